@@ -1,0 +1,1 @@
+"""Dataset mixtures, statistics, frame caching and a tiny fake dataset for tests."""

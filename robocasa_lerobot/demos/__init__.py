@@ -1,0 +1,1 @@
+"""Demonstrators that solve tasks through the same 12-D action interface as a policy, and their recorder."""

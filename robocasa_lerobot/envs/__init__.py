@@ -1,0 +1,1 @@
+"""Kitchens, robot, tasks: the MuJoCo side. Knows no torch."""

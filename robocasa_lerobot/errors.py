@@ -1,0 +1,29 @@
+"""Errors that a user can act on: what was found, what was expected, what to do."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable
+
+
+class UserError(ValueError):
+    """A mistake in what the user asked for or handed in; the command line prints it without a traceback."""
+
+
+class UnknownNameError(UserError):
+    """A name that no registry entry has; the message names the closest ones."""
+
+    def __init__(self, kind: str, name: str, known: Iterable[str], remedy: str = "") -> None:
+        self.kind, self.name = kind, name
+        super().__init__(f"unknown {kind} {name!r}. {suggest(name, known)}{' ' + remedy if remedy else ''}")
+
+
+def suggest(name: str, known: Iterable[str]) -> str:
+    """A sentence with the closest matches of `name`, or with all known names where none is close."""
+    names = sorted(set(known))
+    by_lower = {n.lower(): n for n in names}
+    close = [by_lower[m] for m in difflib.get_close_matches(name.lower(), by_lower, n=3, cutoff=0.5)]
+    if close:
+        return "Did you mean " + " or ".join(repr(c) for c in close) + "?"
+    shown = ", ".join(names[:20]) + (f", ... ({len(names)} in all)" if len(names) > 20 else "")
+    return f"Known: {shown or 'none'}."

@@ -1,0 +1,1 @@
+"""Seeded trials, their records, and the report."""

@@ -1,0 +1,4 @@
+"""Registers the env and policy types by importing the modules whose decorators do so."""
+
+import robocasa_lerobot.envs.lerobot_plugin
+import robocasa_lerobot.policies.diffusion_transformer.configuration_diffusion_transformer  # noqa: F401

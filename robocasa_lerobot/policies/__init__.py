@@ -1,0 +1,1 @@
+"""LeRobot policies. Know no MuJoCo."""

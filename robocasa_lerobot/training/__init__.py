@@ -1,0 +1,1 @@
+"""Training phases on one Accelerate loop."""
