@@ -1,0 +1,71 @@
+# `make demo` and `make test` are all that a fresh machine needs; both create .venv from requirements.lock first.
+
+SHELL := /bin/sh
+.SHELLFLAGS := -eu -c
+.DEFAULT_GOAL := help
+.DELETE_ON_ERROR:
+.SUFFIXES:
+
+VENV := .venv
+BIN := $(VENV)/bin
+STAMP := $(VENV)/.stamp
+COMPANION := companion/lerobot_policy_robocasa
+
+# Without bytecode every start of LeRobot takes twice as long.
+unexport PYTHONDONTWRITEBYTECODE
+unexport PYTHONPATH
+export PYTHONUNBUFFERED := 1
+export UV_HTTP_TIMEOUT ?= 300
+
+.PHONY: help setup demo test test-slow lint format lock doctor clean
+
+help:  ## this list
+	@sed -n 's/^\([a-z-]*\):.*  ## /\1\t/p' Makefile | awk -F '\t' '{printf "  make %-10s %s\n", $$1, $$2}'
+
+setup: $(STAMP)  ## create .venv from requirements.lock and install the package into it
+
+# uv is needed to install uv's fellow packages fast, so its own block of the lock is installed with pip first.
+$(STAMP): requirements.lock pyproject.toml $(COMPANION)/pyproject.toml scripts/find_python.sh
+	@if ! $(BIN)/python -c 'import sys; raise SystemExit(sys.version_info < (3, 12))' 2>/dev/null; then \
+	    python=$$(sh scripts/find_python.sh); \
+	    echo "creating $(VENV) with $$python"; \
+	    rm -rf $(VENV); \
+	    "$$python" -m venv $(VENV); \
+	fi
+	@if ! $(BIN)/uv --version >/dev/null 2>&1; then \
+	    awk '/^[^ ]/ {keep = /^uv==/} keep' requirements.lock > $(VENV)/uv.lock; \
+	    $(BIN)/python -m ensurepip >/dev/null; \
+	    $(BIN)/python -m pip install --quiet --no-deps --require-hashes -r $(VENV)/uv.lock; \
+	fi
+	$(BIN)/uv pip sync --quiet --python $(BIN)/python --require-hashes --compile-bytecode requirements.lock
+	$(BIN)/uv pip install --quiet --python $(BIN)/python --no-deps --no-build-isolation -e . ./$(COMPANION)
+	@touch $@
+
+demo: $(STAMP)  ## demonstrations, dataset, two training phases, evaluation and report
+	PYTHON=$(BIN)/python sh scripts/demo.sh
+
+test: $(STAMP)  ## the fast tests
+	$(BIN)/python -m pytest $(PYTEST_ARGS)
+
+test-slow: $(STAMP)  ## the slow tests: every task and kitchen, long trainings
+	$(BIN)/python -m pytest -m slow $(PYTEST_ARGS)
+
+lint: $(STAMP)  ## ruff and mypy
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+
+format: $(STAMP)  ## rewrite the sources in the project's format
+	$(BIN)/ruff check --fix .
+	$(BIN)/ruff format .
+
+doctor: $(STAMP)  ## check this machine
+	$(BIN)/robocasa-lerobot doctor
+
+# Keeps the pinned versions that still fit; `make lock LOCK_ARGS=--upgrade` takes the newest ones.
+lock: $(STAMP)  ## pin pyproject.toml's dependencies in requirements.lock
+	$(BIN)/uv pip compile pyproject.toml --extra dev --extra setup --python-version 3.12 --universal --generate-hashes \
+	    --no-emit-index-url --no-emit-find-links --no-annotate --no-header --quiet $(LOCK_ARGS) -o requirements.lock
+
+clean:  ## remove .venv and everything that the demo wrote
+	rm -rf $(VENV) outputs
