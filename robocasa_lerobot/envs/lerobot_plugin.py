@@ -1,0 +1,118 @@
+"""The kitchens as a LeRobot env type: `lerobot-eval --env.type=robocasa_kitchen --env.task=OpenDrawer`.
+
+The one module of `envs/` that imports LeRobot. The keys, shapes and rates are those of LeRobot's own `robocasa`
+env type, so a policy trained on either runs on both without a rename map.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from functools import partial
+from typing import Any
+
+import gymnasium
+from lerobot.configs import FeatureType, PolicyFeature
+from lerobot.envs.configs import EnvConfig
+from lerobot.envs.utils import _LazyAsyncVectorEnv
+
+from robocasa_lerobot import contract
+from robocasa_lerobot.envs import registry
+from robocasa_lerobot.envs.kitchen_env import KitchenEnv
+from robocasa_lerobot.errors import UserError
+from robocasa_lerobot.gl import ensure_gl
+
+ENV_TYPE = "robocasa_kitchen"
+
+
+@EnvConfig.register_subclass(ENV_TYPE)
+@dataclass
+class RobocasaKitchenEnvConfig(EnvConfig):
+    """One or more kitchen tasks, each evaluated in vector envs of its own.
+
+    `task` is a task name or a comma-separated list of them, `image_size` the height and width in pixels, and
+    `episode_length` the time limit in control steps (20 Hz), by default each task's own horizon.
+    """
+
+    task: str = "OpenDrawer"
+    fps: int = contract.CONTROL_HZ
+    split: str = "target"
+    render_preset: str = "fast"
+    image_size: int = contract.IMAGE_SIZE
+    episode_length: int | None = None
+    features: dict[str, PolicyFeature] = field(default_factory=dict)
+    features_map: dict[str, str] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        """Fill in the features, which follow from the contract and the image size.
+
+        Raises:
+            UserError: a rate other than the contract's, or several tasks in parallel threads.
+        """
+        if self.fps != contract.CONTROL_HZ:
+            raise UserError(
+                f"env.fps: found {self.fps}, but the kitchens run at {contract.CONTROL_HZ} control steps/s."
+            )
+        if self.max_parallel_tasks != 1:
+            # LeRobot shares one policy, with its action queue, between such threads: actions get mixed up.
+            raise UserError(
+                f"env.max_parallel_tasks: found {self.max_parallel_tasks}, expected 1; "
+                "for more speed raise --eval.batch_size instead."
+            )
+        shapes: dict[str, tuple[FeatureType, tuple[int, ...], str]] = {
+            "action": (FeatureType.ACTION, (contract.ACTION_SIZE,), contract.ACTION_KEY),
+            "agent_pos": (FeatureType.STATE, (contract.STATE_SIZE,), contract.STATE_KEY),
+        }
+        for camera in contract.CAMERAS:
+            shape = (self.image_size, self.image_size, 3)
+            shapes[f"pixels/{camera}"] = (FeatureType.VISUAL, shape, contract.image_key(camera))
+        self.features = {key: PolicyFeature(type=kind, shape=shape) for key, (kind, shape, _) in shapes.items()}
+        self.features_map = {key: policy_key for key, (_, _, policy_key) in shapes.items()}
+
+    @property
+    def gym_kwargs(self) -> dict[str, Any]:
+        """Keyword arguments of `KitchenEnv`, less the task."""
+        return {
+            "split": self.split,
+            "render_preset": self.render_preset,
+            "image_size": self.image_size,
+            "horizon": self.episode_length,
+        }
+
+    def task_names(self) -> tuple[str, ...]:
+        """The tasks that `task` names, in order.
+
+        Raises:
+            UserError: `task` names none, or one twice.
+            UnknownNameError: a name that is no task.
+        """
+        names = tuple(name.strip() for name in (self.task or "").split(",") if name.strip())
+        if not names or len(set(names)) < len(names):
+            raise UserError(f"env.task: found {self.task!r}, expected different task names separated by commas.")
+        for name in names:
+            registry.get_task(name)
+        return names
+
+    def create_envs(self, n_envs: int, use_async_envs: bool = True) -> dict[str, dict[int, Any]]:
+        """A vector env of `n_envs` kitchens for each task: `{task: {0: env}}`.
+
+        More than one kitchen means one process for each, because a process owns one GL context; the processes
+        start on first use, so that of many tasks only the one that is running holds memory. Sub-env i is reset with
+        exactly the i-th seed that it is given.
+
+        Raises:
+            UserError: more than one env without processes; NoOpenGLError where nothing can render.
+        """
+        if n_envs > 1 and not use_async_envs:
+            raise UserError(
+                f"{n_envs} kitchens in one process would share one OpenGL context; "
+                "use --eval.use_async_envs=true, or --eval.batch_size=1."
+            )
+        names = self.task_names()
+        ensure_gl()  # here, so that the workers inherit the choice
+        return {name: {0: self._vector_env(partial(KitchenEnv, name, **self.gym_kwargs), n_envs)} for name in names}
+
+    def _vector_env(self, make: Callable[[], KitchenEnv], n_envs: int) -> Any:
+        if n_envs > 1:
+            return _LazyAsyncVectorEnv([make] * n_envs)
+        return gymnasium.vector.SyncVectorEnv([make])
