@@ -1,0 +1,119 @@
+"""Operational-space pose control of the arm: goals in the base frame, torques in the joints.
+
+After O. Khatib, "A unified approach for motion and force control of robot manipulators" (1987), with position and
+orientation decoupled, a null-space posture and gravity compensation. Gains and goal rules are those of robosuite's
+OSC_POSE as RoboCasa 1.0.1 configures it for the PandaOmron.
+"""
+
+from __future__ import annotations
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from robocasa_lerobot.envs.control import indices
+from robocasa_lerobot.envs.scene import robot_names as names
+
+KP = 150.0
+KD = 2.0 * np.sqrt(KP)  # critical damping
+NULLSPACE_KP = 10.0
+NULLSPACE_KD = 2.0 * np.sqrt(NULLSPACE_KP)
+POSITION_SCALE_M = 0.05  # goal displacement at a full command
+ROTATION_SCALE_RAD = 0.5
+
+_SITE = mujoco.mjtObj.mjOBJ_SITE
+
+
+class OperationalSpaceArm:
+    """Torque control of the seven arm joints towards a pose of the grip site, held in the arm's base frame.
+
+    The base frame is the site at the arm's mount: it moves with base yaw and torso, and the goal with it.
+    """
+
+    def __init__(self, model: mujoco.MjModel) -> None:
+        self._model = model
+        self._grip = model.site(names.GRIP_SITE).id
+        self._base = model.site(names.ARM_CENTER_SITE).id
+        self._qpos = indices.joint_positions(model, names.ARM_JOINTS)
+        self._qvel = indices.joint_velocities(model, names.ARM_JOINTS)
+        self._mass = indices.mass_matrix_addresses(model, self._qvel)
+        self._jacobian = np.zeros((6, model.nv))
+        self._velocity = np.zeros((2, 6))  # of grip and base site; MuJoCo's order: angular, linear
+        self._goal_pos = np.zeros(3)
+        self._goal_mat = np.eye(3)
+        self._posture = np.zeros(7)
+
+    def reset(self, data: mujoco.MjData) -> None:
+        """Take the present pose as goal and the present joint angles as null-space posture."""
+        self._posture = data.qpos[self._qpos]
+        self._goal_pos, self._goal_mat = self._pose_in_base(data)
+
+    def set_goal(self, data: mujoco.MjData, command: NDArray[np.float64], keep_goal: bool) -> None:
+        """Move the goal by `command` (6,): translation and axis-angle rotation in the base frame, each within +-1.
+
+        With `keep_goal` the motion is added to the previous goal (RoboCasa's "desired"), otherwise to the pose that
+        the arm has reached ("achieved"), which forgets what was not followed.
+        """
+        if not keep_goal:
+            self._goal_pos, self._goal_mat = self._pose_in_base(data)
+        self._goal_pos = self._goal_pos + POSITION_SCALE_M * command[:3]
+        self._goal_mat = _rotation_matrix(ROTATION_SCALE_RAD * command[3:]) @ self._goal_mat
+
+    def goal_in_base(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Goal position (3,) metres and rotation matrix (3, 3) of the grip site in the arm's base frame."""
+        return self._goal_pos.copy(), self._goal_mat.copy()
+
+    def torques(self, data: mujoco.MjData) -> NDArray[np.float64]:
+        """Joint torques (7,) in Nm for the present state."""
+        model, jacobian, velocity = self._model, self._jacobian, self._velocity
+        mujoco.mj_jacSite(model, data, jacobian[:3], jacobian[3:], self._grip)
+        mujoco.mj_objectVelocity(model, data, _SITE, self._grip, velocity[0], 0)
+        mujoco.mj_objectVelocity(model, data, _SITE, self._base, velocity[1], 0)
+        arm_jacobian = jacobian[:, self._qvel]
+        mass = data.M[self._mass]
+
+        base_mat = data.site_xmat[self._base].reshape(3, 3)
+        goal_pos = data.site_xpos[self._base] + base_mat @ self._goal_pos
+        goal_mat = base_mat @ self._goal_mat
+        grip_mat = data.site_xmat[self._grip].reshape(3, 3)
+
+        # Accelerations wanted at the grip site; the damping acts on the velocity relative to the base site's.
+        wanted = np.empty((2, 3, 1))
+        wanted[0, :, 0] = KP * (goal_pos - data.site_xpos[self._grip])
+        wanted[1, :, 0] = KP * _rotation_error(goal_mat, grip_mat)
+        wanted[:, :, 0] += KD * (velocity[1] - velocity[0]).reshape(2, 3)[::-1]
+
+        # 6x6 inverse of the operational-space inertia; its diagonal 3x3 blocks are those of position and orientation.
+        inverse_inertia = arm_jacobian @ np.linalg.solve(mass, arm_jacobian.T)
+        blocks = np.stack((inverse_inertia[:3, :3], inverse_inertia[3:, 3:]))
+        wrench = np.linalg.solve(blocks, wanted).reshape(6)
+
+        # Posture torques M a, less their part that would move the grip site: N^T M a = M a - J^T L J a.
+        posture = NULLSPACE_KP * (self._posture - data.qpos[self._qpos]) - NULLSPACE_KD * data.qvel[self._qvel]
+        wrench -= np.linalg.solve(inverse_inertia, arm_jacobian @ posture)
+        return wrench @ arm_jacobian + mass @ posture + data.qfrc_bias[self._qvel]
+
+    def _pose_in_base(self, data: mujoco.MjData) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        base_mat = data.site_xmat[self._base].reshape(3, 3)
+        offset = data.site_xpos[self._grip] - data.site_xpos[self._base]
+        return base_mat.T @ offset, base_mat.T @ data.site_xmat[self._grip].reshape(3, 3)
+
+
+def _rotation_error(goal: NDArray[np.float64], present: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Half the sum of the cross products of the present axes with the wanted ones (sine of the angle, times axis).
+
+    The sum of cross products of columns is the axial vector of G P^T, which needs one product instead of three.
+    """
+    product = goal @ present.T
+    return 0.5 * np.array((product[2, 1] - product[1, 2], product[0, 2] - product[2, 0], product[1, 0] - product[0, 1]))
+
+
+def _rotation_matrix(axis_angle: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Rotation matrix (3, 3) of an axis-angle vector (3,) in radians."""
+    angle = float(np.linalg.norm(axis_angle))
+    if angle == 0.0:
+        return np.eye(3)
+    quat, matrix = np.empty(4), np.empty(9)
+    mujoco.mju_axisAngle2Quat(quat, axis_angle / angle, angle)
+    mujoco.mju_quat2Mat(matrix, quat)
+    return matrix.reshape(3, 3)

@@ -1,0 +1,27 @@
+"""One control step: an action held over 25 physics steps."""
+
+from __future__ import annotations
+
+import mujoco
+from numpy.typing import ArrayLike
+
+from robocasa_lerobot.contract import SUBSTEPS
+from robocasa_lerobot.envs.control.controller import RobotController
+
+
+def control_step(
+    model: mujoco.MjModel, data: mujoco.MjData, controller: RobotController, action: ArrayLike, substeps: int = SUBSTEPS
+) -> None:
+    """Advance the simulation by one policy step (50 ms) with `action` (12,) in HDF5 order.
+
+    Before: positions and velocities are evaluated (`mj_forward`, or an earlier control step). After: they are again,
+    so that poses, contacts and pictures belong to the state reached, not to one physics step before it.
+
+    Raises:
+        ContractError: the action has another shape or is not finite.
+    """
+    controller.set_action(action)
+    for _ in range(substeps):
+        controller.apply()
+        mujoco.mj_step2(model, data)
+        mujoco.mj_step1(model, data)
