@@ -1,0 +1,54 @@
+"""Set-up shared by all tests: no network, a cache of their own, an OpenGL backend, and the folder of real input."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import tempfile
+from pathlib import Path
+
+import pytest
+from hypothesis import settings
+
+from robocasa_lerobot import gl
+
+REPOSITORY = Path(__file__).parents[1]
+
+# No deadlines (the machine may be busy), and the same examples in every run.
+settings.register_profile("tests", deadline=None, derandomize=True, max_examples=50, database=None)
+settings.load_profile("tests")
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    # Before any test module imports the Hugging Face libraries, which read these when they are imported.
+    config.stash[_CACHE] = cache = tempfile.mkdtemp(prefix="robocasa_lerobot_tests_")
+    os.environ.update(HF_HOME=cache, HF_HUB_OFFLINE="1", WANDB_MODE="disabled")
+
+
+def pytest_unconfigure(config: pytest.Config) -> None:
+    shutil.rmtree(config.stash[_CACHE], ignore_errors=True)
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    rendering = [item for item in items if item.get_closest_marker("render")]
+    if not rendering:
+        return
+    try:
+        gl.ensure_gl()
+    except gl.NoOpenGLError as error:
+        if os.environ.get("CI"):
+            pytest.exit(f"tests that render cannot be left out here: {error}", returncode=1)
+        for item in rendering:
+            item.add_marker(pytest.mark.skip(reason=str(error)))
+
+
+@pytest.fixture(scope="session")
+def shared() -> Path:
+    """The folder of real input beside the checkout."""
+    folder = REPOSITORY.parent / "shared"
+    if not folder.is_dir():
+        pytest.skip(f"no folder with real input: {folder.name}/ beside the checkout")
+    return folder
+
+
+_CACHE = pytest.StashKey[str]()

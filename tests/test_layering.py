@@ -1,0 +1,205 @@
+"""The shape of the source tree: who may import whom, nothing happens at import, and files stay readable."""
+
+from __future__ import annotations
+
+import ast
+import json
+import re
+import subprocess
+import sys
+from collections.abc import Iterator
+from functools import cache
+from pathlib import Path
+
+import pytest
+
+from robocasa_lerobot.cli import SUBCOMMANDS
+
+REPOSITORY = Path(__file__).parents[1]
+PACKAGE = REPOSITORY / "robocasa_lerobot"
+
+# What each part of the package may import of the rest of the package. Parts on one level stay apart.
+BASE = {"contract", "errors", "gl"}
+LOW = {"envs", "convert", "data", "policies"}
+MAY_IMPORT: dict[str, set[str]] = {
+    "contract": {"errors"},
+    "errors": set(),
+    "gl": {"errors"},
+    **dict.fromkeys(LOW, BASE),
+    "demos": BASE | {"envs", "convert"},
+    "training": BASE | {"data", "policies"},
+    "evaluation": BASE | {"envs", "data", "policies"},
+    "plugins": BASE | LOW | {"demos", "training", "evaluation"},
+    "doctor": BASE,
+    "cli": BASE,  # and the command modules, by name
+}
+TORCH = {"torch", "torchvision", "lerobot", "accelerate", "transformers", "diffusers", "safetensors"}
+PHYSICS = {"mujoco", "gymnasium_robotics"}
+FORBIDDEN: dict[str, set[str]] = {
+    "contract": TORCH | PHYSICS,
+    "errors": TORCH | PHYSICS,
+    "gl": TORCH,
+    "envs": TORCH,
+    "demos": TORCH,
+    "data": PHYSICS,
+    "policies": PHYSICS,
+    "training": PHYSICS,
+    "convert": PHYSICS,
+}
+# Single files that may import more than their part, and why.
+EXCEPTIONS: dict[str, set[str]] = {
+    "envs/lerobot_plugin.py": {"lerobot"},  # the env type that LeRobot's discovery finds
+    "convert/render.py": {"mujoco"},  # pictures of demonstrations that were stored without any
+}
+MAX_LINES = 400
+LONGER_FILES: dict[str, str] = {}  # path in the repository: reason
+SCRIPT_LINES = 80
+HEAVY = {"torch", "lerobot", "mujoco", "datasets", "transformers", "av", "matplotlib"}
+
+
+def sources() -> list[str]:
+    return sorted(path.relative_to(PACKAGE).as_posix() for path in PACKAGE.rglob("*.py"))
+
+
+def module_name(source: str) -> str:
+    parts = source.removesuffix(".py").split("/")
+    return ".".join(["robocasa_lerobot", *(parts[:-1] if parts[-1] == "__init__" else parts)])
+
+
+def part_of(source: str) -> str:
+    return source.split("/")[0].removesuffix(".py")
+
+
+@cache
+def imports(path: Path) -> frozenset[str]:
+    """Absolute dotted names that a file imports, wherever in it."""
+    found = set()
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            found |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom):
+            assert node.level == 0, f"{path}: relative import; write the full name"
+            found |= {f"{node.module}.{alias.name}" for alias in node.names}
+    return frozenset(found)
+
+
+def own_parts(names: frozenset[str]) -> Iterator[tuple[str, str]]:
+    """(part, full name) of the imports that stay in the package."""
+    for name in names:
+        pieces = name.split(".")
+        if pieces[0] == "robocasa_lerobot" and len(pieces) > 1 and not pieces[1].startswith("__"):
+            yield pieces[1], name
+
+
+@pytest.mark.parametrize("source", sources())
+def test_import_direction(source: str) -> None:
+    part = part_of(source)
+    if part == "__init__":
+        assert not imports(PACKAGE / source)
+        return
+    assert part in MAY_IMPORT, f"new part {part!r}: give it a place in MAY_IMPORT"
+    allowed = MAY_IMPORT[part] | {part}
+    wrong = [name for target, name in own_parts(imports(PACKAGE / source)) if target not in allowed]
+    assert not wrong, f"{part} may import only {sorted(allowed)}"
+
+
+@pytest.mark.parametrize("source", sources())
+def test_parts_know_no_more_than_they_should(source: str) -> None:
+    forbidden = FORBIDDEN.get(part_of(source), set()) - EXCEPTIONS.get(source, set())
+    wrong = sorted(name for name in imports(PACKAGE / source) if name.split(".")[0] in forbidden)
+    assert not wrong
+
+
+def test_exceptions_are_files_that_exist() -> None:
+    assert set(EXCEPTIONS) <= set(sources())
+    assert all((REPOSITORY / path).exists() for path in LONGER_FILES)
+
+
+_IMPORT_ALL = """
+import json, os, random, sys
+names, preloaded = json.loads(sys.argv[1])
+import importlib
+for name in preloaded:
+    importlib.import_module(name)
+import numpy as np
+before = dict(os.environ), random.getstate(), repr(np.random.get_state())
+print("START")
+for name in names:
+    importlib.import_module(name)
+after = dict(os.environ), random.getstate(), repr(np.random.get_state())
+print("END", json.dumps({
+    "environment": sorted(k for k in {*before[0], *after[0]} if before[0].get(k) != after[0].get(k)),
+    "random": before[1:] != after[1:],
+    "loaded": sorted({name.split(".")[0] for name in sys.modules}),
+}))
+"""
+
+
+def import_in_new_process(names: list[str], preloaded: tuple[str, ...] = ()) -> dict[str, object]:
+    """Import modules in a fresh process; what that changed, and what was loaded. Asserts that nothing was printed."""
+    done = subprocess.run(
+        [sys.executable, "-c", _IMPORT_ALL, json.dumps([names, preloaded])], capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    said, _, report = done.stdout.split("START\n", 1)[1].rpartition("END ")
+    assert said == ""
+    return dict(json.loads(report))
+
+
+def modules(*parts: str) -> list[str]:
+    return [module_name(s) for s in sources() if part_of(s) in parts and s not in EXCEPTIONS]
+
+
+def test_envs_and_demos_load_no_torch_and_have_no_import_side_effects() -> None:
+    report = import_in_new_process(modules("contract", "errors", "gl", "envs", "demos"), preloaded=("mujoco",))
+    assert not TORCH & set(report["loaded"])  # type: ignore[call-overload]
+    assert report["environment"] == []
+    assert report["random"] is False
+
+
+def test_learning_side_loads_no_mujoco_and_has_no_import_side_effects() -> None:
+    preloaded = ("torch", "torchvision", "lerobot.policies.factory", "lerobot.datasets", "accelerate")
+    report = import_in_new_process(modules("data", "policies", "training"), preloaded)
+    assert not PHYSICS & set(report["loaded"])  # type: ignore[call-overload]
+    assert report["environment"] == []
+    assert report["random"] is False
+
+
+def test_command_modules_are_light() -> None:
+    report = import_in_new_process(["robocasa_lerobot.cli", *(s.module for s in SUBCOMMANDS.values())])
+    assert not HEAVY & set(report["loaded"])  # type: ignore[call-overload]
+    assert report["environment"] == []
+
+
+@pytest.mark.parametrize("script", ["train.py", "eval.py"])
+def test_scripts_are_thin(script: str) -> None:
+    assert len((REPOSITORY / script).read_text(encoding="utf-8").splitlines()) < SCRIPT_LINES
+
+
+def repository_files() -> list[Path]:
+    listed = subprocess.run(
+        ["git", "ls-files", "--cached", "--others", "--exclude-standard", "-z"],
+        cwd=REPOSITORY, capture_output=True, text=True, check=True,
+    )  # fmt: skip
+    return [path for name in listed.stdout.split("\0") if name and (path := REPOSITORY / name).is_file()]
+
+
+def test_files_are_readable_in_one_go() -> None:
+    for path in repository_files():
+        name = path.relative_to(REPOSITORY).as_posix()
+        if path.suffix == ".py" and name not in LONGER_FILES:
+            lines = len(path.read_text(encoding="utf-8").splitlines())
+            assert lines <= MAX_LINES, f"{name} has {lines} lines: split it, or give a reason in LONGER_FILES"
+
+
+def test_no_paths_of_one_machine_and_no_download_addresses() -> None:
+    machine = re.compile(r"(?:^|[^\w./-])/(?:" + "|".join(["work", "farm", "root"]) + r")/", re.MULTILINE)
+    index = re.compile(r"--(?:extra-)?index-url|--find-links|https?://(?:files|pypi)\.")
+    for path in repository_files():
+        try:
+            text = path.read_text(encoding="utf-8")
+        except UnicodeDecodeError:
+            continue
+        assert not machine.search(text), f"{path}: {machine.search(text)}"
+        if path.name in ("requirements.lock", "pyproject.toml", "Makefile", "run"):
+            assert not index.search(text), f"{path}: {index.search(text)}"
