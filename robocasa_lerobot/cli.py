@@ -19,6 +19,8 @@ class Subcommand:
 
     Its module has `EXAMPLE: str`, `configure(parser: argparse.ArgumentParser) -> None` and
     `run(args: argparse.Namespace) -> int`, and imports anything heavy (torch, mujoco, lerobot) inside `run`.
+    With `parser.set_defaults(takes_settings=True, settings=[])` arguments that the parser does not know come in
+    `args.settings`: a command with a typed configuration answers them better than argparse would.
     """
 
     module: str
@@ -72,8 +74,12 @@ def main(argv: Sequence[str] | None = None) -> int:
         parser.parse_args(arguments)
         parser.print_help()
         return 0
-    args = parser.parse_args(arguments)
+    args, unknown = parser.parse_known_args(arguments)
+    if unknown and not getattr(args, "takes_settings", False):
+        parser.error(f"unrecognized arguments: {' '.join(unknown)}")
     try:
+        if unknown:
+            args.settings = unknown
         return int(args.run(args) or 0)
     except UserError as error:
         print(f"robocasa-lerobot {name}: {error}", file=sys.stderr)

@@ -1,0 +1,141 @@
+"""What a policy checkpoint says about itself, read without importing LeRobot."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from robocasa_lerobot import contract
+from robocasa_lerobot.errors import UserError
+
+REFERENCE_POLICIES = ("random", "zero")
+_WEIGHTS = ("model.safetensors", "adapter_model.safetensors")
+
+
+class CheckpointError(UserError):
+    """A folder that is not a LeRobot `pretrained_model`."""
+
+
+@dataclass(frozen=True)
+class PolicySource:
+    """A policy to evaluate: a checkpoint folder, or a reference policy.
+
+    `fingerprint` is a SHA-256 over weights, config and processors; `phase` and `step` come from the folder's
+    place in a training's output and are None elsewhere. `image_size` is (height, width) of its camera inputs.
+    """
+
+    label: str
+    path: str
+    type: str
+    fingerprint: str
+    phase: str | None = None
+    step: int | None = None
+    image_size: tuple[int, int] | None = None
+
+    @property
+    def is_reference(self) -> bool:
+        """Whether this is `random` or `zero` and not a checkpoint."""
+        return self.path in REFERENCE_POLICIES
+
+    def describe(self) -> dict[str, Any]:
+        """The entry `policy` of a trial's record."""
+        return {
+            "path": self.path,
+            "type": self.type,
+            "fingerprint": self.fingerprint,
+            "phase": self.phase,
+            "step": self.step,
+        }
+
+
+def read_source(path: str, label: str | None = None) -> PolicySource:
+    """The policy at `path`.
+
+    Raises:
+        CheckpointError: not a `pretrained_model` folder; the message says where one was expected.
+    """
+    if path in REFERENCE_POLICIES:
+        return PolicySource(label or path, path, path, fingerprint=path)
+    folder = find_pretrained(Path(path))
+    try:
+        config = json.loads((folder / "config.json").read_text(encoding="utf-8"))
+        kind = config["type"]
+    except (OSError, json.JSONDecodeError, KeyError, TypeError) as error:
+        raise CheckpointError(f"{folder / 'config.json'}: not the config of a LeRobot policy ({error!r}).") from error
+    phase, step = _phase_and_step(folder.resolve())
+    if label is None:
+        label = f"{phase}-{step:06d}" if phase is not None and step is not None else folder.resolve().name
+    return PolicySource(label, str(folder), kind, fingerprint(folder), phase, step, camera_size(config, folder))
+
+
+def find_pretrained(path: Path) -> Path:
+    """The `pretrained_model` folder at `path`, at a checkpoint, or under the last checkpoint of a phase."""
+    for candidate in (path, path / "pretrained_model", path / "checkpoints" / "last" / "pretrained_model"):
+        if (candidate / "config.json").is_file():
+            if not any((candidate / name).is_file() for name in _WEIGHTS):
+                raise CheckpointError(f"{candidate}: config.json without {_WEIGHTS[0]}: the checkpoint is incomplete.")
+            return candidate
+    what = "has no config.json" if path.is_dir() else "no such folder"
+    found = sorted(str(p.parent) for p in path.glob("**/pretrained_model/config.json"))[:3] if path.is_dir() else []
+    hint = f" Did you mean {' or '.join(found)}?" if found else ""
+    known = ", ".join(REFERENCE_POLICIES)
+    raise CheckpointError(f"policy.path {path}: {what}; expected a pretrained_model folder, or one of {known}.{hint}")
+
+
+def fingerprint(folder: Path) -> str:
+    """SHA-256 over the files of a checkpoint that decide what the policy does, by name and content."""
+    digest = hashlib.sha256()
+    files = [p for p in sorted(folder.rglob("*")) if p.is_file() and p.name != "train_config.json"]
+    for file in files:
+        if file.suffix not in (".json", ".safetensors", ".txt", ".model"):
+            continue
+        with file.open("rb") as stream:
+            content = hashlib.file_digest(stream, "sha256").hexdigest()
+        digest.update(f"{file.relative_to(folder).as_posix()} {content}\n".encode())
+    return digest.hexdigest()
+
+
+def camera_size(config: dict[str, Any], folder: Path) -> tuple[int, int] | None:
+    """(height, width) of the camera inputs in a policy's config; None for a policy without cameras."""
+    sizes = set()
+    for name, feature in (config.get("input_features") or {}).items():
+        if name.startswith(contract.IMAGE_PREFIX):
+            channels_first = feature["shape"]
+            sizes.add((int(channels_first[-2]), int(channels_first[-1])))
+    if len(sizes) > 1:
+        raise CheckpointError(f"{folder}: cameras of several sizes {sorted(sizes)}; one size is expected.")
+    return sizes.pop() if sizes else None
+
+
+def common_image_size(sources: list[PolicySource], asked: int | None) -> int:
+    """Pixels of the env's square pictures: what was asked for, else what all the checkpoints were trained at.
+
+    Raises:
+        UserError: checkpoints of different sizes in one evaluation, or pictures that are not square.
+    """
+    if asked is not None:
+        return asked
+    sizes = {source.image_size: source.label for source in sources if source.image_size is not None}
+    if len(sizes) > 1:
+        listed = ", ".join(f"{label} {h}x{w}" for (h, w), label in sizes.items())
+        raise UserError(f"policies trained at different picture sizes ({listed}): evaluate them in separate runs.")
+    if not sizes:
+        return contract.IMAGE_SIZE
+    height, width = next(iter(sizes))
+    if height != width:
+        raise UserError(f"the policy was trained at {height}x{width} pictures; the env renders square ones.")
+    return height
+
+
+def _phase_and_step(folder: Path) -> tuple[str | None, int | None]:
+    # <phase>/checkpoints/<step>/pretrained_model, as written by the training
+    if (
+        folder.name == "pretrained_model"
+        and folder.parent.parent.name == "checkpoints"
+        and folder.parent.name.isdigit()
+    ):
+        return folder.parent.parent.parent.name, int(folder.parent.name)
+    return None, None

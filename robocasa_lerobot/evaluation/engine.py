@@ -1,0 +1,194 @@
+"""Runs an evaluation: the plan, minus what is recorded, through the workers, into `trials.jsonl`."""
+
+from __future__ import annotations
+
+import dataclasses
+import datetime
+import fcntl
+import os
+import sys
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import yaml
+from tqdm import tqdm
+
+from robocasa_lerobot.errors import UserError
+from robocasa_lerobot.evaluation import config as settings_of
+from robocasa_lerobot.evaluation.checkpoints import PolicySource, common_image_size, read_source
+from robocasa_lerobot.evaluation.config import EvaluationConfig
+from robocasa_lerobot.evaluation.plan import TrialSpec, make_plan
+from robocasa_lerobot.evaluation.provenance import git_commit, versions
+from robocasa_lerobot.evaluation.results import (
+    TRIALS_FILE,
+    ResultsError,
+    TrialRecord,
+    append_trial,
+    check_same_run,
+    drop_torn_line,
+    read_trials,
+)
+from robocasa_lerobot.evaluation.worker import WorkerSettings
+from robocasa_lerobot.evaluation.workers import Completed, WorkerPool
+
+CONFIG_FILE = "evaluation.yaml"
+
+
+@dataclasses.dataclass(frozen=True)
+class Evaluation:
+    """An evaluation that is ready to run; making one opens no process and writes no file."""
+
+    config: EvaluationConfig
+    sources: dict[str, PolicySource]
+    settings: dict[str, Any]
+    plan: list[TrialSpec]
+    out: Path
+
+
+def prepare(config: EvaluationConfig) -> Evaluation:
+    """Check everything that the user named, and fix the plan.
+
+    Raises:
+        UserError: an unknown task, a folder that is no checkpoint, two policies with one label, ...
+    """
+    settings_of.check_factory(config.env.factory)
+    horizons = settings_of.horizons(config.env)
+    asked: list[str | None] = [*config.policy.label] or [None] * len(config.policy.path)
+    sources = [read_source(path, label) for path, label in zip(config.policy.path, asked, strict=True)]
+    by_label: dict[str, PolicySource] = {}
+    for source in sources:
+        if source.label in by_label:
+            raise UserError(f"two policies are called {source.label!r}: name them with --policy.label=A,B.")
+        if not source.label or "/" in source.label or source.label.startswith("."):
+            raise UserError(f"policy.label {source.label!r}: it names a folder, so no '/' and no leading '.'.")
+        by_label[source.label] = source
+    settings = settings_of.outcome_settings(config, common_image_size(sources, config.env.image_size))
+    plan = make_plan(list(by_label), horizons, config.trials, config.seed, config.videos)
+    return Evaluation(config, by_label, settings, plan, settings_of.output_folder(config, list(by_label)))
+
+
+def evaluate(evaluation: Evaluation) -> list[TrialRecord]:
+    """Run the trials that are not recorded yet; the records of the whole plan, in its order.
+
+    Each trial is appended to `trials.jsonl` as it ends: after a kill the same call runs the missing ones only.
+
+    Raises:
+        ResultsError: the output folder holds trials of other settings, or another process writes to it.
+        UserError: a policy or an env cannot be built.
+    """
+    out, config = evaluation.out, evaluation.config
+    out.mkdir(parents=True, exist_ok=True)
+    path = out / TRIALS_FILE
+    with _only_writer(out):
+        if drop_torn_line(path):
+            print(f"{path}: the last line was cut off by a kill; its trial runs again.", file=sys.stderr)
+        records = {record.key: record for record in (read_trials(path) if path.exists() else [])}
+        descriptions = {label: source.describe() for label, source in evaluation.sources.items()}
+        check_same_run(path, records.values(), descriptions, evaluation.settings)
+        _check_seeds(path, records, evaluation.plan)
+        _write_config(out / CONFIG_FILE, config)
+        todo = [spec for spec in evaluation.plan if _is_missing(records.get(spec.key), config.retry_errors)]
+        common = {"settings": evaluation.settings, "versions": versions(), "git_commit": git_commit()}
+        for completed in _progress(evaluation, todo, len(evaluation.plan)):
+            record = _record(completed, descriptions[completed.spec.label], common)
+            append_trial(path, record)
+            records[record.key] = record
+    return [records[spec.key] for spec in evaluation.plan]
+
+
+def _progress(evaluation: Evaluation, todo: Sequence[TrialSpec], total: int) -> Iterator[Completed]:
+    if not todo:
+        print(f"all {total} trials are recorded in {evaluation.out / TRIALS_FILE}: nothing to run.")
+        return
+    config = evaluation.config
+    worker_settings = WorkerSettings(
+        sources=evaluation.sources,
+        factory=config.env.factory,
+        env_kwargs={
+            "split": config.env.split,
+            "render_preset": config.env.render_preset,
+            "image_size": evaluation.settings["image_size"],
+        },
+        device=config.policy.device,
+        threads=config.policy.threads,
+        executed_steps=config.executed_steps,
+        out=str(evaluation.out),
+    )
+    pool = WorkerPool(worker_settings, config.worker_count(len(todo)), config.stall_seconds)
+    solved = failed = errors = 0
+    with tqdm(total=total, initial=total - len(todo), unit="trial", desc="trials", dynamic_ncols=True) as bar:
+        for completed in pool.run(todo):
+            error = completed.result.error or completed.earlier_error
+            if error is not None:
+                what = "failed with an error" if completed.result.error else "was tried again after an error"
+                spec = completed.spec
+                bar.write(f"{spec.label} {spec.task} trial {spec.trial} {what}: {_last_line(error)}", file=sys.stderr)
+            errors += completed.result.error is not None
+            solved += completed.result.outcome.success
+            failed += not completed.result.outcome.success
+            bar.set_postfix(success=solved, failure=failed, errors=errors)
+            bar.update()
+            yield completed
+
+
+def _record(completed: Completed, policy: dict[str, Any], common: dict[str, Any]) -> TrialRecord:
+    spec, result = completed.spec, completed.result
+    return TrialRecord(
+        label=spec.label,
+        task=spec.task,
+        trial=spec.trial,
+        seed=spec.seed,
+        policy_seed=spec.policy_seed,
+        horizon=spec.horizon,
+        **dataclasses.asdict(result.outcome),
+        video=result.video,
+        wall_seconds=round(result.wall_seconds, 3),
+        attempts=completed.attempts,
+        error=result.error,
+        retried_error=completed.earlier_error,
+        policy=policy,
+        finished=datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds"),
+        **common,
+    )
+
+
+def _is_missing(record: TrialRecord | None, retry_errors: bool) -> bool:
+    return record is None or (retry_errors and record.error is not None)
+
+
+def _check_seeds(path: Path, records: dict[Any, TrialRecord], plan: Sequence[TrialSpec]) -> None:
+    for spec in plan:
+        record = records.get(spec.key)
+        if record is not None and (record.seed, record.horizon) != (spec.seed, spec.horizon):
+            raise ResultsError(
+                f"{path}: {spec.task} trial {spec.trial} was run with seed {record.seed} and horizon {record.horizon}, "
+                f"this version plans {spec.seed} and {spec.horizon}: choose another --out."
+            )
+
+
+def _last_line(text: str) -> str:
+    return next((line for line in reversed(text.splitlines()) if line.strip()), "")
+
+
+def _write_config(path: Path, config: EvaluationConfig) -> None:
+    part = path.with_name(path.name + ".part")
+    part.write_text(yaml.safe_dump(dataclasses.asdict(config), sort_keys=False), encoding="utf-8")
+    part.replace(path)
+
+
+@contextmanager
+def _only_writer(out: Path) -> Iterator[None]:
+    """Hold the folder's lock, which the system frees when this process ends in whatever way."""
+    descriptor = os.open(out / ".lock", os.O_RDWR | os.O_CREAT, 0o644)
+    try:
+        try:
+            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError as error:
+            raise ResultsError(
+                f"{out}: another evaluation is writing here; wait for it, or choose another --out."
+            ) from error
+        yield
+    finally:
+        os.close(descriptor)

@@ -1,0 +1,100 @@
+"""One seeded trial of a policy in an env."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+import gymnasium
+import numpy as np
+
+from robocasa_lerobot.errors import UserError
+from robocasa_lerobot.evaluation.plan import TrialSpec
+from robocasa_lerobot.evaluation.policy_runner import PolicyRunner
+from robocasa_lerobot.evaluation.video import VideoWriter, side_by_side
+
+# Steps between two signs of life; at 20 to 100 steps/s on a CPU that is at most a second.
+HEARTBEAT_STEPS = 20
+
+
+class RolloutError(RuntimeError):
+    """The policy or the env did something that no trial can go on from."""
+
+
+@dataclass
+class Outcome:
+    """What a trial gave; `steps` are control steps at 20 Hz, the first step is number 1."""
+
+    success: bool = False
+    steps: int = 0
+    first_success_step: int | None = None
+    success_terms: dict[str, bool] = field(default_factory=dict)
+    terms_ever: dict[str, bool] = field(default_factory=dict)
+    instruction: str = ""
+    scene: dict[str, Any] = field(default_factory=dict)
+
+
+def run_trial(
+    env: gymnasium.Env[Any, Any],
+    policy: PolicyRunner,
+    spec: TrialSpec,
+    film: VideoWriter | None = None,
+    heartbeat: Callable[[int], None] = lambda step: None,
+) -> Outcome:
+    """Run one episode from `spec.seed` until the env ends it.
+
+    Success is reached at any step. Pictures are rendered only for steps that the policy looks at, unless filmed.
+
+    Raises:
+        RolloutError: an action that is not finite, or an env that goes on past its horizon.
+    """
+    base: Any = env.unwrapped
+    policy.reset(spec.policy_seed)
+    base.render_observations = film is not None or policy.sees(0)
+    observation, info = env.reset(seed=spec.seed)
+    outcome = Outcome(
+        instruction=str(info.get("instruction") or getattr(base, "task_description", "")),
+        scene=dict(info.get("scene", {})),
+    )
+    limit = horizon_of(env, spec)
+    if film is not None:
+        film.write(side_by_side(observation["pixels"]))
+    ended = False
+    while not ended:
+        if outcome.steps >= limit:
+            raise RolloutError(f"the env went on past its horizon of {limit} steps without truncating the episode")
+        if outcome.steps % HEARTBEAT_STEPS == 0:
+            heartbeat(outcome.steps)
+        action = policy.act(observation, outcome.instruction)
+        if not np.isfinite(action).all():
+            raise RolloutError(f"the policy gave an action that is not finite at step {outcome.steps}: {action}")
+        outcome.steps += 1
+        base.render_observations = film is not None or policy.sees(outcome.steps)
+        observation, _, terminated, truncated, info = env.step(action)
+        if film is not None:
+            film.write(side_by_side(observation["pixels"]))
+        _note(outcome, info)
+        ended = bool(terminated or truncated)
+    return outcome
+
+
+def horizon_of(env: gymnasium.Env[Any, Any], spec: TrialSpec) -> int:
+    """Control steps after which an episode must have ended: the plan's, else the env's own.
+
+    Raises:
+        UserError: neither says.
+    """
+    base = env.unwrapped
+    limit = spec.horizon or getattr(base, "horizon", None) or getattr(base, "_max_episode_steps", None)
+    if limit is None:
+        raise UserError(f"env of task {spec.task}: it has no attribute `horizon`; give --env.horizon.")
+    return int(limit)
+
+
+def _note(outcome: Outcome, info: dict[str, Any]) -> None:
+    if bool(info["is_success"]) and not outcome.success:
+        outcome.success, outcome.first_success_step = True, outcome.steps
+    outcome.success_terms = {name: bool(met) for name, met in info.get("success_terms", {}).items()}
+    for name, met in outcome.success_terms.items():
+        outcome.terms_ever[name] = outcome.terms_ever.get(name, False) or met

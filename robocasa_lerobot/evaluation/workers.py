@@ -1,0 +1,195 @@
+"""The pool of worker processes: hands out trials, survives crashes and hangs, restarts what dies."""
+
+from __future__ import annotations
+
+import collections
+import multiprocessing
+import multiprocessing.connection
+import os
+import signal
+import time
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from multiprocessing.connection import Connection
+from multiprocessing.context import SpawnProcess
+
+from robocasa_lerobot.errors import UserError
+from robocasa_lerobot.evaluation.plan import TrialSpec
+from robocasa_lerobot.evaluation.rollout import Outcome
+from robocasa_lerobot.evaluation.worker import Alive, Finished, Ready, Refused, WorkerSettings, worker_main
+
+MAX_ATTEMPTS = 2
+# A worker that dies before it is ready dies of its surroundings (imports, memory); trying for ever would not help.
+MAX_FAILED_STARTS = 3
+_POLL_SECONDS = 0.5
+
+
+@dataclass(frozen=True)
+class Completed:
+    """A trial that will not be tried again."""
+
+    spec: TrialSpec
+    result: Finished
+    attempts: int
+    earlier_error: str | None
+
+
+@dataclass
+class _Attempt:
+    spec: TrialSpec
+    number: int = 1
+    earlier_error: str | None = None
+
+
+@dataclass
+class _Slot:
+    process: SpawnProcess
+    connection: Connection
+    last_sign: float
+    ready: bool = False
+    attempt: _Attempt | None = None
+    given_at: float = 0.0
+
+
+class WorkerPool:
+    """Runs trials in `size` spawned processes, each with its own pipe.
+
+    A pipe for each worker and not one shared queue: a process that is killed while it holds a queue's lock would
+    block all the others.
+
+    Args:
+        settings: what each worker gets.
+        size: number of processes.
+        stall_seconds: a worker without a sign of life for so long is killed and replaced.
+    """
+
+    def __init__(self, settings: WorkerSettings, size: int, stall_seconds: float) -> None:
+        self._settings, self._size, self._stall_seconds = settings, size, stall_seconds
+        self._context = multiprocessing.get_context("spawn")
+        self._slots: list[_Slot] = []
+        self._failed_starts = 0
+
+    def run(self, specs: Sequence[TrialSpec]) -> Iterator[Completed]:
+        """The trials as they complete, in no particular order; workers are ended when the iterator is closed.
+
+        Raises:
+            UserError: a policy or an env cannot be built, or workers cannot be started.
+        """
+        pending = collections.deque(_Attempt(spec) for spec in specs)
+        finished = False
+        try:
+            while pending or any(slot.attempt for slot in self._slots):
+                busy = sum(slot.attempt is not None for slot in self._slots)
+                while len(self._slots) < min(self._size, busy + len(pending)):
+                    self._slots.append(self._start())
+                for slot in self._slots:
+                    if slot.ready and slot.attempt is None and pending:
+                        self._give(slot, pending.popleft())
+                for completed in self._collect():
+                    if completed.result.error is not None and completed.attempts < MAX_ATTEMPTS:
+                        error = completed.result.error
+                        pending.appendleft(_Attempt(completed.spec, completed.attempts + 1, error))
+                    else:
+                        yield completed
+            finished = True
+        finally:
+            self._end(gently=finished)
+
+    def _collect(self) -> Iterator[Completed]:
+        """What the workers report within a short wait."""
+        # The pipe of a dead worker reports end-of-file, so the pipes alone tell of deaths too.
+        waiting: dict[object, _Slot] = {slot.connection: slot for slot in self._slots}
+        for connection in multiprocessing.connection.wait([s.connection for s in self._slots], _POLL_SECONDS):
+            slot = waiting[connection]
+            try:
+                message = slot.connection.recv()
+            except (EOFError, ConnectionResetError):
+                yield from self._bury(slot, _cause_of_death(slot.process))
+                continue
+            slot.last_sign = time.monotonic()
+            if isinstance(message, Ready):
+                slot.ready, self._failed_starts = True, 0
+            elif isinstance(message, Refused):
+                raise UserError(message.message)
+            elif isinstance(message, Finished):
+                attempt, slot.attempt = slot.attempt, None
+                assert attempt is not None, "a worker reported a trial that it was not given"
+                yield Completed(attempt.spec, message, attempt.number, attempt.earlier_error)
+            else:
+                assert isinstance(message, Alive), message
+        now = time.monotonic()
+        for slot in list(self._slots):
+            if (slot.attempt is not None or not slot.ready) and now - slot.last_sign > self._stall_seconds:
+                slot.process.kill()
+                yield from self._bury(slot, f"no progress for {self._stall_seconds:g} s; the worker was killed")
+
+    def _bury(self, slot: _Slot, cause: str) -> Iterator[Completed]:
+        """Remove a dead worker; its trial, if it had one, ends with the cause as its error."""
+        slot.process.join(timeout=10)
+        slot.connection.close()
+        self._slots.remove(slot)
+        if slot.attempt is not None:
+            result = Finished(Outcome(), None, time.monotonic() - slot.given_at, cause)
+            yield Completed(slot.attempt.spec, result, slot.attempt.number, slot.attempt.earlier_error)
+        elif not slot.ready:
+            self._failed_starts += 1
+            if self._failed_starts >= MAX_FAILED_STARTS:
+                raise UserError(f"{self._failed_starts} workers ended before they were ready: {cause}. See above.")
+
+    def _start(self) -> _Slot:
+        ours, theirs = self._context.Pipe()
+        process = self._context.Process(target=worker_main, args=(theirs, self._settings), daemon=True)
+        with _thread_limit(self._settings.threads):
+            process.start()
+        theirs.close()  # Else end-of-file would never come.
+        return _Slot(process, ours, time.monotonic())
+
+    def _give(self, slot: _Slot, attempt: _Attempt) -> None:
+        slot.attempt, slot.given_at = attempt, time.monotonic()
+        slot.last_sign = slot.given_at
+        # A worker that died while idle: the next look at its pipe says so, and the trial is tried again.
+        with suppress(BrokenPipeError, ConnectionResetError):
+            slot.connection.send(attempt.spec)
+
+    def _end(self, gently: bool) -> None:
+        for slot in self._slots:
+            if gently:
+                with suppress(BrokenPipeError, ConnectionResetError):
+                    slot.connection.send(None)
+            else:
+                slot.process.kill()
+        deadline = time.monotonic() + 10
+        for slot in self._slots:
+            slot.process.join(timeout=max(0.1, deadline - time.monotonic()))
+            if slot.process.is_alive():
+                slot.process.kill()
+                slot.process.join()
+            slot.connection.close()
+        self._slots.clear()
+
+
+def _cause_of_death(process: SpawnProcess) -> str:
+    process.join(timeout=10)
+    code = process.exitcode
+    if code is not None and code < 0:
+        name = signal.Signals(-code).name
+        note = " (out of memory?)" if name == "SIGKILL" else ""
+        return f"the worker process was ended by {name}{note}"
+    return f"the worker process ended with exit status {code}"
+
+
+@contextmanager
+def _thread_limit(threads: int) -> Iterator[None]:
+    """Environment for a child that is about to start: its numeric libraries read these when they are loaded."""
+    names = ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS")
+    before = {name: os.environ.get(name) for name in names}
+    os.environ.update(dict.fromkeys(names, str(threads)))
+    try:
+        yield
+    finally:
+        for name, value in before.items():
+            if value is None:
+                del os.environ[name]
+            else:
+                os.environ[name] = value
