@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import copy
 import importlib.metadata
 import json
 import pickle
 import subprocess
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 
 import gymnasium
 import numpy as np
@@ -18,7 +21,8 @@ from lerobot.envs.configs import EnvConfig, RoboCasaEnv
 from lerobot.envs.factory import make_env_config
 from lerobot.envs.utils import close_envs, env_to_policy_features
 
-from robocasa_lerobot import contract
+from robocasa_lerobot import contract, doctor
+from robocasa_lerobot.envs import registry
 from robocasa_lerobot.envs.lerobot_plugin import ENV_TYPE, RobocasaKitchenEnvConfig
 from robocasa_lerobot.errors import UnknownNameError, UserError
 
@@ -38,17 +42,10 @@ def test_companion_is_named_as_lerobots_discovery_wants() -> None:
 
 
 def test_discovery_of_installed_plugins_finds_both_types() -> None:
-    known = in_new_process(
-        "import json\n"
-        "from lerobot.utils.import_utils import register_third_party_plugins\n"
-        "register_third_party_plugins()\n"
-        "from lerobot.configs.policies import PreTrainedConfig\n"
-        "from lerobot.envs.configs import EnvConfig\n"
-        "print(json.dumps([list(EnvConfig.get_known_choices()), list(PreTrainedConfig.get_known_choices())]))"
-    )
-    env_types, policy_types = json.loads(known)
-    assert ENV_TYPE in env_types
-    assert "diffusion_transformer" in policy_types
+    finding = doctor.check_plugins()  # asks LeRobot in a fresh process
+    assert finding.status == "ok", finding
+    assert ENV_TYPE in finding.found
+    assert "diffusion_transformer" in finding.found
 
 
 def test_discovery_flag_finds_both_types() -> None:
@@ -94,13 +91,18 @@ def test_policy_features_follow_from_the_contract() -> None:
     assert {key: (feature.type, tuple(feature.shape)) for key, feature in features.items()} == {
         contract.ACTION_KEY: (FeatureType.ACTION, (12,)),
         contract.STATE_KEY: (FeatureType.STATE, (16,)),
-        **{key: (FeatureType.VISUAL, (3, 96, 96)) for key in contract.IMAGE_KEYS},
+        **dict.fromkeys(contract.IMAGE_KEYS, (FeatureType.VISUAL, (3, 96, 96))),
     }
 
 
 def test_tasks_by_list() -> None:
     config = RobocasaKitchenEnvConfig(task="OpenDrawer, CloseDrawer")
     assert config.task_names() == ("OpenDrawer", "CloseDrawer")
+
+
+def test_task_sets_stand_for_their_members() -> None:
+    for name in registry.task_sets():
+        assert RobocasaKitchenEnvConfig(task=name).task_names() == registry.task_set(name)
 
 
 @pytest.mark.parametrize("task", ["", " , ", "OpenDrawer,OpenDrawer"])
@@ -129,11 +131,15 @@ SMALL = {"task": "OpenDrawer", "image_size": 32, "episode_length": 3}
 NEW_ROLLOUT = {"lerobot_new_rollout": True}  # what LeRobot's rollout passes to reset
 
 
-def vector_env(n_envs: int, use_async_envs: bool) -> gymnasium.vector.VectorEnv:
-    envs = make_env(RobocasaKitchenEnvConfig(**SMALL), n_envs=n_envs, use_async_envs=use_async_envs)  # type: ignore[arg-type]
-    assert set(envs) == {"OpenDrawer"}
-    assert set(envs["OpenDrawer"]) == {0}
-    return envs["OpenDrawer"][0]
+@contextmanager
+def vector_env(n_envs: int) -> Iterator[gymnasium.vector.VectorEnv]:
+    """The vector env of the one task, made and closed as LeRobot does."""
+    envs = make_env(RobocasaKitchenEnvConfig(**SMALL), n_envs=n_envs, use_async_envs=True)  # type: ignore[arg-type]
+    assert {task: list(of_task) for task, of_task in envs.items()} == {"OpenDrawer": [0]}
+    try:
+        yield envs["OpenDrawer"][0]
+    finally:
+        close_envs(envs)
 
 
 def hold_still(n_envs: int) -> np.ndarray:
@@ -146,8 +152,7 @@ def hold_still(n_envs: int) -> np.ndarray:
 
 @pytest.mark.render
 def test_one_kitchen_as_lerobots_rollout_uses_it() -> None:
-    env = vector_env(1, use_async_envs=True)
-    try:
+    with vector_env(1) as env:
         assert isinstance(env, gymnasium.vector.SyncVectorEnv)
         observation, info = env.reset(seed=[3], options=NEW_ROLLOUT)
         for camera in contract.CAMERAS:
@@ -160,36 +165,39 @@ def test_one_kitchen_as_lerobots_rollout_uses_it() -> None:
         assert env.call("task_description")[0].strip()
         assert env.metadata["render_fps"] == contract.CONTROL_HZ
         for step in range(3):
-            observation, reward, terminated, truncated, info = env.step(hold_still(1))
+            _, _, terminated, truncated, info = env.step(hold_still(1))
             assert "is_success" in info
             assert bool(truncated[0]) == (step == 2)
             assert not terminated[0]
         assert env.envs[0].render().dtype == np.uint8
+
+
+@pytest.mark.render
+def test_vector_env_opens_again_after_it_was_closed() -> None:
+    """Evaluation during LeRobot's training closes the envs after each round and resets them for the next."""
+    with vector_env(1) as env:
+        first, _ = env.reset(seed=[3], options=NEW_ROLLOUT)
         env.close()
-        # In-training evaluation closes the envs after each round and resets them for the next.
         again, _ = env.reset(seed=[3], options=NEW_ROLLOUT)
-        assert again["agent_pos"].shape == (1, contract.STATE_SIZE)
-    finally:
-        close_envs(env)
+        assert np.array_equal(first["agent_pos"], again["agent_pos"])
+        assert not env.closed
 
 
 @pytest.mark.render
 @pytest.mark.slow
 def test_kitchens_in_processes_get_the_seeds_they_are_given() -> None:
     """Distinct seeds stay distinct (LeRobot's own robocasa env adds the index once more), and equal ones equal."""
-    env = vector_env(2, use_async_envs=True)
-    try:
+    with vector_env(2) as env:
         first, _ = env.reset(seed=[5, 6], options=NEW_ROLLOUT)
+        first = copy.deepcopy(first)
         second, _ = env.reset(seed=[6, 5], options=NEW_ROLLOUT)
-        same, _ = env.reset(seed=[6, 6], options=NEW_ROLLOUT)
         assert not np.array_equal(first["agent_pos"][0], first["agent_pos"][1])
         assert np.array_equal(first["agent_pos"], second["agent_pos"][::-1])
+        same, _ = env.reset(seed=[6, 6], options=NEW_ROLLOUT)
         assert np.array_equal(same["agent_pos"][0], same["agent_pos"][1])
         _, _, _, _, info = env.step(hold_still(2))
         assert info["is_success"].shape == (2,)
         assert len(env.call("task_description")) == 2
-    finally:
-        env.close()
 
 
 def test_config_is_picklable() -> None:

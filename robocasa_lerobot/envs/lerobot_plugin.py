@@ -19,10 +19,22 @@ from lerobot.envs.utils import _LazyAsyncVectorEnv
 from robocasa_lerobot import contract
 from robocasa_lerobot.envs import registry
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
-from robocasa_lerobot.errors import UserError
+from robocasa_lerobot.errors import UnknownNameError, UserError
 from robocasa_lerobot.gl import ensure_gl
 
 ENV_TYPE = "robocasa_kitchen"
+
+
+class _ReopeningVectorEnv(gymnasium.vector.SyncVectorEnv):
+    """A vector env in this process that can be used again after `close()`, and then be closed again.
+
+    Evaluation during LeRobot's training closes its envs after each round and resets them for the next; the base
+    class would count as closed for good, and its OpenGL context would be left to the interpreter's end.
+    """
+
+    def reset(self, **kwargs: Any) -> tuple[Any, dict[str, Any]]:
+        self.closed = False
+        return super().reset(**kwargs)
 
 
 @EnvConfig.register_subclass(ENV_TYPE)
@@ -30,8 +42,8 @@ ENV_TYPE = "robocasa_kitchen"
 class RobocasaKitchenEnvConfig(EnvConfig):
     """One or more kitchen tasks, each evaluated in vector envs of its own.
 
-    `task` is a task name or a comma-separated list of them, `image_size` the height and width in pixels, and
-    `episode_length` the time limit in control steps (20 Hz), by default each task's own horizon.
+    `task` is a task name, a task set, or a comma-separated list of them, `image_size` the height and width in pixels,
+    and `episode_length` the time limit in control steps (20 Hz), by default each task's own horizon.
     """
 
     task: str = "OpenDrawer"
@@ -80,18 +92,24 @@ class RobocasaKitchenEnvConfig(EnvConfig):
         }
 
     def task_names(self) -> tuple[str, ...]:
-        """The tasks that `task` names, in order.
+        """The tasks that `task` names, in order, with each set replaced by its members.
 
         Raises:
             UserError: `task` names none, or one twice.
-            UnknownNameError: a name that is no task.
+            UnknownNameError: a name that is neither a task nor a set.
         """
-        names = tuple(name.strip() for name in (self.task or "").split(",") if name.strip())
+        names: list[str] = []
+        for name in (part.strip() for part in (self.task or "").split(",")):
+            if name in registry.task_names():
+                names.append(name)
+            elif name in registry.task_sets():
+                names += registry.task_set(name)
+            elif name:
+                known = (*registry.task_names(), *registry.task_sets())
+                raise UnknownNameError("task or task set", name, known, "`robocasa-lerobot tasks` lists them.")
         if not names or len(set(names)) < len(names):
             raise UserError(f"env.task: found {self.task!r}, expected different task names separated by commas.")
-        for name in names:
-            registry.get_task(name)
-        return names
+        return tuple(names)
 
     def create_envs(self, n_envs: int, use_async_envs: bool = True) -> dict[str, dict[int, Any]]:
         """A vector env of `n_envs` kitchens for each task: `{task: {0: env}}`.
@@ -115,4 +133,4 @@ class RobocasaKitchenEnvConfig(EnvConfig):
     def _vector_env(self, make: Callable[[], KitchenEnv], n_envs: int) -> Any:
         if n_envs > 1:
             return _LazyAsyncVectorEnv([make] * n_envs)
-        return gymnasium.vector.SyncVectorEnv([make])
+        return _ReopeningVectorEnv([make])

@@ -1,0 +1,53 @@
+#!/bin/sh
+# From a kitchen to a report: demonstrations -> dataset -> two training phases -> seeded trials -> report.
+# Only public commands, so each line can be typed by hand. Run through `make demo`; when it was interrupted, the
+# same command goes on where it stopped. `rm -r outputs/demo` starts over.
+set -eu
+
+PYTHON=${PYTHON:-.venv/bin/python}
+OUT=${OUT:-outputs/demo}
+TASKS=${TASKS:-OpenDrawer,CloseDrawer}
+EPISODES=${EPISODES:-20}      # demonstrations of each task
+IMAGE_SIZE=${IMAGE_SIZE:-128} # pixels
+TRIALS=${TRIALS:-10}          # trials of each policy on each task
+EXPERIMENT=${EXPERIMENT:-configs/experiments/demo.yaml}
+SEED=${SEED:-0}
+CORES=$("$PYTHON" -c 'import os; print(len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count())')
+WORKERS=${WORKERS:-$CORES}
+
+export HF_HUB_OFFLINE=1 # nothing of the demo is downloaded
+export HF_HOME="${HF_HOME:-$PWD/$OUT/cache}"
+# One choice for all steps, made once: EGL if it renders, else OSMesa.
+MUJOCO_GL=${MUJOCO_GL:-$("$PYTHON" -m robocasa_lerobot.gl)}
+[ "$MUJOCO_GL" = default ] || export MUJOCO_GL
+
+started=$(date +%s)
+step() {
+    now=$(date +%s)
+    printf '\n== %02d:%02d  %s\n' $(((now - started) / 60)) $(((now - started) % 60)) "$1"
+}
+robocasa_lerobot() { "$PYTHON" -m robocasa_lerobot.cli "$@"; }
+
+mkdir -p "$OUT"
+
+step "demonstrations: $EPISODES of each of $TASKS"
+robocasa_lerobot demos --tasks "$TASKS" --episodes "$EPISODES" --split target --seed "$SEED" --workers "$WORKERS" \
+    --out "$OUT/demos"
+
+step "conversion to a LeRobotDataset v3.0"
+[ -d "$OUT/data/meta" ] ||
+    robocasa_lerobot convert "$OUT"/demos/*.hdf5 --image-size "$IMAGE_SIZE" --workers "$WORKERS" --out "$OUT/data"
+robocasa_lerobot verify "$OUT/data"
+
+step "training: pretraining on all tasks, then fine-tuning on one"
+"$PYTHON" train.py --config_path "$EXPERIMENT"
+
+step "evaluation: $TRIALS trials of the untrained and of the trained policy on each task"
+"$PYTHON" eval.py \
+    --policy.path="$OUT/pretrain/checkpoints/000000/pretrained_model,$OUT/finetune/checkpoints/last/pretrained_model" \
+    --policy.label=untrained,trained \
+    --env.tasks="$TASKS" --trials="$TRIALS" --seed="$SEED" --workers="$WORKERS" --out="$OUT/evaluation"
+
+step "report"
+robocasa_lerobot report "$OUT/evaluation" --training "$OUT" --out "$OUT/report.html"
+step "done: open $OUT/report.html"
