@@ -1,0 +1,142 @@
+"""Decoded frames of a dataset as memory-mapped arrays, because decoding video is what a CPU spends its time on.
+
+A cache is a folder with one `<camera feature>.npy` per camera, uint8 (frames, 3, height, width), row i being
+the dataset's frame i. It is filled next to its final place and renamed when complete; a filling that was
+killed continues with the episode where it stopped.
+"""
+
+from __future__ import annotations
+
+import fcntl
+import functools
+import hashlib
+import json
+import shutil
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+from lerobot.datasets.video_utils import decode_video_frames
+from numpy.typing import NDArray
+from tqdm import tqdm
+
+from robocasa_lerobot.data.source import DatasetSource
+from robocasa_lerobot.errors import UserError
+
+FORMAT = 1  # counted up when the content of a cache changes
+_TOLERANCE_S = 1e-4  # LeRobot's tolerance between the asked and the decoded timestamp
+
+
+def resize_images(images: torch.Tensor, size: tuple[int, int]) -> torch.Tensor:
+    """Uint8 images (..., 3, H, W) at (height, width) `size`, bilinear with antialiasing as torchvision's Resize."""
+    if tuple(images.shape[-2:]) == tuple(size):
+        return images
+    flat = images.reshape(-1, *images.shape[-3:]).float()
+    out = torch.nn.functional.interpolate(flat, size=size, mode="bilinear", antialias=True, align_corners=False)
+    return out.round().clamp(0, 255).to(torch.uint8).reshape(*images.shape[:-2], *size)
+
+
+def cache_bytes(source: DatasetSource, keys: Sequence[str], size: tuple[int, int]) -> int:
+    """Bytes that a cache of all frames of `source` takes."""
+    return int(source.meta.total_frames) * len(keys) * 3 * size[0] * size[1]
+
+
+class FrameCache:
+    """A complete cache, opened for reading."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+
+    @functools.cached_property
+    def _arrays(self) -> dict[str, NDArray[np.uint8]]:
+        keys = json.loads((self.folder / "cache.json").read_text())["keys"]
+        return {key: np.load(self.folder / f"{key}.npy", mmap_mode="r") for key in keys}
+
+    def frames(self, key: str, indices: NDArray[np.int64]) -> torch.Tensor:
+        """Frames of a camera feature: uint8 (*indices.shape, 3, height, width)."""
+        return torch.from_numpy(self._arrays[key][indices])
+
+    def __getstate__(self) -> dict[str, Any]:
+        """A worker process maps the files itself; the arrays must not travel."""
+        return {"folder": self.folder}
+
+
+def open_or_build(source: DatasetSource, keys: Sequence[str], size: tuple[int, int], cache_dir: Path) -> FrameCache:
+    """The cache of the camera features `keys` of `source` at (height, width) `size`, decoded if not there yet.
+
+    Several processes may ask at once: one decodes, the others wait.
+
+    Raises:
+        UserError: too little free disk for it, or a video that lacks frames.
+    """
+    text = json.dumps([FORMAT, source.fingerprint, sorted(keys), list(size)])
+    name = f"{source.root.name}_{size[0]}x{size[1]}_{hashlib.sha256(text.encode()).hexdigest()[:16]}"
+    folder, partial = cache_dir / name, cache_dir / f"{name}.partial"
+    cache_dir.mkdir(parents=True, exist_ok=True)
+    with _lock(cache_dir / f"{name}.lock"):
+        if not folder.is_dir():
+            _check_disk(cache_bytes(source, keys, size), cache_dir)
+            _fill(source, sorted(keys), size, partial)
+            partial.rename(folder)
+    return FrameCache(folder)
+
+
+def _fill(source: DatasetSource, keys: list[str], size: tuple[int, int], folder: Path) -> None:
+    progress = folder / "cache.json"
+    done = json.loads(progress.read_text())["episodes"] if progress.is_file() else 0
+    folder.mkdir(exist_ok=True)
+    shape = (int(source.meta.total_frames), 3, *size)
+    mode: Any = "r+" if done else "w+"
+    arrays = {
+        key: np.lib.format.open_memmap(folder / f"{key}.npy", mode=mode, dtype=np.uint8, shape=None if done else shape)
+        for key in keys
+    }
+    timestamps = source.columns["timestamp"]
+    episodes = tqdm(
+        range(done, len(source.starts)), initial=done, total=len(source.starts), desc=f"decoding {source.root.name}"
+    )
+    with ThreadPoolExecutor(max_workers=len(keys)) as pool:
+        for episode in episodes:
+            where = slice(int(source.starts[episode]), int(source.ends[episode]))
+            jobs = {key: pool.submit(_decode, source, key, episode, timestamps[where], size) for key in keys}
+            for key, job in jobs.items():
+                arrays[key][where] = job.result().numpy()
+            for array in arrays.values():
+                array.flush()
+            aside = progress.with_suffix(".tmp")
+            aside.write_text(json.dumps({"episodes": episode + 1, "keys": keys}))
+            aside.replace(progress)
+
+
+def _decode(
+    source: DatasetSource, key: str, episode: int, timestamps: NDArray[np.float32], size: tuple[int, int]
+) -> torch.Tensor:
+    row = source.meta.episodes[episode]
+    path = source.root / source.meta.get_video_file_path(episode, key)
+    shifted = [row[f"videos/{key}/from_timestamp"] + float(t) for t in timestamps]
+    try:
+        frames = decode_video_frames(path, shifted, _TOLERANCE_S, backend="pyav", return_uint8=True)
+    except Exception as error:
+        raise UserError(f"{path}: cannot decode episode {episode}: {error}. Run `robocasa-lerobot verify`.") from error
+    return resize_images(frames, size)
+
+
+def _check_disk(needed: int, folder: Path) -> None:
+    free = shutil.disk_usage(folder).free
+    if needed > 0.9 * free:
+        raise UserError(
+            f"the frame cache needs {needed / 1e9:.1f} GB but {folder} has {free / 1e9:.1f} GB free. Set "
+            "`loader.cache_dir` to a larger disk, a smaller `loader.image_size`, or `loader.cache_frames: false`."
+        )
+
+
+@contextmanager
+def _lock(path: Path) -> Iterator[None]:
+    """An exclusive lock that the system frees when its holder dies."""
+    with path.open("w") as file:
+        fcntl.flock(file, fcntl.LOCK_EX)
+        yield

@@ -1,0 +1,303 @@
+"""A weighted mixture of LeRobot datasets that reads like one: items, metadata, statistics, sampling.
+
+Numbers come from memory, pictures from the frame cache or, without one, from LeRobot's own reader.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+from lerobot.datasets.lerobot_dataset import LeRobotDataset
+from numpy.typing import NDArray
+
+from robocasa_lerobot.data.config import LoaderConfig, MixtureConfig
+from robocasa_lerobot.data.frame_cache import FrameCache, cache_bytes, open_or_build, resize_images
+from robocasa_lerobot.data.sampler import FramePool, MixtureSampler, mixture_probabilities
+from robocasa_lerobot.data.source import DatasetSource
+from robocasa_lerobot.data.statistics import Statistics, pooled_statistics
+from robocasa_lerobot.errors import UserError
+
+Item = dict[str, Any]
+
+
+@dataclass
+class MixtureMeta:
+    """The part of LeRobot's dataset metadata that policies and processors read, for the whole mixture."""
+
+    features: dict[str, dict[str, Any]]
+    fps: int
+    robot_type: str | None
+    tasks: list[str]
+    total_frames: int
+    total_episodes: int
+    stats: Statistics | None = None
+    repo_id: str = "mixture"
+    has_language_columns: bool = False
+
+    @property
+    def camera_keys(self) -> list[str]:
+        """Features that are pictures."""
+        return [key for key, feature in self.features.items() if _is_image(feature)]
+
+
+@dataclass
+class _Member:
+    source: DatasetSource
+    episodes: NDArray[np.int64]
+    task_index: NDArray[np.int64]  # index in the mixture's tasks of each task index of the dataset
+
+
+class MixtureDataset(torch.utils.data.Dataset[Item]):
+    """Items as LeRobot's datasets give them, over the members of a mixture.
+
+    An item has every column of the frame, and for the keys of `delta_timestamps` a leading time axis and
+    `<key>_is_pad` (true where the window leaves the episode and repeats its edge). Images are uint8
+    (time, 3, H, W), other floats float32; `task` is the instruction and `task_index` its place in `meta.tasks`.
+    Index i counts the frames of the first member's dataset, then of the second's, and so on.
+
+    Raises:
+        UserError: members that do not fit each other, or that have no such episodes.
+    """
+
+    def __init__(self, config: MixtureConfig, image_size: int | None = None) -> None:
+        self.config, self.image_size = config, image_size
+        self._deltas: dict[str, list[int]] = {}
+        self._picture_size: tuple[int, int] | None = None
+        self._caches: dict[Path, FrameCache] = {}
+        self._readers: dict[Path, LeRobotDataset] = {}
+        roots = dict.fromkeys(Path(member.root) for member in config.members)
+        self.sources = {root: DatasetSource(root) for root in roots}
+        _check_alike(list(self.sources.values()), any_image_size=image_size is not None)
+        tasks = sorted({text for source in self.sources.values() for text in source.instructions})
+        self._members = []
+        for member in config.members:
+            source = self.sources[Path(member.root)]
+            to_global = np.array([tasks.index(text) for text in source.instructions])
+            self._members.append(_Member(source, source.select(member.tasks, member.episodes), to_global))
+        frames = [int((m.source.ends - m.source.starts)[m.episodes].sum()) for m in self._members]
+        weights = [member.weight for member in config.members if member.weight is not None]
+        self.probabilities = mixture_probabilities(frames, weights or None, config.alpha)
+        self._offsets = np.cumsum([0, *(m.source.meta.total_frames for m in self._members)])
+        first = self._members[0].source
+        self.meta = MixtureMeta(
+            features={key: self._feature(feature) for key, feature in first.features.items()},
+            fps=int(first.meta.fps),
+            robot_type=first.meta.robot_type,
+            tasks=tasks,
+            total_frames=sum(frames),
+            total_episodes=sum(len(m.episodes) for m in self._members),
+        )
+
+    def _feature(self, feature: Mapping[str, Any]) -> dict[str, Any]:
+        if self.image_size is None or not _is_image(feature):
+            return dict(feature)
+        return {**feature, "shape": (self.image_size, self.image_size, 3)}
+
+    def __len__(self) -> int:
+        return int(self._offsets[-1])
+
+    @property
+    def fingerprint(self) -> str:
+        """Hash of the data of all members."""
+        return "-".join(source.fingerprint[:16] for source in self.sources.values())
+
+    def describe(self) -> str:
+        """A line for each member: episodes, frames, and how often it is drawn."""
+        lines = []
+        for member, part, probability in zip(self.config.members, self._members, self.probabilities, strict=True):
+            frames = int((part.source.ends - part.source.starts)[part.episodes].sum())
+            tasks = ", ".join(member.tasks) if member.tasks else "all tasks"
+            lines.append(f"{member.root} ({tasks}): {len(part.episodes)} episodes, {frames} frames, {probability:.1%}")
+        return "\n".join(lines)
+
+    def statistics(self) -> Statistics:
+        """Pooled statistics of the frames that the mixture draws, weighted as it draws them."""
+        members = self._members
+        return pooled_statistics([m.source for m in members], [m.episodes for m in members], self.probabilities)
+
+    def sampler(self, seed: int, drop_last_frames: int = 0) -> MixtureSampler:
+        """The sampler over the mixture; the last frames of each episode can be kept from starting a sample."""
+        pools = []
+        for member in self._members:
+            starts = member.source.starts[member.episodes]
+            # A shorter episode keeps its first frame: no episode drops out of the training unnoticed.
+            lengths = np.maximum(1, member.source.ends[member.episodes] - starts - drop_last_frames)
+            pools.append(FramePool(starts, lengths))
+        return MixtureSampler(pools, self.probabilities, seed)
+
+    def set_windows(self, delta_timestamps: Mapping[str, Sequence[float]] | None) -> None:
+        """The window of each key, in seconds relative to the frame, as LeRobot's `delta_timestamps`."""
+        windows = delta_timestamps or {}
+        self._deltas = {key: [round(t * self.meta.fps) for t in times] for key, times in windows.items()}
+        self._readers.clear()
+
+    def set_picture_size(self, size: tuple[int, int] | None) -> None:
+        """Hand out pictures at (height, width) `size` where that is smaller than what the features say.
+
+        For a policy that would bring them to this size anyway: less to cache, to move and to compute.
+        """
+        height, width = self._feature_size()
+        self._picture_size = size if size is not None and size[0] * size[1] < height * width else None
+        self._caches.clear()
+
+    def cache_frames(self, cache_dir: Path, budget_bytes: float | None = None) -> bool:
+        """Decode every picture once and read it from disk from then on; the pictures are the same.
+
+        Returns:
+            False where it was left out, because the frames take more than the budget or are no video.
+        """
+        keys = [key for key, f in self.meta.features.items() if f["dtype"] == "video"]
+        if keys != self.meta.camera_keys or not keys:
+            return False
+        size = self._picture_size or self._feature_size()
+        needed = sum(cache_bytes(source, keys, size) for source in self.sources.values())
+        if budget_bytes is not None and needed > budget_bytes:
+            return False
+        for root, source in self.sources.items():
+            self._caches[root] = open_or_build(source, keys, size, cache_dir)
+        return True
+
+    def _feature_size(self) -> tuple[int, int]:
+        """Height and width of the pictures; cameras of different sizes cannot be handed out together."""
+        shapes = {tuple(self.meta.features[key]["shape"][:2]) for key in self.meta.camera_keys}
+        if len(shapes) > 1:
+            raise UserError(f"cameras have different sizes {sorted(shapes)}; set `loader.image_size` to one for all.")
+        return shapes.pop() if shapes else (0, 0)
+
+    def __getitem__(self, index: int) -> Item:
+        member = int(np.searchsorted(self._offsets, index, side="right")) - 1
+        batch = self.batch(np.array([member]), np.array([index - self._offsets[member]]))
+        return {key: value[0] for key, value in batch.items()}
+
+    def batch(self, members: NDArray[np.int64], frames: NDArray[np.int64]) -> Item:
+        """A collated batch: frame `frames[i]` of the dataset of member `members[i]`, for each i."""
+        order: list[NDArray[np.int64]] = []
+        parts: list[Item] = []
+        for number in np.unique(members):
+            chosen = np.flatnonzero(members == number)
+            order.append(chosen)
+            parts.append(self._read(self._members[number], frames[chosen]))
+        back = np.argsort(np.concatenate(order))
+        out: Item = {}
+        for key, first in parts[0].items():
+            if isinstance(first, torch.Tensor):
+                out[key] = torch.cat([part[key] for part in parts])[torch.from_numpy(back)]
+            else:
+                joined = [value for part in parts for value in part[key]]
+                out[key] = [joined[i] for i in back]
+        return out
+
+    def _read(self, member: _Member, frames: NDArray[np.int64]) -> Item:
+        source = member.source
+        out = self._read_pictures(source, frames)
+        episode = source.columns["episode_index"][frames]
+        for key, column in source.columns.items():
+            indices, padded = self._window(key, source, frames, episode)
+            out[key] = torch.from_numpy(column[indices])
+            if padded is not None:
+                out[f"{key}_is_pad"] = torch.from_numpy(padded)
+        task = member.task_index[source.columns["task_index"][frames]]
+        out["task_index"] = torch.from_numpy(task)
+        out["task"] = [self.meta.tasks[i] for i in task]
+        return out
+
+    def _read_pictures(self, source: DatasetSource, frames: NDArray[np.int64]) -> Item:
+        keys, out = self.meta.camera_keys, Item()
+        if not keys:
+            return out
+        episode = source.columns["episode_index"][frames]
+        cache = self._caches.get(source.root)
+        decoded = None if cache else self._decode(source, frames)
+        for key in keys:
+            indices, padded = self._window(key, source, frames, episode)
+            if cache:
+                out[key] = cache.frames(key, indices)
+            else:
+                assert decoded is not None
+                size = self._picture_size or self._feature_size()
+                images = resize_images(torch.stack([item[key] for item in decoded]), size)
+                out[key] = images.reshape(*indices.shape, *images.shape[-3:])
+            if padded is not None:
+                out[f"{key}_is_pad"] = torch.from_numpy(padded)
+        return out
+
+    def _decode(self, source: DatasetSource, frames: NDArray[np.int64]) -> list[Item]:
+        if source.root not in self._readers:
+            cameras = {key: [d / self.meta.fps for d in self._deltas.get(key, [0])] for key in self.meta.camera_keys}
+            self._readers[source.root] = LeRobotDataset(
+                source.root.name, root=source.root, delta_timestamps=cameras, return_uint8=True, video_backend="pyav"
+            )
+        return [self._readers[source.root][int(frame)] for frame in frames]
+
+    def _window(
+        self, key: str, source: DatasetSource, frames: NDArray[np.int64], episode: NDArray[np.int64]
+    ) -> tuple[NDArray[np.int64], NDArray[np.bool_] | None]:
+        """Dataset indices of a key's window, (n,) or (n, time), and where it leaves the episode."""
+        if key not in self._deltas:
+            return frames, None
+        wanted = frames[:, None] + np.asarray(self._deltas[key], dtype=np.int64)
+        first, last = source.starts[episode][:, None], source.ends[episode][:, None] - 1
+        return np.clip(wanted, first, last), (wanted < first) | (wanted > last)
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Worker processes open their own readers."""
+        return {**self.__dict__, "_readers": {}}
+
+
+class StepBatches(torch.utils.data.Dataset[Item]):
+    """Item i is the i-th batch of a phase for this process: what a loader needs to start anywhere.
+
+    Batch number i holds the samples i * batch_size .. (i + 1) * batch_size - 1; process `rank` of `processes`
+    gets an equal consecutive share, so that together they see the same samples whatever their number.
+    """
+
+    def __init__(
+        self, dataset: MixtureDataset, sampler: MixtureSampler, batch_size: int, rank: int = 0, processes: int = 1
+    ) -> None:
+        if batch_size % processes:
+            raise UserError(f"batch of {batch_size} samples cannot be shared by {processes} processes; use a multiple.")
+        self.dataset, self.sampler = dataset, sampler
+        self.batch_size, self._share, self._rank = batch_size, batch_size // processes, rank
+
+    def __getitem__(self, index: int) -> Item:
+        position = index * self.batch_size + self._rank * self._share
+        return self.dataset.batch(*self.sampler.draw(position, self._share))
+
+
+def open_mixture(config: MixtureConfig, loader: LoaderConfig) -> MixtureDataset:
+    """The mixture with the fake datasets made that it asks for; pictures are not cached yet."""
+    for member in config.members:
+        if member.make_fake and not Path(member.root).exists():
+            from robocasa_lerobot.data.fake import write_fake_dataset
+
+            write_fake_dataset(Path(member.root))
+    return MixtureDataset(config, loader.image_size)
+
+
+def _is_image(feature: Mapping[str, Any]) -> bool:
+    return feature["dtype"] in ("video", "image")
+
+
+def _check_alike(sources: Sequence[DatasetSource], any_image_size: bool) -> None:
+    """All datasets must have the same columns and rate: a policy cannot tell which one a batch came from."""
+    first = sources[0]
+    for other in sources[1:]:
+        if other.meta.fps != first.meta.fps:
+            raise UserError(f"{other.root} has {other.meta.fps} frames/s, {first.root} {first.meta.fps}.")
+        for key in sorted(first.features.keys() | other.features.keys()):
+            ours, theirs = first.features.get(key), other.features.get(key)
+            if ours is None or theirs is None:
+                raise UserError(f"feature {key!r} is missing in {(first if ours is None else other).root}.")
+            if any_image_size and _is_image(ours) and _is_image(theirs):
+                continue
+            if tuple(ours["shape"]) != tuple(theirs["shape"]) or ours.get("names") != theirs.get("names"):
+                remedy = " Set `loader.image_size` to bring pictures to one size." if _is_image(ours) else ""
+                raise UserError(
+                    f"feature {key!r}: {first.root} has shape {tuple(ours['shape'])}, names {ours.get('names')}; "
+                    f"{other.root} has {tuple(theirs['shape'])}, {theirs.get('names')}.{remedy}"
+                )

@@ -1,0 +1,145 @@
+"""One LeRobotDataset v3.0 on disk: its metadata, which episodes are wanted, and its numbers as arrays."""
+
+from __future__ import annotations
+
+import functools
+import hashlib
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow.parquet as pq
+from lerobot.datasets.dataset_metadata import LeRobotDatasetMetadata
+from numpy.typing import NDArray
+
+from robocasa_lerobot.errors import UnknownNameError, UserError
+
+EPISODE_TABLE = "meta/robocasa/episodes.jsonl"
+
+
+class DatasetSource:
+    """A dataset folder; metadata is read at once, columns on first use.
+
+    Raises:
+        UserError: no LeRobotDataset v3.0 at `root`.
+    """
+
+    def __init__(self, root: Path) -> None:
+        self.root = Path(root)
+        _check_is_dataset(self.root)
+        self.meta = LeRobotDatasetMetadata(self.root.name, root=self.root)
+        if not self.meta.total_episodes:
+            raise UserError(f"{self.root}: the dataset has no episodes; convert some demonstrations first.")
+        rows = self.meta.episodes.with_format("numpy")
+        self.starts: NDArray[np.int64] = np.asarray(rows["dataset_from_index"], dtype=np.int64)
+        self.ends: NDArray[np.int64] = np.asarray(rows["dataset_to_index"], dtype=np.int64)
+
+    @property
+    def features(self) -> dict[str, dict[str, Any]]:
+        """LeRobot's description of each column."""
+        return self.meta.features
+
+    @property
+    def instructions(self) -> list[str]:
+        """Text of each `task_index`."""
+        return [str(text) for text in self.meta.tasks.sort_values("task_index").index]
+
+    def select(self, tasks: Sequence[str] | None, episodes: Sequence[int] | None) -> NDArray[np.int64]:
+        """Indices (ascending) of the episodes of the given tasks and indices; None keeps all.
+
+        Raises:
+            UserError: an unknown task, an index out of range, or nothing left.
+        """
+        kept: NDArray[np.int64] = np.arange(len(self.starts), dtype=np.int64)
+        if episodes is not None:
+            wrong = [index for index in episodes if not 0 <= index < len(kept)]
+            if wrong:
+                raise UserError(f"{self.root}: no episode {wrong[0]}; it has episodes 0 to {len(kept) - 1}.")
+            kept = np.asarray(sorted(episodes), dtype=np.int64)
+        if tasks is not None:
+            names = self._task_names()
+            for task in tasks:
+                if task not in names:
+                    raise UnknownNameError("task", task, names, f"(in the dataset {self.root})")
+            kept = np.array([index for index in kept if names[index] in tasks], dtype=np.int64)
+        if not len(kept):
+            raise UserError(f"{self.root}: no episode is left with tasks={tasks} and episodes={episodes}.")
+        return kept
+
+    def _task_names(self) -> list[str]:
+        path = self.root / EPISODE_TABLE
+        if not path.is_file():
+            raise UserError(
+                f"{self.root}: `tasks` needs {EPISODE_TABLE}, which `robocasa-lerobot convert` writes and this "
+                "dataset lacks. Leave `tasks` out, or choose by `episodes`."
+            )
+        rows = [json.loads(line) for line in path.read_text().splitlines() if line.strip()]
+        by_episode = {int(row["episode_index"]): str(row["task_name"]) for row in rows}
+        missing = set(range(len(self.starts))) - by_episode.keys()
+        if missing:
+            raise UserError(f"{path}: no line for episode {min(missing)}; convert the dataset again.")
+        return [by_episode[index] for index in range(len(self.starts))]
+
+    @functools.cached_property
+    def columns(self) -> dict[str, NDArray[Any]]:
+        """Every numeric column over all frames: floats as float32 (frames, ...), integers as int64 (frames,).
+
+        float32 is what LeRobot hands to policies too.
+        """
+        wanted = [name for name, feature in self.features.items() if feature["dtype"] not in ("image", "video")]
+        wanted = [name for name in wanted if _is_number(self.features[name]["dtype"])]
+        files = sorted((self.root / "data").glob("*/*.parquet"))
+        tables = [pq.read_table(path, columns=wanted) for path in files]
+        out: dict[str, NDArray[Any]] = {}
+        for name in wanted:
+            parts = [_column_array(table.column(name), self.features[name]["shape"]) for table in tables]
+            array = np.concatenate(parts)
+            out[name] = array.astype(np.int64 if array.dtype.kind in "iub" else np.float32)
+        if not np.array_equal(out["index"], np.arange(self.meta.total_frames)):
+            raise UserError(f"{self.root}: frames are missing or out of order; convert the dataset again.")
+        return out
+
+    @functools.cached_property
+    def fingerprint(self) -> str:
+        """Hash of what the dataset holds: metadata by content, data and video files by name and size."""
+        digest = hashlib.sha256()
+        for path in sorted(p for p in (self.root / "meta").rglob("*") if p.is_file()):
+            digest.update(path.relative_to(self.root).as_posix().encode() + path.read_bytes())
+        for folder in ("data", "videos", "images"):
+            for path in sorted(p for p in (self.root / folder).rglob("*") if p.is_file()):
+                digest.update(f"{path.relative_to(self.root).as_posix()} {path.stat().st_size}".encode())
+        return digest.hexdigest()
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Columns are read again in a worker process instead of being sent to it."""
+        return {key: value for key, value in self.__dict__.items() if key != "columns"}
+
+
+def _check_is_dataset(root: Path) -> None:
+    info = root / "meta" / "info.json"
+    if not info.is_file():
+        hint = f" It has {sorted(p.name for p in root.iterdir())[:5]}." if root.is_dir() else ""
+        raise UserError(
+            f"no dataset at {root} (no meta/info.json).{hint} Record with `robocasa-lerobot demos` and convert with "
+            "`robocasa-lerobot convert`, or correct the mixture's `root`."
+        )
+    version = json.loads(info.read_text()).get("codebase_version")
+    if version != "v3.0":
+        raise UserError(
+            f"{root}: LeRobotDataset {version}, expected v3.0. `robocasa-lerobot convert` reads older ones."
+        )
+
+
+def _is_number(dtype: str) -> bool:
+    return dtype.startswith(("float", "int", "uint", "bool"))
+
+
+def _column_array(column: Any, shape: Sequence[int]) -> NDArray[Any]:
+    array = column.combine_chunks()
+    while hasattr(array, "flatten") and hasattr(array.type, "value_type"):
+        array = array.flatten()
+    values = array.to_numpy(zero_copy_only=False)
+    size = tuple(int(n) for n in shape)
+    return values.reshape(len(column), *size) if size != (1,) else values.reshape(len(column))

@@ -1,0 +1,170 @@
+"""From configuration to objects: LeRobot policy configs, policies, processors, optimisers and schedules."""
+
+from __future__ import annotations
+
+import dataclasses
+import importlib
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import draccus
+import lerobot.policies  # noqa: F401  registers LeRobot's own policy types
+import torch
+from lerobot.configs.policies import PreTrainedConfig
+from lerobot.datasets.factory import resolve_delta_timestamps
+from lerobot.policies.factory import get_policy_class, make_policy, make_pre_post_processors
+from lerobot.policies.pretrained import PreTrainedPolicy
+from lerobot.utils.constants import IMAGENET_STATS
+from lerobot.utils.feature_utils import dataset_to_policy_features
+
+from robocasa_lerobot.data.mixture import MixtureDataset, MixtureMeta
+from robocasa_lerobot.data.statistics import Statistics
+from robocasa_lerobot.errors import UnknownNameError, UserError
+from robocasa_lerobot.training.config import PhaseConfig
+
+# Modules whose import registers this project's policy types with LeRobot.
+POLICY_MODULES = ("robocasa_lerobot.policies.diffusion_transformer.configuration_diffusion_transformer",)
+
+
+def register_policies() -> None:
+    """Make this project's policy types known to LeRobot."""
+    for name in POLICY_MODULES:
+        importlib.import_module(name)
+
+
+def best_device(wanted: str | None) -> str:
+    """The device asked for, or the best one of this machine.
+
+    Raises:
+        UserError: the device asked for is not there.
+    """
+    available = {"cpu": True, "cuda": torch.cuda.is_available(), "mps": torch.backends.mps.is_available()}
+    if wanted is None:
+        return next(name for name in ("cuda", "mps", "cpu") if available[name])
+    if wanted.split(":")[0] not in available:
+        raise UnknownNameError("device", wanted, available)
+    if not available[wanted.split(":")[0]]:
+        raise UserError(f"device {wanted!r} is not there; set `device: null` for the best one, or `cpu`.")
+    return wanted
+
+
+def policy_config(settings: Mapping[str, Any], checkpoint: Path | None, device: str) -> PreTrainedConfig:
+    """A LeRobot policy configuration from `type` and fields, or from a checkpoint's and the fields to change.
+
+    Raises:
+        UserError: an unknown policy type or field (with the closest match), a wrong value, or no checkpoint there.
+    """
+    register_policies()
+    known = PreTrainedConfig.get_known_choices()
+    fields = {key: value for key, value in settings.items() if key not in ("type", "path")}
+    kind = settings.get("type")
+    if checkpoint is not None:
+        base = _read_config(checkpoint)
+        if kind is not None and kind != base["type"]:
+            raise UserError(f"{checkpoint} holds a {base['type']!r} policy, the experiment asks for {kind!r}.")
+        kind = base.pop("type")
+    else:
+        base = {}
+    if kind not in known:
+        raise UnknownNameError("policy type", str(kind), known)
+    names = {f.name for f in dataclasses.fields(PreTrainedConfig.get_choice_class(kind)) if f.init}
+    for key in fields:
+        if key not in names:
+            raise UnknownNameError("key", key, names, f"(in the settings of the policy {kind!r})")
+    data = {"push_to_hub": False, **base, **fields, "device": device, "pretrained_path": None, "type": kind}
+    try:
+        config: PreTrainedConfig = draccus.decode(PreTrainedConfig, data)
+    except Exception as error:  # draccus raises several kinds; each says which field and why
+        cause = error.__cause__ if isinstance(error.__cause__, UserError) else error
+        raise UserError(f"settings of the policy {kind!r}: {cause}") from error
+    return config
+
+
+def frame_size(config: PreTrainedConfig) -> tuple[int, int] | None:
+    """(height, width) that the policy itself brings pictures to, so that smaller ones can be cached; else None."""
+    name = {"diffusion_transformer": "image_size", "diffusion": "resize_shape"}.get(config.type)
+    size = getattr(config, name, None) if name else None
+    return (int(size[0]), int(size[1])) if size is not None else None
+
+
+def set_windows(dataset: MixtureDataset, config: PreTrainedConfig) -> None:
+    """Give the dataset the policy's windows of observations and actions."""
+    dataset.set_windows(resolve_delta_timestamps(config, dataset.meta))
+
+
+def make_phase_policy(config: PreTrainedConfig, meta: MixtureMeta, checkpoint: Path | None) -> PreTrainedPolicy:
+    """A fresh policy for the data, or the checkpoint's with every one of its weights.
+
+    Raises:
+        UserError: the data lack a feature of the policy or have another shape, or weights do not fit.
+    """
+    if checkpoint is None:
+        policy = make_policy(config, ds_meta=meta)
+    else:
+        _check_features(config, meta)
+        try:
+            kwargs = {"dataset_stats": meta.stats, "dataset_meta": meta}
+            policy = get_policy_class(config.type).from_pretrained(checkpoint, config=config, strict=True, **kwargs)
+        except RuntimeError as error:
+            raise UserError(f"the weights of {checkpoint} do not fit the policy's settings: {error}") from error
+    policy.to(config.device)
+    return policy
+
+
+def make_processors(
+    config: PreTrainedConfig, meta: MixtureMeta, checkpoint: Path | None, keep_statistics: bool
+) -> tuple[Any, Any]:
+    """Pre- and postprocessor: the checkpoint's with its statistics, or new ones for the data."""
+    if checkpoint is None or not keep_statistics:
+        return make_pre_post_processors(config, dataset_stats=meta.stats, dataset_meta=meta)
+    overrides = {"device_processor": {"device": str(config.device)}}
+    return make_pre_post_processors(config, pretrained_path=str(checkpoint), preprocessor_overrides=overrides)
+
+
+def make_optimizer(
+    policy: PreTrainedPolicy, phase: PhaseConfig
+) -> tuple[torch.optim.Optimizer, torch.optim.lr_scheduler.LRScheduler | None, float]:
+    """The policy's own optimiser and schedule with the phase's changes, and the largest gradient norm (0: any)."""
+    preset = policy.config.get_optimizer_preset()
+    optimizer = preset.build(policy.get_optim_params())
+    if not isinstance(optimizer, torch.optim.Optimizer):
+        raise UserError(f"policy {policy.config.type!r} wants several optimisers, which training does not support.")
+    if phase.learning_rate is not None:
+        for group in optimizer.param_groups:
+            group["lr"] *= phase.learning_rate / preset.lr
+    schedule = policy.config.get_scheduler_preset()
+    if schedule is not None and phase.warmup_steps is not None:
+        schedule = dataclasses.replace(schedule, num_warmup_steps=phase.warmup_steps)
+    scheduler = schedule.build(optimizer, phase.steps) if schedule is not None else None
+    clip = preset.grad_clip_norm if phase.grad_clip_norm is None else phase.grad_clip_norm
+    return optimizer, scheduler, float(clip or 0.0)
+
+
+def with_imagenet_statistics(stats: Statistics, camera_keys: list[str]) -> Statistics:
+    """Statistics in which the cameras have ImageNet's mean and standard deviation, as LeRobot's training does."""
+    cameras = {key: {name: torch.tensor(v).numpy() for name, v in IMAGENET_STATS.items()} for key in camera_keys}
+    return {**stats, **{key: {**stats.get(key, {}), **values} for key, values in cameras.items()}}
+
+
+def _read_config(checkpoint: Path) -> dict[str, Any]:
+    path = checkpoint / "config.json"
+    if not path.is_file():
+        raise UserError(
+            f"no policy at {checkpoint} (no config.json); give the `pretrained_model` folder of a checkpoint."
+        )
+    data: dict[str, Any] = json.loads(path.read_text())
+    return data
+
+
+def _check_features(config: PreTrainedConfig, meta: MixtureMeta) -> None:
+    found = dataset_to_policy_features(meta.features)
+    for key, wanted in {**(config.input_features or {}), **(config.output_features or {})}.items():
+        if key not in found:
+            raise UnknownNameError("feature", key, found, "(the checkpoint's policy needs it; the data lack it)")
+        if tuple(found[key].shape) != tuple(wanted.shape):
+            raise UserError(
+                f"feature {key!r}: the checkpoint's policy has shape {tuple(wanted.shape)}, the data "
+                f"{tuple(found[key].shape)}. For pictures, set `loader.image_size` to the policy's size."
+            )
