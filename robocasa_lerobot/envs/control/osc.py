@@ -39,9 +39,11 @@ class OperationalSpaceArm:
         self._mass = indices.mass_matrix_addresses(model, self._qvel)
         self._jacobian = np.zeros((6, model.nv))
         self._velocity = np.zeros((2, 6))  # of grip and base site; MuJoCo's order: angular, linear
-        self._goal_pos = np.zeros(3)
-        self._goal_mat = np.eye(3)
-        self._posture = np.zeros(7)
+        self._wanted = np.zeros((2, 6, 1))  # accelerations of the grip site: of the task, and due to the posture
+        self._inverse_inertia = np.zeros((2, 6, 6))  # decoupled, and whole
+        self._goal_pos: NDArray[np.float64] = np.zeros(3)
+        self._goal_mat: NDArray[np.float64] = np.eye(3)
+        self._posture: NDArray[np.float64] = np.zeros(7)
 
     def reset(self, data: mujoco.MjData) -> None:
         """Take the present pose as goal and the present joint angles as null-space posture."""
@@ -69,28 +71,36 @@ class OperationalSpaceArm:
         mujoco.mj_jacSite(model, data, jacobian[:3], jacobian[3:], self._grip)
         mujoco.mj_objectVelocity(model, data, _SITE, self._grip, velocity[0], 0)
         mujoco.mj_objectVelocity(model, data, _SITE, self._base, velocity[1], 0)
-        arm_jacobian = jacobian[:, self._qvel]
+        arm_jacobian = jacobian.take(self._qvel, axis=1)
         mass = data.M[self._mass]
-
-        base_mat = data.site_xmat[self._base].reshape(3, 3)
-        goal_pos = data.site_xpos[self._base] + base_mat @ self._goal_pos
-        goal_mat = base_mat @ self._goal_mat
-        grip_mat = data.site_xmat[self._grip].reshape(3, 3)
+        positions, matrices = data.site_xpos, data.site_xmat
+        base_mat = matrices[self._base].reshape(3, 3)
 
         # Accelerations wanted at the grip site; the damping acts on the velocity relative to the base site's.
-        wanted = np.empty((2, 3, 1))
-        wanted[0, :, 0] = KP * (goal_pos - data.site_xpos[self._grip])
-        wanted[1, :, 0] = KP * _rotation_error(goal_mat, grip_mat)
-        wanted[:, :, 0] += KD * (velocity[1] - velocity[0]).reshape(2, 3)[::-1]
+        wanted = self._wanted[0]
+        wanted[:3, 0] = base_mat @ self._goal_pos + (positions[self._base] - positions[self._grip])
+        wanted[3:, 0] = _rotation_error(base_mat @ self._goal_mat, matrices[self._grip].reshape(3, 3))
+        wanted *= KP
+        damping = KD * (velocity[1] - velocity[0])
+        wanted[:3, 0] += damping[3:]
+        wanted[3:, 0] += damping[:3]
 
-        # 6x6 inverse of the operational-space inertia; its diagonal 3x3 blocks are those of position and orientation.
-        inverse_inertia = arm_jacobian @ np.linalg.solve(mass, arm_jacobian.T)
-        blocks = np.stack((inverse_inertia[:3, :3], inverse_inertia[3:, 3:]))
-        wrench = np.linalg.solve(blocks, wanted).reshape(6)
-
-        # Posture torques M a, less their part that would move the grip site: N^T M a = M a - J^T L J a.
+        # Posture accelerations a: their torques M a, less the part that would move the grip site, are
+        # N^T M a = M a - J^T L J a, where L is the operational-space inertia.
         posture = NULLSPACE_KP * (self._posture - data.qpos[self._qpos]) - NULLSPACE_KD * data.qvel[self._qvel]
-        wrench -= np.linalg.solve(inverse_inertia, arm_jacobian @ posture)
+        self._wanted[1, :, 0] = arm_jacobian @ posture
+
+        # L^-1 = J M^-1 J^T; the task's force uses its position and orientation blocks alone (decoupled). Both
+        # systems are solved in one call.
+        inverse = self._inverse_inertia
+        inverse[1] = arm_jacobian @ np.linalg.solve(mass, arm_jacobian.T)
+        inverse[0, :3, :3] = inverse[1, :3, :3]
+        inverse[0, 3:, 3:] = inverse[1, 3:, 3:]
+        try:
+            forces = np.linalg.solve(inverse, self._wanted)
+        except np.linalg.LinAlgError:  # a stretched arm to the last digit: the least-squares answer
+            forces = np.linalg.pinv(inverse) @ self._wanted
+        wrench = forces[0, :, 0] - forces[1, :, 0]
         return wrench @ arm_jacobian + mass @ posture + data.qfrc_bias[self._qvel]
 
     def _pose_in_base(self, data: mujoco.MjData) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -99,13 +109,13 @@ class OperationalSpaceArm:
         return base_mat.T @ offset, base_mat.T @ data.site_xmat[self._grip].reshape(3, 3)
 
 
-def _rotation_error(goal: NDArray[np.float64], present: NDArray[np.float64]) -> NDArray[np.float64]:
+def _rotation_error(goal: NDArray[np.float64], present: NDArray[np.float64]) -> tuple[float, float, float]:
     """Half the sum of the cross products of the present axes with the wanted ones (sine of the angle, times axis).
 
     The sum of cross products of columns is the axial vector of G P^T, which needs one product instead of three.
     """
-    product = goal @ present.T
-    return 0.5 * np.array((product[2, 1] - product[1, 2], product[0, 2] - product[2, 0], product[1, 0] - product[0, 1]))
+    (_, g01, g02), (g10, _, g12), (g20, g21, _) = (goal @ present.T).tolist()
+    return 0.5 * (g21 - g12), 0.5 * (g02 - g20), 0.5 * (g10 - g01)
 
 
 def _rotation_matrix(axis_angle: NDArray[np.float64]) -> NDArray[np.float64]:

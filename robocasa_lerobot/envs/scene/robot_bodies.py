@@ -94,9 +94,30 @@ _X_PLUS: Quat = (_QUARTER, _QUARTER, 0.0, 0.0)
 _Z_PLUS: Quat = (_QUARTER, 0.0, 0.0, _QUARTER)
 _Z_MINUS: Quat = (_QUARTER, 0.0, 0.0, -_QUARTER)
 
-_FINGER_POS: Vec3 = (0.0, 0.0, 0.0524)
-_FINGER_INERTIAL = {"mass": 0.1, "com": (0.0, 0.0, 0.05), "inertia": (0.01, 0.01, 0.005)}
-_TIP_INERTIAL = {"mass": 0.01, "inertia_quat": (0.0, 0.0, 0.0, 1.0), "inertia": (0.01, 0.01, 0.01)}
+
+def _finger(side: str, joint: str, limits: tuple[float, float]) -> BodySpec:
+    return BodySpec(
+        f"gripper0_right_{side}finger",
+        names.GRIPPER,
+        (0.0, 0.0, 0.0524),
+        _Z_PLUS,
+        mass=0.1,
+        com=(0.0, 0.0, 0.05),
+        inertia=(0.01, 0.01, 0.005),
+        joints=(_finger_joint(joint, limits),),
+    )
+
+
+def _tip(number: int, side: str, y: float) -> BodySpec:
+    return BodySpec(
+        f"gripper0_right_finger_joint{number}_tip",
+        f"gripper0_right_{side}finger",
+        (0.0, y, 0.056),
+        mass=0.01,
+        inertia_quat=(0.0, 0.0, 0.0, 1.0),
+        inertia=(0.01, 0.01, 0.01),
+    )
+
 
 BODIES: tuple[BodySpec, ...] = (
     BodySpec(names.ROBOT_BASE, "", (0.0, 0.0, 0.0)),
@@ -144,24 +165,10 @@ BODIES: tuple[BodySpec, ...] = (
         inertia=(0.09, 0.07, 0.05),
     ),
     BodySpec("gripper0_right_eef", names.GRIPPER, (0.0, 0.0, 0.097), com=(0.0, 0.0, 0.097)),
-    BodySpec(
-        "gripper0_right_leftfinger",
-        names.GRIPPER,
-        _FINGER_POS,
-        _Z_PLUS,
-        joints=(_finger_joint(names.FINGER_JOINTS[0], (0.0, 0.04)),),
-        **_FINGER_INERTIAL,
-    ),
-    BodySpec("gripper0_right_finger_joint1_tip", "gripper0_right_leftfinger", (0.0, 0.0085, 0.056), **_TIP_INERTIAL),
-    BodySpec(
-        "gripper0_right_rightfinger",
-        names.GRIPPER,
-        _FINGER_POS,
-        _Z_PLUS,
-        joints=(_finger_joint(names.FINGER_JOINTS[1], (-0.04, 0.0)),),
-        **_FINGER_INERTIAL,
-    ),
-    BodySpec("gripper0_right_finger_joint2_tip", "gripper0_right_rightfinger", (0.0, -0.0085, 0.056), **_TIP_INERTIAL),
+    _finger("left", names.FINGER_JOINTS[0], (0.0, 0.04)),
+    _tip(1, "left", 0.0085),
+    _finger("right", names.FINGER_JOINTS[1], (-0.04, 0.0)),
+    _tip(2, "right", -0.0085),
     BodySpec(
         "mobilebase0_wheeled_base",
         names.MOBILE_BASE,

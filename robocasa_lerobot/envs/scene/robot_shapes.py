@@ -40,7 +40,7 @@ class _Material:
 
 
 _MATERIALS = {
-    "robot0_white": _Material((0.93, 0.94, 0.95, 1.0), 0.4, 0.5),
+    "robot0_white": _Material((0.86, 0.87, 0.88, 1.0), 0.3, 0.5),
     "robot0_grey": _Material((0.45, 0.46, 0.48, 1.0), 0.3, 0.4),
     "robot0_dark": _Material((0.13, 0.13, 0.15, 1.0), 0.2, 0.3),
     "robot0_blue": _Material((0.10, 0.35, 0.65, 1.0), 0.3, 0.4),

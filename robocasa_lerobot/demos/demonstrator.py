@@ -1,0 +1,34 @@
+"""Demonstrators: carry out the stages that a task declares, through the action interface of a policy."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from robocasa_lerobot.demos.motion import Array, action
+from robocasa_lerobot.demos.skills import SKILLS, SkillError
+from robocasa_lerobot.envs.kitchen_env import KitchenEnv
+from robocasa_lerobot.errors import UnknownNameError
+
+__all__ = ["SkillError", "demonstrate"]
+
+
+def demonstrate(env: KitchenEnv) -> Iterator[Array]:
+    """Actions (12,), stored order, for the episode that `env` has been reset to, one per control step.
+
+    Each action is computed from the state that the env is in when it is asked for, so the caller must step the env
+    with it before asking for the next. It ends after the last stage, with the arm held still from then on.
+
+    Raises:
+        UnknownNameError: a stage needs a skill that does not exist.
+        SkillError: a skill gives up.
+    """
+    gripper = -1.0
+    for stage in env.declaration.stages:
+        key = (stage.skill, stage.verb)
+        if key not in SKILLS:
+            raise UnknownNameError("skill", " ".join(key), (" ".join(k) for k in SKILLS))
+        for step in SKILLS[key](env, stage):
+            gripper = float(step[-1])
+            yield step
+    while True:
+        yield action(gripper=gripper)

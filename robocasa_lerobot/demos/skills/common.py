@@ -1,0 +1,62 @@
+"""Moves that the skills share."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+
+import mujoco
+import numpy as np
+
+from robocasa_lerobot.demos.motion import Array, HandTarget, arm_action, pose_error
+
+POSITION_TOLERANCE_M = 0.012
+ROTATION_TOLERANCE_RAD = 0.12
+# A move that makes less headway than this over `STALL_STEPS` is blocked, or as near as the arm gets.
+STALL_M, STALL_STEPS = 0.002, 12
+
+
+class SkillError(RuntimeError):
+    """The skill cannot go on: what it tried and how far it came."""
+
+
+def move_hand(
+    data: mujoco.MjData,
+    target: HandTarget,
+    gripper: float,
+    *,
+    speed: float = 1.0,
+    tolerance: float = POSITION_TOLERANCE_M,
+    max_steps: int = 90,
+    until: Callable[[], bool] = lambda: False,
+) -> Iterator[Array]:
+    """Servo the hand to a target; ends when it is there, when `until` holds, when it stalls, or after `max_steps`."""
+    best, since = np.inf, 0
+    for _ in range(max_steps):
+        error = pose_error(data, target)
+        if until() or (error.position < tolerance and error.rotation < ROTATION_TOLERANCE_RAD):
+            return
+        progress = error.position + 0.1 * error.rotation
+        if progress < best - STALL_M:
+            best, since = progress, 0
+        else:
+            since += 1
+        if since >= STALL_STEPS:
+            return
+        yield arm_action(data, target, gripper, speed=speed)
+
+
+def hold_hand(data: mujoco.MjData, target: HandTarget, gripper: float, steps: int) -> Iterator[Array]:
+    """Keep the hand at a target while the gripper moves."""
+    for _ in range(steps):
+        yield arm_action(data, target, gripper, speed=0.4)
+
+
+def require_near(data: mujoco.MjData, target: HandTarget, limit_m: float, what: str) -> None:
+    """Raise unless the hand has come within `limit_m` of a target.
+
+    Raises:
+        SkillError: it has not; the message says by how much.
+    """
+    distance = pose_error(data, target).position
+    if distance > limit_m:
+        raise SkillError(f"{what}: the hand stayed {distance * 100:.0f} cm away")

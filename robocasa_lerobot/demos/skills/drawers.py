@@ -1,0 +1,102 @@
+"""Drawers: pulled open by their handle, pushed shut at their front."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from robocasa_lerobot.demos.motion import CLOSED, OPEN, Array, HandTarget, base_pose, frame, grip_position, hand_rotation
+from robocasa_lerobot.demos.skills.common import SkillError, hold_hand, move_hand, require_near
+from robocasa_lerobot.envs.kitchen_env import KitchenEnv
+from robocasa_lerobot.envs.scene.fixtures.cabinets import Drawer
+from robocasa_lerobot.envs.task import Stage
+
+ATTEMPTS = 3
+GRASP_STEPS = 10  # the gripper needs ten control steps for its whole way
+APPROACH_PITCH_RAD = np.deg2rad(15.0)  # downwards: keeps the forearm above the handle
+STANDOFF_M = 0.10
+PULL_SPEED = 0.55
+OPEN_GOAL, CLOSED_GOAL = 0.99, 0.02  # a little beyond what tasks ask for
+UP = np.array([0.0, 0.0, 1.0])
+
+
+def open_drawer(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
+    """Grasp the handle from the front, fingers above and below the bar, and pull.
+
+    Raises:
+        SkillError: the drawer is not open after three attempts.
+    """
+    data, drawer = env.data, env.scene.drawer(stage.target)
+    inwards = _inwards(drawer)
+    rotation = _facing(env, drawer, inwards)
+    approach = rotation[:, 2]
+    for _ in range(ATTEMPTS):
+        handle = data.geom(drawer.handle_geom).xpos.copy()
+        before = HandTarget(handle - approach * STANDOFF_M, rotation)
+        at = HandTarget(handle, rotation)
+        yield from move_hand(data, before, OPEN, tolerance=0.02)
+        yield from move_hand(data, at, OPEN, speed=0.6, max_steps=40)
+        yield from hold_hand(data, at, CLOSED, GRASP_STEPS)
+        reach = drawer.full_travel * (OPEN_GOAL + 0.1 - drawer.openness(data))
+        start = grip_position(data)
+        # The hand keeps the turn that the grasp left it with: a stiff bar turns the wrist, not the other way round.
+        goal = HandTarget(start - inwards * reach, rotation)
+        yield from move_hand(
+            data, goal, CLOSED, speed=PULL_SPEED, max_steps=130, until=lambda: drawer.openness(data) >= OPEN_GOAL
+        )
+        if drawer.openness(data) >= OPEN_GOAL:
+            return
+        away = HandTarget(grip_position(data) - approach * STANDOFF_M, rotation)
+        yield from hold_hand(data, HandTarget(grip_position(data), rotation), OPEN, GRASP_STEPS)
+        yield from move_hand(data, away, OPEN, max_steps=30)
+    raise SkillError(f"{drawer.name} is {drawer.openness(data):.0%} open after {ATTEMPTS} attempts")
+
+
+def close_drawer(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
+    """Push the front beside the handle with closed fingers.
+
+    Raises:
+        SkillError: the drawer is not shut after three attempts.
+    """
+    data, drawer = env.data, env.scene.drawer(stage.target)
+    inwards = _inwards(drawer)
+    rotation = _facing(env, drawer, inwards)
+    sideways = np.cross(inwards, UP)
+    base, _ = base_pose(data)
+    for _ in range(ATTEMPTS):
+        front = data.geom(f"{drawer.name}_front").xpos.copy()
+        # Between the handle and the edge, on the side of the robot.
+        side = float(np.sign((base - front) @ sideways))
+        point = front + sideways * side * 0.32 * drawer.width
+        over = HandTarget(point - inwards * 0.12 + UP * 0.18, rotation)
+        before = HandTarget(point - inwards * 0.09, rotation)
+        yield from move_hand(data, over, CLOSED, tolerance=0.05)
+        yield from move_hand(data, before, CLOSED, tolerance=0.02)
+        require_near(data, before, 0.10, f"in front of {drawer.name}")
+        goal = HandTarget(point + inwards * (drawer.openness(data) * drawer.full_travel + 0.06), rotation)
+        yield from move_hand(
+            data, goal, CLOSED, speed=PULL_SPEED, max_steps=130, until=lambda: drawer.openness(data) <= CLOSED_GOAL
+        )
+        if drawer.openness(data) <= CLOSED_GOAL:
+            return
+        back = HandTarget(grip_position(data) - inwards * 0.12, hand_rotation(data))
+        yield from move_hand(data, back, CLOSED, max_steps=30)
+    raise SkillError(f"{drawer.name} is still {drawer.openness(data):.0%} open after {ATTEMPTS} attempts")
+
+
+def _inwards(drawer: Drawer) -> Array:
+    return np.array([-np.sin(drawer.yaw), np.cos(drawer.yaw), 0.0])
+
+
+def _facing(env: KitchenEnv, drawer: Drawer, inwards: Array) -> Array:
+    """Hand rotation that looks into the drawer, the fingers one above the other.
+
+    Of the two ways to roll the hand, the one that turns the wrist back over the robot's own middle: the other runs
+    the wrist into its limit.
+    """
+    base, _ = base_pose(env.data)
+    rightwards = np.cross(inwards, UP)
+    stands_left = float((base - np.asarray(drawer.pos)) @ rightwards) < 0
+    approach = np.cos(APPROACH_PITCH_RAD) * inwards - np.sin(APPROACH_PITCH_RAD) * UP
+    return frame(approach, -UP if stands_left else UP)

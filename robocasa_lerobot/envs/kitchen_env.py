@@ -1,0 +1,188 @@
+"""The kitchen as a Gymnasium env: a PandaOmron, one task, three cameras, 20 control steps per second."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import gymnasium
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from robocasa_lerobot import contract
+from robocasa_lerobot.envs.control.controller import RobotController
+from robocasa_lerobot.envs.control.step import control_step
+from robocasa_lerobot.envs.proprioception import read_state
+from robocasa_lerobot.envs.registry import get_task
+from robocasa_lerobot.envs.rendering import SceneRenderer
+from robocasa_lerobot.envs.scene.builder import RENDER_PRESETS, build_scene, scene_ids
+from robocasa_lerobot.envs.scene.scene import Scene
+from robocasa_lerobot.errors import UnknownNameError, UserError
+
+Observation = dict[str, Any]
+# Key of the generator that noise on the initial arm pose comes from, apart from the one that makes the scene.
+_ARM_NOISE_STREAM = 1
+
+
+class KitchenEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
+    """One task in kitchens of a split; every reset makes a new scene from its seed.
+
+    Observation: `pixels` {camera: uint8 (S, S, 3), upright} and `agent_pos` float64 (16,), the contract's state.
+    Action: float32 (12,) in [-1, 1] in the contract's stored order; binary parts count as +1 from 0.5 on.
+    Reward: 1 in a step after which the goal holds, else 0. `terminated` at success, `truncated` at the horizon.
+    Info, at reset and every step: `success`, `is_success`, `success_terms`, `instruction`, `task`, `scene`, `seed`.
+
+    Args:
+        task: name of a registered task.
+        split: "target" or "pretrain".
+        render_preset: "fast" (no shadows) or "quality".
+        image_size: height and width of the pictures, pixels.
+        cameras: names of the cameras that are observed.
+        horizon: control steps until truncation; the task's own if None.
+        terminate_on_success: end the episode at the first success.
+        render_mode: "rgb_array" or None.
+
+    Raises:
+        UnknownNameError: no such task, split, preset or render mode.
+        UserError: an image size or horizon below 1.
+    """
+
+    metadata = {"render_modes": ["rgb_array"], "render_fps": contract.CONTROL_HZ}  # noqa: RUF012 (Gymnasium's name)
+
+    def __init__(
+        self,
+        task: str,
+        split: str = "target",
+        render_preset: str = "fast",
+        image_size: int = contract.IMAGE_SIZE,
+        cameras: tuple[str, ...] = contract.CAMERAS,
+        horizon: int | None = None,
+        terminate_on_success: bool = True,
+        render_mode: str | None = "rgb_array",
+    ) -> None:
+        self.declaration = get_task(task)
+        scene_ids(split)  # fails here, not at the first reset, for a split without kitchens
+        if render_preset not in RENDER_PRESETS:
+            raise UnknownNameError("render preset", render_preset, RENDER_PRESETS)
+        if render_mode not in (None, "rgb_array"):
+            raise UnknownNameError("render mode", str(render_mode), ["rgb_array"])
+        if image_size < 1 or (horizon is not None and horizon < 1):
+            raise UserError(f"image_size ({image_size}) and horizon ({horizon}) must be at least 1.")
+        self.task = task
+        self.split = split
+        self.render_preset = render_preset
+        self.image_size = image_size
+        self.cameras = tuple(cameras)
+        self.horizon = horizon if horizon is not None else self.declaration.horizon
+        self._max_episode_steps = self.horizon  # where LeRobot looks
+        self.terminate_on_success = terminate_on_success
+        self.render_mode = render_mode
+        self.render_observations = True
+        self.task_description = ""
+        self.observation_space = gymnasium.spaces.Dict(
+            {
+                "pixels": gymnasium.spaces.Dict(
+                    {
+                        camera: gymnasium.spaces.Box(0, 255, (image_size, image_size, 3), np.uint8)
+                        for camera in self.cameras
+                    }
+                ),
+                "agent_pos": gymnasium.spaces.Box(-np.inf, np.inf, (contract.STATE_SIZE,), np.float64),
+            }
+        )
+        self.action_space = gymnasium.spaces.Box(-1.0, 1.0, (contract.ACTION_SIZE,), np.float32)
+        self._scene: Scene | None = None
+        self._data: mujoco.MjData | None = None
+        self._controller: RobotController | None = None
+        self._renderer: SceneRenderer | None = None
+        self._pixels: dict[str, NDArray[np.uint8]] = {}
+        self._steps = 0
+
+    @property
+    def scene(self) -> Scene:
+        """The scene of the running episode."""
+        if self._scene is None:
+            raise UserError("the env has no scene yet: call reset() first.")
+        return self._scene
+
+    @property
+    def model(self) -> mujoco.MjModel:
+        """The compiled model of the running episode."""
+        return self.scene.model
+
+    @property
+    def data(self) -> mujoco.MjData:
+        """The simulation state of the running episode."""
+        assert self.scene is not None
+        assert self._data is not None
+        return self._data
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Observation, dict[str, Any]]:
+        """Make the scene of `seed` (without one: of the next number of the env's generator) and settle it."""
+        super().reset(seed=seed)
+        episode_seed = seed if seed is not None else int(self.np_random.integers(2**31))
+        self._close_renderer()
+        self._scene = build_scene(self.declaration, self.split, episode_seed, self.render_preset)
+        noise = np.random.default_rng([episode_seed, _ARM_NOISE_STREAM])
+        self._data, self._controller = self._scene.initial_data(noise)
+        self._steps = 0
+        self.task_description = self._scene.instruction
+        self._pixels = {}
+        return self._observe(), self._info()
+
+    def step(self, action: NDArray[np.float32]) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
+        """Carry out one action for 50 ms.
+
+        Raises:
+            UserError: before the first reset.
+            ContractError: the action has a wrong shape or is not finite.
+        """
+        data, controller = self.data, self._controller
+        assert controller is not None
+        command = contract.stored_to_hdf5(contract.binarize(np.asarray(action, dtype=np.float64)))
+        control_step(self.model, data, controller, command)
+        self._steps += 1
+        info = self._info()
+        terminated = self.terminate_on_success and info["success"]
+        truncated = self._steps >= self.horizon and not terminated
+        return self._observe(), float(info["success"]), terminated, truncated, info
+
+    def render(self) -> NDArray[np.uint8]:
+        """The picture of the first camera, (S, S, 3) uint8."""
+        return self.render_camera(self.cameras[0])
+
+    def render_camera(self, camera: str | mujoco.MjvCamera) -> NDArray[np.uint8]:
+        """A picture (S, S, 3) uint8 of the present state from any camera of the model, or a free one."""
+        if self._renderer is None:
+            shadows = self.render_preset == "quality"
+            self._renderer = SceneRenderer(self.model, self.image_size, self.image_size, shadows=shadows)
+        return self._renderer.render(self.data, camera)
+
+    def close(self) -> None:
+        """Free the OpenGL context."""
+        self._close_renderer()
+
+    def _close_renderer(self) -> None:
+        if self._renderer is not None:
+            self._renderer.close()
+            self._renderer = None
+
+    def _observe(self) -> Observation:
+        if self.render_observations or not self._pixels:
+            self._pixels = {camera: self.render_camera(camera) for camera in self.cameras}
+        return {"pixels": dict(self._pixels), "agent_pos": read_state(self.model, self.data)}
+
+    def _info(self) -> dict[str, Any]:
+        terms: dict[str, bool] = {}
+        success = bool(self.declaration.goal.evaluate(self.scene, self.data, terms))
+        return {
+            "success": success,
+            "is_success": success,
+            "success_terms": terms,
+            "instruction": self.scene.instruction,
+            "task": self.task,
+            "scene": {"layout_id": self.scene.layout_id, "style_id": self.scene.style_id},
+            "seed": self.scene.seed,
+        }

@@ -1,0 +1,102 @@
+"""Placing objects on surfaces: rejection sampling of footprints that do not overlap, with the generator passed in."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+MAX_SAMPLES = 500
+MAX_YAW_RAD = np.pi / 4  # of the default rotation range, to either side
+
+
+class PlacementError(RuntimeError):
+    """No free place was found; the scene builder tries the whole scene again with the next draw."""
+
+
+@dataclass(frozen=True)
+class Footprint:
+    """An oriented rectangle on the floor plan: centre (metres), yaw (radians) and half sizes (metres)."""
+
+    x: float
+    y: float
+    yaw: float
+    half: tuple[float, float]
+
+    def axes(self) -> NDArray[np.float64]:
+        """Unit vectors of its edges as rows, shape (2, 2)."""
+        c, s = np.cos(self.yaw), np.sin(self.yaw)
+        return np.array([[c, s], [-s, c]])
+
+    def corners(self) -> NDArray[np.float64]:
+        """Corners, shape (4, 2)."""
+        signs = np.array([[1, 1], [-1, 1], [-1, -1], [1, -1]])
+        return np.array([self.x, self.y]) + (signs * self.half) @ self.axes()
+
+    def overlaps(self, other: Footprint, margin: float = 0.0) -> bool:
+        """Whether two rectangles come closer than `margin` metres (separating axis test)."""
+        a, b = self.corners(), other.corners()
+        for axis in np.vstack([self.axes(), other.axes()]):
+            along_a, along_b = a @ axis, b @ axis
+            if along_a.max() + margin < along_b.min() or along_b.max() + margin < along_a.min():
+                return False
+        return True
+
+
+@dataclass(frozen=True)
+class Area:
+    """A rectangle of a horizontal surface in the frame of a fixture.
+
+    Attributes:
+        x0, x1, y0, y1: bounds in the fixture's frame, metres.
+        origin: of that frame in the room (x, y), metres.
+        yaw: of that frame, radians.
+        z: height of the surface in the room, metres.
+    """
+
+    x0: float
+    x1: float
+    y0: float
+    y1: float
+    origin: tuple[float, float]
+    yaw: float
+    z: float
+
+    def sample(self, rng: np.random.Generator, half: tuple[float, float]) -> Footprint:
+        """A footprint of half sizes `half` whose corners lie in the area where it is large enough, else its centre."""
+        yaw = float(rng.uniform(-MAX_YAW_RAD, MAX_YAW_RAD))
+        c, s = abs(np.cos(yaw)), abs(np.sin(yaw))
+        reach_x, reach_y = c * half[0] + s * half[1], s * half[0] + c * half[1]
+        x = _uniform_inside(rng, self.x0, self.x1, reach_x)
+        y = _uniform_inside(rng, self.y0, self.y1, reach_y)
+        cos, sin = np.cos(self.yaw), np.sin(self.yaw)
+        return Footprint(
+            float(self.origin[0] + cos * x - sin * y), float(self.origin[1] + sin * x + cos * y), self.yaw + yaw, half
+        )
+
+
+def _uniform_inside(rng: np.random.Generator, low: float, high: float, reach: float) -> float:
+    if high - low <= 2 * reach:
+        return (low + high) / 2
+    return float(rng.uniform(low + reach, high - reach))
+
+
+def place(
+    rng: np.random.Generator,
+    areas: list[Area],
+    half: tuple[float, float],
+    occupied: list[Footprint],
+    margin: float = 0.01,
+) -> tuple[Footprint, Area]:
+    """Find a footprint in one of the areas that keeps `margin` metres from those occupied.
+
+    Raises:
+        PlacementError: none found in 500 draws.
+    """
+    for _ in range(MAX_SAMPLES):
+        area = areas[int(rng.integers(len(areas)))]
+        footprint = area.sample(rng, half)
+        if not any(footprint.overlaps(other, margin) for other in occupied):
+            return footprint, area
+    raise PlacementError(f"no free place for a footprint of {half[0] * 2:.2f} x {half[1] * 2:.2f} m")

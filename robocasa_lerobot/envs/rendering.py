@@ -1,0 +1,55 @@
+"""Pictures of a scene from its cameras: one OpenGL context per process and model, upright RGB out."""
+
+from __future__ import annotations
+
+import weakref
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from robocasa_lerobot.errors import UnknownNameError
+from robocasa_lerobot.gl import ensure_gl
+
+COLLISION_GROUP = 0  # geoms that only collide are not shown
+
+
+class SceneRenderer:
+    """Renders cameras of one model.
+
+    Args:
+        model: to render.
+        height, width: of the pictures, pixels.
+        shadows: shadows and reflections (render preset `quality`).
+    """
+
+    def __init__(self, model: mujoco.MjModel, height: int, width: int, *, shadows: bool = False) -> None:
+        ensure_gl()
+        model.vis.global_.offwidth = max(width, model.vis.global_.offwidth)
+        model.vis.global_.offheight = max(height, model.vis.global_.offheight)
+        self._model = model
+        self._renderer = mujoco.Renderer(model, height, width)
+        self._option = mujoco.MjvOption()
+        self._option.geomgroup[COLLISION_GROUP] = 0
+        self._shadows = shadows
+        # Also at exit, before Python takes the OpenGL library down under the context.
+        self._free = weakref.finalize(self, self._renderer.close)
+        self._names = {model.camera(i).name for i in range(model.ncam)}
+
+    def render(self, data: mujoco.MjData, camera: str | mujoco.MjvCamera) -> NDArray[np.uint8]:
+        """A picture of shape (height, width, 3), upright.
+
+        Raises:
+            UnknownNameError: the model has no camera of that name.
+        """
+        if isinstance(camera, str) and camera not in self._names:
+            raise UnknownNameError("camera", camera, self._names)
+        self._renderer.update_scene(data, camera, self._option)
+        flags = self._renderer.scene.flags
+        flags[mujoco.mjtRndFlag.mjRND_SHADOW] = self._shadows
+        flags[mujoco.mjtRndFlag.mjRND_REFLECTION] = self._shadows
+        return self._renderer.render()
+
+    def close(self) -> None:
+        """Free the OpenGL context."""
+        self._free()

@@ -1,0 +1,132 @@
+"""A built scene: the compiled model and what stands where. A pure function of (task, split, seed)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from robocasa_lerobot.envs.control.controller import RobotController
+from robocasa_lerobot.envs.control.step import control_step
+from robocasa_lerobot.envs.scene.fixtures.base import Fixture, yaw_quat
+from robocasa_lerobot.envs.scene.fixtures.cabinets import Drawer
+from robocasa_lerobot.envs.scene.fixtures.counters import Sink
+from robocasa_lerobot.envs.scene.objects.catalogue import Instance
+from robocasa_lerobot.envs.scene.robot import place_base, set_home
+from robocasa_lerobot.envs.scene.selection import RobotPose
+from robocasa_lerobot.envs.task import Task
+from robocasa_lerobot.contract import ACTION_SIZE
+
+SETTLE_STEPS = 10  # control steps without a command after placing everything (robocasa facts, section 1)
+
+
+@dataclass(frozen=True)
+class PlacedObject:
+    """An object of a scene: its model, and where it starts (centre in metres, yaw in radians)."""
+
+    name: str
+    item: Instance
+    pos: tuple[float, float, float]
+    yaw: float
+
+
+@dataclass
+class Scene:
+    """A kitchen made for an episode.
+
+    Attributes:
+        task, split, seed: what it was made from.
+        layout_id, style_id: of the kitchen.
+        spec: the MjSpec; its XML names assets by portable paths.
+        model: compiled.
+        fixtures: by name.
+        roles: fixture name of each role of the task.
+        objects: by name.
+        openness: initial share of full travel by fixture name.
+        robot: start pose of the base.
+        instruction: what the robot is told.
+        arm_noise_rad: standard deviation of the noise on the initial arm pose.
+    """
+
+    task: Task
+    split: str
+    seed: int
+    layout_id: int
+    style_id: int
+    spec: mujoco.MjSpec
+    model: mujoco.MjModel
+    fixtures: dict[str, Fixture]
+    roles: dict[str, str]
+    objects: dict[str, PlacedObject]
+    openness: dict[str, float]
+    robot: RobotPose
+    instruction: str
+    arm_noise_rad: float = 0.02
+    cameras: dict[str, Any] = field(default_factory=dict)
+
+    def fixture(self, role: str) -> Fixture:
+        """The fixture of a role."""
+        return self.fixtures[self.roles[role]]
+
+    def drawer(self, role: str) -> Drawer:
+        """The drawer of a role."""
+        fixture = self.fixture(role)
+        assert isinstance(fixture, Drawer), f"{role} is no drawer"
+        return fixture
+
+    def sink(self, role: str) -> Sink:
+        """The sink of a role."""
+        fixture = self.fixture(role)
+        assert isinstance(fixture, Sink), f"{role} is no sink"
+        return fixture
+
+    def initial_data(self, rng: np.random.Generator) -> tuple[mujoco.MjData, RobotController]:
+        """State at the start of an episode: everything placed, then settled without commands."""
+        data = mujoco.MjData(self.model)
+        place_base(self.model, data, self.robot.x, self.robot.y, self.robot.yaw)
+        set_home(self.model, data, rng, self.arm_noise_rad)
+        for name, openness in self.openness.items():
+            fixture = self.fixtures[name]
+            assert isinstance(fixture, Drawer)
+            fixture.set_openness(data, openness)
+        for placed in self.objects.values():
+            data.joint(f"{placed.name}_joint0").qpos[:] = [*placed.pos, *yaw_quat(placed.yaw)]
+        mujoco.mj_forward(self.model, data)
+        controller = RobotController(self.model, data)
+        controller.reset()
+        hold = np.zeros(ACTION_SIZE)
+        for _ in range(SETTLE_STEPS):
+            control_step(self.model, data, controller, hold)
+        data.time = 0.0
+        return data, controller
+
+    def ep_meta(self) -> dict[str, Any]:
+        """Description of the episode in RoboCasa's keys (JSON-able)."""
+        return {
+            "layout_id": self.layout_id,
+            "style_id": self.style_id,
+            "split": self.split,
+            "seed": self.seed,
+            "lang": self.instruction,
+            "object_cfgs": [
+                {
+                    "name": placed.name,
+                    "type": "object",
+                    "info": {
+                        "cat": placed.item.category.name,
+                        "model": placed.item.model,
+                        "split": self.split,
+                        "groups": list(placed.item.category.groups),
+                    },
+                    "placement": {"pos": list(placed.pos), "yaw": placed.yaw},
+                }
+                for placed in self.objects.values()
+            ],
+            "fixtures": {name: {"cls": type(fixture).__name__} for name, fixture in self.fixtures.items()},
+            "fixture_refs": dict(self.roles),
+            "cam_configs": self.cameras,
+            "init_robot_base_pos": [self.robot.x, self.robot.y, 0.0],
+            "init_robot_base_ori": [0.0, 0.0, self.robot.yaw],
+        }

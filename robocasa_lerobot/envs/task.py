@@ -1,0 +1,157 @@
+"""The words that a task is declared in: fixtures wanted, objects, robot start, initial state, goal, stages.
+
+A task is data. The scene builder reads what is wanted, the env reads the goal, the demonstrator reads the stages.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+from robocasa_lerobot.envs.predicates import Goal
+
+
+@dataclass(frozen=True)
+class FixtureWanted:
+    """A fixture that plays a role in a task.
+
+    Attributes:
+        role: name by which the rest of the declaration calls it.
+        kind: a key of `scene.selection.FIXTURE_KINDS`, e.g. "drawer_top" or "sink".
+    """
+
+    role: str
+    kind: str
+
+
+@dataclass(frozen=True)
+class OnCounter:
+    """Start on the counter that carries, or is cut by, the fixture of a role.
+
+    Attributes:
+        near: role of the reference fixture.
+        loc: "above" centres the region on the fixture; "left_right" puts it directly left or right of it.
+        size: width and depth of the region, metres.
+        at: "front" or "back" edge of the counter that the region starts from.
+        offset: shift of the region to the right and towards the wall, metres.
+    """
+
+    near: str
+    loc: str = "above"
+    size: tuple[float, float] = (1.0, 0.5)
+    at: str = "front"
+    offset: tuple[float, float] = (0.0, 0.0)
+
+
+@dataclass(frozen=True)
+class InsideOf:
+    """Start inside the fixture of a role.
+
+    Attributes:
+        fixture: role.
+        size: width and depth of the part of its floor that is used, metres.
+        at: where that part lies: -1 at the front, 0 in the middle, 1 at the back.
+    """
+
+    fixture: str
+    size: tuple[float, float]
+    at: float = 0.0
+
+
+@dataclass(frozen=True)
+class ObjectWanted:
+    """An object, or several alike, and where it starts.
+
+    Attributes:
+        name: in the scene; several get `<name>_<i>`.
+        groups: object groups to draw from.
+        start: where.
+        count: least and greatest number, both possible.
+        graspable, washable: properties asked for.
+        max_height: bound of its size along z, metres.
+    """
+
+    name: str
+    groups: tuple[str, ...]
+    start: OnCounter | InsideOf
+    count: tuple[int, int] = (1, 1)
+    graspable: bool = False
+    washable: bool = False
+    max_height: float | None = None
+
+
+@dataclass(frozen=True)
+class RobotStart:
+    """Where the robot stands: facing a fixture, in front of it or beside it.
+
+    Attributes:
+        fixture: role.
+        beside: stand half the fixture's width plus 0.2 m to its left or right, whichever is free.
+        deviation: half ranges of the uniform noise along and towards the counter, metres.
+    """
+
+    fixture: str
+    beside: bool = False
+    deviation: tuple[float, float] = (0.15, 0.05)
+
+
+@dataclass(frozen=True)
+class InitialOpenness:
+    """Initial openness of a drawer or door, uniform between two shares of its full travel."""
+
+    fixture: str
+    low: float
+    high: float
+
+
+@dataclass(frozen=True)
+class Stage:
+    """One use of a foundational skill; the demonstrator carries the stages out in order.
+
+    Attributes:
+        skill: one of the eight: "drawers", "pick_place", ...
+        verb: what is done, e.g. "open".
+        target: role of the fixture.
+        object: name of the object that is handled, if any.
+    """
+
+    skill: str
+    verb: str
+    target: str
+    object: str = ""
+
+
+@dataclass(frozen=True)
+class Task:
+    """A task declaration.
+
+    Attributes:
+        name: id, as in RoboCasa365.
+        kind: "atomic" or "composite".
+        activity: for composite tasks the activity group, else "atomic".
+        horizon: control steps at 20 Hz until an episode counts as failed.
+        fixtures, objects, robot_start, initial: the scene.
+        goal: what must hold; its terms are reported one by one.
+        instruction: template; fields are "{side}" and names of objects.
+        paraphrases: other wordings, kept apart as novel language.
+        stages: the plan.
+        sets: names of the task sets it belongs to.
+    """
+
+    name: str
+    kind: str
+    activity: str
+    horizon: int
+    fixtures: tuple[FixtureWanted, ...]
+    robot_start: RobotStart
+    goal: Goal
+    instruction: str
+    stages: tuple[Stage, ...]
+    objects: tuple[ObjectWanted, ...] = ()
+    initial: tuple[InitialOpenness, ...] = ()
+    paraphrases: tuple[str, ...] = ()
+    sets: tuple[str, ...] = ()
+    summary: str = field(default="", compare=False)
+
+
+TaskFactory = Callable[[], Task]

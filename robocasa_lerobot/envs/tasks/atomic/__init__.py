@@ -1,0 +1,1 @@
+"""Tasks of one skill each."""

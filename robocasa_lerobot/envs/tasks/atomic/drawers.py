@@ -1,0 +1,69 @@
+"""OpenDrawer and CloseDrawer: one top drawer, the robot standing beside it."""
+
+from robocasa_lerobot.envs.predicates import DrawerClosed, DrawerOpen
+from robocasa_lerobot.envs.task import (
+    FixtureWanted,
+    InitialOpenness,
+    InsideOf,
+    ObjectWanted,
+    OnCounter,
+    RobotStart,
+    Stage,
+    Task,
+)
+
+_FIXTURES = (FixtureWanted("drawer", "drawer_top"),)
+# The base is placed as exactly as the original does for tasks beside a fixture.
+_START = RobotStart("drawer", beside=True, deviation=(0.05, 0.05))
+_OBJECTS = (
+    ObjectWanted("drawer_obj", ("tool", "utensil"), InsideOf("drawer", size=(0.30, 0.30), at=-0.75), max_height=0.10),
+    ObjectWanted(
+        "distr_counter", ("any",), OnCounter("drawer", size=(1.0, 0.5), at="front", offset=(0.0, 0.1)), count=(1, 3)
+    ),
+)
+
+OPEN_DRAWER = Task(
+    name="OpenDrawer",
+    kind="atomic",
+    activity="atomic",
+    horizon=750,
+    summary="Goal: pull a closed top drawer out. Success: at least 95 % of its full travel.",
+    fixtures=_FIXTURES,
+    robot_start=_START,
+    objects=_OBJECTS,
+    initial=(InitialOpenness("drawer", 0.0, 0.0),),
+    goal=DrawerOpen("drawer", at_least=0.95),
+    instruction="Pull the {side} drawer out as far as it goes.",
+    paraphrases=(
+        "Slide out the drawer on your {side}.",
+        "The {side} drawer should be wide open.",
+        "Take the handle of the {side} drawer and draw it towards you.",
+        "Get the drawer to the {side} fully extended.",
+    ),
+    stages=(Stage("drawers", "open", "drawer"),),
+    sets=("pretrain50", "pretrain100", "pretrain200", "pretrain300", "atomic_seen", "lifelong_phase1", "mimicgen60"),
+)
+
+CLOSE_DRAWER = Task(
+    name="CloseDrawer",
+    kind="atomic",
+    activity="atomic",
+    horizon=450,
+    summary="Goal: push an open top drawer in. Success: at most 5 % of its full travel left.",
+    fixtures=_FIXTURES,
+    robot_start=_START,
+    objects=_OBJECTS,
+    initial=(InitialOpenness("drawer", 0.90, 1.0),),
+    goal=DrawerClosed("drawer", at_most=0.05),
+    instruction="Push the {side} drawer shut.",
+    paraphrases=(
+        "Slide the drawer on your {side} back in.",
+        "The {side} drawer should be closed.",
+        "Put the {side} drawer back all the way into the cabinet.",
+        "Make sure that no gap is left at the {side} drawer.",
+    ),
+    stages=(Stage("drawers", "close", "drawer"),),
+    sets=("pretrain100", "pretrain200", "pretrain300", "lifelong_phase1", "mimicgen60"),
+)
+
+TASKS = (OPEN_DRAWER, CLOSE_DRAWER)
