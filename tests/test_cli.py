@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 import argparse
+import re
 import subprocess
 import sys
+from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
 
 from robocasa_lerobot import __version__, cli
 from robocasa_lerobot.errors import UserError
+
+REPOSITORY = Path(__file__).parents[1]
 
 
 @pytest.mark.parametrize("name", cli.SUBCOMMANDS)
@@ -32,7 +36,12 @@ def test_example_parses(name: str) -> None:
     for line in example.strip().splitlines():
         words = line.split("#")[0].split()
         assert words[:2] == ["robocasa-lerobot", name]
-        assert parser.parse_args(words[1:]).run is not None
+        args, settings = parser.parse_known_args(words[1:])
+        assert callable(args.run)
+        assert not settings or args.takes_settings
+        assert all(re.match(r"--[\w.]+=", setting) for setting in settings)
+        for path in re.findall(r"configs/\S+", line):
+            assert (REPOSITORY / path).is_file(), f"{path} of the example does not exist"
 
 
 def test_no_command_lists_them(capsys: pytest.CaptureFixture[str]) -> None:
