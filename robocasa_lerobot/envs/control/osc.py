@@ -41,6 +41,8 @@ class OperationalSpaceArm:
         self._velocity = np.zeros((2, 6))  # of grip and base site; MuJoCo's order: angular, linear
         self._wanted = np.zeros((2, 6, 1))  # accelerations of the grip site: of the task, and due to the posture
         self._inverse_inertia = np.zeros((2, 6, 6))  # decoupled, and whole
+        self._base_pos = np.zeros(3)
+        self._base_mat = np.eye(3)
         self._goal_pos: NDArray[np.float64] = np.zeros(3)
         self._goal_mat: NDArray[np.float64] = np.eye(3)
         self._posture: NDArray[np.float64] = np.zeros(7)
@@ -48,13 +50,16 @@ class OperationalSpaceArm:
     def reset(self, data: mujoco.MjData) -> None:
         """Take the present pose as goal and the present joint angles as null-space posture."""
         self._posture = data.qpos[self._qpos]
+        self._remember_base(data)
         self._goal_pos, self._goal_mat = self._pose_in_base(data)
 
     def set_goal(self, data: mujoco.MjData, command: NDArray[np.float64], keep_goal: bool) -> None:
         """Move the goal by `command` (6,): translation and axis-angle rotation in the base frame, each within +-1.
 
         With `keep_goal` the motion is added to the previous goal (RoboCasa's "desired"), otherwise to the pose that
-        the arm has reached ("achieved"), which forgets what was not followed.
+        the arm has reached ("achieved"), which forgets what was not followed. As in robosuite, the reached pose is
+        taken relative to the base of the last physics step, which a moving base or torso has just left: the goal
+        then trails by up to 2 mm.
         """
         if not keep_goal:
             self._goal_pos, self._goal_mat = self._pose_in_base(data)
@@ -74,11 +79,12 @@ class OperationalSpaceArm:
         arm_jacobian = jacobian.take(self._qvel, axis=1)
         mass = data.M[self._mass]
         positions, matrices = data.site_xpos, data.site_xmat
-        base_mat = matrices[self._base].reshape(3, 3)
+        self._remember_base(data)
+        base_mat = self._base_mat
 
         # Accelerations wanted at the grip site; the damping acts on the velocity relative to the base site's.
         wanted = self._wanted[0]
-        wanted[:3, 0] = base_mat @ self._goal_pos + (positions[self._base] - positions[self._grip])
+        wanted[:3, 0] = base_mat @ self._goal_pos + (self._base_pos - positions[self._grip])
         wanted[3:, 0] = _rotation_error(base_mat @ self._goal_mat, matrices[self._grip].reshape(3, 3))
         wanted *= KP
         damping = KD * (velocity[1] - velocity[0])
@@ -103,10 +109,13 @@ class OperationalSpaceArm:
         wrench = forces[0, :, 0] - forces[1, :, 0]
         return wrench @ arm_jacobian + mass @ posture + data.qfrc_bias[self._qvel]
 
+    def _remember_base(self, data: mujoco.MjData) -> None:
+        self._base_pos[:] = data.site_xpos[self._base]
+        self._base_mat[:] = data.site_xmat[self._base].reshape(3, 3)
+
     def _pose_in_base(self, data: mujoco.MjData) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        base_mat = data.site_xmat[self._base].reshape(3, 3)
-        offset = data.site_xpos[self._grip] - data.site_xpos[self._base]
-        return base_mat.T @ offset, base_mat.T @ data.site_xmat[self._grip].reshape(3, 3)
+        grip_mat = data.site_xmat[self._grip].reshape(3, 3)
+        return self._base_mat.T @ (data.site_xpos[self._grip] - self._base_pos), self._base_mat.T @ grip_mat
 
 
 def _rotation_error(goal: NDArray[np.float64], present: NDArray[np.float64]) -> tuple[float, float, float]:

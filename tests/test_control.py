@@ -1,0 +1,391 @@
+"""The controllers: what they do to the robot, measured, and against recorded answers of robosuite."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import mujoco
+import numpy as np
+import pytest
+from robot_arena import SHARED, Arena, action, arena_spec
+
+from robocasa_lerobot.contract import ContractError
+from robocasa_lerobot.envs.control import indices
+from robocasa_lerobot.envs.control.osc import KD, KP, NULLSPACE_KD, NULLSPACE_KP
+from robocasa_lerobot.envs.scene import robot_names as names
+
+TORSO = names.TORSO_JOINT
+FORWARD, SIDE, YAW = names.BASE_JOINTS
+
+
+@pytest.fixture(scope="module")
+def model() -> mujoco.MjModel:
+    return arena_spec().compile()
+
+
+def _speed(arena: Arena, joint: str) -> float:
+    return float(arena.data.joint(joint).qvel[0])
+
+
+# --- base ----------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("joint", [FORWARD, SIDE])
+@pytest.mark.parametrize(("command", "speed"), [(0.5, 0.25), (0.75, 0.50), (1.0, 0.745), (-1.0, -0.745)])
+def test_base_speed_is_the_command_less_the_dead_zone(
+    model: mujoco.MjModel, joint: str, command: float, speed: float
+) -> None:
+    arena = Arena.settled(model)
+    arena.run(action(1.0, base=(command, 0, 0) if joint == FORWARD else (0, command, 0)), 30)
+    assert _speed(arena, joint) == pytest.approx(speed, rel=0.05)
+
+
+@pytest.mark.parametrize(("command", "rate"), [(0.25, 0.21), (0.5, 0.58), (1.0, 1.325), (-1.0, -1.325)])
+def test_base_yaw_rate(model: mujoco.MjModel, command: float, rate: float) -> None:
+    arena = Arena.settled(model)
+    arena.run(action(1.0, base=(0, 0, command)), 30)
+    assert _speed(arena, YAW) == pytest.approx(rate, rel=0.05)
+
+
+def test_small_base_commands_creep(model: mujoco.MjModel) -> None:
+    arena = Arena.settled(model)
+    arena.run(action(1.0, base=(0.2, 0, 0)), 20)
+    assert abs(_speed(arena, FORWARD)) < 0.02
+
+
+@pytest.mark.parametrize("yaw", [0.0, 0.9, -np.pi / 2, 2.5])
+def test_forward_and_left_are_those_of_the_present_heading(model: mujoco.MjModel, yaw: float) -> None:
+    for command, direction in (((1.0, 0, 0), yaw), ((0, 1.0, 0), yaw + np.pi / 2)):
+        arena = Arena.settled(model, yaw=yaw, steps=1)
+        before = arena.state()[:2]
+        arena.run(action(1.0, base=command), 20)
+        moved = arena.state()[:2] - before
+        across = moved @ np.array((-np.sin(direction), np.cos(direction)))
+        along = moved @ np.array((np.cos(direction), np.sin(direction)))
+        assert along > 0.3
+        # At a heading off the axes the friction of each slide takes its own share, so the course bends a little.
+        assert abs(across) < 0.35 * along
+
+
+# --- torso and gripper ---------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("command", "speed"), [(0.3, 0.027), (0.5, 0.15)])
+def test_torso_speed(model: mujoco.MjModel, command: float, speed: float) -> None:
+    arena = Arena.settled(model)
+    arena.run(action(torso=command), 10)
+    before = arena.joint(TORSO)
+    arena.run(action(torso=command), 10)
+    assert (arena.joint(TORSO) - before) / 0.5 == pytest.approx(speed, rel=0.05)  # it is faster early in each step
+
+
+def test_torso_reaches_its_end_within_a_second_and_holds_when_idle(model: mujoco.MjModel) -> None:
+    arena = Arena.settled(model)
+    arena.run(action(torso=1.0), 20)
+    assert arena.joint(TORSO) == pytest.approx(0.34, abs=0.005)
+    arena.run(action(torso=-1.0), 8)
+    arena.run(action(), 5)
+    height = arena.joint(TORSO)
+    assert 0.05 < height < 0.3
+    arena.run(action(), 20)
+    assert arena.joint(TORSO) == pytest.approx(height, abs=1e-3)
+    assert arena.state()[2] == pytest.approx(0.70 + height, abs=1e-3)
+
+
+def test_gripper_closes_and_opens_in_the_measured_steps(model: mujoco.MjModel) -> None:
+    arena = Arena.settled(model)
+
+    def opening() -> float:
+        return arena.joint(names.FINGER_JOINTS[0])
+
+    closing_steps = 0
+    while opening() > 0.002 and closing_steps < 30:
+        arena.run(action(gripper=1.0))
+        closing_steps += 1
+    assert 7 <= closing_steps <= 10
+    arena.run(action(gripper=1.0), 20)
+    opening_steps = 0
+    while opening() < 0.039 and opening_steps < 40:
+        arena.run(action(gripper=-1.0))
+        opening_steps += 1
+    assert 15 <= opening_steps <= 19
+
+
+def test_gripper_command_of_zero_holds(model: mujoco.MjModel) -> None:
+    arena = Arena.settled(model)
+    arena.run(action(gripper=-1.0), 3)
+    arena.run(action(), 12)
+    target = arena.data.ctrl[indices.actuators(model, names.FINGER_ACTUATORS)]
+    np.testing.assert_allclose(target, [0.032, -0.032], atol=1e-12)  # half open plus three steps of 4 mm
+    assert arena.joint(names.FINGER_JOINTS[0]) > 0.028
+
+
+# --- arm -----------------------------------------------------------------------------------------------------------
+
+DIRECTIONS = [(axis, sign) for axis in range(3) for sign in (1.0, -1.0)]
+
+
+def test_arm_in_achieved_mode_follows_a_quarter_of_the_command(model: mujoco.MjModel) -> None:
+    arena = Arena.settled(model)
+    start = arena.state()[7:10]
+    arena.run(action(-1.0, position=(1.0, 0, 0)), 10)
+    assert arena.state()[7] - start[0] == pytest.approx(0.116, rel=0.05)
+    before = arena.state()[7]
+    arena.run(action(-1.0, position=(1.0, 0, 0)), 5)
+    assert (arena.state()[7] - before) / 5 == pytest.approx(0.013, rel=0.05)
+
+
+def test_arm_moves_down_in_achieved_mode(model: mujoco.MjModel) -> None:
+    arena = Arena.settled(model)
+    start = arena.state()[9]
+    arena.run(action(-1.0, position=(0, 0, -1.0)), 20)
+    assert arena.state()[9] - start == pytest.approx(-0.244, rel=0.05)
+
+
+def test_arm_in_desired_mode_follows_the_whole_command(model: mujoco.MjModel) -> None:
+    arena = Arena.settled(model)
+    start = arena.state()[7]
+    arena.run(action(1.0, position=(1.0, 0, 0)), 10)
+    assert arena.state()[7] - start == pytest.approx(0.34, rel=0.05)  # 0.5 commanded, less the lag
+    arena.run(action(1.0), 15)
+    assert arena.state()[7] - start == pytest.approx(0.5, abs=0.01)
+
+
+@pytest.mark.parametrize(("axis", "sign"), DIRECTIONS)
+def test_arm_translates_along_the_commanded_axis_of_the_base(model: mujoco.MjModel, axis: int, sign: float) -> None:
+    arena = Arena.settled(model, yaw=0.8)
+    start = arena.state()[7:10]
+    command = np.zeros(3)
+    command[axis] = 0.4 * sign
+    arena.run(action(1.0, position=tuple(command)), 5)
+    arena.run(action(1.0), 20)
+    np.testing.assert_allclose(arena.state()[7:10] - start, 5 * 0.05 * command, atol=0.004)
+
+
+@pytest.mark.parametrize(("axis", "sign"), DIRECTIONS)
+def test_arm_rotates_about_the_commanded_axis_of_the_base(model: mujoco.MjModel, axis: int, sign: float) -> None:
+    arena = Arena.settled(model, yaw=-0.5)
+    start, before = arena.controller.arm.goal_in_base()[1], arena.state()[7:10]
+    command = np.zeros(3)
+    command[axis] = 0.2 * sign
+    arena.run(action(1.0, rotation=tuple(command)), 3)
+    goal = arena.controller.arm.goal_in_base()[1]
+    arena.run(action(1.0), 25)
+    angle = 3 * 0.5 * 0.2 * sign
+    vector = np.array(_axial(goal @ start.T))
+    np.testing.assert_allclose(vector, np.eye(3)[axis] * np.sin(angle), atol=1e-3)
+    base, grip = arena.data.site(names.ARM_CENTER_SITE).xmat, arena.data.site(names.GRIP_SITE).xmat
+    reached = base.reshape(3, 3).T @ grip.reshape(3, 3)
+    assert np.linalg.norm(_axial(goal @ reached.T)) < np.radians(1.0)
+    np.testing.assert_allclose(arena.state()[7:10], before, atol=0.01)
+
+
+def _axial(matrix: np.ndarray) -> tuple[float, float, float]:
+    return (
+        0.5 * (matrix[2, 1] - matrix[1, 2]),
+        0.5 * (matrix[0, 2] - matrix[2, 0]),
+        0.5 * (matrix[1, 0] - matrix[0, 1]),
+    )
+
+
+def test_zero_action_does_not_drift(model: mujoco.MjModel) -> None:
+    arena = Arena.settled(model)
+    start = arena.state()
+    arena.run(action(), 200)
+    np.testing.assert_allclose(arena.state()[:14], start[:14], atol=1e-4)
+
+
+def test_arm_stays_behind_or_rides_along_while_the_base_turns(model: mujoco.MjModel) -> None:
+    lag = {}
+    for mode in (-1.0, 1.0):
+        arena = Arena.settled(model)
+        start = arena.state()[7:10]
+        arena.run(action(mode, base=(0, 0, 1.0)), 40)
+        lag[mode] = np.linalg.norm(arena.state()[7:10] - start)
+    assert lag[-1.0] == pytest.approx(0.46, rel=0.15)
+    assert lag[1.0] < 0.055
+
+
+def test_torso_motion_moves_the_arm_little(model: mujoco.MjModel) -> None:
+    arena = Arena.settled(model)
+    start = arena.state()[7:10]
+    arena.run(action(1.0, torso=0.5), 20)
+    arena.run(action(1.0), 10)
+    assert np.linalg.norm(arena.state()[7:10] - start) < 0.005
+
+
+def test_torques_agree_with_the_textbook_formula(model: mujoco.MjModel) -> None:
+    """The controller's shortened algebra against explicit matrices, in a moving state off the goal."""
+    arena = Arena.settled(model, yaw=0.3)
+    arena.run(action(1.0, position=(0.8, -0.5, 0.3), rotation=(0.3, 0.4, -0.6), base=(0.7, 0.4, 0.5), torso=0.5), 3)
+    data, arm = arena.data, arena.controller.arm
+    dofs = indices.joint_velocities(model, names.ARM_JOINTS)
+    full = np.zeros((model.nv, model.nv))
+    mujoco.mj_fullM(model, data, full)
+    mass = full[np.ix_(dofs, dofs)]
+    grip, base = model.site(names.GRIP_SITE).id, model.site(names.ARM_CENTER_SITE).id
+    jacobians = {}
+    for site in (grip, base):
+        jacobians[site] = np.zeros((6, model.nv))
+        mujoco.mj_jacSite(model, data, jacobians[site][:3], jacobians[site][3:], site)
+    jacobian = jacobians[grip][:, dofs]
+    velocity = (jacobians[base] - jacobians[grip]) @ data.qvel
+    rotation = data.site_xmat[base].reshape(3, 3)
+    goal_pos, goal_mat = arm.goal_in_base()
+    present = data.site_xmat[grip].reshape(3, 3)
+    error = 0.5 * np.cross(present.T, (rotation @ goal_mat).T).sum(axis=0)
+    wanted = KD * velocity
+    wanted[:3] += KP * (data.site_xpos[base] + rotation @ goal_pos - data.site_xpos[grip])
+    wanted[3:] += KP * error
+    inverse = np.linalg.inv(mass)
+    force = np.linalg.inv(jacobian[:3] @ inverse @ jacobian[:3].T) @ wanted[:3]
+    torque = np.linalg.inv(jacobian[3:] @ inverse @ jacobian[3:].T) @ wanted[3:]
+    inertia = np.linalg.inv(jacobian @ inverse @ jacobian.T)
+    nullspace = np.eye(7) - inverse @ jacobian.T @ inertia @ jacobian
+    qpos, qvel = data.qpos[indices.joint_positions(model, names.ARM_JOINTS)], data.qvel[dofs]
+    home = np.array([Arena.settled(model, steps=0).joint(name) for name in names.ARM_JOINTS])
+    posture = mass @ (NULLSPACE_KP * (home - qpos) - NULLSPACE_KD * qvel)
+    expected = jacobian.T @ np.concatenate((force, torque)) + nullspace.T @ posture + data.qfrc_bias[dofs]
+    np.testing.assert_allclose(arm.torques(data), expected, rtol=1e-8, atol=1e-8)
+
+
+# --- actions -------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("index", "joints"),
+    [(6, names.FINGER_JOINTS), (7, names.BASE_JOINTS[:1]), (8, names.BASE_JOINTS[1:2]), (9, names.BASE_JOINTS[2:])]
+    + [(10, (TORSO,))]
+    + [(i, names.ARM_JOINTS) for i in range(6)],
+)
+def test_each_action_component_drives_its_own_joints(
+    model: mujoco.MjModel, index: int, joints: tuple[str, ...]
+) -> None:
+    command = action(1.0)
+    command[index] = 1.0
+    arena, idle = Arena.settled(model), Arena.settled(model)
+    arena.run(command, 4)
+    idle.run(action(1.0), 4)
+    moved = {name: abs(arena.joint(name) - idle.joint(name)) for name in names.JOINTS}
+    driven = max(moved[name] for name in joints)
+    groups = (names.ARM_JOINTS, names.FINGER_JOINTS, (TORSO,), *((name,) for name in names.BASE_JOINTS))
+    for group in groups:
+        if not set(group) & set(joints) and group is not names.ARM_JOINTS:  # the arm makes up for the base's jerk
+            assert max(moved[name] for name in group) < 0.15 * driven
+    assert driven > 0.003
+
+
+def test_actions_beyond_one_are_clipped(model: mujoco.MjModel) -> None:
+    states = []
+    for size in (1.0, 50.0):
+        arena = Arena.settled(model)
+        arena.run(action(1.0, position=(size, 0, -size), base=(size, 0, 0), torso=size), 5)
+        states.append(arena.state())
+    np.testing.assert_array_equal(states[0], states[1])
+
+
+@pytest.mark.parametrize("bad", [np.zeros(11), np.zeros((1, 12)), np.full(12, np.nan), np.full(12, np.inf)])
+def test_bad_actions_are_refused_and_change_nothing(model: mujoco.MjModel, bad: np.ndarray) -> None:
+    arena = Arena.settled(model)
+    before = arena.data.qpos.copy(), arena.data.time
+    with pytest.raises(ContractError):
+        arena.run(bad)
+    np.testing.assert_array_equal(arena.data.qpos, before[0])
+    assert arena.data.time == before[1]
+
+
+def test_a_control_step_is_fifty_milliseconds_and_leaves_fresh_poses(model: mujoco.MjModel) -> None:
+    arena = Arena.settled(model, steps=0)
+    arena.run(action(1.0, position=(1, 1, 1), base=(1, 0, 0)), 3)
+    assert arena.data.time == pytest.approx(0.15)
+    seen = arena.state()
+    mujoco.mj_forward(model, arena.data)
+    np.testing.assert_array_equal(arena.state(), seen)
+
+
+def test_the_same_actions_give_the_same_bits(model: mujoco.MjModel) -> None:
+    commands = np.random.default_rng(3).uniform(-1, 1, (15, 12))
+    states = []
+    for _ in range(2):
+        arena = Arena.settled(model)
+        for command in commands:
+            arena.run(command)
+        states.append(np.concatenate((arena.data.qpos, arena.data.qvel)))
+    np.testing.assert_array_equal(*states)
+
+
+# --- recorded answers of robosuite ---------------------------------------------------------------------------------
+
+# Position of one joint after some steps of a trace (m, rad), kept here so that the comparison also runs where the
+# recordings are not: (trace, its action, steps, joint, position).
+GOLDEN = [
+    ("static", action(), 100, "robot0_joint4", -2.27551),
+    ("base_forward_+1.00", action(1.0, base=(1, 0, 0)), 10, FORWARD, 0.32115),
+    ("base_left_+1.00", action(1.0, base=(0, 1, 0)), 10, SIDE, 0.32104),
+    ("base_yaw_+1.00", action(1.0, base=(0, 0, 1)), 10, YAW, 0.65759),
+    ("torso_+0.5", action(torso=0.5), 10, TORSO, 0.07527),
+    ("arm_x+1_mode-1", action(-1.0, position=(1, 0, 0)), 10, "robot0_joint2", -0.75266),
+    ("arm_x+1_mode+1", action(1.0, position=(1, 0, 0)), 10, "robot0_joint2", -0.13476),
+    ("gripper_close_open", action(gripper=1.0), 10, names.FINGER_JOINTS[0], 0.00134),
+]
+
+
+@pytest.mark.parametrize(("name", "command", "steps", "joint", "value"), GOLDEN, ids=[g[0] for g in GOLDEN])
+def test_joint_positions_recorded_from_robosuite(
+    model: mujoco.MjModel, name: str, command: np.ndarray, steps: int, joint: str, value: float
+) -> None:
+    arena = Arena.settled(model)
+    offset = arena.joint(joint) if joint in (FORWARD, SIDE) else 0.0
+    arena.run(command, steps)
+    assert arena.joint(joint) - offset == pytest.approx(value, abs=5e-5)
+
+
+TRACES = SHARED / "real" / "robosuite_traces" / "panda_omron_traces.npz"
+NEEDS_TRACES = pytest.mark.skipif(not TRACES.exists(), reason="the recorded traces are not here")
+# 1.5.1 moves its "forward" joint for sideways commands: its first two joints are ours exchanged.
+OUR_ORDER = [1, 0, *range(2, 13)]
+# After some 110 steps this one drives the arm through singular poses with torques a thousandfold over their limits
+# and amplifies a difference of 1e-7 rad tenfold in every few steps: it is compared up to there.
+CHAOTIC_AFTER = {"arm_random_mode+1": 110}
+
+
+@cache
+def _traces() -> dict[str, np.ndarray]:
+    with np.load(TRACES) as file:
+        return {key: file[key] for key in file.files}
+
+
+def _trace_names() -> list[str]:
+    return [str(name) for name in _traces()["names"]] if TRACES.exists() else []
+
+
+FAST_TRACES = ("arm_and_base_random", "base_yaw_-1.00", "torso_+1.0", "gripper_close_open", "arm_rx+1_mode+1")
+
+
+@pytest.fixture(scope="module")
+def single_contact_model() -> mujoco.MjModel:
+    """The traces' arena finds one contact per pair of convex shapes, RoboCasa's kitchens several."""
+    spec = arena_spec()
+    spec.option.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_MULTICCD)
+    return spec.compile()
+
+
+@NEEDS_TRACES
+@pytest.mark.parametrize(
+    "name", [n if n in FAST_TRACES else pytest.param(n, marks=pytest.mark.slow) for n in _trace_names()]
+)
+def test_replayed_traces_reach_the_recorded_joint_positions(single_contact_model: mujoco.MjModel, name: str) -> None:
+    traces = _traces()
+    actions, recorded = traces[f"{name}/actions"], traces[f"{name}/qpos"][:, OUR_ORDER]
+    steps = CHAOTIC_AFTER.get(name, len(actions))
+    arena = Arena.settled(single_contact_model)
+    own = [arena.data.qpos.copy()]
+    for command in actions[:steps]:
+        arena.run(command)
+        own.append(arena.data.qpos.copy())
+    ours = np.array(own) + np.array([10.0, 10.0, *np.zeros(11)])
+    error = np.abs(ours - recorded[: steps + 1])
+    # Off yaw 0 the base command of robosuite 1.5.1 is turned the other way, and the arm feels it.
+    base, arm = (5e-3, 2e-4) if name == "arm_and_base_random" else (2e-5, 2e-5)
+    assert error[:, :3].max() < base  # m, rad
+    assert error[:, 3:].max() < arm
