@@ -1,0 +1,75 @@
+"""`robocasa-lerobot convert`: demonstration files in, a LeRobotDataset v3.0 out."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+EXAMPLE = "robocasa-lerobot convert demos/*.hdf5 --out data/demos"
+
+_CODECS = ("h264", "hevc", "av1")
+_SHOWN_REJECTIONS = 5
+
+
+def configure(parser: argparse.ArgumentParser) -> None:
+    """Add the options."""
+    parser.add_argument(
+        "files", nargs="+", type=Path, metavar="FILE", help="HDF5 files of RoboCasa, robosuite or this project"
+    )
+    parser.add_argument("--out", required=True, type=Path, help="folder of the dataset; must not exist yet")
+    parser.add_argument(
+        "--asset-root",
+        action="append",
+        default=[],
+        metavar="DIR",
+        help="where to look for meshes and textures that the scenes name (repeatable); matched by the end of the path",
+    )
+    parser.add_argument(
+        "--cameras",
+        type=lambda text: tuple(name.strip() for name in text.split(",") if name.strip()),
+        metavar="A,B,C",
+        help="cameras to take (default: the robot's own three)",
+    )
+    parser.add_argument(
+        "--image-size", type=int, metavar="PIXELS", help="height and width (default: as stored, else 256)"
+    )
+    parser.add_argument("--instruction", help="language of episodes that have none recorded")
+    parser.add_argument("--workers", type=int, help="processes (default: by the amount of work and cores)")
+    parser.add_argument("--video-codec", choices=_CODECS, default="h264", help="default: %(default)s")
+    parser.add_argument(
+        "--render-preset",
+        choices=("fast", "quality"),
+        default="fast",
+        help="how states are rendered: fast has no shadows, reflections or multisampling (default: %(default)s)",
+    )
+    parser.add_argument("--overwrite", action="store_true", help="replace a dataset at --out")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Convert, and say what was written, rejected and assumed."""
+    from robocasa_lerobot.convert.settings import ConversionSettings
+
+    settings = ConversionSettings(
+        asset_roots=tuple(args.asset_root),
+        cameras=args.cameras,
+        image_size=args.image_size,
+        instruction=args.instruction,
+        video_codec=args.video_codec,
+        render_preset=args.render_preset,
+    )
+    from robocasa_lerobot.convert.pipeline import convert
+    from robocasa_lerobot.gl import ensure_gl
+
+    ensure_gl()
+    result = convert(args.files, args.out, settings, args.workers, args.overwrite)
+    cameras = ", ".join(result.cameras)
+    print(f"{result.root}: {result.num_episodes} episodes, {result.num_frames} frames, cameras {cameras}")
+    for source, count in result.instruction_sources.items():
+        if source != "ep_meta.lang":
+            print(f"{count} episodes record no instruction; theirs is taken from: {source}")
+    if result.rejected:
+        print(f"{len(result.rejected)} episodes rejected (all in meta/robocasa/rejected.jsonl):")
+        for line in result.rejected[:_SHOWN_REJECTIONS]:
+            print(f"  {line['source_file']} {line['source_demo']}: {line['reason']}")
+    print(f"check it: robocasa-lerobot verify {args.out}")
+    return 0

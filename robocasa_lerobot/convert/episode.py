@@ -1,0 +1,157 @@
+"""One episode ready to be written: validated columns, its instruction, and its pictures step by step."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass
+from pathlib import Path
+from types import TracebackType
+from typing import TYPE_CHECKING, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from robocasa_lerobot.convert.mjcf import AssetFinder, loadable
+from robocasa_lerobot.convert.settings import Camera, Plan, needs_scene
+from robocasa_lerobot.convert.source import Demo, DemoFile, RejectedEpisodeError
+
+if TYPE_CHECKING:
+    from robocasa_lerobot.convert.render import Scene
+
+_WORD = re.compile(r"[A-Z]+(?=[A-Z][a-z])|[A-Z]?[a-z]+|[A-Z]+|\d+")
+
+
+@dataclass(frozen=True)
+class Instruction:
+    """The language of an episode and where it came from."""
+
+    text: str
+    source: str
+
+
+def instruction_of(demo: Demo, env_name: str, fallback: str | None) -> Instruction:
+    """The recorded instruction, else the user's, else the words of the environment's name and nothing invented."""
+    recorded = demo.ep_meta.get("lang")
+    if isinstance(recorded, str) and recorded.strip():
+        return Instruction(recorded, "ep_meta.lang")
+    if fallback is not None:
+        return Instruction(fallback, "--instruction")
+    words = [word.lower() for word in _WORD.findall(env_name)]
+    return Instruction(" ".join(words) or env_name, "environment name")
+
+
+class Episode:
+    """A demo seen through a plan; use it in a `with` block (it may hold a compiled scene).
+
+    Attributes: `actions` (T, A) and `states` (T, S) float64 in stored order, `instruction`, `state_source`.
+
+    Raises:
+        RejectedEpisodeError: anything about this demo that keeps it from being converted.
+        MissingAssetsError: meshes or textures of its scene were not found.
+    """
+
+    def __init__(self, file: DemoFile, name: str, plan: Plan) -> None:
+        self.demo = file.demo(name)
+        self.actions = plan.mapping.actions(self.demo)
+        self.instruction = instruction_of(self.demo, file.env_name, plan.settings.instruction)
+        self.cameras = plan.cameras
+        self._scene: Scene | None = None
+        self._stack = ExitStack()
+        names = [camera.name for camera in plan.cameras]
+        for camera in names:
+            if camera in self.demo.image_cameras:
+                self.demo.image_shape(camera)
+        recorded = plan.mapping.recorded_states(self.demo)
+        if needs_scene(self.demo, plan.mapping, names):
+            roots = [Path(root) for root in plan.settings.asset_roots]
+            self._scene = self._stack.enter_context(self._load(AssetFinder(roots, file.asset), plan))
+        self.state_source = "observations" if recorded is not None else "computed from simulator states"
+        try:
+            self.states = recorded if recorded is not None else self._computed_states(plan)
+        except BaseException:
+            self._stack.close()
+            raise
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._stack.close()
+
+    @property
+    def length(self) -> int:
+        """Number of steps."""
+        return self.demo.length
+
+    @property
+    def rendered_cameras(self) -> tuple[str, ...]:
+        """Cameras whose pictures are rendered, the others being stored in the file."""
+        return tuple(camera.name for camera in self.cameras if camera.name not in self.demo.image_cameras)
+
+    def pictures(self) -> Iterator[dict[str, NDArray[np.uint8]]]:
+        """For each step in order, the picture (H, W, 3) of each camera."""
+        stored = {c.name: self.demo.images(c.name) for c in self.cameras if c.name not in self.rendered_cameras}
+        for step in range(self.length):
+            yield self._pictures(step, {name: next(images) for name, images in stored.items()}, self.cameras)
+
+    def pictures_at(self, step: int) -> dict[str, NDArray[np.uint8]]:
+        """The picture (H, W, 3) of each camera at one step."""
+        stored = {c.name: self.demo.image(c.name, step) for c in self.cameras if c.name not in self.rendered_cameras}
+        return self._pictures(step, stored, self.cameras)
+
+    def _pictures(
+        self, step: int, stored: Mapping[str, NDArray[np.uint8]], cameras: Sequence[Camera]
+    ) -> dict[str, NDArray[np.uint8]]:
+        pictures = {}
+        if self._scene is not None and self.rendered_cameras:
+            self._set_state(step)
+        for camera in cameras:
+            if camera.name in stored:
+                pictures[camera.name] = _resized(stored[camera.name], camera.height, camera.width)
+            else:
+                assert self._scene is not None
+                pictures[camera.name] = self._scene.picture(camera.name, camera.height, camera.width)
+        return pictures
+
+    def _load(self, finder: AssetFinder, plan: Plan) -> Scene:
+        from robocasa_lerobot.convert.render import Scene  # MuJoCo is not needed where the file has everything
+
+        if self.demo.model_xml is None or self.demo.states is None:
+            lacking = "model_file" if self.demo.model_xml is None else "states"
+            raise RejectedEpisodeError(f"it has no {lacking}, so nothing can be rendered.")
+        scene = Scene(*loadable(self.demo.model_xml, finder), preset=plan.settings.render_preset)
+        missing = [name for name in self.rendered_cameras if name not in scene.camera_names]
+        if missing:
+            scene.close()
+            raise RejectedEpisodeError(
+                f"its scene has no camera {missing[0]!r} (it has {', '.join(scene.camera_names)})."
+            )
+        return scene
+
+    def _set_state(self, step: int) -> None:
+        assert self._scene is not None
+        assert self.demo.states is not None
+        self._scene.set_state(self.demo.states[step])
+
+    def _computed_states(self, plan: Plan) -> NDArray[np.float64]:
+        assert self._scene is not None
+        states = []
+        for step in range(self.length):
+            self._set_state(step)
+            try:
+                states.append(plan.mapping.state_of_scene(self._scene))
+            except KeyError as error:
+                raise RejectedEpisodeError(f"its scene lacks what the state is computed from: {error}") from None
+        return np.stack(states)
+
+
+def _resized(picture: NDArray[np.uint8], height: int, width: int) -> NDArray[np.uint8]:
+    if picture.shape[:2] == (height, width):
+        return picture
+    from PIL import Image
+
+    return np.asarray(Image.fromarray(picture).resize((width, height), Image.Resampling.LANCZOS))

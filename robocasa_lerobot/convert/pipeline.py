@@ -1,0 +1,315 @@
+"""A whole conversion: plan, shards in parallel, joining, and the one rename that makes the dataset appear.
+
+Everything is written into `<out>.partial-<fingerprint>` beside the output. The fingerprint is that of settings and
+source bytes, so the same command after a kill finds its finished shards again and goes on.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import fcntl
+import io
+import json
+import os
+import shutil
+import threading
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict, dataclass
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from datatrove.executor.local import LocalPipelineExecutor
+from datatrove.utils.logging import logger as datatrove_logger
+from datatrove.utils.stats import PipelineStats
+from tqdm import tqdm
+
+from robocasa_lerobot import __version__
+from robocasa_lerobot.convert.encoder import SAMPLED_FRAMES, Histogram
+from robocasa_lerobot.convert.settings import ConversionSettings, Plan, make_plan
+from robocasa_lerobot.convert.shard import (
+    CODECS,
+    DATASET,
+    EPISODES_FILE,
+    EXTRAS,
+    HISTOGRAMS_FILE,
+    REJECTED_FILE,
+    VIDEO_FILE_MB,
+    convert_shard,
+    episode_folder,
+    read_jsonl,
+    write_jsonl,
+)
+from robocasa_lerobot.errors import UserError
+
+# Our part of a dataset's folder; LeRobot reads nothing in it.
+META_FOLDER = "meta/robocasa"
+CONVERSION_FILE = "conversion.json"
+_POLL_SECONDS = 0.3
+# Starting a worker imports LeRobot and MuJoCo (about 6 s of CPU time); below this much work that does not pay.
+_MIN_FRAMES_PER_WORKER = 400
+_MAX_AUTOMATIC_WORKERS = 8
+
+
+@dataclass(frozen=True)
+class ConversionResult:
+    """What a conversion wrote."""
+
+    root: Path
+    num_episodes: int
+    num_frames: int
+    rejected: list[dict[str, Any]]
+    cameras: tuple[str, ...]
+    instruction_sources: dict[str, int]
+
+
+def convert(
+    files: Sequence[Path], out: Path, settings: ConversionSettings, workers: int | None = None, overwrite: bool = False
+) -> ConversionResult:
+    """Convert demonstration files to one LeRobotDataset v3.0 at `out`.
+
+    Args:
+        files: HDF5 files, in the order in which their episodes come.
+        out: folder of the dataset; it appears complete or not at all.
+        settings: what decides the bytes of the dataset.
+        workers: processes; None chooses by the amount of work. The dataset does not depend on it.
+        overwrite: replace a dataset at `out`.
+
+    Raises:
+        UserError: the input or the output path cannot be used, or no episode is good. Nothing is at `out` then.
+    """
+    out = out.absolute()
+    _check_output(out, overwrite)
+    plan = make_plan(files, settings)
+    partial = out.with_name(f"{out.name}.partial-{plan.fingerprint}")
+    partial.mkdir(parents=True, exist_ok=True)
+    with _locked(partial):
+        try:
+            _run_shards(plan, partial, _num_workers(plan, workers))
+            result = _join(plan, partial, out)
+        except OSError as error:
+            raise UserError(
+                f"writing failed: {error}. Nothing is at {out}; finished parts are kept in {partial}: free what is "
+                "lacking and give the same command to go on."
+            ) from error
+        if result is not None:
+            _publish(partial / "merged", out, partial / "replaced")
+    rejected = result.rejected if result is not None else _rejected(plan, partial)
+    shutil.rmtree(partial)
+    if result is None:
+        lines = "".join(f"\n  {r['source_file']} {r['source_demo']}: {r['reason']}" for r in rejected[:5])
+        raise UserError(f"no episode could be converted ({len(rejected)} rejected), nothing was written:{lines}")
+    return result
+
+
+def _check_output(out: Path, overwrite: bool) -> None:
+    if not out.exists() or (out.is_dir() and not any(out.iterdir())):
+        return
+    if not overwrite:
+        raise UserError(f"{out} exists already. Choose another --out, or replace it with --overwrite.")
+    if not (out / "meta" / "info.json").is_file():
+        raise UserError(f"{out} is not a LeRobotDataset, so --overwrite leaves it alone. Choose another --out.")
+
+
+@contextlib.contextmanager
+def _locked(partial: Path) -> Iterator[None]:
+    with (partial / "lock").open("w") as lock:
+        try:
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError:
+            raise UserError(
+                f"the same conversion is running already (it holds {partial}). Wait until it ends."
+            ) from None
+        yield
+
+
+def _num_workers(plan: Plan, workers: int | None) -> int:
+    if workers is not None:
+        if workers < 1:
+            raise UserError(f"{workers} workers: at least 1 is needed.")
+        return min(workers, len(plan.shards))
+    cores = min(os.cpu_count() or 1, _MAX_AUTOMATIC_WORKERS)
+    return max(1, min(cores, len(plan.shards), plan.num_frames // _MIN_FRAMES_PER_WORKER))
+
+
+@dataclass
+class _ShardTask:
+    """The pipeline step that datatrove runs once for each shard."""
+
+    plan: Plan
+    partial: str
+
+    def __call__(self, data: None, rank: int = 0, world_size: int = 1) -> None:
+        partial = Path(self.partial)
+        done = partial / "progress" / f"{rank:05d}"
+        done.parent.mkdir(exist_ok=True)
+        shard = self.plan.shards[rank]
+        convert_shard(self.plan, shard, shard_folder(partial, rank), lambda frames: _write_count(done, frames))
+
+
+class _Executor(LocalPipelineExecutor):
+    """datatrove's local executor (worker processes, a completion marker for each shard) without its log lines."""
+
+    def _launch_run_for_rank(self, *args: Any, **kwargs: Any) -> PipelineStats:
+        quiet_libraries()  # here, because it must happen in the worker process
+        return super()._launch_run_for_rank(*args, **kwargs)
+
+
+def quiet_libraries() -> None:
+    """Silence what libraries print about every file they write; their errors still arrive as exceptions."""
+    import av
+    import datasets
+
+    datatrove_logger.disable("datatrove")
+    datasets.disable_progress_bars()
+    av.logging.set_libav_level(av.logging.ERROR)
+
+
+def shard_folder(partial: Path, rank: int) -> Path:
+    """Where a shard is written."""
+    return partial / "shards" / f"{rank:05d}"
+
+
+def _run_shards(plan: Plan, partial: Path, workers: int) -> None:
+    quiet_libraries()
+    executor = _Executor(
+        pipeline=[_ShardTask(plan, str(partial))],
+        tasks=len(plan.shards),
+        workers=workers,
+        logging_dir=str(partial / "executor"),
+    )
+    if not executor.get_incomplete_ranks():
+        return
+    with _progress_bar(plan, partial, executor):
+        executor.run()
+
+
+@contextlib.contextmanager
+def _progress_bar(plan: Plan, partial: Path, executor: _Executor) -> Iterator[None]:
+    """A bar over frames, fed by the counts that the workers leave in files."""
+    stop = threading.Event()
+    bar = tqdm(total=plan.num_frames, unit="frame", desc="converting", smoothing=0.05)
+
+    def done(rank: int) -> int:
+        with contextlib.suppress(OSError, ValueError):
+            return int((partial / "progress" / f"{rank:05d}").read_text())
+        return 0
+
+    def watch() -> None:
+        while not stop.wait(_POLL_SECONDS):
+            bar.n = min(plan.num_frames, sum(done(rank) for rank in range(len(plan.shards))))
+            bar.refresh()
+
+    thread = threading.Thread(target=watch, daemon=True)
+    thread.start()
+    try:
+        yield
+        bar.n = plan.num_frames
+    finally:
+        stop.set()
+        thread.join()
+        bar.close()
+
+
+def _write_count(file: Path, count: int) -> None:
+    with contextlib.suppress(OSError):  # only for the eye
+        file.write_text(str(count))
+
+
+def _rejected(plan: Plan, partial: Path) -> list[dict[str, Any]]:
+    return [
+        line for rank in range(len(plan.shards)) for line in read_jsonl(shard_folder(partial, rank) / REJECTED_FILE)
+    ]
+
+
+def _join(plan: Plan, partial: Path, out: Path) -> ConversionResult | None:
+    """Join the shards in `<partial>/merged`; None where no shard has an episode."""
+    from lerobot.datasets.aggregate import aggregate_datasets
+    from lerobot.datasets.dataset_metadata import LeRobotDatasetMetadata
+    from lerobot.datasets.io_utils import write_stats
+
+    from robocasa_lerobot.convert.statistics import dataset_statistics
+
+    merged = partial / "merged"
+    shutil.rmtree(merged, ignore_errors=True)  # an earlier try may have been killed here
+    folders = [shard_folder(partial, rank) for rank in range(len(plan.shards))]
+    full = [folder for folder in folders if (folder / DATASET).exists()]
+    if not full:
+        return None
+    with contextlib.redirect_stderr(io.StringIO()):  # its progress bars
+        aggregate_datasets(
+            repo_ids=[f"local/{folder.name}" for folder in full],
+            aggr_repo_id=f"local/{out.name}",
+            roots=[folder / DATASET for folder in full],
+            aggr_root=merged,
+            video_files_size_in_mb=VIDEO_FILE_MB,
+        )
+    episodes: list[dict[str, Any]] = []
+    histograms: dict[str, Histogram] = {}
+    for folder in full:
+        for line in read_jsonl(folder / EPISODES_FILE):
+            index = len(episodes)
+            _link_tree(folder / EXTRAS / episode_folder(line["episode_index"]), merged / EXTRAS / episode_folder(index))
+            episodes.append(line | {"episode_index": index})
+        with np.load(folder / HISTOGRAMS_FILE) as arrays:
+            for key in arrays.files:
+                histograms[key] = histograms.get(key, 0) + arrays[key]
+    meta = LeRobotDatasetMetadata(f"local/{out.name}", root=merged)
+    num_frames = sum(line["length"] for line in episodes)
+    if (meta.total_episodes, meta.total_frames) != (len(episodes), num_frames):
+        raise RuntimeError(
+            f"joining gave {meta.total_episodes} episodes with {meta.total_frames} frames, "
+            f"expected {len(episodes)} with {num_frames}."
+        )
+    write_stats(dataset_statistics(merged, meta.features, histograms), merged)
+    rejected = _rejected(plan, partial)
+    ours = merged / META_FOLDER
+    ours.mkdir(parents=True)
+    write_jsonl(ours / EPISODES_FILE, episodes)
+    write_jsonl(ours / REJECTED_FILE, rejected)
+    record = _conversion_record(plan, out)
+    (ours / CONVERSION_FILE).write_text(json.dumps(record, indent=2, ensure_ascii=False) + "\n", encoding="utf-8")
+    sources = dict(Counter(line["instruction_source"] for line in episodes))
+    cameras = tuple(camera.name for camera in plan.cameras)
+    return ConversionResult(out, len(episodes), num_frames, rejected, cameras, sources)
+
+
+def _conversion_record(plan: Plan, out: Path) -> dict[str, Any]:
+    """Every setting that made the dataset, for readers and for `verify`."""
+    packages = ("lerobot", "mujoco", "h5py", "av", "numpy")
+    return {
+        "robocasa_lerobot_version": __version__,
+        "versions": {package: version(package) for package in packages},
+        "settings": asdict(plan.settings),
+        "video": CODECS[plan.settings.video_codec],
+        "image_statistics": f"{SAMPLED_FRAMES} evenly spaced frames of each episode (all of shorter ones), all pixels",
+        "robot_type": plan.mapping.robot_type,
+        "fps": plan.fps,
+        "cameras": [asdict(camera) for camera in plan.cameras],
+        "sources": [
+            asdict(source) | {"relative_to_dataset": os.path.relpath(source.file, out)} for source in plan.sources
+        ],
+    }
+
+
+def _link_tree(source: Path, target: Path) -> None:
+    """Copy a folder without copying bytes where the file system allows it; the shard stays as it is."""
+
+    def link(a: str, b: str) -> str:
+        try:
+            os.link(a, b)
+        except OSError:
+            shutil.copy2(a, b)
+        return b
+
+    shutil.copytree(source, target, copy_function=link)
+
+
+def _publish(merged: Path, out: Path, replaced: Path) -> None:
+    """Let the finished dataset appear at `out` by a rename, after moving an old one aside."""
+    if out.exists():
+        shutil.rmtree(replaced, ignore_errors=True)
+        out.rename(replaced)
+    merged.rename(out)

@@ -1,0 +1,388 @@
+"""A converted dataset, read back through LeRobot, compared with the files it was made from."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import av
+import numpy as np
+from lerobot.datasets.lerobot_dataset import LeRobotDataset
+from numpy.typing import NDArray
+from tqdm import tqdm
+
+from robocasa_lerobot import contract
+from robocasa_lerobot.convert.episode import Episode
+from robocasa_lerobot.convert.mapping import choose_mapping
+from robocasa_lerobot.convert.pipeline import CONVERSION_FILE, META_FOLDER, quiet_libraries
+from robocasa_lerobot.convert.settings import Camera, ConversionSettings, Plan, SourceRecord, file_sha256
+from robocasa_lerobot.convert.shard import EPISODES_FILE, REJECTED_FILE, read_jsonl
+from robocasa_lerobot.convert.source import DemoFile, RejectedEpisodeError
+from robocasa_lerobot.convert.statistics import column_of
+from robocasa_lerobot.errors import UserError
+
+_CHECKS = (
+    "source files",
+    "episodes",
+    "frames",
+    "video frames",
+    "actions",
+    "states",
+    "instructions",
+    "timestamps",
+    "pictures",
+)
+_COLUMNS = (
+    contract.ACTION_KEY,
+    contract.STATE_KEY,
+    "timestamp",
+    "frame_index",
+    "episode_index",
+    "index",
+    "task_index",
+)
+_MAX_DIFFERENCES = 20  # shown for each check
+_PEAK = 255.0
+# A picture counts as misplaced where another step's true picture fits it better by this factor in squared error.
+_MISPLACED_FACTOR = 1.5
+
+
+@dataclass
+class Check:
+    """One thing that was compared: how many values, and what differed."""
+
+    name: str
+    compared: int = 0
+    num_differences: int = 0
+    differences: list[str] = field(default_factory=list)
+
+    @property
+    def passed(self) -> bool:
+        """Whether everything was equal and there was something to compare."""
+        return self.num_differences == 0
+
+    def fail(self, difference: str) -> None:
+        """Note a difference."""
+        self.num_differences += 1
+        if len(self.differences) < _MAX_DIFFERENCES:
+            self.differences.append(difference)
+
+    def expect(self, equal: bool, difference: str) -> None:
+        """Count one comparison."""
+        self.compared += 1
+        if not equal:
+            self.fail(difference)
+
+
+@dataclass
+class CameraQuality:
+    """Peak signal-to-noise ratio of decoded pictures against the true ones, in dB (infinite where equal)."""
+
+    camera: str
+    psnr_db: list[float] = field(default_factory=list)
+
+    @property
+    def minimum(self) -> float:
+        """The worst picture."""
+        return min(self.psnr_db, default=float("nan"))
+
+    @property
+    def mean(self) -> float:
+        """Mean over the pictures."""
+        return float(np.mean(self.psnr_db)) if self.psnr_db else float("nan")
+
+
+@dataclass
+class Report:
+    """Outcome of a verification."""
+
+    root: str
+    num_episodes: int
+    num_frames: int
+    checks: list[Check]
+    cameras: list[CameraQuality]
+
+    @property
+    def passed(self) -> bool:
+        """Whether every check passed."""
+        return all(check.passed for check in self.checks)
+
+    def as_json(self) -> dict[str, Any]:
+        """The report as plain data."""
+        return {
+            "root": self.root,
+            "passed": self.passed,
+            "num_episodes": self.num_episodes,
+            "num_frames": self.num_frames,
+            "checks": [
+                {
+                    "name": check.name,
+                    "passed": check.passed,
+                    "compared": check.compared,
+                    "num_differences": check.num_differences,
+                    "differences": check.differences,
+                }
+                for check in self.checks
+            ],
+            "cameras": [
+                {"camera": c.camera, "pictures": len(c.psnr_db), "psnr_min_db": c.minimum, "psnr_mean_db": c.mean}
+                for c in self.cameras
+            ],
+        }
+
+
+def verify(
+    root: Path,
+    sources: Sequence[Path] = (),
+    asset_roots: Sequence[str] = (),
+    pictures_per_episode: int | None = 8,
+    min_psnr_db: float = 25.0,
+) -> Report:
+    """Compare a converted dataset with its source files.
+
+    Args:
+        root: folder of the dataset.
+        sources: the source files where they are not at their recorded places any more.
+        asset_roots: folders with meshes and textures, besides the recorded ones.
+        pictures_per_episode: evenly spaced steps whose pictures are decoded and compared; None takes all.
+        min_psnr_db: the least that a decoded picture must reach.
+
+    Raises:
+        UserError: the folder is no dataset of `convert`, it does not open, or a source file is not to be found.
+    """
+    if not (root / META_FOLDER / CONVERSION_FILE).is_file():
+        what = "a dataset without our records" if (root / "meta" / "info.json").is_file() else "no dataset"
+        raise UserError(f"{root} is {what}: {META_FOLDER}/{CONVERSION_FILE}, which `convert` writes, is not there.")
+    quiet_libraries()
+    record = json.loads((root / META_FOLDER / CONVERSION_FILE).read_text(encoding="utf-8"))
+    episodes = read_jsonl(root / META_FOLDER / EPISODES_FILE)
+    try:
+        dataset = LeRobotDataset(f"local/{root.name}", root=root, video_backend="pyav", return_uint8=True)
+    except Exception as error:
+        raise UserError(f"LeRobot does not open {root}: {type(error).__name__}: {error}") from error
+    verification = _Verification(root, dataset, episodes, record, pictures_per_episode, min_psnr_db)
+    files = _find_sources(root, record["sources"], sources)
+    settings = _settings(record, asset_roots)
+    verification.check_structure()
+    verification.check_videos()
+    with tqdm(total=len(episodes), unit="episode", desc="verifying") as bar:
+        for recorded_name, path, sha256 in files:
+            verification.check_file(recorded_name, path, sha256, settings, record, bar)
+    return verification.report()
+
+
+class _Verification:
+    def __init__(
+        self,
+        root: Path,
+        dataset: LeRobotDataset,
+        episodes: list[dict[str, Any]],
+        record: dict[str, Any],
+        pictures_per_episode: int | None,
+        min_psnr_db: float,
+    ) -> None:
+        self._root, self._dataset, self._episodes = root, dataset, episodes
+        self._pictures_per_episode, self._min_psnr_db = pictures_per_episode, min_psnr_db
+        self._checks = {name: Check(name) for name in _CHECKS}
+        self._quality = {camera["name"]: CameraQuality(camera["name"]) for camera in record["cameras"]}
+        # The dataset as LeRobot opened it, without the conversion to float32 that its items go through.
+        table = dataset.hf_dataset.select_columns(list(_COLUMNS)).with_format("arrow")[:]
+        self._columns: dict[str, NDArray[Any]] = {key: column_of(table, key) for key in _COLUMNS}
+        self._tasks = {int(row.task_index): str(task) for task, row in dataset.meta.tasks.iterrows()}
+
+    def report(self) -> Report:
+        return Report(
+            str(self._root),
+            self._dataset.num_episodes,
+            self._dataset.num_frames,
+            list(self._checks.values()),
+            list(self._quality.values()),
+        )
+
+    def check_structure(self) -> None:
+        """Counts and running indices of the dataset in itself."""
+        lengths = [line["length"] for line in self._episodes]
+        check = self._checks["episodes"]
+        check.expect(
+            self._dataset.num_episodes == len(lengths),
+            f"LeRobot opens {self._dataset.num_episodes} episodes, {len(lengths)} were written",
+        )
+        check = self._checks["frames"]
+        total = sum(lengths)
+        rows = len(self._columns["index"])
+        check.expect(self._dataset.num_frames == total, f"info.json has {self._dataset.num_frames} frames, not {total}")
+        check.expect(rows == total, f"the tables have {rows} rows, not {total}")
+        expected = {
+            "index": np.arange(total),
+            "episode_index": np.repeat(np.arange(len(lengths)), lengths),
+            "frame_index": np.concatenate([np.arange(length) for length in lengths]),
+        }
+        for key, values in expected.items():
+            check.expect(np.array_equal(self._columns[key], values), f"column {key} does not count through")
+        for index, line in enumerate(self._episodes):
+            length = int(self._dataset.meta.episodes[index]["length"]) if index < self._dataset.num_episodes else -1
+            check.expect(length == line["length"], f"episode {index}: {length} frames, {line['length']} were written")
+
+    def check_videos(self) -> None:
+        """As many frames in the video files as in the tables, for every camera: none dropped anywhere."""
+        check = self._checks["video frames"]
+        for camera in self._quality:
+            key = contract.image_key(camera)
+            count = sum(_num_video_frames(file) for file in (self._root / "videos" / key).glob("*/*.mp4"))
+            total = self._dataset.num_frames
+            check.expect(count == total, f"{camera}: {count} frames in the videos, {total} in the tables")
+
+    def check_file(
+        self, recorded: str, path: Path, sha256: str, settings: ConversionSettings, record: dict[str, Any], bar: tqdm
+    ) -> None:
+        """All episodes of one source file, and that none of its demos is unaccounted for."""
+        self._checks["source files"].expect(
+            file_sha256(path) == sha256, f"{path} has changed since the conversion (its SHA-256 is another)"
+        )
+        mine = [line for line in self._episodes if line["source_file"] == recorded]
+        rejected = read_jsonl(self._root / META_FOLDER / REJECTED_FILE)
+        out = {line["source_demo"] for line in rejected if line["source_file"] == recorded}
+        with DemoFile(path) as file:
+            written = {line["source_demo"] for line in mine}
+            for name in file.demo_names:
+                self._checks["episodes"].expect(
+                    (name in written) != (name in out), f"{path} {name} is neither converted nor rejected, or both"
+                )
+            plan = _plan(file, mine, settings, record)
+            for line in mine:
+                try:
+                    with Episode(file, line["source_demo"], plan) as episode:
+                        self._check_episode(line, episode)
+                except RejectedEpisodeError as error:
+                    self._checks["episodes"].fail(f"{path} {line['source_demo']}: {error}")
+                bar.update()
+
+    def _check_episode(self, line: dict[str, Any], episode: Episode) -> None:
+        index, length = line["episode_index"], episode.length
+        where = self._columns["episode_index"] == index
+        label = f"episode {index} ({line['source_demo']})"
+        rows = np.flatnonzero(where)
+        self._checks["frames"].expect(len(rows) == length, f"{label}: {len(rows)} rows, {length} in the source")
+        for name, key, expected in (
+            ("actions", contract.ACTION_KEY, episode.actions),
+            ("states", contract.STATE_KEY, episode.states),
+        ):
+            _compare_bits(self._checks[name], label, self._columns[key][where], expected)
+        timestamps = self._columns["timestamp"][where]
+        exact = (np.arange(length) / self._dataset.fps).astype(np.float32)
+        _compare_bits(self._checks["timestamps"], label, timestamps, exact)
+        tasks = {self._tasks.get(int(task)) for task in np.unique(self._columns["task_index"][where])}
+        self._checks["instructions"].expect(
+            tasks == {episode.instruction.text} and line["instruction"] == episode.instruction.text,
+            f"{label}: {sorted(map(str, tasks))}, the source has {episode.instruction.text!r}",
+        )
+        if len(rows) == length:
+            self._check_pictures(label, int(rows[0]), episode)
+
+    def _check_pictures(self, label: str, first_row: int, episode: Episode) -> None:
+        """Each decoded picture resembles its true one, and no other step's true picture fits it better."""
+        check = self._checks["pictures"]
+        steps = _spread(episode.length, self._pictures_per_episode)
+        true: dict[str, list[NDArray[np.uint8]]] = {camera: [] for camera in self._quality}
+        decoded: dict[str, list[NDArray[np.uint8]]] = {camera: [] for camera in self._quality}
+        for step in steps:
+            try:
+                item = self._dataset[first_row + step]
+            except Exception as error:  # whatever a decoder throws at a broken video
+                check.expect(False, f"{label} step {step}: LeRobot cannot read it: {type(error).__name__}: {error}")
+                return
+            for camera, picture in episode.pictures_at(step).items():
+                true[camera].append(picture)
+                decoded[camera].append(item[contract.image_key(camera)].permute(1, 2, 0).numpy())
+        for camera, quality in self._quality.items():
+            for own, step in enumerate(steps):
+                errors = [_squared_error(decoded[camera][own], picture) for picture in true[camera]]
+                psnr = 10 * np.log10(_PEAK**2 / errors[own]) if errors[own] > 0 else float("inf")
+                quality.psnr_db.append(float(psnr))
+                check.expect(
+                    psnr >= self._min_psnr_db,
+                    f"{label} step {step} {camera}: PSNR {psnr:.1f} dB, at least {self._min_psnr_db:g} needed",
+                )
+                best = int(np.argmin(errors))
+                check.expect(
+                    errors[own] <= _MISPLACED_FACTOR * errors[best],
+                    f"{label} step {step} {camera}: shows the picture of step {steps[best]}",
+                )
+
+
+def _compare_bits(check: Check, label: str, found: NDArray[Any], expected: NDArray[Any]) -> None:
+    check.compared += expected.size
+    if found.shape != expected.shape or found.dtype != expected.dtype:
+        check.fail(f"{label}: {found.shape} {found.dtype}, the source has {expected.shape} {expected.dtype}")
+        return
+    # Bit patterns, so that -0.0 and 0.0 are told apart.
+    bits = np.uint64 if expected.dtype.itemsize == 8 else np.uint32
+    different = np.argwhere(np.ascontiguousarray(found).view(bits) != np.ascontiguousarray(expected).view(bits))
+    for where in different:
+        at = tuple(int(i) for i in where)
+        check.fail(f"{label} step {at[0]} component {at[1:]}: {found[at]!r}, the source has {expected[at]!r}")
+
+
+def _spread(length: int, count: int | None) -> list[int]:
+    if count is None or count >= length:
+        return list(range(length))
+    return sorted({int(step) for step in np.linspace(0, length - 1, count).round()})
+
+
+def _squared_error(a: NDArray[np.uint8], b: NDArray[np.uint8]) -> float:
+    difference = a.astype(np.int32) - b
+    return float(np.mean(difference * difference))
+
+
+def _num_video_frames(file: Path) -> int:
+    with av.open(str(file)) as container:
+        return sum(1 for packet in container.demux(video=0) if packet.size)
+
+
+def _settings(record: dict[str, Any], asset_roots: Sequence[str]) -> ConversionSettings:
+    settings = record["settings"]
+    recorded = [root for root in settings["asset_roots"] if Path(root).is_dir()]
+    cameras = settings["cameras"]
+    return ConversionSettings(
+        **{
+            **settings,
+            "asset_roots": (*asset_roots, *recorded),
+            "cameras": tuple(cameras) if cameras is not None else None,
+        }
+    )
+
+
+def _plan(file: DemoFile, lines: list[dict[str, Any]], settings: ConversionSettings, record: dict[str, Any]) -> Plan:
+    sample = file.demo(lines[0]["source_demo"] if lines else file.demo_names[0])
+    return Plan(
+        settings=settings,
+        sources=(),
+        mapping=choose_mapping(file, sample),
+        cameras=tuple(Camera(**camera) for camera in record["cameras"]),
+        fps=record["fps"],
+        shards=(),
+        num_frames=0,
+    )
+
+
+def _find_sources(root: Path, recorded: list[dict[str, Any]], given: Sequence[Path]) -> Iterator[tuple[str, Path, str]]:
+    """For each recorded source: its recorded name, where it is now, and its recorded SHA-256."""
+    by_sha = {file_sha256(path): path for path in given if path.is_file()}
+    missing = [path for path in given if not path.is_file()]
+    if missing:
+        raise UserError(f"--source {missing[0]} does not exist.")
+    for entry in recorded:
+        fields = {key: entry[key] for key in ("file", "sha256", "size_bytes")}
+        source = SourceRecord(**fields)
+        same_name = [path for path in given if path.name == Path(source.file).name]
+        places = [Path(source.file), root / entry["relative_to_dataset"]]
+        candidates = [by_sha[source.sha256]] if source.sha256 in by_sha else [*same_name, *([] if given else places)]
+        path = next((place for place in candidates if place.is_file()), None)
+        if path is None:
+            raise UserError(
+                f"the source {source.file} is not there any more. Give the source files with --source FILE ..."
+            )
+        yield source.file, path, source.sha256
