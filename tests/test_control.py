@@ -120,6 +120,29 @@ def test_gripper_command_of_zero_holds(model: mujoco.MjModel) -> None:
     assert arena.joint(names.FINGER_JOINTS[0]) > 0.028
 
 
+def test_gripper_holds_what_it_closes_on() -> None:
+    spec = arena_spec()
+    arena = Arena.settled(spec.compile(), steps=0)
+    grip = arena.data.site(names.GRIP_SITE)
+    quat = np.zeros(4)
+    mujoco.mju_mat2Quat(quat, grip.xmat)
+    # It floats until it is grasped.
+    block = spec.worldbody.add_body(name="block", pos=grip.xpos.copy(), quat=quat, gravcomp=1.0)
+    block.add_freejoint()
+    block.add_geom(type=mujoco.mjtGeom.mjGEOM_BOX, size=(0.015, 0.02, 0.015), mass=0.2)
+    arena = Arena.settled(spec.compile(), steps=0)
+    arena.run(action(gripper=1.0), 10)
+    arena.model.body_gravcomp[:] = 0.0
+    height = arena.data.body("block").xpos[2]
+    arena.run(action(1.0, gripper=1.0, position=(0, 0, -0.5)), 10)
+    arena.run(action(1.0, gripper=1.0), 10)
+    offset = arena.data.body("block").xpos - arena.data.site(names.GRIP_SITE).xpos
+    assert height - arena.data.body("block").xpos[2] == pytest.approx(0.25, abs=0.03)
+    assert np.linalg.norm(offset) < 0.02
+    touching = {arena.model.geom(g).name for contact in arena.data.contact for g in (contact.geom1, contact.geom2)}
+    assert set(names.FINGER_PAD_GEOMS) <= touching
+
+
 # --- arm -----------------------------------------------------------------------------------------------------------
 
 DIRECTIONS = [(axis, sign) for axis in range(3) for sign in (1.0, -1.0)]
@@ -344,9 +367,9 @@ TRACES = SHARED / "real" / "robosuite_traces" / "panda_omron_traces.npz"
 NEEDS_TRACES = pytest.mark.skipif(not TRACES.exists(), reason="the recorded traces are not here")
 # 1.5.1 moves its "forward" joint for sideways commands: its first two joints are ours exchanged.
 OUR_ORDER = [1, 0, *range(2, 13)]
-# After some 110 steps this one drives the arm through singular poses with torques a thousandfold over their limits
+# After some 105 steps this one drives the arm through singular poses with torques a thousandfold over their limits
 # and amplifies a difference of 1e-7 rad tenfold in every few steps: it is compared up to there.
-CHAOTIC_AFTER = {"arm_random_mode+1": 110}
+CHAOTIC_AFTER = {"arm_random_mode+1": 105}
 
 
 @cache
@@ -386,6 +409,6 @@ def test_replayed_traces_reach_the_recorded_joint_positions(single_contact_model
     ours = np.array(own) + np.array([10.0, 10.0, *np.zeros(11)])
     error = np.abs(ours - recorded[: steps + 1])
     # Off yaw 0 the base command of robosuite 1.5.1 is turned the other way, and the arm feels it.
-    base, arm = (5e-3, 2e-4) if name == "arm_and_base_random" else (2e-5, 2e-5)
+    base, arm = (5e-3, 2e-4) if name == "arm_and_base_random" else (5e-5, 5e-5)
     assert error[:, :3].max() < base  # m, rad
     assert error[:, 3:].max() < arm
