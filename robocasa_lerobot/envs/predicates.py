@@ -54,7 +54,8 @@ class AllOf(Goal):
 
     def evaluate(self, scene: Scene, data: mujoco.MjData, terms: dict[str, bool]) -> bool:
         """Evaluate every part."""
-        return all([part.evaluate(scene, data, terms) for part in self.parts])
+        held = [part.evaluate(scene, data, terms) for part in self.parts]
+        return all(held)
 
 
 class AnyOf(Goal):
@@ -65,7 +66,8 @@ class AnyOf(Goal):
 
     def evaluate(self, scene: Scene, data: mujoco.MjData, terms: dict[str, bool]) -> bool:
         """Evaluate every part."""
-        return any([part.evaluate(scene, data, terms) for part in self.parts])
+        held = [part.evaluate(scene, data, terms) for part in self.parts]
+        return any(held)
 
 
 @dataclass(frozen=True)

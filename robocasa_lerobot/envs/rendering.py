@@ -33,7 +33,7 @@ class SceneRenderer:
         self._option.geomgroup[COLLISION_GROUP] = 0
         self._shadows = shadows
         # Also at exit, before Python takes the OpenGL library down under the context.
-        self._free = weakref.finalize(self, self._renderer.close)
+        self._free = weakref.finalize(self, _close, self._renderer)
         self._names = {model.camera(i).name for i in range(model.ncam)}
 
     def render(self, data: mujoco.MjData, camera: str | mujoco.MjvCamera) -> NDArray[np.uint8]:
@@ -53,3 +53,12 @@ class SceneRenderer:
     def close(self) -> None:
         """Free the OpenGL context."""
         self._free()
+
+
+def _close(renderer: mujoco.Renderer) -> None:
+    # MuJoCo's renderer frees its OpenGL objects in whichever context is current. With a second renderer alive that
+    # would be the other's, whose textures and framebuffers of the same numbers would go: wrong pictures, no error.
+    context = renderer._gl_context
+    if context is not None:
+        context.make_current()
+    renderer.close()

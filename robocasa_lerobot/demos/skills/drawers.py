@@ -6,7 +6,16 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from robocasa_lerobot.demos.motion import CLOSED, OPEN, Array, HandTarget, base_pose, frame, grip_position, hand_rotation
+from robocasa_lerobot.demos.motion import (
+    CLOSED,
+    OPEN,
+    Array,
+    HandTarget,
+    base_pose,
+    frame,
+    grip_position,
+    hand_rotation,
+)
 from robocasa_lerobot.demos.skills.common import SkillError, hold_hand, move_hand, require_near
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.scene.fixtures.cabinets import Drawer

@@ -82,9 +82,7 @@ def _attempt(
             raise PlacementError(f"layout {layout_id} has no {wanted.kind}")
         roles[wanted.role] = pool[int(rng.integers(len(pool)))].name
     robot = robot_pose(rng, layout, task.robot_start, layout.fixtures[roles[task.robot_start.fixture]])
-    openness = {
-        roles[initial.fixture]: float(rng.uniform(initial.low, initial.high)) for initial in task.initial
-    }
+    openness = {roles[initial.fixture]: float(rng.uniform(initial.low, initial.high)) for initial in task.initial}
     objects = _place_objects(rng, task, split, layout, roles, openness)
     spec = _assemble(layout, style_id, render_preset, objects)
     model = spec.compile()

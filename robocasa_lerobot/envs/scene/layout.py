@@ -150,9 +150,7 @@ def _basin(name: str, x: float) -> Sink:
 
 def _counter(name: str, x0: float, x1: float, basin: Sink | None) -> Counter:
     position = ((x0 + x1) / 2, -COUNTER_DEPTH / 2, COUNTER_HEIGHT - COUNTER_THICKNESS / 2)
-    counter = Counter(
-        name, (x1 - x0, COUNTER_DEPTH, COUNTER_THICKNESS), position, splash_height=SPLASH_HEIGHT
-    )
+    counter = Counter(name, (x1 - x0, COUNTER_DEPTH, COUNTER_THICKNESS), position, splash_height=SPLASH_HEIGHT)
     if basin is not None:
         cx, cy = basin.pos[0] - position[0], basin.pos[1] - position[1]
         half_w, half_d = basin.width / 2, basin.depth / 2

@@ -52,15 +52,17 @@ class Style:
 
 
 def _surface(record: dict[str, Any]) -> Surface:
-    texture = record.get("texture")
     return Surface(
         rgba=tuple(record.get("rgba", (1.0, 1.0, 1.0, 1.0))),
-        texture=TextureRecord(**{k: tuple(v) if isinstance(v, list) else v for k, v in texture.items()})
-        if texture
-        else None,
+        texture=_texture(record["texture"]) if "texture" in record else None,
         shininess=record.get("shininess", 0.2),
         reflectance=record.get("reflectance", 0.0),
     )
+
+
+def _texture(record: dict[str, Any]) -> TextureRecord:
+    colours = {key: tuple(record[key]) for key in ("rgb", "rgb2")}
+    return TextureRecord(**{**record, **colours})
 
 
 def style_ids() -> tuple[int, ...]:

@@ -8,6 +8,7 @@ from typing import Any
 import mujoco
 import numpy as np
 
+from robocasa_lerobot.contract import ACTION_SIZE
 from robocasa_lerobot.envs.control.controller import RobotController
 from robocasa_lerobot.envs.control.step import control_step
 from robocasa_lerobot.envs.scene.fixtures.base import Fixture, yaw_quat
@@ -17,7 +18,6 @@ from robocasa_lerobot.envs.scene.objects.catalogue import Instance
 from robocasa_lerobot.envs.scene.robot import place_base, set_home
 from robocasa_lerobot.envs.scene.selection import RobotPose
 from robocasa_lerobot.envs.task import Task
-from robocasa_lerobot.contract import ACTION_SIZE
 
 SETTLE_STEPS = 10  # control steps without a command after placing everything (robocasa facts, section 1)
 

@@ -147,9 +147,7 @@ def inside_area(start: InsideOf, fixture: Fixture, openness: float) -> Area:
     centre_y = region.center[1] + start.at * (region.half[1] - half_d)
     slide = -openness * fixture.full_travel if isinstance(fixture, Drawer) else 0.0
     centre = fixture.to_world((region.center[0], centre_y + slide, region.center[2] - region.half[2]))
-    return Area(
-        -half_w, half_w, -half_d, half_d, (float(centre[0]), float(centre[1])), fixture.yaw, float(centre[2])
-    )
+    return Area(-half_w, half_w, -half_d, half_d, (float(centre[0]), float(centre[1])), fixture.yaw, float(centre[2]))
 
 
 def _into(fixture: Fixture, x: float, y: float) -> tuple[float, float]:

@@ -46,7 +46,7 @@ class TextureRecord:
 
 
 def _fourier_noise(rng: np.random.Generator, exponent: float, stretch: tuple[float, float]) -> NDArray[np.float64]:
-    """Tileable noise in [0, 1] of shape (size, size) with a power-law spectrum; `stretch` > 1 elongates along an axis."""
+    """Tileable power-law noise in [0, 1], shape (size, size); `stretch` > 1 elongates it along an axis."""
     frequency = np.fft.fftfreq(TEXTURE_SIZE) * TEXTURE_SIZE
     radius = np.hypot(frequency[:, None] * stretch[0], frequency[None, :] * stretch[1])
     radius[0, 0] = 1.0

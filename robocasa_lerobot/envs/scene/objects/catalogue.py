@@ -74,12 +74,26 @@ _BLUE, _WHITE, _TEAL = (0.20, 0.38, 0.66), (0.92, 0.92, 0.90), (0.20, 0.55, 0.52
 _ALL = (
     Category("apple", ("fruit", "food"), "round", (0.064,) * 3, (0.070,) * 3, (_RED, _GREEN, _YELLOW), washable=True),
     Category(
-        "orange", ("fruit", "food"), "round", (0.064,) * 3, (0.070,) * 3, ((0.95, 0.55, 0.12), (0.97, 0.62, 0.18)), washable=True
+        "orange",
+        ("fruit", "food"),
+        "round",
+        (0.064,) * 3,
+        (0.070,) * 3,
+        ((0.95, 0.55, 0.12), (0.97, 0.62, 0.18)),
+        washable=True,
     ),
     Category(
-        "lemon", ("fruit", "vegetable", "food"), "oval", (0.075, 0.050, 0.050), (0.088, 0.058, 0.058), (_YELLOW,), washable=True
+        "lemon",
+        ("fruit", "vegetable", "food"),
+        "oval",
+        (0.075, 0.050, 0.050),
+        (0.088, 0.058, 0.058),
+        (_YELLOW,),
+        washable=True,
     ),
-    Category("tomato", ("vegetable", "food"), "round", (0.058, 0.058, 0.050), (0.068, 0.068, 0.058), (_RED,), washable=True),
+    Category(
+        "tomato", ("vegetable", "food"), "round", (0.058, 0.058, 0.050), (0.068, 0.068, 0.058), (_RED,), washable=True
+    ),
     Category(
         "potato",
         ("vegetable", "food"),
@@ -90,10 +104,22 @@ _ALL = (
         washable=True,
     ),
     Category(
-        "cucumber", ("vegetable", "food"), "rod", (0.15, 0.038, 0.038), (0.19, 0.046, 0.046), ((0.20, 0.42, 0.16),), washable=True
+        "cucumber",
+        ("vegetable", "food"),
+        "rod",
+        (0.15, 0.038, 0.038),
+        (0.19, 0.046, 0.046),
+        ((0.20, 0.42, 0.16),),
+        washable=True,
     ),
     Category(
-        "carrot", ("vegetable", "food"), "rod", (0.14, 0.030, 0.030), (0.18, 0.038, 0.038), ((0.93, 0.48, 0.12),), washable=True
+        "carrot",
+        ("vegetable", "food"),
+        "rod",
+        (0.14, 0.030, 0.030),
+        (0.18, 0.038, 0.038),
+        ((0.93, 0.48, 0.12),),
+        washable=True,
     ),
     Category(
         "bar_soap",
@@ -105,13 +131,31 @@ _ALL = (
         washable=True,
     ),
     Category(
-        "sponge", ("cleaner",), "sponge", (0.090, 0.060, 0.030), (0.110, 0.068, 0.038), (_YELLOW, (0.90, 0.62, 0.30)), washable=True
+        "sponge",
+        ("cleaner",),
+        "sponge",
+        (0.090, 0.060, 0.030),
+        (0.110, 0.068, 0.038),
+        (_YELLOW, (0.90, 0.62, 0.30)),
+        washable=True,
     ),
     Category(
-        "can", ("drink", "packaged_food"), "can", (0.060, 0.060, 0.100), (0.066, 0.066, 0.122), (_RED, _BLUE, _TEAL, _STEEL), washable=True
+        "can",
+        ("drink", "packaged_food"),
+        "can",
+        (0.060, 0.060, 0.100),
+        (0.066, 0.066, 0.122),
+        (_RED, _BLUE, _TEAL, _STEEL),
+        washable=True,
     ),
     Category(
-        "cup", ("receptacle", "stackable"), "vessel", (0.066, 0.066, 0.085), (0.074, 0.074, 0.105), (_BLUE, _WHITE, _TEAL, _RED), washable=True
+        "cup",
+        ("receptacle", "stackable"),
+        "vessel",
+        (0.066, 0.066, 0.085),
+        (0.074, 0.074, 0.105),
+        (_BLUE, _WHITE, _TEAL, _RED),
+        washable=True,
     ),
     Category(
         "bowl",
@@ -123,14 +167,63 @@ _ALL = (
         graspable=False,
         washable=True,
     ),
-    Category("boxed_drink", ("drink", "packaged_food"), "carton", (0.055, 0.042, 0.105), (0.065, 0.050, 0.130), (_GREEN, _RED, _BLUE)),
     Category(
-        "cereal", ("packaged_food",), "carton", (0.150, 0.055, 0.220), (0.190, 0.070, 0.270), (_YELLOW, _RED, _BLUE), graspable=False
+        "boxed_drink",
+        ("drink", "packaged_food"),
+        "carton",
+        (0.055, 0.042, 0.105),
+        (0.065, 0.050, 0.130),
+        (_GREEN, _RED, _BLUE),
     ),
-    Category("spoon", ("utensil",), "spoon", (0.170, 0.036, 0.018), (0.190, 0.042, 0.022), (_STEEL, _WOOD), graspable=False, washable=True),
-    Category("fork", ("utensil",), "fork", (0.170, 0.028, 0.014), (0.195, 0.034, 0.018), (_STEEL,), graspable=False, washable=True),
-    Category("knife", ("utensil",), "knife", (0.190, 0.022, 0.014), (0.230, 0.028, 0.018), (_STEEL,), graspable=False, washable=True),
-    Category("spatula", ("utensil",), "spatula", (0.240, 0.070, 0.016), (0.280, 0.085, 0.020), (_DARK, _WOOD), graspable=False, washable=True),
+    Category(
+        "cereal",
+        ("packaged_food",),
+        "carton",
+        (0.150, 0.055, 0.220),
+        (0.190, 0.070, 0.270),
+        (_YELLOW, _RED, _BLUE),
+        graspable=False,
+    ),
+    Category(
+        "spoon",
+        ("utensil",),
+        "spoon",
+        (0.170, 0.036, 0.018),
+        (0.190, 0.042, 0.022),
+        (_STEEL, _WOOD),
+        graspable=False,
+        washable=True,
+    ),
+    Category(
+        "fork",
+        ("utensil",),
+        "fork",
+        (0.170, 0.028, 0.014),
+        (0.195, 0.034, 0.018),
+        (_STEEL,),
+        graspable=False,
+        washable=True,
+    ),
+    Category(
+        "knife",
+        ("utensil",),
+        "knife",
+        (0.190, 0.022, 0.014),
+        (0.230, 0.028, 0.018),
+        (_STEEL,),
+        graspable=False,
+        washable=True,
+    ),
+    Category(
+        "spatula",
+        ("utensil",),
+        "spatula",
+        (0.240, 0.070, 0.016),
+        (0.280, 0.085, 0.020),
+        (_DARK, _WOOD),
+        graspable=False,
+        washable=True,
+    ),
     Category("rolling_pin", ("tool",), "rod", (0.22, 0.042, 0.042), (0.26, 0.050, 0.050), (_WOOD,), washable=True),
     Category("peeler", ("tool",), "knife", (0.150, 0.026, 0.018), (0.170, 0.032, 0.022), (_STEEL,), washable=True),
 )
@@ -194,7 +287,8 @@ def sample(
         rng: generator that is advanced.
         groups: names of groups; their categories are united.
         split: "pretrain" or "target".
-        graspable, washable: ask for the property.
+        graspable: ask for the property.
+        washable: ask for the property.
         max_height: bound of the size along z, metres.
         exclude: names of categories that are not wanted.
 

@@ -90,7 +90,9 @@ def _rod(b: Builder, item: Instance) -> None:
 def _block(b: Builder, item: Instance) -> None:
     half = [s / 2 for s in item.size]
     b.add(_Geom.mjGEOM_BOX, half, item.rgba)
-    b.add(_Geom.mjGEOM_BOX, (half[0] * 0.7, half[1] * 0.6, 0.001), shade(item.rgba, 0.9), (0, 0, half[2]), collide=False)
+    b.add(
+        _Geom.mjGEOM_BOX, (half[0] * 0.7, half[1] * 0.6, 0.001), shade(item.rgba, 0.9), (0, 0, half[2]), collide=False
+    )
 
 
 def _sponge(b: Builder, item: Instance) -> None:
@@ -134,7 +136,13 @@ def _carton(b: Builder, item: Instance) -> None:
     for side in (-1, 1):
         position = (0, side * half[1], half[2] * float(rng.uniform(-0.1, 0.3)))
         b.add(_Geom.mjGEOM_BOX, (half[0] * 0.8, 0.001, half[2] * 0.35), label, position, collide=False)
-    b.add(_Geom.mjGEOM_BOX, (half[0], half[1], half[2] * 0.08), shade(item.rgba, 0.7), (0, 0, half[2] * 0.93), collide=False)
+    b.add(
+        _Geom.mjGEOM_BOX,
+        (half[0], half[1], half[2] * 0.08),
+        shade(item.rgba, 0.7),
+        (0, 0, half[2] * 0.93),
+        collide=False,
+    )
 
 
 def _handle_and_head(b: Builder, item: Instance, head_share: float, handle_rgba: Rgba) -> tuple[float, float]:
@@ -148,12 +156,20 @@ def _handle_and_head(b: Builder, item: Instance, head_share: float, handle_rgba:
 
 def _spoon(b: Builder, item: Instance) -> None:
     centre, half = _handle_and_head(b, item, 0.34, item.rgba)
-    b.add(_Geom.mjGEOM_ELLIPSOID, (half * 1.1, item.size[1] / 2, item.size[2] / 2), item.rgba, (centre, 0, 0), shininess=0.8)
+    b.add(
+        _Geom.mjGEOM_ELLIPSOID,
+        (half * 1.1, item.size[1] / 2, item.size[2] / 2),
+        item.rgba,
+        (centre, 0, 0),
+        shininess=0.8,
+    )
 
 
 def _fork(b: Builder, item: Instance) -> None:
     centre, half = _handle_and_head(b, item, 0.36, item.rgba)
-    b.add(_Geom.mjGEOM_BOX, (half * 0.4, item.size[1] / 2, 0.003), item.rgba, (centre - half * 0.6, 0, 0), shininess=0.8)
+    b.add(
+        _Geom.mjGEOM_BOX, (half * 0.4, item.size[1] / 2, 0.003), item.rgba, (centre - half * 0.6, 0, 0), shininess=0.8
+    )
     for tine in (-1.0, -0.33, 0.33, 1.0):
         y = tine * (item.size[1] / 2 - 0.002)
         b.add(_Geom.mjGEOM_BOX, (half * 0.6, 0.002, 0.002), item.rgba, (centre + half * 0.4, y, 0), shininess=0.8)

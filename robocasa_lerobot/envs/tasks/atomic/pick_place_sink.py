@@ -20,7 +20,9 @@ COUNTER_TO_SINK = Task(
             washable=True,
         ),
         ObjectWanted(
-            "distr_counter", ("any",), OnCounter("sink", loc="left_right", size=(0.30, 0.30), at="front", offset=(0.0, 0.3))
+            "distr_counter",
+            ("any",),
+            OnCounter("sink", loc="left_right", size=(0.30, 0.30), at="front", offset=(0.0, 0.3)),
         ),
         ObjectWanted("distr_sink", ("any",), InsideOf("sink", size=(0.25, 0.25), at=1.0), washable=True),
     ),

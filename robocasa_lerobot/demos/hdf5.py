@@ -1,0 +1,136 @@
+"""Demonstrations as HDF5 in RoboCasa's layout (robomimic's, with `model_file`, `states` and `ep_meta`)."""
+
+from __future__ import annotations
+
+import datetime
+import json
+from collections.abc import Iterable
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import h5py
+import mujoco
+import numpy as np
+
+from robocasa_lerobot import __version__
+from robocasa_lerobot.demos.episode import Recording
+
+ENV_TYPE_ROBOSUITE = 1  # robomimic's number for environments of this family
+# Group of files that MJCFs name; MuJoCo needs them to load a `model_file` again.
+ASSETS_GROUP = "assets"
+
+
+@dataclass(frozen=True)
+class Failure:
+    """An attempt that did not succeed."""
+
+    seed: int
+    reason: str
+
+
+def write_part(path: Path, recording: Recording) -> None:
+    """Write one episode to a file of its own; it appears under its name only when complete."""
+    partial = path.with_suffix(".partial")
+    with h5py.File(partial, "w") as file:
+        demo = file.create_group("demo")
+        demo.attrs["model_file"] = recording.model_file
+        demo.attrs["ep_meta"] = json.dumps(recording.ep_meta)
+        demo.attrs["num_samples"] = len(recording.actions)
+        demo.attrs["seed"] = recording.seed
+        demo.create_dataset("states", data=recording.states, compression="gzip")
+        demo.create_dataset("actions", data=recording.actions, compression="gzip")
+        demo.create_dataset("rewards", data=recording.rewards)
+        dones = np.zeros(len(recording.actions), dtype=np.int64)
+        dones[-1] = 1
+        demo.create_dataset("dones", data=dones)
+        for key, values in recording.observations.items():
+            demo.create_dataset(f"obs/{key}", data=values, compression="gzip")
+        for name, content in recording.assets.items():
+            file.create_dataset(f"{ASSETS_GROUP}/{name}", data=np.frombuffer(content, dtype=np.uint8))
+    partial.replace(path)
+
+
+@dataclass(frozen=True)
+class Summary:
+    """What a file of demonstrations says of itself; `settings` is None for files recorded by others."""
+
+    settings: dict[str, Any] | None
+    episodes: int
+    steps: int
+    tried: int
+    failures: list[Failure]
+
+
+def read_summary(path: Path) -> Summary:
+    """Read the attributes of a file that `merge_parts` wrote."""
+    with h5py.File(path, "r") as file:
+        attributes = file["data"].attrs
+        return Summary(
+            settings=json.loads(attributes["recording_settings"]) if "recording_settings" in attributes else None,
+            episodes=sum(name.startswith("demo_") for name in file["data"]),
+            steps=int(attributes["total"]),
+            tried=int(attributes.get("episodes_tried", 0)),
+            failures=[Failure(**f) for f in json.loads(attributes.get("failures", "[]"))],
+        )
+
+
+def merge_parts(
+    path: Path,
+    parts: Iterable[Path],
+    *,
+    env_name: str,
+    env_kwargs: dict[str, Any],
+    settings: dict[str, Any],
+    tried: int,
+    failures: list[Failure],
+) -> int:
+    """Join episode files to one file `path`, demos numbered from 0; returns the number of steps in all.
+
+    The file appears under its name only when complete.
+    """
+    partial = path.with_suffix(".partial")
+    now = datetime.datetime.now(datetime.UTC)
+    total = 0
+    with h5py.File(partial, "w") as file:
+        data = file.create_group("data")
+        for index, part in enumerate(parts):
+            with h5py.File(part, "r") as source:
+                source.copy(source["demo"], data, name=f"demo_{index}")
+                for name in _asset_names(source):
+                    if f"{ASSETS_GROUP}/{name}" not in data:
+                        source.copy(source[f"{ASSETS_GROUP}/{name}"], data, name=f"{ASSETS_GROUP}/{name}")
+                total += int(source["demo"].attrs["num_samples"])
+        data.attrs.update(
+            {
+                "date": now.strftime("%m-%d-%Y"),
+                "time": now.strftime("%H:%M:%S"),
+                "robocasa_lerobot_version": __version__,
+                "mujoco_version": mujoco.__version__,
+                "env": env_name,
+                "env_info": json.dumps(env_kwargs),
+                "env_args": json.dumps(
+                    {
+                        "env_name": env_name,
+                        "env_version": __version__,
+                        "type": ENV_TYPE_ROBOSUITE,
+                        "mujoco_version": mujoco.__version__,
+                        "env_kwargs": env_kwargs,
+                    }
+                ),
+                "recording_settings": json.dumps(settings),
+                "total": total,
+                "episodes_tried": tried,
+                "episodes_failed": len(failures),
+                "failures": json.dumps([asdict(f) for f in failures]),
+            }
+        )
+    partial.replace(path)
+    return total
+
+
+def _asset_names(file: h5py.File) -> list[str]:
+    names: list[str] = []
+    if ASSETS_GROUP in file:
+        file[ASSETS_GROUP].visititems(lambda name, item: names.append(name) if isinstance(item, h5py.Dataset) else None)
+    return names
