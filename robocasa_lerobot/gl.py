@@ -21,7 +21,8 @@ VARIABLE = "MUJOCO_GL"
 HEADLESS_BACKENDS = ("egl", "osmesa")
 # Renderer names of the software rasterizers of Mesa and of SwiftShader.
 SOFTWARE_RENDERERS = ("llvmpipe", "softpipe", "swrast", "swiftshader")
-REMEDY = "apt-get install --yes libegl1 libgl1-mesa-dri"
+# libgl1 as well: PyOpenGL, which MuJoCo calls EGL through, loads the OpenGL functions from it.
+REMEDY = "apt-get install --yes libegl1 libgl1 libgl1-mesa-dri"
 NVIDIA_REMEDY = "apt-get install --yes libegl-nvidia0"
 NVIDIA_CONTAINER_NOTE = "in a container, start it with NVIDIA_DRIVER_CAPABILITIES=all"
 
