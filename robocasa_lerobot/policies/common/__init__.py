@@ -1,0 +1,1 @@
+"""Pieces that several policies use: image preparation, vision and text encoders, statistics."""

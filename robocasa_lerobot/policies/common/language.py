@@ -1,0 +1,162 @@
+"""Text encoders: instruction tokens to one vector per instruction.
+
+`TokenEncoder` needs no vocabulary file: a word is the mean of hashed embeddings of itself and of its character
+trigrams (Bojanowski et al. 2017), so an unseen word still shares its parts with known ones.
+`ClipTextEncoder` is the frozen text tower of CLIP (Radford et al. 2021), as published for the benchmark.
+"""
+
+from __future__ import annotations
+
+import re
+import zlib
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+import torch
+from torch import Tensor, nn
+
+from robocasa_lerobot.errors import UserError
+
+SUBWORDS = 8  # per word: the word itself and its first seven trigrams
+PADDING = 0  # token of no word; hashes are 1 ... buckets
+_WORD = re.compile(r"\w+|[^\w\s]")
+
+_CLIP_FIELDS = (
+    "vocab_size",
+    "hidden_size",
+    "intermediate_size",
+    "num_hidden_layers",
+    "num_attention_heads",
+    "max_position_embeddings",
+    "hidden_act",
+    "layer_norm_eps",
+    "projection_dim",
+    "pad_token_id",
+    "bos_token_id",
+    "eos_token_id",
+)
+
+
+@lru_cache(maxsize=8192)
+def hashed_words(text: str, max_words: int, buckets: int) -> tuple[tuple[int, ...], ...]:
+    """Tokens of an instruction: for each of its first `max_words` words, `SUBWORDS` integers in [0, buckets].
+
+    Case does not matter. The hash is CRC-32, the same in every process and on every machine.
+    """
+    words = _WORD.findall(text.lower())[:max_words]
+    return tuple(_hashed_word(word, buckets) for word in words)
+
+
+def _hashed_word(word: str, buckets: int) -> tuple[int, ...]:
+    marked = f"<{word}>"
+    pieces = [marked, *(marked[i : i + 3] for i in range(len(marked) - 2) if len(marked) > 3)][:SUBWORDS]
+    tokens = [1 + zlib.crc32(piece.encode()) % buckets for piece in pieces]
+    return tuple(tokens + [PADDING] * (SUBWORDS - len(tokens)))
+
+
+def token_tensor(texts: list[str], max_words: int, buckets: int) -> Tensor:
+    """Tokens of instructions, int64 of shape (N, max_words, SUBWORDS), padded with `PADDING`."""
+    out = torch.full((len(texts), max_words, SUBWORDS), PADDING, dtype=torch.int64)
+    for i, text in enumerate(texts):
+        words = hashed_words(text, max_words, buckets)
+        if words:
+            out[i, : len(words)] = torch.tensor(words)
+    return out
+
+
+class TokenEncoder(nn.Module):
+    """Hashed words and their order to a vector, by one transformer layer; trained with the policy."""
+
+    def __init__(self, buckets: int, max_words: int, dim: int) -> None:
+        super().__init__()
+        self.dim = dim
+        self.embedding = nn.Embedding(1 + buckets, dim, padding_idx=PADDING)
+        self.position_embedding = nn.Parameter(torch.randn(1, max_words, dim) * 0.02)
+        self.layer = nn.TransformerEncoderLayer(
+            dim, nhead=4, dim_feedforward=2 * dim, dropout=0.0, activation="gelu", batch_first=True, norm_first=True
+        )
+        self.norm = nn.LayerNorm(dim)
+
+    def forward(self, tokens: Tensor, mask: Tensor) -> Tensor:
+        """Maps tokens (N, W, SUBWORDS) and mask (N, W), true where there is a word, to (N, dim)."""
+        # A batch repeats few instructions: encode each once.
+        unique, where = torch.unique(torch.cat([tokens.flatten(1), mask.long()], dim=1), dim=0, return_inverse=True)
+        words = int(mask.sum(dim=1).max().clamp(min=1))
+        mask = unique[:, -mask.shape[1] :][:, :words].bool()
+        tokens = unique[:, : tokens.shape[1] * SUBWORDS].unflatten(1, (-1, SUBWORDS))[:, :words]
+        pieces = (tokens != PADDING).sum(dim=-1, keepdim=True).clamp(min=1)
+        x = self.embedding(tokens).sum(dim=-2) / pieces + self.position_embedding[:, :words]
+        # An empty instruction attends to its first (empty) place: a softmax over nothing is not a number.
+        attended = mask.clone()
+        attended[:, 0] = True
+        x = self.norm(self.layer(x, src_key_padding_mask=~attended))
+        weight = attended.unsqueeze(-1).to(x.dtype)
+        return ((x * weight).sum(dim=1) / weight.sum(dim=1))[where]
+
+
+class ClipTextEncoder(nn.Module):
+    """Frozen CLIP text encoder with a memory of the instructions it has seen.
+
+    Its weights are part of the module (and so of a checkpoint) if `saved`, else they are only held.
+    """
+
+    def __init__(self, path: str, config: dict[str, Any] | None, saved: bool) -> None:
+        super().__init__()
+        from transformers import CLIPTextConfig, CLIPTextModelWithProjection
+
+        if saved and config is not None:  # weights follow from the checkpoint
+            model = CLIPTextModelWithProjection(CLIPTextConfig(**config))
+        else:
+            model = _from_pretrained(CLIPTextModelWithProjection, path, "text encoder")
+        self.config = {name: getattr(model.config, name) for name in _CLIP_FIELDS}
+        self.dim = int(model.config.projection_dim)
+        model.requires_grad_(False)
+        if saved:
+            self.model = model
+        else:
+            self._held = [model]  # a list hides it from parameters(), state_dict() and so from checkpoints
+        self._memory: dict[bytes, Tensor] = {}
+
+    @property
+    def text_model(self) -> nn.Module:
+        """The CLIP model itself."""
+        return self.model if hasattr(self, "model") else self._held[0]
+
+    @torch.no_grad()
+    def forward(self, tokens: Tensor, mask: Tensor) -> Tensor:
+        """Maps CLIP's tokens (N, L) and attention mask (N, L) to its text embeddings (N, dim), in float32."""
+        keys = [row.numpy().tobytes() for row in tokens.cpu()]
+        new = [i for i, key in enumerate(keys) if key not in self._memory and keys.index(key) == i]
+        if new:
+            model = self.text_model.to(tokens.device).eval()
+            embeddings = model(input_ids=tokens[new], attention_mask=mask[new].long()).text_embeds.float()
+            self._memory.update({keys[i]: embedding for i, embedding in zip(new, embeddings, strict=True)})
+        return torch.stack([self._memory[key].to(tokens.device) for key in keys])
+
+    def _load_from_state_dict(self, *args: Any, **kwargs: Any) -> None:
+        self._memory.clear()  # what other weights gave
+        super()._load_from_state_dict(*args, **kwargs)
+
+
+def _from_pretrained(cls: Any, path: str, what: str) -> Any:
+    try:
+        return cls.from_pretrained(path)
+    except (OSError, ValueError) as error:
+        kind = "folder" if Path(path).exists() else "hub name or folder"
+        raise UserError(
+            f"the CLIP {what} could not be loaded from {kind} {path!r}: {error} "
+            "Set clip_path to a folder that holds a CLIP model and its tokenizer (as `save_pretrained` writes it), "
+            "allow access to the hub, or set text_encoder to 'token', which needs no download."
+        ) from error
+
+
+def load_clip_tokenizer(path: str) -> str:
+    """The tokenizer of a CLIP model, from a hub name or folder, as the JSON text of the `tokenizers` library.
+
+    Raises:
+        UserError: nothing loadable at `path`.
+    """
+    from transformers import AutoTokenizer
+
+    return str(_from_pretrained(AutoTokenizer, path, "tokenizer").backend_tokenizer.to_str())

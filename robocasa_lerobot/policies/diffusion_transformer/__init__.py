@@ -1,0 +1,1 @@
+"""`diffusion_transformer`: a transformer that denoises action chunks, given cameras, state and an instruction."""

@@ -1,0 +1,209 @@
+"""The policy `diffusion_transformer`: loss, sampling of action chunks, and stepping through them in an env."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Sequence
+from typing import Any
+
+import torch
+from diffusers.schedulers.scheduling_ddim import DDIMScheduler
+from diffusers.schedulers.scheduling_ddpm import DDPMScheduler
+from diffusers.utils.torch_utils import randn_tensor
+from lerobot.policies.pretrained import PreTrainedPolicy
+from lerobot.utils.constants import ACTION, OBS_LANGUAGE_ATTENTION_MASK, OBS_LANGUAGE_TOKENS, OBS_STATE
+from torch import Tensor
+
+from robocasa_lerobot.errors import UserError
+from robocasa_lerobot.policies.diffusion_transformer.configuration_diffusion_transformer import (
+    DiffusionTransformerConfig,
+)
+from robocasa_lerobot.policies.diffusion_transformer.network import DenoisingTransformer, decay_groups, masked_mse
+from robocasa_lerobot.policies.diffusion_transformer.observation import ObservationEncoder
+
+ACTION_IS_PAD = ACTION + "_is_pad"
+type Generators = torch.Generator | Sequence[torch.Generator] | None
+
+
+class DiffusionTransformerPolicy(PreTrainedPolicy):
+    """A LeRobot policy; its batches come from its preprocessor and its actions go to its postprocessor."""
+
+    config_class = DiffusionTransformerConfig
+    name = "diffusion_transformer"
+
+    def __init__(self, config: DiffusionTransformerConfig, **_: Any) -> None:
+        super().__init__(config)
+        config.validate_features()
+        assert config.action_feature is not None
+        self.config = config
+        self.action_dim = config.action_feature.shape[0]
+        self.observation_encoder = ObservationEncoder(config)
+        self.denoiser = DenoisingTransformer(
+            action_dim=self.action_dim,
+            feature_dim=self.observation_encoder.feature_dim,
+            horizon=config.horizon,
+            n_obs_steps=config.n_obs_steps,
+            width=config.width,
+            n_heads=config.n_heads,
+            n_decoder_layers=config.n_decoder_layers,
+            n_condition_layers=config.n_condition_layers,
+            dropout_embedding=config.dropout_embedding,
+            dropout=config.dropout,
+        )
+        self.scheduler = _noise_scheduler(config)
+        self._observed_keys = (*self.observation_encoder.image_keys, OBS_STATE)
+        self.reset()
+
+    def get_optim_params(self) -> list[dict[str, Any]]:
+        """Parameter groups: matrices of the transformer, its biases, norms and positions, and the encoders."""
+        decayed, rest = decay_groups(self.denoiser)
+        encoder = [p for p in self.observation_encoder.parameters() if p.requires_grad]
+        groups: list[dict[str, Any]] = [
+            {"params": decayed},
+            {"params": rest, "weight_decay": 0.0},
+            {"params": encoder, "weight_decay": self.config.optimizer_encoder_weight_decay},
+        ]
+        return [group for group in groups if group["params"]]
+
+    def forward(
+        self,
+        batch: dict[str, Tensor],
+        reduction: str = "mean",
+        generator: torch.Generator | None = None,
+        noise: Tensor | None = None,
+        times: Tensor | None = None,
+    ) -> tuple[Tensor, dict[str, Any]]:
+        """Loss of a batch.
+
+        Args:
+            batch: observations (B, n_obs_steps, ...), `action` (B, horizon, A) and, for the mask, `action_is_pad`.
+            reduction: `mean` gives a scalar, `none` the loss of each sample (B,).
+            generator: for noise, diffusion times and crops; None uses the global one.
+            noise: (B * noise_draws, horizon, A), drawn where None.
+            times: diffusion steps (B * noise_draws,), drawn where None.
+
+        Returns:
+            The loss, and scalars to log.
+        """
+        draws = self.config.noise_draws
+        features = self.observation_encoder(batch, generator).repeat_interleave(draws, dim=0)
+        actions = batch[ACTION].to(features.dtype).repeat_interleave(draws, dim=0)
+        if tuple(actions.shape[1:]) != (self.config.horizon, self.action_dim):
+            raise UserError(
+                f"actions of shape {tuple(batch[ACTION].shape)}, expected (batch, {self.config.horizon}, "
+                f"{self.action_dim}): load the data with the policy's action_delta_indices."
+            )
+        if noise is None:
+            noise = _normal(actions.shape, generator, actions)
+        if times is None:
+            steps = self.config.num_train_timesteps
+            times = torch.randint(steps, actions.shape[:1], generator=generator).to(actions.device)
+        noisy = self.scheduler.add_noise(actions, noise, times)
+        target = noise if self.config.prediction_type == "epsilon" else actions
+        ignored = batch.get(ACTION_IS_PAD) if self.config.mask_padded_actions else None
+        if ignored is not None:
+            ignored = ignored.repeat_interleave(draws, dim=0)
+        losses = masked_mse(self.denoiser(noisy, times, features), target, ignored)
+        losses = losses.unflatten(0, (-1, draws)).mean(dim=1)
+        if reduction == "none":
+            return losses, {}
+        loss = losses.mean()
+        return loss, {}
+
+    @torch.no_grad()
+    def predict_action_chunk(
+        self, batch: dict[str, Tensor], noise: Tensor | None = None, generator: Generators = None, **_: Any
+    ) -> Tensor:
+        """Sample the actions to execute from now on; a function of its arguments and the weights only.
+
+        Args:
+            batch: observations (B, n_obs_steps, ...); without the time axis they are taken for the first of an
+                episode and repeated.
+            noise: what denoising starts from, (B, horizon, A); drawn where None.
+            generator: one for the batch, or one per sample, so that a sample's actions do not depend on the batch
+                it is in; None uses the global one. DDPM also draws from it at each denoising step.
+
+        Returns:
+            (B, n_action_steps, A), still normalised.
+        """
+        chunk = self.sample(batch, noise, generator)
+        start = self.config.n_obs_steps - 1
+        return chunk[:, start : start + self.config.n_action_steps]
+
+    @torch.no_grad()
+    def sample(self, batch: dict[str, Tensor], noise: Tensor | None = None, generator: Generators = None) -> Tensor:
+        """All predicted actions, (B, horizon, A), from offset 1 - n_obs_steps on. Arguments as above."""
+        self.eval()
+        features = self.observation_encoder(self._with_time_axis(batch))
+        random = generator if generator is None or isinstance(generator, torch.Generator) else list(generator)
+        shape = (features.shape[0], self.config.horizon, self.action_dim)
+        x = _normal(shape, random, features) if noise is None else noise.to(features)
+        if tuple(x.shape) != shape:
+            raise UserError(f"noise of shape {tuple(x.shape)}, expected {shape}.")
+        self.scheduler.set_timesteps(self.config.num_inference_steps or self.config.num_train_timesteps)
+        for time in self.scheduler.timesteps.tolist():
+            times = torch.full(shape[:1], time, device=x.device, dtype=torch.long)
+            x = self.scheduler.step(self.denoiser(x, times, features), time, x, generator=random).prev_sample
+        return x
+
+    def reset(self) -> None:
+        """Forget observations and planned actions; called at the start of an episode."""
+        self._planned: deque[Tensor] = deque()
+        self._history: deque[dict[str, Tensor]] = deque(maxlen=self.config.n_obs_steps)
+
+    @property
+    def needs_observation(self) -> bool:
+        """Whether the observation of the next `select_action` will be looked at, now or as the history of a chunk."""
+        return len(self._planned) < self.config.n_obs_steps or not self._history
+
+    @torch.no_grad()
+    def select_action(
+        self, batch: dict[str, Tensor], noise: Tensor | None = None, generator: Generators = None, **_: Any
+    ) -> Tensor:
+        """The next action (B, A), normalised: of the planned chunk, or of a new one where that is used up.
+
+        Args:
+            batch: the newest observation, without time axis; ignored where `needs_observation` is false.
+            noise: as for `predict_action_chunk`, used when a chunk is sampled.
+            generator: likewise.
+        """
+        if self.needs_observation:
+            self._history.append({key: batch[key] for key in self._observed_keys})
+        if not self._planned:
+            steps = [self._history[0]] * (self.config.n_obs_steps - len(self._history)) + list(self._history)
+            stacked = {key: torch.stack([step[key] for step in steps], dim=1) for key in self._observed_keys}
+            for key in (OBS_LANGUAGE_TOKENS, OBS_LANGUAGE_ATTENTION_MASK):
+                if key in batch:
+                    stacked[key] = batch[key]
+            chunk = self.predict_action_chunk(stacked, noise=noise, generator=generator)
+            self._planned.extend(chunk.unbind(dim=1))
+        return self._planned.popleft()
+
+    def _with_time_axis(self, batch: dict[str, Tensor]) -> dict[str, Tensor]:
+        if batch[OBS_STATE].ndim == 3:
+            return batch
+        steps = self.config.n_obs_steps
+        return {
+            **batch,
+            **{k: batch[k].unsqueeze(1).expand(-1, steps, *batch[k].shape[1:]) for k in self._observed_keys},
+        }
+
+
+def _normal(shape: Sequence[int], generator: Any, like: Tensor) -> Tensor:
+    return randn_tensor(tuple(shape), generator=generator, device=like.device, dtype=like.dtype)
+
+
+def _noise_scheduler(config: DiffusionTransformerConfig) -> DDPMScheduler | DDIMScheduler:
+    shared = {
+        "num_train_timesteps": config.num_train_timesteps,
+        "beta_start": config.beta_start,
+        "beta_end": config.beta_end,
+        "beta_schedule": config.beta_schedule,
+        "clip_sample": config.clip_sample,
+        "clip_sample_range": config.clip_sample_range,
+        "prediction_type": config.prediction_type,
+        "timestep_spacing": config.timestep_spacing,
+    }
+    if config.noise_scheduler == "DDPM":
+        return DDPMScheduler(variance_type="fixed_small", **shared)
+    return DDIMScheduler(set_alpha_to_one=True, **shared)

@@ -1,0 +1,368 @@
+"""The policy `diffusion_transformer`: variants, masks, loss, sampling, checkpoints, its YAML files."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import draccus
+import numpy as np
+import pytest
+import torch
+import yaml
+from lerobot.configs import PreTrainedConfig
+from lerobot.policies.factory import get_policy_class, make_pre_post_processors
+from policy_support import batch_for, tiny_config, unit_stats, with_features
+from torch import nn
+
+from robocasa_lerobot import contract
+from robocasa_lerobot.errors import UserError
+from robocasa_lerobot.policies.common.vision import ResNet18
+from robocasa_lerobot.policies.diffusion_transformer.configuration_diffusion_transformer import (
+    DiffusionTransformerConfig,
+)
+from robocasa_lerobot.policies.diffusion_transformer.modeling_diffusion_transformer import DiffusionTransformerPolicy
+from robocasa_lerobot.policies.diffusion_transformer.network import DenoisingTransformer, causal_mask, memory_mask
+
+PRESETS = sorted((Path(__file__).parents[1] / "configs/policies").glob("diffusion_transformer*.yaml"))
+
+VARIANTS: dict[str, dict[str, Any]] = {
+    "default": {},
+    "one observation": {"n_obs_steps": 1, "horizon": 9},
+    "three observations": {"n_obs_steps": 3, "horizon": 12, "n_action_steps": 4},
+    "all of the state": {"state_indices": None, "state_clip": None},
+    "encoder per camera": {"vision_shared": False},
+    "concatenated language": {"language_concat": True},
+    "language without FiLM": {"language_concat": True, "language_film": False},
+    "resized": {"image_size": (24, 24)},
+    "uncropped": {"crop_fraction": 1.0},
+    "own crops": {"crop_shared_over_time": False},
+    "DDPM": {"noise_scheduler": "DDPM", "num_inference_steps": None, "num_train_timesteps": 6},
+    "DDIM leading": {"noise_scheduler": "DDIM", "timestep_spacing": "leading", "num_inference_steps": 8},
+    "predicts actions": {"prediction_type": "sample"},
+    "multi-layer perceptron": {"n_condition_layers": 0},
+    "several draws": {"noise_draws": 3},
+    "unmasked": {"mask_padded_actions": False},
+    "resnet18": {"vision_encoder": "resnet18"},
+}
+
+
+def build(config: DiffusionTransformerConfig, seed: int = 0) -> tuple[DiffusionTransformerPolicy, Any, Any]:
+    torch.manual_seed(seed)
+    policy = get_policy_class("diffusion_transformer")(config)
+    return (policy, *make_pre_post_processors(config, dataset_stats=unit_stats()))
+
+
+def generators(*seeds: int) -> list[torch.Generator]:
+    return [torch.Generator().manual_seed(seed) for seed in seeds]
+
+
+@pytest.mark.parametrize("overrides", VARIANTS.values(), ids=VARIANTS.keys())
+def test_variant_trains_and_predicts(overrides: dict[str, Any]) -> None:
+    config = tiny_config(**overrides)
+    policy, preprocess, postprocess = build(config)
+    batch = preprocess(batch_for(config))
+    loss, _ = policy.train()(batch)
+    each, _ = policy(batch, reduction="none")
+    assert loss.shape == ()
+    assert torch.isfinite(loss)
+    assert each.shape == (4,)
+    loss.backward()
+    unused = [name for name, p in policy.named_parameters() if p.requires_grad and p.grad is None]
+    assert unused == []
+    chunk = policy.predict_action_chunk(batch)
+    assert chunk.shape == (4, config.n_action_steps, contract.ACTION_SIZE)
+    assert policy.sample(batch).shape == (4, config.horizon, contract.ACTION_SIZE)
+    assert torch.isfinite(postprocess(chunk)).all()
+    assert len(config.observation_delta_indices) == config.n_obs_steps
+    assert config.observation_delta_indices[-1] == 0
+    assert len(config.action_delta_indices) == config.horizon
+    assert config.action_delta_indices[config.n_obs_steps - 1] == 0
+
+
+def test_uint8_and_float_images_are_the_same() -> None:
+    config = tiny_config()
+    policy, preprocess, _ = build(config)
+    a, b = (preprocess(batch_for(config, uint8=uint8)) for uint8 in (True, False))
+    (x,), (y,) = generators(1), generators(1)
+    torch.testing.assert_close(policy.predict_action_chunk(a, generator=x), policy.predict_action_chunk(b, generator=y))
+
+
+def test_masks() -> None:
+    horizon, conditions = 10, 3
+    causal, memory = causal_mask(horizon), memory_mask(horizon, conditions)
+    for i in range(horizon):
+        assert [not blocked for blocked in causal[i]] == [j <= i for j in range(horizon)]
+        assert [not blocked for blocked in memory[i]] == [i >= j - 1 for j in range(conditions)]
+
+
+@pytest.mark.parametrize("n_obs_steps", [1, 2, 3])
+def test_actions_see_neither_later_actions_nor_later_observations(n_obs_steps: int) -> None:
+    torch.manual_seed(0)
+    horizon = 6
+    # Without condition layers no condition token sees another, so the memory mask alone decides.
+    net = DenoisingTransformer(4, 5, horizon, n_obs_steps, 16, 2, 2, n_condition_layers=0, dropout=0.0).eval()
+    x, features, times = torch.randn(1, horizon, 4), torch.randn(1, n_obs_steps, 5), torch.tensor([3])
+    before = net(x, times, features)
+    for changed in range(horizon):
+        y = x.clone()
+        y[:, changed] += 1.0
+        moved = (net(y, times, features) != before).any(dim=-1)[0].tolist()
+        assert moved == [i >= changed for i in range(horizon)]
+    for changed in range(n_obs_steps):
+        f = features.clone()
+        f[:, changed] += 1.0
+        moved = (net(x, times, f) != before).any(dim=-1)[0].tolist()
+        assert moved == [i >= changed for i in range(horizon)]
+    assert (net(x, torch.tensor([4]), features) != before).any(dim=-1).all()
+
+
+def test_film_modulates_each_of_the_eight_blocks() -> None:
+    net = ResNet18(condition_dim=12)
+    assert [block.film.to_shift_and_scale.out_features // 2 for block in net.blocks] == [
+        64, 64, 128, 128, 256, 256, 512, 512,
+    ]  # fmt: skip
+    images, condition = torch.rand(1, 3, 64, 64), torch.rand(1, 12)
+    outputs: list[torch.Tensor] = []
+    hooks = [block.register_forward_hook(lambda _m, _i, out: outputs.append(out)) for block in net.blocks]
+    net(images, condition)
+    for i, block in enumerate(net.blocks):
+        reference, state = outputs[i], block.film.to_shift_and_scale.weight.data.clone()
+        block.film.to_shift_and_scale.weight.data += 0.1
+        outputs.clear()
+        net(images, condition)
+        assert not torch.equal(outputs[i], reference)
+        assert (outputs[i] >= 0).all()  # a ReLU follows the modulation
+        block.film.to_shift_and_scale.weight.data = state
+        outputs.clear()
+        net(images, condition)
+    for hook in hooks:
+        hook.remove()
+    assert not any(isinstance(m, nn.BatchNorm2d) for m in net.modules())
+
+
+def preset(path: Path) -> DiffusionTransformerConfig:
+    values = yaml.safe_load(path.read_text(encoding="utf-8"))
+    assert values["type"] == "diffusion_transformer"
+    return with_features(draccus.decode(PreTrainedConfig, {**values, "device": "cpu"}), contract.IMAGE_SIZE)
+
+
+def test_there_are_presets() -> None:
+    assert {path.stem.removeprefix("diffusion_transformer_") for path in PRESETS} >= {"benchmark", "compact", "demo"}
+
+
+@pytest.mark.parametrize("path", PRESETS, ids=lambda p: p.stem)
+def test_preset_builds(path: Path) -> None:
+    config = preset(path)
+    config.text_encoder = "token"  # the weights of CLIP are not here; its own tests use a small one
+    with torch.device("meta"):
+        policy = DiffusionTransformerPolicy(config)
+    assert sum(p.numel() for p in policy.parameters()) > 0
+    assert config.get_optimizer_preset().lr == config.optimizer_lr
+    assert config.get_scheduler_preset().num_warmup_steps == config.scheduler_warmup_steps
+
+
+def test_benchmark_preset_has_the_published_size() -> None:
+    config = preset(next(path for path in PRESETS if path.stem.endswith("benchmark")))
+    assert config.text_encoder == "clip"
+    # As with CLIP ViT-L/14: a vector of 768, whose encoder is frozen and does not count.
+    config.text_encoder, config.language_dim = "token", 768
+    with torch.device("meta"):
+        policy = DiffusionTransformerPolicy(config)
+    sizes = {
+        "vision": sum(p.numel() for p in policy.observation_encoder.vision.parameters()),
+        "denoiser": sum(p.numel() for p in policy.denoiser.parameters()),
+    }
+    assert policy.observation_encoder.feature_dim == 3 * 64 + 3 + 4 + 2 + 768
+    assert len(policy.observation_encoder.vision) == 3
+    assert sizes["vision"] == pytest.approx(42e6, rel=0.02)
+    assert sizes["denoiser"] == pytest.approx(63e6, rel=0.02)
+    assert sum(sizes.values()) == pytest.approx(106e6, rel=0.01)
+    assert len(policy.denoiser.decoder.layers) == 12
+    assert len(policy.denoiser.condition_encoder.layers) == 4
+    assert policy.denoiser.decoder.layers[0].linear1.out_features == 2048
+    assert config.action_delta_indices == list(range(-1, 9))
+    assert config.drop_n_last_frames == 0
+    groups = policy.get_optim_params()
+    assert [group.get("weight_decay") for group in groups] == [None, 0.0, 1e-6]
+    assert sum(p.numel() for group in groups for p in group["params"]) == sum(p.numel() for p in policy.parameters())
+    assert all(p.ndim == 2 for p in groups[0]["params"])
+
+
+@pytest.mark.parametrize("masked", [True, False])
+def test_padded_actions_in_the_loss(masked: bool) -> None:
+    config = tiny_config(mask_padded_actions=masked)
+    policy, preprocess, _ = build(config)
+    policy.eval()
+    padded = batch_for(config)
+    padded["action_is_pad"][:, 7:] = True
+    padded["action_is_pad"][:, 0] = True
+    changed = {**padded, "action": padded["action"].clone()}
+    changed["action"][padded["action_is_pad"]] = 0.123
+    noise = torch.randn(4, config.horizon, contract.ACTION_SIZE, generator=generators(0)[0])
+    times = torch.tensor([5, 50, 80, 99])
+    # Causality would let padded actions reach later ones only; compare where the denoiser's input is the same.
+    clean, _ = policy(preprocess(dict(padded)), noise=noise, times=times)
+    whole, _ = policy(
+        preprocess({**padded, "action_is_pad": torch.zeros(4, 10, dtype=torch.bool)}), noise=noise, times=times
+    )
+    assert (clean == whole) == (not masked)
+    last_only = {**padded, "action": padded["action"].clone()}
+    last_only["action"][:, 7:] = 0.123  # behind all that counts, so that only the loss can see it
+    other, _ = policy(preprocess(last_only), noise=noise, times=times)
+    assert (clean == other) == masked
+    assert not torch.equal(changed["action"], padded["action"])
+
+
+def test_sample_without_any_valid_action_counts_nothing() -> None:
+    config = tiny_config()
+    policy, preprocess, _ = build(config)
+    batch = batch_for(config)
+    batch["action_is_pad"][1] = True
+    losses, _ = policy(preprocess(batch), reduction="none")
+    assert losses[1] == 0
+    assert (losses[[0, 2, 3]] > 0).all()
+
+
+@pytest.mark.parametrize(("prediction_type", "steps", "share"), [("sample", 120, 0.1), ("epsilon", 200, 0.5)])
+def test_overfits_one_batch(prediction_type: str, steps: int, share: float) -> None:
+    config = tiny_config(
+        prediction_type=prediction_type, width=64, n_heads=4, num_inference_steps=10, crop_fraction=1.0, noise_draws=4
+    )
+    policy, preprocess, postprocess = build(config)
+    raw = batch_for(config)
+    raw["action"] = raw["action"] * 0.8
+    batch = preprocess(dict(raw))
+    optimizer = torch.optim.AdamW(policy.get_optim_params(), lr=3e-3)
+    schedule = torch.optim.lr_scheduler.OneCycleLR(optimizer, max_lr=3e-3, total_steps=steps)
+    generator = generators(0)[0]
+    policy.train()
+    losses = []
+    for _ in range(steps):
+        loss, _ = policy(batch, generator=generator)
+        optimizer.zero_grad()
+        loss.backward()
+        optimizer.step()
+        schedule.step()
+        losses.append(loss.item())
+    assert np.mean(losses[80:100]) < 0.5 * np.mean(losses[:5])
+    assert np.mean(losses[-20:]) < 0.2 * np.mean(losses[:5])
+    wanted = raw["action"][:, 1 : 1 + config.n_action_steps].float()
+    error = (postprocess(policy.predict_action_chunk(batch, generator=generator)) - wanted).abs().mean()
+    untrained = (postprocess(build(config)[0].predict_action_chunk(batch, generator=generator)) - wanted).abs().mean()
+    assert error < share * untrained
+    # Instructions matter: with those of the neighbours something else comes out.
+    swapped = preprocess({**raw, "task": raw["task"][::-1]})
+    a, b = (policy.predict_action_chunk(x, generator=generators(1)[0]) for x in (batch, swapped))
+    assert not torch.equal(a, b)
+
+
+@pytest.mark.parametrize("scheduler", ["DDPM", "DDIM"])
+def test_saved_and_loaded_policy_gives_the_same_actions(scheduler: str, tmp_path: Path) -> None:
+    config = tiny_config(noise_scheduler=scheduler, image_size=(24, 24))
+    policy, preprocess, postprocess = build(config)
+    policy.save_pretrained(tmp_path)
+    preprocess.save_pretrained(tmp_path)
+    postprocess.save_pretrained(tmp_path)
+    loaded_config = PreTrainedConfig.from_pretrained(tmp_path)
+    assert loaded_config.type == "diffusion_transformer"
+    assert draccus.encode(loaded_config) == draccus.encode(config)
+    loaded = DiffusionTransformerPolicy.from_pretrained(tmp_path)
+    pre, post = make_pre_post_processors(loaded_config, pretrained_path=str(tmp_path))
+    raw = batch_for(config)
+    before = postprocess(policy.predict_action_chunk(preprocess(dict(raw)), generator=generators(1, 2, 3, 4)))
+    after = post(loaded.predict_action_chunk(pre(dict(raw)), generator=generators(1, 2, 3, 4)))
+    assert torch.equal(before, after)
+
+
+@pytest.mark.parametrize("scheduler", ["DDPM", "DDIM"])
+def test_actions_depend_on_the_samples_generator_and_not_on_its_batch(scheduler: str) -> None:
+    config = tiny_config(noise_scheduler=scheduler)
+    policy, preprocess, _ = build(config)
+    batch = preprocess(batch_for(config))
+    together = policy.predict_action_chunk(batch, generator=generators(1, 2, 3, 4))
+    torch.manual_seed(123)  # the global generator has no part in it
+    for i in range(4):
+        one = {k: v[i : i + 1] for k, v in batch.items() if k.startswith("observation.")}
+        alone = policy.predict_action_chunk(one, generator=generators(i + 1))
+        torch.testing.assert_close(alone[0], together[i])
+    noise = torch.randn(4, config.horizon, contract.ACTION_SIZE)
+    if scheduler == "DDIM":
+        assert torch.equal(*(policy.predict_action_chunk(batch, noise=noise) for _ in range(2)))
+    with pytest.raises(UserError, match="noise of shape"):
+        policy.predict_action_chunk(batch, noise=noise[:2])
+
+
+@pytest.mark.parametrize(("n_obs_steps", "n_action_steps"), [(1, 1), (1, 4), (2, 1), (2, 4), (3, 2)])
+def test_select_action_steps_through_chunks_of_the_true_history(n_obs_steps: int, n_action_steps: int) -> None:
+    config = tiny_config(n_obs_steps=n_obs_steps, n_action_steps=n_action_steps, horizon=8)
+    policy, preprocess, _ = build(config)
+    episode = [
+        {k: v[:, -1] if isinstance(v, torch.Tensor) else v for k, v in batch_for(config, size=2, seed=t).items()}
+        for t in range(9)
+    ]
+    steps = [preprocess({k: v for k, v in step.items() if not k.startswith("action")}) for step in episode]
+    noise = torch.randn(2, 8, contract.ACTION_SIZE, generator=generators(0)[0])
+    looked_at = set()
+    policy.reset()
+    chosen = []
+    for t, step in enumerate(steps):
+        if policy.needs_observation:
+            looked_at.add(t)
+            chosen.append(policy.select_action(step, noise=noise))
+        else:  # what nobody looks at may be missing
+            chosen.append(policy.select_action({}, noise=noise))
+    for start in range(0, len(steps), n_action_steps):
+        history = [max(0, start - n_obs_steps + 1 + i) for i in range(n_obs_steps)]
+        assert set(history) <= looked_at | {0}
+        stacked = dict(steps[start])
+        for key in (*contract.IMAGE_KEYS, contract.STATE_KEY):
+            stacked[key] = torch.stack([steps[t][key] for t in history], dim=1)
+        chunk = policy.predict_action_chunk(stacked, noise=noise)
+        for i in range(min(n_action_steps, len(steps) - start)):
+            assert torch.equal(chosen[start + i], chunk[:, i])
+    policy.reset()
+    assert policy.needs_observation
+    assert torch.equal(
+        policy.select_action(steps[0], noise=noise), policy.predict_action_chunk(steps[0], noise=noise)[:, 0]
+    )
+
+
+@pytest.mark.parametrize(
+    ("overrides", "message"),
+    [
+        ({"vision_encoder": "resnet81"}, "Did you mean 'resnet18'"),
+        ({"text_encoder": "tokens"}, "Did you mean 'token'"),
+        ({"noise_scheduler": "ddim"}, "Did you mean 'DDIM'"),
+        ({"prediction_type": "noise"}, "unknown prediction_type"),
+        ({"n_action_steps": 10}, "reaches only 9 actions"),
+        ({"width": 30, "n_heads": 4}, "multiple of n_heads"),
+        ({"crop_fraction": 0.0}, "crop_fraction is 0.0"),
+        ({"num_inference_steps": 101}, "num_inference_steps is 101"),
+        ({"language_film": False}, "would not be used"),
+        ({"vision_channels": [12]}, "multiples of 8"),
+        ({"horizon": 0}, "expected at least 1"),
+    ],
+)
+def test_wrong_fields_are_explained(overrides: dict[str, Any], message: str) -> None:
+    with pytest.raises(UserError, match=message):
+        tiny_config(**overrides)
+
+
+def test_wrong_features_and_batches_are_explained() -> None:
+    config = tiny_config()
+    config.input_features = {k: v for k, v in config.input_features.items() if k == contract.STATE_KEY}
+    with pytest.raises(UserError, match="no camera"):
+        DiffusionTransformerPolicy(config)
+    with pytest.raises(UserError, match="needs 'observation\\.state'"):
+        DiffusionTransformerPolicy(DiffusionTransformerConfig(device="cpu"))
+    with pytest.raises(UserError, match="has 16 components"):
+        DiffusionTransformerPolicy(tiny_config(state_indices=[16]))
+    policy, preprocess, _ = build(tiny_config())
+    raw = batch_for(policy.config)
+    with pytest.raises(UserError, match="pass it through the policy's preprocessor"):
+        policy(raw)
+    with pytest.raises(UserError, match="action_delta_indices"):
+        policy(preprocess({**raw, "action": raw["action"][:, :4]}))
+    with pytest.raises(UserError, match="has no instructions"):
+        preprocess({k: v for k, v in raw.items() if k != "task"})
