@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-EXAMPLE = "robocasa-lerobot train --config_path configs/experiments/demo.yaml --phases.pretrain.steps=100"
+EXAMPLE = "robocasa-lerobot train --config_path configs/experiments/demo.yaml"
 
 
 def configure(parser: argparse.ArgumentParser) -> None:

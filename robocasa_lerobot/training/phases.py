@@ -59,10 +59,10 @@ def run_experiment(experiment: ExperimentConfig, stop_after: int | None = None, 
         kwargs_handlers=[DistributedDataParallelKwargs(find_unused_parameters=True)],
     )
     check_unchanged(experiment, output, force)
-    for phase in experiment.phases:  # a wrong setting of the last phase should not wait for the first to finish
-        init = _checkpoint_dir(experiment, phase, output, must_exist=False)
-        if init is None or init.is_dir():
-            builders.policy_config(_policy_settings(experiment, phase), init, device)
+    for phase in experiment.phases:  # a mistake in the last phase should not wait for the first to finish
+        if not is_finished(output, phase):
+            builders.policy_config(*_planned_policy(experiment, phase), device)
+            open_mixture(phase.mixture, experiment.loader)
     if accelerator.is_main_process:
         output.mkdir(parents=True, exist_ok=True)
         aside = output / f".{EXPERIMENT_FILE}"
@@ -199,9 +199,18 @@ def _policy_settings(experiment: ExperimentConfig, phase: PhaseConfig) -> dict[s
     return settings
 
 
-def _checkpoint_dir(
-    experiment: ExperimentConfig, phase: PhaseConfig, output: Path, must_exist: bool = True
-) -> Path | None:
+def _planned_policy(experiment: ExperimentConfig, phase: PhaseConfig) -> tuple[dict[str, Any], Path | None]:
+    """Settings of a phase's policy, with those of the phases it builds on, and the checkpoint at their beginning."""
+    init = experiment.init_of(phase)
+    earlier = next((other for other in experiment.phases if other.name == init), None)
+    if earlier is None:
+        return _policy_settings(experiment, phase), None if init == FROM_SCRATCH else Path(init)
+    settings, checkpoint = _planned_policy(experiment, earlier)
+    return {**settings, **_policy_settings(experiment, phase)}, checkpoint
+
+
+def _checkpoint_dir(experiment: ExperimentConfig, phase: PhaseConfig, output: Path) -> Path | None:
+    """The `pretrained_model` folder that a phase starts from, or None."""
     init = experiment.init_of(phase)
     if init == FROM_SCRATCH:
         return None
@@ -209,9 +218,7 @@ def _checkpoint_dir(
         return Path(init)
     last = last_checkpoint(output / init)
     if last is None:
-        if must_exist:
-            raise UserError(f"phase {phase.name!r} starts from {init!r}, which has no checkpoint in {output}.")
-        return output / init / "none yet"
+        raise UserError(f"phase {phase.name!r} starts from {init!r}, which has no checkpoint in {output}.")
     return pretrained_model(last)
 
 

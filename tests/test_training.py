@@ -1,0 +1,373 @@
+"""Training for real, on a tiny dataset: phases, checkpoints, and going on after an interruption."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import torch
+import yaml
+
+from robocasa_lerobot import contract
+from robocasa_lerobot.data.fake import write_fake_dataset
+from robocasa_lerobot.errors import UserError
+from robocasa_lerobot.training import builders
+from robocasa_lerobot.training.checkpoint import last_checkpoint, pretrained_model
+from robocasa_lerobot.training.config import EmaConfig, ExperimentConfig, load_experiment
+from robocasa_lerobot.training.ema import Ema, ema_decay
+from robocasa_lerobot.training.phases import run_experiment
+
+ROOT = Path(__file__).parents[1]
+TINY: dict[str, dict[str, Any]] = {
+    "diffusion_transformer": {
+        "vision_encoder": "convnet",
+        "vision_shared": True,
+        "vision_channels": [8, 16],
+        "vision_keypoints": 8,
+        "vision_features": 8,
+        "language_dim": 8,
+        "language_buckets": 64,
+        "width": 16,
+        "n_heads": 2,
+        "n_decoder_layers": 1,
+        "n_condition_layers": 1,
+        "dropout": 0.1,
+        "scheduler_warmup_steps": 2,
+        "optimizer_lr": 1e-3,
+    },
+    "act": {
+        "chunk_size": 4,
+        "n_action_steps": 4,
+        "dim_model": 16,
+        "n_heads": 2,
+        "dim_feedforward": 16,
+        "n_encoder_layers": 1,
+        "latent_dim": 4,
+        "n_vae_encoder_layers": 1,
+        "pretrained_backbone_weights": None,
+    },
+    "diffusion": {
+        "down_dims": [8, 16],
+        "n_groups": 4,
+        "diffusion_step_embed_dim": 8,
+        "spatial_softmax_num_keypoints": 4,
+        "horizon": 8,
+        "n_action_steps": 4,
+        "crop_ratio": 0.9,
+        "resize_shape": [64, 64],
+        "pretrained_backbone_weights": None,
+    },
+}
+
+
+@pytest.fixture(scope="module")
+def data(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return write_fake_dataset(tmp_path_factory.mktemp("data") / "fake", episodes=4, length=12, image_size=32)
+
+
+@pytest.fixture(autouse=True)
+def _one_thread() -> None:
+    torch.set_num_threads(1)
+
+
+def experiment_file(folder: Path, data: Path, kind: str = "diffusion_transformer", **changes: Any) -> Path:
+    folder.mkdir(parents=True, exist_ok=True)
+    content = {
+        "name": "test",
+        "output_dir": str(folder / "out"),
+        "device": "cpu",
+        "policy": {"type": kind, **TINY[kind]},
+        "loader": {"cache_dir": str(data.parent / "frames")},
+        "defaults": {"steps": 4, "batch_size": 4, "log_every": 1, "save_every": 2},
+        "phases": [
+            {"name": "pretrain", "mixture": {"members": [{"root": str(data)}]}, "save_initial": True},
+            {"name": "finetune", "mixture": {"members": [{"root": str(data), "tasks": ["OpenDrawer"]}]}},
+        ],
+    }
+    path = folder / "experiment.yaml"
+    path.write_text(yaml.safe_dump(overlay_phases(content, changes)))
+    return path
+
+
+def overlay_phases(content: dict[str, Any], changes: dict[str, Any]) -> dict[str, Any]:
+    from robocasa_lerobot.training.overlay import merge
+
+    return merge(content, changes)
+
+
+def tiny(
+    folder: Path, data: Path, kind: str = "diffusion_transformer", overrides: Sequence[str] = ()
+) -> ExperimentConfig:
+    return load_experiment(experiment_file(folder, data, kind), overrides)
+
+
+def metrics(folder: Path, phase: str) -> list[dict[str, Any]]:
+    return [json.loads(line) for line in (folder / "out" / phase / "metrics.jsonl").read_text().splitlines()]
+
+
+def losses(folder: Path, phase: str) -> list[tuple[int, float, float]]:
+    return [(line["step"], line["loss"], line["grad_norm"]) for line in metrics(folder, phase)]
+
+
+def weights(folder: Path, phase: str, step: str = "last") -> dict[str, torch.Tensor]:
+    from safetensors.torch import load_file
+
+    return load_file(folder / "out" / phase / "checkpoints" / step / "pretrained_model" / "model.safetensors")
+
+
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory: pytest.TempPathFactory, data: Path) -> Path:
+    """A two-phase run in one go."""
+    folder = tmp_path_factory.mktemp("finished")
+    torch.set_num_threads(1)
+    assert run_experiment(tiny(folder, data))
+    return folder
+
+
+def test_two_phases_leave_what_they_should(finished: Path) -> None:
+    out = finished / "out"
+    assert sorted(p.name for p in (out / "pretrain/checkpoints").iterdir()) == ["000000", "000002", "000004", "last"]
+    assert sorted(p.name for p in (out / "finetune/checkpoints").iterdir()) == ["000002", "000004", "last"]
+    assert (out / "finetune/checkpoints/last").readlink() == Path("000004")
+    model = out / "finetune/checkpoints/last/pretrained_model"
+    expected = {"config.json", "model.safetensors", "train_config.json", "policy_preprocessor.json"}
+    assert expected <= {p.name for p in model.iterdir()}
+    assert "optimizer_state.safetensors" in {p.name for p in (model.parent / "training_state").iterdir()}
+    assert load_experiment(out / "experiment.yaml") == load_experiment(finished / "experiment.yaml")
+    about = json.loads((out / "finetune/phase.json").read_text())
+    assert about["init"].endswith("pretrain/checkpoints/000004/pretrained_model")
+    assert "2 episodes, 24 frames" in about["data"][0]
+    for phase in ("pretrain", "finetune"):
+        lines = metrics(finished, phase)
+        assert [line["step"] for line in lines] == [1, 2, 3, 4]
+        assert {"loss", "learning_rate", "grad_norm", "seconds_per_step", "data_seconds_per_step"} <= lines[0].keys()
+        assert [line["samples"] for line in lines] == [4, 8, 12, 16]
+
+
+@pytest.mark.parametrize("first", [1, 2, 3, 5])
+def test_stopped_and_continued_gives_the_same_losses(tmp_path: Path, data: Path, finished: Path, first: int) -> None:
+    experiment = tiny(tmp_path, data)
+    assert not run_experiment(experiment, stop_after=first)
+    while not run_experiment(experiment, stop_after=4):
+        pass
+    for phase in ("pretrain", "finetune"):
+        assert losses(tmp_path, phase) == losses(finished, phase)
+        ours, theirs = weights(tmp_path, phase), weights(finished, phase)
+        assert all(torch.equal(ours[key], theirs[key]) for key in theirs)
+
+
+@pytest.mark.parametrize("kind", ["act", "diffusion"])
+def test_policies_of_lerobot_train_and_continue(tmp_path: Path, data: Path, kind: str) -> None:
+    overrides = ["--defaults.steps=2", "--defaults.save_every=0", "--defaults.ema.enabled=false"]
+    assert not run_experiment(tiny(tmp_path / "whole", data, kind, overrides), stop_after=2)
+    for _ in range(2):
+        assert not run_experiment(tiny(tmp_path / "parts", data, kind, overrides), stop_after=1)
+    assert losses(tmp_path / "parts", "pretrain") == losses(tmp_path / "whole", "pretrain")
+    assert [step for step, *_ in losses(tmp_path / "parts", "pretrain")] == [1, 2]
+
+
+def test_killed_run_goes_on_to_the_same_losses(tmp_path: Path, data: Path) -> None:
+    overrides = ["--defaults.steps=12", "--defaults.save_every=1", "--defaults.log_every=3"]
+    whole, killed = tmp_path / "whole", tmp_path / "killed"
+    assert run_experiment(tiny(whole, data, overrides=overrides))
+    path = experiment_file(killed, data)
+    command = [sys.executable, str(ROOT / "train.py"), "--config_path", str(path), *overrides]
+    environment = {**os.environ, "OMP_NUM_THREADS": "1"}
+    log = (tmp_path / "log").open("w")
+    process = subprocess.Popen(command, env=environment, stdout=log, stderr=subprocess.STDOUT)
+    waiting_until = time.monotonic() + 240
+    while not (killed / "out/pretrain/checkpoints/000004").is_dir() and time.monotonic() < waiting_until:
+        assert process.poll() is None, (tmp_path / "log").read_text()[-2000:]
+        time.sleep(0.01)
+    process.send_signal(signal.SIGKILL)
+    process.wait()
+    assert run_experiment(load_experiment(path, overrides))
+    for phase in ("pretrain", "finetune"):
+        assert losses(killed, phase) == losses(whole, phase)
+    assert not list((killed / "out/pretrain/checkpoints").glob(".writing-*"))
+
+
+def test_finished_run_is_left_alone(finished: Path, data: Path) -> None:
+    before = {path: path.stat().st_mtime_ns for path in (finished / "out").glob("*/**/*") if path.is_file()}
+    assert run_experiment(load_experiment(finished / "experiment.yaml"))
+    assert before == {path: path.stat().st_mtime_ns for path in before}
+
+
+def test_changed_settings_of_a_begun_run_are_listed(tmp_path: Path, data: Path) -> None:
+    assert not run_experiment(tiny(tmp_path, data), stop_after=2)
+    changed = tiny(tmp_path, data, overrides=["--seed=1", "--phases.pretrain.batch_size=2", "--policy.width=32"])
+    with pytest.raises(UserError) as caught:
+        run_experiment(changed)
+    for text in ("seed: 0 -> 1", "phases.pretrain.batch_size: 4 -> 2", "policy.width: 16 -> 32", "--resume=force"):
+        assert text in str(caught.value)
+    later = tiny(tmp_path, data, overrides=["--phases.finetune.batch_size=2", "--phases.pretrain.log_every=2"])
+    assert run_experiment(later, stop_after=6) is True  # a phase that has not begun may change, and what is only shown
+
+
+def test_changed_data_are_told(tmp_path: Path) -> None:
+    data = write_fake_dataset(tmp_path / "data" / "fake", episodes=2, length=8, image_size=32)
+    assert not run_experiment(tiny(tmp_path, data), stop_after=2)
+    data.rename(tmp_path / "before")
+    write_fake_dataset(data, episodes=2, length=9, image_size=32)
+    with pytest.raises(UserError, match="begun with other data"):
+        run_experiment(tiny(tmp_path, data))
+
+
+def test_checkpoint_loads_through_lerobot(finished: Path, data: Path) -> None:
+    from lerobot.configs.policies import PreTrainedConfig
+    from lerobot.policies.factory import get_policy_class, make_pre_post_processors
+
+    model = pretrained_model(last_checkpoint(finished / "out/finetune") or finished)
+    config = PreTrainedConfig.from_pretrained(model)
+    policy = get_policy_class(config.type).from_pretrained(model)
+    pre, post = make_pre_post_processors(config, pretrained_path=str(model))
+    observation = {key: torch.rand(1, 3, 32, 32) for key in contract.IMAGE_KEYS}
+    observation[contract.STATE_KEY] = torch.zeros(1, contract.STATE_SIZE)
+    action = post(policy.select_action(pre({**observation, "task": ["open the left drawer"]})))
+    assert action.shape == (1, contract.ACTION_SIZE)
+    assert torch.isfinite(action).all()
+
+
+def _statistics(folder: Path, phase: str) -> dict[str, np.ndarray[Any, Any]]:
+    from safetensors.numpy import load_file
+
+    (path,) = (folder / "out" / phase / "checkpoints/last/pretrained_model").glob("policy_pre*normalizer*.safetensors")
+    return load_file(path)
+
+
+def test_statistics_are_kept_or_recomputed(tmp_path: Path, finished: Path, data: Path) -> None:
+    key = "observation.state.mean"
+    np.testing.assert_array_equal(_statistics(finished, "finetune")[key], _statistics(finished, "pretrain")[key])
+    assert run_experiment(tiny(tmp_path, data, overrides=["--phases.finetune.statistics=recompute"]))
+    assert not np.array_equal(_statistics(tmp_path, "finetune")[key], _statistics(tmp_path, "pretrain")[key])
+
+
+def test_phase_starts_from_the_weights_of_the_one_before(tmp_path: Path, data: Path) -> None:
+    overrides = ["--phases.finetune.save_initial=true", "--phases.finetune.learning_rate=1e-4"]
+    assert run_experiment(tiny(tmp_path, data, overrides=overrides))
+    before, after = weights(tmp_path, "pretrain"), weights(tmp_path, "finetune", "000000")
+    assert all(torch.equal(before[key], after[key]) for key in before)
+    rates = [line["learning_rate"] for line in metrics(tmp_path, "finetune")]
+    assert max(rates) == pytest.approx(1e-4)
+
+
+def test_checkpoint_of_another_experiment_can_be_the_start(tmp_path: Path, finished: Path, data: Path) -> None:
+    start = finished / "out/pretrain/checkpoints/last/pretrained_model"
+    path = experiment_file(tmp_path, data, policy={"path": str(start), "num_inference_steps": 5})
+    content = yaml.safe_load(path.read_text())
+    content["policy"] = {"path": str(start), "num_inference_steps": 5}
+    content["phases"] = content["phases"][1:]
+    path.write_text(yaml.safe_dump(content))
+    assert run_experiment(load_experiment(path))
+    config = json.loads((tmp_path / "out/finetune/checkpoints/last/pretrained_model/config.json").read_text())
+    assert config["num_inference_steps"] == 5
+    assert config["width"] == 16
+
+
+def test_parts_of_a_batch_add_up(tmp_path: Path, data: Path) -> None:
+    """Accumulated gradients are those of the same samples in one part; without noise, so up to rounding."""
+    plain = ["--policy.use_vae=false", "--policy.dropout=0", "--defaults.steps=1"]
+    run_experiment(tiny(tmp_path / "parts", data, "act", [*plain, "--defaults.gradient_accumulation=2"]), stop_after=1)
+    run_experiment(tiny(tmp_path / "whole", data, "act", plain), stop_after=1)
+    np.testing.assert_allclose(losses(tmp_path / "parts", "pretrain"), losses(tmp_path / "whole", "pretrain"), 1e-4)
+
+
+def test_loss_falls(tmp_path: Path, data: Path) -> None:
+    overrides = ["--phases.pretrain.steps=80", "--phases.pretrain.log_every=20", "--phases.pretrain.batch_size=8"]
+    run_experiment(tiny(tmp_path, data, overrides=[*overrides, "--policy.optimizer_lr=1e-2"]), stop_after=80)
+    values = [line["loss"] for line in metrics(tmp_path, "pretrain")]
+    assert values[-1] < 0.8 * values[0]
+
+
+@pytest.mark.parametrize(
+    ("overrides", "message"),
+    [
+        (["--policy.type=diffusion_transformr"], "Did you mean 'diffusion_transformer'"),
+        (["--policy.widht=8"], "Did you mean 'width'"),
+        (["--policy.width=7"], "multiple of n_heads"),
+        (["--policy.vision_encoder=resnet"], "resnet18"),
+        (["--phases.finetune.policy={horizn: 4}"], "Did you mean 'horizon'"),
+        (["--device=cude"], "Did you mean 'cuda'"),
+        (["--phases.finetune.mixture.members=[{root: nowhere}]"], "no dataset at nowhere"),
+        (["--phases.pretrain.mixture.members=[{root: nowhere}]"], "no dataset at nowhere"),
+    ],
+)
+def test_mistakes_are_told_before_training(tmp_path: Path, data: Path, overrides: list[str], message: str) -> None:
+    experiment = tiny(tmp_path, data, overrides=overrides)
+    with pytest.raises(UserError, match=message):
+        run_experiment(experiment)
+    assert not (tmp_path / "out/pretrain").exists()
+
+
+def test_weights_that_do_not_fit_are_told(tmp_path: Path, finished: Path, data: Path) -> None:
+    start = finished / "out/pretrain/checkpoints/last/pretrained_model"
+    overrides = [f"--phases.pretrain.init={start}", "--phases.pretrain.policy={width: 32}"]
+    with pytest.raises(UserError, match="do not fit"):
+        run_experiment(tiny(tmp_path, data, overrides=overrides))
+    small = [f"--phases.pretrain.init={start}", "--loader.image_size=16"]
+    with pytest.raises(UserError, match="image_size"):
+        run_experiment(tiny(tmp_path / "small", data, overrides=small))
+
+
+def test_loss_that_is_no_number_stops(tmp_path: Path, data: Path) -> None:
+    with pytest.raises(UserError, match="the loss is"):
+        run_experiment(tiny(tmp_path, data, "act", ["--policy.optimizer_lr=1e30", "--defaults.grad_clip_norm=0"]))
+
+
+def test_average_of_weights() -> None:
+    config = EmaConfig(power=0.75)
+    assert [ema_decay(step, config) for step in (0, 1)] == [0.0, pytest.approx(1 - 2**-0.75)]
+    assert ema_decay(10**9, config) == config.max_decay
+    layer = torch.nn.Linear(2, 1, bias=False)
+    layer.weight.data.fill_(1.0)
+    ema, wanted = Ema(layer, config), 1.0
+    for step in range(5):
+        layer.weight.data.fill_(step + 2.0)
+        ema.update()
+        decay = ema_decay(step, config)
+        wanted = decay * wanted + (1 - decay) * (step + 2.0)
+    with ema.applied():
+        assert layer.weight.data[0, 0].item() == pytest.approx(wanted)
+    assert layer.weight.data[0, 0].item() == 6.0
+
+
+def test_checkpoints_hold_the_average(tmp_path: Path, data: Path) -> None:
+    from safetensors.torch import load_file
+
+    assert not run_experiment(tiny(tmp_path, data), stop_after=4)
+    raw = load_file(tmp_path / "out/pretrain/checkpoints/000004/training_state/raw_model.safetensors")
+    average = weights(tmp_path, "pretrain", "000004")
+    assert raw.keys() == average.keys()
+    assert any(not torch.equal(raw[key], average[key]) for key in raw)
+    assert not run_experiment(tiny(tmp_path / "plain", data, overrides=["--defaults.ema.enabled=false"]), stop_after=4)
+    plain = weights(tmp_path / "plain", "pretrain", "000004")
+    assert all(torch.equal(raw[key], plain[key]) for key in raw)  # averaging does not change the training itself
+
+
+def test_learning_rate_scales_all_groups(data: Path, tmp_path: Path) -> None:
+    experiment = tiny(tmp_path, data, "act", ["--defaults.learning_rate=2e-5"])
+    config = builders.policy_config(experiment.policy, None, "cpu")
+    from robocasa_lerobot.data.mixture import open_mixture
+
+    meta = open_mixture(experiment.phases[0].mixture, experiment.loader).meta
+    policy = builders.make_phase_policy(config, meta, None)
+    optimizer, _, clip = builders.make_optimizer(policy, experiment.phases[0])
+    preset = config.get_optimizer_preset()
+    assert optimizer.param_groups[0]["lr"] == pytest.approx(2e-5)
+    assert optimizer.param_groups[1]["lr"] == pytest.approx(config.optimizer_lr_backbone * 2e-5 / preset.lr)
+    assert clip == preset.grad_clip_norm
+
+
+@pytest.mark.slow
+def test_loader_processes_give_the_same_losses(tmp_path: Path, data: Path, finished: Path) -> None:
+    assert run_experiment(tiny(tmp_path, data, overrides=["--loader.workers=2"]))
+    assert losses(tmp_path, "pretrain") == losses(finished, "pretrain")

@@ -1,0 +1,109 @@
+"""Experiment files: defaults, references to files, overrides, and what is said about mistakes."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+import yaml
+
+from robocasa_lerobot.errors import UserError
+from robocasa_lerobot.training import overlay
+from robocasa_lerobot.training.config import ExperimentConfig, load_experiment, to_yaml
+
+EXPERIMENT = """
+name: try
+output_dir: out
+policy: {file: act.yaml, chunk_size: 5}
+defaults: {steps: 7, batch_size: 4, ema: {power: 0.5}, mixture: mix.yaml}
+phases:
+  - {name: pretrain}
+  - {name: finetune, steps: 3, ema: {enabled: false}, learning_rate: 1e-4}
+"""
+
+
+@pytest.fixture
+def path(tmp_path: Path) -> Path:
+    (tmp_path / "act.yaml").write_text("{type: act, chunk_size: 100, dim_model: 64}")
+    (tmp_path / "mix.yaml").write_text("{members: [{root: a, weight: 2}, {root: b, weight: 1}]}")
+    (tmp_path / "try.yaml").write_text(EXPERIMENT)
+    return tmp_path / "try.yaml"
+
+
+def test_phases_name_what_they_change(path: Path) -> None:
+    experiment = load_experiment(path)
+    first, second = experiment.phases
+    assert experiment.policy == {"type": "act", "chunk_size": 5, "dim_model": 64}
+    assert (first.steps, first.batch_size, first.ema.enabled, first.learning_rate) == (7, 4, True, None)
+    assert (second.steps, second.batch_size, second.ema.enabled, second.learning_rate) == (3, 4, False, 1e-4)
+    assert first.ema.power == second.ema.power == 0.5
+    assert [member.root for member in second.mixture.members] == ["a", "b"]
+    assert [experiment.init_of(phase) for phase in experiment.phases] == ["from_scratch", "pretrain"]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "dotted", "value"),
+    [
+        (["--phases.pretrain.steps=10"], "phases.pretrain.steps", 10),
+        (["--phases.1.steps", "10"], "phases.finetune.steps", 10),
+        (["--defaults.batch_size=8"], "phases.finetune.batch_size", 8),
+        (["--policy.chunk_size=9"], "policy.chunk_size", 9),
+        (["--phases.finetune.learning_rate=2e-5"], "phases.finetune.learning_rate", 2e-5),
+        (["--phases.finetune.mixture.alpha=1"], "phases.finetune.mixture.alpha", 1.0),
+        (["--loader.cache_frames=false"], "loader.cache_frames", False),
+        (["--output_dir=other"], "output_dir", "other"),
+        (["--phases.0.policy={dim_model: 32}"], "phases.pretrain.policy.dim_model", 32),
+    ],
+)
+def test_overrides(path: Path, arguments: list[str], dotted: str, value: object) -> None:
+    experiment = load_experiment(path, arguments)
+    assert overlay.flatten(yaml.safe_load(to_yaml(experiment)))[dotted] == value
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["--stepz=1"], "unknown key 'stepz'"),
+        (["--defaults.stepz=1"], "Did you mean 'steps'"),
+        (["--phases.finetune.batchsize=1"], r"'batchsize'.*'batch_size'.*phases\.finetune"),
+        (["--phases.finetune.ema.powr=1"], "Did you mean 'power'"),
+        (["--loader.cache_frame=1"], "Did you mean 'cache_frames'"),
+        (["--phases.fintune.steps=1"], "Did you mean 'finetune'"),
+        (["--phases.2.steps=1"], "has 2 entries"),
+        (["--phases.pretrain.steps=many"], "steps"),
+        (["--phases.pretrain.steps=0"], "expected at least 1"),
+        (["--phases.pretrain.statistics=keeep"], "Did you mean 'keep'"),
+        (["--phases.finetune.init=pretran"], "Did you mean 'pretrain'"),
+        (["--phases.pretrain.init=finetune"], "does not come before"),
+        (["--phases.finetune.name=pretrain"], "two phases"),
+        (["--phases.finetune.name=../x"], "names a folder"),
+        (["--phases.finetune.gradient_accumulation=3"], "no multiple"),
+        (["--phases.finetune.mixture.members=[]"], "no members"),
+        (["--policy.file=atc.yaml"], "no file .*atc.yaml"),
+        (["--output_dir"], "has no value"),
+        (["output_dir=3"], "overrides look like"),
+        (["--name.x=3"], "nothing inside to set"),
+    ],
+)
+def test_mistakes_are_told(path: Path, arguments: list[str], message: str) -> None:
+    with pytest.raises(UserError, match=message):
+        load_experiment(path, arguments)
+
+
+def test_missing_and_broken_files_are_told(path: Path) -> None:
+    with pytest.raises(UserError, match=r"Did you mean 'try\.yaml'"):
+        load_experiment(path.with_name("tri.yaml"))
+    path.with_name("act.yaml").write_text("{type: [")
+    with pytest.raises(UserError, match="not valid YAML"):
+        load_experiment(path)
+    path.write_text("- a\n- b\n")
+    with pytest.raises(UserError, match="expected a mapping"):
+        load_experiment(path)
+
+
+def test_resolved_experiment_loads_again(path: Path, tmp_path: Path) -> None:
+    experiment = load_experiment(path, ["--phases.finetune.steps=4"])
+    (tmp_path / "resolved.yaml").write_text(to_yaml(experiment))
+    again = load_experiment(tmp_path / "resolved.yaml")
+    assert isinstance(again, ExperimentConfig)
+    assert again == experiment
