@@ -1,8 +1,8 @@
 """A small env with the kitchen env's interface, for tests of the evaluation: no physics, no rendering, no torch.
 
 A slider starts at a place drawn from the seed, and the first action component moves it; the goal has two terms.
-Faults are asked for through the task's name, so that they reach the worker processes: `Slide+crash3` raises in the
-trial whose env has been reset for the third time, `+kill` ends the process, `+hang` sleeps for ever, once each.
+Faults are asked for through the task's name, so that they reach the worker processes: `Slide+crash` raises at step 2,
+`+kill` ends the process, `+hang` sleeps for ever, each only once, or n times with `+crashxN`; `+slow` takes its time.
 """
 
 import os
@@ -44,7 +44,9 @@ class SlideEnv(gymnasium.Env):
 
     def step(self, action):
         self._step += 1
-        if self._fault and self._step == 2:
+        if self._fault == "slow":
+            time.sleep(0.02)
+        elif self._fault and self._step == 2:
             self._fail()
         self._place += 0.2 * float(action[0])
         self._reached = self._reached or self._place > 0.5

@@ -11,10 +11,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from robocasa_lerobot import contract
 from robocasa_lerobot.evaluation.report_data import PolicyResult
 from robocasa_lerobot.evaluation.results import TrialRecord
-from robocasa_lerobot.evaluation.video import count_frames, read_frames
+from robocasa_lerobot.evaluation.video import frames_and_rate, read_frames
 
 FRAMES = 6
 JPEG_QUALITY = 82
@@ -59,12 +58,11 @@ def _first_strip(policy: PolicyResult, task: str, success: bool) -> FilmStrip | 
 
 def make_frames(video: Path, count: int = FRAMES) -> list[Frame]:
     """`count` evenly spaced frames of a video, the first and the last among them."""
-    total = count_frames(video)
+    total, rate = frames_and_rate(video)
     indices = sorted({round(i * (total - 1) / max(1, count - 1)) for i in range(min(count, total))})
     pictures = read_frames(video, indices)
     return [
-        Frame(index / contract.VIDEO_FPS, data_uri(stack_cameras(picture)))
-        for index, picture in zip(indices, pictures, strict=True)
+        Frame(index / rate, data_uri(stack_cameras(picture))) for index, picture in zip(indices, pictures, strict=True)
     ]
 
 

@@ -42,10 +42,19 @@ def decode[T](cls: type[T], tree: Mapping[str, Any]) -> T:
     checked = _check(cls, tree, "")
     try:
         return draccus.decode(cls, checked)
-    except UserError:
-        raise
-    except Exception as error:  # draccus raises its own types and whatever a constructor raises
+    except Exception as error:  # draccus raises its own types, around whatever a constructor raises
+        inner = user_error_in(error)
+        if inner is not None:
+            raise inner from None
         raise ConfigError(f"cannot read the configuration: {error}") from error
+
+
+def user_error_in(error: BaseException) -> UserError | None:
+    """The user's mistake that draccus wrapped into an error of its own, if there is one."""
+    inner: BaseException | None = error
+    while inner is not None and not isinstance(inner, UserError):
+        inner = inner.__cause__ or inner.__context__
+    return inner
 
 
 def read_yaml(path: Path) -> dict[str, Any]:

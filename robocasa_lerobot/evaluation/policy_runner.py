@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from robocasa_lerobot import contract
 from robocasa_lerobot.errors import UserError
 from robocasa_lerobot.evaluation.checkpoints import PolicySource
+from robocasa_lerobot.evaluation.overrides import user_error_in
 
 Observation = dict[str, Any]
 
@@ -85,8 +86,14 @@ class CheckpointPolicy:
         overrides = [] if executed_steps is None else [f"--n_action_steps={executed_steps}"]
         try:
             config = PreTrainedConfig.from_pretrained(source.path, cli_overrides=overrides)
-        except (ValueError, SystemExit) as error:
-            raise UserError(f"policy {source.path}: its config cannot be read with {overrides}: {error}") from error
+        except (Exception, SystemExit) as error:
+            reason = user_error_in(error) or error
+            what = (
+                "its config cannot be read"
+                if executed_steps is None
+                else f"executed_steps={executed_steps} does not fit"
+            )
+            raise UserError(f"policy {source.path}: {what}: {reason}") from error
         config.device = pick_device(device)
         config.pretrained_path = source.path
         self._policy = get_policy_class(config.type).from_pretrained(source.path, config=config)
@@ -142,6 +149,7 @@ def register_policy_type(kind: str) -> None:
     ours = f"robocasa_lerobot.policies.{kind}"
     if importlib.util.find_spec(ours) is not None:
         importlib.import_module(f"{ours}.configuration_{kind}")
+        importlib.import_module(f"{ours}.processor_{kind}")  # registers the processor steps of saved pipelines
     if kind not in PreTrainedConfig.get_known_choices():
         from lerobot.utils.import_utils import register_third_party_plugins
 

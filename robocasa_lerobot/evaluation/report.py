@@ -68,19 +68,22 @@ def render(data: ReportData, template: str, folder: Path | None = None) -> str:
 def headline(data: ReportData) -> str:
     """The result in a sentence, about the last policy and what it is compared with."""
     last = data.policies[-1]
-    what = f"{last.label} solved {_of(last.pooled)}"
-    others = [f"{policy.label} {_of(policy.pooled)}" for policy in data.policies[:-1]]
-    return what + (", " + ", ".join(others) if others else "") + "."
+    return (
+        "; ".join(
+            [f"{last.label} solved {_of(last.pooled)}"] + [f"{p.label} {_of(p.pooled)}" for p in data.policies[:-1]]
+        )
+        + "."
+    )
 
 
 def percent(value: float) -> str:
     """A rate in [0, 1] as whole percent, e.g. `70 %`."""
-    return f"{100 * value:.0f} %"
+    return f"{100 * value:.0f}\N{NO-BREAK SPACE}%"
 
 
 def interval(rate: Rate) -> str:
     """The 95 % interval of a rate in whole percent, e.g. `40 to 89 %`."""
-    return f"{100 * rate.low:.0f} to {100 * rate.high:.0f} %"
+    return f"{100 * rate.low:.0f} to {100 * rate.high:.0f}\N{NO-BREAK SPACE}%"
 
 
 def seconds(value: float | None) -> str:

@@ -125,7 +125,7 @@ def gather(
     policies = _with_distinct_labels(policies)
     names = tuple(dict.fromkeys(result.task for policy in policies for result in policy.tasks))
     folders = list(training) or find_trainings(policies)
-    shown = ", ".join(names) if len(names) <= 3 else f"{len(names)} tasks"
+    shown = " and ".join(", ".join(names).rsplit(", ", 1)) if len(names) <= 3 else f"{len(names)} tasks"
     return ReportData(
         title=title or f"Evaluation on {shown}",
         policies=policies,
@@ -205,9 +205,9 @@ def find_trainings(policies: Sequence[PolicyResult]) -> list[Path]:
     for policy in policies:
         if policy.policy.get("phase") is not None:
             # <experiment>/<phase>/checkpoints/<step>/pretrained_model
-            experiment = Path(policy.policy["path"]).resolve().parents[3]
-            if any(experiment.glob("*/metrics.jsonl")):
-                found[experiment] = None
+            above = Path(policy.policy["path"]).resolve().parents
+            if len(above) > 3 and any(above[3].glob("*/metrics.jsonl")):
+                found[above[3]] = None
     return list(found)
 
 

@@ -28,7 +28,7 @@ class TrialRecord:
     `steps` are control steps at 20 Hz. `success` is reached at any step of the episode. `success_terms` are the
     task's goal predicates at the last step, `terms_ever` whether each held at any step. `error` is the traceback
     of a trial that crashed or hung twice; such a trial counts as a failure and is shown as an error. `retried_error`
-    is the one of the first attempt.
+    is the one of the first attempt. `trajectory` is a SHA-256 over all actions and proprioception.
     """
 
     label: str
@@ -44,6 +44,7 @@ class TrialRecord:
     terms_ever: dict[str, bool]
     instruction: str
     scene: dict[str, Any]
+    trajectory: str | None
     video: str | None
     wall_seconds: float
     attempts: int

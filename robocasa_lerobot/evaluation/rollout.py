@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
@@ -10,9 +11,9 @@ import gymnasium
 import numpy as np
 
 from robocasa_lerobot.errors import UserError
+from robocasa_lerobot.evaluation.film import Film
 from robocasa_lerobot.evaluation.plan import TrialSpec
 from robocasa_lerobot.evaluation.policy_runner import PolicyRunner
-from robocasa_lerobot.evaluation.video import VideoWriter, side_by_side
 
 # Steps between two signs of life; at 20 to 100 steps/s on a CPU that is at most a second.
 HEARTBEAT_STEPS = 20
@@ -24,7 +25,10 @@ class RolloutError(RuntimeError):
 
 @dataclass
 class Outcome:
-    """What a trial gave; `steps` are control steps at 20 Hz, the first step is number 1."""
+    """What a trial gave; `steps` are control steps at 20 Hz, the first step is number 1.
+
+    `trajectory` is a SHA-256 over all actions and proprioception: two trials with the same one went the same way.
+    """
 
     success: bool = False
     steps: int = 0
@@ -33,25 +37,27 @@ class Outcome:
     terms_ever: dict[str, bool] = field(default_factory=dict)
     instruction: str = ""
     scene: dict[str, Any] = field(default_factory=dict)
+    trajectory: str | None = None
 
 
 def run_trial(
     env: gymnasium.Env[Any, Any],
     policy: PolicyRunner,
     spec: TrialSpec,
-    film: VideoWriter | None = None,
+    film: Film | None = None,
     heartbeat: Callable[[int], None] = lambda step: None,
 ) -> Outcome:
     """Run one episode from `spec.seed` until the env ends it.
 
-    Success is reached at any step. Pictures are rendered only for steps that the policy looks at, unless filmed.
+    Success is reached at any step. Pictures are rendered only for steps that the policy looks at.
 
     Raises:
         RolloutError: an action that is not finite, or an env that goes on past its horizon.
     """
     base: Any = env.unwrapped
     policy.reset(spec.policy_seed)
-    base.render_observations = film is not None or policy.sees(0)
+    always = film is not None and film.needs_observation(base)
+    base.render_observations = always or policy.sees(0)
     observation, info = env.reset(seed=spec.seed)
     outcome = Outcome(
         instruction=str(info.get("instruction") or getattr(base, "task_description", "")),
@@ -59,7 +65,8 @@ def run_trial(
     )
     limit = horizon_of(env, spec)
     if film is not None:
-        film.write(side_by_side(observation["pixels"]))
+        film.shoot(base, observation, 0)
+    digest = hashlib.sha256(np.asarray(observation["agent_pos"], dtype=np.float64).tobytes())
     ended = False
     while not ended:
         if outcome.steps >= limit:
@@ -70,12 +77,15 @@ def run_trial(
         if not np.isfinite(action).all():
             raise RolloutError(f"the policy gave an action that is not finite at step {outcome.steps}: {action}")
         outcome.steps += 1
-        base.render_observations = film is not None or policy.sees(outcome.steps)
+        base.render_observations = always or policy.sees(outcome.steps)
         observation, _, terminated, truncated, info = env.step(action)
         if film is not None:
-            film.write(side_by_side(observation["pixels"]))
+            film.shoot(base, observation, outcome.steps)
+        digest.update(np.asarray(action, dtype=np.float32).tobytes())
+        digest.update(np.asarray(observation["agent_pos"], dtype=np.float64).tobytes())
         _note(outcome, info)
         ended = bool(terminated or truncated)
+    outcome.trajectory = digest.hexdigest()
     return outcome
 
 

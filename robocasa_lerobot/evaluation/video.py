@@ -30,12 +30,12 @@ def side_by_side(pixels: dict[str, NDArray[np.uint8]]) -> NDArray[np.uint8]:
 
 
 class VideoWriter:
-    """An mp4 (h264, yuv420p) at 20 fps that appears at `path` only when it is complete.
+    """An mp4 (h264, yuv420p) that appears at `path` only when it is complete.
 
     Frames go to the encoder one by one, so memory does not grow with the length of the episode.
     """
 
-    def __init__(self, path: Path, fps: int = contract.VIDEO_FPS) -> None:
+    def __init__(self, path: Path, fps: int) -> None:
         self._path, self._part, self._fps = path, path.with_name(path.name + ".part"), fps
         self._container: Any = None
         self._stream: Any = None
@@ -76,13 +76,13 @@ class VideoWriter:
         self.close(keep=kind is None)
 
 
-def count_frames(path: Path) -> int:
-    """Number of frames of a video."""
+def frames_and_rate(path: Path) -> tuple[int, float]:
+    """Number of frames of a video, and frames per second."""
     import av
 
     with av.open(str(path)) as container:
         stream = container.streams.video[0]
-        return stream.frames or sum(1 for _ in container.decode(stream))
+        return stream.frames or sum(1 for _ in container.decode(stream)), float(stream.average_rate)
 
 
 def read_frames(path: Path, indices: Sequence[int]) -> list[NDArray[np.uint8]]:

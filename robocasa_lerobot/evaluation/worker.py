@@ -16,10 +16,10 @@ import gymnasium
 
 from robocasa_lerobot.errors import UserError
 from robocasa_lerobot.evaluation.checkpoints import PolicySource
+from robocasa_lerobot.evaluation.film import Film
 from robocasa_lerobot.evaluation.plan import TrialSpec
 from robocasa_lerobot.evaluation.policy_runner import PolicyRunner, load_policy
 from robocasa_lerobot.evaluation.rollout import Outcome, horizon_of, run_trial
-from robocasa_lerobot.evaluation.video import VideoWriter
 
 EnvFactory = Callable[..., gymnasium.Env[Any, Any]]
 
@@ -61,7 +61,7 @@ class Finished:
 
 @dataclass(frozen=True)
 class Refused:
-    """The user's mistake that no other trial will get around; the whole run ends with this message."""
+    """A fault that no other trial will get around; the whole run ends with this message."""
 
     message: str
 
@@ -93,12 +93,17 @@ class _Worker:
             self._alive(-1)
             try:
                 policy = self._policy_of(spec.label)
+            except Exception as error:
+                # No other trial will load it either.
+                detail = "" if isinstance(error, UserError) else "\n" + traceback.format_exc()
+                return Refused(f"policy {spec.label!r} cannot be loaded: {error}{detail}")
+            try:
                 env = self._env_of(spec)
             except UserError as error:
                 return Refused(str(error))
             if spec.film:
                 video = f"videos/{spec.label}/{spec.task}/trial_{spec.trial:03d}.mp4"
-                with VideoWriter(Path(self._settings.out) / video) as film:
+                with Film(Path(self._settings.out) / video) as film:
                     outcome = run_trial(env, policy, spec, film, self._alive)
             else:
                 outcome = run_trial(env, policy, spec, None, self._alive)

@@ -1,0 +1,149 @@
+"""A checkpoint in our trials: the same actions as LeRobot's own rollout, with fewer pictures rendered."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from evaluation_env import SlideEnv
+
+from robocasa_lerobot import contract
+from robocasa_lerobot.errors import UserError
+from robocasa_lerobot.evaluation.checkpoints import read_source
+from robocasa_lerobot.evaluation.plan import TrialSpec, make_plan
+from robocasa_lerobot.evaluation.policy_runner import CheckpointPolicy, load_policy
+from robocasa_lerobot.evaluation.rollout import run_trial
+
+SIZE, HORIZON = 32, 30
+
+
+@pytest.fixture(scope="module")
+def checkpoint(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A tiny policy with random weights: 2 observations, chunks of 8 executed steps, sampling noise at inference."""
+    import torch
+    from lerobot.configs.types import FeatureType, PolicyFeature
+    from lerobot.policies.factory import get_policy_class, make_pre_post_processors
+
+    from robocasa_lerobot.policies.diffusion_transformer.configuration_diffusion_transformer import (
+        DiffusionTransformerConfig,
+    )
+
+    torch.manual_seed(0)
+    images = {key: PolicyFeature(FeatureType.VISUAL, (3, SIZE, SIZE)) for key in contract.IMAGE_KEYS}
+    state = {contract.STATE_KEY: PolicyFeature(FeatureType.STATE, (contract.STATE_SIZE,))}
+    config = DiffusionTransformerConfig(
+        input_features={**images, **state},
+        output_features={contract.ACTION_KEY: PolicyFeature(FeatureType.ACTION, (contract.ACTION_SIZE,))},
+        device="cpu",
+        vision_encoder="convnet",
+        vision_shared=True,
+        vision_channels=[8, 16],
+        vision_keypoints=8,
+        language_dim=16,
+        language_buckets=64,
+        width=32,
+        n_heads=2,
+        n_decoder_layers=1,
+        n_condition_layers=1,
+        num_inference_steps=2,
+    )
+    policy = get_policy_class(config.type)(config)
+    sizes = {contract.STATE_KEY: contract.STATE_SIZE, contract.ACTION_KEY: contract.ACTION_SIZE}
+    stats = {key: {"min": -torch.ones(n), "max": torch.ones(n)} for key, n in sizes.items()}
+    folder = tmp_path_factory.mktemp("experiment") / "pretrain/checkpoints/000000/pretrained_model"
+    policy.save_pretrained(folder)
+    for processor in make_pre_post_processors(config, dataset_stats=stats):
+        processor.save_pretrained(folder)
+    return folder
+
+
+@pytest.fixture
+def spec() -> TrialSpec:
+    (only,) = make_plan(["pretrain-000000"], {"Slide": HORIZON}, trials=1, seed=3, videos=0)
+    return only
+
+
+class Recorder(SlideEnv):
+    """Keeps the actions, and counts the steps whose pictures were rendered."""
+
+    def __init__(self, *args: Any, always: bool = False, **kwargs: Any) -> None:
+        super().__init__(*args, image_size=SIZE, horizon=HORIZON, **kwargs)
+        self.actions: list[np.ndarray] = []
+        self.rendered = 0
+        self.always = always
+        self._max_episode_steps = HORIZON
+
+    def reset(self, **kwargs: Any) -> Any:
+        self.actions, self.rendered = [], 0
+        return super().reset(**kwargs)
+
+    def step(self, action: Any) -> Any:
+        self.actions.append(np.asarray(action).copy())
+        # Never arrives, so that every episode has the same length.
+        return super().step(np.zeros(contract.ACTION_SIZE, np.float32))
+
+    def _observe(self) -> Any:
+        self.render_observations = self.render_observations or self.always
+        self.rendered += self.render_observations
+        return super()._observe()
+
+
+def test_actions_are_those_of_lerobots_own_rollout(checkpoint: Path, spec: TrialSpec) -> None:
+    import gymnasium
+    import torch
+    from lerobot.processor import PolicyProcessorPipeline
+    from lerobot.scripts.lerobot_eval import rollout
+
+    runner = load_policy(read_source(str(checkpoint)), "cpu", None)
+    assert isinstance(runner, CheckpointPolicy)
+    ours = Recorder("Slide")
+    outcome = run_trial(ours, runner, spec)
+    assert outcome.steps == len(ours.actions) == HORIZON or outcome.success
+
+    theirs = Recorder("Slide", always=True)
+    nothing: Any = PolicyProcessorPipeline(steps=[])
+    torch.manual_seed(spec.policy_seed)
+    vector = gymnasium.vector.SyncVectorEnv([lambda: theirs])
+    rollout(vector, runner._policy, nothing, nothing, runner._pre, runner._post, seeds=[spec.seed])
+    steps = outcome.steps
+    np.testing.assert_array_equal(np.stack(ours.actions), np.stack(theirs.actions)[:steps])
+
+
+def test_skipped_pictures_change_nothing_and_are_skipped(checkpoint: Path, spec: TrialSpec) -> None:
+    runner = load_policy(read_source(str(checkpoint)), "cpu", None)
+    lazy, eager = Recorder("Slide"), Recorder("Slide", always=True)
+    assert run_trial(lazy, runner, spec) == run_trial(eager, runner, spec)
+    np.testing.assert_array_equal(lazy.actions, eager.actions)
+    assert eager.rendered == len(eager.actions) + 1
+    # Chunks of 8 executed steps, each from 2 observations.
+    assert lazy.rendered <= len(lazy.actions) / 4 + 2
+
+
+def test_executed_steps_change_how_often_the_policy_looks(checkpoint: Path, spec: TrialSpec) -> None:
+    runner = load_policy(read_source(str(checkpoint)), "cpu", 4)
+    assert [runner.sees(step) for step in range(9)] == [True, False, False, True, True, False, False, True, True]
+    with pytest.raises(UserError, match="executed_steps=10 does not fit: n_action_steps is 10, but horizon 10"):
+        load_policy(read_source(str(checkpoint)), "cpu", 10)
+
+
+def test_noise_is_fixed_by_the_trials_seed(checkpoint: Path, spec: TrialSpec) -> None:
+    import dataclasses
+
+    runner = load_policy(read_source(str(checkpoint)), "cpu", None)
+    other = dataclasses.replace(spec, policy_seed=spec.policy_seed + 1)
+    first, second, again = (run_trial(Recorder("Slide"), runner, s).trajectory for s in (spec, other, spec))
+    assert first == again
+    assert first != second
+
+
+def test_an_unregistered_type_is_a_clear_error(checkpoint: Path, tmp_path: Path) -> None:
+    folder = tmp_path / "pretrained_model"
+    folder.mkdir()
+    config = json.loads((checkpoint / "config.json").read_text())
+    (folder / "config.json").write_text(json.dumps({**config, "type": "nonsense"}))
+    (folder / "model.safetensors").write_bytes(b"")
+    with pytest.raises(UserError, match="policy type 'nonsense' is not registered"):
+        load_policy(read_source(str(folder)), "cpu", None)
