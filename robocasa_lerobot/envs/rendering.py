@@ -2,16 +2,25 @@
 
 from __future__ import annotations
 
+import os
 import weakref
 
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from robocasa_lerobot.errors import UnknownNameError
+from robocasa_lerobot.errors import UnknownNameError, UserError
 from robocasa_lerobot.gl import ensure_gl
 
 COLLISION_GROUP = 0  # geoms that only collide are not shown
+
+
+# Process that has made an OpenGL context; a forked child inherits the number, and the driver's dead threads with it.
+_context_process: int | None = None
+
+
+class ForkedContextError(UserError):
+    """A process forked after OpenGL was used in its parent cannot render: its driver would hang for ever."""
 
 
 class SceneRenderer:
@@ -21,10 +30,21 @@ class SceneRenderer:
         model: to render.
         height, width: of the pictures, pixels.
         shadows: shadows and reflections (render preset `quality`).
+
+    Raises:
+        NoOpenGLError: nothing on this machine can render.
+        ForkedContextError: this process was forked from one that had rendered.
     """
 
     def __init__(self, model: mujoco.MjModel, height: int, width: int, *, shadows: bool = False) -> None:
+        global _context_process
+        if _context_process not in (None, os.getpid()):
+            raise ForkedContextError(
+                "this process was forked from one that had rendered, which hangs OpenGL drivers. Start env workers with "
+                "AsyncVectorEnv(..., context='forkserver') or 'spawn'."
+            )
         ensure_gl()
+        _context_process = os.getpid()
         model.vis.global_.offwidth = max(width, model.vis.global_.offwidth)
         model.vis.global_.offheight = max(height, model.vis.global_.offheight)
         self._model = model

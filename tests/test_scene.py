@@ -1,0 +1,186 @@
+"""The parts that scenes are made of: layouts, textures, objects, placement."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+from pathlib import Path
+
+import mujoco
+import numpy as np
+import pytest
+from PIL import Image
+
+from robocasa_lerobot.envs.placement import Area, Footprint, PlacementError, place
+from robocasa_lerobot.envs.registry import get_task, task_names
+from robocasa_lerobot.envs.scene.builder import build_scene
+from robocasa_lerobot.envs.scene.fixtures.cabinets import FULL_TRAVEL_OF_DEPTH, Drawer
+from robocasa_lerobot.envs.scene.fixtures.room import Slab
+from robocasa_lerobot.envs.scene.layout import layout_ids, load_layout
+from robocasa_lerobot.envs.scene.materials import MaterialPalette, load_style, style_ids
+from robocasa_lerobot.envs.scene.objects import catalogue
+from robocasa_lerobot.envs.scene.objects.shapes import SHAPES, add_object
+from robocasa_lerobot.envs.scene.selection import footprint
+from robocasa_lerobot.envs.scene.textures import GENERATORS, TextureRecord, texture_png
+from robocasa_lerobot.errors import UnknownNameError
+
+SHARED = Path(__file__).parents[2] / "shared"
+
+
+@pytest.mark.parametrize("kind", GENERATORS)
+def test_textures_are_pure_functions_of_their_record(kind):
+    record = TextureRecord(kind, (0.7, 0.5, 0.3), (0.3, 0.2, 0.1), seed=5)
+    png = texture_png(record)
+    texture_png.cache_clear()
+    assert texture_png(record) == png
+    pixels = np.asarray(Image.open(io.BytesIO(png)))
+    assert pixels.shape == (256, 256, 3)
+    assert pixels.std() > 1
+    assert texture_png(TextureRecord(kind, (0.7, 0.5, 0.3), (0.3, 0.2, 0.1), seed=6)) != png
+
+
+@pytest.mark.parametrize("layout_id", layout_ids())
+def test_fixtures_of_a_layout_do_not_intersect(layout_id):
+    fixtures = [f for f in load_layout(layout_id).fixtures.values() if not isinstance(f, Slab)]
+    nested = ("_plinth", "_drawer_", "counter_", "sink", "window")
+    for i, a in enumerate(fixtures):
+        for b in fixtures[i + 1 :]:
+            if any(part in a.name or part in b.name for part in nested):
+                continue  # these lie within, or are let into, their neighbours by design
+            apart = a.pos[2] + a.height / 2 <= b.pos[2] - b.height / 2 + 1e-9
+            apart |= b.pos[2] + b.height / 2 <= a.pos[2] - a.height / 2 + 1e-9
+            assert apart or not footprint(a).overlaps(footprint(b), -0.002), (a.name, b.name)
+
+
+@pytest.mark.parametrize("layout_id", layout_ids())
+@pytest.mark.parametrize("style_id", style_ids())
+def test_every_kitchen_compiles_and_rests(layout_id, style_id):
+    spec = mujoco.MjSpec()
+    spec.compiler.degree = False
+    palette = MaterialPalette(spec, load_style(style_id))
+    layout = load_layout(layout_id)
+    for fixture in layout.fixtures.values():
+        fixture.build(spec, palette)
+    model = spec.compile()
+    data = mujoco.MjData(model)
+    for _ in range(200):
+        mujoco.mj_step(model, data)
+    assert data.ncon == 0
+    assert np.abs(data.qpos).max() < 2e-3  # doors and drawers stay shut
+
+
+def test_drawers_open_by_their_full_travel():
+    drawer = next(f for f in load_layout(1).fixtures.values() if isinstance(f, Drawer))
+    assert drawer.full_travel == pytest.approx(FULL_TRAVEL_OF_DEPTH * drawer.depth)
+    assert FULL_TRAVEL_OF_DEPTH == 0.55
+
+
+@pytest.mark.parametrize("name", catalogue.CATEGORIES)
+@pytest.mark.parametrize("index", range(0, catalogue.INSTANCES_PER_CATEGORY, 3))
+def test_every_object_rests_on_a_surface(name, index):
+    item = catalogue.instance(catalogue.CATEGORIES[name], index)
+    spec = mujoco.MjSpec()
+    spec.option.timestep = 0.002
+    spec.option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
+    spec.worldbody.add_geom(type=mujoco.mjtGeom.mjGEOM_PLANE, size=[2, 2, 0.1])
+    add_object(spec, MaterialPalette(spec, load_style(1)), "obj", item)
+    model = spec.compile()
+    data = mujoco.MjData(model)
+    data.joint("obj_joint0").qpos[2] = item.size[2] / 2 + 0.004
+    for _ in range(1500):
+        mujoco.mj_step(model, data)
+    position = data.joint("obj_joint0").qpos[:3]
+    assert np.linalg.norm(position[:2]) < 0.03, "rolled away"
+    assert abs(position[2] - item.size[2] / 2) < 0.01, "sank or fell over"
+    assert model.body("obj").mass[0] > 0.001
+    # What is said to be graspable fits between the fingers.
+    if item.category.graspable:
+        assert min(item.size[:2]) < 0.078
+
+
+def test_object_splits_share_no_instance_and_cover_all():
+    pretrain, target = (set(catalogue.split_indices(s)) for s in catalogue.SPLITS)
+    assert not pretrain & target
+    assert pretrain | target == set(range(catalogue.INSTANCES_PER_CATEGORY))
+    with pytest.raises(UnknownNameError, match="target"):
+        catalogue.split_indices("targets")
+    with pytest.raises(UnknownNameError, match="fruit"):
+        catalogue.categories_of("fruits")
+    assert {c.shape for c in catalogue.CATEGORIES.values()} == set(SHAPES)
+
+
+def test_samples_have_the_properties_asked_for():
+    rng = np.random.default_rng(0)
+    for _ in range(50):
+        item = catalogue.sample(rng, ("any",), "target", graspable=True, washable=True, max_height=0.1)
+        assert item.category.graspable
+        assert item.category.washable
+        assert item.size[2] <= 0.1
+        assert item.index in catalogue.split_indices("target")
+
+
+def test_footprints_overlap_as_rectangles_do():
+    a = Footprint(0, 0, 0, (0.5, 0.1))
+    assert a.overlaps(Footprint(0.9, 0, 0, (0.5, 0.1)))
+    assert not a.overlaps(Footprint(1.1, 0, 0, (0.5, 0.1)))
+    assert a.overlaps(Footprint(1.1, 0, 0, (0.5, 0.1)), margin=0.2)
+    # Their circumscribed circles meet, the rectangles do not.
+    assert not a.overlaps(Footprint(0.0, 0.5, np.pi / 4, (0.3, 0.1)))
+    assert a.overlaps(Footprint(0.0, 0.3, np.pi / 4, (0.3, 0.1)))
+
+
+def test_placement_keeps_inside_and_apart_or_says_so():
+    area = Area(-0.3, 0.3, -0.2, 0.2, (1.0, -1.0), np.pi / 2, 0.9)
+    rng = np.random.default_rng(1)
+    taken: list[Footprint] = []
+    for _ in range(5):
+        found, where = place(rng, [area], (0.05, 0.05), taken)
+        assert where is area
+        assert not any(found.overlaps(other, 0.0099) for other in taken)
+        corners = found.corners() - [1.0, -1.0]
+        # The area's frame is turned by a quarter: its x runs along the room's y.
+        assert np.abs(corners[:, 1]).max() <= 0.3 + 1e-9
+        assert np.abs(corners[:, 0]).max() <= 0.2 + 1e-9
+        taken.append(found)
+    with pytest.raises(PlacementError, match="no free place"):
+        place(rng, [area], (0.28, 0.19), taken)
+
+
+@pytest.mark.parametrize("task", task_names())
+@pytest.mark.parametrize("seed", range(5))
+def test_scenes_are_pure_functions_of_task_split_and_seed(task, seed):
+    first, second = (build_scene(get_task(task), "target", seed) for _ in range(2))
+    assert first.spec.to_xml() == second.spec.to_xml()
+    assert first.ep_meta() == second.ep_meta()
+    json.dumps(first.ep_meta())
+
+
+@pytest.mark.parametrize("task", task_names())
+def test_the_recorded_xml_is_the_model(task):
+    """A model loaded from the XML that demonstrations carry puts every body where the env has it."""
+    scene = build_scene(get_task(task), "target", 1)
+    data, _ = scene.initial_data(np.random.default_rng(0))
+    loaded = mujoco.MjModel.from_xml_string(scene.spec.to_xml(), scene.spec.assets)
+    again = mujoco.MjData(loaded)
+    again.qpos[:] = data.qpos
+    mujoco.mj_kinematics(loaded, again)
+    mujoco.mj_kinematics(scene.model, data)
+    assert loaded.nq == scene.model.nq
+    assert np.abs(again.xpos - data.xpos).max() < 1e-4
+    assert np.abs(again.geom_xpos - data.geom_xpos).max() < 1e-4
+
+
+@pytest.mark.skipif(not SHARED.exists(), reason="the facts are not beside this checkout")
+@pytest.mark.parametrize("name", task_names())
+def test_declarations_agree_with_the_published_facts(name):
+    with (SHARED / "facts" / "tasks.csv").open() as file:
+        row = next(r for r in csv.DictReader(file) if r["task"] == name)
+    task = get_task(name)
+    assert task.horizon == int(row["horizon"])
+    assert task.kind == row["kind"]
+    assert task.activity == row["activity"]
+    assert set(task.sets) == set(row["sets"].split())
+    assert len(task.stages) == int(row["subtasks"])
+    assert len(task.paraphrases) >= 4
+    assert task.instruction not in task.paraphrases
