@@ -49,5 +49,5 @@ step "evaluation: $TRIALS trials of the untrained and of the trained policy on e
     --env.tasks="$TASKS" --trials="$TRIALS" --seed="$SEED" --workers="$WORKERS" --out="$OUT/evaluation"
 
 step "report"
-robocasa_lerobot report "$OUT/evaluation" --training "$OUT" --out "$OUT/report.html"
+robocasa_lerobot report "$OUT/evaluation" --training "$OUT" --demos "$OUT"/demos/*.hdf5 --out "$OUT/report.html"
 step "done: open $OUT/report.html"

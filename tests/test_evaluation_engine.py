@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import collections
+import dataclasses
 import json
 import os
 import signal
@@ -63,7 +64,10 @@ def test_outcomes_do_not_depend_on_workers_order_or_films(tmp_path: Path) -> Non
     assert len({r.trajectory for r in one}) == len(one) == 24
     assert 0 < sum(r.success for r in one) < 24
     filmed = [r for r in two if r.video is not None]
-    assert len(filmed) == 8
+    for label, task in {r.key[:2] for r in two}:
+        group = [r for r in two if r.key[:2] == (label, task)]
+        assert {r.success for r in group} == {r.success for r in group if r.video is not None}
+        assert {r.trial for r in group if r.video is not None} >= {0, 1}
     for record in filmed:
         frames, rate = frames_and_rate(tmp_path / "two" / str(record.video))
         assert (frames, rate) == (1 + record.steps // FILM_EVERY, FILM_FPS)
@@ -211,3 +215,29 @@ def test_random_actions_depend_on_the_seed_alone() -> None:
     first, second, again = (run_trial(env, policy, plan[i]) for i in (0, 1, 0))
     assert first == again
     assert first.trajectory != second.trajectory
+
+
+def test_what_no_film_shows_is_run_again_and_must_go_the_same_way(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "out"
+    arguments: dict[str, Any] = {"policy.path": "zero", "trials": 6}
+    plain = evaluate(out, **arguments)
+    assert {r.success for r in plain} == {True, False}
+    filmed = evaluate(out, videos=1, **arguments)
+    assert comparable(filmed) == comparable(plain)
+    with_film = [r for r in filmed if r.video is not None]
+    assert {r.success for r in with_film} == {True, False}
+    assert all((out / str(r.video)).is_file() for r in with_film)
+    evaluate(out, videos=1, **arguments)
+    assert "nothing to run" in capsys.readouterr().out
+    # A record whose trial goes another way keeps its outcome and gets no film.
+    other = tmp_path / "other"
+    other.mkdir()
+    for record in plain:
+        results.append_trial(other / results.TRIALS_FILE, dataclasses.replace(record, trajectory="another"))
+    again = evaluate(other, videos=1, **arguments)
+    assert "not deterministic" in capsys.readouterr().err
+    assert [r.success for r in again] == [r.success for r in plain]
+    assert {r.video for r in again} == {None}
+    assert not list(other.rglob("*.mp4"))

@@ -63,7 +63,8 @@ class EvaluationConfig:
     seed: fixes scenes, starts and the policy's sampling noise of all trials.
     executed_steps: executed steps of each predicted action chunk; default: the policy's own.
     workers: parallel processes; 0: one for each CPU core. Outcomes do not depend on it.
-    videos: how many trials of each policy on each task are filmed (the first ones).
+    videos: how many trials of each policy on each task are filmed: the first ones, and where these show no success or
+        no failure, the first such trial is run once more for its film. 0: no films.
     out: folder of trials.jsonl, videos and report; default: outputs/evaluations/<labels>.
     retry_errors: run trials again that are recorded with an error.
     stall_seconds: a worker that reports no progress for so long is ended, and its trial tried once more.

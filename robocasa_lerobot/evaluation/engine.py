@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import collections
 import dataclasses
 import datetime
 import fcntl
 import os
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -19,7 +20,7 @@ from robocasa_lerobot.errors import UserError
 from robocasa_lerobot.evaluation import config as settings_of
 from robocasa_lerobot.evaluation.checkpoints import PolicySource, common_image_size, read_source
 from robocasa_lerobot.evaluation.config import EvaluationConfig
-from robocasa_lerobot.evaluation.plan import TrialSpec, make_plan
+from robocasa_lerobot.evaluation.plan import TrialKey, TrialSpec, make_plan
 from robocasa_lerobot.evaluation.provenance import git_commit, versions
 from robocasa_lerobot.evaluation.results import (
     TRIALS_FILE,
@@ -91,16 +92,39 @@ def evaluate(evaluation: Evaluation) -> list[TrialRecord]:
         _write_config(out / CONFIG_FILE, config)
         todo = [spec for spec in evaluation.plan if _is_missing(records.get(spec.key), config.retry_errors)]
         common = {"settings": evaluation.settings, "versions": versions(), "git_commit": git_commit()}
-        for completed in _progress(evaluation, todo, len(evaluation.plan)):
+        for completed in _run(evaluation, todo, records):
             record = _record(completed, descriptions[completed.spec.label], common)
+            earlier = records.get(record.key)
+            if earlier is not None and earlier.error is None:
+                record = _with_film(earlier, record, out)
             append_trial(path, record)
             records[record.key] = record
     return [records[spec.key] for spec in evaluation.plan]
 
 
-def _progress(evaluation: Evaluation, todo: Sequence[TrialSpec], total: int) -> Iterator[Completed]:
-    if not todo:
-        print(f"all {total} trials are recorded in {evaluation.out / TRIALS_FILE}: nothing to run.")
+def showcase(plan: Sequence[TrialSpec], records: Mapping[TrialKey, TrialRecord]) -> list[TrialSpec]:
+    """Trials to run once more for their films: the first success and the first failure that no film shows yet.
+
+    Which trials succeed is not known when the filmed ones are fixed; a trial can be run again, because it goes the
+    same way. Only policies that are filmed at all are looked at.
+    """
+    chosen = []
+    groups = dict.fromkeys((spec.label, spec.task) for spec in plan if spec.film)
+    for label, task in groups:
+        specs = [spec for spec in plan if (spec.label, spec.task) == (label, task) and spec.key in records]
+        for success in (True, False):
+            these = [s for s in specs if records[s.key].success is success and records[s.key].error is None]
+            if these and all(records[spec.key].video is None for spec in these):
+                chosen.append(dataclasses.replace(these[0], film=True))
+    return chosen
+
+
+def _run(
+    evaluation: Evaluation, todo: Sequence[TrialSpec], records: Mapping[TrialKey, TrialRecord]
+) -> Iterator[Completed]:
+    """The missing trials, then the ones to film, with a progress bar; `records` grows while this runs."""
+    if not todo and not showcase(evaluation.plan, records):
+        print(f"all {len(evaluation.plan)} trials are in {evaluation.out / TRIALS_FILE}: nothing to run.")
         return
     config = evaluation.config
     worker_settings = WorkerSettings(
@@ -116,21 +140,46 @@ def _progress(evaluation: Evaluation, todo: Sequence[TrialSpec], total: int) -> 
         executed_steps=config.executed_steps,
         out=str(evaluation.out),
     )
-    pool = WorkerPool(worker_settings, config.worker_count(len(todo)), config.stall_seconds)
-    solved = failed = errors = 0
+    total = len(evaluation.plan)
+    pool = WorkerPool(worker_settings, config.worker_count(max(1, len(todo))), config.stall_seconds)
+    counts = collections.Counter[str]()
     with tqdm(total=total, initial=total - len(todo), unit="trial", desc="trials", dynamic_ncols=True) as bar:
-        for completed in pool.run(todo):
+
+        def to_film() -> list[TrialSpec]:
+            specs = showcase(evaluation.plan, records)
+            bar.total = (bar.total or 0) + len(specs)
+            if specs:
+                bar.set_description("films")
+            return specs
+
+        for completed in pool.run(todo, to_film):
             error = completed.result.error or completed.earlier_error
             if error is not None:
                 what = "failed with an error" if completed.result.error else "was tried again after an error"
                 spec = completed.spec
                 bar.write(f"{spec.label} {spec.task} trial {spec.trial} {what}: {_last_line(error)}", file=sys.stderr)
-            errors += completed.result.error is not None
-            solved += completed.result.outcome.success
-            failed += not completed.result.outcome.success
-            bar.set_postfix(success=solved, failure=failed, errors=errors)
-            bar.update()
+            if completed.spec.key not in records:
+                kind = (
+                    "errors" if completed.result.error else "solved" if completed.result.outcome.success else "failed"
+                )
+                counts[kind] += 1
+                bar.set_postfix(counts)
             yield completed
+            bar.update()
+
+
+def _with_film(earlier: TrialRecord, again: TrialRecord, out: Path) -> TrialRecord:
+    """The record of a trial that was run again for its film, with the film if it went the same way."""
+    if again.video is not None and again.trajectory == earlier.trajectory:
+        return dataclasses.replace(earlier, video=again.video)
+    print(
+        f"{earlier.label} {earlier.task} trial {earlier.trial} went another way when it was run again for its film: "
+        "policy or env is not deterministic. The first run counts, without a film.",
+        file=sys.stderr,
+    )
+    if again.video is not None:
+        (out / again.video).unlink(missing_ok=True)
+    return earlier
 
 
 def _record(completed: Completed, policy: dict[str, Any], common: dict[str, Any]) -> TrialRecord:
@@ -148,7 +197,7 @@ def _record(completed: Completed, policy: dict[str, Any], common: dict[str, Any]
         attempts=completed.attempts,
         error=result.error,
         retried_error=completed.earlier_error,
-        policy=policy,
+        policy={**policy, "device": result.device},
         finished=datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds"),
         **common,
     )

@@ -17,7 +17,9 @@ Observation = dict[str, Any]
 
 
 class PolicyRunner(Protocol):
-    """One policy in one process, for one trial at a time."""
+    """One policy in one process, for one trial at a time; `device` is where it computes."""
+
+    device: str
 
     def reset(self, seed: int) -> None:
         """Forget the last trial; `seed` fixes all sampling noise of the next one."""
@@ -31,6 +33,8 @@ class PolicyRunner(Protocol):
 
 class ZeroPolicy:
     """Every component zero: the arm holds still, the gripper opens."""
+
+    device = "cpu"
 
     def reset(self, seed: int) -> None:
         """Nothing to forget."""
@@ -46,6 +50,8 @@ class ZeroPolicy:
 
 class RandomPolicy:
     """Actions uniform in [-1, 1], independent at each step."""
+
+    device = "cpu"
 
     def __init__(self) -> None:
         self._rng = np.random.default_rng(0)
@@ -94,7 +100,7 @@ class CheckpointPolicy:
                 else f"executed_steps={executed_steps} does not fit"
             )
             raise UserError(f"policy {source.path}: {what}: {reason}") from error
-        config.device = pick_device(device)
+        self.device = config.device = pick_device(device)
         config.pretrained_path = source.path
         self._policy = get_policy_class(config.type).from_pretrained(source.path, config=config)
         self._policy.to(config.device).eval()

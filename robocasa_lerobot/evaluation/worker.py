@@ -51,12 +51,13 @@ class Alive:
 
 @dataclass(frozen=True)
 class Finished:
-    """A trial ended by itself; `error` is the traceback of one that crashed."""
+    """A trial ended by itself; `error` is the traceback of one that crashed, `device` is where the policy ran."""
 
     outcome: Outcome
     video: str | None
     wall_seconds: float
     error: str | None
+    device: str | None = None
 
 
 @dataclass(frozen=True)
@@ -114,7 +115,7 @@ class _Worker:
             self.close_env()
             self._policy = None
             return Finished(Outcome(), None, time.monotonic() - started, traceback.format_exc())
-        return Finished(outcome, video, time.monotonic() - started, None)
+        return Finished(outcome, video, time.monotonic() - started, None, policy.device)
 
     def close_env(self) -> None:
         if self._env is not None:

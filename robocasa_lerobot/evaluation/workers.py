@@ -8,7 +8,7 @@ import multiprocessing.connection
 import os
 import signal
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from multiprocessing.connection import Connection
@@ -70,16 +70,26 @@ class WorkerPool:
         self._slots: list[_Slot] = []
         self._failed_starts = 0
 
-    def run(self, specs: Sequence[TrialSpec]) -> Iterator[Completed]:
+    def run(self, specs: Sequence[TrialSpec], more: Callable[[], Sequence[TrialSpec]] = tuple) -> Iterator[Completed]:
         """The trials as they complete, in no particular order; workers are ended when the iterator is closed.
+
+        Args:
+            specs: trials to run.
+            more: asked once for further trials, when all of `specs` are done and the workers are still there.
 
         Raises:
             UserError: a policy or an env cannot be built, or workers cannot be started.
         """
         pending = collections.deque(_Attempt(spec) for spec in specs)
-        finished = False
+        asked = finished = False
         try:
-            while pending or any(slot.attempt for slot in self._slots):
+            while True:
+                if not pending and not any(slot.attempt for slot in self._slots):
+                    if asked:
+                        break
+                    asked = True
+                    pending.extend(_Attempt(spec) for spec in more())
+                    continue
                 busy = sum(slot.attempt is not None for slot in self._slots)
                 while len(self._slots) < min(self._size, busy + len(pending)):
                     self._slots.append(self._start())
