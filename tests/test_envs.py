@@ -12,10 +12,10 @@ from gymnasium.utils.env_checker import check_env
 
 import robocasa_lerobot.envs  # noqa: F401  (makes the tasks known to Gymnasium)
 from robocasa_lerobot import contract
+from robocasa_lerobot.contract import ContractError
 from robocasa_lerobot.envs.check import check_task
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.registry import get_task, task_names, task_set, task_sets
-from robocasa_lerobot.contract import ContractError
 from robocasa_lerobot.errors import UnknownNameError, UserError
 
 pytestmark = pytest.mark.render
