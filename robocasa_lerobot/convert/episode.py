@@ -45,7 +45,8 @@ def instruction_of(demo: Demo, env_name: str, fallback: str | None) -> Instructi
 class Episode:
     """A demo seen through a plan; use it in a `with` block (it may hold a compiled scene).
 
-    Attributes: `actions` (T, A) and `states` (T, S) float64 in stored order, `instruction`, `state_source`.
+    Attributes: `actions` (T, A) and `states` (T, S) float64 in stored order, `instruction`, `state_source`, and
+    `simulator_states` (T, 1 + nq + nv) or None.
 
     Raises:
         RejectedEpisodeError: anything about this demo that keeps it from being converted.
@@ -59,6 +60,8 @@ class Episode:
         self.cameras = plan.cameras
         self._scene: Scene | None = None
         self._stack = ExitStack()
+        # Everything that is written is read or looked at here, so that nothing is found wrong half-way.
+        self.simulator_states = self.demo.states
         names = [camera.name for camera in plan.cameras]
         for camera in names:
             if camera in self.demo.image_cameras:
@@ -120,7 +123,7 @@ class Episode:
     def _load(self, finder: AssetFinder, plan: Plan) -> Scene:
         from robocasa_lerobot.convert.render import Scene  # MuJoCo is not needed where the file has everything
 
-        if self.demo.model_xml is None or self.demo.states is None:
+        if self.demo.model_xml is None or self.simulator_states is None:
             lacking = "model_file" if self.demo.model_xml is None else "states"
             raise RejectedEpisodeError(f"it has no {lacking}, so nothing can be rendered.")
         scene = Scene(*loadable(self.demo.model_xml, finder), preset=plan.settings.render_preset)
@@ -134,8 +137,8 @@ class Episode:
 
     def _set_state(self, step: int) -> None:
         assert self._scene is not None
-        assert self.demo.states is not None
-        self._scene.set_state(self.demo.states[step])
+        assert self.simulator_states is not None
+        self._scene.set_state(self.simulator_states[step])
 
     def _computed_states(self, plan: Plan) -> NDArray[np.float64]:
         assert self._scene is not None

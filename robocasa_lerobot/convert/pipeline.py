@@ -20,6 +20,7 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
+import multiprocess
 import numpy as np
 from datatrove.executor.local import LocalPipelineExecutor
 from datatrove.utils.logging import logger as datatrove_logger
@@ -28,7 +29,7 @@ from tqdm import tqdm
 
 from robocasa_lerobot import __version__
 from robocasa_lerobot.convert.encoder import SAMPLED_FRAMES, Histogram
-from robocasa_lerobot.convert.settings import ConversionSettings, Plan, make_plan
+from robocasa_lerobot.convert.settings import ConversionSettings, Plan, SourceRecord, make_plan
 from robocasa_lerobot.convert.shard import (
     CODECS,
     DATASET,
@@ -42,6 +43,7 @@ from robocasa_lerobot.convert.shard import (
     read_jsonl,
     write_jsonl,
 )
+from robocasa_lerobot.convert.source import DemoFile
 from robocasa_lerobot.errors import UserError
 
 # Our part of a dataset's folder; LeRobot reads nothing in it.
@@ -117,7 +119,8 @@ def _check_output(out: Path, overwrite: bool) -> None:
 def _locked(partial: Path) -> Iterator[None]:
     with (partial / "lock").open("w") as lock:
         try:
-            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            # A record lock is not inherited, so no orphaned child holds it after the parent was killed.
+            fcntl.lockf(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except OSError:
             raise UserError(
                 f"the same conversion is running already (it holds {partial}). Wait until it ends."
@@ -146,11 +149,23 @@ class _ShardTask:
         done = partial / "progress" / f"{rank:05d}"
         done.parent.mkdir(exist_ok=True)
         shard = self.plan.shards[rank]
-        convert_shard(self.plan, shard, shard_folder(partial, rank), lambda frames: _write_count(done, frames))
+        convert_shard(self.plan, shard, shard_folder(partial, rank), lambda frames: _report(done, frames))
 
 
 class _Executor(LocalPipelineExecutor):
-    """datatrove's local executor (worker processes, a completion marker for each shard) without its log lines."""
+    """datatrove's local executor (worker processes, a completion marker for each shard) without its log lines.
+
+    One worker is this process itself: no managing process is started then.
+    """
+
+    def run(self) -> None:
+        if self.workers == 1:
+            for rank in self.get_incomplete_ranks():
+                self._run_for_rank(rank)
+        else:
+            # Workers are forked from a process that has the slow imports (6 s) done.
+            multiprocess.set_forkserver_preload([convert_shard.__module__])
+            super().run()
 
     def _launch_run_for_rank(self, *args: Any, **kwargs: Any) -> PipelineStats:
         quiet_libraries()  # here, because it must happen in the worker process
@@ -213,7 +228,10 @@ def _progress_bar(plan: Plan, partial: Path, executor: _Executor) -> Iterator[No
         bar.close()
 
 
-def _write_count(file: Path, count: int) -> None:
+def _report(file: Path, count: int) -> None:
+    parent = multiprocess.parent_process()
+    if parent is not None and not parent.is_alive():
+        os._exit(1)  # killed: the next run must not meet a worker that still writes
     with contextlib.suppress(OSError):  # only for the eye
         file.write_text(str(count))
 
@@ -263,6 +281,8 @@ def _join(plan: Plan, partial: Path, out: Path) -> ConversionResult | None:
             f"joining gave {meta.total_episodes} episodes with {meta.total_frames} frames, "
             f"expected {len(episodes)} with {num_frames}."
         )
+    for video in merged.glob("videos/*/*/*.mp4"):
+        video.chmod((merged / "meta" / "info.json").stat().st_mode)  # LeRobot leaves temporary files' mode, owner only
     write_stats(dataset_statistics(merged, meta.features, histograms), merged)
     rejected = _rejected(plan, partial)
     ours = merged / META_FOLDER
@@ -270,7 +290,9 @@ def _join(plan: Plan, partial: Path, out: Path) -> ConversionResult | None:
     write_jsonl(ours / EPISODES_FILE, episodes)
     write_jsonl(ours / REJECTED_FILE, rejected)
     record = _conversion_record(plan, out)
-    (ours / CONVERSION_FILE).write_text(json.dumps(record, indent=2, ensure_ascii=False) + "\n", encoding="utf-8")
+    (ours / CONVERSION_FILE).write_text(
+        json.dumps(record, indent=2, ensure_ascii=False, default=str) + "\n", encoding="utf-8"
+    )
     sources = dict(Counter(line["instruction_source"] for line in episodes))
     cameras = tuple(camera.name for camera in plan.cameras)
     return ConversionResult(out, len(episodes), num_frames, rejected, cameras, sources)
@@ -288,10 +310,14 @@ def _conversion_record(plan: Plan, out: Path) -> dict[str, Any]:
         "robot_type": plan.mapping.robot_type,
         "fps": plan.fps,
         "cameras": [asdict(camera) for camera in plan.cameras],
-        "sources": [
-            asdict(source) | {"relative_to_dataset": os.path.relpath(source.file, out)} for source in plan.sources
-        ],
+        "sources": [_source_record(source, out) for source in plan.sources],
     }
+
+
+def _source_record(source: SourceRecord, out: Path) -> dict[str, Any]:
+    with DemoFile(Path(source.file)) as file:
+        attributes = file.attributes
+    return asdict(source) | {"relative_to_dataset": os.path.relpath(source.file, out), "attributes": attributes}
 
 
 def _link_tree(source: Path, target: Path) -> None:

@@ -19,7 +19,7 @@ from robocasa_lerobot.errors import UnknownNameError, UserError
 FORMAT_VERSION = 1
 # A shard is what a kill can lose and what a worker takes at a time: some seconds of work, but never so many shards
 # that joining them costs more than making them.
-SHARD_FRAMES = 500
+SHARD_FRAMES = 250
 MAX_SHARDS = 64
 
 

@@ -22,10 +22,11 @@ from robocasa_lerobot.convert.settings import Plan, Shard
 from robocasa_lerobot.convert.source import DemoFile, RejectedEpisodeError
 
 # Constant rate factor and preset for each codec. Keyframes every 2 frames, as LeRobot has it: random access decodes
-# at most one frame more than asked for.
+# at most one frame more than asked for. No B-frames: with them the decoding times of short episodes overlap where
+# LeRobot joins video files, and it fails.
 CODECS: dict[str, dict[str, Any]] = {
-    "h264": {"vcodec": "h264", "crf": 18, "preset": "veryfast", "g": 2},
-    "hevc": {"vcodec": "hevc", "crf": 20, "preset": "veryfast", "g": 2},
+    "h264": {"vcodec": "h264", "crf": 18, "preset": "veryfast", "g": 2, "extra_options": {"bf": 0}},
+    "hevc": {"vcodec": "hevc", "crf": 20, "preset": "veryfast", "g": 2, "extra_options": {"bf": 0}},
     "av1": {"vcodec": "libsvtav1", "crf": 30, "preset": 12, "g": 2},
 }
 # Appending an episode rewrites the video file of its camera, so files stay small; also the time to open one.
@@ -179,8 +180,8 @@ def _write_extras(episode: Episode, folder: Path) -> None:
     if demo.model_xml is not None:
         # No time stamp inside, so that the same input gives the same bytes.
         (folder / "model.xml.gz").write_bytes(gzip.compress(demo.model_xml.encode(), mtime=0))
-    if demo.states is not None:
-        np.savez_compressed(folder / "states.npz", states=demo.states)
+    if episode.simulator_states is not None:
+        np.savez_compressed(folder / "states.npz", states=episode.simulator_states)
 
 
 def write_jsonl(path: Path, lines: list[dict[str, Any]]) -> None:

@@ -195,7 +195,7 @@ class DemoFile:
         try:
             self._file = h5py.File(path, "r")
         except OSError as error:
-            if "lock" in str(error):
+            if "unable to lock file" in str(error):
                 raise SourceError(f"{path} is locked: another process writes it. Wait until that has ended.") from None
             raise SourceError(
                 f"{path} cannot be read as HDF5 ({_first_line(error)}). It is truncated or not an HDF5 file: "

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +17,7 @@ from robocasa_lerobot import contract
 from robocasa_lerobot.convert.episode import Episode
 from robocasa_lerobot.convert.mapping import choose_mapping
 from robocasa_lerobot.convert.pipeline import CONVERSION_FILE, META_FOLDER, quiet_libraries
+from robocasa_lerobot.convert.report import CameraQuality, Check, Report
 from robocasa_lerobot.convert.settings import Camera, ConversionSettings, Plan, SourceRecord, file_sha256
 from robocasa_lerobot.convert.shard import EPISODES_FILE, REJECTED_FILE, read_jsonl
 from robocasa_lerobot.convert.source import DemoFile, RejectedEpisodeError
@@ -44,94 +44,9 @@ _COLUMNS = (
     "index",
     "task_index",
 )
-_MAX_DIFFERENCES = 20  # shown for each check
 _PEAK = 255.0
 # A picture counts as misplaced where another step's true picture fits it better by this factor in squared error.
 _MISPLACED_FACTOR = 1.5
-
-
-@dataclass
-class Check:
-    """One thing that was compared: how many values, and what differed."""
-
-    name: str
-    compared: int = 0
-    num_differences: int = 0
-    differences: list[str] = field(default_factory=list)
-
-    @property
-    def passed(self) -> bool:
-        """Whether everything was equal and there was something to compare."""
-        return self.num_differences == 0
-
-    def fail(self, difference: str) -> None:
-        """Note a difference."""
-        self.num_differences += 1
-        if len(self.differences) < _MAX_DIFFERENCES:
-            self.differences.append(difference)
-
-    def expect(self, equal: bool, difference: str) -> None:
-        """Count one comparison."""
-        self.compared += 1
-        if not equal:
-            self.fail(difference)
-
-
-@dataclass
-class CameraQuality:
-    """Peak signal-to-noise ratio of decoded pictures against the true ones, in dB (infinite where equal)."""
-
-    camera: str
-    psnr_db: list[float] = field(default_factory=list)
-
-    @property
-    def minimum(self) -> float:
-        """The worst picture."""
-        return min(self.psnr_db, default=float("nan"))
-
-    @property
-    def mean(self) -> float:
-        """Mean over the pictures."""
-        return float(np.mean(self.psnr_db)) if self.psnr_db else float("nan")
-
-
-@dataclass
-class Report:
-    """Outcome of a verification."""
-
-    root: str
-    num_episodes: int
-    num_frames: int
-    checks: list[Check]
-    cameras: list[CameraQuality]
-
-    @property
-    def passed(self) -> bool:
-        """Whether every check passed."""
-        return all(check.passed for check in self.checks)
-
-    def as_json(self) -> dict[str, Any]:
-        """The report as plain data."""
-        return {
-            "root": self.root,
-            "passed": self.passed,
-            "num_episodes": self.num_episodes,
-            "num_frames": self.num_frames,
-            "checks": [
-                {
-                    "name": check.name,
-                    "passed": check.passed,
-                    "compared": check.compared,
-                    "num_differences": check.num_differences,
-                    "differences": check.differences,
-                }
-                for check in self.checks
-            ],
-            "cameras": [
-                {"camera": c.camera, "pictures": len(c.psnr_db), "psnr_min_db": c.minimum, "psnr_mean_db": c.mean}
-                for c in self.cameras
-            ],
-        }
 
 
 def verify(

@@ -1,0 +1,259 @@
+"""The converter's parts: files named by MJCFs, mappings, the encoder, statistics; and the human demonstrations."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+from typing import Any
+
+import av
+import h5py
+import mujoco
+import numpy as np
+import pytest
+from convert_support import MESH, SCENE, TEXTURE, mujoco_quaternion, write_demos
+from hypothesis import given
+from hypothesis import strategies as st
+
+from robocasa_lerobot import contract
+from robocasa_lerobot.convert import mjcf
+from robocasa_lerobot.convert.encoder import (
+    QUANTILES,
+    EncodingError,
+    SamplingVideoEncoder,
+    channel_histogram,
+    histogram_statistics,
+)
+from robocasa_lerobot.convert.mapping import choose_mapping, quaternion_xyzw
+from robocasa_lerobot.convert.mjcf import AssetFinder, MissingAssetsError, loadable
+from robocasa_lerobot.convert.settings import ConversionSettings, make_plan
+from robocasa_lerobot.convert.source import DemoFile, RejectedEpisodeError, SourceError
+from robocasa_lerobot.errors import UserError
+
+LIFT_FRAMES = {"demo_1": 482, "demo_2": 510, "demo_3": 392}
+
+
+@pytest.fixture
+def root(tmp_path: Path) -> Path:
+    """An asset root with `robots/arm/link.stl`, and a file and a link that lead out of it."""
+    folder = tmp_path / "assets"
+    (folder / "robots" / "arm").mkdir(parents=True)
+    (folder / "robots" / "arm" / "link.stl").write_bytes(b"mesh")
+    (tmp_path / "secret.stl").write_bytes(b"secret")
+    (folder / "link_out.stl").symlink_to(tmp_path / "secret.stl")
+    return folder
+
+
+@pytest.mark.parametrize(
+    ("path", "found"),
+    [
+        ("/home/someone/robosuite/models/assets/robots/arm/link.stl", b"mesh"),
+        ("/home/someone/assets/grippers/../robots/arm/link.stl", b"mesh"),
+        ("C:\\Users\\someone\\assets\\robots\\arm\\link.stl", b"mesh"),
+        ("robots/arm/link.stl", b"mesh"),
+        ("/home/someone/other/hand.stl", None),
+        ("../secret.stl", None),
+        ("link_out.stl", None),
+        ("", None),
+    ],
+)
+def test_files_are_found_by_the_end_of_their_path_and_only_under_the_root(
+    root: Path, path: str, found: bytes | None
+) -> None:
+    assert AssetFinder([root]).read(path) == found
+
+
+def test_the_longest_matching_end_wins(root: Path) -> None:
+    (root / "link.stl").write_bytes(b"another")
+    assert AssetFinder([root]).read("/x/robots/arm/link.stl") == b"mesh"
+
+
+def test_embedded_files_come_first_and_packages_are_known(root: Path) -> None:
+    finder = AssetFinder([root], {"robots/arm/link.stl": b"embedded"}.get)
+    assert finder.read("robots/arm/link.stl") == b"embedded"
+    tile = finder.read(MESH)
+    assert tile
+    assert finder.read(f"/opt/env/site-packages/{MESH}") == tile
+    with pytest.raises(UserError, match="not a folder"):
+        AssetFinder([root / "nowhere"])
+
+
+def test_missing_files_are_named_with_the_remedy(root: Path) -> None:
+    with pytest.raises(MissingAssetsError, match=TEXTURE) as caught:
+        loadable(SCENE, AssetFinder([root]))
+    assert "--asset-root" in str(caught.value)
+
+
+def test_folders_of_the_compiler_count_and_names_stay(root: Path) -> None:
+    xml = (
+        '<mujoco><compiler meshdir="robots/arm" strippath="true"/><asset><mesh file="/old/link.stl"/></asset></mujoco>'
+    )
+    text, assets = loadable(xml, AssetFinder([root]))
+    assert list(assets.values()) == [b"mesh"]
+    assert 'name="link"' in text
+    assert "meshdir" not in text
+
+
+@pytest.mark.parametrize(("tag", "attribute"), mjcf.REPAIRS)
+def test_each_repair_is_needed_and_enough(tag: str, attribute: str) -> None:
+    element = f'<{tag} {attribute}="0"/>'
+    xml = f"<mujoco>{f'<option>{element}</option>' if tag == 'flag' else element}<worldbody/></mujoco>"
+    with pytest.raises(ValueError, match=attribute):
+        mujoco.MjModel.from_xml_string(xml)
+    mujoco.MjModel.from_xml_string(*loadable(xml, AssetFinder([])))
+
+
+@pytest.mark.parametrize(
+    "xml",
+    [
+        '<!DOCTYPE x [<!ENTITY a "b">]><mujoco>&a;</mujoco>',
+        '<mujoco><include file="/etc/passwd"/></mujoco>',
+        '<mujoco><asset><model name="m" file="/etc/passwd"/></asset></mujoco>',
+        "<mujoco>",
+    ],
+)
+def test_hostile_scenes_are_rejected(xml: str) -> None:
+    with pytest.raises(RejectedEpisodeError):
+        loadable(xml, AssetFinder([]))
+
+
+@given(st.lists(st.floats(-1, 1), min_size=4, max_size=4).filter(lambda q: np.linalg.norm(q) > 0.1))
+def test_quaternion_is_that_of_mujoco(quat: list[float]) -> None:
+    matrix = np.empty(9)
+    mujoco.mju_quat2Mat(matrix, np.array(quat) / np.linalg.norm(quat))
+    ours, theirs = quaternion_xyzw(matrix.reshape(3, 3)), mujoco_quaternion(matrix.reshape(3, 3))
+    assert ours[3] >= 0
+    if abs(ours[3]) < 1e-6:  # at a half turn both signs are right
+        ours, theirs = ours * np.sign(ours @ theirs), theirs
+    np.testing.assert_allclose(ours, theirs, atol=1e-9)
+
+
+def test_features_are_the_contracts(tmp_path: Path) -> None:
+    plan = make_plan([write_demos(tmp_path / "a.hdf5", (5,))], ConversionSettings())
+    assert plan.features == contract.dataset_features()
+    assert plan.fps == contract.CONTROL_HZ
+
+
+def test_no_mapping_is_an_error_that_names_the_known_ones(tmp_path: Path) -> None:
+    path = write_demos(tmp_path / "a.hdf5", (5,), proprioception=False)
+    with h5py.File(path, "a") as file:
+        file["data/demo_0"].attrs["model_file"] = "<mujoco><worldbody/></mujoco>"
+    with DemoFile(path) as file, pytest.raises(SourceError, match=contract.ROBOT_TYPE):
+        choose_mapping(file, file.demo("demo_0"))
+
+
+@pytest.mark.parametrize(
+    "given_settings", [{"image_size": 15}, {"image_size": 33}, {"cameras": ()}, {"instruction": " "}]
+)
+def test_impossible_settings_are_refused(given_settings: dict) -> None:
+    with pytest.raises(UserError):
+        ConversionSettings(**given_settings)
+
+
+def test_histogram_statistics_are_those_of_the_pixels() -> None:
+    images = np.random.default_rng(0).integers(20, 230, (5, 16, 16, 3), dtype=np.uint8)
+    histogram = np.sum([channel_histogram(image) for image in images], axis=0)
+    stats = histogram_statistics(histogram, 5)
+    pixels = images.reshape(-1, 3)
+    assert np.array_equal(stats["min"], pixels.min(0))
+    assert np.array_equal(stats["max"], pixels.max(0))
+    np.testing.assert_allclose(stats["mean"], pixels.mean(0))
+    np.testing.assert_allclose(stats["std"], pixels.std(0))
+    for q in QUANTILES:
+        expected = np.quantile(pixels, q, axis=0, method="inverted_cdf")
+        assert np.array_equal(stats[f"q{round(q * 100):02d}"], expected)
+
+
+def _encoder() -> SamplingVideoEncoder:
+    return SamplingVideoEncoder(20, "h264", "yuv420p", {"preset": "ultrafast", "g": "2", "bf": "0"})
+
+
+def test_encoder_keeps_every_frame_however_fast_they_come(tmp_path: Path) -> None:
+    encoder = _encoder()
+    encoder.episode_length = 300
+    encoder.start_episode(["a", "b"], tmp_path)
+    for step in range(300):
+        for key in ("a", "b"):
+            encoder.feed_frame(key, np.full((64, 64, 3), step % 256, np.uint8))
+    for path, stats in encoder.finish_episode().values():
+        with av.open(str(path)) as container:
+            assert sum(1 for _ in container.decode(video=0)) == 300
+        assert stats["count"] == [50]
+
+
+def test_encoder_refuses_a_wrong_number_of_frames(tmp_path: Path) -> None:
+    encoder = _encoder()
+    encoder.episode_length = 4
+    encoder.start_episode(["a"], tmp_path)
+    for _ in range(3):
+        encoder.feed_frame("a", np.zeros((64, 64, 3), np.uint8))
+    with pytest.raises(EncodingError, match="4 frames expected"):
+        encoder.finish_episode()
+
+
+def test_encoder_reports_failures_and_cleans_up(tmp_path: Path) -> None:
+    encoder = SamplingVideoEncoder(20, "h264", "yuv420p", {})
+    encoder.episode_length = 1
+    encoder.start_episode(["a"], tmp_path)
+    encoder.feed_frame("a", np.zeros((63, 63, 3), np.uint8))  # odd sizes are not possible with this pixel format
+    with pytest.raises(EncodingError):
+        encoder.finish_episode()
+    encoder.cancel_episode()
+    assert list(tmp_path.iterdir()) == []
+
+
+def _shortened(shared: Path, path: Path, steps: int) -> Path:
+    """The human demonstrations, each with its first steps only."""
+    shutil.copy(shared / "real" / "robosuite_lift" / "demo.hdf5", path)
+    with h5py.File(path, "a") as file:
+        for demo in file["data"].values():
+            for key in ("states", "actions"):
+                values = demo[key][:steps]
+                del demo[key]
+                demo[key] = values
+    return path
+
+
+def test_human_demonstrations_are_understood(shared: Path) -> None:
+    pytest.importorskip("lerobot.datasets")
+    assets = shared / "real" / "robosuite_lift" / "assets"
+    source = shared / "real" / "robosuite_lift" / "demo.hdf5"
+    plan = make_plan([source], ConversionSettings(asset_roots=(str(assets),)))
+    assert plan.num_frames == sum(LIFT_FRAMES.values()) == 1384
+    assert plan.mapping.robot_type == "Panda"
+    assert [camera.name for camera in plan.cameras] == ["agentview", "robot0_eye_in_hand", "frontview"]
+    assert plan.features["action"]["shape"] == (7,)
+    assert plan.features["observation.state"]["shape"] == (9,)
+    with pytest.raises(MissingAssetsError, match="--asset-root"):
+        make_plan([source], ConversionSettings())
+
+
+@pytest.mark.render
+def test_human_demonstrations_round_trip(shared: Path, tmp_path: Path) -> None:
+    """Three steps of each demo at a small size; the whole file is a slow test."""
+    pytest.importorskip("lerobot.datasets")
+    from robocasa_lerobot.convert.pipeline import convert
+    from robocasa_lerobot.convert.verify import verify
+
+    source = _shortened(shared, tmp_path / "lift.hdf5", 3)
+    settings = ConversionSettings(asset_roots=(str(shared / "real" / "robosuite_lift" / "assets"),), image_size=64)
+    result = convert([source], tmp_path / "lift", settings)
+    assert (result.num_episodes, result.num_frames) == (3, 9)
+    report = verify(tmp_path / "lift", pictures_per_episode=1)
+    assert report.passed, report.as_json()
+
+
+@pytest.mark.slow
+@pytest.mark.render
+@pytest.mark.timeout(1800)
+def test_all_human_demonstrations(shared: Path, tmp_path: Path) -> None:
+    pytest.importorskip("lerobot.datasets")
+    from robocasa_lerobot.convert.pipeline import convert
+    from robocasa_lerobot.convert.verify import verify
+
+    folder = shared / "real" / "robosuite_lift"
+    convert([folder / "demo.hdf5"], tmp_path / "lift", ConversionSettings(asset_roots=(str(folder / "assets"),)))
+    report = verify(tmp_path / "lift")
+    assert report.passed, report.as_json()
+    assert (report.num_episodes, report.num_frames) == (3, 1384)
+    assert min(camera.minimum for camera in report.cameras) > 30
