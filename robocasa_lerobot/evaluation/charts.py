@@ -37,6 +37,10 @@ def learning_curve(phase: TrainingPhase) -> str:
         axes.plot(steps, losses, color=_LINE, linewidth=1.8, marker=marker)
         if len(losses) and losses.min() > 0 and losses.max() / losses.min() > 5:
             axes.set_yscale("log")
+            axes.yaxis.set_major_formatter("{x:g}")
+            # Minor labels (2, 3, 5 of a decade) only where one decade or less is shown; else they crowd.
+            wide = losses.max() / losses.min() > 30
+            axes.yaxis.set_minor_formatter("" if wide else lambda x, _: f"{x:g}" if f"{x:e}"[0] in "235" else "")
         axes.set_xlabel("step", color=_INK)
         axes.set_ylabel("loss", color=_INK)
         axes.tick_params(colors=_INK, which="both", length=0)

@@ -117,6 +117,7 @@ def common_settings(policies: Sequence[PolicyResult]) -> list[tuple[str, str]]:
         tables: list[dict[str, Any]] = [getattr(policy, group) for policy in policies]
         for name in dict.fromkeys(key for table in tables for key in table):
             rows.append((name, _same_or_each([_plain(table.get(name)) for table in tables], policies)))
+    rows.insert(0, ("episode length", _same_or_each([_horizons(policy) for policy in policies], policies)))
     commits = [", ".join(policy.git_commits) or "not in a git checkout" for policy in policies]
     rows.append(("git commit", _same_or_each(commits, policies)))
     return rows
@@ -126,6 +127,12 @@ def _same_or_each(values: list[str], policies: Sequence[PolicyResult]) -> str:
     if len(set(values)) == 1:
         return values[0]
     return "; ".join(f"{policy.label}: {value}" for policy, value in zip(policies, values, strict=True))
+
+
+def _horizons(policy: PolicyResult) -> str:
+    """Control steps after which a trial ends, for each task."""
+    lengths = {result.task: result.trials[0].horizon for result in policy.tasks}
+    return ", ".join(f"{task} {steps or 'set by the env'} steps" for task, steps in lengths.items())
 
 
 def _plain(value: Any) -> str:
