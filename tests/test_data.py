@@ -236,7 +236,7 @@ def test_statistics_are_those_of_the_frames_weighted_by_the_mixture(root: Path) 
 def test_image_statistics_pool_the_episodes(root: Path) -> None:
     key = contract.IMAGE_KEYS[0]
     pooled = mixture(root, alpha=1.0).statistics()[key]
-    whole = DatasetSource(root).meta.stats[key]
+    whole = LeRobotDataset("fake", root=root, video_backend="pyav").meta.stats[key]
     for name in ("mean", "std", "min", "max"):
         assert pooled[name].shape == (3, 1, 1)
         np.testing.assert_allclose(pooled[name], whole[name], rtol=1e-4)
@@ -276,3 +276,15 @@ def test_fake_dataset_is_the_same_for_a_seed_and_holds_the_contract(root: Path, 
     assert set(first.instructions) == set(INSTRUCTIONS.values())
     for key, feature in contract.dataset_features((32, 32)).items():
         assert tuple(first.features[key]["shape"]) == tuple(feature["shape"])
+
+
+def test_batch_over_two_datasets_is_put_together_in_order(root: Path, tmp_path: Path) -> None:
+    other = write_fake_dataset(tmp_path / "other", episodes=1, length=4, image_size=32, seed=5, tasks=["CloseDrawer"])
+    dataset = MixtureDataset(MixtureConfig([MemberConfig(str(root)), MemberConfig(str(other))]))
+    members, frames = np.array([1, 0, 1, 0]), np.array([3, 12, 0, 1])
+    batch = dataset.batch(members, frames)
+    for i, (member, frame) in enumerate(zip(members, frames, strict=True)):
+        item = dataset[int(frame) + 36 * int(member)]
+        assert batch["task"][i] == item["task"] == dataset.meta.tasks[int(item["task_index"])]
+        assert torch.equal(batch["action"][i], item["action"])
+        assert torch.equal(batch[contract.IMAGE_KEYS[1]][i], item[contract.IMAGE_KEYS[1]])

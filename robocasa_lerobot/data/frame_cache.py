@@ -42,7 +42,7 @@ def resize_images(images: torch.Tensor, size: tuple[int, int]) -> torch.Tensor:
 
 def cache_bytes(source: DatasetSource, keys: Sequence[str], size: tuple[int, int]) -> int:
     """Bytes that a cache of all frames of `source` takes."""
-    return int(source.meta.total_frames) * len(keys) * 3 * size[0] * size[1]
+    return source.total_frames * len(keys) * 3 * size[0] * size[1]
 
 
 class FrameCache:
@@ -89,7 +89,7 @@ def _fill(source: DatasetSource, keys: list[str], size: tuple[int, int], folder:
     progress = folder / "cache.json"
     done = json.loads(progress.read_text())["episodes"] if progress.is_file() else 0
     folder.mkdir(exist_ok=True)
-    shape = (int(source.meta.total_frames), 3, *size)
+    shape = (source.total_frames, 3, *size)
     mode: Any = "r+" if done else "w+"
     arrays = {
         key: np.lib.format.open_memmap(folder / f"{key}.npy", mode=mode, dtype=np.uint8, shape=None if done else shape)
@@ -115,9 +115,8 @@ def _fill(source: DatasetSource, keys: list[str], size: tuple[int, int], folder:
 def _decode(
     source: DatasetSource, key: str, episode: int, timestamps: NDArray[np.float32], size: tuple[int, int]
 ) -> torch.Tensor:
-    row = source.meta.episodes[episode]
-    path = source.root / source.meta.get_video_file_path(episode, key)
-    shifted = [row[f"videos/{key}/from_timestamp"] + float(t) for t in timestamps]
+    path, start = source.video(episode, key)
+    shifted = [start + float(t) for t in timestamps]
     try:
         frames = decode_video_frames(path, shifted, _TOLERANCE_S, backend="pyav", return_uint8=True)
     except Exception as error:

@@ -49,7 +49,6 @@ class MixtureMeta:
 class _Member:
     source: DatasetSource
     episodes: NDArray[np.int64]
-    task_index: NDArray[np.int64]  # index in the mixture's tasks of each task index of the dataset
 
 
 class MixtureDataset(torch.utils.data.Dataset[Item]):
@@ -74,20 +73,23 @@ class MixtureDataset(torch.utils.data.Dataset[Item]):
         self.sources = {root: DatasetSource(root) for root in roots}
         _check_alike(list(self.sources.values()), any_image_size=image_size is not None)
         tasks = sorted({text for source in self.sources.values() for text in source.instructions})
+        # Index in the mixture's tasks of each task index of a dataset.
+        self._task_index = {
+            root: np.array([tasks.index(text) for text in source.instructions]) for root, source in self.sources.items()
+        }
         self._members = []
         for member in config.members:
             source = self.sources[Path(member.root)]
-            to_global = np.array([tasks.index(text) for text in source.instructions])
-            self._members.append(_Member(source, source.select(member.tasks, member.episodes), to_global))
+            self._members.append(_Member(source, source.select(member.tasks, member.episodes)))
         frames = [int((m.source.ends - m.source.starts)[m.episodes].sum()) for m in self._members]
         weights = [member.weight for member in config.members if member.weight is not None]
         self.probabilities = mixture_probabilities(frames, weights or None, config.alpha)
-        self._offsets = np.cumsum([0, *(m.source.meta.total_frames for m in self._members)])
+        self._offsets = np.cumsum([0, *(m.source.total_frames for m in self._members)])
         first = self._members[0].source
         self.meta = MixtureMeta(
             features={key: self._feature(feature) for key, feature in first.features.items()},
-            fps=int(first.meta.fps),
-            robot_type=first.meta.robot_type,
+            fps=first.fps,
+            robot_type=first.robot_type,
             tasks=tasks,
             total_frames=sum(frames),
             total_episodes=sum(len(m.episodes) for m in self._members),
@@ -178,10 +180,13 @@ class MixtureDataset(torch.utils.data.Dataset[Item]):
         """A collated batch: frame `frames[i]` of the dataset of member `members[i]`, for each i."""
         order: list[NDArray[np.int64]] = []
         parts: list[Item] = []
-        for number in np.unique(members):
-            chosen = np.flatnonzero(members == number)
+        for source in dict.fromkeys(self._members[number].source for number in np.unique(members)):
+            of_source = np.array([member.source is source for member in self._members])
+            chosen = np.flatnonzero(of_source[members])
             order.append(chosen)
-            parts.append(self._read(self._members[number], frames[chosen]))
+            parts.append(self._read(source, frames[chosen]))
+        if len(parts) == 1:
+            return parts[0]
         back = np.argsort(np.concatenate(order))
         out: Item = {}
         for key, first in parts[0].items():
@@ -192,8 +197,7 @@ class MixtureDataset(torch.utils.data.Dataset[Item]):
                 out[key] = [joined[i] for i in back]
         return out
 
-    def _read(self, member: _Member, frames: NDArray[np.int64]) -> Item:
-        source = member.source
+    def _read(self, source: DatasetSource, frames: NDArray[np.int64]) -> Item:
         out = self._read_pictures(source, frames)
         episode = source.columns["episode_index"][frames]
         for key, column in source.columns.items():
@@ -201,7 +205,7 @@ class MixtureDataset(torch.utils.data.Dataset[Item]):
             out[key] = torch.from_numpy(column[indices])
             if padded is not None:
                 out[f"{key}_is_pad"] = torch.from_numpy(padded)
-        task = member.task_index[source.columns["task_index"][frames]]
+        task = self._task_index[source.root][source.columns["task_index"][frames]]
         out["task_index"] = torch.from_numpy(task)
         out["task"] = [self.meta.tasks[i] for i in task]
         return out
@@ -287,8 +291,8 @@ def _check_alike(sources: Sequence[DatasetSource], any_image_size: bool) -> None
     """All datasets must have the same columns and rate: a policy cannot tell which one a batch came from."""
     first = sources[0]
     for other in sources[1:]:
-        if other.meta.fps != first.meta.fps:
-            raise UserError(f"{other.root} has {other.meta.fps} frames/s, {first.root} {first.meta.fps}.")
+        if other.fps != first.fps:
+            raise UserError(f"{other.root} has {other.fps} frames/s, {first.root} {first.fps}.")
         for key in sorted(first.features.keys() | other.features.keys()):
             ours, theirs = first.features.get(key), other.features.get(key)
             if ours is None or theirs is None:

@@ -10,8 +10,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pyarrow as pa
 import pyarrow.parquet as pq
-from lerobot.datasets.dataset_metadata import LeRobotDatasetMetadata
+from lerobot.datasets.io_utils import load_info, load_tasks
 from numpy.typing import NDArray
 
 from robocasa_lerobot.errors import UnknownNameError, UserError
@@ -20,31 +21,41 @@ EPISODE_TABLE = "meta/robocasa/episodes.jsonl"
 
 
 class DatasetSource:
-    """A dataset folder; metadata is read at once, columns on first use.
+    """A dataset folder; the tables in `meta/` are read at once (milliseconds), columns on first use.
 
     Raises:
-        UserError: no LeRobotDataset v3.0 at `root`.
+        UserError: no LeRobotDataset v3.0 at `root`, or an empty one.
     """
 
     def __init__(self, root: Path) -> None:
         self.root = Path(root)
         _check_is_dataset(self.root)
-        self.meta = LeRobotDatasetMetadata(self.root.name, root=self.root)
-        if not self.meta.total_episodes:
+        self._info = load_info(self.root)
+        if not self._info.total_episodes:
             raise UserError(f"{self.root}: the dataset has no episodes; convert some demonstrations first.")
-        rows = self.meta.episodes.with_format("numpy")
-        self.starts: NDArray[np.int64] = np.asarray(rows["dataset_from_index"], dtype=np.int64)
-        self.ends: NDArray[np.int64] = np.asarray(rows["dataset_to_index"], dtype=np.int64)
+        # LeRobot's own metadata object takes seconds for this table and has what is not needed here too.
+        self._episodes = _read_episodes(self.root, self._info.total_episodes)
+        self.starts: NDArray[np.int64] = self._episodes.column("dataset_from_index").to_numpy().astype(np.int64)
+        self.ends: NDArray[np.int64] = self._episodes.column("dataset_to_index").to_numpy().astype(np.int64)
+        self.fps = int(self._info.fps)
+        self.robot_type: str | None = self._info.robot_type
+        self.features: dict[str, dict[str, Any]] = self._info.features
+        tasks = load_tasks(self.root).sort_values("task_index")
+        self.instructions = [str(text) for text in tasks.index]  # text of each `task_index`
 
     @property
-    def features(self) -> dict[str, dict[str, Any]]:
-        """LeRobot's description of each column."""
-        return self.meta.features
+    def total_frames(self) -> int:
+        """Number of frames."""
+        return int(self._info.total_frames)
 
-    @property
-    def instructions(self) -> list[str]:
-        """Text of each `task_index`."""
-        return [str(text) for text in self.meta.tasks.sort_values("task_index").index]
+    def video(self, episode: int, key: str) -> tuple[Path, float]:
+        """File with the pictures of a camera feature of an episode, and the second in it where they begin."""
+        chunk, file, start = (
+            self._episodes.column(f"videos/{key}/{name}")[episode].as_py()
+            for name in ("chunk_index", "file_index", "from_timestamp")
+        )
+        name = str(self._info.video_path).format(video_key=key, chunk_index=chunk, file_index=file)
+        return self.root / name, float(start)
 
     def select(self, tasks: Sequence[str] | None, episodes: Sequence[int] | None) -> NDArray[np.int64]:
         """Indices (ascending) of the episodes of the given tasks and indices; None keeps all.
@@ -97,7 +108,7 @@ class DatasetSource:
             parts = [_column_array(table.column(name), self.features[name]["shape"]) for table in tables]
             array = np.concatenate(parts)
             out[name] = array.astype(np.int64 if array.dtype.kind in "iub" else np.float32)
-        if not np.array_equal(out["index"], np.arange(self.meta.total_frames)):
+        if not np.array_equal(out["index"], np.arange(self.total_frames)):
             raise UserError(f"{self.root}: frames are missing or out of order; convert the dataset again.")
         return out
 
@@ -130,6 +141,18 @@ def _check_is_dataset(root: Path) -> None:
         raise UserError(
             f"{root}: LeRobotDataset {version}, expected v3.0. `robocasa-lerobot convert` reads older ones."
         )
+
+
+def _read_episodes(root: Path, count: int) -> pa.Table:
+    files = sorted((root / "meta" / "episodes").glob("*/*.parquet"))
+    wanted = [name for name in pq.read_schema(files[0]).names if not name.startswith("stats/")] if files else []
+    try:
+        table = pa.concat_tables([pq.read_table(path, columns=wanted) for path in files]).sort_by("episode_index")
+    except (pa.ArrowInvalid, ValueError) as error:
+        raise UserError(f"{root}: meta/episodes cannot be read ({error}); convert the dataset again.") from error
+    if table.column("episode_index").to_pylist() != list(range(count)):
+        raise UserError(f"{root}: meta/episodes does not list the episodes 0 to {count - 1}; convert it again.")
+    return table
 
 
 def _is_number(dtype: str) -> bool:

@@ -131,6 +131,10 @@ def make_optimizer(
     optimizer = preset.build(policy.get_optim_params())
     if not isinstance(optimizer, torch.optim.Optimizer):
         raise UserError(f"policy {policy.config.type!r} wants several optimisers, which training does not support.")
+    for group in optimizer.param_groups:
+        # One kernel for all elements instead of a dozen: on a CPU the update is several times faster.
+        if "fused" in group and policy.config.device == "cpu":
+            group["fused"] = True
     if phase.learning_rate is not None:
         for group in optimizer.param_groups:
             group["lr"] *= phase.learning_rate / preset.lr
