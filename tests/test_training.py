@@ -7,6 +7,7 @@ import os
 import signal
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Sequence
 from pathlib import Path
@@ -24,6 +25,7 @@ from robocasa_lerobot.training import builders
 from robocasa_lerobot.training.checkpoint import last_checkpoint, pretrained_model
 from robocasa_lerobot.training.config import EmaConfig, ExperimentConfig, load_experiment
 from robocasa_lerobot.training.ema import Ema, ema_decay
+from robocasa_lerobot.training.overlay import merge
 from robocasa_lerobot.training.phases import run_experiment
 
 ROOT = Path(__file__).parents[1]
@@ -94,14 +96,8 @@ def experiment_file(folder: Path, data: Path, kind: str = "diffusion_transformer
         ],
     }
     path = folder / "experiment.yaml"
-    path.write_text(yaml.safe_dump(overlay_phases(content, changes)))
+    path.write_text(yaml.safe_dump(merge(content, changes)))
     return path
-
-
-def overlay_phases(content: dict[str, Any], changes: dict[str, Any]) -> dict[str, Any]:
-    from robocasa_lerobot.training.overlay import merge
-
-    return merge(content, changes)
 
 
 def tiny(
@@ -194,6 +190,25 @@ def test_killed_run_goes_on_to_the_same_losses(tmp_path: Path, data: Path) -> No
     for phase in ("pretrain", "finetune"):
         assert losses(killed, phase) == losses(whole, phase)
     assert not list((killed / "out/pretrain/checkpoints").glob(".writing-*"))
+
+
+def test_request_to_end_saves_first(tmp_path: Path, data: Path) -> None:
+    experiment = tiny(tmp_path, data, overrides=["--defaults.steps=5000"])
+    before = signal.getsignal(signal.SIGTERM)
+
+    def ask() -> None:
+        while not (tmp_path / "out/pretrain/checkpoints/000004").is_dir():
+            time.sleep(0.01)
+        os.kill(os.getpid(), signal.SIGTERM)
+
+    asking = threading.Thread(target=ask)
+    asking.start()
+    assert not run_experiment(experiment)
+    asking.join()
+    assert signal.getsignal(signal.SIGTERM) == before
+    last = last_checkpoint(tmp_path / "out/pretrain")
+    assert last is not None
+    assert int(last.name) == metrics(tmp_path, "pretrain")[-1]["step"] < 5000
 
 
 def test_finished_run_is_left_alone(finished: Path, data: Path) -> None:

@@ -109,7 +109,7 @@ def train_phase(run: PhaseRun, accelerator: Accelerator) -> bool:
             if accelerator.is_main_process:
                 with (run.folder / METRICS).open("a") as file:
                     file.write(json.dumps(line) + "\n")
-        stopped = run.stop(state.step)
+        stopped = _agree(run.stop(state.step), accelerator)
         due = config.save_every > 0 and state.step % config.save_every == 0
         if due or stopped or state.step == config.steps:
             _save(run, accelerator)
@@ -158,6 +158,13 @@ def _scalars(outputs: Any) -> dict[str, float]:
         if isinstance(value, int | float) or (isinstance(value, torch.Tensor) and value.numel() == 1):
             found[key] = float(value)
     return found
+
+
+def _agree(stop: bool, accelerator: Accelerator) -> bool:
+    """Whether any process wants to stop: a signal may reach one of them only, and all must save together."""
+    if accelerator.num_processes == 1:
+        return stop
+    return bool(accelerator.reduce(torch.tensor(float(stop), device=accelerator.device), reduction="sum") > 0)
 
 
 def _note(window: dict[str, list[Any]], **values: Any) -> None:

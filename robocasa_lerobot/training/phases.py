@@ -133,9 +133,12 @@ def prepare_phase(
         _check_same_data(folder, about)
         restore(last, state)
         accelerator.print(f"phase {phase.name}: going on from step {state.step}")
+    accelerator.wait_for_everyone()  # all have read what is replaced now
     if accelerator.is_main_process:
         folder.mkdir(parents=True, exist_ok=True)
-        (folder / PHASE_FILE).write_text(json.dumps(about, indent=2))
+        aside = folder / f".{PHASE_FILE}"
+        aside.write_text(json.dumps(about, indent=2))
+        aside.replace(folder / PHASE_FILE)
         truncate_metrics(folder, state.step)
     sampler = dataset.sampler(seed, drop_last_frames=getattr(config, "drop_n_last_frames", None) or 0)
     share = phase.batch_size // phase.gradient_accumulation
