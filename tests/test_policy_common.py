@@ -204,6 +204,18 @@ def test_clip_policy_loads_offline(saved: bool, clip_folder: Path, tmp_path: Pat
             DiffusionTransformerPolicy.from_pretrained(checkpoint)
 
 
+def test_clip_memory_from_inference_serves_training(clip_folder: Path) -> None:
+    config = tiny_config(text_encoder="clip", clip_path=str(clip_folder))
+    policy = DiffusionTransformerPolicy(config)
+    preprocess, _ = make_pre_post_processors(config, dataset_stats=unit_stats())
+    batch = preprocess(batch_for(config))
+    with torch.inference_mode(), torch.autocast("cpu", torch.bfloat16):
+        policy.predict_action_chunk(batch)
+    (seen, *_) = policy.observation_encoder.text_encoder._memory.values()
+    assert seen.dtype == torch.float32
+    policy.train()(batch)[0].backward()
+
+
 def test_clip_remembers_instructions(clip_folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     config = tiny_config(text_encoder="clip", clip_path=str(clip_folder))
     policy = DiffusionTransformerPolicy(config)

@@ -80,6 +80,17 @@ def test_variant_trains_and_predicts(overrides: dict[str, Any]) -> None:
     assert config.action_delta_indices[config.n_obs_steps - 1] == 0
 
 
+def test_mixed_precision_trains_and_keeps_the_loss_in_float32() -> None:
+    policy, preprocess, _ = build(tiny_config())
+    batch = preprocess(batch_for(policy.config))
+    with torch.autocast("cpu", torch.bfloat16):
+        loss, _ = policy.train()(batch)
+        chunk = policy.predict_action_chunk(batch)
+    loss.backward()
+    assert loss.dtype == chunk.dtype == torch.float32
+    assert all(torch.isfinite(p.grad).all() for p in policy.parameters() if p.grad is not None)
+
+
 def test_uint8_and_float_images_are_the_same() -> None:
     config = tiny_config()
     policy, preprocess, _ = build(config)

@@ -123,6 +123,9 @@ class ClipTextEncoder(nn.Module):
         """The CLIP model itself."""
         return self.model if hasattr(self, "model") else self._held[0]
 
+    # What is remembered must be the same under automatic mixed precision and usable for training although first
+    # seen in inference mode.
+    @torch.inference_mode(False)
     @torch.no_grad()
     def forward(self, tokens: Tensor, mask: Tensor) -> Tensor:
         """Maps CLIP's tokens (N, L) and attention mask (N, L) to its text embeddings (N, dim), in float32."""
@@ -130,7 +133,8 @@ class ClipTextEncoder(nn.Module):
         new = [i for i, key in enumerate(keys) if key not in self._memory and keys.index(key) == i]
         if new:
             model = self.text_model.to(tokens.device).eval()
-            embeddings = model(input_ids=tokens[new], attention_mask=mask[new].long()).text_embeds.float()
+            with torch.autocast(tokens.device.type, enabled=False):
+                embeddings = model(input_ids=tokens[new], attention_mask=mask[new].long()).text_embeds.float()
             self._memory.update({keys[i]: embedding for i, embedding in zip(new, embeddings, strict=True)})
         return torch.stack([self._memory[key].to(tokens.device) for key in keys])
 

@@ -86,8 +86,8 @@ class DiffusionTransformerPolicy(PreTrainedPolicy):
             The loss, and scalars to log.
         """
         draws = self.config.noise_draws
-        features = self.observation_encoder(batch, generator).repeat_interleave(draws, dim=0)
-        actions = batch[ACTION].to(features.dtype).repeat_interleave(draws, dim=0)
+        features = self.observation_encoder(batch, generator).float().repeat_interleave(draws, dim=0)
+        actions = batch[ACTION].float().repeat_interleave(draws, dim=0)
         if tuple(actions.shape[1:]) != (self.config.horizon, self.action_dim):
             raise UserError(
                 f"actions of shape {tuple(batch[ACTION].shape)}, expected (batch, {self.config.horizon}, "
@@ -103,7 +103,7 @@ class DiffusionTransformerPolicy(PreTrainedPolicy):
         ignored = batch.get(ACTION_IS_PAD) if self.config.mask_padded_actions else None
         if ignored is not None:
             ignored = ignored.repeat_interleave(draws, dim=0)
-        losses = masked_mse(self.denoiser(noisy, times, features), target, ignored)
+        losses = masked_mse(self.denoiser(noisy, times, features).float(), target, ignored)
         losses = losses.unflatten(0, (-1, draws)).mean(dim=1)
         if reduction == "none":
             return losses, {}
@@ -134,7 +134,7 @@ class DiffusionTransformerPolicy(PreTrainedPolicy):
     def sample(self, batch: dict[str, Tensor], noise: Tensor | None = None, generator: Generators = None) -> Tensor:
         """All predicted actions, (B, horizon, A), from offset 1 - n_obs_steps on. Arguments as above."""
         self.eval()
-        features = self.observation_encoder(self._with_time_axis(batch))
+        features = self.observation_encoder(self._with_time_axis(batch)).float()
         random = generator if generator is None or isinstance(generator, torch.Generator) else list(generator)
         shape = (features.shape[0], self.config.horizon, self.action_dim)
         x = _normal(shape, random, features) if noise is None else noise.to(features)
@@ -143,7 +143,8 @@ class DiffusionTransformerPolicy(PreTrainedPolicy):
         self.scheduler.set_timesteps(self.config.num_inference_steps or self.config.num_train_timesteps)
         for time in self.scheduler.timesteps.tolist():
             times = torch.full(shape[:1], time, device=x.device, dtype=torch.long)
-            x = self.scheduler.step(self.denoiser(x, times, features), time, x, generator=random).prev_sample
+            prediction = self.denoiser(x, times, features).float()
+            x = self.scheduler.step(prediction, time, x, generator=random).prev_sample
         return x
 
     def reset(self) -> None:
