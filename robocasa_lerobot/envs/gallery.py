@@ -21,10 +21,11 @@ def render_task(
     preset: str = "fast",
     image_size: int = 256,
     overview_size: tuple[int, int] = (720, 1280),
+    file_format: str = "png",
 ) -> list[Path]:
-    """Write `<task>_<seed>_cameras.png` and `<task>_<seed>_kitchen.png` to a folder; returns their paths.
+    """Write `<task>_<seed>_cameras` and `<task>_<seed>_kitchen` to a folder; returns their paths.
 
-    `overview_size` is (height, width) in pixels.
+    `overview_size` is (height, width) in pixels, `file_format` "png" or "jpg".
 
     Raises:
         UnknownNameError: no such task, split or preset.
@@ -33,12 +34,12 @@ def render_task(
     out.mkdir(parents=True, exist_ok=True)
     try:
         observation, _ = env.reset(seed=seed)
-        cameras = out / f"{task}_{seed}_cameras.png"
-        Image.fromarray(np.hstack([observation["pixels"][camera] for camera in env.cameras])).save(cameras)
+        cameras = out / f"{task}_{seed}_cameras.{file_format}"
+        Image.fromarray(np.hstack([observation["pixels"][camera] for camera in env.cameras])).save(cameras, quality=90)
         env.close()
         renderer = SceneRenderer(env.model, *overview_size, shadows=preset == "quality")
-        kitchen = out / f"{task}_{seed}_kitchen.png"
-        Image.fromarray(renderer.render(env.data, visitor_camera(env.scene))).save(kitchen)
+        kitchen = out / f"{task}_{seed}_kitchen.{file_format}"
+        Image.fromarray(renderer.render(env.data, visitor_camera(env.scene))).save(kitchen, quality=90)
         renderer.close()
     finally:
         env.close()

@@ -16,6 +16,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--preset", default="fast", help="render preset: fast or quality (default fast)")
     parser.add_argument("--image-size", type=int, default=256, help="height and width of camera pictures (default 256)")
     parser.add_argument("--overview-size", default="1280x720", help="size of the view of the whole kitchen")
+    parser.add_argument("--format", choices=["png", "jpg"], default="png", help="of the pictures (default png)")
     parser.add_argument("--out", type=Path, required=True, help="folder for the pictures")
 
 
@@ -38,6 +39,8 @@ def run(args: argparse.Namespace) -> int:
         get_task(name)
     for name in names:
         for seed in seeds:
-            for path in render_task(name, seed, args.out, args.split, args.preset, args.image_size, (height, width)):
+            for path in render_task(
+                name, seed, args.out, args.split, args.preset, args.image_size, (height, width), args.format
+            ):
                 print(path)
     return 0
