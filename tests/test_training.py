@@ -239,6 +239,7 @@ def test_changed_data_are_told(tmp_path: Path) -> None:
 
 def test_checkpoint_loads_through_lerobot(finished: Path, data: Path) -> None:
     from lerobot.configs.policies import PreTrainedConfig
+    from lerobot.configs.train import TrainPipelineConfig
     from lerobot.policies.factory import get_policy_class, make_pre_post_processors
 
     model = pretrained_model(last_checkpoint(finished / "out/finetune") or finished)
@@ -250,6 +251,8 @@ def test_checkpoint_loads_through_lerobot(finished: Path, data: Path) -> None:
     action = post(policy.select_action(pre({**observation, "task": ["open the left drawer"]})))
     assert action.shape == (1, contract.ACTION_SIZE)
     assert torch.isfinite(action).all()
+    training = TrainPipelineConfig.from_pretrained(model)
+    assert (training.steps, training.batch_size, training.dataset.root) == (4, 4, str(data))
 
 
 def _statistics(folder: Path, phase: str) -> dict[str, np.ndarray[Any, Any]]:

@@ -12,6 +12,7 @@ import functools
 import hashlib
 import json
 import shutil
+import sys
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
@@ -97,7 +98,12 @@ def _fill(source: DatasetSource, keys: list[str], size: tuple[int, int], folder:
     }
     timestamps = source.columns["timestamp"]
     episodes = tqdm(
-        range(done, len(source.starts)), initial=done, total=len(source.starts), desc=f"decoding {source.root.name}"
+        range(done, len(source.starts)),
+        initial=done,
+        total=len(source.starts),
+        desc=f"decoding {source.root.name}",
+        unit="episode",
+        mininterval=0.2 if sys.stderr.isatty() else 10.0,  # seconds; a log file needs few lines
     )
     with ThreadPoolExecutor(max_workers=len(keys)) as pool:
         for episode in episodes:

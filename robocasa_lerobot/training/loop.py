@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 import math
+import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import nullcontext
@@ -66,6 +67,7 @@ def train_phase(run: PhaseRun, accelerator: Accelerator) -> bool:
         desc=config.name,
         unit="step",
         smoothing=0.05,
+        mininterval=0.2 if sys.stderr.isatty() else 10.0,  # seconds; a log file needs few lines
         disable=not accelerator.is_main_process,
     )
     began, stopped = time.perf_counter(), False
@@ -99,7 +101,7 @@ def train_phase(run: PhaseRun, accelerator: Accelerator) -> bool:
         began = time.perf_counter()
         if state.step % config.log_every == 0 or state.step == config.steps:
             line = _metrics_line(state, learning_rate, config.batch_size)
-            progress.set_postfix(loss=f"{line['loss']:.4f}", lr=f"{learning_rate:.1e}")
+            progress.set_postfix(loss=f"{line['loss']:.4f}", lr=f"{learning_rate:.1e}", refresh=False)
             if not math.isfinite(line["loss"]):
                 raise UserError(
                     f"phase {config.name!r}: the loss is {line['loss']} at step {state.step}. Lower `learning_rate`, "
