@@ -279,6 +279,26 @@ def test_no_good_episode_is_an_error_and_leaves_nothing(tmp_path: Path) -> None:
     assert leftovers(tmp_path / "out") == []
 
 
+def test_damage_found_half_way_through_an_episode_rejects_only_it(tmp_path: Path) -> None:
+    source = write_demos(tmp_path / "demos.hdf5", (30, 8), images=32)
+    key = f"data/demo_0/obs/{contract.CAMERAS[0]}_image"
+    with h5py.File(source, "a") as file:
+        pictures = file[key][:]
+        del file[key]
+        dataset = file.create_dataset(key, data=pictures, chunks=(1, 32, 32, 3), compression="gzip", fletcher32=True)
+        file.flush()
+        where = dataset.id.get_chunk_info(20).byte_offset
+    with source.open("r+b") as stream:
+        stream.seek(where)
+        stream.write(b"\xff" * 16)
+    result = convert([source], tmp_path / "out", SETTINGS)
+    assert [line["source_demo"] for line in result.rejected] == ["demo_0"]
+    assert "cannot be read" in result.rejected[0]["reason"]
+    assert result.num_frames == 8
+    assert verify(tmp_path / "out", pictures_per_episode=None).passed
+    assert {path.name for path in (tmp_path / "out").iterdir()} == {"data", "extras", "meta", "videos"}
+
+
 def test_unknown_camera_names_the_closest(tmp_path: Path) -> None:
     source = write_demos(tmp_path / "demos.hdf5", (5,))
     with pytest.raises(UserError, match="robot0_agentview_left"):

@@ -143,11 +143,11 @@ def test_no_mapping_is_an_error_that_names_the_known_ones(tmp_path: Path) -> Non
 
 
 @pytest.mark.parametrize(
-    "given_settings", [{"image_size": 15}, {"image_size": 33}, {"cameras": ()}, {"instruction": " "}]
+    "fields", [{"image_size": 15}, {"image_size": 33}, {"cameras": ()}, {"instruction": " "}], ids=str
 )
-def test_impossible_settings_are_refused(given_settings: dict) -> None:
+def test_impossible_settings_are_refused(fields: dict[str, Any]) -> None:
     with pytest.raises(UserError):
-        ConversionSettings(**given_settings)
+        ConversionSettings(**fields)
 
 
 def test_histogram_statistics_are_those_of_the_pixels() -> None:

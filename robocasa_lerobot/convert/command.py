@@ -58,9 +58,7 @@ def run(args: argparse.Namespace) -> int:
         render_preset=args.render_preset,
     )
     from robocasa_lerobot.convert.pipeline import convert
-    from robocasa_lerobot.gl import ensure_gl
 
-    ensure_gl()
     result = convert(args.files, args.out, settings, args.workers, args.overwrite)
     cameras = ", ".join(result.cameras)
     print(f"{result.root}: {result.num_episodes} episodes, {result.num_frames} frames, cameras {cameras}")

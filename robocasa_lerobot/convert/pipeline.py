@@ -24,7 +24,6 @@ import multiprocess
 import numpy as np
 from datatrove.executor.local import LocalPipelineExecutor
 from datatrove.utils.logging import logger as datatrove_logger
-from datatrove.utils.stats import PipelineStats
 from tqdm import tqdm
 
 from robocasa_lerobot import __version__
@@ -153,23 +152,22 @@ class _ShardTask:
 
 
 class _Executor(LocalPipelineExecutor):
-    """datatrove's local executor (worker processes, a completion marker for each shard) without its log lines.
+    """datatrove's local executor (a completion marker for each shard) on a plain pool of processes.
 
-    One worker is this process itself: no managing process is started then.
+    datatrove's own pool starts a managing process for its log lines, which stays behind when this one is killed.
     """
 
     def run(self) -> None:
+        ranks = self.get_incomplete_ranks()
         if self.workers == 1:
-            for rank in self.get_incomplete_ranks():
+            for rank in ranks:
                 self._run_for_rank(rank)
-        else:
-            # Workers are forked from a process that has the slow imports (6 s) done.
-            multiprocess.set_forkserver_preload([convert_shard.__module__])
-            super().run()
-
-    def _launch_run_for_rank(self, *args: Any, **kwargs: Any) -> PipelineStats:
-        quiet_libraries()  # here, because it must happen in the worker process
-        return super()._launch_run_for_rank(*args, **kwargs)
+            return
+        # Workers are forked from a process that has the slow imports (6 s) done.
+        multiprocess.set_forkserver_preload([convert_shard.__module__])
+        with multiprocess.get_context("forkserver").Pool(self.workers, initializer=quiet_libraries) as pool:
+            for _ in pool.imap_unordered(self._run_for_rank, ranks):
+                pass
 
 
 def quiet_libraries() -> None:

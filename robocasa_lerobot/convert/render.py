@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robocasa_lerobot.convert.source import RejectedEpisodeError
+from robocasa_lerobot.gl import ensure_gl
 
 PRESETS = ("fast", "quality")
 # robosuite's and RoboCasa's convention: group 0 holds collision shapes, group 1 what cameras see.
@@ -109,7 +110,11 @@ class Scene:
         return np.array([self._data.joint(name).qpos[0] for name in names])
 
     def picture(self, camera: str, height: int, width: int) -> NDArray[np.uint8]:
-        """What a camera sees in the present state: upright (height, width, 3) uint8 RGB."""
+        """What a camera sees in the present state: upright (height, width, 3) uint8 RGB.
+
+        Raises:
+            NoOpenGLError: this machine cannot render; the message has the remedy.
+        """
         renderer = self._renderer(height, width)
         self._hide_unseen(camera, width / height)
         renderer.update_scene(self._data, camera=camera, scene_option=self._option)
@@ -118,6 +123,7 @@ class Scene:
     def _renderer(self, height: int, width: int) -> mujoco.Renderer:
         renderer = self._renderers.get((height, width))
         if renderer is None:
+            ensure_gl()
             buffer: Any = self._model.vis.global_
             buffer.offheight, buffer.offwidth = max(buffer.offheight, height), max(buffer.offwidth, width)
             renderer = mujoco.Renderer(self._model, height, width)

@@ -102,7 +102,8 @@ class _ShardWriter:
         self.episodes: list[dict[str, Any]] = []
 
     def write(self, episode: Episode, file: DemoFile, report: _Throttled) -> None:
-        dataset = self._dataset or self._create()
+        # Not `or`: a dataset without episodes is false.
+        dataset = self._dataset if self._dataset is not None else self._create()
         encoder = dataset.writer._streaming_encoder
         encoder.episode_length = episode.length
         task = episode.instruction.text

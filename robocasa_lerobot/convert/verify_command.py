@@ -38,9 +38,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Verify; exit status 1 where anything differs."""
     from robocasa_lerobot.convert.verify import verify
-    from robocasa_lerobot.gl import ensure_gl
 
-    ensure_gl()
     report = verify(args.dataset, args.source, args.asset_root, args.pictures_per_episode, args.min_psnr)
     print(json.dumps(report.as_json(), indent=2) if args.report == "json" else _table(report))
     return 0 if report.passed else 1
