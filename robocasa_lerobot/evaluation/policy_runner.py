@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.util
 from typing import Any, Protocol
 
 import numpy as np
@@ -152,10 +151,10 @@ def register_policy_type(kind: str) -> None:
     """Import what registers policy type `kind` with LeRobot: ours by its name, else installed plugins."""
     from lerobot.configs.policies import PreTrainedConfig
 
-    ours = f"robocasa_lerobot.policies.{kind}"
-    if importlib.util.find_spec(ours) is not None:
-        importlib.import_module(f"{ours}.configuration_{kind}")
-        importlib.import_module(f"{ours}.processor_{kind}")  # registers the processor steps of saved pipelines
+    from robocasa_lerobot.policies.registry import POLICY_TYPES, register_policies
+
+    if kind in POLICY_TYPES:
+        register_policies()
     if kind not in PreTrainedConfig.get_known_choices():
         from lerobot.utils.import_utils import register_third_party_plugins
 

@@ -1,7 +1,6 @@
-"""Registers the env and policy types by importing the modules whose decorators do so."""
+"""Registers the env and policy types, as LeRobot's discovery expects of the module that it imports."""
 
-import robocasa_lerobot.envs.lerobot_plugin
-import robocasa_lerobot.policies.diffusion_transformer.configuration_diffusion_transformer
+import robocasa_lerobot.envs.lerobot_plugin  # noqa: F401
+from robocasa_lerobot.policies.registry import register_policies
 
-# LeRobot does not import a policy's processor module before it reads a saved pipeline that names its steps.
-import robocasa_lerobot.policies.diffusion_transformer.processor_diffusion_transformer  # noqa: F401
+register_policies()

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import importlib
 import json
 from collections.abc import Mapping
 from pathlib import Path
@@ -22,16 +21,8 @@ from lerobot.utils.feature_utils import dataset_to_policy_features
 from robocasa_lerobot.data.mixture import MixtureDataset, MixtureMeta
 from robocasa_lerobot.data.statistics import Statistics
 from robocasa_lerobot.errors import UnknownNameError, UserError
+from robocasa_lerobot.policies.registry import register_policies
 from robocasa_lerobot.training.config import PhaseConfig
-
-# Modules whose import registers this project's policy types with LeRobot.
-POLICY_MODULES = ("robocasa_lerobot.policies.diffusion_transformer.configuration_diffusion_transformer",)
-
-
-def register_policies() -> None:
-    """Make this project's policy types known to LeRobot."""
-    for name in POLICY_MODULES:
-        importlib.import_module(name)
 
 
 def best_device(wanted: str | None) -> str:
