@@ -19,13 +19,14 @@ REPOSITORY = Path(__file__).parents[1]
 PACKAGE = REPOSITORY / "robocasa_lerobot"
 
 # What each part of the package may import of the rest of the package. Parts on one level stay apart.
-BASE = {"contract", "errors", "gl", "parallel"}
+BASE = {"contract", "errors", "gl", "parallel", "settings"}
 LOW = {"envs", "convert", "data", "policies"}
 MAY_IMPORT: dict[str, set[str]] = {
     "contract": {"errors"},
     "errors": set(),
     "gl": {"errors"},
     "parallel": {"errors"},
+    "settings": {"errors"},
     **dict.fromkeys(LOW, BASE),
     "demos": BASE | {"envs", "convert"},
     "training": BASE | {"data", "policies"},
@@ -41,6 +42,7 @@ FORBIDDEN: dict[str, set[str]] = {
     "errors": TORCH | PHYSICS,
     "gl": TORCH,
     "parallel": TORCH | PHYSICS,
+    "settings": TORCH | PHYSICS,
     "envs": TORCH,
     "demos": TORCH,
     "data": PHYSICS,

@@ -81,7 +81,7 @@ def test_overrides(path: Path, arguments: list[str], dotted: str, value: object)
         (["--phases.finetune.mixture.members=[]"], "no members"),
         (["--policy.file=atc.yaml"], "no file .*atc.yaml"),
         (["--output_dir"], "has no value"),
-        (["output_dir=3"], "overrides look like"),
+        (["output_dir=3"], "settings are written --name=VALUE"),
         (["--name.x=3"], "nothing inside to set"),
     ],
 )

@@ -40,8 +40,8 @@ class SceneRenderer:
         global _context_process
         if _context_process not in (None, os.getpid()):
             raise ForkedContextError(
-                "this process was forked from one that had rendered, which hangs OpenGL drivers. Start env workers with "
-                "AsyncVectorEnv(..., context='forkserver') or 'spawn'."
+                "this process was forked from one that had rendered, which hangs OpenGL drivers. "
+                "Start env workers with AsyncVectorEnv(..., context='forkserver') or 'spawn'."
             )
         ensure_gl()
         _context_process = os.getpid()

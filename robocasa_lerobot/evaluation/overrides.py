@@ -8,14 +8,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-import draccus
-import yaml
-
-from robocasa_lerobot.errors import UserError, suggest
-
-
-class ConfigError(UserError):
-    """A configuration with an unknown key, a value of the wrong type, or an unreadable file."""
+from robocasa_lerobot.errors import suggest
+from robocasa_lerobot.settings import ConfigError, decode, load_yaml, parse_overrides, set_dotted
 
 
 def load_config[T](cls: type[T], arguments: Sequence[str]) -> T:
@@ -27,78 +21,15 @@ def load_config[T](cls: type[T], arguments: Sequence[str]) -> T:
     Raises:
         ConfigError: what was found, what was expected, and the closest name of an unknown key.
     """
-    assignments = parse_assignments(arguments)
     tree: dict[str, Any] = {}
-    config_path = assignments.pop("config_path", None)
-    if config_path is not None:
-        tree = read_yaml(Path(str(config_path)))
-    for key, value in assignments.items():
-        _assign(tree, key, value)
-    return decode(cls, tree)
-
-
-def decode[T](cls: type[T], tree: Mapping[str, Any]) -> T:
-    """An instance of the dataclass `cls` from a nested mapping (see `load_config` for the errors)."""
-    checked = _check(cls, tree, "")
-    try:
-        return draccus.decode(cls, checked)
-    except Exception as error:  # draccus raises its own types, around whatever a constructor raises
-        inner = user_error_in(error)
-        if inner is not None:
-            raise inner from None
-        raise ConfigError(f"cannot read the configuration: {error}") from error
-
-
-def user_error_in(error: BaseException) -> UserError | None:
-    """The user's mistake that draccus wrapped into an error of its own, if there is one."""
-    inner: BaseException | None = error
-    while inner is not None and not isinstance(inner, UserError):
-        inner = inner.__cause__ or inner.__context__
-    return inner
-
-
-def read_yaml(path: Path) -> dict[str, Any]:
-    """The mapping at the top of a YAML file."""
-    if not path.is_file():
-        raise ConfigError(f"{path}: no such configuration file.")
-    try:
-        tree = yaml.safe_load(path.read_text(encoding="utf-8"))
-    except yaml.YAMLError as error:
-        raise ConfigError(f"{path}: not valid YAML: {error}") from error
-    if tree is None:
-        return {}
-    if not isinstance(tree, dict):
-        raise ConfigError(f"{path}: found {type(tree).__name__}, expected a mapping of settings.")
-    return tree
-
-
-def parse_assignments(arguments: Sequence[str]) -> dict[str, Any]:
-    """`--a.b=1`, `--a.b 1` and `--flag` (true) as a mapping of dotted keys to YAML values."""
-    out: dict[str, Any] = {}
-    rest = list(arguments)
-    while rest:
-        argument = rest.pop(0)
-        if not argument.startswith("--") or argument == "--":
-            raise ConfigError(f"unexpected argument {argument!r}: settings are written --name=value.")
-        key, equals, text = argument[2:].partition("=")
-        if not equals:
-            text = rest.pop(0) if rest and not rest[0].startswith("--") else "true"
-        try:
-            out[key] = yaml.safe_load(text)
-        except yaml.YAMLError:
-            out[key] = text
-    return out
-
-
-def _assign(tree: dict[str, Any], key: str, value: Any) -> None:
-    *parents, leaf = key.split(".")
-    node = tree
-    for depth, name in enumerate(parents, start=1):
-        child = node.setdefault(name, {})
-        if not isinstance(child, dict):
-            raise ConfigError(f"--{key}: {'.'.join(parents[:depth])} is {child!r}, which has no settings of its own.")
-        node = child
-    node[leaf] = value
+    overrides = parse_overrides(arguments, flags=True)
+    for key, value in overrides:
+        if key == "config_path":
+            tree = load_yaml(Path(str(value)))
+    for key, value in overrides:
+        if key != "config_path":
+            set_dotted(tree, key, value)
+    return decode(cls, _check(cls, tree, ""), "the configuration")
 
 
 def _check(cls: type, tree: Mapping[str, Any], prefix: str) -> dict[str, Any]:

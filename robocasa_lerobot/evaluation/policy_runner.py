@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from robocasa_lerobot import contract
 from robocasa_lerobot.errors import UserError
 from robocasa_lerobot.evaluation.checkpoints import PolicySource
-from robocasa_lerobot.evaluation.overrides import user_error_in
+from robocasa_lerobot.settings import user_error_in
 
 Observation = dict[str, Any]
 

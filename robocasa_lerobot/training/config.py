@@ -12,11 +12,11 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-import draccus
 import yaml
 
 from robocasa_lerobot.data.config import LoaderConfig, MixtureConfig
 from robocasa_lerobot.errors import UnknownNameError, UserError
+from robocasa_lerobot.settings import decode, parse_overrides
 from robocasa_lerobot.training import overlay
 
 FROM_SCRATCH = "from_scratch"
@@ -155,16 +155,9 @@ def load_experiment(path: Path, overrides: Sequence[str] = ()) -> ExperimentConf
     Raises:
         UserError: a missing file, an unknown key (the closest match is named), or a value that does not fit.
     """
-    data = overlay.resolve(path, overlay.parse_overrides(overrides))
+    data = overlay.resolve(path, parse_overrides(overrides))
     overlay.check_keys(ExperimentConfig, data, path.name)
-    try:
-        experiment: ExperimentConfig = draccus.decode(ExperimentConfig, data)
-    except UserError:
-        raise
-    except Exception as error:  # draccus raises several kinds; each says which field and why
-        cause = error.__cause__ if isinstance(error.__cause__, UserError) else error
-        raise UserError(f"{path}: {cause}") from error
-    return experiment
+    return decode(ExperimentConfig, data, str(path))
 
 
 def to_yaml(experiment: ExperimentConfig) -> str:

@@ -1,0 +1,132 @@
+"""Settings from YAML files and dotted overrides on the command line, decoded by draccus into dataclasses."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from robocasa_lerobot.errors import UnknownNameError, UserError, suggest
+
+Data = dict[str, Any]
+
+
+class ConfigError(UserError):
+    """Settings with an unknown key, a value of the wrong type, or an unreadable file."""
+
+
+class _Loader(yaml.SafeLoader):
+    """YAML with numbers as people write them: PyYAML alone reads `1e-4` as text."""
+
+
+_Loader.add_implicit_resolver(
+    "tag:yaml.org,2002:float",
+    re.compile(r"^[-+]?(\d[\d_]*\.?[\d_]*|\.\d[\d_]*)[eE][-+]?\d+$"),
+    list("-+0123456789."),
+)
+
+
+def load_yaml(path: Path) -> Data:
+    """The mapping at the top of a YAML file; an empty file is an empty mapping.
+
+    Raises:
+        ConfigError: no such file (the closest names are listed), not YAML, or not a mapping.
+    """
+    if not path.is_file():
+        names = [p.name for p in path.parent.glob("*.yaml")] if path.parent.is_dir() else []
+        raise ConfigError(f"no file {path}. {suggest(path.name, names) if names else 'Its folder has no YAML files.'}")
+    try:
+        content = yaml.load(path.read_text(encoding="utf-8"), Loader=_Loader)
+    except yaml.YAMLError as error:
+        raise ConfigError(f"{path}: not valid YAML: {error}") from error
+    if content is not None and not isinstance(content, Mapping):
+        raise ConfigError(f"{path}: found {type(content).__name__}, expected a mapping of settings.")
+    return dict(content or {})
+
+
+def parse_overrides(arguments: Sequence[str], *, flags: bool = False) -> list[tuple[str, Any]]:
+    """`--a.b=10` or `--a.b 10` as ("a.b", 10); values are YAML. With `flags`, `--a.b` alone is true.
+
+    Raises:
+        ConfigError: an argument that is none of these.
+    """
+    out: list[tuple[str, Any]] = []
+    rest = list(arguments)
+    while rest:
+        argument = rest.pop(0)
+        if not argument.startswith("--") or argument == "--":
+            raise ConfigError(f"unexpected argument {argument!r}: settings are written --name=VALUE.")
+        key, equals, text = argument[2:].partition("=")
+        if not equals:
+            alone = not rest or rest[0].startswith("--")
+            if alone and not flags:
+                raise ConfigError(f"the setting --{key} has no value; write --{key}=VALUE.")
+            text = "true" if alone else rest.pop(0)
+        try:
+            out.append((key, yaml.load(text, Loader=_Loader)))
+        except yaml.YAMLError as error:
+            raise ConfigError(f"--{key}: cannot read the value {text!r}: {error}") from error
+    return out
+
+
+def set_dotted(data: Data, dotted: str, value: Any) -> None:
+    """Set `phases.pretrain.steps` or `phases.0.steps` in place; mappings on the way are made if missing.
+
+    Raises:
+        ConfigError: the way leads through something that has nothing inside.
+        UnknownNameError: a list on the way has no entry of that name.
+    """
+    here: Any = data
+    *way, last = dotted.split(".")
+    for step in way:
+        if isinstance(here, list):
+            here = here[_list_index(here, step, dotted)]
+        else:
+            if here.get(step) is None:
+                here[step] = {}
+            here = here[step]
+        if not isinstance(here, dict | list):
+            raise ConfigError(f"--{dotted}: `{step}` is {here!r}, which has nothing inside to set.")
+    if isinstance(here, list):
+        here[_list_index(here, last, dotted)] = value
+    else:
+        here[last] = value
+
+
+def decode[T](cls: type[T], data: Mapping[str, Any], where: str = "") -> T:
+    """An instance of the dataclass `cls` from a nested mapping whose keys have been checked.
+
+    Raises:
+        UserError: the one that the dataclass itself raised, or a ConfigError for a value that does not fit.
+    """
+    import draccus
+
+    try:
+        return draccus.decode(cls, data)
+    except Exception as error:  # draccus raises its own types, around whatever a constructor raises
+        inner = user_error_in(error)
+        if inner is not None:
+            raise inner from None
+        raise ConfigError(f"{where or 'settings'}: {error}") from error
+
+
+def user_error_in(error: BaseException) -> UserError | None:
+    """The user's mistake that a library wrapped into an error of its own, if there is one."""
+    inner: BaseException | None = error
+    while inner is not None and not isinstance(inner, UserError):
+        inner = inner.__cause__ or inner.__context__
+    return inner
+
+
+def _list_index(items: list[Any], step: str, dotted: str) -> int:
+    if step.isdigit():
+        if int(step) >= len(items):
+            raise ConfigError(f"--{dotted}: there is no number {step}; the list has {len(items)} entries, from 0.")
+        return int(step)
+    names = [str(item.get("name")) if isinstance(item, Mapping) else "" for item in items]
+    if step not in names:
+        raise UnknownNameError("list entry", step, filter(None, names), f"(in --{dotted})")
+    return names.index(step)
