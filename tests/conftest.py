@@ -23,6 +23,8 @@ def pytest_configure(config: pytest.Config) -> None:
     # Before any test module imports the Hugging Face libraries, which read these when they are imported.
     config.stash[_CACHE] = cache = tempfile.mkdtemp(prefix="robocasa_lerobot_tests_")
     os.environ.update(HF_HOME=cache, HF_HUB_OFFLINE="1", WANDB_MODE="disabled")
+    # Tiny networks: more threads only wait for each other (12 s became 150 s beside other work on two cores).
+    os.environ.setdefault("OMP_NUM_THREADS", "1")
 
 
 def pytest_unconfigure(config: pytest.Config) -> None:
