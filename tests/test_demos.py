@@ -95,9 +95,7 @@ def test_replaying_the_actions_gives_the_recorded_states(task, recordings):
 def test_states_and_proprioception_belong_together(recordings):
     recording = recordings["OpenDrawer"]
     assert set(contract.STATE_PART_HDF5_KEYS.values()) <= set(recording.observations)
-    model = mujoco.MjSpec.from_string(
-        recording.model_file, assets={**_meshes(), **recording.assets}
-    ).compile()
+    model = mujoco.MjSpec.from_string(recording.model_file, assets={**_meshes(), **recording.assets}).compile()
     data = mujoco.MjData(model)
     for index in (0, len(recording.states) // 2, -1):
         data.qpos[:] = recording.states[index, 1 : 1 + model.nq]
