@@ -7,9 +7,10 @@ set -eu
 PYTHON=${PYTHON:-.venv/bin/python}
 OUT=${OUT:-outputs/demo}
 TASKS=${TASKS:-OpenDrawer,CloseDrawer}
-EPISODES=${EPISODES:-20}      # demonstrations of each task
-IMAGE_SIZE=${IMAGE_SIZE:-128} # pixels
-TRIALS=${TRIALS:-10}          # trials of each policy on each task
+EPISODES=${EPISODES:-36}      # demonstrations of each task
+IMAGE_SIZE=${IMAGE_SIZE:-96}  # pixels
+TRIALS=${TRIALS:-8}           # trials of each policy on each task
+HORIZON=${HORIZON:-250}       # control steps of a trial: twice what a demonstration takes, a third of OpenDrawer's own
 EXPERIMENT=${EXPERIMENT:-configs/experiments/demo.yaml}
 SEED=${SEED:-0}
 CORES=$("$PYTHON" -c 'import os; print(len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count())')
@@ -44,12 +45,13 @@ robocasa_lerobot verify "$OUT/data"
 step "training: pretraining on all tasks, then fine-tuning on one"
 "$PYTHON" train.py --config_path "$EXPERIMENT"
 
-step "evaluation: $TRIALS trials of the untrained and of the trained policy on each task"
-"$PYTHON" eval.py \
-    --policy.path="$OUT/pretrain/checkpoints/000000/pretrained_model,$OUT/finetune/checkpoints/last/pretrained_model" \
-    --policy.label=untrained,trained \
-    --env.tasks="$TASKS" --trials="$TRIALS" --seed="$SEED" --workers="$WORKERS" --out="$OUT/evaluation"
+step "evaluation: $TRIALS trials of the untrained, the pretrained and the fine-tuned policy on each task"
+checkpoints="$OUT/pretrain/checkpoints/000000/pretrained_model,$OUT/pretrain/checkpoints/last/pretrained_model"
+checkpoints="$checkpoints,$OUT/finetune/checkpoints/last/pretrained_model"
+"$PYTHON" eval.py --policy.path="$checkpoints" --policy.label=untrained,pretrained,finetuned \
+    --env.tasks="$TASKS" --env.horizon="$HORIZON" --trials="$TRIALS" --seed=$((SEED + 1000)) --workers="$WORKERS" \
+    --videos=1 --report=false --out="$OUT/evaluation"
 
 step "report"
 robocasa_lerobot report "$OUT/evaluation" --training "$OUT" --demos "$OUT"/demos/*.hdf5 --out "$OUT/report.html"
-step "done: open $OUT/report.html"
+step "done: open $OUT/report.html in a browser"

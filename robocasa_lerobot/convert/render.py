@@ -8,19 +8,16 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from types import TracebackType
-from typing import Any, Self
+from typing import Self
 
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
 from robocasa_lerobot.convert.source import RejectedEpisodeError
-from robocasa_lerobot.gl import ensure_gl
+from robocasa_lerobot.rendering import SceneRenderer
 
 PRESETS = ("fast", "quality")
-# robosuite's and RoboCasa's convention: group 0 holds collision shapes, group 1 what cameras see.
-COLLISION_GROUP = 0
-_HIDDEN_GROUP = 5  # MuJoCo's last geom group, which no camera draws
 _QUALITY_SAMPLES = 4  # multisampling of the `quality` preset
 
 
@@ -47,11 +44,7 @@ class Scene:
             ) from None
         self._data = mujoco.MjData(self._model)
         self._fast = preset == "fast"
-        self._renderers: dict[tuple[int, int], mujoco.Renderer] = {}
-        self._option = mujoco.MjvOption()
-        self._option.geomgroup[COLLISION_GROUP] = 0
-        self._option.sitegroup[:] = 0  # sites are markers
-        self._groups = self._model.geom_group.copy()
+        self._renderers: dict[tuple[int, int], SceneRenderer] = {}
         self._model.vis.quality.offsamples = 0 if self._fast else _QUALITY_SAMPLES
         if self._fast:
             self._model.light_castshadow[:] = 0
@@ -115,43 +108,7 @@ class Scene:
         Raises:
             NoOpenGLError: this machine cannot render; the message has the remedy.
         """
-        renderer = self._renderer(height, width)
-        self._hide_unseen(camera, width / height)
-        renderer.update_scene(self._data, camera=camera, scene_option=self._option)
-        return renderer.render()
-
-    def _renderer(self, height: int, width: int) -> mujoco.Renderer:
-        renderer = self._renderers.get((height, width))
-        if renderer is None:
-            ensure_gl()
-            buffer: Any = self._model.vis.global_
-            buffer.offheight, buffer.offwidth = max(buffer.offheight, height), max(buffer.offwidth, width)
-            renderer = mujoco.Renderer(self._model, height, width)
-            if self._fast:
-                renderer.scene.flags[mujoco.mjtRndFlag.mjRND_SHADOW] = 0
-                renderer.scene.flags[mujoco.mjtRndFlag.mjRND_REFLECTION] = 0
-            self._renderers[height, width] = renderer
-        return renderer
-
-    def _hide_unseen(self, camera: str, aspect: float) -> None:
-        """Leave out geoms whose bounding sphere is outside the camera's view.
-
-        MuJoCo draws every geom for every camera. Measured on a software rasterizer with the 168,000 visual triangles
-        of robosuite's Lift: 43 instead of 31 images/s over three cameras, all pictures the same bit for bit. Shadows
-        and reflections may come from geoms out of view, so this is for the fast preset only.
-        """
-        if not self._fast:
-            return
-        camera_id = self._model.camera(camera).id
-        if self._model.cam_projection[camera_id] != 0 or self._model.cam_sensorsize[camera_id].any():
-            self._model.geom_group[:] = self._groups  # orthographic or given by focal lengths: draw all
-            return
-        rotation = self._data.cam_xmat[camera_id].reshape(3, 3)
-        relative = (self._data.geom_xpos - self._data.cam_xpos[camera_id]) @ rotation
-        depth, radius = -relative[:, 2], self._model.geom_rbound
-        half = np.deg2rad(self._model.cam_fovy[camera_id]) / 2
-        seen = depth > -radius
-        for axis, angle in ((1, half), (0, np.arctan(np.tan(half) * aspect))):
-            seen &= np.abs(relative[:, axis]) * np.cos(angle) - depth * np.sin(angle) <= radius
-        # Planes have no bounding sphere: their radius is 0.
-        self._model.geom_group[:] = np.where(seen | (radius == 0), self._groups, _HIDDEN_GROUP)
+        size = (height, width)
+        if size not in self._renderers:
+            self._renderers[size] = SceneRenderer(self._model, height, width, shadows=not self._fast)
+        return self._renderers[size].render(self._data, camera)

@@ -9,8 +9,8 @@ import numpy as np
 from PIL import Image
 
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
-from robocasa_lerobot.envs.rendering import SceneRenderer
 from robocasa_lerobot.envs.scene.scene import Scene
+from robocasa_lerobot.rendering import SceneRenderer
 
 
 def render_task(

@@ -14,10 +14,10 @@ from robocasa_lerobot.envs.control.controller import RobotController
 from robocasa_lerobot.envs.control.step import control_step
 from robocasa_lerobot.envs.proprioception import read_state
 from robocasa_lerobot.envs.registry import get_task
-from robocasa_lerobot.envs.rendering import SceneRenderer
 from robocasa_lerobot.envs.scene.builder import RENDER_PRESETS, build_scene, scene_ids
 from robocasa_lerobot.envs.scene.scene import Scene
 from robocasa_lerobot.errors import UnknownNameError, UserError
+from robocasa_lerobot.rendering import SceneRenderer
 
 Observation = dict[str, Any]
 # Key of the generator that noise on the initial arm pose comes from, apart from the one that makes the scene.

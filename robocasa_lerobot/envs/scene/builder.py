@@ -170,7 +170,7 @@ def _light(spec: mujoco.MjSpec, layout: Layout, render_preset: str) -> None:
     visual.quality.offsamples = 0 if render_preset == "fast" else 8
     if render_preset == "fast":
         # Fewer facets on round shapes: half the time of a software-rendered picture, hardly visible at 256 pixels.
-        visual.quality.numslices, visual.quality.numstacks, visual.quality.numquads = 14, 8, 1
+        visual.quality.numslices, visual.quality.numstacks, visual.quality.numquads = 10, 6, 1
     visual.map.zfar = 12.0
     # Distances of the map are in units of the model's extent.
     spec.stat.extent = 1.0
