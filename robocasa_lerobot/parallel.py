@@ -1,42 +1,63 @@
-"""Independent pieces of work spread over processes by datatrove, quietly, with the caller's own progress bar."""
+"""Independent pieces of work on several processes: datatrove's executor and completion markers, without its noise."""
 
 from __future__ import annotations
 
 import contextlib
+import os
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
+import multiprocess
 from datatrove.executor.local import LocalPipelineExecutor
 from datatrove.utils.logging import logger as datatrove_logger
-from datatrove.utils.stats import PipelineStats
 
-POLL_SECONDS = 0.5
+POLL_SECONDS = 0.3
 
 
-class QuietExecutor(LocalPipelineExecutor):
-    """datatrove's local executor (worker processes, a completion marker for each piece) without its log lines.
+class PoolExecutor(LocalPipelineExecutor):
+    """datatrove's local executor (a completion marker for each piece) on a plain pool of processes.
 
+    datatrove's own pool starts a managing process for its log lines, which stays behind when this one is killed.
     Log files are still written to its `logging_dir`, and errors arrive as exceptions.
+
+    Args:
+        initializer: called once in every process that works, this one too if it works alone.
+        preload: modules whose slow imports are done once, in the process that workers are forked from.
     """
 
-    on_worker_start: Callable[[], None] | None = None
+    def __init__(
+        self, *args: Any, initializer: Callable[[], None] | None = None, preload: Sequence[str] = (), **kwargs: Any
+    ) -> None:
+        super().__init__(*args, **kwargs)
+        self._initializer = initializer
+        self._preload = list(preload)
 
-    def _launch_run_for_rank(self, *args: Any, **kwargs: Any) -> PipelineStats:
-        datatrove_logger.disable("datatrove")  # here too, because it must happen in the worker process
-        if self.on_worker_start is not None:
-            self.on_worker_start()
-        return super()._launch_run_for_rank(*args, **kwargs)
-
-    def run(self) -> PipelineStats:
+    def run(self) -> None:
         """Run every piece that has no completion marker yet."""
-        datatrove_logger.disable("datatrove")
-        return super().run()
+        ranks = self.get_incomplete_ranks()
+        _start_worker(self._initializer)
+        if self.workers == 1:
+            for rank in ranks:
+                self._run_for_rank(rank)
+            return
+        multiprocess.set_forkserver_preload(self._preload)
+        context = multiprocess.get_context("forkserver")
+        with context.Pool(self.workers, initializer=_start_worker, initargs=(self._initializer,)) as pool:
+            for _ in pool.imap_unordered(self._run_for_rank, ranks):
+                pass
+
+
+def exit_if_orphaned() -> None:
+    """End this worker at once if the process that started it was killed: the next run must not meet it writing."""
+    parent = multiprocess.parent_process()
+    if parent is not None and not parent.is_alive():
+        os._exit(1)
 
 
 @contextlib.contextmanager
 def polled(show: Callable[[], None]) -> Iterator[None]:
-    """Call `show` twice a second from a thread while the body runs: progress of workers that leave files."""
+    """Call `show` from a thread while the body runs: progress of workers that leave files."""
     stop = threading.Event()
 
     def watch() -> None:
@@ -50,3 +71,9 @@ def polled(show: Callable[[], None]) -> Iterator[None]:
     finally:
         stop.set()
         thread.join()
+
+
+def _start_worker(initializer: Callable[[], None] | None) -> None:
+    datatrove_logger.disable("datatrove")
+    if initializer is not None:
+        initializer()

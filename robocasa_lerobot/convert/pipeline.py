@@ -12,7 +12,6 @@ import io
 import json
 import os
 import shutil
-import threading
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass
@@ -20,10 +19,7 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-import multiprocess
 import numpy as np
-from datatrove.executor.local import LocalPipelineExecutor
-from datatrove.utils.logging import logger as datatrove_logger
 from tqdm import tqdm
 
 from robocasa_lerobot import __version__
@@ -44,11 +40,11 @@ from robocasa_lerobot.convert.shard import (
 )
 from robocasa_lerobot.convert.source import DemoFile
 from robocasa_lerobot.errors import UserError
+from robocasa_lerobot.parallel import PoolExecutor, exit_if_orphaned, polled
 
 # Our part of a dataset's folder; LeRobot reads nothing in it.
 META_FOLDER = "meta/robocasa"
 CONVERSION_FILE = "conversion.json"
-_POLL_SECONDS = 0.3
 # Starting a worker imports LeRobot and MuJoCo (about 6 s of CPU time); below this much work that does not pay.
 _MIN_FRAMES_PER_WORKER = 400
 _MAX_AUTOMATIC_WORKERS = 8
@@ -151,31 +147,11 @@ class _ShardTask:
         convert_shard(self.plan, shard, shard_folder(partial, rank), lambda frames: _report(done, frames))
 
 
-class _Executor(LocalPipelineExecutor):
-    """datatrove's local executor (a completion marker for each shard) on a plain pool of processes.
-
-    datatrove's own pool starts a managing process for its log lines, which stays behind when this one is killed.
-    """
-
-    def run(self) -> None:
-        ranks = self.get_incomplete_ranks()
-        if self.workers == 1:
-            for rank in ranks:
-                self._run_for_rank(rank)
-            return
-        # Workers are forked from a process that has the slow imports (6 s) done.
-        multiprocess.set_forkserver_preload([convert_shard.__module__])
-        with multiprocess.get_context("forkserver").Pool(self.workers, initializer=quiet_libraries) as pool:
-            for _ in pool.imap_unordered(self._run_for_rank, ranks):
-                pass
-
-
 def quiet_libraries() -> None:
     """Silence what libraries print about every file they write; their errors still arrive as exceptions."""
     import av
     import datasets
 
-    datatrove_logger.disable("datatrove")
     datasets.disable_progress_bars()
     av.logging.set_libav_level(av.logging.ERROR)
 
@@ -187,49 +163,41 @@ def shard_folder(partial: Path, rank: int) -> Path:
 
 def _run_shards(plan: Plan, partial: Path, workers: int) -> None:
     quiet_libraries()
-    executor = _Executor(
+    executor = PoolExecutor(
         pipeline=[_ShardTask(plan, str(partial))],
         tasks=len(plan.shards),
         workers=workers,
         logging_dir=str(partial / "executor"),
+        initializer=quiet_libraries,
+        preload=[convert_shard.__module__],
     )
     if not executor.get_incomplete_ranks():
         return
-    with _progress_bar(plan, partial, executor):
+    with _progress_bar(plan, partial):
         executor.run()
 
 
 @contextlib.contextmanager
-def _progress_bar(plan: Plan, partial: Path, executor: _Executor) -> Iterator[None]:
+def _progress_bar(plan: Plan, partial: Path) -> Iterator[None]:
     """A bar over frames, fed by the counts that the workers leave in files."""
-    stop = threading.Event()
-    bar = tqdm(total=plan.num_frames, unit="frame", desc="converting", smoothing=0.05)
 
     def done(rank: int) -> int:
         with contextlib.suppress(OSError, ValueError):
             return int((partial / "progress" / f"{rank:05d}").read_text())
         return 0
 
-    def watch() -> None:
-        while not stop.wait(_POLL_SECONDS):
-            bar.n = min(plan.num_frames, sum(done(rank) for rank in range(len(plan.shards))))
-            bar.refresh()
+    def show() -> None:
+        bar.n = min(plan.num_frames, sum(done(rank) for rank in range(len(plan.shards))))
+        bar.refresh()
 
-    thread = threading.Thread(target=watch, daemon=True)
-    thread.start()
-    try:
-        yield
+    with tqdm(total=plan.num_frames, unit="frame", desc="converting", smoothing=0.05) as bar:
+        with polled(show):
+            yield
         bar.n = plan.num_frames
-    finally:
-        stop.set()
-        thread.join()
-        bar.close()
 
 
 def _report(file: Path, count: int) -> None:
-    parent = multiprocess.parent_process()
-    if parent is not None and not parent.is_alive():
-        os._exit(1)  # killed: the next run must not meet a worker that still writes
+    exit_if_orphaned()
     with contextlib.suppress(OSError):  # only for the eye
         file.write_text(str(count))
 

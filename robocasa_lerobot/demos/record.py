@@ -23,7 +23,7 @@ from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.registry import get_task
 from robocasa_lerobot.errors import UserError
 from robocasa_lerobot.gl import ensure_gl
-from robocasa_lerobot.parallel import QuietExecutor, polled
+from robocasa_lerobot.parallel import PoolExecutor, exit_if_orphaned, polled
 
 # Give up when this many attempts per wanted episode were not enough.
 MAX_ATTEMPTS_PER_EPISODE = 10
@@ -178,13 +178,14 @@ def _run_round(settings: RecordingSettings, parts: Path, attempts: list[int], wo
         _attempt_all(settings, parts, attempts, on_done=lambda: _show(bar, parts))
         return
     tasks = min(workers, len(attempts))
-    executor = QuietExecutor(
+    executor = PoolExecutor(
         pipeline=[partial(_rank_attempts, settings=settings, parts=parts, attempts=attempts)],
         tasks=tasks,
         workers=tasks,
         # Outcomes in `parts` are the markers; datatrove's own would outlive a removed part.
         skip_completed=False,
         logging_dir=str(parts / "logs"),
+        preload=[KitchenEnv.__module__],
     )
     with polled(lambda: _show(bar, parts)):
         executor.run()
@@ -201,6 +202,7 @@ def _attempt_all(settings: RecordingSettings, parts: Path, attempts: list[int], 
     env = KitchenEnv(settings.task, split=settings.split, image_size=settings.image_size, terminate_on_success=False)
     try:
         for attempt in attempts:
+            exit_if_orphaned()
             recording = record_episode(
                 env, settings.seed + attempt, action_noise=settings.action_noise, images=settings.images
             )

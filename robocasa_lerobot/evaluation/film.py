@@ -44,7 +44,7 @@ class Film:
             pixels: dict[str, NDArray[np.uint8]] = observation["pixels"]
             return pixels
         if self._renderer is None:
-            from robocasa_lerobot.envs.rendering import SceneRenderer
+            from robocasa_lerobot.rendering import SceneRenderer
 
             shadows = env.render_preset == "quality"
             self._renderer = SceneRenderer(env.model, FILM_SIZE, FILM_SIZE, shadows=shadows)
