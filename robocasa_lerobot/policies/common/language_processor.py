@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -20,13 +21,13 @@ from robocasa_lerobot.policies.common.language import PADDING, SUBWORDS, load_cl
 class _InstructionStep(ObservationProcessorStep):
     """Adds tokens and attention mask of the instructions of a batch."""
 
+    @abstractmethod
     def tokenize(self, instructions: list[str]) -> tuple[Tensor, Tensor]:
         """Tokens and the mask of those that count."""
-        raise NotImplementedError
 
+    @abstractmethod
     def token_shape(self) -> tuple[tuple[int, ...], tuple[int, ...]]:
         """Shapes of tokens and mask of one instruction."""
-        raise NotImplementedError
 
     def observation(self, observation: dict[str, Any]) -> dict[str, Any]:
         """The observation with the tokens of its instructions."""
