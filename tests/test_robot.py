@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import json
+from pathlib import Path
 
 import mujoco
 import numpy as np
 import pytest
-from robot_arena import SHARED, Arena, arena_spec
+from robot_arena import Arena, arena_spec
 
 from robocasa_lerobot import contract
 from robocasa_lerobot.envs.cameras import CAMERA_SETS
@@ -22,10 +23,8 @@ def model() -> mujoco.MjModel:
     return arena_spec().compile()
 
 
-def test_bodies_match_the_recorded_table(model: mujoco.MjModel) -> None:
-    table = SHARED / "facts" / "panda_omron_bodies.jsonl"
-    if not table.exists():
-        pytest.skip("the recorded table of bodies is not here")
+def test_bodies_match_the_recorded_table(model: mujoco.MjModel, shared: Path) -> None:
+    table = shared / "facts" / "panda_omron_bodies.jsonl"
     rows = [json.loads(line) for line in table.read_text().splitlines()]
     assert {row["body"] for row in rows} == {body.name for body in BODIES}
     spawn = np.array([10.0, 10.0, 0.0])

@@ -5,7 +5,6 @@ from __future__ import annotations
 import csv
 import io
 import json
-from pathlib import Path
 
 import mujoco
 import numpy as np
@@ -24,8 +23,6 @@ from robocasa_lerobot.envs.scene.objects.shapes import SHAPES, add_object
 from robocasa_lerobot.envs.scene.selection import footprint
 from robocasa_lerobot.envs.scene.textures import GENERATORS, TextureRecord, texture_png
 from robocasa_lerobot.errors import UnknownNameError
-
-SHARED = Path(__file__).parents[2] / "shared"
 
 
 @pytest.mark.parametrize("kind", GENERATORS)
@@ -171,10 +168,9 @@ def test_the_recorded_xml_is_the_model(task):
     assert np.abs(again.geom_xpos - data.geom_xpos).max() < 1e-4
 
 
-@pytest.mark.skipif(not SHARED.exists(), reason="the facts are not beside this checkout")
 @pytest.mark.parametrize("name", task_names())
-def test_declarations_agree_with_the_published_facts(name):
-    with (SHARED / "facts" / "tasks.csv").open() as file:
+def test_declarations_agree_with_the_published_facts(name, shared):
+    with (shared / "facts" / "tasks.csv").open() as file:
         row = next(r for r in csv.DictReader(file) if r["task"] == name)
     task = get_task(name)
     assert task.horizon == int(row["horizon"])

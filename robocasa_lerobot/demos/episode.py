@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Any
 
-import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
@@ -110,21 +109,8 @@ def record_episode(env: KitchenEnv, seed: int, *, action_noise: float = 0.0, ima
         rewards=np.array(buffer.rewards),
         model_file=model_file,
         assets={name: data for name, data in env.scene.spec.assets.items() if name.startswith("textures/")},
-        ep_meta={**env.scene.ep_meta(), "cam_configs": camera_configs(env.model), "action_noise": action_noise},
+        ep_meta={**env.scene.ep_meta(), "action_noise": action_noise},
     )
-
-
-def camera_configs(model: mujoco.MjModel) -> dict[str, Any]:
-    """Policy cameras: parent body, position (metres), quaternion wxyz, vertical field of view (degrees)."""
-    return {
-        name: {
-            "parent_body": model.body(int(model.camera(name).bodyid[0])).name,
-            "pos": model.camera(name).pos.tolist(),
-            "quat": model.camera(name).quat.tolist(),
-            "fovy": float(model.cam_fovy[model.camera(name).id]),
-        }
-        for name in contract.CAMERAS
-    }
 
 
 def _with_noise(rng: np.random.Generator, action: Array, noise: float) -> Array:

@@ -7,9 +7,11 @@ degrees. Source: RoboCasa 1.0.1 (agentviews and co-training set) and robosuite's
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import mujoco
 
+from robocasa_lerobot import contract
 from robocasa_lerobot.envs.scene import robot_names as names
 from robocasa_lerobot.envs.scene.robot_bodies import Quat, Vec3
 from robocasa_lerobot.errors import UnknownNameError
@@ -90,3 +92,16 @@ def add_cameras(spec: mujoco.MjSpec, camera_set: str = "default") -> None:
             added.sensor_size = camera.sensor_size
         else:
             added.fovy = camera.fovy
+
+
+def camera_configs(model: mujoco.MjModel) -> dict[str, Any]:
+    """Policy cameras: parent body, position (metres), quaternion wxyz, vertical field of view (degrees)."""
+    return {
+        name: {
+            "parent_body": model.body(int(model.camera(name).bodyid[0])).name,
+            "pos": model.camera(name).pos.tolist(),
+            "quat": model.camera(name).quat.tolist(),
+            "fovy": float(model.cam_fovy[model.camera(name).id]),
+        }
+        for name in contract.CAMERAS
+    }

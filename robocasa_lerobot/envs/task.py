@@ -5,7 +5,6 @@ A task is data. The scene builder reads what is wanted, the env reads the goal, 
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from robocasa_lerobot.envs.predicates import Goal
@@ -152,6 +151,3 @@ class Task:
     paraphrases: tuple[str, ...] = ()
     sets: tuple[str, ...] = ()
     summary: str = field(default="", compare=False)
-
-
-TaskFactory = Callable[[], Task]

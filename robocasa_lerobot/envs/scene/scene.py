@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 import mujoco
 import numpy as np
 
 from robocasa_lerobot.contract import ACTION_SIZE
+from robocasa_lerobot.envs.cameras import camera_configs
 from robocasa_lerobot.envs.control.controller import RobotController
 from robocasa_lerobot.envs.control.step import control_step
 from robocasa_lerobot.envs.scene.fixtures.base import Fixture, yaw_quat
@@ -64,7 +65,6 @@ class Scene:
     robot: RobotPose
     instruction: str
     arm_noise_rad: float = 0.02
-    cameras: dict[str, Any] = field(default_factory=dict)
 
     def fixture(self, role: str) -> Fixture:
         """The fixture of a role."""
@@ -126,7 +126,7 @@ class Scene:
             ],
             "fixtures": {name: {"cls": type(fixture).__name__} for name, fixture in self.fixtures.items()},
             "fixture_refs": dict(self.roles),
-            "cam_configs": self.cameras,
+            "cam_configs": camera_configs(self.model),
             "init_robot_base_pos": [self.robot.x, self.robot.y, 0.0],
             "init_robot_base_ori": [0.0, 0.0, self.robot.yaw],
         }
