@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import atexit
 import os
 import weakref
+from functools import cache
 
 import mujoco
 import numpy as np
@@ -18,6 +20,9 @@ _HIDDEN_GROUP = 5  # MuJoCo's last geom group, which no camera draws
 
 # Process that has made an OpenGL context; a forked child inherits the number, and the driver's dead threads with it.
 _context_process: int | None = None
+
+
+_OPEN: weakref.WeakSet[SceneRenderer] = weakref.WeakSet()
 
 
 class ForkedContextError(UserError):
@@ -56,8 +61,12 @@ class SceneRenderer:
         self._option.geomgroup[COLLISION_GROUP] = 0
         self._option.sitegroup[:] = 0  # sites are markers
         self._shadows = shadows
-        # Also at exit, before Python takes the OpenGL library down under the context.
         self._free = weakref.finalize(self, _close, self._renderer)
+        # At exit the context must go before MuJoCo ends its connection to the driver. Exit hooks run backwards, so
+        # ours is set after MuJoCo's, which the first context has set.
+        self._free.atexit = False
+        _OPEN.add(self)
+        _free_at_exit()
         self._names = {model.camera(i).name for i in range(model.ncam)}
 
     def render(self, data: mujoco.MjData, camera: str | mujoco.MjvCamera) -> NDArray[np.uint8]:
@@ -106,6 +115,16 @@ def _in_view(model: mujoco.MjModel, data: mujoco.MjData, camera: str, aspect: fl
         seen &= np.abs(relative[:, axis]) * np.cos(angle) - depth * np.sin(angle) <= radius
     # Planes have no bounding sphere: their radius is 0.
     return seen | (radius == 0)
+
+
+@cache
+def _free_at_exit() -> None:
+    atexit.register(_free_all)
+
+
+def _free_all() -> None:
+    for renderer in list(_OPEN):
+        renderer.close()
 
 
 def _close(renderer: mujoco.Renderer) -> None:

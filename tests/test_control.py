@@ -9,7 +9,7 @@ from robot_arena import Arena, action, arena_spec
 
 from robocasa_lerobot.contract import ContractError
 from robocasa_lerobot.envs.control import indices
-from robocasa_lerobot.envs.control.osc import KD, KP, NULLSPACE_KD, NULLSPACE_KP
+from robocasa_lerobot.envs.control.kernel import ARM_KD, ARM_KP, NULLSPACE_KD, NULLSPACE_KP
 from robocasa_lerobot.envs.scene import robot_names as names
 
 TORSO = names.TORSO_JOINT
@@ -186,11 +186,11 @@ def test_arm_translates_along_the_commanded_axis_of_the_base(model: mujoco.MjMod
 @pytest.mark.parametrize(("axis", "sign"), DIRECTIONS)
 def test_arm_rotates_about_the_commanded_axis_of_the_base(model: mujoco.MjModel, axis: int, sign: float) -> None:
     arena = Arena.settled(model, yaw=-0.5)
-    start, before = arena.controller.arm.goal_in_base()[1], arena.state()[7:10]
+    start, before = arena.controller.goal_in_base()[1], arena.state()[7:10]
     command = np.zeros(3)
     command[axis] = 0.2 * sign
     arena.run(action(1.0, rotation=tuple(command)), 3)
-    goal = arena.controller.arm.goal_in_base()[1]
+    goal = arena.controller.goal_in_base()[1]
     arena.run(action(1.0), 25)
     angle = 3 * 0.5 * 0.2 * sign
     vector = np.array(_axial(goal @ start.T))
@@ -239,7 +239,7 @@ def test_torques_agree_with_the_textbook_formula(model: mujoco.MjModel) -> None:
     """The controller's shortened algebra against explicit matrices, in a moving state off the goal."""
     arena = Arena.settled(model, yaw=0.3)
     arena.run(action(1.0, position=(0.8, -0.5, 0.3), rotation=(0.3, 0.4, -0.6), base=(0.7, 0.4, 0.5), torso=0.5), 3)
-    data, arm = arena.data, arena.controller.arm
+    data, controller = arena.data, arena.controller
     dofs = indices.joint_velocities(model, names.ARM_JOINTS)
     full = np.zeros((model.nv, model.nv))
     mujoco.mj_fullM(model, data, full)
@@ -252,12 +252,12 @@ def test_torques_agree_with_the_textbook_formula(model: mujoco.MjModel) -> None:
     jacobian = jacobians[grip][:, dofs]
     velocity = (jacobians[base] - jacobians[grip]) @ data.qvel
     rotation = data.site_xmat[base].reshape(3, 3)
-    goal_pos, goal_mat = arm.goal_in_base()
+    goal_pos, goal_mat = controller.goal_in_base()
     present = data.site_xmat[grip].reshape(3, 3)
     error = 0.5 * np.cross(present.T, (rotation @ goal_mat).T).sum(axis=0)
-    wanted = KD * velocity
-    wanted[:3] += KP * (data.site_xpos[base] + rotation @ goal_pos - data.site_xpos[grip])
-    wanted[3:] += KP * error
+    wanted = ARM_KD * velocity
+    wanted[:3] += ARM_KP * (data.site_xpos[base] + rotation @ goal_pos - data.site_xpos[grip])
+    wanted[3:] += ARM_KP * error
     inverse = np.linalg.inv(mass)
     force = np.linalg.inv(jacobian[:3] @ inverse @ jacobian[:3].T) @ wanted[:3]
     torque = np.linalg.inv(jacobian[3:] @ inverse @ jacobian[3:].T) @ wanted[3:]
@@ -267,7 +267,9 @@ def test_torques_agree_with_the_textbook_formula(model: mujoco.MjModel) -> None:
     home = np.array([Arena.settled(model, steps=0).joint(name) for name in names.ARM_JOINTS])
     posture = mass @ (NULLSPACE_KP * (home - qpos) - NULLSPACE_KD * qvel)
     expected = jacobian.T @ np.concatenate((force, torque)) + nullspace.T @ posture + data.qfrc_bias[dofs]
-    np.testing.assert_allclose(arm.torques(data), expected, rtol=1e-8, atol=1e-8)
+    controller.apply()
+    applied = data.ctrl[indices.actuators(model, names.ARM_ACTUATORS)]
+    np.testing.assert_allclose(applied, expected, rtol=1e-8, atol=1e-8)
 
 
 # --- actions -------------------------------------------------------------------------------------------------------

@@ -4,21 +4,12 @@ from __future__ import annotations
 
 import mujoco
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
-from robocasa_lerobot.contract import ACTION_SIZE, ACTION_SLICES_HDF5, ContractError
-from robocasa_lerobot.envs.control import indices
-from robocasa_lerobot.envs.control.base import BaseVelocity
-from robocasa_lerobot.envs.control.gripper import Gripper
-from robocasa_lerobot.envs.control.osc import OperationalSpaceArm
-from robocasa_lerobot.envs.control.torso import Torso
+from robocasa_lerobot.contract import ACTION_SIZE, SUBSTEPS, ContractError
+from robocasa_lerobot.envs.control import indices, kernel, native
 from robocasa_lerobot.envs.scene import robot_names as names
-
-_ARM = slice(ACTION_SLICES_HDF5["end_effector_position"].start, ACTION_SLICES_HDF5["end_effector_rotation"].stop)
-_GRIPPER = ACTION_SLICES_HDF5["gripper_close"].start
-_BASE = slice(ACTION_SLICES_HDF5["base_motion"].start, ACTION_SLICES_HDF5["base_motion"].start + 3)
-_TORSO = ACTION_SLICES_HDF5["base_motion"].start + 3
-_MODE = ACTION_SLICES_HDF5["control_mode"].start
+from robocasa_lerobot.errors import UserError
 
 
 class RobotController:
@@ -26,20 +17,33 @@ class RobotController:
 
     The control mode only chooses what an arm command is added to: its previous goal (> 0), so that the arm rides
     with a driving base, or the pose it has reached (<= 0). After a reset the goal is the pose of the reset.
+
+    The controller's memory (goals, posture, targets, the base pose of the last physics step) is one vector, which
+    `get_state` and `set_state` copy: with it and MuJoCo's integration state a simulation continues bit for bit.
     """
 
     def __init__(self, model: mujoco.MjModel, data: mujoco.MjData) -> None:
-        self._data = data
-        self._arm_actuators = indices.actuators(model, names.ARM_ACTUATORS)
-        self.arm = OperationalSpaceArm(model)
-        self.base = BaseVelocity(model)
-        self.torso = Torso(model)
-        self.gripper = Gripper(model)
+        native.load()
+        self._model, self._data = model, data  # the compiled code holds their addresses
+        self._memory = np.zeros(kernel.MEMORY_SIZE)
+        self._places = _places(model)
+        self._views = kernel.Views(
+            qpos=data.qpos,
+            qvel=data.qvel,
+            ctrl=data.ctrl,
+            mass=data.M,
+            bias=data.qfrc_bias,
+            site_xpos=data.site_xpos,
+            site_xmat=data.site_xmat,
+            xaxis=data.xaxis,
+            xanchor=data.xanchor,
+            cvel=data.cvel,
+            subtree_com=data.subtree_com,
+        )
 
     def reset(self) -> None:
         """Forget all goals and hold the present pose; the data must be up to date (`mj_forward`)."""
-        for part in (self.arm, self.base, self.torso, self.gripper):
-            part.reset(self._data)
+        kernel.reset(self._memory, self._views, self._places)
 
     def set_action(self, action: ArrayLike) -> None:
         """Take the action (12,) of a policy step, in HDF5 order; it is clipped to +-1.
@@ -54,16 +58,66 @@ class RobotController:
             raise ContractError(f"action: found shape {command.shape}, expected ({ACTION_SIZE},).")
         if not np.isfinite(command).all():
             raise ContractError(f"action: found {command}, expected finite numbers.")
-        command = np.clip(command, -1.0, 1.0)
-        self.arm.set_goal(self._data, command[_ARM], keep_goal=bool(command[_MODE] > 0.0))
-        self.base.set_goal(self._data, command[_BASE])
-        self.torso.set_goal(self._data, float(command[_TORSO]))
-        self.gripper.set_goal(float(command[_GRIPPER]))
+        kernel.command(self._memory, self._views, self._places, command)
 
     def apply(self) -> None:
         """Write `data.ctrl` for the next physics step (between `mj_step1` and `mj_step2`)."""
-        data = self._data
-        data.ctrl[self._arm_actuators] = self.arm.torques(data)
-        self.base.apply(data)
-        self.torso.apply(data)
-        self.gripper.apply(data)
+        kernel.apply(self._memory, self._views, self._places)
+
+    def run(self, substeps: int = SUBSTEPS) -> None:
+        """Control and advance the simulation by `substeps` physics steps, in one compiled call.
+
+        Before and after: positions and velocities are evaluated (`mj_forward`, `mj_step1`).
+        """
+        model, data = self._model, self._data
+        kernel.run(self._memory, self._views, self._places, model._address, data._address, substeps)
+
+    def goal_in_base(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Goal position (3,) metres and rotation matrix (3, 3) of the grip site in the arm's base frame."""
+        return self._memory[kernel.GOAL_POS].copy(), self._memory[kernel.GOAL_MAT].reshape(3, 3).copy()
+
+    def get_state(self) -> NDArray[np.float64]:
+        """A copy of the controller's memory, shape (37,)."""
+        return self._memory.copy()
+
+    def set_state(self, state: ArrayLike) -> None:
+        """Restore what `get_state` returned.
+
+        Raises:
+            UserError: the state has another shape.
+        """
+        values = np.asarray(state, dtype=np.float64)
+        if values.shape != self._memory.shape:
+            raise UserError(f"controller state: found shape {values.shape}, expected {self._memory.shape}.")
+        self._memory[:] = values
+
+
+def _places(model: mujoco.MjModel) -> kernel.Places:
+    sites = [model.site(name).id for name in (names.GRIP_SITE, names.ARM_CENTER_SITE)]
+    bodies = [int(model.site_bodyid[site]) for site in sites]
+    arm_qvel = indices.joint_velocities(model, names.ARM_JOINTS)
+    torso_qvel = indices.joint_velocities(model, (names.TORSO_JOINT,))
+    fingers = indices.actuators(model, names.FINGER_ACTUATORS)
+    limits = model.actuator_ctrlrange[fingers]
+    actuators = (*names.ARM_ACTUATORS, *names.BASE_ACTUATORS, names.TORSO_ACTUATOR, *names.FINGER_ACTUATORS)
+    return kernel.Places(
+        sites=np.array(sites, dtype=np.int64),
+        site_bodies=np.array(bodies, dtype=np.int64),
+        root=int(model.body_rootid[bodies[0]]),
+        arm_joints=np.array([model.joint(name).id for name in names.ARM_JOINTS], dtype=np.int64),
+        arm_qpos=indices.joint_positions(model, names.ARM_JOINTS),
+        arm_qvel=arm_qvel,
+        arm_mass=indices.mass_matrix_addresses(model, arm_qvel),
+        base_yaw=int(indices.joint_positions(model, names.BASE_JOINTS[2:])[0]),
+        torso=np.array(
+            [
+                indices.joint_positions(model, (names.TORSO_JOINT,))[0],
+                torso_qvel[0],
+                indices.mass_matrix_addresses(model, torso_qvel)[0, 0],
+            ],
+            dtype=np.int64,
+        ),
+        actuators=indices.actuators(model, actuators),
+        finger_middle=limits.mean(axis=1),
+        finger_half=0.5 * (limits[:, 1] - limits[:, 0]),
+    )

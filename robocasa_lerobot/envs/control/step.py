@@ -8,6 +8,16 @@ from numpy.typing import ArrayLike
 from robocasa_lerobot.contract import SUBSTEPS
 from robocasa_lerobot.envs.control.controller import RobotController
 
+_BAD = [
+    int(mujoco.mjtWarning.mjWARN_BADQPOS),
+    int(mujoco.mjtWarning.mjWARN_BADQVEL),
+    int(mujoco.mjtWarning.mjWARN_BADQACC),
+]
+
+
+class DivergedError(RuntimeError):
+    """The physics has left the numbers that it can compute with: a state is not finite, or absurdly large."""
+
 
 def control_step(
     model: mujoco.MjModel, data: mujoco.MjData, controller: RobotController, action: ArrayLike, substeps: int = SUBSTEPS
@@ -19,9 +29,9 @@ def control_step(
 
     Raises:
         ContractError: the action has another shape or is not finite.
+        DivergedError: the simulation is lost; the data must be reset.
     """
     controller.set_action(action)
-    for _ in range(substeps):
-        controller.apply()
-        mujoco.mj_step2(model, data)
-        mujoco.mj_step1(model, data)
+    controller.run(substeps)
+    if data.warning.number[_BAD].any():
+        raise DivergedError(f"the simulation diverged at {data.time:.3f} s; reset the env.")

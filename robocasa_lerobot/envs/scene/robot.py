@@ -84,6 +84,8 @@ def apply_simulation_options(spec: mujoco.MjSpec) -> None:
         option.enableflags |= int(mujoco.mjtEnableBit.mjENBL_MULTICCD)
     if hasattr(mujoco.mjtDisableBit, "mjDSBL_MULTICCD"):
         option.disableflags &= ~int(mujoco.mjtDisableBit.mjDSBL_MULTICCD)
+    # A simulation that is lost must be an error (`control_step` raises it), not a silent return to the zero state.
+    option.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
     spec.visual.map.znear = 0.001
 
 

@@ -1,0 +1,43 @@
+"""Compiled code: the decorator that makes it, and MuJoCo's shared library made known to it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cache
+from pathlib import Path
+
+import mujoco
+from llvmlite import binding
+from numba import njit
+
+
+def compiled[**P, T](function: Callable[P, T]) -> Callable[P, T]:
+    """Compile `function` with numba on its first call and keep the machine code on disk.
+
+    The code goes beside the source, else into the user's cache folder (`NUMBA_CACHE_DIR`); where nothing can be
+    written, as in a read-only container, every process compiles for itself.
+    """
+    try:
+        return njit(cache=True, nogil=True)(function)
+    except RuntimeError:  # numba found no folder that it may write to
+        return njit(nogil=True)(function)
+
+
+@cache
+def load() -> Path:
+    """Load the library that the `mujoco` package itself uses, so that its functions resolve, and return its path.
+
+    Raises:
+        ImportError: the package has no shared library where its wheels carry it.
+    """
+    folder = Path(mujoco.__file__).parent
+    version = mujoco.mj_versionString()
+    names = (f"libmujoco.so.{version}", f"libmujoco.{version}.dylib", "mujoco.dll")
+    for name in names:
+        if (folder / name).is_file():
+            binding.load_library_permanently(str(folder / name))
+            return folder / name
+    raise ImportError(
+        f"no MuJoCo library in {folder}: looked for {', '.join(names)}. "
+        "Install mujoco from its wheel: pip install --force-reinstall mujoco"
+    )
