@@ -1,12 +1,16 @@
-"""The choice of MuJoCo's OpenGL backend: EGL where it works, else OSMesa.
+"""The choice of MuJoCo's OpenGL backend (EGL where it works, else OSMesa) and of the device that draws.
 
 MuJoCo reads `MUJOCO_GL` when it is imported and defaults to a windowed backend, which a machine without a
 display does not have. Entry points that render call `ensure_gl()` once; nothing is chosen at import.
+
+Render devices are numbered as EGL lists them, which is what `MUJOCO_EGL_DEVICE_ID` counts in. That is not CUDA's
+numbering: `CUDA_VISIBLE_DEVICES` neither hides a render device nor renumbers it.
 """
 
 from __future__ import annotations
 
 import importlib
+import json
 import os
 import subprocess
 import sys
@@ -18,6 +22,7 @@ from pathlib import Path
 from robocasa_lerobot.errors import UserError
 
 VARIABLE = "MUJOCO_GL"
+DEVICE_VARIABLE = "MUJOCO_EGL_DEVICE_ID"
 HEADLESS_BACKENDS = ("egl", "osmesa")
 # Renderer names of the software rasterizers of Mesa and of SwiftShader.
 SOFTWARE_RENDERERS = ("llvmpipe", "softpipe", "swrast", "swiftshader")
@@ -43,9 +48,46 @@ assert picture[8, 8, 0] > 100 > picture[8, 8, 1], picture[8, 8]
 print("renderer:", name)
 """
 
+# In a process of its own as well: looking loads every vendor's driver. The numbers are those of EGL_EXT_device_query
+# (0x3055 extensions, 0x3233 device file), EGL_EXT_device_query_name (0x335F) and EGL_NV_device_cuda (0x323A).
+_LIST_DEVICES = """
+import ctypes, json
+from mujoco.egl import egl_ext as EGL
+def function(name, result, *arguments):
+    return ctypes.CFUNCTYPE(result, *arguments)(EGL.eglGetProcAddress(name))
+query = function("eglQueryDeviceStringEXT", ctypes.c_char_p, ctypes.c_void_p, ctypes.c_int)
+number = function(
+    "eglQueryDeviceAttribEXT", ctypes.c_uint, ctypes.c_void_p, ctypes.c_int, ctypes.POINTER(ctypes.c_ssize_t))
+def text(device, key):
+    return (query(device, key) or b"").decode(errors="replace")
+found = []
+for index, device in enumerate(EGL.eglQueryDevicesEXT()):
+    device = ctypes.cast(device, ctypes.c_void_p)
+    extensions, cuda = text(device, 0x3055).split(), ctypes.c_ssize_t(-1)
+    if "EGL_NV_device_cuda" in extensions:
+        number(device, 0x323A, ctypes.byref(cuda))
+    software = "EGL_MESA_device_software" in extensions
+    name = text(device, 0x335F) if "EGL_EXT_device_query_name" in extensions else ""
+    if not name and "EGL_EXT_device_drm" in extensions:
+        name = text(device, 0x3233)
+    found.append([index, name, cuda.value if cuda.value >= 0 else None, software])
+print("devices:", json.dumps(found))
+"""
+
+# What has been announced in this process: one message, however many envs it has.
+_announced: set[str] = set()
+
 
 class NoOpenGLError(UserError):
     """No OpenGL context can be created on this machine."""
+
+
+class RenderDeviceError(UserError):
+    """A render device that does not exist, or that this process can no longer change to."""
+
+
+class SoftwareRenderingWarning(RuntimeWarning):
+    """The CPU draws although the machine has a GPU."""
 
 
 @dataclass(frozen=True)
@@ -59,7 +101,26 @@ class GLProbe:
     @property
     def software(self) -> bool:
         """Whether the pictures are drawn by the CPU."""
-        return self.renderer is not None and any(name in self.renderer.lower() for name in SOFTWARE_RENDERERS)
+        return self.renderer is not None and is_software(self.renderer)
+
+
+@dataclass(frozen=True)
+class RenderDevice:
+    """A device that EGL can draw on; `cuda` is its number in CUDA's own count, None where it has none."""
+
+    index: int
+    name: str
+    cuda: int | None
+    software: bool
+
+    def __str__(self) -> str:
+        name = self.name or ("the CPU" if self.software else "unnamed")
+        return f"{self.index}: {name}" + (f" (CUDA {self.cuda})" if self.cuda is not None else "")
+
+
+def is_software(renderer: str) -> bool:
+    """Whether a renderer of this name (OpenGL's `GL_RENDERER`) is a program for the CPU."""
+    return any(name in renderer.lower() for name in SOFTWARE_RENDERERS)
 
 
 @cache
@@ -84,32 +145,78 @@ def has_gpu() -> bool:
     return Path("/proc/driver/nvidia/version").exists() or Path("/dev/kfd").exists()
 
 
-def ensure_gl() -> str:
+@cache
+def render_devices() -> tuple[RenderDevice, ...]:
+    """The devices that EGL lists (about half a second, once); empty where EGL lists none.
+
+    MuJoCo asks for the first ten only, and so does this.
+    """
+    try:
+        done = subprocess.run(
+            [sys.executable, "-c", _LIST_DEVICES],
+            env={**os.environ, VARIABLE: "egl"},
+            capture_output=True,
+            text=True,
+            timeout=120,
+            check=False,
+        )
+    except subprocess.TimeoutExpired:
+        return ()
+    for line in done.stdout.splitlines():
+        if done.returncode == 0 and line.startswith("devices: "):
+            return tuple(RenderDevice(*fields) for fields in json.loads(line.removeprefix("devices: ")))
+    return ()
+
+
+def check_device(device: int) -> None:
+    """Make sure that EGL lists `device`.
+
+    Raises:
+        RenderDeviceError: it does not, or the backend that was asked for is not EGL.
+    """
+    asked = os.environ.get(VARIABLE) or "egl"
+    if asked != "egl":
+        raise RenderDeviceError(
+            f"render device {device} cannot be chosen with {VARIABLE}={asked}: only EGL has numbered devices. "
+            f"Unset {VARIABLE}, or leave the device out."
+        )
+    if isinstance(device, bool) or device not in {known.index for known in render_devices()}:
+        known_devices = ", ".join(map(str, render_devices())) or "none"
+        raise RenderDeviceError(
+            f"render device {device!r}: EGL lists {known_devices}. The numbers are EGL's, not CUDA's; "
+            "`robocasa-lerobot doctor` shows both."
+        )
+
+
+def ensure_gl(device: int | None = None) -> str:
     """Choose MuJoCo's backend for this process and its children, and return its name.
 
     A `MUJOCO_GL` that is already set stays. Without one, on Linux, the first of EGL and OSMesa that renders is
-    chosen; other systems have a working default. Warns when the CPU draws although the machine has a GPU.
+    chosen; other systems have a working default. Warns when the CPU draws although the machine has a GPU; with a
+    backend that was chosen before, `note_renderer` does so at the first picture.
+
+    Args:
+        device: number of the EGL device that this process shall draw on; None leaves it to `MUJOCO_EGL_DEVICE_ID`,
+            and without that to EGL, whose first working device serves every process.
 
     Raises:
         NoOpenGLError: neither EGL nor OSMesa renders; the message has the command that mends it.
+        RenderDeviceError: no such device, or the process draws on another one already.
     """
+    if device is not None:
+        check_device(device)
+        _pin(device)
     asked = os.environ.get(VARIABLE)
     if asked:
         return asked
     if sys.platform != "linux":
         return "default"
     tried = []
-    for backend in HEADLESS_BACKENDS:
+    for backend in HEADLESS_BACKENDS if device is None else ("egl",):
         result = probe(backend)
         if result.renderer is not None:
-            if result.software and has_gpu():
-                warnings.warn(
-                    f"pictures are drawn by the CPU ({result.renderer}) although this machine has a GPU: many times "
-                    f"slower. Install the vendor's OpenGL libraries: {NVIDIA_REMEDY} ({NVIDIA_CONTAINER_NOTE}).",
-                    RuntimeWarning,
-                    stacklevel=2,
-                )
-            _use(backend)
+            announce(result.renderer)
+            use(backend)
             return backend
         tried.append(f"{backend}: {result.failure}")
     raise NoOpenGLError(
@@ -118,13 +225,57 @@ def ensure_gl() -> str:
     )
 
 
-def _use(backend: str) -> None:
+def use(backend: str, device: int | None = None) -> None:
+    """Take over a backend and device that another process has chosen and checked, before the first OpenGL context."""
+    if device is not None:
+        _pin(device)
+    if os.environ.get(VARIABLE) == backend and "mujoco" not in sys.modules:
+        return
     os.environ[VARIABLE] = backend
     # MuJoCo binds its backend at import, so one that was imported before this choice is bound anew.
     mujoco = sys.modules.get("mujoco")
     if mujoco is not None:
         module = importlib.import_module("mujoco.rendering.classic.gl_context")
         mujoco.GLContext = importlib.reload(module).GLContext  # type: ignore[attr-defined]
+
+
+def note_renderer() -> str:
+    """The name of the renderer behind the current OpenGL context; announces a CPU that draws beside a GPU.
+
+    Unlike a probe it says what really draws, whoever chose the backend.
+    """
+    # Imported here: it binds to the backend that MuJoCo has loaded by now.
+    from OpenGL import GL  # type: ignore[import-untyped]
+
+    name = str(GL.glGetString(GL.GL_RENDERER).decode())
+    announce(name)
+    return name
+
+
+def announce(renderer: str) -> None:
+    """Warn, once in a process, if `renderer` is software on a machine that has a GPU."""
+    if renderer not in _announced and is_software(renderer) and has_gpu():
+        _announced.add(renderer)
+        warnings.warn(
+            f"pictures are drawn by the CPU ({renderer}) although this machine has a GPU: many times "
+            f"slower. Install the vendor's OpenGL libraries: {NVIDIA_REMEDY} ({NVIDIA_CONTAINER_NOTE}).",
+            SoftwareRenderingWarning,
+            stacklevel=3,
+        )
+
+
+def _pin(device: int) -> None:
+    """Set the device for MuJoCo's EGL display, which a process makes once."""
+    if os.environ.get(DEVICE_VARIABLE) == str(device):
+        return
+    egl = sys.modules.get("mujoco.egl")
+    if egl is not None and egl.EGL_DISPLAY is not None:
+        present = os.environ.get(DEVICE_VARIABLE, "that EGL chose")
+        raise RenderDeviceError(
+            f"this process draws on device {present} already and cannot change to {device}. One process draws on one "
+            "device: give it before the first picture, or use make_vector_env(..., devices=[...])."
+        )
+    os.environ[DEVICE_VARIABLE] = str(device)
 
 
 if __name__ == "__main__":  # for shell scripts: `python -m robocasa_lerobot.gl` prints the backend, or fails
