@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from typing import Any
 
 import gymnasium
@@ -9,23 +10,28 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from robocasa_lerobot import contract
+from robocasa_lerobot import contract, gl
 from robocasa_lerobot.envs.control.controller import RobotController
 from robocasa_lerobot.envs.control.step import control_step
 from robocasa_lerobot.envs.proprioception import read_state
 from robocasa_lerobot.envs.registry import get_task
 from robocasa_lerobot.envs.scene.builder import RENDER_PRESETS, build_scene, scene_ids
 from robocasa_lerobot.envs.scene.scene import Scene
+from robocasa_lerobot.envs.state import KitchenState, read_physics, write_physics
 from robocasa_lerobot.errors import UnknownNameError, UserError
 from robocasa_lerobot.rendering import SceneRenderer
 
 Observation = dict[str, Any]
 # Key of the generator that noise on the initial arm pose comes from, apart from the one that makes the scene.
 _ARM_NOISE_STREAM = 1
+_SEED_LIMIT = 2**31  # of seeds that the env draws for itself
 
 
 class KitchenEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
     """One task in kitchens of a split; every reset makes a new scene from its seed.
+
+    A reset with the seed of the running scene returns to its beginning without building it again. `get_state` and
+    `set_state` carry a running episode to another time or env.
 
     Observation: `pixels` {camera: uint8 (S, S, 3), upright} and `agent_pos` float64 (16,), the contract's state.
     Action: float32 (12,) in [-1, 1] in the contract's stored order; binary parts count as +1 from 0.5 on.
@@ -41,10 +47,13 @@ class KitchenEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         horizon: control steps until truncation; the task's own if None.
         terminate_on_success: end the episode at the first success.
         render_mode: "rgb_array" or None.
+        render_device: EGL device that this process draws on (see `gl`); EGL's choice if None. One process draws on
+            one device: for several, see `vector.make_vector_env`.
 
     Raises:
         UnknownNameError: no such task, split, preset or render mode.
         UserError: an image size or horizon below 1.
+        RenderDeviceError: no such render device.
     """
 
     metadata = {"render_modes": ["rgb_array"], "render_fps": contract.CONTROL_HZ}  # noqa: RUF012 (Gymnasium's name)
@@ -59,6 +68,7 @@ class KitchenEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         horizon: int | None = None,
         terminate_on_success: bool = True,
         render_mode: str | None = "rgb_array",
+        render_device: int | None = None,
     ) -> None:
         self.declaration = get_task(task)
         scene_ids(split)  # fails here, not at the first reset, for a split without kitchens
@@ -68,6 +78,8 @@ class KitchenEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
             raise UnknownNameError("render mode", str(render_mode), ["rgb_array"])
         if image_size < 1 or (horizon is not None and horizon < 1):
             raise UserError(f"image_size ({image_size}) and horizon ({horizon}) must be at least 1.")
+        if render_device is not None:
+            gl.check_device(render_device)
         self.task = task
         self.split = split
         self.render_preset = render_preset
@@ -77,6 +89,7 @@ class KitchenEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         self._max_episode_steps = self.horizon  # where LeRobot looks
         self.terminate_on_success = terminate_on_success
         self.render_mode = render_mode
+        self.render_device = render_device
         self.render_observations = True
         self.task_description = ""
         self.observation_space = gymnasium.spaces.Dict(
@@ -97,6 +110,7 @@ class KitchenEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         self._renderer: SceneRenderer | None = None
         self._pixels: dict[str, NDArray[np.uint8]] = {}
         self._steps = 0
+        self._initial: KitchenState | None = None  # of the running scene, right after its reset
 
     @property
     def scene(self) -> Scene:
@@ -122,14 +136,48 @@ class KitchenEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
     ) -> tuple[Observation, dict[str, Any]]:
         """Make the scene of `seed` (without one: of the next number of the env's generator) and settle it."""
         super().reset(seed=seed)
-        episode_seed = seed if seed is not None else int(self.np_random.integers(2**31))
-        self._close_renderer()
-        self._scene = build_scene(self.declaration, self.split, episode_seed, self.render_preset)
-        noise = np.random.default_rng([episode_seed, _ARM_NOISE_STREAM])
-        self._data, self._controller = self._scene.initial_data(noise)
-        self._steps = 0
-        self.task_description = self._scene.instruction
-        self._pixels = {}
+        episode_seed = seed if seed is not None else int(self.np_random.integers(_SEED_LIMIT))
+        if self._initial is not None and self._initial.seed == episode_seed:
+            self._restore(self._initial)
+        else:
+            self._build(episode_seed)
+        return self._observe(), self._info()
+
+    def next_seed(self) -> int:
+        """The seed that the next reset without one will take; asking changes nothing."""
+        return int(copy.deepcopy(self.np_random).integers(_SEED_LIMIT))
+
+    def get_state(self) -> KitchenState:
+        """The state of the running episode."""
+        assert self._controller is not None
+        physics, asleep = read_physics(self.model, self.data)
+        return KitchenState(
+            task=self.task,
+            split=self.split,
+            seed=self.scene.seed,
+            steps=self._steps,
+            physics=physics,
+            asleep=asleep,
+            controller=self._controller.get_state(),
+            mujoco_version=mujoco.mj_versionString(),
+        )
+
+    def set_state(self, state: KitchenState) -> tuple[Observation, dict[str, Any]]:
+        """Go on from `state`, in its scene; returns the observation and info of that moment.
+
+        Raises:
+            UserError: the state is of another task, split, MuJoCo version or version of the kitchens.
+        """
+        for what, found, expected in (
+            ("task", state.task, self.task),
+            ("split", state.split, self.split),
+            ("MuJoCo version", state.mujoco_version, mujoco.mj_versionString()),
+        ):
+            if found != expected:
+                raise UserError(f"kitchen state: found {what} {found!r}, but this env has {expected!r}.")
+        if self._initial is None or self._initial.seed != state.seed:
+            self._build(state.seed)
+        self._restore(state)
         return self._observe(), self._info()
 
     def step(self, action: NDArray[np.float32]) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
@@ -156,6 +204,7 @@ class KitchenEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
     def render_camera(self, camera: str | mujoco.MjvCamera) -> NDArray[np.uint8]:
         """A picture (S, S, 3) uint8 of the present state from any camera of the model, or a free one."""
         if self._renderer is None:
+            gl.ensure_gl(self.render_device)
             shadows = self.render_preset == "quality"
             self._renderer = SceneRenderer(self.model, self.image_size, self.image_size, shadows=shadows)
         return self._renderer.render(self.data, camera)
@@ -163,6 +212,23 @@ class KitchenEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
     def close(self) -> None:
         """Free the OpenGL context."""
         self._close_renderer()
+
+    def _build(self, seed: int) -> None:
+        self._close_renderer()
+        self._initial = None
+        self._scene = build_scene(self.declaration, self.split, seed, self.render_preset)
+        noise = np.random.default_rng([seed, _ARM_NOISE_STREAM])
+        self._data, self._controller = self._scene.initial_data(noise)
+        self._steps = 0
+        self._pixels = {}
+        self.task_description = self._scene.instruction
+        self._initial = self.get_state()
+
+    def _restore(self, state: KitchenState) -> None:
+        assert self._controller is not None
+        write_physics(self.model, self.data, self._controller, state)
+        self._steps = state.steps
+        self._pixels = {}
 
     def _close_renderer(self) -> None:
         if self._renderer is not None:

@@ -1,0 +1,99 @@
+"""The whole state of a running episode: enough to go on from it bit for bit, in this process or another."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass, fields
+from typing import Any
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from robocasa_lerobot.envs.control import kernel
+from robocasa_lerobot.envs.control.controller import RobotController
+from robocasa_lerobot.errors import UserError
+
+_SIGNATURE = int(mujoco.mjtState.mjSTATE_INTEGRATION)
+
+
+@dataclass(frozen=True)
+class KitchenState:
+    """A state of a `KitchenEnv`; on the same machine and MuJoCo version it continues bit for bit.
+
+    Attributes:
+        task, split, seed: the scene, which is a function of them.
+        steps: control steps since the reset.
+        physics: MuJoCo's integration state (time, qpos, qvel, controls, applied forces, solver warm start).
+        asleep: which trees of bodies sleep (int32), as MuJoCo encodes it.
+        controller: goals and targets of the robot's controllers.
+        mujoco_version: that the state is of.
+    """
+
+    task: str
+    split: str
+    seed: int
+    steps: int
+    physics: NDArray[np.float64]
+    asleep: NDArray[np.int32]
+    controller: NDArray[np.float64]
+    mujoco_version: str
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain values and arrays, for `numpy.savez` or a message to another process."""
+        return asdict(self)
+
+    @classmethod
+    def from_dict(cls, values: dict[str, Any]) -> KitchenState:
+        """Read what `to_dict` gave, or an `.npz` file of it.
+
+        Raises:
+            UserError: a part is missing.
+        """
+        missing = [field.name for field in fields(cls) if field.name not in values]
+        if missing:
+            raise UserError(f"kitchen state: {', '.join(missing)} missing; found {', '.join(values) or 'nothing'}.")
+        return cls(
+            task=str(values["task"]),
+            split=str(values["split"]),
+            seed=int(values["seed"]),
+            steps=int(values["steps"]),
+            physics=np.asarray(values["physics"], dtype=np.float64),
+            asleep=np.asarray(values["asleep"], dtype=np.int32),
+            controller=np.asarray(values["controller"], dtype=np.float64),
+            mujoco_version=str(values["mujoco_version"]),
+        )
+
+
+def read_physics(model: mujoco.MjModel, data: mujoco.MjData) -> tuple[NDArray[np.float64], NDArray[np.int32]]:
+    """MuJoCo's integration state, and which trees sleep."""
+    physics = np.empty(mujoco.mj_stateSize(model, _SIGNATURE))
+    mujoco.mj_getState(model, data, physics, _SIGNATURE)
+    return physics, data.tree_asleep.copy()
+
+
+def write_physics(
+    model: mujoco.MjModel,
+    data: mujoco.MjData,
+    controller: RobotController,
+    state: KitchenState,
+) -> None:
+    """Put `data` and `controller` into `state`, positions and velocities evaluated.
+
+    Raises:
+        UserError: the state is of another model.
+    """
+    size = mujoco.mj_stateSize(model, _SIGNATURE)
+    if state.physics.shape != (size,) or state.asleep.shape != (model.ntree,):
+        raise UserError(
+            f"kitchen state: {state.physics.size} numbers and {state.asleep.size} trees do not fit this scene "
+            f"({size} and {model.ntree}); it was made by another version of the kitchens."
+        )
+    mujoco.mj_resetData(model, data)
+    mujoco.mj_setState(model, data, state.physics, _SIGNATURE)
+    # Once with everything awake, since what sleeps is not evaluated; then with what slept asleep again, without
+    # which drawers at rest would creep by their solver's last digits.
+    mujoco.mj_forward(model, data)
+    data.tree_asleep[:] = state.asleep
+    kernel.update_sleep(model._address, data._address)
+    mujoco.mj_step1(model, data)
+    controller.set_state(state.controller)

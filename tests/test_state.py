@@ -1,0 +1,108 @@
+"""States of an episode: exact round trips, in the same env and in others."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from robocasa_lerobot.envs.kitchen_env import KitchenEnv
+from robocasa_lerobot.envs.registry import task_names
+from robocasa_lerobot.envs.state import KitchenState
+from robocasa_lerobot.errors import UserError
+
+
+def make(task: str) -> KitchenEnv:
+    return KitchenEnv(task, cameras=())  # states alone; pictures have tests of their own
+
+
+def actions(count: int, seed: int) -> list[NDArray[np.float32]]:
+    """A wandering command, which moves more than white noise does."""
+    rng = np.random.default_rng(seed)
+    direction = rng.uniform(-1, 1, 12)
+    return [np.clip(direction + 0.3 * rng.normal(size=12), -1, 1).astype(np.float32) for _ in range(count)]
+
+
+def trajectory(env: KitchenEnv, commands: list[NDArray[np.float32]]) -> list[NDArray[np.float64]]:
+    rows = []
+    for command in commands:
+        observation, *_ = env.step(command)
+        rows.append(np.concatenate((env.data.qpos, env.data.qvel, observation["agent_pos"], [env.data.time])))
+    return rows
+
+
+def assert_same(one: list[NDArray[np.float64]], other: list[NDArray[np.float64]]) -> None:
+    assert len(one) == len(other) > 0
+    for step, (a, b) in enumerate(zip(one, other, strict=True)):
+        assert np.array_equal(a, b), f"step {step}: differs by {np.abs(a - b).max()}"
+
+
+@pytest.mark.parametrize("task", task_names())
+def test_an_episode_continues_from_a_state_bit_for_bit(task: str, tmp_path: Path) -> None:
+    env = make(task)
+    env.reset(seed=3)
+    trajectory(env, actions(25, 0))
+    state = env.get_state()
+    expected = trajectory(env, actions(25, 1))
+    _, info = env.set_state(state)
+    assert info["seed"] == 3
+    assert_same(trajectory(env, actions(25, 1)), expected)
+    np.savez(tmp_path / "state.npz", **state.to_dict())
+    with np.load(tmp_path / "state.npz") as file:
+        loaded = KitchenState.from_dict(dict(file))
+    other = make(task)
+    other.set_state(loaded)
+    assert_same(trajectory(other, actions(25, 1)), expected)
+    assert np.array_equal(other.get_state().physics, env.get_state().physics)
+
+
+def test_the_round_trip_holds_in_contact_with_things_awake() -> None:
+    """While the robot pushes something: contacts, awake things, a goal ahead of the arm."""
+    env = make("OpenDrawer")
+    env.reset(seed=1)
+    for command in actions(200, 7):
+        env.step(command)
+        if env.data.ncon > 2 and env.data.ntree_awake > 1:
+            break
+    else:
+        pytest.fail("the arm touched nothing: choose other actions")
+    state = env.get_state()
+    expected = trajectory(env, actions(30, 8))
+    env.set_state(state)
+    assert_same(trajectory(env, actions(30, 8)), expected)
+
+
+@pytest.mark.parametrize("task", task_names())
+def test_a_reset_with_the_running_seed_is_the_same_scene_again(task: str) -> None:
+    env = make(task)
+    first, first_info = env.reset(seed=5)
+    model = env.model
+    expected = trajectory(env, actions(20, 2))
+    again, again_info = env.reset(seed=5)
+    assert env.model is model
+    assert np.array_equal(first["agent_pos"], again["agent_pos"])
+    assert first_info == again_info
+    assert_same(trajectory(env, actions(20, 2)), expected)
+    fresh = make(task)
+    fresh.reset(seed=5)
+    assert_same(trajectory(fresh, actions(20, 2)), expected)
+    env.reset(seed=6)
+    assert env.model is not model
+
+
+def test_a_state_of_something_else_is_refused() -> None:
+    env = make("OpenDrawer")
+    env.reset(seed=0)
+    state = env.get_state()
+    with pytest.raises(UserError, match=r"OpenDrawer.*CloseDrawer"):
+        make("CloseDrawer").set_state(state)
+    values = state.to_dict()
+    with pytest.raises(UserError, match="version of the kitchens"):
+        env.set_state(KitchenState.from_dict({**values, "physics": state.physics[:-1]}))
+    with pytest.raises(UserError, match="MuJoCo version"):
+        env.set_state(KitchenState.from_dict({**values, "mujoco_version": "3.0.0"}))
+    del values["asleep"]
+    with pytest.raises(UserError, match="asleep missing"):
+        KitchenState.from_dict(values)
