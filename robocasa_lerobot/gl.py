@@ -76,6 +76,7 @@ print("devices:", json.dumps(found))
 
 # What has been announced in this process: one message, however many envs it has.
 _announced: set[str] = set()
+_used_renderer: str | None = None
 
 
 class NoOpenGLError(UserError):
@@ -244,12 +245,19 @@ def note_renderer() -> str:
 
     Unlike a probe it says what really draws, whoever chose the backend.
     """
+    global _used_renderer
     # Imported here: it binds to the backend that MuJoCo has loaded by now.
     from OpenGL import GL  # type: ignore[import-untyped]
 
     name = str(GL.glGetString(GL.GL_RENDERER).decode())
+    _used_renderer = name
     announce(name)
     return name
+
+
+def used_renderer() -> str | None:
+    """The name of the renderer that this process draws with; None before its first picture."""
+    return _used_renderer
 
 
 def announce(renderer: str) -> None:

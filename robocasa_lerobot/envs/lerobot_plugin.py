@@ -14,11 +14,12 @@ from typing import Any
 import gymnasium
 from lerobot.configs import FeatureType, PolicyFeature
 from lerobot.envs.configs import EnvConfig
-from lerobot.envs.utils import _LazyAsyncVectorEnv
+from lerobot.envs.utils import _LazyAsyncVectorEnv, freeze_after_episode_end
 
 from robocasa_lerobot import contract
 from robocasa_lerobot.envs import registry
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
+from robocasa_lerobot.envs.vector import make_vector_env
 from robocasa_lerobot.errors import UnknownNameError, UserError
 from robocasa_lerobot.gl import ensure_gl
 
@@ -37,13 +38,36 @@ class _ReopeningVectorEnv(gymnasium.vector.SyncVectorEnv):
         return super().reset(**kwargs)
 
 
+class _LazyKitchens(_LazyAsyncVectorEnv):
+    """LeRobot's vector env that starts its processes on first use, with our workers, which report their failures.
+
+    After a failure, as after `close()`, the next use starts new processes.
+    """
+
+    _env: Any
+
+    def __init__(self, makes: list[Callable[[], KitchenEnv]], devices: list[int] | None) -> None:
+        super().__init__(makes)
+        self._devices = devices
+
+    def _ensure(self) -> None:
+        if self._env is not None and self._env.closed:
+            self._env = None
+        if self._env is None:
+            # An env whose episode has ended stands still until the others' have, as in LeRobot's own.
+            self._env = make_vector_env(
+                [freeze_after_episode_end(make) for make in self._env_fns], devices=self._devices
+            )
+
+
 @EnvConfig.register_subclass(ENV_TYPE)
 @dataclass
 class RobocasaKitchenEnvConfig(EnvConfig):
     """One or more kitchen tasks, each evaluated in vector envs of its own.
 
     `task` is a task name, a task set, or a comma-separated list of them, `image_size` the height and width in pixels,
-    and `episode_length` the time limit in control steps (20 Hz), by default each task's own horizon.
+    and `episode_length` the time limit in control steps (20 Hz), by default each task's own horizon. `render_devices`
+    are the EGL devices (not CUDA's numbers, see `gl`) that parallel kitchens are dealt out to; EGL's choice if None.
     """
 
     task: str = "OpenDrawer"
@@ -52,6 +76,7 @@ class RobocasaKitchenEnvConfig(EnvConfig):
     render_preset: str = "fast"
     image_size: int = contract.IMAGE_SIZE
     episode_length: int | None = None
+    render_devices: list[int] | None = None
     features: dict[str, PolicyFeature] = field(default_factory=dict)
     features_map: dict[str, str] = field(default_factory=dict)
 
@@ -130,7 +155,9 @@ class RobocasaKitchenEnvConfig(EnvConfig):
         ensure_gl()  # here, so that the workers inherit the choice
         return {name: {0: self._vector_env(partial(KitchenEnv, name, **self.gym_kwargs), n_envs)} for name in names}
 
-    def _vector_env(self, make: Callable[[], KitchenEnv], n_envs: int) -> Any:
+    def _vector_env(self, make: Callable[..., KitchenEnv], n_envs: int) -> Any:
         if n_envs > 1:
-            return _LazyAsyncVectorEnv([make] * n_envs)
+            return _LazyKitchens([make] * n_envs, self.render_devices)
+        if self.render_devices:
+            make = partial(make, render_device=self.render_devices[0])
         return _ReopeningVectorEnv([make])
