@@ -32,10 +32,10 @@ EnvFactory = Callable[[], gymnasium.Env[Any, Any]]
 
 # At this signal a worker writes where it is to its fault file, even if it hangs inside compiled code.
 WHERE_SIGNAL = signal.SIGUSR1
-PHASES = ("start-up", "waiting", "reset", "step", "autoreset", "call", "closing")
+PHASES = ("start-up", "waiting", "reset", "step", "autoreset", "call")
 # Numbers of a worker in the shared status: phase, whether the seed is known, seed, steps of the episode.
 STATUS_FIELDS = 4
-_LARGEST_SEED = 2**63
+LARGEST_SEED = 2**63  # exclusive: infos and the status hold seeds as int64
 
 
 class FaultFile:
@@ -213,7 +213,6 @@ class _Worker:
 
     def close(self) -> None:
         """Close the env; what goes wrong then is printed, as nobody waits for it."""
-        self._write(phase="closing")
         if self._env is not None:
             try:
                 self._env.close()
@@ -280,7 +279,7 @@ class _Worker:
         """Change those parts of the shared status that are given; the seed comes as a tuple, as it may be None."""
         start = STATUS_FIELDS * self._index
         if seed is not None:
-            known = seed[0] is not None and seed[0] < _LARGEST_SEED
+            known = seed[0] is not None and seed[0] < LARGEST_SEED
             self._status[start + 1 : start + 3] = [known, seed[0] if known else 0]
         if steps is not None:
             self._status[start + 3] = steps
