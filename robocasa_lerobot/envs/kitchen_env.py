@@ -11,8 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robocasa_lerobot import contract, gl
+from robocasa_lerobot.envs.camera_noise import CameraNoise, choose_noise
+from robocasa_lerobot.envs.cameras import check_camera_names
 from robocasa_lerobot.envs.control.controller import RobotController
 from robocasa_lerobot.envs.control.step import control_step
+from robocasa_lerobot.envs.pictures import Pictures, picture_spaces, segmentation_names, take_pictures
 from robocasa_lerobot.envs.proprioception import read_state
 from robocasa_lerobot.envs.registry import get_task
 from robocasa_lerobot.envs.scene.builder import RENDER_PRESETS, build_scene, scene_ids
@@ -33,7 +36,9 @@ class KitchenEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
     A reset with the seed of the running scene returns to its beginning without building it again. `get_state` and
     `set_state` carry a running episode to another time or env.
 
-    Observation: `pixels` {camera: uint8 (S, S, 3), upright} and `agent_pos` float64 (16,), the contract's state.
+    Observation: `pixels` {camera: uint8 (S, S, 3), upright} and `agent_pos` float64 (16,), the contract's state; on
+    request `depth` {camera: float32 (S, S, 1), metres along the optical axis} and `segmentation` {camera: int32
+    (S, S, 1), geom ids, -1 for nothing}, see `segmentation_names`.
     Action: float32 (12,) in [-1, 1] in the contract's stored order; binary parts count as +1 from 0.5 on.
     Reward: 1 in a step after which the goal holds, else 0. `terminated` at success, `truncated` at the horizon.
     Info, at reset and every step: `success`, `is_success`, `success_terms`, `instruction`, `task`, `scene`, `seed`.
@@ -43,16 +48,21 @@ class KitchenEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         split: "target" or "pretrain".
         render_preset: "fast" (no shadows) or "quality".
         image_size: height and width of the pictures, pixels.
-        cameras: names of the cameras that are observed.
+        cameras: names of the cameras that are observed, of `envs.cameras.CAMERA_SETS`.
         horizon: control steps until truncation; the task's own if None.
         terminate_on_success: end the episode at the first success.
         render_mode: "rgb_array" or None.
         render_device: EGL device that this process draws on (see `gl`); EGL's choice if None. One process draws on
             one device: for several, see `vector.make_vector_env`.
+        camera_set: "default", or "cotraining" for the real robot's poses and wrist lens.
+        camera_noise: True for RoboCasa's noise on camera poses, or noise of one's own; it follows from the episode's
+            seed and changes nothing but pictures.
+        depth: observe depth.
+        segmentation: observe which geom each pixel shows.
 
     Raises:
-        UnknownNameError: no such task, split, preset or render mode.
-        UserError: an image size or horizon below 1.
+        UnknownNameError: no such task, split, preset, render mode, camera or camera set.
+        UserError: an image size or horizon below 1, a camera twice, or a noise that is none.
         RenderDeviceError: no such render device.
     """
 
@@ -69,6 +79,10 @@ class KitchenEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         terminate_on_success: bool = True,
         render_mode: str | None = "rgb_array",
         render_device: int | None = None,
+        camera_set: str = "default",
+        camera_noise: bool | CameraNoise = False,
+        depth: bool = False,
+        segmentation: bool = False,
     ) -> None:
         self.declaration = get_task(task)
         scene_ids(split)  # fails here, not at the first reset, for a split without kitchens
@@ -84,7 +98,10 @@ class KitchenEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         self.split = split
         self.render_preset = render_preset
         self.image_size = image_size
-        self.cameras = tuple(cameras)
+        self.cameras = check_camera_names(cameras, camera_set)
+        self.camera_set = camera_set
+        self.camera_noise = choose_noise(camera_noise, camera_set)
+        self._kinds = {"depth": depth, "segmentation": segmentation}
         self.horizon = horizon if horizon is not None else self.declaration.horizon
         self._max_episode_steps = self.horizon  # where LeRobot looks
         self.terminate_on_success = terminate_on_success
@@ -94,12 +111,7 @@ class KitchenEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         self.task_description = ""
         self.observation_space = gymnasium.spaces.Dict(
             {
-                "pixels": gymnasium.spaces.Dict(
-                    {
-                        camera: gymnasium.spaces.Box(0, 255, (image_size, image_size, 3), np.uint8)
-                        for camera in self.cameras
-                    }
-                ),
+                **picture_spaces(self.cameras, image_size, **self._kinds),
                 "agent_pos": gymnasium.spaces.Box(-np.inf, np.inf, (contract.STATE_SIZE,), np.float64),
             }
         )
@@ -108,7 +120,7 @@ class KitchenEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         self._data: mujoco.MjData | None = None
         self._controller: RobotController | None = None
         self._renderer: SceneRenderer | None = None
-        self._pixels: dict[str, NDArray[np.uint8]] = {}
+        self._pictures: Pictures = {}
         self._steps = 0
         self._initial: KitchenState | None = None  # of the running scene, right after its reset
 
@@ -198,16 +210,21 @@ class KitchenEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         return self._observe(), float(info["success"]), terminated, truncated, info
 
     def render(self) -> NDArray[np.uint8]:
-        """The picture of the first camera, (S, S, 3) uint8."""
-        return self.render_camera(self.cameras[0])
+        """The picture of the first camera, (S, S, 3) uint8; of the contract's first, where none is observed."""
+        return self.render_camera((*self.cameras, *contract.CAMERAS)[0])
 
     def render_camera(self, camera: str | mujoco.MjvCamera) -> NDArray[np.uint8]:
         """A picture (S, S, 3) uint8 of the present state from any camera of the model, or a free one."""
-        if self._renderer is None:
-            gl.ensure_gl(self.render_device)
-            shadows = self.render_preset == "quality"
-            self._renderer = SceneRenderer(self.model, self.image_size, self.image_size, shadows=shadows)
-        return self._renderer.render(self.data, camera)
+        return self._open_renderer().render(self.data, camera)
+
+    @property
+    def segmentation_names(self) -> tuple[str, ...]:
+        """What each id of the episode's segmentation is: a fixture, an object, or a body of the robot.
+
+        One entry for each geom and a last one, "background", for id -1: `np.array(names)[segmentation]`. Ids change
+        with the scene, names do not.
+        """
+        return segmentation_names(self.model)
 
     def close(self) -> None:
         """Free the OpenGL context."""
@@ -216,11 +233,13 @@ class KitchenEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
     def _build(self, seed: int) -> None:
         self._close_renderer()
         self._initial = None
-        self._scene = build_scene(self.declaration, self.split, seed, self.render_preset)
+        self._scene = build_scene(
+            self.declaration, self.split, seed, self.render_preset, self.camera_set, self.camera_noise
+        )
         noise = np.random.default_rng([seed, _ARM_NOISE_STREAM])
         self._data, self._controller = self._scene.initial_data(noise)
         self._steps = 0
-        self._pixels = {}
+        self._pictures = {}
         self.task_description = self._scene.instruction
         self._initial = self.get_state()
 
@@ -228,7 +247,14 @@ class KitchenEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         assert self._controller is not None
         write_physics(self.model, self.data, self._controller, state)
         self._steps = state.steps
-        self._pixels = {}
+        self._pictures = {}
+
+    def _open_renderer(self) -> SceneRenderer:
+        if self._renderer is None:
+            gl.ensure_gl(self.render_device)
+            shadows = self.render_preset == "quality"
+            self._renderer = SceneRenderer(self.model, self.image_size, self.image_size, shadows=shadows)
+        return self._renderer
 
     def _close_renderer(self) -> None:
         if self._renderer is not None:
@@ -236,9 +262,13 @@ class KitchenEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
             self._renderer = None
 
     def _observe(self) -> Observation:
-        if self.render_observations or not self._pixels:
-            self._pixels = {camera: self.render_camera(camera) for camera in self.cameras}
-        return {"pixels": dict(self._pixels), "agent_pos": read_state(self.model, self.data)}
+        if not self.cameras:
+            pictures: Pictures = {key: {} for key in self.observation_space if key != "agent_pos"}
+        else:
+            if self.render_observations or not self._pictures:
+                self._pictures = take_pictures(self._open_renderer(), self.data, self.cameras, **self._kinds)
+            pictures = {key: dict(by_camera) for key, by_camera in self._pictures.items()}
+        return {**pictures, "agent_pos": read_state(self.model, self.data)}
 
     def _info(self) -> dict[str, Any]:
         terms: dict[str, bool] = {}

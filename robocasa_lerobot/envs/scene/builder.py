@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import mujoco
 import numpy as np
 
+from robocasa_lerobot.envs.camera_noise import CameraNoise, add_camera_noise
+from robocasa_lerobot.envs.cameras import cameras_of_set
 from robocasa_lerobot.envs.placement import Footprint, PlacementError, place
 from robocasa_lerobot.envs.scene.layout import Layout, layout_ids, load_layout
 from robocasa_lerobot.envs.scene.materials import MaterialPalette, load_style, style_ids
@@ -21,6 +25,15 @@ RENDER_PRESETS = ("fast", "quality")
 LAST_TARGET_ID = 10  # ids 1..10 are target, 11..60 pretraining (robocasa facts, section 6)
 MAX_ATTEMPTS = 50
 PLACEMENT_GAP_M = 0.004  # objects start this far above their surface and settle
+# Key of the generator of camera noise: a stream of its own, so that noise changes nothing else of the scene.
+_CAMERA_NOISE_STREAM = 2
+
+
+@dataclass(frozen=True)
+class _Look:
+    render_preset: str
+    camera_set: str
+    camera_noise: CameraNoise | None
 
 
 def scene_ids(split: str) -> list[tuple[int, int]]:
@@ -41,22 +54,31 @@ def scene_ids(split: str) -> list[tuple[int, int]]:
     return pairs
 
 
-def build_scene(task: Task, split: str, seed: int, render_preset: str = "fast") -> Scene:
-    """The scene of an episode. The render preset changes looks only: physics and placement are the same in both.
+def build_scene(
+    task: Task,
+    split: str,
+    seed: int,
+    render_preset: str = "fast",
+    camera_set: str = "default",
+    camera_noise: CameraNoise | None = None,
+) -> Scene:
+    """The scene of an episode. Render preset, cameras and their noise change looks only: never physics or placement.
 
     Raises:
-        UnknownNameError: no such split or preset.
+        UnknownNameError: no such split, preset or camera set.
         UserError: no arrangement was found in 50 attempts.
     """
     if render_preset not in RENDER_PRESETS:
         raise UnknownNameError("render preset", render_preset, RENDER_PRESETS)
+    cameras_of_set(camera_set)
+    look = _Look(render_preset, camera_set, camera_noise)
     pairs = scene_ids(split)
     rng = np.random.default_rng(seed)
     failure = ""
     for _ in range(MAX_ATTEMPTS):
         layout_id, style_id = pairs[int(rng.integers(len(pairs)))]
         try:
-            return _attempt(task, split, seed, layout_id, style_id, render_preset, rng)
+            return _attempt(task, split, seed, layout_id, style_id, look, rng)
         except PlacementError as error:
             failure = str(error)
     raise UserError(
@@ -71,7 +93,7 @@ def _attempt(
     seed: int,
     layout_id: int,
     style_id: int,
-    render_preset: str,
+    look: _Look,
     rng: np.random.Generator,
 ) -> Scene:
     layout = load_layout(layout_id)
@@ -84,7 +106,10 @@ def _attempt(
     robot = robot_pose(rng, layout, task.robot_start, layout.fixtures[roles[task.robot_start.fixture]])
     openness = {roles[initial.fixture]: float(rng.uniform(initial.low, initial.high)) for initial in task.initial}
     objects = _place_objects(rng, task, split, layout, roles, openness)
-    spec = _assemble(layout, style_id, render_preset, objects)
+    spec = _assemble(layout, style_id, look, objects)
+    if look.camera_noise is not None:
+        noise_rng = np.random.default_rng([seed, _CAMERA_NOISE_STREAM])
+        add_camera_noise(spec, look.camera_set, look.camera_noise, noise_rng)
     model = spec.compile()
     names = {name: placed.item.category.name.replace("_", " ") for name, placed in objects.items()}
     return Scene(
@@ -143,7 +168,7 @@ def _place_objects(
     return placed
 
 
-def _assemble(layout: Layout, style_id: int, render_preset: str, objects: dict[str, PlacedObject]) -> mujoco.MjSpec:
+def _assemble(layout: Layout, style_id: int, look: _Look, objects: dict[str, PlacedObject]) -> mujoco.MjSpec:
     spec = mujoco.MjSpec()
     spec.modelname = f"kitchen_{layout.layout_id}_{style_id}"
     spec.compiler.degree = False
@@ -151,11 +176,11 @@ def _assemble(layout: Layout, style_id: int, render_preset: str, objects: dict[s
     apply_simulation_options(spec)
     # What is at rest sleeps: a kitchen of a hundred joints then costs little more than its robot.
     spec.option.enableflags |= int(mujoco.mjtEnableBit.mjENBL_SLEEP)
-    _light(spec, layout, render_preset)
+    _light(spec, layout, look.render_preset)
     palette = MaterialPalette(spec, load_style(style_id))
     for fixture in layout.fixtures.values():
         fixture.build(spec, palette)
-    add_robot(spec, render_preset)
+    add_robot(spec, look.render_preset, camera_set=look.camera_set)
     for placed in objects.values():
         add_object(spec, palette, placed.name, placed.item)
     return spec
