@@ -19,8 +19,16 @@ from robocasa_lerobot.errors import UnknownNameError
 # Distance of the base centre from the front edge of the counter that it faces, metres (robocasa facts, section 6).
 ROBOT_STANDOFF_M = 0.20
 BESIDE_CLEARANCE_M = 0.20
+# Free poses are searched for with the start's deviation, then with wider ones (robocasa facts, section 6); RoboCasa
+# widens without end, ours gives the layout up and takes another.
+SPAWN_TRIES, SPAWN_ROUNDS = 50, 4
+SPAWN_WIDENING_M = (0.10, 0.05)
+SPAWN_MARGIN_M = 0.02
 # Box of the mobile base around the base centre, in its own frame (x forward): bounds in metres.
 BASE_BOX_X, BASE_BOX_Y = (-0.55, 0.15), (-0.25, 0.25)
+BASE_TOP_M = 0.38
+# Half size of the column above it, around the base centre, and the height that counts as its way.
+COLUMN_HALF_M, COLUMN_TOP_M = 0.13, 1.0
 MIN_REGION_WIDTH_M = 0.12
 
 FIXTURE_KINDS: dict[str, Callable[[Fixture], bool]] = {
@@ -70,34 +78,40 @@ def counter_of(layout: Layout, fixture: Fixture) -> Counter:
 
 
 def robot_pose(rng: np.random.Generator, layout: Layout, start: RobotStart, fixture: Fixture) -> RobotPose:
-    """A free pose facing a fixture, by RoboCasa's rules, with the start's uniform deviation.
+    """A free pose facing a fixture, by RoboCasa's rules, with the start's uniform deviation to all sides.
 
     Raises:
-        PlacementError: both sides of the fixture are blocked.
+        PlacementError: no pose was free.
     """
     counter = counter_of(layout, fixture)
     local_x = _into(counter, fixture.pos[0], fixture.pos[1])[0]
     lateral = fixture.width / 2 + BESIDE_CLEARANCE_M
     # Standing to the left of the fixture, it is at the robot's right, and the other way round.
     options = [("right", -lateral), ("left", lateral)] if start.beside else [("", 0.0)]
-    order = rng.permutation(len(options))
-    deviation = rng.uniform(-1, 1, size=2) * start.deviation
-    for index in order:
-        side, offset = options[int(index)]
-        x = local_x + offset + float(deviation[0])
-        y = -counter.depth / 2 - ROBOT_STANDOFF_M - abs(float(deviation[1]))
-        world = counter.to_world((x, y, 0.0))
-        pose = RobotPose(float(world[0]), float(world[1]), counter.yaw + np.pi / 2, side)
-        if not _blocked(layout, pose):
-            return pose
+    half_range = np.array(start.deviation)
+    for _ in range(SPAWN_ROUNDS):
+        for _ in range(SPAWN_TRIES):
+            order = rng.permutation(len(options))
+            deviation = rng.uniform(-1, 1, size=2) * half_range
+            for index in order:
+                side, offset = options[int(index)]
+                x = local_x + offset + float(deviation[0])
+                y = -counter.depth / 2 - ROBOT_STANDOFF_M - float(deviation[1])
+                world = counter.to_world((x, y, 0.0))
+                pose = RobotPose(float(world[0]), float(world[1]), counter.yaw + np.pi / 2, side)
+                if not _blocked(layout, pose):
+                    return pose
+        half_range = half_range + SPAWN_WIDENING_M
     raise PlacementError(f"no free place for the robot at {fixture.name}")
 
 
 def _blocked(layout: Layout, pose: RobotPose) -> bool:
-    body = pose.footprint()
-    margin = 0.02
-    standing = [f for f in layout.fixtures.values() if f.pos[2] - f.height / 2 < 0.38 and f.name != "floor"]
-    return any(body.overlaps(footprint(f), margin) for f in standing)
+    column = Footprint(pose.x, pose.y, pose.yaw, (COLUMN_HALF_M, COLUMN_HALF_M))
+    for body, top in ((pose.footprint(), BASE_TOP_M), (column, COLUMN_TOP_M)):
+        standing = [f for f in layout.fixtures.values() if f.pos[2] - f.height / 2 < top and f.name != "floor"]
+        if any(body.overlaps(footprint(f), SPAWN_MARGIN_M) for f in standing):
+            return True
+    return False
 
 
 def footprint(fixture: Fixture) -> Footprint:

@@ -1,0 +1,117 @@
+"""Where the robot starts, against RoboCasa's rules: facing the counter, a little off, touching nothing."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import mujoco
+import numpy as np
+import pytest
+
+from robocasa_lerobot.envs.placement import PlacementError
+from robocasa_lerobot.envs.registry import get_task, task_names
+from robocasa_lerobot.envs.scene import selection
+from robocasa_lerobot.envs.scene.builder import build_scene, scene_ids
+from robocasa_lerobot.envs.scene.fixtures.base import Fixture
+from robocasa_lerobot.envs.scene.fixtures.counters import Counter
+from robocasa_lerobot.envs.scene.layout import Layout, load_layout
+from robocasa_lerobot.envs.scene.selection import RobotPose, candidates, counter_of, robot_pose
+from robocasa_lerobot.envs.task import RobotStart
+
+STANDOFF_M = 0.20  # of the base centre from the counter's front edge
+DEVIATION_M = (0.15, 0.05)  # half ranges along the counter and towards it
+LAYOUTS = sorted({layout for layout, _ in scene_ids("target")})
+
+
+def _in_counter(counter: Counter, pose: RobotPose) -> tuple[float, float]:
+    """Along the counter from its middle, and from its front edge into the room, metres."""
+    offset = np.array([pose.x - counter.pos[0], pose.y - counter.pos[1]])
+    along = np.array([np.cos(counter.yaw), np.sin(counter.yaw)])
+    inwards = np.array([-np.sin(counter.yaw), np.cos(counter.yaw)])
+    return float(along @ offset), float(-inwards @ offset - counter.depth / 2)
+
+
+def _sinks() -> list[tuple[Layout, Fixture]]:
+    layouts = [load_layout(layout_id) for layout_id in LAYOUTS]
+    return [(layout, sink) for layout in layouts for sink in candidates(layout, "sink")]
+
+
+def test_the_standard_deviation_is_robocasas() -> None:
+    assert RobotStart("sink").deviation == DEVIATION_M
+    assert selection.ROBOT_STANDOFF_M == STANDOFF_M
+
+
+def test_poses_spread_uniformly_about_the_place_in_front_of_the_fixture() -> None:
+    rng = np.random.default_rng(0)
+    layout, sink = _sinks()[0]
+    counter = counter_of(layout, sink)
+    centre = _in_counter(counter, RobotPose(sink.pos[0], sink.pos[1], 0.0))[0]
+    rows = []
+    for _ in range(500):
+        pose = robot_pose(rng, layout, RobotStart("sink"), sink)
+        assert pose.yaw == pytest.approx(counter.yaw + np.pi / 2)  # facing it, without noise
+        along, away = _in_counter(counter, pose)
+        rows.append((along - centre, away - STANDOFF_M))
+    spread = np.array(rows)
+    assert (np.abs(spread) <= DEVIATION_M).all()
+    # To both sides and both nearer and farther; the standard deviation of a uniform number is its half range / sqrt 3.
+    np.testing.assert_allclose(spread.mean(axis=0), 0.0, atol=0.02)
+    np.testing.assert_allclose(spread.std(axis=0), np.array(DEVIATION_M) / np.sqrt(3), rtol=0.1)
+
+
+def test_blocked_poses_are_drawn_again_and_the_deviation_widens(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Fifty tries, then 0.10 m and 0.05 m more on each side."""
+    layout, sink = _sinks()[0]
+    counter = counter_of(layout, sink)
+    tried: list[tuple[float, float]] = []
+
+    def blocked(_: Layout, pose: RobotPose) -> bool:
+        tried.append(_in_counter(counter, pose))
+        return len(tried) <= 120
+
+    monkeypatch.setattr(selection, "_blocked", blocked)
+    robot_pose(np.random.default_rng(1), layout, RobotStart("sink"), sink)
+    assert len(tried) == 121
+    centre = _in_counter(counter, RobotPose(sink.pos[0], sink.pos[1], 0.0))[0]
+    off = np.abs(np.array(tried) - (centre, STANDOFF_M))
+    for group, extra in ((slice(0, 50), 0), (slice(50, 100), 1), (slice(100, 121), 2)):
+        limits = np.array(DEVIATION_M) + extra * np.array((0.10, 0.05))
+        assert (off[group] <= limits).all()
+        assert (off[group].max(axis=0) > 0.8 * limits).all()
+
+
+def test_a_layout_without_a_free_place_is_given_up(monkeypatch: pytest.MonkeyPatch) -> None:
+    layout, sink = _sinks()[0]
+    monkeypatch.setattr(selection, "_blocked", lambda *_: True)
+    with pytest.raises(PlacementError, match="no free place"):
+        robot_pose(np.random.default_rng(0), layout, RobotStart("sink"), sink)
+
+
+@pytest.mark.parametrize("task", task_names())
+def test_the_robot_starts_free_of_everything(task: str) -> None:
+    for seed in range(3):
+        scene = build_scene(get_task(task), "target", seed)
+        data, _ = scene.initial_data(np.random.default_rng(seed))
+        _assert_free(scene.model, data)
+
+
+def test_it_stands_free_even_at_the_nearest_pose() -> None:
+    scene = build_scene(get_task("PickPlaceCounterToSink"), "target", 0)
+    layout = load_layout(scene.layout_id)
+    counter = counter_of(layout, layout.fixtures[scene.roles["sink"]])
+    robot, (_, away) = scene.robot, _in_counter(counter, scene.robot)
+    nearer = away - (STANDOFF_M - DEVIATION_M[1])
+    assert nearer > 0.0
+    scene.robot = replace(robot, x=robot.x + nearer * np.cos(robot.yaw), y=robot.y + nearer * np.sin(robot.yaw))
+    assert _in_counter(counter, scene.robot)[1] == pytest.approx(0.15)
+    data, _ = scene.initial_data(np.random.default_rng(0))
+    _assert_free(scene.model, data)
+
+
+def _assert_free(model: mujoco.MjModel, data: mujoco.MjData) -> None:
+    robot = model.body("robot0_base").id
+    for contact in data.contact:
+        bodies = [int(model.geom_bodyid[geom]) for geom in contact.geom]
+        of_robot = [model.body_rootid[body] == robot for body in bodies]
+        touching = [model.geom(int(geom)).name for geom in contact.geom]
+        assert sum(of_robot) != 1 or "floor" in touching, touching
