@@ -6,14 +6,33 @@ or "hang"; where is "make", "reset" (the second one), "step" (the second one) or
 """
 
 import ctypes
+import gc
+import multiprocessing
 import os
 import signal
 import time
 
 import gymnasium
 import numpy as np
+import pytest
 
 from robocasa_lerobot import gl
+
+STILL = np.zeros((2, 2), np.float32)  # an action for two of these envs
+
+
+@pytest.fixture(autouse=True)
+def clean_workers(monkeypatch):
+    """Most of these envs do not render; and whatever happens, no worker outlives its test."""
+    monkeypatch.setenv(gl.VARIABLE, os.environ.get(gl.VARIABLE) or "egl")
+    monkeypatch.delenv(gl.DEVICE_VARIABLE, raising=False)
+    before = set(multiprocessing.active_children())
+    yield
+    gc.collect()
+    left = set(multiprocessing.active_children()) - before
+    for process in left:
+        process.kill()
+    assert not left
 
 
 class FaultyEnv(gymnasium.Env):

@@ -14,10 +14,11 @@ from typing import Any
 import gymnasium
 from lerobot.configs import FeatureType, PolicyFeature
 from lerobot.envs.configs import EnvConfig
-from lerobot.envs.utils import _LazyAsyncVectorEnv, freeze_after_episode_end
+from lerobot.envs.utils import _LazyAsyncVectorEnv
 
 from robocasa_lerobot import contract
 from robocasa_lerobot.envs import registry
+from robocasa_lerobot.envs.hold import held
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.vector import make_vector_env
 from robocasa_lerobot.errors import UnknownNameError, UserError
@@ -55,9 +56,7 @@ class _LazyKitchens(_LazyAsyncVectorEnv):
             self._env = None
         if self._env is None:
             # An env whose episode has ended stands still until the others' have, as in LeRobot's own.
-            self._env = make_vector_env(
-                [freeze_after_episode_end(make) for make in self._env_fns], devices=self._devices
-            )
+            self._env = make_vector_env([partial(held, make) for make in self._env_fns], devices=self._devices)
 
 
 @EnvConfig.register_subclass(ENV_TYPE)
