@@ -68,6 +68,18 @@ def check_opengl(probe: Callable[[str], gl.GLProbe] = gl.probe, has_gpu: Callabl
     return Finding("OpenGL", "ok", found + (" (drawn by the CPU)" if last.software else ""))
 
 
+def check_render_devices(devices: Callable[[], tuple[gl.RenderDevice, ...]] = gl.render_devices) -> Finding:
+    """What EGL can draw on, with the numbers that `render_devices` and `MUJOCO_EGL_DEVICE_ID` count in."""
+    found = devices()
+    chosen = os.environ.get(gl.DEVICE_VARIABLE)
+    listed = ", ".join(map(str, found)) or "EGL lists none"
+    if chosen is not None and chosen not in {str(device.index) for device in found}:
+        return Finding(
+            "render devices", "fault", f"{listed}; {gl.DEVICE_VARIABLE}={chosen}", f"unset {gl.DEVICE_VARIABLE}"
+        )
+    return Finding("render devices", "ok", listed)
+
+
 def check_video() -> Finding:
     """PyAV, which brings its own ffmpeg libraries, has the encoders that datasets are written with."""
     try:
@@ -188,6 +200,7 @@ def _run_discovery() -> subprocess.CompletedProcess[str]:
 CHECKS: tuple[Callable[[], Finding], ...] = (
     check_python,
     check_opengl,
+    check_render_devices,
     check_video,
     check_torchcodec,
     check_gpu,

@@ -255,6 +255,14 @@ def note_renderer() -> str:
     return name
 
 
+def announce_backend() -> None:
+    """Try what renders, and announce it, in a process whose workers will render; costs half a second beside a GPU."""
+    if has_gpu():
+        found = probe(os.environ.get(VARIABLE) or "egl").renderer
+        if found is not None:
+            announce(found)
+
+
 def used_renderer() -> str | None:
     """The name of the renderer that this process draws with; None before its first picture."""
     return _used_renderer

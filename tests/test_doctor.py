@@ -80,6 +80,15 @@ def test_software_rendering_beside_a_gpu_is_a_warning() -> None:
     assert doctor.check_opengl(lambda b: HARDWARE, one_gpu).status == "ok"
 
 
+def test_render_devices_are_listed_with_both_numbers(monkeypatch: pytest.MonkeyPatch) -> None:
+    found = (gl.RenderDevice(0, "NVIDIA H200", 3, False), gl.RenderDevice(1, "", None, True))
+    monkeypatch.delenv(gl.DEVICE_VARIABLE, raising=False)
+    assert doctor.check_render_devices(lambda: found).found == "0: NVIDIA H200 (CUDA 3), 1: the CPU"
+    for chosen, status in (("1", "ok"), ("2", "fault"), ("first", "fault")):
+        monkeypatch.setenv(gl.DEVICE_VARIABLE, chosen)
+        assert doctor.check_render_devices(lambda: found).status == status
+
+
 def test_a_backend_that_was_asked_for_and_fails(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv(gl.VARIABLE, "osmesa")
     finding = doctor.check_opengl(lambda b: gl.GLProbe(b, None, "no library"), no_gpu)

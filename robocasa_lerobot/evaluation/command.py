@@ -37,14 +37,17 @@ def run(args: argparse.Namespace) -> int:
     from robocasa_lerobot.evaluation.config import KITCHEN_ENV_FACTORY, EvaluationConfig
     from robocasa_lerobot.evaluation.engine import evaluate, prepare
     from robocasa_lerobot.evaluation.overrides import load_config
-    from robocasa_lerobot.gl import ensure_gl
+    from robocasa_lerobot.gl import announce_backend, check_device, ensure_gl
 
     given = [f"--{key.removeprefix('set:')}={value}" for key, value in vars(args).items() if key.startswith("set:")]
     path = [f"--config_path={args.config_path}"] if args.config_path else []
     config = load_config(EvaluationConfig, [*path, *given, *args.settings])
+    for device in config.env.render_devices:
+        check_device(device)
     evaluation = prepare(config)
     if config.env.factory == KITCHEN_ENV_FACTORY:
         ensure_gl()  # Inherited by the workers.
+        announce_backend()
     evaluate(evaluation)
     from robocasa_lerobot.evaluation.report_command import print_rates, write_report
 

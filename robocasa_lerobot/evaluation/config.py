@@ -44,6 +44,8 @@ class EnvSettings:
     horizon: control steps at 20 Hz for all tasks; default: each task's own.
     horizon_multiplier: factor on each task's own horizon.
     factory: `module:callable` that makes the env, called with task, split, render_preset, image_size and horizon.
+    render_devices: EGL devices that the workers are dealt out to (`robocasa-lerobot doctor` lists them; the numbers
+        are not CUDA's); default: EGL's choice, its first one for all.
     """
 
     tasks: list[str] = field(default_factory=list)
@@ -53,6 +55,7 @@ class EnvSettings:
     horizon: int | None = None
     horizon_multiplier: float = 1.0
     factory: str = KITCHEN_ENV_FACTORY
+    render_devices: list[int] = field(default_factory=list)
 
 
 @dataclass
@@ -154,7 +157,8 @@ def check_factory(factory: str) -> None:
 
 def outcome_settings(config: EvaluationConfig, image_size: int) -> dict[str, Any]:
     """The settings that a trial's outcome depends on; trials are only ever mixed when all of these agree."""
-    env = {name: value for name, value in dataclasses.asdict(config.env).items() if name != "tasks"}
+    where = ("tasks", "render_devices")
+    env = {name: value for name, value in dataclasses.asdict(config.env).items() if name not in where}
     return {
         **env,
         "image_size": image_size,

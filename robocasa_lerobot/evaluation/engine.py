@@ -139,6 +139,7 @@ def _run(
         threads=config.policy.threads,
         executed_steps=config.executed_steps,
         out=str(evaluation.out),
+        render_devices=tuple(config.env.render_devices),
     )
     total = len(evaluation.plan)
     pool = WorkerPool(worker_settings, config.worker_count(max(1, len(todo))), config.stall_seconds)

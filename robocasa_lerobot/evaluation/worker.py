@@ -6,6 +6,7 @@ import importlib
 import signal
 import time
 import traceback
+import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
 from multiprocessing.connection import Connection
@@ -14,6 +15,7 @@ from typing import Any
 
 import gymnasium
 
+from robocasa_lerobot import gl
 from robocasa_lerobot.errors import UserError
 from robocasa_lerobot.evaluation.checkpoints import PolicySource
 from robocasa_lerobot.evaluation.film import Film
@@ -35,6 +37,7 @@ class WorkerSettings:
     threads: int
     executed_steps: int | None
     out: str
+    render_devices: tuple[int, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -67,9 +70,12 @@ class Refused:
     message: str
 
 
-def worker_main(connection: Connection, settings: WorkerSettings) -> None:
-    """Serve trials from `connection` until it gives None or closes."""
+def worker_main(connection: Connection, settings: WorkerSettings, render_device: int | None = None) -> None:
+    """Serve trials from `connection` until it gives None or closes; pictures are drawn on `render_device`."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches the whole group; the parent ends its workers.
+    warnings.filterwarnings("ignore", category=gl.SoftwareRenderingWarning)  # the parent has announced it
+    if render_device is not None:
+        gl.use("egl", render_device)  # the parent has checked it
     worker = _Worker(connection, settings)
     try:
         connection.send(Ready())

@@ -47,6 +47,7 @@ class _Slot:
     process: SpawnProcess
     connection: Connection
     last_sign: float
+    render_device: int | None = None
     ready: bool = False
     attempt: _Attempt | None = None
     given_at: float = 0.0
@@ -149,11 +150,16 @@ class WorkerPool:
 
     def _start(self) -> _Slot:
         ours, theirs = self._context.Pipe()
-        process = self._context.Process(target=worker_main, args=(theirs, self._settings), daemon=True)
+        device = self._least_used_device()
+        process = self._context.Process(target=worker_main, args=(theirs, self._settings, device), daemon=True)
         with _thread_limit(self._settings.threads):
             process.start()
         theirs.close()  # Else end-of-file would never come.
-        return _Slot(process, ours, time.monotonic())
+        return _Slot(process, ours, time.monotonic(), device)
+
+    def _least_used_device(self) -> int | None:
+        used = collections.Counter(slot.render_device for slot in self._slots)
+        return min(self._settings.render_devices, key=lambda device: used[device], default=None)
 
     def _give(self, slot: _Slot, attempt: _Attempt) -> None:
         slot.attempt, slot.given_at = attempt, time.monotonic()
