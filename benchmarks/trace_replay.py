@@ -10,9 +10,6 @@ its actions enters our simulation.
 from __future__ import annotations
 
 import argparse
-import datetime
-import json
-import platform
 import sys
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -208,6 +205,8 @@ def table(errors: list[TraceError]) -> str:
 
 
 def main(arguments: list[str] | None = None) -> int:
+    from common import machine, versions, write_result  # here: the tests use the rest of this file without it
+
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--traces", type=Path, default=TRACES, help="the recordings (.npz)")
     parser.add_argument("--output", type=Path, default=RESULTS, help="where the figures go (.json)")
@@ -218,9 +217,8 @@ def main(arguments: list[str] | None = None) -> int:
         print(error, file=sys.stderr)
         return 2
     result: dict[str, Any] = {
-        "date": datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds"),
-        "machine": {"processor": platform.machine(), "system": platform.platform(terse=True)},
-        "versions": {"python": platform.python_version(), "mujoco": mujoco.__version__, "numpy": np.__version__},
+        "machine": machine(),
+        "versions": versions("mujoco", "numpy", "numba"),
         "limits": {
             "every_step": [EVERY_STEP_MM, EVERY_STEP_DEG],
             "at_end": [AT_END_MM, AT_END_DEG],
@@ -250,8 +248,7 @@ def main(arguments: list[str] | None = None) -> int:
         print("\nWorst error over its limit: " + ", ".join(f"{k} {v:.2f}" for k, v in entry["ratios"].items()))
         result["multiccd_on" if multiccd else "multiccd_off"] = entry
     result["ratios"] = result["multiccd_on"]["ratios"]  # the production setting
-    options.output.parent.mkdir(parents=True, exist_ok=True)
-    options.output.write_text(json.dumps(result, indent=1) + "\n")
+    write_result(options.output, "trace_replay", result)
     return 0
 
 

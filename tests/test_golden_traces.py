@@ -12,9 +12,8 @@ from pathlib import Path
 import mujoco
 import numpy as np
 import pytest
-
-from benchmarks import trace_replay
-from benchmarks.trace_replay import CHAOTIC_AFTER, CHAOTIC_TRACE, Recording, compare, empty_room, load_traces, replay
+import trace_replay
+from trace_replay import CHAOTIC_AFTER, CHAOTIC_TRACE, Recording, compare, empty_room, load_traces, replay
 
 GOLDEN = Path(__file__).parent / "data" / "robosuite_traces.npz"
 JOINTS = 5e-5  # m, rad: the two simulators at the same instant

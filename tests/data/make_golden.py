@@ -37,9 +37,9 @@ EVERY = 5
 
 
 def main() -> None:
-    sys.path.append(str(REPOSITORY))
-    from benchmarks.trace_replay import TRACES as RECORDING
-    from benchmarks.trace_replay import load_traces
+    sys.path.append(str(REPOSITORY / "benchmarks"))
+    from trace_replay import TRACES as RECORDING
+    from trace_replay import load_traces
 
     table = REPOSITORY.parent / "shared" / "facts" / "panda_omron_bodies.jsonl"
     rows = [list(json.loads(line).values()) for line in table.read_text().splitlines()]
