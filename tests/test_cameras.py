@@ -182,6 +182,10 @@ def test_noise_has_the_distribution_of_the_facts(camera_set: str) -> None:
     assert shift[:, 0].max() == pytest.approx(0.0, abs=1e-12)
     assert (shift[:, 0] > -1e-9).mean() == pytest.approx(0.100, abs=0.02)  # the share beyond 8 mm / 6.25 mm
     assert np.median(shift[:, 0]) == pytest.approx(-0.008, abs=4e-4)
+    if camera_set == "default":  # never into the hand, whose front is 0.016 m away
+        assert shift[:, 0].min() == pytest.approx(-0.016)
+    else:
+        assert shift[:, 0].std() == pytest.approx(0.0058, rel=0.05)
     assert shift[:, 1].std() == pytest.approx(0.00625, rel=0.05)
     assert shift[:, 2].max() == pytest.approx(0.00125)
     assert (shift[:, 2] > 0.00125 - 1e-9).mean() == pytest.approx(0.309, abs=0.03)  # the share beyond half a deviation

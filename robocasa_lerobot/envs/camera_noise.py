@@ -1,6 +1,6 @@
 """Noise on the robot's cameras: where they stand and look differs a little in every episode.
 
-Source of the distributions: RoboCasa 1.0.1 (`randomize_cameras`). Two of its details are not followed:
+Source of the distributions: RoboCasa 1.0.1 (`randomize_cameras`). Three of its details are not followed:
 
 - It reads the quaternions, which are wxyz, as xyzw, adds noise to their Euler angles, and uses the result as wxyz
   again. Measured over 200,000 draws for each of its cameras, that turns a camera about its own three axes by angles of
@@ -8,6 +8,8 @@ Source of the distributions: RoboCasa 1.0.1 (`randomize_cameras`). Two of its de
   Here the camera is turned about its own axes by those angles, which is the same distribution without the detour.
 - It draws the wrist camera's noise from NumPy's global generator, so that it does not follow from the episode's seed.
   Here all noise comes from one generator that is passed in.
+- It lets the wrist camera of the default set into the hand, in 3 of 100 episodes with the full Franka meshes, where it
+  shows the inside of them. Here it stops in front of the hand.
 """
 
 from __future__ import annotations
@@ -24,6 +26,7 @@ from robocasa_lerobot.errors import UserError
 _WRIST_BIAS_X = -0.008
 _WRIST_MAX_Z = 0.00125
 _WRIST_Z_SHARE = 1 / 2.5
+_HAND_FRONT_X = 0.034  # a wrist camera in front of the hand's face stays in front of it, metres in the hand's frame
 
 
 @dataclass(frozen=True)
@@ -31,8 +34,8 @@ class CameraNoise:
     """Standard deviations of Gaussian noise: positions in metres per axis, turns in degrees per axis.
 
     `scene_*` is for the agentviews (left, right, centre), `wrist_*` for the camera in the hand; the front view has
-    none. The wrist camera moves only away from the fingers: by -8 mm on average along the hand's x, never beyond 0,
-    and by at most 1.25 mm along z.
+    none. The wrist camera moves by -8 mm on average along the hand's x and never by more than 0, and along z by 0.4 of
+    its noise and by at most 1.25 mm.
 
     Raises:
         UserError: a negative or infinite deviation.
@@ -91,4 +94,6 @@ def add_camera_noise(spec: mujoco.MjSpec, camera_set: str, noise: CameraNoise, r
         mujoco.mju_mulQuat(quat, np.array(camera.quat), turn)
         mujoco.mju_normalize4(quat)
         target.pos = np.array(camera.pos) + shift
+        if "eye_in_hand" in camera.name and camera.pos[0] > _HAND_FRONT_X:
+            target.pos[0] = max(target.pos[0], _HAND_FRONT_X)
         target.quat = quat
