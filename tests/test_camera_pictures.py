@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from gymnasium.utils.env_checker import check_env
 
-from robocasa_lerobot import contract, rendering
+from robocasa_lerobot import contract
 from robocasa_lerobot.envs.camera_noise import CameraNoise
 from robocasa_lerobot.envs.cameras import CAMERA_SETS, apply_camera_configs
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
@@ -20,6 +20,7 @@ from robocasa_lerobot.envs.pictures import BACKGROUND
 from robocasa_lerobot.envs.projection import back_project, camera_matrix, project
 from robocasa_lerobot.envs.scene.builder import RENDER_PRESETS
 from robocasa_lerobot.envs.scene.robot_bodies import BODIES
+from robocasa_lerobot.rendering import canvas
 
 pytestmark = pytest.mark.render
 
@@ -175,10 +176,10 @@ def test_culling_changes_no_bit(shown: Shown, monkeypatch: pytest.MonkeyPatch) -
             env.data.qpos[address] = home[address] + shift
         mujoco.mj_forward(model, env.data)
         for camera in CAMERAS:
-            left_out.append(int((~rendering._in_view(model, env.data, camera, 1.0)).sum()))
+            left_out.append(int((~canvas.in_view(model, env.data, model.camera(camera).id, 1.0)).sum()))
             culled = draw(camera)
             with monkeypatch.context() as patch:
-                patch.setattr(rendering, "_in_view", lambda *_: np.ones(model.ngeom, dtype=bool))
+                patch.setattr(canvas, "in_view", lambda drawn, *_: np.ones(drawn.ngeom, dtype=bool))
                 whole = draw(camera)
             for a, b in zip(culled, whole, strict=True):
                 np.testing.assert_array_equal(a, b)

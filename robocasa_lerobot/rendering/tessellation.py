@@ -1,0 +1,134 @@
+"""Surfaces of boxes, cylinders and capsules as triangles, with normals and MuJoCo's generated texture coordinates."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Array = NDArray[np.float64]
+
+FACET_M = 0.015  # a round shape gets facets about this wide, up to the number asked for
+MIN_SLICES = 6
+
+
+@dataclass(frozen=True)
+class Surface:
+    """Triangles, counter-clockwise seen from outside.
+
+    Attributes:
+        vertices: metres, (n, 3).
+        normals: at the vertices, unit length, (n, 3).
+        texcoords: at the vertices, (n, 2); of an untextured shape its x and y in units of its half sizes.
+        faces: indices of vertices, (m, 3).
+    """
+
+    vertices: Array
+    normals: Array
+    texcoords: Array
+    faces: NDArray[np.int32]
+
+    def textured(self, repeat: Array) -> Surface:
+        """With texture coordinates as MuJoCo generates them for primitives: projected along the shape's own z.
+
+        `repeat` (2,) counts the texture's repetitions over the shape. The rule was measured on pictures of MuJoCo
+        3.17: u = repeat (1 + x) / 2 and v = repeat (1 - y) / 2 with x and y from -1 to 1.
+        """
+        return replace(self, texcoords=0.5 * repeat * (1.0 + self.texcoords * (1.0, -1.0)))
+
+    def placed(self, position: ArrayLike, rotation: Array) -> Surface:
+        """Moved to `position` (3,) metres and turned by `rotation` (3, 3)."""
+        return replace(
+            self, vertices=self.vertices @ rotation.T + np.asarray(position), normals=self.normals @ rotation.T
+        )
+
+
+def joined(surfaces: Sequence[Surface]) -> Surface:
+    """One surface of all."""
+    starts = np.cumsum([0, *(len(surface.vertices) for surface in surfaces[:-1])])
+    return Surface(
+        np.concatenate([surface.vertices for surface in surfaces]),
+        np.concatenate([surface.normals for surface in surfaces]),
+        np.concatenate([surface.texcoords for surface in surfaces]),
+        np.concatenate([surface.faces + start for surface, start in zip(surfaces, starts, strict=True)]).astype(
+            np.int32
+        ),
+    )
+
+
+def box(half_sizes: ArrayLike) -> Surface:
+    """A box of half sizes (3,) metres, with sharp edges."""
+    return Surface(_BOX_CORNERS * np.asarray(half_sizes), _BOX_NORMALS, _BOX_CORNERS[:, :2], _BOX_FACES)
+
+
+def cylinder(radius: float, half_length: float, slices: int) -> Surface:
+    """A closed cylinder along z, with at most `slices` facets."""
+    circle = _circle(_slices(radius, slices))
+    side = _tube(circle, np.array((1.0, 1.0)), np.array((-1.0, 1.0)), np.zeros(2))
+    unit = joined([side, _disk(circle, -1.0), _disk(circle, 1.0)])
+    return replace(unit, vertices=unit.vertices * (radius, radius, half_length))
+
+
+def capsule(radius: float, half_length: float, slices: int) -> Surface:
+    """A cylinder along z with a half sphere on each end; `half_length` is of the cylinder, as in MuJoCo."""
+    count = _slices(radius, slices)
+    rings = max(1, count // 4)
+    rise = np.linspace(-np.pi / 2, 0.0, rings + 1)  # of the rings of the lower end, from its pole
+    angles = np.concatenate((rise, -rise[::-1]))
+    centers = np.repeat((-half_length, half_length), rings + 1)
+    return _tube(_circle(count), radius * np.cos(angles), centers + radius * np.sin(angles), np.sin(angles), radius)
+
+
+def _slices(radius: float, most: int) -> int:
+    return int(np.clip(np.ceil(2 * np.pi * radius / FACET_M), MIN_SLICES, max(most, MIN_SLICES)))
+
+
+def _circle(slices: int) -> Array:
+    """Points of the unit circle, the first again at the end, (slices + 1, 2)."""
+    angles = np.linspace(0.0, 2 * np.pi, slices + 1)
+    return np.stack((np.cos(angles), np.sin(angles)), axis=1)
+
+
+def _tube(circle: Array, radii: Array, heights: Array, normal_z: Array, scale: float = 1.0) -> Surface:
+    """Rings around z, joined from the lowest up; a ring's normals rise by `normal_z`."""
+    count = len(circle)
+    vertices = np.concatenate(
+        [np.column_stack((circle * radius, np.full(count, z))) for radius, z in zip(radii, heights, strict=True)]
+    )
+    normals = np.concatenate(
+        [np.column_stack((circle * np.sqrt(max(0.0, 1.0 - z * z)), np.full(count, z))) for z in normal_z]
+    )
+    low = np.arange(len(radii) - 1)[:, None] * count + np.arange(count - 1)
+    a, b, c, d = low, low + 1, low + count + 1, low + count
+    faces = np.concatenate((np.stack((a, b, c), axis=-1).reshape(-1, 3), np.stack((a, c, d), axis=-1).reshape(-1, 3)))
+    return Surface(vertices, normals, vertices[:, :2] / scale, faces.astype(np.int32))
+
+
+def _disk(circle: Array, side: float) -> Surface:
+    """The unit disk at z = `side`, seen from there."""
+    count = len(circle)
+    vertices = np.column_stack((np.concatenate((np.zeros((1, 2)), circle)), np.full(count + 1, side)))
+    rim = np.arange(1, count)
+    faces = np.stack((np.zeros_like(rim), rim, rim + 1) if side > 0 else (np.zeros_like(rim), rim + 1, rim), axis=1)
+    return Surface(vertices, np.tile((0.0, 0.0, side), (count + 1, 1)), vertices[:, :2], faces.astype(np.int32))
+
+
+def _unit_box() -> tuple[Array, Array, NDArray[np.int32]]:
+    corners: list[Array] = []
+    normals: list[Array] = []
+    faces: list[tuple[int, int, int]] = []
+    for axis in range(3):
+        for side in (-1.0, 1.0):
+            start = len(corners)
+            for u, v in ((-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)):
+                corner = np.empty(3)
+                corner[[axis, (axis + 1) % 3, (axis + 2) % 3]] = side, u * side, v
+                corners.append(corner)
+                normals.append(side * np.eye(3)[axis])
+            faces += [(start, start + 1, start + 2), (start, start + 2, start + 3)]
+    return np.array(corners), np.array(normals), np.array(faces, dtype=np.int32)
+
+
+_BOX_CORNERS, _BOX_NORMALS, _BOX_FACES = _unit_box()

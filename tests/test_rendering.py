@@ -1,0 +1,155 @@
+"""The look-alike that pictures are drawn from: its surfaces, and that it looks like the model."""
+
+from __future__ import annotations
+
+from collections import Counter
+
+import mujoco
+import numpy as np
+import pytest
+
+from robocasa_lerobot import contract
+from robocasa_lerobot.envs.kitchen_env import KitchenEnv
+from robocasa_lerobot.envs.registry import task_names
+from robocasa_lerobot.rendering import SceneRenderer
+from robocasa_lerobot.rendering.look_alike import look_alike
+from robocasa_lerobot.rendering.tessellation import Surface, box, capsule, cylinder, joined
+
+GROUPS = (1, 2)
+SHAPES = {
+    "box": (box((0.3, 0.2, 0.1)), 8 * 0.3 * 0.2 * 0.1),
+    "cylinder": (cylinder(0.5, 0.2, 64), np.pi * 0.5**2 * 0.4),
+    "capsule": (capsule(0.5, 0.2, 64), np.pi * 0.5**2 * 0.4 + 4 / 3 * np.pi * 0.5**3),
+    "thin bar": (capsule(0.006, 0.1, 10), np.pi * 0.006**2 * 0.2 + 4 / 3 * np.pi * 0.006**3),
+    "both": (joined([box((0.1, 0.1, 0.1)), box((0.1, 0.1, 0.2)).placed((1.0, 0.0, 0.0), np.eye(3))]), 0.008 + 0.016),
+}
+
+
+@pytest.mark.parametrize("name", SHAPES)
+def test_surfaces_are_closed_and_seen_from_outside(name: str) -> None:
+    surface, volume = SHAPES[name]
+    assert volume_of(surface) == pytest.approx(volume, rel=0.25 if name == "thin bar" else 0.02)  # six facets
+    points = np.round(surface.vertices, 9)
+    keys = [tuple(point) for point in points]
+    edges: Counter[tuple[tuple[float, ...], tuple[float, ...]]] = Counter()
+    for face in surface.faces:
+        corners = [keys[i] for i in face]
+        for a, b in zip(corners, [*corners[1:], corners[0]], strict=True):
+            if a != b:
+                edges[a, b] += 1
+    # Triangles at a pole have shrunk to a line, which walks an edge there and back.
+    assert edges
+    assert all(edges[a, b] == edges[b, a] for a, b in edges), "a hole or a triangle turned inside out"
+    np.testing.assert_allclose(np.linalg.norm(surface.normals, axis=1), 1.0)
+    corners = surface.vertices[surface.faces]
+    flat = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    whole = np.linalg.norm(flat, axis=1) > 1e-12
+    facing = (flat[whole, None] * surface.normals[surface.faces][whole]).sum(axis=-1)
+    assert (facing > 0).all()
+
+
+def volume_of(surface: Surface) -> float:
+    a, b, c = np.moveaxis(surface.vertices[surface.faces], 1, 0)
+    return float((np.cross(a, b) * c).sum() / 6)
+
+
+@pytest.mark.render
+@pytest.mark.parametrize("task", task_names())
+def test_the_look_alike_looks_alike(task: str) -> None:
+    env = KitchenEnv(task, image_size=128)
+    env.reset(seed=2)
+    merged = SceneRenderer(env.model, 128, 128)
+    exact = SceneRenderer(env.model, 128, 128)
+    assert merged._alike is not None
+    assert merged._alike.model.ngeom < 0.5 * np.isin(env.model.geom_group, GROUPS).sum()
+    exact._alike = None
+    for _ in range(2):
+        for camera in contract.CAMERAS:
+            one, other = merged.render(env.data, camera), exact.render(env.data, camera)
+            difference = np.abs(one.astype(int) - other.astype(int))
+            assert difference.mean() < 1.5, camera
+            assert (difference.max(axis=-1) > 24).mean() < 0.02, camera  # edges of round shapes
+            assert one.std() > 20, camera  # something is seen
+        for _ in range(10):
+            env.step(np.full(12, 0.7, dtype=np.float32))  # poses are followed
+    merged.close()
+    exact.close()
+    env.close()
+
+
+def boards(texuniform: bool) -> mujoco.MjModel:
+    """Sixty textured boxes on one body, in two sizes and turned, seen from above."""
+    spec = mujoco.MjSpec()
+    texture = spec.add_texture(name="t", type=mujoco.mjtTexture.mjTEXTURE_2D, width=64, height=64, nchannel=3)
+    ramp = np.zeros((64, 64, 3), np.uint8)
+    ramp[..., 0], ramp[..., 1] = np.arange(64)[None] * 4, np.arange(64)[:, None] * 4
+    texture.data = ramp.tobytes()
+    material = spec.add_material(name="m", texrepeat=(20.0, 30.0) if texuniform else (2.0, 3.0), texuniform=texuniform)
+    textures = material.textures
+    textures[mujoco.mjtTextureRole.mjTEXROLE_RGB] = "t"
+    material.textures = textures
+    body = spec.worldbody.add_body(pos=(0.1, 0.0, 0.0))
+    for i in range(60):
+        geom = body.add_geom(type=mujoco.mjtGeom.mjGEOM_BOX, size=(0.05 + 0.04 * (i % 2), 0.06, 0.02), group=1)
+        geom.pos = (0.22 * (i % 8) - 0.8, 0.22 * (i // 8) - 0.8, 0.0)
+        geom.alt.euler = (0.0, 0.0, 10.0 * i)
+        geom.material = "m"
+    spec.worldbody.add_camera(name="above", pos=(0.0, 0.0, 2.5))
+    spec.worldbody.add_light(pos=(0.0, 0.0, 3.0))
+    return spec.compile()
+
+
+@pytest.mark.render
+@pytest.mark.parametrize("texuniform", [False, True])
+def test_textures_lie_as_mujoco_lays_them(texuniform: bool) -> None:
+    model = boards(texuniform)
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    merged, exact = SceneRenderer(model, 200, 200), SceneRenderer(model, 200, 200)
+    exact._alike = None
+    one, other = merged.render(data, "above"), exact.render(data, "above")
+    assert merged._alike is not None
+    assert merged._alike.model.ngeom == 1
+    difference = np.abs(one.astype(int) - other.astype(int)).max(axis=-1)
+    assert (difference > 16).mean() < 0.01  # where the texture starts again, its seam
+    assert other.std() > 30
+    merged.close()
+    exact.close()
+
+
+@pytest.mark.render
+def test_a_state_that_is_shown_by_colour_is_seen() -> None:
+    """Colours of materials are followed; a recoloured shape gets a part of its own, once."""
+    model = boards(texuniform=False)
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    merged, exact = SceneRenderer(model, 64, 64), SceneRenderer(model, 64, 64)
+    exact._alike = None
+
+    def check() -> None:
+        one, other = merged.render(data, "above"), exact.render(data, "above")
+        assert np.abs(one.astype(int) - other.astype(int)).mean() < 1.0
+
+    before = merged.render(data, "above")
+    model.mat_rgba[0] = (1.0, 0.2, 0.2, 1.0)
+    assert merged._alike is not None
+    made = merged._alike.model
+    check()
+    assert merged._alike.model is made
+    model.geom_rgba[7] = (0.0, 0.0, 1.0, 1.0)
+    check()
+    assert merged._alike.loose == {7}
+    made = merged._alike.model
+    model.geom_rgba[7] = (0.0, 1.0, 0.0, 1.0)
+    check()
+    assert merged._alike.model is made
+    assert (merged.render(data, "above") != before).any()
+    model.geom_group[9] = 0
+    check()
+    merged.close()
+    exact.close()
+
+
+def test_a_small_model_is_drawn_as_it_is() -> None:
+    model = mujoco.MjModel.from_xml_string("<mujoco><worldbody><geom size='1' group='1'/></worldbody></mujoco>")
+    assert look_alike(model, GROUPS) is None
