@@ -9,6 +9,7 @@ from contextlib import closing
 from functools import partial
 from typing import Any
 
+import gymnasium
 import numpy as np
 import pytest
 from gymnasium.vector import AutoresetMode
@@ -17,7 +18,7 @@ from vector_support import STILL, FaultyEnv, clean_workers  # noqa: F401 (a fixt
 from robocasa_lerobot import contract
 from robocasa_lerobot.envs import hold
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
-from robocasa_lerobot.envs.vector import WorkerError, env_info, make_vector_env
+from robocasa_lerobot.envs.vector import KitchenVectorEnv, WorkerError, env_info, make_vector_env
 from robocasa_lerobot.errors import UnknownNameError, UserError
 
 
@@ -163,6 +164,12 @@ def test_every_env_gets_its_own_seed_and_wrong_ones_end_nothing() -> None:
         for seed, expected in right:
             observations, _ = envs.reset(seed=seed)
             assert observations["agent_pos"][:, 0].tolist() == expected
+
+
+def test_gymnasiums_make_vec_makes_ours() -> None:
+    with closing(gymnasium.make_vec("robocasa_lerobot/OpenDrawer", num_envs=2, cameras=(), horizon=5)) as envs:
+        assert isinstance(envs, KitchenVectorEnv)
+        assert envs.call("horizon") == (5, 5)
 
 
 def test_spawned_workers_do_as_well() -> None:

@@ -1,6 +1,7 @@
 """Kitchens, robot, tasks: the MuJoCo side. Knows no torch.
 
-Importing this package makes the tasks known to Gymnasium: `gymnasium.make("robocasa_lerobot/OpenDrawer")`.
+Importing this package makes the tasks known to Gymnasium: `gymnasium.make("robocasa_lerobot/OpenDrawer")`, and
+`gymnasium.make_vec` with the arguments of `vector.make_vector_env`.
 """
 
 import gymnasium
@@ -14,5 +15,8 @@ NAMESPACE = "robocasa_lerobot"
 for _name in task_names():
     if f"{NAMESPACE}/{_name}" not in gymnasium.registry:
         gymnasium.register(
-            f"{NAMESPACE}/{_name}", entry_point="robocasa_lerobot.envs.kitchen_env:KitchenEnv", kwargs={"task": _name}
+            f"{NAMESPACE}/{_name}",
+            entry_point="robocasa_lerobot.envs.kitchen_env:KitchenEnv",
+            vector_entry_point="robocasa_lerobot.envs.vector:make_vector_env",
+            kwargs={"task": _name},
         )
