@@ -33,14 +33,14 @@ class ForkedContextError(UserError):
 
 
 class Canvas:
-    """Draws one model into pictures of one size.
+    """Draws one model into pictures of one size; shadows must be asked for when it is made.
 
     Raises:
         NoOpenGLError: nothing on this machine can render.
         ForkedContextError: this process was forked from one that had rendered.
     """
 
-    def __init__(self, model: mujoco.MjModel, height: int, width: int) -> None:
+    def __init__(self, model: mujoco.MjModel, height: int, width: int, *, shadows: bool = False) -> None:
         global _context_process
         if _context_process not in (None, os.getpid()):
             raise ForkedContextError(
@@ -53,7 +53,11 @@ class Canvas:
         model.vis.global_.offheight = max(height, model.vis.global_.offheight)
         self._model = model
         self._aspect = width / height
+        shadow_size = model.vis.quality.shadowsize
+        if not shadows:  # the map of a shadow takes 64 MiB and a tenth of a second to make, used or not
+            model.vis.quality.shadowsize = 0
         self._renderer = mujoco.Renderer(model, height, width, max_geom=model.ngeom + _SPARE_GEOMS)
+        model.vis.quality.shadowsize = shadow_size
         note_renderer()
         self._option = mujoco.MjvOption()
         self._option.geomgroup[COLLISION_GROUP] = 0

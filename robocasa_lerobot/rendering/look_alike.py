@@ -104,8 +104,9 @@ def look_alike(model: mujoco.MjModel, groups: tuple[int, ...], loose: frozenset[
         return None
     spec = mujoco.MjSpec()
     _add_textures_and_materials(spec, model)
+    rotations = _matrices(model.geom_quat)
     for index, geoms in enumerate(parts):
-        _add_part(spec, model, geoms, f"part{index}")
+        _add_part(spec, model, rotations, geoms, f"part{index}")
     for camera in range(model.ncam):
         spec.worldbody.add_camera(name=f"camera{camera}")
     for light in range(model.nlight):
@@ -154,7 +155,7 @@ def _add_textures_and_materials(spec: mujoco.MjSpec, model: mujoco.MjModel) -> N
             material.textures = textures
 
 
-def _add_part(spec: mujoco.MjSpec, model: mujoco.MjModel, geoms: list[int], name: str) -> None:
+def _add_part(spec: mujoco.MjSpec, model: mujoco.MjModel, rotations: Array, geoms: list[int], name: str) -> None:
     first = geoms[0]
     material = int(model.geom_matid[first])
     kind = int(model.geom_type[first])
@@ -162,7 +163,7 @@ def _add_part(spec: mujoco.MjSpec, model: mujoco.MjModel, geoms: list[int], name
     merged = len(geoms) > 1 or kind in (_CYLINDER, _CAPSULE)
     geom = spec.worldbody.add_geom(type=mujoco.mjtGeom(_MESH if merged else kind))
     if merged:
-        _add_mesh(spec, joined([_surface(model, each) for each in geoms]), name)
+        _add_mesh(spec, joined([_surface(model, rotations, each) for each in geoms]), name)
         geom.meshname = name
     else:
         geom.pos, geom.quat, geom.size = model.geom_pos[first], model.geom_quat[first], model.geom_size[first]
@@ -176,7 +177,7 @@ def _add_part(spec: mujoco.MjSpec, model: mujoco.MjModel, geoms: list[int], name
         geom.material = f"{'baked' if merged else 'material'}{material}"
 
 
-def _surface(model: mujoco.MjModel, geom: int) -> Surface:
+def _surface(model: mujoco.MjModel, rotations: Array, geom: int) -> Surface:
     """The shape of a geom in its body's frame, with texture coordinates as MuJoCo generates them."""
     kind, size = model.geom_type[geom], model.geom_size[geom]
     slices = int(model.vis.quality.numslices)
@@ -192,7 +193,7 @@ def _surface(model: mujoco.MjModel, geom: int) -> Surface:
         repeat = model.mat_texrepeat[material].astype(np.float64)
         if model.mat_texuniform[material]:  # repetitions per metre instead of per shape
             repeat = repeat * (size[:2] if kind == _BOX else size[[0, 0]])
-    return shape.textured(repeat).placed(model.geom_pos[geom], _matrices(model.geom_quat[geom][None])[0])
+    return shape.textured(repeat).placed(model.geom_pos[geom], rotations[geom])
 
 
 def _add_mesh(spec: mujoco.MjSpec, surface: Surface, name: str) -> None:

@@ -93,7 +93,7 @@ class SceneRenderer:
 
     def _open_exact(self) -> Canvas:
         if self._exact is None:
-            self._exact = Canvas(self._model, *self._size)
+            self._exact = Canvas(self._model, *self._size, shadows=self._shadows)
         return self._exact
 
     def _look_alike(self) -> LookAlike | None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cache
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -65,20 +66,33 @@ def box(half_sizes: ArrayLike) -> Surface:
 
 def cylinder(radius: float, half_length: float, slices: int) -> Surface:
     """A closed cylinder along z, with at most `slices` facets."""
-    circle = _circle(_slices(radius, slices))
-    side = _tube(circle, np.array((1.0, 1.0)), np.array((-1.0, 1.0)), np.zeros(2))
-    unit = joined([side, _disk(circle, -1.0), _disk(circle, 1.0)])
+    unit = _unit_cylinder(_slices(radius, slices))
     return replace(unit, vertices=unit.vertices * (radius, radius, half_length))
 
 
 def capsule(radius: float, half_length: float, slices: int) -> Surface:
     """A cylinder along z with a half sphere on each end; `half_length` is of the cylinder, as in MuJoCo."""
-    count = _slices(radius, slices)
-    rings = max(1, count // 4)
+    unit, ends = _unit_capsule(_slices(radius, slices))
+    return replace(unit, vertices=radius * unit.vertices + half_length * ends)
+
+
+@cache
+def _unit_cylinder(slices: int) -> Surface:
+    circle = _circle(slices)
+    side = _tube(circle, np.array((1.0, 1.0)), np.array((-1.0, 1.0)), np.zeros(2))
+    return joined([side, _disk(circle, -1.0), _disk(circle, 1.0)])
+
+
+@cache
+def _unit_capsule(slices: int) -> tuple[Surface, Array]:
+    """A unit sphere, parted at its equator, and for each vertex the direction (3,) of its end."""
+    rings = max(1, slices // 4)
     rise = np.linspace(-np.pi / 2, 0.0, rings + 1)  # of the rings of the lower end, from its pole
     angles = np.concatenate((rise, -rise[::-1]))
-    centers = np.repeat((-half_length, half_length), rings + 1)
-    return _tube(_circle(count), radius * np.cos(angles), centers + radius * np.sin(angles), np.sin(angles), radius)
+    surface = _tube(_circle(slices), np.cos(angles), np.sin(angles), np.sin(angles))
+    ends = np.zeros_like(surface.vertices)
+    ends[:, 2] = np.repeat((-1.0, 1.0), (rings + 1) * (slices + 1))
+    return surface, ends
 
 
 def _slices(radius: float, most: int) -> int:
@@ -91,7 +105,7 @@ def _circle(slices: int) -> Array:
     return np.stack((np.cos(angles), np.sin(angles)), axis=1)
 
 
-def _tube(circle: Array, radii: Array, heights: Array, normal_z: Array, scale: float = 1.0) -> Surface:
+def _tube(circle: Array, radii: Array, heights: Array, normal_z: Array) -> Surface:
     """Rings around z, joined from the lowest up; a ring's normals rise by `normal_z`."""
     count = len(circle)
     vertices = np.concatenate(
@@ -103,7 +117,7 @@ def _tube(circle: Array, radii: Array, heights: Array, normal_z: Array, scale: f
     low = np.arange(len(radii) - 1)[:, None] * count + np.arange(count - 1)
     a, b, c, d = low, low + 1, low + count + 1, low + count
     faces = np.concatenate((np.stack((a, b, c), axis=-1).reshape(-1, 3), np.stack((a, c, d), axis=-1).reshape(-1, 3)))
-    return Surface(vertices, normals, vertices[:, :2] / scale, faces.astype(np.int32))
+    return Surface(vertices, normals, vertices[:, :2], faces.astype(np.int32))
 
 
 def _disk(circle: Array, side: float) -> Surface:

@@ -1,7 +1,7 @@
 """The controllers, compiled: what an action changes once per policy step, and what happens at every physics step.
 
 Everything that runs 25 times in a control step is here, compiled by numba into one machine-code call that also
-steps MuJoCo (why: `docs/decisions/0008`). The functions work on views of MuJoCo's arrays and on one flat vector, the
+steps MuJoCo (why: `docs/decisions/0009`). The functions work on views of MuJoCo's arrays and on one flat vector, the
 controller's whole memory. They stand in one file because numba's cache on disk follows the changes of a function's
 own file only.
 
