@@ -18,7 +18,7 @@ export PYTHONUNBUFFERED := 1
 export UV_HTTP_TIMEOUT ?= 300
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
-.PHONY: help setup demo test test-slow lint format lock doctor clean
+.PHONY: help setup demo test test-slow lint format lock doctor bench clean
 
 help:  ## this list
 	@sed -n 's/^\([a-z-]*\):.*  ## /\1\t/p' Makefile | awk -F '\t' '{printf "  make %-10s %s\n", $$1, $$2}'
@@ -62,6 +62,10 @@ format: $(STAMP)  ## rewrite the sources in the project's format
 
 doctor: $(STAMP)  ## check this machine
 	$(BIN)/robocasa-lerobot doctor
+
+# `make bench BENCH_ARGS=--quick` takes about 5 minutes; the first run makes robosuite's environment as well.
+bench: $(STAMP)  ## our simulator beside robosuite's, in one run
+	$(BIN)/python benchmarks/sim_speed.py $(BENCH_ARGS)
 
 # Keeps the pinned versions that still fit; `make lock LOCK_ARGS=--upgrade` takes the newest ones.
 lock: $(STAMP)  ## pin pyproject.toml's dependencies in requirements.lock
