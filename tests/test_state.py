@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from robocasa_lerobot.demos.demonstrator import demonstrate
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.registry import task_names
 from robocasa_lerobot.envs.state import KitchenState
@@ -58,20 +59,42 @@ def test_an_episode_continues_from_a_state_bit_for_bit(task: str, tmp_path: Path
     assert np.array_equal(other.get_state().physics, env.get_state().physics)
 
 
-def test_the_round_trip_holds_in_contact_with_things_awake() -> None:
-    """While the robot pushes something: contacts, awake things, a goal ahead of the arm."""
-    env = make("OpenDrawer")
+@pytest.mark.parametrize("task", task_names())
+def test_a_demonstration_continues_from_anywhere(task: str) -> None:
+    """In grasps, with doors in motion, while things fall asleep and wake: the rest replays to the same bits."""
+    env = make(task)
     env.reset(seed=1)
-    for command in actions(200, 7):
-        env.step(command)
-        if env.data.ncon > 2 and env.data.ntree_awake > 1:
+    commands, states, awake = [], [], set()
+    for command in demonstrate(env):
+        states.append(env.get_state())
+        awake.add(int(env.data.ntree_awake))
+        commands.append(command.astype(np.float32))
+        _, _, terminated, truncated, _ = env.step(commands[-1])
+        if terminated or truncated:
             break
-    else:
-        pytest.fail("the arm touched nothing: choose other actions")
-    state = env.get_state()
-    expected = trajectory(env, actions(30, 8))
-    env.set_state(state)
-    assert_same(trajectory(env, actions(30, 8)), expected)
+    assert len(awake) > 1, "nothing but the robot ever moved"
+    end = env.get_state()
+    for start in range(0, len(states), 17):
+        env.set_state(states[start])
+        for command in commands[start:]:
+            env.step(command)
+        reached = env.get_state()
+        for part in ("physics", "asleep", "controller"):
+            assert np.array_equal(getattr(reached, part), getattr(end, part)), f"{part}, from step {start}"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("task", task_names())
+def test_random_motion_continues_from_any_state(task: str) -> None:
+    env = make(task)
+    for seed in range(40):
+        env.reset(seed=seed)
+        trajectory(env, actions(20 + seed, seed))
+        state = env.get_state()
+        commands = actions(80, 100 + seed)
+        expected = trajectory(env, commands)
+        env.set_state(state)
+        assert_same(trajectory(env, commands), expected)
 
 
 @pytest.mark.parametrize("task", task_names())

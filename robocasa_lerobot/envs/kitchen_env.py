@@ -14,13 +14,14 @@ from robocasa_lerobot import contract, gl
 from robocasa_lerobot.envs.camera_noise import CameraNoise, choose_noise
 from robocasa_lerobot.envs.cameras import check_camera_names
 from robocasa_lerobot.envs.control.controller import RobotController
+from robocasa_lerobot.envs.control.physics import read_physics
 from robocasa_lerobot.envs.control.step import control_step
 from robocasa_lerobot.envs.pictures import Pictures, picture_spaces, segmentation_names, take_pictures
 from robocasa_lerobot.envs.proprioception import read_state
 from robocasa_lerobot.envs.registry import get_task
 from robocasa_lerobot.envs.scene.builder import RENDER_PRESETS, build_scene, scene_ids
 from robocasa_lerobot.envs.scene.scene import Scene
-from robocasa_lerobot.envs.state import KitchenState, read_physics, write_physics
+from robocasa_lerobot.envs.state import KitchenState, restore
 from robocasa_lerobot.errors import UnknownNameError, UserError
 from robocasa_lerobot.rendering import SceneRenderer
 
@@ -245,7 +246,7 @@ class KitchenEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
 
     def _restore(self, state: KitchenState) -> None:
         assert self._controller is not None
-        write_physics(self.model, self.data, self._controller, state)
+        restore(self.model, self.data, self._controller, state)
         self._steps = state.steps
         self._pictures = {}
 

@@ -9,11 +9,9 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from robocasa_lerobot.envs.control import kernel
 from robocasa_lerobot.envs.control.controller import RobotController
+from robocasa_lerobot.envs.control.physics import physics_size, write_physics
 from robocasa_lerobot.errors import UserError
-
-_SIGNATURE = int(mujoco.mjtState.mjSTATE_INTEGRATION)
 
 
 @dataclass(frozen=True)
@@ -64,36 +62,17 @@ class KitchenState:
         )
 
 
-def read_physics(model: mujoco.MjModel, data: mujoco.MjData) -> tuple[NDArray[np.float64], NDArray[np.int32]]:
-    """MuJoCo's integration state, and which trees sleep."""
-    physics = np.empty(mujoco.mj_stateSize(model, _SIGNATURE))
-    mujoco.mj_getState(model, data, physics, _SIGNATURE)
-    return physics, data.tree_asleep.copy()
-
-
-def write_physics(
-    model: mujoco.MjModel,
-    data: mujoco.MjData,
-    controller: RobotController,
-    state: KitchenState,
-) -> None:
+def restore(model: mujoco.MjModel, data: mujoco.MjData, controller: RobotController, state: KitchenState) -> None:
     """Put `data` and `controller` into `state`, positions and velocities evaluated.
 
     Raises:
         UserError: the state is of another model.
     """
-    size = mujoco.mj_stateSize(model, _SIGNATURE)
+    size = physics_size(model)
     if state.physics.shape != (size,) or state.asleep.shape != (model.ntree,):
         raise UserError(
             f"kitchen state: {state.physics.size} numbers and {state.asleep.size} trees do not fit this scene "
             f"({size} and {model.ntree}); it was made by another version of the kitchens."
         )
-    mujoco.mj_resetData(model, data)
-    mujoco.mj_setState(model, data, state.physics, _SIGNATURE)
-    # Once with everything awake, since what sleeps is not evaluated; then with what slept asleep again, without
-    # which drawers at rest would creep by their solver's last digits.
-    mujoco.mj_forward(model, data)
-    data.tree_asleep[:] = state.asleep
-    kernel.update_sleep(model._address, data._address)
-    mujoco.mj_step1(model, data)
+    write_physics(model, data, state.physics, state.asleep)
     controller.set_state(state.controller)

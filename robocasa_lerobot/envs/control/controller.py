@@ -39,6 +39,7 @@ class RobotController:
             xanchor=data.xanchor,
             cvel=data.cvel,
             subtree_com=data.subtree_com,
+            tree_asleep=data.tree_asleep,
         )
 
     def reset(self) -> None:
@@ -64,13 +65,14 @@ class RobotController:
         """Write `data.ctrl` for the next physics step (between `mj_step1` and `mj_step2`)."""
         kernel.apply(self._memory, self._views, self._places)
 
-    def run(self, substeps: int = SUBSTEPS) -> None:
+    def run(self, substeps: int = SUBSTEPS) -> bool:
         """Control and advance the simulation by `substeps` physics steps, in one compiled call.
 
-        Before and after: positions and velocities are evaluated (`mj_forward`, `mj_step1`).
+        Before and after: positions and velocities are evaluated (`mj_forward`, `mj_step1`). Returns whether what
+        sleeps must be evaluated anew (`physics.write_physics`).
         """
         model, data = self._model, self._data
-        kernel.run(self._memory, self._views, self._places, model._address, data._address, substeps)
+        return kernel.run(self._memory, self._views, self._places, model._address, data._address, substeps)
 
     def goal_in_base(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Goal position (3,) metres and rotation matrix (3, 3) of the grip site in the arm's base frame."""
@@ -118,6 +120,7 @@ def _places(model: mujoco.MjModel) -> kernel.Places:
             dtype=np.int64,
         ),
         actuators=indices.actuators(model, actuators),
+        tree_roots=model.body_rootid[model.tree_bodyadr].astype(np.int64),
         finger_middle=limits.mean(axis=1),
         finger_half=0.5 * (limits[:, 1] - limits[:, 0]),
     )

@@ -67,6 +67,7 @@ class Views(NamedTuple):
     xanchor: Array
     cvel: Array
     subtree_com: Array
+    tree_asleep: NDArray[np.int32]
 
 
 class Places(NamedTuple):
@@ -81,6 +82,7 @@ class Places(NamedTuple):
         base_yaw: in qpos.
         torso: in qpos, in qvel, in the mass matrix.
         actuators: 7 of the arm, 3 of the base, 1 of the torso, 2 of the fingers.
+        tree_roots: body at the root of each tree; several trees may share one.
         finger_middle, finger_half: centre and half of the fingers' control ranges, metres.
     """
 
@@ -94,6 +96,7 @@ class Places(NamedTuple):
     base_yaw: int
     torso: Indices
     actuators: Indices
+    tree_roots: Indices
     finger_middle: Array
     finger_half: Array
 
@@ -155,12 +158,30 @@ def apply(memory: Array, views: Any, places: Any) -> None:
 
 
 @compiled
-def run(memory: Array, views: Any, places: Any, model: int, data: int, substeps: int) -> None:
-    """Advance the simulation by `substeps` physics steps; `model` and `data` are the addresses of their structures."""
+def run(memory: Array, views: Any, places: Any, model: int, data: int, substeps: int) -> bool:
+    """Advance the simulation by `substeps` physics steps; `model` and `data` are the addresses of their structures.
+
+    Returns whether what sleeps is evaluated for another state than the present one: MuJoCo leaves it as it was before
+    the step in which it fell asleep, and relative to a centre of mass that moves with what is awake under the same
+    root (the other door of a cabinet).
+    """
+    asleep = views.tree_asleep
+    slept = asleep >= 0
+    stale = False
     for _ in range(substeps):
         apply(memory, views, places)
         _mj_step2(model, data)
         _mj_step1(model, data)
+        for tree in range(asleep.size):
+            if slept[tree] != (asleep[tree] >= 0):
+                slept[tree] = not slept[tree]
+                stale = True
+    moving = np.zeros(places.tree_roots.max() + 1, dtype=np.bool_)
+    for tree in range(asleep.size):
+        moving[places.tree_roots[tree]] |= not slept[tree]
+    for tree in range(asleep.size):
+        stale |= slept[tree] and moving[places.tree_roots[tree]]
+    return stale
 
 
 @compiled

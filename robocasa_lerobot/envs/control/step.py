@@ -7,6 +7,7 @@ from numpy.typing import ArrayLike
 
 from robocasa_lerobot.contract import SUBSTEPS
 from robocasa_lerobot.envs.control.controller import RobotController
+from robocasa_lerobot.envs.control.physics import read_physics, write_physics
 
 _BAD = [
     int(mujoco.mjtWarning.mjWARN_BADQPOS),
@@ -32,6 +33,10 @@ def control_step(
         DivergedError: the simulation is lost; the data must be reset.
     """
     controller.set_action(action)
-    controller.run(substeps)
+    stale = controller.run(substeps)
     if data.warning.number[_BAD].any():
         raise DivergedError(f"the simulation diverged at {data.time:.3f} s; reset the env.")
+    if stale:
+        # MuJoCo uses what it had evaluated for a sleeping tree when the tree wakes. Evaluated anew, that follows from
+        # the state alone, so that a restored state goes on bit for bit as the first run did.
+        write_physics(model, data, *read_physics(model, data))
