@@ -177,17 +177,19 @@ def resident_mib() -> float:
 
 
 def serve(simulator: Simulator) -> None:
-    """Answer commands until stdin ends; an error is answered with its traceback and ends the process."""
-    replies = _take_stdout()
+    """Answer the commands of a simulator's loop until stdin ends."""
     loop = Loop(simulator)
-    commands: dict[str, Callable[..., dict[str, Any]]] = {
-        command.__name__: command
-        for command in (loop.hello, loop.make, loop.resets, loop.prepare, loop.run, loop.split)
-    }
+    answer_commands(loop.hello, loop.make, loop.resets, loop.prepare, loop.run, loop.split)
+
+
+def answer_commands(*commands: Callable[..., dict[str, Any]]) -> None:
+    """Answer commands, which have the functions' names, until stdin ends; an error is answered and ends the process."""
+    replies = _take_stdout()
+    by_name = {command.__name__: command for command in commands}
     for line in sys.stdin:
         request = json.loads(line)
         try:
-            answer: dict[str, Any] = commands[request.pop("command")](**request)
+            answer: dict[str, Any] = by_name[request.pop("command")](**request)
         except Exception:
             answer = {"error": traceback.format_exc()}
         replies.write(json.dumps(answer) + "\n")
