@@ -14,7 +14,11 @@ _SHOWN_REJECTIONS = 5
 def configure(parser: argparse.ArgumentParser) -> None:
     """Add the options."""
     parser.add_argument(
-        "files", nargs="+", type=Path, metavar="FILE", help="HDF5 files of RoboCasa, robosuite or this project"
+        "files",
+        nargs="+",
+        type=Path,
+        metavar="FILE",
+        help="HDF5 files of RoboCasa, robosuite or this project, or folders of LeRobot v2.0 or v2.1 datasets",
     )
     parser.add_argument("--out", required=True, type=Path, help="folder of the dataset; must not exist yet")
     parser.add_argument(
@@ -42,6 +46,16 @@ def configure(parser: argparse.ArgumentParser) -> None:
         default="fast",
         help="how states are rendered: fast has no shadows, reflections or multisampling (default: %(default)s)",
     )
+    parser.add_argument(
+        "--reencode", action="store_true", help="encode videos of LeRobot v2 again even where they could be copied"
+    )
+    parser.add_argument(
+        "--max-gop",
+        type=int,
+        default=10,
+        metavar="FRAMES",
+        help="videos of LeRobot v2 with more frames between key frames are encoded again (default: %(default)s)",
+    )
     parser.add_argument("--overwrite", action="store_true", help="replace a dataset at --out")
 
 
@@ -56,14 +70,18 @@ def run(args: argparse.Namespace) -> int:
         instruction=args.instruction,
         video_codec=args.video_codec,
         render_preset=args.render_preset,
+        reencode=args.reencode,
+        max_gop=args.max_gop,
     )
     from robocasa_lerobot.convert.pipeline import convert
 
     result = convert(args.files, args.out, settings, args.workers, args.overwrite)
     cameras = ", ".join(result.cameras)
     print(f"{result.root}: {result.num_episodes} episodes, {result.num_frames} frames, cameras {cameras}")
+    for note in result.notes:
+        print(f"note: {note}")
     for source, count in result.instruction_sources.items():
-        if source != "ep_meta.lang":
+        if source != "ep_meta.lang" and not source.startswith("tasks.jsonl"):
             print(f"{count} episodes record no instruction; theirs is taken from: {source}")
     if result.rejected:
         print(f"{len(result.rejected)} episodes rejected (all in meta/robocasa/rejected.jsonl):")

@@ -24,6 +24,10 @@ from tqdm import tqdm
 
 from robocasa_lerobot import __version__
 from robocasa_lerobot.convert.encoder import SAMPLED_FRAMES, Histogram
+from robocasa_lerobot.convert.lerobot_v2.dataset import V2Dataset
+from robocasa_lerobot.convert.lerobot_v2.finish import conversion_facts, finish_dataset
+from robocasa_lerobot.convert.lerobot_v2.plan import V2Plan, make_v2_plan, takes
+from robocasa_lerobot.convert.lerobot_v2.shard import convert_v2_shard
 from robocasa_lerobot.convert.settings import ConversionSettings, Plan, SourceRecord, make_plan
 from robocasa_lerobot.convert.shard import (
     CODECS,
@@ -60,6 +64,7 @@ class ConversionResult:
     rejected: list[dict[str, Any]]
     cameras: tuple[str, ...]
     instruction_sources: dict[str, int]
+    notes: tuple[str, ...] = ()  # what the sources hold that was left out or changed
 
 
 def convert(
@@ -68,7 +73,7 @@ def convert(
     """Convert demonstration files to one LeRobotDataset v3.0 at `out`.
 
     Args:
-        files: HDF5 files, in the order in which their episodes come.
+        files: HDF5 files, or folders of LeRobot v2.0 and v2.1 datasets, in the order in which their episodes come.
         out: folder of the dataset; it appears complete or not at all.
         settings: what decides the bytes of the dataset.
         workers: processes; None chooses by the amount of work. The dataset does not depend on it.
@@ -79,7 +84,7 @@ def convert(
     """
     out = out.absolute()
     _check_output(out, overwrite)
-    plan = make_plan(files, settings)
+    plan = make_v2_plan(files, settings) if takes(files) else make_plan(files, settings)
     partial = out.with_name(f"{out.name}.partial-{plan.fingerprint}")
     partial.mkdir(parents=True, exist_ok=True)
     with _locked(partial):
@@ -144,7 +149,11 @@ class _ShardTask:
         done = partial / "progress" / f"{rank:05d}"
         done.parent.mkdir(exist_ok=True)
         shard = self.plan.shards[rank]
-        convert_shard(self.plan, shard, shard_folder(partial, rank), lambda frames: _report(done, frames))
+        folder = shard_folder(partial, rank)
+        if isinstance(self.plan, V2Plan):
+            convert_v2_shard(self.plan, shard, folder, lambda frames: _report(done, frames))
+        else:
+            convert_shard(self.plan, shard, folder, lambda frames: _report(done, frames))
 
 
 def quiet_libraries() -> None:
@@ -229,6 +238,8 @@ def _join(plan: Plan, partial: Path, out: Path) -> ConversionResult | None:
             roots=[folder / DATASET for folder in full],
             aggr_root=merged,
             video_files_size_in_mb=VIDEO_FILE_MB,
+            # Copied videos differ in their headers and have B-frames, which LeRobot's joining cannot do.
+            concatenate_videos=not isinstance(plan, V2Plan),
         )
     episodes: list[dict[str, Any]] = []
     histograms: dict[str, Histogram] = {}
@@ -256,12 +267,16 @@ def _join(plan: Plan, partial: Path, out: Path) -> ConversionResult | None:
     write_jsonl(ours / EPISODES_FILE, episodes)
     write_jsonl(ours / REJECTED_FILE, rejected)
     record = _conversion_record(plan, out)
+    if isinstance(plan, V2Plan):
+        finish_dataset(plan, merged)
+        record |= conversion_facts(plan, episodes)
     (ours / CONVERSION_FILE).write_text(
         json.dumps(record, indent=2, ensure_ascii=False, default=str) + "\n", encoding="utf-8"
     )
     sources = dict(Counter(line["instruction_source"] for line in episodes))
     cameras = tuple(camera.name for camera in plan.cameras)
-    return ConversionResult(out, len(episodes), num_frames, rejected, cameras, sources)
+    notes = plan.notes if isinstance(plan, V2Plan) else ()
+    return ConversionResult(out, len(episodes), num_frames, rejected, cameras, sources, notes)
 
 
 def _conversion_record(plan: Plan, out: Path) -> dict[str, Any]:
@@ -281,8 +296,12 @@ def _conversion_record(plan: Plan, out: Path) -> dict[str, Any]:
 
 
 def _source_record(source: SourceRecord, out: Path) -> dict[str, Any]:
-    with DemoFile(Path(source.file)) as file:
-        attributes = file.attributes
+    path = Path(source.file)
+    if path.is_dir():
+        attributes = V2Dataset(path).collection
+    else:
+        with DemoFile(path) as file:
+            attributes = file.attributes
     return asdict(source) | {"relative_to_dataset": os.path.relpath(source.file, out), "attributes": attributes}
 
 

@@ -37,8 +37,13 @@ class ConversionSettings:
     instruction: str | None = None
     video_codec: str = "h264"
     render_preset: str = "fast"
+    # Of datasets of videos: encode all of them again, or those with more frames from one key frame to the next.
+    reencode: bool = False
+    max_gop: int = 10
 
     def __post_init__(self) -> None:
+        if self.max_gop < 1:
+            raise UserError(f"the largest key frame interval is {self.max_gop} frames; at least 1 is needed.")
         if self.image_size is not None and (self.image_size < 16 or self.image_size % 2):
             raise UserError(
                 f"the image size {self.image_size} is not possible: an even number >= 16 is needed (video)."
