@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import os
+import signal
 import threading
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any
@@ -12,7 +13,13 @@ import multiprocess
 from datatrove.executor.local import LocalPipelineExecutor
 from datatrove.utils.logging import logger as datatrove_logger
 
+from robocasa_lerobot.errors import UserError
+
 POLL_SECONDS = 0.3
+
+
+class WorkerDiedError(UserError):
+    """A process that was working did not live to report: killed, out of memory, or crashed."""
 
 
 class PoolExecutor(LocalPipelineExecutor):
@@ -44,8 +51,27 @@ class PoolExecutor(LocalPipelineExecutor):
         multiprocess.set_forkserver_preload(self._preload)
         context = multiprocess.get_context("forkserver")
         with context.Pool(self.workers, initializer=_start_worker, initargs=(self._initializer,)) as pool:
-            for _ in pool.imap_unordered(self._run_for_rank, ranks):
-                pass
+            # A pool puts a new process in the place of a dead one and waits forever for what that one was doing.
+            processes = list(pool._pool)
+            results = pool.imap_unordered(self._run_for_rank, ranks)
+            for _ in ranks:
+                while True:
+                    try:
+                        results.next(POLL_SECONDS)
+                        break
+                    except multiprocess.TimeoutError:
+                        _check_alive(processes)
+
+
+def _check_alive(processes: Sequence[Any]) -> None:
+    """Raise WorkerDiedError if one of the processes has ended."""
+    for process in processes:
+        status = process.exitcode
+        if status is None:
+            continue
+        cause = f"signal {signal.Signals(-status).name}" if status < 0 else f"exit status {status}"
+        remedy = " (memory may have run out: try fewer workers)" if status == -signal.SIGKILL else ""
+        raise WorkerDiedError(f"a worker process was ended by {cause}{remedy}; the same command goes on from here.")
 
 
 def exit_if_orphaned() -> None:
@@ -53,6 +79,12 @@ def exit_if_orphaned() -> None:
     parent = multiprocess.parent_process()
     if parent is not None and not parent.is_alive():
         os._exit(1)
+
+
+def _end_with(parent: Any) -> None:
+    """Wait for the process that started this one, and end with it, in the middle of whatever is being done."""
+    parent.join()
+    os._exit(1)
 
 
 @contextlib.contextmanager
@@ -75,5 +107,8 @@ def polled(show: Callable[[], None]) -> Iterator[None]:
 
 def _start_worker(initializer: Callable[[], None] | None) -> None:
     datatrove_logger.disable("datatrove")
+    parent = multiprocess.parent_process()
+    if parent is not None:
+        threading.Thread(target=_end_with, args=(parent,), daemon=True).start()
     if initializer is not None:
         initializer()

@@ -13,7 +13,8 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from robocasa_lerobot.convert.source import RejectedEpisodeError
+from robocasa_lerobot.convert.hdf5 import MAX_ASSET_BYTES, RejectedEpisodeError
+from robocasa_lerobot.convert.mjcf_limits import check_limits, parse_mjcf
 from robocasa_lerobot.errors import UserError
 
 # Packages whose installed folder is an asset root for paths that contain the package's name.
@@ -39,8 +40,7 @@ REPAIRS: tuple[tuple[str, str], ...] = (
     ("flag", "passive"),
     ("flag", "sensornoise"),
 )
-# Elements that make MuJoCo open further files by itself.
-_FORBIDDEN = ("include", "model", "attach", "extension")
+_MAX_PATH = 4096  # characters; longer ones no file system has
 
 
 class MissingAssetsError(UserError):
@@ -64,6 +64,8 @@ class AssetFinder:
     def read(self, name: str) -> bytes | None:
         """Bytes of the file that the path `name` stands for, or None."""
         path = posixpath.normpath(name.replace("\\", "/"))
+        if len(path) > _MAX_PATH or "\0" in path:
+            return None
         found = self._embedded(path)
         if found is not None:
             return found
@@ -72,14 +74,14 @@ class AssetFinder:
             for start in range(len(parts)):
                 file = _inside(root, parts[start:])
                 if file is not None:
-                    return file.read_bytes()
+                    return _content(file)
         for package in ASSET_PACKAGES:
             if package in parts:
                 last = len(parts) - 1 - parts[::-1].index(package)
                 folder = _package_folder(package)
                 file = _inside(folder, parts[last + 1 :]) if folder else None
                 if file is not None:
-                    return file.read_bytes()
+                    return _content(file)
         return None
 
 
@@ -99,7 +101,7 @@ def scene_names(xml: str) -> SceneNames:
     Raises:
         RejectedEpisodeError: it is not XML or declares entities.
     """
-    root = _parse(xml)
+    root = parse_mjcf(xml)
 
     def names(tag: str) -> tuple[str, ...]:
         return tuple(element.get("name", "") for element in root.iter(tag) if element.get("name"))
@@ -115,10 +117,9 @@ def loadable(xml: str, finder: AssetFinder) -> tuple[str, dict[str, bytes]]:
         MissingAssetsError: some files were found nowhere; the message names the first ones and the remedy.
         RejectedEpisodeError: it is not XML, declares entities, or would make MuJoCo open files by itself.
     """
-    root = _parse(xml)
+    root = parse_mjcf(xml)
+    check_limits(root, tuple(_FILE_ATTRIBUTES))
     for element in root.iter():
-        if element.tag in _FORBIDDEN and (element.get("file") or element.tag == "extension"):
-            raise RejectedEpisodeError(f"its model_file has a <{element.tag}> element, which is not loaded from demos.")
         for tag, attribute in REPAIRS:
             if element.tag == tag:
                 element.attrib.pop(attribute, None)
@@ -146,16 +147,6 @@ def loadable(xml: str, finder: AssetFinder) -> tuple[str, dict[str, bytes]]:
             "of its path exists under DIR, e.g. .../robosuite/models/assets."
         )
     return ET.tostring(root, encoding="unicode"), assets
-
-
-def _parse(xml: str) -> ET.Element:
-    # Entity declarations are of no use in an MJCF, and can expand without bound.
-    if "<!DOCTYPE" in xml or "<!ENTITY" in xml:
-        raise RejectedEpisodeError("its model_file declares XML entities.")
-    try:
-        return ET.fromstring(xml)
-    except ET.ParseError as error:
-        raise RejectedEpisodeError(f"its model_file is not XML ({error}).") from None
 
 
 def _take_folders(root: ET.Element) -> dict[str, str]:
@@ -190,8 +181,20 @@ def _inside(root: Path, parts: Sequence[str]) -> Path | None:
     if not parts:
         return None
     file = root.joinpath(*parts)
-    # A link under the root may point out of it.
-    return file if file.is_file() and file.resolve().is_relative_to(root) else None
+    try:
+        # A link under the root may point out of it.
+        return file if file.is_file() and file.resolve().is_relative_to(root) else None
+    except OSError:  # a name that is too long, a folder that may not be entered
+        return None
+
+
+def _content(file: Path) -> bytes:
+    try:
+        if file.stat().st_size > MAX_ASSET_BYTES:
+            raise RejectedEpisodeError(f"its scene names {file}, which has {file.stat().st_size} bytes.")
+        return file.read_bytes()
+    except OSError as error:
+        raise UserError(f"{file}, which a scene names, cannot be read: {error}") from None
 
 
 def _package_folder(package: str) -> Path | None:

@@ -150,10 +150,20 @@ class _ShardTask:
         done.parent.mkdir(exist_ok=True)
         shard = self.plan.shards[rank]
         folder = shard_folder(partial, rank)
+        if folder.exists():
+            return  # complete; only the executor's marker was lost
+        # Of its own, since the worker of a run that was killed may still be at the same shard for a moment.
+        attempt = folder.with_name(f"{folder.name}.attempt-{os.getpid()}")
         if isinstance(self.plan, V2Plan):
-            convert_v2_shard(self.plan, shard, folder, lambda frames: _report(done, frames))
+            convert_v2_shard(self.plan, shard, attempt, lambda frames: _report(done, frames))
         else:
-            convert_shard(self.plan, shard, folder, lambda frames: _report(done, frames))
+            convert_shard(self.plan, shard, attempt, lambda frames: _report(done, frames))
+        try:
+            attempt.rename(folder)
+        except OSError:
+            if not folder.exists():
+                raise
+            shutil.rmtree(attempt)  # somebody else finished it: the bytes are the same
 
 
 def quiet_libraries() -> None:
