@@ -1,17 +1,17 @@
-"""A video encoder for LeRobot's dataset writer that waits instead of dropping frames and samples its statistics.
+"""A video encoder for LeRobotDatasets that never drops a frame and samples its statistics.
 
 LeRobot 0.6.1's own streaming encoder is made for recording from real cameras: a full queue drops frames without
-failing, and statistics of every frame cost more than encoding. This one has the same methods, so the writer uses it
-unchanged: a full queue blocks the producer, each packet is counted, and statistics come from evenly spaced frames.
+failing, and statistics of every frame cost more than encoding. This one takes each frame at once, counts every packet,
+and takes statistics from evenly spaced frames. It needs no queue and no threads of its own: PyAV 15 keeps Python's lock
+while it encodes, so threads here would only take turns; the codec's own threads work while the next picture is made.
 """
 
 from __future__ import annotations
 
-import queue
+import contextlib
 import shutil
 import tempfile
-import threading
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
@@ -20,10 +20,21 @@ import av
 import numpy as np
 from numpy.typing import NDArray
 
-# Frames of one episode and camera whose pixels go into the statistics, evenly spaced; all pixels of each.
+# Frames of one episode and camera that go into the statistics, evenly spaced, and about how many rows and columns of
+# pixels of each (evenly spaced, too): 50 frames of 64 x 64 pixels take a sixteenth of the time of whole 256 x 256 ones.
 SAMPLED_FRAMES = 50
+SAMPLED_PIXELS = 64
 QUANTILES = (0.01, 0.10, 0.50, 0.90, 0.99)
-_QUEUE_FRAMES = 16
+# Two frames at a time for each camera. Not the number of cores: the bytes of a video depend on it, though not on time.
+ENCODER_THREADS = 2
+# Constant rate factor and preset for each codec. Keyframes every 2 frames, as LeRobot has it: random access decodes
+# at most one frame more than asked for. No B-frames: with them the decoding times of short episodes overlap where
+# LeRobot joins video files, and it fails.
+CODECS: dict[str, dict[str, Any]] = {
+    "h264": {"vcodec": "h264", "crf": 18, "preset": "veryfast", "g": 2, "extra_options": {"bf": 0}},
+    "hevc": {"vcodec": "hevc", "crf": 20, "preset": "veryfast", "g": 2, "extra_options": {"bf": 0}},
+    "av1": {"vcodec": "libsvtav1", "crf": 30, "preset": 12, "g": 2},
+}
 _LEVELS = 256
 Histogram = NDArray[np.int64]  # (3, 256): how often each 8-bit level occurs in each channel
 
@@ -33,35 +44,37 @@ class EncodingError(RuntimeError):
 
 
 class SamplingVideoEncoder:
-    """Encodes one episode at a time, one thread for each camera.
+    """Encodes one episode at a time, one video for each camera; its memory is a few frames, however long an episode is.
 
     Set `episode_length` before the first frame of an episode: it says which frames are sampled, and how many there
-    must be. `histograms` sums the sampled frames of all episodes so far for each camera.
+    must be. `histograms` sums the sampled pixels of all episodes so far for each camera.
     """
 
-    def __init__(self, fps: int, codec: str, pixel_format: str, options: dict[str, str]) -> None:
+    def __init__(self, fps: int, codec: str, pixel_format: str, options: Mapping[str, str]) -> None:
         self.episode_length = 0
         self.histograms: dict[str, Histogram] = {}
-        self._fps, self._codec, self._pixel_format, self._options = fps, codec, pixel_format, options
-        self._threads: dict[str, _CameraThread] = {}
+        self._fps, self._codec, self._pixel_format, self._options = fps, codec, pixel_format, dict(options)
+        self._videos: dict[str, _Video] = {}
 
     def start_episode(
         self, video_keys: Sequence[str], temp_dir: Path, depth_video_keys: Sequence[str] | None = None
     ) -> None:
-        """Open one video for each key in a temporary folder under `temp_dir` (called by LeRobot's writer)."""
+        """Open one video for each key in a temporary folder under `temp_dir`."""
         assert self.episode_length > 0, "episode_length is set before the first frame"
         assert not depth_video_keys, "depth is not converted"
         self.cancel_episode()
-        count = min(SAMPLED_FRAMES, self.episode_length)
-        sampled = frozenset(np.linspace(0, self.episode_length - 1, count).round().astype(int).tolist())
+        sampled = sampled_frames(self.episode_length)
         for key in video_keys:
             path = Path(tempfile.mkdtemp(dir=temp_dir)) / f"{key}.mp4"
-            self._threads[key] = _CameraThread(path, self._fps, self._codec, self._pixel_format, self._options, sampled)
-            self._threads[key].start()
+            self._videos[key] = _Video(path, self._fps, self._codec, self._pixel_format, self._options, sampled)
 
     def feed_frame(self, video_key: str, image: NDArray[np.uint8]) -> None:
-        """Hand over the next frame (H, W, 3), which is not to be changed afterwards; waits while the queue is full."""
-        self._threads[video_key].put(image)
+        """Encode the next frame (H, W, 3).
+
+        Raises:
+            EncodingError: an earlier frame of this video could not be encoded.
+        """
+        self._videos[video_key].add(image)
 
     def finish_episode(self) -> dict[str, tuple[Path, dict[str, NDArray[Any]]]]:
         """Close the videos; gives path and statistics (min, max, mean, std, count, quantiles per channel) of each.
@@ -69,103 +82,111 @@ class SamplingVideoEncoder:
         Raises:
             EncodingError: a video has not as many frames as the episode, or its encoder failed.
         """
-        for thread in self._threads.values():
-            thread.put(None)
         results = {}
-        for key, thread in self._threads.items():
-            thread.join()
-            thread.check()
-            if not thread.num_packets == thread.num_frames == self.episode_length:
+        for key, video in self._videos.items():
+            video.finish()
+            if not video.num_packets == video.num_frames == self.episode_length:
                 raise EncodingError(
-                    f"{key}: {self.episode_length} frames expected, {thread.num_frames} encoded, "
-                    f"{thread.num_packets} written."
+                    f"{key}: {self.episode_length} frames expected, {video.num_frames} encoded, "
+                    f"{video.num_packets} written."
                 )
-            results[key] = (thread.path, histogram_statistics(thread.histogram, thread.num_sampled))
-            self.histograms[key] = self.histograms.get(key, 0) + thread.histogram
-        self._threads.clear()
+            results[key] = (video.path, histogram_statistics(video.histogram, video.num_sampled))
+            self.histograms[key] = self.histograms.get(key, 0) + video.histogram
+        self._videos.clear()
         return results
 
     def cancel_episode(self) -> None:
         """Stop the present episode and remove its videos."""
-        for thread in self._threads.values():
-            thread.cancelled.set()
-        for thread in self._threads.values():
-            thread.join()
-            shutil.rmtree(thread.path.parent, ignore_errors=True)
-        self._threads.clear()
+        for video in self._videos.values():
+            video.close()
+            shutil.rmtree(video.path.parent, ignore_errors=True)
+        self._videos.clear()
 
     def close(self) -> None:
-        """Same as `cancel_episode` (called by LeRobot's writer at the end)."""
+        """Same as `cancel_episode`."""
         self.cancel_episode()
 
 
-class _CameraThread(threading.Thread):
+class _Video:
     def __init__(
         self, path: Path, fps: int, codec: str, pixel_format: str, options: dict[str, str], sampled: frozenset[int]
     ) -> None:
-        super().__init__(daemon=True)
         self.path = path
         self.num_frames = self.num_packets = self.num_sampled = 0
         self.histogram: Histogram = np.zeros((3, _LEVELS), np.int64)
-        self.cancelled = threading.Event()
         self._error: Exception | None = None
-        self._frames: queue.Queue[NDArray[np.uint8] | None] = queue.Queue(_QUEUE_FRAMES)
-        self._fps, self._codec, self._pixel_format, self._options = fps, codec, pixel_format, options
         self._sampled = sampled
+        self._time_base = Fraction(1, fps)
+        self._container = av.open(str(path), "w")
+        self._stream: Any = self._container.add_stream(codec, fps, options=options)
+        self._stream.pix_fmt = pixel_format
+        self._stream.time_base = self._time_base
 
-    def put(self, frame: NDArray[np.uint8] | None) -> None:
-        while True:
-            self.check()
-            try:
-                return self._frames.put(frame, timeout=0.5)
-            except queue.Full:
-                continue
+    def add(self, image: NDArray[np.uint8]) -> None:
+        """Encode a frame; what goes wrong is reported by the next call."""
+        self._check()
+        try:
+            if self.num_frames == 0:
+                self._stream.height, self._stream.width = image.shape[:2]
+            if self.num_frames in self._sampled:
+                self.histogram += channel_histogram(image)
+                self.num_sampled += 1
+            frame = av.VideoFrame.from_ndarray(image, format="rgb24")
+            frame.pts, frame.time_base = self.num_frames, self._time_base
+            self._write(self._stream.encode(frame))
+            self.num_frames += 1
+        except (av.FFmpegError, ValueError, OSError) as error:
+            self._error = error
 
-    def check(self) -> None:
+    def finish(self) -> None:
+        """Write what the encoder still holds, and close the file."""
+        try:
+            if self.num_frames and self._error is None:
+                self._write(self._stream.encode())
+            self._container.close()
+        except (av.FFmpegError, ValueError, OSError) as error:
+            self._error = self._error or error
+        self._check()
+
+    def close(self) -> None:
+        """Close the file without completing it."""
+        with contextlib.suppress(av.FFmpegError, ValueError, OSError):  # it is thrown away
+            self._container.close()
+
+    def _check(self) -> None:
+        if isinstance(self._error, OSError) and self._error.errno is not None:
+            raise self._error  # a full disk or the like: not about this video
         if self._error is not None:
             raise EncodingError(f"{self.path.name}: {self._error}") from self._error
 
-    def run(self) -> None:
-        try:
-            self._encode()
-        except Exception as error:  # handed to the producer by `check`
-            self._error = error
-
-    def _encode(self) -> None:
-        with av.open(str(self.path), "w") as container:
-            stream = container.add_stream(self._codec, self._fps, options=self._options)
-            stream.pix_fmt = self._pixel_format
-            stream.time_base = Fraction(1, self._fps)
-            while (frame := self._next()) is not None:
-                if self.num_frames == 0:
-                    stream.height, stream.width = frame.shape[:2]
-                if self.num_frames in self._sampled:
-                    self.histogram += channel_histogram(frame)
-                    self.num_sampled += 1
-                picture = av.VideoFrame.from_ndarray(frame, format="rgb24")
-                picture.pts, picture.time_base = self.num_frames, Fraction(1, self._fps)
-                self._write(container, stream.encode(picture))
-                self.num_frames += 1
-            if self.num_frames and not self.cancelled.is_set():
-                self._write(container, stream.encode())
-
-    def _next(self) -> NDArray[np.uint8] | None:
-        while not self.cancelled.is_set():
-            try:
-                return self._frames.get(timeout=0.2)
-            except queue.Empty:
-                continue
-        return None
-
-    def _write(self, container: Any, packets: Sequence[Any]) -> None:
+    def _write(self, packets: Sequence[Any]) -> None:
         for packet in packets:
-            container.mux(packet)
+            self._container.mux(packet)
             self.num_packets += 1
 
 
+def sampled_frames(length: int) -> frozenset[int]:
+    """The frames of an episode whose pixels go into the statistics."""
+    return frozenset(np.linspace(0, length - 1, min(SAMPLED_FRAMES, length)).round().astype(int).tolist())
+
+
 def channel_histogram(image: NDArray[np.uint8]) -> Histogram:
-    """How often each level occurs in each channel of an image (H, W, 3) uint8: (3, 256)."""
-    return np.stack([np.bincount(image[..., channel].ravel(), minlength=_LEVELS) for channel in range(3)])
+    """How often each level occurs in each channel of the sampled pixels of an image (H, W, 3) uint8: (3, 256)."""
+    rows, columns = (slice(step // 2, None, step) for step in _steps(*image.shape[:2]))
+    pixels = image[rows, columns]
+    return np.stack([np.bincount(pixels[..., channel].ravel(), minlength=_LEVELS) for channel in range(3)])
+
+
+def num_sampled_pixels(height: int, width: int) -> int:
+    """How many pixels of an image go into its histogram."""
+    rows, columns = (
+        len(range(step // 2, size, step)) for size, step in zip((height, width), _steps(height, width), strict=True)
+    )
+    return rows * columns
+
+
+def _steps(height: int, width: int) -> tuple[int, int]:
+    return max(1, height // SAMPLED_PIXELS), max(1, width // SAMPLED_PIXELS)
 
 
 def histogram_statistics(histogram: Histogram, num_frames: int) -> dict[str, NDArray[Any]]:

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import contextlib
 import fcntl
-import io
 import json
 import os
 import shutil
@@ -23,20 +22,18 @@ import numpy as np
 from tqdm import tqdm
 
 from robocasa_lerobot import __version__
-from robocasa_lerobot.convert.encoder import SAMPLED_FRAMES, Histogram
+from robocasa_lerobot.convert.encoder import CODECS, SAMPLED_FRAMES, SAMPLED_PIXELS, Histogram
 from robocasa_lerobot.convert.lerobot_v2.dataset import V2Dataset
 from robocasa_lerobot.convert.lerobot_v2.finish import conversion_facts, finish_dataset
 from robocasa_lerobot.convert.lerobot_v2.plan import V2Plan, make_v2_plan, takes
 from robocasa_lerobot.convert.lerobot_v2.shard import convert_v2_shard
 from robocasa_lerobot.convert.settings import ConversionSettings, Plan, SourceRecord, make_plan
 from robocasa_lerobot.convert.shard import (
-    CODECS,
     DATASET,
     EPISODES_FILE,
     EXTRAS,
     HISTOGRAMS_FILE,
     REJECTED_FILE,
-    VIDEO_FILE_MB,
     convert_shard,
     episode_folder,
     read_jsonl,
@@ -229,10 +226,9 @@ def _rejected(plan: Plan, partial: Path) -> list[dict[str, Any]]:
 
 def _join(plan: Plan, partial: Path, out: Path) -> ConversionResult | None:
     """Join the shards in `<partial>/merged`; None where no shard has an episode."""
-    from lerobot.datasets.aggregate import aggregate_datasets
-    from lerobot.datasets.dataset_metadata import LeRobotDatasetMetadata
     from lerobot.datasets.io_utils import write_stats
 
+    from robocasa_lerobot.convert.joining import copy_tree, join_datasets
     from robocasa_lerobot.convert.statistics import dataset_statistics
 
     merged = partial / "merged"
@@ -241,36 +237,25 @@ def _join(plan: Plan, partial: Path, out: Path) -> ConversionResult | None:
     full = [folder for folder in folders if (folder / DATASET).exists()]
     if not full:
         return None
-    with contextlib.redirect_stderr(io.StringIO()):  # its progress bars
-        aggregate_datasets(
-            repo_ids=[f"local/{folder.name}" for folder in full],
-            aggr_repo_id=f"local/{out.name}",
-            roots=[folder / DATASET for folder in full],
-            aggr_root=merged,
-            video_files_size_in_mb=VIDEO_FILE_MB,
-            # Copied videos differ in their headers and have B-frames, which LeRobot's joining cannot do.
-            concatenate_videos=not isinstance(plan, V2Plan),
-        )
+    join_datasets([folder / DATASET for folder in full], merged)
     episodes: list[dict[str, Any]] = []
     histograms: dict[str, Histogram] = {}
     for folder in full:
         for line in read_jsonl(folder / EPISODES_FILE):
             index = len(episodes)
-            _link_tree(folder / EXTRAS / episode_folder(line["episode_index"]), merged / EXTRAS / episode_folder(index))
+            copy_tree(folder / EXTRAS / episode_folder(line["episode_index"]), merged / EXTRAS / episode_folder(index))
             episodes.append(line | {"episode_index": index})
         with np.load(folder / HISTOGRAMS_FILE) as arrays:
             for key in arrays.files:
                 histograms[key] = histograms.get(key, 0) + arrays[key]
-    meta = LeRobotDatasetMetadata(f"local/{out.name}", root=merged)
     num_frames = sum(line["length"] for line in episodes)
-    if (meta.total_episodes, meta.total_frames) != (len(episodes), num_frames):
+    info = json.loads((merged / "meta" / "info.json").read_text(encoding="utf-8"))
+    if (info["total_episodes"], info["total_frames"]) != (len(episodes), num_frames):
         raise RuntimeError(
-            f"joining gave {meta.total_episodes} episodes with {meta.total_frames} frames, "
+            f"joining gave {info['total_episodes']} episodes with {info['total_frames']} frames, "
             f"expected {len(episodes)} with {num_frames}."
         )
-    for video in merged.glob("videos/*/*/*.mp4"):
-        video.chmod((merged / "meta" / "info.json").stat().st_mode)  # LeRobot leaves temporary files' mode, owner only
-    write_stats(dataset_statistics(merged, meta.features, histograms), merged)
+    write_stats(dataset_statistics(merged, info["features"], histograms), merged)
     rejected = _rejected(plan, partial)
     ours = merged / META_FOLDER
     ours.mkdir(parents=True)
@@ -297,35 +282,25 @@ def _conversion_record(plan: Plan, out: Path) -> dict[str, Any]:
         "versions": {package: version(package) for package in packages},
         "settings": asdict(plan.settings),
         "video": CODECS[plan.settings.video_codec],
-        "image_statistics": f"{SAMPLED_FRAMES} evenly spaced frames of each episode (all of shorter ones), all pixels",
+        "image_statistics": (
+            f"{SAMPLED_FRAMES} evenly spaced frames of each episode (all of shorter ones), of each "
+            f"{SAMPLED_PIXELS} or more evenly spaced rows and columns (all of smaller pictures)"
+        ),
         "robot_type": plan.mapping.robot_type,
         "fps": plan.fps,
         "cameras": [asdict(camera) for camera in plan.cameras],
-        "sources": [_source_record(source, out) for source in plan.sources],
+        "sources": [_source_record(source, out, plan.settings) for source in plan.sources],
     }
 
 
-def _source_record(source: SourceRecord, out: Path) -> dict[str, Any]:
+def _source_record(source: SourceRecord, out: Path, settings: ConversionSettings) -> dict[str, Any]:
     path = Path(source.file)
     if path.is_dir():
         attributes = V2Dataset(path).collection
     else:
-        with DemoFile(path) as file:
+        with DemoFile(path, settings.layout) as file:
             attributes = file.attributes
     return asdict(source) | {"relative_to_dataset": os.path.relpath(source.file, out), "attributes": attributes}
-
-
-def _link_tree(source: Path, target: Path) -> None:
-    """Copy a folder without copying bytes where the file system allows it; the shard stays as it is."""
-
-    def link(a: str, b: str) -> str:
-        try:
-            os.link(a, b)
-        except OSError:
-            shutil.copy2(a, b)
-        return b
-
-    shutil.copytree(source, target, copy_function=link)
 
 
 def _publish(merged: Path, out: Path, replaced: Path) -> None:

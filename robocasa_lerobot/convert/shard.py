@@ -12,41 +12,17 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-from lerobot.configs import RGBEncoderConfig
-from lerobot.datasets.lerobot_dataset import LeRobotDataset
 
 from robocasa_lerobot import contract
-from robocasa_lerobot.convert.encoder import SamplingVideoEncoder
 from robocasa_lerobot.convert.episode import Episode
 from robocasa_lerobot.convert.settings import Plan, Shard
 from robocasa_lerobot.convert.source import DemoFile, RejectedEpisodeError
+from robocasa_lerobot.convert.writer import DatasetWriter
 
-# Constant rate factor and preset for each codec. Keyframes every 2 frames, as LeRobot has it: random access decodes
-# at most one frame more than asked for. No B-frames: with them the decoding times of short episodes overlap where
-# LeRobot joins video files, and it fails.
-CODECS: dict[str, dict[str, Any]] = {
-    "h264": {"vcodec": "h264", "crf": 18, "preset": "veryfast", "g": 2, "extra_options": {"bf": 0}},
-    "hevc": {"vcodec": "hevc", "crf": 20, "preset": "veryfast", "g": 2, "extra_options": {"bf": 0}},
-    "av1": {"vcodec": "libsvtav1", "crf": 30, "preset": 12, "g": 2},
-}
-# Appending an episode rewrites the video file of its camera, so files stay small; also the time to open one.
-VIDEO_FILE_MB = 50
-_ENCODER_THREADS = 1  # several frames at a time would make the bytes depend on timing and the processes fight for cores
 _PROGRESS_SECONDS = 0.5
 
 DATASET, EXTRAS = "dataset", "extras"
 EPISODES_FILE, REJECTED_FILE, HISTOGRAMS_FILE = "episodes.jsonl", "rejected.jsonl", "histograms.npz"
-
-
-class _ConversionDataset(LeRobotDataset):
-    """LeRobotDataset whose writer gets this project's encoder, through the method LeRobot makes its own with."""
-
-    @staticmethod
-    def _build_streaming_encoder(
-        fps: int, rgb_encoder: Any, depth_encoder: Any, encoder_queue_maxsize: int, encoder_threads: int | None
-    ) -> Any:
-        options = rgb_encoder.get_codec_options(encoder_threads, as_strings=True)
-        return SamplingVideoEncoder(fps, rgb_encoder.vcodec, rgb_encoder.pix_fmt, options)
 
 
 class ShardOutcome(NamedTuple):
@@ -80,13 +56,12 @@ def convert_shard(plan: Plan, shard: Shard, folder: Path, progress: Callable[[in
     rejected: list[RejectedEpisode] = []
     report = _Throttled(progress)
     try:
-        with DemoFile(Path(shard.file)) as file:
+        with DemoFile(Path(shard.file), plan.settings.layout) as file:
             for name in shard.demos:
                 try:
                     with Episode(file, name, plan) as episode:
                         writer.write(episode, file, report)
                 except RejectedEpisodeError as error:
-                    writer.discard()
                     rejected.append(RejectedEpisode(shard.file, name, str(error)))
     finally:
         writer.finalize()
@@ -98,26 +73,22 @@ def convert_shard(plan: Plan, shard: Shard, folder: Path, progress: Callable[[in
 class _ShardWriter:
     def __init__(self, plan: Plan, folder: Path) -> None:
         self._plan, self._folder = plan, folder
-        self._dataset: _ConversionDataset | None = None
+        self._dataset: DatasetWriter | None = None
         self.episodes: list[dict[str, Any]] = []
 
     def write(self, episode: Episode, file: DemoFile, report: _Throttled) -> None:
-        # Not `or`: a dataset without episodes is false.
-        dataset = self._dataset if self._dataset is not None else self._create()
-        encoder = dataset.writer._streaming_encoder
-        encoder.episode_length = episode.length
+        if self._dataset is None:
+            plan = self._plan
+            self._dataset = DatasetWriter(
+                self._folder / DATASET, plan.fps, plan.mapping.robot_type, plan.features, plan.settings.video_codec
+            )
         task = episode.instruction.text
-        for step, pictures in enumerate(episode.pictures()):
-            frame: dict[str, Any] = {contract.image_key(name): picture for name, picture in pictures.items()}
-            frame[contract.STATE_KEY] = episode.states[step]
-            frame[contract.ACTION_KEY] = episode.actions[step]
-            frame[contract.TASK_KEY] = task
-            dataset.add_frame(frame)
-            report.advance(1)
-        dataset.save_episode()
+        columns = {contract.STATE_KEY: episode.states, contract.ACTION_KEY: episode.actions, **episode.extras}
+        pictures = (
+            {contract.image_key(name): picture for name, picture in step.items()} for step in episode.pictures()
+        )
+        self._dataset.add(columns, task, episode.length, pictures, report.advance)
         index = len(self.episodes)
-        assert dataset.meta.total_episodes == index + 1
-        assert dataset.meta.total_frames == sum(line["length"] for line in self.episodes) + episode.length
         _write_extras(episode, self._folder / EXTRAS / episode_folder(index))
         meta = episode.demo.ep_meta
         self.episodes.append(
@@ -133,12 +104,9 @@ class _ShardWriter:
                 "style_id": meta.get("style_id"),
                 "state_source": episode.state_source,
                 "rendered_cameras": list(episode.rendered_cameras),
+                **({"mimicgen": episode.provenance} if episode.provenance else {}),
             }
         )
-
-    def discard(self) -> None:
-        if self._dataset is not None:
-            self._dataset.clear_episode_buffer()
 
     def finalize(self) -> None:
         """Close the files; without this the parquet files have no footer and the dataset is lost."""
@@ -146,26 +114,10 @@ class _ShardWriter:
             return
         self._dataset.finalize()
         if self.episodes:
-            histograms = self._dataset.writer._streaming_encoder.histograms
+            histograms: dict[str, Any] = self._dataset.histograms
             np.savez_compressed(self._folder / HISTOGRAMS_FILE, **histograms)
         else:
             shutil.rmtree(self._folder / DATASET)
-
-    def _create(self) -> _ConversionDataset:
-        plan = self._plan
-        self._dataset = _ConversionDataset.create(
-            repo_id="local/shard",
-            root=self._folder / DATASET,
-            fps=plan.fps,
-            robot_type=plan.mapping.robot_type,
-            features=plan.features,
-            streaming_encoding=True,
-            video_backend="pyav",
-            rgb_encoder=RGBEncoderConfig(**CODECS[plan.settings.video_codec]),
-            encoder_threads=_ENCODER_THREADS,
-            video_files_size_in_mb=VIDEO_FILE_MB,
-        )
-        return self._dataset
 
 
 def episode_folder(index: int) -> str:

@@ -6,7 +6,8 @@ episodes differ; training with quantile normalization would see it.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import tempfile
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +16,9 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
-from robocasa_lerobot.convert.encoder import QUANTILES, Histogram, histogram_statistics
+from robocasa_lerobot.convert.encoder import QUANTILES, Histogram, histogram_statistics, num_sampled_pixels
+
+_ROWS = 65_536  # read at a time
 
 
 def column(root: Path, key: str) -> NDArray[Any]:
@@ -41,14 +44,37 @@ def dataset_statistics(
     stats = {}
     for key, feature in features.items():
         if feature["dtype"] in ("video", "image"):
-            num_frames = int(histograms[key].sum()) // int(np.prod(feature["shape"]))
-            levels = histogram_statistics(histograms[key], num_frames)
-            stats[key] = {
-                name: value if name == "count" else (value / 255).reshape(3, 1, 1) for name, value in levels.items()
-            }
+            stats[key] = picture_statistics(histograms[key], feature["shape"])
         elif feature["dtype"] != "string":
-            stats[key] = vector_statistics(column(root, key))
+            stats[key] = _column_statistics(root, key)
     return stats
+
+
+def picture_statistics(histogram: Histogram, shape: Sequence[int]) -> dict[str, NDArray[Any]]:
+    """Statistics (3, 1, 1) in [0, 1] of the sampled pixels of pictures of `shape` (H, W, 3)."""
+    num_frames = int(histogram.sum()) // (3 * num_sampled_pixels(shape[0], shape[1]))
+    levels = histogram_statistics(histogram, num_frames)
+    return {name: value if name == "count" else (value / 255).reshape(3, 1, 1) for name, value in levels.items()}
+
+
+def _column_statistics(root: Path, key: str) -> dict[str, NDArray[Any]]:
+    """Statistics of a column over all frames of a dataset, with one component at a time in memory."""
+    files = sorted((root / "data").glob("*/*.parquet"))
+    num_rows = sum(pq.read_metadata(file).num_rows for file in files)
+    with tempfile.TemporaryFile(dir=root.parent) as scratch:
+        components: np.memmap[Any, np.dtype[np.float64]] | None = None
+        start = 0
+        for file in files:
+            for batch in pq.ParquetFile(file).iter_batches(_ROWS, columns=[key]):
+                rows = column_of(pa.Table.from_batches([batch]), key).astype(np.float64).reshape(len(batch), -1)
+                if components is None:
+                    components = np.memmap(scratch, np.float64, "w+", shape=(rows.shape[1], num_rows))
+                components[:, start : start + len(rows)] = rows.T
+                start += len(rows)
+        assert components is not None
+        each = [vector_statistics(np.array(component)) for component in components]
+    joined = {name: np.concatenate([stats[name] for stats in each]) for name in each[0]}
+    return joined | {"count": each[0]["count"]}
 
 
 def vector_statistics(values: NDArray[Any]) -> dict[str, NDArray[Any]]:

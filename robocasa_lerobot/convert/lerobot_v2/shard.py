@@ -25,6 +25,8 @@ from numpy.typing import NDArray
 
 from robocasa_lerobot import contract
 from robocasa_lerobot.convert.encoder import (
+    CODECS,
+    ENCODER_THREADS,
     SAMPLED_FRAMES,
     Histogram,
     SamplingVideoEncoder,
@@ -37,13 +39,11 @@ from robocasa_lerobot.convert.lerobot_v2.plan import V2Plan
 from robocasa_lerobot.convert.lerobot_v2.video import VideoFiles, VideoForm, frames, probe, rgb
 from robocasa_lerobot.convert.settings import Camera, Shard
 from robocasa_lerobot.convert.shard import (
-    CODECS,
     DATASET,
     EPISODES_FILE,
     EXTRAS,
     HISTOGRAMS_FILE,
     REJECTED_FILE,
-    VIDEO_FILE_MB,
     RejectedEpisode,
     ShardOutcome,
     episode_folder,
@@ -51,6 +51,7 @@ from robocasa_lerobot.convert.shard import (
 )
 from robocasa_lerobot.convert.source import RejectedEpisodeError
 from robocasa_lerobot.convert.statistics import vector_statistics
+from robocasa_lerobot.convert.writer import VIDEO_FILE_MB, arrow_table
 
 _DATA_FILE = "data/chunk-000/file-000.parquet"
 
@@ -153,7 +154,7 @@ class _Writer:
             episode.check_frames(key, count)
             return _Video(path, form, histogram, len(sampled), None)
         scratch.mkdir(exist_ok=True)
-        options = self._codec.get_codec_options(1, as_strings=True)
+        options = self._codec.get_codec_options(ENCODER_THREADS, as_strings=True)
         encoder = SamplingVideoEncoder(self._plan.fps, self._codec.vcodec, self._codec.pix_fmt, options)
         encoder.episode_length = episode.length
         try:
@@ -179,7 +180,7 @@ class _Writer:
         }
         assert self._tables is not None
         assert self._schema is not None
-        self._tables.write_table(_table(columns, self._schema))
+        self._tables.write_table(arrow_table(columns, self._schema))
         entries: dict[str, Any] = {
             "data/chunk_index": 0,
             "data/file_index": 0,
@@ -253,19 +254,3 @@ class _Writer:
 def _sampled(length: int) -> frozenset[int]:
     """The frames whose pixels go into the statistics, the same as the encoder takes."""
     return frozenset(np.linspace(0, length - 1, min(SAMPLED_FRAMES, length)).round().astype(int).tolist())
-
-
-def _table(columns: Mapping[str, NDArray[Any]], schema: pa.Schema) -> pa.Table:
-    arrays = []
-    for field in schema:
-        values = columns[field.name]
-        if pa.types.is_nested(field.type):
-            flat = pa.array(values.reshape(-1), type=field.type.value_type)
-            if pa.types.is_fixed_size_list(field.type):
-                arrays.append(pa.FixedSizeListArray.from_arrays(flat, field.type.list_size))
-            else:
-                edges = np.arange(0, flat.__len__() + 1, values.shape[1], dtype=np.int32)
-                arrays.append(pa.ListArray.from_arrays(edges, flat))
-        else:
-            arrays.append(pa.array(values, type=field.type))
-    return pa.Table.from_arrays(arrays, schema=schema)
