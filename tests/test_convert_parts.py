@@ -24,8 +24,9 @@ from robocasa_lerobot.convert.encoder import (
     channel_histogram,
     histogram_statistics,
 )
-from robocasa_lerobot.convert.mapping import choose_mapping, quaternion_xyzw
+from robocasa_lerobot.convert.mapping import quaternion_xyzw
 from robocasa_lerobot.convert.mjcf import AssetFinder, MissingAssetsError, loadable
+from robocasa_lerobot.convert.robots import choose_mapping
 from robocasa_lerobot.convert.settings import ConversionSettings, make_plan
 from robocasa_lerobot.convert.source import DemoFile, RejectedEpisodeError, SourceError
 from robocasa_lerobot.errors import UserError

@@ -5,6 +5,8 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
+from robocasa_lerobot.convert.options import add_source_options, source_settings
+
 EXAMPLE = "robocasa-lerobot convert demos/*.hdf5 --out data/demos"
 
 _CODECS = ("h264", "hevc", "av1")
@@ -28,16 +30,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
         metavar="DIR",
         help="where to look for meshes and textures that the scenes name (repeatable); matched by the end of the path",
     )
-    parser.add_argument(
-        "--cameras",
-        type=lambda text: tuple(name.strip() for name in text.split(",") if name.strip()),
-        metavar="A,B,C",
-        help="cameras to take (default: the robot's own three)",
-    )
-    parser.add_argument(
-        "--image-size", type=int, metavar="PIXELS", help="height and width (default: as stored, else 256)"
-    )
-    parser.add_argument("--instruction", help="language of episodes that have none recorded")
+    add_source_options(parser)
     parser.add_argument("--workers", type=int, help="processes (default: by the amount of work and cores)")
     parser.add_argument("--video-codec", choices=_CODECS, default="h264", help="default: %(default)s")
     parser.add_argument(
@@ -65,9 +58,7 @@ def run(args: argparse.Namespace) -> int:
 
     settings = ConversionSettings(
         asset_roots=tuple(args.asset_root),
-        cameras=args.cameras,
-        image_size=args.image_size,
-        instruction=args.instruction,
+        **source_settings(args),
         video_codec=args.video_codec,
         render_preset=args.render_preset,
         reencode=args.reencode,

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack
-from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Self
@@ -13,40 +11,22 @@ from typing import TYPE_CHECKING, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from robocasa_lerobot.convert.demo import RejectedEpisodeError
+from robocasa_lerobot.convert.instruction import instruction_of
 from robocasa_lerobot.convert.mjcf import AssetFinder, loadable
 from robocasa_lerobot.convert.settings import Camera, Plan, needs_scene
-from robocasa_lerobot.convert.source import Demo, DemoFile, RejectedEpisodeError
+from robocasa_lerobot.convert.source import DemoFile
+from robocasa_lerobot.errors import UnknownNameError
 
 if TYPE_CHECKING:
     from robocasa_lerobot.convert.render import Scene
-
-_WORD = re.compile(r"[A-Z]+(?=[A-Z][a-z])|[A-Z]?[a-z]+|[A-Z]+|\d+")
-
-
-@dataclass(frozen=True)
-class Instruction:
-    """The language of an episode and where it came from."""
-
-    text: str
-    source: str
-
-
-def instruction_of(demo: Demo, env_name: str, fallback: str | None) -> Instruction:
-    """The recorded instruction, else the user's, else the words of the environment's name and nothing invented."""
-    recorded = demo.ep_meta.get("lang")
-    if isinstance(recorded, str) and recorded.strip():
-        return Instruction(recorded, "ep_meta.lang")
-    if fallback is not None:
-        return Instruction(fallback, "--instruction")
-    words = [word.lower() for word in _WORD.findall(env_name)]
-    return Instruction(" ".join(words) or env_name, "environment name")
 
 
 class Episode:
     """A demo seen through a plan; use it in a `with` block (it may hold a compiled scene).
 
-    Attributes: `actions` (T, A) and `states` (T, S) float64 in stored order, `instruction`, `state_source`, and
-    `simulator_states` (T, 1 + nq + nv) or None.
+    Attributes: `actions` (T, A) and `states` (T, S) float64 in stored order, `extras` (feature name -> (T, k) float64),
+    `instruction`, `provenance` (MimicGen's), `state_source`, and `simulator_states` (T, 1 + nq + nv) or None.
 
     Raises:
         RejectedEpisodeError: anything about this demo that keeps it from being converted.
@@ -56,7 +36,13 @@ class Episode:
     def __init__(self, file: DemoFile, name: str, plan: Plan) -> None:
         self.demo = file.demo(name)
         self.actions = plan.mapping.actions(self.demo)
-        self.instruction = instruction_of(self.demo, file.env_name, plan.settings.instruction)
+        settings = plan.settings
+        try:
+            self.instruction = instruction_of(self.demo, file, settings.instruction, settings.replace_instruction)
+        except UnknownNameError as error:  # a field that this episode lacks; the first one of its file has it
+            raise RejectedEpisodeError(str(error)) from None
+        self.extras = plan.mapping.extras(self.demo)
+        self.provenance = self.demo.provenance
         self.cameras = plan.cameras
         self._scene: Scene | None = None
         self._stack = ExitStack()

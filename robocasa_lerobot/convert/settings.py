@@ -5,18 +5,24 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from robocasa_lerobot import contract
-from robocasa_lerobot.convert.mapping import RobotMapping, choose_mapping
+from robocasa_lerobot.convert.custom_mapping import parse_mapping
+from robocasa_lerobot.convert.demo import Demo, RejectedEpisodeError, SourceError
+from robocasa_lerobot.convert.instruction import instruction_of, template_fields
+from robocasa_lerobot.convert.layout import ACTION_KEYS, Layout
+from robocasa_lerobot.convert.mapping import RobotMapping
 from robocasa_lerobot.convert.mjcf import AssetFinder, loadable, scene_names
-from robocasa_lerobot.convert.source import Demo, DemoFile, RejectedEpisodeError, SourceError
+from robocasa_lerobot.convert.robots import choose_mapping
+from robocasa_lerobot.convert.selection import check_selection, select
+from robocasa_lerobot.convert.source import DemoFile
 from robocasa_lerobot.errors import UnknownNameError, UserError
 
 # Raised when the written bytes change for the same input, so that shards of an older version are not taken up again.
-FORMAT_VERSION = 1
+FORMAT_VERSION = 2
 # A shard is what a kill can lose and what a worker takes at a time: some seconds of work, but never so many shards
 # that joining them costs more than making them.
 SHARD_FRAMES = 250
@@ -28,7 +34,9 @@ class ConversionSettings:
     """What the user asked for.
 
     `cameras` None takes the robot's own; `image_size` (pixels, square) None keeps the size of stored pictures and
-    renders at the contract's size.
+    renders at the contract's size. `instruction` may be a template (`instruction.py`), and comes before a recorded one
+    with `replace_instruction`. `filter_key`, `demos` and `demos_seed` select episodes (`selection.py`). `extra_columns`
+    are HDF5 paths below an episode. `mapping` is the JSON text of a mapping file (`custom_mapping.read_mapping`).
     """
 
     asset_roots: tuple[str, ...] = ()
@@ -40,8 +48,16 @@ class ConversionSettings:
     # Of datasets of videos: encode all of them again, or those with more frames from one key frame to the next.
     reencode: bool = False
     max_gop: int = 10
+    replace_instruction: bool = False
+    filter_key: str | None = None
+    demos: str | None = None
+    demos_seed: int = 0
+    action_key: str = "actions"
+    extra_columns: tuple[str, ...] = ()
+    mapping: str | None = None
 
     def __post_init__(self) -> None:
+        object.__setattr__(self, "extra_columns", tuple(self.extra_columns))  # a list where it comes from JSON
         if self.max_gop < 1:
             raise UserError(f"the largest key frame interval is {self.max_gop} frames; at least 1 is needed.")
         if self.image_size is not None and (self.image_size < 16 or self.image_size % 2):
@@ -52,6 +68,28 @@ class ConversionSettings:
             raise UserError(f"cameras {', '.join(self.cameras) or '(none)'}: name each camera once, and at least one.")
         if self.instruction is not None and not self.instruction.strip():
             raise UserError("the instruction is empty: give some text, or leave the option out.")
+        if self.instruction is not None:
+            template_fields(self.instruction)
+        check_selection(self.filter_key, self.demos)
+        if self.action_key not in ACTION_KEYS:
+            raise UnknownNameError("action key", self.action_key, ACTION_KEYS)
+        if self.mapping is not None and self.action_key != ACTION_KEYS[0]:
+            raise UserError("--action-key and --mapping exclude each other: the mapping file names the actions' keys.")
+        for key in self.extra_columns:
+            if key.startswith("/") or any(piece in ("", ".", "..") for piece in key.split("/")):
+                raise UserError(f"extra column {key!r}: a path below an episode is needed, such as obs/object.")
+        if len(set(self.extra_columns)) != len(self.extra_columns):
+            raise UserError("extra columns: name each once.")
+
+    @property
+    def layout(self) -> Layout:
+        """How HDF5 files are read."""
+        layout = parse_mapping(self.mapping) if self.mapping is not None else Layout(action_key=self.action_key)
+        return replace(layout, extra_columns=self.extra_columns)
+
+    def select(self, file: DemoFile) -> tuple[str, ...]:
+        """Names of the demos of a file that are converted."""
+        return select(file, self.filter_key, self.demos, self.demos_seed)
 
 
 @dataclass(frozen=True)
@@ -61,6 +99,7 @@ class SourceRecord:
     file: str  # as the user gave it
     sha256: str
     size_bytes: int
+    demos: tuple[str, ...] | None = None  # those selected, None for all
 
 
 @dataclass(frozen=True)
@@ -124,6 +163,7 @@ def make_plan(files: Sequence[Path], settings: ConversionSettings) -> Plan:
             ("robot", first.mapping.robot_type, look.mapping.robot_type),
             ("state parts", first.mapping.state_parts, look.mapping.state_parts),
             ("action parts", first.mapping.action_parts, look.mapping.action_parts),
+            ("extra columns", first.mapping.extra_columns, look.mapping.extra_columns),
             ("rate in Hz", first.fps, look.fps),
             ("cameras", first.cameras, look.cameras),
         ):
@@ -135,7 +175,7 @@ def make_plan(files: Sequence[Path], settings: ConversionSettings) -> Plan:
     num_frames = sum(length for look in looks for _, length in look.demos)
     target = max(SHARD_FRAMES, -(-num_frames // MAX_SHARDS))
     shards = [shard for look in looks for shard in _cut(look, target)]
-    sources = tuple(SourceRecord(str(look.file), file_sha256(look.file), look.file.stat().st_size) for look in looks)
+    sources = tuple(_source(look) for look in looks)
     return Plan(settings, sources, first.mapping, first.cameras, first.fps, tuple(shards), num_frames)
 
 
@@ -145,6 +185,11 @@ def file_sha256(file: Path) -> str:
         return hashlib.file_digest(stream, "sha256").hexdigest()
 
 
+def _source(look: _Look) -> SourceRecord:
+    selected = None if look.all_demos else tuple(name for name, _ in look.demos)
+    return SourceRecord(str(look.file), file_sha256(look.file), look.file.stat().st_size, selected)
+
+
 @dataclass(frozen=True)
 class _Look:
     file: Path
@@ -152,13 +197,15 @@ class _Look:
     cameras: tuple[Camera, ...]
     fps: int
     demos: tuple[tuple[str, int], ...]  # name, number of steps (0 where it will be rejected)
+    all_demos: bool
 
 
 def _look(path: Path, settings: ConversionSettings, roots: Sequence[Path]) -> _Look:
-    with DemoFile(path) as file:
+    with DemoFile(path, settings.layout) as file:
         reasons, demos = [], []
         sample: Demo | None = None
-        for name in file.demo_names:
+        selected = settings.select(file)
+        for name in selected:
             try:
                 demo = file.demo(name)
                 demos.append((name, demo.length))
@@ -170,6 +217,7 @@ def _look(path: Path, settings: ConversionSettings, roots: Sequence[Path]) -> _L
             raise SourceError(f"{path} has no usable demo; {reasons[0]} Record it again, or leave the file out.")
         try:
             mapping = choose_mapping(file, sample)
+            instruction_of(sample, file, settings.instruction, settings.replace_instruction)
             cameras = _cameras(file, sample, mapping, settings)
             if needs_scene(sample, mapping, [camera.name for camera in cameras]):
                 if sample.model_xml is None or sample.states is None:
@@ -182,7 +230,7 @@ def _look(path: Path, settings: ConversionSettings, roots: Sequence[Path]) -> _L
                 loadable(sample.model_xml, AssetFinder(roots, file.asset))
         except RejectedEpisodeError as error:
             raise SourceError(f"{path}: {sample.name} cannot be used: {error}") from None
-        return _Look(path, mapping, cameras, file.control_hz, tuple(demos))
+        return _Look(path, mapping, cameras, file.control_hz, tuple(demos), len(selected) == len(file.demo_names))
 
 
 def needs_scene(demo: Demo, mapping: RobotMapping, cameras: Sequence[str]) -> bool:
