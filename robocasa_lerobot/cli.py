@@ -31,6 +31,7 @@ SUBCOMMANDS: dict[str, Subcommand] = {
     "demos": Subcommand("robocasa_lerobot.demos.command", "record demonstrations of tasks as HDF5"),
     "convert": Subcommand("robocasa_lerobot.convert.command", "convert demonstration files to a LeRobotDataset v3.0"),
     "verify": Subcommand("robocasa_lerobot.convert.verify_command", "compare a converted dataset with its source"),
+    "export": Subcommand("robocasa_lerobot.convert.export_command", "write a LeRobotDataset v3.0 back to HDF5"),
     "train": Subcommand("robocasa_lerobot.training.command", "run the training phases of an experiment file"),
     "eval": Subcommand("robocasa_lerobot.evaluation.command", "run seeded trials of a policy and report"),
     "report": Subcommand("robocasa_lerobot.evaluation.report_command", "write report.html and report.md from results"),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -15,9 +15,12 @@ from tqdm import tqdm
 
 from robocasa_lerobot import contract
 from robocasa_lerobot.convert.episode import Episode
-from robocasa_lerobot.convert.mapping import choose_mapping
+from robocasa_lerobot.convert.lerobot_v2.dataset import V2Dataset, is_dataset_folder
+from robocasa_lerobot.convert.lerobot_v2.plan import SOURCE_FORMAT, source_record
+from robocasa_lerobot.convert.mapping import EXTRA_PREFIX
 from robocasa_lerobot.convert.pipeline import CONVERSION_FILE, META_FOLDER, quiet_libraries
 from robocasa_lerobot.convert.report import CameraQuality, Check, Report
+from robocasa_lerobot.convert.robots import choose_mapping
 from robocasa_lerobot.convert.settings import Camera, ConversionSettings, Plan, SourceRecord, file_sha256
 from robocasa_lerobot.convert.shard import EPISODES_FILE, REJECTED_FILE, read_jsonl
 from robocasa_lerobot.convert.source import DemoFile, RejectedEpisodeError
@@ -44,6 +47,7 @@ _COLUMNS = (
     "index",
     "task_index",
 )
+_EXTRAS = "extra columns"  # a check of datasets that have such
 _PEAK = 255.0
 # A picture counts as misplaced where another step's true picture fits it better by this factor in squared error.
 _MISPLACED_FACTOR = 1.5
@@ -71,6 +75,9 @@ def verify(
     if not (root / META_FOLDER / CONVERSION_FILE).is_file():
         what = "a dataset without our records" if (root / "meta" / "info.json").is_file() else "no dataset"
         raise UserError(f"{root} is {what}: {META_FOLDER}/{CONVERSION_FILE}, which `convert` writes, is not there.")
+    # Here, as it builds on this module.
+    from robocasa_lerobot.convert.lerobot_v2.verify import V2Verification
+
     quiet_libraries()
     record = json.loads((root / META_FOLDER / CONVERSION_FILE).read_text(encoding="utf-8"))
     episodes = read_jsonl(root / META_FOLDER / EPISODES_FILE)
@@ -78,9 +85,10 @@ def verify(
         dataset = LeRobotDataset(f"local/{root.name}", root=root, video_backend="pyav", return_uint8=True)
     except Exception as error:
         raise UserError(f"LeRobot does not open {root}: {type(error).__name__}: {error}") from error
-    verification = _Verification(root, dataset, episodes, record, pictures_per_episode, min_psnr_db)
+    kind = V2Verification if record.get("source_format") == SOURCE_FORMAT else Verification
+    verification = kind(root, dataset, episodes, record, pictures_per_episode, min_psnr_db)
     files = _find_sources(root, record["sources"], sources)
-    settings = _settings(record, asset_roots)
+    settings = recorded_settings(record, asset_roots)
     verification.check_structure()
     verification.check_videos()
     with tqdm(total=len(episodes), unit="episode", desc="verifying") as bar:
@@ -89,7 +97,9 @@ def verify(
     return verification.report()
 
 
-class _Verification:
+class Verification:
+    """The comparison of a dataset with its sources; `check_*` may be called once each, then `report`."""
+
     def __init__(
         self,
         root: Path,
@@ -99,16 +109,21 @@ class _Verification:
         pictures_per_episode: int | None,
         min_psnr_db: float,
     ) -> None:
-        self._root, self._dataset, self._episodes = root, dataset, episodes
+        self._root, self._dataset, self._episodes, self._record = root, dataset, episodes, record
         self._pictures_per_episode, self._min_psnr_db = pictures_per_episode, min_psnr_db
         self._checks = {name: Check(name) for name in _CHECKS}
         self._quality = {camera["name"]: CameraQuality(camera["name"]) for camera in record["cameras"]}
         # The dataset as LeRobot opened it, without the conversion to float32 that its items go through.
-        table = dataset.hf_dataset.select_columns(list(_COLUMNS)).with_format("arrow")[:]
-        self._columns: dict[str, NDArray[Any]] = {key: column_of(table, key) for key in _COLUMNS}
+        extras = [key for key in dataset.meta.features if key.startswith(EXTRA_PREFIX)]
+        if extras:
+            self._checks[_EXTRAS] = Check(_EXTRAS)
+        keys = [*_COLUMNS, *extras]
+        table = dataset.hf_dataset.select_columns(keys).with_format("arrow")[:]
+        self._columns: dict[str, NDArray[Any]] = {key: column_of(table, key) for key in keys}
         self._tasks = {int(row.task_index): str(task) for task, row in dataset.meta.tasks.iterrows()}
 
     def report(self) -> Report:
+        """What was found so far."""
         return Report(
             str(self._root),
             self._dataset.num_episodes,
@@ -160,9 +175,9 @@ class _Verification:
         mine = [line for line in self._episodes if line["source_file"] == recorded]
         rejected = read_jsonl(self._root / META_FOLDER / REJECTED_FILE)
         out = {line["source_demo"] for line in rejected if line["source_file"] == recorded}
-        with DemoFile(path) as file:
+        with DemoFile(path, settings.layout) as file:
             written = {line["source_demo"] for line in mine}
-            for name in file.demo_names:
+            for name in settings.select(file):
                 self._checks["episodes"].expect(
                     (name in written) != (name in out), f"{path} {name} is neither converted nor rejected, or both"
                 )
@@ -184,23 +199,26 @@ class _Verification:
         for name, key, expected in (
             ("actions", contract.ACTION_KEY, episode.actions),
             ("states", contract.STATE_KEY, episode.states),
+            *((_EXTRAS, key, values) for key, values in episode.extras.items()),
         ):
-            _compare_bits(self._checks[name], label, self._columns[key][where], expected)
+            compare_bits(self._checks[name], label, self._columns[key][where].reshape(-1, expected.shape[1]), expected)
         timestamps = self._columns["timestamp"][where]
         exact = (np.arange(length) / self._dataset.fps).astype(np.float32)
-        _compare_bits(self._checks["timestamps"], label, timestamps, exact)
+        compare_bits(self._checks["timestamps"], label, timestamps, exact)
         tasks = {self._tasks.get(int(task)) for task in np.unique(self._columns["task_index"][where])}
         self._checks["instructions"].expect(
             tasks == {episode.instruction.text} and line["instruction"] == episode.instruction.text,
             f"{label}: {sorted(map(str, tasks))}, the source has {episode.instruction.text!r}",
         )
         if len(rows) == length:
-            self._check_pictures(label, int(rows[0]), episode)
+            self.check_pictures(label, int(rows[0]), length, episode.pictures_at)
 
-    def _check_pictures(self, label: str, first_row: int, episode: Episode) -> None:
+    def check_pictures(
+        self, label: str, first_row: int, length: int, pictures_at: Callable[[int], dict[str, NDArray[np.uint8]]]
+    ) -> None:
         """Each decoded picture resembles its true one, and no other step's true picture fits it better."""
         check = self._checks["pictures"]
-        steps = _spread(episode.length, self._pictures_per_episode)
+        steps = spread(length, self._pictures_per_episode)
         true: dict[str, list[NDArray[np.uint8]]] = {camera: [] for camera in self._quality}
         decoded: dict[str, list[NDArray[np.uint8]]] = {camera: [] for camera in self._quality}
         for step in steps:
@@ -209,7 +227,7 @@ class _Verification:
             except Exception as error:  # whatever a decoder throws at a broken video
                 check.expect(False, f"{label} step {step}: LeRobot cannot read it: {type(error).__name__}: {error}")
                 return
-            for camera, picture in episode.pictures_at(step).items():
+            for camera, picture in pictures_at(step).items():
                 true[camera].append(picture)
                 decoded[camera].append(item[contract.image_key(camera)].permute(1, 2, 0).numpy())
         for camera, quality in self._quality.items():
@@ -228,20 +246,22 @@ class _Verification:
                 )
 
 
-def _compare_bits(check: Check, label: str, found: NDArray[Any], expected: NDArray[Any]) -> None:
+def compare_bits(check: Check, label: str, found: NDArray[Any], expected: NDArray[Any]) -> None:
+    """Count the values whose bit patterns differ between two arrays with the same first axis, the steps."""
     check.compared += expected.size
     if found.shape != expected.shape or found.dtype != expected.dtype:
         check.fail(f"{label}: {found.shape} {found.dtype}, the source has {expected.shape} {expected.dtype}")
         return
     # Bit patterns, so that -0.0 and 0.0 are told apart.
-    bits = np.uint64 if expected.dtype.itemsize == 8 else np.uint32
+    bits = np.dtype(f"u{expected.dtype.itemsize}")
     different = np.argwhere(np.ascontiguousarray(found).view(bits) != np.ascontiguousarray(expected).view(bits))
     for where in different:
         at = tuple(int(i) for i in where)
         check.fail(f"{label} step {at[0]} component {at[1:]}: {found[at]!r}, the source has {expected[at]!r}")
 
 
-def _spread(length: int, count: int | None) -> list[int]:
+def spread(length: int, count: int | None) -> list[int]:
+    """`count` evenly spaced steps of an episode, or all of them."""
     if count is None or count >= length:
         return list(range(length))
     return sorted({int(step) for step in np.linspace(0, length - 1, count).round()})
@@ -257,7 +277,8 @@ def _num_video_frames(file: Path) -> int:
         return sum(1 for packet in container.demux(video=0) if packet.size)
 
 
-def _settings(record: dict[str, Any], asset_roots: Sequence[str]) -> ConversionSettings:
+def recorded_settings(record: dict[str, Any], asset_roots: Sequence[str]) -> ConversionSettings:
+    """The settings of a conversion from its `conversion.json`, with further asset roots."""
     settings = record["settings"]
     recorded = [root for root in settings["asset_roots"] if Path(root).is_dir()]
     cameras = settings["cameras"]
@@ -271,7 +292,7 @@ def _settings(record: dict[str, Any], asset_roots: Sequence[str]) -> ConversionS
 
 
 def _plan(file: DemoFile, lines: list[dict[str, Any]], settings: ConversionSettings, record: dict[str, Any]) -> Plan:
-    sample = file.demo(lines[0]["source_demo"] if lines else file.demo_names[0])
+    sample = file.demo(lines[0]["source_demo"] if lines else settings.select(file)[0])
     return Plan(
         settings=settings,
         sources=(),
@@ -283,10 +304,14 @@ def _plan(file: DemoFile, lines: list[dict[str, Any]], settings: ConversionSetti
     )
 
 
+def _sha256(path: Path) -> str:
+    return source_record(V2Dataset(path)).sha256 if is_dataset_folder(path) else file_sha256(path)
+
+
 def _find_sources(root: Path, recorded: list[dict[str, Any]], given: Sequence[Path]) -> Iterator[tuple[str, Path, str]]:
     """For each recorded source: its recorded name, where it is now, and its recorded SHA-256."""
-    by_sha = {file_sha256(path): path for path in given if path.is_file()}
-    missing = [path for path in given if not path.is_file()]
+    by_sha = {_sha256(path): path for path in given if path.exists()}
+    missing = [path for path in given if not path.exists()]
     if missing:
         raise UserError(f"--source {missing[0]} does not exist.")
     for entry in recorded:
@@ -295,7 +320,7 @@ def _find_sources(root: Path, recorded: list[dict[str, Any]], given: Sequence[Pa
         same_name = [path for path in given if path.name == Path(source.file).name]
         places = [Path(source.file), root / entry["relative_to_dataset"]]
         candidates = [by_sha[source.sha256]] if source.sha256 in by_sha else [*same_name, *([] if given else places)]
-        path = next((place for place in candidates if place.is_file()), None)
+        path = next((place for place in candidates if place.exists()), None)
         if path is None:
             raise UserError(
                 f"the source {source.file} is not there any more. Give the source files with --source FILE ..."

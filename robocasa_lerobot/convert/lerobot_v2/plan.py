@@ -90,7 +90,7 @@ def make_v2_plan(folders: Sequence[Path], settings: ConversionSettings) -> V2Pla
         UserError: a dataset is damaged or has no usable episode, datasets do not fit together, or a camera is unknown
             or declared without files. Nothing has been written then.
     """
-    looks = [_look(V2Dataset(folder), settings) for folder in folders]
+    looks = [look_into(V2Dataset(folder), settings) for folder in folders]
     first = looks[0]
     for look in looks[1:]:
         for what, ours, theirs in (
@@ -141,7 +141,9 @@ def source_record(dataset: V2Dataset) -> SourceRecord:
 
 
 @dataclass(frozen=True)
-class _Look:
+class Look:
+    """What was decided about one dataset."""
+
     dataset: V2Dataset
     mapping: RobotMapping
     columns: tuple[Column, ...]
@@ -151,10 +153,16 @@ class _Look:
 
     @property
     def target_columns(self) -> list[tuple[str, str, tuple[str, ...]]]:
+        """What has to be equal in datasets that are joined."""
         return [(column.name, column.dtype, column.names) for column in self.columns]
 
 
-def _look(dataset: V2Dataset, settings: ConversionSettings) -> _Look:
+def look_into(dataset: V2Dataset, settings: ConversionSettings) -> Look:
+    """Decide columns and cameras of a dataset, and find its first usable episode.
+
+    Raises:
+        UserError: the dataset has none, is damaged, or has not the cameras that were asked for.
+    """
     notes: list[str] = []
     if not dataset.tasks and settings.instruction is None:
         raise SourceError(f"{dataset.root}: meta/tasks.jsonl is empty. Give the instruction with --instruction.")
@@ -172,7 +180,7 @@ def _look(dataset: V2Dataset, settings: ConversionSettings) -> _Look:
             continue
         if episode.time_offset:
             notes.append(f"recorded times start at {episode.time_offset:.4f} s; they are counted from 0 anew")
-        return _Look(dataset, mapping, columns, cameras, keys, tuple(notes))
+        return Look(dataset, mapping, columns, cameras, keys, tuple(notes))
     raise SourceError(f"{dataset.root} has no usable episode; {reasons[0]} Download it again.")
 
 

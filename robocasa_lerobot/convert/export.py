@@ -1,0 +1,277 @@
+"""LeRobotDataset v3.0 back to one HDF5 file in the robomimic/RoboCasa layout, for tools that want it.
+
+Values are the dataset's own, bit for bit, with actions in the order of HDF5 files; pictures are the decoded ones. The
+file is written beside its place and renamed when complete.
+"""
+
+from __future__ import annotations
+
+import gzip
+import json
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+from numpy.typing import NDArray
+from tqdm import tqdm
+
+from robocasa_lerobot import __version__, contract
+from robocasa_lerobot.convert.exported import EXTRA_PREFIX, ExportedDataset, ExportedEpisode
+from robocasa_lerobot.convert.source import ASSETS_GROUP, IMAGE_SUFFIX
+from robocasa_lerobot.errors import UnknownNameError, UserError
+
+COMPRESSIONS = ("gzip", "lzf", "none")
+_GZIP_LEVEL = 1  # pictures hardly get smaller with more, only slower
+_BLOCK_FRAMES = 32  # decoded frames held at a time
+_ROBOSUITE_ENV = 1  # robomimic's number for environments of robosuite
+# Observations of robosuite for the parts of arms with a fixed base; a further arm's name comes before each.
+_ARM_OBSERVATIONS = {
+    "end_effector_position": "eef_pos",
+    "end_effector_rotation": "eef_quat",
+    "gripper_qpos": "gripper_qpos",
+}
+
+
+@dataclass(frozen=True)
+class ExportSettings:
+    """What is exported; None takes all cameras, or the only task."""
+
+    cameras: tuple[str, ...] | None = None
+    images: bool = True
+    task: str | None = None
+    compression: str = "gzip"
+
+    def __post_init__(self) -> None:
+        if self.compression not in COMPRESSIONS:
+            raise UnknownNameError("compression", self.compression, COMPRESSIONS)
+
+
+@dataclass(frozen=True)
+class ExportResult:
+    """What was written, and what the dataset did not have."""
+
+    path: Path
+    num_episodes: int
+    num_frames: int
+    notes: tuple[str, ...]
+
+
+def export(root: Path, out: Path, settings: ExportSettings | None = None, overwrite: bool = False) -> ExportResult:
+    """Write the episodes of a dataset to the HDF5 file `out`.
+
+    Groups are `demo_0`, `demo_1`, ... in the order of the dataset. `states` and `model_file` are there where the
+    dataset keeps them under `extras`, `rewards` where it has `next.reward`.
+
+    Raises:
+        UserError: no readable dataset, an unknown camera or task, episodes of several tasks, `out` exists, or writing
+            fails. Nothing is at `out` then.
+    """
+    settings = settings or ExportSettings()
+    if out.exists() and (not overwrite or out.is_dir()):
+        raise UserError(f"{out} exists already. Choose another --out, or replace it with --overwrite.")
+    dataset = ExportedDataset(root)
+    episodes = _chosen(dataset, settings.task)
+    cameras = _cameras(dataset, settings)
+    notes: list[str] = []
+    out.parent.mkdir(parents=True, exist_ok=True)
+    partial = out.with_name(f"{out.name}.partial")
+    try:
+        with h5py.File(partial, "w") as file:
+            num_frames = _write(file, dataset, episodes, cameras, settings, notes)
+        partial.replace(out)
+    except OSError as error:
+        raise UserError(f"writing {out} failed: {error}. Nothing is there; free what is lacking and repeat.") from error
+    finally:
+        partial.unlink(missing_ok=True)
+    return ExportResult(out, len(episodes), num_frames, tuple(notes))
+
+
+def _chosen(dataset: ExportedDataset, task: str | None) -> list[ExportedEpisode]:
+    names = dict.fromkeys(episode.task_name for episode in dataset.episodes)
+    if task is not None and task not in names:
+        raise UnknownNameError("task", task, names, f"({dataset.root})")
+    if task is None and len(names) > 1:
+        raise UserError(
+            f"{dataset.root} has episodes of {len(names)} tasks ({', '.join(list(names)[:8])}), but an HDF5 file names "
+            "one environment: choose with --task, a file for each."
+        )
+    return [episode for episode in dataset.episodes if task is None or episode.task_name == task]
+
+
+def _cameras(dataset: ExportedDataset, settings: ExportSettings) -> tuple[str, ...]:
+    if not settings.images:
+        return ()
+    for name in settings.cameras or ():
+        if name not in dataset.cameras:
+            raise UnknownNameError("camera", name, dataset.cameras, f"({dataset.root}; choose with --cameras)")
+    return settings.cameras if settings.cameras is not None else tuple(dataset.cameras)
+
+
+def _write(
+    file: h5py.File,
+    dataset: ExportedDataset,
+    episodes: Sequence[ExportedEpisode],
+    cameras: Sequence[str],
+    settings: ExportSettings,
+    notes: list[str],
+) -> int:
+    data = file.create_group("data")
+    compression = _compression(settings.compression)
+    lacking: dict[str, int] = {}
+    num_frames = 0
+    with tqdm(total=sum(episode.length for episode in episodes), unit="frame", desc="exporting") as bar:
+        for index, episode in enumerate(episodes):
+            group = data.create_group(f"demo_{index}")
+            for what in _write_vectors(group, dataset, episode, compression):
+                lacking[what] = lacking.get(what, 0) + 1
+            for camera in cameras:
+                _write_pictures(group, dataset, episode, camera, compression)
+            num_frames += episode.length
+            bar.update(episode.length)
+    notes += [f"{what} of {count} episodes are not in the dataset: left out" for what, count in lacking.items()]
+    data.attrs.update(_attributes(dataset, episodes))
+    data.attrs["total"] = num_frames
+    _copy_assets(data, dataset, notes)
+    return num_frames
+
+
+def _write_vectors(
+    group: h5py.Group, dataset: ExportedDataset, episode: ExportedEpisode, compression: dict[str, Any]
+) -> list[str]:
+    """Everything but pictures; gives what the dataset lacks."""
+    columns = dataset.columns(episode)
+    actions = columns.pop(contract.ACTION_KEY)
+    mobile = dataset.features[contract.ACTION_KEY].get("names") == contract.component_names(contract.ACTION_PARTS)
+    group.create_dataset("actions", data=contract.stored_to_hdf5(actions) if mobile else actions, **compression)
+    observations: dict[str, NDArray[Any]] = {}
+    if contract.STATE_KEY in columns:
+        observations |= _observations(dataset, columns.pop(contract.STATE_KEY))
+    for key, values in observations.items():
+        group.create_dataset(f"obs/{key}", data=values, **compression)
+    for key, values in columns.items():
+        if key.startswith(EXTRA_PREFIX):
+            group.create_dataset(key.removeprefix(EXTRA_PREFIX).replace(".", "/"), data=values, **compression)
+    lacking = []
+    if "next.reward" in columns:
+        group.create_dataset("rewards", data=columns["next.reward"].reshape(-1).astype(np.float64))
+    dones = np.zeros(episode.length, np.int64)
+    dones[-1] = 1  # robomimic's done mode 1: the last step of a demonstration
+    dones = columns["next.done"].reshape(-1).astype(np.int64) if "next.done" in columns else dones
+    group.create_dataset("dones", data=dones)
+    folder = dataset.extras(episode)
+    states = folder / "states.npz"
+    if states.is_file():
+        with np.load(states) as arrays:
+            group.create_dataset("states", data=arrays["states"], **compression)
+    else:
+        lacking.append("simulator states")
+    model = folder / "model.xml.gz"
+    if model.is_file():
+        group.attrs["model_file"] = gzip.decompress(model.read_bytes()).decode("utf-8")
+    else:
+        lacking.append("scenes (model_file)")
+    meta_file = folder / "ep_meta.json"
+    meta = json.loads(meta_file.read_text(encoding="utf-8")) if meta_file.is_file() else {}
+    # What training has as its language; it is recorded here even where it came from elsewhere.
+    group.attrs["ep_meta"] = json.dumps(meta | {"lang": dataset.instruction(episode)})
+    group.attrs["num_samples"] = episode.length
+    return lacking
+
+
+def _observations(dataset: ExportedDataset, states: NDArray[Any]) -> dict[str, NDArray[Any]]:
+    """The state's parts under robosuite's names where they are known, else the whole under `state`."""
+    if dataset.features[contract.STATE_KEY].get("names") == contract.component_names(contract.STATE_PARTS):
+        return {contract.STATE_PART_HDF5_KEYS[name]: states[:, where] for name, where in contract.STATE_SLICES.items()}
+    observations: dict[str, NDArray[Any]] = {}
+    for name, where in dataset.parts("state").items():
+        arm, ending = _arm_part(name)
+        if ending is None:
+            return {"state": states}
+        observations[f"{arm}{ending}"] = states[:, where]
+    return observations or {"state": states}
+
+
+def _arm_part(name: str) -> tuple[str, str | None]:
+    for part, ending in _ARM_OBSERVATIONS.items():
+        if name == part or name.endswith(f"_{part}"):
+            arm = name.removesuffix(part)
+            return (arm if arm.startswith("robot") else f"robot0_{arm}"), ending
+    return "", None
+
+
+def _write_pictures(
+    group: h5py.Group, dataset: ExportedDataset, episode: ExportedEpisode, camera: str, compression: dict[str, Any]
+) -> None:
+    target: h5py.Dataset | None = None
+    start = 0
+    for block in _blocks(dataset.pictures(episode, camera)):
+        if target is None:
+            shape = block.shape[1:]
+            target = group.create_dataset(
+                f"obs/{camera}{IMAGE_SUFFIX}",
+                shape=(episode.length, *shape),
+                dtype=np.uint8,
+                chunks=(1, *shape),
+                **compression,
+            )
+        target[start : start + len(block)] = block
+        start += len(block)
+
+
+def _blocks(pictures: Iterator[NDArray[np.uint8]]) -> Iterator[NDArray[np.uint8]]:
+    block: list[NDArray[np.uint8]] = []
+    for picture in pictures:
+        block.append(picture)
+        if len(block) == _BLOCK_FRAMES:
+            yield np.stack(block)
+            block = []
+    if block:
+        yield np.stack(block)
+
+
+def _attributes(dataset: ExportedDataset, episodes: Sequence[ExportedEpisode]) -> dict[str, Any]:
+    """Attributes of the first episode's source file, and always an `env_args` with the rate and the robot."""
+    recorded = dict(dataset.source_attributes(episodes[0]))
+    env_args = _json_object(recorded.get("env_args"))
+    info = _json_object(recorded.get("env_info"))
+    kwargs = env_args.get("env_kwargs") if isinstance(env_args.get("env_kwargs"), dict) else {}
+    assert isinstance(kwargs, dict)
+    defaults = {"control_freq": dataset.fps, "robots": [dataset.robot_type]}
+    name = env_args.get("env_name") or recorded.get("env") or episodes[0].task_name
+    recorded["env_args"] = json.dumps(
+        {"env_name": name, "type": _ROBOSUITE_ENV} | env_args | {"env_kwargs": defaults | info | kwargs}
+    )
+    recorded.setdefault("env", name)
+    recorded["robocasa_lerobot_version"] = __version__
+    return {key: value for key, value in recorded.items() if isinstance(value, str | int | float | bool)}
+
+
+def _copy_assets(data: h5py.Group, dataset: ExportedDataset, notes: list[str]) -> None:
+    """Files that the scenes name and that the source files hold themselves, where these are still to be found."""
+    for path in dataset.source_files():
+        try:
+            with h5py.File(path, "r") as source:
+                group = source.get(f"data/{ASSETS_GROUP}")
+                if isinstance(group, h5py.Group) and ASSETS_GROUP not in data:
+                    source.copy(group, data, name=ASSETS_GROUP)
+        except OSError as error:
+            notes.append(f"textures stored in {path} could not be taken over ({error})")
+
+
+def _compression(name: str) -> dict[str, Any]:
+    if name == "none":
+        return {}
+    level: dict[str, Any] = {"compression_opts": _GZIP_LEVEL} if name == "gzip" else {}
+    return {"compression": name} | level
+
+
+def _json_object(value: Any) -> dict[str, Any]:
+    if isinstance(value, str):
+        try:
+            value = json.loads(value)
+        except json.JSONDecodeError:
+            return {}
+    return value if isinstance(value, dict) else {}

@@ -1,0 +1,131 @@
+"""A dataset made from LeRobot v2 compared with its source: columns bit for bit, copied frames sample by sample."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from tqdm import tqdm
+
+from robocasa_lerobot import contract
+from robocasa_lerobot.convert.lerobot_v2.dataset import EXTRAS, V2Dataset
+from robocasa_lerobot.convert.lerobot_v2.episode import Column, V2Episode, episode_name
+from robocasa_lerobot.convert.lerobot_v2.plan import look_into, source_record
+from robocasa_lerobot.convert.lerobot_v2.video import digests
+from robocasa_lerobot.convert.pipeline import META_FOLDER
+from robocasa_lerobot.convert.report import Check
+from robocasa_lerobot.convert.settings import Camera, ConversionSettings
+from robocasa_lerobot.convert.shard import REJECTED_FILE, episode_folder, read_jsonl
+from robocasa_lerobot.convert.source import RejectedEpisodeError
+from robocasa_lerobot.convert.statistics import column_of
+from robocasa_lerobot.convert.verify import Verification, compare_bits, spread
+
+_MORE_CHECKS = ("other columns", "extras", "copied frames")
+
+
+class V2Verification(Verification):
+    """The comparison for sources in LeRobot v2."""
+
+    def __init__(self, *args: Any) -> None:
+        super().__init__(*args)
+        self._checks |= {name: Check(name) for name in _MORE_CHECKS}
+        self._cameras = {camera["name"]: Camera(**camera) for camera in self._record["cameras"]}
+
+    def check_file(
+        self, recorded: str, path: Path, sha256: str, settings: ConversionSettings, record: dict[str, Any], bar: tqdm
+    ) -> None:
+        """All episodes of one source dataset, and that none of them is unaccounted for."""
+        source = V2Dataset(path)
+        self._checks["source files"].expect(
+            source_record(source).sha256 == sha256, f"{path} has changed since the conversion (its SHA-256 is another)"
+        )
+        mine = {line["source_demo"]: line for line in self._episodes if line["source_file"] == recorded}
+        rejected = read_jsonl(self._root / META_FOLDER / REJECTED_FILE)
+        out = {line["source_demo"] for line in rejected if line["source_file"] == recorded}
+        look = look_into(source, settings)
+        tasks = tuple(self._tasks[row] for row in sorted(self._tasks))
+        lost = [text for text in source.tasks.values() if text not in tasks]
+        self._checks["instructions"].expect(not lost, f"rows of {path}'s tasks are missing: {lost[:3]}")
+        for line in source.episodes:
+            name = episode_name(line.index)
+            self._checks["episodes"].expect(
+                (name in mine) != (name in out), f"{path} {name} is neither converted nor rejected, or both"
+            )
+            if name not in mine or lost:
+                continue
+            try:
+                episode = V2Episode(source, line, look.columns, tasks, settings.instruction)
+                self._check_v2_episode(mine[name], episode, look.columns, dict(look.camera_keys))
+            except RejectedEpisodeError as error:
+                self._checks["episodes"].fail(f"{path} {name}: {error}")
+            bar.update()
+
+    def _check_v2_episode(
+        self, line: dict[str, Any], episode: V2Episode, columns: tuple[Column, ...], keys: dict[str, str]
+    ) -> None:
+        index, length = line["episode_index"], episode.length
+        rows = np.flatnonzero(self._columns["episode_index"] == index)
+        label = f"episode {index} ({episode.name})"
+        videos = {key: episode.video(key)[0] for key in keys.values()}
+        self._checks["source files"].expect(
+            episode.digest(videos) == line["source_sha256"], f"{label}: its source files have changed"
+        )
+        self._checks["frames"].expect(len(rows) == length, f"{label}: {len(rows)} rows, {length} in the source")
+        if len(rows) != length:
+            return
+        named = {contract.ACTION_KEY: "actions", contract.STATE_KEY: "states"}
+        table = self._dataset.hf_dataset.select_columns([c.name for c in columns]).with_format("arrow")
+        part = table[int(rows[0]) : int(rows[-1]) + 1]
+        for column in columns:
+            check = self._checks[named.get(column.name, "other columns")]
+            compare_bits(check, f"{label} {column.name}", column_of(part, column.name), episode.columns[column.name])
+        exact = (np.arange(length) / self._dataset.fps).astype(np.float32)
+        compare_bits(self._checks["timestamps"], label, self._columns["timestamp"][rows], exact)
+        self._check_instructions(label, line, episode, rows)
+        folder = self._root / EXTRAS / episode_folder(index)
+        for file in episode.extras.files:
+            kept = folder / file.name
+            same = kept.is_file() and kept.read_bytes() == file.read_bytes()
+            self._checks["extras"].expect(same, f"{label}: {file.name} is not that of the source")
+        self._check_copied(label, line, episode, keys)
+        pictures = self._sample(episode, keys)
+        self.check_pictures(label, int(rows[0]), length, pictures.__getitem__)
+
+    def _check_instructions(self, label: str, line: dict[str, Any], episode: V2Episode, rows: NDArray[np.intp]) -> None:
+        check = self._checks["instructions"]
+        found = [self._tasks.get(int(row)) for row in self._columns["task_index"][rows]]
+        tasks = [self._tasks[int(row)] for row in episode.task_index]
+        check.expect(found == tasks, f"{label}: {sorted(set(map(str, found)))}, the source has {sorted(set(tasks))}")
+        check.expect(line["instruction"] == tasks[0], f"{label}: recorded as {line['instruction']!r}")
+        listed = self._dataset.meta.episodes[line["episode_index"]]["tasks"]
+        check.expect(set(listed) == set(tasks), f"{label}: listed as {listed}")
+
+    def _check_copied(self, label: str, line: dict[str, Any], episode: V2Episode, keys: dict[str, str]) -> None:
+        """Every frame of a video that was not encoded again, in order."""
+        check = self._checks["copied frames"]
+        for camera, key in keys.items():
+            if camera in line["reencoded"]:
+                continue
+            meta, index, feature = self._dataset.meta, line["episode_index"], contract.image_key(camera)
+            file = self._root / meta.get_video_file_path(index, feature)
+            start = meta.episodes[index][f"videos/{feature}/from_timestamp"]
+            true = digests(episode.video(key)[0])
+            try:
+                found = digests(file, start, len(true))
+            except Exception as error:  # whatever a decoder throws at a broken video
+                check.fail(f"{label} {camera}: {type(error).__name__}: {error}")
+                continue
+            check.expect(len(found) == len(true), f"{label} {camera}: {len(found)} frames, {len(true)} in the source")
+            for step, (ours, theirs) in enumerate(zip(found, true, strict=False)):
+                check.expect(ours == theirs, f"{label} {camera} step {step}: another picture than in the source")
+
+    def _sample(self, episode: V2Episode, keys: dict[str, str]) -> dict[int, dict[str, NDArray[np.uint8]]]:
+        steps = set(spread(episode.length, self._pictures_per_episode))
+        pictures: dict[int, dict[str, NDArray[np.uint8]]] = {step: {} for step in steps}
+        for camera, key in keys.items():
+            for step, picture in enumerate(episode.pictures(key, self._cameras[camera])):
+                if step in steps:
+                    pictures[step][camera] = picture
+        return pictures
