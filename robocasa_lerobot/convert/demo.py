@@ -21,6 +21,7 @@ from robocasa_lerobot.convert.hdf5 import (
     member,
     names,
     reading,
+    recorded_attributes,
     shape_and_type,
     text_attribute,
 )
@@ -29,6 +30,7 @@ from robocasa_lerobot.convert.layout import ROBOMIMIC, Layout, Picture
 __all__ = ["IMAGE_SUFFIX", "MAX_COLUMN_VALUES", "Demo", "RejectedEpisodeError", "SourceError", "first_line"]
 
 IMAGE_SUFFIX = "_image"
+MAX_SHOWN_TEXT = 200
 
 
 class Demo:
@@ -140,6 +142,7 @@ class Demo:
             return {}
         try:
             meta = json.loads(text)
+            json.dumps(meta, ensure_ascii=False).encode()  # fails for halves of characters, which no file can hold
         except (ValueError, RecursionError) as error:  # also numbers of thousands of digits, and endless nesting
             raise RejectedEpisodeError(f"its ep_meta is not JSON ({error}).") from None
         if not isinstance(meta, dict):
@@ -150,6 +153,14 @@ class Demo:
         """An attribute of the episode's group, bytes as text, or None."""
         with reading(f"the attribute {name!r}"):
             return plain(self._group.attrs.get(name))
+
+    def attribute_kinds(self) -> dict[str, str]:
+        """Names of the attributes of the episode's group, each with its value, or its length where it is a long text.
+
+        Raises:
+            RejectedEpisodeError: they are damaged.
+        """
+        return {key: _shown(value) for key, value in recorded_attributes(self._group).items()}
 
     def text_of(self, key: str) -> str | None:
         """The text in a dataset below the episode (the first, if it has several), or None."""
@@ -241,6 +252,11 @@ class Demo:
     def _read(self, dataset: h5py.Dataset, where: Any, what: str) -> NDArray[Any]:
         with reading(what):
             return dataset[where]
+
+
+def _shown(value: Any) -> str:
+    text = str(value)
+    return text if len(text) <= MAX_SHOWN_TEXT else f"{len(text)} characters"
 
 
 def _flat(column: NDArray[np.float64]) -> NDArray[np.float64]:

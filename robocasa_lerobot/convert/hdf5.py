@@ -20,11 +20,13 @@ from robocasa_lerobot.errors import UserError
 # Larger things than these are no demonstration: values of one column, bytes of one text, of one chunk, of one file
 # that a scene names, and of one attribute that is only kept as a record; height and width of pictures.
 MAX_COLUMN_VALUES = 50_000_000
+MAX_VALUES = 1 << 40  # of pictures, which are read a few at a time
 MAX_TEXT_BYTES = 32 << 20
 MAX_CHUNK_BYTES = 1 << 30
 MAX_ASSET_BYTES = 1 << 29
 MAX_RECORDED_BYTES = 1 << 20
 MAX_IMAGE_SIDE = 4096
+LEFT_OUT = "(attributes left out)"
 _MAX_LINKS = 8
 # Everything that h5py has been seen to raise on damaged files.
 _FAILURES = (OSError, RuntimeError, ValueError, TypeError, LookupError, ArithmeticError, MemoryError, SystemError)
@@ -43,7 +45,7 @@ def reading(what: str) -> Iterator[None]:
     """Turn whatever h5py raises in the body into a RejectedEpisodeError that names `what`."""
     try:
         yield
-    except RejectedEpisodeError:
+    except UserError:
         raise
     except _FAILURES as error:
         raise RejectedEpisodeError(f"{what} cannot be read ({first_line(error)}).") from None
@@ -88,11 +90,14 @@ def names(group: h5py.Group, what: str) -> list[str]:
         return list(group)
 
 
-def shape_and_type(dataset: h5py.Dataset, what: str) -> tuple[tuple[int, ...], np.dtype[Any]]:
-    """Shape and type of a dataset whose data are wholly in its file.
+def shape_and_type(
+    dataset: h5py.Dataset, what: str, max_values: int | None = None
+) -> tuple[tuple[int, ...], np.dtype[Any]]:
+    """Shape and type of a dataset whose data are wholly in its file, at most `max_values` numbers.
 
     Raises:
-        RejectedEpisodeError: they are elsewhere (external, virtual), partly missing, in absurd chunks, or unreadable.
+        RejectedEpisodeError: they are elsewhere (external, virtual), partly missing, too many, in absurd chunks, or
+            unreadable.
     """
     with reading(what):
         shape, dtype = dataset.shape, dataset.dtype
@@ -100,7 +105,7 @@ def shape_and_type(dataset: h5py.Dataset, what: str) -> tuple[tuple[int, ...], n
             raise RejectedEpisodeError(f"{what} is empty.")
         if dataset.is_virtual or dataset.external:
             raise RejectedEpisodeError(f"{what} takes its values from other files, which are not read.")
-        if any(length > np.iinfo(np.int64).max for length in shape):
+        if math.prod(shape) > (MAX_VALUES if max_values is None else max_values):
             raise RejectedEpisodeError(f"{what} declares the absurd shape {shape}.")
         chunks = dataset.chunks
         if chunks is not None:
@@ -136,26 +141,28 @@ def text_attribute(node: h5py.Group, key: str) -> str | None:
 
 
 def recorded_attributes(node: h5py.Group) -> dict[str, Any]:
-    """All attributes as plain data, for the record; those too large for that by their size in words.
+    """All attributes as plain data; why some are left out (damaged, or too large for a record) is under `LEFT_OUT`.
 
     Raises:
         RejectedEpisodeError: the list of attributes is damaged.
     """
+    attributes: dict[str, Any] = {}
+    left_out: list[str] = []
     with reading("the list of attributes"):
         keys = list(node.attrs)
-    attributes: dict[str, Any] = {}
     for key in keys:
         try:
             with reading(f"the attribute {key!r}"):
+                key.encode("utf-8")
                 _check_size(node, key, MAX_RECORDED_BYTES)
                 value = _plain(node.attrs[key])
-                text = value if isinstance(value, str) else repr(value)
-                if len(text.encode("utf-8")) > MAX_RECORDED_BYTES:
-                    raise RejectedEpisodeError(f"{key!r} is left out: {len(text)} characters.")
-                attributes[key.encode("utf-8", "replace").decode()] = value
+                size = len((value if isinstance(value, str) else repr(value)).encode("utf-8"))
+                if size > MAX_RECORDED_BYTES:
+                    raise RejectedEpisodeError(f"the attribute {key!r} has {size} bytes.")
+                attributes[key] = value
         except RejectedEpisodeError as error:
-            attributes[key.encode("utf-8", "replace").decode()] = f"({error})"
-    return attributes
+            left_out.append(str(error))
+    return attributes | ({LEFT_OUT: left_out} if left_out else {})
 
 
 def _check_size(node: h5py.Group, key: str, limit: int) -> None:

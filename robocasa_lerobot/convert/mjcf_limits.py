@@ -91,7 +91,7 @@ def check_limits(root: ET.Element, file_elements: tuple[str, ...]) -> None:
 def _check_copies(root: ET.Element) -> None:
     level = [(root, 1.0)]
     while level:
-        deeper = []
+        deeper: list[tuple[ET.Element, float]] = []
         for element, copies in level:
             if element.tag in _MULTIPLIERS:
                 copies *= max(1.0, _product(element.get("count", "1")))

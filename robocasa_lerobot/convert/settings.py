@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Sequence
+from collections import Counter
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -19,6 +20,7 @@ from robocasa_lerobot.convert.mjcf import AssetFinder, loadable, scene_names
 from robocasa_lerobot.convert.robots import choose_mapping
 from robocasa_lerobot.convert.selection import check_selection, select
 from robocasa_lerobot.convert.source import DemoFile
+from robocasa_lerobot.convert.survey import survey
 from robocasa_lerobot.errors import UnknownNameError, UserError
 
 # Raised when the written bytes change for the same input, so that shards of an older version are not taken up again.
@@ -27,6 +29,7 @@ FORMAT_VERSION = 2
 # that joining them costs more than making them.
 SHARD_FRAMES = 250
 MAX_SHARDS = 64
+_MAX_CANDIDATES = 10  # demos by which robot and cameras are judged, until one is good
 
 
 @dataclass(frozen=True)
@@ -117,6 +120,7 @@ class Shard:
 
     file: str
     demos: tuple[str, ...]
+    rejected: tuple[tuple[str, str], ...] = ()  # those of them that are not to be opened, and why
 
 
 @dataclass(frozen=True)
@@ -157,6 +161,7 @@ def make_plan(files: Sequence[Path], settings: ConversionSettings) -> Plan:
         raise UserError(f"{min(doubles)} was given more than once.")
     roots = [Path(root) for root in settings.asset_roots]
     looks = [_look(file, settings, roots) for file in files]
+    copies = _copies(looks)
     first = looks[0]
     for look in looks[1:]:
         for what, ours, theirs in (
@@ -174,7 +179,7 @@ def make_plan(files: Sequence[Path], settings: ConversionSettings) -> Plan:
                 )
     num_frames = sum(length for look in looks for _, length in look.demos)
     target = max(SHARD_FRAMES, -(-num_frames // MAX_SHARDS))
-    shards = [shard for look in looks for shard in _cut(look, target)]
+    shards = [shard for look in looks for shard in _cut(look, target, copies)]
     sources = tuple(_source(look) for look in looks)
     return Plan(settings, sources, first.mapping, first.cameras, first.fps, tuple(shards), num_frames)
 
@@ -198,39 +203,86 @@ class _Look:
     fps: int
     demos: tuple[tuple[str, int], ...]  # name, number of steps (0 where it will be rejected)
     all_demos: bool
+    traps: dict[str, str]  # demos that end the process that reads them, and how
+    digests: dict[str, str]  # of whole demos
 
 
 def _look(path: Path, settings: ConversionSettings, roots: Sequence[Path]) -> _Look:
-    with DemoFile(path, settings.layout) as file:
-        reasons, demos = [], []
-        sample: Demo | None = None
+    if not path.is_file():
+        DemoFile(path)  # says what is wrong
+    layout = settings.layout
+    found = survey(path, layout.episodes)
+    with DemoFile(path, layout) as file:
+        demos: list[tuple[str, int]] = []
+        widths: dict[str, int] = {}
+        reasons: list[str] = []
         selected = settings.select(file)
+        traps = {name: reason for name in selected if (reason := found.reason(file.place(name)))}
         for name in selected:
             try:
+                if name in traps:
+                    raise RejectedEpisodeError(traps[name])
                 demo = file.demo(name)
                 demos.append((name, demo.length))
-                sample = sample or demo
+                widths[name] = demo.actions.shape[1]
             except RejectedEpisodeError as error:
                 demos.append((name, 0))
                 reasons.append(f"{name}: {error}")
-        if sample is None:
+        if not widths:
             raise SourceError(f"{path} has no usable demo; {reasons[0]} Record it again, or leave the file out.")
+        mapping, cameras = _robot_and_cameras(file, widths, settings, roots)
+        digests = {name: found.digests[file.place(name)] for name in widths if file.place(name) in found.digests}
+        all_demos = len(selected) == len(file.demo_names)
+        return _Look(path, mapping, cameras, file.control_hz, tuple(demos), all_demos, traps, digests)
+
+
+def _robot_and_cameras(
+    file: DemoFile, widths: dict[str, int], settings: ConversionSettings, roots: Sequence[Path]
+) -> tuple[RobotMapping, tuple[Camera, ...]]:
+    """Judged by the first good demo of those with the most frequent number of actions."""
+    usual = Counter(widths.values()).most_common(1)[0][0]
+    candidates = [name for name, width in widths.items() if width == usual][:_MAX_CANDIDATES]
+    failure: UserError | None = None
+    for name in candidates:
         try:
-            mapping = choose_mapping(file, sample)
-            instruction_of(sample, file, settings.instruction, settings.replace_instruction)
-            cameras = _cameras(file, sample, mapping, settings)
-            if needs_scene(sample, mapping, [camera.name for camera in cameras]):
-                if sample.model_xml is None or sample.states is None:
-                    lacking = "model_file attribute" if sample.model_xml is None else "states"
-                    raise SourceError(
-                        f"{path}: {sample.name} has no {lacking}, which is needed to render "
-                        f"{', '.join(c.name for c in cameras)} or to compute the robot's state. "
-                        f"Stored pictures: {', '.join(sample.image_cameras) or 'none'} (choose with --cameras)."
-                    )
-                loadable(sample.model_xml, AssetFinder(roots, file.asset))
+            return _judge(file, file.demo(name), settings, roots)
         except RejectedEpisodeError as error:
-            raise SourceError(f"{path}: {sample.name} cannot be used: {error}") from None
-        return _Look(path, mapping, cameras, file.control_hz, tuple(demos), len(selected) == len(file.demo_names))
+            failure = failure or SourceError(f"{file.path}: {name} cannot be used: {error}")
+        except UserError as error:
+            failure = failure or error
+    assert failure is not None
+    raise failure
+
+
+def _judge(
+    file: DemoFile, sample: Demo, settings: ConversionSettings, roots: Sequence[Path]
+) -> tuple[RobotMapping, tuple[Camera, ...]]:
+    mapping = choose_mapping(file, sample)
+    instruction_of(sample, file, settings.instruction, settings.replace_instruction)
+    cameras = _cameras(file, sample, mapping, settings)
+    if needs_scene(sample, mapping, [camera.name for camera in cameras]):
+        if sample.model_xml is None or sample.states is None:
+            lacking = "model_file attribute" if sample.model_xml is None else "states"
+            raise SourceError(
+                f"{file.path}: {sample.name} has no {lacking}, which is needed to render "
+                f"{', '.join(c.name for c in cameras)} or to compute the robot's state. "
+                f"Stored pictures: {', '.join(sample.image_cameras) or 'none'} (choose with --cameras)."
+            )
+        loadable(sample.model_xml, AssetFinder(roots, file.asset))
+    return mapping, cameras
+
+
+def _copies(looks: Sequence[_Look]) -> dict[tuple[Path, str], str]:
+    """For each demo (file, name) that is a copy of an earlier one: a sentence that names that one."""
+    first: dict[str, tuple[Path, str]] = {}
+    copies: dict[tuple[Path, str], str] = {}
+    for look in looks:
+        for name, digest in look.digests.items():
+            file, earlier = first.setdefault(digest, (look.file, name))
+            if (file, earlier) != (look.file, name):
+                where = earlier if file == look.file else f"{earlier} of {file}"
+                copies[look.file, name] = f"it is a copy of {where}: numbers, attributes and first pictures are equal."
+    return copies
 
 
 def needs_scene(demo: Demo, mapping: RobotMapping, cameras: Sequence[str]) -> bool:
@@ -259,14 +311,16 @@ def _cameras(file: DemoFile, demo: Demo, mapping: RobotMapping, settings: Conver
     return tuple(cameras)
 
 
-def _cut(look: _Look, target: int) -> list[Shard]:
-    shards, names, frames = [], [], 0
-    for name, length in look.demos:
+def _cut(look: _Look, target: int, copies: Mapping[tuple[Path, str], str]) -> list[Shard]:
+    rejected = look.traps | {name: reason for (file, name), reason in copies.items() if file == look.file}
+    shards: list[Shard] = []
+    names: list[str] = []
+    frames = 0
+    for position, (name, length) in enumerate(look.demos, start=1):
         names.append(name)
         frames += length
-        if frames >= target:
-            shards.append(Shard(str(look.file), tuple(names)))
+        if frames >= target or position == len(look.demos):
+            reasons = tuple((name, rejected[name]) for name in names if name in rejected)
+            shards.append(Shard(str(look.file), tuple(names), reasons))
             names, frames = [], 0
-    if names:
-        shards.append(Shard(str(look.file), tuple(names)))
     return shards

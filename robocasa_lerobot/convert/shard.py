@@ -15,6 +15,7 @@ import numpy as np
 
 from robocasa_lerobot import contract
 from robocasa_lerobot.convert.episode import Episode
+from robocasa_lerobot.convert.mjcf import MissingAssetsError
 from robocasa_lerobot.convert.settings import Plan, Shard
 from robocasa_lerobot.convert.source import DemoFile, RejectedEpisodeError
 from robocasa_lerobot.convert.writer import DatasetWriter
@@ -57,11 +58,14 @@ def convert_shard(plan: Plan, shard: Shard, folder: Path, progress: Callable[[in
     report = _Throttled(progress)
     try:
         with DemoFile(Path(shard.file), plan.settings.layout) as file:
+            known = dict(shard.rejected)
             for name in shard.demos:
                 try:
+                    if name in known:
+                        raise RejectedEpisodeError(known[name])
                     with Episode(file, name, plan) as episode:
                         writer.write(episode, file, report)
-                except RejectedEpisodeError as error:
+                except (RejectedEpisodeError, MissingAssetsError) as error:
                     rejected.append(RejectedEpisode(shard.file, name, str(error)))
     finally:
         writer.finalize()
@@ -144,7 +148,8 @@ def write_jsonl(path: Path, lines: list[dict[str, Any]]) -> None:
 
 def read_jsonl(path: Path) -> list[dict[str, Any]]:
     """The JSON objects of a file with one on each line."""
-    return [json.loads(line) for line in path.read_text(encoding="utf-8").splitlines() if line]
+    # Not `splitlines`, which also breaks at other characters that instructions may hold.
+    return [json.loads(line) for line in path.read_text(encoding="utf-8").split("\n") if line]
 
 
 class _Throttled:

@@ -44,6 +44,7 @@ from robocasa_lerobot.errors import suggest
 __all__ = ["IMAGE_SUFFIX", "MAX_COLUMN_VALUES", "Demo", "DemoFile", "RejectedEpisodeError", "SourceError"]
 
 WHOLE_FILE = "episode"  # name of the only episode of a file that is one episode
+UNKNOWN = "unknown"  # name of an environment that the file does not name
 MASKS_GROUP = "mask"  # mask/<filter key>: names of the demos that belong to it
 MAX_RATE_HZ = 10_000
 ASSETS_GROUP = "assets"  # data/assets/<path>: files that the MJCF names, stored once for each HDF5 file
@@ -115,6 +116,11 @@ class DemoFile:
             raise SourceError(f"{self.path} has no demos (groups {wanted}): leave it out, or record it again.")
         return data, sorted(found_names, key=_natural)
 
+    def members(self, path: str) -> tuple[str, ...]:
+        """Names in a group of the file; none where there is no such group."""
+        group = self._file if path == "/" else member(self._file, path)
+        return tuple(names(group, path)) if isinstance(group, h5py.Group) else ()
+
     @property
     def masks(self) -> tuple[str, ...]:
         """Names of the filter keys (`mask/<key>`)."""
@@ -147,6 +153,13 @@ class DemoFile:
             return self.attributes[name]
         with reading(f"the attribute {name!r}"):
             return plain(self._file.attrs.get(name))
+
+    def place(self, name: str) -> str:
+        """HDF5 path of an episode's group; empty where the file is one episode."""
+        if self.layout.episodes == "/":
+            return ""
+        where = self.layout.episodes.strip("/").rpartition("/")[0]
+        return "/" + (f"{where}/{name}" if where else name)
 
     def demo(self, name: str) -> Demo:
         """An episode by its group name.
@@ -186,7 +199,7 @@ class DemoFile:
             _json_object(self.attributes.get("env_args")).get("env_name"),
             self.environment.get("env_name"),
         )
-        return next((name for name in names if isinstance(name, str) and name), "unknown")
+        return next((name for name in names if isinstance(name, str) and name), UNKNOWN)
 
     @cached_property
     def control_hz(self) -> int:
