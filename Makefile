@@ -18,10 +18,10 @@ export PYTHONUNBUFFERED := 1
 export UV_HTTP_TIMEOUT ?= 300
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
-.PHONY: help setup demo test test-slow lint format lock doctor bench clean
+.PHONY: help setup demo test test-slow lint format lock doctor bench bench-convert clean
 
 help:  ## this list
-	@sed -n 's/^\([a-z-]*\):.*  ## /\1\t/p' Makefile | awk -F '\t' '{printf "  make %-10s %s\n", $$1, $$2}'
+	@sed -n 's/^\([a-z-]*\):.*  ## /\1\t/p' Makefile | awk -F '\t' '{printf "  make %-13s %s\n", $$1, $$2}'
 
 setup: $(STAMP)  ## create .venv from requirements.lock and install the package into it
 
@@ -66,6 +66,10 @@ doctor: $(STAMP)  ## check this machine
 # `make bench BENCH_ARGS=--quick` takes about 5 minutes; the first run makes robosuite's environment as well.
 bench: $(STAMP)  ## our simulator beside robosuite's, in one run
 	$(BIN)/python benchmarks/sim_speed.py $(BENCH_ARGS)
+
+# `make bench-convert BENCH_ARGS=--quick` takes under 10 minutes.
+bench-convert: $(STAMP)  ## our converter beside LeRobot's and the official one, in one run
+	$(BIN)/python benchmarks/convert_speed.py $(BENCH_ARGS)
 
 # Keeps the pinned versions that still fit; `make lock LOCK_ARGS=--upgrade` takes the newest ones.
 lock: $(STAMP)  ## pin pyproject.toml's dependencies in requirements.lock

@@ -79,14 +79,15 @@ def report(body: dict[str, Any]) -> str:
 
 
 def _rates(body: dict[str, Any]) -> str:
-    rates = body["frames_per_second"]
+    rates, cpu = body["frames_per_second"], body["cpu_ms_per_step"]
     rows = [
         [f"{SECTIONS[key.partition('_')[0]]}: {words}",
-         *(f"{rates[key][word]:.1f}" for word in ("median", "min", "max")), str(len(rates[key]["values"]))]
+         *(f"{rates[key][word]:.1f}" for word in ("median", "min", "max")), str(len(rates[key]["values"])),
+         f"{cpu[key]['median']:.1f}" if key in cpu else ""]
         for key, words in ROWS.items()
         if key in rates
     ]  # fmt: skip
-    return common.table(["steps/s (three pictures each)", "median", "min", "max", "runs"], rows)
+    return common.table(["steps/s (three pictures each)", "median", "min", "max", "runs", "CPU ms/step"], rows)
 
 
 def _ratios(body: dict[str, Any]) -> str:

@@ -70,6 +70,7 @@ class Run:
     peer: Worker | None = None
     rates: dict[str, list[float]] = field(default_factory=dict)
     sizes: dict[str, float] = field(default_factory=dict)
+    cpu_ms: dict[str, list[float]] = field(default_factory=dict)  # a step, of what one process does
     loading: list[tuple[float, float, int]] = field(default_factory=list)  # opening, drawing, demos
     noise: list[float] = field(default_factory=list)
 
@@ -120,6 +121,7 @@ def measure(effort: Effort, work: Path, peer: bool, memory: bool) -> dict[str, A
     return {
         "ratios": convert_report.ratios(rates, peaks),
         "frames_per_second": rates,
+        "cpu_ms_per_step": {key: common.spread(values) for key, values in run.cpu_ms.items()},
         "commands": commands,
         "memory": peaks,
         "startup": startup,
@@ -229,8 +231,7 @@ def _encoder(run: Run, processes: int) -> float:
     workers = run.workers[:processes]
     for i, (worker, demos) in enumerate(zip(workers, hands, strict=True)):
         worker.send("encode", demos=demos, folder=run.place(f"encoder_{i}"), at=at)
-    # Each process's own rate, added: one that had less to do and ended earlier takes nothing from the sum.
-    return sum(answer["frames"] / answer["seconds"] for answer in [worker.receive() for worker in workers])
+    return _sum_of_rates(run, f"images_encoder_{processes}", [worker.receive() for worker in workers])
 
 
 def _renderer(run: Run, processes: int) -> float:
@@ -242,7 +243,7 @@ def _renderer(run: Run, processes: int) -> float:
     answers = [worker.receive() for worker in workers]
     if processes == 1:
         run.loading.append((answers[0]["loading_s"], answers[0]["seconds"], len(hands[0])))
-    return sum(answer["frames"] / answer["seconds"] for answer in answers)
+    return _sum_of_rates(run, f"states_renderer_{processes}", answers)
 
 
 def _lift_ours(run: Run, key: str, processes: int, preset: str = "fast") -> float:
@@ -275,12 +276,20 @@ def _decode(run: Run, ours: bool) -> float:
     root = run.place("images_ours_1" if ours else "images_lerobot")
     answer = run.workers[1].ask("decode", root=root, batches=run.effort.decode_batches, seed=seed)
     assert answer["cameras"] == len(contract.CAMERAS)
-    return float(answer["frames"] / answer["seconds"])
+    return _sum_of_rates(run, "decode_ours" if ours else "decode_lerobot", [answer])
 
 
 def _rate(run: Run, key: str, answer: dict[str, Any]) -> float:
     run.sizes[key] = answer["mib"]
-    return float(answer["frames"] / answer["seconds"])
+    return _sum_of_rates(run, key, [answer])
+
+
+def _sum_of_rates(run: Run, key: str, answers: Sequence[dict[str, Any]]) -> float:
+    """Each process's own rate, added: one that had less to do and ended earlier takes nothing from the sum."""
+    if not key.endswith("_2"):  # workers of a conversion are children of another process, which does not end
+        cpu, frames = (sum(answer[word] for answer in answers) for word in ("cpu_s", "frames"))
+        run.cpu_ms.setdefault(key, []).append(1000 * cpu / frames)
+    return float(sum(answer["frames"] / answer["seconds"] for answer in answers))
 
 
 def _commands(run: Run) -> dict[str, Any]:

@@ -7,6 +7,7 @@ lines below, which share nothing with the converter's: what they do is what anyb
 from __future__ import annotations
 
 import json
+import os
 import shutil
 import time
 from concurrent.futures import ThreadPoolExecutor
@@ -39,6 +40,17 @@ ENCODER_THREADS = 1  # of one video, as in our converter; each camera has a Pyth
 OFFICIAL_VIDEO = {"vcodec": "h264", "crf": 23, "g": 250}
 
 
+class Clock:
+    """Seconds and processor seconds (of this process's threads and of children that have ended) since it was made."""
+
+    def __init__(self) -> None:
+        self._cpu, self._start = sum(os.times()[:4]), time.perf_counter()
+
+    def taken(self) -> dict[str, float]:
+        """As the fields of an answer."""
+        return {"seconds": time.perf_counter() - self._start, "cpu_s": sum(os.times()[:4]) - self._cpu}
+
+
 def hello() -> dict[str, Any]:
     """An answer, which says that everything is imported."""
     return {}
@@ -59,11 +71,11 @@ def convert(
         cameras=None if cameras is None else tuple(cameras),
         render_preset=preset,
     )
-    start = time.perf_counter()
+    clock = Clock()
     result = pipeline.convert([Path(file)], Path(out), settings, workers)
-    seconds = time.perf_counter() - start
+    taken = clock.taken()
     assert not result.rejected, result.rejected[:1]
-    return {"seconds": seconds, "frames": result.num_frames, "mib": folder_mib(Path(out))}
+    return {**taken, "frames": result.num_frames, "mib": folder_mib(Path(out))}
 
 
 def record_with_lerobot(file: str, reference: str, out: str, render: bool) -> dict[str, Any]:
@@ -76,7 +88,7 @@ def record_with_lerobot(file: str, reference: str, out: str, render: bool) -> di
     features, columns, tasks = _recorded(Path(reference))
     fps = json.loads((Path(reference) / "meta" / "info.json").read_text())["fps"]
     cameras = [key.removeprefix(contract.IMAGE_PREFIX) for key, f in features.items() if f["dtype"] == "video"]
-    start = time.perf_counter()
+    clock = Clock()
     dataset = lerobot_dataset.LeRobotDataset.create("local/lerobot", fps, features, root=out, use_videos=True)
     row, rendering = 0, 0.0
     with h5py.File(file, "r") as source:
@@ -96,13 +108,8 @@ def record_with_lerobot(file: str, reference: str, out: str, render: bool) -> di
             if scene:
                 scene.close()
     dataset.finalize()
-    seconds = time.perf_counter() - start
-    return {
-        "seconds": seconds,
-        "frames": row,
-        "rendering_s": rendering if render else 0.0,
-        "mib": folder_mib(Path(out)),
-    }
+    taken = clock.taken()
+    return {**taken, "frames": row, "rendering_s": rendering if render else 0.0, "mib": folder_mib(Path(out))}
 
 
 class Encoding:
@@ -128,7 +135,7 @@ class Encoding:
         shutil.rmtree(folder, ignore_errors=True)
         Path(folder).mkdir(parents=True)
         _wait_until(at)
-        start = time.perf_counter()
+        clock = Clock()
         frames = 0
         for name in demos:
             with ThreadPoolExecutor(len(self._pictures[name])) as pool:
@@ -139,8 +146,7 @@ class Encoding:
             for video in done:
                 video.result()
             frames += len(next(iter(self._pictures[name].values())))
-        seconds = time.perf_counter() - start
-        return {"seconds": seconds, "frames": frames, "mib": folder_mib(Path(folder))}
+        return {**clock.taken(), "frames": frames, "mib": folder_mib(Path(folder))}
 
     def _encode(self, pictures: NDArray[np.uint8], path: Path) -> None:
         time_base = Fraction(1, contract.CONTROL_HZ)
@@ -198,21 +204,21 @@ def render(file: str, demos: list[str], at: float) -> dict[str, Any]:
     Opening a scene (reading, compiling, a context) is counted apart from drawing.
     """
     _wait_until(at)
-    loading = drawing = 0.0
-    frames = 0
+    loading, drawing, cpu, frames = 0.0, 0.0, 0.0, 0
     cameras = list(contract.CAMERAS)
     with h5py.File(file, "r") as source:
         for name in demos:
-            start = time.perf_counter()
+            clock = Clock()
             scene = RecordedScene(source, name)
-            opened = time.perf_counter()
+            loading += clock.taken()["seconds"]
+            clock = Clock()
             for step in range(len(scene)):
                 scene.pictures(step, cameras)
-            drawing += time.perf_counter() - opened
-            loading += opened - start
+            taken = clock.taken()
+            drawing, cpu = drawing + taken["seconds"], cpu + taken["cpu_s"]
             frames += len(scene)
             scene.close()
-    return {"frames": frames, "seconds": drawing, "loading_s": loading}
+    return {"frames": frames, "seconds": drawing, "cpu_s": cpu, "loading_s": loading}
 
 
 def encode_png(folder: str, out: str) -> dict[str, Any]:
@@ -235,16 +241,11 @@ def decode(root: str, batches: int, seed: int) -> dict[str, Any]:
     loader = iter(torch.utils.data.DataLoader(dataset, batch_size=BATCH, sampler=sampler, num_workers=0))
     first = next(loader)  # opens the files
     cameras = [key for key in first if key.startswith(contract.IMAGE_PREFIX)]
-    start = time.perf_counter()
+    clock = Clock()
     for batch in loader:
         assert all(len(batch[key]) == BATCH for key in cameras)
-    seconds = time.perf_counter() - start
-    return {
-        "seconds": seconds,
-        "frames": batches * BATCH,
-        "cameras": len(cameras),
-        "size": list(first[cameras[0]].shape),
-    }
+    taken, size = clock.taken(), list(first[cameras[0]].shape)
+    return {**taken, "frames": batches * BATCH, "cameras": len(cameras), "size": size}
 
 
 def folder_mib(folder: Path) -> float:
