@@ -30,6 +30,9 @@ class Subcommand:
 SUBCOMMANDS: dict[str, Subcommand] = {
     "demos": Subcommand("robocasa_lerobot.demos.command", "record demonstrations of tasks as HDF5"),
     "convert": Subcommand("robocasa_lerobot.convert.command", "convert demonstration files to a LeRobotDataset v3.0"),
+    "inspect": Subcommand(
+        "robocasa_lerobot.convert.inspect_command", "print what a demonstration file or dataset holds, draft a mapping"
+    ),
     "verify": Subcommand("robocasa_lerobot.convert.verify_command", "compare a converted dataset with its source"),
     "export": Subcommand("robocasa_lerobot.convert.export_command", "write a LeRobotDataset v3.0 back to HDF5"),
     "train": Subcommand("robocasa_lerobot.training.command", "run the training phases of an experiment file"),

@@ -16,7 +16,7 @@ from robocasa_lerobot.convert.instruction import instruction_of
 from robocasa_lerobot.convert.mjcf import AssetFinder, loadable
 from robocasa_lerobot.convert.settings import Camera, Plan, needs_scene
 from robocasa_lerobot.convert.source import DemoFile
-from robocasa_lerobot.errors import UnknownNameError
+from robocasa_lerobot.errors import UserError
 
 if TYPE_CHECKING:
     from robocasa_lerobot.convert.render import Scene
@@ -39,7 +39,7 @@ class Episode:
         settings = plan.settings
         try:
             self.instruction = instruction_of(self.demo, file, settings.instruction, settings.replace_instruction)
-        except UnknownNameError as error:  # a field that this episode lacks; the first one of its file has it
+        except UserError as error:  # a field or text that this episode lacks; the first one of its file has it
             raise RejectedEpisodeError(str(error)) from None
         self.extras = plan.mapping.extras(self.demo)
         self.provenance = self.demo.provenance

@@ -11,7 +11,7 @@ from typing import Any
 
 from robocasa_lerobot.convert.demo import Demo, RejectedEpisodeError
 from robocasa_lerobot.convert.layout import InstructionSource
-from robocasa_lerobot.convert.source import DemoFile
+from robocasa_lerobot.convert.source import UNKNOWN, DemoFile
 from robocasa_lerobot.errors import UnknownNameError, UserError
 
 _WORD = re.compile(r"[A-Z]+(?=[A-Z][a-z])|[A-Z]?[a-z]+|[A-Z]+|\d+")
@@ -33,6 +33,7 @@ def instruction_of(demo: Demo, file: DemoFile, given: str | None, replace: bool 
 
     Raises:
         UnknownNameError: the template has a field that the episode's description has not.
+        UserError: nothing says what the robot was told.
     """
     robot = file.layout.robot
     described = robot.instruction if robot is not None else InstructionSource()
@@ -46,6 +47,10 @@ def instruction_of(demo: Demo, file: DemoFile, given: str | None, replace: bool 
         if not names:
             return Instruction(template.format(), origin)
         return Instruction(_filled(template, names, fields(demo, file.env_name)), f"{origin} template")
+    if file.env_name == UNKNOWN:
+        raise UserError(
+            f"{file.path}: {demo.name} records no instruction and the file no environment: give --instruction TEXT."
+        )
     return Instruction(words_of(file.env_name), "environment name")
 
 

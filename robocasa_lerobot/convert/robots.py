@@ -143,7 +143,7 @@ def _arms(file: DemoFile, demo: Demo, names: SceneNames) -> RobotMapping | None:
         action_columns=tuple(
             Columns(file.layout.action_key, size, end - part.size, end) for part, end in zip(parts, ends, strict=True)
         ),
-        default_cameras=_default_cameras(demo.image_cameras or names.cameras),
+        default_cameras=default_cameras(demo.image_cameras or names.cameras),
         arms=tuple(arms),
     )
 
@@ -193,7 +193,8 @@ def _robot_type(robots: Any) -> str:
     return robots if isinstance(robots, str) and robots else "unknown"
 
 
-def _default_cameras(available: Sequence[str]) -> tuple[str, ...]:
+def default_cameras(available: Sequence[str]) -> tuple[str, ...]:
+    """The cameras of fixed arms that are taken where the user names none."""
     known = [camera for camera in DEFAULT_CAMERAS if camera in available]
     others = [camera for camera in available if camera not in known]
     return tuple([*known, *others][:NUM_DEFAULT_CAMERAS])
