@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
+from robocasa_lerobot.convert.executors import add_options, execution_of
 from robocasa_lerobot.convert.options import add_source_options, source_settings
 
 EXAMPLE = "robocasa-lerobot convert demos/*.hdf5 --out data/demos"
@@ -49,11 +50,16 @@ def configure(parser: argparse.ArgumentParser) -> None:
         metavar="FRAMES",
         help="videos of LeRobot v2 with more frames between key frames are encoded again (default: %(default)s)",
     )
+    add_options(parser)
+    parser.add_argument(
+        "--merge", action="store_true", help="join the complete pieces of a conversion that was submitted to Slurm"
+    )
     parser.add_argument("--overwrite", action="store_true", help="replace a dataset at --out")
 
 
 def run(args: argparse.Namespace) -> int:
     """Convert, and say what was written, rejected and assumed."""
+    execution = execution_of(args)
     from robocasa_lerobot.convert.settings import ConversionSettings
 
     settings = ConversionSettings(
@@ -64,9 +70,15 @@ def run(args: argparse.Namespace) -> int:
         reencode=args.reencode,
         max_gop=args.max_gop,
     )
-    from robocasa_lerobot.convert.pipeline import convert
+    from robocasa_lerobot.convert.pipeline import convert, merge, submit
 
-    result = convert(args.files, args.out, settings, args.workers, args.overwrite)
+    if args.merge:
+        result = merge(args.files, args.out, settings, args.overwrite)
+    elif execution.kind == "slurm":
+        print(submit(args.files, args.out, settings, execution, args.overwrite))
+        return 0
+    else:
+        result = convert(args.files, args.out, settings, args.workers, args.overwrite, execution)
     cameras = ", ".join(result.cameras)
     print(f"{result.root}: {result.num_episodes} episodes, {result.num_frames} frames, cameras {cameras}")
     for note in result.notes:

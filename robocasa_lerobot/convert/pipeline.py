@@ -6,27 +6,26 @@ source bytes, so the same command after a kill finds its finished shards again a
 
 from __future__ import annotations
 
-import contextlib
-import fcntl
 import json
 import os
 import shutil
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from tqdm import tqdm
 
 from robocasa_lerobot import __version__
 from robocasa_lerobot.convert.encoder import CODECS, SAMPLED_FRAMES, SAMPLED_PIXELS, Histogram
+from robocasa_lerobot.convert.executors import Execution
 from robocasa_lerobot.convert.lerobot_v2.dataset import V2Dataset
 from robocasa_lerobot.convert.lerobot_v2.finish import conversion_facts, finish_dataset
 from robocasa_lerobot.convert.lerobot_v2.plan import V2Plan, make_v2_plan, takes
 from robocasa_lerobot.convert.lerobot_v2.shard import convert_v2_shard
+from robocasa_lerobot.convert.modality import MODALITY_FILE, modality, write_modality
 from robocasa_lerobot.convert.settings import ConversionSettings, Plan, SourceRecord, make_plan
 from robocasa_lerobot.convert.shard import (
     DATASET,
@@ -40,8 +39,18 @@ from robocasa_lerobot.convert.shard import (
     write_jsonl,
 )
 from robocasa_lerobot.convert.source import DemoFile
+from robocasa_lerobot.convert.work import (
+    check_output,
+    failures_explained,
+    locked,
+    partial_folder,
+    publish,
+    report_frames,
+    require_complete,
+    run_pieces,
+    submit_pieces,
+)
 from robocasa_lerobot.errors import UserError
-from robocasa_lerobot.parallel import PoolExecutor, exit_if_orphaned, polled
 
 # Our part of a dataset's folder; LeRobot reads nothing in it.
 META_FOLDER = "meta/robocasa"
@@ -65,7 +74,12 @@ class ConversionResult:
 
 
 def convert(
-    files: Sequence[Path], out: Path, settings: ConversionSettings, workers: int | None = None, overwrite: bool = False
+    files: Sequence[Path],
+    out: Path,
+    settings: ConversionSettings,
+    workers: int | None = None,
+    overwrite: bool = False,
+    execution: Execution | None = None,
 ) -> ConversionResult:
     """Convert demonstration files to one LeRobotDataset v3.0 at `out`.
 
@@ -75,54 +89,92 @@ def convert(
         settings: what decides the bytes of the dataset.
         workers: processes; None chooses by the amount of work. The dataset does not depend on it.
         overwrite: replace a dataset at `out`.
+        execution: local (the default) or Ray; `workers` counts for local.
 
     Raises:
         UserError: the input or the output path cannot be used, or no episode is good. Nothing is at `out` then.
     """
+    plan, partial, out = _prepared(files, out, settings, overwrite)
+    with locked(partial), failures_explained(out, partial):
+        run_pieces(
+            _ShardTask(plan, str(partial)),
+            len(plan.shards),
+            partial,
+            execution or Execution(),
+            _num_workers(plan, workers),
+            plan.num_frames,
+            "converting",
+            quiet_libraries,
+            convert_shard.__module__,
+        )
+        return _completed(plan, partial, out)
+
+
+def submit(
+    files: Sequence[Path], out: Path, settings: ConversionSettings, execution: Execution, overwrite: bool = False
+) -> str:
+    """Submit a conversion to Slurm; gives a line for the user. The last job makes the dataset appear at `out`.
+
+    The same call later submits what has not been completed. All paths must be on file systems that the nodes share.
+
+    Raises:
+        UserError: as `convert`, and where Slurm does not take the jobs or still has those of an earlier call.
+    """
+    plan, partial, out = _prepared([file.absolute() for file in files], out, settings, overwrite)
+    # Not locked: the last job takes the lock, and may start before this call returns.
+    with failures_explained(out, partial):
+        step, last = _ShardTask(plan, str(partial)), _LastJob(plan, str(partial), str(out), overwrite)
+        return submit_pieces(step, last, len(plan.shards), partial, out, execution)
+
+
+def merge(files: Sequence[Path], out: Path, settings: ConversionSettings, overwrite: bool = False) -> ConversionResult:
+    """Join the shards of a submitted conversion, as its last job does.
+
+    Raises:
+        UserError: not all of them are complete.
+    """
+    plan, partial, out = _prepared([file.absolute() for file in files], out, settings, overwrite)
+    return _LastJob(plan, str(partial), str(out), overwrite)()
+
+
+@dataclass(frozen=True)
+class _LastJob:
+    """Joins the shards once all are complete."""
+
+    plan: Plan
+    partial: str
+    out: str
+    overwrite: bool
+
+    def __call__(self) -> ConversionResult:
+        partial, out = Path(self.partial), Path(self.out)
+        check_output(out, self.overwrite)
+        require_complete(len(self.plan.shards), partial)
+        quiet_libraries()
+        with locked(partial), failures_explained(out, partial):
+            return _completed(self.plan, partial, out)
+
+
+def _prepared(
+    files: Sequence[Path], out: Path, settings: ConversionSettings, overwrite: bool
+) -> tuple[Plan, Path, Path]:
     out = out.absolute()
-    _check_output(out, overwrite)
+    check_output(out, overwrite)
     plan = make_v2_plan(files, settings) if takes(files) else make_plan(files, settings)
-    partial = out.with_name(f"{out.name}.partial-{plan.fingerprint}")
-    partial.mkdir(parents=True, exist_ok=True)
-    with _locked(partial):
-        try:
-            _run_shards(plan, partial, _num_workers(plan, workers))
-            result = _join(plan, partial, out)
-        except OSError as error:
-            raise UserError(
-                f"writing failed: {error}. Nothing is at {out}; finished parts are kept in {partial}: free what is "
-                "lacking and give the same command to go on."
-            ) from error
-        if result is not None:
-            _publish(partial / "merged", out, partial / "replaced")
+    return plan, partial_folder(out, plan.fingerprint), out
+
+
+def _completed(plan: Plan, partial: Path, out: Path) -> ConversionResult:
+    """Join the shards, let the dataset appear, and clear away the rest."""
+    result = _join(plan, partial, out)
+    if result is not None:
+        publish(partial / "merged", out, partial / "replaced")
     rejected = result.rejected if result is not None else _rejected(plan, partial)
     shutil.rmtree(partial)
     if result is None:
         lines = "".join(f"\n  {r['source_file']} {r['source_demo']}: {r['reason']}" for r in rejected[:5])
         raise UserError(f"no episode could be converted ({len(rejected)} rejected), nothing was written:{lines}")
     return result
-
-
-def _check_output(out: Path, overwrite: bool) -> None:
-    if not out.exists() or (out.is_dir() and not any(out.iterdir())):
-        return
-    if not overwrite:
-        raise UserError(f"{out} exists already. Choose another --out, or replace it with --overwrite.")
-    if not (out / "meta" / "info.json").is_file():
-        raise UserError(f"{out} is not a LeRobotDataset, so --overwrite leaves it alone. Choose another --out.")
-
-
-@contextlib.contextmanager
-def _locked(partial: Path) -> Iterator[None]:
-    with (partial / "lock").open("w") as lock:
-        try:
-            # A record lock is not inherited, so no orphaned child holds it after the parent was killed.
-            fcntl.lockf(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except OSError:
-            raise UserError(
-                f"the same conversion is running already (it holds {partial}). Wait until it ends."
-            ) from None
-        yield
 
 
 def _num_workers(plan: Plan, workers: int | None) -> int:
@@ -143,8 +195,11 @@ class _ShardTask:
 
     def __call__(self, data: None, rank: int = 0, world_size: int = 1) -> None:
         partial = Path(self.partial)
-        done = partial / "progress" / f"{rank:05d}"
-        done.parent.mkdir(exist_ok=True)
+
+        def report(frames: int) -> None:
+            report_frames(partial, rank, frames)
+
+        quiet_libraries()  # on another machine nobody has done it
         shard = self.plan.shards[rank]
         folder = shard_folder(partial, rank)
         if folder.exists():
@@ -152,9 +207,9 @@ class _ShardTask:
         # Of its own, since the worker of a run that was killed may still be at the same shard for a moment.
         attempt = folder.with_name(f"{folder.name}.attempt-{os.getpid()}")
         if isinstance(self.plan, V2Plan):
-            convert_v2_shard(self.plan, shard, attempt, lambda frames: _report(done, frames))
+            convert_v2_shard(self.plan, shard, attempt, report)
         else:
-            convert_shard(self.plan, shard, attempt, lambda frames: _report(done, frames))
+            convert_shard(self.plan, shard, attempt, report)
         try:
             attempt.rename(folder)
         except OSError:
@@ -175,47 +230,6 @@ def quiet_libraries() -> None:
 def shard_folder(partial: Path, rank: int) -> Path:
     """Where a shard is written."""
     return partial / "shards" / f"{rank:05d}"
-
-
-def _run_shards(plan: Plan, partial: Path, workers: int) -> None:
-    quiet_libraries()
-    executor = PoolExecutor(
-        pipeline=[_ShardTask(plan, str(partial))],
-        tasks=len(plan.shards),
-        workers=workers,
-        logging_dir=str(partial / "executor"),
-        initializer=quiet_libraries,
-        preload=[convert_shard.__module__],
-    )
-    if not executor.get_incomplete_ranks():
-        return
-    with _progress_bar(plan, partial):
-        executor.run()
-
-
-@contextlib.contextmanager
-def _progress_bar(plan: Plan, partial: Path) -> Iterator[None]:
-    """A bar over frames, fed by the counts that the workers leave in files."""
-
-    def done(rank: int) -> int:
-        with contextlib.suppress(OSError, ValueError):
-            return int((partial / "progress" / f"{rank:05d}").read_text())
-        return 0
-
-    def show() -> None:
-        bar.n = min(plan.num_frames, sum(done(rank) for rank in range(len(plan.shards))))
-        bar.refresh()
-
-    with tqdm(total=plan.num_frames, unit="frame", desc="converting", smoothing=0.05) as bar:
-        with polled(show):
-            yield
-        bar.n = plan.num_frames
-
-
-def _report(file: Path, count: int) -> None:
-    exit_if_orphaned()
-    with contextlib.suppress(OSError):  # only for the eye
-        file.write_text(str(count))
 
 
 def _rejected(plan: Plan, partial: Path) -> list[dict[str, Any]]:
@@ -265,6 +279,8 @@ def _join(plan: Plan, partial: Path, out: Path) -> ConversionResult | None:
     if isinstance(plan, V2Plan):
         finish_dataset(plan, merged)
         record |= conversion_facts(plan, episodes)
+    if not (merged / MODALITY_FILE).exists():
+        write_modality(merged, modality(info["features"], plan.mapping.state_parts, plan.mapping.action_parts))
     (ours / CONVERSION_FILE).write_text(
         json.dumps(record, indent=2, ensure_ascii=False, default=str) + "\n", encoding="utf-8"
     )
@@ -301,11 +317,3 @@ def _source_record(source: SourceRecord, out: Path, settings: ConversionSettings
         with DemoFile(path, settings.layout) as file:
             attributes = file.attributes
     return asdict(source) | {"relative_to_dataset": os.path.relpath(source.file, out), "attributes": attributes}
-
-
-def _publish(merged: Path, out: Path, replaced: Path) -> None:
-    """Let the finished dataset appear at `out` by a rename, after moving an old one aside."""
-    if out.exists():
-        shutil.rmtree(replaced, ignore_errors=True)
-        out.rename(replaced)
-    merged.rename(out)
