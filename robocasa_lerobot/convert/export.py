@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import gzip
 import json
+import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -27,12 +28,10 @@ COMPRESSIONS = ("gzip", "lzf", "none")
 _GZIP_LEVEL = 1  # pictures hardly get smaller with more, only slower
 _BLOCK_FRAMES = 32  # decoded frames held at a time
 _ROBOSUITE_ENV = 1  # robomimic's number for environments of robosuite
-# Observations of robosuite for the parts of arms with a fixed base; a further arm's name comes before each.
-_ARM_OBSERVATIONS = {
-    "end_effector_position": "eef_pos",
-    "end_effector_rotation": "eef_quat",
-    "gripper_qpos": "gripper_qpos",
-}
+# Names of the state's components of arms with a fixed base, an arm's name before each where there are several, and
+# what robosuite calls the observation that they are of.
+_ARM_COMPONENT = re.compile(r"(.*?)(?:(?P<position>eef_[xyz])|(?P<rotation>eef_q[xyzw])|(?P<fingers>finger_\d+))")
+_ARM_ENDINGS = {"position": "eef_pos", "rotation": "eef_quat", "fingers": "gripper_qpos"}
 
 
 @dataclass(frozen=True)
@@ -186,20 +185,24 @@ def _observations(dataset: ExportedDataset, states: NDArray[Any]) -> dict[str, N
     if dataset.features[contract.STATE_KEY].get("names") == contract.component_names(contract.STATE_PARTS):
         return {contract.STATE_PART_HDF5_KEYS[name]: states[:, where] for name, where in contract.STATE_SLICES.items()}
     observations: dict[str, NDArray[Any]] = {}
-    for name, where in dataset.parts("state").items():
-        arm, ending = _arm_part(name)
-        if ending is None:
-            return {"state": states}
-        observations[f"{arm}{ending}"] = states[:, where]
+    for key, where in _arm_observations(dataset.features[contract.STATE_KEY].get("names") or []).items():
+        observations[key] = states[:, where]
     return observations or {"state": states}
 
 
-def _arm_part(name: str) -> tuple[str, str | None]:
-    for part, ending in _ARM_OBSERVATIONS.items():
-        if name == part or name.endswith(f"_{part}"):
-            arm = name.removesuffix(part)
-            return (arm if arm.startswith("robot") else f"robot0_{arm}"), ending
-    return "", None
+def _arm_observations(names: Sequence[str]) -> dict[str, slice]:
+    """Observation -> components of the state, where all of these have the names that `convert` gives to arms."""
+    found: dict[str, list[int]] = {}
+    for index, name in enumerate(names):
+        match = _ARM_COMPONENT.fullmatch(str(name))
+        if match is None:
+            return {}
+        arm = match[1] if match[1].startswith("robot") else f"robot0_{match[1]}"
+        ending = next(ending for group, ending in _ARM_ENDINGS.items() if match[group])
+        found.setdefault(arm + ending, []).append(index)
+    if any(places != list(range(places[0], places[-1] + 1)) for places in found.values()):
+        return {}
+    return {key: slice(places[0], places[-1] + 1) for key, places in found.items()}
 
 
 def _write_pictures(

@@ -89,15 +89,6 @@ class ExportedDataset:
             if feature["dtype"] in ("video", "image") and not (feature.get("info") or {}).get("is_depth_map")
         }
 
-    def parts(self, kind: str) -> dict[str, slice]:
-        """Parts of the state or action from `meta/modality.json`, in order; empty where it does not say."""
-        file = self.root / "meta" / "modality.json"
-        if not file.is_file():
-            return {}
-        section = json.loads(file.read_text(encoding="utf-8")).get(kind)
-        parts = {name: slice(part["start"], part["end"]) for name, part in (section or {}).items()}
-        return dict(sorted(parts.items(), key=lambda item: item[1].start))
-
     def columns(self, episode: ExportedEpisode) -> dict[str, NDArray[Any]]:
         """All numeric columns of an episode but the indices, (T,) or (T, k), with their stored dtypes."""
         table = self._rows(episode)

@@ -4,16 +4,36 @@ from __future__ import annotations
 
 import random
 import re
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
+from pathlib import Path
+from typing import Protocol
 
 from robocasa_lerobot.convert.demo import SourceError
-from robocasa_lerobot.convert.source import DemoFile
 from robocasa_lerobot.errors import UnknownNameError, UserError
 
 _COUNT_KEY = re.compile(r"(\d+)_demos$")
 _COUNT = re.compile(r"\d+$")
 _SHARE = re.compile(r"(\d+(?:\.\d+)?)%$")
 _RANGE = re.compile(r"(\d+)-(\d+)$")
+
+
+class Listing(Protocol):
+    """What a selection is made from: an HDF5 file, or a dataset folder."""
+
+    @property
+    def path(self) -> Path:
+        """Where it is."""
+
+    @property
+    def demo_names(self) -> Sequence[str]:
+        """Names of its episodes, in order."""
+
+    @property
+    def masks(self) -> Collection[str]:
+        """Its filter keys."""
+
+    def mask(self, key: str) -> Sequence[str]:
+        """The episodes of a filter key."""
 
 
 def sample(names: Sequence[str], count: int, seed: int) -> tuple[str, ...]:
@@ -42,11 +62,11 @@ def check_selection(filter_key: str | None, demos: str | None) -> None:
         _parse(demos)
 
 
-def select(file: DemoFile, filter_key: str | None, demos: str | None, seed: int = 0) -> tuple[str, ...]:
+def select(file: Listing, filter_key: str | None, demos: str | None, seed: int = 0) -> tuple[str, ...]:
     """Names of the demos to convert, in the order of the file.
 
     Args:
-        file: an open file.
+        file: an open file or a dataset folder.
         filter_key: a list `mask/<filter_key>` of the file; `<N>_demos` also where the file has no such list, then by
             the benchmark's rule (`sample`).
         demos: `50` (a sample of so many), `10%` (of so many of a hundred), or names and ranges of numbers such as
@@ -72,7 +92,7 @@ def select(file: DemoFile, filter_key: str | None, demos: str | None, seed: int 
     return tuple(name for name in names if name in wanted)
 
 
-def _of_filter_key(file: DemoFile, key: str, seed: int) -> tuple[str, ...]:
+def _of_filter_key(file: Listing, key: str, seed: int) -> tuple[str, ...]:
     if key in file.masks:
         listed = file.mask(key)
         unknown = [name for name in listed if name not in set(file.demo_names)]
@@ -116,7 +136,7 @@ def _parse(text: str) -> int | float | list[str]:
     return items
 
 
-def _named(item: str, names: Sequence[str], file: DemoFile) -> list[str]:
+def _named(item: str, names: Sequence[str], file: Listing) -> list[str]:
     if item in names:
         return [item]
     numbers = {int(match[1]): name for name in names if (match := re.search(r"(\d+)$", name))}

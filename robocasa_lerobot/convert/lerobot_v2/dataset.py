@@ -34,6 +34,11 @@ class EpisodeLine:
     index: int
     length: int
 
+    @property
+    def name(self) -> str:
+        """What the episode is called in records and options."""
+        return f"episode_{self.index:06d}"
+
 
 def is_dataset_folder(path: Path) -> bool:
     """Whether this is the folder of a LeRobot dataset of any version."""
@@ -114,6 +119,25 @@ class V2Dataset:
             if name.endswith("task_description"):
                 return name
         return "task_index"
+
+    @property
+    def path(self) -> Path:
+        """The folder."""
+        return self.root
+
+    @property
+    def demo_names(self) -> tuple[str, ...]:
+        """Names of the episodes, in order."""
+        return tuple(line.name for line in self.episodes)
+
+    @property
+    def masks(self) -> tuple[str, ...]:
+        """Filter keys, which this format does not have."""
+        return ()
+
+    def mask(self, key: str) -> tuple[str, ...]:
+        """Episodes of a filter key; there is none."""
+        raise KeyError(key)
 
     def data_file(self, episode: int) -> Path:
         """Where an episode's parquet file should be."""

@@ -17,11 +17,13 @@ import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
 from robocasa_lerobot import contract
+from robocasa_lerobot.convert.instruction import OPTION, template_fields
 from robocasa_lerobot.convert.lerobot_v2.dataset import EpisodeLine, V2Dataset
 from robocasa_lerobot.convert.lerobot_v2.video import VideoForm, frames, probe, rgb
-from robocasa_lerobot.convert.settings import Camera
+from robocasa_lerobot.convert.settings import Camera, ConversionSettings
 from robocasa_lerobot.convert.source import RejectedEpisodeError
 from robocasa_lerobot.convert.statistics import column_of
+from robocasa_lerobot.errors import UserError
 
 # How far the recorded times may be from even steps, in steps, before they say that frames were lost.
 MAX_TIME_DEVIATION = 0.1
@@ -68,9 +70,9 @@ class V2Episode:
         line: EpisodeLine,
         columns: tuple[Column, ...],
         tasks: tuple[str, ...],
-        fallback: str | None,
+        settings: ConversionSettings,
     ) -> None:
-        self.dataset, self.index, self.name = dataset, line.index, episode_name(line.index)
+        self.dataset, self.index, self.name = dataset, line.index, line.name
         self._columns, self._tasks, self._fps = columns, tasks, dataset.fps
         self._file = dataset.data_file(line.index)
         table = self._table()
@@ -90,7 +92,7 @@ class V2Episode:
             for column in columns
         }
         self.instruction_source = f"tasks.jsonl by {dataset.instruction_column}"
-        self.task_index = self._instructions(table, fallback)
+        self.task_index = self._instructions(table, settings)
         self.instruction = tasks[int(self.task_index[0])]
         self.extras = self._extras()
 
@@ -209,19 +211,23 @@ class V2Episode:
         values = self._values(table, column)
         return np.array([self._renumbered.get(int(value), int(value)) for value in values], np.int64)
 
-    def _instructions(self, table: pa.Table, fallback: str | None) -> NDArray[np.int64]:
+    def _instructions(self, table: pa.Table, settings: ConversionSettings) -> NDArray[np.int64]:
+        given = given_instruction(settings)
+        if given is not None and settings.replace_instruction:
+            self.instruction_source = OPTION
+            return np.full(self.length, self._rows[given])
         rows = self._raw(table, self.dataset.instruction_column, 1).reshape(-1)
         out = np.empty(self.length, np.int64)
         for row in np.unique(rows):
             text = self.dataset.tasks.get(int(row), "")
             if not text.strip():
-                if fallback is None:
+                if given is None:
                     what = "is empty" if int(row) in self.dataset.tasks else "is not in tasks.jsonl"
                     raise RejectedEpisodeError(
                         f"its instruction, row {int(row)} of tasks.jsonl by {self.dataset.instruction_column}, {what} "
                         "(--instruction gives one)."
                     )
-                text, self.instruction_source = fallback, "--instruction"
+                text, self.instruction_source = given, OPTION
             out[rows == row] = self._rows[text]
         return out
 
@@ -270,9 +276,20 @@ class V2Episode:
         return Extras(meta, present)
 
 
-def episode_name(index: int) -> str:
-    """What an episode is called in records."""
-    return f"episode_{index:06d}"
+def given_instruction(settings: ConversionSettings) -> str | None:
+    """The user's instruction as text.
+
+    Raises:
+        UserError: it is a template with fields; what fills them is read too late to number the tasks.
+    """
+    if settings.instruction is None:
+        return None
+    names = template_fields(settings.instruction)
+    if names:
+        raise UserError(
+            f"--instruction has the field {{{names[0]}}}, which LeRobot v2 datasets do not fill: give plain text."
+        )
+    return settings.instruction.format()
 
 
 def _row_lengths(array: Any) -> list[int]:

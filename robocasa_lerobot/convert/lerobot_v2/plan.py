@@ -6,7 +6,7 @@ import hashlib
 import json
 import os
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -17,14 +17,16 @@ from robocasa_lerobot import contract
 from robocasa_lerobot.contract import Part
 from robocasa_lerobot.convert.lerobot_v2.dataset import (
     INDEX_COLUMNS,
+    EpisodeLine,
     V2Dataset,
     camera_of,
     is_dataset_folder,
     is_depth,
 )
-from robocasa_lerobot.convert.lerobot_v2.episode import Column, V2Episode, episode_name
+from robocasa_lerobot.convert.lerobot_v2.episode import Column, V2Episode, given_instruction
 from robocasa_lerobot.convert.lerobot_v2.video import probe
 from robocasa_lerobot.convert.mapping import RobotMapping
+from robocasa_lerobot.convert.selection import select
 from robocasa_lerobot.convert.settings import MAX_SHARDS, Camera, ConversionSettings, Plan, Shard, SourceRecord
 from robocasa_lerobot.convert.source import RejectedEpisodeError, SourceError
 from robocasa_lerobot.errors import UnknownNameError, UserError
@@ -90,6 +92,7 @@ def make_v2_plan(folders: Sequence[Path], settings: ConversionSettings) -> V2Pla
         UserError: a dataset is damaged or has no usable episode, datasets do not fit together, or a camera is unknown
             or declared without files. Nothing has been written then.
     """
+    _check_settings(settings)
     looks = [look_into(V2Dataset(folder), settings) for folder in folders]
     first = looks[0]
     for look in looks[1:]:
@@ -109,21 +112,24 @@ def make_v2_plan(folders: Sequence[Path], settings: ConversionSettings) -> V2Pla
                 f"{look.dataset.root} and {first.dataset.root} order or name the same things differently. Convert "
                 "them into datasets of their own and join those with LeRobot."
             )
-    fallback = [settings.instruction] if settings.instruction is not None else []
-    texts = [text for look in looks for text in look.dataset.tasks.values()]
-    num_frames = sum(max(0, line.length) for look in looks for line in look.dataset.episodes)
+    num_frames = sum(max(0, line.length) for look in looks for line in look.episodes)
     target = max(SHARD_FRAMES, -(-num_frames // MAX_SHARDS))
     return V2Plan(
         settings=settings,
-        sources=tuple(source_record(look.dataset) for look in looks),
+        sources=tuple(
+            replace(source_record(look.dataset), demos=tuple(line.name for line in look.episodes))
+            if len(look.episodes) < len(look.dataset.episodes)
+            else source_record(look.dataset)
+            for look in looks
+        ),
         mapping=first.mapping,
         cameras=first.cameras,
         fps=first.dataset.fps,
-        shards=tuple(shard for look in looks for shard in _cut(look.dataset, target)),
+        shards=tuple(shard for look in looks for shard in _cut(look, target)),
         num_frames=num_frames,
         columns=first.columns,
         camera_keys=first.camera_keys,
-        tasks=tuple(dict.fromkeys([*texts, *fallback])),
+        tasks=_tasks([look.dataset for look in looks], settings),
         notes=tuple(note for look in looks for note in look.notes),
         stamp=_stamp([look.dataset.root for look in looks]),
     )
@@ -150,6 +156,7 @@ class Look:
     cameras: tuple[Camera, ...]
     camera_keys: tuple[tuple[str, str], ...]
     notes: tuple[str, ...]
+    episodes: tuple[EpisodeLine, ...]  # those that were selected
 
     @property
     def target_columns(self) -> list[tuple[str, str, tuple[str, ...]]]:
@@ -169,19 +176,37 @@ def look_into(dataset: V2Dataset, settings: ConversionSettings) -> Look:
     columns, mapping = _columns(dataset, notes)
     cameras, keys = _cameras(dataset, settings, notes)
     reasons = []
-    tasks = tuple(dict.fromkeys([*dataset.tasks.values(), *([settings.instruction] if settings.instruction else [])]))
-    for line in dataset.episodes:
+    tasks = _tasks([dataset], settings)
+    chosen = frozenset(select(dataset, settings.filter_key, settings.demos, settings.demos_seed))
+    episodes = tuple(line for line in dataset.episodes if line.name in chosen)
+    for line in episodes:
         try:
-            episode = V2Episode(dataset, line, columns, tasks, settings.instruction)
+            episode = V2Episode(dataset, line, columns, tasks, settings)
             for _, key in keys:
                 episode.video(key)
         except RejectedEpisodeError as error:
-            reasons.append(f"{episode_name(line.index)}: {error}")
+            reasons.append(f"{line.name}: {error}")
             continue
         if episode.time_offset:
             notes.append(f"recorded times start at {episode.time_offset:.4f} s; they are counted from 0 anew")
-        return Look(dataset, mapping, columns, cameras, keys, tuple(notes))
+        return Look(dataset, mapping, columns, cameras, keys, tuple(notes), episodes)
     raise SourceError(f"{dataset.root} has no usable episode; {reasons[0]} Download it again.")
+
+
+def _check_settings(settings: ConversionSettings) -> None:
+    for option, given in (
+        ("--mapping", settings.mapping is not None),
+        ("--action-key", settings.action_key != ConversionSettings.action_key),
+        ("--extra-column", bool(settings.extra_columns)),
+    ):
+        if given:
+            raise UserError(f"{option} is for HDF5 files; of a LeRobot dataset, all columns are taken as they are.")
+
+
+def _tasks(datasets: Sequence[V2Dataset], settings: ConversionSettings) -> tuple[str, ...]:
+    given = given_instruction(settings)
+    texts = [text for dataset in datasets for text in dataset.tasks.values()]
+    return tuple(dict.fromkeys([*texts, *([given] if given is not None else [])]))
 
 
 def _columns(dataset: V2Dataset, notes: list[str]) -> tuple[tuple[Column, ...], RobotMapping]:
@@ -330,17 +355,17 @@ def _sample_schema(dataset: V2Dataset) -> pa.Schema:
     raise SourceError(f"{dataset.root} has no readable table ({reason}). Download it again.")
 
 
-def _cut(dataset: V2Dataset, target: int) -> Iterator[Shard]:
+def _cut(look: Look, target: int) -> Iterator[Shard]:
     names: list[str] = []
     num_frames = 0
-    for line in dataset.episodes:
-        names.append(episode_name(line.index))
+    for line in look.episodes:
+        names.append(line.name)
         num_frames += max(0, line.length)
         if num_frames >= target:
-            yield Shard(str(dataset.root), tuple(names))
+            yield Shard(str(look.dataset.root), tuple(names))
             names, num_frames = [], 0
     if names:
-        yield Shard(str(dataset.root), tuple(names))
+        yield Shard(str(look.dataset.root), tuple(names))
 
 
 def _files(root: Path) -> Iterator[tuple[str, Path]]:

@@ -34,7 +34,7 @@ from robocasa_lerobot.convert.encoder import (
     histogram_statistics,
 )
 from robocasa_lerobot.convert.lerobot_v2.dataset import V2Dataset
-from robocasa_lerobot.convert.lerobot_v2.episode import EP_META, V2Episode, episode_name
+from robocasa_lerobot.convert.lerobot_v2.episode import EP_META, V2Episode
 from robocasa_lerobot.convert.lerobot_v2.plan import V2Plan
 from robocasa_lerobot.convert.lerobot_v2.video import VideoFiles, VideoForm, frames, probe, rgb
 from robocasa_lerobot.convert.settings import Camera, Shard
@@ -79,14 +79,14 @@ def convert_v2_shard(plan: V2Plan, shard: Shard, folder: Path, progress: Callabl
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir(parents=True)
     dataset = V2Dataset(Path(shard.file))
-    lines = {episode_name(line.index): line for line in dataset.episodes}
+    lines = {line.name: line for line in dataset.episodes}
     writer = _Writer(plan, folder)
     rejected: list[RejectedEpisode] = []
     done = 0
     try:
         for name in shard.demos:
             try:
-                episode = V2Episode(dataset, lines[name], plan.columns, plan.tasks, plan.settings.instruction)
+                episode = V2Episode(dataset, lines[name], plan.columns, plan.tasks, plan.settings)
                 writer.write(episode)
                 done += episode.length
                 progress(done)

@@ -11,7 +11,7 @@ from tqdm import tqdm
 
 from robocasa_lerobot import contract
 from robocasa_lerobot.convert.lerobot_v2.dataset import EXTRAS, V2Dataset
-from robocasa_lerobot.convert.lerobot_v2.episode import Column, V2Episode, episode_name
+from robocasa_lerobot.convert.lerobot_v2.episode import Column, V2Episode
 from robocasa_lerobot.convert.lerobot_v2.plan import look_into, source_record
 from robocasa_lerobot.convert.lerobot_v2.video import digests
 from robocasa_lerobot.convert.pipeline import META_FOLDER
@@ -48,15 +48,15 @@ class V2Verification(Verification):
         tasks = tuple(self._tasks[row] for row in sorted(self._tasks))
         lost = [text for text in source.tasks.values() if text not in tasks]
         self._checks["instructions"].expect(not lost, f"rows of {path}'s tasks are missing: {lost[:3]}")
-        for line in source.episodes:
-            name = episode_name(line.index)
+        for line in look.episodes:
+            name = line.name
             self._checks["episodes"].expect(
                 (name in mine) != (name in out), f"{path} {name} is neither converted nor rejected, or both"
             )
             if name not in mine or lost:
                 continue
             try:
-                episode = V2Episode(source, line, look.columns, tasks, settings.instruction)
+                episode = V2Episode(source, line, look.columns, tasks, settings)
                 self._check_v2_episode(mine[name], episode, look.columns, dict(look.camera_keys))
             except RejectedEpisodeError as error:
                 self._checks["episodes"].fail(f"{path} {name}: {error}")

@@ -1,0 +1,286 @@
+"""LeRobot v2.0 and v2.1 datasets in RoboCasa365's layout: what is kept, what is copied, what is encoded again."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import v2_support as v2
+from convert_support import leftovers, tree_hashes
+
+from robocasa_lerobot import cli, contract
+
+pytest.importorskip("lerobot.datasets")
+from lerobot.datasets.lerobot_dataset import LeRobotDataset
+
+from robocasa_lerobot.convert import pipeline
+from robocasa_lerobot.convert.lerobot_v2.video import digests, probe
+from robocasa_lerobot.convert.pipeline import META_FOLDER, convert
+from robocasa_lerobot.convert.settings import ConversionSettings
+from robocasa_lerobot.convert.shard import read_jsonl
+from robocasa_lerobot.convert.statistics import column
+from robocasa_lerobot.convert.verify import verify
+
+LENGTHS = (24, 1, 31)
+SETTINGS = ConversionSettings()
+
+
+@pytest.fixture(scope="module")
+def source(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A v2.1 dataset whose videos are in the target form."""
+    return v2.write_dataset(tmp_path_factory.mktemp("v2") / "lerobot", LENGTHS)
+
+
+@pytest.fixture(scope="module")
+def converted(source: Path) -> Path:
+    """The dataset made from it."""
+    return convert([source], source.parent / "data", SETTINGS, workers=1).root
+
+
+def record(root: Path) -> dict[str, Any]:
+    """Its conversion.json."""
+    return dict(json.loads((root / META_FOLDER / "conversion.json").read_text(encoding="utf-8")))
+
+
+def packets(root: Path, camera: str) -> int:
+    """Packets in all video files of a camera."""
+    return sum(probe(file).num_packets for file in (root / "videos" / contract.image_key(camera)).glob("*/*.mp4"))
+
+
+def test_verifies_against_its_source(converted: Path) -> None:
+    report = verify(converted, pictures_per_episode=None)
+    assert report.passed, report.as_json()
+    assert (report.num_episodes, report.num_frames) == (3, sum(LENGTHS))
+    compared = {check.name: check.compared for check in report.checks}
+    assert compared["actions"] == sum(LENGTHS) * contract.ACTION_SIZE
+    assert compared["copied frames"] == len(contract.CAMERAS) * (sum(LENGTHS) + len(LENGTHS))
+    assert min(compared.values()) > 0
+    assert all(camera.minimum == float("inf") for camera in report.cameras)
+
+
+def test_videos_in_the_target_form_are_copied_packet_by_packet(source: Path, converted: Path) -> None:
+    for camera in contract.CAMERAS:
+        assert packets(converted, camera) == sum(LENGTHS)
+        true = [digest for index in range(3) for digest in digests(v2.video(source, index, camera))]
+        files = sorted((converted / "videos" / contract.image_key(camera)).glob("*/*.mp4"))
+        assert [digest for file in files for digest in digests(file)] == true
+        assert len(set(true)) > sum(LENGTHS) // 2
+        assert record(converted)["videos"][camera] == {"copied": 3, "reencoded": {}}
+
+
+def test_features_names_and_values_are_the_contracts(source: Path, converted: Path) -> None:
+    dataset = LeRobotDataset("local/test", root=converted, video_backend="pyav")
+    for key, feature in contract.dataset_features((v2.SIZE, v2.SIZE)).items():
+        found = dataset.meta.features[key]
+        assert (found["dtype"], tuple(found["shape"]), found["names"]) == tuple(feature.values())
+    assert dataset.meta.robot_type == contract.ROBOT_TYPE
+    assert dataset.meta.features["next.done"]["dtype"] == "bool"
+    assert [dataset[i]["task"] for i in (0, 24, 25)] == [v2.INSTRUCTIONS[i] for i in (0, 1, 0)]
+    columns = [v2.read_columns(source, index) for index in range(3)]
+    for key in ("action", "observation.state"):
+        true = np.concatenate([c[key].flatten().to_numpy() for c in columns])
+        assert column(converted, key).tobytes() == true.tobytes()
+    true = np.concatenate([c["next.reward"].to_numpy() for c in columns])
+    assert column(converted, "next.reward").tobytes() == true.tobytes()
+
+
+def test_task_rows_keep_their_numbers_and_the_task_name_is_no_instruction(converted: Path) -> None:
+    dataset = LeRobotDataset("local/test", root=converted, video_backend="pyav")
+    assert dict(dataset.meta.tasks["task_index"]) == {v2.INSTRUCTIONS[0]: 0, v2.INSTRUCTIONS[1]: 1, v2.TASK_NAME: 2}
+    assert column(converted, "annotation.human.task_name").tolist() == [2] * sum(LENGTHS)
+    assert [dataset.meta.episodes[i]["tasks"] for i in range(3)] == [[v2.INSTRUCTIONS[i]] for i in (0, 1, 0)]
+    lines = read_jsonl(converted / META_FOLDER / "episodes.jsonl")
+    assert {line["task_name"] for line in lines} == {v2.TASK_NAME}
+    assert [line["instruction"] for line in lines] == [v2.INSTRUCTIONS[i] for i in (0, 1, 0)]
+    assert [line["style_id"] for line in lines] == [5, 6, 7]
+
+
+def test_extras_and_descriptions_are_kept_as_they_are(source: Path, converted: Path) -> None:
+    true, kept = tree_hashes(source / "extras"), tree_hashes(converted / "extras")
+    assert kept == true
+    assert len(true) == 1 + 3 * 3
+    for name in ("embodiment.json", "modality.json"):
+        assert json.loads((converted / "meta" / name).read_text()) == json.loads((source / "meta" / name).read_text())
+
+
+def test_statistics_are_those_of_all_frames(converted: Path) -> None:
+    stats = json.loads((converted / "meta" / "stats.json").read_text())
+    values = column(converted, "action")
+    np.testing.assert_allclose(stats["action"]["q01"], np.quantile(values, 0.01, axis=0), rtol=1e-12)
+    pictures = stats[contract.IMAGE_KEYS[0]]
+    assert pictures["count"] == [sum(LENGTHS)]
+    assert 0 <= np.min(pictures["q01"]) < np.max(pictures["q99"]) <= 1
+
+
+@pytest.mark.parametrize("version", ["v2.0", "v2.1"])
+def test_long_gops_are_encoded_again_unless_they_are_allowed(version: str, tmp_path: Path) -> None:
+    source = v2.write_dataset(tmp_path / "in", (30, 12), version=version, options=v2.ROBOCASA, extras=False)
+    camera = contract.CAMERAS[0]
+    assert probe(v2.video(source, 0, camera)).delay > 0, "the videos were to have B-frames"
+    convert([source], tmp_path / "again", SETTINGS, workers=1)
+    convert([source], tmp_path / "kept", ConversionSettings(max_gop=250), workers=1)
+    reasons = record(tmp_path / "again")["videos"][camera]["reencoded"]
+    assert list(reasons.values()) == [1, 1] or list(reasons.values()) == [2]
+    assert all("between key frames" in reason for reason in reasons)
+    assert record(tmp_path / "kept")["videos"][camera] == {"copied": 2, "reencoded": {}}
+    for root, exact in ((tmp_path / "again", False), (tmp_path / "kept", True)):
+        report = verify(root)
+        assert report.passed, report.as_json()
+        assert all((quality.minimum == float("inf")) == exact for quality in report.cameras)
+        assert packets(root, camera) == 42
+        assert record(root)["source_versions"] == [version]
+    files = list((tmp_path / "again" / "videos" / contract.image_key(camera)).glob("*/*.mp4"))
+    assert max(probe(file).longest_gop for file in files) == 2
+
+
+@pytest.mark.parametrize(
+    ("settings", "why"),
+    [
+        (ConversionSettings(reencode=True), "--reencode"),
+        (ConversionSettings(image_size=32), "64x64 pixels, not 32x32"),
+        (ConversionSettings(video_codec="hevc"), "codec h264, not hevc"),
+        (ConversionSettings(max_gop=1), "up to 2 frames between key frames, more than 1"),
+    ],
+)
+def test_what_is_not_in_the_target_form_is_encoded_again(
+    settings: ConversionSettings, why: str, tmp_path: Path
+) -> None:
+    source = v2.write_dataset(tmp_path / "in", (9, 6), cameras=contract.CAMERAS[:1], extras=False)
+    result = convert([source], tmp_path / "out", settings, workers=1)
+    assert record(result.root)["videos"][contract.CAMERAS[0]] == {"copied": 0, "reencoded": {why: 2}}
+    report = verify(result.root)
+    assert report.passed, report.as_json()
+    shape = LeRobotDataset("local/test", root=result.root, video_backend="pyav")[3][contract.IMAGE_KEYS[0]].shape
+    assert tuple(shape) == (3, *[settings.image_size or v2.SIZE] * 2)
+
+
+def test_copied_and_encoded_videos_and_other_headers_go_into_one_dataset(tmp_path: Path) -> None:
+    source = v2.write_dataset(tmp_path / "in", (12, 9, 10), cameras=contract.CAMERAS[:1], extras=False)
+    pictures = v2.moving_pictures(9, v2.SIZE, 1)
+    v2.write_video(v2.video(source, 1, contract.CAMERAS[0]), pictures, v2.ROBOCASA)
+    other_header = v2.TARGET | {"profile": "baseline", "refs": "4"}
+    v2.write_video(v2.video(source, 2, contract.CAMERAS[0]), v2.moving_pictures(10, v2.SIZE, 2), other_header)
+    headers = [probe(v2.video(source, index, contract.CAMERAS[0])).header for index in (0, 2)]
+    assert headers[0] != headers[1]
+    result = convert([source], tmp_path / "out", ConversionSettings(max_gop=4), workers=1)
+    assert record(result.root)["videos"][contract.CAMERAS[0]]["copied"] == 2
+    report = verify(result.root, pictures_per_episode=None)
+    assert report.passed, report.as_json()
+
+
+def test_other_orders_of_components_become_the_contracts(source: Path, tmp_path: Path) -> None:
+    changed = v2.clone(source, tmp_path / "in")
+    turned = contract.slices(contract.ACTION_PARTS[::-1])
+
+    def swap(columns: dict[str, Any]) -> None:
+        actions = np.stack(columns["action"].to_pylist())
+        columns["action"] = v2.vectors(np.concatenate([actions[:, contract.ACTION_SLICES[n]] for n in turned], axis=1))
+
+    def rename(modality: dict[str, Any]) -> None:
+        modality["action"] = {name: {"start": s.start, "end": s.stop} for name, s in turned.items()}
+
+    for index in range(3):
+        v2.edit_table(changed, index, swap)
+    v2.edit_json(changed / "meta" / "modality.json", rename)
+    result = convert([changed], tmp_path / "out", SETTINGS, workers=1)
+    true = np.concatenate([v2.read_columns(source, index)["action"].flatten().to_numpy() for index in range(3)])
+    assert column(result.root, "action").tobytes() == true.tobytes()
+    written = json.loads((result.root / "meta" / "modality.json").read_text())["action"]
+    assert {n: (part["start"], part["end"]) for n, part in written.items()} == {
+        n: (where.start, where.stop) for n, where in contract.ACTION_SLICES.items()
+    }
+    assert verify(result.root).passed
+
+
+def test_episodes_are_selected_by_the_benchmarks_rule(source: Path, tmp_path: Path) -> None:
+    result = convert([source], tmp_path / "out", ConversionSettings(filter_key="2_demos"), workers=1)
+    lines = read_jsonl(result.root / META_FOLDER / "episodes.jsonl")
+    # random.Random(0).shuffle([0, 1, 2]) gives [0, 2, 1]
+    assert [line["source_demo"] for line in lines] == ["episode_000000", "episode_000002"]
+    assert verify(result.root).passed
+    assert record(result.root)["sources"][0]["demos"] == ["episode_000000", "episode_000002"]
+
+
+def test_result_does_not_depend_on_workers_or_kills(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    source = v2.write_dataset(tmp_path / "in", (20,) * 6, cameras=contract.CAMERAS[:2])
+    monkeypatch.setattr("robocasa_lerobot.convert.lerobot_v2.plan.SHARD_FRAMES", 40)
+    convert([source], tmp_path / "one", SETTINGS, workers=1)
+    convert([source], tmp_path / "two", SETTINGS, workers=2)
+    real = pipeline._join
+
+    def killed(*args: Any) -> Any:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(pipeline, "_join", killed)
+    with pytest.raises(KeyboardInterrupt):
+        convert([source], tmp_path / "three", SETTINGS, workers=1)
+    assert not (tmp_path / "three").exists()
+    monkeypatch.setattr(pipeline, "_join", real)
+    convert([source], tmp_path / "three", SETTINGS, workers=1)
+    one, two, three = (tree_hashes(tmp_path / name) for name in ("one", "two", "three"))
+    for hashes in (one, two, three):
+        del hashes[f"{META_FOLDER}/conversion.json"]
+    assert one == two == three
+    assert leftovers(tmp_path / "three") == ["three"]
+
+
+def test_touched_source_files_are_not_mixed_with_an_earlier_try(source: Path, tmp_path: Path) -> None:
+    changed = v2.clone(source, tmp_path / "in")
+    before = pipeline.make_v2_plan([changed], SETTINGS).fingerprint
+    assert pipeline.make_v2_plan([changed], SETTINGS).fingerprint == before
+    os.utime(v2.table(changed, 1), ns=(1, 1))
+    assert pipeline.make_v2_plan([changed], SETTINGS).fingerprint != before
+
+
+def test_several_datasets_become_one_with_one_table_of_tasks(source: Path, tmp_path: Path) -> None:
+    second = v2.write_dataset(tmp_path / "second", (8,), seed=1)
+    tasks = [{"task_index": 0, "task": "wave"}, {"task_index": 1, "task": v2.TASK_NAME}]
+    (second / "meta" / "tasks.jsonl").write_text("".join(json.dumps(line) + "\n" for line in tasks))
+    result = convert([source, second], tmp_path / "out", SETTINGS, workers=1)
+    dataset = LeRobotDataset("local/test", root=result.root, video_backend="pyav")
+    assert dict(dataset.meta.tasks["task_index"]) == {
+        **{text: row for row, text in enumerate(v2.INSTRUCTIONS)}, v2.TASK_NAME: 2, "wave": 3,
+    }  # fmt: skip
+    assert set(column(result.root, "annotation.human.task_description")[-8:]) == {3}
+    assert set(column(result.root, "annotation.human.task_name")) == {2}
+    assert dataset[sum(LENGTHS)]["task"] == "wave"
+    report = verify(result.root)
+    assert report.passed, report.as_json()
+
+
+def test_moved_source_is_found_by_option(source: Path, converted: Path, tmp_path: Path) -> None:
+    moved = v2.clone(source, tmp_path / "elsewhere")
+    copy = Path(shutil.copytree(converted, tmp_path / "copy"))
+    assert verify(copy, sources=[moved], pictures_per_episode=1).passed
+
+
+def test_command(source: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    out = tmp_path / "out"
+    assert (
+        cli.main(["convert", str(source), "--out", str(out), "--cameras", contract.CAMERAS[2], "--workers", "1"]) == 0
+    )
+    assert f"3 episodes, {sum(LENGTHS)} frames, cameras {contract.CAMERAS[2]}" in capsys.readouterr().out
+    assert cli.main(["verify", str(out)]) == 0
+    assert "PASSED" in capsys.readouterr().out
+
+
+def test_isaac_groot_data_as_found_in_the_wild(shared: Path, tmp_path: Path) -> None:
+    source = shared / "real" / "groot_picknplace"
+    result = convert([source], tmp_path / "out", ConversionSettings(max_gop=250), workers=1)
+    assert (result.num_episodes, result.num_frames, result.rejected) == (5, 2096, [])
+    assert result.cameras == ("ego_view",)
+    assert any("egoview is declared but has no video files" in note for note in result.notes)
+    lines = read_jsonl(result.root / META_FOLDER / "episodes.jsonl")
+    assert all(line["instruction"].startswith("pick the ") for line in lines)
+    dataset = LeRobotDataset("local/test", root=result.root, video_backend="pyav")
+    assert dataset.meta.features["action"]["shape"] == (44,)
+    assert dataset.meta.tasks.loc["valid", "task_index"] == 1
+    report = verify(result.root, pictures_per_episode=1)
+    assert report.passed, report.as_json()
+    compared = {check.name: check.compared for check in report.checks}
+    assert (compared["actions"], compared["copied frames"]) == (2096 * 44, 2096 + 5)
