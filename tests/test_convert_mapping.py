@@ -422,3 +422,8 @@ def test_twelve_numbers_alone_make_no_panda_omron(tmp_path: Path) -> None:
     with DemoFile(path) as file:
         mapping = choose_mapping(file, file.demo("demo_0"))
     assert (mapping.robot_type, mapping.base_site) == ("PandaDexRH", "")
+
+
+def test_the_documentation_shows_the_same_example() -> None:
+    text = (Path(__file__).parents[1] / "docs" / "convert.md").read_text(encoding="utf-8")
+    assert EXAMPLE in text
