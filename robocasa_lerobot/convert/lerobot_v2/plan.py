@@ -306,7 +306,7 @@ def _cameras(
     for camera, key in keys.items():
         feature = dataset.pictures[key]
         if feature["dtype"] == "image" or is_depth(feature) or "/" in key:
-            what = "depth" if is_depth(feature) else "pictures inside the tables"
+            what = "depth" if is_depth(feature) else "a path" if "/" in key else "pictures inside the tables"
             lack = f"camera {camera} is declared as {what}, which is not converted"
         else:
             paths = (dataset.video_file(line.index, key) for line in dataset.episodes)
