@@ -35,6 +35,9 @@ SUBCOMMANDS: dict[str, Subcommand] = {
     ),
     "verify": Subcommand("robocasa_lerobot.convert.verify_command", "compare a converted dataset with its source"),
     "export": Subcommand("robocasa_lerobot.convert.export_command", "write a LeRobotDataset v3.0 back to HDF5"),
+    "render": Subcommand(
+        "robocasa_lerobot.convert.rerender_command", "render a dataset again with other cameras, sizes or presets"
+    ),
     "train": Subcommand("robocasa_lerobot.training.command", "run the training phases of an experiment file"),
     "eval": Subcommand("robocasa_lerobot.evaluation.command", "run seeded trials of a policy and report"),
     "report": Subcommand("robocasa_lerobot.evaluation.report_command", "write report.html and report.md from results"),

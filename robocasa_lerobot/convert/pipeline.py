@@ -35,6 +35,7 @@ from robocasa_lerobot.convert.shard import (
     REJECTED_FILE,
     convert_shard,
     episode_folder,
+    kept_assets,
     read_jsonl,
     write_jsonl,
 )
@@ -95,6 +96,9 @@ def convert(
         UserError: the input or the output path cannot be used, or no episode is good. Nothing is at `out` then.
     """
     plan, partial, out = _prepared(files, out, settings, overwrite)
+    if out.exists() and not overwrite and _left_behind(out) == partial:
+        shutil.rmtree(partial)  # an earlier run was killed after its dataset had appeared, while clearing away
+        return _recorded_result(plan, out)
     with locked(partial), failures_explained(out, partial):
         run_pieces(
             _ShardTask(plan, str(partial)),
@@ -159,9 +163,34 @@ def _prepared(
     files: Sequence[Path], out: Path, settings: ConversionSettings, overwrite: bool
 ) -> tuple[Plan, Path, Path]:
     out = out.absolute()
-    check_output(out, overwrite)
+    left = _left_behind(out)
+    if left is None:
+        check_output(out, overwrite)
     plan = make_v2_plan(files, settings) if takes(files) else make_plan(files, settings)
-    return plan, partial_folder(out, plan.fingerprint), out
+    partial = partial_folder(out, plan.fingerprint)
+    if left is not None and left != partial:
+        check_output(out, overwrite)
+    return plan, partial, out
+
+
+def _left_behind(out: Path) -> Path | None:
+    """The working folder of the conversion that made the dataset at `out`, where it is still there."""
+    try:
+        record = json.loads((out / META_FOLDER / CONVERSION_FILE).read_text(encoding="utf-8"))
+        folder = partial_folder(out, str(record["fingerprint"]))
+    except (OSError, ValueError, LookupError, TypeError):
+        return None
+    return folder if folder.is_dir() else None
+
+
+def _recorded_result(plan: Plan, out: Path) -> ConversionResult:
+    """What a conversion that has been completed wrote."""
+    episodes, rejected = (read_jsonl(out / META_FOLDER / name) for name in (EPISODES_FILE, REJECTED_FILE))
+    sources = dict(Counter(line["instruction_source"] for line in episodes))
+    num_frames = sum(line["length"] for line in episodes)
+    return ConversionResult(
+        out, len(episodes), num_frames, rejected, tuple(camera.name for camera in plan.cameras), sources
+    )
 
 
 def _completed(plan: Plan, partial: Path, out: Path) -> ConversionResult:
@@ -270,6 +299,8 @@ def _join(plan: Plan, partial: Path, out: Path) -> ConversionResult | None:
             f"expected {len(episodes)} with {num_frames}."
         )
     write_stats(dataset_statistics(merged, info["features"], histograms), merged)
+    for source in plan.sources:
+        _keep_assets(source, merged / EXTRAS, settings=plan.settings)
     rejected = _rejected(plan, partial)
     ours = merged / META_FOLDER
     ours.mkdir(parents=True)
@@ -295,6 +326,7 @@ def _conversion_record(plan: Plan, out: Path) -> dict[str, Any]:
     packages = ("lerobot", "mujoco", "h5py", "av", "numpy")
     return {
         "robocasa_lerobot_version": __version__,
+        "fingerprint": plan.fingerprint,
         "versions": {package: version(package) for package in packages},
         "settings": asdict(plan.settings),
         "video": CODECS[plan.settings.video_codec],
@@ -307,6 +339,17 @@ def _conversion_record(plan: Plan, out: Path) -> dict[str, Any]:
         "cameras": [asdict(camera) for camera in plan.cameras],
         "sources": [_source_record(source, out, plan.settings) for source in plan.sources],
     }
+
+
+def _keep_assets(source: SourceRecord, extras: Path, settings: ConversionSettings) -> None:
+    """Write the meshes and textures that a file holds itself, without which its scenes cannot be rendered again."""
+    if Path(source.file).is_dir():
+        return
+    with DemoFile(Path(source.file), settings.layout) as file:
+        for name, content in file.assets():
+            path = extras / kept_assets(source.sha256) / name
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_bytes(content)
 
 
 def _source_record(source: SourceRecord, out: Path, settings: ConversionSettings) -> dict[str, Any]:

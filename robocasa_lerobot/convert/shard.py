@@ -129,6 +129,11 @@ def episode_folder(index: int) -> str:
     return f"episode_{index:06d}"
 
 
+def kept_assets(sha256: str) -> str:
+    """Folder under `extras` with the meshes and textures that a source file held itself."""
+    return f"assets/{sha256[:12]}"
+
+
 def _write_extras(episode: Episode, folder: Path) -> None:
     """What replaying and rendering the episode again needs, under RoboCasa's names."""
     folder.mkdir(parents=True)

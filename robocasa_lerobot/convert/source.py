@@ -8,9 +8,11 @@ Files that keep them elsewhere are read through a `Layout`.
 
 from __future__ import annotations
 
+import contextlib
 import fnmatch
 import json
 import re
+from collections.abc import Iterator
 from functools import cached_property
 from pathlib import Path
 from types import TracebackType
@@ -50,6 +52,7 @@ MAX_RATE_HZ = 10_000
 ASSETS_GROUP = "assets"  # data/assets/<path>: files that the MJCF names, stored once for each HDF5 file
 _DEMO = re.compile(r"demo_[0-9]{1,18}")
 _NUMBERS = re.compile(r"([0-9]{1,18})")
+_MAX_ASSET_NAME = 200
 
 
 class DemoFile:
@@ -183,6 +186,21 @@ class DemoFile:
             return None
         with reading(path):
             return np.asarray(dataset[()]).tobytes()
+
+    def assets(self) -> Iterator[tuple[str, bytes]]:
+        """Path and bytes of the files that are stored in the HDF5 file itself, but what no scene could use."""
+        group = member(self._data, ASSETS_GROUP)
+        names: list[str] = []
+        if isinstance(group, h5py.Group):
+            with reading(ASSETS_GROUP):
+                group.visit(names.append)
+        for name in names:
+            if {"..", "."} & set(name.split("/")) or len(name) > _MAX_ASSET_NAME:
+                continue
+            with contextlib.suppress(RejectedEpisodeError):
+                content = self.asset(name)
+                if content is not None:
+                    yield name, content
 
     @cached_property
     def environment(self) -> dict[str, Any]:

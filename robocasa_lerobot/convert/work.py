@@ -42,10 +42,14 @@ def locked(partial: Path) -> Iterator[None]:
     """Make the folder and keep others out of it.
 
     Raises:
-        UserError: the same work is running already.
+        UserError: the same work is running already, or the folder cannot be made.
     """
-    partial.mkdir(parents=True, exist_ok=True)
-    with (partial / "lock").open("w") as lock:
+    try:
+        partial.mkdir(parents=True, exist_ok=True)
+        file = (partial / "lock").open("w")
+    except OSError as error:
+        raise UserError(f"nothing can be written beside the output: {error}. Choose another --out.") from None
+    with file as lock:
         try:
             # A record lock is not inherited, so no orphaned child holds it after the parent was killed.
             fcntl.lockf(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
