@@ -26,9 +26,10 @@ from robocasa_lerobot.convert.verify import verify
 
 CAMERA = contract.CAMERAS[0]
 LENGTHS = (24, 15, 9)
-BAD = 1  # the episode that is damaged
+BAD = 1
 SETTINGS = ConversionSettings()
 Damage = Callable[[Path], None]
+EpisodeDamage = Callable[[Path, int], None]
 
 
 @pytest.fixture(scope="module")
@@ -36,28 +37,23 @@ def good(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return v2.write_dataset(tmp_path_factory.mktemp("good") / "lerobot", LENGTHS, cameras=[CAMERA])
 
 
-@pytest.fixture(scope="module")
-def good_out(good: Path) -> Path:
-    return convert([good], good.parent / "out", SETTINGS, workers=1).root
-
-
-def column(name: str, change: Callable[[np.ndarray[Any, Any]], Any]) -> Damage:
+def column(name: str, change: Callable[[np.ndarray[Any, Any]], Any]) -> EpisodeDamage:
     """Replace a column of the damaged episode."""
 
-    def damage(root: Path) -> None:
+    def damage(root: Path, index: int) -> None:
         def edit(columns: dict[str, Any]) -> None:
             values = np.array(columns[name].to_pylist())
             changed = change(values)
             columns[name] = v2.vectors(changed) if isinstance(changed, np.ndarray) and changed.ndim == 2 else changed
 
-        v2.edit_table(root, BAD, edit)
+        v2.edit_table(root, index, edit)
 
     return damage
 
 
-def without(name: str) -> Damage:
-    def damage(root: Path) -> None:
-        v2.edit_table(root, BAD, lambda columns: columns.pop(name))
+def without(name: str) -> EpisodeDamage:
+    def damage(root: Path, index: int) -> None:
+        v2.edit_table(root, index, lambda columns: columns.pop(name))
 
     return damage
 
@@ -71,63 +67,53 @@ def put(value: Any, *where: int) -> Callable[[np.ndarray[Any, Any]], np.ndarray[
     return change
 
 
-def shortened(root: Path) -> None:
-    v2.edit_table(root, BAD, lambda columns: columns.update({k: v[:-1] for k, v in columns.items()}))
+def shortened(root: Path, index: int) -> None:
+    v2.edit_table(root, index, lambda columns: columns.update({k: v[:-1] for k, v in columns.items()}))
 
 
-def zero_steps(root: Path) -> None:
-    v2.edit_table(root, BAD, lambda columns: columns.update({k: v[:0] for k, v in columns.items()}))
+def zero_steps(root: Path, index: int) -> None:
+    v2.edit_table(root, index, lambda columns: columns.update({k: v[:0] for k, v in columns.items()}))
 
 
-def ragged(root: Path) -> None:
+def ragged(root: Path, index: int) -> None:
     def edit(columns: dict[str, Any]) -> None:
         rows = columns["action"].to_pylist()
         columns["action"] = pa.array([*rows[:-1], rows[-1][:-1]])
 
-    v2.edit_table(root, BAD, edit)
+    v2.edit_table(root, index, edit)
 
 
-def nulls(root: Path) -> None:
+def nulls(root: Path, index: int) -> None:
     def edit(columns: dict[str, Any]) -> None:
         rows = columns["action"].to_pylist()
         rows[2][3] = None
         columns["action"] = pa.array(rows)
 
-    v2.edit_table(root, BAD, edit)
+    v2.edit_table(root, index, edit)
 
 
-def scrambled_video(root: Path) -> None:
-    path = v2.video(root, BAD, CAMERA)
+def scrambled_video(root: Path, index: int) -> None:
+    path = v2.video(root, index, CAMERA)
     content = bytearray(path.read_bytes())
     start = len(content) // 2  # behind the codec's own remarks
     content[start : start + 400] = np.random.default_rng(0).bytes(400)
     path.write_bytes(content)
 
 
-def video_of(length: int) -> Damage:
-    def damage(root: Path) -> None:
-        v2.write_video(v2.video(root, BAD, CAMERA), v2.moving_pictures(length, v2.SIZE), v2.TARGET)
+def video_of(length: int) -> EpisodeDamage:
+    def damage(root: Path, index: int) -> None:
+        v2.write_video(v2.video(root, index, CAMERA), v2.moving_pictures(length, v2.SIZE), v2.TARGET)
 
     return damage
 
 
-def nonsense(root: Path) -> None:
-    v2.table(root, BAD).write_bytes(b"PAR1" + b"\xff" * 64 + b"PAR1")
+def nonsense(root: Path, index: int) -> None:
+    v2.table(root, index).write_bytes(b"PAR1" + b"\xff" * 64 + b"PAR1")
 
 
-def every(change: Callable[[Path, int], None]) -> Damage:
-    """Damage every episode."""
-
-    def damage(root: Path) -> None:
-        for index in range(len(LENGTHS)):
-            change(root, index)
-
-    return damage
-
-
-EPISODES: dict[str, tuple[Damage, str]] = {
-    "no table": (lambda root: v2.table(root, BAD).unlink(), "its table is missing"),
-    "truncated table": (lambda root: v2.truncate(v2.table(root, BAD), 0.6), "cannot be read as parquet"),
+EPISODES: dict[str, tuple[EpisodeDamage, str]] = {
+    "no table": (lambda root, index: v2.table(root, index).unlink(), "its table is missing"),
+    "truncated table": (lambda root, index: v2.truncate(v2.table(root, index), 0.6), "cannot be read as parquet"),
     "table of nonsense": (nonsense, "cannot be read as parquet"),
     "NaN": (column("action", put(np.nan, 3, 1)), "action has 1 values that are NaN or infinite, the first at step 3"),
     "Inf": (column("next.reward", lambda v: put(np.inf, 7)(v).astype(np.float32)), "next.reward has 1 values"),
@@ -146,50 +132,60 @@ EPISODES: dict[str, tuple[Damage, str]] = {
         "its times are not 20 steps a second: step 4",
     ),
     "unknown instruction": (column("annotation.human.task_description", lambda v: v * 0 + 9), "row 9 of tasks.jsonl"),
-    "no video": (lambda root: v2.video(root, BAD, CAMERA).unlink(), "its video of observation.images.robot0"),
-    "truncated video": (lambda root: v2.truncate(v2.video(root, BAD, CAMERA), 0.5), "cannot be read as video"),
-    "empty video": (lambda root: v2.video(root, BAD, CAMERA).write_bytes(b""), "cannot be read as video"),
+    "no video": (lambda root, index: v2.video(root, index, CAMERA).unlink(), "its video of observation.images.robot0"),
+    "truncated video": (lambda root, index: v2.truncate(v2.video(root, index, CAMERA), 0.5), "cannot be read as video"),
+    "empty video": (lambda root, index: v2.video(root, index, CAMERA).write_bytes(b""), "cannot be read as video"),
     "scrambled video": (scrambled_video, "damaged"),
     "short video": (video_of(14), "15 rows but 14 frames in the video"),
     "long video": (video_of(16), "15 rows but 16 decodable frames in the video"),
     "other states": (
-        lambda root: np.savez(root / "extras/episode_000001/states.npz", states=np.zeros((3, 4))),
+        lambda root, index: np.savez(root / f"extras/episode_{index:06d}/states.npz", states=np.zeros((3, 4))),
         "extras/states.npz cannot be used (states are (3, 4), expected (15, n)",
     ),
     "pickled states": (
-        lambda root: np.savez(root / "extras/episode_000001/states.npz", states=np.array([{}], dtype=object)),
+        lambda root, index: np.savez(root / f"extras/episode_{index:06d}/states.npz", states=np.array([{}])),
         "extras/states.npz cannot be used",
     ),
     "model is no gzip": (
-        lambda root: [(root / "extras/episode_000001/model.xml.gz").write_bytes(b"<mujoco/>"), None][1],
+        lambda root, index: [(root / f"extras/episode_{index:06d}/model.xml.gz").write_bytes(b"<mujoco/>"), None][1],
         "extras/model.xml.gz cannot be used",
     ),
     "ep_meta is no object": (
-        lambda root: [(root / "extras/episode_000001/ep_meta.json").write_text("[1]"), None][1],
+        lambda root, index: [(root / f"extras/episode_{index:06d}/ep_meta.json").write_text("[1]"), None][1],
         "its ep_meta.json is a JSON list",
     ),
 }  # fmt: skip
 
 
+@pytest.fixture(scope="module")
+def damaged(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The dataset made from one whose episodes are damaged, each in another way, but for the first and the last."""
+    folder = tmp_path_factory.mktemp("damaged")
+    source = v2.write_dataset(folder / "in", (15,) * (len(EPISODES) + 2), cameras=[CAMERA])
+    for index, (damage, _) in enumerate(EPISODES.values(), start=1):
+        damage(source, index)
+    return convert([source], folder / "out", SETTINGS, workers=1).root
+
+
 @pytest.mark.parametrize("name", EPISODES)
-def test_one_bad_episode_is_rejected_with_its_reason_and_the_others_are_converted(
-    name: str, good: Path, good_out: Path, tmp_path: Path
-) -> None:
-    damage, reason = EPISODES[name]
-    source = v2.clone(good, tmp_path / "in")
-    damage(source)
-    result = convert([source], tmp_path / "out", SETTINGS, workers=1)
-    (rejected,) = read_jsonl(result.root / META_FOLDER / "rejected.jsonl")
-    assert rejected["source_demo"] == "episode_000001"
-    assert reason in rejected["reason"], rejected["reason"]
-    lines = read_jsonl(result.root / META_FOLDER / "episodes.jsonl")
-    assert [line["source_demo"] for line in lines] == ["episode_000000", "episode_000002"]
-    assert result.num_frames == LENGTHS[0] + LENGTHS[2]
-    assert leftovers(tmp_path / "out") == ["out"]
-    (file,) = (result.root / "videos" / contract.image_key(CAMERA)).glob("*/*.mp4")
-    (all_frames,) = (good_out / "videos" / contract.image_key(CAMERA)).glob("*/*.mp4")
-    true = digests(all_frames)
-    assert digests(file) == true[: LENGTHS[0]] + true[-LENGTHS[2] :]
+def test_a_bad_episode_is_rejected_with_its_reason(name: str, damaged: Path) -> None:
+    index = list(EPISODES).index(name) + 1
+    (reason,) = [
+        line["reason"]
+        for line in read_jsonl(damaged / META_FOLDER / "rejected.jsonl")
+        if line["source_demo"] == f"episode_{index:06d}"
+    ]
+    assert EPISODES[name][1] in reason
+
+
+def test_good_episodes_among_bad_ones_are_converted_whole(damaged: Path) -> None:
+    lines = read_jsonl(damaged / META_FOLDER / "episodes.jsonl")
+    assert [line["source_demo"] for line in lines] == ["episode_000000", f"episode_{len(EPISODES) + 1:06d}"]
+    assert leftovers(damaged) == [damaged.name]
+    (file,) = (damaged / "videos" / contract.image_key(CAMERA)).glob("*/*.mp4")
+    source = damaged.parent / "in"
+    assert digests(file) == [d for i in (0, len(EPISODES) + 1) for d in digests(v2.video(source, i, CAMERA))]
+    assert verify(damaged, pictures_per_episode=3).passed
 
 
 def test_what_was_rejected_is_part_of_the_verification(good: Path, tmp_path: Path) -> None:
@@ -200,6 +196,16 @@ def test_what_was_rejected_is_part_of_the_verification(good: Path, tmp_path: Pat
     (result.root / META_FOLDER / "rejected.jsonl").write_text("")
     report = verify(result.root, pictures_per_episode=2)
     assert [check.name for check in report.checks if not check.passed] == ["episodes"]
+
+
+def every(change: EpisodeDamage) -> Damage:
+    """Damage every episode."""
+
+    def damage(root: Path) -> None:
+        for index in range(len(LENGTHS)):
+            change(root, index)
+
+    return damage
 
 
 def info(**values: Any) -> Damage:
@@ -266,7 +272,7 @@ def test_cameras_without_videos_are_left_out_with_a_note_or_refused_if_asked_for
 
 def test_the_users_instruction_is_for_episodes_without_one(good: Path, tmp_path: Path) -> None:
     source = v2.clone(good, tmp_path / "in")
-    EPISODES["unknown instruction"][0](source)
+    EPISODES["unknown instruction"][0](source, BAD)
     result = convert([source], tmp_path / "out", ConversionSettings(instruction="open it"), workers=1)
     lines = read_jsonl(result.root / META_FOLDER / "episodes.jsonl")
     assert [line["instruction"] for line in lines] == [v2.INSTRUCTIONS[0], "open it", v2.INSTRUCTIONS[0]]
