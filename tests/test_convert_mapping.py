@@ -168,6 +168,20 @@ def test_states_of_two_arms_are_computed_from_the_scene(tmp_path: Path) -> None:
         assert np.array_equal(state[:, 8 * arm + 7], finger)
 
 
+def test_arms_without_observations_are_named_as_in_their_scene(tmp_path: Path) -> None:
+    scene = _ARM.format(i=0, x=0) + _ARM.format(i=0, x=1).replace("right", "left").replace("robot0_left_base", "b")
+    scene = scene.replace("_hand", "_eef").replace('"robot0_base"', '"a"', 1).replace("robot0_joint1", "j", 1)
+    path = tmp_path / "a.hdf5"
+    with h5py.File(path, "w") as file:
+        demo = file.create_group("data/demo_0")
+        demo.attrs["model_file"] = f"<mujoco><worldbody>{scene}</worldbody></mujoco>"
+        demo["actions"] = np.zeros((2, 3))
+    with DemoFile(path) as file:
+        mapping = choose_mapping(file, file.demo("demo_0"))
+    assert [arm.hand_body for arm in mapping.arms] == ["robot0_right_eef", "robot0_left_eef"]
+    assert [arm.joints for arm in mapping.arms] == [("gripper0_right_finger_joint1",), ("gripper0_left_finger_joint1",)]
+
+
 @pytest.fixture(scope="module")
 def v01(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return write_robocasa_v01(tmp_path_factory.mktemp("v01") / "demo_im128.hdf5")

@@ -164,10 +164,12 @@ def _arm(demo: Demo, names: SceneNames, robot: int, side: str, name: str, *, alo
     """Names in robosuite: >= 1.5 has the side in every name, older versions only for robots with two arms."""
     sites = [f"gripper{robot}_{side}_grip_site", *([f"gripper{robot}_grip_site"] if alone else [])]
     prefix = f"gripper{robot}_" if alone else f"gripper{robot}_{side}_"
+    # The GR1 humanoids have the second one.
+    end = next((end for end in ("hand", "eef") if f"robot{robot}_{side}_{end}" in names.bodies), "hand")
     return Arm(
         name=name,
         observations=f"robot{robot}_" if alone else f"robot{robot}_{side}_",
-        hand_body=f"robot{robot}_{side}_hand",
+        hand_body=f"robot{robot}_{side}_{end}",
         grip_site=next((site for site in sites if site in names.sites), ""),
         joints=tuple(joint for joint in names.joints if joint.startswith(prefix)),
     )
