@@ -17,7 +17,7 @@ from robocasa_lerobot import contract
 from robocasa_lerobot.convert.episode import Episode
 from robocasa_lerobot.convert.lerobot_v2.dataset import V2Dataset, is_dataset_folder
 from robocasa_lerobot.convert.lerobot_v2.plan import SOURCE_FORMAT, source_record
-from robocasa_lerobot.convert.mapping import EXTRA_PREFIX
+from robocasa_lerobot.convert.mapping import EXTRA_PREFIX, RobotMapping
 from robocasa_lerobot.convert.pipeline import CONVERSION_FILE, META_FOLDER, quiet_libraries
 from robocasa_lerobot.convert.report import CameraQuality, Check, Report
 from robocasa_lerobot.convert.robots import choose_mapping
@@ -77,6 +77,8 @@ def verify(
         raise UserError(f"{root} is {what}: {META_FOLDER}/{CONVERSION_FILE}, which `convert` writes, is not there.")
     # Here, as it builds on this module.
     from robocasa_lerobot.convert.lerobot_v2.verify import V2Verification
+    from robocasa_lerobot.convert.rerender import SOURCE_FORMAT as RERENDERED
+    from robocasa_lerobot.convert.rerender_verify import verify_rerendered
 
     quiet_libraries()
     record = json.loads((root / META_FOLDER / CONVERSION_FILE).read_text(encoding="utf-8"))
@@ -85,6 +87,8 @@ def verify(
         dataset = LeRobotDataset(f"local/{root.name}", root=root, video_backend="pyav", return_uint8=True)
     except Exception as error:
         raise UserError(f"LeRobot does not open {root}: {type(error).__name__}: {error}") from error
+    if record.get("source_format") == RERENDERED:
+        return verify_rerendered(root, dataset, record, sources, asset_roots, pictures_per_episode, min_psnr_db)
     kind = V2Verification if record.get("source_format") == SOURCE_FORMAT else Verification
     verification = kind(root, dataset, episodes, record, pictures_per_episode, min_psnr_db)
     files = _find_sources(root, record["sources"], sources)
@@ -161,7 +165,7 @@ class Verification:
         check = self._checks["video frames"]
         for camera in self._quality:
             key = contract.image_key(camera)
-            count = sum(_num_video_frames(file) for file in (self._root / "videos" / key).glob("*/*.mp4"))
+            count = sum(num_video_frames(file) for file in (self._root / "videos" / key).glob("*/*.mp4"))
             total = self._dataset.num_frames
             check.expect(count == total, f"{camera}: {count} frames in the videos, {total} in the tables")
 
@@ -181,6 +185,8 @@ class Verification:
                 self._checks["episodes"].expect(
                     (name in written) != (name in out), f"{path} {name} is neither converted nor rejected, or both"
                 )
+            if not mine:
+                return
             plan = _plan(file, mine, settings, record)
             for line in mine:
                 try:
@@ -233,8 +239,8 @@ class Verification:
         for camera, quality in self._quality.items():
             for own, step in enumerate(steps):
                 errors = [_squared_error(decoded[camera][own], picture) for picture in true[camera]]
-                psnr = 10 * np.log10(_PEAK**2 / errors[own]) if errors[own] > 0 else float("inf")
-                quality.psnr_db.append(float(psnr))
+                psnr = psnr_db(decoded[camera][own], true[camera][own])
+                quality.psnr_db.append(psnr)
                 check.expect(
                     psnr >= self._min_psnr_db,
                     f"{label} step {step} {camera}: PSNR {psnr:.1f} dB, at least {self._min_psnr_db:g} needed",
@@ -272,7 +278,14 @@ def _squared_error(a: NDArray[np.uint8], b: NDArray[np.uint8]) -> float:
     return float(np.mean(difference * difference))
 
 
-def _num_video_frames(file: Path) -> int:
+def psnr_db(found: NDArray[np.uint8], true: NDArray[np.uint8]) -> float:
+    """Peak signal-to-noise ratio of a picture in dB, infinite where it is equal."""
+    error = _squared_error(found, true)
+    return float(10 * np.log10(_PEAK**2 / error)) if error > 0 else float("inf")
+
+
+def num_video_frames(file: Path) -> int:
+    """How many frames a video file holds, without decoding them."""
     with av.open(str(file)) as container:
         return sum(1 for packet in container.demux(video=0) if packet.size)
 
@@ -292,16 +305,26 @@ def recorded_settings(record: dict[str, Any], asset_roots: Sequence[str]) -> Con
 
 
 def _plan(file: DemoFile, lines: list[dict[str, Any]], settings: ConversionSettings, record: dict[str, Any]) -> Plan:
-    sample = file.demo(lines[0]["source_demo"] if lines else settings.select(file)[0])
     return Plan(
         settings=settings,
         sources=(),
-        mapping=choose_mapping(file, sample),
+        mapping=_mapping(file, [line["source_demo"] for line in lines]),
         cameras=tuple(Camera(**camera) for camera in record["cameras"]),
         fps=record["fps"],
         shards=(),
         num_frames=0,
     )
+
+
+def _mapping(file: DemoFile, names: Sequence[str]) -> RobotMapping:
+    """By the first demo that shows the robot: one with a broken scene can be converted, but not judged by."""
+    failure: RejectedEpisodeError | None = None
+    for name in names:
+        try:
+            return choose_mapping(file, file.demo(name))
+        except RejectedEpisodeError as error:
+            failure = failure or error
+    raise UserError(f"{file.path} shows no robot any more: {failure}")
 
 
 def _sha256(path: Path) -> str:
