@@ -1,16 +1,16 @@
 """The measured pieces of `convert_speed.py` that run in our environment; a process that answers commands.
 
 Ours is the converter as users call it. The encoder alone, the renderer alone and LeRobot's own recording path are the
-lines below, which share nothing with the converter's: what they do is what anybody would write first.
+lines below, which share the codec options with the converter and nothing else: they are what anybody would write first.
 """
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import shutil
 import time
-from concurrent.futures import ThreadPoolExecutor
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
@@ -28,6 +28,7 @@ from peers import sim_loop
 
 from robocasa_lerobot import contract
 from robocasa_lerobot.convert import pipeline
+from robocasa_lerobot.convert.encoder import ENCODER_THREADS
 from robocasa_lerobot.convert.mjcf import AssetFinder, loadable
 from robocasa_lerobot.convert.settings import ConversionSettings
 from robocasa_lerobot.convert.statistics import column
@@ -35,7 +36,6 @@ from robocasa_lerobot.rendering import SceneRenderer
 
 Picture = NDArray[np.uint8]
 BATCH = 16
-ENCODER_THREADS = 1  # of one video, as in our converter; each camera has a Python thread of its own
 # RoboCasa's published videos: h264, crf 23, the codec's own keyframe distance.
 OFFICIAL_VIDEO = {"vcodec": "h264", "crf": 23, "g": 250}
 
@@ -113,7 +113,7 @@ def record_with_lerobot(file: str, reference: str, out: str, render: bool) -> di
 
 
 class Encoding:
-    """The encoder alone: pictures that lie in memory, one Python thread and one video for each camera and demo."""
+    """The encoder alone: pictures that lie in memory, one video for each camera and demo."""
 
     def __init__(self) -> None:
         self._pictures: dict[str, dict[str, NDArray[np.uint8]]] = {}
@@ -138,28 +138,29 @@ class Encoding:
         clock = Clock()
         frames = 0
         for name in demos:
-            with ThreadPoolExecutor(len(self._pictures[name])) as pool:
-                done = [
-                    pool.submit(self._encode, pictures, Path(folder) / f"{name}-{key}.mp4")
-                    for key, pictures in self._pictures[name].items()
-                ]
-            for video in done:
-                video.result()
+            self._encode(self._pictures[name], Path(folder), name)
             frames += len(next(iter(self._pictures[name].values())))
         return {**clock.taken(), "frames": frames, "mib": folder_mib(Path(folder))}
 
-    def _encode(self, pictures: NDArray[np.uint8], path: Path) -> None:
+    def _encode(self, pictures: dict[str, NDArray[np.uint8]], folder: Path, name: str) -> None:
         time_base = Fraction(1, contract.CONTROL_HZ)
-        with av.open(str(path), "w") as container:
-            options = self._video.get_codec_options(ENCODER_THREADS, as_strings=True)
-            stream = container.add_stream(self._video.vcodec, contract.CONTROL_HZ, options=options)
-            stream.pix_fmt = self._video.pix_fmt
-            stream.height, stream.width = pictures.shape[1:3]
-            for step, picture in enumerate(pictures):
-                frame = av.VideoFrame.from_ndarray(picture, format="rgb24")
-                frame.pts, frame.time_base = step, time_base
-                container.mux(stream.encode(frame))
-            container.mux(stream.encode())
+        options = self._video.get_codec_options(ENCODER_THREADS, as_strings=True)
+        videos = []
+        with contextlib.ExitStack() as stack:
+            for key, images in pictures.items():
+                container = stack.enter_context(av.open(str(folder / f"{name}-{key}.mp4"), "w"))
+                stream = container.add_stream(self._video.vcodec, contract.CONTROL_HZ, options=options)
+                stream.pix_fmt = self._video.pix_fmt
+                stream.height, stream.width = images.shape[1:3]
+                videos.append((container, stream, images))
+            # Step by step through all cameras, so that the codec's threads of all of them have work.
+            for step in range(len(videos[0][2])):
+                for container, stream, images in videos:
+                    frame = av.VideoFrame.from_ndarray(images[step], format="rgb24")
+                    frame.pts, frame.time_base = step, time_base
+                    container.mux(stream.encode(frame))
+            for container, stream, _ in videos:
+                container.mux(stream.encode())
 
 
 class RecordedScene:
