@@ -19,9 +19,10 @@ pytest.importorskip("lerobot.datasets")
 from lerobot.datasets.lerobot_dataset import LeRobotDataset
 
 from robocasa_lerobot.convert import pipeline
+from robocasa_lerobot.convert.lerobot_v2.plan import V2Plan
 from robocasa_lerobot.convert.lerobot_v2.video import digests, probe
 from robocasa_lerobot.convert.pipeline import META_FOLDER, convert
-from robocasa_lerobot.convert.settings import ConversionSettings
+from robocasa_lerobot.convert.settings import ConversionSettings, Shard
 from robocasa_lerobot.convert.shard import read_jsonl
 from robocasa_lerobot.convert.statistics import column
 from robocasa_lerobot.convert.verify import verify
@@ -206,27 +207,48 @@ def test_episodes_are_selected_by_the_benchmarks_rule(source: Path, tmp_path: Pa
     assert record(result.root)["sources"][0]["demos"] == ["episode_000000", "episode_000002"]
 
 
-def test_result_does_not_depend_on_workers_or_kills(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def _hashes(root: Path) -> dict[str, str]:
+    hashes = tree_hashes(root)
+    del hashes[f"{META_FOLDER}/conversion.json"]  # it names the output
+    return hashes
+
+
+def test_a_killed_conversion_goes_on_to_the_same_bytes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     source = v2.write_dataset(tmp_path / "in", (20,) * 6, cameras=contract.CAMERAS[:2])
     monkeypatch.setattr("robocasa_lerobot.convert.lerobot_v2.plan.SHARD_FRAMES", 40)
     convert([source], tmp_path / "one", SETTINGS, workers=1)
-    convert([source], tmp_path / "two", SETTINGS, workers=2)
-    real = pipeline._join
+    real = pipeline.convert_v2_shard
+    done: list[tuple[str, ...]] = []
 
-    def killed(*args: Any) -> Any:
-        raise KeyboardInterrupt
+    def killed(plan: V2Plan, shard: Shard, *rest: Any) -> Any:
+        if len(done) == 2:
+            raise KeyboardInterrupt
+        done.append(shard.demos)
+        return real(plan, shard, *rest)
 
-    monkeypatch.setattr(pipeline, "_join", killed)
+    monkeypatch.setattr(pipeline, "convert_v2_shard", killed)
     with pytest.raises(KeyboardInterrupt):
-        convert([source], tmp_path / "three", SETTINGS, workers=1)
-    assert not (tmp_path / "three").exists()
-    monkeypatch.setattr(pipeline, "_join", real)
-    convert([source], tmp_path / "three", SETTINGS, workers=1)
-    one, two, three = (tree_hashes(tmp_path / name) for name in ("one", "two", "three"))
-    for hashes in (one, two, three):
-        del hashes[f"{META_FOLDER}/conversion.json"]
-    assert one == two == three
-    assert leftovers(tmp_path / "three") == ["three"]
+        convert([source], tmp_path / "two", SETTINGS, workers=1)
+    assert not (tmp_path / "two").exists()
+
+    def counted(plan: V2Plan, shard: Shard, *rest: Any) -> Any:
+        done.append(shard.demos)
+        return real(plan, shard, *rest)
+
+    monkeypatch.setattr(pipeline, "convert_v2_shard", counted)
+    convert([source], tmp_path / "two", SETTINGS, workers=1)
+    assert done == [(f"episode_{i:06d}", f"episode_{i + 1:06d}") for i in (0, 2, 4)], "a finished shard was done again"
+    assert _hashes(tmp_path / "one") == _hashes(tmp_path / "two")
+    assert leftovers(tmp_path / "two") == ["two"]
+
+
+@pytest.mark.slow
+def test_result_does_not_depend_on_the_workers(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    source = v2.write_dataset(tmp_path / "in", (20,) * 6, cameras=contract.CAMERAS[:2])
+    monkeypatch.setattr("robocasa_lerobot.convert.lerobot_v2.plan.SHARD_FRAMES", 40)
+    for workers in (1, 2):
+        convert([source], tmp_path / f"out{workers}", SETTINGS, workers=workers)
+    assert _hashes(tmp_path / "out1") == _hashes(tmp_path / "out2")
 
 
 def test_touched_source_files_are_not_mixed_with_an_earlier_try(source: Path, tmp_path: Path) -> None:
@@ -284,3 +306,37 @@ def test_isaac_groot_data_as_found_in_the_wild(shared: Path, tmp_path: Path) -> 
     assert report.passed, report.as_json()
     compared = {check.name: check.compared for check in report.checks}
     assert (compared["actions"], compared["copied frames"]) == (2096 * 44, 2096 + 5)
+
+
+@pytest.mark.parametrize(
+    ("codec", "encoder", "options"),
+    [
+        ("hevc", "hevc", {"x265-params": "log-level=error:open-gop=0", "g": "4"}),
+        ("av1", "libsvtav1", {"g": "4", "preset": "12"}),
+    ],
+)
+def test_videos_of_other_codecs_are_copied_where_that_codec_is_wanted(
+    codec: str, encoder: str, options: dict[str, str], tmp_path: Path
+) -> None:
+    source = v2.write_dataset(tmp_path / "in", (11, 7), cameras=contract.CAMERAS[:1], extras=False)
+    for index, length in enumerate((11, 7)):
+        pictures = v2.moving_pictures(length, v2.SIZE, index)
+        v2.write_video(v2.video(source, index, contract.CAMERAS[0]), pictures, options, encoder)
+    result = convert([source], tmp_path / "out", ConversionSettings(video_codec=codec), workers=1)
+    assert record(result.root)["videos"][contract.CAMERAS[0]] == {"copied": 2, "reencoded": {}}
+    report = verify(result.root, pictures_per_episode=None)
+    assert report.passed, report.as_json()
+    assert packets(result.root, contract.CAMERAS[0]) == 18
+
+
+def test_open_gops_are_encoded_again_as_random_access_would_lose_pictures(tmp_path: Path) -> None:
+    source = v2.write_dataset(tmp_path / "in", (11,), cameras=contract.CAMERAS[:1], extras=False)
+    path = v2.video(source, 0, contract.CAMERAS[0])
+    v2.write_video(
+        path, v2.moving_pictures(11, v2.SIZE), {"x265-params": "log-level=error:open-gop=1", "g": "4"}, "hevc"
+    )
+    assert probe(path).open_gop
+    result = convert([source], tmp_path / "out", ConversionSettings(video_codec="hevc"), workers=1)
+    (reason,) = record(result.root)["videos"][contract.CAMERAS[0]]["reencoded"]
+    assert "open GOP" in reason
+    assert verify(result.root, pictures_per_episode=None).passed

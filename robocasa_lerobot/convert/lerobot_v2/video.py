@@ -10,6 +10,7 @@ import hashlib
 from collections.abc import Iterator
 from dataclasses import dataclass
 from fractions import Fraction
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -28,7 +29,8 @@ class VideoForm:
     """What decides whether a video can stay as it is.
 
     `order` gives each packet's place in showing order; `longest_gop` is the longest run of packets that begins with a
-    key frame; `header` is the codec's out-of-band data, which one file has only once.
+    key frame; `open_gop` says that pictures come after a key frame but are shown before it, so that they are lost when
+    playing starts there; `header` is the codec's out-of-band data, which one file has only once.
     """
 
     codec: str
@@ -39,6 +41,7 @@ class VideoForm:
     num_packets: int
     starts_with_key: bool
     longest_gop: int
+    open_gop: bool
     order: tuple[int, ...]
     header: bytes
 
@@ -59,6 +62,8 @@ class VideoForm:
             return f"{self.fps} frames per second, not {fps}"
         if not self.starts_with_key:
             return "it does not start with a key frame"
+        if self.open_gop:
+            return "pictures that cannot be decoded from the key frame they follow (open GOP)"
         if self.longest_gop > max_gop:
             return f"up to {self.longest_gop} frames between key frames, more than {max_gop}"
         return None
@@ -84,6 +89,7 @@ def probe(path: Path) -> VideoForm:
             order = np.empty(len(times), np.int64)
             order[np.argsort(np.array(times, np.int64), kind="stable")] = np.arange(len(times))
             starts = [*np.flatnonzero(keys).tolist(), len(times)]
+            gops = [order[start:end] for start, end in pairwise(starts)]
             return VideoForm(
                 codec=stream.codec.canonical_name,
                 height=context.height,
@@ -93,6 +99,7 @@ def probe(path: Path) -> VideoForm:
                 num_packets=len(times),
                 starts_with_key=keys[0],
                 longest_gop=int(np.diff(starts).max()) if len(starts) > 1 else len(times),
+                open_gop=any(gop.min() < gop[0] for gop in gops),
                 order=tuple(order.tolist()),
                 header=bytes(context.extradata or b""),
             )
