@@ -46,7 +46,16 @@ def read_camera_configs(file: Path) -> CameraConfigs:
     content = content.get("cam_configs", content)
     if not isinstance(content, Mapping) or not content:
         raise UserError(f"{file}: expected cameras by name, each with pos, quat and so on; found {content!r}.")
-    return {str(name): _checked(f"{file}: camera {name}", config) for name, config in content.items()}
+    return check_camera_configs(content, str(file))
+
+
+def check_camera_configs(content: Mapping[str, Any], where: str = "cam_configs") -> CameraConfigs:
+    """Cameras with all numbers as lists.
+
+    Raises:
+        UserError: something in it is no camera; the message begins with `where`.
+    """
+    return {str(name): _checked(f"{where}: camera {name}", config) for name, config in content.items()}
 
 
 def with_cameras(xml: str, configs: Mapping[str, Mapping[str, Any]]) -> str:

@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robocasa_lerobot import contract
-from robocasa_lerobot.convert.camera_configs import with_cameras
+from robocasa_lerobot.convert.camera_configs import check_camera_configs, with_cameras
 from robocasa_lerobot.convert.encoder import CODECS
 from robocasa_lerobot.convert.exported import ExportedDataset, ExportedEpisode
 from robocasa_lerobot.convert.mjcf import AssetFinder, loadable, scene_names
@@ -60,6 +60,8 @@ class RenderSettings:
             raise UserError(f"cameras {', '.join(self.cameras) or '(none)'}: name each camera once, and at least one.")
         if self.video_codec not in CODECS:
             raise UnknownNameError("video codec", self.video_codec, CODECS)
+        configs = check_camera_configs(json.loads(self.cam_configs))
+        object.__setattr__(self, "cam_configs", json.dumps(configs, sort_keys=True))
 
 
 @dataclass(frozen=True)
