@@ -22,7 +22,7 @@ from typing import Any
 
 import h5py
 import numpy as np
-from convert_support import INSTRUCTION, SCENE, moving_pictures
+from convert_support import INSTRUCTION, SCENE
 
 from robocasa_lerobot import contract
 
@@ -56,10 +56,18 @@ def base_file(path: Path, variant: int) -> Path:
             for part in contract.STATE_PARTS:
                 columns[f"obs/{contract.STATE_PART_HDF5_KEYS[part.name]}"] = rng.normal(size=(length, part.size))
             for offset, camera in enumerate(contract.CAMERAS[: 1 + variant % 2]):
-                columns[f"obs/{camera}_image"] = moving_pictures(length, IMAGE_SIZE, offset)
+                columns[f"obs/{camera}_image"] = _pictures(length, offset)
             for key, values in columns.items():
                 demo.create_dataset(key, data=values, **options)
     return path
+
+
+def _pictures(length: int, offset: int) -> np.ndarray:
+    """Shaded pictures (T, 16, 16, 3) uint8 that grow brighter: so small, they survive video only without edges."""
+    across = np.linspace(40, 120, IMAGE_SIZE)
+    shades = across[:, None] / 2 + across[None, :] / 2 + 20 * offset
+    steps = shades[None] + 20 * np.arange(length)[:, None, None]
+    return np.repeat(steps[..., None], 3, axis=-1).astype(np.uint8)
 
 
 def mutate(path: Path, rng: np.random.Generator) -> list[str]:
@@ -215,7 +223,13 @@ def _other_attribute(file: h5py.File, rng: np.random.Generator) -> None:
     name = _pick(file, rng, h5py.Group)
     keys = list(file[name].attrs) or ["env_args"]
     others = ["", "{", "[1, 2]", "[" * 5000, "null", '{"lang": 5}', '{"lang": "\\ud800"}', "x\x85y\u2028z", 7, np.nan]
-    others += [np.arange(5), b"\xff\xfe", np.zeros(3, "S4"), h5py.Empty("f8"), '{"env_kwargs": {"control_freq": 1e400}}']
+    others += [
+        np.arange(5),
+        b"\xff\xfe",
+        np.zeros(3, "S4"),
+        h5py.Empty("f8"),
+        '{"env_kwargs": {"control_freq": 1e400}}',
+    ]
     others += ['{"env_kwargs": {"control_freq": "20"}}', '{"lang": ' + "9" * 5000 + "}", "<mujoco><a></mujoco>"]
     file[name].attrs[str(rng.choice(keys))] = others[int(rng.integers(len(others)))]
 
@@ -276,7 +290,7 @@ class Ending:
 def in_child(function: Callable[[], Any], seconds: float = 60.0, extra_bytes: int = 4 << 30) -> Ending:
     """Call a function in a forked child that may use so much more memory than this process, and so much time."""
     start = time.monotonic()
-    out = tempfile.TemporaryFile()
+    out = tempfile.TemporaryFile()  # noqa: SIM115 (closed below, in both processes)
     read_end, write_end = os.pipe()
     child = os.fork()
     if child == 0:  # never returns

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from robocasa_lerobot.convert.hdf5 import (
     MAX_COLUMN_VALUES,
     MAX_IMAGE_SIDE,
+    MAX_MAGNITUDE,
     RejectedEpisodeError,
     SourceError,
     first_line,
@@ -242,10 +243,11 @@ class Demo:
         if dtype.kind not in "fiub" or not shape or dimensions not in (None, len(shape)):
             raise RejectedEpisodeError(f"{key} is {shape} {dtype}, expected (T, k) numbers.")
         values = self._read(dataset, (), key).astype(np.float64)
-        bad = np.argwhere(~np.isfinite(values))
+        bad = np.argwhere(~(np.abs(values) <= MAX_MAGNITUDE))
         if len(bad):
             raise RejectedEpisodeError(
-                f"{key} has {len(bad)} values that are NaN or infinite, the first at step {bad[0][0]}."
+                f"{key} has {len(bad)} values that are NaN or infinite or beyond {MAX_MAGNITUDE:g}, the first at "
+                f"step {bad[0][0]}."
             )
         return values
 

@@ -135,6 +135,10 @@ class Episode:
                 states.append(plan.mapping.state_of_scene(self._scene))
             except KeyError as error:
                 raise RejectedEpisodeError(f"its scene lacks what the state is computed from: {error}") from None
+            except np.linalg.LinAlgError:
+                raise RejectedEpisodeError(f"its scene falls apart at step {step}: poses are not finite.") from None
+            if not np.isfinite(states[-1]).all():
+                raise RejectedEpisodeError(f"its scene falls apart at step {step}: poses are not finite.")
         return np.stack(states)
 
 

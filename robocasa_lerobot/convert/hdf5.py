@@ -20,6 +20,7 @@ from robocasa_lerobot.errors import UserError
 # Larger things than these are no demonstration: values of one column, bytes of one text, of one chunk, of one file
 # that a scene names, and of one attribute that is only kept as a record; height and width of pictures.
 MAX_COLUMN_VALUES = 50_000_000
+MAX_MAGNITUDE = 1e30  # of numbers: beyond it squares, and so statistics, soon overflow
 MAX_VALUES = 1 << 40  # of pictures, which are read a few at a time
 MAX_TEXT_BYTES = 32 << 20
 MAX_CHUNK_BYTES = 1 << 30
@@ -87,7 +88,8 @@ def _follow(group: h5py.Group, path: str, links: int) -> h5py.Group | h5py.Datas
 def names(group: h5py.Group, what: str) -> list[str]:
     """Names of the members of a group."""
     with reading(what):
-        return list(group)
+        # Those that are no UTF-8 come as bytes.
+        return [name if isinstance(name, str) else name.decode("utf-8", "surrogateescape") for name in group]
 
 
 def shape_and_type(

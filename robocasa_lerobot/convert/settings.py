@@ -29,7 +29,7 @@ FORMAT_VERSION = 2
 # that joining them costs more than making them.
 SHARD_FRAMES = 250
 MAX_SHARDS = 64
-_MAX_CANDIDATES = 10  # demos by which robot and cameras are judged, until one is good
+_MAX_FAILURES = 10  # demos without a known robot, camera or mesh, after which no other is tried
 
 
 @dataclass(frozen=True)
@@ -241,15 +241,17 @@ def _robot_and_cameras(
 ) -> tuple[RobotMapping, tuple[Camera, ...]]:
     """Judged by the first good demo of those with the most frequent number of actions."""
     usual = Counter(widths.values()).most_common(1)[0][0]
-    candidates = [name for name, width in widths.items() if width == usual][:_MAX_CANDIDATES]
     failure: UserError | None = None
-    for name in candidates:
+    failures = 0
+    for name in (name for name, width in widths.items() if width == usual):
         try:
             return _judge(file, file.demo(name), settings, roots)
         except RejectedEpisodeError as error:
             failure = failure or SourceError(f"{file.path}: {name} cannot be used: {error}")
-        except UserError as error:
-            failure = failure or error
+        except UserError as error:  # more likely about the whole file
+            failure, failures = error if failures == 0 else failure, failures + 1
+            if failures == _MAX_FAILURES:
+                break
     assert failure is not None
     raise failure
 

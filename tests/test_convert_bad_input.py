@@ -1,0 +1,591 @@
+"""Bad and hostile input, unwritable outputs: a clear message, the rest goes on, never half a dataset."""
+
+from __future__ import annotations
+
+import errno
+import json
+import os
+import resource
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+import pytest
+from convert_support import INSTRUCTION, SCENE, leftovers, tree_hashes, write_demos
+from fuzz_support import in_child
+
+from robocasa_lerobot import contract
+from robocasa_lerobot.errors import UserError
+
+pytest.importorskip("lerobot.datasets")
+from lerobot.datasets.lerobot_dataset import LeRobotDataset
+
+from robocasa_lerobot.convert import hdf5, pipeline
+from robocasa_lerobot.convert.encoder import SamplingVideoEncoder
+from robocasa_lerobot.convert.mjcf import AssetFinder, loadable
+from robocasa_lerobot.convert.mjcf_limits import MAX_DEPTH
+from robocasa_lerobot.convert.pipeline import META_FOLDER, convert
+from robocasa_lerobot.convert.settings import ConversionSettings, make_plan
+from robocasa_lerobot.convert.shard import read_jsonl
+from robocasa_lerobot.convert.source import DemoFile, RejectedEpisodeError
+from robocasa_lerobot.convert.survey import CPU_SECONDS
+from robocasa_lerobot.convert.verify import verify
+
+SETTINGS = ConversionSettings()
+STEPS = 6
+CAMERA = f"obs/{contract.CAMERAS[0]}_image"
+
+# --- episodes: rejected with a reason, beside good ones -------------------------------------------------------------
+
+
+def _replaced(key: str, make: Callable[[h5py.Group], Any]) -> Callable[[h5py.Group], None]:
+    def spoil(demo: h5py.Group) -> None:
+        values = make(demo)
+        del demo[key]
+        demo[key] = values
+
+    return spoil
+
+
+def _elsewhere(demo: h5py.Group) -> Path:
+    return Path(demo.file.filename).with_name("elsewhere.hdf5")
+
+
+def _external_link(demo: h5py.Group) -> h5py.ExternalLink:
+    with h5py.File(_elsewhere(demo), "w") as other:
+        other["actions"] = np.zeros((STEPS, contract.ACTION_SIZE))
+    return h5py.ExternalLink(_elsewhere(demo).name, "/actions")
+
+
+def _soft_to_external(demo: h5py.Group) -> h5py.SoftLink:
+    demo["aside"] = h5py.ExternalLink(_elsewhere(demo).name, "/actions")
+    return h5py.SoftLink(f"{demo.name}/aside")
+
+
+def _external_data(demo: h5py.Group) -> None:
+    secret = Path(demo.file.filename).with_name("secret.bin")
+    secret.write_bytes(b"s" * STEPS * 16 * 16 * 3)
+    del demo[CAMERA]
+    demo.create_dataset(CAMERA, (STEPS, 16, 16, 3), "u1", external=[(str(secret), 0, h5py.h5f.UNLIMITED)])
+
+
+def _virtual(demo: h5py.Group) -> None:
+    layout = h5py.VirtualLayout((STEPS, contract.ACTION_SIZE), "f8")
+    layout[:] = h5py.VirtualSource(_elsewhere(demo).name, "actions", (STEPS, contract.ACTION_SIZE))
+    del demo["actions"]
+    demo.create_virtual_dataset("actions", layout)
+
+
+def _never_written(demo: h5py.Group) -> None:
+    del demo["actions"]
+    demo.create_dataset("actions", (STEPS, contract.ACTION_SIZE), "f8")
+
+
+def _part_missing(demo: h5py.Group) -> None:
+    values = demo[CAMERA][:]
+    del demo[CAMERA]
+    dataset = demo.create_dataset(CAMERA, values.shape, "u1", chunks=(2, *values.shape[1:]), compression="gzip")
+    dataset[:2] = values[:2]
+    dataset[4:] = values[4:]
+
+
+def _absurd_pictures(demo: h5py.Group) -> None:
+    del demo[CAMERA]
+    demo.create_dataset(CAMERA, (STEPS, 100_000, 100_000, 3), "u1", chunks=(1, 64, 64, 3))
+
+
+def _absurd_chunks(demo: h5py.Group) -> None:
+    del demo["actions"]
+    demo.create_dataset("actions", (STEPS, contract.ACTION_SIZE), "f8", chunks=(2**24, 12), maxshape=(None, 12))
+
+
+def _attribute(name: str, value: Any) -> Callable[[h5py.Group], None]:
+    return lambda demo: demo.attrs.__setitem__(name, value)
+
+
+def _long_text(demo: h5py.Group) -> None:
+    demo.attrs.create("ep_meta", "x" * 40_000_000, dtype=h5py.string_dtype())
+
+
+def _huge_attribute(demo: h5py.Group) -> None:
+    """100 MB in one attribute, stored densely, which older formats cannot."""
+    demo.attrs.create("ep_meta", np.zeros(100_000_000, "u1"))
+
+
+EPISODES: dict[str, tuple[Callable[[h5py.Group], None], str]] = {
+    "link to another file": (_replaced("actions", _external_link), "link to another file"),
+    "link to a link to another file": (_replaced("actions", _soft_to_external), "link to another file"),
+    "link in a circle": (_replaced("actions", lambda d: h5py.SoftLink(f"{d.name}/actions")), "circle"),
+    "link to nowhere": (_replaced("actions", lambda d: h5py.SoftLink("/nowhere")), "not in the file"),
+    "data of another file": (_external_data, "other files"),
+    "virtual data": (_virtual, "other files"),
+    "never written": (_never_written, "never written"),
+    "part missing": (_part_missing, "1 of 3 parts are missing"),
+    "absurd pictures": (_absurd_pictures, "missing"),
+    "absurd chunks": (_absurd_chunks, "in chunks of"),
+    "complex numbers": (_replaced("actions", lambda d: d["actions"][:] + 1j), "numbers"),
+    "a group for numbers": (lambda d: (d.__delitem__("actions"), d.create_group("actions")), "no dataset"),  # type: ignore[dict-item]
+    "half characters": (_attribute("ep_meta", '{"lang": "\\ud800"}'), "ep_meta"),
+    "endless nesting": (_attribute("ep_meta", "[" * 50_000), "not JSON"),
+    "endless number": (_attribute("ep_meta", '{"lang": ' + "9" * 10_000 + "}"), "not JSON"),
+    "wrong bytes": (_attribute("ep_meta", b'{"lang": "\xff\xfe"}'), "cannot be read"),
+    "not an object": (_attribute("ep_meta", "[1]"), "expected an object"),
+    "text without end": (_long_text, "no demonstration"),
+    "attribute of 100 MB": (_huge_attribute, "100000000 bytes"),
+}
+
+
+@pytest.fixture(scope="module")
+def spoilt(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A dataset from a file of every kind of bad demo, the good one last; in the newer format, for large attributes."""
+    folder = tmp_path_factory.mktemp("bad")
+    plain = write_demos(folder / "plain.hdf5", [STEPS] * (1 + len(EPISODES)), images=16)
+    source = folder / "demos.hdf5"
+    with h5py.File(plain) as old, h5py.File(source, "w", libver="latest") as file:
+        file.create_group("data").attrs.update(old["data"].attrs)
+        for name in old["data"]:
+            group = file["data"].create_group(name)
+            group.attrs.update(old["data"][name].attrs)
+            for key in old["data"][name]:
+                old.copy(f"data/{name}/{key}", group)
+        for index, (spoil, _) in enumerate(EPISODES.values()):
+            spoil(file[f"data/demo_{index}"])
+    convert([source], folder / "data", SETTINGS)
+    return folder / "data"
+
+
+def test_the_good_demo_is_converted(spoilt: Path) -> None:
+    report = verify(spoilt, pictures_per_episode=2, min_psnr_db=15)
+    assert report.passed, report.as_json()
+    assert (report.num_episodes, report.num_frames) == (1, STEPS)
+
+
+@pytest.mark.parametrize("case", EPISODES)
+def test_bad_demo_is_rejected_with_its_reason(case: str, spoilt: Path) -> None:
+    lines = {line["source_demo"]: line["reason"] for line in read_jsonl(spoilt / META_FOLDER / "rejected.jsonl")}
+    assert len(lines) == len(EPISODES)
+    assert EPISODES[case][1] in lines[f"demo_{list(EPISODES).index(case)}"]
+
+
+# --- the same demo twice ---------------------------------------------------------------------------------------------
+
+
+def _hard(data: h5py.Group) -> None:
+    data["demo_7"] = data["demo_0"]
+
+
+def _soft(data: h5py.Group) -> None:
+    data["demo_7"] = h5py.SoftLink("/data/demo_0")
+
+
+def _copied(data: h5py.Group) -> None:
+    data.copy("demo_0", "demo_7")
+
+
+def _same_number(data: h5py.Group) -> None:
+    data.copy("demo_0", "demo_00")
+
+
+@pytest.mark.parametrize("twice", [_hard, _soft, _copied, _same_number])
+def test_a_demo_that_is_there_twice_is_taken_once(twice: Callable[[h5py.Group], None], tmp_path: Path) -> None:
+    source = write_demos(tmp_path / "a.hdf5", (5, 4), images=16)
+    with h5py.File(source, "a") as file:
+        twice(file["data"])
+    result = convert([source], tmp_path / "out", SETTINGS)
+    assert result.num_frames == 9
+    assert len(result.rejected) == 1
+    assert "copy of demo_0" in result.rejected[0]["reason"]
+    assert verify(tmp_path / "out", min_psnr_db=15).passed
+
+
+def test_a_demo_of_two_files_is_taken_once_and_two_renderings_of_it_twice(tmp_path: Path) -> None:
+    first = write_demos(tmp_path / "a.hdf5", (5, 4), images=16)
+    second = write_demos(tmp_path / "b.hdf5", (5, 4), images=16)
+    with h5py.File(second, "a") as file:
+        file[f"data/demo_1/{CAMERA}"][0] = 7  # the same motion seen with another texture is another demonstration
+    result = convert([first, second], tmp_path / "out", SETTINGS)
+    assert result.num_frames == 5 + 4 + 4
+    assert [(line["source_file"], line["source_demo"]) for line in result.rejected] == [(str(second), "demo_0")]
+    assert f"copy of demo_0 of {first}" in result.rejected[0]["reason"]
+
+
+def test_a_copy_of_a_demo_that_is_not_selected_is_taken(tmp_path: Path) -> None:
+    source = write_demos(tmp_path / "a.hdf5", (5, 4), images=16)
+    with h5py.File(source, "a") as file:
+        file["data"].copy("demo_0", "demo_2")
+        file["mask/late"] = np.array([b"demo_1", b"demo_2"])
+    result = convert([source], tmp_path / "out", ConversionSettings(filter_key="late"))
+    assert (result.num_frames, result.rejected) == (9, [])
+
+
+# --- instructions ----------------------------------------------------------------------------------------------------
+
+INSTRUCTIONS = [
+    INSTRUCTION,
+    "abre el cajón",
+    "e\u0301 is not \u00e9",  # the same to the eye; neither is changed into the other
+    "два\u2028строки",  # line separators that Python's splitlines knows and JSON lines do not
+    "next\x85line",
+    " spaces are kept ",
+    '"quoted" \\ and a\ttab',
+    "🥄→🍽️",
+    "عبئ الغسالة",
+]
+
+
+def test_instructions_of_every_script_are_kept_exactly(tmp_path: Path) -> None:
+    source = write_demos(tmp_path / "a.hdf5", [2] * len(INSTRUCTIONS), images=16)
+    with h5py.File(source, "a") as file:
+        for index, text in enumerate(INSTRUCTIONS):
+            file[f"data/demo_{index}"].attrs["ep_meta"] = json.dumps({"lang": text}, ensure_ascii=index % 2 == 0)
+    convert([source], tmp_path / "out", SETTINGS)
+    lines = read_jsonl(tmp_path / "out" / META_FOLDER / "episodes.jsonl")
+    assert [line["instruction"] for line in lines] == INSTRUCTIONS
+    dataset = LeRobotDataset("local/x", root=tmp_path / "out", video_backend="pyav")
+    assert [dataset[2 * index]["task"] for index in range(len(INSTRUCTIONS))] == INSTRUCTIONS
+    assert verify(tmp_path / "out", min_psnr_db=15).passed
+
+
+# --- whole files -----------------------------------------------------------------------------------------------------
+
+
+def test_a_file_that_another_process_writes_is_locked(tmp_path: Path) -> None:
+    source = write_demos(tmp_path / "a.hdf5", (5,), images=16)
+    script = f"import h5py; f = h5py.File({str(source)!r}, 'a'); print('open', flush=True); input()"
+    with subprocess.Popen([sys.executable, "-c", script], stdin=subprocess.PIPE, stdout=subprocess.PIPE) as writer:
+        assert writer.stdout is not None
+        assert writer.stdout.readline() == b"open\n"
+        with pytest.raises(UserError, match="locked"):
+            convert([source], tmp_path / "out", SETTINGS)
+        writer.communicate(b"\n")
+    assert leftovers(tmp_path / "out") == []
+    assert convert([source], tmp_path / "out", SETTINGS).num_frames == 5
+
+
+def test_robot_and_cameras_are_judged_by_a_good_demo(tmp_path: Path) -> None:
+    """Not by the first one: here it has another robot's actions, and the second one no camera."""
+    source = write_demos(tmp_path / "a.hdf5", (5, 4, 3), images=16)
+    with h5py.File(source, "a") as file:
+        actions = file["data/demo_0/actions"][:, :7]
+        del file["data/demo_0/actions"], file[f"data/demo_1/{CAMERA}"]
+        del file["data/demo_1"].attrs["model_file"]
+        file["data/demo_0/actions"] = actions
+    result = convert([source], tmp_path / "out", SETTINGS)
+    assert {line["source_demo"]: line["reason"][:30] for line in result.rejected}.keys() == {"demo_0", "demo_1"}
+    assert result.num_frames == 3
+
+
+def test_large_and_damaged_attributes_of_the_file_are_left_out_of_the_record(tmp_path: Path) -> None:
+    source = write_demos(tmp_path / "a.hdf5", (5,), images=16)
+    with h5py.File(source, "a") as file:
+        file["data"].attrs.create("notes", "x" * 5_000_000, dtype=h5py.string_dtype())
+        file["data"].attrs["bytes"] = b"\xff\xfe"
+        file["data"].attrs["env_args"] = "[" * 50_000
+    convert([source], tmp_path / "out", SETTINGS)
+    record = (tmp_path / "out" / META_FOLDER / "conversion.json").read_text()
+    assert len(record) < 200_000
+    assert hdf5.LEFT_OUT in record
+    assert "5000000" in record
+
+
+def test_a_rate_beyond_all_bounds_is_refused(tmp_path: Path) -> None:
+    source = write_demos(tmp_path / "a.hdf5", (5,), images=16)
+    for rate in ("1e400", "-20", '"20"', "1e9", "NaN"):
+        with h5py.File(source, "a") as file:
+            file["data"].attrs["env_args"] = '{"env_kwargs": {"control_freq": ' + rate + "}}"
+        with pytest.raises(UserError, match="control rate"):
+            make_plan([source], SETTINGS)
+
+
+def _trap(path: Path) -> None:
+    """Zero the heap that holds a variable-length text: HDF5 2.0 then looks for it forever."""
+    content = bytearray(path.read_bytes())
+    start = content.rfind(b"GCOL")
+    content[start + 16 : start + 4096] = bytes(len(content[start + 16 : start + 4096]))
+    path.write_bytes(content)
+
+
+def test_a_file_that_traps_hdf5_ends(tmp_path: Path) -> None:
+    source = tmp_path / "a.hdf5"
+    with h5py.File(write_demos(tmp_path / "plain.hdf5", (3, 4), images=16)) as old, h5py.File(source, "w") as file:
+        old.copy("data/demo_0", file, "data/demo_0")
+        file["data"].attrs.update(old["data"].attrs)
+        file.flush()
+        old.copy("data/demo_1", file, "data/demo_1")
+        file["data/demo_1"].attrs["note"] = "y" * 5000  # in a heap of its own, the last one
+    _trap(source)
+    result = convert([source], tmp_path / "out", SETTINGS)
+    assert result.num_frames == 3
+    reasons = {line["source_demo"]: line["reason"] for line in result.rejected}
+    assert reasons.keys() == {"demo_1"}, "this file no longer traps HDF5: find another one"
+    assert f"not coming to an end in {CPU_SECONDS:g} s" in reasons["demo_1"]
+
+
+# --- hostile scenes --------------------------------------------------------------------------------------------------
+
+
+def _mjcf(inside: str) -> str:
+    return f"<mujoco>{inside}<worldbody/></mujoco>"
+
+
+_NESTED = f"<mujoco><worldbody>{'<body>' * 20_000}{'</body>' * 20_000}</worldbody></mujoco>"
+_LAUGHS = '<!DOCTYPE l [<!ENTITY a "ha"><!ENTITY b "&a;&a;&a;">]>'
+SCENES: dict[str, tuple[str, str]] = {
+    "entities that multiply": (f"{_LAUGHS}<mujoco model='&b;'/>", "entities"),
+    "an entity that is a file": ('<!DOCTYPE x [<!ENTITY a SYSTEM "file:///etc/passwd">]><mujoco>&a;</mujoco>', "entit"),
+    "include": ('<mujoco><include file="/etc/passwd"/></mujoco>', "<include>"),
+    "include without a file": ("<mujoco><include/></mujoco>", "<include>"),
+    "attached model": (_mjcf('<asset><model name="m" file="/etc/passwd"/></asset>'), "<model>"),
+    "attach": (_mjcf('<worldbody><attach model="m" prefix="p"/></worldbody>'), "<attach>"),
+    "plugin": (_mjcf('<extension><plugin plugin="mujoco.elasticity.cable"/></extension>'), "<extension>"),
+    "flexible body from a file": (
+        _mjcf('<worldbody><flexcomp name="f" file="/etc/passwd"/></worldbody>'),
+        "<flexcomp>",
+    ),
+    "any element with a file": (_mjcf('<statistic file="/etc/passwd"/>'), "<statistic>"),
+    "endless nesting": (_NESTED, f"{MAX_DEPTH} deep"),
+    "endless text": ("<mujoco>" + " " * (hdf5.MAX_TEXT_BYTES + 1) + "</mujoco>", "characters"),
+    "endless elements": ("<mujoco>" + "<a/>" * 3_000_000 + "</mujoco>", "characters"),
+    "huge texture": (_mjcf('<asset><texture name="t" builtin="flat" width="99999" height="99999"/></asset>'), "absurd"),
+    "huge height field": (
+        _mjcf('<asset><hfield name="h" nrow="99999" ncol="99999"/></asset>'),
+        "absurd",
+    ),
+    "huge numbers": (_mjcf('<custom><numeric name="n" size="2000000000"/></custom>'), "absurd"),
+    "huge user data": (_mjcf('<size nuser_body="2000000000"/>'), "absurd"),
+    "huge shadows": (_mjcf('<visual><quality shadowsize="1000000"/></visual>'), "absurd"),
+    "not a number of shadows": (_mjcf('<visual><quality shadowsize="inf"/></visual>'), "absurd"),
+    "copies of copies": (
+        _mjcf(f"<worldbody>{'<replicate count="1000">' * 3}{'</replicate>' * 3}</worldbody>"),
+        "multiplies",
+    ),
+    "huge cloth": (_mjcf('<worldbody><composite type="cable" count="99999 9 9"/></worldbody>'), "multiplies"),
+    "no MJCF": ("<robot/>", "expected MJCF"),
+    "no XML": ("hello", "not XML"),
+}
+
+
+@pytest.mark.parametrize("case", SCENES)
+def test_hostile_scene_is_refused_before_mujoco_sees_it(case: str) -> None:
+    xml, message = SCENES[case]
+    with pytest.raises(RejectedEpisodeError, match=message):
+        loadable(xml, AssetFinder([]))
+
+
+@pytest.fixture
+def root(tmp_path: Path) -> Path:
+    """An asset root with `arm/link.stl`, beside a secret that links in it point to."""
+    folder = tmp_path / "assets"
+    (folder / "arm").mkdir(parents=True)
+    (folder / "arm" / "link.stl").write_bytes(b"mesh")
+    (tmp_path / "secret.stl").write_bytes(b"secret")
+    (folder / "out.stl").symlink_to(tmp_path / "secret.stl")
+    (folder / "up").symlink_to(tmp_path)
+    (folder / "circle.stl").symlink_to(folder / "circle.stl")
+    os.mkfifo(folder / "pipe.stl")
+    return folder
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "/etc/passwd",
+        "../secret.stl",
+        "arm/../../secret.stl",
+        "out.stl",
+        "up/secret.stl",
+        "circle.stl",
+        "pipe.stl",  # opening it would wait forever
+        "arm",
+        "x" * 300,
+        "a/" * 5000 + "link.stl",
+        "arm/li\0nk.stl",
+        "file:///etc/passwd",
+        "/proc/self/environ",
+        "~/.ssh/id_rsa",
+    ],
+    ids=lambda name: repr(name[:24]),
+)
+def test_nothing_outside_the_asset_roots_is_read(name: str, root: Path) -> None:
+    assert AssetFinder([root]).read(name) is None
+    assert AssetFinder([root]).read("arm/link.stl") == b"mesh"
+
+
+@pytest.mark.parametrize("folder", ["..", "/etc", "x" * 100_000], ids=["up", "absolute", "long"])
+def test_folders_of_the_compiler_lead_nowhere_else(folder: str, root: Path) -> None:
+    xml = f'<mujoco><compiler meshdir="{folder}"/><asset><mesh file="secret.stl"/></asset><worldbody/></mujoco>'
+    with pytest.raises(UserError, match="not found"):
+        loadable(xml, AssetFinder([root]))
+
+
+def test_buffers_are_of_the_size_of_the_pictures() -> None:
+    text, _ = loadable(
+        _mjcf('<visual><global offwidth="99999" offheight="99999"/></visual><size memory="900G"/>'), AssetFinder([])
+    )
+    assert "99999" not in text
+    assert "900G" not in text
+
+
+def test_files_inside_the_hdf5_file_have_the_same_bounds(tmp_path: Path) -> None:
+    source = write_demos(tmp_path / "a.hdf5", (2,))
+    (tmp_path / "other.hdf5").write_bytes(source.read_bytes())
+    with h5py.File(source, "a") as file:
+        assets = file["data/assets"]
+        assets["linked.png"] = h5py.ExternalLink("other.hdf5", "/data/assets/textures/checks.png")
+        assets.create_dataset("huge.png", (2**40,), "u1", chunks=(2**20,))
+        assets["text.png"] = "hello"
+    with DemoFile(source) as file:
+        assert file.asset("textures/checks.png")
+        assert file.asset("text.png") is None
+        for name, message in (("linked.png", "another file"), ("huge.png", "absurd")):
+            with pytest.raises(RejectedEpisodeError, match=message):
+                file.asset(name)
+
+
+@pytest.mark.render
+def test_missing_meshes_of_one_demo_reject_only_it(tmp_path: Path) -> None:
+    source = write_demos(tmp_path / "a.hdf5", (3, 4))
+    with h5py.File(source, "a") as file:
+        file["data/demo_0"].attrs["model_file"] = SCENE.replace("textures/checks.png", "/home/someone/textures/no.png")
+    result = convert([source], tmp_path / "out", ConversionSettings(image_size=32))
+    assert result.num_frames == 4
+    assert "/home/someone/textures/no.png" in result.rejected[0]["reason"]
+    assert "--asset-root" in result.rejected[0]["reason"]
+    with h5py.File(source, "a") as file:
+        del file["data/assets"]
+    with pytest.raises(UserError, match="--asset-root"):
+        convert([source], tmp_path / "none", ConversionSettings(image_size=32))
+    assert leftovers(tmp_path / "none") == []
+
+
+@pytest.mark.render
+def test_a_state_beyond_all_bounds_is_rejected(tmp_path: Path) -> None:
+    source = write_demos(tmp_path / "a.hdf5", (3, 4), proprioception=False)
+    with h5py.File(source, "a") as file:
+        file["data/demo_0/states"][1, 1:4] = 1e300
+    result = convert([source], tmp_path / "out", ConversionSettings(image_size=32))
+    assert [line["source_demo"] for line in result.rejected] == ["demo_0"]
+    assert result.num_frames == 4
+
+
+# --- outputs ---------------------------------------------------------------------------------------------------------
+
+
+def test_an_output_beside_which_nothing_can_be_written(tmp_path: Path) -> None:
+    source = write_demos(tmp_path / "a.hdf5", (3,), images=16)
+    (tmp_path / "file").write_text("a file, not a folder")
+    with pytest.raises(UserError, match="nothing can be written"):
+        convert([source], tmp_path / "file" / "out", SETTINGS)
+    read_only = Path("/sys/kernel")  # even for the superuser
+    if read_only.is_dir():
+        with pytest.raises(UserError, match="nothing can be written"):
+            convert([source], read_only / "out", SETTINGS)
+    if os.geteuid() != 0:
+        locked = tmp_path / "locked"
+        locked.mkdir(mode=0o555)
+        with pytest.raises(UserError, match="nothing can be written"):
+            convert([source], locked / "out", SETTINGS)
+
+
+@pytest.mark.parametrize("what", ["file", "folder of something else", "dataset"])
+def test_an_output_that_exists_is_left_alone(what: str, tmp_path: Path) -> None:
+    source = write_demos(tmp_path / "a.hdf5", (3,), images=16)
+    out = tmp_path / "out"
+    if what == "file":
+        out.write_text("years of work")
+    elif what == "dataset":
+        convert([source], out, SETTINGS)
+    else:
+        (out / "thesis").mkdir(parents=True)
+    before = tree_hashes(out) if out.is_dir() else out.read_text()
+    with pytest.raises(UserError, match="exists already"):
+        convert([source], out, SETTINGS)
+    assert (tree_hashes(out) if out.is_dir() else out.read_text()) == before
+
+
+class _FullDisk:
+    """A file system that is full after a number of pictures."""
+
+    def __init__(self, pictures: int) -> None:
+        self.left = pictures
+        self.feed = SamplingVideoEncoder.feed_frame
+
+    def __call__(self, encoder: SamplingVideoEncoder, key: str, image: np.ndarray) -> None:
+        self.left -= 1
+        if self.left < 0:
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+        self.feed(encoder, key, image)
+
+
+def test_a_full_disk_keeps_what_is_finished(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    source = write_demos(tmp_path / "a.hdf5", (251, 251), images=16)
+    out = tmp_path / "out"
+    with monkeypatch.context() as patch:
+        full = _FullDisk(251 * 3 + 100)
+        patch.setattr(SamplingVideoEncoder, "feed_frame", lambda *args: full(*args))
+        with pytest.raises(UserError, match="No space left on device") as caught:
+            convert([source], out, SETTINGS, workers=1)
+    assert "same command to go on" in str(caught.value)
+    assert not out.exists()
+    done = []
+    convert_shard = pipeline.convert_shard
+    monkeypatch.setattr(pipeline, "convert_shard", lambda *args: (done.append(args[1].demos), convert_shard(*args))[1])
+    assert convert([source], out, SETTINGS, workers=1).num_frames == 502
+    assert done == [("demo_1",)]
+    assert leftovers(out) == ["out"]
+
+
+def _convert_with_short_files(source: Path, out: Path, limit: int) -> str:
+    """The message of a conversion in which no file may be longer than `limit` bytes; runs in a child."""
+    with Path(os.devnull).open("w") as nowhere:
+        os.dup2(nowhere.fileno(), 2)  # what was captured so far may be longer
+    resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit))
+    try:
+        convert([source], out, SETTINGS, workers=1)
+    except UserError as error:
+        return str(error)
+    return "converted"
+
+
+@pytest.mark.parametrize("limit", [2_000, 8_000, 40_000])
+def test_files_that_may_not_grow(limit: int, tmp_path: Path) -> None:
+    """The kernel's own error in the middle of a file, of whatever writes it: videos, tables, extras."""
+    source = write_demos(tmp_path / "a.hdf5", (120, 130), images=64)
+    out = tmp_path / "out"
+    ending = in_child(lambda: _convert_with_short_files(source, out, limit))
+    assert ending.failure is None, ending.failure
+    assert "writing failed" in ending.value
+    assert "File too large" in ending.value
+    assert not out.exists()
+    assert convert([source], out, SETTINGS, workers=1).num_frames == 250
+    assert verify(out, pictures_per_episode=2).passed
+    assert leftovers(out) == ["out"]
+
+
+def test_a_worker_that_dies_is_reported(tmp_path: Path) -> None:
+    """Of memory, say; a pool by itself would wait for it forever."""
+    command = [sys.executable, "-c", _DYING, str(tmp_path)]
+    result = subprocess.run(command, capture_output=True, text=True, timeout=120)
+    assert "SIGKILL" in result.stdout, result.stderr[-3000:]
+    assert "memory may have run out" in result.stdout
+
+
+_DYING = """
+import sys
+from robocasa_lerobot.parallel import PoolExecutor, WorkerDiedError
+
+def die(data, rank=0, world_size=1):
+    import os, signal, time
+    time.sleep(1)
+    if rank == 1:
+        os.kill(os.getpid(), signal.SIGKILL)
+
+try:
+    PoolExecutor(pipeline=[die], tasks=3, workers=2, logging_dir=sys.argv[1]).run()
+except WorkerDiedError as error:
+    print(error)
+"""

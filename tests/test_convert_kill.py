@@ -1,0 +1,182 @@
+"""Conversions that are killed at any moment: the same command ends in the same dataset, and no one sees half of it."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import psutil
+import pytest
+from convert_support import leftovers, tree_hashes, write_demos
+
+pytest.importorskip("lerobot.datasets")
+
+from robocasa_lerobot.convert.pipeline import META_FOLDER
+
+EPISODES = 60
+RECORD = f"{META_FOLDER}/conversion.json"  # names the output's place
+COMPLETE = {"data", "extras", "meta", "videos"}
+SECONDS = 240
+
+
+@pytest.fixture(scope="module")
+def source(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    lengths = [int(n) for n in np.random.default_rng(0).integers(8, 30, EPISODES)]
+    return write_demos(tmp_path_factory.mktemp("source") / "sixty.hdf5", lengths, images=16)
+
+
+@pytest.fixture(scope="module")
+def expected(source: Path) -> dict[str, str]:
+    """The dataset of a run in peace."""
+    out = source.parent / "uninterrupted"
+    _finish(source, out)
+    content = _content(out)
+    assert len(content) > EPISODES
+    return content
+
+
+def _start(source: Path, out: Path) -> subprocess.Popen[bytes]:
+    command = [sys.executable, "-m", "robocasa_lerobot.cli", "convert", str(source), "--out", str(out)]
+    return subprocess.Popen(
+        [*command, "--workers", "2"], stdout=subprocess.PIPE, stderr=subprocess.STDOUT, start_new_session=True
+    )
+
+
+def _finish(source: Path, out: Path) -> None:
+    process = _start(source, out)
+    said, _ = process.communicate(timeout=SECONDS)
+    assert process.returncode == 0, said.decode()[-3000:]
+
+
+def _check_absent_or_complete(out: Path, expected: dict[str, str]) -> bool:
+    """What a loader would see at this moment; true where there is a dataset."""
+    if not out.exists():
+        return False
+    assert {path.name for path in out.iterdir()} == COMPLETE
+    assert _content(out) == expected
+    return True
+
+
+def _content(root: Path) -> dict[str, str]:
+    """Hashes of every file but the record, whose own content but for places of files is added."""
+    hashes = tree_hashes(root)
+    del hashes[RECORD]
+    record: dict[str, Any] = json.loads((root / RECORD).read_text())
+    for entry in record["sources"]:
+        del entry["relative_to_dataset"]
+    return hashes | {RECORD: json.dumps(record, sort_keys=True)}
+
+
+def _kill(process: subprocess.Popen[bytes], everything: bool) -> None:
+    with contextlib.suppress(ProcessLookupError):
+        if everything:
+            os.killpg(process.pid, signal.SIGKILL)
+        else:
+            os.kill(process.pid, signal.SIGKILL)
+    process.wait()
+    assert process.stdout is not None
+    process.stdout.close()
+
+
+@dataclass(frozen=True)
+class Moment:
+    """When to kill: once so many episodes are written (61: while they are joined), and so many seconds later."""
+
+    episodes: int
+    seconds: float
+
+    def has_come(self, out: Path) -> bool:
+        if self.episodes > EPISODES:
+            return any(out.parent.glob(f"{out.name}.partial-*/merged"))
+        written = out.parent.glob(f"{out.name}.partial-*/shards/*/extras/episode_*")
+        return sum(1 for _ in written) >= self.episodes
+
+
+def _kill_and_repeat(source: Path, out: Path, expected: dict[str, str], moment: Moment, everything: bool) -> bool:
+    """Kill a conversion at a moment, then let the same command end; true if it was running."""
+    process = _start(source, out)
+    deadline = time.monotonic() + SECONDS
+    while not moment.has_come(out) and process.poll() is None:
+        assert time.monotonic() < deadline
+        _check_absent_or_complete(out, expected)
+        time.sleep(0.01)
+    time.sleep(moment.seconds)
+    was_running = process.poll() is None
+    _kill(process, everything)
+    killed = process.pid
+    if not _check_absent_or_complete(out, expected) or leftovers(out) != [out.name]:
+        process = _start(source, out)  # at once: orphans of the killed one may still be there
+        while process.poll() is None:
+            assert time.monotonic() < deadline + SECONDS
+            _check_absent_or_complete(out, expected)
+            time.sleep(0.05)
+        said, _ = process.communicate(timeout=5)
+        assert process.returncode == 0, said.decode()[-3000:]
+    assert _check_absent_or_complete(out, expected)
+    assert leftovers(out) == [out.name]
+    while _session(killed):
+        assert time.monotonic() < deadline + SECONDS, "processes of the killed run are still there"
+        time.sleep(0.1)
+    return was_running
+
+
+def _session(leader: int) -> list[int]:
+    """Processes that one of the commands started and that are still there."""
+    found = []
+    for process in psutil.pids():
+        with contextlib.suppress(ProcessLookupError):
+            if os.getsid(process) == leader and psutil.Process(process).status() != psutil.STATUS_ZOMBIE:
+                found.append(process)
+    return found
+
+
+def _moments(count: int, seed: int) -> list[Moment]:
+    """Moments over the whole run: while it starts (the first seconds), writes, and joins."""
+    rng = np.random.default_rng(seed)
+    moments = []
+    for _ in range(count):
+        episodes = int(rng.integers(-5, EPISODES + 10))
+        longest = 4.0 if episodes <= 0 else 0.6 if episodes > EPISODES else 0.2
+        moments.append(Moment(episodes, float(rng.uniform(0, longest))))
+    return moments
+
+
+@pytest.mark.timeout(SECONDS * 4)
+@pytest.mark.parametrize("everything", [True, False], ids=["the whole group", "only the parent"])
+def test_a_kill(everything: bool, source: Path, expected: dict[str, str], tmp_path: Path) -> None:
+    moment = Moment(40, 0.05) if everything else Moment(15, 0.1)
+    assert _kill_and_repeat(source, tmp_path / "out", expected, moment, everything)
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(SECONDS * 40)
+def test_twenty_kills(source: Path, expected: dict[str, str], tmp_path: Path) -> None:
+    running = 0
+    for index, moment in enumerate(_moments(20, seed=1)):
+        running += _kill_and_repeat(source, tmp_path / f"{index}", expected, moment, everything=index % 2 == 0)
+    assert running >= 15, "most of the kills must meet a running conversion"
+
+
+def test_a_kill_while_clearing_away_is_made_good(source: Path, expected: dict[str, str], tmp_path: Path) -> None:
+    """The last thing that can be left: the dataset is there, and the working folder is, too."""
+    out = tmp_path / "out"
+    _finish(source, out)
+    record = json.loads((out / RECORD).read_text())
+    left = tmp_path / f"out.partial-{record['fingerprint']}"
+    (left / "shards" / "00000").mkdir(parents=True)
+    _finish(source, out)
+    assert _content(out) == expected
+    assert leftovers(out) == ["out"]
+    process = _start(source, out)  # without anything left, a dataset at the output is not touched
+    said, _ = process.communicate(timeout=SECONDS)
+    assert process.returncode == 2
+    assert "--overwrite" in said.decode()
