@@ -45,7 +45,10 @@ def write_part(path: Path, recording: Recording) -> None:
         dones[-1] = 1
         demo.create_dataset("dones", data=dones)
         for key, values in recording.observations.items():
-            demo.create_dataset(f"obs/{key}", data=values, compression="gzip")
+            # A chunk for each picture: they are read one after the other, and h5py's own choice of chunks (16 steps
+            # of an eighth of the picture) takes three times as long to unpack.
+            chunks = (1, *values.shape[1:]) if values.ndim == 4 else None
+            demo.create_dataset(f"obs/{key}", data=values, compression="gzip", chunks=chunks)
         for name, content in recording.assets.items():
             file.create_dataset(f"{ASSETS_GROUP}/{name}", data=np.frombuffer(content, dtype=np.uint8))
     partial.replace(path)
