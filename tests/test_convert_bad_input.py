@@ -134,6 +134,7 @@ EPISODES: dict[str, tuple[Callable[[h5py.Group], None], str]] = {
     "endless number": (_attribute("ep_meta", '{"lang": ' + "9" * 10_000 + "}"), "not JSON"),
     "wrong bytes": (_attribute("ep_meta", b'{"lang": "\xff\xfe"}'), "cannot be read"),
     "not an object": (_attribute("ep_meta", "[1]"), "expected an object"),
+    "wrong bytes in the scene": (_attribute("model_file", b"<mujoco>\xff\xfe</mujoco>"), "cannot be read"),
     "text without end": (_long_text, "no demonstration"),
     "attribute of 100 MB": (_huge_attribute, "100000000 bytes"),
 }

@@ -18,9 +18,12 @@ import psutil
 import pytest
 from convert_support import leftovers, tree_hashes, write_demos
 
+from robocasa_lerobot.errors import UserError
+
 pytest.importorskip("lerobot.datasets")
 
-from robocasa_lerobot.convert.pipeline import META_FOLDER
+from robocasa_lerobot.convert.pipeline import META_FOLDER, convert
+from robocasa_lerobot.convert.settings import ConversionSettings
 
 EPISODES = 60
 RECORD = f"{META_FOLDER}/conversion.json"  # names the output's place
@@ -38,7 +41,7 @@ def source(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def expected(source: Path) -> dict[str, str]:
     """The dataset of a run in peace."""
     out = source.parent / "uninterrupted"
-    _finish(source, out)
+    convert([source], out, ConversionSettings(), workers=1)
     content = _content(out)
     assert len(content) > EPISODES
     return content
@@ -49,12 +52,6 @@ def _start(source: Path, out: Path) -> subprocess.Popen[bytes]:
     return subprocess.Popen(
         [*command, "--workers", "2"], stdout=subprocess.PIPE, stderr=subprocess.STDOUT, start_new_session=True
     )
-
-
-def _finish(source: Path, out: Path) -> None:
-    process = _start(source, out)
-    said, _ = process.communicate(timeout=SECONDS)
-    assert process.returncode == 0, said.decode()[-3000:]
 
 
 def _check_absent_or_complete(out: Path, expected: dict[str, str]) -> bool:
@@ -169,14 +166,17 @@ def test_twenty_kills(source: Path, expected: dict[str, str], tmp_path: Path) ->
 def test_a_kill_while_clearing_away_is_made_good(source: Path, expected: dict[str, str], tmp_path: Path) -> None:
     """The last thing that can be left: the dataset is there, and the working folder is, too."""
     out = tmp_path / "out"
-    _finish(source, out)
+    convert([source], out, ConversionSettings(), workers=1)
     record = json.loads((out / RECORD).read_text())
     left = tmp_path / f"out.partial-{record['fingerprint']}"
     (left / "shards" / "00000").mkdir(parents=True)
-    _finish(source, out)
+    result = convert([source], out, ConversionSettings(), workers=1)
+    assert (result.num_episodes, result.rejected) == (EPISODES, [])
     assert _content(out) == expected
     assert leftovers(out) == ["out"]
-    process = _start(source, out)  # without anything left, a dataset at the output is not touched
-    said, _ = process.communicate(timeout=SECONDS)
-    assert process.returncode == 2
-    assert "--overwrite" in said.decode()
+    with pytest.raises(UserError, match="--overwrite"):  # with nothing left, a dataset at the output is not touched
+        convert([source], out, ConversionSettings(), workers=1)
+    left.mkdir()
+    with pytest.raises(UserError, match="--overwrite"):  # nor by another command
+        convert([source], out, ConversionSettings(image_size=32), workers=1)
+    assert _content(out) == expected

@@ -86,6 +86,8 @@ class _ShardWriter:
             self._dataset = DatasetWriter(
                 self._folder / DATASET, plan.fps, plan.mapping.robot_type, plan.features, plan.settings.video_codec
             )
+        # Read now what is written last: an episode that has been added cannot be rejected any more.
+        meta, _ = episode.demo.ep_meta, episode.demo.model_xml
         task = episode.instruction.text
         columns = {contract.STATE_KEY: episode.states, contract.ACTION_KEY: episode.actions, **episode.extras}
         pictures = (
@@ -94,7 +96,6 @@ class _ShardWriter:
         self._dataset.add(columns, task, episode.length, pictures, report.advance)
         index = len(self.episodes)
         _write_extras(episode, self._folder / EXTRAS / episode_folder(index))
-        meta = episode.demo.ep_meta
         self.episodes.append(
             {
                 "episode_index": index,
