@@ -21,11 +21,11 @@ _KEYS = ("parent_body", "pos", "quat", "camera_attribs")
 _LENS = ("focal", "focalpixel", "sensorsize", "resolution", "principal", "principalpixel")
 _ATTRIBUTES = {"fovy": 1, "focal": 2, "focalpixel": 2, "sensorsize": 2, "resolution": 2}
 _ORIENTATIONS = ("quat", "axisangle", "xyaxes", "zaxis", "euler")
-_SETS = Path(__file__).parents[2] / "configs" / "cameras"
+_SETS = Path(__file__).with_name("camera_sets")
 
 
 def camera_set(name: str) -> CameraConfigs:
-    """A set of cameras that the project has: a file of `configs/cameras/`.
+    """A set of cameras that the project has: a file of `camera_sets/`.
 
     Raises:
         UnknownNameError: there is none of that name.

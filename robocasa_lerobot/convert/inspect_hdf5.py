@@ -19,6 +19,7 @@ from robocasa_lerobot.convert.mapping import RobotMapping
 from robocasa_lerobot.convert.mjcf import scene_names
 from robocasa_lerobot.convert.robots import choose_mapping
 from robocasa_lerobot.convert.source import WHOLE_FILE, DemoFile
+from robocasa_lerobot.convert.survey import Survey, survey
 from robocasa_lerobot.errors import UserError
 
 _ACTION = re.compile(r"(^|/)actions?$")
@@ -70,6 +71,7 @@ def inspect_hdf5(path: Path) -> FileReport:
     Raises:
         SourceError: it cannot be read as HDF5.
     """
+    found = survey(path) if path.is_file() else Survey()
     layout, groups = _find_layout(path)
     report = FileReport(str(path), path.stat().st_size, groups, layout=layout)
     if layout is None:
@@ -86,7 +88,7 @@ def inspect_hdf5(path: Path) -> FileReport:
             report.fps = file.control_hz
         except UserError as error:
             report.problems["rate"] = str(error)
-        sample = _walk(file, report)
+        sample = _walk(file, found, report)
         if sample is not None:
             try:
                 report.scene_cameras = scene_names(sample.model_xml).cameras if sample.model_xml else ()
@@ -96,7 +98,7 @@ def inspect_hdf5(path: Path) -> FileReport:
     return report
 
 
-def _walk(file: DemoFile, report: FileReport) -> Demo | None:
+def _walk(file: DemoFile, found: Survey, report: FileReport) -> Demo | None:
     """Note lengths, datasets and instructions of all episodes; gives the first usable one."""
     counts: Counter[str] = Counter()
     texts: Counter[str] = Counter()
@@ -105,6 +107,8 @@ def _walk(file: DemoFile, report: FileReport) -> Demo | None:
     sample: Demo | None = None
     for name in tqdm(file.demo_names, unit="episode", desc="looking", disable=None, leave=False):
         try:
+            if trap := found.reason(file.place(name)):
+                raise RejectedEpisodeError(trap)
             demo = file.demo(name)
             shapes = demo.shapes()
             counts.update(shapes.keys())
