@@ -29,7 +29,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
         help="fast has no shadows, reflections or multisampling (default: %(default)s)",
     )
     where = parser.add_mutually_exclusive_group()
-    where.add_argument("--camera-set", metavar="NAME", help="cameras moved to a set that the project has, such as cotraining")
+    where.add_argument("--camera-set", metavar="NAME", help="cameras moved to a set of the project, such as cotraining")
     where.add_argument(
         "--cam-configs",
         type=Path,
