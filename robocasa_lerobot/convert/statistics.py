@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from robocasa_lerobot.convert.encoder import QUANTILES, Histogram, histogram_statistics, num_sampled_pixels
 
 _ROWS = 65_536  # read at a time
+_QUANTILE_NAMES = tuple(f"q{round(q * 100):02d}" for q in QUANTILES)
 
 
 def column(root: Path, key: str) -> NDArray[Any]:
@@ -86,5 +87,5 @@ def vector_statistics(values: NDArray[Any]) -> dict[str, NDArray[Any]]:
         "mean": rows.mean(axis=0),
         "std": rows.std(axis=0),
         "count": np.array([len(rows)]),
-        **{f"q{round(q * 100):02d}": np.quantile(rows, q, axis=0) for q in QUANTILES},
+        **dict(zip(_QUANTILE_NAMES, np.quantile(rows, QUANTILES, axis=0), strict=True)),
     }
