@@ -110,6 +110,7 @@ def test_slurm_pieces_are_run_resumed_and_joined(
     assert {k: v for k, v in cluster.items() if k != record} == {k: v for k, v in local.items() if k != record}
 
 
+@pytest.mark.slow
 def test_complete_pieces_are_joined_by_hand(
     slurm: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -147,6 +147,7 @@ def _moments(count: int, seed: int) -> list[Moment]:
     return moments
 
 
+@pytest.mark.slow
 @pytest.mark.timeout(SECONDS * 4)
 @pytest.mark.parametrize("everything", [True, False], ids=["the whole group", "only the parent"])
 def test_a_kill(everything: bool, source: Path, expected: dict[str, str], tmp_path: Path) -> None:
