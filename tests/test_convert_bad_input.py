@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import errno
 import json
-import os
-import resource
 import subprocess
 import sys
 from collections.abc import Callable
@@ -15,8 +12,7 @@ from typing import Any
 import h5py
 import numpy as np
 import pytest
-from convert_support import INSTRUCTION, SCENE, leftovers, tree_hashes, write_demos
-from fuzz_support import in_child
+from convert_support import INSTRUCTION, leftovers, write_demos
 
 from robocasa_lerobot import contract
 from robocasa_lerobot.errors import UserError
@@ -24,14 +20,10 @@ from robocasa_lerobot.errors import UserError
 pytest.importorskip("lerobot.datasets")
 from lerobot.datasets.lerobot_dataset import LeRobotDataset
 
-from robocasa_lerobot.convert import hdf5, pipeline
-from robocasa_lerobot.convert.encoder import SamplingVideoEncoder
-from robocasa_lerobot.convert.mjcf import AssetFinder, loadable
-from robocasa_lerobot.convert.mjcf_limits import MAX_DEPTH
+from robocasa_lerobot.convert import hdf5
 from robocasa_lerobot.convert.pipeline import META_FOLDER, convert
 from robocasa_lerobot.convert.settings import ConversionSettings, make_plan
 from robocasa_lerobot.convert.shard import read_jsonl
-from robocasa_lerobot.convert.source import DemoFile, RejectedEpisodeError
 from robocasa_lerobot.convert.survey import CPU_SECONDS
 from robocasa_lerobot.convert.verify import verify
 
@@ -324,269 +316,3 @@ def test_a_file_that_traps_hdf5_ends(tmp_path: Path) -> None:
     reasons = {line["source_demo"]: line["reason"] for line in result.rejected}
     assert reasons.keys() == {"demo_1"}, "this file no longer traps HDF5: find another one"
     assert f"not coming to an end in {CPU_SECONDS:g} s" in reasons["demo_1"]
-
-
-# --- hostile scenes --------------------------------------------------------------------------------------------------
-
-
-def _mjcf(inside: str) -> str:
-    return f"<mujoco>{inside}<worldbody/></mujoco>"
-
-
-_NESTED = f"<mujoco><worldbody>{'<body>' * 20_000}{'</body>' * 20_000}</worldbody></mujoco>"
-_LAUGHS = '<!DOCTYPE l [<!ENTITY a "ha"><!ENTITY b "&a;&a;&a;">]>'
-SCENES: dict[str, tuple[str, str]] = {
-    "entities that multiply": (f"{_LAUGHS}<mujoco model='&b;'/>", "entities"),
-    "an entity that is a file": ('<!DOCTYPE x [<!ENTITY a SYSTEM "file:///etc/passwd">]><mujoco>&a;</mujoco>', "entit"),
-    "include": ('<mujoco><include file="/etc/passwd"/></mujoco>', "<include>"),
-    "include without a file": ("<mujoco><include/></mujoco>", "<include>"),
-    "attached model": (_mjcf('<asset><model name="m" file="/etc/passwd"/></asset>'), "<model>"),
-    "attach": (_mjcf('<worldbody><attach model="m" prefix="p"/></worldbody>'), "<attach>"),
-    "plugin": (_mjcf('<extension><plugin plugin="mujoco.elasticity.cable"/></extension>'), "<extension>"),
-    "flexible body from a file": (
-        _mjcf('<worldbody><flexcomp name="f" file="/etc/passwd"/></worldbody>'),
-        "<flexcomp>",
-    ),
-    "any element with a file": (_mjcf('<statistic file="/etc/passwd"/>'), "<statistic>"),
-    "endless nesting": (_NESTED, f"{MAX_DEPTH} deep"),
-    "endless text": ("<mujoco>" + " " * (hdf5.MAX_TEXT_BYTES + 1) + "</mujoco>", "characters"),
-    "endless elements": ("<mujoco>" + "<a/>" * 3_000_000 + "</mujoco>", "characters"),
-    "huge texture": (_mjcf('<asset><texture name="t" builtin="flat" width="99999" height="99999"/></asset>'), "absurd"),
-    "huge height field": (
-        _mjcf('<asset><hfield name="h" nrow="99999" ncol="99999"/></asset>'),
-        "absurd",
-    ),
-    "huge numbers": (_mjcf('<custom><numeric name="n" size="2000000000"/></custom>'), "absurd"),
-    "huge user data": (_mjcf('<size nuser_body="2000000000"/>'), "absurd"),
-    "huge shadows": (_mjcf('<visual><quality shadowsize="1000000"/></visual>'), "absurd"),
-    "not a number of shadows": (_mjcf('<visual><quality shadowsize="inf"/></visual>'), "absurd"),
-    "copies of copies": (
-        _mjcf(f"<worldbody>{'<replicate count="1000">' * 3}{'</replicate>' * 3}</worldbody>"),
-        "multiplies",
-    ),
-    "huge cloth": (_mjcf('<worldbody><composite type="cable" count="99999 9 9"/></worldbody>'), "multiplies"),
-    "no MJCF": ("<robot/>", "expected MJCF"),
-    "no XML": ("hello", "not XML"),
-}
-
-
-@pytest.mark.parametrize("case", SCENES)
-def test_hostile_scene_is_refused_before_mujoco_sees_it(case: str) -> None:
-    xml, message = SCENES[case]
-    with pytest.raises(RejectedEpisodeError, match=message):
-        loadable(xml, AssetFinder([]))
-
-
-@pytest.fixture
-def root(tmp_path: Path) -> Path:
-    """An asset root with `arm/link.stl`, beside a secret that links in it point to."""
-    folder = tmp_path / "assets"
-    (folder / "arm").mkdir(parents=True)
-    (folder / "arm" / "link.stl").write_bytes(b"mesh")
-    (tmp_path / "secret.stl").write_bytes(b"secret")
-    (folder / "out.stl").symlink_to(tmp_path / "secret.stl")
-    (folder / "up").symlink_to(tmp_path)
-    (folder / "circle.stl").symlink_to(folder / "circle.stl")
-    os.mkfifo(folder / "pipe.stl")
-    return folder
-
-
-@pytest.mark.parametrize(
-    "name",
-    [
-        "/etc/passwd",
-        "../secret.stl",
-        "arm/../../secret.stl",
-        "out.stl",
-        "up/secret.stl",
-        "circle.stl",
-        "pipe.stl",  # opening it would wait forever
-        "arm",
-        "x" * 300,
-        "a/" * 5000 + "link.stl",
-        "arm/li\0nk.stl",
-        "file:///etc/passwd",
-        "/proc/self/environ",
-        "~/.ssh/id_rsa",
-    ],
-    ids=lambda name: repr(name[:24]),
-)
-def test_nothing_outside_the_asset_roots_is_read(name: str, root: Path) -> None:
-    assert AssetFinder([root]).read(name) is None
-    assert AssetFinder([root]).read("arm/link.stl") == b"mesh"
-
-
-@pytest.mark.parametrize("folder", ["..", "/etc", "x" * 100_000], ids=["up", "absolute", "long"])
-def test_folders_of_the_compiler_lead_nowhere_else(folder: str, root: Path) -> None:
-    xml = f'<mujoco><compiler meshdir="{folder}"/><asset><mesh file="secret.stl"/></asset><worldbody/></mujoco>'
-    with pytest.raises(UserError, match="not found"):
-        loadable(xml, AssetFinder([root]))
-
-
-def test_buffers_are_of_the_size_of_the_pictures() -> None:
-    text, _ = loadable(
-        _mjcf('<visual><global offwidth="99999" offheight="99999"/></visual><size memory="900G"/>'), AssetFinder([])
-    )
-    assert "99999" not in text
-    assert "900G" not in text
-
-
-def test_files_inside_the_hdf5_file_have_the_same_bounds(tmp_path: Path) -> None:
-    source = write_demos(tmp_path / "a.hdf5", (2,))
-    (tmp_path / "other.hdf5").write_bytes(source.read_bytes())
-    with h5py.File(source, "a") as file:
-        assets = file["data/assets"]
-        assets["linked.png"] = h5py.ExternalLink("other.hdf5", "/data/assets/textures/checks.png")
-        assets.create_dataset("huge.png", (2**40,), "u1", chunks=(2**20,))
-        assets["text.png"] = "hello"
-    with DemoFile(source) as file:
-        assert file.asset("textures/checks.png")
-        assert file.asset("text.png") is None
-        for name, message in (("linked.png", "another file"), ("huge.png", "absurd")):
-            with pytest.raises(RejectedEpisodeError, match=message):
-                file.asset(name)
-
-
-@pytest.mark.render
-def test_missing_meshes_of_one_demo_reject_only_it(tmp_path: Path) -> None:
-    source = write_demos(tmp_path / "a.hdf5", (3, 4))
-    with h5py.File(source, "a") as file:
-        file["data/demo_0"].attrs["model_file"] = SCENE.replace("textures/checks.png", "/home/someone/textures/no.png")
-    result = convert([source], tmp_path / "out", ConversionSettings(image_size=32))
-    assert result.num_frames == 4
-    assert "/home/someone/textures/no.png" in result.rejected[0]["reason"]
-    assert "--asset-root" in result.rejected[0]["reason"]
-    with h5py.File(source, "a") as file:
-        del file["data/assets"]
-    with pytest.raises(UserError, match="--asset-root"):
-        convert([source], tmp_path / "none", ConversionSettings(image_size=32))
-    assert leftovers(tmp_path / "none") == []
-
-
-@pytest.mark.render
-def test_a_state_beyond_all_bounds_is_rejected(tmp_path: Path) -> None:
-    source = write_demos(tmp_path / "a.hdf5", (3, 4), proprioception=False)
-    with h5py.File(source, "a") as file:
-        file["data/demo_0/states"][1, 1:4] = 1e300
-    result = convert([source], tmp_path / "out", ConversionSettings(image_size=32))
-    assert [line["source_demo"] for line in result.rejected] == ["demo_0"]
-    assert result.num_frames == 4
-
-
-# --- outputs ---------------------------------------------------------------------------------------------------------
-
-
-def test_an_output_beside_which_nothing_can_be_written(tmp_path: Path) -> None:
-    source = write_demos(tmp_path / "a.hdf5", (3,), images=16)
-    (tmp_path / "file").write_text("a file, not a folder")
-    with pytest.raises(UserError, match="nothing can be written"):
-        convert([source], tmp_path / "file" / "out", SETTINGS)
-    read_only = Path("/sys/kernel")  # even for the superuser
-    if read_only.is_dir():
-        with pytest.raises(UserError, match="nothing can be written"):
-            convert([source], read_only / "out", SETTINGS)
-    if os.geteuid() != 0:
-        locked = tmp_path / "locked"
-        locked.mkdir(mode=0o555)
-        with pytest.raises(UserError, match="nothing can be written"):
-            convert([source], locked / "out", SETTINGS)
-
-
-@pytest.mark.parametrize("what", ["file", "folder of something else", "dataset"])
-def test_an_output_that_exists_is_left_alone(what: str, tmp_path: Path) -> None:
-    source = write_demos(tmp_path / "a.hdf5", (3,), images=16)
-    out = tmp_path / "out"
-    if what == "file":
-        out.write_text("years of work")
-    elif what == "dataset":
-        convert([source], out, SETTINGS)
-    else:
-        (out / "thesis").mkdir(parents=True)
-    before = tree_hashes(out) if out.is_dir() else out.read_text()
-    with pytest.raises(UserError, match="exists already"):
-        convert([source], out, SETTINGS)
-    assert (tree_hashes(out) if out.is_dir() else out.read_text()) == before
-
-
-class _FullDisk:
-    """A file system that is full after a number of pictures."""
-
-    def __init__(self, pictures: int) -> None:
-        self.left = pictures
-        self.feed = SamplingVideoEncoder.feed_frame
-
-    def __call__(self, encoder: SamplingVideoEncoder, key: str, image: np.ndarray) -> None:
-        self.left -= 1
-        if self.left < 0:
-            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
-        self.feed(encoder, key, image)
-
-
-def test_a_full_disk_keeps_what_is_finished(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    source = write_demos(tmp_path / "a.hdf5", (251, 251), images=16)
-    out = tmp_path / "out"
-    with monkeypatch.context() as patch:
-        full = _FullDisk(251 * 3 + 100)
-        patch.setattr(SamplingVideoEncoder, "feed_frame", lambda *args: full(*args))
-        with pytest.raises(UserError, match="No space left on device") as caught:
-            convert([source], out, SETTINGS, workers=1)
-    assert "same command to go on" in str(caught.value)
-    assert not out.exists()
-    done = []
-    convert_shard = pipeline.convert_shard
-    monkeypatch.setattr(pipeline, "convert_shard", lambda *args: (done.append(args[1].demos), convert_shard(*args))[1])
-    assert convert([source], out, SETTINGS, workers=1).num_frames == 502
-    assert done == [("demo_1",)]
-    assert leftovers(out) == ["out"]
-
-
-def _convert_with_short_files(source: Path, out: Path, limit: int) -> str:
-    """The message of a conversion in which no file may be longer than `limit` bytes; runs in a child."""
-    with Path(os.devnull).open("w") as nowhere:
-        os.dup2(nowhere.fileno(), 2)  # what was captured so far may be longer
-    resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit))
-    try:
-        convert([source], out, SETTINGS, workers=1)
-    except UserError as error:
-        return str(error)
-    return "converted"
-
-
-@pytest.mark.parametrize("limit", [2_000, 8_000, 40_000])
-def test_files_that_may_not_grow(limit: int, tmp_path: Path) -> None:
-    """The kernel's own error in the middle of a file, of whatever writes it: videos, tables, extras."""
-    source = write_demos(tmp_path / "a.hdf5", (120, 130), images=64)
-    out = tmp_path / "out"
-    ending = in_child(lambda: _convert_with_short_files(source, out, limit))
-    assert ending.failure is None, ending.failure
-    assert "writing failed" in ending.value
-    assert "File too large" in ending.value
-    assert not out.exists()
-    assert convert([source], out, SETTINGS, workers=1).num_frames == 250
-    assert verify(out, pictures_per_episode=2).passed
-    assert leftovers(out) == ["out"]
-
-
-def test_a_worker_that_dies_is_reported(tmp_path: Path) -> None:
-    """Of memory, say; a pool by itself would wait for it forever."""
-    command = [sys.executable, "-c", _DYING, str(tmp_path)]
-    result = subprocess.run(command, capture_output=True, text=True, timeout=120)
-    assert "SIGKILL" in result.stdout, result.stderr[-3000:]
-    assert "memory may have run out" in result.stdout
-
-
-_DYING = """
-import sys
-from robocasa_lerobot.parallel import PoolExecutor, WorkerDiedError
-
-def die(data, rank=0, world_size=1):
-    import os, signal, time
-    time.sleep(1)
-    if rank == 1:
-        os.kill(os.getpid(), signal.SIGKILL)
-
-try:
-    PoolExecutor(pipeline=[die], tasks=3, workers=2, logging_dir=sys.argv[1]).run()
-except WorkerDiedError as error:
-    print(error)
-"""
