@@ -2,8 +2,7 @@
 
 LeRobot 0.6.1's own streaming encoder is made for recording from real cameras: a full queue drops frames without
 failing, and statistics of every frame cost more than encoding. This one takes each frame at once, counts every packet,
-and takes statistics from evenly spaced frames. It needs no queue and no threads of its own: PyAV 15 keeps Python's lock
-while it encodes, so threads here would only take turns; the codec's own threads work while the next picture is made.
+and takes statistics from evenly spaced frames. `encoding_process` runs it beside what makes the pictures.
 """
 
 from __future__ import annotations
@@ -11,7 +10,8 @@ from __future__ import annotations
 import contextlib
 import shutil
 import tempfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
+from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
@@ -25,14 +25,19 @@ from numpy.typing import NDArray
 SAMPLED_FRAMES = 50
 SAMPLED_PIXELS = 64
 QUANTILES = (0.01, 0.10, 0.50, 0.90, 0.99)
-# Two frames at a time for each camera. Not the number of cores: the bytes of a video depend on it, though not on time.
-ENCODER_THREADS = 2
+# One frame at a time: with a second thread h264 takes as long and a fifth more processor time (`docs/decisions/0013`),
+# which the process that makes the pictures needs. Not the number of cores: the bytes of a video depend on it.
+ENCODER_THREADS = 1
 # Constant rate factor and preset for each codec. Keyframes every 2 frames, as LeRobot has it: random access decodes
 # at most one frame more than asked for. No B-frames: with them the decoding times of short episodes overlap where
 # LeRobot joins video files, and it fails. No lookahead for hevc: x265 of PyAV 15 with one writes past its memory at
 # some sizes (64x48 in 3 of 3 runs, without it at no size in 18), and two frames from keyframe to keyframe need none.
+# h264 is tuned for decoding, which training does again and again: a fifth faster to encode and to decode, 5 % larger.
 CODECS: dict[str, dict[str, Any]] = {
-    "h264": {"vcodec": "h264", "crf": 18, "preset": "veryfast", "g": 2, "extra_options": {"bf": 0}},
+    "h264": {
+        **{"vcodec": "h264", "crf": 18, "preset": "veryfast", "g": 2},
+        "extra_options": {"bf": 0, "tune": "fastdecode"},
+    },
     "hevc": {
         **{"vcodec": "hevc", "crf": 20, "preset": "veryfast", "g": 2},
         "extra_options": {"bf": 0, "x265-params": "rc-lookahead=0:log-level=error"},
@@ -47,41 +52,68 @@ class EncodingError(RuntimeError):
     """A video does not hold what was given to the encoder."""
 
 
-class SamplingVideoEncoder:
-    """Encodes one episode at a time, one video for each camera; its memory is a few frames, however long an episode is.
+@dataclass(frozen=True)
+class VideoSettings:
+    """How videos are encoded: rate, FFmpeg's encoder, pixel format, and the encoder's options."""
 
-    Set `episode_length` before the first frame of an episode: it says which frames are sampled, and how many there
-    must be. `histograms` sums the sampled pixels of all episodes so far for each camera.
+    fps: int
+    encoder: str
+    pixel_format: str
+    options: tuple[tuple[str, str], ...]
+
+    @classmethod
+    def of_codec(cls, codec: str, fps: int) -> VideoSettings:
+        """Settings for a key of `CODECS`, with the options that LeRobot makes of it."""
+        from lerobot.configs import RGBEncoderConfig  # heavy; the encoder's own process does not need it
+
+        video = RGBEncoderConfig(**CODECS[codec])
+        options = video.get_codec_options(ENCODER_THREADS, as_strings=True)
+        return cls(fps, video.vcodec, video.pix_fmt, tuple(options.items()))
+
+
+@dataclass(frozen=True)
+class EncodedVideo:
+    """A finished video of one episode and camera, and the sampled pixels of it."""
+
+    path: Path
+    histogram: Histogram
+    num_sampled: int  # frames
+
+    def statistics(self) -> dict[str, NDArray[Any]]:
+        """Statistics (3, 1, 1) in [0, 1] of the sampled pixels, as LeRobot keeps them for each episode."""
+        levels = histogram_statistics(self.histogram, self.num_sampled)
+        return {name: value if name == "count" else (value / 255).reshape(3, 1, 1) for name, value in levels.items()}
+
+
+class SamplingVideoEncoder:
+    """Encodes one episode, one video for each key; its memory is a few frames, however long the episode is.
+
+    Args:
+        settings: rate and codec.
+        keys: names of the videos.
+        folder: an existing one; the videos come into folders of their own below it.
+        length: number of frames that each video must get; it also says which ones are sampled.
     """
 
-    def __init__(self, fps: int, codec: str, pixel_format: str, options: Mapping[str, str]) -> None:
-        self.episode_length = 0
-        self.histograms: dict[str, Histogram] = {}
-        self._fps, self._codec, self._pixel_format, self._options = fps, codec, pixel_format, dict(options)
+    def __init__(self, settings: VideoSettings, keys: Sequence[str], folder: Path, length: int) -> None:
+        assert length > 0, "an episode has frames"
+        self._length = length
+        sampled = sampled_frames(length)
         self._videos: dict[str, _Video] = {}
+        for key in keys:
+            path = Path(tempfile.mkdtemp(dir=folder)) / f"{key}.mp4"
+            self._videos[key] = _Video(path, settings, sampled)
 
-    def start_episode(
-        self, video_keys: Sequence[str], temp_dir: Path, depth_video_keys: Sequence[str] | None = None
-    ) -> None:
-        """Open one video for each key in a temporary folder under `temp_dir`."""
-        assert self.episode_length > 0, "episode_length is set before the first frame"
-        assert not depth_video_keys, "depth is not converted"
-        self.cancel_episode()
-        sampled = sampled_frames(self.episode_length)
-        for key in video_keys:
-            path = Path(tempfile.mkdtemp(dir=temp_dir)) / f"{key}.mp4"
-            self._videos[key] = _Video(path, self._fps, self._codec, self._pixel_format, self._options, sampled)
-
-    def feed_frame(self, video_key: str, image: NDArray[np.uint8]) -> None:
-        """Encode the next frame (H, W, 3).
+    def feed(self, key: str, picture: NDArray[np.uint8]) -> None:
+        """Encode the next frame (H, W, 3) of a video.
 
         Raises:
             EncodingError: an earlier frame of this video could not be encoded.
         """
-        self._videos[video_key].add(image)
+        self._videos[key].add(picture)
 
-    def finish_episode(self) -> dict[str, tuple[Path, dict[str, NDArray[Any]]]]:
-        """Close the videos; gives path and statistics (min, max, mean, std, count, quantiles per channel) of each.
+    def finish(self) -> dict[str, EncodedVideo]:
+        """Close the videos.
 
         Raises:
             EncodingError: a video has not as many frames as the episode, or its encoder failed.
@@ -89,41 +121,33 @@ class SamplingVideoEncoder:
         results = {}
         for key, video in self._videos.items():
             video.finish()
-            if not video.num_packets == video.num_frames == self.episode_length:
+            if not video.num_packets == video.num_frames == self._length:
                 raise EncodingError(
-                    f"{key}: {self.episode_length} frames expected, {video.num_frames} encoded, "
-                    f"{video.num_packets} written."
+                    f"{key}: {self._length} frames expected, {video.num_frames} encoded, {video.num_packets} written."
                 )
-            results[key] = (video.path, histogram_statistics(video.histogram, video.num_sampled))
-            self.histograms[key] = self.histograms.get(key, 0) + video.histogram
+            results[key] = EncodedVideo(video.path, video.histogram, video.num_sampled)
         self._videos.clear()
         return results
 
-    def cancel_episode(self) -> None:
-        """Stop the present episode and remove its videos."""
+    def cancel(self) -> None:
+        """Stop, and remove the videos, unless they are finished."""
         for video in self._videos.values():
             video.close()
             shutil.rmtree(video.path.parent, ignore_errors=True)
         self._videos.clear()
 
-    def close(self) -> None:
-        """Same as `cancel_episode`."""
-        self.cancel_episode()
-
 
 class _Video:
-    def __init__(
-        self, path: Path, fps: int, codec: str, pixel_format: str, options: dict[str, str], sampled: frozenset[int]
-    ) -> None:
+    def __init__(self, path: Path, settings: VideoSettings, sampled: frozenset[int]) -> None:
         self.path = path
         self.num_frames = self.num_packets = self.num_sampled = 0
         self.histogram: Histogram = np.zeros((3, _LEVELS), np.int64)
         self._error: Exception | None = None
         self._sampled = sampled
-        self._time_base = Fraction(1, fps)
+        self._time_base = Fraction(1, settings.fps)
         self._container = av.open(str(path), "w")
-        self._stream: Any = self._container.add_stream(codec, fps, options=options)
-        self._stream.pix_fmt = pixel_format
+        self._stream: Any = self._container.add_stream(settings.encoder, settings.fps, options=dict(settings.options))
+        self._stream.pix_fmt = settings.pixel_format
         self._stream.time_base = self._time_base
 
     def add(self, image: NDArray[np.uint8]) -> None:
@@ -167,6 +191,11 @@ class _Video:
         for packet in packets:
             self._container.mux(packet)
             self.num_packets += 1
+
+
+def quiet_codecs() -> None:
+    """Silence what codecs print about every file; their errors still arrive as exceptions."""
+    av.logging.set_libav_level(av.logging.ERROR)
 
 
 def sampled_frames(length: int) -> frozenset[int]:

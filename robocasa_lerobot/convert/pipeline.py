@@ -6,6 +6,7 @@ source bytes, so the same command after a kill finds its finished shards again a
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import shutil
@@ -19,7 +20,8 @@ from typing import Any
 import numpy as np
 
 from robocasa_lerobot import __version__
-from robocasa_lerobot.convert.encoder import CODECS, SAMPLED_FRAMES, SAMPLED_PIXELS, Histogram
+from robocasa_lerobot.convert.encoder import CODECS, SAMPLED_FRAMES, SAMPLED_PIXELS, Histogram, quiet_codecs
+from robocasa_lerobot.convert.encoding_process import shared_encoder
 from robocasa_lerobot.convert.executors import Execution
 from robocasa_lerobot.convert.lerobot_v2.dataset import V2Dataset
 from robocasa_lerobot.convert.lerobot_v2.finish import conversion_facts, finish_dataset
@@ -99,7 +101,7 @@ def convert(
     if out.exists() and not overwrite and _left_behind(out) == partial:
         shutil.rmtree(partial)  # an earlier run was killed after its dataset had appeared, while clearing away
         return _recorded_result(plan, out)
-    with locked(partial), failures_explained(out, partial):
+    with locked(partial), failures_explained(out, partial), contextlib.closing(shared_encoder):
         run_pieces(
             _ShardTask(plan, str(partial)),
             len(plan.shards),
@@ -249,11 +251,10 @@ class _ShardTask:
 
 def quiet_libraries() -> None:
     """Silence what libraries print about every file they write; their errors still arrive as exceptions."""
-    import av
     import datasets
 
     datasets.disable_progress_bars()
-    av.logging.set_libav_level(av.logging.ERROR)
+    quiet_codecs()
 
 
 def shard_folder(partial: Path, rank: int) -> Path:

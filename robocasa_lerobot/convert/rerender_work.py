@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import shutil
@@ -20,12 +21,12 @@ from lerobot.datasets.video_utils import get_video_info
 from robocasa_lerobot import __version__, contract
 from robocasa_lerobot.convert.encoder import (
     CODECS,
-    ENCODER_THREADS,
     Histogram,
-    SamplingVideoEncoder,
+    VideoSettings,
     histogram_statistics,
     sampled_frames,
 )
+from robocasa_lerobot.convert.encoding_process import shared_encoder
 from robocasa_lerobot.convert.executors import Execution
 from robocasa_lerobot.convert.exported import ExportedEpisode
 from robocasa_lerobot.convert.lerobot_v2.video import VideoFiles, probe
@@ -103,7 +104,7 @@ def render_dataset(
         most = min(os.cpu_count() or 1, _MAX_AUTOMATIC_WORKERS)
         workers = min(most, plan.num_frames // _MIN_FRAMES_PER_WORKER)
     workers = max(1, min(workers, len(plan.pieces)))
-    with locked(partial), failures_explained(out, partial):
+    with locked(partial), failures_explained(out, partial), contextlib.closing(shared_encoder):
         run_pieces(
             step, len(plan.pieces), partial, execution, workers, plan.num_frames, "rendering", quiet_libraries, __name__
         )
@@ -143,29 +144,27 @@ class _Piece:
 def _render_episode(
     plan: RenderPlan, episode: ExportedEpisode, folder: Path, done: int, report: Callable[[int], None]
 ) -> int:
-    codec = RGBEncoderConfig(**CODECS[plan.settings.video_codec])
-    options = codec.get_codec_options(ENCODER_THREADS, as_strings=True)
-    encoder = SamplingVideoEncoder(plan.dataset.fps, codec.vcodec, codec.pix_fmt, options)
-    encoder.episode_length = episode.length
+    settings = VideoSettings.of_codec(plan.settings.video_codec, plan.dataset.fps)
     place = _episode_folder(folder, episode.index)
     place.mkdir()
+    keys = [contract.image_key(camera.name) for camera in plan.cameras]
     try:
-        with EpisodePictures(plan, episode) as pictures:
-            encoder.start_episode([contract.image_key(camera.name) for camera in plan.cameras], place)
+        with shared_encoder.borrowed() as encoder, EpisodePictures(plan, episode) as pictures:
+            encoder.start_episode(settings, keys, place, episode.length)
             for step in pictures:
                 for key, picture in step.items():
-                    encoder.feed_frame(key, picture)
+                    encoder.feed(key, picture)
                 done += 1
                 if done % _REPORT_FRAMES == 0:
                     report(done)
-        for key, (path, _) in encoder.finish_episode().items():
-            path.rename(place / f"{key}.mp4")
-            path.parent.rmdir()
+            encoder.end_episode()
+            videos = encoder.finished()
     except RejectedEpisodeError as error:
         raise UserError(f"episode {episode.index} of {plan.source} cannot be rendered: {error}") from None
-    finally:
-        encoder.cancel_episode()
-    histograms: dict[str, Any] = encoder.histograms
+    for key, video in videos.items():
+        video.path.rename(place / f"{key}.mp4")
+        video.path.parent.rmdir()
+    histograms: dict[str, Any] = {key: video.histogram for key, video in videos.items()}
     np.savez_compressed(place / _HISTOGRAMS, **histograms)
     return done
 

@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from robocasa_lerobot import contract
+from robocasa_lerobot.convert.encoding_process import EncodingProcess, shared_encoder
 from robocasa_lerobot.convert.episode import Episode
 from robocasa_lerobot.convert.mjcf import MissingAssetsError
 from robocasa_lerobot.convert.settings import Plan, Shard
@@ -53,21 +54,19 @@ def convert_shard(plan: Plan, shard: Shard, folder: Path, progress: Callable[[in
     """
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir(parents=True)
-    writer = _ShardWriter(plan, folder)
     rejected: list[RejectedEpisode] = []
     report = _Throttled(progress)
-    try:
-        with DemoFile(Path(shard.file), plan.settings.layout) as file:
-            known = dict(shard.rejected)
-            for name in shard.demos:
-                try:
-                    if name in known:
-                        raise RejectedEpisodeError(known[name])
-                    with Episode(file, name, plan) as episode:
-                        writer.write(episode, file, report)
-                except (RejectedEpisodeError, MissingAssetsError) as error:
-                    rejected.append(RejectedEpisode(shard.file, name, str(error)))
-    finally:
+    with shared_encoder.borrowed() as encoder, DemoFile(Path(shard.file), plan.settings.layout) as file:
+        writer = _ShardWriter(plan, folder, encoder)
+        known = dict(shard.rejected)
+        for name in shard.demos:
+            try:
+                if name in known:
+                    raise RejectedEpisodeError(known[name])
+                with Episode(file, name, plan) as episode:
+                    writer.write(episode, file, report)
+            except (RejectedEpisodeError, MissingAssetsError) as error:
+                rejected.append(RejectedEpisode(shard.file, name, str(error)))
         writer.finalize()
     write_jsonl(folder / EPISODES_FILE, writer.episodes)
     write_jsonl(folder / REJECTED_FILE, [asdict(line) for line in rejected])
@@ -75,8 +74,8 @@ def convert_shard(plan: Plan, shard: Shard, folder: Path, progress: Callable[[in
 
 
 class _ShardWriter:
-    def __init__(self, plan: Plan, folder: Path) -> None:
-        self._plan, self._folder = plan, folder
+    def __init__(self, plan: Plan, folder: Path, encoder: EncodingProcess) -> None:
+        self._plan, self._folder, self._encoder = plan, folder, encoder
         self._dataset: DatasetWriter | None = None
         self.episodes: list[dict[str, Any]] = []
 
@@ -84,7 +83,12 @@ class _ShardWriter:
         if self._dataset is None:
             plan = self._plan
             self._dataset = DatasetWriter(
-                self._folder / DATASET, plan.fps, plan.mapping.robot_type, plan.features, plan.settings.video_codec
+                self._encoder,
+                self._folder / DATASET,
+                plan.fps,
+                plan.mapping.robot_type,
+                plan.features,
+                plan.settings.video_codec,
             )
         # Read now what is written last: an episode that has been added cannot be rejected any more.
         meta, _ = episode.demo.ep_meta, episode.demo.model_xml

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import shutil
 from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +21,8 @@ from lerobot.datasets.feature_utils import get_hf_features_from_features
 from lerobot.datasets.io_utils import write_info
 from numpy.typing import NDArray
 
-from robocasa_lerobot.convert.encoder import CODECS, ENCODER_THREADS, Histogram, SamplingVideoEncoder
+from robocasa_lerobot.convert.encoder import CODECS, EncodedVideo, Histogram, VideoSettings
+from robocasa_lerobot.convert.encoding_process import EncodingProcess
 from robocasa_lerobot.convert.lerobot_v2.video import VideoFiles, probe
 from robocasa_lerobot.convert.statistics import vector_statistics
 
@@ -29,10 +31,21 @@ VIDEO_FILE_MB = 100
 _DATA_FILE = "data/chunk-000/file-000.parquet"
 
 
+@dataclass(frozen=True)
+class _Pending:
+    """An episode whose pictures are on their way through the encoder."""
+
+    columns: Mapping[str, NDArray[Any]]
+    task: str
+    length: int
+    scratch: Path
+
+
 class DatasetWriter:
     """A dataset of one data file; `finalize` completes it.
 
     Args:
+        encoder: the process that encodes the pictures, to be used by nobody else meanwhile.
         root: folder of the dataset, which must not exist.
         fps: frames per second.
         robot_type: name of the robot.
@@ -40,7 +53,9 @@ class DatasetWriter:
         codec: key of `CODECS`.
     """
 
-    def __init__(self, root: Path, fps: int, robot_type: str, features: Mapping[str, Any], codec: str) -> None:
+    def __init__(
+        self, encoder: EncodingProcess, root: Path, fps: int, robot_type: str, features: Mapping[str, Any], codec: str
+    ) -> None:
         self.root, self.num_episodes, self.num_frames = root, 0, 0
         self._fps = fps
         self._video = RGBEncoderConfig(**CODECS[codec])
@@ -52,17 +67,14 @@ class DatasetWriter:
             root=root,
             video_files_size_in_mb=VIDEO_FILE_MB,
         )
-        options = self._video.get_codec_options(ENCODER_THREADS, as_strings=True)
-        self._encoder = SamplingVideoEncoder(fps, self._video.vcodec, self._video.pix_fmt, options)
+        self._encoder, self._settings = encoder, VideoSettings.of_codec(codec, fps)
+        self._pending: _Pending | None = None
+        self._number = 0  # of episodes begun
+        self.histograms: dict[str, Histogram] = {}  # sampled pixels of all episodes so far for each video feature
         self._schema = get_hf_features_from_features(self._meta.features).arrow_schema
         (root / _DATA_FILE).parent.mkdir(parents=True)
         self._tables = pq.ParquetWriter(root / _DATA_FILE, self._schema, compression="snappy")
         self._videos = {key: VideoFiles(root, key, fps, VIDEO_FILE_MB * 2**20) for key in self._meta.video_keys}
-
-    @property
-    def histograms(self) -> dict[str, Histogram]:
-        """Sampled pixels of all episodes so far for each video feature."""
-        return self._encoder.histograms
 
     def add(
         self,
@@ -82,29 +94,33 @@ class DatasetWriter:
             progress: called with 1 after each step.
 
         Raises:
-            EncodingError: the videos do not hold T frames, or cannot be encoded.
+            EncodingError: videos of this episode or the one before do not hold as many frames as it has steps, or
+                cannot be encoded.
             Exception: whatever `pictures` raises. Nothing of the episode is in the dataset then.
         """
-        scratch = self.root / "encoding"
+        self._number += 1
+        scratch = self.root / "encoding" / str(self._number)
         shutil.rmtree(scratch, ignore_errors=True)
-        scratch.mkdir()
+        scratch.mkdir(parents=True)
+        self._encoder.start_episode(self._settings, self._meta.video_keys, scratch, length)
         try:
-            self._encoder.episode_length = length
-            self._encoder.start_episode(self._meta.video_keys, scratch)
             for step in pictures:
                 for key, picture in step.items():
-                    self._encoder.feed_frame(key, picture)
+                    self._encoder.feed(key, picture)
                 progress(1)
-            encoded = self._encoder.finish_episode()
         except BaseException:
             self._encoder.cancel_episode()
-            shutil.rmtree(scratch, ignore_errors=True)
             raise
-        self._append(columns, task, length, encoded)
-        shutil.rmtree(scratch)
+        self._encoder.end_episode()
+        # While this episode's last pictures are encoded, the one before is written.
+        before, self._pending = self._pending, _Pending(columns, task, length, scratch)
+        self._complete(before)
 
     def finalize(self) -> None:
         """Complete the files; without this they have no footers and the dataset is lost."""
+        last, self._pending = self._pending, None
+        self._complete(last)
+        shutil.rmtree(self.root / "encoding", ignore_errors=True)
         self._tables.close()
         for videos in self._videos.values():
             videos.close()
@@ -114,12 +130,13 @@ class DatasetWriter:
                 self._meta.update_video_info(key, video_encoder=self._video)
             write_info(self._meta.info, self.root)
 
+    def _complete(self, pending: _Pending | None) -> None:
+        if pending is not None:
+            self._append(pending.columns, pending.task, pending.length, self._encoder.finished())
+            shutil.rmtree(pending.scratch)
+
     def _append(
-        self,
-        columns: Mapping[str, NDArray[Any]],
-        task: str,
-        length: int,
-        encoded: Mapping[str, tuple[Path, dict[str, NDArray[Any]]]],
+        self, columns: Mapping[str, NDArray[Any]], task: str, length: int, encoded: Mapping[str, EncodedVideo]
     ) -> None:
         index, first = self.num_episodes, self.num_frames
         self._meta.save_episode_tasks([task])
@@ -141,11 +158,10 @@ class DatasetWriter:
         statistics = {
             key: vector_statistics(values) for key, values in everything.items() if values.dtype.kind in "fiub"
         }
-        for key, (path, levels) in encoded.items():
-            entries |= self._videos[key].append(path, probe(path))
-            statistics[key] = {
-                name: value if name == "count" else (value / 255).reshape(3, 1, 1) for name, value in levels.items()
-            }
+        for key, video in encoded.items():
+            entries |= self._videos[key].append(video.path, probe(video.path))
+            statistics[key] = video.statistics()
+            self.histograms[key] = self.histograms.get(key, 0) + video.histogram
         self._meta.save_episode(index, length, [task], statistics, entries)
         self.num_episodes, self.num_frames = index + 1, first + length
 

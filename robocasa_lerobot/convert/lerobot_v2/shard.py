@@ -26,13 +26,13 @@ from numpy.typing import NDArray
 from robocasa_lerobot import contract
 from robocasa_lerobot.convert.encoder import (
     CODECS,
-    ENCODER_THREADS,
-    SAMPLED_FRAMES,
+    EncodedVideo,
     Histogram,
-    SamplingVideoEncoder,
+    VideoSettings,
     channel_histogram,
-    histogram_statistics,
+    sampled_frames,
 )
+from robocasa_lerobot.convert.encoding_process import shared_encoder
 from robocasa_lerobot.convert.lerobot_v2.dataset import V2Dataset
 from robocasa_lerobot.convert.lerobot_v2.episode import EP_META, V2Episode
 from robocasa_lerobot.convert.lerobot_v2.plan import V2Plan
@@ -58,17 +58,11 @@ _DATA_FILE = "data/chunk-000/file-000.parquet"
 
 @dataclass(frozen=True)
 class _Video:
-    """A video that is ready to be appended, and the statistics of its sampled frames."""
+    """A video that is ready to be appended."""
 
-    path: Path
+    encoded: EncodedVideo
     form: VideoForm
-    histogram: Histogram
-    num_sampled: int
     reencoded: str | None  # why
-
-    def statistics(self) -> dict[str, NDArray[Any]]:
-        levels = histogram_statistics(self.histogram, self.num_sampled)
-        return {key: value if key == "count" else (value / 255).reshape(3, 1, 1) for key, value in levels.items()}
 
 
 def convert_v2_shard(plan: V2Plan, shard: Shard, folder: Path, progress: Callable[[int], None]) -> ShardOutcome:
@@ -146,26 +140,26 @@ class _Writer:
         if reason is None and form.num_packets != episode.length:
             reason = "frames outside of its playing time"
         if reason is None:
-            histogram, sampled = np.zeros((3, 256), np.int64), _sampled(episode.length)
+            histogram, sampled = np.zeros((3, 256), np.int64), sampled_frames(episode.length)
             count = 0
             for count, frame in enumerate(frames(path), start=1):
                 if count - 1 in sampled:
                     histogram += channel_histogram(rgb(frame, size))
             episode.check_frames(key, count)
-            return _Video(path, form, histogram, len(sampled), None)
+            return _Video(EncodedVideo(path, histogram, len(sampled)), form, None)
         scratch.mkdir(exist_ok=True)
-        options = self._codec.get_codec_options(ENCODER_THREADS, as_strings=True)
-        encoder = SamplingVideoEncoder(self._plan.fps, self._codec.vcodec, self._codec.pix_fmt, options)
-        encoder.episode_length = episode.length
+        encoder = shared_encoder.started()
+        settings_of_video = VideoSettings.of_codec(settings.video_codec, self._plan.fps)
+        encoder.start_episode(settings_of_video, [camera.name], scratch, episode.length)
         try:
-            encoder.start_episode([camera.name], scratch)
             for picture in episode.pictures(key, camera):
-                encoder.feed_frame(camera.name, picture)
-            ((encoded, _),) = encoder.finish_episode().values()
+                encoder.feed(camera.name, picture)
         except BaseException:
             encoder.cancel_episode()
             raise
-        return _Video(encoded, probe(encoded), encoder.histograms[camera.name], len(_sampled(episode.length)), reason)
+        encoder.end_episode()
+        (video,) = encoder.finished().values()
+        return _Video(video, probe(video.path), reason)
 
     def _append(self, episode: V2Episode, videos: Mapping[str, _Video], digest: str) -> None:
         meta = self._meta if self._meta is not None else self._create()
@@ -190,9 +184,9 @@ class _Writer:
         stats = {key: vector_statistics(values) for key, values in columns.items() if values.dtype.kind in "fiub"}
         for camera, video in videos.items():
             key = contract.image_key(camera)
-            entries |= self._videos[key].append(video.path, video.form)
-            stats[key] = video.statistics()
-            self._histograms[key] = self._histograms.get(key, 0) + video.histogram
+            entries |= self._videos[key].append(video.encoded.path, video.form)
+            stats[key] = video.encoded.statistics()
+            self._histograms[key] = self._histograms.get(key, 0) + video.encoded.histogram
         texts = [self._plan.tasks[row] for row in dict.fromkeys(episode.task_index.tolist())]
         meta.save_episode(index, length, texts, stats, entries)
         self._extras(episode, self._folder / EXTRAS / episode_folder(index))
@@ -249,8 +243,3 @@ class _Writer:
         ours = all(camera in line["reencoded"] for line in self.episodes)
         self._meta.update_video_info(key, video_encoder=self._codec if ours else None)
         write_info(self._meta.info, self._meta.root)
-
-
-def _sampled(length: int) -> frozenset[int]:
-    """The frames whose pixels go into the statistics, the same as the encoder takes."""
-    return frozenset(np.linspace(0, length - 1, min(SAMPLED_FRAMES, length)).round().astype(int).tolist())
