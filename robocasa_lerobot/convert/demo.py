@@ -12,6 +12,7 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
+from robocasa_lerobot.convert.chunks import deflated_row, holds_deflated_rows
 from robocasa_lerobot.convert.hdf5 import (
     MAX_COLUMN_VALUES,
     MAX_IMAGE_SIDE,
@@ -116,8 +117,16 @@ class Demo:
         return int(dataset.shape[1]), int(dataset.shape[2])
 
     def images(self, camera: str, block: int = 64) -> Iterator[NDArray[np.uint8]]:
-        """Stored pictures (H, W, 3) of a camera in order, read `block` at a time."""
+        """Stored pictures (H, W, 3) of a camera in order, read `block` at a time, or one at a time if stored so."""
         dataset, picture = self._image_dataset(camera), self._picture(camera)
+        with reading(picture.key):
+            deflated = holds_deflated_rows(dataset)
+        if deflated:
+            for index in range(len(dataset)):
+                with reading(picture.key):
+                    row = deflated_row(dataset, index)
+                yield _upright(row, picture.flip)
+            return
         for start in range(0, len(dataset), block):
             yield from _upright(self._read(dataset, slice(start, start + block), picture.key), picture.flip)
 

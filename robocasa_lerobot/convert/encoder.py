@@ -1,8 +1,8 @@
-"""A video encoder for LeRobotDatasets that never drops a frame and samples its statistics.
+"""A video encoder for LeRobotDatasets that never drops a frame, and image statistics from sampled pixels.
 
 LeRobot 0.6.1's own streaming encoder is made for recording from real cameras: a full queue drops frames without
-failing, and statistics of every frame cost more than encoding. This one takes each frame at once, counts every packet,
-and takes statistics from evenly spaced frames. `encoding_process` runs it beside what makes the pictures.
+failing, and statistics of every frame cost more than encoding. This one takes each frame at once and counts every
+packet. `encoding_process` runs it beside what makes the pictures, and takes statistics from evenly spaced frames.
 """
 
 from __future__ import annotations
@@ -44,6 +44,7 @@ CODECS: dict[str, dict[str, Any]] = {
     },
     "av1": {"vcodec": "libsvtav1", "crf": 30, "preset": 12, "g": 2},
 }
+PIXEL_FORMAT = "yuv420p"
 _LEVELS = 256
 Histogram = NDArray[np.int64]  # (3, 256): how often each 8-bit level occurs in each channel
 
@@ -54,11 +55,10 @@ class EncodingError(RuntimeError):
 
 @dataclass(frozen=True)
 class VideoSettings:
-    """How videos are encoded: rate, FFmpeg's encoder, pixel format, and the encoder's options."""
+    """How videos are encoded: rate, FFmpeg's encoder, and its options; the pixel format is `PIXEL_FORMAT`."""
 
     fps: int
     encoder: str
-    pixel_format: str
     options: tuple[tuple[str, str], ...]
 
     @classmethod
@@ -68,7 +68,8 @@ class VideoSettings:
 
         video = RGBEncoderConfig(**CODECS[codec])
         options = video.get_codec_options(ENCODER_THREADS, as_strings=True)
-        return cls(fps, video.vcodec, video.pix_fmt, tuple(options.items()))
+        assert video.pix_fmt == PIXEL_FORMAT, video.pix_fmt
+        return cls(fps, video.vcodec, tuple(options.items()))
 
 
 @dataclass(frozen=True)
@@ -85,49 +86,46 @@ class EncodedVideo:
         return {name: value if name == "count" else (value / 255).reshape(3, 1, 1) for name, value in levels.items()}
 
 
-class SamplingVideoEncoder:
+class EpisodeEncoder:
     """Encodes one episode, one video for each key; its memory is a few frames, however long the episode is.
 
     Args:
         settings: rate and codec.
         keys: names of the videos.
         folder: an existing one; the videos come into folders of their own below it.
-        length: number of frames that each video must get; it also says which ones are sampled.
+        length: number of frames that each video must get.
     """
 
     def __init__(self, settings: VideoSettings, keys: Sequence[str], folder: Path, length: int) -> None:
         assert length > 0, "an episode has frames"
         self._length = length
-        sampled = sampled_frames(length)
         self._videos: dict[str, _Video] = {}
         for key in keys:
-            path = Path(tempfile.mkdtemp(dir=folder)) / f"{key}.mp4"
-            self._videos[key] = _Video(path, settings, sampled)
+            self._videos[key] = _Video(Path(tempfile.mkdtemp(dir=folder)) / f"{key}.mp4", settings)
 
-    def feed(self, key: str, picture: NDArray[np.uint8]) -> None:
-        """Encode the next frame (H, W, 3) of a video.
+    def feed(self, key: str, planes: NDArray[np.uint8]) -> None:
+        """Encode the next frame of a video, given as `planes_of` gives it.
 
         Raises:
             EncodingError: an earlier frame of this video could not be encoded.
         """
-        self._videos[key].add(picture)
+        self._videos[key].add(planes)
 
-    def finish(self) -> dict[str, EncodedVideo]:
-        """Close the videos.
+    def finish(self) -> dict[str, Path]:
+        """Close the videos; gives their files.
 
         Raises:
             EncodingError: a video has not as many frames as the episode, or its encoder failed.
         """
-        results = {}
         for key, video in self._videos.items():
             video.finish()
             if not video.num_packets == video.num_frames == self._length:
                 raise EncodingError(
                     f"{key}: {self._length} frames expected, {video.num_frames} encoded, {video.num_packets} written."
                 )
-            results[key] = EncodedVideo(video.path, video.histogram, video.num_sampled)
+        paths = {key: video.path for key, video in self._videos.items()}
         self._videos.clear()
-        return results
+        return paths
 
     def cancel(self) -> None:
         """Stop, and remove the videos, unless they are finished."""
@@ -138,28 +136,23 @@ class SamplingVideoEncoder:
 
 
 class _Video:
-    def __init__(self, path: Path, settings: VideoSettings, sampled: frozenset[int]) -> None:
+    def __init__(self, path: Path, settings: VideoSettings) -> None:
         self.path = path
-        self.num_frames = self.num_packets = self.num_sampled = 0
-        self.histogram: Histogram = np.zeros((3, _LEVELS), np.int64)
+        self.num_frames = self.num_packets = 0
         self._error: Exception | None = None
-        self._sampled = sampled
         self._time_base = Fraction(1, settings.fps)
         self._container = av.open(str(path), "w")
         self._stream: Any = self._container.add_stream(settings.encoder, settings.fps, options=dict(settings.options))
-        self._stream.pix_fmt = settings.pixel_format
+        self._stream.pix_fmt = PIXEL_FORMAT
         self._stream.time_base = self._time_base
 
-    def add(self, image: NDArray[np.uint8]) -> None:
+    def add(self, planes: NDArray[np.uint8]) -> None:
         """Encode a frame; what goes wrong is reported by the next call."""
         self._check()
         try:
             if self.num_frames == 0:
-                self._stream.height, self._stream.width = image.shape[:2]
-            if self.num_frames in self._sampled:
-                self.histogram += channel_histogram(image)
-                self.num_sampled += 1
-            frame = av.VideoFrame.from_ndarray(image, format="rgb24")
+                self._stream.height, self._stream.width = planes.shape[0] * 2 // 3, planes.shape[1]
+            frame = av.VideoFrame.from_ndarray(planes, format=PIXEL_FORMAT)
             frame.pts, frame.time_base = self.num_frames, self._time_base
             self._write(self._stream.encode(frame))
             self.num_frames += 1
@@ -196,6 +189,27 @@ class _Video:
 def quiet_codecs() -> None:
     """Silence what codecs print about every file; their errors still arrive as exceptions."""
     av.logging.set_libav_level(av.logging.ERROR)
+
+
+def planes_of(picture: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    """A picture (H, W, 3) RGB as the planes of `PIXEL_FORMAT` below each other, (H * 3 / 2, W) uint8.
+
+    Colours as ITU-R BT.601 of limited range, which FFmpeg takes for granted; those of four pixels are averaged.
+
+    Raises:
+        EncodingError: height or width is odd.
+    """
+    import cv2  # only where pictures are made
+
+    height, width = picture.shape[:2]
+    if height % 2 or width % 2:
+        raise EncodingError(f"pictures of {height}x{width} pixels: the video format needs even numbers.")
+    planes = cv2.cvtColor(picture, cv2.COLOR_RGB2YUV_I420)
+    # OpenCV takes the colour of one pixel of four: it is given the average in all of them.
+    averaged = cv2.resize(picture, (width // 2, height // 2), interpolation=cv2.INTER_AREA)
+    averaged = cv2.resize(averaged, (width, height), interpolation=cv2.INTER_NEAREST)
+    planes[height:] = cv2.cvtColor(averaged, cv2.COLOR_RGB2YUV_I420)[height:]
+    return np.asarray(planes, np.uint8)
 
 
 def sampled_frames(length: int) -> frozenset[int]:

@@ -95,16 +95,13 @@ class Episode:
     def _pictures(
         self, step: int, stored: Mapping[str, NDArray[np.uint8]], cameras: Sequence[Camera]
     ) -> dict[str, NDArray[np.uint8]]:
-        pictures = {}
-        if self._scene is not None and self.rendered_cameras:
+        pictures = {c.name: _resized(stored[c.name], c.height, c.width) for c in cameras if c.name in stored}
+        rendered = [camera for camera in cameras if camera.name not in stored]
+        if rendered:
+            assert self._scene is not None
             self._set_state(step)
-        for camera in cameras:
-            if camera.name in stored:
-                pictures[camera.name] = _resized(stored[camera.name], camera.height, camera.width)
-            else:
-                assert self._scene is not None
-                pictures[camera.name] = self._scene.picture(camera.name, camera.height, camera.width)
-        return pictures
+            pictures |= self._scene.pictures(rendered)
+        return {camera.name: pictures[camera.name] for camera in cameras}
 
     def _load(self, finder: AssetFinder, plan: Plan) -> Scene:
         from robocasa_lerobot.convert.render import Scene  # MuJoCo is not needed where the file has everything

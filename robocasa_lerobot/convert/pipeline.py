@@ -97,16 +97,30 @@ def convert(
     Raises:
         UserError: the input or the output path cannot be used, or no episode is good. Nothing is at `out` then.
     """
+    with contextlib.closing(shared_encoder):
+        if workers == 1:
+            shared_encoder.started()  # takes a moment, meanwhile the files are looked into
+        return _convert(files, out, settings, workers, overwrite, execution or Execution())
+
+
+def _convert(
+    files: Sequence[Path],
+    out: Path,
+    settings: ConversionSettings,
+    workers: int | None,
+    overwrite: bool,
+    execution: Execution,
+) -> ConversionResult:
     plan, partial, out = _prepared(files, out, settings, overwrite)
     if out.exists() and not overwrite and _left_behind(out) == partial:
         shutil.rmtree(partial)  # an earlier run was killed after its dataset had appeared, while clearing away
         return _recorded_result(plan, out)
-    with locked(partial), failures_explained(out, partial), contextlib.closing(shared_encoder):
+    with locked(partial), failures_explained(out, partial):
         run_pieces(
             _ShardTask(plan, str(partial)),
             len(plan.shards),
             partial,
-            execution or Execution(),
+            execution,
             _num_workers(plan, workers),
             plan.num_frames,
             "converting",

@@ -14,6 +14,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from robocasa_lerobot.convert.settings import Camera
 from robocasa_lerobot.convert.source import RejectedEpisodeError
 from robocasa_lerobot.rendering import SceneRenderer
 
@@ -102,13 +103,16 @@ class Scene:
         """Positions of one-degree-of-freedom joints (n,), in metres or radians."""
         return np.array([self._data.joint(name).qpos[0] for name in names])
 
-    def picture(self, camera: str, height: int, width: int) -> NDArray[np.uint8]:
-        """What a camera sees in the present state: upright (height, width, 3) uint8 RGB.
+    def pictures(self, cameras: Sequence[Camera]) -> dict[str, NDArray[np.uint8]]:
+        """What cameras see in the present state: upright (height, width, 3) uint8 RGB by name.
 
         Raises:
             NoOpenGLError: this machine cannot render; the message has the remedy.
         """
-        size = (height, width)
-        if size not in self._renderers:
-            self._renderers[size] = SceneRenderer(self._model, height, width, shadows=not self._fast)
-        return self._renderers[size].render(self._data, camera)
+        found: dict[str, NDArray[np.uint8]] = {}
+        for size in dict.fromkeys((camera.height, camera.width) for camera in cameras):
+            names = [camera.name for camera in cameras if (camera.height, camera.width) == size]
+            if size not in self._renderers:
+                self._renderers[size] = SceneRenderer(self._model, *size, shadows=not self._fast)
+            found.update(zip(names, self._renderers[size].pictures(self._data, names), strict=True))
+        return found

@@ -152,10 +152,8 @@ class EpisodePictures:
     def at(self, step: int) -> dict[str, NDArray[np.uint8]]:
         """For each video feature, the picture (H, W, 3) at a step."""
         self._scene.set_state(self.states[step])
-        return {
-            contract.image_key(camera.name): self._scene.picture(camera.name, camera.height, camera.width)
-            for camera in self._cameras
-        }
+        pictures = self._scene.pictures(self._cameras)
+        return {contract.image_key(camera.name): pictures[camera.name] for camera in self._cameras}
 
 
 def _scene_text(plan: RenderPlan, episode: ExportedEpisode) -> tuple[str, dict[str, bytes]]:

@@ -6,6 +6,7 @@ import hashlib
 import json
 from collections import Counter
 from collections.abc import Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -24,10 +25,10 @@ from robocasa_lerobot.convert.survey import survey
 from robocasa_lerobot.errors import UnknownNameError, UserError
 
 # Raised when the written bytes change for the same input, so that shards of an older version are not taken up again.
-FORMAT_VERSION = 2
+FORMAT_VERSION = 3
 # A shard is what a kill can lose and what a worker takes at a time: some seconds of work, but never so many shards
 # that joining them costs more than making them.
-SHARD_FRAMES = 250
+SHARD_FRAMES = 500
 MAX_SHARDS = 64
 _MAX_FAILURES = 10  # demos without a known robot, camera or mesh, after which no other is tried
 
@@ -160,7 +161,14 @@ def make_plan(files: Sequence[Path], settings: ConversionSettings) -> Plan:
     if doubles:
         raise UserError(f"{min(doubles)} was given more than once.")
     roots = [Path(root) for root in settings.asset_roots]
-    looks = [_look(file, settings, roots) for file in files]
+    with ThreadPoolExecutor(1) as pool:
+        hashes = [pool.submit(file_sha256, file) for file in files]  # meanwhile they are looked into
+        try:
+            looks = [_look(file, settings, roots) for file in files]
+        except BaseException:
+            pool.shutdown(wait=False, cancel_futures=True)
+            raise
+        sources = tuple(_source(look, digest.result()) for look, digest in zip(looks, hashes, strict=True))
     copies = _copies(looks)
     first = looks[0]
     for look in looks[1:]:
@@ -180,7 +188,6 @@ def make_plan(files: Sequence[Path], settings: ConversionSettings) -> Plan:
     num_frames = sum(length for look in looks for _, length in look.demos)
     target = max(SHARD_FRAMES, -(-num_frames // MAX_SHARDS))
     shards = [shard for look in looks for shard in _cut(look, target, copies)]
-    sources = tuple(_source(look) for look in looks)
     return Plan(settings, sources, first.mapping, first.cameras, first.fps, tuple(shards), num_frames)
 
 
@@ -190,9 +197,9 @@ def file_sha256(file: Path) -> str:
         return hashlib.file_digest(stream, "sha256").hexdigest()
 
 
-def _source(look: _Look) -> SourceRecord:
+def _source(look: _Look, sha256: str) -> SourceRecord:
     selected = None if look.all_demos else tuple(name for name, _ in look.demos)
-    return SourceRecord(str(look.file), file_sha256(look.file), look.file.stat().st_size, selected)
+    return SourceRecord(str(look.file), sha256, look.file.stat().st_size, selected)
 
 
 @dataclass(frozen=True)

@@ -42,7 +42,7 @@ def take_pictures(
     `pixels` uint8 (S, S, 3); with `depth` also float32 (S, S, 1), metres along the optical axis; with `segmentation`
     also int32 (S, S, 1), ids of the model's geoms, -1 where nothing is seen. All upright.
     """
-    taken: Pictures = {"pixels": {camera: renderer.render(data, camera) for camera in cameras}}
+    taken: Pictures = {"pixels": dict(zip(cameras, renderer.pictures(data, cameras), strict=True))}
     if depth or segmentation:
         geometry = {camera: renderer.geometry(data, camera) for camera in cameras}
         if depth:

@@ -1,11 +1,17 @@
-"""A drawing surface of its own OpenGL context for one model."""
+"""A drawing surface for one model. All surfaces of a thread share one OpenGL context.
+
+A driver compiles its programs anew for every context: on a software rasterizer a surface in a context of its own takes
+65 ms to make and 14 ms more for its first pictures, in a shared one 10 ms.
+"""
 
 from __future__ import annotations
 
 import atexit
 import os
+import threading
 import weakref
 from functools import cache
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -22,10 +28,12 @@ _SPARE_GEOMS = 200  # of a scene, beyond the model's own: lights, skins and the 
 # Parts of what is seen that are drawn one after the other, the nearest first. Near ones hide the rest before its
 # pixels are computed; more parts than this cost more than they save.
 _LAYERS = 12
+_CONTEXT_SIZE = 64  # of the window that some drivers need; pictures are drawn elsewhere
 
 # Process that has made an OpenGL context; a forked child inherits the number, and the driver's dead threads with it.
 _context_process: int | None = None
 _open: weakref.WeakSet[Canvas] = weakref.WeakSet()
+_of_thread = threading.local()  # `context`: the thread's OpenGL context, which no other thread can use
 
 
 class ForkedContextError(UserError):
@@ -56,14 +64,15 @@ class Canvas:
         shadow_size = model.vis.quality.shadowsize
         if not shadows:  # the map of a shadow takes 64 MiB and a tenth of a second to make, used or not
             model.vis.quality.shadowsize = 0
-        self._renderer = mujoco.Renderer(model, height, width, max_geom=model.ngeom + _SPARE_GEOMS)
+        self._surface = _Surface(model, height, width)
         model.vis.quality.shadowsize = shadow_size
+        self._scene = mujoco.MjvScene(model, maxgeom=model.ngeom + _SPARE_GEOMS)
         note_renderer()
         self._option = mujoco.MjvOption()
         self._option.geomgroup[COLLISION_GROUP] = 0
         self._option.sitegroup[:] = 0  # sites are markers
         self._nothing_moved = mujoco.MjvPerturb()
-        self._free = weakref.finalize(self, _close, self._renderer)
+        self._free = weakref.finalize(self, self._surface.close)
         # At exit the context must go before MuJoCo ends its connection to the driver. Exit hooks run backwards, so
         # ours is set after MuJoCo's, which the first context has set.
         self._free.atexit = False
@@ -77,7 +86,7 @@ class Canvas:
             if isinstance(camera, int) and cull:
                 seen = in_view(self._model, data, camera, self._aspect)
                 self._model.geom_group[:] = np.where(seen, groups, _HIDDEN_GROUP)
-            self._renderer.update_scene(data, camera, self._option)
+            self._update(data, camera)
         finally:
             self._model.geom_group[:] = groups
 
@@ -86,13 +95,13 @@ class Canvas:
 
         For models of geoms alone.
         """
-        model, scene = self._model, self._renderer.scene
+        model, scene = self._model, self._scene
         groups = model.geom_group.copy()
         seen = np.flatnonzero(in_view(model, data, camera, self._aspect))
         order = seen[np.argsort(distances(model, data, camera)[seen], kind="stable")]
         try:
             model.geom_group[:] = _HIDDEN_GROUP
-            self._renderer.update_scene(data, camera, self._option)
+            self._update(data, camera)
             for layer in np.array_split(order, _LAYERS):
                 model.geom_group[layer] = groups[layer]
                 every = int(mujoco.mjtCatBit.mjCAT_ALL)
@@ -103,30 +112,34 @@ class Canvas:
 
     def picture(self, *, shadows: bool) -> NDArray[np.uint8]:
         """What was last seen, RGB of shape (height, width, 3), upright; with shadows and reflections or without."""
-        flags = self._renderer.scene.flags
+        flags = self._scene.flags
         flags[mujoco.mjtRndFlag.mjRND_SHADOW] = shadows
         flags[mujoco.mjtRndFlag.mjRND_REFLECTION] = shadows
-        return self._renderer.render()
+        colours, _ = self._surface.draw(self._scene, depth=False)
+        return np.ascontiguousarray(colours[::-1])
 
     def geometry(self) -> tuple[NDArray[np.float32], NDArray[np.int32]]:
         """Depth in metres and geom ids (-1 where none is seen) of what was last seen, each (height, width), upright."""
-        renderer, scene = self._renderer, self._renderer.scene
+        scene = self._scene
         usual = scene.flags.copy()
         scene.flags[mujoco.mjtRndFlag.mjRND_SHADOW] = scene.flags[mujoco.mjtRndFlag.mjRND_REFLECTION] = False
         scene.flags[mujoco.mjtRndFlag.mjRND_SEGMENT] = scene.flags[mujoco.mjtRndFlag.mjRND_IDCOLOR] = True
-        colours = np.empty((renderer.height, renderer.width, 3), dtype=np.uint8)
-        buffer = np.empty((renderer.height, renderer.width), dtype=np.float32)
-        if renderer._gl_context is not None:
-            renderer._gl_context.make_current()
-        mujoco.mjr_render(renderer._rect, scene, renderer._mjr_context)
-        mujoco.mjr_readPixels(colours, buffer, renderer._rect, renderer._mjr_context)
+        colours, buffer = self._surface.draw(scene, depth=True)
         scene.flags[:] = usual
+        assert buffer is not None
         depth, ids = self._metres(buffer), _geom_ids(scene, colours)
         return np.ascontiguousarray(depth[::-1]), np.ascontiguousarray(ids[::-1])
 
     def close(self) -> None:
-        """Free the OpenGL context."""
+        """Free what it holds on the graphics card."""
         self._free()
+
+    def _update(self, data: mujoco.MjData, camera: int | mujoco.MjvCamera) -> None:
+        if isinstance(camera, int):
+            number, camera = camera, mujoco.MjvCamera()
+            camera.type, camera.fixedcamid = mujoco.mjtCamera.mjCAMERA_FIXED, number
+        every = int(mujoco.mjtCatBit.mjCAT_ALL)
+        mujoco.mjv_updateScene(self._model, data, self._option, None, camera, every, self._scene)
 
     def _metres(self, buffer: NDArray[np.float32]) -> NDArray[np.float32]:
         """Distances of a reversed depth buffer: 1 at the near plane, 0 at the far one, linear in 1 / distance."""
@@ -157,12 +170,49 @@ def _free_at_exit() -> None:
 def _free_all() -> None:
     for canvas in list(_open):
         canvas.close()
-
-
-def _close(renderer: mujoco.Renderer) -> None:
-    # MuJoCo's renderer frees its OpenGL objects in whichever context is current. With a second renderer alive that
-    # would be the other's, whose textures and framebuffers of the same numbers would go: wrong pictures, no error.
-    context = renderer._gl_context
+    context, _of_thread.context = getattr(_of_thread, "context", None), None
     if context is not None:
-        context.make_current()
-    renderer.close()
+        context.free()
+
+
+class _Surface:
+    """What MuJoCo's renderer keeps on the graphics card for one model: a framebuffer, meshes, textures."""
+
+    def __init__(self, model: mujoco.MjModel, height: int, width: int) -> None:
+        self._height, self._width = height, width
+        self._context = _shared_context()
+        self._rectangle = mujoco.MjrRect(0, 0, width, height)
+        self._kept: mujoco.MjrContext | None = mujoco.MjrContext(model, mujoco.mjtFontScale.mjFONTSCALE_100.value)
+        self._kept.readDepthMap = mujoco.mjtDepthMap.mjDEPTH_ZEROFAR
+
+    def draw(self, scene: mujoco.MjvScene, *, depth: bool) -> tuple[NDArray[np.uint8], NDArray[np.float32] | None]:
+        """Colours (height, width, 3), and depth buffer (height, width) if asked for, the lowest row first."""
+        assert self._kept is not None, "it is closed"
+        colours = np.empty((self._height, self._width, 3), np.uint8)
+        buffer = np.empty((self._height, self._width), np.float32) if depth else None
+        if self._context is not None:
+            self._context.make_current()
+        mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN.value, self._kept)  # another surface may have been
+        mujoco.mjr_render(self._rectangle, scene, self._kept)
+        mujoco.mjr_readPixels(colours, buffer, self._rectangle, self._kept)
+        return colours, buffer
+
+    def close(self) -> None:
+        """Free all of it."""
+        kept, self._kept = self._kept, None
+        if kept is None:
+            return
+        # MuJoCo frees objects by their numbers in whichever context is current: not in that of another thread.
+        if self._context is not None:
+            self._context.make_current()
+        kept.free()
+
+
+def _shared_context() -> Any:
+    """This thread's OpenGL context, current; None where MuJoCo draws without one."""
+    if mujoco.GLContext is None:
+        return None
+    if getattr(_of_thread, "context", None) is None:
+        _of_thread.context = mujoco.GLContext(_CONTEXT_SIZE, _CONTEXT_SIZE)
+    _of_thread.context.make_current()
+    return _of_thread.context

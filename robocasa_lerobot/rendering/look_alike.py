@@ -148,11 +148,10 @@ def _add_textures_and_materials(spec: mujoco.MjSpec, model: mujoco.MjModel) -> N
             material.reflectance = model.mat_reflectance[index]
             material.texrepeat = (1.0, 1.0) if baked else model.mat_texrepeat[index]
             material.texuniform = False if baked else bool(model.mat_texuniform[index])
-            textures = material.textures
+            textures = material.textures  # changed in place: setting it takes half a millisecond
             for role, texture in enumerate(model.mat_texid[index].tolist()):
                 if texture >= 0:
                     textures[role] = f"texture{texture}"
-            material.textures = textures
 
 
 def _add_part(spec: mujoco.MjSpec, model: mujoco.MjModel, rotations: Array, geoms: list[int], name: str) -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
@@ -60,6 +62,25 @@ class SceneRenderer:
         alike.follow(data)
         self._merged.see_nearest_first(alike.data, which)
         return self._merged.picture(shadows=False)
+
+    def pictures(self, data: mujoco.MjData, cameras: Sequence[str]) -> list[NDArray[np.uint8]]:
+        """One picture (height, width, 3) of each camera, all of the same state: cheaper than one by one.
+
+        Raises:
+            UnknownNameError: the model has no camera of that name.
+        """
+        alike = self._look_alike()
+        if alike is None:
+            return [self.render(data, camera) for camera in cameras]
+        numbers = [self._camera(camera) for camera in cameras]
+        alike.follow(data)
+        assert self._merged is not None
+        found = []
+        for number in numbers:
+            assert isinstance(number, int)
+            self._merged.see_nearest_first(alike.data, number)
+            found.append(self._merged.picture(shadows=False))
+        return found
 
     def geometry(
         self, data: mujoco.MjData, camera: str | mujoco.MjvCamera
