@@ -86,6 +86,31 @@ class EncodedVideo:
         return {name: value if name == "count" else (value / 255).reshape(3, 1, 1) for name, value in levels.items()}
 
 
+class FramePreparation:
+    """Makes planes of the pictures of an episode, and counts the levels of the sampled ones.
+
+    Attributes: `histograms` and `num_sampled` (frames), by key.
+    """
+
+    def __init__(self, keys: Sequence[str], length: int) -> None:
+        self.histograms: dict[str, Histogram] = {key: np.zeros((3, _LEVELS), np.int64) for key in keys}
+        self.num_sampled = dict.fromkeys(keys, 0)
+        self._seen = dict.fromkeys(keys, 0)
+        self._wanted = sampled_frames(length)
+
+    def prepared(self, key: str, picture: NDArray[np.uint8]) -> NDArray[np.uint8]:
+        """The planes of the next picture (H, W, 3) of a video.
+
+        Raises:
+            EncodingError: height or width is odd.
+        """
+        if self._seen[key] in self._wanted:
+            self.histograms[key] += channel_histogram(picture)
+            self.num_sampled[key] += 1
+        self._seen[key] += 1
+        return planes_of(picture)
+
+
 class EpisodeEncoder:
     """Encodes one episode, one video for each key; its memory is a few frames, however long the episode is.
 
@@ -199,7 +224,7 @@ def planes_of(picture: NDArray[np.uint8]) -> NDArray[np.uint8]:
     Raises:
         EncodingError: height or width is odd.
     """
-    import cv2  # only where pictures are made
+    import cv2  # takes a moment; many commands never need it
 
     height, width = picture.shape[:2]
     if height % 2 or width % 2:

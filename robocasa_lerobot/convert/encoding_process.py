@@ -27,12 +27,9 @@ from robocasa_lerobot.convert.encoder import (
     EncodedVideo,
     EncodingError,
     EpisodeEncoder,
-    Histogram,
+    FramePreparation,
     VideoSettings,
-    channel_histogram,
-    planes_of,
     quiet_codecs,
-    sampled_frames,
 )
 
 # Not `-m`: the module would be there twice, and so would the classes of its messages.
@@ -40,9 +37,9 @@ _PROGRAM = "import sys; from robocasa_lerobot.convert.encoding_process import se
 _AHEAD_BYTES = 24 << 20  # pictures that wait to be sent
 _PIPE_BYTES = 1 << 20
 _F_SETPIPE_SZ = 1031  # Linux
-# The encoder takes what the renderer leaves: on two cores it would otherwise hold up the renderer's own threads, and
-# states are converted 6 % slower. Where pictures wait for the encoder, the other process sleeps anyway.
-_NICE = 10
+# Beside a renderer the encoder takes what that leaves: on two cores it would otherwise hold up the renderer's own
+# threads, which makes the conversion of states 6 to 15 % slower.
+_NICE = 19
 
 
 @dataclass(frozen=True)
@@ -53,11 +50,12 @@ class _Start:
     keys: tuple[str, ...]
     folder: str
     length: int
+    yielding: bool
 
 
 @dataclass(frozen=True)
 class _Picture:
-    """The next frame of a video; the bytes of its planes follow."""
+    """The next frame of a video; its bytes follow: planes, or colours where the other process yields."""
 
     key: str
     shape: tuple[int, ...]
@@ -69,6 +67,10 @@ class _End:
 
 class _Cancel:
     """The episode is thrown away; nothing is sent back."""
+
+
+# The videos, with the preparation where the other process did it; or what went wrong.
+_Answer = tuple[dict[str, Path], FramePreparation | None] | Exception
 
 
 class EncodingProcess:
@@ -100,8 +102,8 @@ class EncodingProcess:
         self._room = threading.Condition()
         self._bytes = 0
         self._broken: OSError | EncodingError | None = None
-        self._sampled: queue.SimpleQueue[_Samples] = queue.SimpleQueue()
-        self._received: queue.SimpleQueue[dict[str, Path] | Exception | None] = queue.SimpleQueue()
+        self._prepared: queue.SimpleQueue[FramePreparation] = queue.SimpleQueue()
+        self._received: queue.SimpleQueue[_Answer | None] = queue.SimpleQueue()
         # Both directions at any time, or both processes might wait for the other to read.
         self._threads = [threading.Thread(target=f, daemon=True) for f in (self._send_waiting, self._receive)]
         for thread in self._threads:
@@ -118,9 +120,20 @@ class EncodingProcess:
         """Whether the other process is there."""
         return self._broken is None and self._process.poll() is None
 
-    def start_episode(self, settings: VideoSettings, keys: Sequence[str], folder: Path, length: int) -> None:
-        """Begin an episode of `length` frames: one video for each key, somewhere below `folder`, which exists."""
-        self._put(_Start(settings, tuple(keys), str(folder), length))
+    def start_episode(
+        self, settings: VideoSettings, keys: Sequence[str], folder: Path, length: int, yielding: bool = False
+    ) -> None:
+        """Begin an episode.
+
+        Args:
+            settings: codec and rate.
+            keys: one video for each.
+            folder: an existing one, somewhere below which the videos come.
+            length: number of frames.
+            yielding: making the pictures takes longer than encoding them, so the other process takes over what it can,
+                and lets this one go first, from now on.
+        """
+        self._put(_Start(settings, tuple(keys), str(folder), length, yielding))
 
     def feed(self, key: str, picture: NDArray[np.uint8]) -> None:
         """Hand over the next frame (H, W, 3) of a video; it must not be changed afterwards.
@@ -150,10 +163,12 @@ class EncodingProcess:
         if answer is None:
             self._received.put(None)  # for whoever asks again
             raise self._gone()
-        samples = self._sampled.get()
+        here = self._prepared.get()
         if isinstance(answer, Exception):
             raise answer
-        return {key: EncodedVideo(path, samples.histograms[key], samples.taken[key]) for key, path in answer.items()}
+        paths, there = answer
+        frames = here if there is None else there
+        return {key: EncodedVideo(path, frames.histograms[key], frames.num_sampled[key]) for key, path in paths.items()}
 
     def close(self) -> None:
         """End the other process; what it has not finished is lost."""
@@ -175,32 +190,30 @@ class EncodingProcess:
         self._waiting.put((message, picture))
 
     def _send_waiting(self) -> None:
-        samples: _Samples | None = None
+        frames: FramePreparation | None = None
+        yielding = False
         while (item := self._waiting.get()) is not None:
             message, picture = item
+            num_bytes = 0 if picture is None else picture.nbytes
             try:
                 if isinstance(message, _Start):
-                    samples = _Samples(message.keys, message.length)
+                    frames, yielding = FramePreparation(message.keys, message.length), message.yielding
                 elif isinstance(message, _End):
-                    assert samples is not None
-                    self._sampled.put(samples)
+                    assert frames is not None
+                    self._prepared.put(frames)
                 if self._broken is None:
-                    self._send(message, picture, samples)
+                    if picture is not None and not yielding:
+                        assert frames is not None
+                        picture = frames.prepared(message.key, picture)
+                        message = _Picture(message.key, picture.shape)
+                    _write_all(self._pipe, pickle.dumps(message))
+                    if picture is not None:
+                        _write_all(self._pipe, np.ascontiguousarray(picture).reshape(-1).data)
             except (OSError, EncodingError) as error:
                 self._broken = error
             with self._room:
-                self._bytes -= 0 if picture is None else picture.nbytes
+                self._bytes -= num_bytes
                 self._room.notify()
-
-    def _send(self, message: Any, picture: NDArray[np.uint8] | None, samples: _Samples | None) -> None:
-        if picture is None:
-            _write_all(self._pipe, pickle.dumps(message))
-            return
-        assert samples is not None
-        samples.add(message.key, picture)
-        planes = planes_of(picture)
-        _write_all(self._pipe, pickle.dumps(_Picture(message.key, planes.shape)))
-        _write_all(self._pipe, planes.reshape(-1).data)
 
     def _receive(self) -> None:
         with contextlib.suppress(EOFError, OSError, pickle.UnpicklingError):  # the other process is gone
@@ -217,23 +230,6 @@ class EncodingProcess:
             return EncodingError("the encoder's process does not answer.")
         how = f"signal {signal.Signals(-status).name}" if status < 0 else f"exit status {status}"
         return EncodingError(f"the encoder's process ended with {how}.")
-
-
-class _Samples:
-    """Levels of the sampled pixels of an episode, for each video."""
-
-    def __init__(self, keys: Sequence[str], length: int) -> None:
-        self.histograms: dict[str, Histogram] = {key: np.zeros((3, 256), np.int64) for key in keys}
-        self.taken = dict.fromkeys(keys, 0)
-        self._seen = dict.fromkeys(keys, 0)
-        self._wanted = sampled_frames(length)
-
-    def add(self, key: str, picture: NDArray[np.uint8]) -> None:
-        """Count the pixels of the next frame of a video, if it is one that is sampled."""
-        if self._seen[key] in self._wanted:
-            self.histograms[key] += channel_histogram(picture)
-            self.taken[key] += 1
-        self._seen[key] += 1
 
 
 def _write_all(pipe: Any, content: bytes | memoryview) -> None:
@@ -284,21 +280,20 @@ def serve(down: int, up: int) -> None:
         up: file descriptor to write answers to.
     """
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # a user's Ctrl-C: the process that sends pictures ends this one
-    os.nice(_NICE)
     quiet_codecs()
     episode = _Episode()
     buffers: dict[tuple[int, ...], NDArray[np.uint8]] = {}
     with os.fdopen(down, "rb") as pipe, os.fdopen(up, "wb") as answers, contextlib.suppress(BrokenPipeError, EOFError):
         while True:
             message = pickle.load(pipe)
-            planes = None
+            frame = None
             if isinstance(message, _Picture):
                 if message.shape not in buffers:
                     buffers[message.shape] = np.empty(message.shape, np.uint8)
-                planes = buffers[message.shape]
-                if pipe.readinto(planes.reshape(-1).data) != planes.nbytes:
+                frame = buffers[message.shape]
+                if pipe.readinto(frame.reshape(-1).data) != frame.nbytes:
                     return
-            answer = episode.take(message, planes)
+            answer = episode.take(message, frame)
             if answer is not None:
                 pickle.dump(answer, answers)
                 answers.flush()
@@ -309,27 +304,39 @@ class _Episode:
 
     def __init__(self) -> None:
         self._encoder: EpisodeEncoder | None = None
+        self._frames: FramePreparation | None = None  # where they come as colours
         self._failure: Exception | None = None
+        self._yields = False
 
-    def take(self, message: Any, planes: NDArray[np.uint8] | None) -> dict[str, Path] | Exception | None:
+    def take(self, message: Any, frame: NDArray[np.uint8] | None) -> _Answer | None:
         """Act on a message; gives the answer to be sent, if there is one."""
-        answer: dict[str, Path] | None = None
+        paths: dict[str, Path] = {}
         try:
             if isinstance(message, _Start):
-                self._failure = None
-                folder = Path(message.folder)
-                self._encoder = EpisodeEncoder(message.settings, message.keys, folder, message.length)
+                self._start(message)
             elif isinstance(message, _Cancel):
                 self._cancel()
             elif self._encoder is not None:
-                if planes is not None:
+                if frame is not None:
+                    planes = frame if self._frames is None else self._frames.prepared(message.key, frame)
                     self._encoder.feed(message.key, planes)
                 else:
-                    answer = self._encoder.finish()
+                    paths = self._encoder.finish()
         except Exception as error:  # raised in the other process
             self._failure = error
             self._cancel()
-        return (answer if self._failure is None else self._failure) if isinstance(message, _End) else None
+        if not isinstance(message, _End):
+            return None
+        return (paths, self._frames) if self._failure is None else self._failure
+
+    def _start(self, message: _Start) -> None:
+        self._failure = self._frames = None
+        if message.yielding:
+            self._frames = FramePreparation(message.keys, message.length)
+        if message.yielding and not self._yields:
+            os.nice(_NICE)
+            self._yields = True
+        self._encoder = EpisodeEncoder(message.settings, message.keys, Path(message.folder), message.length)
 
     def _cancel(self) -> None:
         if self._encoder is not None:

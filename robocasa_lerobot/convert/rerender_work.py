@@ -150,7 +150,7 @@ def _render_episode(
     keys = [contract.image_key(camera.name) for camera in plan.cameras]
     try:
         with shared_encoder.borrowed() as encoder, EpisodePictures(plan, episode) as pictures:
-            encoder.start_episode(settings, keys, place, episode.length)
+            encoder.start_episode(settings, keys, place, episode.length, yielding=True)
             for step in pictures:
                 for key, picture in step.items():
                     encoder.feed(key, picture)

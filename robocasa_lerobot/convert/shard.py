@@ -97,7 +97,8 @@ class _ShardWriter:
         pictures = (
             {contract.image_key(name): picture for name, picture in step.items()} for step in episode.pictures()
         )
-        self._dataset.add(columns, task, episode.length, pictures, report.advance)
+        rendered = bool(episode.rendered_cameras)
+        self._dataset.add(columns, task, episode.length, pictures, report.advance, rendered)
         index = len(self.episodes)
         _write_extras(episode, self._folder / EXTRAS / episode_folder(index))
         self.episodes.append(

@@ -83,6 +83,7 @@ class DatasetWriter:
         length: int,
         pictures: Iterable[Mapping[str, NDArray[np.uint8]]],
         progress: Callable[[int], None] = lambda _: None,
+        rendered: bool = False,
     ) -> None:
         """Append an episode of `length` steps.
 
@@ -92,6 +93,7 @@ class DatasetWriter:
             length: number of steps T.
             pictures: for each step, the picture (H, W, 3) of each video feature.
             progress: called with 1 after each step.
+            rendered: pictures are being rendered, which takes longer than encoding them.
 
         Raises:
             EncodingError: videos of this episode or the one before do not hold as many frames as it has steps, or
@@ -102,7 +104,7 @@ class DatasetWriter:
         scratch = self.root / "encoding" / str(self._number)
         shutil.rmtree(scratch, ignore_errors=True)
         scratch.mkdir(parents=True)
-        self._encoder.start_episode(self._settings, self._meta.video_keys, scratch, length)
+        self._encoder.start_episode(self._settings, self._meta.video_keys, scratch, length, yielding=rendered)
         try:
             for step in pictures:
                 for key, picture in step.items():
