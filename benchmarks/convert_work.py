@@ -28,10 +28,10 @@ from peers import sim_loop
 
 from robocasa_lerobot import contract
 from robocasa_lerobot.convert import pipeline
-from robocasa_lerobot.convert.encoder import ENCODER_THREADS
-from robocasa_lerobot.convert.mjcf import AssetFinder, loadable
+from robocasa_lerobot.convert.reading.mjcf import AssetFinder, loadable
 from robocasa_lerobot.convert.settings import ConversionSettings
-from robocasa_lerobot.convert.statistics import column
+from robocasa_lerobot.convert.writing.encoder import ENCODER_THREADS
+from robocasa_lerobot.convert.writing.statistics import column
 from robocasa_lerobot.rendering import SceneRenderer
 
 Picture = NDArray[np.uint8]

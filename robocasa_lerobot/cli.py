@@ -29,14 +29,16 @@ class Subcommand:
 
 SUBCOMMANDS: dict[str, Subcommand] = {
     "demos": Subcommand("robocasa_lerobot.demos.command", "record demonstrations of tasks as HDF5"),
-    "convert": Subcommand("robocasa_lerobot.convert.command", "convert demonstration files to a LeRobotDataset v3.0"),
-    "inspect": Subcommand(
-        "robocasa_lerobot.convert.inspect_command", "print what a demonstration file or dataset holds, draft a mapping"
+    "convert": Subcommand(
+        "robocasa_lerobot.convert.commands.convert", "convert demonstration files to a LeRobotDataset v3.0"
     ),
-    "verify": Subcommand("robocasa_lerobot.convert.verify_command", "compare a converted dataset with its source"),
-    "export": Subcommand("robocasa_lerobot.convert.export_command", "write a LeRobotDataset v3.0 back to HDF5"),
+    "inspect": Subcommand(
+        "robocasa_lerobot.convert.commands.inspect", "print what a demonstration file or dataset holds, draft a mapping"
+    ),
+    "verify": Subcommand("robocasa_lerobot.convert.commands.verify", "compare a converted dataset with its source"),
+    "export": Subcommand("robocasa_lerobot.convert.commands.export", "write a LeRobotDataset v3.0 back to HDF5"),
     "render": Subcommand(
-        "robocasa_lerobot.convert.rerender_command", "render a dataset again with other cameras, sizes or presets"
+        "robocasa_lerobot.convert.commands.render", "render a dataset again with other cameras, sizes or presets"
     ),
     "train": Subcommand("robocasa_lerobot.training.command", "run the training phases of an experiment file"),
     "eval": Subcommand("robocasa_lerobot.evaluation.command", "run seeded trials of a policy and report"),

@@ -28,8 +28,8 @@ from robocasa_lerobot.convert import pipeline
 from robocasa_lerobot.convert.pipeline import META_FOLDER, convert
 from robocasa_lerobot.convert.settings import ConversionSettings, Plan, Shard
 from robocasa_lerobot.convert.shard import ShardOutcome, read_jsonl
-from robocasa_lerobot.convert.statistics import column
 from robocasa_lerobot.convert.verify import verify
+from robocasa_lerobot.convert.writing.statistics import column
 
 SETTINGS = ConversionSettings()
 

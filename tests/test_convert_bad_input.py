@@ -20,11 +20,11 @@ from robocasa_lerobot.errors import UserError
 pytest.importorskip("lerobot.datasets")
 from lerobot.datasets.lerobot_dataset import LeRobotDataset
 
-from robocasa_lerobot.convert import hdf5
 from robocasa_lerobot.convert.pipeline import META_FOLDER, convert
+from robocasa_lerobot.convert.reading import hdf5
+from robocasa_lerobot.convert.reading.survey import CPU_SECONDS
 from robocasa_lerobot.convert.settings import ConversionSettings, make_plan
 from robocasa_lerobot.convert.shard import read_jsonl
-from robocasa_lerobot.convert.survey import CPU_SECONDS
 from robocasa_lerobot.convert.verify import verify
 
 SETTINGS = ConversionSettings()

@@ -20,8 +20,8 @@ pytest.importorskip("lerobot.datasets")
 from robocasa_lerobot.convert.pipeline import META_FOLDER, convert
 from robocasa_lerobot.convert.settings import ConversionSettings
 from robocasa_lerobot.convert.shard import read_jsonl
-from robocasa_lerobot.convert.statistics import column
 from robocasa_lerobot.convert.verify import verify
+from robocasa_lerobot.convert.writing.statistics import column
 
 VARIANTS = 12
 SECONDS = 60.0

@@ -21,9 +21,9 @@ from convert_layouts import (
 from convert_support import INSTRUCTION, SCENE, write_demos
 
 from robocasa_lerobot import contract
-from robocasa_lerobot.convert.robots import choose_mapping
+from robocasa_lerobot.convert.mapping.robots import choose_mapping
+from robocasa_lerobot.convert.reading.demo_file import DemoFile
 from robocasa_lerobot.convert.settings import ConversionSettings, make_plan
-from robocasa_lerobot.convert.source import DemoFile
 from robocasa_lerobot.errors import UserError
 
 pytest.importorskip("lerobot.datasets")
@@ -31,8 +31,8 @@ from lerobot.datasets.lerobot_dataset import LeRobotDataset
 
 from robocasa_lerobot.convert.pipeline import META_FOLDER, convert
 from robocasa_lerobot.convert.shard import read_jsonl
-from robocasa_lerobot.convert.statistics import column
 from robocasa_lerobot.convert.verify import verify
+from robocasa_lerobot.convert.writing.statistics import column
 
 BOTH = ("robot0_right_", "robot0_left_")
 TWO = ("robot0_", "robot1_")
@@ -257,7 +257,7 @@ def test_mistakes_are_named(v01: Path, fields: dict[str, Any], message: str) -> 
     ],
 )
 def test_instructions(v01: Path, text: str | None, replaces: bool, expected: str, source: str) -> None:
-    from robocasa_lerobot.convert.instruction import instruction_of
+    from robocasa_lerobot.convert.mapping.instruction import instruction_of
 
     with DemoFile(v01) as file:
         found = instruction_of(file.demo("demo_1"), file, text, replaces)

@@ -13,7 +13,7 @@ import yaml
 from convert_layouts import write_aloha, write_libero
 from convert_support import INSTRUCTION, write_demos
 
-from robocasa_lerobot.convert.custom_mapping import EXAMPLE, parse_mapping, read_mapping
+from robocasa_lerobot.convert.mapping.custom import EXAMPLE, parse_mapping, read_mapping
 from robocasa_lerobot.convert.settings import ConversionSettings, make_plan
 from robocasa_lerobot.errors import UserError
 
@@ -21,8 +21,8 @@ pytest.importorskip("lerobot.datasets")
 from lerobot.datasets.lerobot_dataset import LeRobotDataset
 
 from robocasa_lerobot.convert.pipeline import convert
-from robocasa_lerobot.convert.statistics import column
 from robocasa_lerobot.convert.verify import verify
+from robocasa_lerobot.convert.writing.statistics import column
 
 ALOHA: dict[str, Any] = {
     "robot_type": "ALOHA",

@@ -20,10 +20,10 @@ from robocasa_lerobot.errors import UserError
 pytest.importorskip("lerobot.datasets")
 
 from robocasa_lerobot.convert import pipeline
-from robocasa_lerobot.convert.encoder import SamplingVideoEncoder
 from robocasa_lerobot.convert.pipeline import convert
 from robocasa_lerobot.convert.settings import ConversionSettings
 from robocasa_lerobot.convert.verify import verify
+from robocasa_lerobot.convert.writing.encoding_process import EncodingProcess
 
 SETTINGS = ConversionSettings()
 STEPS = 6
@@ -67,9 +67,9 @@ class _FullDisk:
 
     def __init__(self, pictures: int) -> None:
         self.left = pictures
-        self.feed = SamplingVideoEncoder.feed_frame
+        self.feed = EncodingProcess.feed
 
-    def __call__(self, encoder: SamplingVideoEncoder, key: str, image: np.ndarray) -> None:
+    def __call__(self, encoder: EncodingProcess, key: str, image: np.ndarray) -> None:
         self.left -= 1
         if self.left < 0:
             raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
@@ -77,11 +77,11 @@ class _FullDisk:
 
 
 def test_a_full_disk_keeps_what_is_finished(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    source = write_demos(tmp_path / "a.hdf5", (251, 251), images=16)
+    source = write_demos(tmp_path / "a.hdf5", (501, 501), images=16)
     out = tmp_path / "out"
     with monkeypatch.context() as patch:
-        full = _FullDisk(251 * 3 + 100)
-        patch.setattr(SamplingVideoEncoder, "feed_frame", lambda *args: full(*args))
+        full = _FullDisk(501 * 3 + 100)
+        patch.setattr(EncodingProcess, "feed", lambda *args: full(*args))
         with pytest.raises(UserError, match="No space left on device") as caught:
             convert([source], out, SETTINGS, workers=1)
     assert "same command to go on" in str(caught.value)
@@ -89,7 +89,7 @@ def test_a_full_disk_keeps_what_is_finished(tmp_path: Path, monkeypatch: pytest.
     done = []
     convert_shard = pipeline.convert_shard
     monkeypatch.setattr(pipeline, "convert_shard", lambda *args: (done.append(args[1].demos), convert_shard(*args))[1])
-    assert convert([source], out, SETTINGS, workers=1).num_frames == 502
+    assert convert([source], out, SETTINGS, workers=1).num_frames == 1002
     assert done == [("demo_1",)]
     assert leftovers(out) == ["out"]
 

@@ -6,7 +6,6 @@ import shutil
 from pathlib import Path
 from typing import Any
 
-import av
 import h5py
 import mujoco
 import numpy as np
@@ -16,19 +15,17 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from robocasa_lerobot import contract
-from robocasa_lerobot.convert import mjcf
-from robocasa_lerobot.convert.encoder import (
+from robocasa_lerobot.convert.mapping.robot_mapping import quaternion_xyzw
+from robocasa_lerobot.convert.mapping.robots import choose_mapping
+from robocasa_lerobot.convert.reading import mjcf
+from robocasa_lerobot.convert.reading.demo_file import DemoFile, RejectedEpisodeError, SourceError
+from robocasa_lerobot.convert.reading.mjcf import AssetFinder, MissingAssetsError, loadable
+from robocasa_lerobot.convert.settings import ConversionSettings, make_plan
+from robocasa_lerobot.convert.writing.encoder import (
     QUANTILES,
-    EncodingError,
-    SamplingVideoEncoder,
     channel_histogram,
     histogram_statistics,
 )
-from robocasa_lerobot.convert.mapping import quaternion_xyzw
-from robocasa_lerobot.convert.mjcf import AssetFinder, MissingAssetsError, loadable
-from robocasa_lerobot.convert.robots import choose_mapping
-from robocasa_lerobot.convert.settings import ConversionSettings, make_plan
-from robocasa_lerobot.convert.source import DemoFile, RejectedEpisodeError, SourceError
 from robocasa_lerobot.errors import UserError
 
 LIFT_FRAMES = {"demo_1": 482, "demo_2": 510, "demo_3": 392}
@@ -163,44 +160,6 @@ def test_histogram_statistics_are_those_of_the_pixels() -> None:
     for q in QUANTILES:
         expected = np.quantile(pixels, q, axis=0, method="inverted_cdf")
         assert np.array_equal(stats[f"q{round(q * 100):02d}"], expected)
-
-
-def _encoder() -> SamplingVideoEncoder:
-    return SamplingVideoEncoder(20, "h264", "yuv420p", {"preset": "ultrafast", "g": "2", "bf": "0"})
-
-
-def test_encoder_keeps_every_frame_however_fast_they_come(tmp_path: Path) -> None:
-    encoder = _encoder()
-    encoder.episode_length = 300
-    encoder.start_episode(["a", "b"], tmp_path)
-    for step in range(300):
-        for key in ("a", "b"):
-            encoder.feed_frame(key, np.full((64, 64, 3), step % 256, np.uint8))
-    for path, stats in encoder.finish_episode().values():
-        with av.open(str(path)) as container:
-            assert sum(1 for _ in container.decode(video=0)) == 300
-        assert stats["count"] == [50]
-
-
-def test_encoder_refuses_a_wrong_number_of_frames(tmp_path: Path) -> None:
-    encoder = _encoder()
-    encoder.episode_length = 4
-    encoder.start_episode(["a"], tmp_path)
-    for _ in range(3):
-        encoder.feed_frame("a", np.zeros((64, 64, 3), np.uint8))
-    with pytest.raises(EncodingError, match="4 frames expected"):
-        encoder.finish_episode()
-
-
-def test_encoder_reports_failures_and_cleans_up(tmp_path: Path) -> None:
-    encoder = SamplingVideoEncoder(20, "h264", "yuv420p", {})
-    encoder.episode_length = 1
-    encoder.start_episode(["a"], tmp_path)
-    encoder.feed_frame("a", np.zeros((63, 63, 3), np.uint8))  # odd sizes are not possible with this pixel format
-    with pytest.raises(EncodingError):
-        encoder.finish_episode()
-    encoder.cancel_episode()
-    assert list(tmp_path.iterdir()) == []
 
 
 def _shortened(shared: Path, path: Path, steps: int) -> Path:

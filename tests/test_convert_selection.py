@@ -11,9 +11,9 @@ from convert_layouts import stored_actions, write_robocasa_v01
 from convert_support import write_demos
 
 from robocasa_lerobot import cli
-from robocasa_lerobot.convert.selection import sample, select
+from robocasa_lerobot.convert.reading.demo_file import DemoFile
+from robocasa_lerobot.convert.reading.selection import sample, select
 from robocasa_lerobot.convert.settings import ConversionSettings, make_plan
-from robocasa_lerobot.convert.source import DemoFile
 from robocasa_lerobot.errors import UserError
 
 NAMES = tuple(f"demo_{i}" for i in range(12))
@@ -102,8 +102,8 @@ def test_every_file_is_sampled_by_itself_and_the_record_says_which(
     masked: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     pytest.importorskip("lerobot.datasets")
-    from robocasa_lerobot.convert.statistics import column
     from robocasa_lerobot.convert.verify import verify
+    from robocasa_lerobot.convert.writing.statistics import column
 
     other = write_robocasa_v01(tmp_path / "b.hdf5", (5, 6, 3, 2, 4), size=32)
     out = tmp_path / "out"

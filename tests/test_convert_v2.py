@@ -20,12 +20,12 @@ from lerobot.datasets.lerobot_dataset import LeRobotDataset
 
 from robocasa_lerobot.convert import pipeline
 from robocasa_lerobot.convert.lerobot_v2.plan import V2Plan
-from robocasa_lerobot.convert.lerobot_v2.video import digests, probe
 from robocasa_lerobot.convert.pipeline import META_FOLDER, convert
 from robocasa_lerobot.convert.settings import ConversionSettings, Shard
 from robocasa_lerobot.convert.shard import read_jsonl
-from robocasa_lerobot.convert.statistics import column
 from robocasa_lerobot.convert.verify import verify
+from robocasa_lerobot.convert.writing.statistics import column
+from robocasa_lerobot.convert.writing.video import digests, probe
 
 LENGTHS = (24, 1, 31)
 SETTINGS = ConversionSettings()

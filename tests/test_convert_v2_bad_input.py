@@ -18,11 +18,11 @@ from robocasa_lerobot import contract
 from robocasa_lerobot.errors import UserError
 
 pytest.importorskip("lerobot.datasets")
-from robocasa_lerobot.convert.lerobot_v2.video import digests
 from robocasa_lerobot.convert.pipeline import META_FOLDER, convert
 from robocasa_lerobot.convert.settings import ConversionSettings
 from robocasa_lerobot.convert.shard import read_jsonl
 from robocasa_lerobot.convert.verify import verify
+from robocasa_lerobot.convert.writing.video import digests
 
 CAMERA = contract.CAMERAS[0]
 LENGTHS = (24, 15, 9)

@@ -22,19 +22,20 @@ from lerobot.datasets.lerobot_dataset import LeRobotDataset
 from lerobot.datasets.sampler import EpisodeAwareSampler
 from torch.utils.data import DataLoader
 
-from robocasa_lerobot.convert.encoder import (
+from robocasa_lerobot.convert.pipeline import convert
+from robocasa_lerobot.convert.settings import ConversionSettings
+from robocasa_lerobot.convert.writing.dataset import DatasetWriter
+from robocasa_lerobot.convert.writing.encoder import (
     CODECS,
     SAMPLED_FRAMES,
     channel_histogram,
     num_sampled_pixels,
     sampled_frames,
 )
-from robocasa_lerobot.convert.joining import join_datasets
-from robocasa_lerobot.convert.modality import modality
-from robocasa_lerobot.convert.pipeline import convert
-from robocasa_lerobot.convert.settings import ConversionSettings
-from robocasa_lerobot.convert.statistics import column, dataset_statistics, vector_statistics
-from robocasa_lerobot.convert.writer import DatasetWriter
+from robocasa_lerobot.convert.writing.encoding_process import EncodingProcess
+from robocasa_lerobot.convert.writing.joining import join_datasets
+from robocasa_lerobot.convert.writing.modality import modality
+from robocasa_lerobot.convert.writing.statistics import column, dataset_statistics, vector_statistics
 
 KEY = contract.image_key("front")
 FEATURES: dict[str, dict[str, Any]] = {
@@ -56,11 +57,12 @@ def _episode(length: int, seed: int) -> tuple[dict[str, np.ndarray], np.ndarray]
 
 
 def _write(root: Path, lengths: tuple[int, ...], codec: str = "h264", first: int = 0) -> DatasetWriter:
-    writer = DatasetWriter(root, 30, "arm", FEATURES, codec)
-    for number, length in enumerate(lengths, start=first):
-        columns, pictures = _episode(length, number)
-        writer.add(columns, f"task {number % 2}", length, ({KEY: picture} for picture in pictures))
-    writer.finalize()
+    with EncodingProcess() as encoder:
+        writer = DatasetWriter(encoder, root, 30, "arm", FEATURES, codec)
+        for number, length in enumerate(lengths, start=first):
+            columns, pictures = _episode(length, number)
+            writer.add(columns, f"task {number % 2}", length, ({KEY: picture} for picture in pictures))
+        writer.finalize()
     return writer
 
 
@@ -156,19 +158,20 @@ def test_lerobots_own_aggregation_takes_what_was_written(tmp_path: Path) -> None
 
 
 def test_nothing_of_a_failed_episode_stays(tmp_path: Path) -> None:
-    writer = DatasetWriter(tmp_path / "data", 30, "arm", FEATURES, "h264")
     columns, pictures = _episode(6, 0)
 
     def failing() -> Any:
         yield from ({KEY: picture} for picture in pictures[:4])
         raise RuntimeError("torn cable")
 
-    with pytest.raises(RuntimeError, match="torn cable"):
-        writer.add(columns, "task", 6, failing())
-    with pytest.raises(RuntimeError, match="6 frames expected, 4 encoded"):
-        writer.add(columns, "task", 6, ({KEY: picture} for picture in pictures[:4]))
-    writer.add(columns, "task", 6, ({KEY: picture} for picture in pictures))
-    writer.finalize()
+    with EncodingProcess() as encoder:
+        writer = DatasetWriter(encoder, tmp_path / "data", 30, "arm", FEATURES, "h264")
+        with pytest.raises(RuntimeError, match="torn cable"):
+            writer.add(columns, "task", 6, failing())
+        with pytest.raises(RuntimeError, match="6 frames expected, 4 given"):
+            writer.add(columns, "task", 6, ({KEY: picture} for picture in pictures[:4]))
+        writer.add(columns, "task", 6, ({KEY: picture} for picture in pictures))
+        writer.finalize()
     assert _open(tmp_path / "data").num_frames == 6
     assert {path.name for path in (tmp_path / "data").iterdir()} == {"data", "meta", "videos"}
 

@@ -18,12 +18,12 @@ from robocasa_lerobot.errors import UserError
 
 pytest.importorskip("lerobot.datasets")
 from robocasa_lerobot.convert.export import ExportSettings, export
-from robocasa_lerobot.convert.exported import ExportedDataset
 from robocasa_lerobot.convert.pipeline import META_FOLDER, convert
+from robocasa_lerobot.convert.reading.lerobot_v3 import ExportedDataset
 from robocasa_lerobot.convert.settings import ConversionSettings
 from robocasa_lerobot.convert.shard import read_jsonl
-from robocasa_lerobot.convert.statistics import column
 from robocasa_lerobot.convert.verify import verify
+from robocasa_lerobot.convert.writing.statistics import column
 
 LENGTHS = (14, 1, 9)
 SETTINGS = ConversionSettings()

@@ -18,13 +18,13 @@ from robocasa_lerobot.errors import UserError
 pytest.importorskip("lerobot.datasets")
 from lerobot.datasets.lerobot_dataset import LeRobotDataset
 
-from robocasa_lerobot.convert import rerender_work
-from robocasa_lerobot.convert.camera_configs import camera_set, read_camera_configs, with_cameras
 from robocasa_lerobot.convert.pipeline import META_FOLDER, convert
-from robocasa_lerobot.convert.rerender import RenderSettings, make_render_plan
-from robocasa_lerobot.convert.rerender_work import render_dataset
+from robocasa_lerobot.convert.reading.demo_file import RejectedEpisodeError
+from robocasa_lerobot.convert.rerender import work as rerender_work
+from robocasa_lerobot.convert.rerender.camera_configs import camera_set, read_camera_configs, with_cameras
+from robocasa_lerobot.convert.rerender.plan import RenderSettings, make_render_plan
+from robocasa_lerobot.convert.rerender.work import render_dataset
 from robocasa_lerobot.convert.settings import ConversionSettings
-from robocasa_lerobot.convert.source import RejectedEpisodeError
 from robocasa_lerobot.convert.verify import verify
 
 ABOVE = {"above": {"parent_body": "world", "pos": [1, 0, 3], "quat": [1, 0, 0, 0], "camera_attribs": {"fovy": 70}}}
@@ -113,7 +113,7 @@ def test_rendering_goes_on_after_an_interruption_and_does_not_depend_on_the_work
 ) -> None:
     source = write_demos(tmp_path / "demos.hdf5", (9, 8, 7), images=16)
     convert([source], tmp_path / "data", ConversionSettings(cameras=contract.CAMERAS[:1]))
-    monkeypatch.setattr("robocasa_lerobot.convert.rerender.SHARD_FRAMES", 8)
+    monkeypatch.setattr("robocasa_lerobot.convert.rerender.plan.SHARD_FRAMES", 8)
     settings = _settings(image_size=32)
     assert len(make_render_plan(tmp_path / "data", settings).pieces) == 3
     done: list[int] = []

@@ -11,11 +11,11 @@ from typing import TYPE_CHECKING, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from robocasa_lerobot.convert.demo import RejectedEpisodeError
-from robocasa_lerobot.convert.instruction import instruction_of
-from robocasa_lerobot.convert.mjcf import AssetFinder, loadable
+from robocasa_lerobot.convert.mapping.instruction import instruction_of
+from robocasa_lerobot.convert.reading.demo import RejectedEpisodeError
+from robocasa_lerobot.convert.reading.demo_file import DemoFile
+from robocasa_lerobot.convert.reading.mjcf import AssetFinder, loadable
 from robocasa_lerobot.convert.settings import Camera, Plan, needs_scene
-from robocasa_lerobot.convert.source import DemoFile
 from robocasa_lerobot.errors import UserError
 
 if TYPE_CHECKING:

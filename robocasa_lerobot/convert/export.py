@@ -20,8 +20,8 @@ from numpy.typing import NDArray
 from tqdm import tqdm
 
 from robocasa_lerobot import __version__, contract
-from robocasa_lerobot.convert.exported import EXTRA_PREFIX, ExportedDataset, ExportedEpisode
-from robocasa_lerobot.convert.source import ASSETS_GROUP, IMAGE_SUFFIX
+from robocasa_lerobot.convert.reading.demo_file import ASSETS_GROUP, IMAGE_SUFFIX
+from robocasa_lerobot.convert.reading.lerobot_v3 import EXTRA_PREFIX, ExportedDataset, ExportedEpisode
 from robocasa_lerobot.errors import UnknownNameError, UserError
 
 COMPRESSIONS = ("gzip", "lzf", "none")

@@ -20,14 +20,23 @@ from typing import Any
 import numpy as np
 
 from robocasa_lerobot import __version__
-from robocasa_lerobot.convert.encoder import CODECS, SAMPLED_FRAMES, SAMPLED_PIXELS, Histogram, quiet_codecs
-from robocasa_lerobot.convert.encoding_process import shared_encoder
-from robocasa_lerobot.convert.executors import Execution
 from robocasa_lerobot.convert.lerobot_v2.dataset import V2Dataset
 from robocasa_lerobot.convert.lerobot_v2.finish import conversion_facts, finish_dataset
 from robocasa_lerobot.convert.lerobot_v2.plan import V2Plan, make_v2_plan, takes
 from robocasa_lerobot.convert.lerobot_v2.shard import convert_v2_shard
-from robocasa_lerobot.convert.modality import MODALITY_FILE, modality, write_modality
+from robocasa_lerobot.convert.reading.demo_file import DemoFile
+from robocasa_lerobot.convert.running.executors import Execution
+from robocasa_lerobot.convert.running.work import (
+    check_output,
+    failures_explained,
+    locked,
+    partial_folder,
+    publish,
+    report_frames,
+    require_complete,
+    run_pieces,
+    submit_pieces,
+)
 from robocasa_lerobot.convert.settings import ConversionSettings, Plan, SourceRecord, make_plan
 from robocasa_lerobot.convert.shard import (
     DATASET,
@@ -41,18 +50,9 @@ from robocasa_lerobot.convert.shard import (
     read_jsonl,
     write_jsonl,
 )
-from robocasa_lerobot.convert.source import DemoFile
-from robocasa_lerobot.convert.work import (
-    check_output,
-    failures_explained,
-    locked,
-    partial_folder,
-    publish,
-    report_frames,
-    require_complete,
-    run_pieces,
-    submit_pieces,
-)
+from robocasa_lerobot.convert.writing.encoder import CODECS, SAMPLED_FRAMES, SAMPLED_PIXELS, Histogram, quiet_codecs
+from robocasa_lerobot.convert.writing.encoding_process import shared_encoder
+from robocasa_lerobot.convert.writing.modality import MODALITY_FILE, modality, write_modality
 from robocasa_lerobot.errors import UserError
 
 # Our part of a dataset's folder; LeRobot reads nothing in it.
@@ -286,8 +286,8 @@ def _join(plan: Plan, partial: Path, out: Path) -> ConversionResult | None:
     """Join the shards in `<partial>/merged`; None where no shard has an episode."""
     from lerobot.datasets.io_utils import write_stats
 
-    from robocasa_lerobot.convert.joining import copy_tree, join_datasets
-    from robocasa_lerobot.convert.statistics import dataset_statistics
+    from robocasa_lerobot.convert.writing.joining import copy_tree, join_datasets
+    from robocasa_lerobot.convert.writing.statistics import dataset_statistics
 
     merged = partial / "merged"
     shutil.rmtree(merged, ignore_errors=True)  # an earlier try may have been killed here

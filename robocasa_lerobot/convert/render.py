@@ -14,8 +14,8 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from robocasa_lerobot.convert.reading.demo_file import RejectedEpisodeError
 from robocasa_lerobot.convert.settings import Camera
-from robocasa_lerobot.convert.source import RejectedEpisodeError
 from robocasa_lerobot.rendering import SceneRenderer
 
 PRESETS = ("fast", "quality")

@@ -12,16 +12,16 @@ from pathlib import Path
 from typing import Any
 
 from robocasa_lerobot import contract
-from robocasa_lerobot.convert.custom_mapping import parse_mapping
-from robocasa_lerobot.convert.demo import Demo, RejectedEpisodeError, SourceError
-from robocasa_lerobot.convert.instruction import instruction_of, template_fields
-from robocasa_lerobot.convert.layout import ACTION_KEYS, Layout
-from robocasa_lerobot.convert.mapping import RobotMapping
-from robocasa_lerobot.convert.mjcf import AssetFinder, loadable, scene_names
-from robocasa_lerobot.convert.robots import choose_mapping
-from robocasa_lerobot.convert.selection import check_selection, select
-from robocasa_lerobot.convert.source import DemoFile
-from robocasa_lerobot.convert.survey import survey
+from robocasa_lerobot.convert.mapping.custom import parse_mapping
+from robocasa_lerobot.convert.mapping.instruction import instruction_of, template_fields
+from robocasa_lerobot.convert.mapping.robot_mapping import RobotMapping
+from robocasa_lerobot.convert.mapping.robots import choose_mapping
+from robocasa_lerobot.convert.reading.demo import Demo, RejectedEpisodeError, SourceError
+from robocasa_lerobot.convert.reading.demo_file import DemoFile
+from robocasa_lerobot.convert.reading.layout import ACTION_KEYS, Layout
+from robocasa_lerobot.convert.reading.mjcf import AssetFinder, loadable, scene_names
+from robocasa_lerobot.convert.reading.selection import check_selection, select
+from robocasa_lerobot.convert.reading.survey import survey
 from robocasa_lerobot.errors import UnknownNameError, UserError
 
 # Raised when the written bytes change for the same input, so that shards of an older version are not taken up again.

@@ -14,12 +14,12 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from robocasa_lerobot import contract
-from robocasa_lerobot.convert.encoding_process import EncodingProcess, shared_encoder
 from robocasa_lerobot.convert.episode import Episode
-from robocasa_lerobot.convert.mjcf import MissingAssetsError
+from robocasa_lerobot.convert.reading.demo_file import DemoFile, RejectedEpisodeError
+from robocasa_lerobot.convert.reading.mjcf import MissingAssetsError
 from robocasa_lerobot.convert.settings import Plan, Shard
-from robocasa_lerobot.convert.source import DemoFile, RejectedEpisodeError
-from robocasa_lerobot.convert.writer import DatasetWriter
+from robocasa_lerobot.convert.writing.dataset import DatasetWriter
+from robocasa_lerobot.convert.writing.encoding_process import EncodingProcess, shared_encoder
 
 _PROGRESS_SECONDS = 0.5
 

@@ -17,14 +17,14 @@ from robocasa_lerobot import contract
 from robocasa_lerobot.convert.episode import Episode
 from robocasa_lerobot.convert.lerobot_v2.dataset import V2Dataset, is_dataset_folder
 from robocasa_lerobot.convert.lerobot_v2.plan import SOURCE_FORMAT, source_record
-from robocasa_lerobot.convert.mapping import EXTRA_PREFIX, RobotMapping
+from robocasa_lerobot.convert.mapping.robot_mapping import EXTRA_PREFIX, RobotMapping
+from robocasa_lerobot.convert.mapping.robots import choose_mapping
 from robocasa_lerobot.convert.pipeline import CONVERSION_FILE, META_FOLDER, quiet_libraries
+from robocasa_lerobot.convert.reading.demo_file import DemoFile, RejectedEpisodeError
 from robocasa_lerobot.convert.report import CameraQuality, Check, Report
-from robocasa_lerobot.convert.robots import choose_mapping
 from robocasa_lerobot.convert.settings import Camera, ConversionSettings, Plan, SourceRecord, file_sha256
 from robocasa_lerobot.convert.shard import EPISODES_FILE, REJECTED_FILE, read_jsonl
-from robocasa_lerobot.convert.source import DemoFile, RejectedEpisodeError
-from robocasa_lerobot.convert.statistics import column_of
+from robocasa_lerobot.convert.writing.statistics import column_of
 from robocasa_lerobot.errors import UserError
 
 _CHECKS = (
@@ -77,8 +77,8 @@ def verify(
         raise UserError(f"{root} is {what}: {META_FOLDER}/{CONVERSION_FILE}, which `convert` writes, is not there.")
     # Here, as it builds on this module.
     from robocasa_lerobot.convert.lerobot_v2.verify import V2Verification
-    from robocasa_lerobot.convert.rerender import SOURCE_FORMAT as RERENDERED
-    from robocasa_lerobot.convert.rerender_verify import verify_rerendered
+    from robocasa_lerobot.convert.rerender.plan import SOURCE_FORMAT as RERENDERED
+    from robocasa_lerobot.convert.rerender.verify import verify_rerendered
 
     quiet_libraries()
     record = json.loads((root / META_FOLDER / CONVERSION_FILE).read_text(encoding="utf-8"))

@@ -15,7 +15,7 @@ from pathlib import Path, PurePosixPath
 from typing import Any
 
 from robocasa_lerobot import contract
-from robocasa_lerobot.convert.source import SourceError
+from robocasa_lerobot.convert.reading.demo_file import SourceError
 from robocasa_lerobot.errors import suggest
 
 INFO = "meta/info.json"

@@ -17,12 +17,12 @@ import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
 from robocasa_lerobot import contract
-from robocasa_lerobot.convert.instruction import OPTION, template_fields
 from robocasa_lerobot.convert.lerobot_v2.dataset import EpisodeLine, V2Dataset
-from robocasa_lerobot.convert.lerobot_v2.video import VideoForm, frames, probe, rgb
+from robocasa_lerobot.convert.mapping.instruction import OPTION, template_fields
+from robocasa_lerobot.convert.reading.demo_file import RejectedEpisodeError
 from robocasa_lerobot.convert.settings import Camera, ConversionSettings
-from robocasa_lerobot.convert.source import RejectedEpisodeError
-from robocasa_lerobot.convert.statistics import column_of
+from robocasa_lerobot.convert.writing.statistics import column_of
+from robocasa_lerobot.convert.writing.video import VideoForm, frames, probe, rgb
 from robocasa_lerobot.errors import UserError
 
 # How far the recorded times may be from even steps, in steps, before they say that frames were lost.

@@ -24,11 +24,11 @@ from robocasa_lerobot.convert.lerobot_v2.dataset import (
     is_depth,
 )
 from robocasa_lerobot.convert.lerobot_v2.episode import Column, V2Episode, given_instruction
-from robocasa_lerobot.convert.lerobot_v2.video import probe
-from robocasa_lerobot.convert.mapping import RobotMapping
-from robocasa_lerobot.convert.selection import select
+from robocasa_lerobot.convert.mapping.robot_mapping import RobotMapping
+from robocasa_lerobot.convert.reading.demo_file import RejectedEpisodeError, SourceError
+from robocasa_lerobot.convert.reading.selection import select
 from robocasa_lerobot.convert.settings import MAX_SHARDS, Camera, ConversionSettings, Plan, Shard, SourceRecord
-from robocasa_lerobot.convert.source import RejectedEpisodeError, SourceError
+from robocasa_lerobot.convert.writing.video import probe
 from robocasa_lerobot.errors import UnknownNameError, UserError
 
 SOURCE_FORMAT = "lerobot_v2"

@@ -24,19 +24,10 @@ from lerobot.datasets.io_utils import write_info
 from numpy.typing import NDArray
 
 from robocasa_lerobot import contract
-from robocasa_lerobot.convert.encoder import (
-    CODECS,
-    EncodedVideo,
-    Histogram,
-    VideoSettings,
-    channel_histogram,
-    sampled_frames,
-)
-from robocasa_lerobot.convert.encoding_process import shared_encoder
 from robocasa_lerobot.convert.lerobot_v2.dataset import V2Dataset
 from robocasa_lerobot.convert.lerobot_v2.episode import EP_META, V2Episode
 from robocasa_lerobot.convert.lerobot_v2.plan import V2Plan
-from robocasa_lerobot.convert.lerobot_v2.video import VideoFiles, VideoForm, frames, probe, rgb
+from robocasa_lerobot.convert.reading.demo_file import RejectedEpisodeError
 from robocasa_lerobot.convert.settings import Camera, Shard
 from robocasa_lerobot.convert.shard import (
     DATASET,
@@ -49,9 +40,18 @@ from robocasa_lerobot.convert.shard import (
     episode_folder,
     write_jsonl,
 )
-from robocasa_lerobot.convert.source import RejectedEpisodeError
-from robocasa_lerobot.convert.statistics import vector_statistics
-from robocasa_lerobot.convert.writer import VIDEO_FILE_MB, arrow_table
+from robocasa_lerobot.convert.writing.dataset import VIDEO_FILE_MB, arrow_table
+from robocasa_lerobot.convert.writing.encoder import (
+    CODECS,
+    EncodedVideo,
+    Histogram,
+    VideoSettings,
+    channel_histogram,
+    sampled_frames,
+)
+from robocasa_lerobot.convert.writing.encoding_process import shared_encoder
+from robocasa_lerobot.convert.writing.statistics import vector_statistics
+from robocasa_lerobot.convert.writing.video import VideoFiles, VideoForm, frames, probe, rgb
 
 _DATA_FILE = "data/chunk-000/file-000.parquet"
 

@@ -13,14 +13,14 @@ from robocasa_lerobot import contract
 from robocasa_lerobot.convert.lerobot_v2.dataset import EXTRAS, V2Dataset
 from robocasa_lerobot.convert.lerobot_v2.episode import Column, V2Episode
 from robocasa_lerobot.convert.lerobot_v2.plan import look_into, source_record
-from robocasa_lerobot.convert.lerobot_v2.video import digests
 from robocasa_lerobot.convert.pipeline import META_FOLDER
+from robocasa_lerobot.convert.reading.demo_file import RejectedEpisodeError
 from robocasa_lerobot.convert.report import Check
 from robocasa_lerobot.convert.settings import Camera, ConversionSettings
 from robocasa_lerobot.convert.shard import REJECTED_FILE, episode_folder, read_jsonl
-from robocasa_lerobot.convert.source import RejectedEpisodeError
-from robocasa_lerobot.convert.statistics import column_of
 from robocasa_lerobot.convert.verify import Verification, compare_bits, spread
+from robocasa_lerobot.convert.writing.statistics import column_of
+from robocasa_lerobot.convert.writing.video import digests
 
 _MORE_CHECKS = ("other columns", "extras", "copied frames")
 

@@ -1,0 +1,1 @@
+"""Files and datasets that are converted, read lazily and checked."""

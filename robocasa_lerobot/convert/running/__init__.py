@@ -1,0 +1,1 @@
+"""Pieces of work on this machine or a cluster."""

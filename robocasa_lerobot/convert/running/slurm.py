@@ -1,0 +1,57 @@
+"""Jobs of a Slurm cluster: an array of pieces by datatrove, and the one that comes after them.
+
+`python -m robocasa_lerobot.convert.running.slurm FILE` is that last job: it calls what is pickled in the file.
+"""
+
+from __future__ import annotations
+
+import pickle
+import sys
+from pathlib import Path
+from typing import Any
+
+from datatrove.executor.base import DistributedEnvVars
+from datatrove.executor.slurm import SlurmPipelineExecutor, launch_slurm_job
+from datatrove.utils.logging import logger as datatrove_logger
+
+
+class ArrayExecutor(SlurmPipelineExecutor):
+    """datatrove's Slurm executor for pieces that need nothing of each other."""
+
+    def run(self) -> None:
+        """Submit the array or, inside one of its jobs, run the piece; exceptions are not logged but raised."""
+        datatrove_logger.disable("datatrove")
+        super().run()
+
+    def launch_merge_stats(self) -> None:
+        """Nothing: datatrove counts documents here, of which there are none."""
+
+    def get_distributed_env(self, node_rank: int = -1) -> DistributedEnvVars:
+        """Nothing of it is used, and asking Slurm for the names of nodes can fail."""
+        return DistributedEnvVars(
+            datatrove_node_ips="",
+            datatrove_cpus_per_task=str(self.cpus_per_task),
+            datatrove_mem_per_cpu=str(self.mem_per_cpu_gb),
+            datatrove_gpus_on_node=str(self.gpus_per_task),
+            datatrove_executor="SLURM",
+        )
+
+    def submit_after(self, array: str | None, command: str) -> str:
+        """Submit one job that runs a command once every job of the array has succeeded; gives its number."""
+        arguments: dict[str, Any] = {k: v for k, v in self.get_sbatch_args().items() if k not in ("array", "gpus")}
+        arguments["job-name"] = f"{self.job_name}-join"
+        if array is not None:
+            arguments["dependency"] = f"afterok:{array}"
+            arguments["kill-on-invalid-dep"] = "yes"
+        for key in ("output", "error"):
+            arguments[key] = str(Path(self.slurm_logs_folder) / "join-%j.out")
+        return str(launch_slurm_job(self.get_launch_file_contents(arguments, command), self.job_id_retriever))
+
+
+def main() -> None:
+    """Call the pickled function."""
+    pickle.loads(Path(sys.argv[1]).read_bytes())()
+
+
+if __name__ == "__main__":
+    main()

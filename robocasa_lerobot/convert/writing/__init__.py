@@ -1,0 +1,1 @@
+"""LeRobotDatasets v3.0: tables, videos, statistics."""

@@ -1,0 +1,349 @@
+"""The video encoder in a process of its own, so that pictures are made and encoded at the same time.
+
+PyAV and MuJoCo's renderer both keep Python's lock while they work, so threads of one process would take turns. Pictures
+go through a pipe, sent by a thread: the process that makes them waits only when it is far ahead. A codec that crashes
+ends the other process, not the conversion.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import pickle
+import queue
+import signal
+import subprocess
+import sys
+import threading
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from robocasa_lerobot.convert.writing.encoder import (
+    EncodedVideo,
+    EncodingError,
+    EpisodeEncoder,
+    FramePreparation,
+    VideoSettings,
+    quiet_codecs,
+)
+
+# Not `-m`: the module would be there twice, and so would the classes of its messages.
+_PROGRAM = (
+    "import sys; from robocasa_lerobot.convert.writing.encoding_process import serve; serve(*map(int, sys.argv[1:]))"
+)
+_AHEAD_BYTES = 24 << 20  # pictures that wait to be sent
+_PIPE_BYTES = 1 << 20
+_F_SETPIPE_SZ = 1031  # Linux
+# Beside a renderer the encoder takes what that leaves: on two cores it would otherwise hold up the renderer's own
+# threads, which makes the conversion of states 6 to 15 % slower.
+_NICE = 19
+
+
+@dataclass(frozen=True)
+class _Start:
+    """A new episode of `length` frames, whose videos are written into `folder`."""
+
+    settings: VideoSettings
+    keys: tuple[str, ...]
+    folder: str
+    length: int
+    yielding: bool
+
+
+@dataclass(frozen=True)
+class _Picture:
+    """The next frame of a video; its bytes follow: planes, or colours where the other process yields."""
+
+    key: str
+    shape: tuple[int, ...]
+
+
+class _End:
+    """The episode has all its frames: its videos, or what went wrong, are sent back."""
+
+
+class _Cancel:
+    """The episode is thrown away; nothing is sent back."""
+
+
+# The videos, with the preparation where the other process did it; or what went wrong.
+_Answer = tuple[dict[str, Path], FramePreparation | None] | Exception
+
+
+class EncodingProcess:
+    """Encodes episodes one after the other in another process; use it in a `with` block, or `close` it.
+
+    An episode that has been ended is encoded while the next one is begun: `finished` gives what has been ended, in
+    order. The other process ends with this one, however that ends.
+    """
+
+    def __init__(self) -> None:
+        down_read, down_write = os.pipe()
+        up_read, up_write = os.pipe()
+        with contextlib.suppress(OSError, ImportError):  # only faster
+            import fcntl
+
+            fcntl.fcntl(down_write, _F_SETPIPE_SZ, _PIPE_BYTES)
+        places = [str(Path(__file__).parents[3]), *filter(None, [os.environ.get("PYTHONPATH")])]
+        self._process = subprocess.Popen(
+            [sys.executable, "-c", _PROGRAM, str(down_read), str(up_write)],
+            pass_fds=(down_read, up_write),
+            stdin=subprocess.DEVNULL,
+            env={**os.environ, "PYTHONPATH": os.pathsep.join(places)},
+        )
+        os.close(down_read)
+        os.close(up_write)
+        self._pipe = os.fdopen(down_write, "wb", buffering=0)
+        self._answers = os.fdopen(up_read, "rb")
+        self._waiting: queue.SimpleQueue[tuple[Any, NDArray[np.uint8] | None] | None] = queue.SimpleQueue()
+        self._room = threading.Condition()
+        self._bytes = 0
+        self._broken: OSError | EncodingError | None = None
+        self._prepared: queue.SimpleQueue[FramePreparation] = queue.SimpleQueue()
+        self._received: queue.SimpleQueue[_Answer | None] = queue.SimpleQueue()
+        # Both directions at any time, or both processes might wait for the other to read.
+        self._threads = [threading.Thread(target=f, daemon=True) for f in (self._send_waiting, self._receive)]
+        for thread in self._threads:
+            thread.start()
+
+    def __enter__(self) -> EncodingProcess:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    @property
+    def alive(self) -> bool:
+        """Whether the other process is there."""
+        return self._broken is None and self._process.poll() is None
+
+    def start_episode(
+        self, settings: VideoSettings, keys: Sequence[str], folder: Path, length: int, yielding: bool = False
+    ) -> None:
+        """Begin an episode.
+
+        Args:
+            settings: codec and rate.
+            keys: one video for each.
+            folder: an existing one, somewhere below which the videos come.
+            length: number of frames.
+            yielding: making the pictures takes longer than encoding them, so the other process takes over what it can,
+                and lets this one go first, from now on.
+        """
+        self._put(_Start(settings, tuple(keys), str(folder), length, yielding))
+
+    def feed(self, key: str, picture: NDArray[np.uint8]) -> None:
+        """Hand over the next frame (H, W, 3) of a video; it must not be changed afterwards.
+
+        Raises:
+            EncodingError: the other process is gone.
+        """
+        self._put(_Picture(key, picture.shape), picture)
+
+    def end_episode(self) -> None:
+        """Say that all frames have been handed over."""
+        self._put(_End())
+
+    def cancel_episode(self) -> None:
+        """Throw the episode away that was begun and not ended; its files go."""
+        with contextlib.suppress(EncodingError):  # the other process is gone, and says so where it matters
+            self._put(_Cancel())
+
+    def finished(self) -> dict[str, EncodedVideo]:
+        """Wait for the first episode that has been ended and not been asked for.
+
+        Raises:
+            EncodingError: a video has not as many frames as the episode, or its encoder failed or crashed.
+            OSError: writing failed (a full disk).
+        """
+        answer = self._received.get()
+        if answer is None:
+            self._received.put(None)  # for whoever asks again
+            raise self._gone()
+        here = self._prepared.get()
+        if isinstance(answer, Exception):
+            raise answer
+        paths, there = answer
+        frames = here if there is None else there
+        return {key: EncodedVideo(path, frames.histograms[key], frames.num_sampled[key]) for key, path in paths.items()}
+
+    def close(self) -> None:
+        """End the other process; what it has not finished is lost."""
+        self._waiting.put(None)
+        self._process.kill()
+        self._process.wait()
+        for thread in self._threads:
+            thread.join()
+        with contextlib.suppress(OSError):
+            self._pipe.close()
+        self._answers.close()
+
+    def _put(self, message: Any, picture: NDArray[np.uint8] | None = None) -> None:
+        with self._room:
+            while self._bytes > _AHEAD_BYTES and self._broken is None:
+                self._room.wait()
+            if self._broken is not None:
+                raise self._gone()
+            self._bytes += 0 if picture is None else picture.nbytes
+        self._waiting.put((message, picture))
+
+    def _send_waiting(self) -> None:
+        frames: FramePreparation | None = None
+        yielding = False
+        while (item := self._waiting.get()) is not None:
+            message, picture = item
+            num_bytes = 0 if picture is None else picture.nbytes
+            try:
+                if isinstance(message, _Start):
+                    frames, yielding = FramePreparation(message.keys, message.length), message.yielding
+                elif isinstance(message, _End):
+                    assert frames is not None
+                    self._prepared.put(frames)
+                if self._broken is None:
+                    if picture is not None and not yielding:
+                        assert frames is not None
+                        picture = frames.prepared(message.key, picture)
+                        message = _Picture(message.key, picture.shape)
+                    _write_all(self._pipe, pickle.dumps(message))
+                    if picture is not None:
+                        _write_all(self._pipe, np.ascontiguousarray(picture).reshape(-1).data)
+            except (OSError, EncodingError) as error:
+                self._broken = error
+                with contextlib.suppress(OSError):
+                    self._pipe.close()  # which ends the other process, and so whoever waits for its answer
+            with self._room:
+                self._bytes -= num_bytes
+                self._room.notify()
+
+    def _receive(self) -> None:
+        with contextlib.suppress(EOFError, OSError, pickle.UnpicklingError):  # the other process is gone
+            while True:
+                self._received.put(pickle.load(self._answers))
+        self._received.put(None)
+
+    def _gone(self) -> EncodingError:
+        if isinstance(self._broken, EncodingError):
+            return self._broken
+        try:
+            status = self._process.wait(timeout=5)
+        except subprocess.TimeoutExpired:
+            return EncodingError("the encoder's process does not answer.")
+        how = f"signal {signal.Signals(-status).name}" if status < 0 else f"exit status {status}"
+        return EncodingError(f"the encoder's process ended with {how}.")
+
+
+def _write_all(pipe: Any, content: bytes | memoryview) -> None:
+    left = memoryview(content)
+    while left:
+        left = left[pipe.write(left) :]
+
+
+class SharedEncoder:
+    """The one `EncodingProcess` of a process, started when it is first wanted, since starting takes a moment."""
+
+    def __init__(self) -> None:
+        self._encoder: EncodingProcess | None = None
+
+    @contextlib.contextmanager
+    def borrowed(self) -> Iterator[EncodingProcess]:
+        """The process; it is ended if the block fails, since nobody knows what it still holds."""
+        encoder = self.started()
+        try:
+            yield encoder
+        except BaseException:
+            self.close()
+            raise
+
+    def started(self) -> EncodingProcess:
+        """Start the process, unless it runs."""
+        if self._encoder is not None and not self._encoder.alive:
+            self.close()
+        if self._encoder is None:
+            self._encoder = EncodingProcess()
+        return self._encoder
+
+    def close(self) -> None:
+        """End the process, if it runs."""
+        if self._encoder is not None:
+            self._encoder.close()
+            self._encoder = None
+
+
+shared_encoder = SharedEncoder()
+
+
+def serve(down: int, up: int) -> None:
+    """The other process: encode what comes through a pipe until that is closed, and answer through another one.
+
+    Args:
+        down: file descriptor to read messages and pictures from.
+        up: file descriptor to write answers to.
+    """
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # a user's Ctrl-C: the process that sends pictures ends this one
+    quiet_codecs()
+    episode = _Episode()
+    buffers: dict[tuple[int, ...], NDArray[np.uint8]] = {}
+    with os.fdopen(down, "rb") as pipe, os.fdopen(up, "wb") as answers, contextlib.suppress(BrokenPipeError, EOFError):
+        while True:
+            message = pickle.load(pipe)
+            frame = None
+            if isinstance(message, _Picture):
+                if message.shape not in buffers:
+                    buffers[message.shape] = np.empty(message.shape, np.uint8)
+                frame = buffers[message.shape]
+                if pipe.readinto(frame.reshape(-1).data) != frame.nbytes:
+                    return
+            answer = episode.take(message, frame)
+            if answer is not None:
+                pickle.dump(answer, answers)
+                answers.flush()
+
+
+class _Episode:
+    """What is being encoded; after a failure the rest of an episode is let pass."""
+
+    def __init__(self) -> None:
+        self._encoder: EpisodeEncoder | None = None
+        self._frames: FramePreparation | None = None  # where they come as colours
+        self._failure: Exception | None = None
+        self._yields = False
+
+    def take(self, message: Any, frame: NDArray[np.uint8] | None) -> _Answer | None:
+        """Act on a message; gives the answer to be sent, if there is one."""
+        paths: dict[str, Path] = {}
+        try:
+            if isinstance(message, _Start):
+                self._start(message)
+            elif isinstance(message, _Cancel):
+                self._cancel()
+            elif self._encoder is not None:
+                if frame is not None:
+                    planes = frame if self._frames is None else self._frames.prepared(message.key, frame)
+                    self._encoder.feed(message.key, planes)
+                else:
+                    paths = self._encoder.finish()
+        except Exception as error:  # raised in the other process
+            self._failure = error
+            self._cancel()
+        if not isinstance(message, _End):
+            return None
+        return (paths, self._frames) if self._failure is None else self._failure
+
+    def _start(self, message: _Start) -> None:
+        self._failure = self._frames = None
+        if message.yielding:
+            self._frames = FramePreparation(message.keys, message.length)
+        if message.yielding and not self._yields:
+            os.nice(_NICE)
+            self._yields = True
+        self._encoder = EpisodeEncoder(message.settings, message.keys, Path(message.folder), message.length)
+
+    def _cancel(self) -> None:
+        if self._encoder is not None:
+            self._encoder.cancel()
+        self._encoder = None
