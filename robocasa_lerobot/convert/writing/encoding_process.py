@@ -248,6 +248,7 @@ class SharedEncoder:
 
     def __init__(self) -> None:
         self._encoder: EncodingProcess | None = None
+        self._owner = os.getpid()
 
     @contextlib.contextmanager
     def borrowed(self) -> Iterator[EncodingProcess]:
@@ -261,6 +262,8 @@ class SharedEncoder:
 
     def started(self) -> EncodingProcess:
         """Start the process, unless it runs."""
+        if self._owner != os.getpid():
+            self._encoder, self._owner = None, os.getpid()  # a fork must not write into its parent's pipe
         if self._encoder is not None and not self._encoder.alive:
             self.close()
         if self._encoder is None:
@@ -269,7 +272,7 @@ class SharedEncoder:
 
     def close(self) -> None:
         """End the process, if it runs."""
-        if self._encoder is not None:
+        if self._encoder is not None and self._owner == os.getpid():
             self._encoder.close()
             self._encoder = None
 
