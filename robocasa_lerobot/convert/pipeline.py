@@ -9,6 +9,7 @@ from __future__ import annotations
 import contextlib
 import json
 import os
+import platform
 import shutil
 from collections import Counter
 from collections.abc import Sequence
@@ -250,7 +251,7 @@ class _ShardTask:
         if folder.exists():
             return  # complete; only the executor's marker was lost
         # Of its own, since the worker of a run that was killed may still be at the same shard for a moment.
-        attempt = folder.with_name(f"{folder.name}.attempt-{os.getpid()}")
+        attempt = folder.with_name(f"{folder.name}.attempt-{platform.node()}-{os.getpid()}")
         if isinstance(self.plan, V2Plan):
             convert_v2_shard(self.plan, shard, attempt, report)
         else:

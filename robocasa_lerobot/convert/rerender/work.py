@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import json
 import os
+import platform
 import shutil
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass
@@ -124,7 +125,7 @@ class _Piece:
         if folder.exists():
             return  # complete; only the executor's marker was lost
         quiet_libraries()
-        attempt = folder.with_name(f"{folder.name}.attempt-{os.getpid()}")
+        attempt = folder.with_name(f"{folder.name}.attempt-{platform.node()}-{os.getpid()}")
         shutil.rmtree(attempt, ignore_errors=True)
         attempt.mkdir(parents=True)
         done = 0
