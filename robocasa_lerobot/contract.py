@@ -8,6 +8,7 @@ datasets are xyzw with w >= 0; lengths are metres, angles radians, and image arr
 
 from __future__ import annotations
 
+import random
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -190,6 +191,17 @@ def dataset_features(image_size: tuple[int, int] = (IMAGE_SIZE, IMAGE_SIZE)) -> 
         STATE_KEY: {"dtype": "float64", "shape": (STATE_SIZE,), "names": component_names(STATE_PARTS)},
         ACTION_KEY: {"dtype": "float64", "shape": (ACTION_SIZE,), "names": component_names(ACTION_PARTS)},
     }
+
+
+def demo_subset(total: int, count: int, seed: int = 0) -> tuple[int, ...]:
+    """Which `count` of `total` demonstrations `<count>_demos` means, ascending; all where there are no more.
+
+    RoboCasa365's own rule (its GR00T dataset class): the episodes in order are shuffled by Python's generator with
+    seed 0, and the first `count` taken.
+    """
+    order = list(range(total))
+    random.Random(seed).shuffle(order)
+    return tuple(sorted(order[:count]))
 
 
 def _checked(array: ArrayLike, size: int, what: str) -> NDArray[Any]:

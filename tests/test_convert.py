@@ -336,7 +336,7 @@ def test_existing_output_is_replaced_only_when_asked(tmp_path: Path, capsys: pyt
 
 
 def test_killed_conversion_goes_on_where_it_was(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    source = write_demos(tmp_path / "a.hdf5", (251, 251, 251), images=16)
+    source = write_demos(tmp_path / "a.hdf5", (501, 501, 501), images=16)
     out = tmp_path / "out"
     command = [
         sys.executable,

@@ -79,7 +79,7 @@ def _command(source: Path, out: Path, *more: str) -> list[str]:
 def test_slurm_pieces_are_run_resumed_and_joined(
     slurm: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    source = write_demos(tmp_path / "a.hdf5", (251, 251), images=16)
+    source = write_demos(tmp_path / "a.hdf5", (501, 501), images=16)
     out = tmp_path / "out"
     monkeypatch.setenv("FAKE_SLURM_FAILS", "1")
     assert cli.main(_command(source, out, "--slurm.account", "robots")) == 0

@@ -92,7 +92,11 @@ def experiment_file(folder: Path, data: Path, kind: str = "diffusion_transformer
         "defaults": {"steps": 4, "batch_size": 4, "log_every": 1, "save_every": 2},
         "phases": [
             {"name": "pretrain", "mixture": {"members": [{"root": str(data)}]}, "save_initial": True},
-            {"name": "finetune", "mixture": {"members": [{"root": str(data), "tasks": ["OpenDrawer"]}]}},
+            {
+                "name": "finetune",
+                "mixture": {"members": [{"root": str(data), "tasks": ["OpenDrawer"]}]},
+                "statistics": "keep",
+            },
         ],
     }
     path = folder / "experiment.yaml"
@@ -267,7 +271,7 @@ def _statistics(folder: Path, phase: str) -> dict[str, np.ndarray[Any, Any]]:
 def test_statistics_are_kept_or_recomputed(tmp_path: Path, finished: Path, data: Path) -> None:
     key = "observation.state.mean"
     np.testing.assert_array_equal(_statistics(finished, "finetune")[key], _statistics(finished, "pretrain")[key])
-    assert run_experiment(tiny(tmp_path, data, overrides=["--phases.finetune.statistics=recompute"]))
+    assert run_experiment(tiny(tmp_path, data, overrides=["--phases.finetune.statistics=replace"]))
     assert not np.array_equal(_statistics(tmp_path, "finetune")[key], _statistics(tmp_path, "pretrain")[key])
 
 
@@ -330,10 +334,10 @@ def test_mistakes_are_told_before_training(tmp_path: Path, data: Path, overrides
 
 def test_weights_that_do_not_fit_are_told(tmp_path: Path, finished: Path, data: Path) -> None:
     start = finished / "out/pretrain/checkpoints/last/pretrained_model"
-    overrides = [f"--phases.pretrain.init={start}", "--phases.pretrain.policy={width: 32}"]
+    overrides = [f"--phases.pretrain.init={start}", "--defaults.statistics=keep", "--phases.pretrain.policy={width: 32}"]
     with pytest.raises(UserError, match="do not fit"):
         run_experiment(tiny(tmp_path, data, overrides=overrides))
-    small = [f"--phases.pretrain.init={start}", "--loader.image_size=16"]
+    small = [f"--phases.pretrain.init={start}", "--defaults.statistics=keep", "--loader.image_size=16"]
     with pytest.raises(UserError, match="image_size"):
         run_experiment(tiny(tmp_path / "small", data, overrides=small))
 

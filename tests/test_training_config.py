@@ -18,7 +18,7 @@ policy: {file: act.yaml, chunk_size: 5}
 defaults: {steps: 7, batch_size: 4, ema: {power: 0.5}, mixture: mix.yaml}
 phases:
   - {name: pretrain}
-  - {name: finetune, steps: 3, ema: {enabled: false}, learning_rate: 1e-4}
+  - {name: finetune, statistics: keep, steps: 3, ema: {enabled: false}, learning_rate: 1e-4}
 """
 
 

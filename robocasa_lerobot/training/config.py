@@ -1,12 +1,11 @@
-"""An experiment as typed configuration: a policy and a list of training phases.
+"""An experiment as typed configuration: a policy and a graph of training phases.
 
-The file format, overrides and how a phase inherits are described in `configs/README.md`.
+The file format, overrides and how a phase or a file inherits are described in `configs/README.md`.
 """
 
 from __future__ import annotations
 
 import dataclasses
-import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -14,86 +13,18 @@ from typing import Any
 
 import yaml
 
-from robocasa_lerobot.data.config import LoaderConfig, MixtureConfig
+from robocasa_lerobot.data.config import LoaderConfig
 from robocasa_lerobot.errors import UnknownNameError, UserError
 from robocasa_lerobot.settings import decode, parse_overrides
 from robocasa_lerobot.training import overlay
+from robocasa_lerobot.training.phase_config import EmaConfig, PhaseConfig, check_choice
+
+__all__ = ["FROM_SCRATCH", "HUB", "EmaConfig", "ExperimentConfig", "PhaseConfig", "load_experiment", "to_yaml"]
 
 FROM_SCRATCH = "from_scratch"
-STATISTICS = ("keep", "recompute")
-IMAGE_STATISTICS = ("dataset", "imagenet")
+HUB = "hub:"
 MIXED_PRECISION = ("no", "bf16", "fp16")
-
-
-@dataclass
-class EmaConfig:
-    """Exponential moving average of the weights; decay = 1 - (1 + step / inv_gamma) ** -power, within bounds.
-
-    The defaults are those of the benchmark's Diffusion Policy. With it, checkpoints hold the averaged weights.
-    """
-
-    enabled: bool = True
-    power: float = 0.75
-    inv_gamma: float = 1.0
-    min_decay: float = 0.0
-    max_decay: float = 0.9999
-
-
-@dataclass
-class PhaseConfig:
-    """One training run of the experiment.
-
-    Attributes:
-        name: names the phase's folder and lets later phases start from it.
-        mixture: the data.
-        steps: optimiser steps.
-        init: `from_scratch`, the name of an earlier phase, or a `pretrained_model` folder; null is the previous
-            phase, or for the first one `policy.path` if the experiment has it, else `from_scratch`.
-        statistics: of normalisation, when starting from a checkpoint: `keep` the checkpoint's, or `recompute`
-            them for this phase's data (the policy then sees the same state as another input).
-        image_statistics: `dataset`, or `imagenet` for encoders trained on ImageNet.
-        policy: settings of the policy that this phase changes.
-        batch_size: samples per optimiser step, over all processes and accumulated parts.
-        gradient_accumulation: parts in which a batch goes through the policy, one after the other.
-        learning_rate: null is the policy's own; otherwise the rates of all parameter groups are scaled alike.
-        warmup_steps: null is the policy's own schedule's.
-        grad_clip_norm: largest gradient norm; null is the policy's own, 0 is none.
-        save_every: steps between checkpoints; the last step always has one. 0 is the last step only.
-        save_initial: also keep the policy before the first step, as checkpoint 000000.
-        log_every: steps that a line of metrics.jsonl averages over.
-        ema: moving average of the weights.
-    """
-
-    name: str
-    mixture: MixtureConfig
-    steps: int
-    init: str | None = None
-    statistics: str = "keep"
-    image_statistics: str = "dataset"
-    policy: dict[str, Any] = field(default_factory=dict)
-    batch_size: int = 32
-    gradient_accumulation: int = 1
-    learning_rate: float | None = None
-    warmup_steps: int | None = None
-    grad_clip_norm: float | None = None
-    save_every: int = 0
-    save_initial: bool = False
-    log_every: int = 10
-    ema: EmaConfig = field(default_factory=EmaConfig)
-
-    def __post_init__(self) -> None:
-        if not re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9_.-]*", self.name):
-            raise UserError(f"phase {self.name!r}: a name has letters, digits, '_', '-' and '.', as it names a folder.")
-        for name in ("steps", "batch_size", "gradient_accumulation", "log_every"):
-            if getattr(self, name) < 1:
-                raise UserError(f"phase {self.name!r}: {name} is {getattr(self, name)}, expected at least 1.")
-        if self.batch_size % self.gradient_accumulation:
-            raise UserError(
-                f"phase {self.name!r}: batch_size {self.batch_size} is no multiple of gradient_accumulation "
-                f"{self.gradient_accumulation}."
-            )
-        _check_choice(f"phase {self.name!r}: statistics", self.statistics, STATISTICS)
-        _check_choice(f"phase {self.name!r}: image_statistics", self.image_statistics, IMAGE_STATISTICS)
+TRACKERS = ("tensorboard", "trackio", "wandb")
 
 
 @dataclass
@@ -103,10 +34,11 @@ class ExperimentConfig:
     Attributes:
         output_dir: results; each phase gets a folder in it.
         policy: settings of a LeRobot policy: `type` and its fields, or `path` of a checkpoint and what to change.
-        phases: in the order in which they run.
+        phases: in the order in which they run; each may start from any that comes before it.
         seed: of everything random, together with the phase's name.
         device: `cpu`, `cuda`, `mps`, or null for the best one there is.
         mixed_precision: `no`, `bf16` or `fp16`.
+        trackers: where metrics go besides `metrics.jsonl`: `tensorboard`, `trackio`, `wandb`.
     """
 
     name: str
@@ -116,6 +48,7 @@ class ExperimentConfig:
     seed: int = 0
     device: str | None = None
     mixed_precision: str = "no"
+    trackers: list[str] = field(default_factory=list)
     loader: LoaderConfig = field(default_factory=LoaderConfig)
 
     def __post_init__(self) -> None:
@@ -125,28 +58,78 @@ class ExperimentConfig:
             raise UserError(
                 f"experiment {self.name!r}: `policy` needs a `type`, a `file` or the `path` of a checkpoint."
             )
-        _check_choice("mixed_precision", self.mixed_precision, MIXED_PRECISION)
+        check_choice("mixed_precision", self.mixed_precision, MIXED_PRECISION)
+        for tracker in self.trackers:
+            check_choice("trackers", tracker, TRACKERS)
         names = [phase.name for phase in self.phases]
         for number, phase in enumerate(self.phases):
             if phase.name in names[:number]:
                 raise UserError(f"two phases are called {phase.name!r}.")
             self._check_init(phase, names, names[:number])
+            self._check_replay(phase)
 
     def _check_init(self, phase: PhaseConfig, names: Sequence[str], earlier: Sequence[str]) -> None:
-        if phase.init is None or phase.init == FROM_SCRATCH or phase.init in earlier or Path(phase.init).is_dir():
+        init = phase.init
+        known = init is None or init == FROM_SCRATCH or init in earlier or init.startswith(HUB) or Path(init).is_dir()
+        if not known and init in names:
+            raise UserError(f"phase {phase.name!r} starts from {init!r}, which does not come before it.")
+        if not known:
+            raise UnknownNameError(
+                "start",
+                str(init),
+                [FROM_SCRATCH, *earlier],
+                f"(`init` of phase {phase.name!r}; no such folder either)",
+            )
+        if phase.statistics is None and self.init_of(phase) != FROM_SCRATCH:
+            raise UserError(
+                f"phase {phase.name!r} starts from {self.init_of(phase)!r} and does not say what its inputs are "
+                "normalised with: set `statistics` to `keep` (the checkpoint's, so that the same state stays the same "
+                "input), `replace` (those of this phase's data) or `pool` (both)."
+            )
+
+    def _check_replay(self, phase: PhaseConfig) -> None:
+        if phase.replay is None:
             return
-        if phase.init in names:
-            raise UserError(f"phase {phase.name!r} starts from {phase.init!r}, which does not come before it.")
-        raise UnknownNameError(
-            "start", phase.init, [FROM_SCRATCH, *earlier], f"(`init` of phase {phase.name!r}; no such folder either)"
-        )
+        earlier = [other.name for other in self.phases[: self.phases.index(phase)]]
+        for name in phase.replay.phases or []:
+            if name not in earlier:
+                raise UnknownNameError("phase", name, earlier, f"(in `replay` of phase {phase.name!r})")
+        if not phase.replay.phases and not self.ancestors(phase):
+            raise UserError(f"phase {phase.name!r} has a `replay` share, but builds on no earlier phase.")
+
+    def phase(self, name: str) -> PhaseConfig:
+        """The phase of that name.
+
+        Raises:
+            UnknownNameError: there is none.
+        """
+        found = {phase.name: phase for phase in self.phases}
+        if name not in found:
+            raise UnknownNameError("phase", name, found, f"(of experiment {self.name!r})")
+        return found[name]
 
     def init_of(self, phase: PhaseConfig) -> str:
-        """`from_scratch`, the name of an earlier phase, or a folder: where the phase's weights come from."""
+        """`from_scratch`, an earlier phase, a folder or `hub:owner/name`: where the phase's weights come from."""
         if phase.init is not None:
             return phase.init
         number = self.phases.index(phase)
         return self.phases[number - 1].name if number else str(self.policy.get("path", FROM_SCRATCH))
+
+    def parent(self, phase: PhaseConfig) -> PhaseConfig | None:
+        """The phase whose weights this one starts from, if it starts from one."""
+        init = self.init_of(phase)
+        return next((other for other in self.phases if other.name == init), None)
+
+    def ancestors(self, phase: PhaseConfig) -> list[PhaseConfig]:
+        """The phases that this one builds on, the first one first."""
+        parent = self.parent(phase)
+        return [] if parent is None else [*self.ancestors(parent), parent]
+
+    def replayed(self, phase: PhaseConfig) -> list[PhaseConfig]:
+        """The phases whose data this one sees again."""
+        if phase.replay is None:
+            return []
+        return [self.phase(n) for n in phase.replay.phases] if phase.replay.phases else self.ancestors(phase)
 
 
 def load_experiment(path: Path, overrides: Sequence[str] = ()) -> ExperimentConfig:
@@ -161,10 +144,5 @@ def load_experiment(path: Path, overrides: Sequence[str] = ()) -> ExperimentConf
 
 
 def to_yaml(experiment: ExperimentConfig) -> str:
-    """The resolved experiment, in the same format as its file (without `defaults` and references to files)."""
+    """The resolved experiment, in the same format as its file (without `base`, `defaults` and references to files)."""
     return yaml.safe_dump(dataclasses.asdict(experiment), sort_keys=False, width=120)
-
-
-def _check_choice(what: str, value: str, choices: Sequence[str]) -> None:
-    if value not in choices:
-        raise UnknownNameError(f"value of {what}:", value, choices)

@@ -1,43 +1,84 @@
-"""Experiment files as plain data: references to other files, defaults of phases, unknown keys."""
+"""Experiment files as plain data: bases, references to other files, defaults of phases, unknown keys."""
 
 from __future__ import annotations
 
 import copy
 import dataclasses
+import functools
 import typing
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from robocasa_lerobot.errors import UnknownNameError
+from robocasa_lerobot.errors import UnknownNameError, UserError
 from robocasa_lerobot.settings import Data, load_yaml, set_dotted
 
 FILE_KEYS = ("policy", "mixture")  # their value may be the name of a YAML file, or hold one under `file`
+BASE, WITHOUT = "base", "without_phases"
+# Settings of FILE_KEYS that say what the thing is: with one of them, nothing of the base's is left.
+IDENTITY = ("file", "type", "path", "members")
 
 
 def merge(base: Mapping[str, Any], changes: Mapping[str, Any]) -> Data:
-    """`base` with `changes` laid over it: mappings key by key, everything else replaced."""
+    """`base` with `changes` laid over it: mappings key by key, phases by name, everything else replaced.
+
+    A policy or mixture that names what it is (a file, a type, members) replaces the base's with all its settings.
+    """
     out = dict(copy.deepcopy(dict(base)))
     for key, value in changes.items():
         both = isinstance(value, Mapping) and isinstance(out.get(key), Mapping)
-        out[key] = merge(out[key], value) if both else copy.deepcopy(value)
+        if key == "phases" and _named(out.get(key)) and _named(value):
+            out[key] = _merge_phases(out[key], value)
+        elif both and not (key in FILE_KEYS and any(name in value for name in IDENTITY)):
+            out[key] = merge(out[key], value)
+        else:
+            out[key] = copy.deepcopy(value)
     return out
 
 
 def resolve(path: Path, overrides: Sequence[tuple[str, Any]] = ()) -> Data:
-    """The experiment file `path` as plain data: files included, overrides applied, `defaults` in every phase.
+    """The experiment file `path` as plain data: bases and files included, overrides and `defaults` applied.
 
     Raises:
-        UserError: a missing file, or an override that leads nowhere.
+        UserError: a missing file, files that are each other's base, or an override that leads nowhere.
     """
-    data = _include(load_yaml(path), path.parent)
+    data = _load(path, ())
     for key, value in overrides:
         set_dotted(data, key, value)
-    data = _include(data, Path.cwd())
+    data = _at_file_keys(data, _included)
     defaults = data.pop("defaults", None) or {}
     if isinstance(data.get("phases"), list):
         data["phases"] = [merge(defaults, p) if isinstance(p, Mapping) else p for p in data["phases"]]
     return data
+
+
+def _load(path: Path, above: tuple[Path, ...]) -> Data:
+    """A file laid over its bases, with the files that it names as paths that hold anywhere."""
+    if path.resolve() in above:
+        raise UserError(f"{path} is its own base, through {', '.join(str(p.name) for p in above)}.")
+    data = load_yaml(path)
+    bases, without = data.pop(BASE, None) or [], data.pop(WITHOUT, None) or []
+    own = _at_file_keys(data, functools.partial(_anchored, folder=path.parent))
+    out: Data = {}
+    for name in [bases] if isinstance(bases, str) else bases:
+        out = merge(out, _load(path.parent / name, (*above, path.resolve())))
+    for name in without:
+        known = [p["name"] for p in out.get("phases", [])]
+        if name not in known:
+            raise UnknownNameError("phase", str(name), known, f"(in `{WITHOUT}` of {path.name})")
+        out["phases"] = [p for p in out["phases"] if p["name"] != name]
+    return merge(out, own)
+
+
+def _named(phases: Any) -> bool:
+    return isinstance(phases, list) and all(isinstance(p, Mapping) and "name" in p for p in phases)
+
+
+def _merge_phases(base: list[Data], changes: list[Data]) -> list[Data]:
+    out = {phase["name"]: phase for phase in base}
+    for phase in changes:
+        out[phase["name"]] = merge(out.get(phase["name"], {}), phase)
+    return list(out.values())
 
 
 def check_keys(kind: type, data: Any, where: str) -> None:
@@ -80,25 +121,37 @@ def _dataclasses_in(hint: Any) -> list[type]:
     return [found for argument in typing.get_args(hint) for found in _dataclasses_in(argument)]
 
 
-def _include(data: Data, folder: Path) -> Data:
-    """Replace file names under FILE_KEYS, at the top, in `defaults` and in each phase, by the files' content."""
+def _at_file_keys(data: Data, change: Callable[[Any], Any]) -> Data:
+    """`data` with what stands under FILE_KEYS changed: at the top, in `defaults` and in each phase."""
     out = dict(data)
     for key in FILE_KEYS:
         if key in out:
-            out[key] = _included(out[key], folder)
+            out[key] = change(out[key])
     if isinstance(out.get("defaults"), Mapping):
-        out["defaults"] = _include(dict(out["defaults"]), folder)
+        out["defaults"] = _at_file_keys(dict(out["defaults"]), change)
     if isinstance(out.get("phases"), list):
-        out["phases"] = [_include(dict(p), folder) if isinstance(p, Mapping) else p for p in out["phases"]]
+        out["phases"] = [_at_file_keys(dict(p), change) if isinstance(p, Mapping) else p for p in out["phases"]]
     return out
 
 
-def _included(value: Any, folder: Path) -> Any:
-    name = value if isinstance(value, str) else value.get("file") if isinstance(value, Mapping) else None
+def _anchored(value: Any, folder: Path) -> Any:
+    """A file name as `{file: path}`: it counts from the file that has it, else from the working directory."""
+    name = _file_of(value)
     if name is None:
         return value
-    # A name counts from the file that has it; from the working directory if there is no such file.
     near = folder / name
-    content = load_yaml(near if near.is_file() or not Path(name).is_file() else Path(name))
+    path = str(near if near.is_file() or not Path(name).is_file() else name)
+    return {"file": path} if isinstance(value, str) else {**value, "file": path}
+
+
+def _included(value: Any) -> Any:
+    name = _file_of(value)
+    if name is None:
+        return value
     changes = {} if isinstance(value, str) else {k: v for k, v in value.items() if k != "file"}
-    return merge(content, changes)
+    return merge(load_yaml(Path(name)), changes)
+
+
+def _file_of(value: Any) -> str | None:
+    name = value if isinstance(value, str) else value.get("file") if isinstance(value, Mapping) else None
+    return None if name is None else str(name)

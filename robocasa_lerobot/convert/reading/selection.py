@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import random
 import re
 from collections.abc import Collection, Sequence
 from pathlib import Path
 from typing import Protocol
 
+from robocasa_lerobot import contract
 from robocasa_lerobot.convert.reading.demo import SourceError
 from robocasa_lerobot.errors import UnknownNameError, UserError
 
@@ -37,17 +37,8 @@ class Listing(Protocol):
 
 
 def sample(names: Sequence[str], count: int, seed: int) -> tuple[str, ...]:
-    """`count` of the names, in the order of `names`; all where there are no more.
-
-    RoboCasa365's own rule for `<N>_demos` (its GR00T dataset class): the episodes in order are shuffled by Python's
-    generator with seed 0, and the first N taken.
-    """
-    if count >= len(names):
-        return tuple(names)
-    shuffled = list(names)
-    random.Random(seed).shuffle(shuffled)
-    chosen = set(shuffled[:count])
-    return tuple(name for name in names if name in chosen)
+    """`count` of the names, in the order of `names`; all where there are no more. Which: `contract.demo_subset`."""
+    return tuple(names[index] for index in contract.demo_subset(len(names), count, seed))
 
 
 def check_selection(filter_key: str | None, demos: str | None) -> None:
