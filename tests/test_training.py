@@ -334,7 +334,11 @@ def test_mistakes_are_told_before_training(tmp_path: Path, data: Path, overrides
 
 def test_weights_that_do_not_fit_are_told(tmp_path: Path, finished: Path, data: Path) -> None:
     start = finished / "out/pretrain/checkpoints/last/pretrained_model"
-    overrides = [f"--phases.pretrain.init={start}", "--defaults.statistics=keep", "--phases.pretrain.policy={width: 32}"]
+    overrides = [
+        f"--phases.pretrain.init={start}",
+        "--defaults.statistics=keep",
+        "--phases.pretrain.policy={width: 32}",
+    ]
     with pytest.raises(UserError, match="do not fit"):
         run_experiment(tiny(tmp_path, data, overrides=overrides))
     small = [f"--phases.pretrain.init={start}", "--defaults.statistics=keep", "--loader.image_size=16"]

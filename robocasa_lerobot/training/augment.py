@@ -1,0 +1,83 @@
+"""Random changes of the pictures of a batch, computed where the batch is and drawn for each sample on its own."""
+
+from __future__ import annotations
+
+import fnmatch
+import math
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import Tensor
+
+from robocasa_lerobot.training.phase_config import AugmentConfig
+
+_GREY = (0.299, 0.587, 0.114)  # luma of ITU-R BT.601
+# YIQ of the NTSC standard: the hue is the angle in the plane of its last two coordinates.
+_TO_YIQ = torch.tensor([_GREY, (0.5959, -0.2746, -0.3213), (0.2115, -0.5227, 0.3112)])
+
+
+def augment(
+    batch: dict[str, Tensor], cameras: list[str], config: AugmentConfig, seed: int, rank: int = 0, processes: int = 1
+) -> dict[str, Tensor]:
+    """The batch with changed pictures, float (B, ..., 3, H, W) in [0, 1].
+
+    What is drawn for a sample depends on the seed and its place in the batch of all processes only.
+    """
+    out = dict(batch)
+    for number, key in enumerate(cameras):
+        images = batch[key]
+        count = images.shape[0]
+        generator = np.random.default_rng((seed, number))
+        drawn = generator.uniform(-1, 1, (count * processes, 7))[rank * count : (rank + 1) * count]
+        flat = images.reshape(count, -1, *images.shape[-3:])
+        moved = config.crop_cameras is None or any(fnmatch.fnmatchcase(key, p) for p in config.crop_cameras)
+        if moved and (config.crop < 1 or config.rotate > 0):
+            flat = _crop_and_rotate(flat, config, drawn[:, :3])
+        out[key] = _jitter(flat, config, drawn[:, 3:]).reshape(images.shape)
+    return out
+
+
+def _crop_and_rotate(images: Tensor, config: AugmentConfig, drawn: NDArray[np.float64]) -> Tensor:
+    """Pictures (B, T, 3, H, W), each looked up on a smaller, shifted and turned grid; the edge is repeated."""
+    count, steps, channels, height, width = images.shape
+    angle = np.deg2rad(config.rotate) * drawn[:, 0]
+    cos, sin = config.crop * np.cos(angle), config.crop * np.sin(angle)
+    shift = (1 - config.crop) * drawn[:, 1:]
+    aspect = height / width
+    theta = np.stack([cos, -sin * aspect, shift[:, 0], sin / aspect, cos, shift[:, 1]], axis=1).reshape(-1, 2, 3)
+    grid = torch.nn.functional.affine_grid(
+        torch.from_numpy(theta).to(images), [count, channels, height, width], align_corners=False
+    )
+    stacked = images.reshape(count, steps * channels, height, width)  # all time steps alike
+    moved = torch.nn.functional.grid_sample(stacked, grid, padding_mode="border", align_corners=False)
+    return moved.reshape(images.shape)
+
+
+def _jitter(images: Tensor, config: AugmentConfig, drawn: NDArray[np.float64]) -> Tensor:
+    """Brightness, contrast, saturation and hue of pictures (B, T, 3, H, W), in this order."""
+    if not (config.brightness or config.contrast or config.saturation or config.hue):
+        return images
+    factors = torch.from_numpy(drawn).to(images)[:, :, None, None, None, None]
+    grey = torch.tensor(_GREY).to(images).reshape(3, 1, 1)
+    if config.brightness:
+        images = (images * (1 + config.brightness * factors[:, 0]).clamp(min=0)).clamp(0, 1)
+    if config.contrast:
+        mean = (images * grey).sum(dim=-3, keepdim=True).mean(dim=(1, -2, -1), keepdim=True)
+        images = (mean + (images - mean) * (1 + config.contrast * factors[:, 1]).clamp(min=0)).clamp(0, 1)
+    if config.saturation:
+        own = (images * grey).sum(dim=-3, keepdim=True)
+        images = (own + (images - own) * (1 + config.saturation * factors[:, 2]).clamp(min=0)).clamp(0, 1)
+    if config.hue:
+        images = torch.einsum("bij,btjhw->btihw", _hue_turn(config.hue * drawn[:, 3]).to(images), images).clamp(0, 1)
+    return images
+
+
+def _hue_turn(turns: NDArray[np.float64]) -> Tensor:
+    """Matrices (B, 3, 3) that turn the hue of RGB by so many full turns, and leave luma and greys as they are."""
+    angle = torch.from_numpy(2 * math.pi * turns).float()
+    turn = torch.zeros(len(turns), 3, 3)
+    turn[:, 0, 0] = 1
+    turn[:, 1, 1] = turn[:, 2, 2] = angle.cos()
+    turn[:, 1, 2], turn[:, 2, 1] = -angle.sin(), angle.sin()
+    return torch.linalg.inv(_TO_YIQ) @ turn @ _TO_YIQ
