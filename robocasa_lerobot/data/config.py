@@ -2,13 +2,19 @@
 
 from __future__ import annotations
 
+import re
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from robocasa_lerobot.errors import UserError
+from robocasa_lerobot.errors import UnknownNameError, UserError
 
 # Exponent on the number of frames with which the published benchmark weights its datasets: P ~ L^0.4
-# (RoboCasa365's Diffusion Policy and pi0 trainers).
+# (RoboCasa365's Diffusion Policy and pi0 trainers; its GR00T trainer comes to L^1.4).
 BENCHMARK_ALPHA = 0.4
+ROBOCASA365 = "robocasa365"  # the registry of the published datasets, in `datasets/` of the working directory
+
+_COUNT = re.compile(r"(\d+)(?:_demos)?$")
+_SHARE = re.compile(r"(\d+(?:\.\d+)?)%$")
 
 
 @dataclass
@@ -21,6 +27,9 @@ class MemberConfig:
         episodes: episode indices to keep; None keeps all. With `tasks`, both must hold.
         weight: how often the member is drawn, relative to the others; None: frames ** `alpha` of the mixture.
         make_fake: for debugging: write the tiny made-up dataset of `data/fake.py` at `root` if nothing is there.
+        demos: of the episodes that are left, so many of each task: `50` (or `50_demos`) or `10%`, by the
+            benchmark's rule (`contract.demo_subset`).
+        group: class of the member, for `shares` of the mixture.
     """
 
     root: str
@@ -28,13 +37,46 @@ class MemberConfig:
     episodes: list[int] | None = None
     weight: float | None = None
     make_fake: bool = False
+    demos: str | None = None
+    group: str | None = None
 
     def __post_init__(self) -> None:
-        if self.weight is not None and not self.weight > 0:
-            raise UserError(f"mixture member {self.root!r}: weight is {self.weight}, expected a number above 0.")
+        self.demos = _check_part(f"mixture member {self.root!r}", self.weight, self.demos)
         for name, values in (("tasks", self.tasks), ("episodes", self.episodes)):
             if values is not None and (not values or len(set(values)) != len(values)):
                 raise UserError(f"mixture member {self.root!r}: `{name}` is empty or has repeats: {values}.")
+
+
+@dataclass
+class SelectionConfig:
+    """Datasets of a registry, one member of the mixture for each task, split and source.
+
+    Attributes:
+        registry: `robocasa365` (the published folders, in `datasets/`) or a registry file (`data/registry.py`).
+        task_set: a set of tasks such as `atomic_seen`; those of which nothing is published are left out.
+        tasks: names of tasks, instead of a set or beside it.
+        split: `pretrain` or `target`; None is both.
+        source: `human`, `mg` and so on; None is all.
+        views: `lerobot`, or `lerobot_cotraining_cams` for pictures from the real cameras' views.
+        demos: so many of each dataset, as for a member.
+        weight: of each of the datasets, as for a member.
+        group: class of the datasets, as for a member.
+    """
+
+    registry: str = ROBOCASA365
+    task_set: str | None = None
+    tasks: list[str] | None = None
+    split: str | None = None
+    source: str | None = None
+    views: str = "lerobot"
+    demos: str | None = None
+    weight: float | None = None
+    group: str | None = None
+
+    def __post_init__(self) -> None:
+        self.demos = _check_part(f"selection of {self.registry!r}", self.weight, self.demos)
+        if self.tasks is not None and (not self.tasks or len(set(self.tasks)) != len(self.tasks)):
+            raise UserError(f"selection of {self.registry!r}: `tasks` is empty or has repeats: {self.tasks}.")
 
 
 @dataclass
@@ -42,21 +84,31 @@ class MixtureConfig:
     """Datasets and how often each is drawn: a dataset by its weight, then one of its frames uniformly.
 
     Attributes:
-        members: the datasets; either all or none of them have a `weight`.
+        members: the datasets; either all or none of them (and of `select`) have a `weight`.
         alpha: without weights, a dataset of L frames is drawn with a probability proportional to L ** alpha:
             1 makes every frame equally likely, 0 every dataset.
+        select: further members, by task set, split and source.
+        shares: of each class (`group` of the members), such as `{real: 0.15, same_views: 0.3, other: 0.55}`; inside
+            a class by `weight`, or equally without weights.
     """
 
     members: list[MemberConfig] = field(default_factory=list)
     alpha: float = BENCHMARK_ALPHA
+    select: list[SelectionConfig] = field(default_factory=list)
+    shares: dict[str, float] | None = None
 
     def __post_init__(self) -> None:
-        if not self.members:
-            raise UserError("mixture: no members; give at least one `{root: <folder of a LeRobotDataset>}`.")
-        weighted = [member for member in self.members if member.weight is not None]
-        if weighted and len(weighted) != len(self.members):
-            plain = next(member.root for member in self.members if member.weight is None)
-            raise UserError(f"mixture: {plain!r} has no `weight` while others have one; give all or none.")
+        parts: list[MemberConfig | SelectionConfig] = [*self.members, *self.select]
+        if not parts:
+            raise UserError(
+                "mixture: no members; give at least one `{root: <folder of a LeRobotDataset>}`, or a `select`."
+            )
+        weighted = [part for part in parts if part.weight is not None]
+        if weighted and len(weighted) != len(parts):
+            plain = next(part for part in parts if part.weight is None)
+            raise UserError(f"mixture: {_name(plain)} has no `weight` while others have one; give all or none.")
+        if self.shares is not None:
+            _check_shares(self.shares, parts)
 
 
 @dataclass
@@ -69,6 +121,9 @@ class LoaderConfig:
         cache_budget_gb: what "if they fit" means, in 10^9 bytes for all datasets of a phase together.
         cache_dir: where the frames are kept; null is `<output_dir>/frame_cache`.
         image_size: height and width in pixels handed to the policy; null is the dataset's own size.
+        cache_columns_above_gb: states, actions and other numbers of larger mixtures stay in memory-mapped files in
+            the cache folder instead of memory (10^9 bytes for all datasets of a phase, in each loader process).
+        cache_open_files: videos, and datasets' memory-mapped numbers, that a loader process keeps open at once.
     """
 
     workers: int = 0
@@ -76,3 +131,48 @@ class LoaderConfig:
     cache_budget_gb: float = 8.0
     cache_dir: str | None = None
     image_size: int | None = None
+    cache_columns_above_gb: float = 2.0
+    cache_open_files: int = 64
+
+    def __post_init__(self) -> None:
+        if self.cache_open_files < 1:
+            raise UserError(f"loader: cache_open_files is {self.cache_open_files}, expected at least 1.")
+
+
+def demo_count(demos: str, total: int) -> int:
+    """How many of `total` demonstrations `50`, `50_demos` or `10%` are; a share is at least one."""
+    count, share = _COUNT.fullmatch(demos), _SHARE.fullmatch(demos)
+    if count:
+        return min(total, int(count[1]))
+    assert share, f"not checked: demos {demos!r}"
+    return max(1, round(total * float(share[1]) / 100))
+
+
+def _check_part(what: str, weight: float | None, demos: str | None) -> str | None:
+    """`demos` as text, once both have been checked."""
+    if weight is not None and not weight > 0:
+        raise UserError(f"{what}: weight is {weight}, expected a number above 0.")
+    if demos is None:
+        return None
+    text = str(demos).strip()
+    count, share = _COUNT.fullmatch(text), _SHARE.fullmatch(text)
+    if not (count and int(count[1]) > 0) and not (share and 0 < float(share[1]) <= 100):
+        raise UserError(f"{what}: demos is {text!r}, expected a number (50, 50_demos) or a share (10%).")
+    return text
+
+
+def _check_shares(shares: dict[str, float], parts: Sequence[MemberConfig | SelectionConfig]) -> None:
+    for group, share in shares.items():
+        if not share > 0:
+            raise UserError(f"mixture: the share of {group!r} is {share}, expected a number above 0.")
+        if group not in {part.group for part in parts}:
+            raise UserError(f"mixture: no member has `group: {group}`, which has a share.")
+    for part in parts:
+        if part.group is None:
+            raise UserError(f"mixture: {_name(part)} has no `group`, which `shares` needs: {sorted(shares)}.")
+        if part.group not in shares:
+            raise UnknownNameError("group", part.group, shares, f"({_name(part)}; groups are those in `shares`)")
+
+
+def _name(part: MemberConfig | SelectionConfig) -> str:
+    return repr(part.root) if isinstance(part, MemberConfig) else f"a selection of {part.registry!r}"

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from robocasa_lerobot.data.config import LoaderConfig, MixtureConfig
 from robocasa_lerobot.data.frame_cache import FrameCache, cache_bytes, open_or_build, resize_images
+from robocasa_lerobot.data.registry import resolve_mixture
 from robocasa_lerobot.data.sampler import FramePool, MixtureSampler, mixture_probabilities
 from robocasa_lerobot.data.source import DatasetSource
 from robocasa_lerobot.data.statistics import Statistics, pooled_statistics
@@ -54,6 +55,7 @@ class _Member:
 class MixtureDataset(torch.utils.data.Dataset[Item]):
     """Items as LeRobot's datasets give them, over the members of a mixture.
 
+    `config` is the mixture with its selections written out as members (`data/registry.py`).
     An item has every column of the frame, and for the keys of `delta_timestamps` a leading time axis and
     `<key>_is_pad` (true where the window leaves the episode and repeats its edge). Images are uint8
     (time, 3, H, W), other floats float32; `task` is the instruction and `task_index` its place in `meta.tasks`.
@@ -64,6 +66,7 @@ class MixtureDataset(torch.utils.data.Dataset[Item]):
     """
 
     def __init__(self, config: MixtureConfig, image_size: int | None = None) -> None:
+        config = resolve_mixture(config)
         self.config, self.image_size = config, image_size
         self._deltas: dict[str, list[int]] = {}
         self._picture_size: tuple[int, int] | None = None
@@ -80,10 +83,11 @@ class MixtureDataset(torch.utils.data.Dataset[Item]):
         self._members = []
         for member in config.members:
             source = self.sources[Path(member.root)]
-            self._members.append(_Member(source, source.select(member.tasks, member.episodes)))
+            self._members.append(_Member(source, source.select(member.tasks, member.episodes, member.demos)))
         frames = [int((m.source.ends - m.source.starts)[m.episodes].sum()) for m in self._members]
         weights = [member.weight for member in config.members if member.weight is not None]
-        self.probabilities = mixture_probabilities(frames, weights or None, config.alpha)
+        groups = [str(member.group) for member in config.members]
+        self.probabilities = mixture_probabilities(frames, weights or None, config.alpha, groups, config.shares)
         self._offsets = np.cumsum([0, *(m.source.total_frames for m in self._members)])
         first = self._members[0].source
         self.meta = MixtureMeta(

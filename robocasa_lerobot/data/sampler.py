@@ -6,7 +6,7 @@ processes and loader workers, and wherever training was interrupted.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -46,9 +46,16 @@ class FramePool:
 
 
 def mixture_probabilities(
-    frames: Sequence[int], weights: Sequence[float] | None = None, alpha: float = 0.4
+    frames: Sequence[int],
+    weights: Sequence[float] | None = None,
+    alpha: float = 0.4,
+    groups: Sequence[str] | None = None,
+    shares: Mapping[str, float] | None = None,
 ) -> NDArray[np.float64]:
-    """Probability of each dataset: `weights` if given, else frames ** alpha; both are normalised to sum 1.
+    """Probability of each dataset; all together are 1.
+
+    Proportional to `weights` if given, else to frames ** alpha. With `shares`, the datasets of a class (`groups[i]`)
+    have its share together, divided by `weights`, or equally without them (RoboCasa365's co-training with real data).
 
     Raises:
         UserError: a dataset has no frames.
@@ -56,8 +63,18 @@ def mixture_probabilities(
     counts = np.asarray(frames, dtype=np.float64)
     if (counts <= 0).any():
         raise UserError(f"mixture: member number {int(np.argmin(counts))} has no frames to draw from.")
-    raw = counts**alpha if weights is None else np.asarray(weights, dtype=np.float64)
-    return raw / raw.sum()
+    if shares is None:
+        # Relative to the largest, so that no power of a count overflows.
+        raw = (counts / counts.max()) ** alpha if weights is None else np.asarray(weights, dtype=np.float64)
+        return raw / raw.sum()
+    assert groups is not None
+    assert set(groups) == set(shares)
+    raw = np.ones(len(counts)) if weights is None else np.asarray(weights, dtype=np.float64)
+    out = np.zeros(len(counts))
+    for group, share in shares.items():
+        of_group = np.array([name == group for name in groups])
+        out[of_group] = share * raw[of_group] / raw[of_group].sum()
+    return out / out.sum()
 
 
 class MixtureSampler:

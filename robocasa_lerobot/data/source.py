@@ -15,6 +15,8 @@ import pyarrow.parquet as pq
 from lerobot.datasets.io_utils import load_info, load_tasks
 from numpy.typing import NDArray
 
+from robocasa_lerobot import contract
+from robocasa_lerobot.data.config import demo_count
 from robocasa_lerobot.errors import UnknownNameError, UserError
 
 EPISODE_TABLE = "meta/robocasa/episodes.jsonl"
@@ -57,8 +59,13 @@ class DatasetSource:
         name = str(self._info.video_path).format(video_key=key, chunk_index=chunk, file_index=file)
         return self.root / name, float(start)
 
-    def select(self, tasks: Sequence[str] | None, episodes: Sequence[int] | None) -> NDArray[np.int64]:
+    def select(
+        self, tasks: Sequence[str] | None, episodes: Sequence[int] | None, demos: str | None = None
+    ) -> NDArray[np.int64]:
         """Indices (ascending) of the episodes of the given tasks and indices; None keeps all.
+
+        `demos` (`50`, `10%`) then keeps so many of each task, by the benchmark's rule; a dataset that does not know
+        its tasks counts as one.
 
         Raises:
             UserError: an unknown task, an index out of range, or nothing left.
@@ -77,7 +84,16 @@ class DatasetSource:
             kept = np.array([index for index in kept if names[index] in tasks], dtype=np.int64)
         if not len(kept):
             raise UserError(f"{self.root}: no episode is left with tasks={tasks} and episodes={episodes}.")
-        return kept
+        return kept if demos is None else self._sample(kept, demos)
+
+    def _sample(self, kept: NDArray[np.int64], demos: str) -> NDArray[np.int64]:
+        known = (self.root / EPISODE_TABLE).is_file()
+        names = np.array(self._task_names())[kept] if known else np.zeros(len(kept))
+        parts = []
+        for name in np.unique(names):
+            of_task = kept[names == name]
+            parts.append(of_task[list(contract.demo_subset(len(of_task), demo_count(demos, len(of_task))))])
+        return np.sort(np.concatenate(parts))
 
     def _task_names(self) -> list[str]:
         path = self.root / EPISODE_TABLE

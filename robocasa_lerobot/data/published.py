@@ -1,0 +1,121 @@
+"""RoboCasa365's published datasets: what there is of which task, and the folders it lies in."""
+
+from __future__ import annotations
+
+import functools
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass
+from importlib import resources
+from pathlib import Path
+
+from robocasa_lerobot.errors import UserError
+
+VERSION_FOLDER = "v1.0"  # of RoboCasa365's datasets
+CONVERTED = "_v3"  # after the name of a published (v2.1) dataset's folder: its conversion, beside it
+TARGET_SETS = ("atomic_seen", "composite_seen", "composite_unseen")
+
+
+@dataclass(frozen=True)
+class DatasetEntry:
+    """A dataset of one task, or the part of a dataset that is one task's; `missing` says how to get it, if it is.
+
+    `root` is where it is or should be, relative to the working directory if the registry is; `task_filter` says
+    that the dataset has other tasks too.
+    """
+
+    task: str
+    split: str
+    source: str
+    root: Path
+    missing: str | None = None
+    task_filter: bool = False
+
+
+@functools.cache
+def published_tasks() -> dict[str, tuple[str, frozenset[str]]]:
+    """Kind (`atomic`, `composite`) and sets of each of RoboCasa365's tasks, by name."""
+    text = resources.files("robocasa_lerobot.data").joinpath("robocasa365.jsonl").read_text(encoding="utf-8")
+    rows = [json.loads(line) for line in text.splitlines()]
+    return {row["task"]: (row["kind"], frozenset(row["sets"])) for row in rows}
+
+
+@functools.cache
+def published_task_sets() -> dict[str, tuple[str, ...]]:
+    """The benchmark's task sets by name, with `target50` (the three target sets) and `diversity17`.
+
+    `diversity17` are the atomic target tasks with MimicGen data, those of the scene-diversity experiment.
+    """
+    sets: dict[str, list[str]] = {}
+    for task, (_, names) in published_tasks().items():
+        own = set(names)
+        own |= {"target50"} if own & set(TARGET_SETS) else set()
+        own |= {"diversity17"} if {"atomic_seen", "mimicgen60"} <= own else set()
+        for name in own:
+            sets.setdefault(name, []).append(task)
+    return {name: tuple(tasks) for name, tasks in sorted(sets.items())}
+
+
+# Which tasks have data, by split and source. The folders of the two reduced MimicGen sets are not described
+# anywhere: they are looked for by the same pattern, with the source's own name in the place of `mg`.
+PUBLISHED: dict[tuple[str, str], str] = {
+    ("pretrain", "human"): "pretrain300",
+    ("pretrain", "mg"): "mimicgen60",
+    ("pretrain", "mg_5x5"): "diversity17",
+    ("pretrain", "mg_5x1"): "diversity17",
+    ("target", "human"): "target50",
+}
+
+
+class PublishedDatasets:
+    """RoboCasa365's datasets under a folder, in its scheme.
+
+    `[v1.0/]<split>/<kind>/<Task>/<date>/lerobot` for human demonstrations, `.../<date>/mg/demo/<time>/lerobot` for
+    those of MimicGen. They are published as LeRobotDataset v2.1; a conversion to v3.0 is looked for in their place
+    and, with `_v3` after the name, beside them. Of several dates the newest counts.
+    """
+
+    def __init__(self, root: Path) -> None:
+        self.root = root
+        self._base = root / VERSION_FOLDER if (root / VERSION_FOLDER).is_dir() else root
+
+    def find(self, tasks: Sequence[str], split: str | None, source: str | None, views: str) -> list[DatasetEntry]:
+        """What is published of the tasks, in the order of the tasks, there or not."""
+        wanted = [key for key in PUBLISHED if split in (None, key[0]) and source in (None, key[1])]
+        found = []
+        for task in tasks:
+            for key in wanted:
+                if task in published_task_sets()[PUBLISHED[key]]:
+                    found.append(self._entry(task, *key, views))
+        return found
+
+    def _entry(self, task: str, split: str, source: str, views: str) -> DatasetEntry:
+        parent = self._base / split / published_tasks()[task][0] / task
+        inner = "*" if source == "human" else f"*/{source}/demo/*"
+        dated = sorted(path for path in parent.glob(inner) if path.is_dir())
+        for folder in reversed(dated):
+            for name in (views, views + CONVERTED):
+                if dataset_version(folder / name) == "v3.0":
+                    return DatasetEntry(task, split, source, folder / name)
+            version = dataset_version(folder / views)
+            if version is not None:
+                old, new = folder / views, folder / (views + CONVERTED)
+                remedy = f"{version} there, v3.0 is needed: `robocasa-lerobot convert {old} --out {new}`"
+                return DatasetEntry(task, split, source, new, remedy)
+        expected = parent.parent / "<Task>" / inner.replace("*", "<date>", 1).replace("*", "<time>") / views
+        remedy = (
+            f"get them with RoboCasa's own downloads, so that they lie at {expected}, and convert them with "
+            f"`robocasa-lerobot convert <folder> --out <folder>{CONVERTED}`"
+        )
+        return DatasetEntry(task, split, source, parent, remedy)
+
+
+def dataset_version(root: Path) -> str | None:
+    """`codebase_version` of the LeRobot dataset at `root`; None if there is none."""
+    path = root / "meta" / "info.json"
+    if not path.is_file():
+        return None
+    try:
+        return str(json.loads(path.read_text(encoding="utf-8")).get("codebase_version"))
+    except ValueError as error:
+        raise UserError(f"{path}: not valid JSON: {error}; get or convert the dataset again.") from error
