@@ -243,6 +243,8 @@ def _renderer(run: Run, processes: int) -> float:
     answers = [worker.receive() for worker in workers]
     if processes == 1:
         run.loading.append((answers[0]["loading_s"], answers[0]["seconds"], len(hands[0])))
+    with_opening = sum(answer["frames"] / (answer["seconds"] + answer["loading_s"]) for answer in answers)
+    run.rates.setdefault(f"states_scenes_{processes}", []).append(with_opening)
     return _sum_of_rates(run, f"states_renderer_{processes}", answers)
 
 
