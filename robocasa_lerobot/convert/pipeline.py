@@ -9,7 +9,6 @@ from __future__ import annotations
 import contextlib
 import json
 import os
-import platform
 import shutil
 from collections import Counter
 from collections.abc import Sequence
@@ -31,6 +30,7 @@ from robocasa_lerobot.convert.running.work import (
     check_output,
     failures_explained,
     locked,
+    make_piece,
     partial_folder,
     publish,
     report_frames,
@@ -247,21 +247,14 @@ class _ShardTask:
 
         quiet_libraries()  # on another machine nobody has done it
         shard = self.plan.shards[rank]
-        folder = shard_folder(partial, rank)
-        if folder.exists():
-            return  # complete; only the executor's marker was lost
-        # Of its own, since the worker of a run that was killed may still be at the same shard for a moment.
-        attempt = folder.with_name(f"{folder.name}.attempt-{platform.node()}-{os.getpid()}")
-        if isinstance(self.plan, V2Plan):
-            convert_v2_shard(self.plan, shard, attempt, report)
-        else:
-            convert_shard(self.plan, shard, attempt, report)
-        try:
-            attempt.rename(folder)
-        except OSError:
-            if not folder.exists():
-                raise
-            shutil.rmtree(attempt)  # somebody else finished it: the bytes are the same
+
+        def write(folder: Path) -> None:
+            if isinstance(self.plan, V2Plan):
+                convert_v2_shard(self.plan, shard, folder, report)
+            else:
+                convert_shard(self.plan, shard, folder, report)
+
+        make_piece(shard_folder(partial, rank), write)
 
 
 def quiet_libraries() -> None:

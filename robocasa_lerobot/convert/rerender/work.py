@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import json
 import os
-import platform
 import shutil
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass
@@ -35,6 +34,7 @@ from robocasa_lerobot.convert.running.work import (
     check_output,
     failures_explained,
     locked,
+    make_piece,
     partial_folder,
     publish,
     report_frames,
@@ -121,25 +121,17 @@ class _Piece:
 
     def __call__(self, data: None, rank: int = 0, world_size: int = 1) -> None:
         partial = Path(self.partial)
-        folder = _piece_folder(partial, rank)
-        if folder.exists():
-            return  # complete; only the executor's marker was lost
         quiet_libraries()
-        attempt = folder.with_name(f"{folder.name}.attempt-{platform.node()}-{os.getpid()}")
-        shutil.rmtree(attempt, ignore_errors=True)
-        attempt.mkdir(parents=True)
-        done = 0
         episodes = {episode.index: episode for episode in self.plan.dataset.episodes}
-        for number in self.plan.pieces[rank]:
-            done = _render_episode(
-                self.plan, episodes[number], attempt, done, lambda frames: report_frames(partial, rank, frames)
-            )
-        try:
-            attempt.rename(folder)
-        except OSError:
-            if not folder.exists():
-                raise
-            shutil.rmtree(attempt)  # somebody else finished it: the bytes are the same
+
+        def draw(folder: Path) -> None:
+            done = 0
+            for number in self.plan.pieces[rank]:
+                done = _render_episode(
+                    self.plan, episodes[number], folder, done, lambda frames: report_frames(partial, rank, frames)
+                )
+
+        make_piece(_piece_folder(partial, rank), draw)
 
 
 def _render_episode(

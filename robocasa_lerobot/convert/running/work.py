@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import contextlib
 import fcntl
+import os
+import platform
 import shutil
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -148,6 +150,26 @@ def require_complete(pieces: int, partial: Path) -> None:
             f"{len(missing)} of {pieces} pieces are not complete (the first: {missing[0]}): there is nothing to join "
             "yet. Give the same command without --merge to run them."
         )
+
+
+def make_piece(folder: Path, make: Callable[[Path], object]) -> None:
+    """Let `make` fill a folder that then gets its name; nothing is done where it is there already.
+
+    Each process fills one of its own, since the worker of a run that was killed may still be at the same piece for a
+    moment. Whoever is first wins: the bytes are the same.
+    """
+    if folder.exists():
+        return  # complete; only the executor's marker was lost
+    attempt = folder.with_name(f"{folder.name}.attempt-{platform.node()}-{os.getpid()}")
+    shutil.rmtree(attempt, ignore_errors=True)
+    attempt.mkdir(parents=True)
+    make(attempt)
+    try:
+        attempt.rename(folder)
+    except OSError:
+        if not folder.exists():
+            raise
+        shutil.rmtree(attempt)
 
 
 def report_frames(partial: Path, rank: int, count: int) -> None:
