@@ -11,8 +11,11 @@ from typing import Any
 import draccus
 import lerobot.policies  # noqa: F401  registers LeRobot's own policy types
 import torch
+from huggingface_hub import snapshot_download
 from lerobot.configs.policies import PreTrainedConfig
 from lerobot.datasets.factory import resolve_delta_timestamps
+from lerobot.optim.optimizers import OptimizerConfig
+from lerobot.optim.schedulers import LRSchedulerConfig
 from lerobot.policies.factory import get_policy_class, make_policy, make_pre_post_processors
 from lerobot.policies.pretrained import PreTrainedPolicy
 from lerobot.utils.constants import IMAGENET_STATS
@@ -22,7 +25,7 @@ from robocasa_lerobot.data.mixture import MixtureDataset, MixtureMeta
 from robocasa_lerobot.data.statistics import Statistics
 from robocasa_lerobot.errors import UnknownNameError, UserError
 from robocasa_lerobot.policies.registry import register_policies
-from robocasa_lerobot.training.config import PhaseConfig
+from robocasa_lerobot.training.phase_config import PhaseConfig
 
 
 def best_device(wanted: str | None) -> str:
@@ -117,9 +120,13 @@ def make_processors(
 def make_optimizer(
     policy: PreTrainedPolicy, phase: PhaseConfig
 ) -> tuple[torch.optim.Optimizer, torch.optim.lr_scheduler.LRScheduler | None, float]:
-    """The policy's own optimiser and schedule with the phase's changes, and the largest gradient norm (0: any)."""
-    preset = policy.config.get_optimizer_preset()
-    optimizer = preset.build(policy.get_optim_params())
+    """The policy's own optimiser and schedule with the phase's changes, and the largest gradient norm (0: any).
+
+    Raises:
+        UserError: a setting that the optimiser or schedule does not have, or nothing to train.
+    """
+    preset = _changed(OptimizerConfig, policy.config.get_optimizer_preset(), phase.optimizer, "optimizer")
+    optimizer = preset.build(_trained_groups(policy, phase))
     if not isinstance(optimizer, torch.optim.Optimizer):
         raise UserError(f"policy {policy.config.type!r} wants several optimisers, which training does not support.")
     for group in optimizer.param_groups:
@@ -130,11 +137,66 @@ def make_optimizer(
         for group in optimizer.param_groups:
             group["lr"] *= phase.learning_rate / preset.lr
     schedule = policy.config.get_scheduler_preset()
+    if phase.scheduler.get("type") == "none":
+        schedule = None
+    elif phase.scheduler:
+        schedule = _changed(LRSchedulerConfig, schedule, phase.scheduler, "scheduler")
     if schedule is not None and phase.warmup_steps is not None:
         schedule = dataclasses.replace(schedule, num_warmup_steps=phase.warmup_steps)
     scheduler = schedule.build(optimizer, phase.steps) if schedule is not None else None
     clip = preset.grad_clip_norm if phase.grad_clip_norm is None else phase.grad_clip_norm
     return optimizer, scheduler, float(clip or 0.0)
+
+
+def _changed(registry: Any, preset: Any, changes: Mapping[str, Any], what: str) -> Any:
+    """The policy's own settings with changes, or another type's with what is given for it."""
+    kind = changes.get("type", preset.type if preset is not None else None)
+    fields = {key: value for key, value in changes.items() if key != "type"}
+    if kind not in registry.get_known_choices():
+        raise UnknownNameError(f"type of {what}", str(kind), [*registry.get_known_choices(), "none"])
+    chosen = registry.get_choice_class(kind)
+    names = [f.name for f in dataclasses.fields(chosen)]
+    for key in fields:
+        if key not in names:
+            raise UnknownNameError("key", key, names, f"(in `{what}`)")
+    fields = {key: tuple(value) if isinstance(value, list) else value for key, value in fields.items()}
+    if preset is not None and kind == preset.type:
+        return dataclasses.replace(preset, **fields)
+    try:
+        return chosen(**fields)
+    except TypeError as error:
+        raise UserError(f"`{what}` of type {kind!r}: {error}.") from error
+
+
+def _trained_groups(policy: PreTrainedPolicy, phase: PhaseConfig) -> Any:
+    """The policy's parameter groups without what is frozen; one group where low-rank changes are trained."""
+    trained = [p for p in policy.parameters() if p.requires_grad]
+    if not trained:
+        raise UserError(f"phase {phase.name!r}: `freeze` leaves nothing of the policy to train.")
+    if phase.lora is not None:
+        return [{"params": trained}]
+    params = policy.get_optim_params()
+    if isinstance(params, dict):  # an optimiser that goes by the names
+        return {name: p for name, p in params.items() if p.requires_grad}
+    params = list(params)
+    groups = params if params and isinstance(params[0], dict) else [{"params": params}]
+    kept = [{**group, "params": [p for p in group["params"] if p.requires_grad]} for group in groups]
+    return [group for group in kept if group["params"]]
+
+
+def hub_checkpoint(name: str) -> Path:
+    """Folder of a policy on the hub, downloaded or from the local cache.
+
+    Raises:
+        UserError: there is none of that name, or no way to get it.
+    """
+    try:
+        return Path(snapshot_download(name))
+    except Exception as error:  # the hub's client raises many kinds
+        raise UserError(
+            f"cannot get the policy {name!r} from the hub: {error} Where there is no network, download it elsewhere "
+            "with `hf download`, and give its folder as the start."
+        ) from error
 
 
 def with_imagenet_statistics(stats: Statistics, camera_keys: list[str]) -> Statistics:

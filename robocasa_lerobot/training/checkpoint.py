@@ -1,7 +1,8 @@
 """Checkpoints in LeRobot's layout, complete or not there at all.
 
 <phase>/checkpoints/000100/pretrained_model/   config.json, model.safetensors, processors, train_config.json
-<phase>/checkpoints/000100/training_state/     optimiser, schedule, step, raw weights if averaged, log window
+<phase>/checkpoints/000100/training_state/     optimiser, schedule, step, log window; the weights as they are
+                                               trained, where `pretrained_model` has averaged or merged ones
 <phase>/checkpoints/last -> 000100
 """
 
@@ -9,6 +10,7 @@ from __future__ import annotations
 
 import json
 import shutil
+from contextlib import nullcontext
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -16,14 +18,15 @@ from typing import Any
 import torch
 from lerobot.common.train_utils import load_training_state, save_training_state
 from lerobot.policies.pretrained import PreTrainedPolicy
-from safetensors.torch import load_model, save_model
+from safetensors.torch import load_file, load_model, save_file, save_model
 
 from robocasa_lerobot.errors import UserError
+from robocasa_lerobot.training.adapters import merged_state
 from robocasa_lerobot.training.ema import Ema
 
 CHECKPOINTS, LAST = "checkpoints", "last"
 PRETRAINED, STATE = "pretrained_model", "training_state"
-RAW_WEIGHTS, LOG_WINDOW = "raw_model.safetensors", "log_window.json"
+RAW_WEIGHTS, AVERAGE, LOG_WINDOW = "raw_model.safetensors", "average.safetensors", "log_window.json"
 
 
 @dataclass
@@ -36,14 +39,56 @@ class TrainingState:
     optimizer: torch.optim.Optimizer
     scheduler: torch.optim.lr_scheduler.LRScheduler | None
     ema: Ema | None
+    low_rank: bool = False
     step: int = 0
     log_window: dict[str, list[float]] = field(default_factory=dict)
 
 
 def last_checkpoint(phase_dir: Path) -> Path | None:
     """The newest complete checkpoint of a phase, or None."""
-    found = [path for path in (phase_dir / CHECKPOINTS).glob("[0-9]*") if path.name.isdigit() and path.is_dir()]
-    return max(found, key=lambda path: int(path.name), default=None)
+    return max(_checkpoints(phase_dir), key=checkpoint_step, default=None)
+
+
+def tidy(phase_dir: Path) -> None:
+    """Bring a phase's checkpoints in order after a kill: nothing half-written, and `last` points at the newest."""
+    parent = phase_dir / CHECKPOINTS
+    for stale in [*parent.glob(".writing-*"), *parent.glob(".dropped-*")]:
+        shutil.rmtree(stale)
+    newest = last_checkpoint(phase_dir)
+    link = parent / LAST
+    if newest is not None and not (link.is_symlink() and link.readlink() == Path(newest.name)):
+        _point_last_at(newest)
+
+
+def prune(phase_dir: Path, keep_last: int, keep_every: int) -> None:
+    """Remove checkpoints beyond the newest `keep_last` (0 keeps all).
+
+    The initial one stays, and so do those whose step is a multiple of `keep_every` (0: none).
+    """
+    if not keep_last:
+        return
+    for checkpoint in sorted(_checkpoints(phase_dir), key=checkpoint_step)[:-keep_last]:
+        step = checkpoint_step(checkpoint)
+        if step and not (keep_every and step % keep_every == 0):
+            _drop(checkpoint)
+
+
+def _checkpoints(phase_dir: Path) -> list[Path]:
+    return [path for path in (phase_dir / CHECKPOINTS).glob("[0-9]*") if path.name.isdigit() and path.is_dir()]
+
+
+def _drop(checkpoint: Path) -> None:
+    """Remove it whole or not at all: a folder with half its files would look like a checkpoint."""
+    aside = checkpoint.with_name(f".dropped-{checkpoint.name}")
+    checkpoint.rename(aside)
+    shutil.rmtree(aside)
+
+
+def _point_last_at(checkpoint: Path) -> None:
+    link = checkpoint.with_name(".last")
+    link.unlink(missing_ok=True)
+    link.symlink_to(checkpoint.name)
+    link.replace(checkpoint.with_name(LAST))
 
 
 def checkpoint_step(checkpoint: Path) -> int:
@@ -60,28 +105,24 @@ def save_checkpoint(phase_dir: Path, state: TrainingState, train_config: Any) ->
     """Write a checkpoint aside, rename it, and point `last` at it."""
     parent = phase_dir / CHECKPOINTS
     parent.mkdir(parents=True, exist_ok=True)
-    for stale in parent.glob(".writing-*"):  # what a killed process left
-        shutil.rmtree(stale)
+    tidy(phase_dir)
     final, aside = parent / f"{state.step:06d}", parent / f".writing-{state.step:06d}"
     model_dir, state_dir = aside / PRETRAINED, aside / STATE
     save_training_state(aside, state.step, state.optimizer, state.scheduler)
     (state_dir / LOG_WINDOW).write_text(json.dumps(state.log_window))
-    if state.ema is None:
-        state.policy.save_pretrained(model_dir)
-    else:
+    if state.ema is not None or state.low_rank:
         save_model(state.policy, str(state_dir / RAW_WEIGHTS))
-        with state.ema.applied():
-            state.policy.save_pretrained(model_dir)
+    if state.ema is not None and state.low_rank:  # merged weights do not tell the averages
+        save_file(state.ema.state(), state_dir / AVERAGE)
+    with state.ema.applied() if state.ema is not None else nullcontext():
+        state.policy.save_pretrained(model_dir, state_dict=merged_state(state.policy))
     state.preprocessor.save_pretrained(model_dir)
     state.postprocessor.save_pretrained(model_dir)
     train_config.save_pretrained(model_dir)
     if final.exists():
-        shutil.rmtree(final)
+        _drop(final)
     aside.rename(final)
-    link = parent / ".last"
-    link.unlink(missing_ok=True)
-    link.symlink_to(final.name)
-    link.replace(parent / LAST)
+    _point_last_at(final)
     return final
 
 
@@ -95,12 +136,17 @@ def restore(checkpoint: Path, state: TrainingState) -> None:
     if not folder.is_dir():
         raise UserError(f"{checkpoint} has no {STATE}/, so training cannot go on from it; start a new phase from it.")
     raw = folder / RAW_WEIGHTS
-    if raw.is_file() != (state.ema is not None):
+    if raw.is_file() != (state.ema is not None or state.low_rank):
         raise UserError(
-            f"{checkpoint} was written with{'' if raw.is_file() else 'out'} `ema`; the phase says otherwise."
+            f"{checkpoint} was written with{'' if raw.is_file() else 'out'} `ema` or `lora`; the phase says otherwise."
         )
-    if raw.is_file():
-        load_model(state.policy, str(raw), strict=True)
+    try:
+        if raw.is_file():
+            load_model(state.policy, str(raw), strict=True)
+        if state.ema is not None and state.low_rank:
+            state.ema.load(load_file(folder / AVERAGE))
+    except (RuntimeError, OSError) as error:
+        raise UserError(f"{folder} does not fit the phase's policy: {error}") from error
     try:
         state.step, _, _ = load_training_state(checkpoint, state.optimizer, state.scheduler)
     except (KeyError, ValueError, TypeError) as error:

@@ -7,7 +7,7 @@ from contextlib import contextmanager
 
 import torch
 
-from robocasa_lerobot.training.config import EmaConfig
+from robocasa_lerobot.training.phase_config import EmaConfig
 
 
 def ema_decay(step: int, config: EmaConfig) -> float:
@@ -37,6 +37,21 @@ class Ema:
         decay = ema_decay(self.step, self.config)
         torch._foreach_lerp_(self._average, [p.detach() for p in self._live], 1.0 - decay)
         self.step += 1
+
+    def state(self) -> dict[str, torch.Tensor]:
+        """The averages, by the place of their parameter."""
+        return {f"{number:06d}": average for number, average in enumerate(self._average)}
+
+    def load(self, state: dict[str, torch.Tensor]) -> None:
+        """Take averages over that `state` gave.
+
+        Raises:
+            RuntimeError: they are of other parameters.
+        """
+        if len(state) != len(self._average):
+            raise RuntimeError(f"{len(state)} averages for {len(self._average)} parameters")
+        for number, average in enumerate(self._average):
+            average.copy_(state[f"{number:06d}"])
 
     @contextmanager
     def applied(self) -> Iterator[None]:

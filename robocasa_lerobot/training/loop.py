@@ -6,13 +6,12 @@ the step, and the samples follow from their position, so a run that was killed g
 
 from __future__ import annotations
 
-import json
 import math
 import sys
 import time
 from collections.abc import Callable, Iterator
-from contextlib import nullcontext
-from dataclasses import dataclass
+from contextlib import AbstractContextManager, nullcontext
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -23,10 +22,16 @@ from tqdm import tqdm
 
 from robocasa_lerobot.data.mixture import StepBatches
 from robocasa_lerobot.errors import UserError
-from robocasa_lerobot.training.checkpoint import TrainingState, save_checkpoint
-from robocasa_lerobot.training.config import PhaseConfig
+from robocasa_lerobot.training.augment import augment
+from robocasa_lerobot.training.checkpoint import TrainingState, prune, save_checkpoint
+from robocasa_lerobot.training.held_out import HeldOut
+from robocasa_lerobot.training.metrics import HELD_OUT, METRICS, append_line, draw_curve, track
+from robocasa_lerobot.training.phase_config import PhaseConfig
+from robocasa_lerobot.training.shared_noise import SharedNoise
 
-METRICS = "metrics.jsonl"
+BAD_BATCH = "bad_batch"
+# Policies whose loss is a mean over the actions inside the episode, of which parts of a batch have different numbers.
+MEAN_OF_INSIDE = ("act",)
 
 
 @dataclass
@@ -34,7 +39,8 @@ class PhaseRun:
     """Everything that a phase trains with.
 
     `batches` holds parts of a batch (`gradient_accumulation` of them make one), `stop` is asked after each step
-    whether to save and end early, and `train_config` goes into the checkpoints for LeRobot.
+    whether to save and end early, `always_eval` are modules that keep out of training mode, and `train_config` goes
+    into the checkpoints for LeRobot.
     """
 
     config: PhaseConfig
@@ -46,18 +52,22 @@ class PhaseRun:
     seed: int
     workers: int
     train_config: Any
-    stop: Callable[[int], bool]
+    stop: Callable[[], bool]
+    held_out: HeldOut | None = None
+    always_eval: list[torch.nn.Module] = field(default_factory=list)
 
 
 def train_phase(run: PhaseRun, accelerator: Accelerator) -> bool:
     """Train from `run.state.step` to the phase's last step; returns whether it got there.
 
     Raises:
-        UserError: the loss is no longer a finite number.
+        UserError: the loss is no longer a finite number; the batch is saved beside the checkpoints.
     """
     config, state, parts = run.config, run.state, run.config.gradient_accumulation
     policy, optimizer = accelerator.prepare(state.policy, state.optimizer)
-    policy.train()
+    if config.compile:
+        state.policy.compile()
+    _set_training(run)
     batches = _loader(run, first=state.step * parts, end=config.steps * parts)
     if state.step == 0 and config.save_initial:
         _save(run, accelerator)
@@ -72,19 +82,22 @@ def train_phase(run: PhaseRun, accelerator: Accelerator) -> bool:
     )
     began, stopped = time.perf_counter(), False
     while state.step < config.steps and not stopped:
-        waited, loss_sum = 0.0, torch.zeros((), device=accelerator.device)
-        for part in range(parts):
-            asked = time.perf_counter()
-            batch = state.preprocessor(_as_float(next(batches), run.camera_keys))
-            waited += time.perf_counter() - asked
-            torch.manual_seed(_step_seed(run.seed, state.step, part, accelerator.process_index))
+        asked = time.perf_counter()
+        loaded = [next(batches) for _ in range(parts)]
+        waited = time.perf_counter() - asked
+        shares = _shares(loaded, state.policy.config.type, accelerator)
+        loss_sum = torch.zeros((), device=accelerator.device)
+        for part, (batch, share) in enumerate(zip(loaded, shares, strict=True)):
+            prepared = _prepare(run, batch, accelerator, part)
             with nullcontext() if part == parts - 1 else accelerator.no_sync(policy):
-                with accelerator.autocast():
-                    loss, outputs = policy(batch)
-                accelerator.backward(loss / parts)
-            loss_sum += loss.detach() / parts
+                with accelerator.autocast(), _noise(run, part, accelerator):
+                    loss, outputs = policy(prepared)
+                accelerator.backward(loss * share)
+            loss_sum += loss.detach() * share
+        mean_loss = accelerator.reduce(loss_sum, reduction="mean")
         clip = run.grad_clip_norm if run.grad_clip_norm > 0 else math.inf
         grad_norm = accelerator.clip_grad_norm_(policy.parameters(), clip)
+        _check_finite(run, loaded, mean_loss, grad_norm, accelerator)
         learning_rate = optimizer.param_groups[0]["lr"]
         optimizer.step()
         optimizer.zero_grad()
@@ -95,41 +108,27 @@ def train_phase(run: PhaseRun, accelerator: Accelerator) -> bool:
         state.step += 1
         progress.update(1)
 
-        mean_loss = accelerator.reduce(loss_sum, reduction="mean")
         _note(state.log_window, loss=mean_loss, grad_norm=grad_norm, seconds=time.perf_counter() - began, waited=waited)
         _note(state.log_window, **{f"policy/{k}": v for k, v in _scalars(outputs).items() if k != "loss"})
         began = time.perf_counter()
         if state.step % config.log_every == 0 or state.step == config.steps:
             line = _metrics_line(state, learning_rate, config.batch_size)
             progress.set_postfix(loss=f"{line['loss']:.4f}", lr=f"{learning_rate:.1e}", refresh=False)
-            if not math.isfinite(line["loss"]):
-                raise UserError(
-                    f"phase {config.name!r}: the loss is {line['loss']} at step {state.step}. Lower `learning_rate`, "
-                    "set `grad_clip_norm`, or look for bad values in the data with `robocasa-lerobot verify`. The "
-                    "checkpoints written so far are sound."
-                )
             if accelerator.is_main_process:
-                with (run.folder / METRICS).open("a") as file:
-                    file.write(json.dumps(line) + "\n")
-        stopped = _agree(run.stop(state.step), accelerator)
+                append_line(run.folder / METRICS, line)
+            track(accelerator, config.name, line)
+        if run.held_out is not None and run.held_out.due(state.step, config.steps):
+            _measure_held_out(run, run.held_out, accelerator)
+            began = time.perf_counter()
+        stopped = _agree(run.stop(), accelerator)
         due = config.save_every > 0 and state.step % config.save_every == 0
         if due or stopped or state.step == config.steps:
             _save(run, accelerator)
             began = time.perf_counter()
     progress.close()
+    if accelerator.is_main_process:
+        draw_curve(run.folder)
     return state.step >= config.steps
-
-
-def truncate_metrics(folder: Path, step: int) -> None:
-    """Drop the lines of steps that will be done again, and a last line that was cut off."""
-    path = folder / METRICS
-    if not path.is_file():
-        return
-    lines = path.read_text().splitlines(keepends=True)
-    kept = [line for line in lines if line.endswith("}\n") and json.loads(line)["step"] <= step]
-    aside = path.with_suffix(".tmp")
-    aside.write_text("".join(kept))
-    aside.replace(path)
 
 
 def _loader(run: PhaseRun, first: int, end: int) -> Iterator[dict[str, Any]]:
@@ -145,13 +144,103 @@ def _loader(run: PhaseRun, first: int, end: int) -> Iterator[dict[str, Any]]:
     return iter(loader)
 
 
-def _as_float(batch: dict[str, Any], camera_keys: list[str]) -> dict[str, Any]:
-    """Pictures as float32 in [0, 1], which is what LeRobot's policies take."""
-    return {key: value.float().div_(255) if key in camera_keys else value for key, value in batch.items()}
+def _prepare(run: PhaseRun, batch: dict[str, Any], accelerator: Accelerator, part: int | None = None) -> dict[str, Any]:
+    """A batch as the policy takes it: pictures as float32 in [0, 1], changed while training, then normalised.
+
+    Pictures travel to the device as bytes, a quarter of their size as floats. `part` None is not training.
+    """
+    batch = dict(batch)
+    for key in run.camera_keys:
+        batch[key] = batch[key].to(accelerator.device, non_blocking=True).float().div_(255)
+    if part is not None and run.config.augment is not None:
+        seed = step_seed(run.seed, run.state.step, part, 0)
+        rank, processes = accelerator.process_index, accelerator.num_processes
+        batch = augment(batch, run.camera_keys, run.config.augment, seed, rank, processes)
+    prepared: dict[str, Any] = run.state.preprocessor(batch)
+    return prepared
 
 
-def _step_seed(seed: int, step: int, part: int, process: int) -> int:
+def _noise(run: PhaseRun, part: int, accelerator: Accelerator) -> AbstractContextManager[Any]:
+    """Seed the policy's randomness of a part of a step, alike for any number of processes where that can be."""
+    rank, processes = accelerator.process_index, accelerator.num_processes
+    torch.manual_seed(step_seed(run.seed, run.state.step, part, rank))
+    if processes == 1 or run.config.compile:  # compiled code would leave the mode out
+        return nullcontext()
+    samples = run.batches.batch_size // processes
+    return SharedNoise(samples, rank, processes, step_seed(run.seed, run.state.step, part, 0))
+
+
+def step_seed(seed: int, step: int, part: int, process: int) -> int:
+    """The seed of what a process draws for a part of a step."""
     return int(np.random.SeedSequence((seed, step, part, process)).generate_state(1, np.uint64)[0] >> np.uint64(1))
+
+
+def _shares(loaded: list[dict[str, Any]], kind: str, accelerator: Accelerator) -> list[float]:
+    """What each part's loss counts, so that parts and processes add up to the loss of the whole batch.
+
+    Gradients are averaged over the processes afterwards, so the shares of all processes sum to their number.
+    """
+    equal = [1 / len(loaded)] * len(loaded)
+    processes = accelerator.num_processes
+    if kind not in MEAN_OF_INSIDE or len(loaded) * processes == 1 or "action_is_pad" not in loaded[0]:
+        return equal
+    inside = torch.stack([(~batch["action_is_pad"]).sum() for batch in loaded]).double()
+    total = float(accelerator.reduce(inside.sum().float().to(accelerator.device), reduction="sum"))
+    return [float(count) * processes / total for count in inside] if total else equal
+
+
+def _check_finite(
+    run: PhaseRun, loaded: list[dict[str, Any]], loss: torch.Tensor, grad_norm: Any, accelerator: Accelerator
+) -> None:
+    """Stop before a step that would make the weights worthless, and keep the batch that led to it.
+
+    Raises:
+        UserError: the loss or the gradient is no finite number.
+    """
+    scaled = accelerator.scaler is not None  # fp16 skips steps whose gradient is too large, by itself
+    norm = 0.0 if scaled or grad_norm is None else float(grad_norm)
+    if math.isfinite(float(loss)) and math.isfinite(norm):
+        return
+    step, state = run.state.step, run.state
+    path = run.folder / f"{BAD_BATCH}_{step:06d}_rank{accelerator.process_index}.pt"
+    aside = path.with_suffix(".tmp")
+    torch.save({"step": step, "loss": float(loss), "grad_norm": norm, "parts": loaded}, aside)
+    aside.replace(path)
+    bad = sorted(
+        {
+            k
+            for b in loaded
+            for k, v in b.items()
+            if torch.is_tensor(v) and v.is_floating_point() and not v.isfinite().all()
+        }
+    )
+    found = f"Not finite in it: {', '.join(bad)}. " if bad else "Its values are finite. "
+    rates = [group["lr"] for group in state.optimizer.param_groups]
+    what = f"the loss is {float(loss)}" + ("" if math.isfinite(norm) else f", the gradient's norm {norm}")
+    raise UserError(
+        f"phase {run.config.name!r}: {what} at step {step + 1}; the learning rate is {max(rates):.2g}. The batch is in "
+        f"{path}. {found}Lower `learning_rate`, set `grad_clip_norm`, or look for bad values in the data with "
+        "`robocasa-lerobot verify`. The checkpoints written so far are sound."
+    )
+
+
+def _measure_held_out(run: PhaseRun, held_out: HeldOut, accelerator: Accelerator) -> None:
+    """Loss of the weights that checkpoints hold, without augmentation and dropout."""
+    state = run.state
+    state.policy.eval()
+    with state.ema.applied() if state.ema is not None else nullcontext(), accelerator.autocast():
+        losses = held_out.measure(lambda b: state.policy(_prepare(run, b, accelerator)), run.seed, accelerator)
+    _set_training(run)
+    line = {"step": state.step, "loss": sum(losses.values()) / len(losses), "tasks": losses}
+    if accelerator.is_main_process:
+        append_line(run.folder / HELD_OUT, line)
+    track(accelerator, run.config.name, {**line, "held_out_loss": line["loss"], "loss": None})
+
+
+def _set_training(run: PhaseRun) -> None:
+    run.state.policy.train()
+    for module in run.always_eval:
+        module.eval()
 
 
 def _scalars(outputs: Any) -> dict[str, float]:
@@ -182,11 +271,13 @@ def _metrics_line(state: TrainingState, learning_rate: float, batch_size: int) -
     steps = len(window["loss"])
     line = {"step": state.step, "samples": state.step * batch_size, "learning_rate": learning_rate}
     line |= {key: sum(values) / len(values) for key, values in window.items()}
-    return line | {"seconds_per_step": seconds / steps, "data_seconds_per_step": waited / steps}
+    times = {"seconds_per_step": seconds / steps, "data_seconds_per_step": waited / steps}
+    return line | times | {"data_share": waited / seconds, "samples_per_second": steps * batch_size / seconds}
 
 
 def _save(run: PhaseRun, accelerator: Accelerator) -> None:
     run.state.log_window = {key: [float(v) for v in values] for key, values in run.state.log_window.items()}
     if accelerator.is_main_process:
         save_checkpoint(run.folder, run.state, run.train_config)
+        prune(run.folder, run.config.keep_last, run.config.keep_every)
     accelerator.wait_for_everyone()

@@ -15,24 +15,37 @@ from robocasa_lerobot.settings import Data, load_yaml, set_dotted
 
 FILE_KEYS = ("policy", "mixture")  # their value may be the name of a YAML file, or hold one under `file`
 BASE, WITHOUT = "base", "without_phases"
-# Settings of FILE_KEYS that say what the thing is: with one of them, nothing of the base's is left.
-IDENTITY = ("file", "type", "path", "members")
+# Settings that say what the thing is, and with each the settings of the base that it puts an end to; None is all.
+IDENTITY: dict[str, dict[str, tuple[str, ...] | None]] = {
+    "policy": {"file": None, "type": None, "path": None},
+    "mixture": {"file": None, **dict.fromkeys(("members", "select"), ("file", "members", "select", "shares"))},
+}
 
 
 def merge(base: Mapping[str, Any], changes: Mapping[str, Any]) -> Data:
     """`base` with `changes` laid over it: mappings key by key, phases by name, everything else replaced.
 
-    A policy or mixture that names what it is (a file, a type, members) replaces the base's with all its settings.
+    A policy or mixture that names what it is (a file, a type) replaces the base's with all its settings, and new
+    members of a mixture replace the base's.
     """
     out = dict(copy.deepcopy(dict(base)))
     for key, value in changes.items():
         both = isinstance(value, Mapping) and isinstance(out.get(key), Mapping)
         if key == "phases" and _named(out.get(key)) and _named(value):
             out[key] = _merge_phases(out[key], value)
-        elif both and not (key in FILE_KEYS and any(name in value for name in IDENTITY)):
-            out[key] = merge(out[key], value)
+        elif both:
+            out[key] = merge(_kept(key, out[key], value), value)
         else:
             out[key] = copy.deepcopy(value)
+    return out
+
+
+def _kept(key: str, base: Mapping[str, Any], changes: Mapping[str, Any]) -> Data:
+    """What of the policy or mixture `base` is left where `changes` say what it is."""
+    out = dict(base)
+    for name in IDENTITY.get(key, {}).keys() & changes.keys():
+        ended = IDENTITY[key][name]
+        out = {} if ended is None else {k: v for k, v in out.items() if k not in ended}
     return out
 
 

@@ -1,0 +1,41 @@
+"""Requests to save and end: a number of steps, or a signal of the system that runs the job."""
+
+from __future__ import annotations
+
+import signal
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+SIGNALS = (signal.SIGTERM, signal.SIGUSR1)  # Slurm sends the one it is told to before the time is over
+REQUEUE = 75  # exit status "try again later" (EX_TEMPFAIL of sysexits.h): saved on a signal
+STOPPED = 3  # exit status: saved after the number of steps that was asked for
+
+
+class Interrupts:
+    """Whether training has been asked to save and end; `stop` is asked once after each step."""
+
+    def __init__(self, stop_after: int | None = None) -> None:
+        self.stop_after, self.signalled, self._steps = stop_after, False, 0
+
+    def stop(self) -> bool:
+        """Whether to save and end after this step."""
+        self._steps += 1
+        return self.signalled or (self.stop_after is not None and self._steps >= self.stop_after)
+
+    @contextmanager
+    def listening(self) -> Iterator[None]:
+        """Take signals inside this context, and leave them to whoever had them before after it."""
+
+        def on_signal(*_: object) -> None:
+            self.signalled = True
+
+        try:
+            before = {number: signal.signal(number, on_signal) for number in SIGNALS}
+        except ValueError:  # not in the main thread: signals are somebody else's
+            yield
+            return
+        try:
+            yield
+        finally:
+            for number, handler in before.items():
+                signal.signal(number, handler)

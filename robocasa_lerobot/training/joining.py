@@ -1,0 +1,55 @@
+"""Mixtures put together: samples of earlier phases among those of a later one, and statistics over several."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+
+from robocasa_lerobot.data.config import MixtureConfig
+from robocasa_lerobot.data.mixture import MixtureDataset, open_mixture
+from robocasa_lerobot.data.statistics import Statistics
+from robocasa_lerobot.errors import UserError
+from robocasa_lerobot.training.config import ExperimentConfig, PhaseConfig
+
+
+def open_phase_data(experiment: ExperimentConfig, phase: PhaseConfig) -> MixtureDataset:
+    """The phase's mixture, with its share of earlier phases' samples.
+
+    Raises:
+        UserError: as `open_mixture`.
+    """
+    own = open_mixture(phase.mixture, experiment.loader)
+    earlier = experiment.replayed(phase)
+    if phase.replay is None or not earlier:
+        return own
+    again = [open_mixture(other.mixture, experiment.loader) for other in earlier]
+    shares = [1 - phase.replay.share, *[phase.replay.share / len(again)] * len(again)]
+    return open_mixture(joined([own, *again], shares), experiment.loader)
+
+
+def pooled(experiment: ExperimentConfig, phase: PhaseConfig, dataset: MixtureDataset) -> Statistics:
+    """Statistics of this phase's data and of those it builds on, each counted by the samples drawn from it.
+
+    Raises:
+        UserError: the phase builds on no phase of this experiment, so that there are no data to pool with.
+    """
+    earlier = experiment.ancestors(phase)
+    if not earlier:
+        raise UserError(
+            f"phase {phase.name!r}: `statistics: pool` needs the data of what it starts from, and "
+            f"{experiment.init_of(phase)!r} is no phase of this experiment. Set `keep` or `replace`."
+        )
+    samples = [other.steps * other.batch_size for other in [phase, *earlier]]
+    shares = [count / sum(samples) for count in samples]
+    before = [open_phase_data(experiment, other) for other in earlier]
+    return open_mixture(joined([dataset, *before], shares), experiment.loader).statistics()
+
+
+def joined(datasets: Sequence[MixtureDataset], shares: Sequence[float]) -> MixtureConfig:
+    """One mixture that draws from each of several by its share, and inside each as it does."""
+    members = [
+        dataclasses.replace(member, weight=float(probability * share), group=None)
+        for dataset, share in zip(datasets, shares, strict=True)
+        for member, probability in zip(dataset.config.members, dataset.probabilities, strict=True)
+    ]
+    return MixtureConfig(members=members)

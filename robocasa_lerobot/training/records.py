@@ -1,0 +1,137 @@
+"""What a phase folder says about its run: settings, data, versions and commit, and whether they are still the same."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+import json
+import platform
+import subprocess
+from importlib import metadata
+from pathlib import Path
+from typing import Any
+
+import torch
+import yaml
+
+from robocasa_lerobot.data.mixture import MixtureDataset
+from robocasa_lerobot.errors import UserError
+from robocasa_lerobot.training import overlay
+from robocasa_lerobot.training.checkpoint import last_checkpoint
+from robocasa_lerobot.training.config import FROM_SCRATCH, ExperimentConfig, PhaseConfig, to_yaml
+
+EXPERIMENT_FILE, PHASE_FILE, CONFIG_FILE = "experiment.yaml", "phase.json", "config.yaml"
+PACKAGES = ("robocasa-lerobot", "lerobot", "torch", "accelerate", "transformers", "diffusers", "numpy")
+# Settings that may change while a phase is under way, because the losses do not depend on them.
+FREE_SETTINGS = (
+    *("loader.workers", "loader.cache", "device", "trackers", "save_every", "keep_last", "keep_every", "log_every"),
+    *("held_out.every", "held_out.samples", "evaluations"),
+)
+
+
+def write_text(path: Path, text: str) -> None:
+    """Write a file whole or not at all."""
+    aside = path.with_name(f".{path.name}")
+    aside.write_text(text, encoding="utf-8")
+    aside.replace(path)
+
+
+def describe_phase(
+    experiment: ExperimentConfig,
+    phase: PhaseConfig,
+    dataset: MixtureDataset,
+    policy: torch.nn.Module,
+    init: Path | None,
+) -> dict[str, Any]:
+    """The content of `phase.json`."""
+    return {
+        "experiment": experiment.name,
+        "phase": phase.name,
+        "init": str(init) if init else FROM_SCRATCH,
+        "statistics": phase.statistics if init else "replace",
+        "data": dataset.describe().splitlines(),
+        "data_fingerprint": dataset.fingerprint,
+        "parameters": sum(p.numel() for p in policy.parameters()),
+        "trainable_parameters": sum(p.numel() for p in policy.parameters() if p.requires_grad),
+        "versions": {"python": platform.python_version(), **_versions()},
+        "git_commit": git_commit(),
+    }
+
+
+def write_records(folder: Path, about: dict[str, Any], experiment: ExperimentConfig, phase: PhaseConfig) -> None:
+    """Write `phase.json`, and the experiment with this phase alone as `config.yaml`."""
+    folder.mkdir(parents=True, exist_ok=True)
+    write_text(folder / PHASE_FILE, json.dumps(about, indent=2))
+    resolved = {**dataclasses.asdict(experiment), "phases": [dataclasses.asdict(phase)]}
+    resolved["phases"][0]["init"] = about["init"]
+    write_text(folder / CONFIG_FILE, yaml.safe_dump(resolved, sort_keys=False, width=120))
+
+
+def check_unchanged(experiment: ExperimentConfig, output: Path, force: bool) -> None:
+    """Check that what has begun in `output` is continued as it began.
+
+    Raises:
+        UserError: a setting that matters is different; all of them are listed.
+    """
+    path = output / EXPERIMENT_FILE
+    if not path.is_file() or force:
+        return
+    begun = {phase.name for phase in experiment.phases if last_checkpoint(output / phase.name)}
+    old = overlay.flatten(yaml.safe_load(path.read_text(encoding="utf-8")))
+    new = overlay.flatten(yaml.safe_load(to_yaml(experiment)))
+    lines = [
+        f"  {key}: {old.get(key, '(not set)')} -> {new.get(key, '(not set)')}"
+        for key in sorted(old.keys() | new.keys())
+        if old.get(key) != new.get(key) and begun and not _may_change(key, begun)
+    ]
+    if lines:
+        raise UserError(
+            f"{output} holds the same experiment with other settings:\n" + "\n".join(lines) + "\nGive another "
+            "`--output_dir`, remove the folder, or pass `--resume=force` to go on with the new settings."
+        )
+
+
+def check_same_data(folder: Path, about: dict[str, Any]) -> None:
+    """Check that a begun phase goes on with the data that it began with.
+
+    Raises:
+        UserError: they are others now.
+    """
+    path = folder / PHASE_FILE
+    if not path.is_file():
+        return
+    before = json.loads(path.read_text(encoding="utf-8"))
+    if before["data_fingerprint"] != about["data_fingerprint"]:
+        raise UserError(
+            f"{folder} was begun with other data: {before['data']}; now: {about['data']} (or their content changed). "
+            "Restore them, or start in another `--output_dir`."
+        )
+
+
+@functools.cache
+def git_commit() -> str | None:
+    """Commit of the checkout that holds this code, if it is one; with `-dirty` where files differ from it."""
+    here = str(Path(__file__).parent)
+    command = ["git", "-C", here, "describe", "--always", "--abbrev=40", "--dirty", "--exclude=*"]
+    try:
+        out = subprocess.run(command, capture_output=True, text=True, check=False)
+    except OSError:  # no git on this machine
+        return None
+    return out.stdout.strip() or None if out.returncode == 0 else None
+
+
+def _may_change(key: str, begun: set[str]) -> bool:
+    if key.startswith("phases."):
+        name = next((name for name in begun if key.startswith(f"phases.{name}.")), None)
+        return name is None or key.removeprefix(f"phases.{name}.").startswith(FREE_SETTINGS)
+    return key.startswith(FREE_SETTINGS) or key in ("name", "output_dir")
+
+
+def _versions() -> dict[str, str]:
+    found = {}
+    for name in PACKAGES:
+        try:
+            found[name] = metadata.version(name)
+        except metadata.PackageNotFoundError:
+            continue
+    return found
