@@ -7,15 +7,12 @@ killed continues with the episode where it stopped.
 
 from __future__ import annotations
 
-import fcntl
 import functools
 import hashlib
 import json
-import shutil
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -25,6 +22,7 @@ from lerobot.datasets.video_utils import decode_video_frames
 from numpy.typing import NDArray
 from tqdm import tqdm
 
+from robocasa_lerobot.data.cache_folder import check_disk, locked
 from robocasa_lerobot.data.source import DatasetSource
 from robocasa_lerobot.errors import UserError
 
@@ -78,9 +76,10 @@ def open_or_build(source: DatasetSource, keys: Sequence[str], size: tuple[int, i
     name = f"{source.root.name}_{size[0]}x{size[1]}_{hashlib.sha256(text.encode()).hexdigest()[:16]}"
     folder, partial = cache_dir / name, cache_dir / f"{name}.partial"
     cache_dir.mkdir(parents=True, exist_ok=True)
-    with _lock(cache_dir / f"{name}.lock"):
+    with locked(cache_dir / f"{name}.lock"):
         if not folder.is_dir():
-            _check_disk(cache_bytes(source, keys, size), cache_dir)
+            remedy = ", a smaller `loader.image_size`, or `loader.cache_frames: false`"
+            check_disk(cache_bytes(source, keys, size), cache_dir, "the frame cache", remedy)
             _fill(source, sorted(keys), size, partial)
             partial.rename(folder)
     return FrameCache(folder)
@@ -128,20 +127,3 @@ def _decode(
     except Exception as error:
         raise UserError(f"{path}: cannot decode episode {episode}: {error}. Run `robocasa-lerobot verify`.") from error
     return resize_images(frames, size)
-
-
-def _check_disk(needed: int, folder: Path) -> None:
-    free = shutil.disk_usage(folder).free
-    if needed > 0.9 * free:
-        raise UserError(
-            f"the frame cache needs {needed / 1e9:.1f} GB but {folder} has {free / 1e9:.1f} GB free. Set "
-            "`loader.cache_dir` to a larger disk, a smaller `loader.image_size`, or `loader.cache_frames: false`."
-        )
-
-
-@contextmanager
-def _lock(path: Path) -> Iterator[None]:
-    """An exclusive lock that the system frees when its holder dies."""
-    with path.open("w") as file:
-        fcntl.flock(file, fcntl.LOCK_EX)
-        yield

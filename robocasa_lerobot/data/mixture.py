@@ -5,6 +5,8 @@ Numbers come from memory, pictures from the frame cache or, without one, from Le
 
 from __future__ import annotations
 
+import hashlib
+from collections import OrderedDict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,15 +14,15 @@ from typing import Any
 
 import numpy as np
 import torch
-from lerobot.datasets.lerobot_dataset import LeRobotDataset
 from numpy.typing import NDArray
 
-from robocasa_lerobot.data.config import LoaderConfig, MixtureConfig
+from robocasa_lerobot.data.config import LoaderConfig, MemberConfig, MixtureConfig
 from robocasa_lerobot.data.frame_cache import FrameCache, cache_bytes, open_or_build, resize_images
+from robocasa_lerobot.data.pictures import PictureReader
 from robocasa_lerobot.data.registry import resolve_mixture
 from robocasa_lerobot.data.sampler import FramePool, MixtureSampler, mixture_probabilities
 from robocasa_lerobot.data.source import DatasetSource
-from robocasa_lerobot.data.statistics import Statistics, pooled_statistics
+from robocasa_lerobot.data.statistics import Part, Statistics, cached_statistics, pooled_statistics
 from robocasa_lerobot.errors import UserError
 
 Item = dict[str, Any]
@@ -51,6 +53,10 @@ class _Member:
     source: DatasetSource
     episodes: NDArray[np.int64]
 
+    @property
+    def frames(self) -> int:
+        return int((self.source.ends - self.source.starts)[self.episodes].sum())
+
 
 class MixtureDataset(torch.utils.data.Dataset[Item]):
     """Items as LeRobot's datasets give them, over the members of a mixture.
@@ -65,26 +71,38 @@ class MixtureDataset(torch.utils.data.Dataset[Item]):
         UserError: members that do not fit each other, or that have no such episodes.
     """
 
-    def __init__(self, config: MixtureConfig, image_size: int | None = None) -> None:
-        config = resolve_mixture(config)
-        self.config, self.image_size = config, image_size
+    def __init__(
+        self, config: MixtureConfig, image_size: int | None = None, loader: LoaderConfig | None = None
+    ) -> None:
+        config, loader = resolve_mixture(config), loader or LoaderConfig()
+        self.config, self.image_size = config, image_size if image_size is not None else loader.image_size
+        image_size = self.image_size
         self._deltas: dict[str, list[int]] = {}
         self._picture_size: tuple[int, int] | None = None
         self._caches: dict[Path, FrameCache] = {}
-        self._readers: dict[Path, LeRobotDataset] = {}
+        self._pictures = PictureReader(loader.cache_open_files)
+        self._recent: OrderedDict[Path, None] = OrderedDict()  # sources with mapped columns, the last used at the end
+        self._max_open = loader.cache_open_files
+        self._cache_dir = Path(loader.cache_dir) if loader.cache_dir else None
         roots = dict.fromkeys(Path(member.root) for member in config.members)
         self.sources = {root: DatasetSource(root) for root in roots}
         _check_alike(list(self.sources.values()), any_image_size=image_size is not None)
+        # Whether the numbers of all datasets stay on disk, mapped into memory as they are used.
+        self._mapped = sum(s.column_bytes for s in self.sources.values()) > loader.cache_columns_above_gb * 1e9
         tasks = sorted({text for source in self.sources.values() for text in source.instructions})
+        number = {text: index for index, text in enumerate(tasks)}
         # Index in the mixture's tasks of each task index of a dataset.
         self._task_index = {
-            root: np.array([tasks.index(text) for text in source.instructions]) for root, source in self.sources.items()
+            root: np.array([number[text] for text in source.instructions]) for root, source in self.sources.items()
         }
         self._members = []
         for member in config.members:
             source = self.sources[Path(member.root)]
             self._members.append(_Member(source, source.select(member.tasks, member.episodes, member.demos)))
-        frames = [int((m.source.ends - m.source.starts)[m.episodes].sum()) for m in self._members]
+        places = {root: place for place, root in enumerate(self.sources)}
+        self._source_list = list(self.sources.values())
+        self._place = np.array([places[Path(member.root)] for member in config.members])  # of each member's source
+        frames = [m.frames for m in self._members]
         weights = [member.weight for member in config.members if member.weight is not None]
         groups = [str(member.group) for member in config.members]
         self.probabilities = mixture_probabilities(frames, weights or None, config.alpha, groups, config.shares)
@@ -110,21 +128,32 @@ class MixtureDataset(torch.utils.data.Dataset[Item]):
     @property
     def fingerprint(self) -> str:
         """Hash of the data of all members."""
-        return "-".join(source.fingerprint[:16] for source in self.sources.values())
+        return hashlib.sha256("-".join(source.fingerprint for source in self._source_list).encode()).hexdigest()
+
+    def episodes_of(self, member: MemberConfig) -> NDArray[np.int64]:
+        """Indices in its dataset, ascending, of the episodes of a member of `config`."""
+        return self._members[self.config.members.index(member)].episodes
 
     def describe(self) -> str:
         """A line for each member: episodes, frames, and how often it is drawn."""
         lines = []
         for member, part, probability in zip(self.config.members, self._members, self.probabilities, strict=True):
-            frames = int((part.source.ends - part.source.starts)[part.episodes].sum())
             tasks = ", ".join(member.tasks) if member.tasks else "all tasks"
-            lines.append(f"{member.root} ({tasks}): {len(part.episodes)} episodes, {frames} frames, {probability:.1%}")
+            counts = f"{len(part.episodes)} episodes, {part.frames} frames"
+            lines.append(f"{member.root} ({tasks}): {counts}, {probability:.{1 if probability >= 0.01 else 3}%}")
         return "\n".join(lines)
 
-    def statistics(self) -> Statistics:
-        """Pooled statistics of the frames that the mixture draws, weighted as it draws them."""
-        members = self._members
-        return pooled_statistics([m.source for m in members], [m.episodes for m in members], self.probabilities)
+    def statistics(self, images: bool = True) -> Statistics:
+        """Pooled statistics of the frames that the mixture draws, weighted as it draws them.
+
+        Without `images`, of the numbers alone. With a cache folder they are computed once for all processes.
+        """
+        parts = [
+            Part(m.source, m.episodes, p, self._use) for m, p in zip(self._members, self.probabilities, strict=True)
+        ]
+        if self._cache_dir is None:
+            return pooled_statistics(parts, images)
+        return cached_statistics(parts, self._cache_dir, images)
 
     def sampler(self, seed: int, drop_last_frames: int = 0) -> MixtureSampler:
         """The sampler over the mixture; the last frames of each episode can be kept from starting a sample."""
@@ -140,7 +169,6 @@ class MixtureDataset(torch.utils.data.Dataset[Item]):
         """The window of each key, in seconds relative to the frame, as LeRobot's `delta_timestamps`."""
         windows = delta_timestamps or {}
         self._deltas = {key: [round(t * self.meta.fps) for t in times] for key, times in windows.items()}
-        self._readers.clear()
 
     def set_picture_size(self, size: tuple[int, int] | None) -> None:
         """Hand out pictures at (height, width) `size` where that is smaller than what the features say.
@@ -157,6 +185,7 @@ class MixtureDataset(torch.utils.data.Dataset[Item]):
         Returns:
             False where it was left out, because the frames take more than the budget or are no video.
         """
+        self._cache_dir = self._cache_dir or cache_dir
         keys = [key for key, f in self.meta.features.items() if f["dtype"] == "video"]
         if keys != self.meta.camera_keys or not keys:
             return False
@@ -165,7 +194,7 @@ class MixtureDataset(torch.utils.data.Dataset[Item]):
         if budget_bytes is not None and needed > budget_bytes:
             return False
         for root, source in self.sources.items():
-            self._caches[root] = open_or_build(source, keys, size, cache_dir)
+            self._caches[root] = open_or_build(self._use(source), keys, size, cache_dir)
         return True
 
     def _feature_size(self) -> tuple[int, int]:
@@ -184,11 +213,11 @@ class MixtureDataset(torch.utils.data.Dataset[Item]):
         """A collated batch: frame `frames[i]` of the dataset of member `members[i]`, for each i."""
         order: list[NDArray[np.int64]] = []
         parts: list[Item] = []
-        for source in dict.fromkeys(self._members[number].source for number in np.unique(members)):
-            of_source = np.array([member.source is source for member in self._members])
-            chosen = np.flatnonzero(of_source[members])
+        places = self._place[members]
+        for place in dict.fromkeys(places.tolist()):
+            chosen = np.flatnonzero(places == place)
             order.append(chosen)
-            parts.append(self._read(source, frames[chosen]))
+            parts.append(self._read(self._use(self._source_list[place]), frames[chosen]))
         if len(parts) == 1:
             return parts[0]
         back = np.argsort(np.concatenate(order))
@@ -220,27 +249,34 @@ class MixtureDataset(torch.utils.data.Dataset[Item]):
             return out
         episode = source.columns["episode_index"][frames]
         cache = self._caches.get(source.root)
-        decoded = None if cache else self._decode(source, frames)
         for key in keys:
             indices, padded = self._window(key, source, frames, episode)
             if cache:
                 out[key] = cache.frames(key, indices)
             else:
-                assert decoded is not None
                 size = self._picture_size or self._feature_size()
-                images = resize_images(torch.stack([item[key] for item in decoded]), size)
+                images = resize_images(self._pictures.frames(source, key, indices.ravel()), size)
                 out[key] = images.reshape(*indices.shape, *images.shape[-3:])
             if padded is not None:
                 out[f"{key}_is_pad"] = torch.from_numpy(padded)
         return out
 
-    def _decode(self, source: DatasetSource, frames: NDArray[np.int64]) -> list[Item]:
-        if source.root not in self._readers:
-            cameras = {key: [d / self.meta.fps for d in self._deltas.get(key, [0])] for key in self.meta.camera_keys}
-            self._readers[source.root] = LeRobotDataset(
-                source.root.name, root=source.root, delta_timestamps=cameras, return_uint8=True, video_backend="pyav"
+    def _use(self, source: DatasetSource) -> DatasetSource:
+        """The source, ready to be read; with mapped columns, those of another one may be closed for it."""
+        if not self._mapped:
+            return source
+        if self._cache_dir is None:
+            total = sum(s.column_bytes for s in self._source_list)
+            raise UserError(
+                f"states and actions of the mixture take {total / 1e9:.1f} GB, more memory than "
+                "`loader.cache_columns_above_gb` allows; set `loader.cache_dir` to a folder for files to map instead."
             )
-        return [self._readers[source.root][int(frame)] for frame in frames]
+        source.column_cache = self._cache_dir
+        self._recent[source.root] = None
+        self._recent.move_to_end(source.root)
+        while len(self._recent) > self._max_open:
+            self.sources[self._recent.popitem(last=False)[0]].close()
+        return source
 
     def _window(
         self, key: str, source: DatasetSource, frames: NDArray[np.int64], episode: NDArray[np.int64]
@@ -251,10 +287,6 @@ class MixtureDataset(torch.utils.data.Dataset[Item]):
         wanted = frames[:, None] + np.asarray(self._deltas[key], dtype=np.int64)
         first, last = source.starts[episode][:, None], source.ends[episode][:, None] - 1
         return np.clip(wanted, first, last), (wanted < first) | (wanted > last)
-
-    def __getstate__(self) -> dict[str, Any]:
-        """Worker processes open their own readers."""
-        return {**self.__dict__, "_readers": {}}
 
 
 class StepBatches(torch.utils.data.Dataset[Item]):
@@ -284,7 +316,7 @@ def open_mixture(config: MixtureConfig, loader: LoaderConfig) -> MixtureDataset:
             from robocasa_lerobot.data.fake import write_fake_dataset
 
             write_fake_dataset(Path(member.root))
-    return MixtureDataset(config, loader.image_size)
+    return MixtureDataset(config, loader=loader)
 
 
 def _is_image(feature: Mapping[str, Any]) -> bool:

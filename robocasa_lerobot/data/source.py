@@ -16,10 +16,12 @@ from lerobot.datasets.io_utils import load_info, load_tasks
 from numpy.typing import NDArray
 
 from robocasa_lerobot import contract
+from robocasa_lerobot.data.column_file import column_types, map_columns, read_columns
 from robocasa_lerobot.data.config import demo_count
 from robocasa_lerobot.errors import UnknownNameError, UserError
 
 EPISODE_TABLE = "meta/robocasa/episodes.jsonl"
+_EPISODE_COLUMNS = ("episode_index", "dataset_from_index", "dataset_to_index")
 
 
 class DatasetSource:
@@ -39,6 +41,7 @@ class DatasetSource:
         self._episodes = _read_episodes(self.root, self._info.total_episodes)
         self.starts: NDArray[np.int64] = self._episodes.column("dataset_from_index").to_numpy().astype(np.int64)
         self.ends: NDArray[np.int64] = self._episodes.column("dataset_to_index").to_numpy().astype(np.int64)
+        self.column_cache: Path | None = None
         self.fps = int(self._info.fps)
         self.robot_type: str | None = self._info.robot_type
         self.features: dict[str, dict[str, Any]] = self._info.features
@@ -109,24 +112,25 @@ class DatasetSource:
             raise UserError(f"{path}: no line for episode {min(missing)}; convert the dataset again.")
         return [by_episode[index] for index in range(len(self.starts))]
 
+    @property
+    def column_bytes(self) -> int:
+        """Bytes that `columns` take."""
+        return self.total_frames * column_types(self.features).itemsize
+
     @functools.cached_property
     def columns(self) -> dict[str, NDArray[Any]]:
         """Every numeric column over all frames: floats as float32 (frames, ...), integers as int64 (frames,).
 
-        float32 is what LeRobot hands to policies too.
+        float32 is what LeRobot hands to policies too. In memory, or with `column_cache` memory-mapped from that folder.
         """
-        wanted = [name for name, feature in self.features.items() if feature["dtype"] not in ("image", "video")]
-        wanted = [name for name in wanted if _is_number(self.features[name]["dtype"])]
-        files = sorted((self.root / "data").glob("*/*.parquet"))
-        tables = [pq.read_table(path, columns=wanted) for path in files]
-        out: dict[str, NDArray[Any]] = {}
-        for name in wanted:
-            parts = [_column_array(table.column(name), self.features[name]["shape"]) for table in tables]
-            array = np.concatenate(parts)
-            out[name] = array.astype(np.int64 if array.dtype.kind in "iub" else np.float32)
-        if not np.array_equal(out["index"], np.arange(self.total_frames)):
-            raise UserError(f"{self.root}: frames are missing or out of order; convert the dataset again.")
-        return out
+        row = column_types(self.features)
+        if self.column_cache is None:
+            return read_columns(self.root, row, self.total_frames)
+        return map_columns(self.root, row, self.total_frames, self.fingerprint, self.column_cache)
+
+    def close(self) -> None:
+        """Let go of the columns; they are read again when they are asked for."""
+        self.__dict__.pop("columns", None)
 
     @functools.cached_property
     def fingerprint(self) -> str:
@@ -160,25 +164,17 @@ def _check_is_dataset(root: Path) -> None:
 
 
 def _read_episodes(root: Path, count: int) -> pa.Table:
+    """Where the frames and the videos of each episode are: numbers only, by episode."""
     files = sorted((root / "meta" / "episodes").glob("*/*.parquet"))
-    wanted = [name for name in pq.read_schema(files[0]).names if not name.startswith("stats/")] if files else []
+    names = pq.read_schema(files[0]).names if files else []
+    wanted = [name for name in names if name in _EPISODE_COLUMNS or name.startswith("videos/")]
     try:
-        table = pa.concat_tables([pq.read_table(path, columns=wanted) for path in files]).sort_by("episode_index")
-    except (pa.ArrowInvalid, ValueError) as error:
+        table = pa.concat_tables([pq.read_table(path, columns=wanted) for path in files]).combine_chunks()
+        if not np.array_equal(table.column("episode_index").to_numpy(), np.arange(count)):
+            table = table.sort_by("episode_index")
+        found = table.column("episode_index").to_numpy()
+    except (pa.ArrowInvalid, ValueError, KeyError) as error:
         raise UserError(f"{root}: meta/episodes cannot be read ({error}); convert the dataset again.") from error
-    if table.column("episode_index").to_pylist() != list(range(count)):
+    if not np.array_equal(found, np.arange(count)):
         raise UserError(f"{root}: meta/episodes does not list the episodes 0 to {count - 1}; convert it again.")
     return table
-
-
-def _is_number(dtype: str) -> bool:
-    return dtype.startswith(("float", "int", "uint", "bool"))
-
-
-def _column_array(column: Any, shape: Sequence[int]) -> NDArray[Any]:
-    array = column.combine_chunks()
-    while hasattr(array, "flatten") and hasattr(array.type, "value_type"):
-        array = array.flatten()
-    values = array.to_numpy(zero_copy_only=False)
-    size = tuple(int(n) for n in shape)
-    return values.reshape(len(column), *size) if size != (1,) else values.reshape(len(column))
