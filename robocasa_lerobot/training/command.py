@@ -18,7 +18,15 @@ def configure(parser: argparse.ArgumentParser) -> None:
         help="auto: continue what was begun, if its settings are the same; force: even if they are not",
     )
     parser.add_argument("--stop_after", type=int, metavar="STEPS", help="save and end after so many steps of this run")
+    parser.add_argument("--phase", metavar="NAME", help="run this phase only; what it starts from must be finished")
+    parser.add_argument("--evaluate", action="store_true", help="run the phases' evaluations when they are finished")
     parser.add_argument("--print_config", action="store_true", help="print the resolved experiment and end")
+    parser.add_argument(
+        "--plan", action="store_true", help="print steps, samples, missing data, disk and hours of each phase, and end"
+    )
+    parser.add_argument(
+        "--measure", type=int, default=20, metavar="STEPS", help="steps that --plan times; 0: none (default 20)"
+    )
     parser.epilog = (
         f"{parser.epilog or ''}\n\nAny setting of the experiment can be given as --name=value, such as\n"
         "  --output_dir=outputs/try --phases.pretrain.batch_size=16 --policy.horizon=16 --defaults.learning_rate=1e-4"
@@ -27,14 +35,28 @@ def configure(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Run the experiment; 0 when finished, 3 when it was asked to stop before."""
+    """Run the experiment; 0 when finished, 3 when it stopped as asked, 75 when a signal ended it (run it again)."""
     from robocasa_lerobot.training.config import load_experiment, to_yaml
 
     experiment = load_experiment(args.config_path, getattr(args, "settings", ()))
+    if args.plan:
+        from robocasa_lerobot.training.builders import best_device
+        from robocasa_lerobot.training.plan import plan_experiment
+        from robocasa_lerobot.training.plan_text import render_plan
+
+        plans = plan_experiment(experiment, args.phase, args.measure)
+        print(render_plan(experiment, plans, best_device(experiment.device)))
+        return 0
     print(to_yaml(experiment), flush=True)
     if args.print_config:
         return 0
+    from robocasa_lerobot.training.interrupts import REQUEUE, STOPPED, Interrupts
     from robocasa_lerobot.training.phases import run_experiment
 
-    finished = run_experiment(experiment, stop_after=args.stop_after, force=args.resume == "force")
-    return 0 if finished else 3
+    interrupts = Interrupts(args.stop_after)
+    finished = run_experiment(
+        experiment, force=args.resume == "force", only=args.phase, evaluate=args.evaluate, interrupts=interrupts
+    )
+    if finished:
+        return 0
+    return REQUEUE if interrupts.signalled else STOPPED

@@ -39,8 +39,8 @@ class PhaseRun:
     """Everything that a phase trains with.
 
     `batches` holds parts of a batch (`gradient_accumulation` of them make one), `stop` is asked after each step
-    whether to save and end early, `always_eval` are modules that keep out of training mode, and `train_config` goes
-    into the checkpoints for LeRobot.
+    whether to save and end early, `always_eval` are modules that keep out of training mode, `train_config` goes into
+    the checkpoints for LeRobot, and without `save` there are no checkpoints.
     """
 
     config: PhaseConfig
@@ -55,6 +55,7 @@ class PhaseRun:
     stop: Callable[[], bool]
     held_out: HeldOut | None = None
     always_eval: list[torch.nn.Module] = field(default_factory=list)
+    save: bool = True
 
 
 def train_phase(run: PhaseRun, accelerator: Accelerator) -> bool:
@@ -277,7 +278,7 @@ def _metrics_line(state: TrainingState, learning_rate: float, batch_size: int) -
 
 def _save(run: PhaseRun, accelerator: Accelerator) -> None:
     run.state.log_window = {key: [float(v) for v in values] for key, values in run.state.log_window.items()}
-    if accelerator.is_main_process:
+    if accelerator.is_main_process and run.save:
         save_checkpoint(run.folder, run.state, run.train_config)
         prune(run.folder, run.config.keep_last, run.config.keep_every)
     accelerator.wait_for_everyone()
