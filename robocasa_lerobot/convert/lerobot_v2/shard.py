@@ -15,13 +15,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pyarrow as pa
-import pyarrow.parquet as pq
-from lerobot.configs import RGBEncoderConfig
-from lerobot.datasets.dataset_metadata import LeRobotDatasetMetadata
-from lerobot.datasets.feature_utils import get_hf_features_from_features
-from lerobot.datasets.io_utils import write_info
-from numpy.typing import NDArray
 
 from robocasa_lerobot import contract
 from robocasa_lerobot.convert.lerobot_v2.dataset import V2Dataset
@@ -40,20 +33,15 @@ from robocasa_lerobot.convert.shard import (
     episode_folder,
     write_jsonl,
 )
-from robocasa_lerobot.convert.writing.dataset import VIDEO_FILE_MB, arrow_table
 from robocasa_lerobot.convert.writing.encoder import (
-    CODECS,
     EncodedVideo,
-    Histogram,
     VideoSettings,
     channel_histogram,
     sampled_frames,
 )
 from robocasa_lerobot.convert.writing.encoding_process import shared_encoder
-from robocasa_lerobot.convert.writing.statistics import vector_statistics
-from robocasa_lerobot.convert.writing.video import VideoFiles, VideoForm, frames, probe, rgb
-
-_DATA_FILE = "data/chunk-000/file-000.parquet"
+from robocasa_lerobot.convert.writing.files import DatasetFiles
+from robocasa_lerobot.convert.writing.video import VideoForm, frames, probe, rgb
 
 
 @dataclass(frozen=True)
@@ -97,12 +85,7 @@ class _Writer:
     def __init__(self, plan: V2Plan, folder: Path) -> None:
         self._plan, self._folder = plan, folder
         self._cameras = dict(plan.camera_keys)
-        self._codec = RGBEncoderConfig(**CODECS[plan.settings.video_codec])
-        self._meta: LeRobotDatasetMetadata | None = None
-        self._tables: pq.ParquetWriter | None = None
-        self._schema: pa.Schema | None = None
-        self._videos: dict[str, VideoFiles] = {}
-        self._histograms: dict[str, Histogram] = {}
+        self._files: DatasetFiles | None = None
         self.episodes: list[dict[str, Any]] = []
 
     def write(self, episode: V2Episode) -> None:
@@ -118,16 +101,14 @@ class _Writer:
 
     def finalize(self) -> None:
         """Close the files; without this the parquet files have no footer and the dataset is lost."""
-        for files in self._videos.values():
-            files.close()
-        if self._tables is not None:
-            self._tables.close()
-        if self._meta is None:
+        if self._files is None:
             return
-        for key in self._videos if self.episodes else ():
-            self._describe(key)
-        self._meta.finalize()
-        arrays: dict[str, Any] = self._histograms
+        codecs: dict[str, str | None] = {}
+        for camera in self._plan.cameras:  # LeRobot's description of the encoder holds where all went through it
+            ours = all(camera.name in line["reencoded"] for line in self.episodes)
+            codecs[contract.image_key(camera.name)] = self._plan.settings.video_codec if ours else None
+        self._files.finalize(codecs)
+        arrays: dict[str, Any] = self._files.histograms
         np.savez_compressed(self._folder / HISTOGRAMS_FILE, **arrays)
 
     def _video(self, episode: V2Episode, camera: Camera, scratch: Path) -> _Video:
@@ -162,33 +143,20 @@ class _Writer:
         return _Video(video, probe(video.path), reason)
 
     def _append(self, episode: V2Episode, videos: Mapping[str, _Video], digest: str) -> None:
-        meta = self._meta if self._meta is not None else self._create()
-        index, length, first = len(self.episodes), episode.length, meta.total_frames
-        columns: dict[str, NDArray[Any]] = {
-            **episode.columns,
-            "timestamp": (np.arange(length) / self._plan.fps).astype(np.float32),
-            "frame_index": np.arange(length),
-            "episode_index": np.full(length, index),
-            "index": np.arange(first, first + length),
-            "task_index": episode.task_index,
-        }
-        assert self._tables is not None
-        assert self._schema is not None
-        self._tables.write_table(arrow_table(columns, self._schema))
-        entries: dict[str, Any] = {
-            "data/chunk_index": 0,
-            "data/file_index": 0,
-            "dataset_from_index": first,
-            "dataset_to_index": first + length,
-        }
-        stats = {key: vector_statistics(values) for key, values in columns.items() if values.dtype.kind in "fiub"}
-        for camera, video in videos.items():
-            key = contract.image_key(camera)
-            entries |= self._videos[key].append(video.encoded.path, video.form)
-            stats[key] = video.encoded.statistics()
-            self._histograms[key] = self._histograms.get(key, 0) + video.encoded.histogram
-        texts = [self._plan.tasks[row] for row in dict.fromkeys(episode.task_index.tolist())]
-        meta.save_episode(index, length, texts, stats, entries)
+        plan, index, length = self._plan, len(self.episodes), episode.length
+        if self._files is None:
+            # All tasks in every shard, so that joining keeps their numbers, which annotation columns refer to.
+            root = self._folder / DATASET
+            self._files = DatasetFiles(root, plan.fps, plan.mapping.robot_type, plan.features, plan.tasks)
+        texts = [plan.tasks[row] for row in dict.fromkeys(episode.task_index.tolist())]
+        keys = {camera: contract.image_key(camera) for camera in videos}
+        self._files.append(
+            {**episode.columns, "task_index": episode.task_index},
+            texts,
+            length,
+            {keys[camera]: video.encoded for camera, video in videos.items()},
+            {keys[camera]: video.form for camera, video in videos.items()},
+        )
         self._extras(episode, self._folder / EXTRAS / episode_folder(index))
         ep_meta = episode.extras.ep_meta
         self.episodes.append(
@@ -214,32 +182,3 @@ class _Writer:
         (folder / EP_META).write_text(json.dumps({"lang": episode.instruction}), encoding="utf-8")
         for path in episode.extras.files:
             shutil.copyfile(path, folder / path.name)
-
-    def _create(self) -> LeRobotDatasetMetadata:
-        plan = self._plan
-        root = self._folder / DATASET
-        features = plan.features
-        self._meta = LeRobotDatasetMetadata.create(
-            repo_id="local/shard",
-            fps=plan.fps,
-            features=features,
-            robot_type=plan.mapping.robot_type,
-            root=root,
-            video_files_size_in_mb=VIDEO_FILE_MB,
-        )
-        # All rows in every shard, so that joining keeps their numbers, which annotation columns refer to.
-        self._meta.save_episode_tasks(list(plan.tasks))
-        self._schema = get_hf_features_from_features(self._meta.features).arrow_schema
-        (root / _DATA_FILE).parent.mkdir(parents=True)
-        self._tables = pq.ParquetWriter(root / _DATA_FILE, self._schema, compression="snappy")
-        keys = [contract.image_key(camera.name) for camera in plan.cameras]
-        self._videos = {key: VideoFiles(root, key, plan.fps, VIDEO_FILE_MB * 2**20) for key in keys}
-        return self._meta
-
-    def _describe(self, key: str) -> None:
-        """LeRobot's description of a camera's videos; of the encoder only where all of them went through it."""
-        assert self._meta is not None
-        camera = key.removeprefix(contract.IMAGE_PREFIX)
-        ours = all(camera in line["reencoded"] for line in self.episodes)
-        self._meta.update_video_info(key, video_encoder=self._codec if ours else None)
-        write_info(self._meta.info, self._meta.root)

@@ -41,7 +41,6 @@ from robocasa_lerobot.convert.running.work import (
     run_pieces,
     submit_pieces,
 )
-from robocasa_lerobot.convert.writing.dataset import VIDEO_FILE_MB
 from robocasa_lerobot.convert.writing.encoder import (
     CODECS,
     Histogram,
@@ -50,6 +49,7 @@ from robocasa_lerobot.convert.writing.encoder import (
     sampled_frames,
 )
 from robocasa_lerobot.convert.writing.encoding_process import shared_encoder
+from robocasa_lerobot.convert.writing.files import VIDEO_FILE_MB
 from robocasa_lerobot.convert.writing.modality import modality, read_modality, write_modality
 from robocasa_lerobot.convert.writing.statistics import picture_statistics
 from robocasa_lerobot.convert.writing.video import VideoFiles, probe

@@ -1,4 +1,4 @@
-"""A LeRobotDataset v3.0 written episode by episode: columns into parquet, pictures straight into the video encoder.
+"""A LeRobotDataset v3.0 written episode by episode, pictures going straight into the video encoder.
 
 LeRobot's own writer spends as long on an episode's table as the encoder does on its pictures, and rewrites the whole
 video file for every episode it appends (measured with LeRobot 0.6.1); its metadata writer is used as it is.
@@ -13,22 +13,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pyarrow as pa
-import pyarrow.parquet as pq
-from lerobot.configs import RGBEncoderConfig
-from lerobot.datasets.dataset_metadata import LeRobotDatasetMetadata
-from lerobot.datasets.feature_utils import get_hf_features_from_features
-from lerobot.datasets.io_utils import write_info
 from numpy.typing import NDArray
 
-from robocasa_lerobot.convert.writing.encoder import CODECS, EncodedVideo, EncodingError, Histogram, VideoSettings
+from robocasa_lerobot.convert.writing.encoder import EncodingError, Histogram, VideoSettings
 from robocasa_lerobot.convert.writing.encoding_process import EncodingProcess
-from robocasa_lerobot.convert.writing.statistics import vector_statistics
-from robocasa_lerobot.convert.writing.video import VideoFiles, probe
-
-# Also the time to open one file, and what is lost with it.
-VIDEO_FILE_MB = 100
-_DATA_FILE = "data/chunk-000/file-000.parquet"
+from robocasa_lerobot.convert.writing.files import DatasetFiles
 
 
 @dataclass(frozen=True)
@@ -56,25 +45,16 @@ class DatasetWriter:
     def __init__(
         self, encoder: EncodingProcess, root: Path, fps: int, robot_type: str, features: Mapping[str, Any], codec: str
     ) -> None:
-        self.root, self.num_episodes, self.num_frames = root, 0, 0
-        self._fps = fps
-        self._video = RGBEncoderConfig(**CODECS[codec])
-        self._meta = LeRobotDatasetMetadata.create(
-            repo_id="local/shard",
-            fps=fps,
-            features=dict(features),
-            robot_type=robot_type,
-            root=root,
-            video_files_size_in_mb=VIDEO_FILE_MB,
-        )
+        self.root, self._codec = root, codec
+        self._files = DatasetFiles(root, fps, robot_type, features)
         self._encoder, self._settings = encoder, VideoSettings.of_codec(codec, fps)
         self._pending: _Pending | None = None
         self._number = 0  # of episodes begun
-        self.histograms: dict[str, Histogram] = {}  # sampled pixels of all episodes so far for each video feature
-        self._schema = get_hf_features_from_features(self._meta.features).arrow_schema
-        (root / _DATA_FILE).parent.mkdir(parents=True)
-        self._tables = pq.ParquetWriter(root / _DATA_FILE, self._schema, compression="snappy")
-        self._videos = {key: VideoFiles(root, key, fps, VIDEO_FILE_MB * 2**20) for key in self._meta.video_keys}
+
+    @property
+    def histograms(self) -> dict[str, Histogram]:
+        """Sampled pixels of all episodes so far for each video feature."""
+        return self._files.histograms
 
     def add(
         self,
@@ -104,7 +84,7 @@ class DatasetWriter:
         scratch = self.root / "encoding" / str(self._number)
         shutil.rmtree(scratch, ignore_errors=True)
         scratch.mkdir(parents=True)
-        self._encoder.start_episode(self._settings, self._meta.video_keys, scratch, length, yielding=rendered)
+        self._encoder.start_episode(self._settings, self._files.video_keys, scratch, length, yielding=rendered)
         given = 0
         try:
             for step in pictures:
@@ -127,63 +107,9 @@ class DatasetWriter:
         last, self._pending = self._pending, None
         self._complete(last)
         shutil.rmtree(self.root / "encoding", ignore_errors=True)
-        self._tables.close()
-        for videos in self._videos.values():
-            videos.close()
-        self._meta.finalize()
-        if self.num_episodes:
-            for key in self._videos:
-                self._meta.update_video_info(key, video_encoder=self._video)
-            write_info(self._meta.info, self.root)
+        self._files.finalize(dict.fromkeys(self._files.video_keys, self._codec))
 
     def _complete(self, pending: _Pending | None) -> None:
         if pending is not None:
-            self._append(pending.columns, pending.task, pending.length, self._encoder.finished())
+            self._files.append(pending.columns, [pending.task], pending.length, self._encoder.finished())
             shutil.rmtree(pending.scratch)
-
-    def _append(
-        self, columns: Mapping[str, NDArray[Any]], task: str, length: int, encoded: Mapping[str, EncodedVideo]
-    ) -> None:
-        index, first = self.num_episodes, self.num_frames
-        self._meta.save_episode_tasks([task])
-        everything: dict[str, NDArray[Any]] = {
-            **columns,
-            "timestamp": (np.arange(length) / self._fps).astype(np.float32),
-            "frame_index": np.arange(length),
-            "episode_index": np.full(length, index),
-            "index": np.arange(first, first + length),
-            "task_index": np.full(length, self._meta.get_task_index(task)),
-        }
-        self._tables.write_table(arrow_table(everything, self._schema))
-        entries: dict[str, Any] = {
-            "data/chunk_index": 0,
-            "data/file_index": 0,
-            "dataset_from_index": first,
-            "dataset_to_index": first + length,
-        }
-        statistics = {
-            key: vector_statistics(values) for key, values in everything.items() if values.dtype.kind in "fiub"
-        }
-        for key, video in encoded.items():
-            entries |= self._videos[key].append(video.path, probe(video.path))
-            statistics[key] = video.statistics()
-            self.histograms[key] = self.histograms.get(key, 0) + video.histogram
-        self._meta.save_episode(index, length, [task], statistics, entries)
-        self.num_episodes, self.num_frames = index + 1, first + length
-
-
-def arrow_table(columns: Mapping[str, NDArray[Any]], schema: pa.Schema) -> pa.Table:
-    """Columns (T,) or (T, k) as an Arrow table with the fields of `schema`, bit for bit."""
-    arrays = []
-    for field in schema:
-        values = columns[field.name]
-        if not pa.types.is_nested(field.type):
-            arrays.append(pa.array(values.reshape(-1), type=field.type))
-            continue
-        flat = pa.array(values.reshape(-1), type=field.type.value_type)
-        if pa.types.is_fixed_size_list(field.type):
-            arrays.append(pa.FixedSizeListArray.from_arrays(flat, field.type.list_size))
-        else:
-            edges = np.arange(0, len(flat) + 1, values.shape[1], dtype=np.int32)
-            arrays.append(pa.ListArray.from_arrays(edges, flat))
-    return pa.Table.from_arrays(arrays, schema=schema)

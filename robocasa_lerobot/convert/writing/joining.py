@@ -21,7 +21,7 @@ import pyarrow.parquet as pq
 from lerobot.datasets.io_utils import write_tasks
 from numpy.typing import NDArray
 
-from robocasa_lerobot.convert.writing.dataset import VIDEO_FILE_MB
+from robocasa_lerobot.convert.writing.files import VIDEO_FILE_MB
 from robocasa_lerobot.convert.writing.statistics import column_of, vector_statistics
 from robocasa_lerobot.convert.writing.video import VideoFiles, probe
 
