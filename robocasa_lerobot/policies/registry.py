@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import importlib
 
-POLICY_TYPES: tuple[str, ...] = ("diffusion_transformer",)
+POLICY_TYPES: tuple[str, ...] = ("diffusion_transformer", "flow_vla")
 
 
 def register_policies() -> None:
