@@ -8,7 +8,7 @@ from __future__ import annotations
 import hashlib
 import json
 import sys
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -69,12 +69,11 @@ def pooled_statistics(parts: Sequence[Part], images: bool = True) -> Statistics:
     out: Statistics = {}
     columns: dict[str, _Column] = {}
     for key, feature in parts[0].source.features.items():
-        dtype = str(feature["dtype"])
-        if dtype in ("video", "image"):
+        if feature["dtype"] in ("video", "image"):
             if images:
                 out[key] = _image_statistics(key, parts)
-        elif key not in BOOKKEEPING and dtype.startswith(("float", "int", "uint", "bool")):
-            columns[key] = _Column(int(np.prod(feature["shape"])), dtype)
+        elif has_statistics(key, feature):
+            columns[key] = _Column(int(np.prod(feature["shape"])), str(feature["dtype"]))
             out[key] = {}  # in the order of the features
     for number in range(max((c.quantiles.passes for c in columns.values()), default=0)):
         progress = tqdm(
@@ -91,6 +90,11 @@ def pooled_statistics(parts: Sequence[Part], images: bool = True) -> Statistics:
                 column.quantiles.narrow()
     count = np.array([sum(part.frames for part in parts)])
     return out | {key: column.statistics(count) for key, column in columns.items()}
+
+
+def has_statistics(key: str, feature: Mapping[str, Any]) -> bool:
+    """Whether a feature is a number that policies may see."""
+    return key not in BOOKKEEPING and str(feature["dtype"]).startswith(("float", "int", "uint", "bool"))
 
 
 def cached_statistics(parts: Sequence[Part], folder: Path, images: bool = True) -> Statistics:

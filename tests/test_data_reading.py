@@ -1,0 +1,171 @@
+"""Reading with bounded memory and file handles: videos, mapped columns, and bad files."""
+
+from __future__ import annotations
+
+import pickle
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+from lerobot.datasets.video_utils import decode_video_frames
+
+from robocasa_lerobot import contract
+from robocasa_lerobot.data.column_file import map_columns
+from robocasa_lerobot.data.config import LoaderConfig, MemberConfig, MixtureConfig
+from robocasa_lerobot.data.fake import write_fake_dataset
+from robocasa_lerobot.data.mixture import MixtureDataset, StepBatches
+from robocasa_lerobot.data.pictures import PictureReader
+from robocasa_lerobot.data.source import DatasetSource
+from robocasa_lerobot.data.video_reader import VideoReader
+from robocasa_lerobot.errors import UserError
+
+KEY = contract.IMAGE_KEYS[0]
+COPIES, OPEN = 9, 4
+WINDOWS = {
+    KEY: [-0.05, 0.0],
+    contract.IMAGE_KEYS[1]: [-0.05, 0.0],
+    contract.IMAGE_KEYS[2]: [0.0],
+    contract.STATE_KEY: [-0.05, 0.0],
+    contract.ACTION_KEY: [i / 20 for i in range(10)],
+}
+
+
+@pytest.fixture(scope="module")
+def root(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return write_fake_dataset(tmp_path_factory.mktemp("data") / "fake", episodes=4, length=30, image_size=32)
+
+
+@pytest.fixture(scope="module")
+def many(root: Path, tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
+    folder = tmp_path_factory.mktemp("many")
+    return [Path(shutil.copytree(root, folder / f"copy{number}")) for number in range(COPIES)]
+
+
+def open_many(roots: list[Path], **loader: object) -> MixtureDataset:
+    config = MixtureConfig([MemberConfig(str(path)) for path in roots], alpha=0.0)
+    dataset = MixtureDataset(config, loader=LoaderConfig(**loader))  # type: ignore[arg-type]
+    dataset.set_windows(WINDOWS)
+    return dataset
+
+
+def video_of(root: Path, episode: int = 0) -> tuple[Path, float]:
+    return DatasetSource(root).video(episode, KEY)
+
+
+def open_files_under(folder: Path) -> int:
+    """Number of files in the folder that this process has open or mapped."""
+    handles = {path.resolve() for path in Path("/proc/self/fd").iterdir() if path.exists()}
+    mapped = {line.split(maxsplit=5)[5] for line in Path("/proc/self/maps").read_text().splitlines() if "/" in line}
+    return sum(folder in path.parents for path in handles | {Path(name) for name in mapped})
+
+
+def test_pictures_equal_lerobots_in_any_order(root: Path) -> None:
+    reader, (path, start) = VideoReader(2), video_of(root, 2)
+    for frames in ([0], [29], [0], [7, 3, 3, 28], list(range(30)), [29], [12]):
+        times = start + np.array(frames) / 20
+        wanted = decode_video_frames(path, times.tolist(), 1e-4, backend="pyav", return_uint8=True)
+        assert torch.equal(reader.frames(path, times), wanted)
+    assert len(reader) == 1
+
+
+def test_pictures_of_the_end_of_the_video_do_not_end_reading(root: Path) -> None:
+    """A decoder that has been drained gives nothing more unless it is reset."""
+    reader, (path, start) = VideoReader(1), video_of(root, 3)
+    last = start + np.array([29]) / 20
+    first = reader.frames(path, last)
+    for _ in range(3):
+        assert torch.equal(reader.frames(path, last), first)
+    assert not torch.equal(reader.frames(path, start + np.array([0.0])), first)
+
+
+def test_frames_of_several_episodes_come_as_asked(root: Path) -> None:
+    source, reader = DatasetSource(root), PictureReader(2)
+    indices = np.array([119, 0, 30, 29, 0, 65, 31])
+    pictures = reader.frames(source, KEY, indices)
+    for index, picture in zip(indices, pictures, strict=True):
+        episode = int(index) // 30
+        path, start = source.video(episode, KEY)
+        at = start + (int(index) - 30 * episode) / 20
+        assert torch.equal(picture, decode_video_frames(path, [at], 1e-4, backend="pyav", return_uint8=True)[0])
+
+
+def test_damaged_and_short_videos_are_told(root: Path, tmp_path: Path) -> None:
+    reader, (path, _) = VideoReader(2), video_of(root)
+    with pytest.raises(UserError, match=r"no picture at 500\.0000 s"):
+        reader.frames(path, np.array([500.0]))
+    with pytest.raises(UserError, match="cannot be decoded"):
+        reader.frames(tmp_path / "gone.mp4", np.array([0.0]))
+    (tmp_path / "damaged.mp4").write_bytes(path.read_bytes()[:1000])
+    with pytest.raises(UserError, match="cannot be decoded"):
+        reader.frames(tmp_path / "damaged.mp4", np.array([0.0]))
+    assert reader.frames(path, np.array([0.0])).shape == (1, 3, 32, 32)
+
+
+def test_open_files_are_bounded_and_samples_are_the_same(many: list[Path], tmp_path: Path) -> None:
+    plain = open_many(many)
+    bounded = open_many(many, cache_open_files=OPEN, cache_columns_above_gb=0.0, cache_dir=str(tmp_path))
+    wanted, batches = (StepBatches(d, d.sampler(seed=0), 8) for d in (plain, bounded))
+    for step in range(6):
+        batch = batches[step]
+        for key, value in wanted[step].items():
+            assert torch.equal(batch[key], value) if isinstance(value, torch.Tensor) else batch[key] == value, key
+        assert len(bounded._pictures.videos) <= OPEN
+        assert sum("columns" in source.__dict__ for source in bounded.sources.values()) <= OPEN
+    assert 1 <= open_files_under(tmp_path) <= OPEN
+    del plain, wanted
+    assert 1 <= open_files_under(many[0].parent) <= OPEN
+
+
+def test_workers_get_a_dataset_without_open_files(many: list[Path], tmp_path: Path) -> None:
+    dataset = open_many(many, cache_open_files=OPEN, cache_columns_above_gb=0.0, cache_dir=str(tmp_path))
+    first = dataset[31]
+    copy = pickle.loads(pickle.dumps(dataset))
+    assert len(copy._pictures.videos) == 0
+    assert not any("columns" in source.__dict__ for source in copy.sources.values())
+    assert all(torch.equal(copy[31][key], first[key]) for key in WINDOWS)
+
+
+def test_mapped_columns_need_a_folder_and_are_made_once(root: Path, tmp_path: Path) -> None:
+    with pytest.raises(UserError, match=r"loader\.cache_dir"):
+        open_many([root], cache_columns_above_gb=0.0)[0]
+    source = DatasetSource(root)
+    plain = source.columns
+    source.close()
+    source.column_cache = tmp_path
+    mapped = source.columns
+    assert mapped.keys() == plain.keys()
+    for key, column in plain.items():
+        assert mapped[key].dtype == column.dtype
+        np.testing.assert_array_equal(mapped[key], column)
+    (file,) = tmp_path.glob("*.npy")
+    made = file.stat().st_mtime_ns
+    source.close()
+    assert source.columns["index"][-1] == 119
+    assert file.stat().st_mtime_ns == made
+
+
+def test_a_killed_mapping_is_made_again(root: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    source = DatasetSource(root)
+    source.column_cache = tmp_path
+
+    def killed(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(Path, "replace", killed)
+    with pytest.raises(KeyboardInterrupt):
+        _ = source.columns
+    monkeypatch.undo()
+    assert [path.name for path in tmp_path.glob("*.npy") if ".partial" not in path.name] == []
+    assert source.columns["index"].tolist() == list(range(120))
+    assert not list(tmp_path.glob("*.partial*"))
+
+
+def test_missing_frames_are_told(root: Path, tmp_path: Path) -> None:
+    source = DatasetSource(root)
+    row = np.dtype([("index", np.int64), ("action", np.float32, (12,))])
+    for total in (119, 121):
+        with pytest.raises(UserError, match="missing or out of order"):
+            map_columns(source.root, row, total, f"total{total}", tmp_path)
+    assert not [path for path in tmp_path.glob("*.npy") if ".partial" not in path.name]
