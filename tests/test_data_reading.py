@@ -114,7 +114,7 @@ def test_open_files_are_bounded_and_samples_are_the_same(many: list[Path], tmp_p
         assert len(bounded._pictures.videos) <= OPEN
         assert sum("columns" in source.__dict__ for source in bounded.sources.values()) <= OPEN
     assert 1 <= open_files_under(tmp_path) <= OPEN
-    del plain, wanted
+    plain._pictures.videos.close()
     assert 1 <= open_files_under(many[0].parent) <= OPEN
 
 
