@@ -1,0 +1,197 @@
+"""LeRobot's own policies: their files in `configs/policies/`, training and trials as for ours, and what they need."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import yaml
+from evaluation_env import SlideEnv
+from flow_vla_support import with_features
+from lerobot.configs import NormalizationMode
+from policy_models_support import tiny_settings
+from training_support import metrics
+
+from robocasa_lerobot import contract
+from robocasa_lerobot.data.fake import write_fake_dataset
+from robocasa_lerobot.data.mixture import MixtureMeta
+from robocasa_lerobot.errors import UserError
+from robocasa_lerobot.evaluation.checkpoints import read_source
+from robocasa_lerobot.evaluation.plan import make_plan
+from robocasa_lerobot.evaluation.policy_runner import load_policy
+from robocasa_lerobot.evaluation.rollout import run_trial
+from robocasa_lerobot.policies.needs import NEEDS, explained
+from robocasa_lerobot.training import builders
+from robocasa_lerobot.training.config import load_experiment
+from robocasa_lerobot.training.phases import run_experiment
+
+FOLDER = Path(__file__).parents[1] / "configs/policies"
+FILES = sorted(FOLDER.glob("*.yaml"))
+OURS = ("diffusion_transformer", "flow_vla")
+LEROBOTS = ("act", "diffusion", "multi_task_dit", "smolvla", "xvla", "pi0", "pi05", "groot")
+OFFLINE = ("act", "diffusion", "multi_task_dit", "smolvla", "xvla")
+SIZE = 32
+
+# Published values (facts of the benchmark's forks): type, field, value.
+PUBLISHED: list[tuple[str, dict[str, Any]]] = [
+    (
+        "pi0",
+        {
+            "chunk_size": 50, "n_action_steps": 5, "max_action_dim": 32, "tokenizer_max_length": 96,
+            "num_inference_steps": 10, "time_sampling_beta_alpha": 1.5, "time_sampling_beta_beta": 1.0,
+            "optimizer_lr": 2.5e-5, "optimizer_betas": (0.9, 0.95), "optimizer_weight_decay": 1e-10,
+            "optimizer_grad_clip_norm": 1.0, "scheduler_warmup_steps": 1000, "scheduler_decay_steps": 100_000,
+            "scheduler_decay_lr": 2.5e-6, "image_resolution": (224, 224),
+        },
+    ),
+    (
+        "pi05",
+        {
+            "chunk_size": 50, "n_action_steps": 5, "tokenizer_max_length": 200, "optimizer_lr": 2.5e-5,
+            "optimizer_weight_decay": 1e-10, "scheduler_decay_steps": 100_000,
+        },
+    ),
+    (
+        "groot",
+        {
+            "chunk_size": 16, "n_action_steps": 16, "num_inference_timesteps": 4, "tune_llm": False,
+            "tune_visual": False, "tune_projector": True, "tune_diffusion_model": True, "lora_rank": 0,
+            "optimizer_lr": 3e-5, "optimizer_betas": (0.95, 0.999), "optimizer_weight_decay": 1e-5,
+            "warmup_ratio": 0.05, "embodiment_tag": "new_embodiment",
+        },
+    ),
+    (
+        "diffusion",
+        {
+            "n_obs_steps": 2, "n_action_steps": 8, "spatial_softmax_num_keypoints": 32, "num_train_timesteps": 100,
+            "num_inference_steps": 100, "noise_scheduler_type": "DDPM", "optimizer_lr": 1e-4,
+            "optimizer_betas": (0.9, 0.95), "scheduler_warmup_steps": 1000, "crop_shape": (224, 224),
+        },
+    ),
+]  # fmt: skip
+
+
+def settings(path: Path) -> dict[str, Any]:
+    return dict(yaml.safe_load(path.read_text(encoding="utf-8")))
+
+
+def config_of(kind: str) -> Any:
+    return builders.policy_config(settings(FOLDER / f"{kind}.yaml"), None, "cpu")
+
+
+def meta() -> MixtureMeta:
+    return MixtureMeta(contract.dataset_features((SIZE, SIZE)), contract.VIDEO_FPS, contract.ROBOT_TYPE, ["open"], 1, 1)
+
+
+@pytest.fixture(scope="module")
+def data(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return write_fake_dataset(tmp_path_factory.mktemp("data") / "fake", episodes=2, length=10, image_size=SIZE)
+
+
+@pytest.fixture(autouse=True)
+def _without_num2words(monkeypatch: pytest.MonkeyPatch) -> None:
+    """SmolVLM's processor refuses to be made without a package that only its prompts for videos use."""
+    from transformers.models.smolvlm import processing_smolvlm
+
+    if processing_smolvlm.num2words is None:
+        monkeypatch.setattr(processing_smolvlm, "num2words", str)
+
+
+def test_every_policy_has_a_file() -> None:
+    kinds = {settings(path)["type"] for path in FILES}
+    assert kinds == {*OURS, *LEROBOTS}
+    assert set(NEEDS) == set(LEROBOTS)
+
+
+@pytest.mark.parametrize("path", FILES, ids=lambda path: path.stem)
+def test_file_fits_the_contracts_features(path: Path) -> None:
+    config = with_features(builders.policy_config(settings(path), None, "cpu"), contract.IMAGE_SIZE)
+    config.validate_features()
+    assert not config.push_to_hub
+    assert 1 <= config.n_action_steps <= len(config.action_delta_indices)
+    assert 0 in config.action_delta_indices
+    config.get_optimizer_preset()
+    config.get_scheduler_preset()
+
+
+@pytest.mark.parametrize(("kind", "published"), PUBLISHED, ids=[kind for kind, _ in PUBLISHED])
+def test_published_settings(kind: str, published: dict[str, Any]) -> None:
+    config = config_of(kind)
+    found = {name: getattr(config, name) for name in published}
+    found = {name: tuple(value) if isinstance(value, list) else value for name, value in found.items()}
+    assert found == published
+    if kind in ("pi0", "pi05"):
+        assert config.normalization_mapping["STATE"] == config.normalization_mapping["ACTION"]
+        assert config.normalization_mapping["ACTION"] == NormalizationMode.MEAN_STD
+
+
+@pytest.mark.parametrize("kind", OFFLINE)
+def test_two_steps_of_training_and_a_trial(kind: str, data: Path, tmp_path: Path) -> None:
+    experiment = {
+        "name": "test",
+        "output_dir": str(tmp_path / "out"),
+        "device": "cpu",
+        "policy": {"file": str(FOLDER / f"{kind}.yaml"), **tiny_settings(kind, tmp_path / "models")},
+        "loader": {"cache_dir": str(data.parent / "frames")},
+        "phases": [
+            {
+                "name": "train",
+                "mixture": {"members": [{"root": str(data)}]},
+                "steps": 2,
+                "batch_size": 2,
+                "log_every": 1,
+                "save_every": 2,
+                "save_initial": True,
+            }
+        ],
+    }
+    path = tmp_path / "experiment.yaml"
+    path.write_text(yaml.safe_dump(experiment))
+    assert run_experiment(load_experiment(path))
+    lines = metrics(tmp_path, "train")
+    assert [line["step"] for line in lines] == [1, 2]
+    assert all(math.isfinite(line["loss"]) and line["grad_norm"] > 0 for line in lines)
+
+    runner = load_policy(read_source(str(tmp_path / "out/train/checkpoints/000002/pretrained_model")), "cpu", None)
+    (trial,) = make_plan(["test"], {"Slide": 6}, trials=1, seed=3, videos=0)
+    actions = []
+    for _ in range(2):
+        runner.reset(seed=5)
+        observation, _ = SlideEnv("Slide", image_size=SIZE).reset(seed=1)
+        actions.append(np.stack([runner.act(observation, "open the left drawer") for _ in range(6)]))
+        assert actions[-1].shape == (6, contract.ACTION_SIZE)
+        assert np.isfinite(actions[-1]).all()
+    np.testing.assert_array_equal(*actions)
+    assert run_trial(SlideEnv("Slide", image_size=SIZE, horizon=6), runner, trial).steps <= 6
+
+
+@pytest.mark.parametrize("kind", ["multi_task_dit", "smolvla", "xvla", "groot"])
+def test_missing_weights_are_named(kind: str) -> None:
+    with pytest.raises(UserError, match="could not be built") as raised, explained(kind):
+        builders.make_phase_policy(config_of(kind), meta(), None)
+    assert f"lerobot[{NEEDS[kind].extra}]" in str(raised.value)
+    assert NEEDS[kind].weights in str(raised.value)
+    assert NEEDS[kind].remedy in str(raised.value)
+    assert raised.value.__cause__ is not None
+
+
+@pytest.mark.parametrize("kind", ["pi0", "pi05"])
+def test_missing_tokenizer_is_named(kind: str) -> None:
+    # Their networks build without weights, at 3 billion parameters: only the processors are made here.
+    with pytest.raises(UserError, match="google/paligemma-3b-pt-224") as raised, explained(kind):
+        builders.make_processors(with_features(config_of(kind), SIZE), meta(), None, keep_statistics=False)
+    assert f"lerobot[{NEEDS[kind].extra}]" in str(raised.value)
+
+
+def test_other_errors_pass_as_they_are() -> None:
+    with pytest.raises(UserError, match=r"^mine$"), explained("pi0"):
+        raise UserError("mine")
+    with pytest.raises(ValueError, match=r"^not a need$"), explained("flow_vla"):
+        raise ValueError("not a need")
+    with pytest.raises(RuntimeError, match=r"^a bug$"), explained("pi0"):
+        raise RuntimeError("a bug")
+    with pytest.raises(UserError, match=r"No module named 'timm'.*lerobot\[groot\]"), explained("groot"):
+        raise ModuleNotFoundError("No module named 'timm'")
