@@ -67,7 +67,7 @@ doctor: $(STAMP)  ## check this machine
 bench: $(STAMP)  ## our simulator beside robosuite's, in one run
 	$(BIN)/python benchmarks/sim_speed.py $(BENCH_ARGS)
 
-# `make bench-convert BENCH_ARGS=--quick` takes under 10 minutes.
+# `make bench-convert BENCH_ARGS=--quick` takes about 10 minutes.
 bench-convert: $(STAMP)  ## our converter beside LeRobot's and the official one, in one run
 	$(BIN)/python benchmarks/convert_speed.py $(BENCH_ARGS)
 

@@ -54,7 +54,7 @@ class Effort:
 
 
 FULL = Effort(16, 5, 3, 160, (10, 100, 1000), 40)
-QUICK = Effort(6, 3, 1, 30, (10, 100, 300), 20)
+QUICK = Effort(10, 2, 1, 100, (10, 100, 300), 20)
 
 
 @dataclass
@@ -82,7 +82,7 @@ class Run:
 def parse(arguments: Sequence[str] | None = None) -> argparse.Namespace:
     """The command's options."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--quick", action="store_true", help="less and less often: under 10 minutes")
+    parser.add_argument("--quick", action="store_true", help="less and less often: about 10 minutes")
     parser.add_argument(
         "--output", type=Path, help=f"JSON file to write; default: {OUTPUT.relative_to(common.REPOSITORY)}"
     )

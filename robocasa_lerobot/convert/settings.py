@@ -29,6 +29,8 @@ FORMAT_VERSION = 3
 # A shard is what a kill can lose and what a worker takes at a time: some seconds of work, but never so many shards
 # that joining them costs more than making them.
 SHARD_FRAMES = 500
+_MIN_SHARD_FRAMES = 125
+_WANTED_SHARDS = 5  # of little work, so that several processes have something to do
 MAX_SHARDS = 64
 _MAX_FAILURES = 10  # demos without a known robot, camera or mesh, after which no other is tried
 
@@ -186,9 +188,15 @@ def make_plan(files: Sequence[Path], settings: ConversionSettings) -> Plan:
                     "Convert them into datasets of their own, or choose the same cameras and size for both."
                 )
     num_frames = sum(length for look in looks for _, length in look.demos)
-    target = max(SHARD_FRAMES, -(-num_frames // MAX_SHARDS))
+    target = shard_frames(num_frames, SHARD_FRAMES)
     shards = [shard for look in looks for shard in _cut(look, target, copies)]
     return Plan(settings, sources, first.mapping, first.cameras, first.fps, tuple(shards), num_frames)
+
+
+def shard_frames(num_frames: int, most: int) -> int:
+    """How many frames go into a shard of so many in all: `most`, fewer of little work, more of very much."""
+    few = max(_MIN_SHARD_FRAMES, num_frames // _WANTED_SHARDS)
+    return max(min(most, few), -(-num_frames // MAX_SHARDS))
 
 
 def file_sha256(file: Path) -> str:

@@ -24,7 +24,7 @@ from robocasa_lerobot.convert.reading.demo_file import RejectedEpisodeError
 from robocasa_lerobot.convert.reading.lerobot_v3 import ExportedDataset, ExportedEpisode
 from robocasa_lerobot.convert.reading.mjcf import AssetFinder, loadable, scene_names
 from robocasa_lerobot.convert.rerender.camera_configs import check_camera_configs, with_cameras
-from robocasa_lerobot.convert.settings import MAX_SHARDS, SHARD_FRAMES, Camera
+from robocasa_lerobot.convert.settings import SHARD_FRAMES, Camera, shard_frames
 from robocasa_lerobot.convert.shard import EXTRAS, kept_assets
 from robocasa_lerobot.convert.writing.encoder import CODECS
 from robocasa_lerobot.errors import UnknownNameError, UserError
@@ -120,7 +120,7 @@ def make_render_plan(source: Path, settings: RenderSettings) -> RenderPlan:
         if camera.name not in known:
             raise UnknownNameError("camera", camera.name, known, "(describe a new one with --cam-configs FILE)")
     num_frames = sum(episode.length for episode in dataset.episodes)
-    pieces = _cut(dataset.episodes, max(SHARD_FRAMES, -(-num_frames // MAX_SHARDS)))
+    pieces = _cut(dataset.episodes, shard_frames(num_frames, SHARD_FRAMES))
     return RenderPlan(settings, source, plan.stamp, cameras, pieces, num_frames)
 
 

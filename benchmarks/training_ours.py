@@ -1,0 +1,49 @@
+"""Our loop as a process: an experiment file, trained as `train.py` does, or on the batches of LeRobot's loader.
+
+python benchmarks/training_ours.py experiment.yaml [--lerobot-loader]
+"""
+
+from __future__ import annotations
+
+import argparse
+import dataclasses
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, cast
+
+from accelerate import Accelerator
+from lerobot.datasets.factory import resolve_delta_timestamps
+from training_loaders import LeRobotBatches, lerobot_dataset
+
+from robocasa_lerobot.training import builders
+from robocasa_lerobot.training.config import load_experiment
+from robocasa_lerobot.training.loop import train_phase
+from robocasa_lerobot.training.phases import run_experiment
+from robocasa_lerobot.training.prepare import prepare_phase
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Train the file's only phase."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("experiment", type=Path)
+    parser.add_argument("--lerobot-loader", action="store_true")
+    options = parser.parse_args(arguments)
+    experiment = load_experiment(options.experiment)
+    if not options.lerobot_loader:
+        run_experiment(experiment)
+        return 0
+    (phase,) = experiment.phases
+    device = builders.best_device(experiment.device)
+    accelerator = Accelerator(cpu=device == "cpu", mixed_precision=experiment.mixed_precision)
+    run = prepare_phase(experiment, phase, device, accelerator)
+    root, policy = Path(phase.mixture.members[0].root), run.state.policy.config
+    dataset = lerobot_dataset(root, None)
+    dataset = lerobot_dataset(root, resolve_delta_timestamps(policy, dataset.meta))
+    batches = LeRobotBatches(dataset, phase.batch_size, getattr(policy, "drop_n_last_frames", None) or 0)
+    # The loop asks for batches by their number and looks at nothing else.
+    train_phase(dataclasses.replace(run, batches=cast(Any, batches)), accelerator)
+    return 0
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())
