@@ -143,7 +143,7 @@ def make_optimizer(
         schedule = _changed(LRSchedulerConfig, schedule, phase.scheduler, "scheduler")
     if schedule is not None and phase.warmup_steps is not None:
         schedule = dataclasses.replace(schedule, num_warmup_steps=phase.warmup_steps)
-    scheduler = schedule.build(optimizer, phase.steps) if schedule is not None else None
+    scheduler = schedule.build(optimizer, phase.schedule_steps or phase.steps) if schedule is not None else None
     clip = preset.grad_clip_norm if phase.grad_clip_norm is None else phase.grad_clip_norm
     return optimizer, scheduler, float(clip or 0.0)
 

@@ -14,7 +14,7 @@ from robocasa_lerobot.errors import UnknownNameError, UserError
 from robocasa_lerobot.settings import Data, load_yaml, set_dotted
 
 FILE_KEYS = ("policy", "mixture")  # their value may be the name of a YAML file, or hold one under `file`
-BASE, WITHOUT = "base", "without_phases"
+BASE, WITHOUT, REGISTRY = "base", "without_phases", "registry"
 # Settings that say what the thing is, and with each the settings of the base that it puts an end to; None is all.
 IDENTITY: dict[str, dict[str, tuple[str, ...] | None]] = {
     "policy": {"file": None, "type": None, "path": None},
@@ -60,9 +60,20 @@ def resolve(path: Path, overrides: Sequence[tuple[str, Any]] = ()) -> Data:
         set_dotted(data, key, value)
     data = _at_file_keys(data, _included)
     defaults = data.pop("defaults", None) or {}
+    registry = data.pop(REGISTRY, None)
     if isinstance(data.get("phases"), list):
         data["phases"] = [merge(defaults, p) if isinstance(p, Mapping) else p for p in data["phases"]]
+        for phase in data["phases"] if registry is not None else ():
+            _set_registry(phase, registry)
     return data
+
+
+def _set_registry(phase: Any, registry: str) -> None:
+    """Let the phase's selections that name no registry look in `registry`."""
+    mixture = phase.get("mixture") if isinstance(phase, Mapping) else None
+    for selection in (mixture.get("select") or []) if isinstance(mixture, Mapping) else []:
+        if isinstance(selection, dict):
+            selection.setdefault("registry", registry)
 
 
 def _load(path: Path, above: tuple[Path, ...]) -> Data:
@@ -72,6 +83,8 @@ def _load(path: Path, above: tuple[Path, ...]) -> Data:
     data = load_yaml(path)
     bases, without = data.pop(BASE, None) or [], data.pop(WITHOUT, None) or []
     own = _at_file_keys(data, functools.partial(_anchored, folder=path.parent))
+    if isinstance(own.get(REGISTRY), str):
+        own[REGISTRY] = _anchored(own[REGISTRY], path.parent)["file"]
     out: Data = {}
     for name in [bases] if isinstance(bases, str) else bases:
         out = merge(out, _load(path.parent / name, (*above, path.resolve())))

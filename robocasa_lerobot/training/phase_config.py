@@ -146,7 +146,8 @@ class PhaseConfig:
         warmup_steps: null is the policy's own schedule's.
         optimizer: fields of the policy's own optimiser that this phase changes, such as `weight_decay`; with a
             `type`, another of LeRobot's optimisers.
-        scheduler: likewise for the schedule of the learning rate.
+        scheduler: likewise for the schedule of the learning rate; `type: none` keeps the rate constant.
+        schedule_steps: steps that the schedule is made for; null is `steps`.
         grad_clip_norm: largest gradient norm; null is the policy's own, 0 is none.
         save_every: steps between checkpoints; the last step always has one. 0 is the last step only.
         save_initial: also keep the policy before the first step, as checkpoint 000000.
@@ -176,6 +177,7 @@ class PhaseConfig:
     warmup_steps: int | None = None
     optimizer: dict[str, Any] = field(default_factory=dict)
     scheduler: dict[str, Any] = field(default_factory=dict)
+    schedule_steps: int | None = None
     grad_clip_norm: float | None = None
     save_every: int = 0
     save_initial: bool = False
