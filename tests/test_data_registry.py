@@ -20,7 +20,7 @@ from robocasa_lerobot.data.registry import MissingDatasetsError, missing_dataset
 from robocasa_lerobot.data.source import DatasetSource
 from robocasa_lerobot.envs import registry as envs
 from robocasa_lerobot.errors import UnknownNameError, UserError
-from robocasa_lerobot.settings import decode
+from robocasa_lerobot.settings import decode, load_yaml
 
 
 @pytest.fixture(scope="module")
@@ -213,3 +213,11 @@ def test_mixture_files_may_write_numbers_and_text() -> None:
     )
     assert config.select[0].demos == "50"
     assert config.shares == {"a": 1.0}
+
+
+@pytest.mark.parametrize("name", ["human300", "human300_mg60", "target_10"])
+def test_mixture_files_of_the_benchmark_select_its_datasets(name: str) -> None:
+    path = Path(__file__).parents[1] / f"configs/mixtures/robocasa365_{name}.yaml"
+    config = decode(MixtureConfig, load_yaml(path))
+    counts = {"human300": 300, "human300_mg60": 360, "target_10": 50}
+    assert sum(len(select_datasets(selection)) for selection in config.select) == counts[name]
