@@ -79,7 +79,7 @@ def test_stopped_and_continued_gives_the_same_losses(tmp_path: Path, data: Path,
         assert all(torch.equal(ours[key], theirs[key]) for key in theirs)
 
 
-@pytest.mark.parametrize("kind", ["act", "diffusion"])
+@pytest.mark.parametrize("kind", ["act", "diffusion", "flow_vla"])
 def test_policies_of_lerobot_train_and_continue(tmp_path: Path, data: Path, kind: str) -> None:
     overrides = ["--defaults.steps=2", "--defaults.save_every=0", "--defaults.ema.enabled=false"]
     assert not run_experiment(tiny(tmp_path / "whole", data, kind, overrides), stop_after=2)

@@ -41,8 +41,9 @@ class SharedNoise(TorchFunctionMode):
             if size is None:
                 size = args[0] if isinstance(args[0], Sequence) else args
             return self._draw(func, (), tuple(size), kwargs)
-        if func is torch.randint and (isinstance(args[-1], Sequence) if args else False):
-            return self._draw(func, args[:-1], tuple(args[-1]), kwargs)
+        if func is torch.randint:
+            first, size = (args, kwargs.pop("size")) if "size" in kwargs else (args[:-1], args[-1])
+            return self._draw(func, first, tuple(size), kwargs)
         if func is torch._sample_dirichlet:  # what a Beta distribution draws from
             return self._dirichlet(args[0])
         return func(*args, **kwargs)
@@ -53,8 +54,8 @@ class SharedNoise(TorchFunctionMode):
         if kwargs.get("generator") is None:
             kwargs["generator"] = self._generator(torch.device(kwargs.get("device") or "cpu"))
         if not size or size[0] == 0 or size[0] % self._samples:
-            return func(*first, size, **kwargs)
-        whole = func(*first, (size[0] * self._processes, *size[1:]), **kwargs)
+            return func(*first, size=size, **kwargs)
+        whole = func(*first, size=(size[0] * self._processes, *size[1:]), **kwargs)
         return whole[self._rank * size[0] : (self._rank + 1) * size[0]]
 
     def _dirichlet(self, concentration: Tensor) -> Tensor:

@@ -1,0 +1,225 @@
+"""The loop's safeguards and extras: bad losses, pruning, signals, augmentation, trackers."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import torch
+from training_support import ROOT, experiment_file, losses, metrics, tiny
+
+from robocasa_lerobot import contract
+from robocasa_lerobot.data.fake import write_fake_dataset
+from robocasa_lerobot.errors import UserError
+from robocasa_lerobot.training.augment import augment
+from robocasa_lerobot.training.checkpoint import CHECKPOINTS, last_checkpoint, prune, tidy
+from robocasa_lerobot.training.interrupts import REQUEUE
+from robocasa_lerobot.training.phase_config import AugmentConfig
+from robocasa_lerobot.training.phases import run_experiment
+from robocasa_lerobot.training.shared_noise import SharedNoise
+
+CAMERA = contract.IMAGE_KEYS[0]
+
+
+@pytest.fixture(scope="module")
+def data(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    torch.set_num_threads(1)
+    return write_fake_dataset(tmp_path_factory.mktemp("data") / "fake", episodes=4, length=12, image_size=32)
+
+
+def test_batch_of_a_bad_loss_is_kept(tmp_path: Path, data: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The third step's loss is no number: weights stay those of the second, and the batch can be looked at."""
+    from robocasa_lerobot.policies.diffusion_transformer.modeling_diffusion_transformer import (
+        DiffusionTransformerPolicy,
+    )
+
+    whole, calls = DiffusionTransformerPolicy.forward, []
+
+    def sick(self: Any, batch: dict[str, Any], *args: Any, **kwargs: Any) -> Any:
+        calls.append(batch)
+        loss, outputs = whole(self, batch, *args, **kwargs)
+        return (loss * float("nan") if len(calls) == 3 else loss), outputs
+
+    monkeypatch.setattr(DiffusionTransformerPolicy, "forward", sick)
+    experiment = tiny(tmp_path, data)
+    with pytest.raises(UserError, match=r"the loss is nan.* at step 3.*Its values are finite"):
+        run_experiment(experiment)
+    (saved,) = (tmp_path / "out/pretrain").glob("bad_batch_*.pt")
+    content = torch.load(saved, weights_only=False)
+    assert content["step"] == 2
+    np.testing.assert_array_equal(content["parts"][0]["index"], calls[2]["index"])
+    last = last_checkpoint(tmp_path / "out/pretrain")
+    assert last is not None
+    assert last.name == "000002"
+    monkeypatch.undo()
+    assert not run_experiment(experiment, stop_after=2)  # with the cause gone, it goes on from there
+    assert [step for step, *_ in losses(tmp_path, "pretrain")] == [1, 2, 3, 4]
+
+
+def checkpoint_names(phase: Path) -> list[str]:
+    return sorted(path.name for path in (phase / CHECKPOINTS).iterdir() if path.name.isdigit())
+
+
+def test_checkpoints_are_pruned_by_rule(tmp_path: Path) -> None:
+    for step in range(0, 70, 10):
+        (tmp_path / CHECKPOINTS / f"{step:06d}").mkdir(parents=True)
+    prune(tmp_path, keep_last=0, keep_every=0)
+    assert len(checkpoint_names(tmp_path)) == 7
+    prune(tmp_path, keep_last=2, keep_every=20)
+    assert checkpoint_names(tmp_path) == ["000000", "000020", "000040", "000050", "000060"]
+    prune(tmp_path, keep_last=1, keep_every=0)
+    assert checkpoint_names(tmp_path) == ["000000", "000060"]
+
+
+def test_what_a_kill_left_is_put_in_order(tmp_path: Path) -> None:
+    parent = tmp_path / CHECKPOINTS
+    for name in ("000010", "000020", ".writing-000030", ".dropped-000005"):
+        (parent / name).mkdir(parents=True)
+    (parent / "last").symlink_to("000010")
+    tidy(tmp_path)
+    assert sorted(path.name for path in parent.iterdir()) == ["000010", "000020", "last"]
+    assert (parent / "last").readlink() == Path("000020")
+
+
+def test_training_prunes_as_it_goes(tmp_path: Path, data: Path) -> None:
+    run_experiment(tiny(tmp_path, data, overrides=["--defaults.save_every=1", "--defaults.keep_last=2"]), stop_after=4)
+    assert checkpoint_names(tmp_path / "out/pretrain") == ["000000", "000003", "000004"]
+
+
+def test_signal_saves_and_asks_for_another_turn(tmp_path: Path, data: Path) -> None:
+    path = experiment_file(tmp_path, data, defaults={"steps": 100000, "save_every": 2})
+    command = [sys.executable, str(ROOT / "train.py"), "--config_path", str(path)]
+    with (tmp_path / "log").open("w") as log:
+        process = subprocess.Popen(command, env={**os.environ, "OMP_NUM_THREADS": "1"}, stdout=log, stderr=log)
+        try:
+            until = time.monotonic() + 200
+            while not (tmp_path / "out/pretrain/checkpoints/000002").is_dir() and time.monotonic() < until:
+                assert process.poll() is None, (tmp_path / "log").read_text()[-2000:]
+                time.sleep(0.05)
+            process.send_signal(signal.SIGUSR1)
+            assert process.wait(timeout=60) == REQUEUE
+        finally:
+            process.kill()
+    last = last_checkpoint(tmp_path / "out/pretrain")
+    assert last is not None
+    assert int(last.name) == metrics(tmp_path, "pretrain")[-1]["step"]
+
+
+def pictures(count: int = 4) -> dict[str, torch.Tensor]:
+    return {CAMERA: torch.rand(count, 2, 3, 16, 16, generator=torch.Generator().manual_seed(0))}
+
+
+def changed(config: AugmentConfig, seed: int = 0, count: int = 4) -> torch.Tensor:
+    return augment(pictures(count), [CAMERA], config, seed)[CAMERA]
+
+
+def test_no_augmentation_changes_nothing() -> None:
+    assert torch.equal(changed(AugmentConfig()), pictures()[CAMERA])
+
+
+FULL = AugmentConfig(crop=0.9, rotate=5, brightness=0.3, contrast=0.4, saturation=0.5, hue=0.08)
+
+
+def test_augmentation_belongs_to_samples() -> None:
+    """The same seed gives the same pictures, each sample its own change, and a sample's the same over time."""
+    assert torch.equal(changed(FULL), changed(FULL))
+    assert not torch.equal(changed(FULL), changed(FULL, seed=1))
+    same = {CAMERA: pictures(1)[CAMERA][:, :1].expand(3, 2, 3, 16, 16).contiguous()}
+    out = augment(same, [CAMERA], FULL, 0)[CAMERA]
+    assert torch.allclose(out[:, 0], out[:, 1], atol=1e-6)
+    assert not torch.allclose(out[0], out[1], atol=1e-3)
+    assert 0 <= float(out.min()) <= float(out.max()) <= 1
+
+
+def test_processes_augment_their_part_of_the_batch() -> None:
+    batch = pictures(4)[CAMERA]
+    whole = augment({CAMERA: batch}, [CAMERA], FULL, 0)[CAMERA]
+    parts = [augment({CAMERA: batch[2 * r : 2 * r + 2]}, [CAMERA], FULL, 0, r, 2)[CAMERA] for r in range(2)]
+    torch.testing.assert_close(torch.cat(parts), whole)
+
+
+def test_each_augmentation_does_what_it_says() -> None:
+    before = pictures()[CAMERA]
+    grey = before.mean(dim=2, keepdim=True).expand_as(before).contiguous()
+    for name in ("saturation", "hue"):  # grey has neither
+        out = augment({CAMERA: grey}, [CAMERA], AugmentConfig(**{name: 0.5}), 0)[CAMERA]
+        torch.testing.assert_close(out, grey, atol=2e-3, rtol=0)
+        assert not torch.allclose(changed(AugmentConfig(**{name: 0.5})), before, atol=1e-2)
+    dim = 0.5 * before  # far from where values are cut off
+    brighter = augment({CAMERA: dim}, [CAMERA], AugmentConfig(brightness=0.3), 0)[CAMERA] / dim
+    factors = brighter[:, 0, 0, 0, 0]
+    torch.testing.assert_close(brighter, factors[:, None, None, None, None].expand_as(brighter))
+    assert 0.7 <= float(factors.min()) < float(factors.max()) <= 1.3
+    flat = torch.full((4, 1, 3, 16, 16), 0.25)
+    torch.testing.assert_close(augment({CAMERA: flat}, [CAMERA], AugmentConfig(crop=0.5, rotate=30), 0)[CAMERA], flat)
+    ramp = torch.linspace(0, 1, 16).expand(4, 1, 3, 16, 16).contiguous()
+    steps = augment({CAMERA: ramp}, [CAMERA], AugmentConfig(crop=0.5), 0)[CAMERA].diff(dim=-1)
+    torch.testing.assert_close(steps[..., 4:-4], torch.full_like(steps[..., 4:-4], 0.5 / 15))  # half as steep
+    kept = augment({CAMERA: ramp}, [CAMERA], AugmentConfig(crop=0.5, crop_cameras=["*wrist*"]), 0)[CAMERA]
+    assert torch.equal(kept, ramp)
+
+
+def test_training_with_everything_on(tmp_path: Path, data: Path) -> None:
+    overrides = ["--defaults.augment={crop: 0.9, hue: 0.1}", "--defaults.gradient_accumulation=2"]
+    assert not run_experiment(tiny(tmp_path / "a", data, overrides=overrides), stop_after=4)
+    assert not run_experiment(tiny(tmp_path / "b", data, overrides=overrides), stop_after=2)
+    assert not run_experiment(tiny(tmp_path / "b", data, overrides=overrides), stop_after=2)
+    assert losses(tmp_path / "a", "pretrain") == losses(tmp_path / "b", "pretrain")
+    line = metrics(tmp_path / "a", "pretrain")[-1]
+    assert 0 <= line["data_share"] <= 1
+    assert line["samples_per_second"] == pytest.approx(4 / line["seconds_per_step"])
+
+
+def test_tracker_without_its_package_is_told(tmp_path: Path, data: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    from robocasa_lerobot.training import metrics as module
+
+    monkeypatch.setattr(module, "get_available_trackers", lambda: [])
+    with pytest.raises(UserError, match="tracker 'tensorboard': its package is not installed"):
+        run_experiment(tiny(tmp_path, data, overrides=["--trackers=[tensorboard]"]))
+
+
+@pytest.mark.parametrize("tracker", ["tensorboard", "wandb"])
+def test_trackers_get_the_metrics(tmp_path: Path, data: Path, monkeypatch: pytest.MonkeyPatch, tracker: str) -> None:
+    pytest.importorskip(tracker)
+    from accelerate import Accelerator
+
+    sent: list[dict[str, Any]] = []
+    monkeypatch.setattr(Accelerator, "log", lambda _, values, step=None, **__: sent.append({**values, "step": step}))
+    monkeypatch.chdir(tmp_path)
+    run_experiment(tiny(tmp_path, data, overrides=[f"--trackers=[{tracker}]"]), stop_after=2)
+    assert [values["step"] for values in sent] == [1, 2]
+    assert sent[1]["pretrain/loss"] == metrics(tmp_path, "pretrain")[1]["loss"]
+
+
+def test_shared_noise_is_that_of_one_process() -> None:
+    def draws() -> list[torch.Tensor]:
+        times = torch.distributions.Beta(torch.tensor(1.5), torch.tensor(1.0)).sample((draws.rows,))  # type: ignore[attr-defined]
+        like = torch.zeros(draws.rows * 2, 5)  # type: ignore[attr-defined]
+        steps = torch.randint(low=0, high=100, size=(draws.rows,))  # type: ignore[attr-defined]
+        return [torch.randn(draws.rows, 3), torch.randn_like(like), steps, times, torch.rand(1)]  # type: ignore[attr-defined]
+
+    draws.rows = 8  # type: ignore[attr-defined]
+    torch.manual_seed(3)
+    whole = draws()
+    draws.rows = 4  # type: ignore[attr-defined]
+    parts = []
+    for rank in range(2):
+        with SharedNoise(4, rank, 2, seed=3):
+            parts.append(draws())
+    for number in range(4):
+        assert torch.equal(torch.cat([part[number] for part in parts]), whole[number])
+    assert torch.equal(parts[0][4], parts[1][4])
+
+
+def test_lines_of_metrics_are_json(tmp_path: Path, data: Path) -> None:
+    run_experiment(tiny(tmp_path, data), stop_after=1)
+    (line,) = (tmp_path / "out/pretrain/metrics.jsonl").read_text().splitlines()
+    assert json.loads(line)["step"] == 1

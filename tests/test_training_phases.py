@@ -1,0 +1,294 @@
+"""Phases as a graph: what they start from, what of the policy they train, whose data they see, and what they leave."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import torch
+import yaml
+from safetensors.torch import load_file
+from training_support import experiment_file, losses, metrics, tiny, weights
+
+from robocasa_lerobot.data.fake import write_fake_dataset
+from robocasa_lerobot.data.mixture import open_mixture
+from robocasa_lerobot.errors import UserError
+from robocasa_lerobot.training import builders, joining
+from robocasa_lerobot.training.adapters import apply_training_scope, merged_state
+from robocasa_lerobot.training.config import load_experiment
+from robocasa_lerobot.training.held_out import without_held_out
+from robocasa_lerobot.training.phase_config import HeldOutConfig, LoraConfig, PhaseConfig
+from robocasa_lerobot.training.phases import run_experiment
+from robocasa_lerobot.training.plan import plan_experiment
+from robocasa_lerobot.training.plan_text import render_plan
+
+FROZEN = "observation_encoder"
+
+
+@pytest.fixture(scope="module")
+def data(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return write_fake_dataset(tmp_path_factory.mktemp("data") / "fake", episodes=8, length=12, image_size=32)
+
+
+@pytest.fixture(scope="module")
+def other(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return write_fake_dataset(tmp_path_factory.mktemp("other") / "fake", episodes=2, length=8, image_size=32, seed=1)
+
+
+@pytest.fixture(scope="module")
+def pretrained(tmp_path_factory: pytest.TempPathFactory, data: Path) -> Path:
+    """Output folder of a finished first phase."""
+    folder = tmp_path_factory.mktemp("pretrained")
+    torch.set_num_threads(1)
+    assert run_experiment(tiny(folder, data, overrides=["--defaults.steps=2"]), only="pretrain")
+    return folder / "out/pretrain/checkpoints/last/pretrained_model"
+
+
+def from_there(folder: Path, data: Path, pretrained: Path, **finetune: Any) -> Path:
+    """An experiment of one phase that starts from a checkpoint."""
+    path = experiment_file(folder, data)
+    content = yaml.safe_load(path.read_text())
+    content["phases"] = [{**content["phases"][1], "init": str(pretrained), **finetune}]
+    path.write_text(yaml.safe_dump(content))
+    return path
+
+
+def changed_weights(folder: Path, pretrained: Path, phase: str = "finetune") -> set[str]:
+    before, after = load_file(pretrained / "model.safetensors"), weights(folder, phase)
+    assert before.keys() == after.keys()
+    return {key for key in before if not torch.equal(before[key], after[key])}
+
+
+def test_graph_of_phases(tmp_path: Path, data: Path) -> None:
+    """Two fine-tunings from one pretraining: both start from its weights, and one can be run alone."""
+    path = experiment_file(tmp_path, data, defaults={"steps": 2})
+    content = yaml.safe_load(path.read_text())
+    content["phases"].append({**content["phases"][1], "name": "second", "init": "pretrain", "save_initial": True})
+    content["phases"][1]["save_initial"] = True
+    path.write_text(yaml.safe_dump(content))
+    experiment = load_experiment(path)
+    with pytest.raises(UserError, match=r"'pretrain', which is not finished.*--phase pretrain"):
+        run_experiment(experiment, only="second")
+    with pytest.raises(UserError, match="Did you mean 'second'"):
+        run_experiment(experiment, only="secnd")
+    assert run_experiment(experiment, only="pretrain")
+    assert run_experiment(experiment, only="second")
+    assert not (tmp_path / "out/finetune").exists()
+    assert run_experiment(experiment)
+    start = weights(tmp_path, "pretrain")
+    for name in ("finetune", "second"):
+        assert all(torch.equal(value, start[key]) for key, value in weights(tmp_path, name, "000000").items())
+    assert losses(tmp_path, "finetune") != losses(tmp_path, "second")  # other samples and noise
+
+
+def test_phase_folder_says_how_it_was_made(tmp_path: Path, data: Path) -> None:
+    experiment = tiny(tmp_path, data, overrides=["--defaults.steps=1"])
+    assert run_experiment(experiment, only="pretrain")
+    folder = tmp_path / "out/pretrain"
+    about = json.loads((folder / "phase.json").read_text())
+    assert {"python", "lerobot", "torch"} <= about["versions"].keys()
+    assert len(about["data_fingerprint"]) > 10
+    assert "git_commit" in about
+    again = load_experiment(folder / "config.yaml")
+    assert [phase.name for phase in again.phases] == ["pretrain"]
+    assert again.phases[0].batch_size == experiment.phases[0].batch_size
+    assert (folder / "learning_curve.png").read_bytes().startswith(b"\x89PNG")
+
+
+@pytest.mark.parametrize("missing", [None, "replce"])
+def test_statistics_must_be_said(tmp_path: Path, data: Path, missing: str | None) -> None:
+    path = experiment_file(tmp_path, data)
+    content = yaml.safe_load(path.read_text())
+    content["phases"][1]["statistics"] = missing
+    path.write_text(yaml.safe_dump(content))
+    with pytest.raises(UserError, match="does not say what its inputs" if missing is None else "'replace'"):
+        load_experiment(path)
+
+
+def test_pooled_statistics_are_those_of_both_phases_samples(tmp_path: Path, data: Path, other: Path) -> None:
+    mixture = f"{{members: [{{root: {other}}}]}}"
+    overrides = ["--defaults.steps=2", f"--phases.finetune.mixture={mixture}", "--phases.finetune.statistics=pool"]
+    experiment = tiny(tmp_path, data, overrides=[*overrides, "--phases.pretrain.steps=6"])
+    ours = open_mixture(experiment.phases[1].mixture, experiment.loader)
+    theirs = open_mixture(experiment.phases[0].mixture, experiment.loader)
+    found = joining.pooled(experiment, experiment.phases[1], ours)["observation.state"]
+    parts = [ours.statistics()["observation.state"], theirs.statistics()["observation.state"]]
+    shares = (0.25, 0.75)  # 2 steps of 8
+    mean = sum(share * part["mean"] for share, part in zip(shares, parts, strict=True))
+    square = sum(s * (p["std"] ** 2 + p["mean"] ** 2) for s, p in zip(shares, parts, strict=True))
+    np.testing.assert_allclose(found["mean"], mean, atol=1e-6)
+    np.testing.assert_allclose(found["std"], np.sqrt(square - mean**2), atol=1e-6)
+    np.testing.assert_array_equal(found["max"], np.maximum(parts[0]["max"], parts[1]["max"]))
+
+
+def test_pool_needs_the_earlier_data(tmp_path: Path, data: Path, pretrained: Path) -> None:
+    with pytest.raises(UserError, match="no phase of this experiment"):
+        run_experiment(load_experiment(from_there(tmp_path, data, pretrained, statistics="pool")))
+
+
+def test_replay_draws_its_share_from_earlier_phases(tmp_path: Path, data: Path, other: Path) -> None:
+    mixture = f"{{members: [{{root: {other}}}]}}"
+    overrides = [f"--phases.finetune.mixture={mixture}", "--phases.finetune.replay.share=0.25"]
+    experiment = tiny(tmp_path, data, overrides=overrides)
+    dataset = joining.open_phase_data(experiment, experiment.phases[1])
+    assert [member.root for member in dataset.config.members] == [str(other), str(data)]
+    np.testing.assert_allclose(dataset.probabilities, [0.75, 0.25])
+    members, _ = dataset.sampler(seed=0).draw(0, 4000)
+    assert np.mean(members == 1) == pytest.approx(0.25, abs=0.03)  # 4 standard deviations
+    with pytest.raises(UserError, match="builds on no earlier phase"):
+        tiny(tmp_path, data, overrides=["--phases.pretrain.replay.share=0.25"])
+    with pytest.raises(UserError, match="Did you mean 'pretrain'"):
+        tiny(tmp_path, data, overrides=["--phases.finetune.replay={phases: [pretran]}"])
+
+
+def test_frozen_parts_stay(tmp_path: Path, data: Path, pretrained: Path) -> None:
+    experiment = load_experiment(from_there(tmp_path, data, pretrained, freeze=[FROZEN]))
+    assert run_experiment(experiment, stop_after=2) is False
+    changed = changed_weights(tmp_path, pretrained)
+    assert changed
+    assert not [key for key in changed if key.startswith(FROZEN)]
+    about = json.loads((tmp_path / "out/finetune/phase.json").read_text())
+    assert 0 < about["trainable_parameters"] < about["parameters"]
+
+
+def test_frozen_modules_keep_out_of_training_mode() -> None:
+    model = torch.nn.Sequential(torch.nn.Linear(2, 2), torch.nn.Dropout(), torch.nn.Linear(2, 2))
+    phase = PhaseConfig.__new__(PhaseConfig)
+    phase.freeze, phase.lora = ["0"], None
+    assert apply_training_scope(model, phase, 0) == [model[0]]
+    phase.freeze = ["3"]
+    with pytest.raises(UserError, match=r"unknown part of the policy '3'"):
+        apply_training_scope(model, phase, 0)
+
+
+def test_low_rank_training_goes_on_and_leaves_an_ordinary_policy(tmp_path: Path, data: Path, pretrained: Path) -> None:
+    changes = {"lora": {"rank": 2, "dropout": 0.1}, "save_initial": True}
+    whole = load_experiment(from_there(tmp_path / "whole", data, pretrained, **changes))
+    parts = load_experiment(from_there(tmp_path / "parts", data, pretrained, **changes))
+    assert run_experiment(whole)
+    assert not run_experiment(parts, stop_after=2)
+    assert run_experiment(parts)
+    assert losses(tmp_path / "parts", "finetune") == losses(tmp_path / "whole", "finetune")
+    ours, theirs = weights(tmp_path / "parts", "finetune"), weights(tmp_path / "whole", "finetune")
+    assert all(torch.equal(ours[key], theirs[key]) for key in theirs)
+    start = weights(tmp_path / "whole", "finetune", "000000")
+    changed = changed_weights(tmp_path / "whole", pretrained)
+    assert changed
+    for key in changed:  # differences of rank 2, and of matrices only
+        difference = (theirs[key] - start[key]).double()
+        assert difference.ndim == 2
+        values = torch.linalg.svdvals(difference)
+        assert (values[2:] < 1e-4 * values[0]).all()  # float32 rounds
+    about = json.loads((tmp_path / "whole/out/finetune/phase.json").read_text())
+    assert about["trainable_parameters"] < 0.5 * about["parameters"]
+
+
+def test_low_rank_change_starts_at_nothing() -> None:
+    model = torch.nn.ModuleDict({"a": torch.nn.Linear(4, 4), "m": torch.nn.MultiheadAttention(4, 2)})
+    before = {key: value.clone() for key, value in model.state_dict().items()}
+    phase = PhaseConfig.__new__(PhaseConfig)
+    phase.freeze, phase.lora = [], LoraConfig(rank=2, targets=["a", "m.in_proj"], train=["m.out_proj.bias"])
+    apply_training_scope(model, phase, 0)
+    merged = merged_state(model)
+    assert merged is not None
+    assert merged.keys() == before.keys()
+    assert all(torch.equal(merged[key], before[key]) for key in before)
+    trained = {name for name, p in model.named_parameters() if p.requires_grad}
+    assert len(trained) == 5  # two matrices for each of two weights, and the bias
+    phase.lora = LoraConfig(targets=["b"])
+    with pytest.raises(UserError, match="unknown layer 'b'"):
+        apply_training_scope(torch.nn.Sequential(torch.nn.Linear(2, 2)), phase, 0)
+
+
+def test_held_out_episodes_are_not_trained_on(tmp_path: Path, data: Path) -> None:
+    overrides = ["--defaults.steps=2", "--defaults.held_out={share: 0.25, every: 1, samples: 8}"]
+    experiment = tiny(tmp_path, data, overrides=overrides)
+    mixture = open_mixture(experiment.phases[0].mixture, experiment.loader)
+    kept, apart = without_held_out(mixture, HeldOutConfig(share=0.25), experiment.loader, seed=0)
+    numbers = [dataset.config.members[0].episodes or [] for dataset in (kept, apart)]
+    assert sorted([*numbers[0], *numbers[1]]) == list(range(8))
+    assert len(numbers[1]) == 2  # one of four of each task
+    assert {number % 2 for number in numbers[1]} == {0, 1}
+    assert run_experiment(experiment, only="pretrain")
+    lines = [json.loads(line) for line in (tmp_path / "out/pretrain/held_out.jsonl").read_text().splitlines()]
+    assert [line["step"] for line in lines] == [1, 2]
+    assert lines[0]["tasks"].keys() == {"OpenDrawer", "CloseDrawer"}
+    assert lines[0]["loss"] == pytest.approx(np.mean(list(lines[0]["tasks"].values())))
+    assert lines[0] != lines[1]
+
+
+def test_measuring_held_out_episodes_does_not_change_the_training(tmp_path: Path, data: Path) -> None:
+    common = ["--defaults.steps=3"]
+    often = [*common, "--defaults.held_out={share: 0.25, every: 1, samples: 8}"]
+    seldom = [*common, "--defaults.held_out={share: 0.25, every: 9, samples: 8}"]
+    for name, overrides in (("often", often), ("seldom", seldom)):
+        assert run_experiment(tiny(tmp_path / name, data, overrides=overrides), only="pretrain")
+    assert losses(tmp_path / "often", "pretrain") == losses(tmp_path / "seldom", "pretrain")
+
+
+def test_plan_tells_what_would_be_done(tmp_path: Path, data: Path) -> None:
+    overrides = ["--phases.pretrain.save_every=1", "--phases.pretrain.keep_last=2", "--phases.finetune.lora.rank=2"]
+    overrides.append("--loader.image_size=32")
+    mixture = "--phases.finetune.mixture={select: [{task_set: atomic_seen, split: target}]}"
+    experiment = tiny(tmp_path, data, overrides=[*overrides, mixture])
+    pretrain, finetune = plan_experiment(experiment, measured_steps=4)
+    assert not (tmp_path / "out").exists()
+    assert (pretrain.depth, finetune.depth) == (0, 1)
+    assert (pretrain.samples, pretrain.frames, pretrain.missing) == (16, 96, [])
+    assert pretrain.kept == 3  # the newest two and the initial one
+    assert pretrain.parameters is not None
+    assert finetune.parameters is not None
+    assert pretrain.parameters[0] == pretrain.parameters[1]
+    assert finetune.parameters[1] < finetune.parameters[0]
+    assert len(finetune.missing) == 18
+    assert pretrain.seconds is not None
+    assert pretrain.seconds > 0
+    text = render_plan(experiment, [pretrain, finetune], "cpu")
+    for part in ("finetune <- pretrain (to do)", "missing datasets: 18", "statistics: keep", "hours by measurement"):
+        assert part in text
+    assert run_experiment(tiny(tmp_path, data, overrides=overrides), only="pretrain")
+    assert plan_experiment(experiment, only="pretrain", measured_steps=0)[0].done == 4
+
+
+def test_optimizer_and_schedule_of_a_phase(tmp_path: Path, data: Path) -> None:
+    def made(*overrides: str) -> tuple[torch.optim.Optimizer, Any]:
+        experiment = tiny(tmp_path, data, "act", overrides)
+        config = builders.policy_config(experiment.policy, None, "cpu")
+        meta = open_mixture(experiment.phases[0].mixture, experiment.loader).meta
+        policy = builders.make_phase_policy(config, meta, None)
+        return builders.make_optimizer(policy, experiment.phases[0])[:2]
+
+    optimizer, _ = made("--phases.pretrain.optimizer={weight_decay: 0.5, betas: [0.5, 0.6]}")
+    assert optimizer.param_groups[0]["weight_decay"] == 0.5
+    assert optimizer.param_groups[0]["betas"] == (0.5, 0.6)
+    optimizer, schedule = made(
+        "--phases.pretrain.optimizer={type: sgd, lr: 0.1}", "--phases.pretrain.scheduler={type: none}"
+    )
+    assert isinstance(optimizer, torch.optim.SGD)
+    assert schedule is None
+    with pytest.raises(UserError, match="Did you mean 'weight_decay'"):
+        made("--phases.pretrain.optimizer={weight_decy: 0.5}")
+    with pytest.raises(UserError, match="type of optimizer"):
+        made("--phases.pretrain.optimizer={type: sdg}")
+
+
+def test_mistakes_in_phases_are_told(tmp_path: Path, data: Path) -> None:
+    for overrides, message in (
+        (["--phases.pretrain.evaluations=[quik]"], "Did you mean 'quick'"),
+        (["--phases.pretrain.init=hub:nobody/nothing", "--phases.pretrain.statistics=keep"], "hf download"),
+        (["--trackers=[tensorbord]"], "Did you mean 'tensorboard'"),
+        (["--phases.pretrain.lora.rank=0"], "rank is 0"),
+        (["--phases.pretrain.lora.rank=1", "--phases.pretrain.freeze=[a]"], "leave `freeze` out"),
+        (["--phases.pretrain.augment.crop=2"], "crop is 2"),
+        (["--phases.pretrain.freeze=['*']"], "leaves nothing"),
+    ):
+        with pytest.raises(UserError, match=message):
+            run_experiment(tiny(tmp_path, data, overrides=overrides), only="pretrain")
+    assert not metrics_exist(tmp_path)
+
+
+def metrics_exist(folder: Path) -> bool:
+    return (folder / "out/pretrain/metrics.jsonl").exists() and bool(metrics(folder, "pretrain"))
