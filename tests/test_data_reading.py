@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
+from lerobot.datasets.lerobot_dataset import LeRobotDataset
 from lerobot.datasets.video_utils import decode_video_frames
 
 from robocasa_lerobot import contract
@@ -169,3 +170,29 @@ def test_missing_frames_are_told(root: Path, tmp_path: Path) -> None:
         with pytest.raises(UserError, match="missing or out of order"):
             map_columns(source.root, row, total, f"total{total}", tmp_path)
     assert not [path for path in tmp_path.glob("*.npy") if ".partial" not in path.name]
+
+
+def test_pictures_that_are_stored_singly_equal_lerobots(tmp_path: Path) -> None:
+    feature = {"dtype": "image", "shape": (16, 16, 3), "names": ["height", "width", "channel"]}
+    features = {KEY: feature, "action": {"dtype": "float32", "shape": (2,), "names": ["x", "y"]}}
+    written = LeRobotDataset.create(
+        "single", 20, features, root=tmp_path / "single", use_videos=False, video_backend="pyav"
+    )
+    generator = np.random.default_rng(0)
+    for _ in range(2):
+        for _ in range(5):
+            picture = generator.integers(0, 256, (16, 16, 3), dtype=np.uint8)
+            written.add_frame({KEY: picture, "action": np.zeros(2, np.float32), "task": "look"})
+        written.save_episode()
+    written.finalize()
+    windows = {KEY: [-0.05, 0.0]}
+    dataset = MixtureDataset(MixtureConfig([MemberConfig(str(tmp_path / "single"))]))
+    dataset.set_windows(windows)
+    reference = LeRobotDataset(
+        "single", root=tmp_path / "single", delta_timestamps=windows, return_uint8=True, video_backend="pyav"
+    )
+    for index in (0, 4, 5, 9):
+        wanted = reference[index]
+        assert dataset[index][KEY].dtype == torch.uint8
+        assert torch.equal(dataset[index][KEY].float() / 255, wanted[KEY])  # which are floats from 0 to 1
+        assert torch.equal(dataset[index][f"{KEY}_is_pad"], wanted[f"{KEY}_is_pad"])

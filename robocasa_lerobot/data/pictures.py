@@ -36,7 +36,9 @@ class PictureReader:
         depth = bool((feature.get("info") or {}).get("is_depth_map"))
         if feature["dtype"] != "video" or depth:
             others = self._lerobot(source)
-            return torch.stack([others[int(index)][key] for index in distinct])[torch.from_numpy(back)]
+            pictures = torch.stack([others[int(index)][key] for index in distinct])[torch.from_numpy(back)]
+            # LeRobot gives pictures that are stored singly as floats, whatever it is asked for.
+            return pictures if depth else pictures.mul(255).round().to(torch.uint8)
         parts = []
         episodes = np.searchsorted(source.ends, distinct, side="right")
         for episode in np.unique(episodes):
