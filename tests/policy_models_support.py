@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import torch
+from flow_vla_support import TINY, write_pretrained
 
 WORDS = [
     "[UNK]",
@@ -133,4 +134,11 @@ def tiny_settings(kind: str, folder: Path) -> dict[str, Any]:
             "num_domains": 2, "tokenizer_max_length": 12, "resize_imgs_with_padding": [32, 32],
             "num_denoising_steps": 2,
         }  # fmt: skip
+    if kind.startswith("flow_vla"):
+        tiny = {**TINY, "image_size": list(TINY["image_size"])}
+        del tiny["device"]
+        if kind == "flow_vla":
+            return tiny
+        model = str(write_pretrained(folder / kind, kind.removeprefix("flow_vla_")))
+        return {**tiny, "prefix": "pretrained", "prefix_path": model, "image_size": None, "freeze_vision": True}
     raise AssertionError(kind)

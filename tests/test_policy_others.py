@@ -8,12 +8,13 @@ from typing import Any
 
 import numpy as np
 import pytest
+import torch
 import yaml
 from evaluation_env import SlideEnv
 from flow_vla_support import with_features
 from lerobot.configs import NormalizationMode
 from policy_models_support import tiny_settings
-from training_support import metrics
+from training_support import losses, weights
 
 from robocasa_lerobot import contract
 from robocasa_lerobot.data.fake import write_fake_dataset
@@ -33,6 +34,13 @@ FILES = sorted(FOLDER.glob("*.yaml"))
 OURS = ("diffusion_transformer", "flow_vla")
 LEROBOTS = ("act", "diffusion", "multi_task_dit", "smolvla", "xvla", "pi0", "pi05", "groot")
 OFFLINE = ("act", "diffusion", "multi_task_dit", "smolvla", "xvla")
+# The two with full ResNets take long; small ones of both are in the fast tests of training.
+RESUMED = [
+    *(pytest.param(kind, marks=pytest.mark.slow) if kind in ("act", "diffusion") else kind for kind in OFFLINE),
+    "flow_vla",
+    "flow_vla_smolvlm",
+    "flow_vla_paligemma",
+]
 SIZE = 32
 
 # Published values (facts of the benchmark's forks): type, field, value.
@@ -128,19 +136,19 @@ def test_published_settings(kind: str, published: dict[str, Any]) -> None:
         assert config.normalization_mapping["ACTION"] == NormalizationMode.MEAN_STD
 
 
-@pytest.mark.parametrize("kind", OFFLINE)
-def test_two_steps_of_training_and_a_trial(kind: str, data: Path, tmp_path: Path) -> None:
-    experiment = {
+def experiment_file(folder: Path, data: Path, kind: str, models: Path) -> Path:
+    file = FOLDER / f"{'flow_vla_demo' if kind.startswith('flow_vla') else kind}.yaml"
+    content = {
         "name": "test",
-        "output_dir": str(tmp_path / "out"),
+        "output_dir": str(folder / "out"),
         "device": "cpu",
-        "policy": {"file": str(FOLDER / f"{kind}.yaml"), **tiny_settings(kind, tmp_path / "models")},
+        "policy": {"file": str(file), **tiny_settings(kind, models)},
         "loader": {"cache_dir": str(data.parent / "frames")},
         "phases": [
             {
                 "name": "train",
                 "mixture": {"members": [{"root": str(data)}]},
-                "steps": 2,
+                "steps": 4,
                 "batch_size": 2,
                 "log_every": 1,
                 "save_every": 2,
@@ -148,14 +156,30 @@ def test_two_steps_of_training_and_a_trial(kind: str, data: Path, tmp_path: Path
             }
         ],
     }
-    path = tmp_path / "experiment.yaml"
-    path.write_text(yaml.safe_dump(experiment))
-    assert run_experiment(load_experiment(path))
-    lines = metrics(tmp_path, "train")
-    assert [line["step"] for line in lines] == [1, 2]
-    assert all(math.isfinite(line["loss"]) and line["grad_norm"] > 0 for line in lines)
+    folder.mkdir()
+    path = folder / "experiment.yaml"
+    path.write_text(yaml.safe_dump(content))
+    return path
 
-    runner = load_policy(read_source(str(tmp_path / "out/train/checkpoints/000002/pretrained_model")), "cpu", None)
+
+@pytest.mark.parametrize("kind", RESUMED)
+def test_two_steps_and_two_more_equal_four_and_a_trial(kind: str, data: Path, tmp_path: Path) -> None:
+    at_once, in_two = tmp_path / "at_once", tmp_path / "in_two"
+    models = tmp_path / "models"
+    assert run_experiment(load_experiment(experiment_file(at_once, data, kind, models)))
+    halves = load_experiment(experiment_file(in_two, data, kind, models))
+    assert not run_experiment(halves, stop_after=2)
+    assert run_experiment(halves)
+    lines = losses(at_once, "train")
+    assert [step for step, *_ in lines] == [1, 2, 3, 4]
+    assert all(math.isfinite(loss) and norm > 0 for _, loss, norm in lines)
+    assert losses(in_two, "train") == lines
+    whole, resumed = weights(at_once, "train"), weights(in_two, "train")
+    assert whole.keys() == resumed.keys()
+    assert all(torch.equal(whole[name], resumed[name]) for name in whole)
+    assert any(not torch.equal(whole[name], value) for name, value in weights(at_once, "train", "000000").items())
+
+    runner = load_policy(read_source(str(at_once / "out/train/checkpoints/000004/pretrained_model")), "cpu", None)
     (trial,) = make_plan(["test"], {"Slide": 6}, trials=1, seed=3, videos=0)
     actions = []
     for _ in range(2):
