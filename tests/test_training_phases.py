@@ -250,6 +250,10 @@ def test_plan_tells_what_would_be_done(tmp_path: Path, data: Path) -> None:
     for part in ("finetune <- pretrain (to do)", "missing datasets: 18", "statistics: keep", "hours by measurement"):
         assert part in text
     assert run_experiment(tiny(tmp_path, data, overrides=overrides), only="pretrain")
+    names = ("pretrained_model/model", "training_state/raw_model", "training_state/optimizer_state")
+    files = [tmp_path / f"out/pretrain/checkpoints/000004/{name}.safetensors" for name in names]
+    sizes = sum(tensor.nbytes for path in files for tensor in load_file(path).values())
+    assert pretrain.checkpoint_bytes == pytest.approx(sizes, rel=0.05)
     assert plan_experiment(experiment, only="pretrain", measured_steps=0)[0].done == 4
 
 

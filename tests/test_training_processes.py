@@ -1,0 +1,71 @@
+"""Several processes train as one does."""
+
+from __future__ import annotations
+
+import os
+import socket
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+from training_support import ROOT, experiment_file, losses
+
+from robocasa_lerobot.data.fake import write_fake_dataset
+
+# Without dropout, whose masks belong to processes; everything else that is random belongs to samples.
+CALM = {
+    "diffusion_transformer": {"dropout": 0.0},
+    "act": {"dropout": 0.0, "use_vae": False},
+    "flow_vla": {},
+}
+
+
+@pytest.fixture(scope="module")
+def data(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    torch.set_num_threads(1)
+    return write_fake_dataset(tmp_path_factory.mktemp("data") / "fake", episodes=4, length=12, image_size=32)
+
+
+def command(path: Path, *settings: str) -> list[str]:
+    return [sys.executable, str(ROOT / "train.py"), "--config_path", str(path), *settings]
+
+
+def environment(**more: str) -> dict[str, str]:
+    return {**os.environ, "OMP_NUM_THREADS": "1", **more}
+
+
+def run_in_two_processes(path: Path) -> None:
+    """As `torchrun` starts them, on this machine and with gloo."""
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        port = str(free.getsockname()[1])
+    common = {"WORLD_SIZE": "2", "MASTER_ADDR": "127.0.0.1", "MASTER_PORT": port, "LOCAL_WORLD_SIZE": "2"}
+    logs = [path.with_name(f"rank{rank}.log") for rank in range(2)]
+    processes = []
+    try:
+        for rank, log in enumerate(logs):
+            with log.open("w") as file:
+                own = environment(**common, RANK=str(rank), LOCAL_RANK=str(rank), ACCELERATE_USE_CPU="true")
+                processes.append(subprocess.Popen(command(path), env=own, stdout=file, stderr=file))
+        for process, log in zip(processes, logs, strict=True):
+            assert process.wait(timeout=280) == 0, log.read_text()[-3000:]
+    finally:
+        for process in processes:
+            process.kill()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", sorted(CALM))
+def test_two_processes_train_as_one_does(tmp_path: Path, data: Path, kind: str) -> None:
+    changes = {"policy": CALM[kind], "defaults": {"augment": {"crop": 0.9, "brightness": 0.2}, "steps": 4}}
+    one = experiment_file(tmp_path / "one", data, kind, **changes)
+    two = experiment_file(tmp_path / "two", data, kind, **changes)
+    done = subprocess.run(command(one), env=environment(), capture_output=True, text=True, timeout=280, check=False)
+    assert done.returncode == 0, done.stderr[-3000:]
+    run_in_two_processes(two)
+    for phase in ("pretrain", "finetune"):
+        ours, theirs = losses(tmp_path / "two", phase), losses(tmp_path / "one", phase)
+        np.testing.assert_allclose(ours, theirs, rtol=1e-5)
