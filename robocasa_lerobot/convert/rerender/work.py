@@ -45,8 +45,8 @@ from robocasa_lerobot.convert.writing.encoder import (
     CODECS,
     Histogram,
     VideoSettings,
-    histogram_statistics,
     sampled_frames,
+    unit_statistics,
 )
 from robocasa_lerobot.convert.writing.encoding_process import shared_encoder
 from robocasa_lerobot.convert.writing.files import VIDEO_FILE_MB
@@ -240,9 +240,8 @@ def _place_videos(
                     path = place / f"{key}.mp4"
                     entry |= files[key].append(path, probe(path))
                     count = len(sampled_frames(lengths[number]))
-                    for name, value in histogram_statistics(histograms[key], count).items():
-                        levels = value if name == "count" else (value / 255).reshape(3, 1, 1)
-                        entry[f"stats/{key}/{name}"] = levels.tolist()
+                    for name, value in unit_statistics(histograms[key], count).items():
+                        entry[f"stats/{key}/{name}"] = value.tolist()
                     totals[key] = totals.get(key, 0) + histograms[key]
             columns[number] = entry
     for file in files.values():

@@ -84,8 +84,7 @@ class EncodedVideo:
 
     def statistics(self) -> dict[str, NDArray[Any]]:
         """Statistics (3, 1, 1) in [0, 1] of the sampled pixels, as LeRobot keeps them for each episode."""
-        levels = histogram_statistics(self.histogram, self.num_sampled)
-        return {name: value if name == "count" else (value / 255).reshape(3, 1, 1) for name, value in levels.items()}
+        return unit_statistics(self.histogram, self.num_sampled)
 
 
 class FramePreparation:
@@ -285,3 +284,9 @@ def histogram_statistics(histogram: Histogram, num_frames: int) -> dict[str, NDA
             for q in QUANTILES
         },
     }
+
+
+def unit_statistics(histogram: Histogram, num_frames: int) -> dict[str, NDArray[Any]]:
+    """`histogram_statistics` in LeRobot's layout: (3, 1, 1), in [0, 1]."""
+    levels = histogram_statistics(histogram, num_frames)
+    return {name: value if name == "count" else (value / 255).reshape(3, 1, 1) for name, value in levels.items()}

@@ -16,7 +16,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
-from robocasa_lerobot.convert.writing.encoder import QUANTILES, Histogram, histogram_statistics, num_sampled_pixels
+from robocasa_lerobot.convert.writing.encoder import QUANTILES, Histogram, num_sampled_pixels, unit_statistics
 
 _ROWS = 65_536  # read at a time
 _QUANTILE_NAMES = tuple(f"q{round(q * 100):02d}" for q in QUANTILES)
@@ -54,8 +54,7 @@ def dataset_statistics(
 def picture_statistics(histogram: Histogram, shape: Sequence[int]) -> dict[str, NDArray[Any]]:
     """Statistics (3, 1, 1) in [0, 1] of the sampled pixels of pictures of `shape` (H, W, 3)."""
     num_frames = int(histogram.sum()) // (3 * num_sampled_pixels(shape[0], shape[1]))
-    levels = histogram_statistics(histogram, num_frames)
-    return {name: value if name == "count" else (value / 255).reshape(3, 1, 1) for name, value in levels.items()}
+    return unit_statistics(histogram, num_frames)
 
 
 def _column_statistics(root: Path, key: str) -> dict[str, NDArray[Any]]:

@@ -6,6 +6,7 @@ Gemma), read layer by layer through its key/value cache; it is small and new, or
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from typing import Any
 
 import torch
@@ -38,7 +39,7 @@ class LastLayer(nn.Module):
         return hidden_states
 
 
-class Prefix(nn.Module):
+class Prefix(nn.Module, ABC):
     """What both kinds of prefix share; `parts` says which modules see and which read."""
 
     language_model: nn.Module
@@ -49,17 +50,17 @@ class Prefix(nn.Module):
         self.config = config
         self.image_keys = list(config.image_features)
 
+    @abstractmethod
     def embed_images(self, images: Tensor) -> Tensor:
         """Pictures (N, 3, H, W) in [-1, 1] as tokens (N, T, width)."""
-        raise NotImplementedError
 
+    @abstractmethod
     def embed_words(self, tokens: Tensor) -> Tensor:
         """Tokens of the preprocessor as vectors (B, W, width)."""
-        raise NotImplementedError
 
+    @abstractmethod
     def parts(self) -> dict[str, list[nn.Module]]:
         """The modules of `vision` and of `language`."""
-        raise NotImplementedError
 
     def checkpoint_config(self) -> dict[str, Any] | None:
         """What a checkpoint needs to build this prefix without the pretrained model."""
