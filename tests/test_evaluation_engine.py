@@ -18,7 +18,7 @@ import test_evaluation_records
 from evaluation_env import SlideEnv
 
 from robocasa_lerobot.errors import UserError
-from robocasa_lerobot.evaluation import engine, results
+from robocasa_lerobot.evaluation import engine, results, trials_file
 from robocasa_lerobot.evaluation.config import EvaluationConfig
 from robocasa_lerobot.evaluation.film import FILM_EVERY, FILM_FPS, Film
 from robocasa_lerobot.evaluation.overrides import load_config
@@ -50,11 +50,8 @@ def evaluate(out: Path, tasks: str = "Slide", **changes: Any) -> list[TrialRecor
     return engine.evaluate(engine.prepare(load_config(EvaluationConfig, settings(out, tasks, **changes))))
 
 
-def comparable(records: list[TrialRecord]) -> list[tuple[Any, ...]]:
-    return [
-        (r.key, r.seed, r.success, r.steps, r.trajectory, r.success_terms, r.terms_ever, r.scene, r.error)
-        for r in sorted(records, key=lambda r: r.key)
-    ]
+def comparable(records: list[TrialRecord]) -> list[dict[str, Any]]:
+    return [r.comparable() for r in sorted(records, key=lambda r: r.key)]
 
 
 def test_outcomes_do_not_depend_on_workers_order_or_films(tmp_path: Path) -> None:
@@ -64,8 +61,8 @@ def test_outcomes_do_not_depend_on_workers_order_or_films(tmp_path: Path) -> Non
     assert len({r.trajectory for r in one}) == len(one) == 24
     assert 0 < sum(r.success for r in one) < 24
     filmed = [r for r in two if r.video is not None]
-    for label, task in {r.key[:2] for r in two}:
-        group = [r for r in two if r.key[:2] == (label, task)]
+    for label, task in {(r.label, r.task) for r in two}:
+        group = [r for r in two if (r.label, r.task) == (label, task)]
         assert {r.success for r in group} == {r.success for r in group if r.video is not None}
         assert {r.trial for r in group if r.video is not None} >= {0, 1}
     for record in filmed:
@@ -76,32 +73,34 @@ def test_outcomes_do_not_depend_on_workers_order_or_films(tmp_path: Path) -> Non
 
 def test_records_say_what_happened_and_what_made_it(tmp_path: Path) -> None:
     records = evaluate(tmp_path / "out", trials=8, **{"policy.path": "zero"})
-    assert results.read_trials(tmp_path / "out" / results.TRIALS_FILE) == records
+    assert results.read_results(tmp_path / "out").trials == records
     for record in records:
         assert record.instruction == "slide the block"
-        assert record.success is (record.first_success_step is not None) is record.success_terms["very far"]
+        assert record.success is (record.first_success_step is not None) is record.terms["very far"].final
         assert record.steps == (record.first_success_step or 30)
-        assert set(record.terms_ever) == {"far", "very far"}
-        assert record.settings["seed"] == 0
-        assert record.settings["factory"] == FACTORY
-        assert {"robocasa_lerobot", "lerobot", "mujoco", "torch"} <= set(record.versions)
+        assert set(record.terms) == {"far", "very far"}
+    (header,) = results.read_results(tmp_path / "out").headers.values()
+    assert header.settings["seed"] == 0
+    assert header.settings["factory"] == FACTORY
+    assert {"robocasa_lerobot", "lerobot", "mujoco", "torch"} <= set(header.versions)
 
 
 @pytest.mark.parametrize(
-    ("fault", "words"),
+    ("fault", "words", "outcome"),
     [
-        ("crash", "RuntimeError: the block fell off"),
-        ("kill", "ended with exit status 7"),
-        ("hang", "no progress for 2 s"),
+        ("crash", "RuntimeError: the block fell off", "crashed"),
+        ("kill", "ended with exit status 7", "crashed"),
+        ("hang", "no progress for 2 s", "hung"),
     ],
 )
-def test_a_fault_costs_one_attempt(tmp_path: Path, fault: str, words: str) -> None:
+def test_a_fault_costs_one_attempt(tmp_path: Path, fault: str, words: str, outcome: str) -> None:
     healthy = evaluate(tmp_path / "healthy")
     records = evaluate(tmp_path / "out", f"Slide+{fault}", stall_seconds=2)
     assert [r.error for r in records] == [None] * 4
     assert sorted(r.attempts for r in records) == [1, 1, 1, 2]
     (retried,) = [r for r in records if r.attempts == 2]
-    assert words in str(retried.retried_error)
+    assert words in str(retried.first_error)
+    assert retried.first_outcome == outcome
     assert len(healthy) == len(records)
 
 
@@ -126,7 +125,7 @@ def test_a_killed_evaluation_runs_only_what_is_missing(tmp_path: Path) -> None:
     environment = {**os.environ, "PYTHONPATH": str(ROOT / "tests")}
     process = subprocess.Popen(command, env=environment, stderr=subprocess.DEVNULL)
     deadline = time.monotonic() + 120
-    while not (path.exists() and path.read_bytes().count(b"\n") >= 3):
+    while not (path.exists() and path.read_bytes().count(b"\n") >= 4):
         assert process.poll() is None, "the evaluation ended before it could be killed"
         assert time.monotonic() < deadline
         time.sleep(0.01)
@@ -138,11 +137,13 @@ def test_a_killed_evaluation_runs_only_what_is_missing(tmp_path: Path) -> None:
     done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=120, check=True)
     assert "cut off by a kill" in done.stderr
     assert path.read_bytes().startswith(complete)
-    keys = collections.Counter((r["task"], r["trial"]) for r in map(json.loads, path.read_text().splitlines()))
+    keys = collections.Counter(
+        (r["task"], r["trial"]) for r in map(json.loads, path.read_text().splitlines()) if r["kind"] == "trial"
+    )
     assert sorted(keys) == [("Slide+slow", trial) for trial in range(12)]
     assert set(keys.values()) == {1}
     whole = evaluate(tmp_path / "whole", "Slide+slow", trials=12, **{"policy.path": "zero"})
-    assert comparable(results.read_trials(path)) == comparable(whole)
+    assert comparable(results.read_results(path).trials) == comparable(whole)
 
 
 def test_more_trials_tasks_or_policies_can_be_added_but_settings_cannot_change(tmp_path: Path) -> None:
@@ -151,7 +152,7 @@ def test_more_trials_tasks_or_policies_can_be_added_but_settings_cannot_change(t
     more = evaluate(out, "Slide,Push", trials=3, **{"policy.path": "random,zero"})
     assert len(more) == 12
     assert {r.key: r for r in more}[first[0].key] == first[0]
-    assert len(results.read_trials(out / results.TRIALS_FILE)) == 12
+    assert len(results.read_results(out).trials) == 12
     with pytest.raises(UserError, match=r"(?s)seed: 0 in the file, 1 now.*choose another --out"):
         evaluate(out, trials=2, seed=1)
 
@@ -234,8 +235,10 @@ def test_what_no_film_shows_is_run_again_and_must_go_the_same_way(
     # A record whose trial goes another way keeps its outcome and gets no film.
     other = tmp_path / "other"
     other.mkdir()
+    (header,) = results.read_results(out).headers.values()
+    trials_file.append(other / results.TRIALS_FILE, header)
     for record in plain:
-        results.append_trial(other / results.TRIALS_FILE, dataclasses.replace(record, trajectory="another"))
+        trials_file.append(other / results.TRIALS_FILE, dataclasses.replace(record, trajectory="another"))
     again = evaluate(other, videos=1, **arguments)
     assert "not deterministic" in capsys.readouterr().err
     assert [r.success for r in again] == [r.success for r in plain]

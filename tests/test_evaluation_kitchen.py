@@ -27,12 +27,13 @@ def test_a_kitchen_trial_goes_the_same_way_whatever_ran_before_it_and_filmed_or_
     one = evaluate(tmp_path / "one", "--env.tasks=OpenDrawer", "--workers=1", "--videos=0")
     two = evaluate(tmp_path / "two", "--env.tasks=OpenDrawer", "--workers=2", "--videos=1")
     assert [r.error for r in one + two] == [None] * 4
-    assert [(r.seed, r.steps, r.trajectory, r.instruction, r.success_terms, r.scene) for r in one] == [
-        (r.seed, r.steps, r.trajectory, r.instruction, r.success_terms, r.scene) for r in two
+    assert [(r.seed, r.steps, r.trajectory, r.instruction, r.terms, r.layout_id, r.style_id) for r in one] == [
+        (r.seed, r.steps, r.trajectory, r.instruction, r.terms, r.layout_id, r.style_id) for r in two
     ]
     assert one[0].steps == 12
     assert one[0].instruction
-    assert set(one[0].scene) == {"layout_id", "style_id"}
+    assert one[0].layout_id is not None
+    assert one[0].style_id is not None
     (frame,) = read_frames(tmp_path / "two" / str(two[0].video), [6])
     assert frame.shape == (FILM_SIZE, 3 * FILM_SIZE, 3)
     # Three different pictures with something on them.

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import json
 from pathlib import Path
+from typing import Any
 
 import pytest
 import yaml
@@ -13,11 +14,11 @@ from hypothesis import strategies as st
 
 from robocasa_lerobot import contract
 from robocasa_lerobot.errors import UserError
-from robocasa_lerobot.evaluation import checkpoints, results
+from robocasa_lerobot.evaluation import checkpoints, results, trials_file
 from robocasa_lerobot.evaluation.config import EvaluationConfig, horizons, outcome_settings
 from robocasa_lerobot.evaluation.overrides import load_config
 from robocasa_lerobot.evaluation.plan import make_plan, trial_seed
-from robocasa_lerobot.evaluation.results import ResultsError, TrialRecord
+from robocasa_lerobot.evaluation.results import PolicyInfo, ResultsError, RunHeader, Seconds, TermSummary, TrialRecord
 from robocasa_lerobot.evaluation.statistics import success_rate, wilson_interval
 
 ROOT = Path(__file__).parents[1]
@@ -77,86 +78,141 @@ def test_plan_seeds_differ_between_trials_tasks_and_evaluations_but_not_between_
     assert [s.seed for s in longer][:50] == [s.seed for s in plan if s.label == "b" and s.task == "CloseDrawer"]
 
 
+def header(label: str = "finetune-000400", **policy: Any) -> RunHeader:
+    values = {"path": "p", "type": "t", "fingerprint": "f", "phase": "finetune", "step": 400, **policy}
+    return RunHeader(
+        protocol="custom",
+        task_sets={},
+        tasks=["OpenDrawer"],
+        missing_tasks=[],
+        trials=10,
+        seed=0,
+        split="target",
+        render_preset="fast",
+        image_size=64,
+        horizon_rule="task",
+        horizon_multiplier=1.0,
+        success_rule="any_step",
+        success_hold_steps=1,
+        executed_steps=None,
+        perturbations={"none": {}},
+        settings={"seed": 0, "split": "target"},
+        policies={label: PolicyInfo(label=label, **values)},
+        versions={"robocasa_lerobot": "0"},
+        git_commit=None,
+        device="cpu",
+        machine={"cores": "2"},
+        started="2026-01-01T00:00:00+00:00",
+    )
+
+
 def record(**changes: object) -> TrialRecord:
     values: dict[str, object] = {
+        "run": header().id,
         "label": "finetune-000400",
         "task": "OpenDrawer",
+        "perturbation": "none",
         "trial": 0,
         "seed": 1,
         "policy_seed": 2,
-        "success": True,
-        "steps": 80,
-        "horizon": 100,
-        "first_success_step": 80,
-        "success_terms": {"drawer_open": True},
-        "terms_ever": {"drawer_open": True},
+        "split": "target",
+        "layout_id": 1,
+        "style_id": 1,
         "instruction": "Open the drawer.",
-        "scene": {"layout_id": 1, "style_id": 1},
+        "horizon": 100,
+        "horizon_multiplier": 1.0,
+        "success": True,
+        "first_success_step": 80,
+        "steps": 80,
+        "terms": {"drawer_open": TermSummary(80, 0.0125, True)},
+        "outcome": "finished",
+        "error": None,
+        "attempts": 1,
+        "first_outcome": None,
+        "first_error": None,
+        "warnings": {},
         "trajectory": "00",
         "video": None,
-        "wall_seconds": 1.5,
-        "attempts": 1,
-        "error": None,
-        "retried_error": None,
-        "policy": {"path": "p", "type": "t", "fingerprint": "f", "phase": "finetune", "step": 400},
-        "settings": {"seed": 0, "split": "target"},
-        "versions": {"robocasa_lerobot": "0"},
-        "git_commit": None,
+        "seconds": Seconds(total=1.5),
         "finished": "2026-01-01T00:00:00+00:00",
     }
     return TrialRecord(**{**values, **changes})  # type: ignore[arg-type]
 
 
+def write(path: Path, *items: RunHeader | TrialRecord) -> None:
+    for item in items:
+        trials_file.append(path, item)
+
+
 def test_records_round_trip(tmp_path: Path) -> None:
     path = tmp_path / results.TRIALS_FILE
     written = [record(trial=i, instruction="Öffne\ndie „Schublade“") for i in range(3)]
-    for one in written:
-        results.append_trial(path, one)
-    assert results.read_trials(path) == written
-    again = dataclasses.replace(written[1], success=False)
-    results.append_trial(path, again)
-    assert {r.trial: r.success for r in results.read_trials(path)} == {0: True, 1: False, 2: True}
+    write(path, header(), *written)
+    read = results.read_results(path)
+    assert read.trials == written
+    assert read == results.read_results(tmp_path)
+    assert read.headers == {header().id: header()}
+    assert read.header_of(written[0]).split == "target"
+    assert read.policy_of(written[0]).step == 400
+    write(path, dataclasses.replace(written[1], success=False, first_success_step=None))
+    assert {r.trial: r.success for r in results.read_results(path).trials} == {0: True, 1: False, 2: True}
 
 
 def test_a_torn_last_line_is_left_out_and_cut_off_at_every_length(tmp_path: Path) -> None:
     path = tmp_path / results.TRIALS_FILE
-    whole = (record(trial=0).to_line() + "\n").encode()
+    whole = (header().to_line() + "\n" + record(trial=0).to_line() + "\n").encode()
     torn = record(trial=1).to_line().encode()
     for length in (1, len(torn) // 2, len(torn)):
         path.write_bytes(whole + torn[:length])
-        assert [r.trial for r in results.read_trials(path)] == [0]
-        assert results.drop_torn_line(path) == length
+        assert [r.trial for r in results.read_results(path).trials] == [0]
+        assert trials_file.drop_torn_line(path) == length
         assert path.read_bytes() == whole
-    assert results.drop_torn_line(path) == 0
+    assert trials_file.drop_torn_line(path) == 0
 
 
 @pytest.mark.parametrize(
     ("line", "message"),
     [
-        ("not json", "trials.jsonl:1: not a JSON object"),
+        ("not json", "trials.jsonl:2: not a JSON object"),
         ("[1]", "found list, expected a JSON object"),
-        (json.dumps({"schema": 99}), "schema 99, this version reads 1"),
+        (json.dumps({"schema": 99}), "schema 99, this version reads 2"),
+        (json.dumps({"schema": 2, "kind": "dog"}), "kind 'dog', expected 'run' or 'trial'"),
         (record().to_line().replace('"success"', '"sucess"'), "unknown key 'sucess'. Did you mean 'success'"),
         (record().to_line().replace('"success": true', '"success": 1'), "'success' is 1, expected bool"),
         (record().to_line().replace('"steps": 80, ', ""), "missing key.s. steps"),
+        (record().to_line().replace('"share"', '"shore"'), "unknown key 'terms.drawer_open.shore'"),
+        (record(first_success_step=None).to_line(), "contradict each other"),
+        (record(outcome="lost").to_line(), "outcome 'lost', expected one of finished"),
+        (record(error="e").to_line(), "outcome 'finished' with error 'e'"),
+        (record(run="0").to_line(), "run '0' has no header above it"),
+        (record(label="other").to_line(), "policy 'other' is not in the header"),
+        (header().to_line().replace('"trials": 10', '"trials": 99'), "it was edited"),
     ],
 )
 def test_a_bad_line_is_named(tmp_path: Path, line: str, message: str) -> None:
     path = tmp_path / results.TRIALS_FILE
-    path.write_text(line + "\n")
+    write(path, header())
+    with path.open("a") as file:
+        file.write(line + "\n")
     with pytest.raises(ResultsError, match=message):
-        results.read_trials(path)
+        results.read_results(path)
 
 
-def test_other_settings_or_weights_are_refused_with_the_difference() -> None:
-    policies = {"finetune-000400": {"fingerprint": "f"}}
-    same = {"seed": 0, "split": "target"}
-    results.check_same_run(Path("t"), [record()], policies, same)
-    results.check_same_run(Path("t"), [record()], {"other": {"fingerprint": "g"}}, same)
-    with pytest.raises(ResultsError, match="split: 'target' in the file, 'pretrain' now"):
-        results.check_same_run(Path("t"), [record()], policies, {**same, "split": "pretrain"})
-    with pytest.raises(ResultsError, match="weights f in the file, g now"):
-        results.check_same_run(Path("t"), [record()], {"finetune-000400": {"fingerprint": "g"}}, same)
+def test_other_settings_weights_or_versions_are_refused_with_the_difference() -> None:
+    old, check = header(), trials_file.check_same_run
+    check(Path("t"), [old], header())
+    check(Path("t"), [old], header("other", fingerprint="g"))
+    changed: list[tuple[RunHeader, str]] = [
+        (
+            dataclasses.replace(old, settings={"seed": 0, "split": "pretrain"}),
+            "split: 'target' in the file, 'pretrain'",
+        ),
+        (header(fingerprint="g"), "weights f in the file, g now"),
+        (dataclasses.replace(old, versions={"robocasa_lerobot": "1"}), "robocasa_lerobot: 0 in the file, 1 now"),
+    ]
+    for new, message in changed:
+        with pytest.raises(ResultsError, match=message):
+            check(Path("t"), [old], new)
 
 
 def test_config_from_arguments_in_either_spelling() -> None:

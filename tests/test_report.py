@@ -13,14 +13,15 @@ from typing import Any
 import h5py
 import numpy as np
 import pytest
-from test_evaluation_records import record
+from test_evaluation_records import header, record
 
 from robocasa_lerobot.cli import main
 from robocasa_lerobot.errors import UserError
-from robocasa_lerobot.evaluation import results
+from robocasa_lerobot.evaluation import results, trials_file
 from robocasa_lerobot.evaluation.charts import MAX_POINTS, learning_curve, running_mean, thin_out
 from robocasa_lerobot.evaluation.report import interval, percent
 from robocasa_lerobot.evaluation.report_data import TrainingPhase, gather, summarize
+from robocasa_lerobot.evaluation.results import TermSummary
 from robocasa_lerobot.evaluation.statistics import success_rate
 from robocasa_lerobot.evaluation.video import VideoWriter
 
@@ -77,9 +78,12 @@ class Page(HTMLParser):
 
 
 def write_results(folder: Path, trials: list[dict[str, Any]]) -> Path:
-    folder.mkdir(parents=True)
+    folder.mkdir(parents=True, exist_ok=True)
     for changes in trials:
-        results.append_trial(folder / results.TRIALS_FILE, record(**changes))
+        changes = dict(changes)
+        one = header(str(changes.get("label", "finetune-000400")), **changes.pop("policy", {}))
+        trials_file.append(folder / results.TRIALS_FILE, one)
+        trials_file.append(folder / results.TRIALS_FILE, record(run=one.id, **changes))
     return folder
 
 
@@ -103,20 +107,20 @@ def folder(tmp_path: Path) -> Path:
                 "policy": policy,
                 "success": success,
                 "first_success_step": 50 + trial if success else None,
-                "success_terms": {"drawer_open": success, "gripper_far": trial % 2 == 0},
-                "terms_ever": {"drawer_open": success, "gripper_far": True},
+                "terms": {
+                    "drawer_open": TermSummary(50 + trial if success else None, 0.1 * success, success),
+                    "gripper_far": TermSummary(1, 0.5, trial % 2 == 0),
+                },
                 "instruction": EVIL,
                 "video": f"videos/{label}/{trial}.mp4" if trial in (0, 8) else None,
             }
             if changes["video"]:
                 film(tmp_path / "results" / str(changes["video"]))
             trials.append(changes)
-        error = {"error": f"Traceback {EVIL}", "success_terms": {}, "terms_ever": {}, "first_success_step": None}
+        error = {"error": f"Traceback {EVIL}", "outcome": "crashed", "terms": {}, "first_success_step": None}
         trials.append({"label": label, "task": "CloseDrawer", "policy": policy, "success": False, **error})
     (tmp_path / "results").mkdir(exist_ok=True)
-    for changes in trials:
-        results.append_trial(tmp_path / "results" / results.TRIALS_FILE, record(**changes))
-    return tmp_path / "results"
+    return write_results(tmp_path / "results", trials)
 
 
 @pytest.fixture
@@ -145,6 +149,7 @@ def make_report(folder: Path, *arguments: object) -> tuple[str, str]:
 def test_numbers_shown_are_those_of_the_trials(folder: Path) -> None:
     html, markdown = make_report(folder)
     lines = [json.loads(line) for line in (folder / results.TRIALS_FILE).read_text().splitlines()]
+    lines = [line for line in lines if line["kind"] == "trial"]
     counts: dict[tuple[str, str], list[bool]] = {}
     for line in lines:
         counts.setdefault((line["task"], line["label"]), []).append(line["success"])
@@ -195,14 +200,17 @@ def test_everything_asked_for_is_in_both_files(folder: Path, training: Path, dem
 
 
 def test_two_results_folders_and_equal_labels_are_told_apart(folder: Path, tmp_path: Path) -> None:
-    other = write_results(tmp_path / "other", [{"label": "untrained", "trial": t, "success": False} for t in range(3)])
+    other = write_results(
+        tmp_path / "other",
+        [{"label": "untrained", "trial": t, "success": False, "first_success_step": None} for t in range(3)],
+    )
     html, _ = make_report(folder, other)
     labels = {row["data-policy"] for row in Page(html).rows if "data-policy" in row}
     assert labels == {"untrained (results)", "untrained (other)", "finetune-000400"}
 
 
 def test_terms_of_failures_are_counted_without_errors(folder: Path) -> None:
-    records = [r for r in results.read_trials(folder / results.TRIALS_FILE) if r.label == "finetune-000400"]
+    records = [r for r in results.read_results(folder).trials if r.label == "finetune-000400"]
     result = summarize("OpenDrawer", [r for r in records if r.task == "OpenDrawer"])
     assert (result.failed, result.errors, result.median_seconds) == (3, 0, 53 / 20)
     assert [(t.name, t.never, t.lost) for t in result.terms] == [("drawer_open", 3, 0), ("gripper_far", 0, 2)]

@@ -10,6 +10,7 @@ from typing import Any
 
 from robocasa_lerobot import contract
 from robocasa_lerobot.errors import UserError
+from robocasa_lerobot.evaluation.results import PolicyInfo
 
 REFERENCE_POLICIES = ("random", "zero")
 _WEIGHTS = ("model.safetensors", "adapter_model.safetensors")
@@ -40,15 +41,9 @@ class PolicySource:
         """Whether this is `random` or `zero` and not a checkpoint."""
         return self.path in REFERENCE_POLICIES
 
-    def describe(self) -> dict[str, Any]:
-        """The entry `policy` of a trial's record."""
-        return {
-            "path": self.path,
-            "type": self.type,
-            "fingerprint": self.fingerprint,
-            "phase": self.phase,
-            "step": self.step,
-        }
+    def describe(self) -> PolicyInfo:
+        """What the header of a run says about it."""
+        return PolicyInfo(self.label, self.path, self.type, self.fingerprint, self.phase, self.step)
 
 
 def read_source(path: str, label: str | None = None) -> PolicySource:

@@ -9,6 +9,8 @@ from pathlib import Path
 from typing import Any
 
 from robocasa_lerobot.errors import UnknownNameError, UserError
+from robocasa_lerobot.evaluation.provenance import git_commit, machine, utc_now, versions
+from robocasa_lerobot.evaluation.results import UNPERTURBED, PolicyInfo, RunHeader
 
 KITCHEN_ENV_FACTORY = "robocasa_lerobot.envs.kitchen_env:KitchenEnv"
 SPLITS = ("target", "pretrain")
@@ -168,6 +170,37 @@ def outcome_settings(config: EvaluationConfig, image_size: int) -> dict[str, Any
         "threads": config.policy.threads,
         "success_rule": "any step",
     }
+
+
+def run_header(
+    config: EvaluationConfig, policies: dict[str, PolicyInfo], horizons: dict[str, int | None], settings: dict[str, Any]
+) -> RunHeader:
+    """The header of a run with these settings on this machine."""
+    env = config.env
+    return RunHeader(
+        protocol="custom",
+        task_sets={},
+        tasks=list(horizons),
+        missing_tasks=[],
+        trials=config.trials,
+        seed=config.seed,
+        split=env.split,
+        render_preset=env.render_preset,
+        image_size=settings["image_size"],
+        horizon_rule="fixed" if env.horizon else "task" if env.factory == KITCHEN_ENV_FACTORY else "env",
+        horizon_multiplier=env.horizon_multiplier,
+        success_rule="any_step",
+        success_hold_steps=1,
+        executed_steps=config.executed_steps,
+        perturbations={UNPERTURBED: {}},
+        settings=settings,
+        policies=policies,
+        versions=versions(),
+        git_commit=git_commit(),
+        device=config.policy.device,
+        machine=machine(),
+        started=utc_now(),
+    )
 
 
 def output_folder(config: EvaluationConfig, labels: list[str]) -> Path:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import collections
 import dataclasses
-import datetime
 import fcntl
 import os
 import sys
@@ -20,17 +19,19 @@ from robocasa_lerobot.errors import UserError
 from robocasa_lerobot.evaluation import config as settings_of
 from robocasa_lerobot.evaluation.checkpoints import PolicySource, common_image_size, read_source
 from robocasa_lerobot.evaluation.config import EvaluationConfig
-from robocasa_lerobot.evaluation.plan import TrialKey, TrialSpec, make_plan
-from robocasa_lerobot.evaluation.provenance import git_commit, versions
+from robocasa_lerobot.evaluation.plan import TrialSpec, make_plan
+from robocasa_lerobot.evaluation.provenance import utc_now
 from robocasa_lerobot.evaluation.results import (
     TRIALS_FILE,
+    Results,
     ResultsError,
+    RunHeader,
+    Seconds,
+    TrialKey,
     TrialRecord,
-    append_trial,
-    check_same_run,
-    drop_torn_line,
-    read_trials,
+    read_results,
 )
+from robocasa_lerobot.evaluation.trials_file import append, check_same_run, drop_torn_line
 from robocasa_lerobot.evaluation.worker import WorkerSettings
 from robocasa_lerobot.evaluation.workers import Completed, WorkerPool
 
@@ -43,7 +44,7 @@ class Evaluation:
 
     config: EvaluationConfig
     sources: dict[str, PolicySource]
-    settings: dict[str, Any]
+    header: RunHeader
     plan: list[TrialSpec]
     out: Path
 
@@ -67,7 +68,8 @@ def prepare(config: EvaluationConfig) -> Evaluation:
         by_label[source.label] = source
     settings = settings_of.outcome_settings(config, common_image_size(sources, config.env.image_size))
     plan = make_plan(list(by_label), horizons, config.trials, config.seed, config.videos)
-    return Evaluation(config, by_label, settings, plan, settings_of.output_folder(config, list(by_label)))
+    header = settings_of.run_header(config, {label: s.describe() for label, s in by_label.items()}, horizons, settings)
+    return Evaluation(config, by_label, header, plan, settings_of.output_folder(config, list(by_label)))
 
 
 def evaluate(evaluation: Evaluation) -> list[TrialRecord]:
@@ -85,19 +87,21 @@ def evaluate(evaluation: Evaluation) -> list[TrialRecord]:
     with _only_writer(out):
         if drop_torn_line(path):
             print(f"{path}: the last line was cut off by a kill; its trial runs again.", file=sys.stderr)
-        records = {record.key: record for record in (read_trials(path) if path.exists() else [])}
-        descriptions = {label: source.describe() for label, source in evaluation.sources.items()}
-        check_same_run(path, records.values(), descriptions, evaluation.settings)
+        header = evaluation.header
+        earlier_runs = read_results(path) if path.exists() else Results(path, {}, [])
+        check_same_run(path, earlier_runs.headers.values(), header)
+        records = {record.key: record for record in earlier_runs.trials}
         _check_seeds(path, records, evaluation.plan)
         _write_config(out / CONFIG_FILE, config)
         todo = [spec for spec in evaluation.plan if _is_missing(records.get(spec.key), config.retry_errors)]
-        common = {"settings": evaluation.settings, "versions": versions(), "git_commit": git_commit()}
+        if header.id not in earlier_runs.headers:
+            append(path, header)
         for completed in _run(evaluation, todo, records):
-            record = _record(completed, descriptions[completed.spec.label], common)
+            record = _record(completed, header)
             earlier = records.get(record.key)
             if earlier is not None and earlier.error is None:
                 record = _with_film(earlier, record, out)
-            append_trial(path, record)
+            append(path, record)
             records[record.key] = record
     return [records[spec.key] for spec in evaluation.plan]
 
@@ -133,7 +137,7 @@ def _run(
         env_kwargs={
             "split": config.env.split,
             "render_preset": config.env.render_preset,
-            "image_size": evaluation.settings["image_size"],
+            "image_size": evaluation.header.image_size,
         },
         device=config.policy.device,
         threads=config.policy.threads,
@@ -154,7 +158,7 @@ def _run(
             return specs
 
         for completed in pool.run(todo, to_film):
-            error = completed.result.error or completed.earlier_error
+            error = completed.result.error or (completed.earlier.error if completed.earlier else None)
             if error is not None:
                 what = "failed with an error" if completed.result.error else "was tried again after an error"
                 spec = completed.spec
@@ -183,24 +187,36 @@ def _with_film(earlier: TrialRecord, again: TrialRecord, out: Path) -> TrialReco
     return earlier
 
 
-def _record(completed: Completed, policy: dict[str, Any], common: dict[str, Any]) -> TrialRecord:
-    spec, result = completed.spec, completed.result
+def _record(completed: Completed, header: RunHeader) -> TrialRecord:
+    spec, result, earlier = completed.spec, completed.result, completed.earlier
     return TrialRecord(
+        run=header.id,
         label=spec.label,
         task=spec.task,
+        perturbation=spec.perturbation,
         trial=spec.trial,
         seed=spec.seed,
         policy_seed=spec.policy_seed,
+        split=header.split,
+        layout_id=result.outcome.layout_id,
+        style_id=result.outcome.style_id,
+        instruction=result.outcome.instruction,
         horizon=spec.horizon,
-        **dataclasses.asdict(result.outcome),
-        video=result.video,
-        wall_seconds=round(result.wall_seconds, 3),
-        attempts=completed.attempts,
+        horizon_multiplier=header.horizon_multiplier,
+        success=result.outcome.success,
+        first_success_step=result.outcome.first_success_step,
+        steps=result.outcome.steps,
+        terms=result.outcome.terms,
+        outcome=result.kind,
         error=result.error,
-        retried_error=completed.earlier_error,
-        policy={**policy, "device": result.device},
-        finished=datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds"),
-        **common,
+        attempts=completed.attempts,
+        first_outcome=earlier.kind if earlier else None,
+        first_error=earlier.error if earlier else None,
+        warnings={},
+        trajectory=result.outcome.trajectory,
+        video=result.video,
+        seconds=Seconds(total=round(result.wall_seconds, 3)),
+        finished=utc_now(),
     )
 
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-TrialKey = tuple[str, str, int]
+from robocasa_lerobot.evaluation.results import UNPERTURBED, TrialKey
 
 # Two streams, so that the scene and the policy's sampling noise are independent of each other.
 _ENV_STREAM, _POLICY_STREAM = 0, 1
@@ -25,11 +25,12 @@ class TrialSpec:
     policy_seed: int
     horizon: int | None
     film: bool
+    perturbation: str = UNPERTURBED
 
     @property
     def key(self) -> TrialKey:
         """What identifies the trial in a results file."""
-        return (self.label, self.task, self.trial)
+        return (self.label, self.task, self.perturbation, self.trial)
 
 
 def trial_seed(seed: int, task: str, trial: int, stream: int = _ENV_STREAM) -> int:

@@ -5,14 +5,14 @@ from __future__ import annotations
 import json
 import statistics as median_of
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from importlib import resources
 from pathlib import Path
 from typing import Any
 
 from robocasa_lerobot import contract
 from robocasa_lerobot.errors import UserError
-from robocasa_lerobot.evaluation.results import TRIALS_FILE, TrialRecord, read_trials
+from robocasa_lerobot.evaluation.results import TrialRecord, read_results
 from robocasa_lerobot.evaluation.statistics import Rate, success_rate
 
 
@@ -141,13 +141,11 @@ def summarize(task: str, trials: Sequence[TrialRecord]) -> TaskResult:
     ordered = tuple(sorted(trials, key=lambda record: record.trial))
     first = [r.first_success_step for r in ordered if r.first_success_step is not None]
     failed = [r for r in ordered if not r.success and r.error is None]
-    names = dict.fromkeys(name for record in failed for name in record.terms_ever)
+    names = dict.fromkeys(name for record in failed for name in record.terms)
     terms = []
     for name in names:
-        never = sum(not record.terms_ever.get(name, False) for record in failed)
-        held = sum(
-            record.terms_ever.get(name, False) and not record.success_terms.get(name, False) for record in failed
-        )
+        never = sum(name not in r.terms or r.terms[name].first_step is None for r in failed)
+        held = sum(name in r.terms and r.terms[name].first_step is not None and not r.terms[name].final for r in failed)
         terms.append(TermCount(name, never, held))
     return TaskResult(
         task=task,
@@ -161,19 +159,21 @@ def summarize(task: str, trials: Sequence[TrialRecord]) -> TaskResult:
 
 
 def _read_policies(folder: Path) -> list[PolicyResult]:
-    records = read_trials(folder / TRIALS_FILE)
+    results = read_results(folder)
+    records = results.trials
     out = []
     for label in dict.fromkeys(record.label for record in records):
         own = [record for record in records if record.label == label]
         tasks = dict.fromkeys(record.task for record in own)
+        header = results.header_of(own[0])
         out.append(
             PolicyResult(
                 label=label,
                 folder=folder,
-                policy=own[0].policy,
-                settings=own[0].settings,
-                versions=own[0].versions,
-                git_commits=tuple(sorted({r.git_commit for r in own if r.git_commit is not None})),
+                policy={**asdict(results.policy_of(own[0])), "device": header.device},
+                settings=header.settings,
+                versions=header.versions,
+                git_commits=tuple(sorted({h.git_commit for h in results.headers.values() if h.git_commit is not None})),
                 tasks=tuple(summarize(task, [r for r in own if r.task == task]) for task in tasks),
                 pooled=success_rate(sum(r.success for r in own), len(own)),
             )

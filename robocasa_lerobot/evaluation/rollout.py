@@ -14,13 +14,38 @@ from robocasa_lerobot.errors import UserError
 from robocasa_lerobot.evaluation.film import Film
 from robocasa_lerobot.evaluation.plan import TrialSpec
 from robocasa_lerobot.evaluation.policy_runner import PolicyRunner
+from robocasa_lerobot.evaluation.results import TermSummary
 
 # Steps between two signs of life; at 20 to 100 steps/s on a CPU that is at most a second.
 HEARTBEAT_STEPS = 20
 
 
+@dataclass
+class TermCount:
+    """A success term while a trial runs."""
+
+    first_step: int | None = None
+    met: int = 0
+    final: bool = False
+
+    def note(self, step: int, met: bool) -> None:
+        """Its value after a step, which counts from 1."""
+        if met and self.first_step is None:
+            self.first_step = step
+        self.met += met
+        self.final = met
+
+    def summary(self, steps: int) -> TermSummary:
+        """The term in short."""
+        return TermSummary(self.first_step, round(self.met / max(1, steps), 6), self.final)
+
+
 class RolloutError(RuntimeError):
     """The policy or the env did something that no trial can go on from."""
+
+
+class DivergedError(RolloutError):
+    """Numbers that are not finite, from the policy or the physics."""
 
 
 @dataclass
@@ -33,10 +58,10 @@ class Outcome:
     success: bool = False
     steps: int = 0
     first_success_step: int | None = None
-    success_terms: dict[str, bool] = field(default_factory=dict)
-    terms_ever: dict[str, bool] = field(default_factory=dict)
+    terms: dict[str, TermSummary] = field(default_factory=dict)
     instruction: str = ""
-    scene: dict[str, Any] = field(default_factory=dict)
+    layout_id: int | None = None
+    style_id: int | None = None
     trajectory: str | None = None
 
 
@@ -61,13 +86,15 @@ def run_trial(
     observation, info = env.reset(seed=spec.seed)
     outcome = Outcome(
         instruction=str(info.get("instruction") or getattr(base, "task_description", "")),
-        scene=dict(info.get("scene", {})),
+        layout_id=info.get("scene", {}).get("layout_id"),
+        style_id=info.get("scene", {}).get("style_id"),
     )
     limit = horizon_of(env, spec)
     if film is not None:
         film.shoot(base, observation, 0)
     digest = hashlib.sha256(np.asarray(observation["agent_pos"], dtype=np.float64).tobytes())
     ended = False
+    counts: dict[str, TermCount] = {}
     while not ended:
         if outcome.steps >= limit:
             raise RolloutError(f"the env went on past its horizon of {limit} steps without truncating the episode")
@@ -75,7 +102,7 @@ def run_trial(
             heartbeat(outcome.steps)
         action = policy.act(observation, outcome.instruction)
         if not np.isfinite(action).all():
-            raise RolloutError(f"the policy gave an action that is not finite at step {outcome.steps}: {action}")
+            raise DivergedError(f"the policy gave an action that is not finite at step {outcome.steps}: {action}")
         outcome.steps += 1
         base.render_observations = always or policy.sees(outcome.steps)
         observation, _, terminated, truncated, info = env.step(action)
@@ -83,8 +110,9 @@ def run_trial(
             film.shoot(base, observation, outcome.steps)
         digest.update(np.asarray(action, dtype=np.float32).tobytes())
         digest.update(np.asarray(observation["agent_pos"], dtype=np.float64).tobytes())
-        _note(outcome, info)
+        _note(outcome, info, counts)
         ended = bool(terminated or truncated)
+    outcome.terms = {name: count.summary(outcome.steps) for name, count in counts.items()}
     outcome.trajectory = digest.hexdigest()
     return outcome
 
@@ -102,9 +130,8 @@ def horizon_of(env: gymnasium.Env[Any, Any], spec: TrialSpec) -> int:
     return int(limit)
 
 
-def _note(outcome: Outcome, info: dict[str, Any]) -> None:
+def _note(outcome: Outcome, info: dict[str, Any], counts: dict[str, TermCount]) -> None:
     if bool(info["is_success"]) and not outcome.success:
         outcome.success, outcome.first_success_step = True, outcome.steps
-    outcome.success_terms = {name: bool(met) for name, met in info.get("success_terms", {}).items()}
-    for name, met in outcome.success_terms.items():
-        outcome.terms_ever[name] = outcome.terms_ever.get(name, False) or met
+    for name, met in info.get("success_terms", {}).items():
+        counts.setdefault(name, TermCount()).note(outcome.steps, bool(met))

@@ -21,7 +21,8 @@ from robocasa_lerobot.evaluation.checkpoints import PolicySource
 from robocasa_lerobot.evaluation.film import Film
 from robocasa_lerobot.evaluation.plan import TrialSpec
 from robocasa_lerobot.evaluation.policy_runner import PolicyRunner, load_policy
-from robocasa_lerobot.evaluation.rollout import Outcome, horizon_of, run_trial
+from robocasa_lerobot.evaluation.results import CRASHED, DIVERGED, FINISHED
+from robocasa_lerobot.evaluation.rollout import DivergedError, Outcome, horizon_of, run_trial
 
 EnvFactory = Callable[..., gymnasium.Env[Any, Any]]
 
@@ -54,13 +55,13 @@ class Alive:
 
 @dataclass(frozen=True)
 class Finished:
-    """A trial ended by itself; `error` is the traceback of one that crashed, `device` is where the policy ran."""
+    """A trial ended by itself; `error` is the traceback of one that crashed, `kind` is the record's outcome."""
 
     outcome: Outcome
     video: str | None
     wall_seconds: float
     error: str | None
-    device: str | None = None
+    kind: str = FINISHED
 
 
 @dataclass(frozen=True)
@@ -116,12 +117,13 @@ class _Worker:
                 outcome = run_trial(env, policy, spec, None, self._alive)
         except (EOFError, BrokenPipeError, ConnectionResetError):
             raise
-        except Exception:
+        except Exception as error:
             # What the trial left behind may be broken as well: the next one starts from a new env and policy.
             self.close_env()
             self._policy = None
-            return Finished(Outcome(), None, time.monotonic() - started, traceback.format_exc())
-        return Finished(outcome, video, time.monotonic() - started, None, policy.device)
+            kind = DIVERGED if isinstance(error, DivergedError) else CRASHED
+            return Finished(Outcome(), None, time.monotonic() - started, traceback.format_exc(), kind)
+        return Finished(outcome, video, time.monotonic() - started, None)
 
     def close_env(self) -> None:
         if self._env is not None:

@@ -16,6 +16,7 @@ from multiprocessing.context import SpawnProcess
 
 from robocasa_lerobot.errors import UserError
 from robocasa_lerobot.evaluation.plan import TrialSpec
+from robocasa_lerobot.evaluation.results import CRASHED, HUNG
 from robocasa_lerobot.evaluation.rollout import Outcome
 from robocasa_lerobot.evaluation.worker import Alive, Finished, Ready, Refused, WorkerSettings, worker_main
 
@@ -32,14 +33,14 @@ class Completed:
     spec: TrialSpec
     result: Finished
     attempts: int
-    earlier_error: str | None
+    earlier: Finished | None
 
 
 @dataclass
 class _Attempt:
     spec: TrialSpec
     number: int = 1
-    earlier_error: str | None = None
+    earlier: Finished | None = None
 
 
 @dataclass
@@ -99,8 +100,7 @@ class WorkerPool:
                         self._give(slot, pending.popleft())
                 for completed in self._collect():
                     if completed.result.error is not None and completed.attempts < MAX_ATTEMPTS:
-                        error = completed.result.error
-                        pending.appendleft(_Attempt(completed.spec, completed.attempts + 1, error))
+                        pending.appendleft(_Attempt(completed.spec, completed.attempts + 1, completed.result))
                     else:
                         yield completed
             finished = True
@@ -116,7 +116,7 @@ class WorkerPool:
             try:
                 message = slot.connection.recv()
             except (EOFError, ConnectionResetError):
-                yield from self._bury(slot, _cause_of_death(slot.process))
+                yield from self._bury(slot, _cause_of_death(slot.process), CRASHED)
                 continue
             slot.last_sign = time.monotonic()
             if isinstance(message, Ready):
@@ -126,23 +126,23 @@ class WorkerPool:
             elif isinstance(message, Finished):
                 attempt, slot.attempt = slot.attempt, None
                 assert attempt is not None, "a worker reported a trial that it was not given"
-                yield Completed(attempt.spec, message, attempt.number, attempt.earlier_error)
+                yield Completed(attempt.spec, message, attempt.number, attempt.earlier)
             else:
                 assert isinstance(message, Alive), message
         now = time.monotonic()
         for slot in list(self._slots):
             if (slot.attempt is not None or not slot.ready) and now - slot.last_sign > self._stall_seconds:
                 slot.process.kill()
-                yield from self._bury(slot, f"no progress for {self._stall_seconds:g} s; the worker was killed")
+                yield from self._bury(slot, f"no progress for {self._stall_seconds:g} s; the worker was killed", HUNG)
 
-    def _bury(self, slot: _Slot, cause: str) -> Iterator[Completed]:
+    def _bury(self, slot: _Slot, cause: str, kind: str) -> Iterator[Completed]:
         """Remove a dead worker; its trial, if it had one, ends with the cause as its error."""
         slot.process.join(timeout=10)
         slot.connection.close()
         self._slots.remove(slot)
         if slot.attempt is not None:
-            result = Finished(Outcome(), None, time.monotonic() - slot.given_at, cause)
-            yield Completed(slot.attempt.spec, result, slot.attempt.number, slot.attempt.earlier_error)
+            result = Finished(Outcome(), None, time.monotonic() - slot.given_at, cause, kind)
+            yield Completed(slot.attempt.spec, result, slot.attempt.number, slot.attempt.earlier)
         elif not slot.ready:
             self._failed_starts += 1
             if self._failed_starts >= MAX_FAILED_STARTS:
