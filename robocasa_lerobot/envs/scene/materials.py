@@ -23,12 +23,14 @@ class Surface:
         texture: generated texture, if any.
         shininess: in [0, 1], of the highlight; also its strength.
         reflectance: in [0, 1]; only the `quality` render preset shows it.
+        emission: in [0, 1], light that it seems to give by itself.
     """
 
     rgba: tuple[float, float, float, float] = (1.0, 1.0, 1.0, 1.0)
     texture: TextureRecord | None = None
     shininess: float = 0.2
     reflectance: float = 0.0
+    emission: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -111,6 +113,7 @@ class MaterialPalette:
         material.specular = 0.3 + 0.5 * surface.shininess
         material.shininess = surface.shininess
         material.reflectance = surface.reflectance
+        material.emission = surface.emission
         if surface.texture is not None:
             record = surface.texture
             texture_name = f"{name}_texture"
