@@ -8,6 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from robocasa_lerobot.envs.scene.fixtures.base import Vector
+
 Points = NDArray[np.float64]
 
 
@@ -77,9 +79,7 @@ def turned(profile: Sequence[tuple[float, float]], segments: int = 12, *, caps: 
     return loft([circle(r, z, segments) for r, z in profile], caps=caps)
 
 
-def block(
-    size: Sequence[float], radius: float, *, bevel: float = 0.004, taper: float = 1.0, per_corner: int = 3
-) -> Mesh:
+def block(size: Vector, radius: float, *, bevel: float = 0.004, taper: float = 1.0, per_corner: int = 3) -> Mesh:
     """A block with upright edges of a radius and bevelled upper and lower edges; the top is scaled by `taper`."""
     width, depth, height = size
     bevel = min(bevel, height / 3)
@@ -94,7 +94,7 @@ def block(
     return loft([at(low, bevel), at(low + bevel, 0.0), at(high - bevel, 0.0), at(high, bevel)])
 
 
-def dome(size: Sequence[float], radius: float, *, shoulder: float, per_corner: int = 3) -> Mesh:
+def dome(size: Vector, radius: float, *, shoulder: float, per_corner: int = 3) -> Mesh:
     """A block whose upper edge is rounded over the height `shoulder`; as bread bins, retro toasters and kettles."""
     width, depth, height = size
     low, high = -height / 2, height / 2
@@ -106,7 +106,7 @@ def dome(size: Sequence[float], radius: float, *, shoulder: float, per_corner: i
     return loft(rings)
 
 
-def pipe(path: Sequence[Sequence[float]], radius: float, sides: int = 6) -> Mesh:
+def pipe(path: Sequence[Vector], radius: float, sides: int = 6) -> Mesh:
     """A round bar along a polyline of points, mitred at its bends, with flat ends."""
     points = np.asarray(path, dtype=np.float64)
     steps = np.diff(points, axis=0)
