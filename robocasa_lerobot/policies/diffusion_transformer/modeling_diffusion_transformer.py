@@ -3,26 +3,28 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Sequence
 from typing import Any
 
 import torch
 from diffusers.schedulers.scheduling_ddim import DDIMScheduler
 from diffusers.schedulers.scheduling_ddpm import DDPMScheduler
-from diffusers.utils.torch_utils import randn_tensor
 from lerobot.policies.pretrained import PreTrainedPolicy
-from lerobot.utils.constants import ACTION, OBS_LANGUAGE_ATTENTION_MASK, OBS_LANGUAGE_TOKENS, OBS_STATE
+from lerobot.utils.constants import OBS_LANGUAGE_ATTENTION_MASK, OBS_LANGUAGE_TOKENS, OBS_STATE
 from torch import Tensor
 
-from robocasa_lerobot.errors import UserError
+from robocasa_lerobot.policies.common.chunks import (
+    Generators,
+    decay_groups,
+    normal_noise,
+    sample_losses,
+    starting_noise,
+    target_actions,
+)
 from robocasa_lerobot.policies.diffusion_transformer.configuration_diffusion_transformer import (
     DiffusionTransformerConfig,
 )
-from robocasa_lerobot.policies.diffusion_transformer.network import DenoisingTransformer, decay_groups, masked_mse
+from robocasa_lerobot.policies.diffusion_transformer.network import DenoisingTransformer
 from robocasa_lerobot.policies.diffusion_transformer.observation import ObservationEncoder
-
-ACTION_IS_PAD = ACTION + "_is_pad"
-type Generators = torch.Generator | Sequence[torch.Generator] | None
 
 
 class DiffusionTransformerPolicy(PreTrainedPolicy):
@@ -87,28 +89,16 @@ class DiffusionTransformerPolicy(PreTrainedPolicy):
         """
         draws = self.config.noise_draws
         features = self.observation_encoder(batch, generator).float().repeat_interleave(draws, dim=0)
-        actions = batch[ACTION].float().repeat_interleave(draws, dim=0)
-        if tuple(actions.shape[1:]) != (self.config.horizon, self.action_dim):
-            raise UserError(
-                f"actions of shape {tuple(batch[ACTION].shape)}, expected (batch, {self.config.horizon}, "
-                f"{self.action_dim}): load the data with the policy's action_delta_indices."
-            )
+        actions = target_actions(batch, self.config.horizon, self.action_dim, draws)
         if noise is None:
-            noise = _normal(actions.shape, generator, actions)
+            noise = normal_noise(actions.shape, generator, actions)
         if times is None:
             steps = self.config.num_train_timesteps
             times = torch.randint(steps, actions.shape[:1], generator=generator).to(actions.device)
         noisy = self.scheduler.add_noise(actions, noise, times)
         target = noise if self.config.prediction_type == "epsilon" else actions
-        ignored = batch.get(ACTION_IS_PAD) if self.config.mask_padded_actions else None
-        if ignored is not None:
-            ignored = ignored.repeat_interleave(draws, dim=0)
-        losses = masked_mse(self.denoiser(noisy, times, features).float(), target, ignored)
-        losses = losses.unflatten(0, (-1, draws)).mean(dim=1)
-        if reduction == "none":
-            return losses, {}
-        loss = losses.mean()
-        return loss, {}
+        losses = sample_losses(self.denoiser(noisy, times, features).float(), target, batch, self.config)
+        return (losses if reduction == "none" else losses.mean()), {}
 
     @torch.no_grad()
     def predict_action_chunk(
@@ -137,9 +127,7 @@ class DiffusionTransformerPolicy(PreTrainedPolicy):
         features = self.observation_encoder(self._with_time_axis(batch)).float()
         random = generator if generator is None or isinstance(generator, torch.Generator) else list(generator)
         shape = (features.shape[0], self.config.horizon, self.action_dim)
-        x = _normal(shape, random, features) if noise is None else noise.to(features)
-        if tuple(x.shape) != shape:
-            raise UserError(f"noise of shape {tuple(x.shape)}, expected {shape}.")
+        x = starting_noise(noise, shape, generator, features)
         self.scheduler.set_timesteps(self.config.num_inference_steps or self.config.num_train_timesteps)
         for time in self.scheduler.timesteps.tolist():
             times = torch.full(shape[:1], time, device=x.device, dtype=torch.long)
@@ -188,10 +176,6 @@ class DiffusionTransformerPolicy(PreTrainedPolicy):
             **batch,
             **{k: batch[k].unsqueeze(1).expand(-1, steps, *batch[k].shape[1:]) for k in self._observed_keys},
         }
-
-
-def _normal(shape: Sequence[int], generator: Any, like: Tensor) -> Tensor:
-    return randn_tensor(tuple(shape), generator=generator, device=like.device, dtype=like.dtype)
 
 
 def _noise_scheduler(config: DiffusionTransformerConfig) -> DDPMScheduler | DDIMScheduler:

@@ -10,7 +10,6 @@ import math
 
 import torch
 from torch import Tensor, nn
-from torch.nn import functional
 
 LONGEST_WAVELENGTH = 10_000.0  # of the sinusoidal time embedding, as in Vaswani et al. 2017
 INITIAL_STD = 0.02
@@ -113,35 +112,6 @@ class DenoisingTransformer(nn.Module):
         x = self.dropout(self.embed_action(noisy_actions) + self.action_position)
         x = self.decoder(x, memory, tgt_mask=self.causal_mask, memory_mask=self.memory_mask)
         return self.head(self.norm(x))
-
-
-def decay_groups(module: nn.Module) -> tuple[list[nn.Parameter], list[nn.Parameter]]:
-    """Trainable parameters of `module` that weight decay is for, and the rest.
-
-    It is for the matrices of linear layers and attention; the rest are biases, scales of norms and positions.
-    """
-    decayed: list[nn.Parameter] = []
-    for child in module.modules():
-        if isinstance(child, nn.Linear):
-            decayed.append(child.weight)
-        elif isinstance(child, nn.MultiheadAttention) and child.in_proj_weight is not None:
-            decayed.append(child.in_proj_weight)
-    chosen = {id(p) for p in decayed}
-    rest = [p for p in module.parameters() if id(p) not in chosen and p.requires_grad]
-    return [p for p in decayed if p.requires_grad], rest
-
-
-def masked_mse(prediction: Tensor, target: Tensor, ignored: Tensor | None) -> Tensor:
-    """Mean squared error of each sample, (B,), over the actions (B, T, A) that are not `ignored` (B, T).
-
-    A sample with nothing left counts as zero. Every sample weighs the same, however much of it is ignored, so that
-    the mean over a batch is the mean over any equal parts of it (processes, accumulated batches).
-    """
-    error = functional.mse_loss(prediction, target, reduction="none").mean(dim=-1)
-    if ignored is None:
-        return error.mean(dim=1)
-    kept = (~ignored).to(error.dtype)
-    return (error * kept).sum(dim=1) / kept.sum(dim=1).clamp(min=1.0)
 
 
 def _initialise(module: nn.Module) -> None:

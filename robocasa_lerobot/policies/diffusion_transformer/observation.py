@@ -9,6 +9,7 @@ from torch import Tensor, nn
 from robocasa_lerobot.errors import UserError
 from robocasa_lerobot.policies.common.images import center_crop, random_crop, resize, to_signed_float
 from robocasa_lerobot.policies.common.language import ClipTextEncoder, TokenEncoder
+from robocasa_lerobot.policies.common.state import StateInput
 from robocasa_lerobot.policies.common.vision import ConvNet, ResNet18, VisionEncoder
 from robocasa_lerobot.policies.diffusion_transformer.configuration_diffusion_transformer import (
     DiffusionTransformerConfig,
@@ -32,11 +33,8 @@ class ObservationEncoder(nn.Module):
             if config.vision_shared and config.language_film
             else None
         )
-        state = config.robot_state_feature
-        assert state is not None  # checked by validate_features
-        indices = range(state.shape[0]) if config.state_indices is None else config.state_indices
-        self.register_buffer("state_indices", torch.tensor(list(indices)), persistent=False)
-        self.feature_dim = len(self.image_keys) * config.vision_features + len(indices)
+        self.state = StateInput(config)
+        self.feature_dim = len(self.image_keys) * config.vision_features + self.state.size
         if config.language_concat:
             self.feature_dim += dim
 
@@ -57,9 +55,7 @@ class ObservationEncoder(nn.Module):
                 "tokens of the instruction."
             )
         language = self.text_encoder(batch[OBS_LANGUAGE_TOKENS], batch[OBS_LANGUAGE_ATTENTION_MASK])
-        state = batch[OBS_STATE].to(language.dtype).index_select(-1, self.state_indices)
-        if self.config.state_clip is not None:
-            state = state.clamp(-self.config.state_clip, self.config.state_clip)
+        state = self.state(batch[OBS_STATE].to(language.dtype))
         steps = state.shape[1]
         parts = [self._see(batch, language, steps, generator), state]
         if self.config.language_concat:

@@ -10,15 +10,10 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from lerobot.configs import NormalizationMode, PreTrainedConfig
-from lerobot.optim import (
-    AdamWConfig,
-    CosineDecayWithWarmupSchedulerConfig,
-    DiffuserSchedulerConfig,
-    LRSchedulerConfig,
-)
+from lerobot.optim import CosineDecayWithWarmupSchedulerConfig, DiffuserSchedulerConfig, LRSchedulerConfig
 
-from robocasa_lerobot.contract import STATE_PARTS, STATE_SIZE, STATE_SLICES
 from robocasa_lerobot.errors import UnknownNameError, UserError
+from robocasa_lerobot.policies.common.configuration import ActionChunkConfig
 
 PREFIXES = ("scratch", "pretrained")
 TIME_CONDITIONINGS = ("mlp", "adaptive_norm")
@@ -26,29 +21,20 @@ FROZEN_DTYPES = ("float32", "bfloat16")
 SCRATCH_IMAGE_SIZE = (128, 128)
 
 
-def _state_without_base() -> list[int]:
-    """Indices of the state parts that do not depend on where the kitchen's origin is."""
-    slices = [STATE_SLICES[part.name] for part in STATE_PARTS if not part.name.startswith("base_")]
-    return [i for s in slices for i in range(s.start, s.stop)]
-
-
 @PreTrainedConfig.register_subclass("flow_vla")
 @dataclass
-class FlowVlaConfig(PreTrainedConfig):
-    """Fields of the policy; lengths in control steps, image sizes in pixels (height, width)."""
+class FlowVlaConfig(ActionChunkConfig):
+    """Fields of the policy beside the common ones; lengths in control steps."""
 
     # Time. `chunk_size` actions are predicted from now on, the first `n_action_steps` of them are executed.
     n_obs_steps: int = 1
     chunk_size: int = 50
     n_action_steps: int = 10  # half a second; the benchmark executes 5 of pi0's 50
 
-    # State: which components enter the network, as one token. The default leaves the base pose out; null takes all.
-    state_indices: list[int] | None = field(default_factory=_state_without_base)
-    state_clip: float | None = 5.0  # bound on normalised components, so that one outlier cannot saturate the network
+    state_clip: float | None = 5.0
 
-    # Images: resized to `image_size`, cropped to `crop_fraction` of each side (at random while training, in the
-    # centre otherwise) and brought back to `image_size`.
-    image_size: tuple[int, int] | None = None  # null: what the pretrained vision model takes; 128x128 from scratch
+    # Images: after the crop they are brought back to `image_size`. Null is what the pretrained vision model takes, and
+    # 128x128 from scratch.
     crop_fraction: float = 0.95
 
     # Prefix: what reads pictures and instruction. `scratch`: a small vision transformer and hashed words, trained
@@ -70,8 +56,6 @@ class FlowVlaConfig(PreTrainedConfig):
     prefix_heads: int = 8
     prefix_kv_heads: int = 2
     prefix_head_dim: int = 64
-    language_buckets: int = 8192
-    max_words: int = 32
 
     # Action expert: as many layers as the prefix has, each attending to that layer's keys and values.
     expert_width: int = 256
@@ -85,10 +69,6 @@ class FlowVlaConfig(PreTrainedConfig):
     time_smallest: float = 1e-3  # then brought into [time_smallest, 1]
     num_inference_steps: int = 10  # Euler steps from noise to actions
 
-    # Loss.
-    mask_padded_actions: bool = True  # actions past the end of the episode do not count
-    noise_draws: int = 1  # (time, noise) pairs per sample and step; the prefix is read once for all of them
-
     normalization_mapping: dict[str, NormalizationMode] = field(
         default_factory=lambda: {
             "VISUAL": NormalizationMode.IDENTITY,
@@ -96,19 +76,10 @@ class FlowVlaConfig(PreTrainedConfig):
             "ACTION": NormalizationMode.MEAN_STD,
         }
     )
-    constant_range: float = 1e-3  # a narrower component (max - min) counts as constant and keeps its scale
 
-    # Optimiser and schedule, used by training unless it says otherwise.
     optimizer_lr: float = 3e-4
-    optimizer_betas: tuple[float, float] = (0.9, 0.95)
-    optimizer_eps: float = 1e-8
-    optimizer_weight_decay: float = 1e-3  # on the matrices of linear layers
-    optimizer_grad_clip_norm: float = 1.0  # 0: no clipping
-    scheduler_warmup_steps: int = 1000
     scheduler_decay_steps: int | None = None  # cosine to `scheduler_decay_lr` in so many; null: to 0 over the run
     scheduler_decay_lr: float = 2.5e-6
-
-    push_to_hub: bool = False
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -124,9 +95,7 @@ class FlowVlaConfig(PreTrainedConfig):
         self._check_sizes()
 
     def _check_sizes(self) -> None:
-        for name in ("chunk_size", "n_action_steps", "prefix_depth", "num_inference_steps", "noise_draws"):
-            if getattr(self, name) < 1:
-                raise UserError(f"{name} is {getattr(self, name)}, expected at least 1.")
+        self.check_at_least_one(("chunk_size", "n_action_steps", "prefix_depth", "num_inference_steps", "noise_draws"))
         if self.n_obs_steps != 1:
             raise UserError(f"n_obs_steps is {self.n_obs_steps}, but flow_vla sees one observation; set it to 1.")
         if self.n_action_steps > self.chunk_size:
@@ -136,8 +105,7 @@ class FlowVlaConfig(PreTrainedConfig):
             )
         if self.expert_width % 2 or self.expert_width < 2:
             raise UserError(f"expert_width is {self.expert_width}, expected an even number of at least 2.")
-        if not 0.0 < self.crop_fraction <= 1.0:
-            raise UserError(f"crop_fraction is {self.crop_fraction}, expected more than 0 and at most 1.")
+        self.check_crop()
         if not (self.time_alpha > 0.0 and 0.0 <= self.time_smallest < 1.0):
             raise UserError(
                 f"time_alpha is {self.time_alpha} and time_smallest {self.time_smallest}, expected more than 0 for "
@@ -167,10 +135,7 @@ class FlowVlaConfig(PreTrainedConfig):
             )
         if self.prefix_head_dim < 2 or self.prefix_head_dim % 2:
             raise UserError(f"prefix_head_dim is {self.prefix_head_dim}, expected an even number.")
-        if not self.vision_channels or any(c % 8 for c in self.vision_channels):
-            raise UserError(
-                f"vision_channels is {self.vision_channels}, expected multiples of 8 (normalised in groups)."
-            )
+        self.check_channels()
 
     @property
     def observation_delta_indices(self) -> None:
@@ -182,21 +147,6 @@ class FlowVlaConfig(PreTrainedConfig):
         """Frame offsets of the predicted actions of a sample."""
         return list(range(self.chunk_size))
 
-    @property
-    def reward_delta_indices(self) -> None:
-        """No rewards are used."""
-        return None
-
-    def get_optimizer_preset(self) -> AdamWConfig:
-        """AdamW; which parameters decay comes from the policy's `get_optim_params`."""
-        return AdamWConfig(
-            lr=self.optimizer_lr,
-            betas=self.optimizer_betas,
-            eps=self.optimizer_eps,
-            weight_decay=self.optimizer_weight_decay,
-            grad_clip_norm=self.optimizer_grad_clip_norm,
-        )
-
     def get_scheduler_preset(self) -> LRSchedulerConfig:
         """Linear warm-up and a cosine, over the run or over `scheduler_decay_steps`."""
         if self.scheduler_decay_steps is None:
@@ -207,24 +157,3 @@ class FlowVlaConfig(PreTrainedConfig):
             peak_lr=self.optimizer_lr,
             decay_lr=self.scheduler_decay_lr,
         )
-
-    def validate_features(self) -> None:
-        """Check the features of the data against the fields; called when the policy is built.
-
-        Raises:
-            UserError: no state, no action, no camera, or state components that the data does not have.
-        """
-        if self.robot_state_feature is None or self.action_feature is None:
-            found = ", ".join([*(self.input_features or {}), *(self.output_features or {})]) or "none"
-            raise UserError(f"features {found}: flow_vla needs 'observation.state' and 'action'.")
-        if not self.image_features:
-            raise UserError("no camera among the input features: flow_vla needs at least one.")
-        size = self.robot_state_feature.shape[0]
-        if self.state_indices is None:
-            return
-        if not self.state_indices or any(not 0 <= i < size for i in self.state_indices):
-            hint = "" if size == STATE_SIZE else f" The default is for the {STATE_SIZE} components of PandaOmron."
-            raise UserError(
-                f"state_indices is {self.state_indices}, but observation.state has {size} components.{hint} "
-                "Set state_indices to null to use all of them."
-            )

@@ -4,26 +4,28 @@ from __future__ import annotations
 
 import copy
 from collections import deque
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import torch
-from diffusers.utils.torch_utils import randn_tensor
 from lerobot.policies.common.flow_matching import euler_integrate
 from lerobot.policies.pretrained import PreTrainedPolicy
-from lerobot.utils.constants import ACTION, OBS_STATE
+from lerobot.utils.constants import OBS_STATE
 from torch import Tensor
 
-from robocasa_lerobot.errors import UserError
-from robocasa_lerobot.policies.diffusion_transformer.network import decay_groups, masked_mse
+from robocasa_lerobot.policies.common.chunks import (
+    Generators,
+    decay_groups,
+    normal_noise,
+    sample_losses,
+    starting_noise,
+    target_actions,
+)
+from robocasa_lerobot.policies.common.state import StateInput
 from robocasa_lerobot.policies.flow_vla.configuration_flow_vla import FlowVlaConfig
 from robocasa_lerobot.policies.flow_vla.expert import ActionExpert, PrefixCache
 from robocasa_lerobot.policies.flow_vla.prefix import Prefix, ScratchPrefix
 from robocasa_lerobot.policies.flow_vla.pretrained import PretrainedPrefix
-
-ACTION_IS_PAD = ACTION + "_is_pad"
-type Generators = torch.Generator | Sequence[torch.Generator] | None
 
 
 class FlowVlaPolicy(PreTrainedPolicy):
@@ -36,15 +38,13 @@ class FlowVlaPolicy(PreTrainedPolicy):
         super().__init__(config)
         config.validate_features()
         assert config.action_feature is not None
-        assert config.robot_state_feature is not None
         self.config = config
         self.action_dim = config.action_feature.shape[0]
-        indices = range(config.robot_state_feature.shape[0]) if config.state_indices is None else config.state_indices
-        self.register_buffer("state_indices", torch.tensor(list(indices)), persistent=False)
+        self.state = StateInput(config)
         self.prefix: Prefix = ScratchPrefix(config) if config.prefix == "scratch" else PretrainedPrefix(config)
         self.prefix.freeze()
         self.expert = ActionExpert(
-            state_dim=len(indices),
+            state_dim=self.state.size,
             action_dim=self.action_dim,
             width=config.expert_width,
             hidden=round(config.expert_width * config.expert_mlp_ratio),
@@ -82,24 +82,16 @@ class FlowVlaPolicy(PreTrainedPolicy):
             The loss, and scalars to log.
         """
         draws = self.config.noise_draws
-        if tuple(batch[ACTION].shape[1:]) != (self.config.chunk_size, self.action_dim):
-            raise UserError(
-                f"actions of shape {tuple(batch[ACTION].shape)}, expected (batch, {self.config.chunk_size}, "
-                f"{self.action_dim}): load the data with the policy's action_delta_indices."
-            )
+        actions = target_actions(batch, self.config.chunk_size, self.action_dim, draws)
         prefix = self.prefix(batch, generator).repeated(draws)
         state = self._state(batch).repeat_interleave(draws, dim=0)
-        actions = batch[ACTION].float().repeat_interleave(draws, dim=0)
         if noise is None:
-            noise = _normal(actions.shape, generator, actions)
+            noise = normal_noise(actions.shape, generator, actions)
         if times is None:
             times = self.sample_times(actions.shape[0], generator).to(actions.device)
         t = times[:, None, None]
         velocity = self.velocity(state, t * noise + (1.0 - t) * actions, times, prefix)
-        ignored = batch.get(ACTION_IS_PAD) if self.config.mask_padded_actions else None
-        if ignored is not None:
-            ignored = ignored.repeat_interleave(draws, dim=0)
-        losses = masked_mse(velocity, noise - actions, ignored).unflatten(0, (-1, draws)).mean(dim=1)
+        losses = sample_losses(velocity, noise - actions, batch, self.config)
         return (losses if reduction == "none" else losses.mean()), {}
 
     def sample_times(self, count: int, generator: torch.Generator | None = None) -> Tensor:
@@ -142,11 +134,7 @@ class FlowVlaPolicy(PreTrainedPolicy):
         """
         self.eval()
         state = self._state(batch)
-        random = generator if generator is None or isinstance(generator, torch.Generator) else list(generator)
-        shape = (state.shape[0], self.config.chunk_size, self.action_dim)
-        x = _normal(shape, random, state) if noise is None else noise.to(state)
-        if tuple(x.shape) != shape:
-            raise UserError(f"noise of shape {tuple(x.shape)}, expected {shape}.")
+        x = starting_noise(noise, (state.shape[0], self.config.chunk_size, self.action_dim), generator, state)
         cache = self.prefix(batch) if cached_prefix else None
         return euler_integrate(
             lambda noisy, times: self.velocity(state, noisy, times, cache or self.prefix(batch)),
@@ -180,9 +168,8 @@ class FlowVlaPolicy(PreTrainedPolicy):
 
     def _state(self, batch: dict[str, Tensor]) -> Tensor:
         state = batch[OBS_STATE].float()
-        state = (state.squeeze(1) if state.ndim == 3 else state).index_select(-1, self.state_indices)
-        clip = self.config.state_clip
-        return state if clip is None else state.clamp(-clip, clip)
+        chosen: Tensor = self.state(state.squeeze(1) if state.ndim == 3 else state)
+        return chosen
 
     def _get_default_peft_targets(self) -> dict[str, Any]:
         """LoRA on the attention of prefix and expert; what joins them to states and actions is trained in full."""
@@ -197,7 +184,3 @@ class FlowVlaPolicy(PreTrainedPolicy):
         config = copy.copy(self.config)
         config.prefix_config = self.prefix.checkpoint_config()
         config._save_pretrained(save_directory)
-
-
-def _normal(shape: Sequence[int], generator: Any, like: Tensor) -> Tensor:
-    return randn_tensor(tuple(shape), generator=generator, device=like.device, dtype=like.dtype)

@@ -1,4 +1,4 @@
-"""Processors of the policy `flow_vla`; they are saved with it, statistics and tokenizer included."""
+"""Processors of the policy `flow_vla`."""
 
 from __future__ import annotations
 
@@ -6,24 +6,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from lerobot.processor import (
-    PolicyAction,
-    PolicyProcessorPipeline,
-    ProcessorStepRegistry,
-    make_default_policy_processor_steps,
-    make_policy_processor_pipelines,
-)
-from lerobot.utils.constants import ACTION, OBS_STATE
+from lerobot.processor import ProcessorStepRegistry
 from torch import Tensor
 
 from robocasa_lerobot.errors import UserError
 from robocasa_lerobot.policies.common.language_processor import ClipTokensStep, HashedWordsStep
-from robocasa_lerobot.policies.common.statistics import widen_constant_components
+from robocasa_lerobot.policies.common.processors import Pipelines, make_pipelines
 from robocasa_lerobot.policies.flow_vla.configuration_flow_vla import FlowVlaConfig
-
-Pipelines = tuple[
-    PolicyProcessorPipeline[dict[str, Any], dict[str, Any]], PolicyProcessorPipeline[PolicyAction, PolicyAction]
-]
 
 
 @dataclass
@@ -61,22 +50,10 @@ class PromptTokensStep(ClipTokensStep):
 def make_flow_vla_pre_post_processors(
     config: FlowVlaConfig, dataset_stats: Mapping[str, Mapping[str, Any]] | None = None
 ) -> Pipelines:
-    """The preprocessor (instruction to tokens, device, normalisation) and the postprocessor (actions in data units).
-
-    Args:
-        config: of the policy, with its features set.
-        dataset_stats: LeRobot's statistics; constant components are widened (`policies/common/statistics.py`).
-    """
-    stats = None
-    if dataset_stats is not None:
-        stats = widen_constant_components(dataset_stats, (OBS_STATE, ACTION), config.constant_range)
-    steps = make_default_policy_processor_steps(config, stats)
+    """Pre- and postprocessor for the data of `dataset_stats`; LeRobot's discovery calls it by its name."""
     tokens = (
         HashedWordsStep(max_words=config.max_words, buckets=config.language_buckets)
         if config.prefix == "scratch"
         else PromptTokensStep(path=config.prefix_path, max_length=config.max_tokens)
     )
-    return make_policy_processor_pipelines(
-        input_steps=[steps.rename_observations, steps.add_batch_dim, tokens, steps.to_device, steps.normalize],
-        output_steps=[steps.unnormalize, steps.to_cpu],
-    )
+    return make_pipelines(config, dataset_stats, tokens)
