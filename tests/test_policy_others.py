@@ -194,7 +194,7 @@ def test_two_steps_and_two_more_equal_four_and_a_trial(kind: str, data: Path, tm
 
 @pytest.mark.parametrize("kind", ["multi_task_dit", "smolvla", "xvla", "groot"])
 def test_missing_weights_are_named(kind: str) -> None:
-    with pytest.raises(UserError, match="could not be built") as raised, explained(kind):
+    with pytest.raises(UserError, match="could not be built") as raised:
         builders.make_phase_policy(config_of(kind), meta(), None)
     assert f"lerobot[{NEEDS[kind].extra}]" in str(raised.value)
     assert NEEDS[kind].weights in str(raised.value)
@@ -205,7 +205,7 @@ def test_missing_weights_are_named(kind: str) -> None:
 @pytest.mark.parametrize("kind", ["pi0", "pi05"])
 def test_missing_tokenizer_is_named(kind: str) -> None:
     # Their networks build without weights, at 3 billion parameters: only the processors are made here.
-    with pytest.raises(UserError, match="google/paligemma-3b-pt-224") as raised, explained(kind):
+    with pytest.raises(UserError, match="google/paligemma-3b-pt-224") as raised:
         builders.make_processors(with_features(config_of(kind), SIZE), meta(), None, keep_statistics=False)
     assert f"lerobot[{NEEDS[kind].extra}]" in str(raised.value)
 

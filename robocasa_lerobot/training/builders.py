@@ -24,6 +24,7 @@ from lerobot.utils.feature_utils import dataset_to_policy_features
 from robocasa_lerobot.data.mixture import MixtureDataset, MixtureMeta
 from robocasa_lerobot.data.statistics import Statistics
 from robocasa_lerobot.errors import UnknownNameError, UserError
+from robocasa_lerobot.policies.needs import explained
 from robocasa_lerobot.policies.registry import register_policies
 from robocasa_lerobot.training.phase_config import PhaseConfig
 
@@ -78,7 +79,8 @@ def policy_config(settings: Mapping[str, Any], checkpoint: Path | None, device: 
 
 def frame_size(config: PreTrainedConfig) -> tuple[int, int] | None:
     """(height, width) that the policy itself brings pictures to, so that smaller ones can be cached; else None."""
-    name = {"diffusion_transformer": "image_size", "diffusion": "resize_shape"}.get(config.type)
+    names = {"diffusion_transformer": "image_size", "flow_vla": "image_size", "diffusion": "resize_shape"}
+    name = names.get(config.type)
     size = getattr(config, name, None) if name else None
     return (int(size[0]), int(size[1])) if size is not None else None
 
@@ -92,29 +94,40 @@ def make_phase_policy(config: PreTrainedConfig, meta: MixtureMeta, checkpoint: P
     """A fresh policy for the data, or the checkpoint's with every one of its weights.
 
     Raises:
-        UserError: the data lack a feature of the policy or have another shape, or weights do not fit.
+        UserError: the data lack a feature of the policy or have another shape, weights do not fit, or something that
+            the policy needs is not there.
     """
-    if checkpoint is None:
-        policy = make_policy(config, ds_meta=meta)
-    else:
-        _check_features(config, meta)
-        try:
-            kwargs = {"dataset_stats": meta.stats, "dataset_meta": meta}
-            policy = get_policy_class(config.type).from_pretrained(checkpoint, config=config, strict=True, **kwargs)
-        except RuntimeError as error:
-            raise UserError(f"the weights of {checkpoint} do not fit the policy's settings: {error}") from error
+    with explained(config.type):
+        if checkpoint is None:
+            policy = make_policy(config, ds_meta=meta)
+        else:
+            _check_features(config, meta)
+            policy = _load(config, meta, checkpoint)
     policy.to(config.device)
     return policy
+
+
+def _load(config: PreTrainedConfig, meta: MixtureMeta, checkpoint: Path) -> PreTrainedPolicy:
+    kwargs = {"dataset_stats": meta.stats, "dataset_meta": meta}
+    try:
+        return get_policy_class(config.type).from_pretrained(checkpoint, config=config, strict=True, **kwargs)
+    except RuntimeError as error:
+        raise UserError(f"the weights of {checkpoint} do not fit the policy's settings: {error}") from error
 
 
 def make_processors(
     config: PreTrainedConfig, meta: MixtureMeta, checkpoint: Path | None, keep_statistics: bool
 ) -> tuple[Any, Any]:
-    """Pre- and postprocessor: the checkpoint's with its statistics, or new ones for the data."""
-    if checkpoint is None or not keep_statistics:
-        return make_pre_post_processors(config, dataset_stats=meta.stats, dataset_meta=meta)
-    overrides = {"device_processor": {"device": str(config.device)}}
-    return make_pre_post_processors(config, pretrained_path=str(checkpoint), preprocessor_overrides=overrides)
+    """Pre- and postprocessor: the checkpoint's with its statistics, or new ones for the data.
+
+    Raises:
+        UserError: something that they need is not there, such as a tokenizer.
+    """
+    with explained(config.type):
+        if checkpoint is None or not keep_statistics:
+            return make_pre_post_processors(config, dataset_stats=meta.stats, dataset_meta=meta)
+        overrides = {"device_processor": {"device": str(config.device)}}
+        return make_pre_post_processors(config, pretrained_path=str(checkpoint), preprocessor_overrides=overrides)
 
 
 def make_optimizer(
