@@ -5,8 +5,6 @@ from __future__ import annotations
 import json
 import os
 import signal
-import subprocess
-import sys
 import threading
 import time
 from pathlib import Path
@@ -16,7 +14,7 @@ import numpy as np
 import pytest
 import torch
 import yaml
-from training_support import ROOT, experiment_file, losses, metrics, tiny, weights
+from training_support import experiment_file, losses, metrics, tiny, weights
 
 from robocasa_lerobot import contract
 from robocasa_lerobot.data.fake import write_fake_dataset
@@ -77,39 +75,6 @@ def test_stopped_and_continued_gives_the_same_losses(tmp_path: Path, data: Path,
         assert losses(tmp_path, phase) == losses(finished, phase)
         ours, theirs = weights(tmp_path, phase), weights(finished, phase)
         assert all(torch.equal(ours[key], theirs[key]) for key in theirs)
-
-
-@pytest.mark.parametrize("kind", ["act", "diffusion", "flow_vla"])
-def test_policies_of_lerobot_train_and_continue(tmp_path: Path, data: Path, kind: str) -> None:
-    overrides = ["--defaults.steps=2", "--defaults.save_every=0", "--defaults.ema.enabled=false"]
-    assert not run_experiment(tiny(tmp_path / "whole", data, kind, overrides), stop_after=2)
-    for _ in range(2):
-        assert not run_experiment(tiny(tmp_path / "parts", data, kind, overrides), stop_after=1)
-    assert losses(tmp_path / "parts", "pretrain") == losses(tmp_path / "whole", "pretrain")
-    assert [step for step, *_ in losses(tmp_path / "parts", "pretrain")] == [1, 2]
-
-
-def test_killed_run_goes_on_to_the_same_losses(tmp_path: Path, data: Path) -> None:
-    overrides = ["--defaults.steps=12", "--defaults.save_every=1", "--defaults.log_every=3"]
-    whole, killed = tmp_path / "whole", tmp_path / "killed"
-    assert run_experiment(tiny(whole, data, overrides=overrides))
-    path = experiment_file(killed, data)
-    command = [sys.executable, str(ROOT / "train.py"), "--config_path", str(path), *overrides]
-    environment = {**os.environ, "OMP_NUM_THREADS": "1"}
-    log = (tmp_path / "log").open("w")
-    process = subprocess.Popen(command, env=environment, stdout=log, stderr=subprocess.STDOUT)
-    waiting_until = time.monotonic() + 240
-    while not (killed / "out/pretrain/checkpoints/000004").is_dir() and time.monotonic() < waiting_until:
-        assert process.poll() is None, (tmp_path / "log").read_text()[-2000:]
-        time.sleep(0.01)
-    process.send_signal(signal.SIGKILL)
-    process.wait()
-    # The same command, in a process that has imported nothing yet.
-    again = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=280, check=False)
-    assert again.returncode == 0, again.stderr[-2000:]
-    for phase in ("pretrain", "finetune"):
-        assert losses(killed, phase) == losses(whole, phase)
-    assert not list((killed / "out/pretrain/checkpoints").glob(".writing-*"))
 
 
 def test_request_to_end_saves_first(tmp_path: Path, data: Path) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import sys
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -79,8 +80,8 @@ def check_trackers(names: Sequence[str]) -> None:
     for name in names:
         if name not in available:
             raise UserError(
-                f"tracker {name!r}: its package is not installed. Install {name}, or take it out of `trackers`; "
-                f"{METRICS} and {CURVE} are always written."
+                f"tracker {name!r}: its package is not installed. Install it with `{sys.executable} -m pip install "
+                f"{name}`, or take it out of `trackers`; {METRICS} and {CURVE} are always written."
             )
 
 
