@@ -8,6 +8,7 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -15,10 +16,20 @@ import numpy as np
 import pytest
 import torch
 import yaml
-from safetensors.torch import load_file
+from safetensors.torch import load_file, save_file
 from training_support import ROOT, experiment_file
 
 from robocasa_lerobot.data.fake import write_fake_dataset
+from robocasa_lerobot.training.checkpoint import (
+    TrainingState,
+    checkpoint_step,
+    last_checkpoint,
+    prune,
+    save_checkpoint,
+    tidy,
+)
+from robocasa_lerobot.training.config import EmaConfig
+from robocasa_lerobot.training.ema import Ema
 
 KILLS = 10
 STEPS = 24  # of each of the two phases
@@ -172,3 +183,104 @@ def _seconds_per_line(run: Run) -> float:
     phase = run.out / PHASES[0]
     first, last = (phase / "phase.json").stat().st_mtime, (phase / "metrics.jsonl").stat().st_mtime
     return (last - first) / (STEPS // LOG_EVERY)
+
+
+class Killed(BaseException):
+    """Stands for a kill: nothing handles it, and nothing is cleaned up on its way."""
+
+
+class KillSwitch:
+    """Stops Python before its n-th change of the file system, wherever it comes from."""
+
+    changes = ("os.rename", "os.mkdir", "os.remove", "os.rmdir", "os.symlink", "shutil.rmtree")
+
+    def __init__(self) -> None:
+        self._left: int | None = None
+        sys.addaudithook(self._hook)  # for ever: hooks cannot be taken away
+
+    def _hook(self, event: str, args: tuple[Any, ...]) -> None:
+        if self._left is None:
+            return
+        if event in self.changes or (event == "open" and isinstance(args[1], str) and set(args[1]) & set("wax+")):
+            self._left -= 1
+            if self._left < 0:
+                raise Killed
+
+    def fires(self, after: int, action: Callable[[], object]) -> bool:
+        """Whether the action was stopped before change number `after`, counted from 0; otherwise it has ended."""
+        self._left = after
+        try:
+            action()
+        except Killed:
+            return True
+        finally:
+            self._left = None
+        return False
+
+
+class Layer(torch.nn.Linear):
+    """As much of a policy as a checkpoint needs."""
+
+    def save_pretrained(self, folder: Path, state_dict: dict[str, torch.Tensor] | None = None) -> None:
+        folder.mkdir(parents=True)
+        save_file(state_dict or self.state_dict(), folder / "model.safetensors")
+        (folder / "config.json").write_text("{}")
+
+
+class Written:
+    """A part of a checkpoint that is one file."""
+
+    def __init__(self, name: str) -> None:
+        self.name = name
+
+    def save_pretrained(self, folder: Path) -> None:
+        (folder / self.name).write_text("whole")
+
+
+def state_at(step: int) -> TrainingState:
+    policy: Any = Layer(2, 2)
+    policy.weight.data.fill_(float(step))
+    optimizer = torch.optim.SGD(policy.parameters(), lr=0.1)
+    ema = Ema(policy, EmaConfig())
+    return TrainingState(policy, Written("pre.json"), Written("post.json"), optimizer, None, ema, step=step)
+
+
+def files_of(checkpoint: Path) -> list[str]:
+    return sorted(path.relative_to(checkpoint).as_posix() for path in checkpoint.rglob("*") if path.is_file())
+
+
+def test_a_kill_at_any_change_of_files_leaves_whole_checkpoints(tmp_path: Path) -> None:
+    """Saving and pruning are stopped before each of their changes, and what starts then finds a sound checkpoint."""
+    switch = KillSwitch()
+    save_checkpoint(tmp_path / "example", state_at(3), Written("train_config.json"))
+    complete = files_of(tmp_path / "example/checkpoints/000003")
+    assert "training_state/raw_model.safetensors" in complete
+    newest: list[int] = []
+    for after in range(1000):
+        phase = tmp_path / f"{after}"
+        for step in (3, 6):
+            save_checkpoint(phase, state_at(step), Written("train_config.json"))
+
+        def save_and_prune(phase: Path = phase) -> None:
+            save_checkpoint(phase, state_at(9), Written("train_config.json"))
+            save_checkpoint(phase, state_at(9), Written("train_config.json"))  # again, as after an initial checkpoint
+            prune(phase, keep_last=1, keep_every=0)
+
+        stopped = switch.fires(after, save_and_prune)
+        last = last_checkpoint(phase)
+        assert last is not None
+        newest.append(checkpoint_step(last))
+        tidy(phase)
+        assert last_checkpoint(phase) == last
+        assert (phase / "checkpoints/last").readlink() == Path(last.name)
+        for checkpoint in (phase / "checkpoints").iterdir():
+            assert checkpoint.name in ("000003", "000006", "000009", "last")
+            assert files_of(checkpoint) == complete
+            weights = load_file(checkpoint / "training_state/raw_model.safetensors")["weight"]
+            assert weights.unique().tolist() == [checkpoint_step(checkpoint.resolve())]
+        if not stopped:
+            break
+    assert len(newest) > 30  # kills
+    assert set(newest) == {6, 9}
+    assert files_of(phase / "checkpoints") == [f"000009/{file}" for file in complete]
+    print(f"{len(newest) - 1} kills")

@@ -24,7 +24,7 @@ from robocasa_lerobot.errors import UserError
 from robocasa_lerobot.training.adapters import merged_state
 from robocasa_lerobot.training.ema import Ema
 
-CHECKPOINTS, LAST = "checkpoints", "last"
+CHECKPOINTS, LAST, LINK_ASIDE = "checkpoints", "last", ".last"
 PRETRAINED, STATE = "pretrained_model", "training_state"
 RAW_WEIGHTS, AVERAGE, LOG_WINDOW = "raw_model.safetensors", "average.safetensors", "log_window.json"
 
@@ -54,6 +54,7 @@ def tidy(phase_dir: Path) -> None:
     parent = phase_dir / CHECKPOINTS
     for stale in [*parent.glob(".writing-*"), *parent.glob(".dropped-*")]:
         shutil.rmtree(stale)
+    (parent / LINK_ASIDE).unlink(missing_ok=True)
     newest = last_checkpoint(phase_dir)
     link = parent / LAST
     if newest is not None and not (link.is_symlink() and link.readlink() == Path(newest.name)):
@@ -85,7 +86,7 @@ def _drop(checkpoint: Path) -> None:
 
 
 def _point_last_at(checkpoint: Path) -> None:
-    link = checkpoint.with_name(".last")
+    link = checkpoint.with_name(LINK_ASIDE)
     link.unlink(missing_ok=True)
     link.symlink_to(checkpoint.name)
     link.replace(checkpoint.with_name(LAST))
