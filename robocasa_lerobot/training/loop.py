@@ -22,6 +22,7 @@ from tqdm import tqdm
 
 from robocasa_lerobot.data.mixture import StepBatches
 from robocasa_lerobot.errors import UserError
+from robocasa_lerobot.training.allocator import keep_freed_memory
 from robocasa_lerobot.training.augment import augment
 from robocasa_lerobot.training.checkpoint import TrainingState, prune, save_checkpoint
 from robocasa_lerobot.training.held_out import HeldOut
@@ -65,6 +66,8 @@ def train_phase(run: PhaseRun, accelerator: Accelerator) -> bool:
         UserError: the loss is no longer a finite number; the batch is saved beside the checkpoints.
     """
     config, state, parts = run.config, run.state, run.config.gradient_accumulation
+    if accelerator.device.type == "cpu":
+        keep_freed_memory()
     policy, optimizer = accelerator.prepare(state.policy, state.optimizer)
     if config.compile:
         state.policy.compile()
