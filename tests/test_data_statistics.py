@@ -1,4 +1,4 @@
-"""Exact pooled statistics, out of memory and in it, and what becomes of them from phase to phase."""
+"""Exact pooled statistics, out of memory and in it."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from robocasa_lerobot import contract
-from robocasa_lerobot.data import phase_statistics, statistics
+from robocasa_lerobot.data import statistics
 from robocasa_lerobot.data.config import LoaderConfig, MemberConfig, MixtureConfig
 from robocasa_lerobot.data.fake import write_fake_dataset
 from robocasa_lerobot.data.mixture import MixtureDataset
@@ -152,28 +152,3 @@ def test_statistics_are_the_same_from_mapped_columns_and_from_the_cache(roots: l
     assert len(list(tmp_path.glob("statistics_*.json"))) == 2
     assert not np.array_equal(other["action"]["mean"], plain["action"]["mean"])
     assert contract.IMAGE_KEYS[0] not in mixture(roots, **settings).statistics(images=False)
-
-
-def test_phases_keep_replace_or_pool(roots: list[Path]) -> None:
-    before, after = mixture(roots[:1]), mixture(roots[1:2])
-    saved = before.statistics()
-    assert phase_statistics.keep(saved, after)["action"]["mean"].tolist() == saved["action"]["mean"].tolist()
-    own = phase_statistics.replace(after)
-    assert own["action"]["mean"].tolist() == after.statistics()["action"]["mean"].tolist()
-    pooled = phase_statistics.pool([before, after], [300, 100])
-    both = mixture(roots[:2], (3.0, 1.0)).statistics()
-    for key in both:
-        for name, value in both[key].items():
-            np.testing.assert_allclose(pooled[key][name], value, rtol=1e-12)
-    with pytest.raises(UserError, match="shares"):
-        phase_statistics.pool([before, after], [1])
-
-
-def test_statistics_that_do_not_fit_are_not_kept(roots: list[Path]) -> None:
-    dataset = mixture(roots[:1])
-    saved = dataset.statistics()
-    with pytest.raises(UserError, match="lack it"):
-        phase_statistics.keep({k: v for k, v in saved.items() if k != "action"}, dataset)
-    smaller = {**saved, "action": {name: value[:7] for name, value in saved["action"].items()}}
-    with pytest.raises(UserError, match=r"have shape \(7,\), the data \(12,\)"):
-        phase_statistics.keep(smaller, dataset)

@@ -26,7 +26,6 @@ from robocasa_lerobot.data.statistics import (
     Part,
     Statistics,
     cached_statistics,
-    has_statistics,
     pooled_statistics,
 )
 from robocasa_lerobot.errors import UserError
@@ -155,17 +154,12 @@ class MixtureDataset(torch.utils.data.Dataset[Item]):
         Without `images`, of the numbers alone. With a cache folder they are computed once for all processes.
         """
         if self._cache_dir is None:
-            return pooled_statistics(self.parts(), images)
-        return cached_statistics(self.parts(), self._cache_dir, images)
+            return pooled_statistics(self._parts(), images)
+        return cached_statistics(self._parts(), self._cache_dir, images)
 
-    def parts(self, scale: float = 1.0) -> list[Part]:
-        """The members' episodes with their probabilities times `scale`, for statistics over several mixtures."""
-        shares = zip(self._members, self.probabilities * scale, strict=True)
+    def _parts(self) -> list[Part]:
+        shares = zip(self._members, self.probabilities, strict=True)
         return [Part(member.source, member.episodes, float(share), self._use) for member, share in shares]
-
-    def numeric_features(self) -> dict[str, dict[str, Any]]:
-        """The features of which there are statistics, without pictures."""
-        return {key: feature for key, feature in self.meta.features.items() if has_statistics(key, feature)}
 
     def sampler(self, seed: int, drop_last_frames: int = 0) -> MixtureSampler:
         """The sampler over the mixture; the last frames of each episode can be kept from starting a sample."""

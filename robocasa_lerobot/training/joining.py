@@ -28,7 +28,9 @@ def open_phase_data(experiment: ExperimentConfig, phase: PhaseConfig) -> Mixture
 
 
 def pooled(experiment: ExperimentConfig, phase: PhaseConfig, dataset: MixtureDataset) -> Statistics:
-    """Statistics of this phase's data and of those it builds on, each counted by the samples drawn from it.
+    """Exact statistics over the frames of this phase's data and of those it builds on.
+
+    Each phase counts by the samples drawn in it, each frame in it as often as it is drawn.
 
     Raises:
         UserError: the phase builds on no phase of this experiment, so that there are no data to pool with.
