@@ -266,7 +266,7 @@ def test_wrong_datasets_are_told(root: Path, tmp_path: Path) -> None:
         DatasetSource(old)
     shutil.rmtree(other / "meta/robocasa")
     with pytest.raises(UserError, match="Leave `tasks` out"):
-        DatasetSource(other).select(["OpenDrawer"], None)
+        DatasetSource(other).select(MemberConfig(str(other), ["OpenDrawer"]))
 
 
 def test_fake_dataset_is_the_same_for_a_seed_and_holds_the_contract(root: Path, tmp_path: Path) -> None:

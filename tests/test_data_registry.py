@@ -6,6 +6,7 @@ import csv
 import json
 import shutil
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -191,9 +192,39 @@ def test_demo_subset_is_the_benchmarks(fake: Path) -> None:
     assert contract.demo_subset(6, 3) == (1, 2, 4)
     assert contract.demo_subset(6, 9) == tuple(range(6))
     source = DatasetSource(fake)  # tasks take turns: even episodes are of the one, odd ones of the other
-    assert source.select(["OpenDrawer"], None, "3").tolist() == [2, 4, 8]
-    assert source.select(None, None, "50%").tolist() == [2, 3, 4, 5, 8, 9]
-    assert source.select(None, [0, 2, 4, 6, 8, 10], "3_demos").tolist() == [2, 4, 8]
+    assert source.select(MemberConfig("-", ["OpenDrawer"], demos="3")).tolist() == [2, 4, 8]
+    assert source.select(MemberConfig("-", demos="50%")).tolist() == [2, 3, 4, 5, 8, 9]
+    assert source.select(MemberConfig("-", episodes=[0, 2, 4, 6, 8, 10], demos="3_demos")).tolist() == [2, 4, 8]
+
+
+def test_episodes_are_chosen_by_kitchen(fake: Path, tmp_path: Path) -> None:
+    source = DatasetSource(fake)  # kitchens change after each round of the two tasks
+
+    def chosen(**fields: Any) -> list[int]:
+        return source.select(MemberConfig("-", **fields)).tolist()
+
+    assert chosen(layouts=[11]) == chosen(styles=[34, 28]) == [0, 1, 4, 5, 8, 9]
+    assert chosen(layouts=[11, 15, 18], styles=[14], tasks=["CloseDrawer"]) == [3, 7, 11]
+    # After the choice of kitchens, one of the three of each task: random.Random(0) shuffles range(3) to 0 2 1.
+    assert chosen(layouts=[15], demos="1") == [2, 3]
+    with pytest.raises(UserError, match=r"no episode is left with layouts=\[11\], styles=\[14\]"):
+        chosen(layouts=[11], styles=[14])
+    for fields in ({"layouts": []}, {"styles": [34, 34]}):
+        with pytest.raises(UserError, match="is empty or has repeats"):
+            MemberConfig("-", **fields)
+    registry = registry_file(tmp_path, datasets=[{"path": str(fake), "tasks": ["OpenDrawer"]}])
+    (member,) = resolve_mixture(MixtureConfig(select=[SelectionConfig(registry, layouts=[15], styles=[14])])).members
+    assert (member.layouts, member.styles) == ([15], [14])
+    dataset = MixtureDataset(MixtureConfig([member]))
+    assert dataset.meta.total_episodes == 6
+    assert "layouts 15; styles 14" in dataset.describe()
+    without = tmp_path / "without"
+    shutil.copytree(fake, without)
+    table = without / "meta/robocasa/episodes.jsonl"
+    rows = [json.loads(line) for line in table.read_text().splitlines()]
+    table.write_text("".join(json.dumps({**row, "layout_id": None}) + "\n" for row in rows))
+    with pytest.raises(UserError, match="no layout_id of episode 0, which `layouts` needs"):
+        DatasetSource(without).select(MemberConfig("-", layouts=[11]))
 
 
 def test_shares_need_groups() -> None:

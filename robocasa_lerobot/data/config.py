@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 from robocasa_lerobot.errors import UnknownNameError, UserError
 
@@ -24,7 +25,9 @@ class MemberConfig:
     Attributes:
         root: folder of a LeRobotDataset v3.0, relative to the working directory.
         tasks: task names to keep (`task_name` of `meta/robocasa/episodes.jsonl`); None keeps all.
-        episodes: episode indices to keep; None keeps all. With `tasks`, both must hold.
+        episodes: episode indices to keep; None keeps all. Of all that is given here, each must hold.
+        layouts: kitchens to keep, by their layout (`layout_id` of the same table); None keeps all.
+        styles: likewise by their style.
         weight: how often the member is drawn, relative to the others; None: frames ** `alpha` of the mixture.
         make_fake: for debugging: write the tiny made-up dataset of `data/fake.py` at `root` if nothing is there.
         demos: of the episodes that are left, so many of each task: `50` (or `50_demos`) or `10%`, by the
@@ -39,12 +42,13 @@ class MemberConfig:
     make_fake: bool = False
     demos: str | None = None
     group: str | None = None
+    layouts: list[int] | None = None
+    styles: list[int] | None = None
 
     def __post_init__(self) -> None:
-        self.demos = _check_part(f"mixture member {self.root!r}", self.weight, self.demos)
-        for name, values in (("tasks", self.tasks), ("episodes", self.episodes)):
-            if values is not None and (not values or len(set(values)) != len(values)):
-                raise UserError(f"mixture member {self.root!r}: `{name}` is empty or has repeats: {values}.")
+        what = f"mixture member {self.root!r}"
+        self.demos = _check_part(what, self.weight, self.demos)
+        _check_lists(what, tasks=self.tasks, episodes=self.episodes, layouts=self.layouts, styles=self.styles)
 
 
 @dataclass
@@ -61,6 +65,8 @@ class SelectionConfig:
         demos: so many of each dataset, as for a member.
         weight: of each of the datasets, as for a member.
         group: class of the datasets, as for a member.
+        layouts: kitchens to keep of each dataset, by their layout, as for a member.
+        styles: likewise by their style.
     """
 
     registry: str = ROBOCASA365
@@ -72,11 +78,13 @@ class SelectionConfig:
     demos: str | None = None
     weight: float | None = None
     group: str | None = None
+    layouts: list[int] | None = None
+    styles: list[int] | None = None
 
     def __post_init__(self) -> None:
-        self.demos = _check_part(f"selection of {self.registry!r}", self.weight, self.demos)
-        if self.tasks is not None and (not self.tasks or len(set(self.tasks)) != len(self.tasks)):
-            raise UserError(f"selection of {self.registry!r}: `tasks` is empty or has repeats: {self.tasks}.")
+        what = f"selection of {self.registry!r}"
+        self.demos = _check_part(what, self.weight, self.demos)
+        _check_lists(what, tasks=self.tasks, layouts=self.layouts, styles=self.styles)
 
 
 @dataclass
@@ -159,6 +167,12 @@ def _check_part(what: str, weight: float | None, demos: str | None) -> str | Non
     if not (count and int(count[1]) > 0) and not (share and 0 < float(share[1]) <= 100):
         raise UserError(f"{what}: demos is {text!r}, expected a number (50, 50_demos) or a share (10%).")
     return text
+
+
+def _check_lists(what: str, **lists: Sequence[Any] | None) -> None:
+    for name, values in lists.items():
+        if values is not None and (not values or len(set(values)) != len(values)):
+            raise UserError(f"{what}: `{name}` is empty or has repeats: {values}.")
 
 
 def _check_shares(shares: dict[str, float], parts: Sequence[MemberConfig | SelectionConfig]) -> None:

@@ -21,6 +21,7 @@ from robocasa_lerobot import contract
 from robocasa_lerobot.data.source import EPISODE_TABLE
 
 INSTRUCTIONS = {"OpenDrawer": "open the left drawer", "CloseDrawer": "close the left drawer"}
+KITCHENS = ((11, 34), (15, 14))  # layout and style, taking turns from one round of the tasks to the next
 
 
 def write_fake_dataset(
@@ -67,8 +68,16 @@ def _write(
             for frame in _frames(task, length, image_size, generator):
                 dataset.add_frame(frame)
             dataset.save_episode()
+            kitchen = KITCHENS[episode // len(tasks) % len(KITCHENS)]
             rows.append(
-                {"episode_index": episode, "task_name": task, "instruction": INSTRUCTIONS[task], "length": length}
+                {
+                    "episode_index": episode,
+                    "task_name": task,
+                    "instruction": INSTRUCTIONS[task],
+                    "length": length,
+                    "layout_id": kitchen[0],
+                    "style_id": kitchen[1],
+                }
             )
     finally:
         dataset.finalize()

@@ -103,7 +103,7 @@ class MixtureDataset(torch.utils.data.Dataset[Item]):
         self._members = []
         for member in config.members:
             source = self.sources[Path(member.root)]
-            self._members.append(_Member(source, source.select(member.tasks, member.episodes, member.demos)))
+            self._members.append(_Member(source, source.select(member)))
         places = {root: place for place, root in enumerate(self.sources)}
         self._source_list = list(self.sources.values())
         self._place = np.array([places[Path(member.root)] for member in config.members])  # of each member's source
@@ -144,6 +144,8 @@ class MixtureDataset(torch.utils.data.Dataset[Item]):
         lines = []
         for member, part, probability in zip(self.config.members, self._members, self.probabilities, strict=True):
             tasks = ", ".join(member.tasks) if member.tasks else "all tasks"
+            for name, kitchens in (("layouts", member.layouts), ("styles", member.styles)):
+                tasks += f"; {name} {', '.join(map(str, kitchens))}" if kitchens else ""
             counts = f"{len(part.episodes)} episodes, {part.frames} frames"
             lines.append(f"{member.root} ({tasks}): {counts}, {probability:.{1 if probability >= 0.01 else 3}%}")
         return "\n".join(lines)

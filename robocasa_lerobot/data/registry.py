@@ -222,7 +222,13 @@ def resolve_mixture(config: MixtureConfig) -> MixtureConfig:
             tasks = [entry.task] if entry.task_filter else None
             members.append(
                 MemberConfig(
-                    str(entry.root), tasks, weight=selection.weight, demos=selection.demos, group=selection.group
+                    str(entry.root),
+                    tasks,
+                    weight=selection.weight,
+                    demos=selection.demos,
+                    group=selection.group,
+                    layouts=selection.layouts,
+                    styles=selection.styles,
                 )
             )
     return dataclasses.replace(config, members=members, select=[])

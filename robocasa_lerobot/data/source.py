@@ -5,7 +5,6 @@ from __future__ import annotations
 import functools
 import hashlib
 import json
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -17,10 +16,12 @@ from numpy.typing import NDArray
 
 from robocasa_lerobot import contract
 from robocasa_lerobot.data.column_file import column_types, map_columns, read_columns
-from robocasa_lerobot.data.config import demo_count
+from robocasa_lerobot.data.config import MemberConfig, demo_count
 from robocasa_lerobot.errors import UnknownNameError, UserError
 
 EPISODE_TABLE = "meta/robocasa/episodes.jsonl"
+# What a member can choose episodes by: columns of that table, and the member's fields.
+_CHOSEN_BY = {"task_name": "tasks", "layout_id": "layouts", "style_id": "styles"}
 _EPISODE_COLUMNS = ("episode_index", "dataset_from_index", "dataset_to_index")
 
 
@@ -62,54 +63,58 @@ class DatasetSource:
         name = str(self._info.video_path).format(video_key=key, chunk_index=chunk, file_index=file)
         return self.root / name, float(start)
 
-    def select(
-        self, tasks: Sequence[str] | None, episodes: Sequence[int] | None, demos: str | None = None
-    ) -> NDArray[np.int64]:
-        """Indices (ascending) of the episodes of the given tasks and indices; None keeps all.
+    def select(self, member: MemberConfig) -> NDArray[np.int64]:
+        """Indices (ascending) of the episodes that a member of a mixture keeps.
 
-        `demos` (`50`, `10%`) then keeps so many of each task, by the benchmark's rule; a dataset that does not know
-        its tasks counts as one.
+        Those of its `episodes`, `tasks`, `layouts` and `styles`; `demos` (`50`, `10%`) then keeps so many of each
+        task, by the benchmark's rule. A dataset that does not know its tasks counts as one.
 
         Raises:
             UserError: an unknown task, an index out of range, or nothing left.
         """
         kept: NDArray[np.int64] = np.arange(len(self.starts), dtype=np.int64)
-        if episodes is not None:
-            wrong = [index for index in episodes if not 0 <= index < len(kept)]
+        if member.episodes is not None:
+            wrong = [index for index in member.episodes if not 0 <= index < len(kept)]
             if wrong:
                 raise UserError(f"{self.root}: no episode {wrong[0]}; it has episodes 0 to {len(kept) - 1}.")
-            kept = np.asarray(sorted(episodes), dtype=np.int64)
-        if tasks is not None:
-            names = self._task_names()
-            for task in tasks:
-                if task not in names:
-                    raise UnknownNameError("task", task, names, f"(in the dataset {self.root})")
-            kept = np.array([index for index in kept if names[index] in tasks], dtype=np.int64)
+            kept = np.asarray(sorted(member.episodes), dtype=np.int64)
+        rules = {name: getattr(member, field) for name, field in _CHOSEN_BY.items() if getattr(member, field)}
+        for name, wanted in rules.items():
+            values = self._episode_values(name, _CHOSEN_BY[name])
+            for task in wanted if name == "task_name" else ():  # of the kitchens, not every task has all
+                if task not in values:
+                    raise UnknownNameError("task", task, values, f"(in the dataset {self.root})")
+            kept = np.array([index for index in kept if values[index] in wanted], dtype=np.int64)
         if not len(kept):
-            raise UserError(f"{self.root}: no episode is left with tasks={tasks} and episodes={episodes}.")
-        return kept if demos is None else self._sample(kept, demos)
+            asked = ", ".join(f"{_CHOSEN_BY[name]}={wanted}" for name, wanted in rules.items())
+            raise UserError(f"{self.root}: no episode is left with {asked} and episodes={member.episodes}.")
+        return kept if member.demos is None else self._sample(kept, member.demos)
 
     def _sample(self, kept: NDArray[np.int64], demos: str) -> NDArray[np.int64]:
         known = (self.root / EPISODE_TABLE).is_file()
-        names = np.array(self._task_names())[kept] if known else np.zeros(len(kept))
+        names = np.array(self._episode_values("task_name", "tasks"))[kept] if known else np.zeros(len(kept))
         parts = []
         for name in np.unique(names):
             of_task = kept[names == name]
             parts.append(of_task[list(contract.demo_subset(len(of_task), demo_count(demos, len(of_task))))])
         return np.sort(np.concatenate(parts))
 
-    def _task_names(self) -> list[str]:
+    def _episode_values(self, name: str, field: str) -> list[Any]:
+        """What the table of episodes says under `name` of each; `field` is what asks for it."""
         path = self.root / EPISODE_TABLE
         if not path.is_file():
             raise UserError(
-                f"{self.root}: `tasks` needs {EPISODE_TABLE}, which `robocasa-lerobot convert` writes and this "
-                "dataset lacks. Leave `tasks` out, or choose by `episodes`."
+                f"{self.root}: `{field}` needs {EPISODE_TABLE}, which `robocasa-lerobot convert` writes and this "
+                f"dataset lacks. Leave `{field}` out, or choose by `episodes`."
             )
         rows = [json.loads(line) for line in path.read_text().splitlines() if line.strip()]
-        by_episode = {int(row["episode_index"]): str(row["task_name"]) for row in rows}
-        missing = set(range(len(self.starts))) - by_episode.keys()
+        by_episode = {int(row["episode_index"]): row.get(name) for row in rows}
+        missing = set(range(len(self.starts))) - {index for index, value in by_episode.items() if value is not None}
         if missing:
-            raise UserError(f"{path}: no line for episode {min(missing)}; convert the dataset again.")
+            raise UserError(
+                f"{path}: no {name} of episode {min(missing)}, which `{field}` needs; convert the dataset again, or "
+                f"leave `{field}` out."
+            )
         return [by_episode[index] for index in range(len(self.starts))]
 
     @property

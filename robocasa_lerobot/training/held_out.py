@@ -14,7 +14,7 @@ from accelerate import Accelerator
 from accelerate.utils import gather_object
 from numpy.typing import NDArray
 
-from robocasa_lerobot.data.config import LoaderConfig, MixtureConfig
+from robocasa_lerobot.data.config import LoaderConfig, MemberConfig, MixtureConfig
 from robocasa_lerobot.data.mixture import MixtureDataset, open_mixture
 from robocasa_lerobot.data.source import EPISODE_TABLE, DatasetSource
 from robocasa_lerobot.errors import UserError
@@ -37,12 +37,12 @@ def without_held_out(
     kept, apart = [], []
     for member, probability in zip(dataset.config.members, dataset.probabilities, strict=True):
         source = dataset.sources[Path(member.root)]
-        used = source.select(member.tasks, member.episodes, member.demos)
+        used = source.select(member)
         held = np.intersect1d(used, _held_out(source, config.share, seed))
         left = np.setdiff1d(used, held)
         if not len(left):
             raise UserError(f"{member.root}: `held_out` leaves no episode to train on; give more data or less share.")
-        plain = dataclasses.replace(member, tasks=None, demos=None, group=None, weight=float(probability))
+        plain = MemberConfig(member.root, weight=float(probability))
         kept.append(dataclasses.replace(plain, episodes=left.tolist()))
         if len(held):
             apart.append(dataclasses.replace(plain, episodes=held.tolist()))
@@ -95,7 +95,7 @@ def held_out_frames(dataset: MixtureDataset, samples: int, seed: int) -> dict[st
     for number, member in enumerate(dataset.config.members):
         source = dataset.sources[Path(member.root)]
         names = task_names(source)
-        for episode in source.select(member.tasks, member.episodes, member.demos):
+        for episode in source.select(member):
             frames = np.arange(source.starts[episode], source.ends[episode])
             pairs = np.stack([np.full(len(frames), number), frames], axis=1)
             of_task.setdefault(names[episode], []).append(pairs)
