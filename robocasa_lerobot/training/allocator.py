@@ -21,6 +21,4 @@ def keep_freed_memory() -> bool:
     if platform.libc_ver()[0] != "glibc":
         return False
     library = ctypes.CDLL(None)
-    return bool(
-        library.mallopt(_MMAP_THRESHOLD, _LARGEST_MMAP_BYTES) and library.mallopt(_TRIM_THRESHOLD, _KEPT_BYTES)
-    )
+    return bool(library.mallopt(_MMAP_THRESHOLD, _LARGEST_MMAP_BYTES) and library.mallopt(_TRIM_THRESHOLD, _KEPT_BYTES))
