@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, field
+from typing import ClassVar
 
 import mujoco
 import numpy as np
@@ -63,10 +64,12 @@ class Appliance(Fixture):
     Attributes:
         record: the model.
         memory_slots: numbers that it keeps in user data.
+        looks: states worth a picture: shares of range by part.
     """
 
     record: ModelRecord = field(kw_only=True)
-    memory_slots = 0
+    memory_slots: ClassVar[int] = 0
+    looks: ClassVar[dict[str, dict[str, float]]] = {"": {}}
     _memory_at: int = field(default=-1, init=False, repr=False)
     _woken: set[int] = field(default_factory=set, init=False, repr=False)
     _changed: bool = field(default=False, init=False, repr=False)
@@ -166,10 +169,9 @@ class Appliance(Fixture):
         """Whether the gripper touches a part."""
         return contacts.body(model.body(f"{self.name}_{part}").id)
 
-    def show(self, data: mujoco.MjData, part: str, on: bool) -> None:
-        """Show or hide a lamp."""
-        low, high = data.model.joint(self.joint(part)).range
-        position = float(high if on else low)
+    def show(self, data: mujoco.MjData, part: str, share: float) -> None:
+        """Show a lamp (1), hide it (0), or show a part of it."""
+        position = float(share * data.model.joint(self.joint(part)).range[1])
         if self.position(data, part) != position:
             self.set_position(data, part, position)
             self._changed = True

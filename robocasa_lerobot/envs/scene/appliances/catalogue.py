@@ -5,13 +5,40 @@ from __future__ import annotations
 import functools
 
 from robocasa_lerobot.envs.scene.appliances.base import Appliance
-from robocasa_lerobot.envs.scene.appliances.casing import Casing
+from robocasa_lerobot.envs.scene.appliances.blender import Blender
+from robocasa_lerobot.envs.scene.appliances.coffee_machine import CoffeeMachine
+from robocasa_lerobot.envs.scene.appliances.dishwasher import Dishwasher
+from robocasa_lerobot.envs.scene.appliances.electric_kettle import ElectricKettle
 from robocasa_lerobot.envs.scene.appliances.families import KINDS
+from robocasa_lerobot.envs.scene.appliances.fridge import BottomFreezerFridge, FrenchDoorFridge, SideBySideFridge
+from robocasa_lerobot.envs.scene.appliances.microwave import Microwave
+from robocasa_lerobot.envs.scene.appliances.oven import Oven
 from robocasa_lerobot.envs.scene.appliances.records import SPLITS, ModelRecord, Size, generate
+from robocasa_lerobot.envs.scene.appliances.sink import Sink
+from robocasa_lerobot.envs.scene.appliances.stand_mixer import StandMixer
+from robocasa_lerobot.envs.scene.appliances.stove import Stove, Stovetop
+from robocasa_lerobot.envs.scene.appliances.toaster import Toaster
+from robocasa_lerobot.envs.scene.appliances.toaster_oven import ToasterOven
 from robocasa_lerobot.errors import UnknownNameError
 
-# By category: the class that builds its models.
-CLASSES: dict[str, type[Appliance]] = {}
+# By kind, else by category: the class that builds its models.
+CLASSES: dict[str, type[Appliance]] = {
+    "blender": Blender,
+    "coffee_machine": CoffeeMachine,
+    "dishwasher": Dishwasher,
+    "electric_kettle": ElectricKettle,
+    "fridge_bottom_freezer": BottomFreezerFridge,
+    "fridge_french_door": FrenchDoorFridge,
+    "fridge_side_by_side": SideBySideFridge,
+    "sink": Sink,
+    "microwave": Microwave,
+    "oven": Oven,
+    "stand_mixer": StandMixer,
+    "stove": Stove,
+    "stovetop": Stovetop,
+    "toaster": Toaster,
+    "toaster_oven": ToasterOven,
+}
 
 
 @functools.cache
@@ -86,5 +113,5 @@ def build_appliance(
         UnknownNameError: no such model.
     """
     record = model_of(model_id)
-    made = CLASSES.get(record.category, Casing)
+    made = CLASSES[record.kind if record.kind in CLASSES else record.category]
     return made(name, record.size if size is None else size, pos, yaw, record=record)

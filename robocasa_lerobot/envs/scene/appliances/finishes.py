@@ -51,7 +51,7 @@ _TEXTURED: dict[str, tuple[str, Rgb, Rgb, float, float]] = {
 # See-through, with opacity.
 _CLEAR: dict[str, tuple[Rgb, float]] = {
     "glass": ((0.80, 0.88, 0.90), 0.28),
-    "smoked_glass": ((0.10, 0.11, 0.12), 0.62),
+    "smoked_glass": ((0.10, 0.11, 0.12), 0.48),
     "shelf_glass": ((0.75, 0.85, 0.87), 0.45),
     "crisper": ((0.85, 0.90, 0.93), 0.50),
     "water_cold": ((0.55, 0.75, 0.95), 0.70),

@@ -108,7 +108,7 @@ def dome(size: Vector, radius: float, *, shoulder: float, per_corner: int = 3) -
 
 def pipe(path: Sequence[Vector], radius: float, sides: int = 6) -> Mesh:
     """A round bar along a polyline of points, mitred at its bends, with flat ends."""
-    points = np.asarray(path, dtype=np.float64)
+    points = _cut_corners(np.asarray(path, dtype=np.float64), 1.6 * radius)
     steps = np.diff(points, axis=0)
     steps /= np.linalg.norm(steps, axis=1, keepdims=True)
     tangents = np.concatenate([steps[:1], steps[:-1] + steps[1:], steps[-1:]])
@@ -126,3 +126,37 @@ def pipe(path: Sequence[Vector], radius: float, sides: int = 6) -> Mesh:
         stretch = 1.0 / max(float(tangent @ step), 0.5)  # keeps the bar's thickness at a bend
         rings.append(point + radius * stretch * (np.cos(angle)[:, None] * normal + np.sin(angle)[:, None] * other))
     return loft(rings)
+
+
+def _cut_corners(points: Points, cut: float) -> Points:
+    """A polyline whose bends of more than 50 degrees are broken in two, `cut` metres before and after."""
+    out = [points[0]]
+    for before, corner, after in zip(points[:-2], points[1:-1], points[2:], strict=True):
+        back, ahead = before - corner, after - corner
+        lengths = float(np.linalg.norm(back)), float(np.linalg.norm(ahead))
+        back, ahead = back / lengths[0], ahead / lengths[1]
+        if back @ ahead > -np.cos(np.radians(50.0)):
+            out += [corner + back * min(cut, lengths[0] * 0.4), corner + ahead * min(cut, lengths[1] * 0.4)]
+        else:
+            out.append(corner)
+    return np.array([*out, points[-1]])
+
+
+def disc(radius: float, segments: int = 16) -> Mesh:
+    """A flat cone about z, hardly raised in its middle, seen only from above: for what lies on a surface."""
+    ring = circle(radius, 0.0, segments)
+    vertices = np.concatenate([ring, [[0.0, 0.0, 1e-4]]])
+    faces = [(i, (i + 1) % segments, segments) for i in range(segments)]
+    return Mesh(vertices, np.array(faces))
+
+
+def crown(radius: float, height: float, points: int = 10) -> Mesh:
+    """A ring of pointed tongues about z that lean outwards, seen from outside and from above: flames."""
+    low, high = circle(radius, 0.0, 2 * points), circle(radius * 1.12, height, 2 * points)
+    inner = circle(radius * 0.82, 0.0, 2 * points)
+    vertices = np.concatenate([low, high, inner])
+    faces = []
+    for i in range(points):
+        left, tip, right = 2 * i, 2 * points + 2 * i + 1, (2 * i + 2) % (2 * points)
+        faces += [(left, right, tip), (4 * points + right, 4 * points + left, tip)]
+    return Mesh(vertices, np.array(faces))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import mujoco
 import numpy as np
+from numpy.typing import NDArray
 
 from robocasa_lerobot.envs.scene.appliances.shapes import Shapes
 from robocasa_lerobot.envs.scene.fixtures import base
@@ -12,7 +13,15 @@ from robocasa_lerobot.envs.scene.fixtures.base import Vector
 # Clearance behind a handle for a finger of the gripper, metres.
 HANDLE_STANDOFF_M = 0.045
 HANDLE_RADIUS_M = 0.008
+# What is too long to hide in its appliance, such as running water, waits this far below the floor, metres.
+HIDDEN_M = 3.0
 
+# Of what faces a side: outwards, upwards as somebody there sees it, and the axis name of its round parts.
+_FACINGS: dict[str, tuple[NDArray[np.float64], NDArray[np.float64], str]] = {
+    "front": (np.array([0.0, -1.0, 0.0]), np.array([0.0, 0.0, 1.0]), "y"),
+    "top": (np.array([0.0, 0.0, 1.0]), np.array([0.0, 1.0, 0.0]), "z"),
+    "right": (np.array([1.0, 0.0, 0.0]), np.array([0.0, 0.0, 1.0]), "x"),
+}
 _HINGE, _SLIDE = mujoco.mjtJoint.mjJNT_HINGE, mujoco.mjtJoint.mjJNT_SLIDE
 
 
@@ -104,14 +113,16 @@ class Parts(Shapes):
         facing: str = "front",
         style: str = "round",
     ) -> mujoco.MjsBody:
-        """A knob that turns clockwise for a person in front (or above), with a pointer; friction holds it."""
-        front = facing == "front"
-        axis = (0, 1, 0) if front else (0, 0, -1)
+        """A knob that turns clockwise for somebody it faces ("front", "top" or "right"); friction holds it.
+
+        `style` is "round" or "bar", a disc with a grip across it. A pointer shows where it stands.
+        """
+        out, up, turn = _FACINGS[facing]
         body = self.hinge(
             parent,
             part,
             pos,
-            axis,
+            -out,
             limits,
             mass=0.04,
             size=(2 * radius, length, 2 * radius),
@@ -119,18 +130,15 @@ class Parts(Shapes):
             damping=0.01,
             armature=0.0005,
         )
-        out = np.array((0.0, -1.0, 0.0) if front else (0.0, 0.0, 1.0))
-        turn = "y" if front else "z"
-        up = np.array((0.0, 0.0, 1.0) if front else (0.0, 1.0, 0.0))
         if style == "bar":
             self.tube(body, out * 0.004, radius, 0.008, finish, axis=turn, collide=False)
             size = np.abs(out) * length + np.abs(up) * 2 * radius
-            size[0] = radius * 0.55
+            size[size == 0] = radius * 0.55
             self.box(body, out * length / 2, size, finish)
         else:
             self.tube(body, out * length / 2, radius, length, finish, axis=turn, bevel=0.004, top_radius=radius * 0.88)
         mark = np.abs(out) * 0.002 + np.abs(up) * radius * 0.9
-        mark[0] = 0.004
+        mark[mark == 0] = 0.004
         self.box(body, out * (length + 0.0008) + up * radius * 0.42, mark, pointer, collide=False)
         return body
 
@@ -151,13 +159,12 @@ class Parts(Shapes):
 
         `size` is across, then up (or away, for a button that is pressed from above), then how far it stands out.
         """
-        front = facing == "front"
-        inwards = np.array((0.0, 1.0, 0.0) if front else (0.0, 0.0, -1.0))
+        out, up, turn = _FACINGS[facing]
         body = self.slide(
             parent,
             part,
             pos,
-            inwards,
+            -out,
             (0.0, travel),
             mass=0.01,
             size=(0.02, 0.02, 0.02),
@@ -167,14 +174,13 @@ class Parts(Shapes):
         )
         stiffness = force / (1.25 * travel)
         self.spring(body, stiffness, -0.25 * travel)
-        across, up, out = size
+        across, high, deep = size
         if round_:
-            self.tube(
-                body, inwards * out / 2, across / 2, out, finish, axis="y" if front else "z", bevel=min(0.003, out / 2)
-            )
+            self.tube(body, -out * deep / 2, across / 2, deep, finish, axis=turn, bevel=min(0.003, deep / 2))
         else:
-            full = (across, out, up) if front else (across, up, out)
-            self.box(body, inwards * out / 2, full, finish)
+            full = np.abs(out) * deep + np.abs(up) * high
+            full[full == 0] = across
+            self.box(body, -out * deep / 2, full, finish)
         return body
 
     def lamp(
@@ -256,3 +262,44 @@ class Parts(Shapes):
             size = np.full(3, 0.014)
             size[1] = HANDLE_STANDOFF_M
             self.box(body, post + out / 2, size, finish)
+
+    def pane(
+        self,
+        body: mujoco.MjsBody,
+        low: Vector,
+        high: Vector,
+        finish: str,
+        margins: tuple[float, float, float, float],
+        glass: str = "smoked_glass",
+    ) -> None:
+        """A door from one corner to the other with a window; `margins` are those left, right, below and above it."""
+        (x0, y0, z0), (x1, y1, z1) = low, high
+        left, right, below, above = margins
+        self.span(body, (x0, y0, z0), (x0 + left, y1, z1), finish)
+        self.span(body, (x1 - right, y0, z0), (x1, y1, z1), finish)
+        self.span(body, (x0 + left, y0, z0), (x1 - right, y1, z0 + below), finish)
+        self.span(body, (x0 + left, y0, z1 - above), (x1 - right, y1, z1), finish)
+        middle, half = (y0 + y1) / 2, (y1 - y0) * 0.3
+        self.span(body, (x0 + left, middle - half, z0 + below), (x1 - right, middle + half, z1 - above), glass)
+
+    def wire_rack(
+        self, body: mujoco.MjsBody, size: Vector, finish: str, *, bars: int = 7, rim: float = 0.0, name: str = "rack"
+    ) -> None:
+        """A wire shelf, its top at the body's origin: bars from front to back in a frame; touched as a thin plate.
+
+        `rim` is the height of a fence around it, with a rail at the front to pull it by.
+        """
+        width, depth, _ = size
+        wire = 0.005
+        self.blocker(body, (0, 0, -wire / 2), (width, depth, wire), name=name)
+        for x in np.linspace(-width / 2 + wire, width / 2 - wire, bars):
+            self.box(body, (float(x), 0, -wire / 2), (wire * 0.7, depth, wire), finish, collide=False)
+        for level in {0.0, rim}:
+            for side in (-1, 1):
+                self.box(body, (0, side * (depth - wire) / 2, level), (width, wire, wire), finish, collide=rim > 0)
+                self.box(body, (side * (width - wire) / 2, 0, level), (wire, depth, wire), finish, collide=rim > 0)
+        if rim > 0:
+            for x in (-0.5, -0.17, 0.17, 0.5):
+                for side in (-1, 1):
+                    post = (x * (width - wire), side * (depth - wire) / 2, rim / 2)
+                    self.box(body, post, (wire, wire, rim), finish, collide=False)
