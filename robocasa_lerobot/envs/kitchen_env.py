@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import time
 from typing import Any
 
 import gymnasium
@@ -16,6 +17,7 @@ from robocasa_lerobot.envs.cameras import check_camera_names
 from robocasa_lerobot.envs.control.controller import RobotController
 from robocasa_lerobot.envs.control.physics import read_physics
 from robocasa_lerobot.envs.control.step import control_step
+from robocasa_lerobot.envs.initial_noise import InitialNoise, add_initial_noise
 from robocasa_lerobot.envs.pictures import Pictures, picture_spaces, segmentation_names, take_pictures
 from robocasa_lerobot.envs.proprioception import read_state
 from robocasa_lerobot.envs.registry import get_task
@@ -28,6 +30,7 @@ from robocasa_lerobot.rendering import SceneRenderer
 Observation = dict[str, Any]
 # Key of the generator that noise on the initial arm pose comes from, apart from the one that makes the scene.
 _ARM_NOISE_STREAM = 1
+_WORDING_STREAM = 4  # of the choice among a task's paraphrases
 _SEED_LIMIT = 2**31  # of seeds that the env draws for itself
 
 
@@ -58,6 +61,8 @@ class KitchenEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         camera_set: "default", or "cotraining" for the real robot's poses and wrist lens.
         camera_noise: True for RoboCasa's noise on camera poses, or noise of one's own; it follows from the episode's
             seed and changes nothing but pictures.
+        novel_language: give one of the task's other wordings as instruction, chosen by the episode's seed.
+        initial_noise: on the robot's start, in place of RoboCasa's 0.02 rad on the arm's joints.
         depth: observe depth.
         segmentation: observe which geom each pixel shows.
 
@@ -82,6 +87,8 @@ class KitchenEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         render_device: int | None = None,
         camera_set: str = "default",
         camera_noise: bool | CameraNoise = False,
+        initial_noise: InitialNoise | None = None,
+        novel_language: bool = False,
         depth: bool = False,
         segmentation: bool = False,
     ) -> None:
@@ -101,6 +108,10 @@ class KitchenEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         self.image_size = image_size
         self.cameras = check_camera_names(cameras, camera_set)
         self.camera_set = camera_set
+        if novel_language and not self.declaration.paraphrases:
+            raise UserError(f"novel_language: task {task} declares no paraphrases.")
+        self.novel_language = novel_language
+        self.initial_noise = initial_noise
         self.camera_noise = choose_noise(camera_noise, camera_set)
         self._kinds = {"depth": depth, "segmentation": segmentation}
         self.horizon = horizon if horizon is not None else self.declaration.horizon
@@ -109,6 +120,7 @@ class KitchenEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         self.render_mode = render_mode
         self.render_device = render_device
         self.render_observations = True
+        self.rendering_seconds = 0.0  # wall time in which observations' pictures were made, since the env was made
         self.task_description = ""
         self.observation_space = gymnasium.spaces.Dict(
             {
@@ -237,6 +249,12 @@ class KitchenEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         self._scene = build_scene(
             self.declaration, self.split, seed, self.render_preset, self.camera_set, self.camera_noise
         )
+        if self.novel_language:
+            wordings = self._scene.paraphrases
+            choice = np.random.default_rng([seed, _WORDING_STREAM]).integers(len(wordings))
+            self._scene.instruction = wordings[int(choice)]
+        if self.initial_noise is not None:
+            add_initial_noise(self._scene, self.initial_noise)
         noise = np.random.default_rng([seed, _ARM_NOISE_STREAM])
         self._data, self._controller = self._scene.initial_data(noise)
         self._steps = 0
@@ -267,7 +285,9 @@ class KitchenEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
             pictures: Pictures = {key: {} for key in self.observation_space if key != "agent_pos"}
         else:
             if self.render_observations or not self._pictures:
+                started = time.perf_counter()
                 self._pictures = take_pictures(self._open_renderer(), self.data, self.cameras, **self._kinds)
+                self.rendering_seconds += time.perf_counter() - started
             pictures = {key: dict(by_camera) for key, by_camera in self._pictures.items()}
         return {**pictures, "agent_pos": read_state(self.model, self.data)}
 

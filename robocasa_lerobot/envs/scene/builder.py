@@ -126,6 +126,7 @@ def _attempt(
         openness=openness,
         robot=robot,
         instruction=task.instruction.format(side=robot.side, **names),
+        paraphrases=tuple(wording.format(side=robot.side, **names) for wording in task.paraphrases),
     )
 
 

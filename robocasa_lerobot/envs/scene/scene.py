@@ -48,6 +48,7 @@ class Scene:
         openness: initial share of full travel by fixture name.
         robot: start pose of the base.
         instruction: what the robot is told.
+        paraphrases: the same in other words.
         arm_noise_rad: standard deviation of the noise on the initial arm pose.
     """
 
@@ -64,6 +65,7 @@ class Scene:
     openness: dict[str, float]
     robot: RobotPose
     instruction: str
+    paraphrases: tuple[str, ...] = ()
     arm_noise_rad: float = 0.02
 
     def fixture(self, role: str) -> Fixture:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -105,13 +105,18 @@ def robot_pose(rng: np.random.Generator, layout: Layout, start: RobotStart, fixt
     raise PlacementError(f"no free place for the robot at {fixture.name}")
 
 
-def _blocked(layout: Layout, pose: RobotPose) -> bool:
+def is_free(fixtures: Mapping[str, Fixture], pose: RobotPose) -> bool:
+    """Whether the robot can stand at a pose without touching a fixture."""
     column = Footprint(pose.x, pose.y, pose.yaw, (COLUMN_HALF_M, COLUMN_HALF_M))
     for body, top in ((pose.footprint(), BASE_TOP_M), (column, COLUMN_TOP_M)):
-        standing = [f for f in layout.fixtures.values() if f.pos[2] - f.height / 2 < top and f.name != "floor"]
+        standing = [f for f in fixtures.values() if f.pos[2] - f.height / 2 < top and f.name != "floor"]
         if any(body.overlaps(footprint(f), SPAWN_MARGIN_M) for f in standing):
-            return True
-    return False
+            return False
+    return True
+
+
+def _blocked(layout: Layout, pose: RobotPose) -> bool:
+    return not is_free(layout.fixtures, pose)
 
 
 def footprint(fixture: Fixture) -> Footprint:

@@ -1,0 +1,65 @@
+"""Perturbations of the episode's start and of its wording: they follow from the seed and change nothing else."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from robocasa_lerobot.envs.initial_noise import InitialNoise
+from robocasa_lerobot.envs.kitchen_env import KitchenEnv
+from robocasa_lerobot.envs.registry import task_names
+from robocasa_lerobot.envs.scene.robot import ARM_HOME_QPOS
+from robocasa_lerobot.envs.scene.selection import is_free
+from robocasa_lerobot.errors import UserError
+
+SEEDS = range(6)
+
+
+def starts(**kwargs: object) -> list[tuple[np.ndarray, np.ndarray, str]]:
+    """Base pose (x, y, yaw), arm joints before settling, and instruction of each seed."""
+    env = KitchenEnv("OpenDrawer", cameras=(), **kwargs)  # type: ignore[arg-type]
+    out = []
+    for seed in SEEDS:
+        env.reset(seed=seed)
+        robot = env.scene.robot
+        assert is_free(env.scene.fixtures, robot)
+        arm = np.array([env.data.joint(f"robot0_joint{i}").qpos[0] for i in range(1, 8)])
+        out.append((np.array([robot.x, robot.y, robot.yaw]), arm, env.scene.instruction))
+    return out
+
+
+def test_each_noise_moves_what_it_names() -> None:
+    plain = starts()
+    assert all(np.array_equal(a[1], b[1]) for a, b in zip(plain, starts(), strict=True))
+    joints = starts(initial_noise=InitialNoise(arm_rad=0.1))
+    base = starts(initial_noise=InitialNoise(base_position_m=0.1, base_yaw_deg=10.0))
+    for one, arm, moved in zip(plain, joints, base, strict=True):
+        assert np.array_equal(one[0], arm[0])
+        assert not np.array_equal(one[0], moved[0])
+        assert one[2] == arm[2] == moved[2]
+        # The same draw, five times as large; the controller has held the arm for half a second since.
+        scaled = (arm[1] - ARM_HOME_QPOS) / (one[1] - ARM_HOME_QPOS)
+        assert np.median(scaled) == pytest.approx(5.0, rel=0.2)
+    shifts = np.array([moved[0] - one[0] for one, moved in zip(plain, base, strict=True)])
+    assert 0.02 < np.abs(shifts[:, :2]).mean() < 0.25
+    assert 2.0 < np.rad2deg(np.abs(shifts[:, 2])).mean() < 25.0
+
+
+@pytest.mark.parametrize("task", task_names())
+def test_novel_language_is_one_of_the_tasks_other_wordings(task: str) -> None:
+    plain, novel = KitchenEnv(task, cameras=()), KitchenEnv(task, cameras=(), novel_language=True)
+    told = set()
+    for seed in SEEDS:
+        first, _ = plain.reset(seed=seed)
+        second, info = novel.reset(seed=seed)
+        assert np.array_equal(first["agent_pos"], second["agent_pos"])
+        assert info["instruction"] != plain.scene.instruction
+        assert info["instruction"] in plain.scene.paraphrases
+        assert "{" not in info["instruction"]
+        told.add(plain.scene.paraphrases.index(info["instruction"]))
+    assert len(told) > 1
+
+
+def test_impossible_noise_is_explained() -> None:
+    with pytest.raises(UserError, match=r"initial_noise.arm_rad: found -0.1"):
+        InitialNoise(arm_rad=-0.1)
