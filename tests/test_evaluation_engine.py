@@ -23,7 +23,7 @@ from robocasa_lerobot.evaluation.config import EvaluationConfig
 from robocasa_lerobot.evaluation.film import FILM_EVERY, FILM_FPS, Film
 from robocasa_lerobot.evaluation.overrides import load_config
 from robocasa_lerobot.evaluation.plan import make_plan
-from robocasa_lerobot.evaluation.policy_runner import RandomPolicy, ZeroPolicy
+from robocasa_lerobot.evaluation.reference_policies import RandomPolicy, ZeroPolicy
 from robocasa_lerobot.evaluation.results import TrialRecord
 from robocasa_lerobot.evaluation.rollout import RolloutError, run_trial
 from robocasa_lerobot.evaluation.video import frames_and_rate
@@ -187,7 +187,7 @@ def test_a_checkpoint_that_cannot_be_loaded_ends_the_run(tmp_path: Path) -> None
 class Endless(SlideEnv):
     def step(self, action: Any) -> Any:
         observation, reward, _, _, info = super().step(action)
-        return observation, reward, False, False, info
+        return observation, reward, False, False, {**info, "is_success": False}
 
 
 class NotFinite(ZeroPolicy):

@@ -15,9 +15,10 @@ from hypothesis import strategies as st
 from robocasa_lerobot import contract
 from robocasa_lerobot.errors import UserError
 from robocasa_lerobot.evaluation import checkpoints, results, trials_file
-from robocasa_lerobot.evaluation.config import EvaluationConfig, horizons, outcome_settings
+from robocasa_lerobot.evaluation.config import EvaluationConfig
 from robocasa_lerobot.evaluation.overrides import load_config
 from robocasa_lerobot.evaluation.plan import make_plan, trial_seed
+from robocasa_lerobot.evaluation.resolve import outcome_settings, plan_tasks
 from robocasa_lerobot.evaluation.results import PolicyInfo, ResultsError, RunHeader, Seconds, TermSummary, TrialRecord
 from robocasa_lerobot.evaluation.statistics import success_rate, wilson_interval
 
@@ -256,18 +257,18 @@ def test_bad_arguments_are_explained(arguments: list[str], message: str) -> None
 def test_every_evaluation_file_parses_and_names_registered_tasks(path: Path) -> None:
     config = load_config(EvaluationConfig, [f"--config_path={path}", "--policy.path=zero", "--trials=2"])
     assert config.trials == 2
-    assert set(horizons(config.env)) == set(config.env.tasks)
+    assert plan_tasks(config.env).horizons
 
 
 def test_horizons_come_from_the_registry_times_the_multiplier() -> None:
     config = load_config(EvaluationConfig, ["--policy.path=zero", "--env.tasks=OpenDrawer"])
-    own = horizons(config.env)["OpenDrawer"]
+    own = plan_tasks(config.env).horizons["OpenDrawer"]
     assert own is not None
     config.env.horizon_multiplier = 1.5
-    assert horizons(config.env) == {"OpenDrawer": round(1.5 * own)}
+    assert plan_tasks(config.env).horizons == {"OpenDrawer": round(1.5 * own)}
     config.env.tasks = ["OpenDrawr"]
     with pytest.raises(UserError, match="Did you mean 'OpenDrawer'"):
-        horizons(config.env)
+        plan_tasks(config.env)
 
 
 def test_settings_that_cannot_change_an_outcome_are_not_compared() -> None:

@@ -31,7 +31,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     **dict.fromkeys(LOW, BASE),
     "demos": BASE | {"envs", "convert"},
     "training": BASE | {"data", "policies"},
-    "evaluation": BASE | {"envs", "data", "policies"},
+    "evaluation": BASE | {"envs", "convert", "data", "policies", "demos"},  # demos: a reference policy
     "plugins": BASE | LOW | {"demos", "training", "evaluation"},
     "doctor": BASE,
     "cli": BASE,  # and the command modules, by name

@@ -12,7 +12,8 @@ from robocasa_lerobot import contract
 from robocasa_lerobot.errors import UserError
 from robocasa_lerobot.evaluation.results import PolicyInfo
 
-REFERENCE_POLICIES = ("random", "zero")
+REFERENCE_POLICIES = ("demonstrator", "random", "zero")
+REPLAY = "replay"  # written replay:FILE
 _WEIGHTS = ("model.safetensors", "adapter_model.safetensors")
 
 
@@ -38,8 +39,8 @@ class PolicySource:
 
     @property
     def is_reference(self) -> bool:
-        """Whether this is `random` or `zero` and not a checkpoint."""
-        return self.path in REFERENCE_POLICIES
+        """Whether this is `demonstrator`, `random`, `zero` or `replay`, and not a checkpoint."""
+        return self.type in (*REFERENCE_POLICIES, REPLAY)
 
     def describe(self) -> PolicyInfo:
         """What the header of a run says about it."""
@@ -54,6 +55,9 @@ def read_source(path: str, label: str | None = None) -> PolicySource:
     """
     if path in REFERENCE_POLICIES:
         return PolicySource(label or path, path, path, fingerprint=path)
+    kind, colon, file = path.partition(":")
+    if kind == REPLAY and colon:
+        return PolicySource(label or REPLAY, path, REPLAY, fingerprint=stored_fingerprint(Path(file)))
     folder = find_pretrained(Path(path))
     try:
         config = json.loads((folder / "config.json").read_text(encoding="utf-8"))
@@ -76,7 +80,7 @@ def find_pretrained(path: Path) -> Path:
     what = "has no config.json" if path.is_dir() else "no such folder"
     found = sorted(str(p.parent) for p in path.glob("**/pretrained_model/config.json"))[:3] if path.is_dir() else []
     hint = f" Did you mean {' or '.join(found)}?" if found else ""
-    known = ", ".join(REFERENCE_POLICIES)
+    known = ", ".join((*REFERENCE_POLICIES, "replay:FILE"))
     raise CheckpointError(f"policy.path {path}: {what}; expected a pretrained_model folder, or one of {known}.{hint}")
 
 
@@ -90,6 +94,24 @@ def fingerprint(folder: Path) -> str:
         with file.open("rb") as stream:
             content = hashlib.file_digest(stream, "sha256").hexdigest()
         digest.update(f"{file.relative_to(folder).as_posix()} {content}\n".encode())
+    return digest.hexdigest()
+
+
+def stored_fingerprint(path: Path) -> str:
+    """SHA-256 over a file of demonstrations, or over the parts of a dataset that decide what `replay` does.
+
+    Raises:
+        CheckpointError: no such file or folder.
+    """
+    files = [path] if path.is_file() else sorted([*path.glob("meta/**/*.json*"), *path.glob("data/**/*.parquet")])
+    if not files:
+        raise CheckpointError(
+            f"policy.path replay:{path}: expected an HDF5 file of demonstrations or a LeRobotDataset."
+        )
+    digest = hashlib.sha256()
+    for file in files:
+        with file.open("rb") as stream:
+            digest.update(hashlib.file_digest(stream, "sha256").digest())
     return digest.hexdigest()
 
 

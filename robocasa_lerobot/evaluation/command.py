@@ -21,6 +21,8 @@ def configure(parser: argparse.ArgumentParser) -> None:
     from robocasa_lerobot.evaluation.config import EvaluationConfig
 
     parser.add_argument("--config_path", metavar="FILE", help="YAML file of settings; options win over it")
+    short = "what to evaluate, short for --policy.path: a checkpoint, demonstrator, random, zero, replay:FILE"
+    parser.add_argument("--policy", dest="set:policy", metavar="A,B", default=argparse.SUPPRESS, help=short)
     for name, hint, help_text in describe_settings(EvaluationConfig):
         options: dict[str, Any] = {"nargs": "?", "const": "true"} if hint is bool else {}
         shown = {list[str]: "A,B", bool: "true"}.get(hint, "VALUE")

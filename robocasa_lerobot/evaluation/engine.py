@@ -8,7 +8,7 @@ import fcntl
 import os
 import sys
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -16,13 +16,14 @@ import yaml
 from tqdm import tqdm
 
 from robocasa_lerobot.errors import UserError
-from robocasa_lerobot.evaluation import config as settings_of
-from robocasa_lerobot.evaluation.checkpoints import PolicySource, common_image_size, read_source
-from robocasa_lerobot.evaluation.config import EvaluationConfig
-from robocasa_lerobot.evaluation.plan import TrialSpec, make_plan
+from robocasa_lerobot.evaluation import resolve
+from robocasa_lerobot.evaluation.checkpoints import REPLAY, PolicySource, common_image_size, read_source
+from robocasa_lerobot.evaluation.config import EvaluationConfig, check_factory, output_folder
+from robocasa_lerobot.evaluation.plan import Shard, TrialSpec, make_plan, running_order, to_film
 from robocasa_lerobot.evaluation.provenance import utc_now
 from robocasa_lerobot.evaluation.results import (
     TRIALS_FILE,
+    PolicyInfo,
     Results,
     ResultsError,
     RunHeader,
@@ -31,21 +32,27 @@ from robocasa_lerobot.evaluation.results import (
     TrialRecord,
     read_results,
 )
+from robocasa_lerobot.evaluation.serving import open_servers, served_labels
 from robocasa_lerobot.evaluation.trials_file import append, check_same_run, drop_torn_line
 from robocasa_lerobot.evaluation.worker import WorkerSettings
 from robocasa_lerobot.evaluation.workers import Completed, WorkerPool
 
 CONFIG_FILE = "evaluation.yaml"
+SHARDS_FOLDER = "shards"
 
 
 @dataclasses.dataclass(frozen=True)
 class Evaluation:
-    """An evaluation that is ready to run; making one opens no process and writes no file."""
+    """An evaluation that is ready to run; making one opens no process and writes no file.
+
+    `plan` is the whole one, `todo_plan` the part of this shard; `out` is this shard's folder.
+    """
 
     config: EvaluationConfig
     sources: dict[str, PolicySource]
     header: RunHeader
     plan: list[TrialSpec]
+    todo_plan: list[TrialSpec]
     out: Path
 
 
@@ -55,8 +62,8 @@ def prepare(config: EvaluationConfig) -> Evaluation:
     Raises:
         UserError: an unknown task, a folder that is no checkpoint, two policies with one label, ...
     """
-    settings_of.check_factory(config.env.factory)
-    horizons = settings_of.horizons(config.env)
+    check_factory(config.env.factory)
+    tasks = resolve.plan_tasks(config.env)
     asked: list[str | None] = [*config.policy.label] or [None] * len(config.policy.path)
     sources = [read_source(path, label) for path, label in zip(config.policy.path, asked, strict=True)]
     by_label: dict[str, PolicySource] = {}
@@ -66,14 +73,70 @@ def prepare(config: EvaluationConfig) -> Evaluation:
         if not source.label or "/" in source.label or source.label.startswith("."):
             raise UserError(f"policy.label {source.label!r}: it names a folder, so no '/' and no leading '.'.")
         by_label[source.label] = source
-    settings = settings_of.outcome_settings(config, common_image_size(sources, config.env.image_size))
-    plan = make_plan(list(by_label), horizons, config.trials, config.seed, config.videos)
-    header = settings_of.run_header(config, {label: s.describe() for label, s in by_label.items()}, horizons, settings)
-    return Evaluation(config, by_label, header, plan, settings_of.output_folder(config, list(by_label)))
+    needs_torch = not all(source.is_reference for source in sources)
+    device = resolve.resolve_device(config.policy.device, needs_torch)
+    settings = resolve.outcome_settings(config, common_image_size(sources, config.env.image_size), device)
+    seeds = _stored_seeds(sources, config, settings, list(tasks.horizons))
+    phases: list[int | None] = [*config.policy.lifelong_phase] if config.lifelong else [None] * len(sources)
+    own_tasks = {label: tasks.of_policy(phase) for label, phase in zip(by_label, phases, strict=True)}
+    plan = make_plan(
+        own_tasks, tasks.horizons, config.trials, config.seed, config.videos, config.perturbation.names, seeds
+    )
+    header = resolve.run_header(config, _describe(sources, config), tasks, settings)
+    out = output_folder(config, list(by_label))
+    if config.shard is None:
+        return Evaluation(config, by_label, header, plan, plan, out)
+    shard = Shard.parse(config.shard)
+    return Evaluation(config, by_label, header, plan, shard.of(plan), shard_folder(out, shard))
+
+
+def shard_folder(out: Path, shard: Shard) -> Path:
+    """Where a shard's results go."""
+    return out / SHARDS_FOLDER / f"{shard.index}-of-{shard.count}"
+
+
+def _describe(sources: Sequence[PolicySource], config: EvaluationConfig) -> dict[str, PolicyInfo]:
+    described = {}
+    for index, source in enumerate(sources):
+        policy = config.policy
+        described[source.label] = dataclasses.replace(
+            source.describe(),
+            lifelong_phase=policy.lifelong_phase[index] if policy.lifelong_phase else None,
+            demo_fraction=policy.demo_fraction[index] if policy.demo_fraction else None,
+            training_data=policy.training_data[index] if policy.training_data else None,
+        )
+    return described
+
+
+def _stored_seeds(
+    sources: Sequence[PolicySource], config: EvaluationConfig, settings: dict[str, Any], tasks: Sequence[str]
+) -> dict[str, list[int]]:
+    """Scene seeds of the episodes that are replayed, by task; {} where nothing is. They go into the settings."""
+    replays = [source for source in sources if source.type == REPLAY]
+    if not replays:
+        return {}
+    if len(replays) > 1:
+        raise UserError("one replay:FILE at a time: its scenes are the trials' scenes.")
+    from robocasa_lerobot.evaluation.stored_episodes import read_episodes
+
+    file = Path(replays[0].path.partition(":")[2])
+    seeds: dict[str, list[int]] = {}
+    for episode in read_episodes(file):
+        if episode.split == config.env.split:
+            seeds.setdefault(episode.task, []).append(episode.seed)
+    for task in tasks:
+        found = len(seeds.get(task, []))
+        if found < config.trials:
+            raise UserError(
+                f"{file}: {found} episodes of {task} in {config.env.split} scenes, {config.trials} trials: "
+                f"use --trials={found} or fewer, other --env.tasks, or --env.split."
+            )
+    settings["scenes_of"] = replays[0].fingerprint
+    return seeds
 
 
 def evaluate(evaluation: Evaluation) -> list[TrialRecord]:
-    """Run the trials that are not recorded yet; the records of the whole plan, in its order.
+    """Run the trials that are not recorded yet; the records of the plan (or shard), in its order.
 
     Each trial is appended to `trials.jsonl` as it ends: after a kill the same call runs the missing ones only.
 
@@ -81,29 +144,29 @@ def evaluate(evaluation: Evaluation) -> list[TrialRecord]:
         ResultsError: the output folder holds trials of other settings, or another process writes to it.
         UserError: a policy or an env cannot be built.
     """
-    out, config = evaluation.out, evaluation.config
+    out, header = evaluation.out, evaluation.header
     out.mkdir(parents=True, exist_ok=True)
     path = out / TRIALS_FILE
     with _only_writer(out):
         if drop_torn_line(path):
             print(f"{path}: the last line was cut off by a kill; its trial runs again.", file=sys.stderr)
-        header = evaluation.header
         earlier_runs = read_results(path) if path.exists() else Results(path, {}, [])
         check_same_run(path, earlier_runs.headers.values(), header)
         records = {record.key: record for record in earlier_runs.trials}
-        _check_seeds(path, records, evaluation.plan)
-        _write_config(out / CONFIG_FILE, config)
-        todo = [spec for spec in evaluation.plan if _is_missing(records.get(spec.key), config.retry_errors)]
+        check_plan(path, records, evaluation.todo_plan)
+        _write_config(out / CONFIG_FILE, evaluation.config)
+        retry = evaluation.config.retry_errors
+        todo = [spec for spec in evaluation.todo_plan if _is_missing(records.get(spec.key), retry)]
         if header.id not in earlier_runs.headers:
             append(path, header)
-        for completed in _run(evaluation, todo, records):
+        for completed in _run(evaluation, running_order(todo), records):
             record = _record(completed, header)
             earlier = records.get(record.key)
             if earlier is not None and earlier.error is None:
                 record = _with_film(earlier, record, out)
             append(path, record)
             records[record.key] = record
-    return [records[spec.key] for spec in evaluation.plan]
+    return [records[spec.key] for spec in evaluation.todo_plan]
 
 
 def showcase(plan: Sequence[TrialSpec], records: Mapping[TrialKey, TrialRecord]) -> list[TrialSpec]:
@@ -113,51 +176,68 @@ def showcase(plan: Sequence[TrialSpec], records: Mapping[TrialKey, TrialRecord])
     same way. Only policies that are filmed at all are looked at.
     """
     chosen = []
-    groups = dict.fromkeys((spec.label, spec.task) for spec in plan if spec.film)
-    for label, task in groups:
-        specs = [spec for spec in plan if (spec.label, spec.task) == (label, task) and spec.key in records]
+    groups: dict[tuple[str, str], list[TrialSpec]] = {}
+    for spec in plan:
+        groups.setdefault((spec.label, spec.task), []).append(spec)
+    for specs in groups.values():
+        if not any(spec.film for spec in specs):
+            continue
         for success in (True, False):
-            these = [s for s in specs if records[s.key].success is success and records[s.key].error is None]
+            done = [s for s in specs if s.key in records]
+            these = [s for s in done if records[s.key].success is success and records[s.key].error is None]
             if these and all(records[spec.key].video is None for spec in these):
-                chosen.append(dataclasses.replace(these[0], film=True))
+                chosen.append(to_film(these[0]))
     return chosen
+
+
+def worker_settings(evaluation: Evaluation) -> WorkerSettings:
+    """What the workers of an evaluation need."""
+    config, header = evaluation.config, evaluation.header
+    return WorkerSettings(
+        sources=evaluation.sources,
+        factory=config.env.factory,
+        env_kwargs={
+            "split": config.env.split,
+            "render_preset": config.env.render_preset,
+            "image_size": header.image_size,
+        },
+        device=header.device,
+        threads=config.policy.threads,
+        executed_steps=config.executed_steps,
+        out=str(evaluation.out),
+        render_devices=tuple(config.env.render_devices),
+        perturbations={name: resolve.env_arguments(name, config.perturbation) for name in config.perturbation.names},
+        success_rule=config.success.rule,
+        success_hold_steps=config.success.hold_steps,
+        width=header.settings["batch_width"],
+        served=served_labels(evaluation.sources, config.policy, header.device),
+    )
 
 
 def _run(
     evaluation: Evaluation, todo: Sequence[TrialSpec], records: Mapping[TrialKey, TrialRecord]
 ) -> Iterator[Completed]:
     """The missing trials, then the ones to film, with a progress bar; `records` grows while this runs."""
-    if not todo and not showcase(evaluation.plan, records):
-        print(f"all {len(evaluation.plan)} trials are in {evaluation.out / TRIALS_FILE}: nothing to run.")
+    if not todo and not showcase(evaluation.todo_plan, records):
+        print(f"all {len(evaluation.todo_plan)} trials are in {evaluation.out / TRIALS_FILE}: nothing to run.")
         return
-    config = evaluation.config
-    worker_settings = WorkerSettings(
-        sources=evaluation.sources,
-        factory=config.env.factory,
-        env_kwargs={
-            "split": config.env.split,
-            "render_preset": config.env.render_preset,
-            "image_size": evaluation.header.image_size,
-        },
-        device=config.policy.device,
-        threads=config.policy.threads,
-        executed_steps=config.executed_steps,
-        out=str(evaluation.out),
-        render_devices=tuple(config.env.render_devices),
-    )
-    total = len(evaluation.plan)
-    pool = WorkerPool(worker_settings, config.worker_count(max(1, len(todo))), config.stall_seconds)
+    config, settings = evaluation.config, worker_settings(evaluation)
+    total = len(evaluation.todo_plan)
     counts = collections.Counter[str]()
-    with tqdm(total=total, initial=total - len(todo), unit="trial", desc="trials", dynamic_ncols=True) as bar:
+    with (
+        open_servers(settings, config) as servers,
+        tqdm(total=total, initial=total - len(todo), unit="trial", desc="trials", dynamic_ncols=True) as bar,
+    ):
+        pool = WorkerPool(settings, config.worker_count(max(1, len(todo))), config.stall_seconds, servers)
 
-        def to_film() -> list[TrialSpec]:
-            specs = showcase(evaluation.plan, records)
+        def more() -> list[TrialSpec]:
+            specs = showcase(evaluation.todo_plan, records)
             bar.total = (bar.total or 0) + len(specs)
             if specs:
                 bar.set_description("films")
             return specs
 
-        for completed in pool.run(todo, to_film):
+        for completed in pool.run(todo, more):
             error = completed.result.error or (completed.earlier.error if completed.earlier else None)
             if error is not None:
                 what = "failed with an error" if completed.result.error else "was tried again after an error"
@@ -189,6 +269,8 @@ def _with_film(earlier: TrialRecord, again: TrialRecord, out: Path) -> TrialReco
 
 def _record(completed: Completed, header: RunHeader) -> TrialRecord:
     spec, result, earlier = completed.spec, completed.result, completed.earlier
+    outcome = result.outcome
+    seconds = outcome.seconds if result.error is None else Seconds(total=result.wall_seconds)
     return TrialRecord(
         run=header.id,
         label=spec.label,
@@ -198,24 +280,24 @@ def _record(completed: Completed, header: RunHeader) -> TrialRecord:
         seed=spec.seed,
         policy_seed=spec.policy_seed,
         split=header.split,
-        layout_id=result.outcome.layout_id,
-        style_id=result.outcome.style_id,
-        instruction=result.outcome.instruction,
+        layout_id=outcome.layout_id,
+        style_id=outcome.style_id,
+        instruction=outcome.instruction,
         horizon=spec.horizon,
         horizon_multiplier=header.horizon_multiplier,
-        success=result.outcome.success,
-        first_success_step=result.outcome.first_success_step,
-        steps=result.outcome.steps,
-        terms=result.outcome.terms,
+        success=outcome.success,
+        first_success_step=outcome.first_success_step,
+        steps=outcome.steps,
+        terms=outcome.terms,
         outcome=result.kind,
         error=result.error,
         attempts=completed.attempts,
         first_outcome=earlier.kind if earlier else None,
         first_error=earlier.error if earlier else None,
-        warnings={},
-        trajectory=result.outcome.trajectory,
+        warnings=outcome.warnings,
+        trajectory=outcome.trajectory,
         video=result.video,
-        seconds=Seconds(total=round(result.wall_seconds, 3)),
+        seconds=Seconds(**{name: round(value, 4) for name, value in dataclasses.asdict(seconds).items()}),
         finished=utc_now(),
     )
 
@@ -224,10 +306,16 @@ def _is_missing(record: TrialRecord | None, retry_errors: bool) -> bool:
     return record is None or (retry_errors and record.error is not None)
 
 
-def _check_seeds(path: Path, records: dict[Any, TrialRecord], plan: Sequence[TrialSpec]) -> None:
+def check_plan(path: Path, records: Mapping[TrialKey, TrialRecord], plan: Sequence[TrialSpec]) -> None:
+    """The recorded trials must be those that this version plans.
+
+    Raises:
+        ResultsError: a recorded trial had another seed or horizon.
+    """
     for spec in plan:
         record = records.get(spec.key)
-        if record is not None and (record.seed, record.horizon) != (spec.seed, spec.horizon):
+        planned = (spec.seed, spec.policy_seed, spec.horizon)
+        if record is not None and (record.seed, record.policy_seed, record.horizon) != planned:
             raise ResultsError(
                 f"{path}: {spec.task} trial {spec.trial} was run with seed {record.seed} and horizon {record.horizon}, "
                 f"this version plans {spec.seed} and {spec.horizon}: choose another --out."
@@ -257,4 +345,5 @@ def _only_writer(out: Path) -> Iterator[None]:
             ) from error
         yield
     finally:
-        os.close(descriptor)
+        with suppress(OSError):
+            os.close(descriptor)

@@ -11,6 +11,9 @@ from typing import Any
 from robocasa_lerobot.errors import suggest
 from robocasa_lerobot.settings import ConfigError, decode, load_yaml, parse_overrides, set_dotted
 
+# Groups of settings that may be given by one value: `--policy=zero` is `--policy.path=zero`.
+_SHORT = {"policy": "path"}
+
 
 def load_config[T](cls: type[T], arguments: Sequence[str]) -> T:
     """An instance of the dataclass `cls` from command-line arguments.
@@ -43,6 +46,8 @@ def _check(cls: type, tree: Mapping[str, Any], prefix: str) -> dict[str, Any]:
             raise ConfigError(f"unknown setting '{prefix}{key}'. {shown}")
         hint = hints[key]
         if dataclasses.is_dataclass(hint):
+            if not isinstance(value, Mapping) and key in _SHORT:
+                value = {_SHORT[key]: value}
             if not isinstance(value, Mapping):
                 raise ConfigError(
                     f"{prefix}{key}: found {value!r}, expected settings such as --{prefix}{key}.NAME=VALUE."

@@ -1,4 +1,4 @@
-"""A worker process: its own env and policy replica, one trial after another from its pipe."""
+"""A worker process: its own env, one trial after another from its pipe; the policy here, or in a policy server."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import time
 import traceback
 import warnings
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any
@@ -17,19 +17,28 @@ import gymnasium
 
 from robocasa_lerobot import gl
 from robocasa_lerobot.errors import UserError
+from robocasa_lerobot.evaluation.actor import Actor
 from robocasa_lerobot.evaluation.checkpoints import PolicySource
+from robocasa_lerobot.evaluation.chunk_policy import BatchingError
 from robocasa_lerobot.evaluation.film import Film
+from robocasa_lerobot.evaluation.messages import Alive, Finished, Ready, Refused
 from robocasa_lerobot.evaluation.plan import TrialSpec
-from robocasa_lerobot.evaluation.policy_runner import PolicyRunner, load_policy
-from robocasa_lerobot.evaluation.results import CRASHED, DIVERGED, FINISHED
+from robocasa_lerobot.evaluation.policy_runner import load_actor
+from robocasa_lerobot.evaluation.policy_server import RemotePolicy
+from robocasa_lerobot.evaluation.results import CRASHED, DIVERGED
 from robocasa_lerobot.evaluation.rollout import DivergedError, Outcome, horizon_of, run_trial
+from robocasa_lerobot.evaluation.success import SuccessRule
 
 EnvFactory = Callable[..., gymnasium.Env[Any, Any]]
 
 
 @dataclass(frozen=True)
 class WorkerSettings:
-    """What a worker needs beside the trials themselves; picklable."""
+    """What a worker needs beside the trials themselves; picklable.
+
+    `perturbations` are the arguments that each of them adds to the env's, `served` the labels of policies that a
+    policy server computes.
+    """
 
     sources: dict[str, PolicySource]
     factory: str
@@ -39,45 +48,25 @@ class WorkerSettings:
     executed_steps: int | None
     out: str
     render_devices: tuple[int, ...] = ()
+    perturbations: dict[str, dict[str, Any]] = field(default_factory=dict)
+    success_rule: str = "any_step"
+    success_hold_steps: int = 1
+    width: int = 1
+    served: frozenset[str] = frozenset()
 
 
-@dataclass(frozen=True)
-class Ready:
-    """The worker waits for its first trial."""
+def worker_main(
+    connection: Connection, settings: WorkerSettings, render_device: int | None = None, server: str | None = None
+) -> None:
+    """Serve trials from `connection` until it gives None or closes.
 
-
-@dataclass(frozen=True)
-class Alive:
-    """A sign of life from inside a trial; `step` is -1 while policy or env are being built."""
-
-    step: int
-
-
-@dataclass(frozen=True)
-class Finished:
-    """A trial ended by itself; `error` is the traceback of one that crashed, `kind` is the record's outcome."""
-
-    outcome: Outcome
-    video: str | None
-    wall_seconds: float
-    error: str | None
-    kind: str = FINISHED
-
-
-@dataclass(frozen=True)
-class Refused:
-    """A fault that no other trial will get around; the whole run ends with this message."""
-
-    message: str
-
-
-def worker_main(connection: Connection, settings: WorkerSettings, render_device: int | None = None) -> None:
-    """Serve trials from `connection` until it gives None or closes; pictures are drawn on `render_device`."""
+    Pictures are drawn on `render_device`; `server` is the address of the policy server.
+    """
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches the whole group; the parent ends its workers.
     warnings.filterwarnings("ignore", category=gl.SoftwareRenderingWarning)  # the parent has announced it
     if render_device is not None:
         gl.use("egl", render_device)  # the parent has checked it
-    worker = _Worker(connection, settings)
+    worker = _Worker(connection, settings, server)
     try:
         connection.send(Ready())
         while (spec := connection.recv()) is not None:
@@ -89,10 +78,11 @@ def worker_main(connection: Connection, settings: WorkerSettings, render_device:
 
 
 class _Worker:
-    def __init__(self, connection: Connection, settings: WorkerSettings) -> None:
+    def __init__(self, connection: Connection, settings: WorkerSettings, server: str | None) -> None:
         self._connection, self._settings = connection, settings
-        self._policy: tuple[str, PolicyRunner] | None = None
-        self._env: tuple[tuple[str, int | None], gymnasium.Env[Any, Any]] | None = None
+        self._remote = None if server is None else RemotePolicy(server, self._alive)
+        self._policy: tuple[str, Actor] | None = None
+        self._env: tuple[tuple[Any, ...], gymnasium.Env[Any, Any]] | None = None
 
     def run(self, spec: TrialSpec) -> Finished | Refused:
         started = time.monotonic()
@@ -100,23 +90,23 @@ class _Worker:
         try:
             self._alive(-1)
             try:
-                policy = self._policy_of(spec.label)
-            except Exception as error:
-                # No other trial will load it either.
-                detail = "" if isinstance(error, UserError) else "\n" + traceback.format_exc()
-                return Refused(f"policy {spec.label!r} cannot be loaded: {error}{detail}")
-            try:
                 env = self._env_of(spec)
             except UserError as error:
                 return Refused(str(error))
+            policy = self._policy_of(spec.label)
+            if isinstance(policy, Refused):
+                return policy
+            rule = SuccessRule(self._settings.success_rule, self._settings.success_hold_steps)
             if spec.film:
-                video = f"videos/{spec.label}/{spec.task}/trial_{spec.trial:03d}.mp4"
+                video = video_path(spec)
                 with Film(Path(self._settings.out) / video) as film:
-                    outcome = run_trial(env, policy, spec, film, self._alive)
+                    outcome = run_trial(env, policy, spec, film, self._alive, rule)
             else:
-                outcome = run_trial(env, policy, spec, None, self._alive)
+                outcome = run_trial(env, policy, spec, None, self._alive, rule)
         except (EOFError, BrokenPipeError, ConnectionResetError):
             raise
+        except BatchingError as error:
+            return Refused(str(error))
         except Exception as error:
             # What the trial left behind may be broken as well: the next one starts from a new env and policy.
             self.close_env()
@@ -136,26 +126,46 @@ class _Worker:
     def _alive(self, step: int) -> None:
         self._connection.send(Alive(step))
 
-    def _policy_of(self, label: str) -> PolicyRunner:
+    def _policy_of(self, label: str) -> Actor | Refused:
         if self._policy is None or self._policy[0] != label:
             self._policy = None  # Free the last one first: two large policies may not fit.
-            source = self._settings.sources[label]
-            if not source.is_reference:
-                import torch
+            settings = self._settings
+            source = settings.sources[label]
+            if label in settings.served:
+                assert self._remote is not None, "a policy is to be served, but there is no server"
+                self._policy = (label, self._remote.actor(label))
+                return self._policy[1]
+            try:
+                if not source.is_reference:
+                    import torch
 
-                torch.set_num_threads(self._settings.threads)
-            self._policy = (label, load_policy(source, self._settings.device, self._settings.executed_steps))
+                    torch.set_num_threads(settings.threads)
+                actor = load_actor(source, settings.device, settings.executed_steps, settings.width)
+            except Exception as error:
+                # No other trial will load it either.
+                detail = "" if isinstance(error, UserError) else "\n" + traceback.format_exc()
+                return Refused(f"policy {label!r} cannot be loaded: {error}{detail}")
+            self._policy = (label, actor)
         return self._policy[1]
 
     def _env_of(self, spec: TrialSpec) -> gymnasium.Env[Any, Any]:
-        wanted = (spec.task, spec.horizon)
+        wanted = (spec.task, spec.horizon, spec.perturbation)
         if self._env is None or self._env[0] != wanted:
             self.close_env()
-            factory = load_factory(self._settings.factory)
-            env = factory(task=spec.task, horizon=spec.horizon, **self._settings.env_kwargs)
+            settings = self._settings
+            arguments = {**settings.env_kwargs, **settings.perturbations.get(spec.perturbation, {})}
+            if not SuccessRule(settings.success_rule, settings.success_hold_steps).ends_early:
+                arguments["terminate_on_success"] = False
+            env = load_factory(settings.factory)(task=spec.task, horizon=spec.horizon, **arguments)
             self._env = (wanted, env)
             horizon_of(env, spec)
         return self._env[1]
+
+
+def video_path(spec: TrialSpec) -> str:
+    """Where a trial's film lies in the results folder."""
+    perturbed = "" if spec.perturbation == "none" else f"{spec.perturbation}_"
+    return f"videos/{spec.label}/{spec.task}/{perturbed}trial_{spec.trial:03d}.mp4"
 
 
 def load_factory(factory: str) -> EnvFactory:

@@ -5,24 +5,27 @@ from __future__ import annotations
 import collections
 import multiprocessing
 import multiprocessing.connection
-import os
-import signal
 import time
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import suppress
 from dataclasses import dataclass
 from multiprocessing.connection import Connection
 from multiprocessing.context import SpawnProcess
 
 from robocasa_lerobot.errors import UserError
+from robocasa_lerobot.evaluation.messages import Alive, Finished, Ready, Refused
 from robocasa_lerobot.evaluation.plan import TrialSpec
+from robocasa_lerobot.evaluation.processes import cause_of_death, thread_limit
 from robocasa_lerobot.evaluation.results import CRASHED, HUNG
 from robocasa_lerobot.evaluation.rollout import Outcome
-from robocasa_lerobot.evaluation.worker import Alive, Finished, Ready, Refused, WorkerSettings, worker_main
+from robocasa_lerobot.evaluation.servers import ServerPool
+from robocasa_lerobot.evaluation.worker import WorkerSettings, worker_main
 
 MAX_ATTEMPTS = 2
 # A worker that dies before it is ready dies of its surroundings (imports, memory); trying for ever would not help.
 MAX_FAILED_STARTS = 3
+# A start takes seconds, on a machine with too much to do many.
+START_SECONDS = 180.0
 _POLL_SECONDS = 0.5
 
 
@@ -49,6 +52,7 @@ class _Slot:
     connection: Connection
     last_sign: float
     render_device: int | None = None
+    server: str | None = None
     ready: bool = False
     attempt: _Attempt | None = None
     given_at: float = 0.0
@@ -64,10 +68,14 @@ class WorkerPool:
         settings: what each worker gets.
         size: number of processes.
         stall_seconds: a worker without a sign of life for so long is killed and replaced.
+        servers: policy servers that the workers are dealt out to; watched here while trials run.
     """
 
-    def __init__(self, settings: WorkerSettings, size: int, stall_seconds: float) -> None:
+    def __init__(
+        self, settings: WorkerSettings, size: int, stall_seconds: float, servers: ServerPool | None = None
+    ) -> None:
         self._settings, self._size, self._stall_seconds = settings, size, stall_seconds
+        self._servers = servers
         self._context = multiprocessing.get_context("spawn")
         self._slots: list[_Slot] = []
         self._failed_starts = 0
@@ -96,7 +104,7 @@ class WorkerPool:
                 while len(self._slots) < min(self._size, busy + len(pending)):
                     self._slots.append(self._start())
                 for slot in self._slots:
-                    if slot.ready and slot.attempt is None and pending:
+                    if slot.ready and slot.attempt is None and pending and self._may_begin(pending[0].spec):
                         self._give(slot, pending.popleft())
                 for completed in self._collect():
                     if completed.result.error is not None and completed.attempts < MAX_ATTEMPTS:
@@ -111,12 +119,18 @@ class WorkerPool:
         """What the workers report within a short wait."""
         # The pipe of a dead worker reports end-of-file, so the pipes alone tell of deaths too.
         waiting: dict[object, _Slot] = {slot.connection: slot for slot in self._slots}
-        for connection in multiprocessing.connection.wait([s.connection for s in self._slots], _POLL_SECONDS):
+        watched = [] if self._servers is None else self._servers.connections
+        reporting = multiprocessing.connection.wait([*(s.connection for s in self._slots), *watched], _POLL_SECONDS)
+        if self._servers is not None:
+            self._servers.attend(reporting)
+        for connection in reporting:
+            if connection not in waiting:
+                continue
             slot = waiting[connection]
             try:
                 message = slot.connection.recv()
             except (EOFError, ConnectionResetError):
-                yield from self._bury(slot, _cause_of_death(slot.process), CRASHED)
+                yield from self._bury(slot, cause_of_death(slot.process), CRASHED)
                 continue
             slot.last_sign = time.monotonic()
             if isinstance(message, Ready):
@@ -131,9 +145,10 @@ class WorkerPool:
                 assert isinstance(message, Alive), message
         now = time.monotonic()
         for slot in list(self._slots):
-            if (slot.attempt is not None or not slot.ready) and now - slot.last_sign > self._stall_seconds:
+            limit = self._stall_seconds if slot.ready else max(self._stall_seconds, START_SECONDS)
+            if (slot.attempt is not None or not slot.ready) and now - slot.last_sign > limit:
                 slot.process.kill()
-                yield from self._bury(slot, f"no progress for {self._stall_seconds:g} s; the worker was killed", HUNG)
+                yield from self._bury(slot, f"no progress for {limit:g} s; the worker was killed", HUNG)
 
     def _bury(self, slot: _Slot, cause: str, kind: str) -> Iterator[Completed]:
         """Remove a dead worker; its trial, if it had one, ends with the cause as its error."""
@@ -150,16 +165,26 @@ class WorkerPool:
 
     def _start(self) -> _Slot:
         ours, theirs = self._context.Pipe()
-        device = self._least_used_device()
-        process = self._context.Process(target=worker_main, args=(theirs, self._settings, device), daemon=True)
-        with _thread_limit(self._settings.threads):
+        device, server = self._least_used_device(), self._least_used_server()
+        process = self._context.Process(target=worker_main, args=(theirs, self._settings, device, server), daemon=True)
+        with thread_limit(self._settings.threads):
             process.start()
         theirs.close()  # Else end-of-file would never come.
-        return _Slot(process, ours, time.monotonic(), device)
+        return _Slot(process, ours, time.monotonic(), device, server)
 
     def _least_used_device(self) -> int | None:
         used = collections.Counter(slot.render_device for slot in self._slots)
         return min(self._settings.render_devices, key=lambda device: used[device], default=None)
+
+    def _least_used_server(self) -> str | None:
+        used = collections.Counter(slot.server for slot in self._slots)
+        addresses = [] if self._servers is None else self._servers.addresses
+        return min(addresses, key=lambda address: used[address], default=None)
+
+    def _may_begin(self, spec: TrialSpec) -> bool:
+        """Whether a trial of this policy may run now: a server holds one policy, so that they come one by one."""
+        running = {slot.attempt.spec.label for slot in self._slots if slot.attempt is not None}
+        return not self._settings.served or running <= {spec.label}
 
     def _give(self, slot: _Slot, attempt: _Attempt) -> None:
         slot.attempt, slot.given_at = attempt, time.monotonic()
@@ -183,29 +208,3 @@ class WorkerPool:
                 slot.process.join()
             slot.connection.close()
         self._slots.clear()
-
-
-def _cause_of_death(process: SpawnProcess) -> str:
-    process.join(timeout=10)
-    code = process.exitcode
-    if code is not None and code < 0:
-        name = signal.Signals(-code).name
-        note = " (out of memory?)" if name == "SIGKILL" else ""
-        return f"the worker process was ended by {name}{note}"
-    return f"the worker process ended with exit status {code}"
-
-
-@contextmanager
-def _thread_limit(threads: int) -> Iterator[None]:
-    """Environment for a child that is about to start: its numeric libraries read these when they are loaded."""
-    names = ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS")
-    before = {name: os.environ.get(name) for name in names}
-    os.environ.update(dict.fromkeys(names, str(threads)))
-    try:
-        yield
-    finally:
-        for name, value in before.items():
-            if value is None:
-                del os.environ[name]
-            else:
-                os.environ[name] = value

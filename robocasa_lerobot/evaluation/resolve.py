@@ -1,0 +1,214 @@
+"""From settings to what is planned: tasks, horizons, what a trial's outcome depends on, and the run's header."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from robocasa_lerobot.errors import UnknownNameError, UserError
+from robocasa_lerobot.evaluation.config import KITCHEN_ENV_FACTORY, EnvSettings, EvaluationConfig, PerturbationSettings
+from robocasa_lerobot.evaluation.provenance import git_commit, machine, utc_now, versions
+from robocasa_lerobot.evaluation.results import PolicyInfo, RunHeader
+
+GPU_BATCH_WIDTH = 8
+_SHOWN = 60
+
+
+@dataclass(frozen=True)
+class PlannedTasks:
+    """What is run: `horizons` of tasks (control steps), `sets` with their planned tasks, `missing` tasks of sets."""
+
+    horizons: dict[str, int | None]
+    sets: dict[str, list[str]]
+    missing: list[str]
+
+    def of_policy(self, lifelong_phase: int | None) -> list[str]:
+        """The tasks of a policy: all, or those of the first sets."""
+        if lifelong_phase is None:
+            return list(self.horizons)
+        if lifelong_phase > len(self.sets):
+            raise UserError(f"policy.lifelong_phase: found {lifelong_phase}, but env.task_sets has {len(self.sets)}.")
+        chosen = [task for tasks in list(self.sets.values())[:lifelong_phase] for task in tasks]
+        return list(dict.fromkeys(chosen))
+
+
+def plan_tasks(env: EnvSettings) -> PlannedTasks:
+    """The tasks of the settings, with their horizons: fixed ones, or the registry's times the multiplier.
+
+    Raises:
+        UnknownNameError: a task that is not registered, or a task set that the benchmark does not have.
+        UserError: a set with tasks that are not registered yet (all are named), or no task is left.
+    """
+    if env.factory != KITCHEN_ENV_FACTORY:
+        if env.task_sets:
+            raise UserError("env.task_sets are the kitchens'; name the tasks of an env of your own in env.tasks.")
+        if env.horizon_multiplier != 1.0:
+            raise UserError("env.horizon_multiplier needs the kitchen env; give env.horizon for an env of your own.")
+        return PlannedTasks(dict.fromkeys(env.tasks, env.horizon), {}, [])
+    from robocasa_lerobot.envs import registry
+
+    registered = set(registry.task_names())
+    for task in env.tasks:
+        registry.get_task(task)
+    named = _tasks_of_sets(env.task_sets)
+    wanted = [task for tasks in named.values() for task in tasks]
+    if env.tasks:
+        chosen = set(env.tasks)
+        outside = sorted(chosen - set(wanted)) if named else []
+        if outside:
+            raise UserError(f"env.tasks: {', '.join(outside)} belong to none of {', '.join(named)}.")
+    else:
+        chosen = registered & set(wanted)
+        lacking = [task for task in dict.fromkeys(wanted) if task not in registered]
+        if lacking and not env.allow_missing_tasks:
+            raise UserError(_lacking(named, lacking, registered))
+    if not chosen:
+        raise UserError(f"none of the tasks of {', '.join(named)} is registered: there is nothing to run.")
+    order = [task for task in dict.fromkeys((*wanted, *env.tasks)) if task in chosen]
+    if not named:
+        order = env.tasks
+    steps = {task: int(registry.get_task(task).horizon) for task in order}
+    horizons: dict[str, int | None] = {
+        task: env.horizon if env.horizon is not None else max(1, round(own * env.horizon_multiplier))
+        for task, own in steps.items()
+    }
+    sets = {name: [task for task in tasks if task in chosen] for name, tasks in named.items()}
+    return PlannedTasks(horizons, sets, [task for task in dict.fromkeys(wanted) if task not in chosen])
+
+
+def _tasks_of_sets(names: Sequence[str]) -> dict[str, tuple[str, ...]]:
+    from robocasa_lerobot.data.published import published_task_sets
+
+    known = published_task_sets()
+    for name in names:
+        if name not in known:
+            raise UnknownNameError("task set", name, known)
+    return {name: known[name] for name in names}
+
+
+def _lacking(named: Mapping[str, Sequence[str]], lacking: list[str], registered: set[str]) -> str:
+    there = sorted(registered & {task for tasks in named.values() for task in tasks})
+    shown = ", ".join(lacking[:_SHOWN]) + (f" and {len(lacking) - _SHOWN} more" if len(lacking) > _SHOWN else "")
+    remedy = (
+        f"Run those that are there with --env.tasks={','.join(there)} or --env.allow_missing_tasks=true; the results "
+        "then say that the protocol is incomplete."
+        if there
+        else "None of them is there yet."
+    )
+    return f"{len(lacking)} task(s) of {', '.join(named)} are not registered in this version: {shown}. {remedy}"
+
+
+def perturbation_parameters(settings: PerturbationSettings) -> dict[str, dict[str, Any]]:
+    """Each planned perturbation with its standard deviations."""
+    prefixes = {"camera": ("camera_", "wrist_"), "joint": ("joint_",), "base": ("base_",)}
+    values = dataclasses.asdict(settings)
+    return {
+        name: {key: value for key, value in values.items() if key.startswith(prefixes.get(name, ("\0",)))}
+        for name in settings.names
+    }
+
+
+def env_arguments(name: str, settings: PerturbationSettings) -> dict[str, Any]:
+    """Arguments of the kitchen env for a perturbation; the seeds of its noise are the trial's own."""
+    if name == "language":
+        return {"novel_language": True}
+    if name == "camera":
+        from robocasa_lerobot.envs.camera_noise import CameraNoise
+
+        return {
+            "camera_noise": CameraNoise(
+                scene_position_m=settings.camera_position_m,
+                scene_angle_deg=settings.camera_angle_deg,
+                wrist_position_m=settings.wrist_position_m,
+                wrist_angle_deg=settings.wrist_angle_deg,
+            )
+        }
+    if name in ("joint", "base"):
+        from robocasa_lerobot.envs.initial_noise import InitialNoise
+
+        if name == "joint":
+            return {"initial_noise": InitialNoise(arm_rad=settings.joint_rad)}
+        noise = InitialNoise(base_position_m=settings.base_position_m, base_yaw_deg=settings.base_yaw_deg)
+        return {"initial_noise": noise}
+    return {}
+
+
+def batch_width(asked: int, device: str) -> int:
+    """Observations that a policy computes at once: what was asked for, else 1 on a CPU and 8 on a GPU."""
+    return asked or (1 if device == "cpu" else GPU_BATCH_WIDTH)
+
+
+def outcome_settings(config: EvaluationConfig, image_size: int, device: str = "cpu") -> dict[str, Any]:
+    """The settings that a trial's outcome depends on; trials are only ever mixed when all of these agree."""
+    places = ("tasks", "task_sets", "allow_missing_tasks", "render_devices")
+    env = {name: value for name, value in dataclasses.asdict(config.env).items() if name not in places}
+    noise = {name: value for name, value in dataclasses.asdict(config.perturbation).items() if name != "names"}
+    return {
+        "protocol": config.protocol,
+        **env,
+        "image_size": image_size,
+        "seed": config.seed,
+        "executed_steps": config.executed_steps,
+        "device": device,
+        "threads": config.policy.threads,
+        "batch_width": batch_width(config.policy.batch_width, device),
+        "success_rule": config.success.rule,
+        "success_hold_steps": config.success.hold_steps,
+        "perturbation": noise,
+    }
+
+
+def run_header(
+    config: EvaluationConfig,
+    policies: dict[str, PolicyInfo],
+    tasks: PlannedTasks,
+    settings: dict[str, Any],
+) -> RunHeader:
+    """The header of a run with these settings on this machine."""
+    env = config.env
+    rule = "fixed" if env.horizon else "task" if env.factory == KITCHEN_ENV_FACTORY else "env"
+    return RunHeader(
+        protocol=config.protocol,
+        task_sets=tasks.sets,
+        tasks=list(tasks.horizons),
+        missing_tasks=tasks.missing,
+        trials=config.trials,
+        seed=config.seed,
+        split=env.split,
+        render_preset=env.render_preset,
+        image_size=settings["image_size"],
+        horizon_rule=rule,
+        horizon_multiplier=env.horizon_multiplier,
+        success_rule=config.success.rule,
+        success_hold_steps=config.success.hold_steps,
+        executed_steps=config.executed_steps,
+        perturbations=perturbation_parameters(config.perturbation),
+        settings=settings,
+        policies=policies,
+        versions=versions(),
+        git_commit=git_commit(),
+        device=settings["device"],
+        machine=machine(),
+        started=utc_now(),
+    )
+
+
+def resolve_device(asked: str, needs_torch: bool) -> str:
+    """`auto` resolved to what this machine has; torch is only imported where there may be a GPU.
+
+    Raises:
+        UserError: a device that this machine does not have.
+    """
+    import platform
+
+    if not needs_torch:
+        return "cpu"
+    may_be_gpu = Path("/proc/driver/nvidia").exists() or Path("/dev/kfd").exists() or platform.system() != "Linux"
+    if asked == "cpu" or (asked == "auto" and not may_be_gpu):
+        return "cpu"
+    from robocasa_lerobot.evaluation.policy_runner import pick_device
+
+    return pick_device(asked)
