@@ -13,6 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from robocasa_lerobot import contract
+from robocasa_lerobot.envs.registry import task_names
 from robocasa_lerobot.errors import UserError
 from robocasa_lerobot.evaluation import checkpoints, results, trials_file
 from robocasa_lerobot.evaluation.config import EvaluationConfig
@@ -254,10 +255,13 @@ def test_bad_arguments_are_explained(arguments: list[str], message: str) -> None
 
 
 @pytest.mark.parametrize("path", sorted((ROOT / "configs/evaluations").glob("*.yaml")), ids=lambda p: p.stem)
-def test_every_evaluation_file_parses_and_names_registered_tasks(path: Path) -> None:
-    config = load_config(EvaluationConfig, [f"--config_path={path}", "--policy.path=zero", "--trials=2"])
-    assert config.trials == 2
-    assert plan_tasks(config.env).horizons
+def test_every_evaluation_file_parses_and_can_be_run_with_the_tasks_that_are_there(path: Path) -> None:
+    config = load_config(EvaluationConfig, [f"--config_path={path}", "--policy=zero", "--policy.lifelong_phase=1"])
+    assert config.protocol == path.stem
+    config.env.tasks = config.env.tasks or ["OpenDrawer"]
+    planned = plan_tasks(config.env)
+    assert set(planned.horizons) <= set(task_names())
+    assert set(planned.sets) == set(config.env.task_sets)
 
 
 def test_horizons_come_from_the_registry_times_the_multiplier() -> None:

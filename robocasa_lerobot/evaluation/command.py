@@ -1,4 +1,4 @@
-"""`robocasa-lerobot eval`: run seeded trials of policies and write the report."""
+"""`robocasa-lerobot eval`: run seeded trials of policies, here or in shards elsewhere, and write the report."""
 
 from __future__ import annotations
 
@@ -8,7 +8,12 @@ import inspect
 import textwrap
 import typing
 from collections.abc import Iterator
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+from robocasa_lerobot.errors import UserError
+
+if TYPE_CHECKING:
+    from robocasa_lerobot.evaluation.config import EvaluationConfig
 
 EXAMPLE = (
     "robocasa-lerobot eval --policy.path=outputs/demo/finetune/checkpoints/last/pretrained_model"
@@ -18,8 +23,12 @@ EXAMPLE = (
 
 def configure(parser: argparse.ArgumentParser) -> None:
     """Declare every setting of `EvaluationConfig` as an option, with the help of its docstring."""
+    from robocasa_lerobot.convert.running.executors import add_options
     from robocasa_lerobot.evaluation.config import EvaluationConfig
 
+    add_options(parser)
+    parser.add_argument("--shards", type=int, metavar="N", help="with --executor: into how many parts the plan is cut")
+    parser.add_argument("--merge", action="store_true", help="join the results of --shard=1/N to N/N, run nothing")
     parser.add_argument("--config_path", metavar="FILE", help="YAML file of settings; options win over it")
     short = "what to evaluate, short for --policy.path: a checkpoint, demonstrator, random, zero, replay:FILE"
     parser.add_argument("--policy", dest="set:policy", metavar="A,B", default=argparse.SUPPRESS, help=short)
@@ -38,6 +47,8 @@ def run(args: argparse.Namespace) -> int:
     """Evaluate, print the success rates, write the report."""
     from robocasa_lerobot.evaluation.config import KITCHEN_ENV_FACTORY, EvaluationConfig
     from robocasa_lerobot.evaluation.engine import evaluate, prepare
+    from robocasa_lerobot.evaluation.finishing import write_outputs
+    from robocasa_lerobot.evaluation.merging import merge
     from robocasa_lerobot.evaluation.overrides import load_config
     from robocasa_lerobot.gl import announce_backend, check_device, ensure_gl
 
@@ -46,16 +57,38 @@ def run(args: argparse.Namespace) -> int:
     config = load_config(EvaluationConfig, [*path, *given, *args.settings])
     for device in config.env.render_devices:
         check_device(device)
+    if args.executor != "local":
+        return _run_elsewhere(config, args)
+    if args.shards is not None:
+        raise UserError("--shards is for --executor slurm or ray; here give --shard=I/N, and --merge at the end.")
     evaluation = prepare(config)
+    if args.merge:
+        if config.shard is not None:
+            raise UserError("--merge joins all shards: leave --shard out.")
+        merge(evaluation)
+        write_outputs(evaluation)
+        return 0
     if config.env.factory == KITCHEN_ENV_FACTORY:
         ensure_gl()  # Inherited by the workers.
         announce_backend()
     evaluate(evaluation)
-    from robocasa_lerobot.evaluation.report_command import print_rates, write_report
+    if config.shard is None:
+        write_outputs(evaluation)
+    else:
+        print(f"shard {config.shard} is complete. When all are: the same command with --merge instead of --shard.")
+    return 0
 
-    print_rates([evaluation.out])
-    if config.report:
-        write_report([evaluation.out], out=evaluation.out / "report.html")
+
+def _run_elsewhere(config: EvaluationConfig, args: argparse.Namespace) -> int:
+    from robocasa_lerobot.convert.running.executors import execution_of
+    from robocasa_lerobot.evaluation.distributed import run_distributed
+
+    if args.shards is None:
+        raise UserError(f"--executor {args.executor} needs --shards=N: into how many parts the plan is cut.")
+    args.workers = None  # the setting `workers` is for each shard
+    line = run_distributed(config, args.shards, execution_of(args))
+    if line is not None:
+        print(line)
     return 0
 
 

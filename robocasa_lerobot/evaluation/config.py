@@ -55,7 +55,7 @@ class PolicySettings:
 class EnvSettings:
     """In which kitchens, on which tasks, and for how long.
 
-    tasks: registered task names; with task_sets, only these of their tasks.
+    tasks: registered task names; they take the place of task_sets, whose other tasks are then noted as missing.
     task_sets: sets of the benchmark, such as atomic_seen, composite_seen, composite_unseen, lifelong_phase1.
     allow_missing_tasks: leave out tasks of the sets that this version does not have, and say so in the results.
     split: target or pretrain scenes.

@@ -31,7 +31,7 @@ def load_config[T](cls: type[T], arguments: Sequence[str]) -> T:
             tree = load_yaml(Path(str(value)))
     for key, value in overrides:
         if key != "config_path":
-            set_dotted(tree, key, value)
+            set_dotted(tree, f"{key}.{_SHORT[key]}" if key in _SHORT else key, value)
     return decode(cls, _check(cls, tree, ""), "the configuration")
 
 
@@ -46,8 +46,6 @@ def _check(cls: type, tree: Mapping[str, Any], prefix: str) -> dict[str, Any]:
             raise ConfigError(f"unknown setting '{prefix}{key}'. {shown}")
         hint = hints[key]
         if dataclasses.is_dataclass(hint):
-            if not isinstance(value, Mapping) and key in _SHORT:
-                value = {_SHORT[key]: value}
             if not isinstance(value, Mapping):
                 raise ConfigError(
                     f"{prefix}{key}: found {value!r}, expected settings such as --{prefix}{key}.NAME=VALUE."

@@ -57,9 +57,6 @@ def plan_tasks(env: EnvSettings) -> PlannedTasks:
     wanted = [task for tasks in named.values() for task in tasks]
     if env.tasks:
         chosen = set(env.tasks)
-        outside = sorted(chosen - set(wanted)) if named else []
-        if outside:
-            raise UserError(f"env.tasks: {', '.join(outside)} belong to none of {', '.join(named)}.")
     else:
         chosen = registered & set(wanted)
         lacking = [task for task in dict.fromkeys(wanted) if task not in registered]
