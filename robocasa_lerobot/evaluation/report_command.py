@@ -1,4 +1,4 @@
-"""`robocasa-lerobot report`: write report.html and report.md from the results of evaluations."""
+"""`robocasa-lerobot report`: write report.html, .md, .tex and .csv from the results of evaluations."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ EXAMPLE = "robocasa-lerobot report outputs/demo/evaluation --training outputs/de
 
 def configure(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
-    parser.add_argument("results", nargs="+", type=Path, metavar="RESULTS_DIR", help="folder with a trials.jsonl")
+    parser.add_argument("results", nargs="+", type=Path, metavar="RUN", help="folder with a trials.jsonl")
     parser.add_argument(
         "--training",
         nargs="*",
@@ -30,33 +30,38 @@ def configure(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--out",
+        "-o",
         type=Path,
         default=None,
         metavar="FILE",
-        help="HTML file; default: report.html in the first RESULTS_DIR",
+        help="HTML file, with .md, .tex and .csv beside it; default: report.html in the first RUN",
     )
     parser.add_argument("--title", default=None, help="heading of the report")
+    parser.add_argument("--no-videos", action="store_true", help="film strips only, for a smaller file")
 
 
 def run(args: argparse.Namespace) -> int:
     """Write the report and print the rates."""
     out = args.out or args.results[0] / "report.html"
     print_rates(args.results)
-    write_report(args.results, args.training, args.demos, out, args.title)
+    write_report(args.results, args.training, args.demos, out, args.title, videos=not args.no_videos)
     return 0
 
 
 def print_rates(results: Sequence[Path]) -> None:
     """The success rates on the terminal."""
-    from robocasa_lerobot.evaluation.report import interval, percent
-    from robocasa_lerobot.evaluation.report_data import gather
+    from robocasa_lerobot.evaluation.report.format import interval, percent
+    from robocasa_lerobot.evaluation.report.gather import gather
+    from robocasa_lerobot.evaluation.results import UNPERTURBED
 
     rows = [("policy", "task", "success", "95 % interval", "trials", "errors")]
     for policy in gather(results).policies:
-        for result in policy.tasks:
-            rate = result.rate
-            counts = (f"{rate.successes}/{rate.trials}", str(result.errors))
-            rows.append((policy.label, result.task, percent(rate.rate), interval(rate), *counts))
+        for condition, tasks in policy.conditions.items():
+            label = policy.label if condition == UNPERTURBED else f"{policy.label} ({condition})"
+            for result in tasks:
+                rate = result.rate
+                counts = (f"{rate.successes}/{rate.trials}", str(result.errors))
+                rows.append((label, result.task, percent(rate.rate), interval(rate), *counts))
     widths = [max(len(row[column]) for row in rows) for column in range(len(rows[0]))]
     for row in rows:
         print("  ".join(text.ljust(width) for text, width in zip(row, widths, strict=True)).rstrip())
@@ -68,10 +73,16 @@ def write_report(
     demos: Sequence[Path] = (),
     out: Path = Path("report.html"),
     title: str | None = None,
+    videos: bool = True,
 ) -> None:
-    """Write the report's two files and print where they are."""
-    from robocasa_lerobot.evaluation import report
-    from robocasa_lerobot.evaluation.report_data import gather
+    """Write the report's files and print where they are."""
+    from robocasa_lerobot.evaluation.report.build import build
+    from robocasa_lerobot.evaluation.report.gather import gather
+    from robocasa_lerobot.evaluation.report.render import write_report
+    from robocasa_lerobot.evaluation.report.training import find_trainings, read_demonstrator, read_training
 
-    html, markdown = report.write_report(gather(results, training, demos, title), out)
-    print(f"report: {html.resolve()} and {markdown.name}")
+    data = gather(results, title)
+    trainings = [read_training(folder) for folder in list(training) or find_trainings(data.policies)]
+    demonstrators = [result for path in demos for result in read_demonstrator(path)]
+    html, *others = write_report(build(data, trainings, demonstrators, videos), data, out)
+    print(f"report: {html.resolve()} and {', '.join(path.name for path in others)}")

@@ -13,11 +13,12 @@ from typing import Any
 
 from robocasa_lerobot.errors import UnknownNameError
 
-# What stands under every table that shows our numbers beside published ones.
+# Said in the summary of every report, and in short above every table that shows our numbers beside published ones.
 DIFFERENT_KITCHENS = (
     "Published numbers come from RoboCasa's own kitchens, objects and human demonstrations in robosuite; ours come "
     "from kitchens made in code, in another simulator. Read them as context, not as the same experiment."
 )
+DIFFERENT_KITCHENS_SHORT = "Ours are other kitchens, other objects and another simulator than the published ones."
 TABLES = (
     "multi_task",
     "foundation",

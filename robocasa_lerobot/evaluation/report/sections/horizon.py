@@ -1,0 +1,113 @@
+"""Success against time: what a shorter or longer horizon would have changed."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from robocasa_lerobot import contract
+from robocasa_lerobot.evaluation.report import format as fmt
+from robocasa_lerobot.evaluation.report.charts import Line, line_chart
+from robocasa_lerobot.evaluation.report.gather import PolicyResult, ReportData
+from robocasa_lerobot.evaluation.report.model import Cell, Column, Figure, Section, Series, Table
+from robocasa_lerobot.evaluation.statistics.horizon import success_curve, time_to_success
+
+MAX_LINES = 6
+AT = (0.25, 0.5, 0.75, 1.0)
+
+
+def section(data: ReportData) -> Section | None:
+    """None where no trial has a horizon, or none succeeded."""
+    policies = [policy for policy in data.policies if _times(policy)[1]][-MAX_LINES:]
+    if not any(result.rate.successes for policy in policies for result in policy.tasks):
+        return None
+    lines, rows = [], []
+    unit = _unit(policies)
+    for policy in policies:
+        first, ended = _times(policy)
+        curve = success_curve(first, ended)
+        # A step curve begins at nothing solved.
+        x, y, low, high = (
+            np.concatenate([[start], values])
+            for start, values in ((0.0, curve.times), (0.0, curve.rate), (0.0, curve.low), (0.0, curve.high))
+        )
+        grid = np.union1d(np.linspace(0, max(ended), 120), [0.0])
+        index = np.searchsorted(x, grid, side="right") - 1
+        lines.append(
+            Line(
+                policy.label,
+                data.series(policy),
+                tuple(grid),
+                tuple(100 * y[index]),
+                tuple(100 * low[index]),
+                tuple(100 * high[index]),
+            )
+        )
+        quartiles = time_to_success(
+            [r.first_success_step / contract.CONTROL_HZ if r.first_success_step else None for r in _records(policy)]
+        )
+        times = [fmt.NONE] * 3
+        if quartiles is not None:
+            times = [fmt.seconds(t) for t in (quartiles.first_quartile, quartiles.median, quartiles.third_quartile)]
+        values = [] if quartiles is None else [quartiles.first_quartile, quartiles.median, quartiles.third_quartile]
+        rows.append(
+            (
+                Cell(policy.label),
+                *(Cell(fmt.percent(curve.at(share)), curve.at(share)) for share in AT),
+                *(Cell(t, values[i] if values else None) for i, t in enumerate(times)),
+            )
+        )
+    svg = line_chart(
+        "horizon-chart",
+        "Success against time",
+        f"Share of trials solved by each time, in {unit}, for {fmt.listed([p.label for p in policies])}; the table "
+        "below has the numbers.",
+        lines,
+        unit,
+        "solved, % of trials",
+        y_range=(0, 100),
+    )
+    table = Table(
+        "horizon-numbers",
+        "Share of trials solved by parts of the horizon, and seconds to success",
+        (
+            Column("policy"),
+            *(Column(f"by {share:g}×", numeric=True) for share in AT),
+            Column("first quartile", numeric=True),
+            Column("median", numeric=True),
+            Column("third quartile", numeric=True),
+        ),
+        tuple(rows),
+        notes=("Seconds are simulated, over solved trials only.",),
+    )
+    figure = Figure(
+        "horizon-figure",
+        "Trials solved by each time",
+        svg,
+        table,
+        "All trials together; bands are 95 % intervals (Kaplan-Meier). A curve that still rises at its end says that a "
+        "longer horizon would give a higher rate.",
+        tuple(Series(line.label, line.series) for line in lines),
+    )
+    left_out = len(data.policies) - len(policies)
+    text = (f"The last {len(policies)} policies; {left_out} more are in the tables.",) if left_out > 0 else ()
+    return Section("horizon", "Success against time", text, parts=(figure,))
+
+
+def _records(policy: PolicyResult) -> list:
+    return [r for result in policy.tasks for r in result.trials if r.horizon]
+
+
+def _times(policy: PolicyResult) -> tuple[list[float | None], list[float]]:
+    """First success and end of each trial as multiples of the task's own horizon (or of the fixed one)."""
+    first: list[float | None] = []
+    ended = []
+    for record in _records(policy):
+        own = record.horizon / record.horizon_multiplier
+        first.append(None if record.first_success_step is None else record.first_success_step / own)
+        ended.append(record.horizon / own)
+    return first, ended
+
+
+def _unit(policies: list[PolicyResult]) -> str:
+    fixed = any(policy.header.horizon_rule != "task" for policy in policies)
+    return "share of the trial's horizon" if fixed else "time, as a multiple of the task's own horizon"

@@ -1,0 +1,111 @@
+"""Where the numbers come from: settings, versions, checkpoints and errors."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from robocasa_lerobot.evaluation.report.gather import PolicyResult, ReportData, describe_policy
+from robocasa_lerobot.evaluation.report.model import Block, Listing, Section
+from robocasa_lerobot.evaluation.report.sections.beside_published import horizon_phrase, success_phrase
+from robocasa_lerobot.evaluation.results import TRIALS_FILE
+
+MAX_ERRORS = 30
+
+
+def section(data: ReportData) -> Section:
+    """Settings in common first, then each policy."""
+    parts: list[Listing | Block] = [Listing("Settings and versions", tuple(common_settings(data.policies)))]
+    for policy in data.policies:
+        items = (
+            ("what", describe_policy(policy)),
+            ("path", policy.info.path),
+            ("weights", f"{policy.info.fingerprint} (SHA-256)"),
+            ("results", f"{policy.folder.name}/{TRIALS_FILE}"),
+        )
+        parts.append(Listing(policy.label, items, folded=len(data.policies) > 2))
+    return Section("settings", "Settings and provenance", parts=tuple(parts))
+
+
+def errors(data: ReportData) -> Section | None:
+    """The tracebacks of trials that ended in an error."""
+    broken = [
+        record
+        for policy in data.policies
+        for tasks in policy.conditions.values()
+        for result in tasks
+        for record in result.trials
+        if record.error is not None
+    ]
+    if not broken:
+        return None
+    text = (
+        (f"The first {MAX_ERRORS} of {len(broken)}; all are in the results file.",) if len(broken) > MAX_ERRORS else ()
+    )
+    parts = tuple(
+        Block(f"{r.label} · {r.task} · trial {r.trial} · seed {r.seed}: {r.outcome}", str(r.error))
+        for r in broken[:MAX_ERRORS]
+    )
+    return Section("errors", "Errors", text, parts=parts)
+
+
+def common_settings(policies: Sequence[PolicyResult]) -> list[tuple[str, str]]:
+    """Every setting with its value; one that differs between the policies is listed with each policy's value."""
+    rows = []
+    for name, phrase in (("a trial lasts", horizon_phrase), ("a trial is solved", success_phrase)):
+        rows.append((name, _same_or_each([phrase(policy) for policy in policies], policies)))
+    heads = (
+        "protocol",
+        "split",
+        "trials",
+        "seed",
+        "render_preset",
+        "image_size",
+        "executed_steps",
+        "device",
+        "started",
+    )
+    for name in heads:
+        values = [_plain(getattr(policy.header, name)) for policy in policies]
+        rows.append((name.replace("_", " "), _same_or_each(values, policies)))
+    for group in ("settings", "versions", "machine"):
+        tables: list[dict[str, Any]] = [flat(getattr(policy.header, group)) for policy in policies]
+        for name in dict.fromkeys(key for table in tables for key in table):
+            if name in heads:
+                continue
+            values = [_plain(table.get(name)) for table in tables]
+            rows.append((name.replace("_", " "), _same_or_each(values, policies)))
+    commits = [
+        ", ".join(sorted({h.git_commit for h in policy.headers if h.git_commit})) or "not in a git checkout"
+        for policy in policies
+    ]
+    rows.append(("git commit", _same_or_each(commits, policies)))
+    missing = sorted({task for policy in policies for task in policy.header.missing_tasks})
+    if missing:
+        rows.append(("tasks of the protocol left out", ", ".join(missing)))
+    return rows
+
+
+def flat(values: dict[str, Any], prefix: str = "") -> dict[str, Any]:
+    """Nested settings as one level, names joined by dots."""
+    out: dict[str, Any] = {}
+    for name, value in values.items():
+        if isinstance(value, dict) and value:
+            out |= flat(value, f"{prefix}{name}.")
+        else:
+            out[prefix + name] = value
+    return out
+
+
+def _same_or_each(values: list[str], policies: Sequence[PolicyResult]) -> str:
+    if len(set(values)) == 1:
+        return values[0]
+    return "; ".join(f"{policy.label}: {value}" for policy, value in zip(policies, values, strict=True))
+
+
+def _plain(value: Any) -> str:
+    if value is None:
+        return "default"
+    if isinstance(value, list):
+        return ", ".join(map(str, value)) if len(value) <= 12 else f"{len(value)} values"
+    return "yes" if value is True else "no" if value is False else str(value)

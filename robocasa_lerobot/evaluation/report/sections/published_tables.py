@@ -1,0 +1,47 @@
+"""All published tables of the benchmark, folded, so that nobody has to look them up elsewhere."""
+
+from __future__ import annotations
+
+from robocasa_lerobot.evaluation import published
+from robocasa_lerobot.evaluation.report import format as fmt
+from robocasa_lerobot.evaluation.report.gather import ReportData
+from robocasa_lerobot.evaluation.report.model import Cell, Column, Section, Table
+
+
+def section(_: ReportData) -> Section:
+    """Every table of the paper, and the leaderboard."""
+    parts = [_table(name) for name in published.TABLES]
+    parts.append(_leaderboard())
+    text = (published.DIFFERENT_KITCHENS,)
+    return Section("published", "The benchmark's published results", text, parts=tuple(parts))
+
+
+def _table(name: str) -> Table:
+    table = published.table(name)
+    columns = (Column(table.row_head), *(Column(c.label, numeric=True, published=True) for c in table.columns))
+    rows = []
+    for row in table.rows:
+        cells = [Cell(row.label)]
+        for column in table.columns:
+            value = table.value(row.key, column.key)
+            cells.append(Cell("") if value is None else Cell(fmt.published(value), value / 100))
+        rows.append(tuple(cells))
+    protocol = f"{table.source}; {table.protocol['split']} scenes, {table.protocol['trials_per_task']} trials per task."
+    return Table(
+        f"published-{name}", table.title, columns, tuple(rows), (f"{protocol} {table.notes}".strip(),), folded=True
+    )
+
+
+def _leaderboard() -> Table:
+    values = published.read("leaderboard")
+    rows = tuple(
+        (Cell(row["model"]), Cell(f"{row['overall']:.1f}{fmt.NBSP}%", row["overall"] / 100)) for row in values["rows"]
+    )
+    return Table(
+        "published-leaderboard",
+        values["title"],
+        (Column("model"), Column("overall", numeric=True, published=True)),
+        rows,
+        (f"{values['source']}. {values['notes']}",),
+        folded=True,
+    )

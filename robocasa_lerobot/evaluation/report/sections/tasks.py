@@ -1,0 +1,85 @@
+"""Success on every task."""
+
+from __future__ import annotations
+
+from robocasa_lerobot.evaluation import published
+from robocasa_lerobot.evaluation.report import format as fmt
+from robocasa_lerobot.evaluation.report.gather import PolicyResult, ReportData, TaskResult
+from robocasa_lerobot.evaluation.report.model import Bar, Cell, Column, Section, Series, Table
+from robocasa_lerobot.evaluation.results import TrialRecord
+from robocasa_lerobot.evaluation.statistics import Estimate
+
+# More trials than this are a texture, no longer something to point at; with many policies there is no room.
+MAX_MARKS, MAX_MARKED_POLICIES = 60, 3
+
+
+def section(data: ReportData) -> Section:
+    """A row per task with each policy's rate, interval and single trials, and the published rate beside them."""
+    marks = len(data.policies) <= MAX_MARKED_POLICIES and all(
+        result.rate.trials <= MAX_MARKS for policy in data.policies for result in policy.tasks
+    )
+    roomy = len(data.policies) <= MAX_MARKED_POLICIES
+    known = {task: rate for task, rate in published.per_task_rates().items() if task in data.task_names}
+    columns = [Column("task")]
+    columns += [Column(policy.label, numeric=True, wide=roomy, series=data.series(policy)) for policy in data.policies]
+    if known:
+        columns.append(Column("best", numeric=True, published=True))
+    rows = []
+    for task in data.task_names:
+        cells = [Cell(task, code=True)]
+        for policy in data.policies:
+            cells.append(_cell(data, policy, policy.task(task), known.get(task), marks))
+        if known:
+            value = known.get(task)
+            cells.append(Cell(fmt.NONE) if value is None else Cell(f"{value:.0f}{fmt.NBSP}%", value / 100))
+        rows.append(tuple(cells))
+    notes = ["Whiskers are Wilson 95 % intervals. A trial that ended in an error counts as not solved."]
+    if known:
+        notes.append(
+            "The diamond is the published rate of the best variant: "
+            f"{published.read('per_task')['notes'].rstrip('.')}, target scenes, 30 trials."
+        )
+    table = Table(
+        "task-rates",
+        "Success rate on each task",
+        tuple(columns),
+        tuple(rows),
+        notes=tuple(notes),
+        warnings=(published.DIFFERENT_KITCHENS_SHORT,) if known else (),
+        cards=True,
+    )
+    text = []
+    if marks:
+        text.append(
+            "Each square is one trial, in the order of the plan: the same place is the same kitchen for every policy."
+        )
+    series = tuple(Series(policy.label, data.series(policy)) for policy in data.policies)
+    return Section("tasks", "Task by task", tuple(text), parts=(table,), legend=series, marks_legend=marks)
+
+
+def _cell(data: ReportData, policy: PolicyResult, result: TaskResult | None, known: float | None, marks: bool) -> Cell:
+    if result is None:
+        return Cell(fmt.NONE)
+    rate = result.rate
+    errors = f"; {fmt.count(result.errors, 'error')}" if result.errors else ""
+    bar = Bar(Estimate(rate.rate, rate.low, rate.high), data.series(policy), None if known is None else known / 100)
+    return Cell(
+        fmt.percent(rate.rate),
+        rate.rate,
+        f"{fmt.interval(rate)} · {rate.successes}/{rate.trials}{errors}",
+        bar=bar,
+        strong=True,
+        marks=tuple((_mark(record), trial_title(record)) for record in result.trials) if marks else (),
+    )
+
+
+def _mark(record: TrialRecord) -> str:
+    return "e" if record.error is not None else "s" if record.success else "f"
+
+
+def trial_title(record: TrialRecord) -> str:
+    """What a trial's square says when pointed at."""
+    if record.error is not None:
+        return f"trial {record.trial}, seed {record.seed}: {record.outcome}"
+    result = f"success at step {record.first_success_step}" if record.success else f"failure after {record.steps} steps"
+    return f"trial {record.trial}, seed {record.seed}: {result}"

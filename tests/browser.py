@@ -1,0 +1,144 @@
+"""A headless Chromium for tests, spoken to through its DevTools pipe; no driver and no network."""
+
+from __future__ import annotations
+
+import base64
+import json
+import os
+import shutil
+import subprocess
+import tempfile
+import time
+from pathlib import Path
+from types import TracebackType
+from typing import Any
+
+NAMES = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "chrome")
+
+
+def find_chromium() -> str | None:
+    """The path of a Chromium on this machine ($CHROMIUM first)."""
+    return next(
+        (path for name in (os.environ.get("CHROMIUM", ""), *NAMES) if name and (path := shutil.which(name))), None
+    )
+
+
+class Browser:
+    """One page at a time: open it in a given width and theme, ask it things, photograph it."""
+
+    def __init__(self, program: str, timeout_s: float = 120.0) -> None:
+        self._timeout_s = timeout_s
+        self._profile = tempfile.TemporaryDirectory(ignore_cleanup_errors=True)
+        commands_out, self._commands = os.pipe()
+        self._answers, answers_in = os.pipe()
+
+        def connect() -> None:
+            # Chromium reads commands from descriptor 3 and writes answers to 4.
+            high = os.dup2(commands_out, 100), os.dup2(answers_in, 101)
+            os.dup2(high[0], 3)
+            os.dup2(high[1], 4)
+
+        arguments = ["--headless=new", "--no-sandbox", "--disable-gpu", "--no-first-run", "--disable-extensions"]
+        arguments += ["--disable-background-networking", "--disable-dev-shm-usage", "--hide-scrollbars"]
+        arguments += ["--remote-debugging-pipe", f"--user-data-dir={self._profile.name}", "about:blank"]
+        self._process = subprocess.Popen(
+            [program, *arguments],
+            pass_fds=(3, 4),
+            preexec_fn=connect,
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+        )
+        os.close(commands_out)
+        os.close(answers_in)
+        self._buffer, self._number, self._session = b"", 0, ""
+        self.messages: list[str] = []
+        self.requests: list[str] = []
+        self._loaded = False
+        targets = self._send("Target.getTargets")["targetInfos"]
+        target = next(t["targetId"] for t in targets if t["type"] == "page")
+        self._session = self._send("Target.attachToTarget", targetId=target, flatten=True)["sessionId"]
+        for domain in ("Page", "Runtime", "Log", "Network"):
+            self._send(f"{domain}.enable")
+
+    def __enter__(self) -> Browser:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._process.terminate()
+        try:
+            self._process.wait(10)
+        except subprocess.TimeoutExpired:
+            self._process.kill()
+            self._process.wait()
+        os.close(self._commands)
+        os.close(self._answers)
+        self._profile.cleanup()
+
+    def open(self, path: Path, width: int = 1280, height: int = 900, dark: bool = False) -> None:
+        """Load a file; `messages` are then what its console said, `requests` what it asked for beside itself."""
+        self.messages, self.requests, self._loaded = [], [], False
+        theme = [{"name": "prefers-color-scheme", "value": "dark" if dark else "light"}]
+        self._send("Emulation.setEmulatedMedia", features=theme)
+        self._send(
+            "Emulation.setDeviceMetricsOverride", width=width, height=height, deviceScaleFactor=1, mobile=width < 600
+        )
+        self._send("Page.navigate", url=path.resolve().as_uri())
+        deadline = time.monotonic() + self._timeout_s
+        while not self._loaded:
+            self._read(deadline)
+
+    def ask(self, expression: str) -> Any:
+        """The value of a JavaScript expression."""
+        answer = self._send("Runtime.evaluate", expression=expression, returnByValue=True, awaitPromise=True)
+        assert "exceptionDetails" not in answer, answer["exceptionDetails"]
+        return answer["result"].get("value")
+
+    def screenshot(self, path: Path, top: int = 0, height: int | None = None) -> None:
+        """The page from `top` for `height` pixels (default: to its end) as PNG."""
+        size = self._send("Page.getLayoutMetrics")["cssContentSize"]
+        high = size["height"] - top if height is None else min(height, size["height"] - top)
+        clip = {"x": 0, "y": top, "width": size["width"], "height": max(1, high), "scale": 1}
+        data = self._send("Page.captureScreenshot", clip=clip, captureBeyondViewport=True)["data"]
+        path.write_bytes(base64.b64decode(data))
+
+    def _send(self, method: str, **parameters: Any) -> dict[str, Any]:
+        self._number += 1
+        message: dict[str, Any] = {"id": self._number, "method": method, "params": parameters}
+        if self._session:
+            message["sessionId"] = self._session
+        os.write(self._commands, json.dumps(message).encode() + b"\0")
+        deadline = time.monotonic() + self._timeout_s
+        while True:
+            answer = self._read(deadline)
+            if answer.get("id") == self._number:
+                assert "error" not in answer, answer["error"]
+                result: dict[str, Any] = answer["result"]
+                return result
+
+    def _read(self, deadline: float) -> dict[str, Any]:
+        while b"\0" not in self._buffer:
+            assert time.monotonic() < deadline, "Chromium does not answer"
+            part = os.read(self._answers, 1 << 20)
+            assert part, "Chromium has ended"
+            self._buffer += part
+        line, self._buffer = self._buffer.split(b"\0", 1)
+        message: dict[str, Any] = json.loads(line)
+        self._note(message.get("method", ""), message.get("params", {}))
+        return message
+
+    def _note(self, method: str, values: dict[str, Any]) -> None:
+        if method == "Page.loadEventFired":
+            self._loaded = True
+        elif method == "Runtime.exceptionThrown":
+            self.messages.append(f"exception: {values['exceptionDetails'].get('text')}")
+        elif method == "Runtime.consoleAPICalled":
+            self.messages.append(f"{values['type']}: {values['args']}")
+        elif method == "Log.entryAdded":
+            self.messages.append(f"{values['entry']['level']}: {values['entry']['text']}")
+        elif method == "Network.requestWillBeSent":
+            url = values["request"]["url"]
+            if not url.startswith(("data:", "blob:")) and values.get("type") != "Document":
+                self.requests.append(url)

@@ -1,0 +1,263 @@
+"""Runs of the benchmark's four kinds from synthetic trials, to show and test reports. No policy ever ran.
+
+    python tests/synthetic_runs.py outputs/synthetic   # four runs and their reports
+
+Every header says `synthetic: true` in its settings, which the report shows on top of the page.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from robocasa_lerobot.data.published import published_task_sets
+from robocasa_lerobot.evaluation import published
+from robocasa_lerobot.evaluation.results import (
+    TRIALS_FILE,
+    PolicyInfo,
+    RunHeader,
+    Seconds,
+    TermSummary,
+    TrialRecord,
+)
+from robocasa_lerobot.evaluation.video import VideoWriter
+
+TERMS = ("reached", "grasped", "placed", "gripper_away")
+GROUPS = published.group_of_task()
+LIFELONG = {f"lifelong_phase{k}": published_task_sets()[f"lifelong_phase{k}"] for k in range(1, 5)}
+Rates = Mapping[str, float]
+
+
+def header(protocol: str, policies: Sequence[PolicyInfo], tasks: Sequence[str], **changes: Any) -> RunHeader:
+    values: dict[str, Any] = {
+        "protocol": protocol,
+        "task_sets": {
+            group: [t for t in tasks if GROUPS.get(t) == group]
+            for group in published.GROUPS
+            if any(GROUPS.get(t) == group for t in tasks)
+        },
+        "tasks": list(tasks),
+        "missing_tasks": [],
+        "trials": 50,
+        "seed": 0,
+        "split": "target",
+        "render_preset": "fast",
+        "image_size": 256,
+        "horizon_rule": "task",
+        "horizon_multiplier": 1.0,
+        "success_rule": "any_step",
+        "success_hold_steps": 1,
+        "executed_steps": 16,
+        "perturbations": {"none": {}},
+        "settings": {"synthetic": True, "seed": 0},
+        "policies": {policy.label: policy for policy in policies},
+        "versions": {"robocasa_lerobot": "0.1.0", "python": "3.12", "mujoco": "3.17.0", "lerobot": "0.6.1"},
+        "git_commit": "0" * 40,
+        "device": "synthetic",
+        "machine": {"processor": "none: these trials were drawn at random", "system": "none"},
+        "started": "2026-01-01T00:00:00+00:00",
+    }
+    return RunHeader(**{**values, **changes})
+
+
+def policy(label: str, **changes: Any) -> PolicyInfo:
+    values: dict[str, Any] = {"path": f"synthetic/{label}", "type": "synthetic", "fingerprint": "0" * 64}
+    return PolicyInfo(label=label, **{**values, **changes})
+
+
+def trials(
+    head: RunHeader,
+    label: str,
+    rates: Rates,
+    count: int,
+    perturbation: str = "none",
+    luck_share: float = 0.6,
+    films: Mapping[str, Sequence[int]] | None = None,
+) -> list[TrialRecord]:
+    """Trials of one policy; the luck of a scene is shared by all policies, so that comparisons are paired."""
+    out = []
+    for task, rate in rates.items():
+        horizon = 300 + 50 * (sum(map(ord, task)) % 20)
+        scenes = np.random.default_rng([1, *task.encode()]).normal(size=count)
+        own = np.random.default_rng([2, *task.encode(), *label.encode(), *perturbation.encode()])
+        noise, errors = own.normal(size=count), own.random(count) < 0.002
+        mixed = np.sqrt(luck_share) * scenes + np.sqrt(1 - luck_share) * noise
+        # The share of a standard normal below its own quantile: success with exactly this probability.
+        threshold = (
+            float("-inf") if rate <= 0 else float(np.quantile(np.random.default_rng(3).normal(size=20001), rate))
+        )
+        for trial in range(count):
+            success = bool(mixed[trial] < threshold) and not errors[trial]
+            first = int(horizon * min(0.999, 0.15 + 0.8 * own.beta(2, 3))) if success else None
+            met = np.full(len(TERMS), True)
+            if not success:
+                # Each goal has a difficulty of its own; at least one is missed.
+                met = own.random(len(TERMS)) < [0.9, 0.7, 0.4, 0.8]
+                met[int(own.choice(len(TERMS), p=[0.1, 0.25, 0.5, 0.15]))] = False
+            lost = not success and own.random() < 0.3
+            terms = {
+                name: TermSummary(10 * (i + 1) if met[i] else None, 0.5 if met[i] else 0.0, bool(met[i]) and not lost)
+                for i, name in enumerate(TERMS)
+            }
+            film = films is not None and trial in films.get(task, ())
+            out.append(
+                TrialRecord(
+                    run=head.id,
+                    label=label,
+                    task=task,
+                    perturbation=perturbation,
+                    trial=trial,
+                    seed=1000 + trial,
+                    policy_seed=trial,
+                    split=head.split,
+                    layout_id=1 + trial % 10,
+                    style_id=1 + trial % 10,
+                    instruction=f"Synthetic instruction of {task}.",
+                    horizon=horizon,
+                    horizon_multiplier=1.0,
+                    success=success,
+                    first_success_step=first,
+                    steps=first or horizon,
+                    terms={} if errors[trial] else terms,
+                    outcome="crashed" if errors[trial] else "finished",
+                    error="Traceback: a synthetic error" if errors[trial] else None,
+                    attempts=2 if errors[trial] else 1,
+                    first_outcome="crashed" if errors[trial] else None,
+                    first_error="Traceback: a synthetic error" if errors[trial] else None,
+                    warnings={},
+                    trajectory="00",
+                    video=f"videos/{label}/{task}-{trial}.mp4" if film else None,
+                    seconds=Seconds(total=1.0),
+                    finished="2026-01-01T00:00:00+00:00",
+                )
+            )
+    return out
+
+
+def write(folder: Path, head: RunHeader, records: Sequence[TrialRecord]) -> Path:
+    folder.mkdir(parents=True, exist_ok=True)
+    lines = [head.to_line(), *(record.to_line() for record in records)]
+    (folder / TRIALS_FILE).write_text("\n".join(lines) + "\n", encoding="utf-8")
+    for record in records:
+        if record.video is not None:
+            _film(folder / record.video, record)
+    return folder
+
+
+def scaled(averages: Mapping[str, float], tasks: Sequence[str]) -> dict[str, float]:
+    """Rates of tasks whose group averages are `averages` (percent), spread as the published single tasks are."""
+    best = published.per_task_rates()
+    out = {}
+    for task in tasks:
+        group = [best[t] for t in best if GROUPS[t] == GROUPS[task]]
+        out[task] = min(0.98, best[task] / (sum(group) / len(group)) * averages[GROUPS[task]] / 100)
+    return out
+
+
+def multi_task(folder: Path, count: int = 50, films: bool = True) -> Path:
+    table = published.table("multi_task")
+    tasks = list(GROUPS)
+    names = {"diffusion_policy": "diffusion transformer", "pi05": "flow VLA", "gr00t": "flow VLA, large"}
+    head = header("leaderboard", [policy(name, step=250_000, phase="multitask") for name in names.values()], tasks)
+    head = header("leaderboard", list(head.policies.values()), tasks, split="pretrain", trials=count)
+    records = []
+    for key, name in names.items():
+        averages = {row: table.percent[row][key] for row in published.GROUPS}
+        rates = scaled(averages, tasks)
+        filmed = dict.fromkeys(tasks[:3], (0, 1, 2)) if films and key == "gr00t" else None
+        records += trials(head, name, rates, count, films=filmed)
+    return write(folder, head, records)
+
+
+def foundation(folder: Path, count: int = 30) -> Path:
+    table = published.table("foundation")
+    tasks = list(GROUPS)
+    policies, rates = [], {}
+    for column in table.columns:
+        demos = column.facts["target_demos"]
+        data = "pretraining + target" if column.facts["pretrained"] else "target only"
+        name = f"pretrained, {demos // 5} %" if column.facts["pretrained"] else f"target only, {demos // 5} %"
+        policies.append(policy(name, demo_fraction=demos / 500, training_data=data, phase="target", step=60_000))
+        rates[name] = scaled({row: table.percent[row][column.key] for row in published.GROUPS}, tasks)
+    head = header("foundation", policies, tasks, trials=count)
+    return write(folder, head, [r for name, own in rates.items() for r in trials(head, name, own, count)])
+
+
+def lifelong(folder: Path, count: int = 20) -> Path:
+    table = published.table("lifelong")
+    tasks = [task for members in LIFELONG.values() for task in members]
+    policies = [policy(f"after phase {k}", lifelong_phase=k, phase=f"phase{k}", step=60_000) for k in range(1, 5)]
+    head = header(
+        "lifelong",
+        policies,
+        tasks,
+        task_sets={name: list(tasks) for name, tasks in LIFELONG.items()},
+        split="pretrain",
+        trials=count,
+    )
+    records = []
+    for k in range(1, 5):
+        rates = {}
+        for j, (name, members) in enumerate(LIFELONG.items(), start=1):
+            value = table.value(str(k), name) if j <= k else None
+            rates |= dict.fromkeys(members, value / 100) if value is not None else {}
+        records += trials(head, f"after phase {k}", rates, count)
+    return write(folder, head, records)
+
+
+def robustness(folder: Path, count: int = 50) -> Path:
+    table = published.table("robustness")
+    tasks = [task for task, group in GROUPS.items() if group != "atomic_seen"]
+    perturbations = {
+        "none": {},
+        "language": {},
+        "camera": {"camera_position_m": 0.03, "camera_angle_deg": 3.0},
+        "joint": {"joint_rad": 0.05},
+        "base": {"base_position_m": 0.05, "base_yaw_deg": 5.0},
+    }
+    head = header("robustness", [policy("pretrained + target")], tasks, perturbations=perturbations, trials=count)
+    records = []
+    for name in perturbations:
+        rates = scaled({row: table.percent[row][name] for row in ("composite_seen", "composite_unseen")}, tasks)
+        records += trials(head, "pretrained + target", rates, count, perturbation=name, luck_share=0.8)
+    return write(folder, head, records)
+
+
+RUNS = {"multi_task": multi_task, "foundation": foundation, "lifelong": lifelong, "robustness": robustness}
+
+
+def _film(path: Path, record: TrialRecord, frames: int = 60) -> None:
+    """A drawn scene that nobody takes for a kitchen: a square that moves over stripes towards a line."""
+    y, x = np.mgrid[0:192, 0:192]
+    with VideoWriter(path, fps=10) as writer:
+        for index in range(frames):
+            views = []
+            for camera in range(3):
+                stripes = ((x + y * (camera - 1)) // 24 % 2).astype(np.uint8)
+                picture = np.stack([90 + 40 * stripes, 110 + 30 * stripes, 130 + 20 * stripes], axis=-1).astype(
+                    np.uint8
+                )
+                picture[:, 150:153] = (240, 200, 60)
+                left = int(20 + (130 if record.success else 70) * index / frames)
+                picture[80:112, left : left + 32] = (60, 160, 110) if record.success else (190, 80, 60)
+                views.append(picture)
+            writer.write(np.concatenate(views, axis=1))
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("out", type=Path)
+    folder = parser.parse_args().out
+    from robocasa_lerobot.evaluation.report_command import write_report
+
+    for name, make in RUNS.items():
+        run = make(folder / name)
+        write_report([run], out=run / "report.html")
+
+
+if __name__ == "__main__":
+    main()
