@@ -42,7 +42,10 @@ SUBCOMMANDS: dict[str, Subcommand] = {
     ),
     "train": Subcommand("robocasa_lerobot.training.command", "run the training phases of an experiment file"),
     "eval": Subcommand("robocasa_lerobot.evaluation.command", "run seeded trials of a policy and report"),
-    "report": Subcommand("robocasa_lerobot.evaluation.report_command", "write report.html and report.md from results"),
+    "report": Subcommand("robocasa_lerobot.evaluation.report_command", "compare runs: report.html, .md, .tex and .csv"),
+    "leaderboard": Subcommand(
+        "robocasa_lerobot.evaluation.leaderboard_command", "write or check a submission to the public leaderboard"
+    ),
     "gallery": Subcommand("robocasa_lerobot.envs.gallery_command", "render kitchens and tasks to pictures"),
     "tasks": Subcommand("robocasa_lerobot.envs.tasks_command", "list the tasks, their sets and horizons"),
     "doctor": Subcommand("robocasa_lerobot.doctor", "check this machine and name the command that mends a fault"),
