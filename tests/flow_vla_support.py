@@ -5,17 +5,15 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-import numpy as np
+import policy_support
 import torch
-from lerobot.configs import FeatureType, PolicyFeature, PreTrainedConfig
-from lerobot.policies.factory import get_policy_class, make_pre_post_processors
+from policy_support import INSTRUCTIONS, check_trains_and_predicts, generators, with_features
 from torch import Tensor
 
 from robocasa_lerobot import contract
 from robocasa_lerobot.policies.flow_vla.configuration_flow_vla import FlowVlaConfig
 from robocasa_lerobot.policies.flow_vla.modeling_flow_vla import FlowVlaPolicy
 
-INSTRUCTIONS = ("Open the left drawer.", "Close the right drawer, please.")
 TINY: dict[str, Any] = {
     "device": "cpu",
     "chunk_size": 6,
@@ -38,43 +36,12 @@ TINY: dict[str, Any] = {
 KINDS = ("smolvlm", "paligemma")
 
 
-def with_features[C: PreTrainedConfig](config: C, pixels: int = 32) -> C:
-    config.input_features = {
-        **{key: PolicyFeature(FeatureType.VISUAL, (3, pixels, pixels)) for key in contract.IMAGE_KEYS},
-        contract.STATE_KEY: PolicyFeature(FeatureType.STATE, (contract.STATE_SIZE,)),
-    }
-    config.output_features = {contract.ACTION_KEY: PolicyFeature(FeatureType.ACTION, (contract.ACTION_SIZE,))}
-    return config
-
-
 def tiny_config(**overrides: Any) -> FlowVlaConfig:
     return with_features(FlowVlaConfig(**{**TINY, **overrides}))
 
 
 def pretrained_config(folder: Path, **overrides: Any) -> FlowVlaConfig:
     return tiny_config(**{"prefix": "pretrained", "prefix_path": str(folder), "image_size": None, **overrides})
-
-
-def batch_for(config: FlowVlaConfig, size: int = 4, pixels: int = 32, seed: int = 0, uint8: bool = True) -> Any:
-    """A batch as a LeRobot data loader gives it, before the preprocessor."""
-    rng = np.random.default_rng(seed)
-    batch: dict[str, Any] = {}
-    for key in contract.IMAGE_KEYS:
-        images = torch.from_numpy(rng.integers(0, 256, (size, 3, pixels, pixels), dtype=np.uint8))
-        batch[key] = images if uint8 else images.float() / 255
-    batch[contract.STATE_KEY] = torch.from_numpy(rng.uniform(-1, 1, (size, contract.STATE_SIZE)))
-    batch[contract.ACTION_KEY] = torch.from_numpy(rng.uniform(-1, 1, (size, config.chunk_size, contract.ACTION_SIZE)))
-    batch["action_is_pad"] = torch.zeros(size, config.chunk_size, dtype=torch.bool)
-    batch["task"] = [INSTRUCTIONS[i % 2] for i in range(size)]
-    return batch
-
-
-def unit_stats() -> dict[str, dict[str, np.ndarray]]:
-    """Statistics with which normalisation changes nothing."""
-    sizes = {contract.STATE_KEY: contract.STATE_SIZE, contract.ACTION_KEY: contract.ACTION_SIZE}
-    return {
-        key: {"min": -np.ones(n), "max": np.ones(n), "mean": np.zeros(n), "std": np.ones(n)} for key, n in sizes.items()
-    }
 
 
 def write_pretrained(folder: Path, kind: str) -> Path:
@@ -128,16 +95,11 @@ def write_pretrained(folder: Path, kind: str) -> Path:
 
 
 def build(config: FlowVlaConfig, seed: int = 0, awake: bool = True) -> tuple[FlowVlaPolicy, Any, Any]:
-    torch.manual_seed(seed)
-    policy = get_policy_class("flow_vla")(config)
+    policy, preprocess, postprocess = policy_support.build(config, seed)
     for name, parameter in policy.named_parameters():
         if awake and "modulation" in name:  # zero when new: nothing of the layer would be seen
             torch.nn.init.normal_(parameter, std=0.1)
-    return (policy, *make_pre_post_processors(config, dataset_stats=unit_stats()))
-
-
-def generators(*seeds: int) -> list[torch.Generator]:
-    return [torch.Generator().manual_seed(seed) for seed in seeds]
+    return policy, preprocess, postprocess
 
 
 def chunk_noise(config: FlowVlaConfig, size: int = 4, seed: int = 0) -> Tensor:
@@ -145,18 +107,6 @@ def chunk_noise(config: FlowVlaConfig, size: int = 4, seed: int = 0) -> Tensor:
 
 
 def check_variant(config: FlowVlaConfig) -> None:
-    policy, preprocess, postprocess = build(config)
-    batch = preprocess(batch_for(config))
-    loss, _ = policy.train()(batch)
-    each, _ = policy(batch, reduction="none")
-    assert loss.shape == ()
-    assert torch.isfinite(loss)
-    assert each.shape == (4,)
-    loss.backward()
-    assert [name for name, p in policy.named_parameters() if p.requires_grad and p.grad is None] == []
-    chunk = policy.predict_action_chunk(batch)
-    assert chunk.shape == (4, config.n_action_steps, contract.ACTION_SIZE)
-    assert policy.sample(batch).shape == (4, config.chunk_size, contract.ACTION_SIZE)
-    assert torch.isfinite(postprocess(chunk)).all()
+    check_trains_and_predicts(*build(config), config.chunk_size)
     assert config.action_delta_indices == list(range(config.chunk_size))
     assert config.observation_delta_indices is None

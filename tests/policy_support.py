@@ -1,4 +1,4 @@
-"""Small configurations and batches of the policy `diffusion_transformer`, for its tests."""
+"""What the tests of our policies share: features, batches, statistics, building; small diffusion transformers."""
 
 from __future__ import annotations
 
@@ -6,13 +6,15 @@ from typing import Any
 
 import numpy as np
 import torch
-from lerobot.configs import FeatureType, PolicyFeature
+from lerobot.configs import FeatureType, PolicyFeature, PreTrainedConfig
+from lerobot.policies.factory import get_policy_class, make_pre_post_processors
 
 from robocasa_lerobot import contract
 from robocasa_lerobot.policies.diffusion_transformer.configuration_diffusion_transformer import (
     DiffusionTransformerConfig,
 )
 
+INSTRUCTIONS = ("Open the left drawer.", "Close the right drawer, please.")
 TINY: dict[str, Any] = {
     "device": "cpu",
     "vision_encoder": "convnet",
@@ -32,7 +34,7 @@ TINY: dict[str, Any] = {
 }
 
 
-def with_features(config: DiffusionTransformerConfig, pixels: int = 32) -> DiffusionTransformerConfig:
+def with_features[C: PreTrainedConfig](config: C, pixels: int = 32) -> C:
     config.input_features = {
         **{key: PolicyFeature(FeatureType.VISUAL, (3, pixels, pixels)) for key in contract.IMAGE_KEYS},
         contract.STATE_KEY: PolicyFeature(FeatureType.STATE, (contract.STATE_SIZE,)),
@@ -46,23 +48,54 @@ def tiny_config(pixels: int = 32, **overrides: Any) -> DiffusionTransformerConfi
 
 
 def batch_for(
-    config: DiffusionTransformerConfig, size: int = 4, pixels: int = 32, seed: int = 0, uint8: bool = True
+    config: PreTrainedConfig, size: int = 4, pixels: int = 32, seed: int = 0, uint8: bool = True
 ) -> dict[str, Any]:
     """A batch as a LeRobot data loader gives it, before the preprocessor."""
     rng = np.random.default_rng(seed)
-    steps = config.n_obs_steps
+    steps, length = config.observation_delta_indices, len(config.action_delta_indices)
+    observed = (size,) if steps is None else (size, len(steps))
     batch: dict[str, Any] = {}
     for key in contract.IMAGE_KEYS:
-        images = torch.from_numpy(rng.integers(0, 256, (size, steps, 3, pixels, pixels), dtype=np.uint8))
+        images = torch.from_numpy(rng.integers(0, 256, (*observed, 3, pixels, pixels), dtype=np.uint8))
         batch[key] = images if uint8 else images.float() / 255
-    batch[contract.STATE_KEY] = torch.from_numpy(rng.uniform(-1, 1, (size, steps, contract.STATE_SIZE)))
-    batch[contract.ACTION_KEY] = torch.from_numpy(rng.uniform(-1, 1, (size, config.horizon, contract.ACTION_SIZE)))
-    batch["action_is_pad"] = torch.zeros(size, config.horizon, dtype=torch.bool)
-    batch["task"] = [("Open the left drawer.", "Close the right drawer.")[i % 2] for i in range(size)]
+    batch[contract.STATE_KEY] = torch.from_numpy(rng.uniform(-1, 1, (*observed, contract.STATE_SIZE)))
+    batch[contract.ACTION_KEY] = torch.from_numpy(rng.uniform(-1, 1, (size, length, contract.ACTION_SIZE)))
+    batch["action_is_pad"] = torch.zeros(size, length, dtype=torch.bool)
+    batch["task"] = [INSTRUCTIONS[i % 2] for i in range(size)]
     return batch
 
 
 def unit_stats() -> dict[str, dict[str, np.ndarray]]:
-    """Statistics with which min-max normalisation changes nothing."""
+    """Statistics with which normalisation changes nothing."""
     sizes = {contract.STATE_KEY: contract.STATE_SIZE, contract.ACTION_KEY: contract.ACTION_SIZE}
-    return {key: {"min": -np.ones(size), "max": np.ones(size)} for key, size in sizes.items()}
+    return {
+        key: {"min": -np.ones(n), "max": np.ones(n), "mean": np.zeros(n), "std": np.ones(n)} for key, n in sizes.items()
+    }
+
+
+def build(config: PreTrainedConfig, seed: int = 0) -> tuple[Any, Any, Any]:
+    """A new policy of a configuration with features, its preprocessor and its postprocessor."""
+    torch.manual_seed(seed)
+    return (get_policy_class(config.type)(config), *make_pre_post_processors(config, dataset_stats=unit_stats()))
+
+
+def generators(*seeds: int) -> list[torch.Generator]:
+    return [torch.Generator().manual_seed(seed) for seed in seeds]
+
+
+def check_trains_and_predicts(policy: Any, preprocess: Any, postprocess: Any, length: int) -> None:
+    """A policy of `build` has a loss that reaches every weight, and predicts chunks out of `length` actions."""
+    config = policy.config
+    batch = preprocess(batch_for(config))
+    loss, _ = policy.train()(batch)
+    each, _ = policy(batch, reduction="none")
+    assert loss.shape == ()
+    assert torch.isfinite(loss)
+    assert each.shape == (4,)
+    loss.backward()
+    assert [name for name, p in policy.named_parameters() if p.requires_grad and p.grad is None] == []
+    chunk = policy.predict_action_chunk(batch)
+    assert chunk.shape == (4, config.n_action_steps, contract.ACTION_SIZE)
+    assert policy.sample(batch).shape == (4, length, contract.ACTION_SIZE)
+    assert torch.isfinite(postprocess(chunk)).all()
+    assert len(config.action_delta_indices) == length

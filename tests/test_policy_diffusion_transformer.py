@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 import torch
 from lerobot.configs import PreTrainedConfig
-from lerobot.policies.factory import get_policy_class, make_pre_post_processors
-from policy_support import batch_for, tiny_config, unit_stats
+from lerobot.policies.factory import make_pre_post_processors
+from policy_support import batch_for, build, check_trains_and_predicts, generators, tiny_config
 from torch import nn
 
 from robocasa_lerobot import contract
@@ -44,36 +44,12 @@ VARIANTS: dict[str, dict[str, Any]] = {
 }
 
 
-def build(config: DiffusionTransformerConfig, seed: int = 0) -> tuple[DiffusionTransformerPolicy, Any, Any]:
-    torch.manual_seed(seed)
-    policy = get_policy_class("diffusion_transformer")(config)
-    return (policy, *make_pre_post_processors(config, dataset_stats=unit_stats()))
-
-
-def generators(*seeds: int) -> list[torch.Generator]:
-    return [torch.Generator().manual_seed(seed) for seed in seeds]
-
-
 @pytest.mark.parametrize("overrides", VARIANTS.values(), ids=VARIANTS.keys())
 def test_variant_trains_and_predicts(overrides: dict[str, Any]) -> None:
     config = tiny_config(**overrides)
-    policy, preprocess, postprocess = build(config)
-    batch = preprocess(batch_for(config))
-    loss, _ = policy.train()(batch)
-    each, _ = policy(batch, reduction="none")
-    assert loss.shape == ()
-    assert torch.isfinite(loss)
-    assert each.shape == (4,)
-    loss.backward()
-    unused = [name for name, p in policy.named_parameters() if p.requires_grad and p.grad is None]
-    assert unused == []
-    chunk = policy.predict_action_chunk(batch)
-    assert chunk.shape == (4, config.n_action_steps, contract.ACTION_SIZE)
-    assert policy.sample(batch).shape == (4, config.horizon, contract.ACTION_SIZE)
-    assert torch.isfinite(postprocess(chunk)).all()
+    check_trains_and_predicts(*build(config), config.horizon)
     assert len(config.observation_delta_indices) == config.n_obs_steps
     assert config.observation_delta_indices[-1] == 0
-    assert len(config.action_delta_indices) == config.horizon
     assert config.action_delta_indices[config.n_obs_steps - 1] == 0
 
 

@@ -11,18 +11,9 @@ import numpy as np
 import pytest
 import torch
 import yaml
-from flow_vla_support import (
-    INSTRUCTIONS,
-    batch_for,
-    build,
-    check_variant,
-    chunk_noise,
-    generators,
-    tiny_config,
-    with_features,
-    write_pretrained,
-)
+from flow_vla_support import build, check_variant, chunk_noise, tiny_config, write_pretrained
 from lerobot.configs import PreTrainedConfig
+from policy_support import INSTRUCTIONS, batch_for, generators, with_features
 
 from robocasa_lerobot import contract
 from robocasa_lerobot.errors import UserError

@@ -12,20 +12,11 @@ from typing import Any
 import draccus
 import pytest
 import torch
-from flow_vla_support import (
-    KINDS,
-    batch_for,
-    build,
-    check_variant,
-    chunk_noise,
-    generators,
-    pretrained_config,
-    tiny_config,
-    write_pretrained,
-)
+from flow_vla_support import KINDS, build, check_variant, chunk_noise, pretrained_config, tiny_config, write_pretrained
 from lerobot.configs import PreTrainedConfig
 from lerobot.policies.factory import make_pre_post_processors
 from lerobot.utils.constants import OBS_LANGUAGE_ATTENTION_MASK, OBS_LANGUAGE_TOKENS
+from policy_support import batch_for, generators
 from torch import Tensor
 
 from robocasa_lerobot.errors import UserError

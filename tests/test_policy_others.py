@@ -11,9 +11,9 @@ import pytest
 import torch
 import yaml
 from evaluation_env import SlideEnv
-from flow_vla_support import with_features
 from lerobot.configs import NormalizationMode
 from policy_models_support import tiny_settings
+from policy_support import with_features
 from training_support import losses, weights
 
 from robocasa_lerobot import contract
