@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import json
 from pathlib import Path
 
 import draccus
@@ -10,7 +11,7 @@ import pytest
 from training_support import TINY
 
 from robocasa_lerobot import contract
-from robocasa_lerobot.data.config import MemberConfig, MixtureConfig
+from robocasa_lerobot.data.config import MixtureConfig
 from robocasa_lerobot.training import overlay
 from robocasa_lerobot.training.config import FROM_SCRATCH, HUB, ExperimentConfig, load_experiment, to_yaml
 
@@ -86,50 +87,68 @@ def test_policies_of_our_own_experiments_build(path: Path) -> None:
         assert scheduler is not None or config.get_scheduler_preset() is None
 
 
-def shrunk(experiment: ExperimentConfig, folder: Path, data: Path) -> ExperimentConfig:
-    """The same graph, two steps a phase, on the fake dataset and with a tiny policy.
+def shrunk(experiment: ExperimentConfig, folder: Path) -> ExperimentConfig:
+    """The same graph on the same mixtures, two steps a phase and with a tiny policy.
 
-    A policy that cannot be built without downloads is stood in for by the tiny diffusion transformer.
+    Policies that cannot be built without downloads (pi0, pi05, groot) are stood in for by a tiny diffusion transformer
+    from scratch; of them, the settings are checked by `test_policy_others.py`.
     """
     own = experiment.policy.get("type") in TINY
     kind = str(experiment.policy["type"]) if own else "diffusion_transformer"
     kept = ("time_conditioning",)
     policy = {"type": kind, **TINY[kind], **{k: experiment.policy[k] for k in kept if k in experiment.policy}}
+    small = {"steps": 2, "batch_size": 4, "save_every": 1, "log_every": 1, "warmup_steps": 1, "schedule_steps": None}
     phases = []
     for phase in experiment.phases:
         on_hub = (phase.init or "").startswith(HUB)
         lora = phase.lora and dataclasses.replace(phase.lora, rank=2, targets=phase.lora.targets if own else None)
         held_out = phase.held_out and dataclasses.replace(phase.held_out, every=2, samples=4)
-        small = {
-            "steps": 2,
-            "batch_size": 4,
-            "save_every": 1,
-            "log_every": 1,
-            "warmup_steps": 1,
-            "schedule_steps": None,
-        }
-        mixture = MixtureConfig(members=[MemberConfig(str(data))], alpha=phase.mixture.alpha)
-        changes = {"mixture": mixture, "init": FROM_SCRATCH if on_hub else phase.init, "lora": lora, "policy": {}}
-        phases.append(
-            dataclasses.replace(phase, **changes, **small, held_out=held_out, evaluations=[], save_initial=False)
-        )
-    loader = dataclasses.replace(experiment.loader, workers=0, cache_frames=None, cache_dir=str(data.parent / "frames"))
+        changes = {"init": FROM_SCRATCH if on_hub else phase.init, "lora": lora, "policy": {}, "held_out": held_out}
+        phases.append(dataclasses.replace(phase, **changes, **small, evaluations=[], save_initial=False))
     return dataclasses.replace(
         experiment,
         policy=policy,
         phases=phases,
-        loader=loader,
+        loader=dataclasses.replace(experiment.loader, workers=0, cache_dir=str(folder.parent / "cache")),
         device="cpu",
         mixed_precision="no",
         output_dir=str(folder),
     )
 
 
+@pytest.fixture(scope="module")
+def all_datasets(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A working directory in which every dataset of the experiments lies where they look: one of two fake ones."""
+    from robocasa_lerobot.data.fake import INSTRUCTIONS, write_fake_dataset
+    from robocasa_lerobot.data.published import PUBLISHED, published_task_sets, published_tasks
+
+    work = tmp_path_factory.mktemp("work")
+    small = write_fake_dataset(work / "small", episodes=4, length=4, image_size=32)
+    large = write_fake_dataset(work / "large", episodes=60, length=4, image_size=32, tasks=tuple(INSTRUCTIONS))
+    places = [work / "outputs/demo/data"]
+    for split, source in PUBLISHED:
+        inner = "20250101" if source == "human" else f"20250101/{source}/demo/000000"
+        for task in published_task_sets()[PUBLISHED[split, source]]:
+            parent = work / "datasets/v1.0" / split / published_tasks()[task][0] / task / inner
+            places += [parent / "lerobot", parent / "lerobot_cotraining_cams"]
+    own = ("pretrain", "pretrain_many", "pretrain_25_scenes", "target", "other_cameras")
+    kitchens = [work / "datasets/kitchens" / name for name in own]  # of which parts are held out, and chosen by scene
+    real = ("CloseElectricKettleLid", "PickPlaceToasterOvenToCounter", "PickPlaceCounterToCabinet", "PlaceOnDishRack")
+    places += [work / "datasets/real" / name for name in (*real, "OpenDrawer", "CloseDrawer")]
+    for place in (*places, *kitchens):
+        place.parent.mkdir(parents=True, exist_ok=True)
+        place.symlink_to(large if place in kitchens else small)
+    return work
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("path", EXPERIMENTS, ids=name_of)
-def test_experiment_runs_two_steps_of_each_phase(path: Path, tmp_path: Path, tiny_dataset: Path) -> None:
+def test_experiment_runs_two_steps_of_each_phase(
+    path: Path, tmp_path: Path, all_datasets: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     phases = pytest.importorskip("robocasa_lerobot.training.phases")
-    experiment = shrunk(load_experiment(path), tmp_path / "out", tiny_dataset)
+    monkeypatch.chdir(all_datasets)
+    experiment = shrunk(load_experiment(path), tmp_path / "out")
     assert phases.run_experiment(experiment)
     for phase in experiment.phases:
         folder = tmp_path / "out" / phase.name
@@ -137,10 +156,14 @@ def test_experiment_runs_two_steps_of_each_phase(path: Path, tmp_path: Path, tin
         assert {"config.yaml", "phase.json", "metrics.jsonl", "learning_curve.png"} <= {
             p.name for p in folder.iterdir()
         }
+        members = json.loads((folder / "phase.json").read_text())["data"]
+        assert len(members) == DATASETS.get((path.parent.name, phase.name), len(members))
 
 
-@pytest.fixture(scope="module")
-def tiny_dataset(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    from robocasa_lerobot.data.fake import write_fake_dataset
-
-    return write_fake_dataset(tmp_path_factory.mktemp("data") / "fake", episodes=4, length=12, image_size=32)
+# Datasets of some of the published experiments' phases.
+DATASETS = {
+    ("robocasa365", "multitask"): 300,
+    ("robocasa365", "joint"): 410,
+    ("robocasa365", "atomic_10"): 18,
+    ("robocasa365", "composite_unseen_100"): 16,
+}

@@ -20,7 +20,11 @@ from lerobot.datasets.lerobot_dataset import LeRobotDataset
 from robocasa_lerobot import contract
 from robocasa_lerobot.data.source import EPISODE_TABLE
 
-INSTRUCTIONS = {"OpenDrawer": "open the left drawer", "CloseDrawer": "close the left drawer"}
+INSTRUCTIONS = {
+    "OpenDrawer": "open the left drawer",
+    "CloseDrawer": "close the left drawer",
+    "PickPlaceCounterToSink": "pick the apple from the counter and place it in the sink",
+}
 KITCHENS = ((11, 34), (15, 14))  # layout and style, taking turns from one round of the tasks to the next
 
 
