@@ -12,8 +12,11 @@ from training_support import TINY
 
 from robocasa_lerobot import contract
 from robocasa_lerobot.data.config import MixtureConfig
+from robocasa_lerobot.evaluation.config import EvaluationConfig
+from robocasa_lerobot.evaluation.overrides import load_config
 from robocasa_lerobot.training import overlay
 from robocasa_lerobot.training.config import FROM_SCRATCH, HUB, ExperimentConfig, load_experiment, to_yaml
+from robocasa_lerobot.training.evaluations import phase_evaluations
 
 CONFIGS = Path(__file__).parents[1] / "configs"
 PARTS = CONFIGS / "experiments" / "parts"  # bases that are no experiments by themselves
@@ -48,6 +51,30 @@ def test_every_experiment_has_its_own_folder_and_name() -> None:
     experiments = [load_experiment(path) for path in EXPERIMENTS]
     assert len({experiment.output_dir for experiment in experiments}) == len(experiments)
     assert len({experiment.name for experiment in experiments}) == len(experiments)
+
+
+@pytest.mark.parametrize("path", EXPERIMENTS, ids=name_of)
+def test_evaluations_of_an_experiment_are_evaluations(path: Path) -> None:
+    """As the command of an evaluation reads them; of the benchmark's protocols, each simulated experiment has one."""
+    found = []
+    for phase in load_experiment(path).phases:
+        for evaluation in phase_evaluations(phase):
+            arguments = ["--config_path", str(evaluation.file), "--policy.path=checkpoint", *evaluation.settings]
+            config = load_config(EvaluationConfig, arguments)
+            assert config.policy.path == ["checkpoint"]
+            found.append(config)
+    if path.parent.name == "robocasa365" and path.stem not in ("real_only", "sim_and_real"):
+        assert {config.protocol for config in found} <= {"leaderboard", "foundation", "lifelong", "robustness"}
+        assert found
+    if path.parent.name == "small" and path.stem not in ("real_only", "sim_and_real"):
+        assert {tuple(config.env.task_sets) for config in found} == {()}
+        assert len(found) == len(load_experiment(path).phases)
+
+
+def test_lifelong_phases_are_evaluated_on_the_tasks_so_far() -> None:
+    phases = load_experiment(CONFIGS / "experiments/robocasa365/lifelong.yaml").phases
+    settings = [phase_evaluations(phase)[0].settings for phase in phases]
+    assert settings == [(f"--policy.lifelong_phase={number}",) for number in (1, 2, 3, 4)]
 
 
 @pytest.mark.parametrize("path", EXPERIMENTS, ids=name_of)

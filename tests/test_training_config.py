@@ -107,3 +107,16 @@ def test_resolved_experiment_loads_again(path: Path, tmp_path: Path) -> None:
     again = load_experiment(tmp_path / "resolved.yaml")
     assert isinstance(again, ExperimentConfig)
     assert again == experiment
+
+
+def test_a_pattern_changes_all_phases_that_match(tmp_path: Path) -> None:
+    phases = [{"name": name, "steps": 1} for name in ("pretrain", "atomic_10", "atomic_30")]
+    (tmp_path / "base.yaml").write_text(yaml.safe_dump({"phases": phases}))
+    changes = [{"name": "atomic_*", "steps": 2}, {"name": "*", "batch_size": 8}, {"name": "last", "steps": 3}]
+    (tmp_path / "own.yaml").write_text(yaml.safe_dump({"base": "base.yaml", "phases": changes}))
+    assert overlay.resolve(tmp_path / "own.yaml")["phases"] == [
+        {"name": "pretrain", "steps": 1, "batch_size": 8},
+        {"name": "atomic_10", "steps": 2, "batch_size": 8},
+        {"name": "atomic_30", "steps": 2, "batch_size": 8},
+        {"name": "last", "steps": 3},
+    ]

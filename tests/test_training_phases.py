@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import json
+import subprocess
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -16,7 +18,7 @@ from training_support import experiment_file, losses, metrics, tiny, weights
 from robocasa_lerobot.data.fake import write_fake_dataset
 from robocasa_lerobot.data.mixture import open_mixture
 from robocasa_lerobot.errors import UserError
-from robocasa_lerobot.training import builders, joining
+from robocasa_lerobot.training import builders, evaluations, joining
 from robocasa_lerobot.training.adapters import apply_training_scope, merged_state
 from robocasa_lerobot.training.config import load_experiment
 from robocasa_lerobot.training.held_out import without_held_out
@@ -282,6 +284,8 @@ def test_optimizer_and_schedule_of_a_phase(tmp_path: Path, data: Path) -> None:
 def test_mistakes_in_phases_are_told(tmp_path: Path, data: Path) -> None:
     for overrides, message in (
         (["--phases.pretrain.evaluations=[quik]"], "Did you mean 'quick'"),
+        (["--phases.pretrain.evaluations=['quick --seed=\"1']"], "No closing quotation"),
+        (["--phases.pretrain.evaluations=[quick, quick --seed=1]"], "two evaluations"),
         (["--phases.pretrain.init=hub:nobody/nothing", "--phases.pretrain.statistics=keep"], "hf download"),
         (["--trackers=[tensorbord]"], "Did you mean 'tensorboard'"),
         (["--phases.pretrain.lora.rank=0"], "rank is 0"),
@@ -292,6 +296,26 @@ def test_mistakes_in_phases_are_told(tmp_path: Path, data: Path) -> None:
         with pytest.raises(UserError, match=message):
             run_experiment(tiny(tmp_path, data, overrides=overrides), only="pretrain")
     assert not metrics_exist(tmp_path)
+
+
+def test_evaluations_run_once_for_each_checkpoint_and_setting(
+    tmp_path: Path, data: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    commands: list[list[str]] = []
+
+    def run(command: list[str], **_: Any) -> subprocess.CompletedProcess[bytes]:
+        commands.append(command)
+        return subprocess.CompletedProcess(command, 0)
+
+    monkeypatch.setattr(evaluations, "subprocess", SimpleNamespace(run=run))
+    common = ["--defaults.steps=1"]
+    for settings in ("--seed=1", "--seed=1", '--policy.training_data="a b"'):
+        names = [*common, f"--phases.pretrain.evaluations=['quick {settings}']"]
+        assert run_experiment(tiny(tmp_path, data, overrides=names), only="pretrain", evaluate=True)
+    assert [command[-1] for command in commands] == ["--seed=1", "--policy.training_data=a b"]
+    folder = tmp_path / "out/pretrain"
+    assert f"--policy.path={folder}/checkpoints/last/pretrained_model" in commands[0]
+    assert f"--out={folder}/evaluations/quick" in commands[0]
 
 
 def metrics_exist(folder: Path) -> bool:

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import os
+import shlex
 import subprocess
 import sys
+from dataclasses import dataclass
 from pathlib import Path
 
 from robocasa_lerobot.errors import UserError, suggest
@@ -16,20 +18,36 @@ NAMED = Path(__file__).parents[2] / "configs" / "evaluations"
 _LAUNCHER = ("RANK", "LOCAL_RANK", "WORLD_SIZE", "MASTER_ADDR", "MASTER_PORT", "ACCELERATE_", "TORCHELASTIC_")
 
 
-def evaluation_files(phase: PhaseConfig) -> list[Path]:
-    """The phase's evaluation files: paths, or names of those in `configs/evaluations/`.
+@dataclass(frozen=True)
+class PhaseEvaluation:
+    """An evaluation file, and settings that a phase changes in it, as on the command line."""
+
+    file: Path
+    settings: tuple[str, ...]
+
+
+def phase_evaluations(phase: PhaseConfig) -> list[PhaseEvaluation]:
+    """The phase's evaluations: paths, or names of files in `configs/evaluations/`, each with its settings.
 
     Raises:
-        UserError: one is not there.
+        UserError: a file is not there or is named twice, or a quotation does not end.
     """
-    files = []
-    for name in phase.evaluations:
+    found: list[PhaseEvaluation] = []
+    for text in phase.evaluations:
+        try:
+            name, *settings = shlex.split(text)
+        except ValueError as error:
+            raise UserError(
+                f"phase {phase.name!r}: evaluation {text!r} ({error}); expected `NAME --setting=value ...`."
+            ) from error
         file = next((p for p in (Path(name), NAMED / f"{name}.yaml") if p.is_file()), None)
         if file is None:
             known = suggest(name, [path.stem for path in NAMED.glob("*.yaml")])
             raise UserError(f"phase {phase.name!r}: no evaluation file {name}. {known}")
-        files.append(file)
-    return files
+        if file.stem in [other.file.stem for other in found]:
+            raise UserError(f"phase {phase.name!r}: two evaluations would write to the folder {file.stem!r}.")
+        found.append(PhaseEvaluation(file, tuple(settings)))
+    return found
 
 
 def run_evaluations(phase: PhaseConfig, folder: Path) -> None:
@@ -38,21 +56,26 @@ def run_evaluations(phase: PhaseConfig, folder: Path) -> None:
     Raises:
         UserError: one failed; its own message stands above.
     """
-    for file in evaluation_files(phase):
+    for evaluation in phase_evaluations(phase):
+        file = evaluation.file
         out = folder / FOLDER / file.stem
         last = last_checkpoint(folder)
         done = out / "finished"
-        if last is None or (done.is_file() and done.read_text() == last.name):
+        if last is None:
+            continue
+        what = " ".join((last.name, *evaluation.settings))
+        if done.is_file() and done.read_text() == what:
             continue
         command = [sys.executable, "-m", "robocasa_lerobot.cli", "eval", "--config_path", str(file)]
         command += [f"--policy.path={folder / 'checkpoints' / LAST / PRETRAINED}", f"--out={out}"]
+        command += evaluation.settings
         # It is no part of this process group of trainers.
         environment = {k: v for k, v in os.environ.items() if not k.startswith(_LAUNCHER)}
         status = subprocess.run(command, env=environment, check=False).returncode
         if status:
             raise UserError(
                 f"the evaluation {file} of phase {phase.name!r} ended with status {status}; the training is complete. "
-                f"Run it again with the same command, or alone: {' '.join(command[1:])}"
+                f"Run it again with the same command, or alone: {shlex.join(command[1:])}"
             )
         out.mkdir(parents=True, exist_ok=True)
-        done.write_text(last.name)
+        done.write_text(what)

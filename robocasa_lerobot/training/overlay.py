@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 import dataclasses
+import fnmatch
 import functools
 import typing
 from collections.abc import Callable, Mapping, Sequence
@@ -23,7 +24,7 @@ IDENTITY: dict[str, dict[str, tuple[str, ...] | None]] = {
 
 
 def merge(base: Mapping[str, Any], changes: Mapping[str, Any]) -> Data:
-    """`base` with `changes` laid over it: mappings key by key, phases by name, everything else replaced.
+    """`base` with `changes` laid over it: mappings key by key, phases by name or pattern, everything else replaced.
 
     A policy or mixture that names what it is (a file, a type) replaces the base's with all its settings, and new
     members of a mixture replace the base's.
@@ -103,7 +104,12 @@ def _named(phases: Any) -> bool:
 def _merge_phases(base: list[Data], changes: list[Data]) -> list[Data]:
     out = {phase["name"]: phase for phase in base}
     for phase in changes:
-        out[phase["name"]] = merge(out.get(phase["name"], {}), phase)
+        if "*" in phase["name"]:  # what changes in all phases so far that match
+            own = {key: value for key, value in phase.items() if key != "name"}
+            matching = [name for name in out if fnmatch.fnmatchcase(name, phase["name"])]
+            out |= {name: merge(out[name], own) for name in matching}
+        else:
+            out[phase["name"]] = merge(out.get(phase["name"], {}), phase)
     return list(out.values())
 
 

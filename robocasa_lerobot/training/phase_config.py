@@ -158,7 +158,8 @@ class PhaseConfig:
         augment: changes of the pictures.
         held_out: loss on episodes that are not trained on.
         compile: translate the policy with `torch.compile`; first steps take minutes, and later ones less time.
-        evaluations: evaluation files that are run on the finished phase, by name or path.
+        evaluations: evaluation files that are run on the finished phase with `--evaluate`, by name or path; settings
+            of them may follow, as in `lifelong --policy.lifelong_phase=2`.
     """
 
     name: str

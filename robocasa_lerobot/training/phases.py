@@ -9,7 +9,7 @@ from accelerate import Accelerator, DistributedDataParallelKwargs
 from robocasa_lerobot.training import builders, joining, metrics, records
 from robocasa_lerobot.training.checkpoint import checkpoint_step, last_checkpoint, tidy
 from robocasa_lerobot.training.config import ExperimentConfig, PhaseConfig, to_yaml
-from robocasa_lerobot.training.evaluations import evaluation_files, run_evaluations
+from robocasa_lerobot.training.evaluations import phase_evaluations, run_evaluations
 from robocasa_lerobot.training.interrupts import Interrupts
 from robocasa_lerobot.training.loop import train_phase
 from robocasa_lerobot.training.prepare import planned_policy, prepare_phase, start_of
@@ -81,7 +81,7 @@ def check_phase(experiment: ExperimentConfig, phase: PhaseConfig, device: str, a
     """
     builders.policy_config(*planned_policy(experiment, phase), device)
     joining.open_phase_data(experiment, phase)
-    evaluation_files(phase)
+    phase_evaluations(phase)
     if alone:
         start_of(experiment, phase)
 

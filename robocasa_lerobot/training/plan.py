@@ -23,7 +23,7 @@ from robocasa_lerobot.errors import UserError
 from robocasa_lerobot.training import builders, joining
 from robocasa_lerobot.training.checkpoint import checkpoint_step, last_checkpoint
 from robocasa_lerobot.training.config import FROM_SCRATCH, ExperimentConfig, PhaseConfig
-from robocasa_lerobot.training.evaluations import evaluation_files
+from robocasa_lerobot.training.evaluations import phase_evaluations
 from robocasa_lerobot.training.loop import train_phase
 from robocasa_lerobot.training.metrics import METRICS, read_lines
 from robocasa_lerobot.training.prepare import planned_policy, prepare_phase
@@ -109,7 +109,7 @@ def _plan_phase(experiment: ExperimentConfig, phase: PhaseConfig, device: str) -
     last = last_checkpoint(Path(experiment.output_dir) / phase.name)
     done = min(checkpoint_step(last), phase.steps) if last is not None else 0
     plan = PhasePlan(phase, len(experiment.ancestors(phase)), experiment.init_of(phase), done)
-    evaluation_files(phase)
+    phase_evaluations(phase)
     _plan_data(experiment, phase, plan)
     try:
         settings, checkpoint = planned_policy(experiment, phase)
