@@ -16,6 +16,7 @@ from robocasa_lerobot.contract import ContractError
 from robocasa_lerobot.envs.check import check_task
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.registry import get_task, task_names, task_set, task_sets
+from robocasa_lerobot.envs.scene.kitchens import scene_ids
 from robocasa_lerobot.errors import UnknownNameError, UserError
 
 pytestmark = pytest.mark.render
@@ -62,7 +63,7 @@ def test_observations_follow_the_contract(task):
     assert np.linalg.norm(state["base_rotation"]) == pytest.approx(1.0)
     assert info["success_terms"]
     assert not info["success"]
-    assert info["scene"] == {"layout_id": 1, "style_id": 1}
+    assert (info["scene"]["layout_id"], info["scene"]["style_id"]) in scene_ids("target")
     assert env.task_description == info["instruction"]
     assert "{" not in info["instruction"]
     assert env.horizon == get_task(task).horizon == env._max_episode_steps
@@ -202,8 +203,6 @@ def test_misspelt_arguments_name_the_closest_match(kwargs, words):
 
 
 def test_other_mistakes_say_what_to_do():
-    with pytest.raises(UserError, match="target"):
-        KitchenEnv("OpenDrawer", split="pretrain")
     with pytest.raises(UserError, match="at least 1"):
         KitchenEnv("OpenDrawer", image_size=0)
     env = KitchenEnv("OpenDrawer", image_size=32)

@@ -11,9 +11,10 @@ import pytest
 from robocasa_lerobot.envs.placement import PlacementError
 from robocasa_lerobot.envs.registry import get_task, task_names
 from robocasa_lerobot.envs.scene import selection
-from robocasa_lerobot.envs.scene.builder import build_scene, scene_ids
+from robocasa_lerobot.envs.scene.builder import build_scene
 from robocasa_lerobot.envs.scene.fixtures.base import Fixture
 from robocasa_lerobot.envs.scene.fixtures.counters import Counter
+from robocasa_lerobot.envs.scene.kitchens import scene_ids
 from robocasa_lerobot.envs.scene.layout import Layout, load_layout
 from robocasa_lerobot.envs.scene.selection import RobotPose, candidates, counter_of, robot_pose
 from robocasa_lerobot.envs.task import RobotStart

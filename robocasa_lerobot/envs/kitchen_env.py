@@ -21,7 +21,8 @@ from robocasa_lerobot.envs.initial_noise import InitialNoise, add_initial_noise
 from robocasa_lerobot.envs.pictures import Pictures, picture_spaces, segmentation_names, take_pictures
 from robocasa_lerobot.envs.proprioception import read_state
 from robocasa_lerobot.envs.registry import get_task
-from robocasa_lerobot.envs.scene.builder import RENDER_PRESETS, build_scene, scene_ids
+from robocasa_lerobot.envs.scene.builder import RENDER_PRESETS, build_scene
+from robocasa_lerobot.envs.scene.kitchens import scene_ids
 from robocasa_lerobot.envs.scene.scene import Scene
 from robocasa_lerobot.envs.state import KitchenState, restore
 from robocasa_lerobot.errors import UnknownNameError, UserError

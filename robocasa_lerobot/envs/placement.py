@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-MAX_SAMPLES = 500
+MAX_SAMPLES = 5000  # draws for an object before the scene is given up (robocasa facts, section 6)
 MAX_YAW_RAD = np.pi / 4  # of the default rotation range, to either side
 
 
@@ -53,6 +53,10 @@ class Area:
         origin: of that frame in the room (x, y), metres.
         yaw: of that frame, radians.
         z: height of the surface in the room, metres.
+        name: of the surface, for messages.
+        height: free above it, metres.
+        rotation: bounds of the turn of what is placed, radians.
+        inside: whole footprints must lie in it, not their middles alone.
     """
 
     x0: float
@@ -62,18 +66,40 @@ class Area:
     origin: tuple[float, float]
     yaw: float
     z: float
+    name: str = "surface"
+    height: float = float("inf")
+    rotation: tuple[float, float] = (-MAX_YAW_RAD, MAX_YAW_RAD)
+    inside: bool = True
 
     def sample(self, rng: np.random.Generator, half: tuple[float, float]) -> Footprint:
         """A footprint of half sizes `half` whose corners lie in the area where it is large enough, else its centre."""
-        yaw = float(rng.uniform(-MAX_YAW_RAD, MAX_YAW_RAD))
+        yaw = float(rng.uniform(*self.rotation))
         c, s = abs(np.cos(yaw)), abs(np.sin(yaw))
-        reach_x, reach_y = c * half[0] + s * half[1], s * half[0] + c * half[1]
+        reach_x, reach_y = (c * half[0] + s * half[1], s * half[0] + c * half[1]) if self.inside else (0.0, 0.0)
         x = _uniform_inside(rng, self.x0, self.x1, reach_x)
         y = _uniform_inside(rng, self.y0, self.y1, reach_y)
         cos, sin = np.cos(self.yaw), np.sin(self.yaw)
         return Footprint(
             float(self.origin[0] + cos * x - sin * y), float(self.origin[1] + sin * x + cos * y), self.yaw + yaw, half
         )
+
+    @property
+    def extent(self) -> float:
+        """Square metres."""
+        return max(self.x1 - self.x0, 0.0) * max(self.y1 - self.y0, 0.0)
+
+    def free_extent(self, occupied: list[Footprint], grid: int = 24) -> float:
+        """Square metres that no footprint covers, counted on a grid."""
+        xs = self.x0 + (np.arange(grid) + 0.5) * (self.x1 - self.x0) / grid
+        ys = self.y0 + (np.arange(grid) + 0.5) * (self.y1 - self.y0) / grid
+        x, y = (axis.ravel() for axis in np.meshgrid(xs, ys))
+        c, s = np.cos(self.yaw), np.sin(self.yaw)
+        points = np.stack([self.origin[0] + c * x - s * y, self.origin[1] + s * x + c * y], axis=1)
+        free = np.ones(len(points), dtype=bool)
+        for other in occupied:
+            local = np.abs((points - (other.x, other.y)) @ other.axes().T)
+            free &= (local > other.half).any(axis=1)
+        return self.extent * float(free.mean())
 
 
 def _uniform_inside(rng: np.random.Generator, low: float, high: float, reach: float) -> float:
@@ -88,15 +114,32 @@ def place(
     half: tuple[float, float],
     occupied: list[Footprint],
     margin: float = 0.01,
+    what: str = "a footprint",
 ) -> tuple[Footprint, Area]:
     """Find a footprint in one of the areas that keeps `margin` metres from those occupied.
 
     Raises:
-        PlacementError: none found in 500 draws.
+        PlacementError: none found in 5000 draws; it names `what`, the region, its free area and three remedies.
     """
+    near = {id(area): _neighbours(area, half, occupied, margin) for area in areas}
     for _ in range(MAX_SAMPLES):
         area = areas[int(rng.integers(len(areas)))]
         footprint = area.sample(rng, half)
-        if not any(footprint.overlaps(other, margin) for other in occupied):
+        if not any(footprint.overlaps(other, margin) for other in near[id(area)]):
             return footprint, area
-    raise PlacementError(f"no free place for a footprint of {half[0] * 2:.2f} x {half[1] * 2:.2f} m")
+    free = sum(area.free_extent(occupied) for area in areas)
+    names = ", ".join(dict.fromkeys(area.name for area in areas))
+    raise PlacementError(
+        f"no free place for {what} of {half[0] * 2:.2f} x {half[1] * 2:.2f} m on {names}: {free:.3f} of "
+        f"{sum(area.extent for area in areas):.3f} m2 are free. Ask for a larger region, for fewer or smaller "
+        "objects there, or for another fixture."
+    )
+
+
+def _neighbours(area: Area, half: tuple[float, float], occupied: list[Footprint], margin: float) -> list[Footprint]:
+    """Footprints that one in the area can come near to."""
+    c, s = np.cos(area.yaw), np.sin(area.yaw)
+    x, y = (area.x0 + area.x1) / 2, (area.y0 + area.y1) / 2
+    middle = area.origin[0] + c * x - s * y, area.origin[1] + s * x + c * y
+    reach = np.hypot(area.x1 - area.x0, area.y1 - area.y0) / 2 + np.hypot(*half) + margin
+    return [o for o in occupied if np.hypot(o.x - middle[0], o.y - middle[1]) <= reach + np.hypot(*o.half)]

@@ -16,11 +16,17 @@ class FixtureWanted:
 
     Attributes:
         role: name by which the rest of the declaration calls it.
-        kind: a key of `scene.selection.FIXTURE_KINDS`, e.g. "drawer_top" or "sink".
+        kind: a key of `scene.fixture_types.FIXTURE_KINDS`, e.g. "drawer_top" or "sink".
+        near: role of an earlier fixture that it is the nearest to.
+        other_than: roles of earlier fixtures that it is none of.
+        size: least width and depth of its top, metres; of counters.
     """
 
     role: str
     kind: str
+    near: str = ""
+    other_than: tuple[str, ...] = ()
+    size: tuple[float, float] = (0.0, 0.0)
 
 
 @dataclass(frozen=True)
@@ -58,6 +64,58 @@ class InsideOf:
 
 
 @dataclass(frozen=True)
+class SampleRegion:
+    """Which part of a fixture's tops or insides is used.
+
+    Attributes:
+        ref: role of a reference fixture; none uses the whole fixture.
+        loc: "nn" takes the part nearest to the reference, "left" or "right" those on one side of it, "left_right" those
+            on either, "any" all.
+        top_size: least width and depth of the part, metres.
+        height: bounds of the height in the room of the part's floor, metres.
+        level: number of the part from below; -1 is the highest.
+    """
+
+    ref: str = ""
+    loc: str = "any"
+    top_size: tuple[float, float] = (0.0, 0.0)
+    height: tuple[float, float] = (0.0, 3.0)
+    level: int | None = None
+
+
+@dataclass(frozen=True)
+class Placement:
+    """Start on or in a fixture, or on an object that was placed before, as RoboCasa's placement records say it.
+
+    Attributes:
+        fixture: role.
+        object: name of an object of the scene, instead of a fixture.
+        region: which part of the fixture.
+        size: width and depth of the rectangle that is used, metres; the whole part if None.
+        pos: where the rectangle lies, -1 left or front, 1 right or back; "ref" is in line with the reference, None
+            anywhere. Of an object on an object it is not used.
+        offset: shift to the right and to the back, metres.
+        margin: kept from the rectangle's edges, metres.
+        rotation: bounds of the turn, radians.
+        try_to_place_in: object group: what can be in a container stands in one of that group, `<name>_container`.
+        reuse_region_from: name of an object whose part of the fixture is taken again.
+        ensure_inside: the whole footprint lies in the rectangle, not its middle alone.
+    """
+
+    fixture: str = ""
+    object: str = ""
+    region: SampleRegion = SampleRegion()
+    size: tuple[float, float] | None = None
+    pos: tuple[float | str | None, float | str | None] = (None, None)
+    offset: tuple[float, float] = (0.0, 0.0)
+    margin: float = 0.04
+    rotation: tuple[float, float] = (-0.7853981633974483, 0.7853981633974483)
+    try_to_place_in: str = ""
+    reuse_region_from: str = ""
+    ensure_inside: bool = True
+
+
+@dataclass(frozen=True)
 class ObjectWanted:
     """An object, or several alike, and where it starts.
 
@@ -72,7 +130,7 @@ class ObjectWanted:
 
     name: str
     groups: tuple[str, ...]
-    start: OnCounter | InsideOf
+    start: OnCounter | InsideOf | Placement
     count: tuple[int, int] = (1, 1)
     graspable: bool = False
     washable: bool = False
@@ -135,6 +193,8 @@ class Task:
         paraphrases: other wordings, kept apart as novel language.
         stages: the plan.
         sets: names of the task sets it belongs to.
+        needs: names of `scene.kitchens.EXCLUDED`, of what a layout must have: the others are left out, always.
+        exclude_styles: ids of styles that do not suit it.
     """
 
     name: str
@@ -150,4 +210,6 @@ class Task:
     initial: tuple[InitialOpenness, ...] = ()
     paraphrases: tuple[str, ...] = ()
     sets: tuple[str, ...] = ()
+    needs: tuple[str, ...] = ()
+    exclude_styles: tuple[int, ...] = ()
     summary: str = field(default="", compare=False)

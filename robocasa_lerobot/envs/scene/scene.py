@@ -12,9 +12,11 @@ from robocasa_lerobot.contract import ACTION_SIZE
 from robocasa_lerobot.envs.cameras import camera_configs
 from robocasa_lerobot.envs.control.controller import RobotController
 from robocasa_lerobot.envs.control.step import control_step
+from robocasa_lerobot.envs.scene.appliances.base import Appliance
+from robocasa_lerobot.envs.scene.appliances.sink import Sink
 from robocasa_lerobot.envs.scene.fixtures.base import Fixture, yaw_quat
-from robocasa_lerobot.envs.scene.fixtures.cabinets import Drawer
-from robocasa_lerobot.envs.scene.fixtures.counters import Sink
+from robocasa_lerobot.envs.scene.fixtures.cabinets import Drawer, HingeCabinet
+from robocasa_lerobot.envs.scene.layout import Layout
 from robocasa_lerobot.envs.scene.objects.catalogue import Instance
 from robocasa_lerobot.envs.scene.robot import place_base, set_home
 from robocasa_lerobot.envs.scene.selection import RobotPose
@@ -42,7 +44,7 @@ class Scene:
         layout_id, style_id: of the kitchen.
         spec: the MjSpec; its XML names assets by portable paths.
         model: compiled.
-        fixtures: by name.
+        layout: where its fixtures stand.
         roles: fixture name of each role of the task.
         objects: by name.
         openness: initial share of full travel by fixture name.
@@ -59,7 +61,7 @@ class Scene:
     style_id: int
     spec: mujoco.MjSpec
     model: mujoco.MjModel
-    fixtures: dict[str, Fixture]
+    layout: Layout
     roles: dict[str, str]
     objects: dict[str, PlacedObject]
     openness: dict[str, float]
@@ -67,6 +69,11 @@ class Scene:
     instruction: str
     paraphrases: tuple[str, ...] = ()
     arm_noise_rad: float = 0.02
+
+    @property
+    def fixtures(self) -> dict[str, Fixture]:
+        """Fixtures by name."""
+        return self.layout.fixtures
 
     def fixture(self, role: str) -> Fixture:
         """The fixture of a role."""
@@ -91,8 +98,7 @@ class Scene:
         set_home(self.model, data, rng, self.arm_noise_rad)
         for name, openness in self.openness.items():
             fixture = self.fixtures[name]
-            assert isinstance(fixture, Drawer)
-            fixture.set_openness(data, openness)
+            set_openness(fixture, data, openness)
         for placed in self.objects.values():
             data.joint(f"{placed.name}_joint0").qpos[:] = [*placed.pos, *yaw_quat(placed.yaw)]
         mujoco.mj_forward(self.model, data)
@@ -126,9 +132,22 @@ class Scene:
                 }
                 for placed in self.objects.values()
             ],
-            "fixtures": {name: {"cls": type(fixture).__name__} for name, fixture in self.fixtures.items()},
+            "fixtures": {
+                name: {"cls": type(fixture).__name__, "type": self.layout.types[name]}
+                for name, fixture in self.fixtures.items()
+            },
             "fixture_refs": dict(self.roles),
             "cam_configs": camera_configs(self.model),
             "init_robot_base_pos": [self.robot.x, self.robot.y, 0.0],
             "init_robot_base_ori": [0.0, 0.0, self.robot.yaw],
         }
+
+
+def set_openness(fixture: Fixture, data: mujoco.MjData, openness: float) -> None:
+    """Open a drawer or the doors of a cabinet or appliance by a share of their full travel; for initial states."""
+    if isinstance(fixture, Drawer | HingeCabinet):
+        fixture.set_openness(data, openness)
+    elif isinstance(fixture, Appliance):
+        fixture.set_door(data, openness)
+    else:
+        raise AssertionError(f"{fixture.name} cannot be opened")

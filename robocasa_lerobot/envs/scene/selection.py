@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
 from robocasa_lerobot.envs.placement import Area, Footprint, PlacementError
+from robocasa_lerobot.envs.scene.appliances.sink import Sink
+from robocasa_lerobot.envs.scene.fixture_types import FIXTURE_KINDS
 from robocasa_lerobot.envs.scene.fixtures.base import Fixture
 from robocasa_lerobot.envs.scene.fixtures.cabinets import Drawer
-from robocasa_lerobot.envs.scene.fixtures.counters import Counter, Sink
-from robocasa_lerobot.envs.scene.fixtures.room import Slab, Window
+from robocasa_lerobot.envs.scene.fixtures.counters import Counter
+from robocasa_lerobot.envs.scene.fixtures.stools import SEAT_M
+from robocasa_lerobot.envs.scene.islands import STOOL_OUT_M
 from robocasa_lerobot.envs.scene.layout import Layout
 from robocasa_lerobot.envs.task import InsideOf, OnCounter, RobotStart
 from robocasa_lerobot.errors import UnknownNameError
@@ -29,15 +32,15 @@ BASE_BOX_X, BASE_BOX_Y = (-0.55, 0.15), (-0.25, 0.25)
 BASE_TOP_M = 0.38
 # Half size of the column above it, around the base centre, and the height that counts as its way.
 COLUMN_HALF_M, COLUMN_TOP_M = 0.13, 1.0
+# Forearm and hand in the initial pose: before the base centre, half width, and heights.
+HAND_X_M, HAND_HALF_M, HAND_Z_M = (0.0, 0.30), 0.11, (1.0, 1.6)
 MIN_REGION_WIDTH_M = 0.12
+TALL_STANDOFF_M = 0.10  # more, before fridges and tall housings (robocasa facts, section 6)
+HANDLE_OUT_M = 0.05
+HOUSING_BELOW_M = 0.6  # a housing whose underside is lower stands on the floor
 
-FIXTURE_KINDS: dict[str, Callable[[Fixture], bool]] = {
-    # Top drawers have their middle between 0.7 and 0.9 m (robocasa facts, section 6).
-    "drawer_top": lambda f: isinstance(f, Drawer) and 0.7 <= f.pos[2] <= 0.9,
-    "drawer": lambda f: isinstance(f, Drawer),
-    "sink": lambda f: isinstance(f, Sink),
-    "counter": lambda f: isinstance(f, Counter),
-}
+# Fixture types that nothing on a counter meets: shells, counters themselves, what is flat on a wall.
+NOT_IN_THE_WAY = ("counter", "floor", "wall", "window", "stool", "box", "panel_cabinet", "drawer")
 
 
 @dataclass(frozen=True)
@@ -64,17 +67,84 @@ def candidates(layout: Layout, kind: str) -> list[Fixture]:
     """
     if kind not in FIXTURE_KINDS:
         raise UnknownNameError("fixture kind", kind, FIXTURE_KINDS)
-    return [f for f in layout.fixtures.values() if FIXTURE_KINDS[kind](f)]
+    return [f for f in layout.fixtures.values() if FIXTURE_KINDS[kind](layout, f)]
 
 
 def counter_of(layout: Layout, fixture: Fixture) -> Counter:
-    """The counter above a base fixture, or around a sink."""
+    """The counter above a base fixture, around a sink, under an appliance, or nearest in front of what hangs.
+
+    Raises:
+        PlacementError: the fixture has no counter, e.g. a fridge.
+    """
+    if isinstance(fixture, Counter):
+        return fixture
     for counter in layout.fixtures.values():
-        if isinstance(counter, Counter):
-            local = _into(counter, fixture.pos[0], fixture.pos[1])
-            if abs(local[0]) <= counter.width / 2 and abs(local[1]) <= counter.depth / 2:
-                return counter
-    raise AssertionError(f"{fixture.name} stands under no counter")
+        if isinstance(counter, Counter) and _within(counter, fixture):
+            return counter
+    raise PlacementError(f"{fixture.name} has no counter")
+
+
+def ground_fixture(layout: Layout, fixture: Fixture) -> Fixture:
+    """What the robot stands before to reach a fixture: a counter, stove, tall housing or fridge."""
+    types = layout.types
+    if isinstance(fixture, Counter) or types[fixture.name].startswith(("stove", "fridge")):
+        return fixture if types[fixture.name] != "stovetop" else counter_of(layout, fixture)
+    ground = [
+        f
+        for name, f in layout.fixtures.items()
+        if isinstance(f, Counter)
+        or (
+            (types[name] in ("stove", "stove_wide", "housing_cabinet") or types[name].startswith("fridge"))
+            and f.pos[2] - f.height / 2 < HOUSING_BELOW_M
+        )
+    ]
+    for f in ground:
+        if _within(f, fixture):
+            return f
+    return min(ground, key=lambda f: float(np.hypot(f.pos[0] - fixture.pos[0], f.pos[1] - fixture.pos[1])))
+
+
+def _within(ground: Fixture, fixture: Fixture) -> bool:
+    local = _into(ground, fixture.pos[0], fixture.pos[1])
+    return abs(local[0]) <= ground.width / 2 and abs(local[1]) <= ground.depth / 2
+
+
+@dataclass(frozen=True)
+class Face:
+    """A side of a fixture that a robot may stand at.
+
+    Attributes:
+        turn: of the side's frame from the fixture's, radians; 0 is the front.
+        width, depth: of the fixture seen from there, metres.
+        clearance: kept free for stools, metres.
+    """
+
+    turn: float
+    width: float
+    depth: float
+    clearance: float = 0.0
+
+
+def faces(layout: Layout, ground: Fixture, fixture: Fixture) -> list[Face]:
+    """Sides of a ground fixture, the best first: the front, or for islands and tables any, at their stools last."""
+    front = Face(0.0, ground.width, ground.depth)
+    if not (isinstance(ground, Counter) and ground.back_face):
+        return [front]
+    stools = [_into(ground, *f.pos[:2])[1] for f in layout.of_type("stool") if _belongs(ground, f)]
+    room = STOOL_OUT_M + SEAT_M / 2
+    front = Face(0.0, ground.width, ground.depth, room if any(y < 0 for y in stools) else 0.0)
+    back = Face(np.pi, ground.width, ground.depth, room if any(y > 0 for y in stools) else 0.0)
+    if layout.types[fixture.name] == "stool":
+        return [back if _into(ground, *fixture.pos[:2])[1] > 0 else front]
+    if fixture is not ground:
+        return [front]
+    sides = [Face(turn, ground.depth, ground.width) for turn in (-np.pi / 2, np.pi / 2)]
+    return sorted([front, back, *sides], key=lambda face: (face.clearance, abs(face.turn) == np.pi / 2, abs(face.turn)))
+
+
+def _belongs(counter: Counter, stool: Fixture) -> bool:
+    x, y = _into(counter, *stool.pos[:2])
+    return abs(x) <= counter.width / 2 and abs(y) <= counter.depth / 2 + STOOL_OUT_M + 0.05
 
 
 def robot_pose(rng: np.random.Generator, layout: Layout, start: RobotStart, fixture: Fixture) -> RobotPose:
@@ -83,40 +153,72 @@ def robot_pose(rng: np.random.Generator, layout: Layout, start: RobotStart, fixt
     Raises:
         PlacementError: no pose was free.
     """
-    counter = counter_of(layout, fixture)
-    local_x = _into(counter, fixture.pos[0], fixture.pos[1])[0]
+    ground = ground_fixture(layout, fixture)
     lateral = fixture.width / 2 + BESIDE_CLEARANCE_M
     # Standing to the left of the fixture, it is at the robot's right, and the other way round.
     options = [("right", -lateral), ("left", lateral)] if start.beside else [("", 0.0)]
-    half_range = np.array(start.deviation)
-    for _ in range(SPAWN_ROUNDS):
-        for _ in range(SPAWN_TRIES):
-            order = rng.permutation(len(options))
-            deviation = rng.uniform(-1, 1, size=2) * half_range
-            for index in order:
-                side, offset = options[int(index)]
-                x = local_x + offset + float(deviation[0])
-                y = -counter.depth / 2 - ROBOT_STANDOFF_M - float(deviation[1])
-                world = counter.to_world((x, y, 0.0))
-                pose = RobotPose(float(world[0]), float(world[1]), counter.yaw + np.pi / 2, side)
-                if not _blocked(layout, pose):
-                    return pose
-        half_range = half_range + SPAWN_WIDENING_M
+    standoff = ROBOT_STANDOFF_M
+    if layout.types[ground.name] == "housing_cabinet" or layout.types[ground.name].startswith("fridge"):
+        standoff += TALL_STANDOFF_M
+    for face in faces(layout, ground, fixture):
+        half_range = np.array(start.deviation)
+        for _ in range(SPAWN_ROUNDS):
+            for _ in range(SPAWN_TRIES):
+                order = rng.permutation(len(options))
+                deviation = rng.uniform(-1, 1, size=2) * half_range
+                for index in order:
+                    side, offset = options[int(index)]
+                    local_x = _turned(_into(ground, fixture.pos[0], fixture.pos[1]), -face.turn)[0]
+                    x = local_x + offset + float(deviation[0])
+                    y = -face.depth / 2 - standoff - face.clearance - float(deviation[1])
+                    world = ground.to_world((*_turned((x, y), face.turn), 0.0))
+                    yaw = float(
+                        np.arctan2(
+                            np.sin(ground.yaw + face.turn + np.pi / 2), np.cos(ground.yaw + face.turn + np.pi / 2)
+                        )
+                    )
+                    pose = RobotPose(float(world[0]), float(world[1]), yaw, side)
+                    if not _blocked(layout, pose):
+                        return pose
+            half_range = half_range + SPAWN_WIDENING_M
     raise PlacementError(f"no free place for the robot at {fixture.name}")
 
 
+def _turned(point: tuple[float, float], angle: float) -> tuple[float, float]:
+    c, s = float(np.cos(angle)), float(np.sin(angle))
+    return c * point[0] - s * point[1], s * point[0] + c * point[1]
+
+
 def is_free(fixtures: Mapping[str, Fixture], pose: RobotPose) -> bool:
-    """Whether the robot can stand at a pose without touching a fixture."""
+    """Whether the robot can stand at a pose without touching a fixture, its arm as at the start of an episode."""
     column = Footprint(pose.x, pose.y, pose.yaw, (COLUMN_HALF_M, COLUMN_HALF_M))
     for body, top in ((pose.footprint(), BASE_TOP_M), (column, COLUMN_TOP_M)):
         standing = [f for f in fixtures.values() if f.pos[2] - f.height / 2 < top and f.name != "floor"]
-        if any(body.overlaps(footprint(f), SPAWN_MARGIN_M) for f in standing):
+        if any(body.overlaps(mark, SPAWN_MARGIN_M) for f in standing for mark in (footprint(f), *_handles(f, top))):
             return False
-    return True
+    low, high = HAND_Z_M
+    tall = [f for f in fixtures.values() if f.pos[2] - f.height / 2 < high and f.pos[2] + f.height / 2 > low]
+    hand = _hand(pose)
+    return not any(hand.overlaps(footprint(f)) for f in tall)
 
 
 def _blocked(layout: Layout, pose: RobotPose) -> bool:
     return not is_free(layout.fixtures, pose)
+
+
+def _hand(pose: RobotPose) -> Footprint:
+    """What the arm covers in its initial pose, before the base."""
+    along, half = (HAND_X_M[0] + HAND_X_M[1]) / 2, (HAND_X_M[1] - HAND_X_M[0]) / 2
+    x, y = pose.x + np.cos(pose.yaw) * along, pose.y + np.sin(pose.yaw) * along
+    return Footprint(float(x), float(y), pose.yaw, (half, HAND_HALF_M))
+
+
+def _handles(fixture: Fixture, top: float) -> list[Footprint]:
+    """The handle of a drawer that is low enough to be met: it stands out of the fixture's box."""
+    if not isinstance(fixture, Drawer) or fixture.pos[2] > top:
+        return []
+    x, y, _ = fixture.to_world((0.0, -fixture.depth / 2 - HANDLE_OUT_M / 2, 0.0))
+    return [Footprint(float(x), float(y), fixture.yaw, (fixture.width / 4, HANDLE_OUT_M / 2))]
 
 
 def footprint(fixture: Fixture) -> Footprint:
@@ -148,14 +250,19 @@ def counter_areas(layout: Layout, start: OnCounter, near: Fixture) -> tuple[list
             areas.append(Area(x0, x1, y0, y1, counter.pos[:2], counter.yaw, counter.surface_z))
     if not areas:
         raise PlacementError(f"no room on {counter.name} near {near.name}")
-    occupied = [
+    return areas, standing_on(layout, counter, counter.surface_z)
+
+
+def standing_on(layout: Layout, fixture: Fixture, surface_z: float) -> list[Footprint]:
+    """Footprints of the fixtures that stand on a surface of a fixture, or reach near it from above."""
+    return [
         footprint(f)
         for f in layout.fixtures.values()
-        if not isinstance(f, Counter | Slab | Window)
-        and f.pos[2] + f.height / 2 > counter.surface_z - 0.005
-        and f.pos[2] - f.height / 2 < counter.surface_z + 0.3
+        if f is not fixture
+        and layout.types[f.name] not in NOT_IN_THE_WAY
+        and f.pos[2] + f.height / 2 > surface_z - 0.005
+        and f.pos[2] - f.height / 2 < surface_z + 0.3
     ]
-    return areas, occupied
 
 
 def inside_area(start: InsideOf, fixture: Fixture, openness: float) -> Area:

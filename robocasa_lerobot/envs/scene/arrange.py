@@ -1,0 +1,222 @@
+"""Casts a layout's fixtures in the roles of a task, and puts the task's objects where they start."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from robocasa_lerobot.envs.placement import Area, Footprint, PlacementError, place
+from robocasa_lerobot.envs.scene.fixtures.base import Fixture
+from robocasa_lerobot.envs.scene.layout import Layout
+from robocasa_lerobot.envs.scene.objects import catalogue
+from robocasa_lerobot.envs.scene.sampling import Part, choose_parts, rectangle_in
+from robocasa_lerobot.envs.scene.scene import PlacedObject
+from robocasa_lerobot.envs.scene.selection import candidates, counter_areas, inside_area, standing_on
+from robocasa_lerobot.envs.task import FixtureWanted, ObjectWanted, OnCounter, Placement, Task
+
+PLACEMENT_GAP_M = 0.004  # objects start this far above their surface and settle
+IN_CONTAINER = "in_container"  # object group of what may stand in a container
+
+
+def cast_roles(rng: np.random.Generator, task: Task, layout: Layout) -> dict[str, str]:
+    """Fixture name of each role of a task.
+
+    Raises:
+        PlacementError: the layout has nothing for a role.
+    """
+    roles: dict[str, str] = {}
+    for wanted in task.fixtures:
+        pool = [f for f in candidates(layout, wanted.kind) if _suits(f, wanted, roles)]
+        if not pool:
+            raise PlacementError(
+                f"layout {layout.layout_id} has no {wanted.kind} for {wanted.role!r}. Name another kind, a smaller "
+                "size, or in `needs` what layouts must have."
+            )
+        if wanted.near:
+            ref = layout.fixtures[roles[wanted.near]]
+            roles[wanted.role] = min(pool, key=lambda f: _distance(f, ref)).name
+        else:
+            roles[wanted.role] = pool[int(rng.integers(len(pool)))].name
+    return roles
+
+
+def _suits(fixture: Fixture, wanted: FixtureWanted, roles: dict[str, str]) -> bool:
+    others = {roles[role] for role in wanted.other_than}
+    return fixture.name not in others and fixture.width >= wanted.size[0] and fixture.depth >= wanted.size[1]
+
+
+def _distance(fixture: Fixture, ref: Fixture) -> float:
+    """Metres on the floor plan from a point to the rectangle of a fixture."""
+    dx, dy = ref.pos[0] - fixture.pos[0], ref.pos[1] - fixture.pos[1]
+    c, s = np.cos(fixture.yaw), np.sin(fixture.yaw)
+    x, y = abs(c * dx + s * dy) - fixture.width / 2, abs(-s * dx + c * dy) - fixture.depth / 2
+    return float(np.hypot(max(x, 0.0), max(y, 0.0)))
+
+
+@dataclass
+class _Table:
+    """Where things have been put so far.
+
+    Attributes:
+        placed: objects by name.
+        taken: their footprints.
+        parts: which part of a fixture each object stands on.
+        used: categories.
+    """
+
+    placed: dict[str, PlacedObject] = field(default_factory=dict)
+    taken: list[tuple[Footprint, float]] = field(default_factory=list)
+    parts: dict[str, list[Part]] = field(default_factory=dict)
+    used: set[str] = field(default_factory=set)
+
+    def near(self, z: float) -> list[Footprint]:
+        """Footprints of what stands at about a height (metres), or on something there."""
+        return [footprint for footprint, height in self.taken if abs(height - z) < 0.15]
+
+
+def place_objects(
+    rng: np.random.Generator,
+    task: Task,
+    split: str,
+    layout: Layout,
+    roles: dict[str, str],
+    openness: dict[str, float],
+) -> dict[str, PlacedObject]:
+    """Draw the objects of a task and put them down, in the order in which they are declared.
+
+    Raises:
+        PlacementError: something has no free place.
+    """
+    table = _Table()
+    for wanted in task.objects:
+        count = int(rng.integers(wanted.count[0], wanted.count[1] + 1))
+        for index in range(count):
+            name = wanted.name if wanted.count == (1, 1) else f"{wanted.name}_{index}"
+            item = catalogue.sample(
+                rng,
+                wanted.groups,
+                split,
+                graspable=wanted.graspable,
+                washable=wanted.washable,
+                max_height=wanted.max_height,
+                exclude=frozenset(table.used),  # so that an instruction names one object of the scene
+            )
+            table.used.add(item.category.name)
+            _put(rng, table, wanted, name, item, split, layout, roles, openness)
+    return table.placed
+
+
+def _put(
+    rng: np.random.Generator,
+    table: _Table,
+    wanted: ObjectWanted,
+    name: str,
+    item: catalogue.Instance,
+    split: str,
+    layout: Layout,
+    roles: dict[str, str],
+    openness: dict[str, float],
+) -> None:
+    start = wanted.start
+    standing: list[Footprint] = []
+    if isinstance(start, OnCounter):
+        areas, standing = counter_areas(layout, start, layout.fixtures[roles[start.near]])
+    elif not isinstance(start, Placement):
+        fixture = layout.fixtures[roles[start.fixture]]
+        areas = [inside_area(start, fixture, openness.get(fixture.name, 0.0))]
+    elif start.object:
+        _put_on(rng, table, name, item, table.placed[start.object], start)
+        return
+    else:
+        fixture = layout.fixtures[roles[start.fixture]]
+        areas = _areas(table, name, start, fixture, layout, roles, openness)
+        standing = standing_on(layout, fixture, areas[0].z)
+        if start.try_to_place_in and IN_CONTAINER in _groups_of(item):
+            container = catalogue.sample(rng, (start.try_to_place_in,), split)
+            holder = f"{name}_container"
+            _put_down(rng, table, holder, container, areas, standing)
+            _put_on(rng, table, name, item, table.placed[holder], start)
+            return
+    _put_down(rng, table, name, item, areas, standing)
+
+
+def _groups_of(item: catalogue.Instance) -> set[str]:
+    """Groups of an object's category, with those that are made of others."""
+    found = set(item.category.groups)
+    if IN_CONTAINER in catalogue.GROUPS and item.category in catalogue.categories_of(IN_CONTAINER):
+        found.add(IN_CONTAINER)
+    return found
+
+
+def _areas(
+    table: _Table,
+    name: str,
+    start: Placement,
+    fixture: Fixture,
+    layout: Layout,
+    roles: dict[str, str],
+    openness: dict[str, float],
+) -> list[Area]:
+    region = start.region
+    ref = layout.fixtures[roles[region.ref]] if region.ref else None
+    if start.reuse_region_from:
+        parts = table.parts[start.reuse_region_from]
+    else:
+        parts = choose_parts(layout, start, fixture, ref, openness.get(fixture.name, 0.0))
+    table.parts[name] = parts
+    return [rectangle_in(part, start, fixture, ref) for part in parts]
+
+
+def _put_down(
+    rng: np.random.Generator,
+    table: _Table,
+    name: str,
+    item: catalogue.Instance,
+    areas: list[Area],
+    standing: list[Footprint],
+) -> None:
+    width, depth, height = item.size
+    high = [area for area in areas if area.height > height + PLACEMENT_GAP_M]
+    what = f"{name} ({item.model})"
+    if not high:
+        raise PlacementError(
+            f"{what} is {height:.2f} m high, and {areas[0].name} has {max(a.height for a in areas):.2f} m. Ask for a "
+            "lower object, for a higher part, or for another fixture."
+        )
+    footprint, area = place(rng, high, (width / 2, depth / 2), [*table.near(high[0].z), *standing], what=what)
+    table.taken.append((footprint, area.z))
+    z = area.z + height / 2 + PLACEMENT_GAP_M
+    table.placed[name] = PlacedObject(name, item, (footprint.x, footprint.y, z), footprint.yaw)
+
+
+def _put_on(
+    rng: np.random.Generator,
+    table: _Table,
+    name: str,
+    item: catalogue.Instance,
+    holder: PlacedObject,
+    start: Placement,
+) -> None:
+    """Put an object into, or onto, one that was placed: on the floor of its inside, else on its top."""
+    x, y, z = holder.pos
+    inside = getattr(holder.item, "interior", None)
+    if inside is not None:
+        (cx, cy, cz), half = inside.center, inside.half
+        floor = z + cz - half[2]
+    else:
+        (cx, cy), half = (0.0, 0.0), (0.35 * holder.item.size[0], 0.35 * holder.item.size[1], 0.0)
+        floor = z + holder.item.size[2] / 2
+    area = Area(cx - half[0], cx + half[0], cy - half[1], cy + half[1], (x, y), holder.yaw, floor, holder.name)
+    area = replace(area, rotation=start.rotation, inside=start.ensure_inside)
+    others = [
+        Footprint(p.pos[0], p.pos[1], p.yaw, (p.item.size[0] / 2, p.item.size[1] / 2))
+        for other, p in table.placed.items()
+        if other != holder.name and abs(p.pos[2] - p.item.size[2] / 2 - floor) < 0.03
+    ]
+    width, depth, height = item.size
+    what = f"{name} ({item.model})"
+    footprint, _ = place(rng, [area], (width / 2, depth / 2), others, margin=0.002, what=what)
+    at = (footprint.x, footprint.y, floor + height / 2 + PLACEMENT_GAP_M)
+    table.placed[name] = PlacedObject(name, item, at, footprint.yaw)
+    table.taken.append((footprint, floor))

@@ -1,0 +1,129 @@
+"""Is a kitchen sound: fixtures apart, walkways wide, objects at rest. For tests and the sweep over all kitchens."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from robocasa_lerobot.envs.placement import Footprint
+from robocasa_lerobot.envs.scene.fixtures.base import Fixture
+from robocasa_lerobot.envs.scene.layout import Layout
+from robocasa_lerobot.envs.scene.scene import Scene
+from robocasa_lerobot.envs.scene.selection import footprint
+
+PENETRATION_M = 0.002  # that fixtures may have
+WALKWAY_M = 1.0  # free before everything that opens
+SETTLE_S, MOVED_M = 1.0, 0.01
+_PROBE_M = 0.05  # thickness of the slices that walkways are looked through in
+_OPENING = ("drawer", "hinge_cabinet", "single_cabinet", "dishwasher", "oven", "stove", "stove_wide", "stovetop")
+_FRIDGES = ("fridge_french_door", "fridge_side_by_side", "fridge_bottom_freezer")
+_BELOW_M = 0.9  # what begins above it is in no robot's way
+
+
+@dataclass(frozen=True)
+class Overlap:
+    """Two fixtures that reach into each other, by this depth in metres."""
+
+    first: str
+    second: str
+    depth: float
+
+
+def overlaps(model: mujoco.MjModel, data: mujoco.MjData, fixtures: dict[str, Fixture]) -> list[Overlap]:
+    """Colliding geoms of different fixtures that reach more than 2 mm into each other, the deepest of each pair.
+
+    Before: positions are evaluated.
+    """
+    owner = _owners(model, fixtures)
+    geoms = np.flatnonzero((owner >= 0) & (model.geom_contype != 0))
+    centers, halves = _boxes(model, data, geoms)
+    names = list(fixtures)
+    deepest: dict[tuple[int, int], float] = {}
+    for index, geom in enumerate(geoms):
+        apart = np.abs(centers[index + 1 :] - centers[index]) - halves[index + 1 :] - halves[index]
+        near = geoms[index + 1 :][(apart < -PENETRATION_M).all(axis=1) & (owner[geoms[index + 1 :]] != owner[geom])]
+        for other in near:
+            distance = mujoco.mj_geomDistance(model, data, int(geom), int(other), 0.001, None)
+            if distance < -PENETRATION_M:
+                first, second = sorted((int(owner[geom]), int(owner[other])))
+                deepest[first, second] = min(deepest.get((first, second), 0.0), float(distance))
+    return [Overlap(names[a], names[b], round(-depth, 5)) for (a, b), depth in sorted(deepest.items())]
+
+
+def _owners(model: mujoco.MjModel, fixtures: dict[str, Fixture]) -> NDArray[np.intp]:
+    """Number of the fixture that each geom belongs to, -1 for none."""
+    roots = {model.body(name).id: number for number, name in enumerate(fixtures)}
+    body_owner = np.full(model.nbody, -1, dtype=np.intp)
+    for body in range(1, model.nbody):  # parents come before children
+        body_owner[body] = roots.get(body, body_owner[model.body_parentid[body]])
+    return np.asarray(body_owner[model.geom_bodyid])
+
+
+def _boxes(
+    model: mujoco.MjModel, data: mujoco.MjData, geoms: NDArray[np.intp]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Middles and half sizes of boxes along the room's axes around geoms, metres."""
+    rotations = data.geom_xmat[geoms].reshape(-1, 3, 3)
+    centers = data.geom_xpos[geoms] + (rotations @ model.geom_aabb[geoms, :3, None])[:, :, 0]
+    halves = (np.abs(rotations) @ model.geom_aabb[geoms, 3:, None])[:, :, 0]
+    return centers, halves
+
+
+def blocked_walkways(layout: Layout) -> list[str]:
+    """What opens at the floor and has less than a metre free before it, with what is in the way."""
+    room = layout.room
+    standing = [
+        f
+        for name, f in layout.fixtures.items()
+        if f.pos[2] - f.height / 2 < _BELOW_M and layout.types[name] not in ("stool", "floor", "wall")
+    ]
+    marks = [(f, footprint(f), float(np.hypot(f.width, f.depth)) / 2) for f in standing]
+    found = []
+    for fixture in layout.of_type(*_OPENING, *_FRIDGES):
+        if fixture.pos[2] - fixture.height / 2 > _BELOW_M:
+            continue
+        away = WALKWAY_M / 2 + 0.08  # the first centimetres are handles and the counter's edge
+        half = (fixture.width / 2 - 0.03, (WALKWAY_M - 0.16) / 2)
+        x, y, _ = fixture.to_world((0.0, -fixture.depth / 2 - away, 0.0))
+        way = Footprint(float(x), float(y), fixture.yaw, half)
+        corners = way.corners()
+        low, high = corners.min(axis=0), corners.max(axis=0)
+        if low[0] < room["x_min"] or high[0] > room["x_max"] or low[1] < room["y_min"] or high[1] > 0:
+            found.append(f"{fixture.name}: a wall")
+        reach = float(np.hypot(*half))
+        found += [
+            f"{fixture.name}: {other.name}"
+            for other, mark, radius in marks
+            if other is not fixture and np.hypot(mark.x - x, mark.y - y) < radius + reach and way.overlaps(mark)
+        ]
+    return found
+
+
+def moved(scene: Scene, data: mujoco.MjData) -> dict[str, float]:
+    """Metres that each object moved in a second after it had settled; doors and drawers by their joints, too.
+
+    `data` is the state at the episode's start; it is stepped.
+    """
+    model = scene.model
+    objects = {name: data.body(name).xpos.copy() for name in scene.objects}
+    robot = model.body("robot0_base").id
+    still = [
+        j
+        for j in range(model.njnt)
+        if model.jnt_type[j] in (mujoco.mjtJoint.mjJNT_HINGE, mujoco.mjtJoint.mjJNT_SLIDE)
+        and model.body_rootid[model.jnt_bodyid[j]] != robot
+    ]
+    before = data.qpos[model.jnt_qposadr[still]].copy()
+    for _ in range(round(SETTLE_S / model.opt.timestep)):
+        mujoco.mj_step(model, data)
+    found = {name: float(np.linalg.norm(data.body(name).xpos - start)) for name, start in objects.items()}
+    travel = np.abs(data.qpos[model.jnt_qposadr[still]] - before)
+    return found | {model.joint(j).name: float(way) for j, way in zip(still, travel, strict=True)}
+
+
+def fell(scene: Scene, data: mujoco.MjData) -> dict[str, float]:
+    """Metres that each object has left the place where it was put down, along z; `data` is the episode's start."""
+    return {name: float(abs(data.body(name).xpos[2] - placed.pos[2])) for name, placed in scene.objects.items()}
