@@ -3,9 +3,12 @@
 A slider starts at a place drawn from the seed, and the first action component moves it; the goal has two terms.
 Faults are asked for through the task's name, so that they reach the worker processes: `Slide+crash` raises at step 2,
 `+kill` ends the process, `+hang` sleeps for ever, each only once, or n times with `+crashxN`; `+slow` takes its time.
+`SLIDE_FAULTY_SEEDS` (JSON, seed -> fault) has those that happen in every attempt at a trial; `sigkill` and `nan` too.
 """
 
+import json
 import os
+import signal
 import time
 from pathlib import Path
 from typing import Any, ClassVar
@@ -40,6 +43,7 @@ class SlideEnv(gymnasium.Env):
         super().reset(seed=seed)
         self._place = float(self.np_random.uniform(-1, 1))
         self._seed, self._step, self._reached = seed, 0, False
+        self._always = json.loads(os.environ.get("SLIDE_FAULTY_SEEDS", "{}")).get(str(seed))
         return self._observe(), {**self._info(), "seed": seed}
 
     def step(self, action):
@@ -48,6 +52,8 @@ class SlideEnv(gymnasium.Env):
             time.sleep(0.02)
         elif self._fault and self._step == 2:
             self._fail()
+        if self._always and self._step == 2:
+            self._happen(self._always)
         self._place += 0.2 * float(action[0])
         self._reached = self._reached or self._place > 0.5
         success = self._place > 0.8
@@ -70,7 +76,7 @@ class SlideEnv(gymnasium.Env):
         if self.render_observations:
             for index, camera in enumerate(contract.CAMERAS):
                 picture = np.full_like(self._pixels[camera], 30 + 60 * index)
-                column = int(np.clip((self._place + 2) / 4, 0, 0.99) * picture.shape[1])
+                column = int(np.clip(np.nan_to_num(self._place + 2) / 4, 0, 0.99) * picture.shape[1])
                 picture[:, column] = (255, 128, 0)
                 self._pixels[camera] = picture
         state = np.zeros(contract.STATE_SIZE)
@@ -84,10 +90,17 @@ class SlideEnv(gymnasium.Env):
         if len(list(marks.iterdir())) >= int(times or 1):
             return
         (marks / f"{time.time_ns()}").touch()
+        self._happen(kind)
+
+    def _happen(self, kind):
         if kind == "crash":
             raise RuntimeError("the block fell off")
         if kind == "kill":
             os._exit(7)
+        if kind == "sigkill":
+            os.kill(os.getpid(), signal.SIGKILL)
+        if kind == "nan":
+            self._place = float("nan")
         if kind == "hang":
             time.sleep(3600)
 
