@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+import policy_support
 import torch
 from flow_vla_support import TINY, write_pretrained
 
@@ -134,6 +135,8 @@ def tiny_settings(kind: str, folder: Path) -> dict[str, Any]:
             "num_domains": 2, "tokenizer_max_length": 12, "resize_imgs_with_padding": [32, 32],
             "num_denoising_steps": 2,
         }  # fmt: skip
+    if kind == "diffusion_transformer":
+        return {name: value for name, value in policy_support.TINY.items() if name != "device"}
     if kind.startswith("flow_vla"):
         tiny = {**TINY, "image_size": list(TINY["image_size"])}
         del tiny["device"]

@@ -22,7 +22,7 @@ from robocasa_lerobot.data.mixture import MixtureMeta
 from robocasa_lerobot.errors import UserError
 from robocasa_lerobot.evaluation.checkpoints import read_source
 from robocasa_lerobot.evaluation.plan import make_plan
-from robocasa_lerobot.evaluation.policy_runner import load_policy
+from robocasa_lerobot.evaluation.policy_runner import load_actor
 from robocasa_lerobot.evaluation.rollout import run_trial
 from robocasa_lerobot.policies.needs import NEEDS, explained
 from robocasa_lerobot.training import builders
@@ -34,9 +34,11 @@ FILES = sorted(FOLDER.glob("*.yaml"))
 OURS = ("diffusion_transformer", "flow_vla")
 LEROBOTS = ("act", "diffusion", "multi_task_dit", "smolvla", "xvla", "pi0", "pi05", "groot")
 OFFLINE = ("act", "diffusion", "multi_task_dit", "smolvla", "xvla")
-# The two with full ResNets take long; small ones of both are in the fast tests of training.
+DOWNLOADED = ("pi0", "pi05", "groot")  # 3 billion parameters whatever the settings, or weights that must be there
+# The two with full ResNets take long.
 RESUMED = [
     *(pytest.param(kind, marks=pytest.mark.slow) if kind in ("act", "diffusion") else kind for kind in OFFLINE),
+    "diffusion_transformer",
     "flow_vla",
     "flow_vla_smolvlm",
     "flow_vla_paligemma",
@@ -112,6 +114,7 @@ def test_every_policy_has_a_file() -> None:
     kinds = {settings(path)["type"] for path in FILES}
     assert kinds == {*OURS, *LEROBOTS}
     assert set(NEEDS) == set(LEROBOTS)
+    assert {*OURS, *OFFLINE} == kinds - set(DOWNLOADED)  # those that are trained in tests
 
 
 @pytest.mark.parametrize("path", FILES, ids=lambda path: path.stem)
@@ -137,7 +140,8 @@ def test_published_settings(kind: str, published: dict[str, Any]) -> None:
 
 
 def experiment_file(folder: Path, data: Path, kind: str, models: Path) -> Path:
-    file = FOLDER / f"{'flow_vla_demo' if kind.startswith('flow_vla') else kind}.yaml"
+    own = next((ours for ours in OURS if kind.startswith(ours)), None)
+    file = FOLDER / f"{f'{own}_demo' if own else kind}.yaml"
     content = {
         "name": "test",
         "output_dir": str(folder / "out"),
@@ -179,12 +183,13 @@ def test_two_steps_and_two_more_equal_four_and_a_trial(kind: str, data: Path, tm
     assert all(torch.equal(whole[name], resumed[name]) for name in whole)
     assert any(not torch.equal(whole[name], value) for name, value in weights(at_once, "train", "000000").items())
 
-    runner = load_policy(read_source(str(at_once / "out/train/checkpoints/000004/pretrained_model")), "cpu", None)
+    runner = load_actor(read_source(str(at_once / "out/train/checkpoints/000004/pretrained_model")), "cpu", None)
     (trial,) = make_plan(["test"], {"Slide": 6}, trials=1, seed=3, videos=0)
     actions = []
     for _ in range(2):
-        runner.reset(seed=5)
-        observation, _ = SlideEnv("Slide", image_size=SIZE).reset(seed=1)
+        env = SlideEnv("Slide", image_size=SIZE)
+        observation, _ = env.reset(seed=1)
+        runner.reset(5, env)
         actions.append(np.stack([runner.act(observation, "open the left drawer") for _ in range(6)]))
         assert actions[-1].shape == (6, contract.ACTION_SIZE)
         assert np.isfinite(actions[-1]).all()
