@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from scipy.stats import norm
 
 from robocasa_lerobot.data.published import published_task_sets
 from robocasa_lerobot.evaluation import published
@@ -86,10 +87,7 @@ def trials(
         own = np.random.default_rng([2, *task.encode(), *label.encode(), *perturbation.encode()])
         noise, errors = own.normal(size=count), own.random(count) < 0.002
         mixed = np.sqrt(luck_share) * scenes + np.sqrt(1 - luck_share) * noise
-        # The share of a standard normal below its own quantile: success with exactly this probability.
-        threshold = (
-            float("-inf") if rate <= 0 else float(np.quantile(np.random.default_rng(3).normal(size=20001), rate))
-        )
+        threshold = norm.ppf(rate)  # success with exactly this probability
         for trial in range(count):
             success = bool(mixed[trial] < threshold) and not errors[trial]
             first = int(horizon * min(0.999, 0.15 + 0.8 * own.beta(2, 3))) if success else None
