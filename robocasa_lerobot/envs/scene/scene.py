@@ -12,13 +12,14 @@ from robocasa_lerobot.contract import ACTION_SIZE
 from robocasa_lerobot.envs.cameras import camera_configs
 from robocasa_lerobot.envs.control.controller import RobotController
 from robocasa_lerobot.envs.control.step import control_step
-from robocasa_lerobot.envs.scene.appliances.base import Appliance
+from robocasa_lerobot.envs.scene.appliances.base import Appliance, update_all
 from robocasa_lerobot.envs.scene.appliances.sink import Sink
 from robocasa_lerobot.envs.scene.fixtures.base import Fixture, yaw_quat
 from robocasa_lerobot.envs.scene.fixtures.cabinets import Drawer, HingeCabinet
 from robocasa_lerobot.envs.scene.layout import Layout
 from robocasa_lerobot.envs.scene.objects.catalogue import Instance
 from robocasa_lerobot.envs.scene.robot import place_base, set_home
+from robocasa_lerobot.envs.scene.robot_names import GRIPPER
 from robocasa_lerobot.envs.scene.selection import RobotPose
 from robocasa_lerobot.envs.task import Task
 
@@ -107,8 +108,15 @@ class Scene:
         hold = np.zeros(ACTION_SIZE)
         for _ in range(SETTLE_STEPS):
             control_step(self.model, data, controller, hold)
+            self.update_appliances(data)
         data.time = 0.0
         return data, controller
+
+    def update_appliances(self, data: mujoco.MjData) -> None:
+        """Let appliances latch, time and light up, once after each control step."""
+        appliances = [fixture for fixture in self.fixtures.values() if isinstance(fixture, Appliance)]
+        if appliances:
+            update_all(appliances, self.model, data, self.model.body(GRIPPER).id)
 
     def ep_meta(self) -> dict[str, Any]:
         """Description of the episode in RoboCasa's keys (JSON-able)."""
