@@ -88,10 +88,10 @@ class Dishwasher(Appliance):
             (0, front + DOOR_M, -height / 2 + _KICK_M),
             (1, 0, 0),
             (0.0, np.pi / 2),
-            mass=4.0,
+            mass=2.4,
             size=(width, DOOR_M, door_h),
-            center=(0, -DOOR_M / 2, door_h * 0.4),
-            friction=13.0,
+            center=(0, 0.010, door_h * 0.4),  # weighed so that it stays shut
+            friction=9.0,
             damping=2.0,
             armature=0.05,
         )

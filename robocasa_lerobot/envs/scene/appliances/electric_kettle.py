@@ -134,8 +134,8 @@ class ElectricKettle(Appliance):
             (0, hinge_y + 0.012, rim - 0.004),
             (0, front + 0.016, rim - 0.004),
             (0, front, rim - 0.026),
-            (0, front + 0.004, low + 0.075),
-            (0, foot_y + 0.004, low + 0.040),
+            (0, front + 0.004, low + 0.105),
+            (0, foot_y + 0.004, low + 0.080),
         ]
         parts.pipe(root, path, 0.0115, grip, sides=8, name="grip")
         # The lid's button on top of the handle, near the hinge.
@@ -158,7 +158,7 @@ class ElectricKettle(Appliance):
         )
         parts.spring(switch, 90.0, -0.012)
         parts.hold("switch", _SWITCH_M)
-        parts.box(switch, (0, -0.004, 0), (0.034, 0.036, 0.010), "light_red" if grip == "black" else "black")
+        parts.box(switch, (0, -0.004, 0), (0.044, 0.036, 0.010), "light_red" if grip == "black" else "black")
         parts.box(switch, (0, (foot_y - y) / 2, 0), (0.012, abs(foot_y - y), 0.008), "black", collide=False)
         # A lamp around the foot of the body.
         radius = self.width / 2

@@ -139,10 +139,10 @@ def add_oven_door(
         (0, -depth / 2 + DOOR_M, low),
         (1, 0, 0),
         (0.0, np.pi / 2),
-        mass=3.0,
+        mass=2.0,
         size=(door_w, DOOR_M, door_h),
-        center=(0, -DOOR_M / 2, door_h * 0.35),
-        friction=6.5,
+        center=(0, 0.010, door_h * 0.35),  # weighed so that it stays shut
+        friction=4.5,
         damping=1.5,
         armature=0.05,
     )

@@ -90,6 +90,11 @@ class Parts(Shapes):
             damping=[damping],
             frictionloss=friction,
             armature=armature,
+            # Dry friction that does not creep: doors stay where they are left.
+            solref_friction=[0.004, 1.0],
+            solimp_friction=[0.998, 0.9999, 0.001, 0.5, 2.0],
+            solref_limit=[0.006, 1.0],
+            solimp_limit=[0.98, 0.999, 0.001, 0.5, 2.0],
         )
         base.set_inertia(body, mass, size, center)
         return body
@@ -217,6 +222,8 @@ class Parts(Shapes):
         )
         equality.name1 = f"{self.name}_{part}_joint"
         equality.data[0] = at
+        equality.solref = [0.004, 1.0]
+        equality.solimp = [0.99, 0.999, 0.001, 0.5, 2.0]
         equality.active = False
 
     def handle(

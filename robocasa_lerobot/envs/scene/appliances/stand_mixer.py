@@ -155,6 +155,7 @@ class StandMixer(Appliance):
             damping=0.4,
             armature=0.02,
         )
+        parts.hold("head", 0.0)
         # Along y: a loft of rings from the back to the nose.
         wide = width * 0.52
         shape: tuple[tuple[float, float], ...]

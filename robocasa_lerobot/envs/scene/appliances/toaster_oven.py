@@ -18,7 +18,9 @@ _TICK_STEPS = 10  # the clockwork moves its knob twice a second
 _RESTING_SHARE = 0.0005  # of the door: closer than this it is shut
 
 DOOR_M, PANEL_M = 0.024, 0.095
-_FOOT_M = 0.014
+_FOOT_M, _SILL_M = 0.018, 0.042
+# Short of level, so that the handle of the open door keeps clear of the counter.
+DOOR_MAX = 1.40
 KNOBS = ("knob_function", "knob_temp", "knob_doneness", "knob_time")
 
 
@@ -83,14 +85,14 @@ class ToasterOven(Appliance):
 
     def _cavity(self) -> tuple[np.ndarray, np.ndarray]:
         width, depth, height = self.size
-        low = np.array([-width / 2 + 0.016, -depth / 2 + DOOR_M, -height / 2 + _FOOT_M + 0.022])
+        low = np.array([-width / 2 + 0.016, -depth / 2 + DOOR_M, -height / 2 + _FOOT_M + _SILL_M])
         high = np.array([width / 2 - PANEL_M, depth / 2 - 0.022, height / 2 - 0.026])
         return low, high
 
     def _levels(self) -> list[float]:
         low, high = self._cavity()
         room = high[2] - low[2]
-        return [float(low[2] + room * share) for share in ((0.22,) if len(self.racks) == 1 else (0.12, 0.50))]
+        return [float(low[2] + room * share) for share in ((0.24,) if len(self.racks) == 1 else (0.20, 0.56))]
 
     def assemble(self, parts: Parts, root: mujoco.MjsBody) -> None:
         """Add case, panel with knobs, racks, heating wires and door."""
@@ -98,7 +100,7 @@ class ToasterOven(Appliance):
         finish = self.record["finish"]
         low, high = self._cavity()
         case_low = (-width / 2, -depth / 2 + DOOR_M, -height / 2 + _FOOT_M)
-        walls = {"left": 0.016, "right": PANEL_M, "bottom": 0.022, "top": 0.026, "back": 0.022, "front": 0.0}
+        walls = {"left": 0.016, "right": PANEL_M, "bottom": _SILL_M, "top": 0.026, "back": 0.022, "front": 0.0}
         parts.shell(root, case_low, (width / 2, depth / 2, height / 2), walls, finish, "cavity")
         for x in (-1, 1):
             for y in (-1, 1):
@@ -162,10 +164,10 @@ class ToasterOven(Appliance):
             "door",
             (middle, -depth / 2 + DOOR_M, bottom),
             (1, 0, 0),
-            (0.0, np.pi / 2),
+            (0.0, DOOR_MAX),
             mass=0.5,
             size=(door_w, DOOR_M, door_h),
-            center=(0, -DOOR_M / 2, door_h * 0.4),
+            center=(0, 0.006, door_h * 0.4),  # weighed so that it stays shut
             friction=0.9,
             damping=0.3,
             armature=0.01,
