@@ -39,6 +39,7 @@ class Bench:
         self.finger = self.model.body("finger").id
         self.toucher = self.finger
         self.mocap = int(self.model.body("finger").mocapid[0])
+        self.way = np.zeros(3)  # that the finger pushes
         self.goal = PARKED.copy()  # of the finger's holder, reached at the end of a control step
 
     # Time -----------------------------------------------------------------------------------------------------
@@ -96,11 +97,25 @@ class Bench:
                 if leave:
                     self.retreat()
                 return True
-            self.park()
-            self.step(1)
+            self.retreat()
+        return False
+
+    def press(self, button: str) -> bool:
+        """Press a button for half a second with the finger, then take the finger away."""
+        joint = self.model.joint(self.it.joint(button)).id
+        for geom, along in self._spots(button, joint):
+            self._follow(button, geom, along, 1.0, 2.0, 0.5, 0.0)
+            pressed = self.share(button) > 0.75
+            self.retreat()
+            if pressed:
+                return True
         return False
 
     def retreat(self) -> None:
+        """Move the finger back the way that it came, then take it away."""
+        for _ in range(8):
+            self.goal = self.goal - self.way * 0.004
+            self.step()
         self.park()
         self.step(2)
 
@@ -160,6 +175,7 @@ class Bench:
     ) -> bool:
         joint = self.model.joint(self.it.joint(part)).id
         touch, way = self._target(joint, geom, along, sign)
+        self.way = way
         self.goal = touch - way * 0.004
         self.data.mocap_pos[self.mocap] = self.goal
         mujoco.mj_forward(self.model, self.data)
@@ -178,6 +194,7 @@ class Bench:
             if still > 24:
                 return False  # this spot does not do
             touch, way = self._target(joint, geom, along, sign)
+            self.way = way
             # Ahead of the part by what the springs give: no more than MOST_GIVE_M.
             press = min(press + 0.002, MOST_GIVE_M)
             goal = touch + way * press
@@ -231,7 +248,8 @@ class Bench:
         self._pads(-PAD_FORCE)
         self.step(4)
         self.toucher = self.finger
-        self.retreat()
+        self.park()
+        self.step(2)
 
     def _pads(self, force: float) -> None:
         for index in range(2):
@@ -273,9 +291,9 @@ def _add_finger(spec: mujoco.MjSpec) -> None:
     body = root
     for index, axis in enumerate(np.eye(3)):
         body = body.add_body(name=f"finger_{'xyz'[index]}_body", gravcomp=1.0)
-        body.add_joint(
-            name=f"finger_{'xyz'[index]}", type=mujoco.mjtJoint.mjJNT_SLIDE, axis=axis.tolist()
-        )
+        if index == 0:
+            body.sleep = mujoco.mjtSleepPolicy.mjSLEEP_NEVER  # as a robot, which its actuators keep awake
+        body.add_joint(name=f"finger_{'xyz'[index]}", type=mujoco.mjtJoint.mjJNT_SLIDE, axis=axis.tolist())
         body.joints[0].stiffness = [SPRING, 0, 0]
         body.joints[0].damping = [60.0, 0, 0]
         body.mass, body.explicitinertial = 0.3, True

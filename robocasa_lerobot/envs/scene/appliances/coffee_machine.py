@@ -139,7 +139,7 @@ class CoffeeMachine(Appliance):
         x = self.width * (0.0 if self.record["family"] in ("capsule", "pod") else 0.27)
         finish = "silver" if self.record["finish"] not in ("silver", "steel", "white", "cream") else "black"
         parts.tube(root, (x, face - 0.001, z), 0.0225, 0.004, "chrome", axis="y", collide=False)
-        parts.button(root, "start_button", (x, face - 0.010, z), (0.034, 0.034, 0.012), finish, round_=True)
+        parts.button(root, "start_button", (x, face - 0.013, z), (0.034, 0.034, 0.015), finish, round_=True)
         lamp = parts.lamp(root, "power", (0, 0.012, 0), (0, 0, 0))
         parts.tube(lamp, (x, face - 0.0025, z), 0.0215, 0.003, "light_green", axis="y", segments=14, collide=False)
 

@@ -88,10 +88,10 @@ class Dishwasher(Appliance):
             (0, front + DOOR_M, -height / 2 + _KICK_M),
             (1, 0, 0),
             (0.0, np.pi / 2),
-            mass=2.4,
+            mass=1.6,
             size=(width, DOOR_M, door_h),
             center=(0, 0.010, door_h * 0.4),  # weighed so that it stays shut
-            friction=9.0,
+            friction=6.0,
             damping=2.0,
             armature=0.05,
         )

@@ -124,7 +124,7 @@ class Microwave(Appliance):
         start_z, stop_z = -0.20 * height, -0.37 * height
         button = "silver" if finish != "silver" else "white"
         for part, z, mark in (("start_button", start_z, "light_green"), ("stop_button", stop_z, "light_red")):
-            body = parts.button(root, part, (x, front - 0.006, z), (0.062, 0.028, 0.010), button)
+            body = parts.button(root, part, (x, front - 0.009, z), (0.062, 0.028, 0.013), button)
             parts.box(body, (0, -0.0005, 0), (0.014, 0.002, 0.006), mark, collide=False)
         # Display, lamp and the light inside come out of their covers together.
         lamp = parts.lamp(root, "power", (0, 0.012, 0), (0, 0, 0))

@@ -15,6 +15,7 @@ from robocasa_lerobot.envs.scene.fixtures.base import Region, yaw_quat
 
 # Robocasa facts, section 7.
 LOCK_FROM, HEAD_DOWN = 0.75, 0.01
+LOCK_RELEASED = 0.25  # the lock has come out
 HEAD_MAX = 0.75  # radians
 _BASE_M, _BOWL_SIDES = 0.030, 10
 
@@ -63,7 +64,7 @@ class StandMixer(Appliance):
         elif held and memory[0] == 1:
             self.catch(model, data, "head_lock", held=False)
             held, memory[0] = False, 2
-        elif not held and not touched:
+        elif not held and not touched and self.share(data, "head_lock") < LOCK_RELEASED:
             memory[0] = 0
         self.catch(model, data, "head", held=held and self.share(data, "head") <= HEAD_DOWN)
         self.show(data, "power", float(self.share(data, "knob_speed") > 0.02))
