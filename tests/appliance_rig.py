@@ -120,7 +120,7 @@ class Bench:
         self.step(2)
 
     def _spots(self, part: str, joint: int):
-        """Places on a part to push at: the geoms that can be touched, farthest from a hinge first; middle, then ends."""
+        """Places on a part to push at: the geoms that can be touched, farthest from a hinge first; then their ends."""
         moved = in_subtree(self.model, self.model.body(f"it_{part}").id)[self.model.geom_bodyid]
         geoms = np.flatnonzero(moved & (self.model.geom_contype > 0)).tolist()
         anchor, axis = self.data.xanchor[joint], self.data.xaxis[joint]

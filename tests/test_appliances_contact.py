@@ -234,19 +234,20 @@ def test_sink(model_id):
     it, data = bench.it, bench.data
     bench.start()
     assert not it.water_on(data)
-    assert bench.state()["temperature"] == pytest.approx(0.5)
+    assert bench.state()["temperature"] == pytest.approx(0.4)
     assert bench.push("handle", 0.40), "the lever lifts"
     assert it.water_on(data)
     bench.step(1)
     shown = [s for s in ("cold_low", "cold_high", "hot_low", "hot_high") if it.lit(data, f"water_{s}")]
-    assert shown == ["hot_low"]
+    assert shown == ["cold_low"]
     assert bench.push("handle", 0.9)
     assert bench.state()["high"]
-    assert bench.push("handle_temp", 0.0)
-    assert not bench.state()["hot"]
     assert it.lit(data, "water_cold_high")
     assert bench.push("handle_temp", 1.0)
     assert bench.state()["hot"]
+    assert it.lit(data, "water_hot_high")
+    assert bench.push("handle_temp", 0.0)
+    assert not bench.state()["hot"]
     assert bench.push("handle", 0.0)
     assert not it.water_on(data)
     assert not any(it.lit(data, f"water_{s}") for s in ("cold_low", "cold_high", "hot_low", "hot_high"))

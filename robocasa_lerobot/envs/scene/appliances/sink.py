@@ -20,6 +20,7 @@ SIDE_FROM = np.pi / 6
 SET_ON = (0.40, 0.50)  # a faucet that starts on
 
 HANDLE_MAX, TEMP_MAX, SPOUT_MAX = 1.2, 1.6, 1.2
+TEMP_START = 0.4  # share of the temperature when nobody has set it: cold, but not by a hair
 WALL_M, RIM_M = 0.012, 0.020
 _FAUCET_BACK_M = 0.055  # from the basin's rear edge
 _STREAMS = ("cold_low", "cold_high", "hot_low", "hot_high")
@@ -197,7 +198,7 @@ class Sink(Appliance):
             damping=0.05,
             armature=0.003,
         )
-        turn.joints[0].ref = TEMP_MAX / 2
+        turn.joints[0].ref = TEMP_START * TEMP_MAX
         parts.tube(turn, (0, 0, 0.002), 0.0185, 0.026, metal, bevel=0.004, collide=False)
         # Lifting turns about the axis to the left of the lever's direction, downwards.
         axis = np.cross(out, [0.0, 0.0, 1.0])
