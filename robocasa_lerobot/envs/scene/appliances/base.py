@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, field
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import mujoco
 import numpy as np
@@ -71,7 +71,8 @@ class Appliance(Fixture):
     memory_slots: ClassVar[int] = 0
     looks: ClassVar[dict[str, dict[str, float]]] = {"": {}}
     _memory_at: int = field(default=-1, init=False, repr=False)
-    _woken: set[int] = field(default_factory=set, init=False, repr=False)
+    _places: dict[str, tuple[int, int, float, float]] = field(default_factory=dict, init=False, repr=False)
+    _places_of: Any = field(default=None, init=False, repr=False)
     _changed: bool = field(default=False, init=False, repr=False)
 
     def build(self, spec: mujoco.MjSpec, palette: MaterialPalette) -> None:
@@ -122,24 +123,34 @@ class Appliance(Fixture):
 
     def position(self, data: mujoco.MjData, part: str) -> float:
         """Position of a part's joint, radians or metres."""
-        return float(data.joint(self.joint(part)).qpos[0])
+        return float(data.qpos[self._place(data, part)[0]])
 
     def share(self, data: mujoco.MjData, part: str) -> float:
         """Position of a part as a share of its range; from the other end where the range begins below zero."""
-        low, high = data.model.joint(self.joint(part)).range
-        share = (self.position(data, part) - low) / (high - low)
-        return float(1.0 - share if low < 0 else share)
+        address, _, low, high = self._place(data, part)
+        share = (float(data.qpos[address]) - low) / (high - low)
+        return 1.0 - share if low < 0 else share
 
     def set_share(self, data: mujoco.MjData, part: str, share: float) -> None:
         """Put a part at a share of its range; for initial states. Evaluate positions afterwards."""
-        low, high = data.model.joint(self.joint(part)).range
+        _, _, low, high = self._place(data, part)
         share = 1.0 - share if low < 0 else share
-        self.set_position(data, part, float(low + share * (high - low)))
+        self.set_position(data, part, low + share * (high - low))
 
     def set_position(self, data: mujoco.MjData, part: str, position: float) -> None:
         """Put a part's joint at a position, radians or metres; for initial states."""
-        joint = data.joint(self.joint(part))
-        joint.qpos[0], joint.qvel[0] = position, 0.0
+        address, dof, _, _ = self._place(data, part)
+        data.qpos[address], data.qvel[dof] = position, 0.0
+
+    def _place(self, data: mujoco.MjData, part: str) -> tuple[int, int, float, float]:
+        """Index into qpos and qvel of a part's joint, and its range; looked up once, since this is asked often."""
+        if self._places_of is not data.model:
+            self._places_of, self._places = data.model, {}
+        if part not in self._places:
+            joint = data.model.joint(self.joint(part))
+            low, high = (float(v) for v in joint.range)
+            self._places[part] = (int(joint.qposadr[0]), int(joint.dofadr[0]), low, high)
+        return self._places[part]
 
     def lit(self, data: mujoco.MjData, part: str) -> bool:
         """Whether a lamp is shown."""
@@ -171,7 +182,7 @@ class Appliance(Fixture):
 
     def show(self, data: mujoco.MjData, part: str, share: float) -> None:
         """Show a lamp (1), hide it (0), or show a part of it."""
-        position = float(share * data.model.joint(self.joint(part)).range[1])
+        position = share * self._place(data, part)[3]
         if self.position(data, part) != position:
             self.set_position(data, part, position)
             self._changed = True
@@ -185,7 +196,7 @@ class Appliance(Fixture):
 
     def wake(self, model: mujoco.MjModel, data: mujoco.MjData, part: str) -> None:
         """Let a part move that may be asleep."""
-        tree = int(model.dof_treeid[model.joint(self.joint(part)).dofadr[0]])
+        tree = int(model.dof_treeid[self._place(data, part)[1]])
         self._changed = True
         # What sleeps together is a cycle of numbers.
         while data.tree_asleep[tree] >= 0:
