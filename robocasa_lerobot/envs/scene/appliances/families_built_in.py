@@ -247,15 +247,15 @@ BUILT_IN: tuple[Kind, ...] = (
         (
             Family(
                 "gas",
-                (0.58, 0.50, 0.05),
-                (0.76, 0.53, 0.06),
+                (0.58, 0.50, 0.010),
+                (0.76, 0.53, 0.015),
                 ("steel", "black", "black_steel", "white", "warm_steel"),
                 {"knob": ("round", "bar"), "hob": ("gas",), "burners": (4, 5)},
             ),
             Family(
                 "ceramic",
-                (0.58, 0.50, 0.04),
-                (0.76, 0.53, 0.05),
+                (0.58, 0.50, 0.010),
+                (0.76, 0.53, 0.015),
                 ("black", "graphite", "steel", "white"),
                 {"knob": ("round",), "hob": ("glass",), "burners": (4,)},
             ),

@@ -223,7 +223,7 @@ class Stove(Hob):
 
 @dataclass
 class Stovetop(Hob):
-    """A hob let into a counter, with knobs on top; its upper face lies 12 mm above the counter's."""
+    """A hob with knobs on top; its box is the plate that stands out of the counter."""
 
     looks: ClassVar = {
         "off": {},
@@ -237,14 +237,11 @@ class Stovetop(Hob):
         return {location: (x * 1.08 - 0.075, y * 1.05 + 0.01) for location, (x, y) in burners.items()}
 
     def assemble(self, parts: Parts, root: mujoco.MjsBody) -> None:
-        """Add the tub, the plate, burners and knobs."""
+        """Add the plate, burners and knobs."""
         width, depth, height = self.size
         top = height / 2
-        plate = 0.012
-        tub = ((-width / 2 + 0.02, -depth / 2 + 0.02, -top), (width / 2 - 0.02, depth / 2 - 0.02, top - plate))
-        parts.span(root, *tub, "graphite")
         finish = "dark_glass" if self.record["hob"] == "glass" else self.record["finish"]
-        parts.span(root, (-width / 2, -depth / 2, top - plate), (width / 2, depth / 2, top), finish, name="hob")
+        parts.span(root, (-width / 2, -depth / 2, -top), (width / 2, depth / 2, top), finish, name="hob")
         if self.record["hob"] == "glass":
             for side in (-1, 1):
                 parts.box(
