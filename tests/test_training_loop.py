@@ -22,6 +22,7 @@ from robocasa_lerobot.data.fake import write_fake_dataset
 from robocasa_lerobot.errors import UserError
 from robocasa_lerobot.training import metrics as module
 from robocasa_lerobot.training.augment import augment
+from robocasa_lerobot.training.builders import frame_size, policy_config
 from robocasa_lerobot.training.checkpoint import CHECKPOINTS, last_checkpoint, prune, tidy
 from robocasa_lerobot.training.config import TRACKERS
 from robocasa_lerobot.training.interrupts import REQUEUE
@@ -235,3 +236,21 @@ def test_lines_of_metrics_are_json(tmp_path: Path, data: Path) -> None:
     run_experiment(tiny(tmp_path, data), stop_after=1)
     (line,) = (tmp_path / "out/pretrain/metrics.jsonl").read_text().splitlines()
     assert json.loads(line)["step"] == 1
+
+
+@pytest.mark.parametrize(
+    ("settings", "size"),
+    [
+        ({"type": "flow_vla", "image_size": [32, 48]}, (32, 48)),
+        ({"type": "flow_vla"}, (128, 128)),
+        ({"type": "flow_vla", "prefix": "pretrained"}, None),  # that of the model, known once it is loaded
+        ({"type": "diffusion_transformer", "image_size": [32, 48]}, (32, 48)),
+        ({"type": "diffusion_transformer"}, None),
+        ({"type": "diffusion", "resize_shape": [32, 48]}, (32, 48)),
+        ({"type": "act"}, None),
+    ],
+)
+def test_frames_are_cached_at_the_size_that_the_policy_brings_them_to(
+    settings: dict[str, Any], size: tuple[int, int] | None
+) -> None:
+    assert frame_size(policy_config(settings, None, "cpu")) == size
