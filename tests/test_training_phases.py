@@ -17,6 +17,7 @@ from training_support import experiment_file, losses, metrics, tiny, weights
 
 from robocasa_lerobot.data.fake import write_fake_dataset
 from robocasa_lerobot.data.mixture import open_mixture
+from robocasa_lerobot.data.source import DatasetSource
 from robocasa_lerobot.errors import UserError
 from robocasa_lerobot.training import builders, evaluations, joining
 from robocasa_lerobot.training.adapters import apply_training_scope, merged_state
@@ -144,6 +145,33 @@ def test_replay_draws_its_share_from_earlier_phases(tmp_path: Path, data: Path, 
         tiny(tmp_path, data, overrides=["--phases.pretrain.replay.share=0.25"])
     with pytest.raises(UserError, match="Did you mean 'pretrain'"):
         tiny(tmp_path, data, overrides=["--phases.finetune.replay={phases: [pretran]}"])
+
+
+def test_datasets_of_several_phases_are_opened_once(
+    tmp_path: Path, data: Path, other: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Three phases on two datasets with replay of what was before: each dataset is a member once."""
+    path = experiment_file(tmp_path, data)
+    content = yaml.safe_load(path.read_text())
+    second = {**content["phases"][1], "mixture": {"members": [{"root": str(other)}]}, "replay": {"share": 0.5}}
+    third = {**second, "name": "third", "mixture": {"members": [{"root": str(data)}]}, "statistics": "pool"}
+    content["phases"][1:] = [second, third]
+    path.write_text(yaml.safe_dump(content))
+    experiment = load_experiment(path)
+    count: list[Path] = []
+    whole = DatasetSource.__init__
+
+    def counted(self: DatasetSource, root: Path) -> None:
+        count.append(root)
+        whole(self, root)
+
+    monkeypatch.setattr(DatasetSource, "__init__", counted)
+    dataset = joining.open_phase_data(experiment, experiment.phases[2])
+    assert sorted(count) == sorted([data, other])
+    assert [member.root for member in dataset.config.members] == [str(data), str(other)]
+    np.testing.assert_allclose(dataset.probabilities, [0.75, 0.25])  # a half, and a half of the replayed half
+    joining.pooled(experiment, experiment.phases[2], dataset)
+    assert len(count) == 2
 
 
 def test_frozen_parts_stay(tmp_path: Path, data: Path, pretrained: Path) -> None:

@@ -70,14 +70,19 @@ class MixtureDataset(torch.utils.data.Dataset[Item]):
     An item has every column of the frame, and for the keys of `delta_timestamps` a leading time axis and
     `<key>_is_pad` (true where the window leaves the episode and repeats its edge). Images are uint8
     (time, 3, H, W), other floats float32; `task` is the instruction and `task_index` its place in `meta.tasks`.
-    Index i counts the frames of the first member's dataset, then of the second's, and so on.
+    Index i counts the frames of the first member's dataset, then of the second's, and so on. Datasets in `opened` are
+    not opened again, and those that are opened are added to it.
 
     Raises:
         UserError: members that do not fit each other, or that have no such episodes.
     """
 
     def __init__(
-        self, config: MixtureConfig, image_size: int | None = None, loader: LoaderConfig | None = None
+        self,
+        config: MixtureConfig,
+        image_size: int | None = None,
+        loader: LoaderConfig | None = None,
+        opened: dict[Path, DatasetSource] | None = None,
     ) -> None:
         config, loader = resolve_mixture(config), loader or LoaderConfig()
         self.config, self.image_size = config, image_size if image_size is not None else loader.image_size
@@ -90,7 +95,11 @@ class MixtureDataset(torch.utils.data.Dataset[Item]):
         self._max_open = loader.cache_open_files
         self._cache_dir = Path(loader.cache_dir) if loader.cache_dir else None
         roots = dict.fromkeys(Path(member.root) for member in config.members)
-        self.sources = {root: DatasetSource(root) for root in roots}
+        opened = {} if opened is None else opened
+        for root in roots:
+            if root not in opened:
+                opened[root] = DatasetSource(root)
+        self.sources = {root: opened[root] for root in roots}
         _check_alike(list(self.sources.values()), any_image_size=image_size is not None)
         # Whether the numbers of all datasets stay on disk, mapped into memory as they are used.
         self._mapped = sum(s.column_bytes for s in self.sources.values()) > loader.cache_columns_above_gb * 1e9
@@ -317,14 +326,16 @@ class StepBatches(torch.utils.data.Dataset[Item]):
         return self.dataset.batch(*self.sampler.draw(position, self._share))
 
 
-def open_mixture(config: MixtureConfig, loader: LoaderConfig) -> MixtureDataset:
-    """The mixture with the fake datasets made that it asks for; pictures are not cached yet."""
+def open_mixture(
+    config: MixtureConfig, loader: LoaderConfig, opened: dict[Path, DatasetSource] | None = None
+) -> MixtureDataset:
+    """The mixture with the fake datasets made that it asks for; pictures are not cached yet. `opened` as above."""
     for member in config.members:
         if member.make_fake and not Path(member.root).exists():
             from robocasa_lerobot.data.fake import write_fake_dataset
 
             write_fake_dataset(Path(member.root))
-    return MixtureDataset(config, loader=loader)
+    return MixtureDataset(config, loader=loader, opened=opened)
 
 
 def _is_image(feature: Mapping[str, Any]) -> bool:

@@ -4,27 +4,34 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Sequence
+from pathlib import Path
 
-from robocasa_lerobot.data.config import MixtureConfig
+from robocasa_lerobot.data.config import MemberConfig, MixtureConfig
 from robocasa_lerobot.data.mixture import MixtureDataset, open_mixture
+from robocasa_lerobot.data.source import DatasetSource
 from robocasa_lerobot.data.statistics import Statistics
 from robocasa_lerobot.errors import UserError
 from robocasa_lerobot.training.config import ExperimentConfig, PhaseConfig
 
+type Opened = dict[Path, DatasetSource]
 
-def open_phase_data(experiment: ExperimentConfig, phase: PhaseConfig) -> MixtureDataset:
+
+def open_phase_data(experiment: ExperimentConfig, phase: PhaseConfig, opened: Opened | None = None) -> MixtureDataset:
     """The phase's mixture, with its share of earlier phases' samples.
+
+    A dataset is opened once, however many phases have it; `opened` carries those that are open already.
 
     Raises:
         UserError: as `open_mixture`.
     """
-    own = open_mixture(phase.mixture, experiment.loader)
+    opened = {} if opened is None else opened
+    own = open_mixture(phase.mixture, experiment.loader, opened)
     earlier = experiment.replayed(phase)
     if phase.replay is None or not earlier:
         return own
-    again = [open_mixture(other.mixture, experiment.loader) for other in earlier]
+    again = [open_mixture(other.mixture, experiment.loader, opened) for other in earlier]
     shares = [1 - phase.replay.share, *[phase.replay.share / len(again)] * len(again)]
-    return open_mixture(joined([own, *again], shares), experiment.loader)
+    return open_mixture(joined([own, *again], shares), experiment.loader, opened)
 
 
 def pooled(experiment: ExperimentConfig, phase: PhaseConfig, dataset: MixtureDataset) -> Statistics:
@@ -43,15 +50,20 @@ def pooled(experiment: ExperimentConfig, phase: PhaseConfig, dataset: MixtureDat
         )
     samples = [other.steps * other.batch_size for other in [phase, *earlier]]
     shares = [count / sum(samples) for count in samples]
-    before = [open_phase_data(experiment, other) for other in earlier]
-    return open_mixture(joined([dataset, *before], shares), experiment.loader).statistics()
+    opened = dict(dataset.sources)
+    before = [open_phase_data(experiment, other, opened) for other in earlier]
+    return open_mixture(joined([dataset, *before], shares), experiment.loader, opened).statistics()
 
 
 def joined(datasets: Sequence[MixtureDataset], shares: Sequence[float]) -> MixtureConfig:
-    """One mixture that draws from each of several by its share, and inside each as it does."""
-    members = [
-        dataclasses.replace(member, weight=float(probability * share), group=None)
-        for dataset, share in zip(datasets, shares, strict=True)
-        for member, probability in zip(dataset.config.members, dataset.probabilities, strict=True)
-    ]
-    return MixtureConfig(members=members)
+    """One mixture that draws from each of several by its share, and inside each as it does.
+
+    What several have is one member of it, with the weights added.
+    """
+    members: dict[str, MemberConfig] = {}
+    for dataset, share in zip(datasets, shares, strict=True):
+        for member, probability in zip(dataset.config.members, dataset.probabilities, strict=True):
+            plain = dataclasses.replace(member, weight=None, group=None)
+            weight = members[repr(plain)].weight or 0.0 if repr(plain) in members else 0.0
+            members[repr(plain)] = dataclasses.replace(plain, weight=weight + float(probability * share))
+    return MixtureConfig(members=list(members.values()))
