@@ -18,7 +18,7 @@ export PYTHONUNBUFFERED := 1
 export UV_HTTP_TIMEOUT ?= 300
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
-.PHONY: help setup demo test test-slow lint format lock doctor bench bench-convert clean
+.PHONY: help setup demo test test-slow lint format lock doctor bench bench-convert bench-grasps clean
 
 help:  ## this list
 	@sed -n 's/^\([a-z-]*\):.*  ## /\1\t/p' Makefile | awk -F '\t' '{printf "  make %-13s %s\n", $$1, $$2}'
@@ -70,6 +70,10 @@ bench: $(STAMP)  ## our simulator beside robosuite's, in one run
 # `make bench-convert BENCH_ARGS=--quick` takes about 10 minutes.
 bench-convert: $(STAMP)  ## our converter beside LeRobot's and the official one, in one run
 	$(BIN)/python benchmarks/convert_speed.py $(BENCH_ARGS)
+
+# Takes about 10 minutes; `BENCH_ARGS=--quick` one. Continues where it was stopped.
+bench-grasps: $(STAMP)  ## which objects a gripper can lift: every instance, the best of 16 poses
+	$(BIN)/python benchmarks/grasps.py $(BENCH_ARGS)
 
 # Keeps the pinned versions that still fit; `make lock LOCK_ARGS=--upgrade` takes the newest ones.
 lock: $(STAMP)  ## pin pyproject.toml's dependencies in requirements.lock

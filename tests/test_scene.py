@@ -18,11 +18,8 @@ from robocasa_lerobot.envs.scene.builder import build_scene
 from robocasa_lerobot.envs.scene.fixtures.cabinets import FULL_TRAVEL_OF_DEPTH, Drawer
 from robocasa_lerobot.envs.scene.layout import layout_ids, load_layout, split_of
 from robocasa_lerobot.envs.scene.materials import MaterialPalette, load_style, style_ids
-from robocasa_lerobot.envs.scene.objects import catalogue
-from robocasa_lerobot.envs.scene.objects.shapes import SHAPES, add_object
 from robocasa_lerobot.envs.scene.soundness import overlaps
 from robocasa_lerobot.envs.scene.textures import GENERATORS, TextureRecord, texture_png
-from robocasa_lerobot.errors import UnknownNameError
 
 
 @pytest.mark.parametrize("kind", GENERATORS)
@@ -80,50 +77,6 @@ def test_drawers_open_by_their_full_travel():
     drawer = next(f for f in load_layout(1).fixtures.values() if isinstance(f, Drawer))
     assert drawer.full_travel == pytest.approx(FULL_TRAVEL_OF_DEPTH * drawer.depth)
     assert FULL_TRAVEL_OF_DEPTH == 0.55
-
-
-@pytest.mark.parametrize("name", catalogue.CATEGORIES)
-@pytest.mark.parametrize("index", range(0, catalogue.INSTANCES_PER_CATEGORY, 3))
-def test_every_object_rests_on_a_surface(name, index):
-    item = catalogue.instance(catalogue.CATEGORIES[name], index)
-    spec = mujoco.MjSpec()
-    spec.option.timestep = 0.002
-    spec.option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
-    spec.worldbody.add_geom(type=mujoco.mjtGeom.mjGEOM_PLANE, size=[2, 2, 0.1])
-    add_object(spec, MaterialPalette(spec, load_style(1)), "obj", item)
-    model = spec.compile()
-    data = mujoco.MjData(model)
-    data.joint("obj_joint0").qpos[2] = item.size[2] / 2 + 0.004
-    for _ in range(1500):
-        mujoco.mj_step(model, data)
-    position = data.joint("obj_joint0").qpos[:3]
-    assert np.linalg.norm(position[:2]) < 0.03, "rolled away"
-    assert abs(position[2] - item.size[2] / 2) < 0.01, "sank or fell over"
-    assert model.body("obj").mass[0] > 0.001
-    # What is said to be graspable fits between the fingers.
-    if item.category.graspable:
-        assert min(item.size[:2]) < 0.078
-
-
-def test_object_splits_share_no_instance_and_cover_all():
-    pretrain, target = (set(catalogue.split_indices(s)) for s in catalogue.SPLITS)
-    assert not pretrain & target
-    assert pretrain | target == set(range(catalogue.INSTANCES_PER_CATEGORY))
-    with pytest.raises(UnknownNameError, match="target"):
-        catalogue.split_indices("targets")
-    with pytest.raises(UnknownNameError, match="fruit"):
-        catalogue.categories_of("fruits")
-    assert {c.shape for c in catalogue.CATEGORIES.values()} == set(SHAPES)
-
-
-def test_samples_have_the_properties_asked_for():
-    rng = np.random.default_rng(0)
-    for _ in range(50):
-        item = catalogue.sample(rng, ("any",), "target", graspable=True, washable=True, max_height=0.1)
-        assert item.category.graspable
-        assert item.category.washable
-        assert item.size[2] <= 0.1
-        assert item.index in catalogue.split_indices("target")
 
 
 def test_footprints_overlap_as_rectangles_do():

@@ -33,7 +33,7 @@ class Recording:
         observations: robosuite-named proprioception, each (T, k); pictures (T, S, S, 3) uint8 if asked for.
         rewards: (T,) 1 where the goal held in states[t].
         model_file: MJCF.
-        assets: texture files that the MJCF names.
+        assets: files of textures and objects that the MJCF names.
         ep_meta: description of the scene.
     """
 
@@ -108,7 +108,9 @@ def record_episode(env: KitchenEnv, seed: int, *, action_noise: float = 0.0, ima
         observations={key: np.array(values) for key, values in buffer.observations.items()},
         rewards=np.array(buffer.rewards),
         model_file=model_file,
-        assets={name: data for name, data in env.scene.spec.assets.items() if name.startswith("textures/")},
+        assets={
+            name: data for name, data in env.scene.spec.assets.items() if name.startswith(("textures/", "objects/"))
+        },
         ep_meta={**env.scene.ep_meta(), "action_noise": action_noise},
     )
 
