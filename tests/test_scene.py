@@ -17,7 +17,7 @@ from robocasa_lerobot.envs.scene.assembly import bare_kitchen
 from robocasa_lerobot.envs.scene.builder import build_scene
 from robocasa_lerobot.envs.scene.fixtures.cabinets import FULL_TRAVEL_OF_DEPTH, Drawer
 from robocasa_lerobot.envs.scene.layout import layout_ids, load_layout, split_of
-from robocasa_lerobot.envs.scene.materials import MaterialPalette, load_style, style_ids
+from robocasa_lerobot.envs.scene.materials import style_ids
 from robocasa_lerobot.envs.scene.soundness import overlaps
 from robocasa_lerobot.envs.scene.textures import GENERATORS, TextureRecord, texture_png
 
