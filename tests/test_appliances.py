@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import mujoco
+import numpy as np
 import pytest
 
+from robocasa_lerobot.envs.scene.appliances.base import OPEN_FROM
 from robocasa_lerobot.envs.scene.appliances.catalogue import (
     build_appliance,
     categories,
@@ -14,6 +16,7 @@ from robocasa_lerobot.envs.scene.appliances.catalogue import (
     models_of,
 )
 from robocasa_lerobot.envs.scene.appliances.finishes import finish, finish_names
+from robocasa_lerobot.envs.scene.appliances.pictures import appliance_pictures
 from robocasa_lerobot.envs.scene.materials import MaterialPalette, load_style
 from robocasa_lerobot.errors import UnknownNameError
 
@@ -89,3 +92,107 @@ def compiled(model_id, **kwargs):
 def test_models_compile(model_id):
     _, model = compiled(model_id)
     assert model.ngeom > 0
+
+
+@pytest.mark.parametrize("model_id", SAMPLE)
+def test_built_in_models_fill_their_slot(model_id):
+    size = tuple(1.06 * edge for edge in model_of(model_id).size)
+    fixture, model = compiled(model_id, size=size)
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    low, high = np.full(3, np.inf), np.full(3, -np.inf)
+    for geom in range(model.ngeom):
+        if model.geom_contype[geom]:
+            rotation, size_of = np.abs(data.geom_xmat[geom].reshape(3, 3)), model.geom_size[geom]
+            if model.geom_type[geom] == mujoco.mjtGeom.mjGEOM_BOX:
+                extent = rotation @ size_of
+            elif model.geom_type[geom] == mujoco.mjtGeom.mjGEOM_CYLINDER:
+                extent = rotation[:, 2] * size_of[1] + size_of[0] * np.sqrt(1 - np.clip(rotation[:, 2], 0, 1) ** 2)
+            else:
+                continue
+            low = np.minimum(low, data.geom_xpos[geom] - extent)
+            high = np.maximum(high, data.geom_xpos[geom] + extent)
+    half = np.array(size) / 2
+    assert low[2] == pytest.approx(-half[2], abs=0.03)  # none sinks in
+    assert low[2] > -half[2] - 1e-6
+    if fixture.record.category in ("fridge", "dishwasher", "oven", "stove"):
+        assert high[0] == pytest.approx(half[0], abs=0.012)
+        assert low[0] == pytest.approx(-half[0], abs=0.012)
+        assert high[1] == pytest.approx(half[1], abs=0.012)
+
+
+@pytest.mark.parametrize("model_id", SAMPLE)
+def test_regions_lie_inside(model_id):
+    fixture, model = compiled(model_id)
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    half = np.array(fixture.size) / 2
+    for name, region in fixture.regions.items():
+        for corner in np.array(np.meshgrid(*[(-1, 1)] * 3)).reshape(3, -1).T:
+            point = region.world(data, corner * region.half)
+            assert (np.abs(point) <= half + 1e-3).all(), (name, point, half)
+            assert region.contains(data, region.world(data, 0.99 * corner * region.half))
+
+
+@pytest.mark.parametrize("kind", kinds())
+def test_initial_states_can_be_set(kind):
+    fixture, model = compiled(models_of(kind)[0].model_id)
+    data = mujoco.MjData(model)
+    for share in (0.0, 0.5, 1.0):
+        fixture.set_door(data, share)
+        for door in fixture.doors:
+            assert fixture.share(data, door) == pytest.approx(share)
+        assert fixture.is_open(data) == (share >= OPEN_FROM or not fixture.doors)
+        assert fixture.is_closed(data) == (share == 0.0 or not fixture.doors)
+    for rack in (*getattr(fixture, "racks", ()), *getattr(fixture, "sliding", ())):
+        mujoco.mj_resetData(model, data)
+        fixture.set_rack(data, 0.7, rack)
+        assert fixture.state(data)[rack] == pytest.approx(0.7)
+        assert fixture.is_open(data)
+
+
+@pytest.mark.parametrize("model_id", [r.model_id for kind in kinds() for r in models_of(kind)[:3]])
+def test_burners_take_every_level(model_id):
+    fixture, model = compiled(model_id)
+    if fixture.record.category != "stove":
+        return
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    for location in fixture.burners:
+        for draw in (0.0, 0.5, 1.0):
+            for level, reads in (("off", ("off",)), ("low", ("low",)), ("high", ("high",)), ("on", ("low", "high"))):
+                fixture.set_burner(data, location, level, draw)
+                assert fixture.burner_level(data, location) in reads, (level, draw)
+        site = data.site(f"it_burner_on_{location}").xpos
+        assert fixture.nearest_burner(data, site + np.array([0.01, 0.0, 0.1])) == (location, pytest.approx(0.01))
+
+
+@pytest.mark.parametrize("kind", [k for k in kinds() if k.startswith("fridge")])
+def test_fridges_have_usable_shelves_and_a_drawer(kind):
+    for record in models_of(kind):
+        fixture = build_appliance(record.model_id, "it", (0.0, 0.0, record.size[2] / 2))
+        highest, second = fixture.shelf(-1), fixture.shelf(-2)
+        assert highest.center[2] > second.center[2], record.model_id
+        assert fixture.drawers
+
+
+def test_a_mug_under_the_spout_is_told_from_one_beside_it():
+    for record in models_of("coffee_machine")[:8]:
+        fixture, model = compiled(record.model_id)
+        data = mujoco.MjData(model)
+        mujoco.mj_forward(model, data)
+        place = np.array(fixture.place)
+        assert fixture.under_spout(data, place)
+        assert fixture.under_spout(data, place + np.array([0.03, 0.0, 0.09]))
+        assert not fixture.under_spout(data, place + np.array([0.05, 0.0, 0.0]))
+        assert not fixture.under_spout(data, place + np.array([0.0, 0.0, 0.11]))
+
+
+@pytest.mark.render
+@pytest.mark.parametrize("kind", kinds())
+def test_states_can_be_seen(kind):
+    pictures = appliance_pictures(models_of(kind)[0].model_id, size=96)
+    first, *others = [picture.astype(int) for picture in pictures.values()]
+    assert first.std() > 5
+    for name, other in zip(list(pictures)[1:], others, strict=True):
+        assert (np.abs(first - other).max(axis=-1) > 30).sum() >= 4, name

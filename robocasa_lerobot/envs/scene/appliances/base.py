@@ -23,6 +23,7 @@ from robocasa_lerobot.envs.scene.materials import MaterialPalette
 
 # A door counts as open, or as closed, by these shares of its range (robocasa facts, section 7).
 OPEN_FROM, CLOSED_UP_TO = 0.90, 0.005
+RACK_DOOR_FROM = 0.99  # the door must be this open for a rack to slide
 _AWAKE = -(1 + 10)  # of `tree_asleep`: awake, and 10 quiet steps (mjMINAWAKE) away from sleep
 
 
@@ -114,6 +115,14 @@ class Appliance(Fixture):
         """Open one door, or all, by a share of its range; for initial states."""
         for door in self.doors if part is None else (part,):
             self.set_share(data, door, share)
+
+    def set_rack(self, data: mujoco.MjData, share: float, rack: str) -> None:
+        """Slide a rack or drawer out by a share of its range; doors in its way are opened. For initial states."""
+        if share > 0.0:
+            for door in self.doors:
+                if self.share(data, door) < RACK_DOOR_FROM:
+                    self.set_share(data, door, 1.0)
+        self.set_share(data, rack, share)
 
     # Joints ----------------------------------------------------------------------------------------------------
 

@@ -7,6 +7,7 @@ from typing import ClassVar
 
 import mujoco
 import numpy as np
+from numpy.typing import NDArray
 
 from robocasa_lerobot.envs.scene.appliances import meshes
 from robocasa_lerobot.envs.scene.appliances.base import Appliance, Touches
@@ -15,7 +16,8 @@ from robocasa_lerobot.envs.scene.fixtures.base import Region
 
 POUR_STEPS = 160  # control steps that coffee is seen to run
 _TRAY_M, _CUP_ROOM_M = 0.030, 0.145
-# Of the middle of a mug that stands on the tray (robocasa facts, section 7: |dz| < 0.10 m of this point).
+# Of a mug's middle to where it belongs, horizontally and up or down, metres (robocasa facts, section 7).
+UNDER_SPOUT_M = (0.04, 0.10)
 _PLACE_ABOVE_TRAY_M = 0.045
 
 
@@ -45,6 +47,11 @@ class CoffeeMachine(Appliance):
     def set_on(self, data: mujoco.MjData, on: bool) -> None:
         """Switch it; for initial states."""
         self.set_share(data, "power", float(on))
+
+    def under_spout(self, data: mujoco.MjData, point: NDArray[np.float64]) -> bool:
+        """Whether a mug with its middle at a world point stands where the coffee runs."""
+        away = data.site(f"{self.name}_receptacle").xpos - point
+        return bool(np.linalg.norm(away[:2]) < UNDER_SPOUT_M[0] and abs(away[2]) < UNDER_SPOUT_M[1])
 
     def react(self, model: mujoco.MjModel, data: mujoco.MjData, contacts: Touches) -> None:
         """Start by touch; coffee runs for a while."""

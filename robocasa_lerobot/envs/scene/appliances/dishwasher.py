@@ -13,7 +13,6 @@ from robocasa_lerobot.envs.scene.appliances.parts import Parts
 from robocasa_lerobot.envs.scene.fixtures.base import Region
 
 DOOR_M, _KICK_M, _WALL_M = 0.050, 0.10, 0.022
-RACK_DOOR_FROM = 0.99  # the door must be this open for a rack to slide (robocasa facts, section 7)
 _RACKS = {"rack0": 0.10, "rack1": 0.56}  # level of each as a share of the inside
 _RIM_M = {"rack0": 0.12, "rack1": 0.07}
 
@@ -51,12 +50,6 @@ class Dishwasher(Appliance):
     def state(self, data: mujoco.MjData) -> dict[str, float | bool]:
         """Shares of the ranges of door and racks."""
         return {part: self.share(data, part) for part in (*self.doors, *self.racks)}
-
-    def set_rack(self, data: mujoco.MjData, share: float, rack: str = "rack1") -> None:
-        """Slide a rack out by a share of its range, opening the door if need be; for initial states."""
-        if self.share(data, "door") < RACK_DOOR_FROM:
-            self.set_share(data, "door", 1.0)
-        self.set_share(data, rack, share)
 
     def _inside(self) -> tuple[np.ndarray, np.ndarray]:
         width, depth, height = self.size

@@ -7,6 +7,7 @@ from typing import ClassVar
 
 import mujoco
 import numpy as np
+from numpy.typing import NDArray
 
 from robocasa_lerobot.envs.scene.appliances import meshes
 from robocasa_lerobot.envs.scene.appliances.base import Appliance, Touches
@@ -77,6 +78,15 @@ class Hob(Appliance):
         }[level]
         # Just inside, since the upper end of "low" is already "high".
         self.set_position(data, f"knob_{location}", low + min(draw, 0.999) * (high - low))
+
+    def nearest_burner(self, data: mujoco.MjData, point: NDArray[np.float64]) -> tuple[str, float]:
+        """The burner nearest to a world point, and its horizontal distance, metres."""
+        reach = {
+            location: float(np.linalg.norm(data.site(f"{self.name}_burner_on_{location}").xpos[:2] - point[:2]))
+            for location in self.burners
+        }
+        nearest = min(reach, key=lambda location: reach[location])
+        return nearest, reach[nearest]
 
     def react(self, model: mujoco.MjModel, data: mujoco.MjData, contacts: Touches) -> None:
         """Flames and rings follow the knobs."""

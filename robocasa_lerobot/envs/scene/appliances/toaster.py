@@ -45,7 +45,7 @@ class Toaster(Appliance):
             for index, (x, y) in enumerate(self._slots(side)):
                 half_x, half_y = self._slot_half()
                 regions[f"slot{2 * side + index}"] = Region(
-                    f"{self.name}_lever{side}", (x, y, 0.05), (half_x, half_y, 0.05)
+                    f"{self.name}_lever{side}", (x, y, 0.028), (half_x, half_y, 0.028)
                 )
         return regions
 
