@@ -15,6 +15,7 @@ import yaml
 from safetensors.torch import load_file
 from training_support import experiment_file, losses, metrics, tiny, weights
 
+from robocasa_lerobot.data.config import MemberConfig, MixtureConfig
 from robocasa_lerobot.data.fake import write_fake_dataset
 from robocasa_lerobot.data.mixture import open_mixture
 from robocasa_lerobot.data.source import DatasetSource
@@ -248,6 +249,20 @@ def test_held_out_episodes_are_not_trained_on(tmp_path: Path, data: Path) -> Non
     assert lines[0]["tasks"].keys() == {"OpenDrawer", "CloseDrawer"}
     assert lines[0]["loss"] == pytest.approx(np.mean(list(lines[0]["tasks"].values())))
     assert lines[0] != lines[1]
+
+
+def test_a_small_part_of_a_dataset_has_held_out_episodes_too(tmp_path: Path, data: Path) -> None:
+    experiment = tiny(tmp_path, data)
+    for demos in ("2", "3"):
+        for seed in range(8):
+            config = MixtureConfig([MemberConfig(str(data), demos=demos), MemberConfig(str(data), ["OpenDrawer"])])
+            mixture = open_mixture(config, experiment.loader)
+            kept, apart = without_held_out(mixture, HeldOutConfig(share=0.25), experiment.loader, seed)
+            trained = {e for member in kept.config.members for e in member.episodes or []}
+            held = {e for member in apart.config.members for e in member.episodes or []}
+            assert held
+            assert not held & trained
+            assert {e % 2 for e in held} == {e % 2 for e in trained} == {0, 1}  # of both tasks
 
 
 def test_measuring_held_out_episodes_does_not_change_the_training(tmp_path: Path, data: Path) -> None:

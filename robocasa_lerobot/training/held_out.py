@@ -28,17 +28,23 @@ def without_held_out(
 ) -> tuple[MixtureDataset, MixtureDataset]:
     """The mixture without its held-out episodes, and one of those alone.
 
-    Which episodes these are depends on the seed and the dataset only, so that a dataset that is a member twice has
-    the same ones held out.
+    A dataset that is a member twice has the same ones held out.
 
     Raises:
         UserError: a task has but one episode, so that nothing is left of it to train on.
     """
+    used_of: dict[str, list[NDArray[np.int64]]] = {}
+    for member in dataset.config.members:
+        used_of.setdefault(member.root, []).append(dataset.sources[Path(member.root)].select(member))
+    held_of = {
+        root: _held_out(dataset.sources[Path(root)], np.unique(np.concatenate(parts)), config.share, seed)
+        for root, parts in used_of.items()
+    }
     kept, apart = [], []
     for member, probability in zip(dataset.config.members, dataset.probabilities, strict=True):
         source = dataset.sources[Path(member.root)]
         used = source.select(member)
-        held = np.intersect1d(used, _held_out(source, config.share, seed))
+        held = np.intersect1d(used, held_of[member.root])
         left = np.setdiff1d(used, held)
         if not len(left):
             raise UserError(f"{member.root}: `held_out` leaves no episode to train on; give more data or less share.")
@@ -116,13 +122,19 @@ def task_names(source: DatasetSource) -> list[str]:
     return [by_episode.get(index, source.root.as_posix()) for index in range(len(source.starts))]
 
 
-def _held_out(source: DatasetSource, share: float, seed: int) -> NDArray[np.int64]:
-    """Episodes of the dataset that are held out: of each task its share, at least one, and never all."""
+def _held_out(source: DatasetSource, used: NDArray[np.int64], share: float, seed: int) -> NDArray[np.int64]:
+    """Episodes that are held out: of each task its share of the whole dataset, so that phases agree, as far as used.
+
+    Where none of these is among the `used` ones and there are two or more, it is one of them.
+    """
     names = np.array(task_names(source))
     chosen = []
-    for name in np.unique(names):
+    for name in np.unique(names[used]):
         episodes = np.flatnonzero(names == name)
         count = min(max(1, round(share * len(episodes))), len(episodes) - 1)
         generator = np.random.default_rng((seed, len(episodes), int(episodes[0])))
-        chosen.append(generator.permutation(episodes)[:count])
+        order = generator.permutation(episodes)
+        among = order[np.isin(order, used)]
+        held = np.intersect1d(order[:count], used)
+        chosen.append(held if len(held) or len(among) < 2 else among[:1])
     return np.sort(np.concatenate(chosen)).astype(np.int64)
