@@ -86,7 +86,9 @@ def measure(policy: str, effort: Effort, workers: int, folder: Path, bar: Any, n
             busy = common.busy_share()
             if busy is not None:
                 noise.append(busy)
-            runs[name_of(side, films)].append(run_side(side, dataclasses.replace(job, films=films), folder))
+            result = run_side(side, dataclasses.replace(job, films=films), folder)
+            runs[name_of(side, films)].append(result)
+            bar.write(f"{policy}: {name_of(side, films)}: {result['seconds']:.0f} s", file=sys.stderr)
             bar.update()
     return {name: summary(found, effort.trials * len(TASKS)) for name, found in runs.items()}
 

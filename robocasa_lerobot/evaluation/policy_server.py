@@ -19,6 +19,7 @@ from robocasa_lerobot.evaluation.actor import ChunkActor, ChunkReply, ChunkReque
 from robocasa_lerobot.evaluation.checkpoints import PolicySource
 from robocasa_lerobot.evaluation.chunk_policy import BatchingError, ChunkPolicy, LoadedCheckpoint
 from robocasa_lerobot.evaluation.messages import Alive, Describe, Failed, Loading, Ready, Refused
+from robocasa_lerobot.evaluation.processes import take_over
 from robocasa_lerobot.evaluation.rollout import RolloutError
 
 _POLL_SECONDS = 0.5
@@ -42,8 +43,9 @@ class ServerSettings:
     address: str
 
 
-def server_main(parent: Connection, settings: ServerSettings) -> None:
+def server_main(parent: Connection, settings: ServerSettings, environment: dict[str, str]) -> None:
     """Answer requests until the parent's pipe closes."""
+    take_over(environment)
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent ends its processes
     import torch
 

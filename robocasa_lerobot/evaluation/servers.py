@@ -2,20 +2,20 @@
 
 from __future__ import annotations
 
-import multiprocessing
+import os
 import shutil
 import tempfile
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from multiprocessing.connection import Connection
-from multiprocessing.context import SpawnProcess
+from multiprocessing.context import ForkServerProcess
 from pathlib import Path
 
 from robocasa_lerobot.errors import UserError
 from robocasa_lerobot.evaluation.messages import Loading, Refused
 from robocasa_lerobot.evaluation.policy_server import ServerSettings, server_main
-from robocasa_lerobot.evaluation.processes import cause_of_death, thread_limit
+from robocasa_lerobot.evaluation.processes import cause_of_death, process_context, thread_limit
 
 MAX_RESTARTS = 10
 # No sign of life comes while a process starts, or loads weights from a slow disk.
@@ -25,7 +25,7 @@ LOADING_SECONDS = 900.0
 @dataclass
 class _Server:
     settings: ServerSettings
-    process: SpawnProcess
+    process: ForkServerProcess
     connection: Connection
     last_sign: float
     loading: bool = True
@@ -42,7 +42,7 @@ class ServerPool:
 
     def __init__(self, settings: ServerSettings, devices: Sequence[str], stall_seconds: float) -> None:
         self._folder = Path(tempfile.mkdtemp(prefix="robocasa-lerobot-"))
-        self._context = multiprocessing.get_context("spawn")
+        self._context = process_context(checkpoints=True)
         self._stall_seconds, self._restarts = stall_seconds, 0
         self._servers = [
             self._start(replace(settings, device=device, address=str(self._folder / f"policy-{i}")))
@@ -99,8 +99,9 @@ class ServerPool:
 
     def _start(self, settings: ServerSettings) -> _Server:
         ours, theirs = self._context.Pipe()
-        process = self._context.Process(target=server_main, args=(theirs, settings), daemon=True)
         with thread_limit(settings.threads):
+            environment = dict(os.environ)
+            process = self._context.Process(target=server_main, args=(theirs, settings, environment), daemon=True)
             process.start()
         theirs.close()
         return _Server(settings, process, ours, time.monotonic())

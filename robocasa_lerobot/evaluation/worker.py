@@ -25,6 +25,7 @@ from robocasa_lerobot.evaluation.messages import Alive, Finished, Ready, Refused
 from robocasa_lerobot.evaluation.plan import TrialSpec
 from robocasa_lerobot.evaluation.policy_runner import load_actor
 from robocasa_lerobot.evaluation.policy_server import RemotePolicy
+from robocasa_lerobot.evaluation.processes import take_over
 from robocasa_lerobot.evaluation.results import CRASHED, DIVERGED
 from robocasa_lerobot.evaluation.rollout import DivergedError, Outcome, horizon_of, run_trial
 from robocasa_lerobot.evaluation.success import SuccessRule
@@ -56,12 +57,17 @@ class WorkerSettings:
 
 
 def worker_main(
-    connection: Connection, settings: WorkerSettings, render_device: int | None = None, server: str | None = None
+    connection: Connection,
+    settings: WorkerSettings,
+    render_device: int | None,
+    server: str | None,
+    environment: dict[str, str],
 ) -> None:
     """Serve trials from `connection` until it gives None or closes.
 
     Pictures are drawn on `render_device`; `server` is the address of the policy server.
     """
+    take_over(environment)
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches the whole group; the parent ends its workers.
     warnings.filterwarnings("ignore", category=gl.SoftwareRenderingWarning)  # the parent has announced it
     if render_device is not None:

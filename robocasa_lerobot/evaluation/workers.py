@@ -3,19 +3,19 @@
 from __future__ import annotations
 
 import collections
-import multiprocessing
 import multiprocessing.connection
+import os
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from multiprocessing.connection import Connection
-from multiprocessing.context import SpawnProcess
+from multiprocessing.context import ForkServerProcess
 
 from robocasa_lerobot.errors import UserError
 from robocasa_lerobot.evaluation.messages import Alive, Finished, Ready, Refused
 from robocasa_lerobot.evaluation.plan import TrialSpec
-from robocasa_lerobot.evaluation.processes import cause_of_death, thread_limit
+from robocasa_lerobot.evaluation.processes import cause_of_death, process_context, thread_limit
 from robocasa_lerobot.evaluation.results import CRASHED, HUNG
 from robocasa_lerobot.evaluation.rollout import Outcome
 from robocasa_lerobot.evaluation.servers import ServerPool
@@ -48,7 +48,7 @@ class _Attempt:
 
 @dataclass
 class _Slot:
-    process: SpawnProcess
+    process: ForkServerProcess
     connection: Connection
     last_sign: float
     render_device: int | None = None
@@ -59,7 +59,7 @@ class _Slot:
 
 
 class WorkerPool:
-    """Runs trials in `size` spawned processes, each with its own pipe.
+    """Runs trials in `size` processes, each with its own pipe.
 
     A pipe for each worker and not one shared queue: a process that is killed while it holds a queue's lock would
     block all the others.
@@ -76,7 +76,7 @@ class WorkerPool:
     ) -> None:
         self._settings, self._size, self._stall_seconds = settings, size, stall_seconds
         self._servers = servers
-        self._context = multiprocessing.get_context("spawn")
+        self._context = process_context(not all(source.is_reference for source in settings.sources.values()))
         self._slots: list[_Slot] = []
         self._failed_starts = 0
 
@@ -166,8 +166,11 @@ class WorkerPool:
     def _start(self) -> _Slot:
         ours, theirs = self._context.Pipe()
         device, server = self._least_used_device(), self._least_used_server()
-        process = self._context.Process(target=worker_main, args=(theirs, self._settings, device, server), daemon=True)
         with thread_limit(self._settings.threads):
+            environment = dict(os.environ)
+            process = self._context.Process(
+                target=worker_main, args=(theirs, self._settings, device, server, environment), daemon=True
+            )
             process.start()
         theirs.close()  # Else end-of-file would never come.
         return _Slot(process, ours, time.monotonic(), device, server)
