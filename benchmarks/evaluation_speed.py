@@ -30,6 +30,7 @@ from tqdm import tqdm
 
 OUTPUT = common.RESULTS / "evaluation_speed.json"
 TASKS = ["CloseDrawer", "PickPlaceCounterToSink", "OpenDrawer"]  # 450, 600 and 750 steps
+Sides = Sequence[tuple[str, bool]]
 IMAGE_SIZES = {"demo": 96, "compact": 128}
 
 
@@ -50,6 +51,7 @@ def parse(arguments: Sequence[str] | None = None) -> argparse.Namespace:
     """The command's options."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--quick", action="store_true", help="one small policy, few trials: about 5 minutes")
+    parser.add_argument("--without-films", action="store_true", help="leave out the runs with films")
     parser.add_argument("--workers", type=int, default=2, help="env processes on both sides (default 2)")
     parser.add_argument("--trials", type=int, help="trials of each task")
     parser.add_argument("--policies", nargs="+", choices=sorted(IMAGE_SIZES), help="presets in configs/policies")
@@ -75,14 +77,16 @@ def run_side(side: str, job: sides.Job, folder: Path) -> dict[str, Any]:
     return {"seconds": seconds, **json.loads(lines[-1].removeprefix("RESULT "))}
 
 
-def measure(policy: str, effort: Effort, workers: int, folder: Path, bar: Any, noise: list[float]) -> dict[str, Any]:
+def measure(
+    policy: str, effort: Effort, workers: int, chosen: Sides, folder: Path, bar: Any, noise: list[float]
+) -> dict[str, Any]:
     """All sides for one policy, in turn in every repetition."""
     size = IMAGE_SIZES[policy]
     checkpoint = sides.make_checkpoint(folder / policy, training_sides.policy_settings(policy), size)
     job = sides.Job(str(checkpoint), TASKS, effort.trials, workers, size, out="", films=False)
-    runs: dict[str, list[dict[str, Any]]] = {name_of(*side): [] for side in sides.SIDES}
+    runs: dict[str, list[dict[str, Any]]] = {name_of(*side): [] for side in chosen}
     for repetition in range(effort.repetitions):
-        for side, films in sides.SIDES if repetition % 2 == 0 else sides.SIDES[::-1]:
+        for side, films in chosen if repetition % 2 == 0 else chosen[::-1]:
             busy = common.busy_share()
             if busy is not None:
                 noise.append(busy)
@@ -109,6 +113,8 @@ def ratios(found: dict[str, dict[str, Any]]) -> dict[str, float]:
     out = {}
     for policy, sides_of in found.items():
         for films in (True, False):
+            if name_of(sides.OURS, films) not in sides_of:
+                continue
             ours, theirs = (
                 sides_of[name_of(side, films)]["trials_per_hour"]["median"] for side in (sides.OURS, sides.LEROBOT)
             )
@@ -136,10 +142,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
         effort, trials=options.trials or effort.trials, policies=tuple(options.policies or effort.policies)
     )
     noise: list[float] = []
-    total = len(effort.policies) * effort.repetitions * len(sides.SIDES)
+    chosen = tuple(side for side in sides.SIDES if not (options.without_films and side[1]))
+    total = len(effort.policies) * effort.repetitions * len(chosen)
     with tempfile.TemporaryDirectory() as folder, tqdm(total=total, unit="run", smoothing=0) as bar:
         found = {
-            policy: measure(policy, effort, options.workers, Path(folder), bar, noise) for policy in effort.policies
+            policy: measure(policy, effort, options.workers, chosen, Path(folder), bar, noise)
+            for policy in effort.policies
         }
     body = {
         "mode": "quick" if options.quick else "full",

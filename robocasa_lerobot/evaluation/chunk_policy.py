@@ -4,7 +4,7 @@ Sums of floats come out differently with the size of the batch, so that a trial 
 share its batch. Here every batch has the same width, the last one filled up with copies, and the noise of each sample
 comes from a generator of its own. On a CPU even the place within a batch matters (vector instructions take another path
 at the ends of an array), so that the width is 1 there; with a greater one, the first batches are computed twice, with
-the samples in other places, and a difference ends the run. docs/decisions/0015-evaluation-batches.md has the
+the samples in other places, and a difference ends the run. docs/decisions/0018-evaluation-batches.md has the
 measurements.
 """
 
