@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import collections
 import csv
+import dataclasses
 import json
 import re
 from html.parser import HTMLParser
@@ -19,6 +20,7 @@ from test_evaluation_records import header, record
 from robocasa_lerobot.cli import main
 from robocasa_lerobot.errors import UserError
 from robocasa_lerobot.evaluation import results, trials_file
+from robocasa_lerobot.evaluation.published import table
 from robocasa_lerobot.evaluation.report import film_strip, latex, markdown
 from robocasa_lerobot.evaluation.report.charts import (
     MAX_POINTS,
@@ -30,6 +32,7 @@ from robocasa_lerobot.evaluation.report.charts import (
 )
 from robocasa_lerobot.evaluation.report.format import count, interval, listed, p_value, percent, points, published
 from robocasa_lerobot.evaluation.report.gather import gather, same_trials, summarize
+from robocasa_lerobot.evaluation.report.sections.beside_published import differences
 from robocasa_lerobot.evaluation.report.training import TrainingPhase, find_trainings, read_demonstrator, read_training
 from robocasa_lerobot.evaluation.results import TermSummary
 from robocasa_lerobot.evaluation.statistics import success_rate
@@ -351,3 +354,35 @@ def test_text_is_escaped_for_markdown_and_latex(text: str) -> None:
     bare = re.sub(r"\\(.)", "", markdown.escape(text))
     assert not set(bare) & set("|<>`[]#_*")
     assert not set(re.sub(r"\\[&%$#_{}]|\$[<>|]\$", "", latex.escape(text))) & set("&%#_<>|")
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({}, []),
+        ({"split": "pretrain"}, ["Scenes differ: ours are pretraining scenes, published are target scenes."]),
+        ({"horizon_multiplier": 1.5}, ["Horizons differ: ours are 1.5 times each task's own."]),
+        (
+            {"horizon_rule": "fixed"},
+            ["Horizons differ: ours are a fixed horizon of 100 steps, published are each task's own."],
+        ),
+        (
+            {"success_rule": "hold", "success_hold_steps": 10},
+            ["Success differs: ours when the goal held for 10 steps in a row, published at any step."],
+        ),
+    ],
+)
+def test_what_differs_from_the_published_protocol_is_said(
+    changes: dict[str, Any], said: list[str], tmp_path: Path
+) -> None:
+    one = dataclasses.replace(header(), **changes)
+    for item in (one, *(record(run=one.id, trial=t, seed=t) for t in range(30))):
+        trials_file.append(tmp_path / results.TRIALS_FILE, item)
+    policies = gather([tmp_path]).policies
+    assert differences(policies, table("foundation").protocol) == said
+    html, text = make_report(tmp_path)
+    for sentence in (*said, "Ours are other kitchens"):
+        assert sentence.replace("'", "&#39;") in html
+        assert sentence in text
+    fewer = {**table("foundation").protocol, "trials_per_task": 50}
+    assert differences(policies, fewer)[: len(said) + 1].count("Trials per task differ: ours 30, published 50.") == 1

@@ -37,7 +37,7 @@ def build(
         data_efficiency.section(data),
         lifelong.section(data),
         robustness.section(data),
-        beside_published.section(data),
+        None if lifelong.policies_by_phase(data) else beside_published.section(data),
         comparison.section(data),
         _films(data, videos),
         failures.section(data),

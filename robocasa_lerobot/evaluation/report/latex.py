@@ -60,7 +60,12 @@ def _table(table: Table, synthetic: bool) -> list[str]:
     if synthetic:
         caption = f"{SYNTHETIC} {caption}"
     kinds = "l" + "".join("r" if column.numeric else "l" for column in table.columns[1:])
-    head = " & ".join(escape(c.label) + (r"\,(publ.)" if c.published else "") for c in table.columns) + r" \\"
+    head = (
+        " & ".join(
+            escape(c.label) + (r"\,(publ.)" if c.published else r"\,(ours)" if c.ours else "") for c in table.columns
+        )
+        + r" \\"
+    )
     rows = [" & ".join(_cell(cell) for cell in row) + r" \\" for row in table.rows]
     label = rf"\caption{{{escape(caption)}}}\label{{tab:{table.id}}}"
     if len(rows) > LONG:

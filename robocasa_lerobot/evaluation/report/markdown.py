@@ -63,7 +63,10 @@ def _table(table: Table) -> list[str]:
     for warning in table.warnings:
         lines += [f"> {escape(warning)}"]
     lines += [""] if table.warnings else []
-    heads = (escape(column.label) + (" (published)" if column.published else "") for column in table.columns)
+    heads = (
+        escape(column.label) + (" (published)" if column.published else " (ours)" if column.ours else "")
+        for column in table.columns
+    )
     lines.append("| " + " | ".join(heads) + " |")
     lines.append("|" + "|".join("---:" if column.numeric else "---" for column in table.columns) + "|")
     lines += ["| " + " | ".join(_cell(cell) for cell in row) + " |" for row in table.rows]

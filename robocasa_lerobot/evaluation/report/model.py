@@ -46,11 +46,12 @@ class Cell:
 
 @dataclass(frozen=True)
 class Column:
-    """A column: its heading, whether it holds numbers, and whether its numbers are published ones."""
+    """A column: its heading, whether it holds numbers, published ones, or ours beside those."""
 
     label: str
     numeric: bool = False
     published: bool = False
+    ours: bool = False
     wide: bool = False
     series: int | None = None
 

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
+from typing import Any
+
 from robocasa_lerobot.evaluation import published
 from robocasa_lerobot.evaluation.published import Entry, PublishedTable
 from robocasa_lerobot.evaluation.report import format as fmt
@@ -15,8 +18,8 @@ SPLITS = {"target": "target scenes", "pretrain": "pretraining scenes"}
 
 
 def section(data: ReportData) -> Section | None:
-    """The group table that fits the run's scenes; None where no task is in a published group."""
-    policies = [policy for policy in data.policies if policy.group("average")]
+    """The group table that fits the run's scenes; None where no policy has half of the tasks of a published group."""
+    policies = [policy for policy in data.policies if _covers_a_group(policy)]
     if not policies:
         return None
     table = published.table(table_for(policies))
@@ -69,7 +72,7 @@ def _table(data: ReportData, policies: list[PolicyResult], table: PublishedTable
         columns,
         tuple(rows),
         notes=(f"Published: {table.source}. {table.notes}",),
-        warnings=(published.DIFFERENT_KITCHENS_SHORT, *differences(policies, table)),
+        warnings=(published.DIFFERENT_KITCHENS_SHORT, *differences(policies, table.protocol)),
         cards=True,
     )
 
@@ -84,23 +87,27 @@ def _published_row(table: PublishedTable, column: Entry) -> tuple[Cell, ...]:
     return tuple(cells)
 
 
+def _covers_a_group(policy: PolicyResult) -> bool:
+    return any(2 * len(policy.group(group)) >= size for group, size in published.GROUPS.items())
+
+
 def group_size(key: str) -> int:
     """Tasks of a published group; "average" is all of them."""
     return published.GROUPS.get(key, sum(published.GROUPS.values()))
 
 
-def differences(policies: list[PolicyResult], table: PublishedTable) -> list[str]:
-    """Where our protocol is not that of a published table, a sentence for each difference."""
+def differences(policies: Sequence[PolicyResult], protocol: Mapping[str, Any]) -> list[str]:
+    """Where ours is not the protocol of a published table, a sentence for each difference."""
     found: dict[str, None] = {}
     for policy in policies:
         header, who = policy.header, "ours"
-        if header.split != table.protocol["split"]:
-            theirs = SPLITS.get(table.protocol["split"], table.protocol["split"])
+        if header.split != protocol["split"]:
+            theirs = SPLITS.get(protocol["split"], protocol["split"])
             found[f"Scenes differ: {who} are {SPLITS.get(header.split, header.split)}, published are {theirs}."] = None
         trials = {result.rate.trials for result in policy.tasks}
-        if trials != {table.protocol["trials_per_task"]}:
+        if trials != {protocol["trials_per_task"]}:
             shown = f"{min(trials)} to {max(trials)}" if len(trials) > 1 else str(min(trials))
-            found[f"Trials per task differ: {who} {shown}, published {table.protocol['trials_per_task']}."] = None
+            found[f"Trials per task differ: {who} {shown}, published {protocol['trials_per_task']}."] = None
         if header.horizon_rule != "task":
             found[f"Horizons differ: {who} are {horizon_phrase(policy)}, published are each task's own."] = None
         elif header.horizon_multiplier != 1.0:
@@ -115,9 +122,9 @@ def horizon_phrase(policy: PolicyResult) -> str:
     header = policy.header
     if header.horizon_rule == "fixed":
         lengths = {r.horizon for result in policy.tasks for r in result.trials if r.horizon is not None}
-        return f"fixed at {', '.join(f'{steps:,}' for steps in sorted(lengths))} steps"
+        return f"a fixed horizon of {', '.join(f'{steps:,}' for steps in sorted(lengths))} steps"
     if header.horizon_rule == "env":
-        return "set by the env"
+        return "the env's own horizon"
     own = "each task's own horizon"
     return own if header.horizon_multiplier == 1 else f"{header.horizon_multiplier:g} times {own}"
 

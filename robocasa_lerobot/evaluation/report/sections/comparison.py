@@ -95,6 +95,8 @@ def sentence(data: ReportData) -> str | None:
             if clear
             else f" No single task of the {len(tasks)} shows a clear difference."
         )
+    if overall.p_value < ALPHA:
+        return text[:1].upper() + text[1:]
     if pair.smallest is not None:
         text += (
             f" So many trials would have shown a true difference of {100 * pair.smallest:.1f} points or more with "
@@ -102,7 +104,7 @@ def sentence(data: ReportData) -> str | None:
         )
     else:
         text += " So few trials cannot show any difference."
-    return text
+    return text[:1].upper() + text[1:]
 
 
 def _p(value: float) -> str:

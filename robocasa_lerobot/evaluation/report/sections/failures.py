@@ -11,8 +11,11 @@ SHOWN = 15
 
 
 def section(data: ReportData) -> Section | None:
-    """Terms ranked by the trials that they cost, for the last policy in full view and for the others folded."""
-    tables = [table for policy in reversed(data.policies) if (table := _table(data, policy)) is not None]
+    """Terms ranked by the trials that they cost; the last policy that failed in full view, the others folded."""
+    tables: list[Table] = []
+    for policy in reversed(data.policies):
+        table = _table(data, policy, folded=bool(tables))
+        tables += [table] if table is not None else []
     if not tables:
         return None
     text = (
@@ -39,7 +42,7 @@ def spelled(term: str) -> str:
     return term.replace("_", " ")
 
 
-def _table(data: ReportData, policy: PolicyResult) -> Table | None:
+def _table(data: ReportData, policy: PolicyResult, folded: bool) -> Table | None:
     found = sorted(
         ((term, result) for result in policy.tasks for term in result.terms if term.never or term.lost),
         key=lambda item: (-item[0].never, -item[0].lost),
@@ -74,6 +77,6 @@ def _table(data: ReportData, policy: PolicyResult) -> Table | None:
         ),
         tuple(rows),
         notes=(f"The {len(rows)} that cost most trials; {more} more are left out.",) if more else (),
-        folded=policy is not data.policies[-1],
+        folded=folded,
         cards=True,
     )

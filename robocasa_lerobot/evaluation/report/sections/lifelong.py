@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from robocasa_lerobot.data.published import published_task_sets
 from robocasa_lerobot.evaluation import published
 from robocasa_lerobot.evaluation.report import format as fmt
 from robocasa_lerobot.evaluation.report.gather import GROUP_LABELS, LIFELONG_SETS, PolicyResult, ReportData, average_of
@@ -115,17 +116,22 @@ def _heat_map(result: Lifelong) -> Table:
 
 
 def _summary(result: Lifelong, last: int) -> Table:
-    def row(name: str, one: Estimate | None, meaning: str, rate: bool = False) -> tuple[Cell, ...]:
+    def row(name: str, one: Estimate | None, meaning: str, signed: bool = True) -> tuple[Cell, ...]:
         if one is None:
             return (Cell(name), Cell(fmt.NONE), Cell(meaning))
-        text, ends = (
-            (fmt.percent(one.value), fmt.interval(one)) if rate else (fmt.points(one.value), fmt.points_interval(one))
-        )
+        text, ends = fmt.points(one.value), fmt.points_interval(one)
+        if not signed:
+            text, ends = fmt.bare(one.value), fmt.bare_interval(one)
         return (Cell(name), Cell(text, 100 * one.value, ends, strong=True), Cell(meaning))
 
     rows = (
-        row("average success", result.average.get(last), f"after phase {last}, mean over the phases", rate=True),
-        row("forgetting", result.forgetting.get(last), "best earlier success on a phase minus the last; more is worse"),
+        row("average success", result.average.get(last), f"after phase {last}, mean over the phases", signed=False),
+        row(
+            "forgetting",
+            result.forgetting.get(last),
+            "best earlier success on a phase minus the last; more is worse",
+            signed=False,
+        ),
         row("backward transfer", result.backward_transfer, "last success on a phase minus that when it was new"),
         row(
             "forward transfer",
@@ -152,7 +158,7 @@ def _published(policies: dict[int, PolicyResult]) -> Table:
     table = published.table("lifelong")
     columns = [Column("trained")]
     for column in table.columns:
-        columns += [Column(f"{column.label}, ours", numeric=True), Column("published", numeric=True, published=True)]
+        columns += [Column(column.label, numeric=True, ours=True), Column(column.label, numeric=True, published=True)]
     rows = []
     for row in table.rows:
         policy = policies.get(int(row.key))
@@ -161,7 +167,9 @@ def _published(policies: dict[int, PolicyResult]) -> Table:
             tasks = policy.group(column.key) if policy else ()
             if tasks:
                 mean = average_of(tasks)
-                cells.append(Cell(fmt.percent(mean.value), mean.value, f"{len(tasks)} tasks", strong=True))
+                full = len(published_task_sets()[column.key])
+                some = "" if len(tasks) == full else f"{len(tasks)} of {full} tasks"
+                cells.append(Cell(fmt.percent(mean.value), mean.value, some, strong=True))
             else:
                 cells.append(Cell(""))
             value = table.value(row.key, column.key)
@@ -173,7 +181,7 @@ def _published(policies: dict[int, PolicyResult]) -> Table:
         tuple(columns),
         tuple(rows),
         notes=(f"Published: {table.source}. {table.notes}",),
-        warnings=(published.DIFFERENT_KITCHENS_SHORT, *differences(list(policies.values()), table)),
+        warnings=(published.DIFFERENT_KITCHENS_SHORT, *differences(list(policies.values()), table.protocol)),
         sortable=False,
     )
 

@@ -115,22 +115,21 @@ def _published(policy: PolicyResult) -> Table | None:
     groups = [row.key for row in table.rows if policy.group(row.key)]
     if len(names) < 2 or not groups:
         return None
-    columns = [Column("tasks")]
-    for name in names:
-        label = known[name].label
-        columns += [Column(f"{label}, ours", numeric=True), Column("published", numeric=True, published=True)]
-    rows = []
+    columns = [Column("perturbation")]
     for key in groups:
-        cells = [Cell(GROUP_LABELS[key])]
-        for name in names:
-            tasks = policy.group(key, name)
+        label = GROUP_LABELS[key]
+        columns += [Column(label, numeric=True, ours=True), Column(label, numeric=True, published=True)]
+    rows = []
+    for name in names:
+        cells = [Cell(known[name].label)]
+        for key in groups:
+            tasks, value = policy.group(key, name), table.value(key, name)
             mean = average_of(tasks) if tasks else None
             cells.append(
                 Cell(fmt.NONE)
                 if mean is None
                 else Cell(fmt.percent(mean.value), mean.value, fmt.interval(mean), strong=True)
             )
-            value = table.value(key, name)
             cells.append(Cell(fmt.NONE) if value is None else Cell(fmt.published(value), value / 100))
         rows.append(tuple(cells))
     return Table(
@@ -139,6 +138,6 @@ def _published(policy: PolicyResult) -> Table | None:
         tuple(columns),
         tuple(rows),
         notes=(f"Published: {table.source}, GR00T N1.5. {table.notes}",),
-        warnings=(published.DIFFERENT_KITCHENS_SHORT, *differences([policy], table)),
+        warnings=(published.DIFFERENT_KITCHENS_SHORT, *differences([policy], table.protocol)),
         sortable=False,
     )

@@ -6,6 +6,7 @@ from robocasa_lerobot.evaluation import published
 from robocasa_lerobot.evaluation.report import format as fmt
 from robocasa_lerobot.evaluation.report.gather import PolicyResult, ReportData, TaskResult
 from robocasa_lerobot.evaluation.report.model import Bar, Cell, Column, Section, Series, Table
+from robocasa_lerobot.evaluation.report.sections.beside_published import differences
 from robocasa_lerobot.evaluation.results import TrialRecord
 from robocasa_lerobot.evaluation.statistics import Estimate
 
@@ -39,22 +40,18 @@ def section(data: ReportData) -> Section:
             "The diamond is the published rate of the best variant: "
             f"{published.read('per_task')['notes'].rstrip('.')}, target scenes, 30 trials."
         )
+    protocol = published.read("per_task")["protocol"]
     table = Table(
         "task-rates",
         "Success rate on each task",
         tuple(columns),
         tuple(rows),
         notes=tuple(notes),
-        warnings=(published.DIFFERENT_KITCHENS_SHORT,) if known else (),
+        warnings=(published.DIFFERENT_KITCHENS_SHORT, *differences(data.policies, protocol)) if known else (),
         cards=True,
     )
-    text = []
-    if marks:
-        text.append(
-            "Each square is one trial, in the order of the plan: the same place is the same kitchen for every policy."
-        )
     series = tuple(Series(policy.label, data.series(policy)) for policy in data.policies)
-    return Section("tasks", "Task by task", tuple(text), parts=(table,), legend=series, marks_legend=marks)
+    return Section("tasks", "Task by task", parts=(table,), legend=series, marks_legend=marks)
 
 
 def _cell(data: ReportData, policy: PolicyResult, result: TaskResult | None, known: float | None, marks: bool) -> Cell:
