@@ -91,8 +91,8 @@ class LookAlike:
 def look_alike(model: mujoco.MjModel, groups: tuple[int, ...], loose: frozenset[int] = frozenset()) -> LookAlike | None:
     """Make the look-alike of the geoms in `groups`; None where it would save little, or could not show everything.
 
-    Boxes, cylinders and capsules of one body, material and colour become one mesh, but for the `loose` ones and
-    what is transparent. Other shapes are taken over as they are.
+    Boxes, cylinders, capsules and untextured meshes of one body, material and colour become one mesh, but for the
+    `loose` ones and what is transparent. Other shapes are taken over as they are.
     """
     if model.nskin or model.nflex or model.ntendon or model.nhfield:
         return None
@@ -125,7 +125,7 @@ def _parts(model: mujoco.MjModel, visible: NDArray[np.bool_], loose: frozenset[i
     for geom in np.flatnonzero(visible).tolist():
         material, rgba = int(model.geom_matid[geom]), tuple(model.geom_rgba[geom].tolist())
         opaque = rgba[3] == 1.0 and (material < 0 or model.mat_rgba[material, 3] == 1.0)
-        mergeable = opaque and model.geom_type[geom] in _MERGED and geom not in loose
+        mergeable = opaque and _can_be_merged(model, geom) and geom not in loose
         own = -1 if mergeable else geom
         parts.setdefault((int(model.geom_bodyid[geom]), material, own, *rgba), []).append(geom)
     return list(parts.values())
@@ -182,6 +182,8 @@ def _surface(model: mujoco.MjModel, rotations: Array, geom: int) -> Surface:
     slices = int(model.vis.quality.numslices)
     if kind == _BOX:
         shape = box(size)
+    elif kind == _MESH:
+        shape = _mesh_surface(model, int(model.geom_dataid[geom]))
     elif kind == _CYLINDER:
         shape = cylinder(size[0], size[1], slices)
     else:
@@ -193,6 +195,28 @@ def _surface(model: mujoco.MjModel, rotations: Array, geom: int) -> Surface:
         if model.mat_texuniform[material]:  # repetitions per metre instead of per shape
             repeat = repeat * (size[:2] if kind == _BOX else size[[0, 0]])
     return shape.textured(repeat).placed(model.geom_pos[geom], rotations[geom])
+
+
+def _can_be_merged(model: mujoco.MjModel, geom: int) -> bool:
+    """Whether a geom's triangles are known: of a mesh those without a texture, which would need its coordinates."""
+    if model.geom_type[geom] != _MESH:
+        return int(model.geom_type[geom]) in _MERGED
+    material = int(model.geom_matid[geom])
+    return material < 0 or bool((model.mat_texid[material] < 0).all())
+
+
+def _mesh_surface(model: mujoco.MjModel, index: int) -> Surface:
+    """A mesh of the model, with a vertex for each pair of a place and a normal."""
+    start, count = int(model.mesh_faceadr[index]), int(model.mesh_facenum[index])
+    places = model.mesh_face[start : start + count] + model.mesh_vertadr[index]
+    normals = model.mesh_facenormal[start : start + count] + model.mesh_normaladr[index]
+    pairs, faces = np.unique(np.stack([places, normals], axis=-1).reshape(-1, 2), axis=0, return_inverse=True)
+    return Surface(
+        model.mesh_vert[pairs[:, 0]].astype(np.float64),
+        model.mesh_normal[pairs[:, 1]].astype(np.float64),
+        np.zeros((len(pairs), 2)),
+        faces.reshape(-1, 3).astype(np.int32),
+    )
 
 
 def _add_mesh(spec: mujoco.MjSpec, surface: Surface, name: str) -> None:
