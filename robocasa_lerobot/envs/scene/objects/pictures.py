@@ -74,9 +74,9 @@ def object_tiles(items: Sequence[Instance], size: int) -> list[NDArray[np.uint8]
     light.diffuse = [0.5, 0.5, 0.5]
     light.castshadow = False
     palette = MaterialPalette(spec, load_style(style_ids()[0]))
-    gap = 3.0
+    gap = 6.0
     for k, item in enumerate(items):
-        table = spec.worldbody.add_geom(type=mujoco.mjtGeom.mjGEOM_BOX, size=[1.2, 1.2, 0.01], pos=[gap * k, 0, -0.01])
+        table = spec.worldbody.add_geom(type=mujoco.mjtGeom.mjGEOM_BOX, size=[2.9, 2.9, 0.01], pos=[gap * k, 0, -0.01])
         table.rgba = [0.83, 0.82, 0.80, 1.0]
         table.group = 1
         body = add_object(spec, palette, f"obj{k}", item)

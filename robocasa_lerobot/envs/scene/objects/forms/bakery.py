@@ -174,7 +174,7 @@ def croissant(d: Draft) -> None:
         segments.append(one)
     whole = joined(segments)
     shaped = bent(whole.scaled(1.35 * x, 0.62 * y, z), 1.9)
-    shaped = shaped.fitted((x, y, z)).flattened(0.1)
+    shaped = shaped.fitted((x, y, z)).flattened(0.2)
     d.add(shaped, gradient([shade(d.colour, 0.7), d.colour, shade(d.colour, 1.12)], [0, 0.5, 1], 8), "satin")
     low, high = shaped.vertices[:, 0].min(), shaped.vertices[:, 0].max()
     for a, b in ((0, 0.36), (0.3, 0.7), (0.64, 1)):

@@ -212,7 +212,8 @@ def ginger(d: Draft) -> None:
         [0.3 * z, 0.4 * z, 0.32 * z],
         8,
     )
-    d.body(lumpy(d.rng, main, 0.15).flattened(0.1), rings)
+    root = d.body(lumpy(d.rng, main, 0.15).flattened(0.2), rings)
+    floor = float(root.vertices[:, 2].min())
     for k, (where, way, up) in enumerate(((-0.22, 1, 0.05), (0.05, -1, 0.05), (0.25, 1, 0.15))):
         end = (where * x + 0.12 * x, way * 0.4 * y, (0.42 + up) * z)
         knob = tube(
@@ -220,7 +221,7 @@ def ginger(d: Draft) -> None:
             [0.3 * z, 0.32 * z, 0.2 * z],
             7,
         )
-        piece = lumpy(d.rng, knob, 0.15)
+        piece = lumpy(d.rng, knob, 0.15).above(floor + 0.0005)
         if k < 2:
             d.hull(piece)
         d.add(piece, rings)

@@ -106,7 +106,7 @@ def lying(
 ) -> Mesh:
     """The main body of something long that lies along x: turned, laid down, bent sideways."""
     x, y, z = d.size
-    mesh = lathe(_dense(profile) if bend else profile, n).turned("y", np.pi / 2)
+    mesh = lathe(dense(profile) if bend else profile, n).turned("y", np.pi / 2)
     if lumps:
         mesh = lumpy(d.rng, mesh, lumps)
     mesh = mesh.fitted((x, y, z))
@@ -123,7 +123,7 @@ def lying(
     return d.add(mesh, paint, finish)
 
 
-def _dense(profile: Points) -> Array:
+def dense(profile: Points) -> Array:
     """The profile with points added, so that it can be bent."""
     points = np.asarray(profile, float)
     out = [points[0]]
@@ -138,18 +138,18 @@ def blush(d: Draft, other: Rgb) -> Paint:
     return speckled(d.colour, mix(d.colour, other, 0.22), 0.35, d.seed, blur=True)
 
 
-def _veins(rgb: Rgb, vein: Rgb) -> Paint:
+def leaf_veins(rgb: Rgb, vein: Rgb) -> Paint:
     """A leaf: a midrib and side veins, a darker rim."""
     image, draw = canvas(rgb, 32, 32)
-    draw.rectangle((0, 0, 31, 31), outline=bytes_of(shade(rgb, 0.6)))
-    draw.line((16, 31, 16, 3), fill=bytes_of(vein), width=3)
+    draw.rectangle((0, 0, 31, 31), outline=bytes_of(shade(rgb, 1.2)))
+    draw.line((16, 31, 16, 5), fill=bytes_of(vein), width=2)
     for k in range(4):
         for side in (-1, 1):
-            draw.line((16, 28 - 7 * k, 16 + side * 13, 19 - 7 * k), fill=bytes_of(mix(rgb, vein, 0.6)))
+            draw.line((16, 28 - 7 * k, 16 + side * 13, 19 - 7 * k), fill=bytes_of(mix(rgb, vein, 0.45)))
     return pixels(image)
 
 
-def _cap(radius: float, z: float, span: float, width: float, *, ruffle: float, phase: float) -> Mesh:
+def leaf_cap(radius: float, z: float, span: float, width: float, *, ruffle: float, phase: float) -> Mesh:
     """A leaf that hugs a ball, from its foot up to a share of its height, its rim turned outwards."""
     v = np.linspace(0, 1, 5)[:, None]
     u = np.linspace(-1, 1, 6)[None, :]

@@ -10,9 +10,9 @@ from robocasa_lerobot.envs.scene.objects.forms.produce import (
     DIMPLED,
     LEAF,
     ROUND,
-    _cap,
-    _veins,
     leaf,
+    leaf_cap,
+    leaf_veins,
     lying,
     ribbed,
     rosette,
@@ -214,7 +214,7 @@ def potato(d: Draft) -> None:
         if not d.args.get("tapered")
         else [(0, 0), (0.12, 0.03), (0.36, 0.22), (0.5, 0.5), (0.42, 0.75), (0.14, 0.96), (0, 1)]
     )
-    lying(d, profile, speckled(d.colour, shade(d.colour, 0.6), 0.06, d.seed), "matte", lumps=0.12, n=12)
+    lying(d, profile, speckled(d.colour, shade(d.colour, 0.6), 0.06, d.seed), "matte", flat=0.14, lumps=0.1, n=12)
 
 
 @form
@@ -318,14 +318,13 @@ def leafy_head(d: Draft) -> None:
     d.rolls = True
     d.hull(lathe(ROUND, 12).fitted((0.95 * x, 0.95 * x, z)).flattened(0.06))
     d.add(lumpy(d.rng, core, 0.08), pale, "matte")
-    for ring, (count, low, span) in enumerate(((6, 0.0, 0.78), (5, 0.06, 0.92), (5, 0.0, 0.55))):
+    # From the heart outwards: leaves that close over the top, then wider ones whose rims stand off.
+    rings = ((3, 0.43, 1.16, 1.3, 0.2), (4, 0.455, 0.95, 1.05, 0.6), (4, 0.48, 0.62, 1.15, 1.0))
+    for ring, (count, radius, span, width, lift) in enumerate(rings):
         for k in range(count):
-            radius = x * (0.42 + 0.03 * (2 - ring) if ring < 2 else 0.47)
-            leaf_ = _cap(radius, z, span, 0.85 if ring < 2 else 1.05, ruffle=loose, phase=k + ring)
-            tone = mix(shade(d.colour, (0.92, 1.1, 0.72)[ring]), pale, 0.15 * (k % 2))
-            d.add(
-                leaf_.turned("z", 2 * np.pi * (k + 0.37 * ring) / count).moved(z=low * z), _veins(tone, pale), "matte"
-            )
+            wrap = leaf_cap(radius * x, z, span, width, ruffle=loose * lift, phase=k + ring)
+            tone = mix(shade(d.colour, (1.08, 0.95, 0.8)[ring]), pale, 0.2 * (k % 2))
+            d.add(wrap.turned("z", 2 * np.pi * (k + 0.37 * ring) / count), leaf_veins(tone, pale), "matte")
 
 
 @form
