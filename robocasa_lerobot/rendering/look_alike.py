@@ -19,6 +19,8 @@ from robocasa_lerobot.rendering.tessellation import Surface, box, capsule, cylin
 Array = NDArray[np.float64]
 
 VISIBLE_GROUP = 1  # of all geoms of a look-alike
+# Edge of the squares of floor over which things that never move are merged: culling still tells them apart.
+CELL_M = 2.0
 MIN_SAVED_DRAWS = 50  # below it, a look-alike costs more memory and building time than it is worth
 _BOX, _MESH = int(mujoco.mjtGeom.mjGEOM_BOX), int(mujoco.mjtGeom.mjGEOM_MESH)
 _CYLINDER, _CAPSULE = int(mujoco.mjtGeom.mjGEOM_CYLINDER), int(mujoco.mjtGeom.mjGEOM_CAPSULE)
@@ -104,9 +106,9 @@ def look_alike(model: mujoco.MjModel, groups: tuple[int, ...], loose: frozenset[
         return None
     spec = mujoco.MjSpec()
     _add_textures_and_materials(spec, model)
-    rotations = _matrices(model.geom_quat)
+    poses = _Poses.of(model)
     for index, geoms in enumerate(parts):
-        _add_part(spec, model, rotations, geoms, f"part{index}")
+        _add_part(spec, model, poses, geoms, f"part{index}")
     for camera in range(model.ncam):
         spec.worldbody.add_camera(name=f"camera{camera}")
     for light in range(model.nlight):
@@ -116,18 +118,52 @@ def look_alike(model: mujoco.MjModel, groups: tuple[int, ...], loose: frozenset[
     data = mujoco.MjData(made)
     mujoco.mj_forward(made, data)
     first = np.array([geoms[0] for geoms in parts], dtype=np.intp)
-    return LookAlike(model, made, data, model.geom_bodyid[first].astype(np.intp), first, loose)
+    bodies = np.where(poses.fixed[first], 0, model.geom_bodyid[first]).astype(np.intp)
+    return LookAlike(model, made, data, bodies, first, loose)
+
+
+@dataclass(frozen=True)
+class _Poses:
+    """Where geoms are drawn: those that never move in the world's frame, the others in their body's.
+
+    Attributes:
+        fixed: whether a geom never moves, (ngeom,).
+        positions, rotations: (ngeom, 3) and (ngeom, 3, 3).
+        quats: wxyz, (ngeom, 4).
+    """
+
+    fixed: NDArray[np.bool_]
+    positions: Array
+    rotations: Array
+    quats: Array
+
+    @classmethod
+    def of(cls, model: mujoco.MjModel) -> _Poses:
+        """Of all geoms of a model."""
+        data = mujoco.MjData(model)
+        mujoco.mj_kinematics(model, data)
+        fixed = (model.body_weldid == 0) & (model.body_mocapid < 0)
+        at_rest = fixed[model.geom_bodyid]
+        rotations = np.where(at_rest[:, None, None], data.geom_xmat.reshape(-1, 3, 3), _matrices(model.geom_quat))
+        positions = np.where(at_rest[:, None], data.geom_xpos, model.geom_pos)
+        quats = model.geom_quat.copy()
+        for geom in np.flatnonzero(at_rest):
+            mujoco.mju_mat2Quat(quats[geom], data.geom_xmat[geom])
+        return cls(at_rest, positions, rotations, quats)
 
 
 def _parts(model: mujoco.MjModel, visible: NDArray[np.bool_], loose: frozenset[int]) -> list[list[int]]:
-    """Geoms that are drawn together."""
+    """Geoms that are drawn together: of one body, or, where nothing moves, of one cell of the room."""
+    poses = _Poses.of(model)
+    cells = np.floor(poses.positions[:, :2] / CELL_M)
     parts: dict[tuple[float, ...], list[int]] = {}
     for geom in np.flatnonzero(visible).tolist():
         material, rgba = int(model.geom_matid[geom]), tuple(model.geom_rgba[geom].tolist())
         opaque = rgba[3] == 1.0 and (material < 0 or model.mat_rgba[material, 3] == 1.0)
         mergeable = opaque and _can_be_merged(model, geom) and geom not in loose
         own = -1 if mergeable else geom
-        parts.setdefault((int(model.geom_bodyid[geom]), material, own, *rgba), []).append(geom)
+        where = (-1, *cells[geom]) if poses.fixed[geom] and mergeable else (int(model.geom_bodyid[geom]), 0, 0)
+        parts.setdefault((*where, material, own, *rgba), []).append(geom)
     return list(parts.values())
 
 
@@ -154,7 +190,7 @@ def _add_textures_and_materials(spec: mujoco.MjSpec, model: mujoco.MjModel) -> N
                     textures[role] = f"texture{texture}"
 
 
-def _add_part(spec: mujoco.MjSpec, model: mujoco.MjModel, rotations: Array, geoms: list[int], name: str) -> None:
+def _add_part(spec: mujoco.MjSpec, model: mujoco.MjModel, poses: _Poses, geoms: list[int], name: str) -> None:
     first = geoms[0]
     material = int(model.geom_matid[first])
     kind = int(model.geom_type[first])
@@ -162,10 +198,10 @@ def _add_part(spec: mujoco.MjSpec, model: mujoco.MjModel, rotations: Array, geom
     merged = len(geoms) > 1 or kind in (_CYLINDER, _CAPSULE)
     geom = spec.worldbody.add_geom(type=mujoco.mjtGeom(_MESH if merged else kind))
     if merged:
-        _add_mesh(spec, joined([_surface(model, rotations, each) for each in geoms]), name)
+        _add_mesh(spec, joined([_surface(model, poses, each) for each in geoms]), name)
         geom.meshname = name
     else:
-        geom.pos, geom.quat, geom.size = model.geom_pos[first], model.geom_quat[first], model.geom_size[first]
+        geom.pos, geom.quat, geom.size = poses.positions[first], poses.quats[first], model.geom_size[first]
         if kind == _MESH:
             geom.meshname = _copied_mesh(spec, model, int(model.geom_dataid[first]))
     geom.group = VISIBLE_GROUP
@@ -176,7 +212,7 @@ def _add_part(spec: mujoco.MjSpec, model: mujoco.MjModel, rotations: Array, geom
         geom.material = f"{'baked' if merged else 'material'}{material}"
 
 
-def _surface(model: mujoco.MjModel, rotations: Array, geom: int) -> Surface:
+def _surface(model: mujoco.MjModel, poses: _Poses, geom: int) -> Surface:
     """The shape of a geom in its body's frame, with texture coordinates as MuJoCo generates them."""
     kind, size = model.geom_type[geom], model.geom_size[geom]
     slices = int(model.vis.quality.numslices)
@@ -194,7 +230,7 @@ def _surface(model: mujoco.MjModel, rotations: Array, geom: int) -> Surface:
         repeat = model.mat_texrepeat[material].astype(np.float64)
         if model.mat_texuniform[material]:  # repetitions per metre instead of per shape
             repeat = repeat * (size[:2] if kind == _BOX else size[[0, 0]])
-    return shape.textured(repeat).placed(model.geom_pos[geom], rotations[geom])
+    return shape.textured(repeat).placed(poses.positions[geom], poses.rotations[geom])
 
 
 def _can_be_merged(model: mujoco.MjModel, geom: int) -> bool:

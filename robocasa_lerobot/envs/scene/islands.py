@@ -29,6 +29,7 @@ FACING = {"front": 0.0, "right": np.pi / 2, "back": np.pi, "left": -np.pi / 2}
 STOOL_OUT_M = 0.12  # of a stool's middle from the counter's edge
 PENDANT_Z_M = 1.95
 _BACK_PANEL_M = 0.02
+_LEGS_M = 0.14  # at either end of a table, where its legs are
 
 
 def island_line(record: dict[str, Any]) -> Line:
@@ -88,17 +89,17 @@ def add_table(record: dict[str, Any], kind: str, style: Style, names: Names, cei
     table.table = table.back_face = True
     table.overhang = depth
     row.add("counter", table)
-    _stools(row, names, record.get("stools", 0), width, -STOOL_OUT_M, yaw + np.pi)
-    _stools(row, names, record.get("front_stools", 0), width, depth + STOOL_OUT_M, yaw)
+    _stools(row, names, record.get("stools", 0), width, -STOOL_OUT_M, yaw + np.pi, _LEGS_M)
+    _stools(row, names, record.get("front_stools", 0), width, depth + STOOL_OUT_M, yaw, _LEGS_M)
     _pendants(row, names, record.get("pendants", 0), width, depth / 2, ceiling)
     counter_things(row, record.get("counter", []))
     return row
 
 
-def _stools(row: Row, names: Names, count: int, length: float, out: float, yaw: float) -> None:
-    """Stools in a line, at equal distances along the counter; their fronts look at it."""
+def _stools(row: Row, names: Names, count: int, length: float, out: float, yaw: float, inset: float = 0.0) -> None:
+    """Stools in a line, at equal distances along the counter but its ends; their fronts look at it."""
     for index in range(count):
-        along = (index + 0.5) * length / count
+        along = inset + (index + 0.5) * (length - 2 * inset) / count
         size = (SEAT_M, SEAT_M, STOOL_HEIGHT_M)
         pos = row.line.at(along, out, STOOL_HEIGHT_M / 2)
         row.add("stool", Stool(names.next("stool"), size, pos, float(yaw + np.pi)))
