@@ -75,6 +75,10 @@ bench-convert: $(STAMP)  ## our converter beside LeRobot's and the official one,
 bench-grasps: $(STAMP)  ## which objects a gripper can lift: every instance, the best of 16 poses
 	$(BIN)/python benchmarks/grasps.py $(BENCH_ARGS)
 
+# Goes on where it was stopped; BENCH_ARGS=--fresh begins again, BENCH_ARGS='--every 31' takes a sample.
+bench-kitchens: $(STAMP)  ## build, check and settle all 2,510 kitchens
+	$(BIN)/python benchmarks/kitchens.py $(BENCH_ARGS)
+
 # Keeps the pinned versions that still fit; `make lock LOCK_ARGS=--upgrade` takes the newest ones.
 lock: $(STAMP)  ## pin pyproject.toml's dependencies in requirements.lock
 	$(BIN)/uv pip compile pyproject.toml --extra dev --extra setup --python-version 3.12 --universal --generate-hashes \

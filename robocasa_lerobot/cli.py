@@ -46,7 +46,10 @@ SUBCOMMANDS: dict[str, Subcommand] = {
     "leaderboard": Subcommand(
         "robocasa_lerobot.evaluation.leaderboard_command", "write or check a submission to the public leaderboard"
     ),
-    "gallery": Subcommand("robocasa_lerobot.envs.gallery_command", "render kitchens and tasks to pictures"),
+    "gallery": Subcommand(
+        "robocasa_lerobot.envs.gallery_command", "render tasks, kitchens, appliances and objects to pictures"
+    ),
+    "view": Subcommand("robocasa_lerobot.envs.view_command", "open a task's scene in MuJoCo's viewer"),
     "tasks": Subcommand("robocasa_lerobot.envs.tasks_command", "list the tasks, their sets and horizons"),
     "doctor": Subcommand("robocasa_lerobot.doctor", "check this machine and name the command that mends a fault"),
 }

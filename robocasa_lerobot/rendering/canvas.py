@@ -25,9 +25,9 @@ from robocasa_lerobot.rendering.frustum import clipping_planes, distances, in_vi
 COLLISION_GROUP = 0
 _HIDDEN_GROUP = 5  # MuJoCo's last geom group, which no camera draws
 _SPARE_GEOMS = 200  # of a scene, beyond the model's own: lights, skins and the like
-# Parts of what is seen that are drawn one after the other, the nearest first. Near ones hide the rest before its
-# pixels are computed; more parts than this cost more than they save.
-_LAYERS = 12
+# Distances in metres between the parts of what is seen that are drawn one after the other, the nearest first. Near
+# ones hide the rest before its pixels are computed; more than a dozen parts cost more than they save.
+_LAYER_EDGES_M = (0.15, 0.3, 0.45, 0.6, 0.8, 1.0, 1.3, 1.7, 2.2, 3.0, 4.5)
 _CONTEXT_SIZE = 64  # of the window that some drivers need; pictures are drawn elsewhere
 
 # Process that has made an OpenGL context; a forked child inherits the number, and the driver's dead threads with it.
@@ -98,11 +98,15 @@ class Canvas:
         model, scene = self._model, self._scene
         groups = model.geom_group.copy()
         seen = np.flatnonzero(in_view(model, data, camera, self._aspect))
-        order = seen[np.argsort(distances(model, data, camera)[seen], kind="stable")]
+        # By distance alone: where faces lie in one plane, the order decides, and must not hang on what was left out.
+        layers = np.searchsorted(_LAYER_EDGES_M, distances(model, data, camera)[seen])
         try:
             model.geom_group[:] = _HIDDEN_GROUP
             self._update(data, camera)
-            for layer in np.array_split(order, _LAYERS):
+            for number in range(len(_LAYER_EDGES_M) + 1):
+                layer = seen[layers == number]
+                if len(layer) == 0:
+                    continue
                 model.geom_group[layer] = groups[layer]
                 every = int(mujoco.mjtCatBit.mjCAT_ALL)
                 mujoco.mjv_addGeoms(model, data, self._option, self._nothing_moved, every, scene)
