@@ -106,7 +106,7 @@ class Blender(Appliance):
         low, top, radius = self._jug()
         y, base_h = self._y(), low + height / 2 - 0.004
         middle = (0, y * 0.5, -height / 2 + base_h / 2)
-        size = (min(width, 0.18), min(depth, 0.195), base_h)
+        size = (min(width, 0.18), min(depth - 0.014, 0.195), base_h)
         corner = {"jug": 0.03, "retro": 0.07, "tower": 0.018}[family]
         parts.block(
             root, middle, size, corner, finish, taper={"jug": 0.80, "retro": 0.72, "tower": 0.92}[family], bevel=0.010

@@ -63,6 +63,10 @@ class CoffeeMachine(Appliance):
         self.show(data, "pour", float(on and memory[0] < POUR_STEPS))
         memory[0] += on
 
+    def _top(self) -> float:
+        """Height of the head's top in the fixture's frame, below a hopper, a lever or a rail that reaches higher."""
+        return self.height / 2 - {"hopper": 0.062, "lever": 0.026, "rail": 0.017, "flat": 0.0}[self.record["top"]]
+
     def _tray_depth(self) -> float:
         return min(0.62 * self.depth, 0.17)
 
@@ -70,7 +74,7 @@ class CoffeeMachine(Appliance):
         """Add tray, back, head with spout and button, and what belongs to the design."""
         width, depth, height = self.size
         family, finish, accent = self.record["family"], self.record["finish"], self.record["accent"]
-        front, bottom, top = -depth / 2, -height / 2, height / 2
+        front, bottom, top = -depth / 2, -height / 2, self._top()
         tray_d = self._tray_depth()
         radius = {"espresso": 0.012, "capsule": 0.045, "bean_to_cup": 0.015, "pod": 0.035}[family]
         head_z = bottom + _TRAY_M + _CUP_ROOM_M
@@ -88,8 +92,8 @@ class CoffeeMachine(Appliance):
         x, y, _ = self.place
         self._add_tray(parts, root, (x, y, bottom + _TRAY_M), tray_d)
         # Back and head.
-        back = (width * (1.0 if family != "capsule" else 0.92), back_d, height - _TRAY_M)
-        parts.block(root, (0, depth / 2 - back_d / 2, _TRAY_M / 2), back, radius, finish)
+        back = (width * (1.0 if family != "capsule" else 0.92), back_d, top - bottom - _TRAY_M)
+        parts.block(root, (0, depth / 2 - back_d / 2, (bottom + top + _TRAY_M) / 2), back, radius, finish)
         head_d = depth * (0.96 if family != "pod" else 0.99)
         parts.block(
             root, (0, depth / 2 - head_d / 2, head_z + head_h / 2), (width, head_d, head_h), radius, finish, bevel=0.008
@@ -154,7 +158,7 @@ class CoffeeMachine(Appliance):
         self, parts: Parts, root: mujoco.MjsBody, face: float, head_z: float, head_h: float, accent: str
     ) -> None:
         width, depth, height = self.size
-        family, top = self.record["family"], height / 2
+        family, top = self.record["family"], self._top()
         if family == "espresso":
             parts.tube(
                 root, (-width * 0.27, face - 0.006, head_z + head_h * 0.62), 0.021, 0.014, "label", axis="y",

@@ -77,7 +77,7 @@ class ElectricKettle(Appliance):
         bottom, top = -height / 2, height / 2
         trim = "black" if finish != "black" else "graphite"
         parts.tube(root, (0, y, bottom + _BASE_M / 2), wide * 0.98, _BASE_M, trim, segments=16, bevel=0.005)
-        low, rim = bottom + _BASE_M + 0.002, top - 0.030
+        low, rim = bottom + _BASE_M + 0.002, top - (0.048 if family == "dome" else 0.036)
         shape = {
             "cone": [(0.94, 0.0), (0.97, 0.06), (0.90, 0.45), (0.78, 0.85), (0.72, 1.0)],
             "dome": [(0.90, 0.0), (0.98, 0.15), (1.0, 0.35), (0.92, 0.65), (0.72, 0.92), (0.62, 1.0)],

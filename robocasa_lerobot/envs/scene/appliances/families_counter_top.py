@@ -52,8 +52,8 @@ COUNTER_TOP: tuple[Kind, ...] = (
             ),
             Family(
                 "capsule",
-                (0.14, 0.30, 0.25),
-                (0.18, 0.36, 0.31),
+                (0.14, 0.30, 0.27),
+                (0.18, 0.36, 0.33),
                 ("black", "white", "red", "graphite", "sky", "mustard"),
                 {"tray": ("round", "grid"), "top": ("lever", "flat"), "accent": ("chrome", "black")},
             ),
