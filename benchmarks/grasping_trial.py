@@ -124,7 +124,11 @@ class GripperTrial:
         return Outcome(False, len(poses), len(poses), "no pose fits" if not poses else "slipped")
 
     def lifts(self, pose: GraspPose) -> bool:
-        """Whether the gripper comes down to the pose, closes, and lifts and holds the object."""
+        """Whether the gripper comes down to the pose, closes, and lifts and holds the object.
+
+        The hand rises by 10 cm. What hangs by its rim or handle swings, so its origin must be 7 cm higher at the end,
+        never have sunk below 5 cm, and it must touch a finger and not the table.
+        """
         model, data = self.model, self.data
         mujoco.mj_resetData(model, data)
         data.joint("obj_joint0").qpos[:] = self.rest

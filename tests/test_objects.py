@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import json
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import mujoco
 import numpy as np
 import pytest
-from grasping_trial import try_instance
+from grasping_trial import GripperTrial, try_instance
 
 from robocasa_lerobot.envs.scene.materials import MaterialPalette, load_style, style_ids
 from robocasa_lerobot.envs.scene.objects import catalogue
@@ -296,6 +297,15 @@ def test_grasp_poses_keep_the_fingers_off_the_table(name):
 @pytest.mark.parametrize("name", ["apple", "mug", "fish", "milk", "saucepan", "sausage"])
 def test_a_gripper_lifts_and_holds(name):
     assert try_instance(name, 6).lifted
+
+
+@pytest.mark.parametrize("name", ["apple", "mug"])
+def test_a_gripper_that_closes_beside_an_object_lifts_nothing(name):
+    trial = GripperTrial(item_of(name, 6))
+    pose = trial.poses()[0]
+    assert trial.lifts(pose)
+    assert not trial.lifts(replace(pose, position=pose.position + np.array([0.12, 0.0, 0.0])))
+    assert not trial.lifts(replace(pose, position=pose.position + np.array([0.0, 0.0, 0.12])))
 
 
 def test_the_published_grasps_meet_the_aim():

@@ -43,7 +43,7 @@ def grapes(d: Draft) -> None:
             points.append((-0.36 * x + row * 1.5 * r, (k - (count - 1) / 2) * 1.6 * r, 2.4 * r))
     for k, p in enumerate(points):
         jitter = d.rng.uniform(-0.12, 0.12, 3) * r
-        d.add(ball(2 * r, np.array(p) + jitter, 7, 5), d.colour if k % 3 else dark, "satin")
+        d.add(ball(2 * r, np.array(p) + jitter, 6, 4), d.colour if k % 3 else dark, "satin")
     last = points[19][0] if len(points) > 19 else 0.4 * x
     end = max(p[0] for p in points)
     d.add(tube([(end - r, 0, 2 * r), (end + r, 0, 2.6 * r), (end + 2.6 * r, 0.6 * r, 2.6 * r)], 0.16 * r, 5), STEM)
