@@ -195,8 +195,8 @@ class Blender(Appliance):
             parts.block(body, (0, 0, _FLANGE_M / 2), (2 * flange, 2 * flange, _FLANGE_M), 0.022, colour)
             parts.block(body, (0, 0, -_PLUG_M / 2), (2 * plug, 2 * plug, _PLUG_M), 0.018, "rubber", taper=1.0)
         else:
-            parts.tube(body, (0, 0, _FLANGE_M / 2), flange, _FLANGE_M, colour, segments=14, bevel=0.003)
-            parts.tube(body, (0, 0, -_PLUG_M / 2), plug * 0.985, _PLUG_M, "rubber", segments=14)
+            parts.tube(body, (0, 0, _FLANGE_M / 2), flange, _FLANGE_M, colour, segments=14, bevel=0.003, foot=True)
+            parts.tube(body, (0, 0, -_PLUG_M / 2), plug * 0.985, _PLUG_M, "rubber", segments=14, foot=True)
         parts.tube(
             body, (0, 0, _FLANGE_M + _KNOB_M / 2), _KNOB_RADIUS_M * 0.92, _KNOB_M, colour, segments=10,
             top_radius=_KNOB_RADIUS_M, bevel=0.004,

@@ -21,12 +21,13 @@ class Mesh:
     faces: NDArray[np.int64]
 
 
-def loft(rings: Sequence[Points], *, caps: bool = True) -> Mesh:
+def loft(rings: Sequence[Points], *, caps: bool = True, foot: bool = True) -> Mesh:
     """The skin through rings of n points each, counter-clockwise as seen against the direction of the rings' order.
 
     Args:
         rings: of shape (n, 3); a ring whose points coincide becomes a tip.
         caps: close the first and the last ring.
+        foot: close the first one too, which nobody sees of what stands on something.
     """
     count = len(rings[0])
     vertices = np.concatenate(rings)
@@ -40,7 +41,8 @@ def loft(rings: Sequence[Points], *, caps: bool = True) -> Mesh:
     if caps:
         last = (len(rings) - 1) * count
         for i in range(1, count - 1):
-            faces.append((0, i + 1, i))
+            if foot:
+                faces.append((0, i + 1, i))
             faces.append((last, last + i, last + i + 1))
     return _merged(vertices, np.array(faces))
 
@@ -71,12 +73,12 @@ def rounded_rectangle(width: float, depth: float, z: float, radius: float, per_c
     return np.array(points)
 
 
-def turned(profile: Sequence[tuple[float, float]], segments: int = 12, *, caps: bool = True) -> Mesh:
+def turned(profile: Sequence[tuple[float, float]], segments: int = 12, *, caps: bool = True, foot: bool = True) -> Mesh:
     """A body of revolution about z through (radius, z) points, which must go upwards along the outside.
 
     A profile may come back down on the inside, as of a bowl; then `caps` should be False.
     """
-    return loft([circle(r, z, segments) for r, z in profile], caps=caps)
+    return loft([circle(r, z, segments) for r, z in profile], caps=caps, foot=foot)
 
 
 def block(size: Vector, radius: float, *, bevel: float = 0.004, taper: float = 1.0, per_corner: int = 3) -> Mesh:

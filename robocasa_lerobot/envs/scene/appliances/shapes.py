@@ -103,18 +103,25 @@ class Shapes:
         finish: str,
         *,
         axis: str = "z",
-        segments: int = 12,
+        segments: int | None = None,
         bevel: float = 0.0,
         top_radius: float | None = None,
         collide: bool = True,
+        foot: bool = False,
     ) -> None:
-        """A round bar, disc or cone about an axis; `bevel` breaks its upper edge."""
+        """A round bar, disc or cone about an axis; `bevel` breaks its upper edge, `foot` closes its lower end."""
         top = radius if top_radius is None else top_radius
         profile = [(radius, -length / 2), (top, length / 2 - bevel)]
         if bevel > 0:
             profile.append((top - bevel, length / 2))
         # Along y the mesh's upper end must look at the person in front, who stands at -y: AXIS_QUATS turns z to -y.
-        self.mesh(body, meshes.turned(profile, segments), center, finish, axis=axis)
+        self.mesh(
+            body,
+            meshes.turned(profile, segments or (10 if radius < 0.03 else 14), foot=foot),
+            center,
+            finish,
+            axis=axis,
+        )
         if collide:
             self.stopper(body, center, max(radius, top), length, axis=axis)
 

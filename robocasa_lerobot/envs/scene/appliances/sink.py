@@ -159,10 +159,10 @@ class Sink(Appliance):
         parts.pipe(spout, path, 0.0125, metal, sides=8)
         tip = np.asarray(path[-1])
         if style == "pull_down":
-            parts.tube(spout, tip - (0, 0, 0.02), 0.017, 0.06, metal if metal != "black" else "graphite")
+            parts.tube(spout, tip - (0, 0, 0.02), 0.017, 0.06, metal if metal != "black" else "graphite", foot=True)
             tip = tip - np.array([0, 0, 0.05])
         else:
-            parts.tube(spout, tip, 0.0155, 0.014, metal)
+            parts.tube(spout, tip, 0.0155, 0.014, metal, foot=True)
             tip = tip - np.array([0, 0, 0.007])
         parts.site(spout, "water", tip)
         fall = float(tip[2]) + 0.064 + self.height - WALL_M

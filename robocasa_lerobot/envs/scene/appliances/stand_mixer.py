@@ -181,7 +181,7 @@ class StandMixer(Appliance):
                 head, (0, 0.03 - long * 0.5, head_h * 0.42), (wide * 1.01, long * 0.42, 0.012), "chrome", collide=False
             )
         parts.tube(head, (0, 0.03 - long - 0.002, head_h * 0.55), 0.022, 0.012, "chrome", axis="y", bevel=0.003)
-        parts.tube(head, (0, nose_y, -0.006), 0.034, 0.020, "chrome", collide=False)
+        parts.tube(head, (0, nose_y, -0.006), 0.034, 0.020, "chrome", collide=False, foot=True)
         reach = z - (bowl_z + tall) + 0.075
         parts.tube(head, (0, nose_y, -reach * 0.35), 0.007, reach * 0.7, "chrome", segments=8, collide=False)
         tool_z = -reach * 0.62
