@@ -111,10 +111,13 @@ class ToasterOven(Appliance):
                     parts.box(root, spot, (0.03, 0.03, _FOOT_M), "rubber")
         self._add_panel(parts, root)
         self._add_racks(parts, root)
-        lamp = parts.lamp(root, "power", (0, 0.014, 0), (0, 0, 0))
-        for share in (0.12, 0.38, 0.64, 0.90):
-            spot = ((low[0] + high[0]) / 2, high[1] - 0.006, low[2] + share * (high[2] - low[2]))
-            parts.box(lamp, spot, (high[0] - low[0] - 0.03, 0.008, 0.012), "light_orange", collide=False)
+        # Heating wires come up out of the floor while a lamp comes out of the panel.
+        lamp = parts.lamp(root, "power", (0, 0.012, -0.014), (0, 0, 0))
+        for share in (0.16, 0.50, 0.84):
+            spot = ((low[0] + high[0]) / 2, low[1] + share * (high[1] - low[1]), low[2] + 0.006)
+            parts.box(lamp, spot, (high[0] - low[0] - 0.03, 0.012, 0.008), "light_orange", collide=False)
+        spot = (width / 2 - PANEL_M / 2, -depth / 2 - 0.001, height / 2 - 0.010)
+        parts.box(lamp, spot, (0.022, 0.003, 0.006), "light_red", collide=False)
         self._add_door(parts, root)
 
     def _add_panel(self, parts: Parts, root: mujoco.MjsBody) -> None:
