@@ -42,6 +42,9 @@ def parse(arguments: Sequence[str] | None = None) -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--workers", type=int, default=2, help="processes (default 2)")
     parser.add_argument("--every", type=int, default=1, help="take every n-th kitchen of the pretraining split")
+    parser.add_argument(
+        "--limit", type=int, help="examine at most this many more, evenly spread; the result is of all that have been"
+    )
     parser.add_argument("--fresh", action="store_true", help="forget what an earlier sweep has found")
     parser.add_argument("--time", type=int, default=0, metavar="N", help="time N builds on one process, nothing else")
     return parser.parse_args(arguments)
@@ -79,17 +82,18 @@ def is_sound(row: dict[str, Any]) -> bool:
     return not any(row.get(key) for key in ("error", "overlaps", "blocked", "fell", "moved"))
 
 
-def sweep(pairs: list[tuple[int, int]], workers: int) -> list[dict[str, Any]]:
-    """Examine the kitchens that have not been, and return the rows of all."""
+def sweep(pairs: list[tuple[int, int]], workers: int, limit: int | None) -> list[dict[str, Any]]:
+    """Examine the kitchens that have not been, and return the rows of all that have."""
     rows = {(row["layout"], row["style"]): row for row in _read()}
-    todo = [pair for pair in pairs if pair not in rows]
+    mixed = [pairs[index] for index in np.random.default_rng(0).permutation(len(pairs))]
+    todo = [pair for pair in mixed if pair not in rows][:limit]
     PARTS.parent.mkdir(parents=True, exist_ok=True)
     with PARTS.open("a", encoding="utf-8") as file:
         for row in tqdm(_work(todo, workers), total=len(todo), unit="kitchen", smoothing=0):
             file.write(json.dumps(row) + "\n")
             file.flush()
             rows[row["layout"], row["style"]] = row
-    return [rows[pair] for pair in pairs]
+    return [rows[pair] for pair in pairs if pair in rows]
 
 
 def _work(pairs: list[tuple[int, int]], workers: int) -> Iterator[dict[str, Any]]:
@@ -160,7 +164,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if options.fresh:
             PARTS.unlink(missing_ok=True)
         pairs = scene_ids("target") + scene_ids("pretrain")[:: options.every]
-        rows = sweep(pairs, options.workers)
+        rows = sweep(pairs, options.workers, options.limit)
         body |= {"splits": summary(rows), "unsound": [row for row in rows if not is_sound(row)]}
         print(json.dumps(body["splits"], indent=1))
     sound = body.get("splits", {})

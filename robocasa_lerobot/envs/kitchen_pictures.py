@@ -13,6 +13,7 @@ from robocasa_lerobot.rendering import SceneRenderer
 Picture = NDArray[np.uint8]
 _EYE_M = 1.60
 _WIDE_DEG = 62.0  # vertical field of view of the photographer's lens
+_CROWDED_M = 1.9
 _HIDDEN_GROUP = 5  # drawn by no camera
 _CUT_M = 2.25  # what is above is left out of views from above
 
@@ -83,6 +84,12 @@ def _photographer(layout: Layout, corner: str) -> mujoco.MjvCamera:
         corner = "left" if sides["right"] > sides["left"] else "right"
         if sides["left"] == sides["right"]:
             corner = "left" if fridge.pos[0] > width / 2 else "right"
+        # Not close behind a fridge or a tall housing.
+        tall = [f for f in layout.fixtures.values() if f.height > _EYE_M and layout.types[f.name] != "wall"]
+        ways = {side: (0.22 if side == "left" else width - 0.22, 0.22 - depth) for side in sides}
+        near = {side: min(np.hypot(f.pos[0] - x, f.pos[1] - y) for f in tall) for side, (x, y) in ways.items()}
+        if near[corner] < _CROWDED_M < max(near.values()):
+            corner = "left" if corner == "right" else "right"
     x = 0.22 if corner == "left" else width - 0.22
     eye = np.array([x, -depth + 0.22, _EYE_M])
     if layout.plan == "galley":

@@ -27,7 +27,7 @@ def bare_kitchen(layout: Layout, render_preset: str = "fast") -> tuple[mujoco.Mj
 
 def _light(spec: mujoco.MjSpec, layout: Layout, render_preset: str) -> None:
     visual = spec.visual
-    visual.headlight.ambient = [0.36, 0.36, 0.37]
+    visual.headlight.ambient = [0.42, 0.42, 0.42]
     visual.headlight.diffuse = [0.20, 0.20, 0.20]
     visual.headlight.specular = [0.05, 0.05, 0.05]
     visual.quality.shadowsize = 4096
@@ -42,8 +42,8 @@ def _light(spec: mujoco.MjSpec, layout: Layout, render_preset: str) -> None:
     spec.stat.center = [(room["x_min"] + room["x_max"]) / 2, room["y_min"] / 2, 1.0]
     middle = spec.stat.center[0]
     for name, position, direction, strength, shadow in (
-        ("ceiling_light", [middle, room["y_min"] * 0.7, room["height"]], [0.14, 0.40, -1.0], 0.46, True),
-        ("window_light", [middle, -0.2, 2.2], [-0.55, -0.35, -0.8], 0.20, False),
+        ("ceiling_light", [middle, room["y_min"] * 0.7, room["height"]], [0.14, 0.40, -1.0], 0.43, True),
+        ("window_light", [middle, -0.2, 2.2], [-0.55, -0.35, -0.8], 0.17, False),
     ):
         light = spec.worldbody.add_light(name=name, pos=position, dir=direction)
         light.type = mujoco.mjtLightType.mjLIGHT_DIRECTIONAL

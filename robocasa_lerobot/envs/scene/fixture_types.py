@@ -61,9 +61,19 @@ def _cabinet(*types: str) -> Filter:
             layout.types[fixture.name] in types
             and low <= fixture.pos[2] - fixture.height / 2 <= high
             and not any(part in fixture.name for part in ("stack", "corner"))
+            and not _over_corner(layout, fixture)
         )
 
     return found
+
+
+def _over_corner(layout: Layout, fixture: Fixture) -> bool:
+    """Whether it hangs over the counter of a corner, which no robot can stand before."""
+    x, y, _ = fixture.pos
+    return any(
+        isinstance(f, Counter) and "corner" in f.name and max(abs(f.pos[0] - x), abs(f.pos[1] - y)) < f.width / 2
+        for f in layout.fixtures.values()
+    )
 
 
 def _top_drawer(layout: Layout, fixture: Fixture) -> bool:

@@ -38,7 +38,7 @@ COMMON_SURFACES: dict[str, Surface] = {
     "cabinet_glass": Surface(rgba=(0.30, 0.34, 0.36, 1.0), shininess=0.9),
     "window_frame": Surface(rgba=(0.96, 0.96, 0.95, 1.0), shininess=0.3),
     "window_pane": Surface(rgba=(0.72, 0.86, 0.96, 1.0), shininess=0.9),
-    "ceiling": Surface(rgba=(0.97, 0.97, 0.96, 1.0), shininess=0.0, emission=0.35),
+    "ceiling": Surface(rgba=(0.97, 0.97, 0.96, 1.0), shininess=0.0, emission=0.5),
     "trim": Surface(rgba=(0.95, 0.95, 0.93, 1.0), shininess=0.2),
     "toe_kick": Surface(rgba=(0.13, 0.13, 0.13, 1.0), shininess=0.05),
     "paper": Surface(rgba=(0.97, 0.97, 0.96, 1.0), shininess=0.02),

@@ -1,0 +1,62 @@
+"""The gallery's pages and sheets, and the viewer's message where there is no display."""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from robocasa_lerobot.cli import main
+from robocasa_lerobot.envs.gallery_page import write_page
+from robocasa_lerobot.envs.gallery_sections import SECTIONS, Tile, tiles_of, write_sheets
+from robocasa_lerobot.errors import UnknownNameError
+
+TILES = [
+    Tile(
+        f"thing {i}",
+        ("round", "square")[i % 2],
+        ("target", "pretrain")[i % 3 == 0],
+        np.full((20, 30, 3), 40 * i, np.uint8),
+    )
+    for i in range(5)
+]
+
+
+def test_a_page_loads_nothing_and_has_every_picture_and_choice(tmp_path) -> None:
+    text = write_page(tmp_path / "gallery.html", {"objects": TILES}).read_text()
+    assert not re.search(r"(src|href)=[\"']?(?!data:)[\w/.:]+", text)
+    assert text.count("<figure") == text.count("data:image/jpeg;base64,") == len(TILES)
+    for tile in TILES:
+        assert f'data-category="{tile.category}" data-split={tile.split}' in text
+        assert tile.title in text
+    assert "<option>round</option><option>square</option>" in text
+
+
+def test_contact_sheets_hold_all_pictures(tmp_path) -> None:
+    columns = SECTIONS["appliances"][2]
+    paths = write_sheets("appliances", TILES, tmp_path, rows=1)
+    assert len(paths) == -(-len(TILES) // columns)
+    assert Image.open(paths[0]).size == (30 * columns, 20 + 16)
+
+
+@pytest.mark.render
+def test_sections_are_filtered() -> None:
+    toasters = list(tiles_of("appliances", ("target",), ("toaster",)))
+    assert toasters
+    assert {(tile.category, tile.split) for tile in toasters} == {("toaster", "target")}
+    plans = list(tiles_of("layouts", ("target",), ("galley",)))
+    assert [tile.title for tile in plans] == ["layout 5: galley"]
+    assert plans[0].picture.std() > 20
+    with pytest.raises(UnknownNameError, match="layouts"):
+        list(tiles_of("layout"))
+
+
+def test_the_viewer_says_that_there_is_no_display(monkeypatch, capsys) -> None:
+    for name in ("DISPLAY", "WAYLAND_DISPLAY"):
+        monkeypatch.delenv(name, raising=False)
+    assert main(["view", "--task", "OpenDrawer"]) == 2
+    assert "gallery" in capsys.readouterr().err
+    assert main(["view", "--layout", "3"]) == 2
+    assert "--style" in capsys.readouterr().err

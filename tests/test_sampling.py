@@ -1,0 +1,120 @@
+"""Where objects may start: parts of fixtures, rectangles in them, containers, and what is said when nothing fits."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from robocasa_lerobot.envs.placement import PlacementError
+from robocasa_lerobot.envs.registry import get_task
+from robocasa_lerobot.envs.scene.arrange import cast_roles, place_objects
+from robocasa_lerobot.envs.scene.layout import load_layout
+from robocasa_lerobot.envs.scene.sampling import choose_parts, parts_of, rectangle_in
+from robocasa_lerobot.envs.scene.selection import candidates, faces, ground_fixture, is_free, robot_pose
+from robocasa_lerobot.envs.task import FixtureWanted, ObjectWanted, Placement, RobotStart, SampleRegion
+
+LAYOUT = load_layout(2)
+SINK = candidates(LAYOUT, "sink")[0]
+COUNTER = next(f for f in candidates(LAYOUT, "counter") if getattr(f, "opening", None) is not None)
+CABINET = candidates(LAYOUT, "cabinet_double_door")[0]
+
+
+def test_a_counter_has_a_part_on_each_side_of_its_sink_and_strips() -> None:
+    parts = parts_of(LAYOUT, COUNTER)
+    assert len(parts) == 4
+    assert sum(part.area.extent for part in parts) == pytest.approx(
+        COUNTER.width * COUNTER.depth - SINK.width * SINK.depth, rel=1e-3
+    )
+    for loc, sign in (("left", -1), ("right", 1)):
+        found = choose_parts(LAYOUT, Placement(region=SampleRegion("sink", loc)), COUNTER, SINK, 0.0)
+        assert len(found) == 1
+        middle = np.array(found[0].middle) - SINK.pos[:2]
+        assert sign * (middle @ (np.cos(COUNTER.yaw), np.sin(COUNTER.yaw))) > SINK.width / 2 - 1e-6
+        assert found[0].area.y1 - found[0].area.y0 == pytest.approx(COUNTER.depth)  # not the strips
+    both = choose_parts(LAYOUT, Placement(region=SampleRegion("sink", "left_right")), COUNTER, SINK, 0.0)
+    assert len(both) == 2
+    with pytest.raises(PlacementError, match="Ask for a smaller part"):
+        choose_parts(LAYOUT, Placement(region=SampleRegion(top_size=(9.0, 0.1))), COUNTER, None, 0.0)
+
+
+def test_positions_are_normalised_and_follow_the_reference() -> None:
+    part = max(parts_of(LAYOUT, COUNTER), key=lambda p: p.area.extent)
+    start = Placement(size=(0.3, 0.2), pos=(-1.0, 1.0), margin=0.0)
+    area = rectangle_in(part, start, COUNTER, None)
+    assert (area.x0, area.y1) == pytest.approx((part.area.x0, part.area.y1))
+    assert (area.x1 - area.x0, area.y1 - area.y0) == pytest.approx((0.3, 0.2))
+    at_ref = rectangle_in(part, replace(start, pos=("ref", -1.0)), COUNTER, SINK)
+    assert min(abs(at_ref.x0 - part.area.x0), abs(at_ref.x1 - part.area.x1)) == pytest.approx(0.0)
+    assert at_ref.y0 == pytest.approx(part.area.y0)
+    inner = rectangle_in(part, replace(start, margin=0.04), COUNTER, None)
+    assert inner.x1 - inner.x0 == pytest.approx(0.22)
+    with pytest.raises(PlacementError, match="smaller offset"):
+        rectangle_in(part, replace(start, offset=(0.0, 5.0)), COUNTER, None)
+
+
+def test_levels_of_a_cabinet() -> None:
+    heights = [part.area.z for part in parts_of(LAYOUT, CABINET)]
+    assert heights == sorted(heights)
+    top = choose_parts(LAYOUT, Placement(region=SampleRegion(level=-1)), CABINET, None, 0.0)
+    assert [part.area.z for part in top] == heights[-1:]
+    low = choose_parts(LAYOUT, Placement(region=SampleRegion(height=(1.0, 1.5))), CABINET, None, 0.0)
+    assert {part.area.z for part in low} == {z for z in heights if z <= 1.5}
+
+
+def _task(*objects: ObjectWanted):
+    fixtures = (FixtureWanted("sink", "sink"), FixtureWanted("counter", "counter", near="sink"))
+    return replace(get_task("PickPlaceCounterToSink"), fixtures=fixtures, objects=objects)
+
+
+def test_food_stands_in_its_container_and_regions_are_taken_again() -> None:
+    start = Placement("counter", region=SampleRegion("sink", "left_right"), try_to_place_in="plate")
+    again = Placement("counter", region=SampleRegion("sink", "any"), reuse_region_from="obj")
+    task = _task(ObjectWanted("obj", ("fruit",), start), ObjectWanted("other", ("can",), again))
+    for seed in range(5):
+        rng = np.random.default_rng(seed)
+        roles = cast_roles(rng, task, LAYOUT)
+        assert roles["counter"] == COUNTER.name
+        placed = place_objects(rng, task, "target", LAYOUT, roles, {})
+        assert set(placed) == {"obj", "obj_container", "other"}
+        obj, plate = placed["obj"], placed["obj_container"]
+        assert plate.item.category.name == "plate"
+        assert np.hypot(obj.pos[0] - plate.pos[0], obj.pos[1] - plate.pos[1]) < max(plate.item.size[:2]) / 2
+        assert obj.pos[2] > plate.pos[2]
+
+
+def test_what_does_not_fit_is_said_with_free_area_and_three_remedies() -> None:
+    start = Placement("counter", size=(0.3, 0.3), pos=(-1.0, -1.0))
+    names = ("plate", "tray", "pan", "pot", "cutting_board")
+    task = _task(*(ObjectWanted(f"wide_{name}", (name,), start) for name in names))
+    rng = np.random.default_rng(0)
+    roles = cast_roles(rng, task, LAYOUT)
+    with pytest.raises(PlacementError, match="wide_") as failure:
+        place_objects(rng, task, "target", LAYOUT, roles, {})
+    assert "m2 are free" in str(failure.value)
+    assert str(failure.value).count(", ") >= 2
+    assert COUNTER.name in str(failure.value)
+
+
+@pytest.mark.parametrize("layout_id", [2, 8, 13])
+def test_robots_stand_before_stools_islands_fridges_and_towers(layout_id: int) -> None:
+    layout = load_layout(layout_id)
+    rng = np.random.default_rng(0)
+    for kind in ("stool", "dining_counter", "fridge", "microwave", "cabinet", "stove", "dishwasher"):
+        found = 0
+        for fixture in candidates(layout, kind):
+            try:
+                pose = robot_pose(rng, layout, RobotStart(kind), fixture)
+            except PlacementError:
+                assert kind == "cabinet", fixture.name  # beside a corner there may be no room: the builder draws again
+                continue
+            found += 1
+            assert is_free(layout.fixtures, pose)
+            ground = ground_fixture(layout, fixture)
+            facing = np.array([np.cos(pose.yaw), np.sin(pose.yaw)])
+            away = np.array([pose.x, pose.y]) - ground.pos[:2]
+            assert facing @ away < 0
+            if kind == "stool":
+                assert faces(layout, ground, fixture)[0].clearance > 0.2
+        assert found, kind
