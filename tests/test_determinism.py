@@ -12,10 +12,10 @@ import numpy as np
 import pytest
 from gymnasium.vector import AutoresetMode
 from numpy.typing import NDArray
+from task_selection import demonstrated
 
 from robocasa_lerobot.demos.demonstrator import demonstrate
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
-from robocasa_lerobot.envs.registry import task_names
 from robocasa_lerobot.envs.state import KitchenState
 from robocasa_lerobot.envs.vector import make_vector_env
 
@@ -61,7 +61,7 @@ def over_workers(task: str, seeds: list[int], workers: int) -> list[str]:
     return digests
 
 
-@pytest.mark.parametrize("task", task_names())
+@pytest.mark.parametrize("task", demonstrated())
 def test_a_few_episodes_are_the_same_alone_and_over_workers(task: str) -> None:
     seeds = [4, 9, 1]
     expected = alone(task, seeds)
@@ -71,7 +71,7 @@ def test_a_few_episodes_are_the_same_alone_and_over_workers(task: str) -> None:
 
 @pytest.mark.slow
 def test_two_hundred_episodes_are_the_same_over_one_and_two_workers() -> None:
-    tasks = task_names()
+    tasks = demonstrated()
     for index, task in enumerate(tasks):
         seeds = list(range(index, 200, len(tasks)))
         one = over_workers(task, seeds, 1)
@@ -79,7 +79,7 @@ def test_two_hundred_episodes_are_the_same_over_one_and_two_workers() -> None:
         assert len(set(one)) == len(seeds)
 
 
-def demonstrated(env: KitchenEnv) -> dict[str, bool]:
+def terms_at_the_end(env: KitchenEnv) -> dict[str, bool]:
     """The success terms at the end of a demonstration."""
     for action in demonstrate(env):
         _, _, terminated, truncated, info = env.step(action.astype(np.float32))
@@ -89,7 +89,7 @@ def demonstrated(env: KitchenEnv) -> dict[str, bool]:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("task", task_names())
+@pytest.mark.parametrize("task", demonstrated())
 def test_sleep_changes_no_outcome(task: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """A demonstrator that sees the state meets the same success terms with MuJoCo's sleep and without."""
     outcomes: dict[bool, list[dict[str, bool]]] = {}
@@ -100,7 +100,7 @@ def test_sleep_changes_no_outcome(task: str, monkeypatch: pytest.MonkeyPatch) ->
             env.reset(seed=seed)
             if not sleep:
                 env.model.opt.enableflags &= ~int(mujoco.mjtEnableBit.mjENBL_SLEEP)
-            outcomes[sleep].append(demonstrated(env))
+            outcomes[sleep].append(terms_at_the_end(env))
     assert outcomes[True] == outcomes[False]
     assert any(all(terms.values()) for terms in outcomes[True])
 

@@ -9,6 +9,7 @@ import gymnasium
 import numpy as np
 import pytest
 from gymnasium.utils.env_checker import check_env
+from task_selection import every_task
 
 import robocasa_lerobot.envs  # noqa: F401  (makes the tasks known to Gymnasium)
 from robocasa_lerobot import contract
@@ -27,7 +28,7 @@ def make(task: str, **kwargs) -> KitchenEnv:
     return env.unwrapped
 
 
-@pytest.mark.parametrize("task", task_names())
+@pytest.mark.parametrize("task", every_task())
 def test_gymnasium_checker_finds_no_fault(task):
     env = make(task)
     with warnings.catch_warnings():
@@ -38,18 +39,18 @@ def test_gymnasium_checker_finds_no_fault(task):
     env.close()
 
 
-@pytest.mark.parametrize("task", task_names())
+@pytest.mark.parametrize("task", every_task())
 def test_task_checker_finds_no_fault(task):
     assert check_task(task, seeds=(0, 1)) == []
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("task", task_names())
+@pytest.mark.parametrize("task", every_task())
 def test_task_checker_finds_no_fault_on_ten_seeds(task):
     assert check_task(task) == []
 
 
-@pytest.mark.parametrize("task", task_names())
+@pytest.mark.parametrize("task", every_task())
 def test_observations_follow_the_contract(task):
     env = make(task)
     observation, info = env.reset(seed=1)

@@ -5,9 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+from task_selection import demonstrated
 
 from robocasa_lerobot.demos.record import RecordingSettings, record_task
-from robocasa_lerobot.envs.registry import task_names
 from robocasa_lerobot.errors import UserError
 from robocasa_lerobot.evaluation import engine
 from robocasa_lerobot.evaluation.config import EvaluationConfig
@@ -70,7 +70,7 @@ def test_the_demonstrator_is_a_policy_of_the_engine(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("task", task_names())
+@pytest.mark.parametrize("task", demonstrated())
 def test_bounds_of_every_registered_task(task: str, tmp_path: Path) -> None:
     """Zero and random below 2 %, the demonstrator at least at the success of its own recordings."""
     trials = 30

@@ -7,9 +7,10 @@ from dataclasses import replace
 import mujoco
 import numpy as np
 import pytest
+from task_selection import every_task
 
 from robocasa_lerobot.envs.placement import PlacementError
-from robocasa_lerobot.envs.registry import get_task, task_names
+from robocasa_lerobot.envs.registry import get_task
 from robocasa_lerobot.envs.scene import selection
 from robocasa_lerobot.envs.scene.builder import build_scene
 from robocasa_lerobot.envs.scene.fixtures.base import Fixture
@@ -88,7 +89,7 @@ def test_a_layout_without_a_free_place_is_given_up(monkeypatch: pytest.MonkeyPat
         robot_pose(np.random.default_rng(0), layout, RobotStart("sink"), sink)
 
 
-@pytest.mark.parametrize("task", task_names())
+@pytest.mark.parametrize("task", every_task())
 def test_the_robot_starts_free_of_everything(task: str) -> None:
     for seed in range(3):
         scene = build_scene(get_task(task), "target", seed)

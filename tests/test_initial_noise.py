@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from task_selection import every_task
 
 from robocasa_lerobot.envs.initial_noise import InitialNoise
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
-from robocasa_lerobot.envs.registry import task_names
 from robocasa_lerobot.envs.scene.robot import ARM_HOME_QPOS
 from robocasa_lerobot.envs.scene.selection import is_free
 from robocasa_lerobot.errors import UserError
@@ -45,7 +45,7 @@ def test_each_noise_moves_what_it_names() -> None:
     assert 2.0 < np.rad2deg(np.abs(shifts[:, 2])).mean() < 25.0
 
 
-@pytest.mark.parametrize("task", task_names())
+@pytest.mark.parametrize("task", every_task())
 def test_novel_language_is_one_of_the_tasks_other_wordings(task: str) -> None:
     plain, novel = KitchenEnv(task, cameras=()), KitchenEnv(task, cameras=(), novel_language=True)
     told = set()

@@ -7,10 +7,10 @@ from collections import Counter
 import mujoco
 import numpy as np
 import pytest
+from task_selection import every_task
 
 from robocasa_lerobot import contract
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
-from robocasa_lerobot.envs.registry import task_names
 from robocasa_lerobot.rendering import SceneRenderer
 from robocasa_lerobot.rendering.look_alike import look_alike
 from robocasa_lerobot.rendering.tessellation import Surface, box, capsule, cylinder, joined
@@ -54,7 +54,7 @@ def volume_of(surface: Surface) -> float:
 
 
 @pytest.mark.render
-@pytest.mark.parametrize("task", task_names())
+@pytest.mark.parametrize("task", every_task())
 def test_the_look_alike_looks_alike(task: str) -> None:
     env = KitchenEnv(task, image_size=128)
     env.reset(seed=2)

@@ -31,12 +31,11 @@ def configure(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Record every task; prints episodes, steps and the failure rate of each."""
+    from robocasa_lerobot.demos.demonstrator import check_demonstrable
     from robocasa_lerobot.demos.record import RecordingSettings, record_task
-    from robocasa_lerobot.envs.registry import get_task
 
     names = [name.strip() for name in args.tasks.split(",") if name.strip()]
-    for name in names:
-        get_task(name)
+    check_demonstrable(names)
     for name in names:
         settings = RecordingSettings(
             task=name,

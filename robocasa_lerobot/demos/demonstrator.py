@@ -2,14 +2,37 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 
 from robocasa_lerobot.demos.motion import Array, action
 from robocasa_lerobot.demos.skills import SKILLS, SkillError
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
-from robocasa_lerobot.errors import UnknownNameError
+from robocasa_lerobot.envs.registry import get_task, task_names
+from robocasa_lerobot.envs.task import Task
+from robocasa_lerobot.errors import UnknownNameError, UserError
 
-__all__ = ["SkillError", "demonstrate"]
+__all__ = ["SkillError", "can_demonstrate", "demonstrate"]
+
+
+def can_demonstrate(task: Task) -> bool:
+    """Whether every stage of a task has a skill."""
+    return all((stage.skill, stage.verb) in SKILLS for stage in task.stages)
+
+
+def check_demonstrable(names: Iterable[str]) -> None:
+    """Check that tasks exist, and that the demonstrator can solve them.
+
+    Raises:
+        UnknownNameError: no task of that name.
+        UserError: a task has a stage that no skill carries out yet.
+    """
+    lacking = [name for name in names if not can_demonstrate(get_task(name))]
+    if lacking:
+        able = [name for name in task_names() if can_demonstrate(get_task(name))]
+        raise UserError(
+            f"no demonstrator yet for {', '.join(lacking)}. It can solve {', '.join(able)}; for the others, record "
+            "demonstrations by hand, or evaluate a policy that was trained on RoboCasa365's."
+        )
 
 
 def demonstrate(env: KitchenEnv) -> Iterator[Array]:

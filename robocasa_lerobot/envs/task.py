@@ -5,9 +5,11 @@ A task is data. The scene builder reads what is wanted, the env reads the goal, 
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from robocasa_lerobot.envs.predicates import Goal
+from robocasa_lerobot.envs.initial import Initial
+from robocasa_lerobot.envs.predicates.logic import Goal
 
 
 @dataclass(frozen=True)
@@ -20,6 +22,7 @@ class FixtureWanted:
         near: role of an earlier fixture that it is the nearest to.
         other_than: roles of earlier fixtures that it is none of.
         size: least width and depth of its top, metres; of counters.
+        apart_m: least distance on the floor from the fixtures of `other_than`, metres.
     """
 
     role: str
@@ -27,6 +30,24 @@ class FixtureWanted:
     near: str = ""
     other_than: tuple[str, ...] = ()
     size: tuple[float, float] = (0.0, 0.0)
+    apart_m: float = 0.0
+
+
+@dataclass(frozen=True)
+class Choice:
+    """A value that is drawn at reset: which knob, which rack, which way.
+
+    Declarations name it in braces, as in `part="knob_{knob}"`; instructions too.
+
+    Attributes:
+        name: of the choice.
+        options: by value, the words that instructions may use besides the value itself.
+        of: role of a fixture whose parts are the options instead: burners, racks, or slots.
+    """
+
+    name: str
+    options: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
+    of: str = ""
 
 
 @dataclass(frozen=True)
@@ -73,14 +94,16 @@ class SampleRegion:
             on either, "any" all.
         top_size: least width and depth of the part, metres.
         height: bounds of the height in the room of the part's floor, metres.
-        level: number of the part from below; -1 is the highest.
+        level: number of the part from below; -1 is the highest. May name a choice in braces.
+        name: start of the part's name, such as "shelf" or "rack0"; may name a choice in braces.
     """
 
     ref: str = ""
     loc: str = "any"
     top_size: tuple[float, float] = (0.0, 0.0)
     height: tuple[float, float] = (0.0, 3.0)
-    level: int | None = None
+    level: int | str | None = None
+    name: str = ""
 
 
 @dataclass(frozen=True)
@@ -100,6 +123,7 @@ class Placement:
         try_to_place_in: object group: what can be in a container stands in one of that group, `<name>_container`.
         reuse_region_from: name of an object whose part of the fixture is taken again.
         ensure_inside: the whole footprint lies in the rectangle, not its middle alone.
+        slot: it stands along the longer side of the part, and out of its top, as bread does in a toaster.
     """
 
     fixture: str = ""
@@ -113,6 +137,7 @@ class Placement:
     try_to_place_in: str = ""
     reuse_region_from: str = ""
     ensure_inside: bool = True
+    slot: bool = False
 
 
 @dataclass(frozen=True)
@@ -126,6 +151,13 @@ class ObjectWanted:
         count: least and greatest number, both possible.
         graspable, washable: properties asked for.
         max_height: bound of its size along z, metres.
+        properties: further properties asked for, such as "cookable".
+        exclude: groups or categories that are not wanted.
+        max_size: bounds of its size along x, y, z, metres; None leaves an axis free.
+        scale: factor of its size.
+        upright: turned so that its longest axis points up.
+        repeats: may be of a category that the scene already has.
+        filled: what is seen in it, such as "coffee".
     """
 
     name: str
@@ -135,6 +167,13 @@ class ObjectWanted:
     graspable: bool = False
     washable: bool = False
     max_height: float | None = None
+    properties: tuple[str, ...] = ()
+    exclude: tuple[str, ...] = ()
+    max_size: tuple[float | None, float | None, float | None] | None = None
+    scale: float = 1.0
+    upright: bool = False
+    repeats: bool = False
+    filled: str = ""
 
 
 @dataclass(frozen=True)
@@ -145,11 +184,15 @@ class RobotStart:
         fixture: role.
         beside: stand half the fixture's width plus 0.2 m to its left or right, whichever is free.
         deviation: half ranges of the uniform noise along and towards the counter, metres.
+        setback: farther from it than usual, metres.
+        at_object: name of an object that it stands in line with, instead of the fixture's middle.
     """
 
     fixture: str
     beside: bool = False
     deviation: tuple[float, float] = (0.15, 0.05)
+    setback: float = 0.0
+    at_object: str = ""
 
 
 @dataclass(frozen=True)
@@ -161,6 +204,9 @@ class InitialOpenness:
     high: float
 
 
+type InitialState = InitialOpenness | Initial
+
+
 @dataclass(frozen=True)
 class Stage:
     """One use of a foundational skill; the demonstrator carries the stages out in order.
@@ -170,12 +216,14 @@ class Stage:
         verb: what is done, e.g. "open".
         target: role of the fixture.
         object: name of the object that is handled, if any.
+        part: of the fixture, if any; may name a choice in braces.
     """
 
     skill: str
     verb: str
     target: str
     object: str = ""
+    part: str = ""
 
 
 @dataclass(frozen=True)
@@ -188,6 +236,7 @@ class Task:
         activity: for composite tasks the activity group, else "atomic".
         horizon: control steps at 20 Hz until an episode counts as failed.
         fixtures, objects, robot_start, initial: the scene.
+        choices: what is drawn at reset.
         goal: what must hold; its terms are reported one by one.
         instruction: template; fields are "{side}" and names of objects.
         paraphrases: other wordings, kept apart as novel language.
@@ -207,7 +256,8 @@ class Task:
     instruction: str
     stages: tuple[Stage, ...]
     objects: tuple[ObjectWanted, ...] = ()
-    initial: tuple[InitialOpenness, ...] = ()
+    initial: tuple[InitialState, ...] = ()
+    choices: tuple[Choice, ...] = ()
     paraphrases: tuple[str, ...] = ()
     sets: tuple[str, ...] = ()
     needs: tuple[str, ...] = ()

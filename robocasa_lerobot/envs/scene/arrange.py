@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from types import MappingProxyType
 
 import numpy as np
 
@@ -10,7 +12,7 @@ from robocasa_lerobot.envs.placement import Area, Footprint, PlacementError, pla
 from robocasa_lerobot.envs.scene.fixtures.base import Fixture
 from robocasa_lerobot.envs.scene.layout import Layout
 from robocasa_lerobot.envs.scene.objects import catalogue
-from robocasa_lerobot.envs.scene.sampling import Part, choose_parts, rectangle_in
+from robocasa_lerobot.envs.scene.sampling import Part, Shares, choose_parts, rectangle_in
 from robocasa_lerobot.envs.scene.scene import PlacedObject
 from robocasa_lerobot.envs.scene.selection import candidates, counter_areas, inside_area, standing_on
 from robocasa_lerobot.envs.task import FixtureWanted, ObjectWanted, OnCounter, Placement, Task
@@ -27,7 +29,7 @@ def cast_roles(rng: np.random.Generator, task: Task, layout: Layout) -> dict[str
     """
     roles: dict[str, str] = {}
     for wanted in task.fixtures:
-        pool = [f for f in candidates(layout, wanted.kind) if _suits(f, wanted, roles)]
+        pool = [f for f in candidates(layout, wanted.kind) if _suits(f, wanted, layout, roles)]
         if not pool:
             raise PlacementError(
                 f"layout {layout.layout_id} has no {wanted.kind} for {wanted.role!r}. Name another kind, a smaller "
@@ -41,9 +43,11 @@ def cast_roles(rng: np.random.Generator, task: Task, layout: Layout) -> dict[str
     return roles
 
 
-def _suits(fixture: Fixture, wanted: FixtureWanted, roles: dict[str, str]) -> bool:
+def _suits(fixture: Fixture, wanted: FixtureWanted, layout: Layout, roles: dict[str, str]) -> bool:
     others = {roles[role] for role in wanted.other_than}
-    return fixture.name not in others and fixture.width >= wanted.size[0] and fixture.depth >= wanted.size[1]
+    large = fixture.width >= wanted.size[0] and fixture.depth >= wanted.size[1]
+    apart = all(_distance(layout.fixtures[name], fixture) >= wanted.apart_m for name in others)
+    return fixture.name not in others and large and apart
 
 
 def _distance(fixture: Fixture, ref: Fixture) -> float:
@@ -81,7 +85,8 @@ def place_objects(
     split: str,
     layout: Layout,
     roles: dict[str, str],
-    openness: dict[str, float],
+    openness: Mapping[str, float | Shares],
+    choices: Mapping[str, str] = MappingProxyType({}),
 ) -> dict[str, PlacedObject]:
     """Draw the objects of a task and put them down, in the order in which they are declared.
 
@@ -100,11 +105,29 @@ def place_objects(
                 graspable=wanted.graspable,
                 washable=wanted.washable,
                 max_height=wanted.max_height,
-                exclude=frozenset(table.used),  # so that an instruction names one object of the scene
+                # An instruction names one object of the scene.
+                exclude=frozenset(() if wanted.repeats else table.used) | frozenset(wanted.exclude),
+                properties=wanted.properties,
+                max_size=wanted.max_size,
+                object_scale=wanted.scale,
+                rotate_upright=wanted.upright,
             )
             table.used.add(item.category.name)
-            _put(rng, table, wanted, name, item, split, layout, roles, openness)
+            _put(rng, table, _filled(rng, wanted, choices), name, item, split, layout, roles, openness)
     return table.placed
+
+
+def _filled(rng: np.random.Generator, wanted: ObjectWanted, choices: Mapping[str, str]) -> ObjectWanted:
+    """With the choices filled into the names of its place, and one taken of several ("{knob}|any")."""
+    start = wanted.start
+    if not isinstance(start, Placement) or not (start.region.name or isinstance(start.region.level, str)):
+        return wanted
+    region = start.region
+    names = region.name.split("|")
+    name = names[int(rng.integers(len(names)))].format(**choices)
+    level = region.level.format(**choices) if isinstance(region.level, str) else region.level
+    region = replace(region, name="" if name == "any" else name, level=level)
+    return replace(wanted, start=replace(start, region=region))
 
 
 def _put(
@@ -116,7 +139,7 @@ def _put(
     split: str,
     layout: Layout,
     roles: dict[str, str],
-    openness: dict[str, float],
+    openness: Mapping[str, float | Shares],
 ) -> None:
     start = wanted.start
     standing: list[Footprint] = []
@@ -124,14 +147,20 @@ def _put(
         areas, standing = counter_areas(layout, start, layout.fixtures[roles[start.near]])
     elif not isinstance(start, Placement):
         fixture = layout.fixtures[roles[start.fixture]]
-        areas = [inside_area(start, fixture, openness.get(fixture.name, 0.0))]
+        share = openness.get(fixture.name, 0.0)
+        assert isinstance(share, float)
+        areas = [inside_area(start, fixture, share)]
     elif start.object:
         _put_on(rng, table, name, item, table.placed[start.object], start)
         return
     else:
         fixture = layout.fixtures[roles[start.fixture]]
         areas = _areas(table, name, start, fixture, layout, roles, openness)
-        standing = standing_on(layout, fixture, areas[0].z)
+        if start.slot:
+            areas = [_in_slot(area, item) for area in areas]
+        # What stands around a compartment is not in it.
+        inside = any(part.name for part in table.parts[name])
+        standing = [] if inside else standing_on(layout, fixture, areas[0].z)
         if start.try_to_place_in and IN_CONTAINER in _groups_of(item):
             container = catalogue.sample(rng, (start.try_to_place_in,), split)
             holder = f"{name}_container"
@@ -139,6 +168,14 @@ def _put(
             _put_on(rng, table, name, item, table.placed[holder], start)
             return
     _put_down(rng, table, name, item, areas, standing)
+
+
+def _in_slot(area: Area, item: catalogue.Instance) -> Area:
+    """A slot, in which the item's longer side lies along the slot's, and whose top is open."""
+    crossed = (area.x1 - area.x0 > area.y1 - area.y0) != (item.size[0] > item.size[1])
+    low, high = area.rotation
+    turn = np.pi / 2 if crossed else 0.0
+    return replace(area, height=np.inf, rotation=(low + turn, high + turn))
 
 
 def _groups_of(item: catalogue.Instance) -> set[str]:
@@ -156,7 +193,7 @@ def _areas(
     fixture: Fixture,
     layout: Layout,
     roles: dict[str, str],
-    openness: dict[str, float],
+    openness: Mapping[str, float | Shares],
 ) -> list[Area]:
     region = start.region
     ref = layout.fixtures[roles[region.ref]] if region.ref else None

@@ -6,19 +6,26 @@ from dataclasses import dataclass
 
 import mujoco
 import numpy as np
+from numpy.typing import NDArray
 
 from robocasa_lerobot.envs.camera_noise import CameraNoise, add_camera_noise
 from robocasa_lerobot.envs.cameras import cameras_of_set
-from robocasa_lerobot.envs.placement import PlacementError
+from robocasa_lerobot.envs.initial import Initial, LidAside, PartAt
+from robocasa_lerobot.envs.placement import Footprint, PlacementError, place
+from robocasa_lerobot.envs.scene.appliances.base import Appliance
+from robocasa_lerobot.envs.scene.appliances.blender import Blender
 from robocasa_lerobot.envs.scene.arrange import cast_roles, place_objects
 from robocasa_lerobot.envs.scene.assembly import bare_kitchen
+from robocasa_lerobot.envs.scene.choices import Choices, draw_choices
+from robocasa_lerobot.envs.scene.fixtures.cabinets import HingeCabinet
 from robocasa_lerobot.envs.scene.kitchens import Pairs, scene_ids, without
 from robocasa_lerobot.envs.scene.layout import Layout, load_layout
 from robocasa_lerobot.envs.scene.objects.shapes import add_object
 from robocasa_lerobot.envs.scene.robot import add_robot
+from robocasa_lerobot.envs.scene.sampling import Shares
 from robocasa_lerobot.envs.scene.scene import PlacedObject, Scene
-from robocasa_lerobot.envs.scene.selection import robot_pose
-from robocasa_lerobot.envs.task import Task
+from robocasa_lerobot.envs.scene.selection import RobotPose, counter_areas, counter_of, robot_pose
+from robocasa_lerobot.envs.task import InitialOpenness, OnCounter, Task
 from robocasa_lerobot.errors import UnknownNameError, UserError
 
 RENDER_PRESETS = ("fast", "quality")
@@ -81,15 +88,34 @@ def _attempt(
 ) -> Scene:
     layout = load_layout(layout_id, style_id)
     roles = cast_roles(rng, task, layout)
-    robot = robot_pose(rng, layout, task.robot_start, layout.fixtures[roles[task.robot_start.fixture]])
-    openness = {roles[initial.fixture]: float(rng.uniform(initial.low, initial.high)) for initial in task.initial}
-    objects = place_objects(rng, task, split, layout, roles, openness)
+    choices = draw_choices(rng, task, layout.fixtures, roles)
+    robot: RobotPose | None = None
+    if not task.robot_start.at_object:
+        robot = robot_pose(rng, layout, task.robot_start, layout.fixtures[roles[task.robot_start.fixture]])
+    openness = {
+        roles[initial.fixture]: float(rng.uniform(initial.low, initial.high))
+        for initial in task.initial
+        if isinstance(initial, InitialOpenness)
+    }
+    setup = [entry for entry in task.initial if isinstance(entry, Initial)]
+    drawn = tuple(entry.draw(rng, choices.values) for entry in setup)
+    lids = _lids(task, roles)
+    for role, gone in lids.items():
+        blender = layout.fixtures[roles[role]]
+        assert isinstance(blender, Blender)
+        blender.with_lid = not gone
+    places: dict[str, float | Shares] = {**openness, **_shares(setup, drawn, roles, choices)}
+    objects = place_objects(rng, task, split, layout, roles, places, choices.values)
+    if robot is None:
+        at = objects[task.robot_start.at_object].pos[:2]
+        robot = robot_pose(rng, layout, task.robot_start, layout.fixtures[roles[task.robot_start.fixture]], at)
+    spots = {role: _lid_spot(rng, layout, roles[role], objects) for role, gone in lids.items() if not gone}
     spec = _assemble(layout, look, objects)
     if look.camera_noise is not None:
         noise_rng = np.random.default_rng([seed, _CAMERA_NOISE_STREAM])
         add_camera_noise(spec, look.camera_set, look.camera_noise, noise_rng)
     model = spec.compile()
-    names = {name: placed.item.category.name.replace("_", " ") for name, placed in objects.items()}
+    words = _words(layout, roles, objects) | choices.words | {"side": robot.side}
     return Scene(
         task=task,
         split=split,
@@ -103,9 +129,67 @@ def _attempt(
         objects=objects,
         openness=openness,
         robot=robot,
-        instruction=task.instruction.format(side=robot.side, **names),
-        paraphrases=tuple(wording.format(side=robot.side, **names) for wording in task.paraphrases),
+        instruction=_said(task.instruction, words),
+        paraphrases=tuple(_said(wording, words) for wording in task.paraphrases),
+        choices=choices.values,
+        drawn=drawn,
+        lid_spots=spots,
     )
+
+
+def _shares(
+    setup: list[Initial], drawn: tuple[float, ...], roles: dict[str, str], choices: Choices
+) -> dict[str, Shares]:
+    """Where parts stand that objects may lie on, by fixture."""
+    found: dict[str, dict[str, float]] = {}
+    for entry, share in zip(setup, drawn, strict=True):
+        if isinstance(entry, PartAt):
+            found.setdefault(roles[entry.fixture], {})[entry.part.format(**choices.values)] = share
+    return dict(found)
+
+
+def _lids(task: Task, roles: dict[str, str]) -> dict[str, bool]:
+    """Roles of the blenders whose lid is not on, and whether it is gone altogether."""
+    return {entry.fixture: entry.gone for entry in task.initial if isinstance(entry, LidAside)}
+
+
+def _lid_spot(
+    rng: np.random.Generator, layout: Layout, name: str, objects: dict[str, PlacedObject]
+) -> NDArray[np.float64]:
+    """Where the lid of a blender may lie on its counter: in the room, metres.
+
+    Raises:
+        PlacementError: there is no room for it.
+    """
+    blender = layout.fixtures[name]
+    assert isinstance(blender, Blender)
+    counter = counter_of(layout, blender)
+    areas, standing = counter_areas(layout, OnCounter("", "left_right", size=(0.35, 0.35)), blender)
+    taken = [Footprint(p.pos[0], p.pos[1], p.yaw, (p.item.size[0] / 2, p.item.size[1] / 2)) for p in objects.values()]
+    width, depth, _ = blender.lid_size
+    spot, _ = place(rng, areas, (width / 2, depth / 2), [*standing, *taken], what="the blender's lid")
+    return np.array([spot.x, spot.y, counter.surface_z + 0.002])
+
+
+def _words(layout: Layout, roles: dict[str, str], objects: dict[str, PlacedObject]) -> dict[str, str]:
+    """What instructions call fixtures and objects, by role and name."""
+    names = {role: _fixture_word(layout.types[name]) for role, name in roles.items()}
+    for name in roles.values():
+        fixture = layout.fixtures[name]
+        doors = fixture.doors if isinstance(fixture, HingeCabinet | Appliance) else ()
+        if doors:
+            number = doors if isinstance(doors, int) else len(doors)
+            names.setdefault("doors", "door" if number == 1 else "doors")
+    return names | {name: placed.item.category.name.replace("_", " ") for name, placed in objects.items()}
+
+
+def _fixture_word(kind: str) -> str:
+    return "fridge" if kind.startswith("fridge") else "stove" if kind.startswith("stove") else kind.replace("_", " ")
+
+
+def _said(wording: str, words: dict[str, str]) -> str:
+    """A wording with its words; a missing one (a rack that needs no name) leaves no double space."""
+    return " ".join(wording.format(**words).split())
 
 
 def _assemble(layout: Layout, look: _Look, objects: dict[str, PlacedObject]) -> mujoco.MjSpec:

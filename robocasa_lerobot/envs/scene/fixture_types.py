@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from enum import IntEnum
 
+from robocasa_lerobot.envs.scene.appliances.fridge import Fridge
 from robocasa_lerobot.envs.scene.fixtures.base import Fixture
 from robocasa_lerobot.envs.scene.fixtures.counters import Counter
 from robocasa_lerobot.envs.scene.layout import Layout
@@ -129,3 +130,24 @@ FILTERS: dict[FixtureType, Filter] = {
 # By the words of task declarations: the enum's names in small letters.
 FIXTURE_KINDS: dict[str, Filter] = {kind.name.lower(): FILTERS[kind] for kind in FixtureType}
 FIXTURE_KINDS["drawer_top"] = FILTERS[FixtureType.TOP_DRAWER]
+
+
+def _with_drawer(layout: Layout, fixture: Fixture) -> bool:
+    return isinstance(fixture, Fridge) and bool(fixture.drawers)
+
+
+# What a robot is sent from and to (robocasa facts, blueprint of NavigateKitchen).
+_LANDMARKS = (
+    "coffee_machine", "toaster", "toaster_oven", "stove", "stove_wide", "stovetop", "open_cabinet", "microwave", "sink",
+    "hood", "oven", "fridge_french_door", "fridge_side_by_side", "fridge_bottom_freezer", "dishwasher",
+    "electric_kettle", "stand_mixer",
+)  # fmt: skip
+_SOURCES = (*_LANDMARKS, "single_cabinet", "hinge_cabinet", "drawer")
+
+
+def _once(layout: Layout, fixture: Fixture) -> bool:
+    kind = layout.types[fixture.name]
+    return kind in _LANDMARKS and list(layout.types.values()).count(kind) == 1
+
+
+FIXTURE_KINDS |= {"fridge_with_drawer": _with_drawer, "landmark": _types(*_SOURCES), "landmark_once": _once}

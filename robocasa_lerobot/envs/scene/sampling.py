@@ -2,18 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 
 import mujoco
 import numpy as np
 
 from robocasa_lerobot.envs.placement import Area, PlacementError
+from robocasa_lerobot.envs.scene.appliances.base import Appliance
 from robocasa_lerobot.envs.scene.fixtures.base import Fixture, Region
 from robocasa_lerobot.envs.scene.fixtures.counters import Counter
+from robocasa_lerobot.envs.scene.fixtures.regions import regions_of
 from robocasa_lerobot.envs.scene.layout import Layout
 from robocasa_lerobot.envs.scene.materials import MaterialPalette, load_style
 from robocasa_lerobot.envs.task import Placement
+
+# Shares of the ranges of an appliance's parts, by name.
+type Shares = Mapping[str, float]
 
 MIN_SIDE_M = 0.06  # parts narrower than this are no use
 
@@ -25,10 +30,12 @@ class Part:
     Attributes:
         area: its bounds, height and free height.
         fixture: name.
+        name: of the region, if it is one.
     """
 
     area: Area
     fixture: str
+    name: str = ""
 
     @property
     def middle(self) -> tuple[float, float]:
@@ -39,7 +46,7 @@ class Part:
         return float(area.origin[0] + c * x - s * y), float(area.origin[1] + s * x + c * y)
 
 
-def parts_of(layout: Layout, fixture: Fixture, openness: float = 0.0) -> list[Part]:
+def parts_of(layout: Layout, fixture: Fixture, openness: float | Shares = 0.0) -> list[Part]:
     """The parts of a fixture that things can stand on or in, in its own order, drawers and racks as they stand open.
 
     Counters have a rectangle on each side of an opening and the strips before and behind it.
@@ -55,22 +62,8 @@ def parts_of(layout: Layout, fixture: Fixture, openness: float = 0.0) -> list[Pa
         half = region.half
         rectangle = (x - half[0], x + half[0], y - half[1], y + half[1])
         area = _area(fixture, rectangle, z - half[2], f"{fixture.name} ({name})")
-        found.append(Part(replace(area, height=2 * half[2]), fixture.name))
+        found.append(Part(replace(area, height=2 * half[2]), fixture.name, name))
     return found
-
-
-def regions_of(fixture: Fixture) -> list[tuple[str, Region]]:
-    """Named regions of a fixture that things can be put into."""
-    named = getattr(fixture, "regions", None)
-    if named:
-        return list(named.items())
-    several = getattr(fixture, "interiors", None)
-    if several is not None:
-        return [(f"level {index}", region) for index, region in enumerate(several)]
-    for name in ("interior", "basin"):
-        if hasattr(fixture, name):
-            return [(name, getattr(fixture, name))]
-    raise PlacementError(f"{fixture.name} has no place for objects")
 
 
 def _area(fixture: Fixture, rectangle: tuple[float, float, float, float], z: float, name: str) -> Area:
@@ -78,7 +71,9 @@ def _area(fixture: Fixture, rectangle: tuple[float, float, float, float], z: flo
     return Area(x0, x1, y0, y1, (fixture.pos[0], fixture.pos[1]), fixture.yaw, z, name)
 
 
-def _region_frame(layout: Layout, fixture: Fixture, region: Region, openness: float) -> tuple[float, float, float]:
+def _region_frame(
+    layout: Layout, fixture: Fixture, region: Region, openness: float | Shares
+) -> tuple[float, float, float]:
     """Middle of a region: x and y in the fixture's frame, z in the room."""
     center = np.asarray(region.center)
     if region.body != fixture.name:
@@ -86,7 +81,7 @@ def _region_frame(layout: Layout, fixture: Fixture, region: Region, openness: fl
     return float(center[0]), float(center[1]), float(center[2] + fixture.pos[2])
 
 
-def _part_offset(style_id: int, fixture: Fixture, body: str, openness: float) -> np.ndarray:
+def _part_offset(style_id: int, fixture: Fixture, body: str, openness: float | Shares) -> np.ndarray:
     """Where a moving part of a fixture is, in the fixture's frame: from a model of the fixture alone."""
     spec = mujoco.MjSpec()
     spec.compiler.degree = False
@@ -94,14 +89,18 @@ def _part_offset(style_id: int, fixture: Fixture, body: str, openness: float) ->
     alone.build(spec, MaterialPalette(spec, load_style(style_id), textures=False))
     model = spec.compile()
     data = mujoco.MjData(model)
-    if openness and hasattr(alone, "set_openness"):
+    if isinstance(openness, Mapping):
+        assert isinstance(alone, Appliance)
+        for part, share in openness.items():
+            alone.set_share(data, part, share)
+    elif openness and hasattr(alone, "set_openness"):
         alone.set_openness(data, openness)
     mujoco.mj_kinematics(model, data)
     return np.asarray(data.body(body).xpos.copy())
 
 
 def choose_parts(
-    layout: Layout, placement: Placement, fixture: Fixture, ref: Fixture | None, openness: float
+    layout: Layout, placement: Placement, fixture: Fixture, ref: Fixture | None, openness: float | Shares
 ) -> list[Part]:
     """The parts of a fixture that a placement allows.
 
@@ -113,11 +112,14 @@ def choose_parts(
     parts = [
         part
         for part in parts_of(layout, fixture, openness)
-        if low <= part.area.z <= high and _sides(part.area) >= (MIN_SIDE_M, MIN_SIDE_M)
+        if part.name.startswith(region.name)
+        and low <= part.area.z <= high
+        and _sides(part.area) >= (MIN_SIDE_M, MIN_SIDE_M)
     ]
     if region.level is not None:
         parts.sort(key=lambda part: part.area.z)
-        parts = parts[region.level :][:1] if region.level != -1 else parts[-1:]
+        level = int(region.level)
+        parts = parts[level:][:1] if level != -1 else parts[-1:]
     wide, deep = region.top_size
     parts = [p for p in parts if p.area.x1 - p.area.x0 >= wide - 1e-9 and p.area.y1 - p.area.y0 >= deep - 1e-9]
     if ref is not None:

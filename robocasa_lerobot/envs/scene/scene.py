@@ -2,25 +2,29 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import mujoco
 import numpy as np
+from numpy.typing import NDArray
 
 from robocasa_lerobot.contract import ACTION_SIZE
 from robocasa_lerobot.envs.cameras import camera_configs
 from robocasa_lerobot.envs.control.controller import RobotController
 from robocasa_lerobot.envs.control.step import control_step
+from robocasa_lerobot.envs.initial import Initial, PartAt
 from robocasa_lerobot.envs.scene.appliances.base import Appliance, update_all
+from robocasa_lerobot.envs.scene.appliances.blender import Blender
 from robocasa_lerobot.envs.scene.appliances.sink import Sink
+from robocasa_lerobot.envs.scene.appliances.stove import Hob
 from robocasa_lerobot.envs.scene.fixtures.base import Fixture, yaw_quat
 from robocasa_lerobot.envs.scene.fixtures.cabinets import Drawer, HingeCabinet
 from robocasa_lerobot.envs.scene.layout import Layout
 from robocasa_lerobot.envs.scene.objects.catalogue import Instance
 from robocasa_lerobot.envs.scene.robot import place_base, set_home
 from robocasa_lerobot.envs.scene.robot_names import GRIPPER
-from robocasa_lerobot.envs.scene.selection import RobotPose
+from robocasa_lerobot.envs.scene.selection import RobotPose, standing_pose
 from robocasa_lerobot.envs.task import Task
 
 SETTLE_STEPS = 10  # control steps without a command after placing everything (robocasa facts, section 1)
@@ -52,6 +56,9 @@ class Scene:
         robot: start pose of the base.
         instruction: what the robot is told.
         paraphrases: the same in other words.
+        choices: what was drawn for the task's choices, and the roles' fixtures, by name.
+        drawn: numbers of the task's initial states, in their order.
+        lid_spots: where the lid of a blender may lie, by role.
         arm_noise_rad: standard deviation of the noise on the initial arm pose.
     """
 
@@ -69,7 +76,11 @@ class Scene:
     robot: RobotPose
     instruction: str
     paraphrases: tuple[str, ...] = ()
+    choices: dict[str, str] = field(default_factory=dict)
+    drawn: tuple[float, ...] = ()
+    lid_spots: dict[str, NDArray[np.float64]] = field(default_factory=dict)
     arm_noise_rad: float = 0.02
+    _shares: dict[tuple[str, str], float] = field(default_factory=dict, repr=False)
 
     @property
     def fixtures(self) -> dict[str, Fixture]:
@@ -92,6 +103,37 @@ class Scene:
         assert isinstance(fixture, Sink), f"{role} is no sink"
         return fixture
 
+    def appliance(self, role: str) -> Appliance:
+        """The appliance of a role."""
+        fixture = self.fixture(role)
+        assert isinstance(fixture, Appliance), f"{role} is no appliance"
+        return fixture
+
+    def hob(self, role: str) -> Hob:
+        """The stove or stovetop of a role."""
+        fixture = self.fixture(role)
+        assert isinstance(fixture, Hob), f"{role} is no hob"
+        return fixture
+
+    def fill(self, text: str) -> str:
+        """A name of a declaration with its choices and roles filled in, e.g. "knob_{knob}"."""
+        return text.format(**self.choices) if "{" in text else text
+
+    def initial_share(self, role: str, part: str) -> float:
+        """Where a part of an appliance was at reset, as a share of its range."""
+        return self._shares[role, part]
+
+    def standing_pose(self, role: str) -> RobotPose:
+        """Where a robot stands that is to use the fixture of a role, without deviation."""
+        return standing_pose(self.layout, self.fixture(role))
+
+    def lay_lid(self, role: str, data: mujoco.MjData, turn: float, *, gone: bool) -> None:
+        """Lay the lid of a blender on the counter, turned by a share of a full turn, or out of the way if `gone`."""
+        blender = self.fixture(role)
+        assert isinstance(blender, Blender)
+        if not gone:
+            blender.set_lid(data, self.lid_spots[role], 2 * np.pi * turn)
+
     def initial_data(self, rng: np.random.Generator) -> tuple[mujoco.MjData, RobotController]:
         """State at the start of an episode: everything placed, then settled without commands."""
         data = mujoco.MjData(self.model)
@@ -100,6 +142,11 @@ class Scene:
         for name, openness in self.openness.items():
             fixture = self.fixtures[name]
             set_openness(fixture, data, openness)
+        setup = [entry for entry in self.task.initial if isinstance(entry, Initial)]
+        for entry, drawn in zip(setup, self.drawn, strict=True):
+            entry.apply(self, data, drawn)
+            if isinstance(entry, PartAt):
+                self._shares[entry.fixture, entry.part] = drawn
         for placed in self.objects.values():
             data.joint(f"{placed.name}_joint0").qpos[:] = [*placed.pos, *yaw_quat(placed.yaw)]
         mujoco.mj_forward(self.model, data)

@@ -147,8 +147,46 @@ def _belongs(counter: Counter, stool: Fixture) -> bool:
     return abs(x) <= counter.width / 2 and abs(y) <= counter.depth / 2 + STOOL_OUT_M + 0.05
 
 
-def robot_pose(rng: np.random.Generator, layout: Layout, start: RobotStart, fixture: Fixture) -> RobotPose:
+def standing_pose(layout: Layout, fixture: Fixture) -> RobotPose:
+    """Where a robot stands to use a fixture: in line with its middle, at the usual distance of its front."""
+    ground = ground_fixture(layout, fixture)
+    face = faces(layout, ground, fixture)[0]
+    return _pose_at(layout, ground, face, fixture.pos[:2], (0.0, 0.0), 0.0, "")
+
+
+def _standoff(layout: Layout, ground: Fixture) -> float:
+    tall = layout.types[ground.name] == "housing_cabinet" or layout.types[ground.name].startswith("fridge")
+    return ROBOT_STANDOFF_M + (TALL_STANDOFF_M if tall else 0.0)
+
+
+def _pose_at(
+    layout: Layout,
+    ground: Fixture,
+    face: Face,
+    at: tuple[float, float],
+    shift: tuple[float, float],
+    setback: float,
+    side: str,
+) -> RobotPose:
+    """The pose before a face of a ground fixture, in line with a point of the room, shifted right and inwards."""
+    x = _turned(_into(ground, *at), -face.turn)[0] + shift[0]
+    y = -face.depth / 2 - _standoff(layout, ground) - setback - face.clearance - shift[1]
+    world = ground.to_world((*_turned((x, y), face.turn), 0.0))
+    heading = ground.yaw + face.turn + np.pi / 2
+    yaw = float(np.arctan2(np.sin(heading), np.cos(heading)))
+    return RobotPose(float(world[0]), float(world[1]), yaw, side)
+
+
+def robot_pose(
+    rng: np.random.Generator,
+    layout: Layout,
+    start: RobotStart,
+    fixture: Fixture,
+    at: tuple[float, float] | None = None,
+) -> RobotPose:
     """A free pose facing a fixture, by RoboCasa's rules, with the start's uniform deviation to all sides.
+
+    `at` is a point of the room to stand in line with, instead of the fixture's middle.
 
     Raises:
         PlacementError: no pose was free.
@@ -157,9 +195,8 @@ def robot_pose(rng: np.random.Generator, layout: Layout, start: RobotStart, fixt
     lateral = fixture.width / 2 + BESIDE_CLEARANCE_M
     # Standing to the left of the fixture, it is at the robot's right, and the other way round.
     options = [("right", -lateral), ("left", lateral)] if start.beside else [("", 0.0)]
-    standoff = ROBOT_STANDOFF_M
-    if layout.types[ground.name] == "housing_cabinet" or layout.types[ground.name].startswith("fridge"):
-        standoff += TALL_STANDOFF_M
+    if start.setback and layout.types[fixture.name] == "fridge_bottom_freezer":
+        options = [("", -start.setback)]  # out of the way of its doors (robocasa facts, blueprint of OpenFridge)
     for face in faces(layout, ground, fixture):
         half_range = np.array(start.deviation)
         for _ in range(SPAWN_ROUNDS):
@@ -168,16 +205,8 @@ def robot_pose(rng: np.random.Generator, layout: Layout, start: RobotStart, fixt
                 deviation = rng.uniform(-1, 1, size=2) * half_range
                 for index in order:
                     side, offset = options[int(index)]
-                    local_x = _turned(_into(ground, fixture.pos[0], fixture.pos[1]), -face.turn)[0]
-                    x = local_x + offset + float(deviation[0])
-                    y = -face.depth / 2 - standoff - face.clearance - float(deviation[1])
-                    world = ground.to_world((*_turned((x, y), face.turn), 0.0))
-                    yaw = float(
-                        np.arctan2(
-                            np.sin(ground.yaw + face.turn + np.pi / 2), np.cos(ground.yaw + face.turn + np.pi / 2)
-                        )
-                    )
-                    pose = RobotPose(float(world[0]), float(world[1]), yaw, side)
+                    shift = (offset + float(deviation[0]), float(deviation[1]))
+                    pose = _pose_at(layout, ground, face, at or fixture.pos[:2], shift, start.setback, side)
                     if not _blocked(layout, pose):
                         return pose
             half_range = half_range + SPAWN_WIDENING_M

@@ -21,6 +21,8 @@ KNOB_MAX = 1.5 * np.pi
 
 _PANEL_M, _KICK_M, _HOB_M = 0.115, 0.08, 0.014
 _GRATE_M = 0.036  # top of the grates above the hob
+_SURFACE_M = {"gas": _GRATE_M, "coil": 0.010}  # what pans stand on, above the hob; else its plate
+_PAN_REACH_M, _PAN_ROOM_M = 0.11, 0.10  # half sizes of the room of a pan on a burner
 _LEVELS = {"off": 0.0, "low": 0.62, "high": 1.0}  # how far a flame or ring is shown
 
 FOUR = {
@@ -48,6 +50,18 @@ class Hob(Appliance):
     def burners(self) -> dict[str, tuple[float, float]]:
         """Middle of each burner by location, as shares of width and depth."""
         return FOUR
+
+    @property
+    def regions(self) -> dict[str, Region]:
+        """Above each burner, by its location: where the bottom of a pan stands."""
+        width, depth, height = self.size
+        z = height / 2 + _SURFACE_M.get(self.record["hob"], 0.001)
+        return {
+            location: Region(
+                self.name, (x * width, y * depth, z + _PAN_ROOM_M), (_PAN_REACH_M, _PAN_REACH_M, _PAN_ROOM_M)
+            )
+            for location, (x, y) in self.burners.items()
+        }
 
     def state(self, data: mujoco.MjData) -> dict[str, float | bool]:
         """Shares of doors; by burner the knob's angle in radians and whether it is on (`<location>_on`)."""
@@ -165,10 +179,10 @@ class Stove(Hob):
 
     @property
     def regions(self) -> dict[str, Region]:
-        """The oven above its rack."""
+        """Above each burner, by its location, then the oven above its rack."""
         low, high = self._cavity()
         low[2] += 0.10
-        return {"interior": Region.between(self.name, low, high)}
+        return {**super().regions, "interior": Region.between(self.name, low, high)}
 
     def _cavity(self) -> tuple[np.ndarray, np.ndarray]:
         width, depth, height = self.size

@@ -1,0 +1,89 @@
+"""Goals: named conditions on the state of a scene, joined by and, or, not."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+import mujoco
+
+if TYPE_CHECKING:
+    from robocasa_lerobot.envs.scene.scene import Scene
+
+
+class Goal(ABC):
+    """Something that holds or does not hold in a state."""
+
+    @abstractmethod
+    def evaluate(self, scene: Scene, data: mujoco.MjData, terms: dict[str, bool]) -> bool:
+        """Whether it holds; every named term that it is made of is written to `terms`."""
+
+
+class Term(Goal):
+    """A single named condition."""
+
+    @property
+    @abstractmethod
+    def name(self) -> str:
+        """Key in `info["success_terms"]`."""
+
+    @abstractmethod
+    def holds(self, scene: Scene, data: mujoco.MjData) -> bool:
+        """Whether the condition holds."""
+
+    def evaluate(self, scene: Scene, data: mujoco.MjData, terms: dict[str, bool]) -> bool:
+        """Evaluate and note the result under the term's name."""
+        terms[self.name] = self.holds(scene, data)
+        return terms[self.name]
+
+
+class AllOf(Goal):
+    """Every part holds. All parts are evaluated, so that a failure names all that is missing."""
+
+    def __init__(self, *parts: Goal) -> None:
+        self.parts = parts
+
+    def evaluate(self, scene: Scene, data: mujoco.MjData, terms: dict[str, bool]) -> bool:
+        """Evaluate every part."""
+        held = [part.evaluate(scene, data, terms) for part in self.parts]
+        return all(held)
+
+
+class AnyOf(Goal):
+    """At least one part holds."""
+
+    def __init__(self, *parts: Goal) -> None:
+        self.parts = parts
+
+    def evaluate(self, scene: Scene, data: mujoco.MjData, terms: dict[str, bool]) -> bool:
+        """Evaluate every part."""
+        held = [part.evaluate(scene, data, terms) for part in self.parts]
+        return any(held)
+
+
+class Not(Goal):
+    """The part does not hold; its own terms are reported as they are."""
+
+    def __init__(self, part: Goal) -> None:
+        self.part = part
+
+    def evaluate(self, scene: Scene, data: mujoco.MjData, terms: dict[str, bool]) -> bool:
+        """Evaluate the part."""
+        return not self.part.evaluate(scene, data, terms)
+
+
+class When(Goal):
+    """One of several goals, by a value that was drawn at reset (`envs.task.Choice`)."""
+
+    def __init__(self, choice: str, goals: Mapping[str, Goal]) -> None:
+        self.choice, self.goals = choice, dict(goals)
+
+    def evaluate(self, scene: Scene, data: mujoco.MjData, terms: dict[str, bool]) -> bool:
+        """Evaluate the goal of the value that was drawn."""
+        return self.goals[scene.choices[self.choice]].evaluate(scene, data, terms)
+
+
+def plain(name: str) -> str:
+    """A name without the braces of choices, for the names of terms."""
+    return name.replace("{", "").replace("}", "")

@@ -1,0 +1,220 @@
+"""Conditions on objects: inside, on, touching, upright. Lengths in metres."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from robocasa_lerobot.envs.predicates.contacts import subtree, touching
+from robocasa_lerobot.envs.predicates.logic import Term, plain
+from robocasa_lerobot.envs.scene.fixtures.base import Region
+from robocasa_lerobot.envs.scene.fixtures.counters import Counter
+from robocasa_lerobot.envs.scene.fixtures.regions import regions_of
+
+if TYPE_CHECKING:
+    from robocasa_lerobot.envs.scene.scene import Scene
+
+INSIDE_MARGIN_M = 0.01  # the bounding box may stand out of a region by this much
+RECEPTACLE_SHARE = 0.7  # of the receptacle's horizontal radius (robocasa facts, section 8)
+UPRIGHT_RAD = np.deg2rad(15.0)
+
+
+@dataclass(frozen=True)
+class ObjectInBasin(Term):
+    """An object's centre is inside the basin of a sink."""
+
+    object: str
+    fixture: str
+
+    @property
+    def name(self) -> str:
+        """E.g. `obj_in_sink`."""
+        return f"{self.object}_in_{self.fixture}"
+
+    def holds(self, scene: Scene, data: mujoco.MjData) -> bool:
+        """Test the body's origin against the basin's region."""
+        return scene.sink(self.fixture).basin.contains(data, data.body(scene.fill(self.object)).xpos)
+
+
+@dataclass(frozen=True)
+class ObjectInside(Term):
+    """All corners of an object's bounding box are in one of a fixture's regions.
+
+    Attributes:
+        object: name.
+        fixture: role.
+        region: start of the region's name; all of the fixture's regions if empty. May name a choice in braces.
+        margin: by which corners may stand out.
+        lower: share of the region's height, from its floor, that the object's origin must be in.
+        height: bounds of the height of the region's floor in the room, and its least height.
+    """
+
+    object: str
+    fixture: str
+    region: str = ""
+    margin: float = INSIDE_MARGIN_M
+    lower: float = 1.0
+    height: tuple[float, float, float] = (-np.inf, np.inf, 0.0)
+
+    @property
+    def name(self) -> str:
+        """E.g. `obj_inside_cabinet`."""
+        return f"{self.object}_inside_{self.fixture}"
+
+    def holds(self, scene: Scene, data: mujoco.MjData) -> bool:
+        """Test the corners against each region."""
+        wanted = scene.fill(self.region)
+        corners, origin = object_corners(scene, data, self.object), data.body(scene.fill(self.object)).xpos
+        return any(
+            self._usable(data, region) and self._inside(data, region, corners, origin)
+            for name, region in regions_of(scene.fixture(self.fixture))
+            if name.startswith(wanted)
+        )
+
+    def _usable(self, data: mujoco.MjData, region: Region) -> bool:
+        low, high, least = self.height
+        floor = float(region.world(data, (0.0, 0.0, -region.half[2]))[2])
+        return low <= floor <= high and 2 * region.half[2] >= least
+
+    def _inside(
+        self, data: mujoco.MjData, region: Region, corners: NDArray[np.float64], origin: NDArray[np.float64]
+    ) -> bool:
+        half = np.asarray(region.half)
+        local = np.array([region.local(data, corner) for corner in corners])
+        z = float(region.local(data, origin)[2])
+        return bool(np.all(np.abs(local) <= half + self.margin)) and z <= (2 * self.lower - 1) * half[2]
+
+
+@dataclass(frozen=True)
+class ObjectTouches(Term):
+    """An object touches a fixture, or one part of it, or another object.
+
+    Attributes:
+        object: name.
+        what: role of a fixture, or name of an object.
+        part: of the fixture; may name a choice in braces.
+    """
+
+    object: str
+    what: str
+    part: str = ""
+
+    @property
+    def name(self) -> str:
+        """E.g. `obj_touches_counter`."""
+        return f"{self.object}_touches_{self.what}"
+
+    def holds(self, scene: Scene, data: mujoco.MjData) -> bool:
+        """Look at the contacts."""
+        model = scene.model
+        body = self.what if self.what in scene.objects else scene.fixture(self.what).name
+        part = scene.fill(self.part)
+        return touching(
+            model, data, subtree(model, [scene.fill(self.object)]), subtree(model, [f"{body}_{part}" if part else body])
+        )
+
+
+@dataclass(frozen=True)
+class ObjectTouchesAnyCounter(Term):
+    """An object touches a counter."""
+
+    object: str
+
+    @property
+    def name(self) -> str:
+        """E.g. `obj_touches_any_counter`."""
+        return f"{plain(self.object)}_touches_any_counter"
+
+    def holds(self, scene: Scene, data: mujoco.MjData) -> bool:
+        """Look at the contacts with every counter."""
+        counters = [name for name, fixture in scene.fixtures.items() if isinstance(fixture, Counter)]
+        model = scene.model
+        return touching(model, data, subtree(model, [scene.fill(self.object)]), subtree(model, counters))
+
+
+@dataclass(frozen=True)
+class ObjectOn(Term):
+    """An object lies in or on a receptacle: they touch, and its centre is near the receptacle's middle.
+
+    Attributes:
+        object, receptacle: names.
+        within: horizontal distance of the centres; None is 0.7 of the receptacle's horizontal radius.
+    """
+
+    object: str
+    receptacle: str
+    within: float | None = None
+
+    @property
+    def name(self) -> str:
+        """E.g. `obj_on_plate`."""
+        return f"{self.object}_on_{self.receptacle}"
+
+    def holds(self, scene: Scene, data: mujoco.MjData) -> bool:
+        """Look at distance, then contacts."""
+        apart = data.body(scene.fill(self.object)).xpos[:2] - data.body(self.receptacle).xpos[:2]
+        limit = self.within
+        if limit is None:
+            limit = RECEPTACLE_SHARE * max(scene.objects[self.receptacle].item.size[:2]) / 2
+        model = scene.model
+        return float(np.linalg.norm(apart)) < limit and touching(
+            model, data, subtree(model, [scene.fill(self.object)]), subtree(model, [self.receptacle])
+        )
+
+
+@dataclass(frozen=True)
+class ObjectAtSite(Term):
+    """An object's origin is near a site of a fixture.
+
+    Attributes:
+        object: name.
+        fixture: role.
+        site: of the fixture, without its name.
+        across, high: bounds of the horizontal and of the vertical distance.
+    """
+
+    object: str
+    fixture: str
+    site: str
+    across: float
+    high: float
+
+    @property
+    def name(self) -> str:
+        """E.g. `obj_under_coffee_machine`."""
+        return f"{self.object}_under_{self.fixture}"
+
+    def holds(self, scene: Scene, data: mujoco.MjData) -> bool:
+        """Compare both distances with the bounds."""
+        site = data.site(f"{scene.fixture(self.fixture).name}_{self.site}").xpos
+        apart = data.body(scene.fill(self.object)).xpos - site
+        return float(np.linalg.norm(apart[:2])) < self.across and abs(float(apart[2])) < self.high
+
+
+@dataclass(frozen=True)
+class ObjectUpright(Term):
+    """An object's own z axis is within 15 degrees of the vertical."""
+
+    object: str
+
+    @property
+    def name(self) -> str:
+        """E.g. `obj_upright`."""
+        return f"{self.object}_upright"
+
+    def holds(self, scene: Scene, data: mujoco.MjData) -> bool:
+        """Compare the tilt with the bound."""
+        return bool(data.body(scene.fill(self.object)).xmat.reshape(3, 3)[2, 2] > np.cos(UPRIGHT_RAD))
+
+
+def object_corners(scene: Scene, data: mujoco.MjData, name: str) -> NDArray[np.float64]:
+    """Corners of an object's bounding box in the world, (8, 3)."""
+    half = np.asarray(scene.objects[name].item.size) / 2
+    signs = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])
+    body = data.body(name)
+    corners: NDArray[np.float64] = body.xpos + (signs * half) @ body.xmat.reshape(3, 3).T
+    return corners

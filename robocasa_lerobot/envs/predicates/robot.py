@@ -1,0 +1,78 @@
+"""Conditions on the robot: how far the gripper is, and where the base stands."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import mujoco
+import numpy as np
+
+from robocasa_lerobot.envs.predicates.logic import Term, plain
+from robocasa_lerobot.envs.scene.robot_names import BASE_CENTER_SITE, GRIP_SITE
+
+if TYPE_CHECKING:
+    from robocasa_lerobot.envs.scene.scene import Scene
+
+GRIPPER_FAR_M, BUTTON_FAR_M = 0.25, 0.15
+# Of the base from the pose in front of a fixture (robocasa facts, section 8).
+STANDS_WITHIN_M, STANDS_COSINE = 0.20, 0.98
+
+
+@dataclass(frozen=True)
+class GripperFar(Term):
+    """The grip site is farther than a distance (metres) from an object's origin."""
+
+    object: str
+    distance: float = GRIPPER_FAR_M
+
+    @property
+    def name(self) -> str:
+        """E.g. `gripper_far_from_obj`."""
+        return f"gripper_far_from_{plain(self.object)}"
+
+    def holds(self, scene: Scene, data: mujoco.MjData) -> bool:
+        """Compare the distance with the threshold."""
+        return (
+            float(np.linalg.norm(data.site(GRIP_SITE).xpos - data.body(scene.fill(self.object)).xpos)) > self.distance
+        )
+
+
+@dataclass(frozen=True)
+class GripperFarFromPart(Term):
+    """The grip site is farther than a distance (metres) from a part of a fixture."""
+
+    fixture: str
+    part: str
+    distance: float = BUTTON_FAR_M
+
+    @property
+    def name(self) -> str:
+        """E.g. `gripper_far_from_start_button`."""
+        return f"gripper_far_from_{self.part}"
+
+    def holds(self, scene: Scene, data: mujoco.MjData) -> bool:
+        """Compare the distance with the threshold."""
+        body = data.body(f"{scene.fixture(self.fixture).name}_{self.part}")
+        return float(np.linalg.norm(data.site(GRIP_SITE).xpos - body.xipos)) > self.distance
+
+
+@dataclass(frozen=True)
+class StandsBefore(Term):
+    """The base stands in front of a fixture as if an episode started there: within 0.20 m, turned to it."""
+
+    fixture: str
+
+    @property
+    def name(self) -> str:
+        """E.g. `stands_before_target`."""
+        return f"stands_before_{self.fixture}"
+
+    def holds(self, scene: Scene, data: mujoco.MjData) -> bool:
+        """Compare place and heading with the standing pose."""
+        goal = scene.standing_pose(self.fixture)
+        site = data.site(BASE_CENTER_SITE)
+        apart = float(np.hypot(site.xpos[0] - goal.x, site.xpos[1] - goal.y))
+        rotation = site.xmat.reshape(3, 3)
+        heading = float(np.arctan2(rotation[1, 0], rotation[0, 0]))
+        return apart <= STANDS_WITHIN_M and float(np.cos(heading - goal.yaw)) >= STANDS_COSINE

@@ -1,0 +1,42 @@
+"""A mug at the coffee machine: put under its spout, and taken away."""
+
+from robocasa_lerobot.envs.predicates import AllOf, GripperFar, ObjectAtSite, ObjectTouches
+from robocasa_lerobot.envs.task import FixtureWanted, ObjectWanted, Placement, RobotStart, SampleRegion, Stage
+from robocasa_lerobot.envs.tasks.atomic.common import SEEN, atomic, counter_near, on_counter
+
+_FIXTURES = (FixtureWanted("coffee_machine", "coffee_machine"), counter_near("coffee_machine"))
+
+TASKS = (
+    atomic(
+        "CoffeeSetupMug",
+        600,
+        "The mug stands under the spout, the gripper away.",
+        fixtures=_FIXTURES,
+        start=RobotStart("coffee_machine"),
+        objects=(
+            ObjectWanted(
+                "obj", ("mug",), on_counter("coffee_machine", (0.3, 0.4), rotation=(0.79, 1.57)), graspable=True
+            ),
+        ),
+        goal=AllOf(ObjectAtSite("obj", "coffee_machine", "receptacle", across=0.04, high=0.10), GripperFar("obj")),
+        stages=(Stage("pick_place", "place_at_site", "coffee_machine", object="obj", part="receptacle"),),
+        sets=SEEN,
+    ),
+    atomic(
+        "CoffeeServeMug",
+        450,
+        "The mug stands on the counter, the gripper away.",
+        fixtures=_FIXTURES,
+        start=RobotStart("coffee_machine"),
+        objects=(
+            ObjectWanted(
+                "obj",
+                ("mug",),
+                Placement("coffee_machine", region=SampleRegion(name="cup"), rotation=(0.39, 0.79)),
+                graspable=True,
+            ),
+        ),
+        goal=AllOf(ObjectTouches("obj", "counter"), GripperFar("obj")),
+        stages=(Stage("pick_place", "place_on_counter", "counter", object="obj"),),
+    ),
+)

@@ -1,0 +1,224 @@
+"""Take an object from one place to another: counter, cabinet, drawer, sink, stove, microwave."""
+
+from robocasa_lerobot.envs.predicates import (
+    AllOf,
+    GripperFar,
+    Not,
+    ObjectInside,
+    ObjectOn,
+    ObjectTouches,
+    ObjectTouchesAnyCounter,
+)
+from robocasa_lerobot.envs.task import (
+    FixtureWanted,
+    InitialOpenness,
+    ObjectWanted,
+    Placement,
+    RobotStart,
+    SampleRegion,
+)
+from robocasa_lerobot.envs.tasks.atomic.common import SEEN, atomic, counter_near, on_counter, place
+from robocasa_lerobot.envs.tasks.atomic.controls import HANDLE_TURN
+
+_TOOLS, _NOT_TOOLS = ("reamer", "strainer", "cheese_grater"), ("tool", "utensil")
+_IN_PAN_M = 0.07  # horizontally from the middle of a pan
+_PAN = Placement("stove", region=SampleRegion(name="any"), size=(0.02, 0.02), rotation=HANDLE_TURN, ensure_inside=False)
+_DOOR_OPEN = (0.90, 1.0)
+
+
+def _back(ref: str, size: tuple[float, float], offset: tuple[float, float] = (0.0, 0.0)) -> ObjectWanted:
+    return ObjectWanted("distr_counter", ("any",), on_counter(ref, size, pos=("ref", 1.0), offset=offset))
+
+
+CABINET = (
+    atomic(
+        "PickPlaceCounterToCabinet",
+        750,
+        "The object is inside the cabinet, the gripper away.",
+        fixtures=(FixtureWanted("cab", "cabinet"), counter_near("cab")),
+        start=RobotStart("cab"),
+        objects=(
+            ObjectWanted("obj", ("any",), on_counter("cab", (0.6, 0.3), offset=(0.0, 0.1)), graspable=True),
+            ObjectWanted("distr_counter", ("any",), on_counter("cab", (1.0, 0.3), offset=(0.0, 0.3))),
+            ObjectWanted("distr_cab", ("any",), Placement("cab", size=(1.0, 0.2), pos=(0.0, 1.0))),
+        ),
+        initial=(InitialOpenness("cab", *_DOOR_OPEN),),
+        goal=AllOf(ObjectInside("obj", "cab"), GripperFar("obj")),
+        stages=place(target="cab", verb="place_inside"),
+        sets=SEEN,
+    ),
+    atomic(
+        "PickPlaceCabinetToCounter",
+        450,
+        "The object is on the counter below the cabinet, the gripper away.",
+        fixtures=(FixtureWanted("cab", "cabinet"), counter_near("cab")),
+        start=RobotStart("cab"),
+        objects=(
+            ObjectWanted("obj", ("any",), Placement("cab", size=(0.5, 0.2), pos=(0.0, -1.0)), graspable=True),
+            _back("cab", (1.0, 0.3), (0.0, -0.05)),
+            ObjectWanted("distr_cab", ("any",), Placement("cab", size=(1.0, 0.2), pos=(0.0, 1.0))),
+        ),
+        initial=(InitialOpenness("cab", *_DOOR_OPEN),),
+        goal=AllOf(ObjectTouches("obj", "counter"), GripperFar("obj")),
+        stages=place(verb="place_on_counter"),
+    ),
+)
+
+TOP_DRAWER = (
+    atomic(
+        "PickPlaceCounterToDrawer",
+        750,
+        "The object is inside the drawer and touches no counter, the gripper away.",
+        fixtures=(FixtureWanted("drawer", "drawer_top"), counter_near("drawer")),
+        start=RobotStart("drawer"),
+        objects=(
+            ObjectWanted("obj", _NOT_TOOLS, on_counter("drawer", (0.6, 0.3)), graspable=True, exclude=_TOOLS),
+            ObjectWanted("distr", ("any",), on_counter("drawer", (0.6, 0.3), pos=("ref", -0.5)), exclude=_NOT_TOOLS),
+        ),
+        initial=(InitialOpenness("drawer", *_DOOR_OPEN),),
+        goal=AllOf(ObjectInside("obj", "drawer"), Not(ObjectTouchesAnyCounter("obj")), GripperFar("obj")),
+        stages=place(target="drawer", verb="place_inside"),
+    ),
+    atomic(
+        "PickPlaceDrawerToCounter",
+        750,
+        "The object is on a counter, the gripper away.",
+        fixtures=(FixtureWanted("drawer", "drawer_top"), counter_near("drawer")),
+        start=RobotStart("drawer"),
+        objects=(
+            ObjectWanted(
+                "obj",
+                _NOT_TOOLS,
+                Placement("drawer", size=(0.3, 0.25), pos=(0.0, -0.25)),
+                graspable=True,
+                exclude=_TOOLS,
+            ),
+            ObjectWanted("distr", ("any",), on_counter("drawer", (0.5, 0.3), pos=("ref", -0.5)), exclude=_NOT_TOOLS),
+        ),
+        initial=(InitialOpenness("drawer", 1.0, 1.0),),
+        goal=AllOf(ObjectTouchesAnyCounter("obj"), GripperFar("obj")),
+        stages=place(verb="place_on_counter"),
+        sets=SEEN,
+    ),
+)
+
+SINK = (
+    atomic(
+        "PickPlaceSinkToCounter",
+        900,
+        "The object is on the plate, the plate on the counter, the gripper away.",
+        fixtures=(FixtureWanted("sink", "sink"), counter_near("sink")),
+        start=RobotStart("sink"),
+        objects=(
+            ObjectWanted(
+                "obj", ("food",), Placement("sink", size=(0.25, 0.25), pos=(0.0, 1.0)), graspable=True, washable=True
+            ),
+            ObjectWanted("container", ("plate",), on_counter("sink", (0.35, 0.4), loc="left_right")),
+            ObjectWanted(
+                "distr_counter", ("any",), on_counter("sink", (0.3, 0.3), loc="left_right", offset=(0.0, 0.3))
+            ),
+        ),
+        goal=AllOf(ObjectOn("obj", "container"), ObjectTouches("container", "counter"), GripperFar("obj")),
+        stages=place(target="container", verb="place_on"),
+        sets=SEEN,
+    ),
+)
+
+STOVE = (
+    atomic(
+        "PickPlaceCounterToStove",
+        600,
+        "The object is in the pan, the gripper away.",
+        fixtures=(FixtureWanted("stove", "stove"), counter_near("stove", size=(0.3, 0.4))),
+        start=RobotStart("stove"),
+        objects=(
+            ObjectWanted("container", ("pan",), _PAN),
+            ObjectWanted(
+                "obj",
+                ("food",),
+                on_counter("stove", (0.3, 0.3), try_to_place_in="plate"),
+                graspable=True,
+                properties=("cookable",),
+            ),
+        ),
+        goal=AllOf(ObjectOn("obj", "container", within=_IN_PAN_M), GripperFar("obj")),
+        stages=place(target="container", verb="place_on"),
+        sets=SEEN,
+    ),
+    atomic(
+        "PickPlaceStoveToCounter",
+        450,
+        "The object is in the plate or bowl on the counter, the gripper away.",
+        fixtures=(FixtureWanted("stove", "stove"), counter_near("stove", size=(0.3, 0.4))),
+        start=RobotStart("stove"),
+        objects=(
+            ObjectWanted("obj_container", ("pan",), _PAN),
+            ObjectWanted(
+                "obj",
+                ("food",),
+                Placement(object="obj_container", size=(0.02, 0.02)),
+                graspable=True,
+                properties=("cookable",),
+                max_size=(0.15, 0.15, None),
+            ),
+            ObjectWanted("container", ("plate", "bowl"), on_counter("stove", (0.3, 0.3))),
+        ),
+        goal=AllOf(ObjectOn("obj", "container", within=_IN_PAN_M), GripperFar("obj")),
+        stages=place(target="container", verb="place_on"),
+    ),
+)
+
+MICROWAVE = (
+    atomic(
+        "PickPlaceCounterToMicrowave",
+        1050,
+        "The object is on the plate in the microwave, the gripper away.",
+        fixtures=(FixtureWanted("microwave", "microwave"), counter_near("microwave")),
+        start=RobotStart("microwave"),
+        objects=(
+            ObjectWanted(
+                "obj",
+                ("food",),
+                on_counter("microwave", (0.3, 0.3), try_to_place_in="plate"),
+                graspable=True,
+                properties=("microwavable",),
+            ),
+            ObjectWanted(
+                "container", ("plate",), Placement("microwave", size=(0.05, 0.05), pos=(0.0, 0.0), ensure_inside=False)
+            ),
+            _back("microwave", (0.3, 0.3)),
+        ),
+        initial=(InitialOpenness("microwave", *_DOOR_OPEN),),
+        goal=AllOf(ObjectTouches("obj", "container"), ObjectTouches("container", "microwave"), GripperFar("obj")),
+        stages=place(target="container", verb="place_on"),
+    ),
+    atomic(
+        "PickPlaceMicrowaveToCounter",
+        750,
+        "The object is on the plate on the counter, the gripper away.",
+        fixtures=(FixtureWanted("microwave", "microwave"), counter_near("microwave")),
+        start=RobotStart("microwave"),
+        objects=(
+            ObjectWanted(
+                "obj",
+                ("food",),
+                Placement("microwave", size=(0.05, 0.05), pos=(0.0, 0.0), ensure_inside=False, try_to_place_in="plate"),
+                graspable=True,
+                properties=("microwavable",),
+            ),
+            ObjectWanted("container", ("plate",), on_counter("microwave", (0.3, 0.3))),
+            _back("microwave", (0.3, 0.3)),
+        ),
+        initial=(InitialOpenness("microwave", *_DOOR_OPEN),),
+        goal=AllOf(ObjectOn("obj", "container"), GripperFar("obj")),
+        stages=place(target="container", verb="place_on"),
+    ),
+)
+
+TASKS = (
+    *CABINET,
+    *TOP_DRAWER,
+    *SINK,
+    *STOVE,
+    *MICROWAVE,
+)

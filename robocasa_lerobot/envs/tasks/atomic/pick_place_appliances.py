@@ -1,0 +1,195 @@
+"""Pick and place at ovens, toaster, blender and stand mixer."""
+
+from robocasa_lerobot.envs.initial import LidAside, PartAt
+from robocasa_lerobot.envs.predicates import (
+    AllOf,
+    GripperFar,
+    ObjectInside,
+    ObjectOn,
+    ObjectTouches,
+    ObjectTouchesAnyCounter,
+    StateIs,
+)
+from robocasa_lerobot.envs.task import (
+    Choice,
+    FixtureWanted,
+    InitialOpenness,
+    ObjectWanted,
+    Placement,
+    RobotStart,
+    SampleRegion,
+)
+from robocasa_lerobot.envs.tasks.atomic.common import (
+    SEEN,
+    atomic,
+    counter_near,
+    on_counter,
+    place,
+)
+
+OVENS = (
+    atomic(
+        "PickPlaceCounterToOven",
+        600,
+        "The object is on the tray, the tray on the rack, the gripper away.",
+        fixtures=(FixtureWanted("oven", "oven"), counter_near("oven")),
+        start=RobotStart("counter", at_object="obj"),
+        choices=(Choice("rack", of="oven"),),
+        objects=(
+            ObjectWanted(
+                "obj", ("oven_ready",), on_counter("oven", (0.45, 0.3), try_to_place_in="plate"), graspable=True
+            ),
+            ObjectWanted(
+                "oven_tray",
+                ("oven_tray",),
+                Placement(
+                    "oven", region=SampleRegion(name="{rack}"), size=(1.0, 0.45), pos=(0.0, -1.0), rotation=(-0.1, 0.1)
+                ),
+            ),
+        ),
+        initial=(InitialOpenness("oven", 1.0, 1.0), PartAt("oven", "{rack}", (1.0, 1.0))),
+        goal=AllOf(ObjectTouches("oven_tray", "oven", part="{rack}"), ObjectOn("obj", "oven_tray"), GripperFar("obj")),
+        stages=place(target="oven_tray", verb="place_on"),
+        needs=("oven",),
+    ),
+    atomic(
+        "PickPlaceCounterToToasterOven",
+        450,
+        "The object lies on the pulled-out rack, the gripper away.",
+        fixtures=(FixtureWanted("toaster_oven", "toaster_oven"), counter_near("toaster_oven")),
+        start=RobotStart("toaster_oven"),
+        choices=(Choice("rack", of="toaster_oven"),),
+        objects=(
+            ObjectWanted(
+                "obj",
+                ("bread_food",),
+                on_counter("toaster_oven", (0.45, 0.3), loc="left_right", try_to_place_in="plate"),
+                graspable=True,
+                scale=0.8,
+            ),
+        ),
+        initial=(InitialOpenness("toaster_oven", 1.0, 1.0), PartAt("toaster_oven", "{rack}", (1.0, 1.0))),
+        goal=AllOf(ObjectTouches("obj", "toaster_oven", part="{rack}"), GripperFar("obj")),
+        stages=place(target="toaster_oven", verb="place_inside", part="{rack}"),
+    ),
+    atomic(
+        "PickPlaceToasterOvenToCounter",
+        450,
+        "The object is on the plate, the plate on the counter, the gripper away.",
+        fixtures=(FixtureWanted("toaster_oven", "toaster_oven"), counter_near("toaster_oven")),
+        start=RobotStart("toaster_oven"),
+        choices=(Choice("rack", of="toaster_oven"),),
+        objects=(
+            ObjectWanted(
+                "obj",
+                ("bread_food",),
+                Placement("toaster_oven", region=SampleRegion(name="{rack}"), size=(0.5, 0.4), pos=(0.0, -1.0)),
+                graspable=True,
+                scale=0.8,
+            ),
+            ObjectWanted("container", ("plate",), on_counter("toaster_oven", (0.3, 0.3), loc="left_right")),
+        ),
+        initial=(InitialOpenness("toaster_oven", 1.0, 1.0), PartAt("toaster_oven", "{rack}", (1.0, 1.0))),
+        goal=AllOf(ObjectOn("obj", "container"), ObjectTouches("container", "counter"), GripperFar("obj")),
+        stages=place(target="container", verb="place_on"),
+    ),
+    atomic(
+        "PickPlaceToasterToCounter",
+        600,
+        "The slice is on the plate, the gripper away.",
+        fixtures=(FixtureWanted("toaster", "toaster"), counter_near("toaster")),
+        start=RobotStart("toaster"),
+        choices=(Choice("slot", of="toaster"),),
+        objects=(
+            ObjectWanted(
+                "obj",
+                ("sandwich_bread",),
+                Placement(
+                    "toaster", region=SampleRegion(name="slot{slot}"), rotation=(0.0, 0.0), margin=0.0, slot=True
+                ),
+                scale=0.85,
+                upright=True,
+            ),
+            ObjectWanted("plate", ("plate",), on_counter("toaster", (0.8, 0.3))),
+        ),
+        goal=AllOf(ObjectOn("obj", "plate"), GripperFar("obj")),
+        stages=place(target="plate", verb="place_on"),
+        sets=SEEN,
+    ),
+)
+
+BLENDER_AND_MIXER = (
+    atomic(
+        "PickPlaceCounterToBlender",
+        750,
+        "The fruit is in the blender's jar, the gripper away.",
+        fixtures=(FixtureWanted("blender", "blender"), counter_near("blender")),
+        start=RobotStart("blender"),
+        objects=(
+            ObjectWanted(
+                "obj",
+                ("fruit",),
+                on_counter("blender", (0.5, 0.25), loc="left_right"),
+                graspable=True,
+                scale=0.8,
+                max_size=(0.085, 0.085, None),
+            ),
+            ObjectWanted(
+                "distr_counter",
+                ("any",),
+                on_counter("blender", (0.5, 0.3), pos=("ref", -0.5)),
+                exclude=("fruit", "vegetable"),
+            ),
+        ),
+        initial=(LidAside("blender", gone=True),),
+        goal=AllOf(ObjectInside("obj", "blender"), GripperFar("obj")),
+        stages=place(target="blender", verb="place_inside"),
+    ),
+    atomic(
+        "PickPlaceCounterToStandMixer",
+        600,
+        "The object is in the lower half of the mixer's bowl, the gripper away.",
+        fixtures=(FixtureWanted("stand_mixer", "stand_mixer"), counter_near("stand_mixer")),
+        start=RobotStart("stand_mixer"),
+        objects=(
+            ObjectWanted(
+                "obj",
+                ("cheese", "bread", "cake"),
+                on_counter("stand_mixer", (0.3, 0.3), loc="left_right"),
+                graspable=True,
+            ),
+        ),
+        initial=(PartAt("stand_mixer", "head", (1.0, 1.0)),),
+        goal=AllOf(ObjectInside("obj", "stand_mixer", lower=0.5), GripperFar("obj")),
+        stages=place(target="stand_mixer", verb="place_inside"),
+    ),
+    atomic(
+        "OpenBlenderLid",
+        450,
+        "The lid lies on a counter, the gripper 15 cm away.",
+        fixtures=(FixtureWanted("blender", "blender"), counter_near("blender")),
+        start=RobotStart("blender"),
+        goal=AllOf(
+            ObjectTouchesAnyCounter("{blender}_lid"),
+            StateIs("blender", "lid", value=False),
+            GripperFar("{blender}_lid", 0.15),
+        ),
+        stages=place("{blender}_lid", verb="place_on_counter"),
+    ),
+    atomic(
+        "CloseBlenderLid",
+        900,
+        "The lid sits on the jar, the gripper 15 cm away.",
+        fixtures=(FixtureWanted("blender", "blender"), counter_near("blender")),
+        start=RobotStart("blender"),
+        initial=(LidAside("blender"),),
+        goal=AllOf(StateIs("blender", "lid"), GripperFar("{blender}_lid", 0.15)),
+        stages=place("{blender}_lid", "blender", verb="cover"),
+        sets=SEEN,
+    ),
+)
+
+TASKS = (
+    *OVENS,
+    *BLENDER_AND_MIXER,
+)

@@ -1,0 +1,105 @@
+"""Pick and place of food on a counter: onto bread, into a glass, into a box."""
+
+from robocasa_lerobot.envs.predicates import (
+    AllOf,
+    AnyOf,
+    GripperFar,
+    ObjectOn,
+    ObjectTouches,
+)
+from robocasa_lerobot.envs.task import (
+    FixtureWanted,
+    ObjectWanted,
+    Placement,
+    RobotStart,
+)
+from robocasa_lerobot.envs.tasks.atomic.common import PHASE1, UNMULTIPLIED, atomic, counter_near, on_counter, place
+
+COUNTER = (
+    atomic(
+        "CheesyBread",
+        750,
+        "The bread is on the board, the cheese on the bread, the gripper away.",
+        fixtures=(FixtureWanted("counter", "counter", size=(0.6, 0.6)),),
+        start=RobotStart("counter", at_object="cheese"),
+        objects=(
+            ObjectWanted("bread_container", ("cutting_board",), Placement("counter", size=(0.5, 0.7), pos=(0.0, -1.0))),
+            ObjectWanted("bread", ("bread_flat",), Placement(object="bread_container"), scale=1.5),
+            ObjectWanted(
+                "cheese",
+                ("cheese",),
+                Placement("counter", reuse_region_from="bread_container", size=(1.0, 0.3), pos=(0.0, -1.0)),
+                graspable=True,
+            ),
+            ObjectWanted(
+                "distr_counter",
+                ("any",),
+                Placement("counter", reuse_region_from="bread_container", size=(1.0, 0.2), pos=(0.0, 1.0)),
+            ),
+        ),
+        goal=AllOf(ObjectOn("bread", "bread_container"), ObjectTouches("cheese", "bread"), GripperFar("cheese")),
+        stages=place("cheese", "bread", verb="place_on"),
+        sets=UNMULTIPLIED,
+    ),
+    atomic(
+        "MakeIcedCoffee",
+        750,
+        "One of the ice cubes is inside the glass, the gripper 15 cm away from both.",
+        fixtures=(FixtureWanted("cabinet", "cabinet"), counter_near("cabinet")),
+        start=RobotStart("counter", at_object="ice_bowl"),
+        objects=(
+            ObjectWanted("ice_bowl", ("bowl",), on_counter("cabinet", (1.0, 0.4), pos=(0.0, -1.0))),
+            ObjectWanted("ice_cube1", ("ice_cube",), Placement(object="ice_bowl"), graspable=True, scale=0.8),
+            ObjectWanted(
+                "ice_cube2", ("ice_cube",), Placement(object="ice_bowl"), graspable=True, scale=0.8, repeats=True
+            ),
+            ObjectWanted(
+                "cup",
+                ("glass_cup",),
+                Placement("counter", reuse_region_from="ice_bowl", size=(0.5, 0.25), pos=(0.0, -1.0)),
+                scale=1.25,
+                filled="coffee",
+            ),
+        ),
+        # The original's distance of half a metre decides nothing: inside means within the glass.
+        goal=AllOf(
+            AnyOf(ObjectOn("ice_cube1", "cup", within=0.06), ObjectOn("ice_cube2", "cup", within=0.06)),
+            GripperFar("ice_cube1", 0.15),
+            GripperFar("ice_cube2", 0.15),
+        ),
+        stages=place("ice_cube1", "cup", verb="drop_into"),
+        sets=UNMULTIPLIED,
+    ),
+    atomic(
+        "PackDessert",
+        600,
+        "Both foods are in the box, the gripper away.",
+        fixtures=(FixtureWanted("counter", "counter"),),
+        start=RobotStart("counter", at_object="cooked_food_container"),
+        objects=(
+            ObjectWanted(
+                "cooked_food_container",
+                ("tupperware",),
+                Placement("counter", size=(0.5, 0.5), pos=(0.0, -1.0), rotation=(0.0, 0.0)),
+                scale=2.0,
+            ),
+            ObjectWanted("cooked_food", ("cooked_food",), Placement(object="cooked_food_container"), graspable=True),
+            ObjectWanted(
+                "dessert",
+                ("sweets",),
+                Placement("counter", reuse_region_from="cooked_food_container", size=(0.5, 0.2), pos=(0.0, -1.0)),
+                graspable=True,
+                exclude=("sugar_cube",),
+            ),
+        ),
+        goal=AllOf(
+            ObjectOn("cooked_food", "cooked_food_container"),
+            ObjectOn("dessert", "cooked_food_container"),
+            GripperFar("dessert"),
+        ),
+        stages=place("dessert", "cooked_food_container", verb="place_on"),
+        sets=PHASE1,
+    ),
+)
+
+TASKS = (*COUNTER,)

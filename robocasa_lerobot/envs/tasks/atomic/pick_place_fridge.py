@@ -1,0 +1,91 @@
+"""Pick and place inside the fridge: between its shelves and its drawers."""
+
+from robocasa_lerobot.envs.initial import PartAt
+from robocasa_lerobot.envs.predicates import (
+    AllOf,
+    GripperFar,
+    ObjectInside,
+)
+from robocasa_lerobot.envs.task import (
+    Choice,
+    FixtureWanted,
+    InitialOpenness,
+    ObjectWanted,
+    Placement,
+    RobotStart,
+    SampleRegion,
+)
+from robocasa_lerobot.envs.tasks.atomic.common import atomic, place
+from robocasa_lerobot.envs.tasks.atomic.racks import DRAWER
+
+_FRIDGE_FAR_M = 0.15
+# A fridge shelf that counts: its floor between these heights, and at least so high, metres.
+USABLE_SHELF = (0.5, 1.5, 0.20)
+
+
+FRIDGE = (
+    atomic(
+        "PickPlaceFridgeShelfToDrawer",
+        600,
+        "The object is inside the highest drawer of the fridge, the gripper 15 cm away.",
+        fixtures=(FixtureWanted("fridge", "fridge_with_drawer"),),
+        start=RobotStart("fridge", setback=0.3),
+        choices=(Choice("level", {"-1": {}, "-2": {}}), DRAWER),
+        objects=(
+            ObjectWanted(
+                "obj",
+                ("vegetable", "fruit"),
+                Placement(
+                    "fridge",
+                    region=SampleRegion(name="fridge_shelf", level="{level}"),
+                    size=(0.4, 0.15),
+                    pos=(0.0, -1.0),
+                ),
+                graspable=True,
+                properties=("fridgable",),
+            ),
+            ObjectWanted(
+                "distr",
+                ("any",),
+                Placement("fridge", region=SampleRegion(name="fridge_shelf"), size=(0.4, 0.15), pos=(0.0, -0.5)),
+                properties=("fridgable",),
+                exclude=("vegetable", "fruit"),
+            ),
+        ),
+        initial=(InitialOpenness("fridge", 1.0, 1.0), PartAt("fridge", "{drawer}", (0.8, 1.0))),
+        goal=AllOf(ObjectInside("obj", "fridge", region="{drawer}"), GripperFar("obj", _FRIDGE_FAR_M)),
+        stages=place(target="fridge", verb="place_inside", part="{drawer}"),
+    ),
+    atomic(
+        "PickPlaceFridgeDrawerToShelf",
+        600,
+        "The object is on a shelf of the fridge, the gripper 15 cm away.",
+        fixtures=(FixtureWanted("fridge", "fridge_with_drawer"),),
+        start=RobotStart("fridge", setback=0.3),
+        choices=(DRAWER,),
+        objects=(
+            ObjectWanted(
+                "obj",
+                ("vegetable", "fruit"),
+                Placement("fridge", region=SampleRegion(name="{drawer}"), size=(0.4, 0.2), pos=(0.0, 0.25)),
+                graspable=True,
+                properties=("fridgable",),
+            ),
+            ObjectWanted(
+                "distr",
+                ("any",),
+                Placement("fridge", region=SampleRegion(name="fridge_shelf"), size=(0.4, 0.2), pos=(0.0, 0.5)),
+                properties=("fridgable",),
+                exclude=("vegetable", "fruit"),
+            ),
+        ),
+        initial=(InitialOpenness("fridge", 1.0, 1.0), PartAt("fridge", "{drawer}", (0.8, 0.8))),
+        goal=AllOf(
+            ObjectInside("obj", "fridge", region="fridge_shelf", lower=0.9, height=USABLE_SHELF),
+            GripperFar("obj", _FRIDGE_FAR_M),
+        ),
+        stages=place(target="fridge", verb="place_inside", part="fridge_shelf"),
+    ),
+)
+
+TASKS = (*FRIDGE,)

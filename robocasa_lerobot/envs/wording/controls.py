@@ -1,0 +1,118 @@
+"""Wordings of knobs, levers and buttons."""
+
+from robocasa_lerobot.envs.wording.words import say
+
+KNOBS_LEVERS_BUTTONS = {
+    "TurnOnStove": say(
+        "Turn on the {knob} burner of the stove.",
+        "The {knob} burner should be burning.",
+        "Use the knob of the {knob} burner to light it.",
+        "Get heat from the {knob} burner.",
+        "Ignite the stove at the {knob} position.",
+    ),
+    "TurnOffStove": say(
+        "Turn off the {knob} burner of the stove.",
+        "The {knob} burner should no longer burn.",
+        "Use the knob of the {knob} burner to put it out.",
+        "No more heat from the {knob} burner, please.",
+        "Switch the stove off at the {knob} position.",
+    ),
+    "LowerHeat": say(
+        "Turn the burner under the kettle down to low.",
+        "The kettle should simmer: less heat, but do not switch it off.",
+        "Set the burner below the kettle to a low flame.",
+        "Take the heat under the kettle back to low.",
+        "Let the kettle keep warm on a small flame.",
+    ),
+    "PreheatOven": say(
+        "Turn the temperature knob of the oven up to preheat it.",
+        "Start heating the oven with its temperature dial.",
+        "The oven should get hot; set its temperature.",
+        "Preheat the oven.",
+        "Twist the oven's heat control up from zero.",
+    ),
+    "TurnOnToasterOven": say(
+        "Start the toaster oven with its timer knob.",
+        "Set some time on the toaster oven.",
+        "The toaster oven should run: turn its timer.",
+        "Wind up the timer dial on the toaster oven.",
+        "Switch the toaster oven on by its timer.",
+    ),
+    "AdjustToasterOvenTemperature": say(
+        "{verb} the temperature of the toaster oven.",
+        "{verb} the heat at the toaster oven's temperature dial.",
+        "The toaster oven should be {comparative}.",
+        "Make the toaster oven {comparative} with its temperature knob.",
+        "The temperature set on the toaster oven must go {way}.",
+    ),
+    "TurnOnSinkFaucet": say(
+        "Turn on the faucet of the sink.",
+        "Let water run into the sink.",
+        "I need running water at the sink.",
+        "Open the tap.",
+        "Use the sink's handle so that water flows.",
+    ),
+    "TurnOffSinkFaucet": say(
+        "Turn off the faucet of the sink.",
+        "Stop the water in the sink.",
+        "No more water should run at the sink.",
+        "Close the tap.",
+        "Use the sink's handle so that the water stops.",
+    ),
+    "TurnSinkSpout": say(
+        "Turn the spout of the faucet to the {direction}.",
+        "The sink's spout should point {direction}.",
+        "Rotate the faucet's spout {direction}.",
+        "Push the spout over the {direction} half of the sink.",
+        "Get the spout of the tap to the {direction} side.",
+    ),
+    "AdjustWaterTemperature": say(
+        "Make the running water {target} with the sink's handle.",
+        "The {start} water should become {target} while it keeps running.",
+        "Move the temperature lever of the faucet from {start} to {target}.",
+        "Change the tap from {start} to {target} water without closing it.",
+        "I want {target} water instead of {start} water.",
+    ),
+    "TurnOnElectricKettle": say(
+        "Switch on the electric kettle.",
+        "Push the kettle's switch down.",
+        "Make the electric kettle boil.",
+        "The kettle should be heating.",
+        "Start the electric kettle with its lever.",
+    ),
+    "TurnOnToaster": say(
+        "Push the lever of the toaster down.",
+        "Toast the bread that is in the toaster.",
+        "The bread should go down into the toaster.",
+        "Start the toaster.",
+        "Press down the toaster's lever on the side with the bread.",
+    ),
+    "TurnOnMicrowave": say(
+        "Press the start button of the microwave.",
+        "Start the microwave.",
+        "The microwave should run.",
+        "Push the button that sets the microwave going.",
+        "Heat what is in the microwave.",
+    ),
+    "TurnOffMicrowave": say(
+        "Press the stop button of the microwave.",
+        "Stop the microwave.",
+        "The microwave should no longer run.",
+        "Push the button that ends the microwave's program.",
+        "Interrupt the heating in the microwave.",
+    ),
+    "StartCoffeeMachine": say(
+        "Press the button of the coffee machine.",
+        "Make coffee into the mug under the machine.",
+        "The coffee machine should start to brew.",
+        "Begin brewing with the button on the coffee machine.",
+        "Get some coffee going.",
+    ),
+    "TurnOnBlender": say(
+        "Press the power button of the blender.",
+        "Blend what is in the jar.",
+        "The blender should run.",
+        "Switch the blender on by its button.",
+        "Get the blender going.",
+    ),
+}
