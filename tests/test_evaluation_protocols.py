@@ -74,7 +74,7 @@ def test_missing_tasks_are_listed_and_can_be_left_out_by_name_or_by_consent() ->
         assert not set(header.missing_tasks) & set(there)
         assert sorted(t for tasks in header.task_sets.values() for t in tasks) == sorted(there)
         assert len(evaluation.plan) == 50 * len(there)
-    outside = engine.prepare(protocol("leaderboard", "--env.tasks=OpenDrawerDrawer")).header
+    outside = engine.prepare(protocol("leaderboard", "--env.tasks=CloseDrawer")).header
     assert (outside.tasks, len(outside.missing_tasks)) == (["CloseDrawer"], 50)
     with pytest.raises(UserError, match="Did you mean 'atomic_seen'"):
         engine.prepare(protocol("leaderboard", "--env.task_sets=atomic_sen"))
@@ -101,7 +101,7 @@ def test_lifelong_policies_run_the_tasks_of_their_phases(monkeypatch: pytest.Mon
 
 def test_perturbations_share_seeds_and_have_their_sigmas_in_the_header() -> None:
     config = protocol(
-        "robustness", "--env.task_sets=[]", "--env.tasks=Close", "--trials=3", "--perturbation.joint_rad=0.3"
+        "robustness", "--env.task_sets=[]", "--env.tasks=OpenDrawer", "--trials=3", "--perturbation.joint_rad=0.3"
     )
     evaluation = engine.prepare(config)
     assert len(evaluation.plan) == 3 * len(PERTURBATIONS)
