@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import pytest
@@ -9,16 +10,30 @@ import pytest
 from robocasa_lerobot.demos.demonstrator import can_demonstrate
 from robocasa_lerobot.envs.registry import get_task, task_names
 
-# Of every sort one: a door, a knob, an object in a narrow place.
+# Among the fast tests: one task of every sort that is declared, and one of every sort that a demonstrator solves.
 _SORTS = ("OpenFridge", "TurnOnStove", "PickPlaceToasterToCounter")
+_SOLVED = ("OpenDrawer", "CloseDrawer", "PickPlaceCounterToSink")
 
 
-def demonstrated() -> tuple[str, ...]:
+def solvable() -> tuple[str, ...]:
     """Tasks whose stages all have a skill."""
     return tuple(name for name in task_names() if can_demonstrate(get_task(name)))
 
 
+def demonstrated() -> list[Any]:
+    """Tasks whose stages all have a skill; those that are not of the sample are slow tests."""
+    return _marked(solvable(), _SOLVED)
+
+
 def every_task() -> list[Any]:
     """All tasks; those that are not of the sample are slow tests."""
-    fast = {*demonstrated(), *_SORTS}
-    return [name if name in fast else pytest.param(name, marks=pytest.mark.slow) for name in task_names()]
+    return _marked(task_names(), (*_SOLVED, *_SORTS))
+
+
+def sample() -> tuple[str, ...]:
+    """The solved tasks of the fast tests."""
+    return _SOLVED
+
+
+def _marked(names: Sequence[str], fast: Sequence[str]) -> list[Any]:
+    return [name if name in fast else pytest.param(name, marks=pytest.mark.slow) for name in names]

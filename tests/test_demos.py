@@ -19,7 +19,7 @@ from task_selection import demonstrated
 
 from robocasa_lerobot import contract
 from robocasa_lerobot.demos.demonstrator import demonstrate
-from robocasa_lerobot.demos.episode import SUCCESS_HOLD_STEPS, record_episode
+from robocasa_lerobot.demos.episode import SUCCESS_HOLD_STEPS, Recording, record_episode
 from robocasa_lerobot.demos.hdf5 import read_summary
 from robocasa_lerobot.demos.record import RecordingSettings, record_task
 from robocasa_lerobot.demos.skills import SKILLS, SkillError
@@ -30,15 +30,19 @@ from robocasa_lerobot.errors import UnknownNameError, UserError
 pytestmark = pytest.mark.render
 
 
-@pytest.fixture(scope="module")
-def recordings():
-    """One recorded episode of each task."""
-    out = {}
-    for task in demonstrated():
+class _Recordings(dict[str, Recording]):
+    """One recorded episode of each task, made when it is asked for."""
+
+    def __missing__(self, task: str) -> Recording:
         env = KitchenEnv(task, image_size=32, terminate_on_success=False)
-        out[task] = record_episode(env, 3, action_noise=0.05, images=task == "CloseDrawer")
+        self[task] = record_episode(env, 3, action_noise=0.05, images=task == "CloseDrawer")
         env.close()
-    return out
+        return self[task]
+
+
+@pytest.fixture(scope="module")
+def recordings() -> _Recordings:
+    return _Recordings()
 
 
 @pytest.mark.parametrize("task", demonstrated())
