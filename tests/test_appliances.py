@@ -141,12 +141,17 @@ def test_built_in_models_take_the_size_of_their_slot(category):
 
 
 @pytest.mark.parametrize("model_id", SAMPLE)
-def test_regions_lie_inside(model_id):
+def test_regions_lie_inside_and_those_of_burners_on_top(model_id):
     fixture, model = compiled(model_id)
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
     half = np.array(fixture.size) / 2
     for name, region in fixture.regions.items():
+        if name in getattr(fixture, "burners", ()):
+            floor = region.world(data, (0.0, 0.0, -region.half[2]))
+            assert (np.abs(floor[:2]) < half[:2]).all()
+            assert half[2] <= floor[2] < half[2] + 0.05
+            continue
         for corner in np.array(np.meshgrid(*[(-1, 1)] * 3)).reshape(3, -1).T:
             point = region.world(data, corner * region.half)
             assert (np.abs(point) <= half + 1e-3).all(), (name, point, half)
