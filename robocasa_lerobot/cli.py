@@ -50,7 +50,7 @@ SUBCOMMANDS: dict[str, Subcommand] = {
         "robocasa_lerobot.envs.gallery_command", "render tasks, kitchens, appliances and objects to pictures"
     ),
     "view": Subcommand("robocasa_lerobot.envs.view_command", "open a task's scene in MuJoCo's viewer"),
-    "tasks": Subcommand("robocasa_lerobot.envs.tasks_command", "list the tasks, their sets and horizons"),
+    "tasks": Subcommand("robocasa_lerobot.demos.tasks_command", "list the tasks, their sets and horizons"),
     "doctor": Subcommand("robocasa_lerobot.doctor", "check this machine and name the command that mends a fault"),
 }
 

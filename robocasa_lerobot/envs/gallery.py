@@ -9,8 +9,12 @@ import numpy as np
 from PIL import Image
 
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
+from robocasa_lerobot.envs.placement import Footprint
 from robocasa_lerobot.envs.scene.scene import Scene
+from robocasa_lerobot.envs.scene.selection import footprint
 from robocasa_lerobot.rendering import SceneRenderer
+
+_NEAREST_M, _FARTHEST_M, _MARGIN_M, _EYE_M = 1.4, 3.0, 0.2, 1.5
 
 
 def render_task(
@@ -47,11 +51,32 @@ def render_task(
 
 
 def visitor_camera(scene: Scene) -> mujoco.MjvCamera:
-    """A free camera at eye height behind and beside the robot."""
+    """A free camera at eye height behind and beside the robot, as far away as the room and its furniture allow."""
     camera = mujoco.MjvCamera()
     towards = np.array([np.cos(scene.robot.yaw), np.sin(scene.robot.yaw)])
     camera.lookat = [scene.robot.x + 0.25 * towards[0], scene.robot.y + 0.25 * towards[1], 0.95]
-    camera.distance = 3.0
-    camera.azimuth = float(np.degrees(scene.robot.yaw)) + 28.0
     camera.elevation = -14.0
+    spots = [
+        (_clear_distance(scene, camera, scene.robot.yaw + np.radians(side)), -abs(side), side)
+        for side in (28.0, -28.0, 55.0, -55.0, 80.0, -80.0)
+    ]
+    camera.distance, _, side = max(spots)
+    camera.azimuth = float(np.degrees(scene.robot.yaw)) + side
     return camera
+
+
+def _clear_distance(scene: Scene, camera: mujoco.MjvCamera, azimuth: float) -> float:
+    """How far back a camera can stand in a direction, up to 3 m, before a wall or something tall is in the way."""
+    room = scene.layout.room
+    low, high = np.array([0.0, room["y_min"]]) + _MARGIN_M, np.array([room["x_max"], 0.0]) - _MARGIN_M
+    back = -np.array([np.cos(azimuth), np.sin(azimuth)]) * np.cos(np.radians(camera.elevation))
+    tall = [f for f in scene.fixtures.values() if f.pos[2] - f.height / 2 < _EYE_M < f.pos[2] + f.height / 2]
+    marks = [footprint(f) for f in tall if not f.name.startswith("wall")]
+    clear = _NEAREST_M
+    for distance in np.arange(_NEAREST_M, _FARTHEST_M + 1e-6, 0.1):
+        x, y = camera.lookat[:2] + distance * back
+        eye = Footprint(float(x), float(y), 0.0, (0.1, 0.1))
+        if not ((low <= (x, y)).all() and ((x, y) <= high).all()) or any(eye.overlaps(mark) for mark in marks):
+            break
+        clear = float(distance)
+    return clear

@@ -1,4 +1,4 @@
-"""`robocasa-lerobot tasks`: list the tasks, their sets and horizons; check that they are sound."""
+"""`robocasa-lerobot tasks`: the tasks, their sets and horizons, whether they are sound, and who can demonstrate them."""
 
 from __future__ import annotations
 
@@ -18,6 +18,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Print a table of tasks, or of what the checker found; status 1 if a check failed."""
+    from robocasa_lerobot.demos.demonstrator import can_demonstrate
     from robocasa_lerobot.envs.registry import get_task, task_names, task_set
 
     names = args.names or (task_set(args.task_set) if args.task_set else task_names())
@@ -35,7 +36,14 @@ def run(args: argparse.Namespace) -> int:
         print(
             json.dumps(
                 [
-                    {"name": t.name, "kind": t.kind, "horizon": t.horizon, "sets": t.sets, "instruction": t.instruction}
+                    {
+                        "name": t.name,
+                        "kind": t.kind,
+                        "horizon": t.horizon,
+                        "demonstrator": can_demonstrate(t),
+                        "sets": t.sets,
+                        "instruction": t.instruction,
+                    }
                     for t in tasks
                 ],
                 indent=1,
@@ -43,8 +51,9 @@ def run(args: argparse.Namespace) -> int:
         )
         return 0
     width = max(len(t.name) for t in tasks)
-    print(f"{'task':<{width}}  {'kind':<9}  horizon  instruction")
+    print(f"{'task':<{width}}  {'kind':<9}  horizon  demonstrator  instruction")
     for task in tasks:
-        print(f"{task.name:<{width}}  {task.kind:<9}  {task.horizon:>7}  {task.instruction}")
-        print(f"{'':<{width}}  {'':<9}  {'':>7}  sets: {', '.join(task.sets)}")
+        able = "yes" if can_demonstrate(task) else "-"
+        print(f"{task.name:<{width}}  {task.kind:<9}  {task.horizon:>7}  {able:<12}  {task.instruction}")
+        print(f"{'':<{width}}  {'':<9}  {'':>7}  {'':<12}  sets: {', '.join(task.sets)}")
     return 0
