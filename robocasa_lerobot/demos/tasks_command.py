@@ -1,4 +1,4 @@
-"""`robocasa-lerobot tasks`: the tasks, their sets and horizons, whether they are sound, and who can demonstrate them."""
+"""`robocasa-lerobot tasks`: list the tasks, what they need and who can demonstrate them; check that they are sound."""
 
 from __future__ import annotations
 
