@@ -7,10 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from task_selection import demonstrated, every_task
 
 from robocasa_lerobot.demos.demonstrator import demonstrate
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
-from robocasa_lerobot.envs.registry import task_names
 from robocasa_lerobot.envs.state import KitchenState
 from robocasa_lerobot.errors import UserError
 
@@ -40,7 +40,7 @@ def assert_same(one: list[NDArray[np.float64]], other: list[NDArray[np.float64]]
         assert np.array_equal(a, b), f"step {step}: differs by {np.abs(a - b).max()}"
 
 
-@pytest.mark.parametrize("task", task_names())
+@pytest.mark.parametrize("task", every_task())
 def test_an_episode_continues_from_a_state_bit_for_bit(task: str, tmp_path: Path) -> None:
     env = make(task)
     env.reset(seed=3)
@@ -59,7 +59,7 @@ def test_an_episode_continues_from_a_state_bit_for_bit(task: str, tmp_path: Path
     assert np.array_equal(other.get_state().physics, env.get_state().physics)
 
 
-@pytest.mark.parametrize("task", task_names())
+@pytest.mark.parametrize("task", demonstrated())
 def test_a_demonstration_continues_from_anywhere(task: str) -> None:
     """In grasps, with doors in motion, while things fall asleep and wake: the rest replays to the same bits."""
     env = make(task)
@@ -84,7 +84,7 @@ def test_a_demonstration_continues_from_anywhere(task: str) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("task", task_names())
+@pytest.mark.parametrize("task", demonstrated())
 def test_random_motion_continues_from_any_state(task: str) -> None:
     env = make(task)
     for seed in range(40):
@@ -97,7 +97,7 @@ def test_random_motion_continues_from_any_state(task: str) -> None:
         assert_same(trajectory(env, commands), expected)
 
 
-@pytest.mark.parametrize("task", task_names())
+@pytest.mark.parametrize("task", every_task())
 def test_a_reset_with_the_running_seed_is_the_same_scene_again(task: str) -> None:
     env = make(task)
     first, first_info = env.reset(seed=5)
