@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterator
 from robocasa_lerobot.demos.motion import Array
 from robocasa_lerobot.demos.skills.common import SkillError
 from robocasa_lerobot.demos.skills.drawers import close_drawer, open_drawer
+from robocasa_lerobot.demos.skills.navigation import drive
 from robocasa_lerobot.demos.skills.pick_place import place_into_basin
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.task import Stage
@@ -19,6 +20,7 @@ Skill = Callable[[KitchenEnv, Stage], Iterator[Array]]
 SKILLS: dict[tuple[str, str], Skill] = {
     ("drawers", "open"): open_drawer,
     ("drawers", "close"): close_drawer,
+    ("navigation", "drive"): drive,
     ("pick_place", "place"): place_into_basin,
 }
 
