@@ -8,8 +8,11 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 
 from robocasa_lerobot.demos.motion import Array
+from robocasa_lerobot.demos.skills.buttons import press_button
 from robocasa_lerobot.demos.skills.common import SkillError
 from robocasa_lerobot.demos.skills.drawers import close_drawer, open_drawer
+from robocasa_lerobot.demos.skills.knobs import raise_knob, turn_burner_low, turn_knob, turn_off_burner, turn_on_burner
+from robocasa_lerobot.demos.skills.levers import press_lever, turn_off_water, turn_on_water, turn_sideways
 from robocasa_lerobot.demos.skills.navigation import drive
 from robocasa_lerobot.demos.skills.pick_place import place_into_basin
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
@@ -21,6 +24,16 @@ SKILLS: dict[tuple[str, str], Skill] = {
     ("drawers", "open"): open_drawer,
     ("drawers", "close"): close_drawer,
     ("navigation", "drive"): drive,
+    ("buttons", "press"): press_button,
+    ("knobs", "on"): turn_on_burner,
+    ("knobs", "off"): turn_off_burner,
+    ("knobs", "low"): turn_burner_low,
+    ("knobs", "raise"): raise_knob,
+    ("knobs", "turn"): turn_knob,
+    ("levers", "press"): press_lever,
+    ("levers", "on"): turn_on_water,
+    ("levers", "off"): turn_off_water,
+    ("levers", "turn"): turn_sideways,
     ("pick_place", "place"): place_into_basin,
 }
 
