@@ -1,0 +1,199 @@
+"""What turns on a hinge, seen as a skill needs it: where its points are at any angle, and how to push it round."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+
+import mujoco
+import numpy as np
+
+from robocasa_lerobot import contract
+from robocasa_lerobot.demos.motion import (
+    CLOSED,
+    FROM_DESIRED,
+    Array,
+    HandTarget,
+    action,
+    arm_action,
+    base_pose,
+    frame,
+)
+from robocasa_lerobot.envs.scene.fixtures.base import Fixture
+
+LEAD_M = 0.07  # of the commanded point before the one that is pushed: with the servo's lag, the force of the push
+STALL_STEPS, STALL_RAD = 25, 0.004
+UP = np.array([0.0, 0.0, 1.0])
+
+
+class Hinged:
+    """A door, head or lid of a fixture.
+
+    Points are given in the fixture's axes (x to the right, y inwards, z up) from the hinge, as they lie when it is
+    shut.
+
+    Args:
+        data: state that is looked at.
+        fixture: it belongs to.
+        joint: name of its hinge.
+
+    Attributes:
+        low, high: opposite corners of its panel, without handles, metres, each (3,).
+    """
+
+    def __init__(self, data: mujoco.MjData, fixture: Fixture, joint: str) -> None:
+        model = data.model
+        self._data, self.name = data, joint
+        hinge = model.joint(joint)
+        self._address, self._body = int(hinge.qposadr[0]), int(model.jnt_bodyid[hinge.id])
+        low, high = (float(v) for v in hinge.range)
+        self.opening, self.full = (-1.0, -low) if low < 0 else (1.0, high)
+        self._axis = hinge.axis.copy()
+        cos, sin = np.cos(fixture.yaw), np.sin(fixture.yaw)
+        self._turn = np.array([[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]])
+        self.inwards, self.rightwards = self._turn[:, 1], self._turn[:, 0]
+        self.low, self.high = self._bounds()
+
+    @property
+    def upright(self) -> bool:
+        """Whether the hinge is vertical."""
+        return abs(self._axis[2]) > 0.5
+
+    @property
+    def angle(self) -> float:
+        """Angle from shut, radians; positive is open."""
+        return self.opening * float(self._data.qpos[self._address])
+
+    @property
+    def share(self) -> float:
+        """Angle as a share of the range."""
+        return self.angle / self.full
+
+    def turned(self, angle: float) -> Array:
+        """World rotation (3, 3) of what lies in the fixture's axes when shut, at an angle."""
+        quat, out = np.empty(4), np.empty(9)
+        mujoco.mju_axisAngle2Quat(quat, self._axis, self.opening * angle)
+        mujoco.mju_quat2Mat(out, quat)
+        return self._turn @ out.reshape(3, 3)
+
+    def point(self, local: Array, angle: float) -> Array:
+        """World position (3,) of a point at an angle, metres."""
+        return self._data.xpos[self._body] + self.turned(angle) @ local
+
+    def radius(self, local: Array) -> float:
+        """Distance of a point from the hinge's axis, metres."""
+        return float(np.linalg.norm(np.cross(self._axis, local)))
+
+    def geoms(self, *, handle: bool) -> list[int]:
+        """Solid geoms of its handle, or the others."""
+        model = self._data.model
+        return [
+            geom
+            for geom in range(model.body_geomadr[self._body], model.body_geomadr[self._body] + self._count())
+            if (model.geom_contype[geom] or model.geom_conaffinity[geom])
+            and ("handle" in model.geom(geom).name) == handle
+        ]
+
+    def _count(self) -> int:
+        return int(self._data.model.body_geomnum[self._body])
+
+    def _box(self, geom: int) -> tuple[Array, Array]:
+        model = self._data.model
+        rotation, out = np.empty(9), model.geom_aabb[geom]
+        mujoco.mju_quat2Mat(rotation, model.geom_quat[geom])
+        turn = rotation.reshape(3, 3)
+        middle, half = model.geom_pos[geom] + turn @ out[:3], np.abs(turn) @ out[3:]
+        return middle - half, middle + half
+
+    def _bounds(self) -> tuple[Array, Array]:
+        boxes = [self._box(geom) for geom in self.geoms(handle=False)]
+        # The panel is what covers the most of the front; posts of handles stand out before it.
+        front = [(b[1] - b[0])[0] * (b[1] - b[0])[2] for b in boxes]
+        panel = boxes[int(np.argmax(front))]
+        low, high = np.min([b[0] for b in boxes], axis=0), np.max([b[1] for b in boxes], axis=0)
+        low[1], high[1] = panel[0][1], max(panel[1][1], 0.0)
+        return low, high
+
+
+def push_round(
+    part: Hinged,
+    data: mujoco.MjData,
+    local: Array,
+    goal: float,
+    rotation: Callable[[float], Array],
+    *,
+    gripper: float = CLOSED,
+    speed: float = 0.8,
+    lead_m: float = LEAD_M,
+    max_steps: int = 200,
+    follow: float = np.inf,
+) -> Iterator[Array]:
+    """Push a part round its hinge at a point until its share reaches `goal`; ends too when it stalls.
+
+    Args:
+        part: what turns.
+        data: present state.
+        local: where the grip site pushes, in the fixture's axes when shut.
+        goal: share of the range.
+        rotation: hand rotation wanted at an angle.
+        gripper: OPEN or CLOSED.
+        speed: bound of each command component, in (0, 1].
+        lead_m: how far before the pushed point the commanded one is, metres.
+        max_steps: control steps at most.
+        follow: the base drives along where the target is farther before it than this, metres.
+    """
+    way = 1.0 if goal > part.share else -1.0
+    lead = lead_m / part.radius(local)
+    last, since = part.angle, 0
+    for _ in range(max_steps):
+        if way * (part.share - goal) >= 0.0:
+            return
+        if way * (part.angle - last) > STALL_RAD:
+            last, since = part.angle, 0
+        else:
+            since += 1
+        if since >= STALL_STEPS:
+            return
+        angle = part.angle + way * lead
+        target = HandTarget(part.point(local, angle), rotation(angle))
+        step = arm_action(data, target, gripper, speed=speed)
+        ahead, left = in_base(data, target.position)
+        excess = np.array([max(ahead - follow, 0.0), np.sign(left) * max(abs(left) - follow, 0.0)])
+        step[contract.ACTION_SLICES["base_motion"]][:2] = _over_dead_zone(excess)
+        yield step
+
+
+def in_base(data: mujoco.MjData, point: Array) -> Array:
+    """A point of the world as metres ahead of the base's centre and to its left, (2,)."""
+    base, yaw = base_pose(data)
+    cos, sin = np.cos(yaw), np.sin(yaw)
+    ahead: Array = np.array([[cos, sin], [-sin, cos]]) @ (point - base)[:2]
+    return ahead
+
+
+def shift_base(data: mujoco.MjData, spot: Array, gripper: float = CLOSED, *, max_steps: int = 120) -> Iterator[Array]:
+    """Drive the base's centre to a spot on the floor without turning, the arm riding along; ends if it is blocked."""
+    best, since = np.inf, 0
+    for _ in range(max_steps):
+        error = in_base(data, spot)
+        distance = float(np.linalg.norm(error))
+        best, since = (distance, 0) if distance < best - 0.02 else (best, since + 1)
+        if distance < 0.03 or since > 15:
+            break
+        motion = np.array([*_over_dead_zone(error), 0.0, 0.0])
+        yield action(gripper=gripper, base=motion, mode=FROM_DESIRED)
+
+
+def _over_dead_zone(error: Array) -> Array:
+    """Base command for an error in metres: the first quarter of a command only overcomes friction."""
+    distance = float(np.linalg.norm(error))
+    if distance < 0.01:
+        return np.zeros(2)
+    command: Array = error / distance * (0.25 + min(2.0 * distance, 0.6))
+    return command
+
+
+def facing(approach: Array, opening: Array, present: Array) -> Array:
+    """Hand rotation with an approach and an opening direction; of the two turns that fit, the one nearer to now."""
+    one = frame(approach, opening)
+    other = one @ np.diag([-1.0, -1.0, 1.0])
+    return one if np.trace(one.T @ present) >= np.trace(other.T @ present) else other
