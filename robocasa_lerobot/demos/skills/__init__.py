@@ -16,6 +16,7 @@ from robocasa_lerobot.demos.skills.knobs import raise_knob, turn_burner_low, tur
 from robocasa_lerobot.demos.skills.levers import press_lever, turn_off_water, turn_on_water, turn_sideways
 from robocasa_lerobot.demos.skills.navigation import drive
 from robocasa_lerobot.demos.skills.pick_place import place_into_basin
+from robocasa_lerobot.demos.skills.put_down import place_on
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.task import Stage
 
@@ -38,6 +39,7 @@ SKILLS: dict[tuple[str, str], Skill] = {
     ("levers", "off"): turn_off_water,
     ("levers", "turn"): turn_sideways,
     ("pick_place", "place"): place_into_basin,
+    ("pick_place", "place_on"): place_on,
 }
 
 __all__ = ["SKILLS", "Skill", "SkillError"]

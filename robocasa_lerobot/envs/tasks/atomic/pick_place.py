@@ -190,7 +190,7 @@ MICROWAVE = (
         ),
         initial=(InitialOpenness("microwave", *_DOOR_OPEN),),
         goal=AllOf(ObjectTouches("obj", "container"), ObjectTouches("container", "microwave"), GripperFar("obj")),
-        stages=place(target="container", verb="place_on"),
+        stages=place(target="container", verb="place_on_reaching_in"),
     ),
     atomic(
         "PickPlaceMicrowaveToCounter",
@@ -211,7 +211,7 @@ MICROWAVE = (
         ),
         initial=(InitialOpenness("microwave", *_DOOR_OPEN),),
         goal=AllOf(ObjectOn("obj", "container"), GripperFar("obj")),
-        stages=place(target="container", verb="place_on"),
+        stages=place(target="container", verb="place_on_reaching_in"),
     ),
 )
 

@@ -49,7 +49,7 @@ OVENS = (
         ),
         initial=(InitialOpenness("oven", 1.0, 1.0), PartAt("oven", "{rack}", (1.0, 1.0))),
         goal=AllOf(ObjectTouches("oven_tray", "oven", part="{rack}"), ObjectOn("obj", "oven_tray"), GripperFar("obj")),
-        stages=place(target="oven_tray", verb="place_on"),
+        stages=place(target="oven_tray", verb="place_on_reaching_in"),
         needs=("oven",),
     ),
     atomic(
@@ -91,7 +91,7 @@ OVENS = (
         ),
         initial=(InitialOpenness("toaster_oven", 1.0, 1.0), PartAt("toaster_oven", "{rack}", (1.0, 1.0))),
         goal=AllOf(ObjectOn("obj", "container"), ObjectTouches("container", "counter"), GripperFar("obj")),
-        stages=place(target="container", verb="place_on"),
+        stages=place(target="container", verb="place_on_reaching_in"),
     ),
     atomic(
         "PickPlaceToasterToCounter",
@@ -113,7 +113,7 @@ OVENS = (
             ObjectWanted("plate", ("plate",), on_counter("toaster", (0.8, 0.3))),
         ),
         goal=AllOf(ObjectOn("obj", "plate"), GripperFar("obj")),
-        stages=place(target="plate", verb="place_on"),
+        stages=place(target="plate", verb="place_on_reaching_in"),
         sets=SEEN,
     ),
 )
