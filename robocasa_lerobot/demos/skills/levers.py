@@ -1,7 +1,7 @@
 """Levers: pushed with the closed finger tips, or grasped and led along the arc of their hinge.
 
-Solved in target kitchens with action noise 0.05, seeds 4-9: faucet on 6/6, off 6/6, spout 6/6, toaster 5/6, kettle 3/6
-(its switch lies below the handle, which the hand meets first); water temperature 4/4 (seeds 0-3, no noise).
+Solved in target kitchens with action noise 0.05, seeds 4-9: faucet on 6/6, off 6/6, spout 6/6, water temperature 5/6,
+toaster 5/6, kettle 3/6 (its switch lies below the handle, which the hand meets first).
 """
 
 from __future__ import annotations
