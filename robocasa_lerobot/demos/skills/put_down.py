@@ -1,8 +1,9 @@
 """Put an object down, from above, on or into another one that stands free: a plate, pan, board or box.
 
 Solved in target scenes, without action noise, seeds from 0 on: CheesyBread 6 of 6, PackDessert 5 of 6,
-PickPlaceSinkToCounter 3 of 4, PickPlaceCounterToStove 2 of 3. What failed were grasps that did not lift the object: a
-banana and a tomato in the basin, kebabs, a large cake. PickPlaceStoveToCounter shares the skill and is not measured.
+PickPlaceSinkToCounter 3 of 5, PickPlaceCounterToStove 2 of 3. What failed were grasps that did not lift the object: a
+banana and a tomato in the basin, kebabs, a large cake. PickPlaceStoveToCounter (1 of 4) has a verb
+of its own until grasps in a pan are better.
 """
 
 from __future__ import annotations

@@ -164,7 +164,7 @@ STOVE = (
             ObjectWanted("container", ("plate", "bowl"), on_counter("stove", (0.3, 0.3))),
         ),
         goal=AllOf(ObjectOn("obj", "container", within=_IN_PAN_M), GripperFar("obj")),
-        stages=place(target="container", verb="place_on"),
+        stages=place(target="container", verb="place_on_from_pan"),
     ),
 )
 
