@@ -36,6 +36,9 @@ def configure(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Run the experiment; 0 when finished, 3 when it stopped as asked, 75 when a signal ended it (run it again)."""
+    from robocasa_lerobot.training.spinning import limit_spinning
+
+    limit_spinning()
     from robocasa_lerobot.training.config import load_experiment, to_yaml
 
     experiment = load_experiment(args.config_path, getattr(args, "settings", ()))
