@@ -18,7 +18,7 @@ export PYTHONUNBUFFERED := 1
 export UV_HTTP_TIMEOUT ?= 300
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
-.PHONY: help setup demo test test-slow lint format lock doctor bench bench-convert bench-grasps clean
+.PHONY: help setup demo test test-slow lint format lock doctor bench bench-convert bench-grasps bench-demonstrators clean
 
 help:  ## this list
 	@sed -n 's/^\([a-z-]*\):.*  ## /\1\t/p' Makefile | awk -F '\t' '{printf "  make %-13s %s\n", $$1, $$2}'
@@ -74,6 +74,10 @@ bench-convert: $(STAMP)  ## our converter beside LeRobot's and the official one,
 # Takes about 10 minutes; `BENCH_ARGS=--quick` one. Continues where it was stopped.
 bench-grasps: $(STAMP)  ## which objects a gripper can lift: every instance, the best of 16 poses
 	$(BIN)/python benchmarks/grasps.py $(BENCH_ARGS)
+
+# Goes on where it was stopped. BENCH_ARGS='--tasks OpenDrawer --fresh' runs a task again, `--seeds N` takes N of each split.
+bench-demonstrators: $(STAMP)  ## how often and how fast each demonstrator solves its task
+	$(BIN)/python benchmarks/demonstrators.py $(BENCH_ARGS)
 
 # Goes on where it was stopped; BENCH_ARGS=--fresh begins again, BENCH_ARGS='--every 31' takes a sample.
 bench-kitchens: $(STAMP)  ## build, check and settle all 2,510 kitchens

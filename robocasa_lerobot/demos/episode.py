@@ -28,6 +28,7 @@ class Recording:
         seed: of the scene.
         success: whether the goal held at the end.
         reason: why not, if not.
+        false_terms: names of the goal's terms that did not hold at the end.
         states: (T, 1 + nq + nv) time, positions, velocities.
         actions: (T, 12) in HDF5 order, as executed.
         observations: robosuite-named proprioception, each (T, k); pictures (T, S, S, 3) uint8 if asked for.
@@ -40,6 +41,7 @@ class Recording:
     seed: int
     success: bool
     reason: str
+    false_terms: tuple[str, ...]
     states: Array
     actions: Array
     observations: dict[str, NDArray[Any]]
@@ -103,6 +105,7 @@ def record_episode(env: KitchenEnv, seed: int, *, action_noise: float = 0.0, ima
         seed=seed,
         success=held >= SUCCESS_HOLD_STEPS,
         reason=reason,
+        false_terms=tuple(name for name, held in info["success_terms"].items() if not held),
         states=np.array(buffer.states),
         actions=np.array(buffer.actions),
         observations={key: np.array(values) for key, values in buffer.observations.items()},

@@ -5,6 +5,9 @@ from __future__ import annotations
 import functools
 import importlib
 import pkgutil
+from importlib.resources import files
+
+import yaml
 
 from robocasa_lerobot.envs import tasks as tasks_package
 from robocasa_lerobot.envs.task import Task
@@ -55,3 +58,14 @@ def task_set(name: str) -> tuple[str, ...]:
 def task_sets() -> tuple[str, ...]:
     """Names of the sets that registered tasks belong to, sorted."""
     return tuple(sorted({s for task in _tasks().values() for s in task.sets}))
+
+
+@functools.cache
+def _human_seconds() -> dict[str, float]:
+    text = files(tasks_package).joinpath("human_seconds.yaml").read_text(encoding="utf-8")
+    return {name: float(seconds) for name, seconds in yaml.safe_load(text).items()}
+
+
+def human_seconds(name: str) -> float | None:
+    """Median length of the published human demonstrations of a task, seconds; None where there are none."""
+    return _human_seconds().get(name)

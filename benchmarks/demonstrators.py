@@ -1,0 +1,211 @@
+"""The demonstrators: how often each solves its task in kitchens it was not made on, and how long it takes.
+
+Seeds from 100,000 on in both splits. Every trial is a line of `outputs/demonstrators.jsonl`, so that a run can be
+stopped and continued; the result holds all trials that are there. After a skill was changed, run its tasks again:
+
+    python benchmarks/demonstrators.py --tasks OpenDrawer,CloseDrawer --fresh
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import multiprocessing
+import os
+import sys
+import time
+from collections.abc import Iterable, Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+import common
+from demonstrators_report import draw, ratios, summary, text
+from tqdm import tqdm
+
+from robocasa_lerobot.demos.choose import expand_names
+from robocasa_lerobot.demos.demonstrator import can_demonstrate
+from robocasa_lerobot.demos.episode import record_episode
+from robocasa_lerobot.envs.kitchen_env import KitchenEnv
+from robocasa_lerobot.envs.registry import get_task, task_names
+
+OUTPUT = common.RESULTS / "demonstrators.json"
+PICTURE = common.RESULTS / "demonstrators.png"
+TRIALS = common.REPOSITORY / "outputs" / "demonstrators.jsonl"
+SPLITS = ("target", "pretrain")
+FIRST_SEED = 100_000  # below, skills are tuned
+
+
+@dataclass(frozen=True)
+class Trial:
+    """One attempt of a demonstrator.
+
+    Attributes:
+        task, split, seed, action_noise: what was tried.
+        success: whether the goal held at the end.
+        steps: control steps of the episode.
+        wall_s: seconds that it took, making the kitchen included.
+        workers: processes that worked at the time.
+        reason: why it failed.
+        false_terms: terms of the goal that did not hold then.
+        commit: of the checkout.
+    """
+
+    task: str
+    split: str
+    seed: int
+    action_noise: float
+    success: bool
+    steps: int
+    wall_s: float
+    workers: int
+    reason: str
+    false_terms: tuple[str, ...]
+    commit: str
+
+    @property
+    def key(self) -> tuple[str, str, int, float]:
+        """What makes it one trial."""
+        return self.task, self.split, self.seed, self.action_noise
+
+
+def parse(arguments: Sequence[str] | None = None) -> argparse.Namespace:
+    """The command's options."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--tasks", default="all", help="names or sets separated by commas (default: all)")
+    parser.add_argument("--seeds", type=int, default=20, help="seeds in each split (default 20)")
+    parser.add_argument("--splits", default=",".join(SPLITS), help="default: both")
+    parser.add_argument("--first-seed", type=int, default=FIRST_SEED, help=f"default {FIRST_SEED}")
+    parser.add_argument("--action-noise", type=float, default=0.0, help="as of `demos` (default 0)")
+    parser.add_argument("--workers", type=int, default=os.cpu_count() or 1, help="processes (default: all cores)")
+    parser.add_argument("--fresh", action="store_true", help="forget finished trials of these tasks and settings")
+    parser.add_argument("--report", action="store_true", help="run nothing: result and picture of what is there")
+    parser.add_argument("--trials", type=Path, default=TRIALS, help="file of finished trials")
+    parser.add_argument("--out", type=Path, default=OUTPUT, help="result; the picture lies beside it")
+    return parser.parse_args(arguments)
+
+
+def attempt(task: str, split: str, seed: int, action_noise: float, workers: int, commit: str) -> Trial:
+    """Let the demonstrator try once. Nothing that goes wrong ends the benchmark: it counts as a failure."""
+    started = time.perf_counter()
+    env = KitchenEnv(task, split=split, cameras=(), terminate_on_success=False)
+    success, steps, reason, false_terms = False, 0, "", ()
+    try:
+        recording = record_episode(env, seed, action_noise=action_noise)
+        success, steps, reason = recording.success, len(recording.actions), recording.reason
+        false_terms = recording.false_terms
+    except Exception as error:
+        reason = f"{type(error).__name__}: {error}"
+    finally:
+        env.close()
+    seconds = round(time.perf_counter() - started, 3)
+    return Trial(task, split, seed, action_noise, success, steps, seconds, workers, reason, false_terms, commit)
+
+
+def read_trials(path: Path) -> dict[tuple[str, str, int, float], Trial]:
+    """Finished trials; of one that was made twice, the later."""
+    if not path.exists():
+        return {}
+    lines = path.read_text(encoding="utf-8").splitlines(keepends=True)
+    found = (json.loads(line) for line in lines if line.endswith("\n"))  # the last one may be cut off
+    trials = (Trial(**{**values, "false_terms": tuple(values["false_terms"])}) for values in found)
+    return {trial.key: trial for trial in trials}
+
+
+def forget(path: Path, keys: Iterable[tuple[str, str, int, float]]) -> None:
+    """Remove trials from the file."""
+    gone = set(keys)
+    left = [trial for key, trial in read_trials(path).items() if key not in gone]
+    aside = path.with_name(path.name + ".part")
+    path.parent.mkdir(parents=True, exist_ok=True)
+    aside.write_text("".join(json.dumps(asdict(trial)) + "\n" for trial in left), encoding="utf-8")
+    aside.replace(path)
+
+
+def run(jobs: list[tuple[str, str, int, float]], path: Path, workers: int) -> None:
+    """Make the trials, and write each down when it has ended."""
+    commit = common.versions()["commit"]
+    path.parent.mkdir(parents=True, exist_ok=True)
+    _mend(path)
+    context = multiprocessing.get_context("forkserver")
+    context.set_forkserver_preload(["robocasa_lerobot.demos.episode"])
+    solved = failed = 0
+    with ProcessPoolExecutor(workers, mp_context=context) as pool, path.open("a", encoding="utf-8") as file:
+        futures = [pool.submit(attempt, *job, workers, commit) for job in jobs]
+        try:
+            with tqdm(as_completed(futures), total=len(futures), unit="trial", smoothing=0.02) as bar:
+                for future in bar:
+                    trial = future.result()
+                    file.write(json.dumps(asdict(trial)) + "\n")
+                    file.flush()
+                    solved, failed = solved + trial.success, failed + (not trial.success)
+                    bar.set_postfix(solved=solved, failed=failed)
+        except BaseException:
+            pool.shutdown(wait=False, cancel_futures=True)
+            raise
+
+
+def _mend(path: Path) -> None:
+    """End a line that was cut off when an earlier run was killed."""
+    if path.exists() and (content := path.read_bytes()) and not content.endswith(b"\n"):
+        path.write_bytes(content[: content.rfind(b"\n") + 1])
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run what is missing, print, write."""
+    options = parse(arguments)
+    names = expand_names(options.tasks)
+    splits = tuple(split.strip() for split in options.splits.split(","))
+    seeds = range(options.first_seed, options.first_seed + options.seeds)
+    noise = options.action_noise
+    # Seed by seed, so that a run that is stopped has seen all tasks about equally often.
+    able = [name for name in names if can_demonstrate(get_task(name))]
+    jobs = [(name, split, seed, noise) for seed in seeds for split in splits for name in able]
+    if not options.report:
+        if options.fresh:
+            forget(options.trials, [key for key in read_trials(options.trials) if key[0] in names and key[3] == noise])
+        done = read_trials(options.trials)
+        todo = [job for job in jobs if job not in done]
+        print(f"{len(able)} of {len(names)} tasks have a demonstrator; {len(todo)} of {len(jobs)} trials to make")
+        if todo:
+            run(todo, options.trials, options.workers)
+    wanted = {(split, seed) for split in splits for seed in seeds}
+    trials = [
+        t for t in read_trials(options.trials).values() if t.action_noise == noise and (t.split, t.seed) in wanted
+    ]
+    tasks = summary(trials, {name: can_demonstrate(get_task(name)) for name in task_names()})
+    body = {
+        "machine": common.machine(),
+        "versions": common.versions("mujoco", "numpy"),
+        "settings": {
+            "first_seed": options.first_seed,
+            "seeds_per_split": options.seeds,
+            "splits": list(splits),
+            "action_noise": noise,
+        },
+        "trials": len(trials),
+        "commits": {c: sum(t.commit == c for t in trials) for c in sorted({t.commit for t in trials})},
+        "ratios": ratios(tasks),
+        "demonstrations_per_hour": per_hour(trials),
+        "tasks": tasks,
+    }
+    print(text(body))
+    common.write_result(options.out, "demonstrators", body)
+    draw(tasks, options.out.with_suffix(".png"))
+    print(f"{options.out}, {options.out.with_suffix('.png').name}")
+    return 0
+
+
+def per_hour(trials: Sequence[Trial]) -> dict[str, float] | None:
+    """Demonstrations that succeed, by the time that all trials took: of one process, and of all that worked."""
+    if not trials:
+        return None
+    solved = sum(trial.success for trial in trials)
+    return {
+        "one_process": round(3600 * solved / sum(trial.wall_s for trial in trials), 1),
+        "all_processes": round(3600 * solved / sum(trial.wall_s / trial.workers for trial in trials), 1),
+    }
+
+
+if __name__ == "__main__":
+    sys.exit(main())

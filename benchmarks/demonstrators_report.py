@@ -1,0 +1,177 @@
+"""The demonstrators' rates, times and picture, computed from their trials alone."""
+
+from __future__ import annotations
+
+import statistics
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import common
+
+from robocasa_lerobot import contract
+from robocasa_lerobot.envs.registry import human_seconds
+from robocasa_lerobot.evaluation.statistics.rates import success_rate
+
+if TYPE_CHECKING:
+    from demonstrators import Trial
+
+# What a finished set of demonstrators is to reach: mean rate, lowest rate, and seconds over the human median.
+AIM_MEAN, AIM_TASK, AIM_TIMES_HUMAN = 0.85, 0.50, 1.5
+_SPLITS = {"target": "#1f77b4", "pretrain": "#ff7f0e"}
+_REASONS = 3
+
+
+def summary(trials: Sequence[Trial], able: Mapping[str, bool]) -> dict[str, Any]:
+    """For each task: rate with interval, in all and by split, seconds beside the human's, and why it fails.
+
+    Tasks without a demonstrator, and those that were not tried, have the rate None.
+    """
+    out: dict[str, Any] = {}
+    for name in sorted(able):
+        mine = [trial for trial in trials if trial.task == name]
+        human = human_seconds(name)
+        entry: dict[str, Any] = {"demonstrator": able[name], **_rate(mine), "human_seconds": human}
+        if mine:
+            entry["splits"] = {
+                split: _rate(of_split)
+                for split in sorted({trial.split for trial in mine})
+                if (of_split := [trial for trial in mine if trial.split == split])
+            }
+            entry |= _seconds([trial for trial in mine if trial.success], human)
+            entry["failures"] = dict(Counter(_kind(t) for t in mine if not t.success).most_common(_REASONS))
+            entry["failed_seeds"] = sorted([t.split, t.seed] for t in mine if not t.success)
+        out[name] = entry
+    return out
+
+
+def ratios(tasks: Mapping[str, Any]) -> dict[str, Any]:
+    """Means over tasks and shares of tasks; None where nothing was tried."""
+    rates = [task["success_rate"] for task in tasks.values() if task["success_rate"] is not None]
+    by_split = {
+        f"mean_success_{split}": [
+            t["splits"][split]["success_rate"] for t in tasks.values() if split in t.get("splits", {})
+        ]
+        for split in _SPLITS
+    }
+    times = [task["times_human"] for task in tasks.values() if task.get("times_human") is not None]
+    return {
+        "tasks_with_demonstrator": sum(task["demonstrator"] for task in tasks.values()) / len(tasks),
+        "mean_success": statistics.mean(rates) if rates else None,
+        "mean_success_counting_missing_as_0": sum(rates) / len(tasks),
+        **{name: statistics.mean(values) if values else None for name, values in by_split.items()},
+        "worst_task": min(rates, default=None),
+        "tasks_at_least_half": sum(rate >= AIM_TASK for rate in rates) / len(tasks),
+        "tasks_within_1.5_times_human": sum(t <= AIM_TIMES_HUMAN for t in times) / len(tasks),
+        "median_times_human": statistics.median(times) if times else None,
+    }
+
+
+def text(body: Mapping[str, Any]) -> str:
+    """Tables for the terminal: every task, worst first, and the averages."""
+    tried = {name: t for name, t in body["tasks"].items() if t["success_rate"] is not None}
+    rows = [
+        [
+            name,
+            f"{task['successes']}/{task['trials']}",
+            f"{task['success_rate']:.0%}",
+            f"{task['low']:.0%}-{task['high']:.0%}",
+            *(f"{task['splits'][s]['success_rate']:.0%}" if s in task["splits"] else "-" for s in _SPLITS),
+            "-" if task["seconds_median"] is None else f"{task['seconds_median']:.1f}",
+            "-" if task["human_seconds"] is None else f"{task['human_seconds']:.0f}",
+            next(iter(task["failures"]), "")[:70],
+        ]
+        for name, task in sorted(tried.items(), key=lambda item: (item[1]["success_rate"], item[0]))
+    ]
+    header = ["task", "solved", "rate", "95 %", *_SPLITS, "s", "human s", "most frequent failure"]
+    missing = [name for name, task in body["tasks"].items() if not task["demonstrator"]]
+    found = body["ratios"]
+    lines = [common.table(header, rows) if rows else "nothing has been tried yet", ""]
+    if rows:
+        quick = round(found["tasks_within_1.5_times_human"] * len(body["tasks"]))
+        hourly = body["demonstrations_per_hour"]
+        lines += [
+            f"mean {found['mean_success']:.1%} of {len(rows)} tasks (aim {AIM_MEAN:.0%}), "
+            f"worst {found['worst_task']:.0%} (aim {AIM_TASK:.0%}); "
+            f"{quick} tasks take at most {AIM_TIMES_HUMAN} times the human median",
+            f"{hourly['all_processes']:.0f} demonstrations an hour, {hourly['one_process']:.0f} of one process",
+        ]
+    if missing:
+        lines.append(f"no demonstrator: {', '.join(missing)}")
+    return "\n".join(lines)
+
+
+def draw(tasks: Mapping[str, Any], path: Path) -> None:
+    """A picture of the rates with their intervals, the best task on top; tasks without a demonstrator stand last."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    order = sorted(tasks, key=lambda name: (_place(tasks[name]), name))
+    figure = Figure(figsize=(9, 1.2 + 0.21 * len(order)), dpi=110, layout="constrained")
+    FigureCanvasAgg(figure)
+    axes = figure.add_subplot()
+    for shift, (split, colour) in zip((0.17, -0.17), _SPLITS.items(), strict=True):
+        rows = [
+            (y, tasks[name]["splits"][split]) for y, name in enumerate(order) if split in tasks[name].get("splits", {})
+        ]
+        if rows:
+            rates = [r["success_rate"] for _, r in rows]
+            spread = [[r["success_rate"] - r["low"] for _, r in rows], [r["high"] - r["success_rate"] for _, r in rows]]
+            heights = [y + shift for y, _ in rows]
+            axes.errorbar(rates, heights, xerr=spread, fmt="o", ms=4, lw=1.2, color=colour, label=split)
+    for y, name in enumerate(order):
+        if tasks[name]["success_rate"] is None:
+            note = "not tried" if tasks[name]["demonstrator"] else "no demonstrator"
+            axes.text(0.01, y, note, va="center", fontsize=7, color="0.5")
+    axes.set_yticks(range(len(order)), order, fontsize=7)
+    axes.set_ylim(-0.7, len(order) - 0.3)
+    axes.set_xlim(0, 1.005)
+    axes.xaxis.set_major_formatter(lambda value, _: f"{value:.0%}")
+    axes.axvline(AIM_TASK, color="0.7", lw=0.8, ls=":")
+    axes.grid(axis="x", color="0.93")
+    axes.set_axisbelow(True)
+    axes.set_xlabel("success rate of the demonstrator, Wilson 95 % intervals")
+    axes.set_title("Demonstrators in kitchens and with seeds that they were not made on", fontsize=10)
+    if axes.get_legend_handles_labels()[0]:
+        axes.legend(loc="lower right", fontsize=8)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    figure.savefig(path)
+
+
+def _place(task: Mapping[str, Any]) -> float:
+    rate: float | None = task["success_rate"]
+    return rate if rate is not None else -1.0 if task["demonstrator"] else -2.0
+
+
+def _rate(trials: Sequence[Trial]) -> dict[str, Any]:
+    if not trials:
+        return {"success_rate": None, "successes": 0, "trials": 0}
+    rate = success_rate(sum(trial.success for trial in trials), len(trials))
+    return {
+        "success_rate": round(rate.rate, 4),
+        "low": round(rate.low, 4),
+        "high": round(rate.high, 4),
+        "successes": rate.successes,
+        "trials": rate.trials,
+    }
+
+
+def _seconds(solved: Sequence[Trial], human: float | None) -> dict[str, Any]:
+    """Simulated seconds of the demonstrations that succeeded."""
+    if not solved:
+        return {"seconds_median": None, "seconds_max": None, "times_human": None}
+    seconds = [trial.steps / contract.CONTROL_HZ for trial in solved]
+    median = statistics.median(seconds)
+    return {
+        "seconds_median": round(median, 2),
+        "seconds_max": round(max(seconds), 2),
+        "times_human": round(median / human, 3) if human else None,
+    }
+
+
+def _kind(trial: Trial) -> str:
+    """A failure's reason without the numbers, objects and names that make each one different."""
+    reason = trial.reason or "the goal does not hold at the end"
+    words = ["#" if any(character.isdigit() for character in word) else word for word in reason.split()]
+    return " ".join(words)
