@@ -122,6 +122,20 @@ def axis_angle(rotation: Array) -> Array:
     return out
 
 
+def rotation_about(axis: Array, angle: float) -> Array:
+    """Rotation (3, 3) by an angle in radians about an axis (3,) of length 1."""
+    quat, matrix = np.empty(4), np.empty(9)
+    mujoco.mju_axisAngle2Quat(quat, axis, angle)
+    mujoco.mju_quat2Mat(matrix, quat)
+    return matrix.reshape(3, 3)
+
+
+def nearer_turn(rotation: Array, present: Array) -> Array:
+    """A gripper is the same after half a turn about its approach: choose the turn nearer to the present one."""
+    flipped = rotation @ np.diag([-1.0, -1.0, 1.0])
+    return rotation if np.trace(rotation.T @ present) >= np.trace(flipped.T @ present) else flipped
+
+
 def frame(approach: Array, opening: Array) -> Array:
     """Hand rotation (3, 3) with the given approach direction and finger opening direction (made orthogonal)."""
     z = approach / np.linalg.norm(approach)

@@ -11,9 +11,18 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from robocasa_lerobot.demos.motion import CLOSED, Array, HandTarget, base_pose, frame, grip_position, hand_rotation
+from robocasa_lerobot.demos.motion import (
+    CLOSED,
+    Array,
+    HandTarget,
+    base_pose,
+    frame,
+    grip_position,
+    hand_rotation,
+    nearer_turn,
+)
 from robocasa_lerobot.demos.skills.common import SkillError, move_hand
-from robocasa_lerobot.demos.skills.hinged import UP, Hinged, facing, in_base, push_round, shift_base
+from robocasa_lerobot.demos.skills.hinged import UP, Hinged, in_base, push_round, shift_base
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.scene.appliances.base import Appliance
 from robocasa_lerobot.envs.scene.fixtures.cabinets import HingeCabinet
@@ -112,7 +121,7 @@ def _press_down(env: KitchenEnv, stage: Stage, part: str, goal: float, *, lean: 
 
     def rotation(angle: float) -> Array:
         # From above, leaning so that the forearm keeps below wall cabinets.
-        return facing(lean * lid.inwards - UP, lid.rightwards, hand_rotation(data))
+        return nearer_turn(frame(lean * lid.inwards - UP, lid.rightwards), hand_rotation(data))
 
     for _ in range(ATTEMPTS):
         top = lid.high[2]

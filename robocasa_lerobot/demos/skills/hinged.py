@@ -16,7 +16,7 @@ from robocasa_lerobot.demos.motion import (
     action,
     arm_action,
     base_pose,
-    frame,
+    rotation_about,
 )
 from robocasa_lerobot.envs.scene.fixtures.base import Fixture
 
@@ -70,10 +70,7 @@ class Hinged:
 
     def turned(self, angle: float) -> Array:
         """World rotation (3, 3) of what lies in the fixture's axes when shut, at an angle."""
-        quat, out = np.empty(4), np.empty(9)
-        mujoco.mju_axisAngle2Quat(quat, self._axis, self.opening * angle)
-        mujoco.mju_quat2Mat(out, quat)
-        return self._turn @ out.reshape(3, 3)
+        return self._turn @ rotation_about(self._axis, self.opening * angle)
 
     def point(self, local: Array, angle: float) -> Array:
         """World position (3,) of a point at an angle, metres."""
@@ -190,10 +187,3 @@ def _over_dead_zone(error: Array) -> Array:
         return np.zeros(2)
     command: Array = error / distance * (0.25 + min(2.0 * distance, 0.6))
     return command
-
-
-def facing(approach: Array, opening: Array, present: Array) -> Array:
-    """Hand rotation with an approach and an opening direction; of the two turns that fit, the one nearer to now."""
-    one = frame(approach, opening)
-    other = one @ np.diag([-1.0, -1.0, 1.0])
-    return one if np.trace(one.T @ present) >= np.trace(other.T @ present) else other

@@ -8,10 +8,18 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 
-import mujoco
 import numpy as np
 
-from robocasa_lerobot.demos.motion import CLOSED, OPEN, Array, HandTarget, frame, grip_position, hand_rotation
+from robocasa_lerobot.demos.motion import (
+    CLOSED,
+    OPEN,
+    Array,
+    HandTarget,
+    frame,
+    grip_position,
+    hand_rotation,
+    rotation_about,
+)
 from robocasa_lerobot.demos.skills.common import SkillError, hold_hand, move_hand
 from robocasa_lerobot.demos.skills.reach import plan_reach, shift_base
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
@@ -119,7 +127,7 @@ def _twist(env: KitchenEnv, at: HandTarget, axis: Array, goal: float, angle: Cal
         if since > 10:
             return
         lead = float(np.clip(left_over * 1.5, -LEAD_RAD, LEAD_RAD))
-        rotation = _rotated(axis, lead) @ hand_rotation(env.data)
+        rotation = rotation_about(axis, lead) @ hand_rotation(env.data)
         yield from hold_hand(env.data, HandTarget(at.position, rotation), CLOSED, 1)
 
 
@@ -127,7 +135,7 @@ def _way(grip: Array, rotation: Array, axis: Array, turn: float) -> tuple[HandTa
     return (
         HandTarget(grip - rotation[:, 2] * STANDOFF_M, rotation),
         HandTarget(grip, rotation),
-        HandTarget(grip, _rotated(axis, turn) @ rotation),
+        HandTarget(grip, rotation_about(axis, turn) @ rotation),
     )
 
 
@@ -141,7 +149,7 @@ def _rotations(knob: Array, inwards: Array) -> list[Array]:
     for tilt in TILTS:
         approach = np.cos(tilt) * inwards + np.sin(tilt) * lean
         for roll in np.deg2rad((0.0, 180.0, 90.0, -90.0, 45.0, -45.0, 135.0, -135.0)):
-            out.append(frame(approach, _rotated(inwards, float(roll)) @ knob[:, 0]))
+            out.append(frame(approach, rotation_about(inwards, float(roll)) @ knob[:, 0]))
     return out
 
 
@@ -158,10 +166,3 @@ def _length(env: KitchenEnv, body: int, inwards: Array) -> float:
         middle = data.geom_xpos[geom] + turn @ centre - data.xpos[body]
         out = max(out, float(-middle @ inwards) + float(half @ np.abs(turn.T @ inwards)))
     return out
-
-
-def _rotated(axis: Array, angle: float) -> Array:
-    quat, matrix = np.empty(4), np.empty(9)
-    mujoco.mju_axisAngle2Quat(quat, axis, angle)
-    mujoco.mju_quat2Mat(matrix, quat)
-    return matrix.reshape(3, 3)

@@ -11,7 +11,16 @@ from collections.abc import Callable, Iterator
 import mujoco
 import numpy as np
 
-from robocasa_lerobot.demos.motion import CLOSED, OPEN, Array, HandTarget, base_pose, frame, grip_position
+from robocasa_lerobot.demos.motion import (
+    CLOSED,
+    OPEN,
+    Array,
+    HandTarget,
+    base_pose,
+    frame,
+    grip_position,
+    rotation_about,
+)
 from robocasa_lerobot.demos.skills.common import SkillError, hold_hand, move_hand
 from robocasa_lerobot.demos.skills.reach import plan_reach, shift_base, untried
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
@@ -233,10 +242,7 @@ def _upper_face(env: KitchenEnv, body: int, way: Array) -> Array:
 
 
 def _turned(target: HandTarget, anchor: Array, axis: Array, angle: float, *, turns_hand: bool) -> HandTarget:
-    quat, matrix = np.empty(4), np.empty(9)
-    mujoco.mju_axisAngle2Quat(quat, axis, angle)
-    mujoco.mju_quat2Mat(matrix, quat)
-    turn = matrix.reshape(3, 3)
+    turn = rotation_about(axis, angle)
     return HandTarget(
         anchor + turn @ (target.position - anchor), turn @ target.rotation if turns_hand else target.rotation
     )

@@ -16,6 +16,7 @@ from robocasa_lerobot.demos.motion import (
     frame,
     grip_position,
     hand_rotation,
+    nearer_turn,
 )
 from robocasa_lerobot.demos.skills.common import SkillError, hold_hand, move_hand
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
@@ -47,7 +48,7 @@ def place_into_basin(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
         # In front of the faucet, whose spout reaches over the middle.
         over = rim + _towards_robot(env) * 0.09
         rotation = frame(DOWN, _lateral(env))
-        rotation = _nearer_turn(rotation, hand_rotation(data))
+        rotation = nearer_turn(rotation, hand_rotation(data))
         carry = HandTarget(over + np.array([0, 0, CARRY_M]), rotation)
         yield from move_hand(data, carry, CLOSED, tolerance=0.03)
         hang = grip_position(data)[2] - data.body(placed.name).xpos[2] + placed.item.size[2] / 2
@@ -112,11 +113,11 @@ def _grasp(env: KitchenEnv, placed: PlacedObject, attempt: int) -> tuple[Array, 
         raise SkillError(f"{placed.name} ({placed.item.model}): no pose of the gripper fits as it lies")
 
     def cost(pose: GraspPose) -> float:
-        nearest = _nearer_turn(pose.rotation, present)
+        nearest = nearer_turn(pose.rotation, present)
         return 0.35 * float(np.linalg.norm(axis_angle(nearest @ present.T))) - pose.score
 
     pose = sorted(poses, key=cost)[min(attempt, len(poses) - 1)]
-    return pose.position, _nearer_turn(pose.rotation, present)
+    return pose.position, nearer_turn(pose.rotation, present)
 
 
 def _half_height(env: KitchenEnv, placed: PlacedObject) -> float:
@@ -125,12 +126,6 @@ def _half_height(env: KitchenEnv, placed: PlacedObject) -> float:
     return min(
         float(np.abs(rotation[2]) @ np.asarray(placed.item.size)) / 2, float(np.linalg.norm(placed.item.size)) / 2
     )
-
-
-def _nearer_turn(rotation: Array, present: Array) -> Array:
-    """A gripper is the same after half a turn about its approach: choose the turn nearer to the present one."""
-    flipped = rotation @ np.diag([-1.0, -1.0, 1.0])
-    return rotation if np.trace(rotation.T @ present) >= np.trace(flipped.T @ present) else flipped
 
 
 def _lateral(env: KitchenEnv) -> Array:

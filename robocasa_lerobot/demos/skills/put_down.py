@@ -22,6 +22,7 @@ from robocasa_lerobot.demos.motion import (
     frame,
     grip_position,
     hand_rotation,
+    nearer_turn,
 )
 from robocasa_lerobot.demos.skills.common import SkillError, hold_hand, move_hand
 from robocasa_lerobot.demos.skills.navigation import drive_to
@@ -31,7 +32,6 @@ from robocasa_lerobot.demos.skills.pick_place import (
     DOWN,
     RELEASE_STEPS,
     _half_height,
-    _nearer_turn,
     pick,
 )
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
@@ -91,7 +91,7 @@ def _put(env: KitchenEnv, placed: PlacedObject, spot: Spot, top: float, done: Ca
     for _ in range(ATTEMPTS):
         yield from _face(env, data.body(placed.name).xpos, OPEN)
         yield from pick(env, placed)
-        rotation = _nearer_turn(frame(DOWN, hand_rotation(data)[:, 1]), hand_rotation(data))
+        rotation = nearer_turn(frame(DOWN, hand_rotation(data)[:, 1]), hand_rotation(data))
         hang = _hang(env, placed)
         height = max(top + hang + 0.08, grip_position(data)[2])
         start = grip_position(data)
