@@ -10,7 +10,8 @@ import mujoco
 import numpy as np
 
 from robocasa_lerobot.contract import SUBSTEPS
-from robocasa_lerobot.envs.scene.appliances.base import in_subtree, update_all
+from robocasa_lerobot.envs.bodies import subtree
+from robocasa_lerobot.envs.scene.appliances.base import update_all
 from robocasa_lerobot.envs.scene.appliances.catalogue import build_appliance
 from robocasa_lerobot.envs.scene.materials import MaterialPalette, load_style
 from robocasa_lerobot.envs.scene.robot import apply_simulation_options
@@ -36,7 +37,7 @@ class Bench:
         self.model = spec.compile()
         self.data = mujoco.MjData(self.model)
         mujoco.mj_forward(self.model, self.data)
-        self.finger = self.model.body("finger").id
+        self.finger = subtree(self.model, "finger")
         self.toucher = self.finger
         self.mocap = int(self.model.body("finger").mocapid[0])
         self.way = np.zeros(3)  # that the finger pushes
@@ -121,7 +122,7 @@ class Bench:
 
     def _spots(self, part: str, joint: int):
         """Places on a part to push at: the geoms that can be touched, farthest from a hinge first; then their ends."""
-        moved = in_subtree(self.model, self.model.body(f"it_{part}").id)[self.model.geom_bodyid]
+        moved = subtree(self.model, f"it_{part}")[self.model.geom_bodyid]
         geoms = np.flatnonzero(moved & (self.model.geom_contype > 0)).tolist()
         anchor, axis = self.data.xanchor[joint], self.data.xaxis[joint]
 
@@ -235,7 +236,7 @@ class Bench:
     def grip(self, centre: np.ndarray, quat: np.ndarray) -> None:
         """Put the open pincer around a place and close it."""
         body = self.model.body("pincer")
-        self.toucher = body.id
+        self.toucher = subtree(self.model, "pincer")
         self.data.mocap_pos[body.mocapid[0]] = centre
         self.data.mocap_quat[body.mocapid[0]] = quat
         self._pads(-PAD_FORCE)

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import pytest
 
 from robocasa_lerobot.demos.demonstrator import can_demonstrate
 from robocasa_lerobot.envs.registry import get_task, task_names
+from robocasa_lerobot.envs.task import Task
 
 # Among the fast tests: one task of every sort that is declared, and one of every sort that a demonstrator solves.
 _SORTS = ("OpenFridge", "TurnOnStove", "PickPlaceToasterToCounter")
@@ -25,9 +26,9 @@ def demonstrated() -> list[Any]:
     return _marked(solvable(), _SOLVED)
 
 
-def every_task() -> list[Any]:
-    """All tasks; those that are not of the sample are slow tests."""
-    return _marked(task_names(), (*_SOLVED, *_SORTS))
+def every_task(wanted: Callable[[Task], bool] = lambda task: True) -> list[Any]:
+    """All tasks, or those wanted; those that are not of the sample are slow tests."""
+    return _marked([name for name in task_names() if wanted(get_task(name))], (*_SOLVED, *_SORTS))
 
 
 def sample() -> tuple[str, ...]:

@@ -30,7 +30,7 @@ def test_a_counter_has_a_part_on_each_side_of_its_sink_and_strips() -> None:
     for loc, sign in (("left", -1), ("right", 1)):
         found = choose_parts(LAYOUT, Placement(region=SampleRegion("sink", loc)), COUNTER, SINK, 0.0)
         assert len(found) == 1
-        middle = np.array(found[0].middle) - SINK.pos[:2]
+        middle = np.array(found[0].area.middle) - SINK.pos[:2]
         assert sign * (middle @ (np.cos(COUNTER.yaw), np.sin(COUNTER.yaw))) > SINK.width / 2 - 1e-6
         assert found[0].area.y1 - found[0].area.y0 == pytest.approx(COUNTER.depth)  # not the strips
     both = choose_parts(LAYOUT, Placement(region=SampleRegion("sink", "left_right")), COUNTER, SINK, 0.0)

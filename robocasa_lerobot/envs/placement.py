@@ -78,10 +78,17 @@ class Area:
         reach_x, reach_y = (c * half[0] + s * half[1], s * half[0] + c * half[1]) if self.inside else (0.0, 0.0)
         x = _uniform_inside(rng, self.x0, self.x1, reach_x)
         y = _uniform_inside(rng, self.y0, self.y1, reach_y)
-        cos, sin = np.cos(self.yaw), np.sin(self.yaw)
-        return Footprint(
-            float(self.origin[0] + cos * x - sin * y), float(self.origin[1] + sin * x + cos * y), self.yaw + yaw, half
-        )
+        return Footprint(*self.to_room(x, y), self.yaw + yaw, half)
+
+    def to_room(self, x: float, y: float) -> tuple[float, float]:
+        """Where a point of the fixture's frame is in the room, metres."""
+        c, s = np.cos(self.yaw), np.sin(self.yaw)
+        return float(self.origin[0] + c * x - s * y), float(self.origin[1] + s * x + c * y)
+
+    @property
+    def middle(self) -> tuple[float, float]:
+        """In the room, metres."""
+        return self.to_room((self.x0 + self.x1) / 2, (self.y0 + self.y1) / 2)
 
     @property
     def extent(self) -> float:
@@ -92,9 +99,7 @@ class Area:
         """Square metres that no footprint covers, counted on a grid."""
         xs = self.x0 + (np.arange(grid) + 0.5) * (self.x1 - self.x0) / grid
         ys = self.y0 + (np.arange(grid) + 0.5) * (self.y1 - self.y0) / grid
-        x, y = (axis.ravel() for axis in np.meshgrid(xs, ys))
-        c, s = np.cos(self.yaw), np.sin(self.yaw)
-        points = np.stack([self.origin[0] + c * x - s * y, self.origin[1] + s * x + c * y], axis=1)
+        points = np.array([self.to_room(x, y) for x in xs for y in ys])
         free = np.ones(len(points), dtype=bool)
         for other in occupied:
             local = np.abs((points - (other.x, other.y)) @ other.axes().T)
@@ -138,8 +143,6 @@ def place(
 
 def _neighbours(area: Area, half: tuple[float, float], occupied: list[Footprint], margin: float) -> list[Footprint]:
     """Footprints that one in the area can come near to."""
-    c, s = np.cos(area.yaw), np.sin(area.yaw)
-    x, y = (area.x0 + area.x1) / 2, (area.y0 + area.y1) / 2
-    middle = area.origin[0] + c * x - s * y, area.origin[1] + s * x + c * y
+    middle = area.middle
     reach = np.hypot(area.x1 - area.x0, area.y1 - area.y0) / 2 + np.hypot(*half) + margin
     return [o for o in occupied if np.hypot(o.x - middle[0], o.y - middle[1]) <= reach + np.hypot(*o.half)]

@@ -24,7 +24,6 @@ from robocasa_lerobot.demos.motion import (
 from robocasa_lerobot.demos.skills.common import SkillError, hold_hand, move_hand
 from robocasa_lerobot.demos.skills.reach import plan_reach, shift_base, untried
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
-from robocasa_lerobot.envs.scene.appliances.base import in_subtree
 from robocasa_lerobot.envs.task import Stage
 
 ATTEMPTS = 4
@@ -123,7 +122,7 @@ def _lead(env: KitchenEnv, stage: Stage, part: str, left_over: Callable[[], floa
         SkillError: neither is it there after four attempts, nor does the task's goal hold.
     """
     data, sink = env.data, env.scene.sink(stage.target)
-    tree = in_subtree(env.model, env.model.body(f"{sink.name}_{part}").id)
+    tree = env.scene.subtree(f"{sink.name}_{part}")
     allowed = frozenset(int(i) for i in np.flatnonzero(tree))
     tried: list[Array] = []
     for _ in range(ATTEMPTS):

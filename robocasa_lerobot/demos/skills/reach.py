@@ -22,9 +22,9 @@ from robocasa_lerobot.demos.motion import (
     limit,
     pose_error,
 )
+from robocasa_lerobot.envs.bodies import subtree
 from robocasa_lerobot.envs.control.indices import joint_positions, joint_velocities
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
-from robocasa_lerobot.envs.scene.appliances.base import in_subtree
 from robocasa_lerobot.envs.scene.robot_names import (
     ARM_JOINTS,
     BASE_CENTER_SITE,
@@ -199,7 +199,7 @@ def _collisions(model: mujoco.MjModel, data: mujoco.MjData, allowed: frozenset[i
     mujoco.mj_collision(model, data)
     if data.ncon == 0:
         return 0
-    robot = in_subtree(model, model.body(MOBILE_BASE).id)
+    robot = subtree(model, MOBILE_BASE)
     pairs = model.geom_bodyid[data.contact.geom]
     touched = {
         int(other)

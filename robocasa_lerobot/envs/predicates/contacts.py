@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
@@ -13,18 +11,8 @@ from numpy.typing import NDArray
 ASLEEP_TOUCH_M = 0.001
 
 
-def subtree(model: mujoco.MjModel, roots: Iterable[str]) -> NDArray[np.bool_]:
-    """For each body whether it is one of the named ones or hangs on one, (nbody,)."""
-    inside = np.zeros(model.nbody, dtype=np.bool_)
-    inside[[model.body(name).id for name in roots]] = True
-    for body in range(1, model.nbody):  # parents come before children
-        inside[body] |= inside[model.body_parentid[body]]
-    inside[0] = False
-    return inside
-
-
 def touching(model: mujoco.MjModel, data: mujoco.MjData, first: NDArray[np.bool_], second: NDArray[np.bool_]) -> bool:
-    """Whether a body of one set touches a body of the other; the sets as of `subtree`.
+    """Whether a body of one set touches a body of the other; the sets as of `bodies.subtree`.
 
     Before: contacts are evaluated.
     """

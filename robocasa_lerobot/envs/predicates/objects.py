@@ -9,7 +9,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from robocasa_lerobot.envs.predicates.contacts import subtree, touching
+from robocasa_lerobot.envs.predicates.contacts import touching
 from robocasa_lerobot.envs.predicates.logic import Term, plain
 from robocasa_lerobot.envs.scene.fixtures.base import Region
 from robocasa_lerobot.envs.scene.fixtures.counters import Counter
@@ -110,12 +110,10 @@ class ObjectTouches(Term):
 
     def holds(self, scene: Scene, data: mujoco.MjData) -> bool:
         """Look at the contacts."""
-        model = scene.model
         body = self.what if self.what in scene.objects else scene.fixture(self.what).name
         part = scene.fill(self.part)
-        return touching(
-            model, data, subtree(model, [scene.fill(self.object)]), subtree(model, [f"{body}_{part}" if part else body])
-        )
+        what = scene.subtree(f"{body}_{part}" if part else body)
+        return touching(scene.model, data, scene.subtree(scene.fill(self.object)), what)
 
 
 @dataclass(frozen=True)
@@ -132,8 +130,7 @@ class ObjectTouchesAnyCounter(Term):
     def holds(self, scene: Scene, data: mujoco.MjData) -> bool:
         """Look at the contacts with every counter."""
         counters = [name for name, fixture in scene.fixtures.items() if isinstance(fixture, Counter)]
-        model = scene.model
-        return touching(model, data, subtree(model, [scene.fill(self.object)]), subtree(model, counters))
+        return touching(scene.model, data, scene.subtree(scene.fill(self.object)), scene.subtree(*counters))
 
 
 @dataclass(frozen=True)
@@ -160,9 +157,8 @@ class ObjectOn(Term):
         limit = self.within
         if limit is None:
             limit = RECEPTACLE_SHARE * max(scene.objects[self.receptacle].item.size[:2]) / 2
-        model = scene.model
         return float(np.linalg.norm(apart)) < limit and touching(
-            model, data, subtree(model, [scene.fill(self.object)]), subtree(model, [self.receptacle])
+            scene.model, data, scene.subtree(scene.fill(self.object)), scene.subtree(self.receptacle)
         )
 
 

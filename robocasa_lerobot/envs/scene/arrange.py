@@ -52,10 +52,8 @@ def _suits(fixture: Fixture, wanted: FixtureWanted, layout: Layout, roles: dict[
 
 def _distance(fixture: Fixture, ref: Fixture) -> float:
     """Metres on the floor plan from a point to the rectangle of a fixture."""
-    dx, dy = ref.pos[0] - fixture.pos[0], ref.pos[1] - fixture.pos[1]
-    c, s = np.cos(fixture.yaw), np.sin(fixture.yaw)
-    x, y = abs(c * dx + s * dy) - fixture.width / 2, abs(-s * dx + c * dy) - fixture.depth / 2
-    return float(np.hypot(max(x, 0.0), max(y, 0.0)))
+    x, y = fixture.to_local(ref.pos)
+    return float(np.hypot(max(abs(x) - fixture.width / 2, 0.0), max(abs(y) - fixture.depth / 2, 0.0)))
 
 
 @dataclass
@@ -247,7 +245,7 @@ def _put_on(
     area = Area(cx - half[0], cx + half[0], cy - half[1], cy + half[1], (x, y), holder.yaw, floor, holder.name)
     area = replace(area, rotation=start.rotation, inside=start.ensure_inside)
     others = [
-        Footprint(p.pos[0], p.pos[1], p.yaw, (p.item.size[0] / 2, p.item.size[1] / 2))
+        p.footprint
         for other, p in table.placed.items()
         if other != holder.name and abs(p.pos[2] - p.item.size[2] / 2 - floor) < 0.03
     ]

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from robocasa_lerobot.envs.camera_noise import CameraNoise, add_camera_noise
 from robocasa_lerobot.envs.cameras import cameras_of_set
 from robocasa_lerobot.envs.initial import Initial, LidAside, PartAt
-from robocasa_lerobot.envs.placement import Footprint, PlacementError, place
+from robocasa_lerobot.envs.placement import PlacementError, place
 from robocasa_lerobot.envs.scene.appliances.base import Appliance
 from robocasa_lerobot.envs.scene.appliances.blender import Blender
 from robocasa_lerobot.envs.scene.arrange import cast_roles, place_objects
@@ -165,7 +165,7 @@ def _lid_spot(
     assert isinstance(blender, Blender)
     counter = counter_of(layout, blender)
     areas, standing = counter_areas(layout, OnCounter("", "left_right", size=(0.35, 0.35)), blender)
-    taken = [Footprint(p.pos[0], p.pos[1], p.yaw, (p.item.size[0] / 2, p.item.size[1] / 2)) for p in objects.values()]
+    taken = [placed.footprint for placed in objects.values()]
     width, depth, _ = blender.lid_size
     spot, _ = place(rng, areas, (width / 2, depth / 2), [*standing, *taken], what="the blender's lid")
     return np.array([spot.x, spot.y, counter.surface_z + 0.002])

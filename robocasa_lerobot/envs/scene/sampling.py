@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import mujoco
@@ -36,14 +36,6 @@ class Part:
     area: Area
     fixture: str
     name: str = ""
-
-    @property
-    def middle(self) -> tuple[float, float]:
-        """In the room, metres."""
-        area = self.area
-        x, y = (area.x0 + area.x1) / 2, (area.y0 + area.y1) / 2
-        c, s = np.cos(area.yaw), np.sin(area.yaw)
-        return float(area.origin[0] + c * x - s * y), float(area.origin[1] + s * x + c * y)
 
 
 def parts_of(layout: Layout, fixture: Fixture, openness: float | Shares = 0.0) -> list[Part]:
@@ -138,7 +130,7 @@ def _sides(area: Area) -> tuple[float, float]:
 
 
 def _near(parts: list[Part], fixture: Fixture, ref: Fixture, loc: str) -> list[Part]:
-    at = _local(fixture, ref.pos[:2])[0]
+    at = fixture.to_local(ref.pos)[0]
     if loc == "nn":
         return sorted(parts, key=lambda part: _gap(part, at))[:1]
     if loc == "any":
@@ -161,13 +153,6 @@ def _gap(part: Part, at: float) -> float:
     return max(part.area.x0 - at, at - part.area.x1, 0.0)
 
 
-def _local(fixture: Fixture, point: Iterable[float]) -> tuple[float, float]:
-    x, y = point
-    dx, dy = x - fixture.pos[0], y - fixture.pos[1]
-    c, s = float(np.cos(fixture.yaw)), float(np.sin(fixture.yaw))
-    return c * dx + s * dy, -s * dx + c * dy
-
-
 def rectangle_in(part: Part, placement: Placement, fixture: Fixture, ref: Fixture | None) -> Area:
     """The rectangle of a part that a placement's size, position, offset and margin leave.
 
@@ -175,7 +160,7 @@ def rectangle_in(part: Part, placement: Placement, fixture: Fixture, ref: Fixtur
     """
     area = part.area
     bounds = []
-    ref_at = (0.0, 0.0) if ref is None else _local(fixture, ref.pos[:2])
+    ref_at = (0.0, 0.0) if ref is None else fixture.to_local(ref.pos)
     for axis, (low, high) in enumerate(((area.x0, area.x1), (area.y0, area.y1))):
         wide = high - low
         side = wide if placement.size is None else min(placement.size[axis], wide)

@@ -10,10 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robocasa_lerobot.contract import ACTION_SIZE
+from robocasa_lerobot.envs.bodies import subtree
 from robocasa_lerobot.envs.cameras import camera_configs
 from robocasa_lerobot.envs.control.controller import RobotController
 from robocasa_lerobot.envs.control.step import control_step
 from robocasa_lerobot.envs.initial import Initial, PartAt
+from robocasa_lerobot.envs.placement import Footprint
 from robocasa_lerobot.envs.scene.appliances.base import Appliance, update_all
 from robocasa_lerobot.envs.scene.appliances.blender import Blender
 from robocasa_lerobot.envs.scene.appliances.sink import Sink
@@ -38,6 +40,12 @@ class PlacedObject:
     item: Instance
     pos: tuple[float, float, float]
     yaw: float
+
+    @property
+    def footprint(self) -> Footprint:
+        """Its bounding box on the floor plan."""
+        width, depth, _ = self.item.size
+        return Footprint(self.pos[0], self.pos[1], self.yaw, (width / 2, depth / 2))
 
 
 @dataclass
@@ -80,7 +88,7 @@ class Scene:
     drawn: tuple[float, ...] = ()
     lid_spots: dict[str, NDArray[np.float64]] = field(default_factory=dict)
     arm_noise_rad: float = 0.02
-    _shares: dict[tuple[str, str], float] = field(default_factory=dict, repr=False)
+    _subtrees: dict[tuple[str, ...], NDArray[np.bool_]] = field(default_factory=dict, init=False, repr=False)
 
     @property
     def fixtures(self) -> dict[str, Fixture]:
@@ -121,7 +129,22 @@ class Scene:
 
     def initial_share(self, role: str, part: str) -> float:
         """Where a part of an appliance was at reset, as a share of its range."""
-        return self._shares[role, part]
+        return next(
+            drawn
+            for entry, drawn in self._setup()
+            if isinstance(entry, PartAt) and (entry.fixture, entry.part) == (role, part)
+        )
+
+    def _setup(self) -> list[tuple[Initial, float]]:
+        """The initial states that write positions, each with its drawn number."""
+        setup = [entry for entry in self.task.initial if isinstance(entry, Initial)]
+        return list(zip(setup, self.drawn, strict=True))
+
+    def subtree(self, *bodies: str) -> NDArray[np.bool_]:
+        """For each body of the model whether it is one of the named ones or hangs on one, (nbody,); kept."""
+        if bodies not in self._subtrees:
+            self._subtrees[bodies] = subtree(self.model, *bodies)
+        return self._subtrees[bodies]
 
     def standing_pose(self, role: str) -> RobotPose:
         """Where a robot stands that is to use the fixture of a role, without deviation."""
@@ -142,11 +165,8 @@ class Scene:
         for name, openness in self.openness.items():
             fixture = self.fixtures[name]
             set_openness(fixture, data, openness)
-        setup = [entry for entry in self.task.initial if isinstance(entry, Initial)]
-        for entry, drawn in zip(setup, self.drawn, strict=True):
+        for entry, drawn in self._setup():
             entry.apply(self, data, drawn)
-            if isinstance(entry, PartAt):
-                self._shares[entry.fixture, entry.part] = drawn
         for placed in self.objects.values():
             data.joint(f"{placed.name}_joint0").qpos[:] = [*placed.pos, *yaw_quat(placed.yaw)]
         mujoco.mj_forward(self.model, data)
@@ -163,7 +183,7 @@ class Scene:
         """Let appliances latch, time and light up, once after each control step."""
         appliances = [fixture for fixture in self.fixtures.values() if isinstance(fixture, Appliance)]
         if appliances:
-            update_all(appliances, self.model, data, self.model.body(GRIPPER).id)
+            update_all(appliances, self.model, data, self.subtree(GRIPPER))
 
     def ep_meta(self) -> dict[str, Any]:
         """Description of the episode in RoboCasa's keys (JSON-able)."""

@@ -105,7 +105,7 @@ def ground_fixture(layout: Layout, fixture: Fixture) -> Fixture:
 
 
 def _within(ground: Fixture, fixture: Fixture) -> bool:
-    local = _into(ground, fixture.pos[0], fixture.pos[1])
+    local = ground.to_local(fixture.pos)
     return abs(local[0]) <= ground.width / 2 and abs(local[1]) <= ground.depth / 2
 
 
@@ -130,12 +130,12 @@ def faces(layout: Layout, ground: Fixture, fixture: Fixture) -> list[Face]:
     front = Face(0.0, ground.width, ground.depth)
     if not (isinstance(ground, Counter) and ground.back_face):
         return [front]
-    stools = [_into(ground, *f.pos[:2])[1] for f in layout.of_type("stool") if _belongs(ground, f)]
+    stools = [ground.to_local(f.pos)[1] for f in layout.of_type("stool") if _belongs(ground, f)]
     room = STOOL_OUT_M + SEAT_M / 2
     front = Face(0.0, ground.width, ground.depth, room if any(y < 0 for y in stools) else 0.0)
     back = Face(np.pi, ground.width, ground.depth, room if any(y > 0 for y in stools) else 0.0)
     if layout.types[fixture.name] == "stool":
-        return [back if _into(ground, *fixture.pos[:2])[1] > 0 else front]
+        return [back if ground.to_local(fixture.pos)[1] > 0 else front]
     if fixture is not ground:
         return [front]
     sides = [Face(turn, ground.depth, ground.width) for turn in (-np.pi / 2, np.pi / 2)]
@@ -143,7 +143,7 @@ def faces(layout: Layout, ground: Fixture, fixture: Fixture) -> list[Face]:
 
 
 def _belongs(counter: Counter, stool: Fixture) -> bool:
-    x, y = _into(counter, *stool.pos[:2])
+    x, y = counter.to_local(stool.pos)
     return abs(x) <= counter.width / 2 and abs(y) <= counter.depth / 2 + STOOL_OUT_M + 0.05
 
 
@@ -169,7 +169,7 @@ def _pose_at(
     side: str,
 ) -> RobotPose:
     """The pose before a face of a ground fixture, in line with a point of the room, shifted right and inwards."""
-    x = _turned(_into(ground, *at), -face.turn)[0] + shift[0]
+    x = _turned(ground.to_local(at), -face.turn)[0] + shift[0]
     y = -face.depth / 2 - _standoff(layout, ground) - setback - face.clearance - shift[1]
     world = ground.to_world((*_turned((x, y), face.turn), 0.0))
     heading = ground.yaw + face.turn + np.pi / 2
@@ -258,7 +258,7 @@ def footprint(fixture: Fixture) -> Footprint:
 def counter_areas(layout: Layout, start: OnCounter, near: Fixture) -> tuple[list[Area], list[Footprint]]:
     """The rectangles of the counter that a start allows, and what already stands on the counter."""
     counter = counter_of(layout, near)
-    near_x = _into(counter, near.pos[0], near.pos[1])[0]
+    near_x = counter.to_local(near.pos)[0]
     width, depth = start.size
     shift_x, shift_y = start.offset
     if start.at == "front":
@@ -303,9 +303,3 @@ def inside_area(start: InsideOf, fixture: Fixture, openness: float) -> Area:
     slide = -openness * fixture.full_travel if isinstance(fixture, Drawer) else 0.0
     centre = fixture.to_world((region.center[0], centre_y + slide, region.center[2] - region.half[2]))
     return Area(-half_w, half_w, -half_d, half_d, (float(centre[0]), float(centre[1])), fixture.yaw, float(centre[2]))
-
-
-def _into(fixture: Fixture, x: float, y: float) -> tuple[float, float]:
-    dx, dy = x - fixture.pos[0], y - fixture.pos[1]
-    c, s = np.cos(fixture.yaw), np.sin(fixture.yaw)
-    return float(c * dx + s * dy), float(-s * dx + c * dy)

@@ -7,6 +7,7 @@ catches that hold a lever in `eq_active`: both are part of the integration state
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import Any, ClassVar
@@ -32,30 +33,21 @@ class Touches:
 
     Args:
         model, data: with contacts evaluated.
-        root: body whose subtree touches, e.g. the gripper's.
+        toucher: for each body whether it belongs to what touches, (nbody,).
     """
 
-    def __init__(self, model: mujoco.MjModel, data: mujoco.MjData, root: int) -> None:
+    def __init__(self, model: mujoco.MjModel, data: mujoco.MjData, toucher: NDArray[np.bool_]) -> None:
         self._bodies: frozenset[int] = frozenset()
         if data.ncon == 0:
             return
         bodies = model.geom_bodyid[data.contact.geom]
-        mine = in_subtree(model, root)[bodies]
+        mine = toucher[bodies]
         touching = data.contact.dist <= 0.0
         self._bodies = frozenset(bodies[(mine[:, ::-1] & ~mine) & touching[:, None]].tolist())
 
     def body(self, number: int) -> bool:
         """Whether a body is touched."""
         return number in self._bodies
-
-
-def in_subtree(model: mujoco.MjModel, root: int) -> NDArray[np.bool_]:
-    """For each body whether it is `root` or hangs on it, (nbody,)."""
-    inside = np.zeros(model.nbody, dtype=np.bool_)
-    inside[root] = True
-    for body in range(root + 1, model.nbody):  # parents come before children
-        inside[body] = inside[model.body_parentid[body]]
-    return inside
 
 
 @dataclass
@@ -83,9 +75,9 @@ class Appliance(Fixture):
             spec.nuserdata += self.memory_slots
         self.assemble(Parts(spec, palette, self.name, self.record.split), self.root_body(spec))
 
+    @abstractmethod
     def assemble(self, parts: Parts, root: mujoco.MjsBody) -> None:
-        """Add everything that stands on the root body; implemented by each category."""
-        raise NotImplementedError
+        """Add everything that stands on the root body."""
 
     # What tasks and placement ask ------------------------------------------------------------------------------
 
@@ -212,8 +204,10 @@ class Appliance(Fixture):
             data.tree_asleep[tree], tree = _AWAKE, int(data.tree_asleep[tree])
 
 
-def update_all(appliances: Iterable[Appliance], model: mujoco.MjModel, data: mujoco.MjData, gripper: int) -> None:
-    """Let appliances do what they do by themselves; `gripper` is the body whose subtree presses buttons.
+def update_all(
+    appliances: Iterable[Appliance], model: mujoco.MjModel, data: mujoco.MjData, gripper: NDArray[np.bool_]
+) -> None:
+    """Let appliances do what they do by themselves; `gripper` are the bodies that press buttons, (nbody,).
 
     Before and after: positions and contacts are evaluated.
     """

@@ -42,9 +42,8 @@ class Parts(Shapes):
         friction: float = 0.5,
         damping: float = 0.5,
         armature: float = 0.01,
-        joint: str = "",
     ) -> mujoco.MjsBody:
-        """A body on a hinge; the joint is `<appliance>_<part>_joint` unless named otherwise. Radians, Nm."""
+        """A body on a hinge; the joint is `<appliance>_<part>_joint`. Radians, Nm."""
         return self._moving(parent, part, _HINGE, pos, axis, limits, mass, size, center, friction, damping, armature)
 
     def slide(
