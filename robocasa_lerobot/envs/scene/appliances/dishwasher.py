@@ -8,57 +8,47 @@ from typing import ClassVar
 import mujoco
 import numpy as np
 
-from robocasa_lerobot.envs.scene.appliances.base import Appliance
 from robocasa_lerobot.envs.scene.appliances.parts import Parts
+from robocasa_lerobot.envs.scene.appliances.racked import Racked, fold_door
 from robocasa_lerobot.envs.scene.fixtures.base import Region
 
 DOOR_M, _KICK_M, _WALL_M = 0.050, 0.10, 0.022
-_RACKS = {"rack0": 0.10, "rack1": 0.56}  # level of each as a share of the inside
 _RIM_M = {"rack0": 0.12, "rack1": 0.07}
 
 
 @dataclass
-class Dishwasher(Appliance):
+class Dishwasher(Racked):
     """Racks `rack0` (lower) and `rack1` (upper)."""
 
     looks: ClassVar = {"closed": {}, "open": {"door": 1.0, "rack0": 0.8, "rack1": 0.4}}
 
     @property
-    def doors(self) -> tuple[str, ...]:
-        """The door."""
-        return ("door",)
-
-    @property
-    def racks(self) -> tuple[str, ...]:
-        """Racks from below."""
-        return tuple(_RACKS)
-
-    @property
     def regions(self) -> dict[str, Region]:
         """Above each rack, the upper one first, moving with it; then the whole inside."""
-        low, high = self._inside()
+        low, high = self.cavity()
         size = self._rack_size()
-        levels = {rack: float(low[2] + share * (high[2] - low[2])) for rack, share in _RACKS.items()}
+        levels = dict(zip(self.racks, self.rack_heights(), strict=True))
         tops = {"rack0": levels["rack1"] - 0.02, "rack1": float(high[2]) - 0.01}
         found = {}
-        for rack in reversed(_RACKS):
+        for rack in reversed(self.racks):
             room = (tops[rack] - levels[rack]) / 2
             found[rack] = Region(f"{self.name}_{rack}", (0, 0, room), (size[0] / 2 - 0.012, size[1] / 2 - 0.012, room))
         found["interior"] = Region.between(self.name, low, high)
         return found
 
-    def state(self, data: mujoco.MjData) -> dict[str, float | bool]:
-        """Shares of the ranges of door and racks."""
-        return {part: self.share(data, part) for part in (*self.doors, *self.racks)}
-
-    def _inside(self) -> tuple[np.ndarray, np.ndarray]:
+    def cavity(self) -> tuple[np.ndarray, np.ndarray]:
+        """Opposite corners of its inside in its frame, metres, each (3,)."""
         width, depth, height = self.size
         low = np.array([-width / 2 + _WALL_M, -depth / 2 + DOOR_M, -height / 2 + _KICK_M + 0.03])
         high = np.array([width / 2 - _WALL_M, depth / 2 - 0.04, height / 2 - 0.03])
         return low, high
 
+    def rack_levels(self) -> tuple[float, ...]:
+        """Height of each rack from below, as a share of the cavity's."""
+        return (0.10, 0.56)
+
     def _rack_size(self) -> np.ndarray:
-        low, high = self._inside()
+        low, high = self.cavity()
         return np.array([high[0] - low[0] - 0.02, high[1] - low[1] - 0.02, 0.005])
 
     def assemble(self, parts: Parts, root: mujoco.MjsBody) -> None:
@@ -68,25 +58,21 @@ class Dishwasher(Appliance):
         finish = self.record["finish"]
         kick = ((-width / 2, front + 0.07, -height / 2), (width / 2, depth / 2, -height / 2 + _KICK_M))
         parts.span(root, *kick, "black")
-        low, high = self._inside()
         case = ((-width / 2, front + DOOR_M, -height / 2 + _KICK_M), (width / 2, depth / 2, height / 2))
         walls = {"left": _WALL_M, "right": _WALL_M, "bottom": 0.03, "top": 0.03, "back": 0.04, "front": 0.0}
         parts.shell(root, *case, walls, "graphite", "steel_plain")
-        for rack, share in _RACKS.items():
-            self._add_rack(parts, root, rack, float(low[2] + share * (high[2] - low[2])))
+        for rack in self.racks:
+            self._add_rack(parts, root, rack)
         door_h = height - _KICK_M - 0.006
-        door = parts.hinge(
+        door = fold_door(
+            parts,
             root,
-            "door",
             (0, front + DOOR_M, -height / 2 + _KICK_M),
-            (1, 0, 0),
-            (0.0, np.pi / 2),
+            (width, DOOR_M, door_h),
             mass=1.6,
-            size=(width, DOOR_M, door_h),
-            center=(0, 0.010, door_h * 0.4),  # weighed so that it stays shut
+            weight_at=(0.010, 0.4),
             friction=6.0,
             damping=2.0,
-            armature=0.05,
         )
         strip = 0.085 if self.record["family"] == "front_control" else 0.0
         parts.box(
@@ -112,22 +98,9 @@ class Dishwasher(Appliance):
             style=self.record["handle"],
         )  # fmt: skip
 
-    def _add_rack(self, parts: Parts, root: mujoco.MjsBody, rack: str, level: float) -> None:
-        low, high = self._inside()
-        size = self._rack_size()
-        body = parts.slide(
-            root,
-            rack,
-            (0, (low[1] + high[1]) / 2, level),
-            (0, -1, 0),
-            (0.0, 0.80 * float(size[1])),
-            mass=1.2,
-            size=(size[0], size[1], 0.08),
-            friction=1.5,
-            damping=8.0,
-        )
-        rim = _RIM_M[rack]
-        parts.wire_rack(body, size, "wire", bars=7, rim=rim, name=rack)
+    def _add_rack(self, parts: Parts, root: mujoco.MjsBody, rack: str) -> None:
+        size, rim = self._rack_size(), _RIM_M[rack]
+        body = self.add_rack(parts, root, rack, size, mass=1.2, reach=0.80, bars=7, height=0.08, rim=rim)
         # The front rail carries a grip that a finger gets behind.
         parts.box(body, (0, -size[1] / 2 - 0.004, rim), (0.16, 0.012, 0.030), "graphite")
         rows = int(self.record["tines"])

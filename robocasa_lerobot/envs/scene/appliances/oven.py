@@ -8,9 +8,9 @@ from typing import ClassVar
 import mujoco
 import numpy as np
 
-from robocasa_lerobot.envs.scene.appliances.base import Appliance, Touches
+from robocasa_lerobot.envs.scene.appliances.base import Touches
 from robocasa_lerobot.envs.scene.appliances.parts import Parts
-from robocasa_lerobot.envs.scene.fixtures.base import Region
+from robocasa_lerobot.envs.scene.appliances.racked import Racked, fold_door
 
 DOOR_M, PANEL_M = 0.045, 0.105
 _WALL_M = 0.035
@@ -18,37 +18,14 @@ LIT_FROM = 0.05  # share of the temperature knob
 
 
 @dataclass
-class Oven(Appliance):
+class Oven(Racked):
     """Knobs `knob_time` and `knob_temp`; racks `rack0`, and above it `rack1`."""
 
     looks: ClassVar = {"closed": {}, "open": {"door": 1.0, "rack0": 0.7}, "on": {"knob_temp": 0.6, "power": 1.0}}
 
-    @property
-    def doors(self) -> tuple[str, ...]:
-        """The door."""
-        return ("door",)
-
-    @property
-    def racks(self) -> tuple[str, ...]:
-        """Racks from below."""
-        return tuple(f"rack{i}" for i in range(self.record["racks"]))
-
-    @property
-    def regions(self) -> dict[str, Region]:
-        """Above each rack, moving with it, then the whole cavity."""
-        low, high = self._cavity()
-        half = (high - low) / 2
-        levels = [*self._levels(), high[2]]
-        found = {}
-        for index, rack in enumerate(self.racks):
-            room = (levels[index + 1] - levels[index] - 0.01) / 2
-            found[rack] = Region(f"{self.name}_{rack}", (0, 0, room), (half[0] - 0.02, half[1] - 0.02, room))
-        found["interior"] = Region.between(self.name, low, high)
-        return found
-
     def state(self, data: mujoco.MjData) -> dict[str, float | bool]:
         """Shares of the door, racks and knobs (`time`, `temperature`), and whether it is lit (`on`)."""
-        state: dict[str, float | bool] = {part: self.share(data, part) for part in (*self.doors, *self.racks)}
+        state = super().state(data)
         state["time"], state["temperature"] = self.share(data, "knob_time"), self.share(data, "knob_temp")
         state["on"] = self.lit(data, "power")
         return state
@@ -57,23 +34,23 @@ class Oven(Appliance):
         """Light and display follow the temperature knob."""
         self.show(data, "power", float(self.share(data, "knob_temp") >= LIT_FROM))
 
-    def _cavity(self) -> tuple[np.ndarray, np.ndarray]:
+    def cavity(self) -> tuple[np.ndarray, np.ndarray]:
+        """Opposite corners of its inside in its frame, metres, each (3,)."""
         width, depth, height = self.size
         low = np.array([-width / 2 + _WALL_M, -depth / 2 + DOOR_M, -height / 2 + _WALL_M + 0.01])
         high = np.array([width / 2 - _WALL_M, depth / 2 - 0.05, height / 2 - PANEL_M - 0.012])
         return low, high
 
-    def _levels(self) -> list[float]:
-        low, high = self._cavity()
-        room = high[2] - low[2]
-        return [float(low[2] + room * share) for share in ((0.25,) if len(self.racks) == 1 else (0.14, 0.54))]
+    def rack_levels(self) -> tuple[float, ...]:
+        """Height of each rack from below, as a share of the cavity's."""
+        return (0.25,) if self.record["racks"] == 1 else (0.14, 0.54)
 
     def assemble(self, parts: Parts, root: mujoco.MjsBody) -> None:
         """Add case, panel with knobs, racks, light and door."""
         width, depth, height = self.size
         finish = self.record["finish"]
         front = -depth / 2
-        low, high = self._cavity()
+        low, high = self.cavity()
         walls = {
             "left": _WALL_M,
             "right": _WALL_M,
@@ -102,26 +79,11 @@ class Oven(Appliance):
             parts.box(lamp, (x, front + 0.002, z), (0.014, 0.003, 0.026), "light_orange", collide=False)
         size = (high[0] - low[0] - 0.02, 0.004, high[2] - low[2] - 0.02)
         parts.box(lamp, (0, high[1] - 0.004, (low[2] + high[2]) / 2), size, "light_warm", collide=False)
-        self._add_racks(parts, root)
+        rack = (high[0] - low[0] - 0.012, high[1] - low[1] - 0.03, 0.005)
+        for name in self.racks:
+            body = self.add_rack(parts, root, name, rack, mass=1.0, reach=0.70, bars=9, back=0.005)
+            parts.box(body, (0, -rack[1] / 2 + 0.004, 0.012), (rack[0], 0.008, 0.024), "wire")
         add_oven_door(parts, root, self.size, (-height / 2 + 0.012, height / 2 - PANEL_M - 0.004), self.record)
-
-    def _add_racks(self, parts: Parts, root: mujoco.MjsBody) -> None:
-        low, high = self._cavity()
-        size = (high[0] - low[0] - 0.012, high[1] - low[1] - 0.03, 0.005)
-        for rack, z in zip(self.racks, self._levels(), strict=True):
-            body = parts.slide(
-                root,
-                rack,
-                (0, (low[1] + high[1]) / 2 - 0.005, z),
-                (0, -1, 0),
-                (0.0, 0.70 * size[1]),
-                mass=1.0,
-                size=(size[0], size[1], 0.02),
-                friction=1.5,
-                damping=8.0,
-            )
-            parts.wire_rack(body, size, "wire", bars=9, name=rack)
-            parts.box(body, (0, -size[1] / 2 + 0.004, 0.012), (size[0], 0.008, 0.024), "wire")
 
 
 def add_oven_door(
@@ -133,18 +95,15 @@ def add_oven_door(
     door_w, door_h = width - 0.008, high - low
     finish, style = record["finish"], record["handle"]  # type: ignore[index]
     # Sprung in life: here friction carries its weight, so that it stays where it is left.
-    door = parts.hinge(
+    door = fold_door(
+        parts,
         root,
-        "door",
         (0, -depth / 2 + DOOR_M, low),
-        (1, 0, 0),
-        (0.0, np.pi / 2),
+        (door_w, DOOR_M, door_h),
         mass=2.0,
-        size=(door_w, DOOR_M, door_h),
-        center=(0, 0.010, door_h * 0.35),  # weighed so that it stays shut
+        weight_at=(0.010, 0.35),
         friction=4.5,
         damping=1.5,
-        armature=0.05,
     )
     side, foot = door_w * 0.11, door_h * 0.14
     parts.pane(

@@ -8,9 +8,9 @@ from typing import ClassVar
 import mujoco
 import numpy as np
 
-from robocasa_lerobot.envs.scene.appliances.base import Appliance, Touches
+from robocasa_lerobot.envs.scene.appliances.base import Touches
 from robocasa_lerobot.envs.scene.appliances.parts import Parts
-from robocasa_lerobot.envs.scene.fixtures.base import Region
+from robocasa_lerobot.envs.scene.appliances.racked import Racked, fold_door
 
 # Robocasa facts, section 7; the timer runs down over its whole range in 3000 control steps.
 SNAP_BELOW, TIMER_STEPS = 0.01, 3000
@@ -25,9 +25,11 @@ KNOBS = ("knob_function", "knob_temp", "knob_doneness", "knob_time")
 
 
 @dataclass
-class ToasterOven(Appliance):
+class ToasterOven(Racked):
     """Knobs `knob_function`, `knob_temp`, `knob_doneness`, `knob_time`; racks `rack0`, and above it `rack1`."""
 
+    rack_gap_m: ClassVar = 0.008
+    rack_edge_m: ClassVar = (0.012, 0.01)
     memory_slots: ClassVar = 1  # control steps since the last tick
     looks: ClassVar = {
         "closed": {},
@@ -35,32 +37,9 @@ class ToasterOven(Appliance):
         "on": {"knob_time": 0.6, "knob_temp": 0.5, "power": 1.0},
     }
 
-    @property
-    def doors(self) -> tuple[str, ...]:
-        """The door."""
-        return ("door",)
-
-    @property
-    def racks(self) -> tuple[str, ...]:
-        """Racks from below."""
-        return tuple(f"rack{i}" for i in range(self.record["racks"]))
-
-    @property
-    def regions(self) -> dict[str, Region]:
-        """Above each rack, moving with it, then the whole cavity."""
-        low, high = self._cavity()
-        half = (high - low) / 2
-        levels = [*self._levels(), high[2]]
-        found = {}
-        for index, rack in enumerate(self.racks):
-            room = (levels[index + 1] - levels[index] - 0.008) / 2
-            found[rack] = Region(f"{self.name}_{rack}", (0, 0, room), (half[0] - 0.012, half[1] - 0.01, room))
-        found["interior"] = Region.between(self.name, low, high)
-        return found
-
     def state(self, data: mujoco.MjData) -> dict[str, float | bool]:
         """Shares of the door, racks and knobs (`temperature`, `time`, ...), and whether it heats (`on`)."""
-        state: dict[str, float | bool] = {part: self.share(data, part) for part in (*self.doors, *self.racks)}
+        state = super().state(data)
         for knob, name in zip(KNOBS, ("function", "temperature", "doneness", "time"), strict=True):
             state[name] = self.share(data, knob)
         state["on"] = self.lit(data, "power")
@@ -83,22 +62,22 @@ class ToasterOven(Appliance):
                 self.wake(model, data, "knob_time")
         self.show(data, "power", float(running))
 
-    def _cavity(self) -> tuple[np.ndarray, np.ndarray]:
+    def cavity(self) -> tuple[np.ndarray, np.ndarray]:
+        """Opposite corners of its inside in its frame, metres, each (3,)."""
         width, depth, height = self.size
         low = np.array([-width / 2 + 0.016, -depth / 2 + DOOR_M, -height / 2 + _FOOT_M + _SILL_M])
         high = np.array([width / 2 - PANEL_M, depth / 2 - 0.022, height / 2 - 0.026])
         return low, high
 
-    def _levels(self) -> list[float]:
-        low, high = self._cavity()
-        room = high[2] - low[2]
-        return [float(low[2] + room * share) for share in ((0.24,) if len(self.racks) == 1 else (0.20, 0.56))]
+    def rack_levels(self) -> tuple[float, ...]:
+        """Height of each rack from below, as a share of the cavity's."""
+        return (0.24,) if self.record["racks"] == 1 else (0.20, 0.56)
 
     def assemble(self, parts: Parts, root: mujoco.MjsBody) -> None:
         """Add case, panel with knobs, racks, heating wires and door."""
         width, depth, height = self.size
         finish = self.record["finish"]
-        low, high = self._cavity()
+        low, high = self.cavity()
         case_low = (-width / 2, -depth / 2 + DOOR_M, -height / 2 + _FOOT_M)
         walls = {"left": 0.016, "right": PANEL_M, "bottom": _SILL_M, "top": 0.026, "back": 0.022, "front": 0.0}
         parts.shell(root, case_low, (width / 2, depth / 2, height / 2), walls, finish, "cavity")
@@ -136,43 +115,31 @@ class ToasterOven(Appliance):
             parts.knob(root, knob, (x, front, z), 0.0185, body, pointer, limits=(0.0, 1.5 * np.pi), length=0.024)
 
     def _add_racks(self, parts: Parts, root: mujoco.MjsBody) -> None:
-        low, high = self._cavity()
+        low, high = self.cavity()
         size = (high[0] - low[0] - 0.008, high[1] - low[1] - 0.012, 0.005)
-        for rack, z in zip(self.racks, self._levels(), strict=True):
-            body = parts.slide(
-                root,
-                rack,
-                ((low[0] + high[0]) / 2, (low[1] + high[1]) / 2, z),
-                (0, -1, 0),
-                (0.0, 0.62 * size[1]),
-                mass=0.4,
-                size=(size[0], size[1], 0.02),
-                friction=0.8,
-                damping=5.0,
-            )
-            parts.wire_rack(body, size, "wire", bars=8, name=rack)
+        for rack in self.racks:
+            body = self.add_rack(parts, root, rack, size, mass=0.4, reach=0.62, bars=8, friction=0.8, damping=5.0)
             # A lip at the front to pull and push it by.
             parts.box(body, (0, -size[1] / 2 + 0.003, 0.009), (size[0], 0.006, 0.018), "wire")
 
     def _add_door(self, parts: Parts, root: mujoco.MjsBody) -> None:
         width, depth, height = self.size
         finish = self.record["finish"]
-        low, _ = self._cavity()
+        low, _ = self.cavity()
         bottom = float(low[2]) - 0.012
         door_w, door_h = width - PANEL_M - 0.003, height / 2 - 0.006 - bottom
         middle = -PANEL_M / 2
         # Counterweighted like the real ones: its friction carries the weight at every angle.
-        door = parts.hinge(
+        door = fold_door(
+            parts,
             root,
-            "door",
             (middle, -depth / 2 + DOOR_M, bottom),
-            (1, 0, 0),
-            (0.0, DOOR_MAX),
+            (door_w, DOOR_M, door_h),
             mass=0.5,
-            size=(door_w, DOOR_M, door_h),
-            center=(0, 0.006, door_h * 0.4),  # weighed so that it stays shut
+            weight_at=(0.006, 0.4),
             friction=0.9,
             damping=0.3,
+            limit=DOOR_MAX,
             armature=0.01,
         )
         frame = finish if self.record["family"] == "retro" else ("black" if finish == "black" else finish)
