@@ -25,7 +25,7 @@ from robocasa_lerobot.evaluation.results import (
     TermSummary,
     TrialRecord,
 )
-from robocasa_lerobot.evaluation.video import VideoWriter
+from robocasa_lerobot.video import VideoWriter
 
 TERMS = ("reached", "grasped", "placed", "gripper_away")
 GROUPS = published.group_of_task()

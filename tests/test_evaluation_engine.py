@@ -26,7 +26,7 @@ from robocasa_lerobot.evaluation.plan import make_plan
 from robocasa_lerobot.evaluation.reference_policies import RandomPolicy, ZeroPolicy
 from robocasa_lerobot.evaluation.results import TrialRecord
 from robocasa_lerobot.evaluation.rollout import RolloutError, run_trial
-from robocasa_lerobot.evaluation.video import frames_and_rate
+from robocasa_lerobot.video import frames_and_rate
 
 ROOT = Path(__file__).parents[1]
 FACTORY = "evaluation_env:SlideEnv"

@@ -11,8 +11,8 @@ from robocasa_lerobot.evaluation.config import EvaluationConfig
 from robocasa_lerobot.evaluation.film import FILM_SIZE
 from robocasa_lerobot.evaluation.overrides import load_config
 from robocasa_lerobot.evaluation.results import TrialRecord
-from robocasa_lerobot.evaluation.video import read_frames
 from robocasa_lerobot.gl import ensure_gl
+from robocasa_lerobot.video import read_frames
 
 
 def evaluate(out: Path, *changes: str) -> list[TrialRecord]:

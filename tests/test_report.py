@@ -36,7 +36,7 @@ from robocasa_lerobot.evaluation.report.sections.beside_published import differe
 from robocasa_lerobot.evaluation.report.training import TrainingPhase, find_trainings, read_demonstrator, read_training
 from robocasa_lerobot.evaluation.results import TermSummary
 from robocasa_lerobot.evaluation.statistics import success_rate
-from robocasa_lerobot.evaluation.video import VideoWriter, frames_and_rate
+from robocasa_lerobot.video import VideoWriter, frames_and_rate
 
 # Elements without an end tag.
 VOID = {"meta", "link", "img", "br", "hr", "input", "wbr"}

@@ -114,8 +114,14 @@ def record_episode(env: KitchenEnv, seed: int, *, action_noise: float = 0.0, ima
         assets={
             name: data for name, data in env.scene.spec.assets.items() if name.startswith(("textures/", "objects/"))
         },
-        ep_meta={**env.scene.ep_meta(), "action_noise": action_noise},
+        ep_meta={**env.scene.ep_meta(), **_kitchens(env), "action_noise": action_noise},
     )
+
+
+def _kitchens(env: KitchenEnv) -> dict[str, Any]:
+    """What the env was restricted to: with the seed, it decides the scene."""
+    asked = {"layouts": env.layouts, "styles": env.styles}
+    return {key: list(ids) for key, ids in asked.items() if ids is not None}
 
 
 def _with_noise(rng: np.random.Generator, action: Array, noise: float) -> Array:

@@ -23,10 +23,16 @@ ASSETS_GROUP = "assets"
 
 @dataclass(frozen=True)
 class Failure:
-    """An attempt that did not succeed."""
+    """An attempt that did not succeed: its seed, why, and the goal's terms that did not hold at the end."""
 
     seed: int
     reason: str
+    false_terms: tuple[str, ...] = ()
+
+    @classmethod
+    def of(cls, values: dict[str, Any]) -> Failure:
+        """Read what `asdict` gave, as JSON keeps it."""
+        return cls(int(values["seed"]), str(values["reason"]), tuple(values.get("false_terms", ())))
 
 
 def write_part(path: Path, recording: Recording) -> None:
@@ -74,7 +80,7 @@ def read_summary(path: Path) -> Summary:
             episodes=sum(name.startswith("demo_") for name in file["data"]),
             steps=int(attributes["total"]),
             tried=int(attributes.get("episodes_tried", 0)),
-            failures=[Failure(**f) for f in json.loads(attributes.get("failures", "[]"))],
+            failures=[Failure.of(f) for f in json.loads(attributes.get("failures", "[]"))],
         )
 
 

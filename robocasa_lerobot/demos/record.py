@@ -1,128 +1,175 @@
-"""Recording: attempts at demonstrations, spread over processes, until enough have succeeded.
-
-Attempt i of a task uses seed `seed + i`, and the file holds the first successes in this order, so that the result is
-the same for any number of workers and after any interruption. Every attempt leaves a small file in a folder beside
-the output, which is how a killed recording goes on where it was.
-"""
+"""Recording: attempts at demonstrations of tasks, spread over processes, until enough of each have succeeded."""
 
 from __future__ import annotations
 
-import json
-import math
+import contextlib
 import shutil
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import Any
 
-from tqdm import tqdm
-
-from robocasa_lerobot.demos.episode import record_episode
-from robocasa_lerobot.demos.hdf5 import Failure, merge_parts, read_summary, write_part
+from robocasa_lerobot.convert.running.work import locked
+from robocasa_lerobot.demos.attempts import Parts, RecordingSettings, Tally
+from robocasa_lerobot.demos.failures import remove_others
+from robocasa_lerobot.demos.hdf5 import Failure, merge_parts, read_summary
+from robocasa_lerobot.demos.progress import Board
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
-from robocasa_lerobot.envs.registry import get_task
 from robocasa_lerobot.errors import UserError
 from robocasa_lerobot.gl import ensure_gl
-from robocasa_lerobot.parallel import PoolExecutor, exit_if_orphaned, polled
+from robocasa_lerobot.parallel import PoolExecutor, polled
 
-# Give up when this many attempts per wanted episode were not enough.
-MAX_ATTEMPTS_PER_EPISODE = 10
+__all__ = ["FAILURES_FOLDER", "RecordingResult", "RecordingSettings", "record_task", "record_tasks"]
 
-
-@dataclass(frozen=True)
-class RecordingSettings:
-    """What a file of demonstrations is made from.
-
-    Attributes:
-        task: name.
-        episodes: successes wanted.
-        split: of the kitchens.
-        seed: of the first attempt.
-        action_noise: see `record_episode`.
-        images: whether camera pictures are stored.
-        image_size: of those pictures, pixels.
-    """
-
-    task: str
-    episodes: int
-    split: str = "target"
-    seed: int = 0
-    action_noise: float = 0.05
-    images: bool = False
-    image_size: int = 256
-
-    def env_kwargs(self) -> dict[str, Any]:
-        """Arguments of the env, for the file's `env_args`."""
-        return {"split": self.split, "image_size": self.image_size, "render_preset": "fast"}
-
-    def identity(self) -> dict[str, Any]:
-        """What attempts depend on: parts recorded under other values are not reused. `episodes` is not among it."""
-        return {key: getattr(self, key) for key in ("task", "split", "seed", "action_noise", "images", "image_size")}
+FAILURES_FOLDER = "failures"
+# Attempts of a process in one round: files appear after each, and starting processes takes two seconds.
+_ROUND = 24
 
 
 @dataclass(frozen=True)
 class RecordingResult:
-    """What came of it: the file, episodes, steps, attempts and failures."""
+    """What came of it.
+
+    Attributes:
+        path: of the file, which is not there if the task was given up.
+        episodes, steps: in it.
+        tried: attempts that it took.
+        failures: those of them that failed.
+        gave_up: why the task was given up, or "".
+    """
 
     path: Path
     episodes: int
     steps: int
     tried: int
     failures: list[Failure]
+    gave_up: str = ""
+
+    @property
+    def task(self) -> str:
+        """Name."""
+        return self.path.stem
 
 
 def record_task(
-    settings: RecordingSettings, out: Path, *, workers: int = 1, show_progress: bool = True
+    settings: RecordingSettings,
+    out: Path,
+    *,
+    workers: int = 1,
+    keep_failures: bool = False,
+    show_progress: bool = True,
 ) -> RecordingResult:
     """Record demonstrations of a task to `out/<task>.hdf5`.
 
     Raises:
-        UnknownNameError: no such task or split.
-        UserError: the file exists, episodes or workers below 1, or too many attempts failed.
+        UserError: what `record_tasks` raises, or too many attempts failed.
     """
-    get_task(settings.task)
-    KitchenEnv(settings.task, split=settings.split)  # checks the names before any process starts
-    if settings.episodes < 1 or workers < 1:
-        raise UserError(f"episodes ({settings.episodes}) and workers ({workers}) must be at least 1.")
-    path = out / f"{settings.task}.hdf5"
-    if path.exists():
-        return _recorded(path, settings)
-    if settings.images:
+    result = record_tasks([settings], out, workers=workers, keep_failures=keep_failures, show_progress=show_progress)[0]
+    if result.gave_up:
+        raise UserError(result.gave_up)
+    return result
+
+
+def record_tasks(
+    all_settings: Sequence[RecordingSettings],
+    out: Path,
+    *,
+    workers: int = 1,
+    keep_failures: bool = False,
+    show_progress: bool = True,
+) -> list[RecordingResult]:
+    """Record demonstrations of several tasks, each to `out/<task>.hdf5`; a task that cannot be solved ends no other.
+
+    A task whose file is there is left alone; one that was interrupted goes on.
+
+    Args:
+        all_settings: of the tasks, each once.
+        out: folder.
+        workers: processes.
+        keep_failures: write a film and a description of each failed attempt to `out/failures/<task>/`.
+        show_progress: on the terminal.
+
+    Raises:
+        UnknownNameError: no such task, split, layout or style.
+        UserError: a file exists that was recorded with other settings, the same recording is running already, or
+            episodes or workers below 1.
+    """
+    for settings in all_settings:
+        settings.make_env()  # checks the names before any process starts
+        if settings.episodes < 1 or workers < 1:
+            raise UserError(f"episodes ({settings.episodes}) and workers ({workers}) must be at least 1.")
+    if keep_failures or any(settings.images for settings in all_settings):
         ensure_gl()
-    parts = out / f".{settings.task}.parts"
-    _prepare(parts, settings)
-    seen = -1
-    with tqdm(total=settings.episodes, desc=settings.task, unit="episode", disable=not show_progress) as bar:
-        while True:
-            done = _outcomes(parts)
-            chosen, tried, failures = _first_successes(done, settings)
-            if len(chosen) == settings.episodes:
+    results: dict[str, RecordingResult] = {}
+    waiting: list[Parts] = []
+    for settings in all_settings:
+        if _file(out, settings).exists():
+            results[settings.task] = _recorded(_file(out, settings), settings)
+        else:
+            waiting.append(Parts(out, settings, out / FAILURES_FOLDER / settings.task if keep_failures else None))
+    with contextlib.ExitStack() as stack:
+        for parts in waiting:
+            lock = parts.folder.with_suffix(".lock")
+            stack.enter_context(locked(lock))
+            stack.callback(shutil.rmtree, lock, ignore_errors=True)  # before it is released
+            parts.prepare()
+        board = stack.enter_context(Board([parts.settings for parts in waiting], show=show_progress))
+        for result in _record(waiting, out, workers, board):
+            results[result.task] = result
+    return [results[settings.task] for settings in all_settings]
+
+
+def _record(waiting: list[Parts], out: Path, workers: int, board: Board) -> Iterator[RecordingResult]:
+    """Rounds of attempts at the tasks in their order; the result of each task when it is complete."""
+    left = list(waiting)
+    while left:
+        jobs: list[tuple[Parts, int]] = []
+        for parts in list(left):
+            tally = parts.tally()
+            board.update(parts.settings, tally)
+            result = _finished(parts, tally, out)
+            if result is not None:
+                left.remove(parts)
+                board.finish(parts.settings, tally)
+                yield result
+                continue
+            wanted = parts.wanted(tally)
+            if len(left) == 1:  # nothing else to do for a process that would wait
+                beyond = range(max(wanted) + 1, parts.settings.limit)
+                wanted += list(beyond)[: -len(wanted) % workers]
+            jobs += [(parts, number) for number in wanted]
+            if len(jobs) >= _ROUND * workers:
                 break
-            assert len(done) > seen, "a round of attempts left no outcome"
-            seen = len(done)
-            limit = settings.episodes * MAX_ATTEMPTS_PER_EPISODE
-            if tried >= limit:
-                last = failures[-1].reason if failures else ""
-                raise UserError(
-                    f"{settings.task}: {len(chosen)} of {settings.episodes} episodes succeeded in {tried} attempts "
-                    f"(last failure: {last}). Ask for fewer episodes, less --action-noise, or another --seed."
-                )
-            missing = settings.episodes - len(chosen)
-            wanted = [i for i in range(limit) if i not in done][: max(missing, math.ceil(missing / workers) * workers)]
-            _run_round(settings, parts, wanted, workers, bar)
-        bar.n = settings.episodes
-        bar.refresh()
+        if jobs:
+            _run_round(jobs[: _ROUND * workers], workers, board)
+
+
+def _finished(parts: Parts, tally: Tally, out: Path) -> RecordingResult | None:
+    """The result of a task that is complete, whose file is written, or given up; else None."""
+    settings, path = parts.settings, _file(out, parts.settings)
+    gave_up = parts.gave_up(tally)
+    if gave_up:
+        return RecordingResult(path, 0, 0, tally.tried, tally.failures, gave_up)
+    if len(tally.chosen) < settings.episodes:
+        return None
     steps = merge_parts(
         path,
-        [parts / f"{i:06d}.hdf5" for i in chosen],
+        [parts.episode(number) for number in tally.chosen],
         env_name=settings.task,
         env_kwargs=settings.env_kwargs(),
         settings={**settings.identity(), "episodes": settings.episodes},
-        tried=tried,
-        failures=failures,
+        tried=tally.tried,
+        failures=tally.failures,
     )
-    shutil.rmtree(parts)
-    return RecordingResult(path, len(chosen), steps, tried, failures)
+    if parts.films is not None:
+        remove_others(parts.films, tally.failures)
+    shutil.rmtree(parts.folder)
+    return RecordingResult(path, len(tally.chosen), steps, tally.tried, tally.failures)
+
+
+def _file(out: Path, settings: RecordingSettings) -> Path:
+    return out / f"{settings.task}.hdf5"
 
 
 def _recorded(path: Path, settings: RecordingSettings) -> RecordingResult:
@@ -132,95 +179,50 @@ def _recorded(path: Path, settings: RecordingSettings) -> RecordingResult:
         UserError: it was recorded with others.
     """
     summary = read_summary(path)
+    found = summary.settings or {}
     wanted = {**settings.identity(), "episodes": settings.episodes}
-    if summary.settings != wanted:
-        found = summary.settings or {}
-        differing = ", ".join(f"{k}: {found.get(k)!r}, now {v!r}" for k, v in wanted.items() if found.get(k) != v)
+    differing = ", ".join(f"{k}: {found.get(k)!r}, now {v!r}" for k, v in wanted.items() if found.get(k) != v)
+    if differing:
         raise UserError(
             f"{path} exists and was recorded with other settings ({differing}). Remove it, or choose another --out."
         )
     return RecordingResult(path, summary.episodes, summary.steps, summary.tried, summary.failures)
 
 
-def _prepare(parts: Path, settings: RecordingSettings) -> None:
-    """Make the folder of parts, dropping one that was recorded with other settings."""
-    note = parts / "settings.json"
-    if parts.exists() and (not note.exists() or json.loads(note.read_text()) != settings.identity()):
-        shutil.rmtree(parts)
-    parts.mkdir(parents=True, exist_ok=True)
-    note.write_text(json.dumps(settings.identity()))
-
-
-def _outcomes(parts: Path) -> dict[int, str | None]:
-    """Attempt -> None if it succeeded, else why not."""
-    done: dict[int, str | None] = {int(f.stem): None for f in parts.glob("[0-9]*.hdf5")}
-    done |= {int(f.stem): json.loads(f.read_text())["reason"] for f in parts.glob("[0-9]*.json")}
-    return done
-
-
-def _first_successes(done: dict[int, str | None], settings: RecordingSettings) -> tuple[list[int], int, list[Failure]]:
-    """The first successes among attempts 0, 1, 2, ... without a gap; how many attempts that took; those that failed."""
-    chosen: list[int] = []
-    failures: list[Failure] = []
-    attempt = 0
-    while attempt in done and len(chosen) < settings.episodes:
-        reason = done[attempt]
-        if reason is None:
-            chosen.append(attempt)
-        else:
-            failures.append(Failure(settings.seed + attempt, reason))
-        attempt += 1
-    return chosen, attempt, failures
-
-
-def _run_round(settings: RecordingSettings, parts: Path, attempts: list[int], workers: int, bar: tqdm[Any]) -> None:
+def _run_round(jobs: list[tuple[Parts, int]], workers: int, board: Board) -> None:
     if workers == 1:
-        _attempt_all(settings, parts, attempts, on_done=lambda: _show(bar, parts))
+        for job in jobs:
+            _attempt([job], 0)
+            board.update(job[0].settings, job[0].tally())
         return
-    tasks = min(workers, len(attempts))
+    tasks = list(dict.fromkeys(parts for parts, _ in jobs))
+
+    def show() -> None:
+        for parts in tasks:
+            board.update(parts.settings, parts.tally())
+
     executor = PoolExecutor(
-        pipeline=[partial(_rank_attempts, settings=settings, parts=parts, attempts=attempts)],
-        tasks=tasks,
-        workers=tasks,
-        # Outcomes in `parts` are the markers; datatrove's own would outlive a removed part.
+        pipeline=[partial(_rank_attempt, jobs=jobs)],
+        tasks=len(jobs),
+        workers=min(workers, len(jobs)),
+        # Outcomes are the markers; datatrove's own would outlive a removed part.
         skip_completed=False,
-        logging_dir=str(parts / "logs"),
+        logging_dir=str(tasks[0].folder / "logs"),
         preload=[KitchenEnv.__module__],
     )
-    with polled(lambda: _show(bar, parts)):
+    with polled(show):
         executor.run()
 
 
-def _rank_attempts(
-    data: Any, rank: int = 0, world_size: int = 1, *, settings: RecordingSettings, parts: Path, attempts: list[int]
-) -> None:
-    """One process's share of a round, in datatrove's calling convention."""
-    _attempt_all(settings, parts, attempts[rank::world_size])
+def _rank_attempt(data: Any, rank: int = 0, world_size: int = 1, *, jobs: list[tuple[Parts, int]]) -> None:
+    """One attempt, in datatrove's calling convention."""
+    _attempt(jobs, rank)
 
 
-def _attempt_all(settings: RecordingSettings, parts: Path, attempts: list[int], on_done: Any = None) -> None:
-    env = KitchenEnv(settings.task, split=settings.split, image_size=settings.image_size, terminate_on_success=False)
+def _attempt(jobs: list[tuple[Parts, int]], index: int) -> None:
+    parts, number = jobs[index]
+    env = parts.settings.make_env()
     try:
-        for attempt in attempts:
-            exit_if_orphaned()
-            recording = record_episode(
-                env, settings.seed + attempt, action_noise=settings.action_noise, images=settings.images
-            )
-            if recording.success:
-                write_part(parts / f"{attempt:06d}.hdf5", recording)
-            else:
-                note = parts / f"{attempt:06d}.json"
-                aside = note.with_suffix(".partial")
-                aside.write_text(json.dumps({"seed": recording.seed, "reason": recording.reason}))
-                aside.replace(note)
-            if on_done is not None:
-                on_done()
+        parts.attempt(number, env)
     finally:
         env.close()
-
-
-def _show(bar: tqdm[Any], parts: Path) -> None:
-    done = _outcomes(parts)
-    failed = sum(reason is not None for reason in done.values())
-    bar.n = min(len(done) - failed, int(bar.total or 0))
-    bar.set_postfix(failed=failed)

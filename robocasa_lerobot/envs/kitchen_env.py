@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 import time
+from collections.abc import Sequence
 from typing import Any
 
 import gymnasium
@@ -22,7 +23,7 @@ from robocasa_lerobot.envs.pictures import Pictures, picture_spaces, segmentatio
 from robocasa_lerobot.envs.proprioception import read_state
 from robocasa_lerobot.envs.registry import get_task
 from robocasa_lerobot.envs.scene.builder import RENDER_PRESETS, build_scene
-from robocasa_lerobot.envs.scene.kitchens import scene_ids
+from robocasa_lerobot.envs.scene.kitchens import scene_ids, without
 from robocasa_lerobot.envs.scene.scene import Scene
 from robocasa_lerobot.envs.state import KitchenState, restore
 from robocasa_lerobot.errors import UnknownNameError, UserError
@@ -66,9 +67,11 @@ class KitchenEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         initial_noise: on the robot's start, in place of RoboCasa's 0.02 rad on the arm's joints.
         depth: observe depth.
         segmentation: observe which geom each pixel shows.
+        layouts: ids of layouts, or of groups of them (negative, see `scene.kitchens`), instead of the split's own.
+        styles: the same for styles. States and seeds go with them: the same seed elsewhere is another scene.
 
     Raises:
-        UnknownNameError: no such task, split, preset, render mode, camera or camera set.
+        UnknownNameError: no such task, split, preset, render mode, camera, camera set, layout or style.
         UserError: an image size or horizon below 1, a camera twice, or a noise that is none.
         RenderDeviceError: no such render device.
     """
@@ -92,9 +95,15 @@ class KitchenEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         novel_language: bool = False,
         depth: bool = False,
         segmentation: bool = False,
+        layouts: Sequence[int] | None = None,
+        styles: Sequence[int] | None = None,
     ) -> None:
         self.declaration = get_task(task)
-        scene_ids(split)  # fails here, not at the first reset, for a split without kitchens
+        # Fails here, not at the first reset, for a split without kitchens.
+        chosen = scene_ids(split, layouts=layouts, styles=styles)
+        without(chosen, self.declaration.needs, self.declaration.exclude_styles)
+        self.layouts, self.styles = layouts, styles
+        self._kitchens = None if layouts is None and styles is None else chosen
         if render_preset not in RENDER_PRESETS:
             raise UnknownNameError("render preset", render_preset, RENDER_PRESETS)
         if render_mode not in (None, "rgb_array"):
@@ -249,7 +258,13 @@ class KitchenEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         self._close_renderer()
         self._initial = None
         self._scene = build_scene(
-            self.declaration, self.split, seed, self.render_preset, self.camera_set, self.camera_noise
+            self.declaration,
+            self.split,
+            seed,
+            self.render_preset,
+            self.camera_set,
+            self.camera_noise,
+            self._kitchens,
         )
         if self.novel_language:
             wordings = self._scene.paraphrases

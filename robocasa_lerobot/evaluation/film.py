@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robocasa_lerobot import contract
-from robocasa_lerobot.evaluation.video import VideoWriter, side_by_side
+from robocasa_lerobot.video import VideoWriter, side_by_side
 
 # Half the control rate and 192 pixels: on a CPU, rendering every step at full size would take longer than the trial.
 FILM_EVERY = 2

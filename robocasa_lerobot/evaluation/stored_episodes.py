@@ -63,4 +63,9 @@ def _episode(where: str, task: str, meta: dict[str, Any], actions: NDArray[Any])
             f"{where}: its ep_meta has no scene seed and split, so that its kitchen cannot be made again; "
             "`robocasa-lerobot demos` records files that can be replayed."
         )
+    if "layouts" in meta or "styles" in meta:
+        raise UserError(
+            f"{where}: recorded with --layouts or --styles, so that its seed is another kitchen here. "
+            "`robocasa-lerobot replay` makes its own kitchen again."
+        )
     return StoredEpisode(task, str(meta["split"]), meta["seed"], np.asarray(actions, dtype=np.float32))

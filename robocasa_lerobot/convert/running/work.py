@@ -56,9 +56,7 @@ def locked(partial: Path) -> Iterator[None]:
             # A record lock is not inherited, so no orphaned child holds it after the parent was killed.
             fcntl.lockf(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except OSError:
-            raise UserError(
-                f"the same conversion is running already (it holds {partial}). Wait until it ends."
-            ) from None
+            raise UserError(f"the same work is running already (it holds {partial}). Wait until it ends.") from None
         yield
 
 

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from robocasa_lerobot.evaluation.report.gather import PolicyResult, ReportData
 from robocasa_lerobot.evaluation.report.model import Film, Frame
 from robocasa_lerobot.evaluation.results import TrialRecord
-from robocasa_lerobot.evaluation.video import frames_and_rate, read_frames
+from robocasa_lerobot.video import frames_and_rate, read_frames
 
 FRAMES = 6
 JPEG_QUALITY = 80

@@ -1,4 +1,4 @@
-"""Films of trials: streamed to the encoder while the trial runs, read back as a few frames for the report."""
+"""Films of trials and attempts: streamed to the encoder while they run, read back as a few frames for a report."""
 
 from __future__ import annotations
 

@@ -1,0 +1,197 @@
+"""Attempts at demonstrations: each leaves one small file, which is how a killed recording goes on where it was.
+
+Attempt i of a task uses seed `seed + i`; a file of demonstrations holds the first successes in this order. So it is
+the same for any number of workers and after any interruption.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import math
+import shutil
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from robocasa_lerobot.demos.episode import Recording, record_episode
+from robocasa_lerobot.demos.failures import film_of, keep_failure
+from robocasa_lerobot.demos.hdf5 import Failure, write_part
+from robocasa_lerobot.envs.kitchen_env import KitchenEnv
+from robocasa_lerobot.gl import NoOpenGLError
+from robocasa_lerobot.parallel import exit_if_orphaned
+
+# Give up when this many attempts per wanted episode were not enough, or when none of the first ones has succeeded.
+MAX_ATTEMPTS_PER_EPISODE, HOPELESS = 10, 20
+_ENOUGH_FOR_A_RATE = 10
+
+
+@dataclass(frozen=True)
+class RecordingSettings:
+    """What a file of demonstrations is made from.
+
+    Attributes:
+        task: name.
+        episodes: successes wanted.
+        split: of the kitchens.
+        seed: of the first attempt.
+        action_noise: see `record_episode`.
+        images: whether camera pictures are stored.
+        image_size: of those pictures, pixels.
+        layouts: ids of layouts or of groups of them; None takes the split's own.
+        styles: the same for styles.
+    """
+
+    task: str
+    episodes: int
+    split: str = "target"
+    seed: int = 0
+    action_noise: float = 0.05
+    images: bool = False
+    image_size: int = 256
+    layouts: tuple[int, ...] | None = None
+    styles: tuple[int, ...] | None = None
+
+    def env_kwargs(self) -> dict[str, Any]:
+        """Arguments of the env, for the file's `env_args`."""
+        chosen = {key: getattr(self, key) for key in ("layouts", "styles") if getattr(self, key) is not None}
+        return {"split": self.split, "image_size": self.image_size, "render_preset": "fast", **chosen}
+
+    def identity(self) -> dict[str, Any]:
+        """What attempts depend on: parts recorded under other values are not reused. `episodes` is not among it."""
+        values = {
+            field.name: getattr(self, field.name) for field in dataclasses.fields(self) if field.name != "episodes"
+        }
+        return {key: list(value) if isinstance(value, tuple) else value for key, value in values.items()}
+
+    @property
+    def limit(self) -> int:
+        """The greatest number of attempts."""
+        return self.episodes * MAX_ATTEMPTS_PER_EPISODE
+
+    def make_env(self) -> KitchenEnv:
+        """The env that attempts are made in; it renders nothing unless pictures are stored."""
+        kwargs = self.env_kwargs() if self.images else {**self.env_kwargs(), "cameras": ()}
+        return KitchenEnv(self.task, terminate_on_success=False, **kwargs)
+
+
+@dataclass(frozen=True)
+class Tally:
+    """How far the attempts at a task are.
+
+    Attributes:
+        chosen: the first successes among attempts 0, 1, 2, ... without a gap, no more than are wanted.
+        tried: how many attempts that took.
+        failures: those of them that failed.
+        done: every attempt that has ended, and whether it succeeded.
+    """
+
+    chosen: list[int]
+    tried: int
+    failures: list[Failure]
+    done: dict[int, bool]
+
+    @property
+    def rate(self) -> float:
+        """Share of the attempts that have ended which succeeded; 0 where none has."""
+        return sum(self.done.values()) / max(len(self.done), 1)
+
+
+class Parts:
+    """The folder of what a task's attempts have left.
+
+    Args:
+        out: the folder that the file of demonstrations comes to.
+        settings: of the recording.
+        films: folder for what is kept of failures; None keeps nothing.
+    """
+
+    def __init__(self, out: Path, settings: RecordingSettings, films: Path | None = None) -> None:
+        self.folder = out / f".{settings.task}.parts"
+        self.settings = settings
+        self.films = films
+
+    def prepare(self) -> None:
+        """Make the folder, dropping one that was recorded with other settings."""
+        note = self.folder / "settings.json"
+        identity = self.settings.identity()
+        if self.folder.exists() and (not note.exists() or json.loads(note.read_text()) != identity):
+            shutil.rmtree(self.folder)
+        self.folder.mkdir(parents=True, exist_ok=True)
+        aside = note.with_suffix(".partial")
+        aside.write_text(json.dumps(identity))
+        aside.replace(note)
+
+    def episode(self, attempt: int) -> Path:
+        """File of an attempt that succeeded."""
+        return self.folder / f"{attempt:06d}.hdf5"
+
+    def tally(self) -> Tally:
+        """Read what there is. A failure that is to be kept counts only when it has been."""
+        found: dict[int, Failure | None] = {int(file.stem): None for file in self.folder.glob("[0-9]*.hdf5")}
+        for file in self.folder.glob("[0-9]*.json"):
+            failure = Failure.of(json.loads(file.read_text()))
+            if self.films is None or film_of(self.films, failure.seed).exists():
+                found[int(file.stem)] = failure
+        chosen: list[int] = []
+        failures: list[Failure] = []
+        attempt = 0
+        while attempt in found and len(chosen) < self.settings.episodes:
+            failed = found[attempt]
+            if failed is None:
+                chosen.append(attempt)
+            else:
+                failures.append(failed)
+            attempt += 1
+        return Tally(chosen, attempt, failures, {number: failed is None for number, failed in found.items()})
+
+    def wanted(self, tally: Tally) -> list[int]:
+        """The attempts to make next: those that were jumped over, and as many as may be needed beyond."""
+        done = tally.done
+        top = max(done, default=-1) + 1
+        gaps = [number for number in range(top) if number not in done]
+        missing = self.settings.episodes - sum(done.values()) - len(gaps)
+        if len(done) >= _ENOUGH_FOR_A_RATE:
+            missing = math.ceil(missing / max(tally.rate, 0.1))
+        if not any(done.values()):  # it may be hopeless
+            missing = min(missing, max(HOPELESS - top, 1))
+        return [*gaps, *range(top, min(top + max(missing, 0), self.settings.limit))]
+
+    def gave_up(self, tally: Tally) -> str:
+        """Why no more attempts are made, or "" if they are."""
+        settings = self.settings
+        hopeless = tally.tried >= HOPELESS and not any(tally.done.get(number) for number in range(HOPELESS))
+        if len(tally.chosen) == settings.episodes or not (hopeless or tally.tried >= settings.limit):
+            return ""
+        last = tally.failures[-1].reason if tally.failures else ""
+        return (
+            f"{settings.task}: {len(tally.chosen)} of {settings.episodes} episodes succeeded in {tally.tried} attempts "
+            f"(last failure: {last}). Ask for fewer episodes, less --action-noise, or another --seed."
+        )
+
+    def attempt(self, number: int, env: KitchenEnv) -> None:
+        """Make one attempt, and leave its file.
+
+        A skill that goes wrong in a way that nobody foresaw must not end a recording of thousands: it failed.
+        """
+        exit_if_orphaned()
+        settings = self.settings
+        seed = settings.seed + number
+        recording: Recording | None = None
+        try:
+            recording = record_episode(env, seed, action_noise=settings.action_noise, images=settings.images)
+        except (OSError, MemoryError, NoOpenGLError):
+            raise
+        except Exception as error:
+            failure = Failure(seed, f"{type(error).__name__}: {error}")
+        else:
+            if recording.success:
+                write_part(self.episode(number), recording)
+                return
+            failure = Failure(seed, recording.reason, recording.false_terms)
+        if self.films is not None:
+            keep_failure(self.films, env, failure, recording)
+        note = self.folder / f"{number:06d}.json"
+        aside = note.with_suffix(".partial")
+        aside.write_text(json.dumps(dataclasses.asdict(failure)))
+        aside.replace(note)

@@ -1,0 +1,61 @@
+"""Recordings on a Slurm cluster or on Ray, through datatrove, as conversions run there: a job for each task."""
+
+from __future__ import annotations
+
+import dataclasses
+import hashlib
+import json
+from collections.abc import Sequence
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from robocasa_lerobot.convert.running.executors import Execution, run_with_ray, submit_to_slurm
+from robocasa_lerobot.demos.record import RecordingSettings, record_tasks
+from robocasa_lerobot.demos.summary import print_summary
+
+_FOLDER, _LOGS = ".executor", "slurm"
+
+
+def record_one(
+    data: Any,
+    rank: int = 0,
+    world_size: int = 1,
+    *,
+    settings: Sequence[RecordingSettings],
+    out: Path,
+    workers: int,
+    keep_failures: bool,
+) -> None:
+    """Record one of the tasks, in datatrove's calling convention."""
+    record_tasks([settings[rank]], out, workers=workers, keep_failures=keep_failures)
+
+
+def finish(settings: Sequence[RecordingSettings], out: Path, keep_failures: bool) -> int:
+    """Print the table of what the jobs recorded; tasks that were given up say so at once."""
+    return print_summary(record_tasks(settings, out, keep_failures=keep_failures, show_progress=False))
+
+
+def record_distributed(
+    settings: Sequence[RecordingSettings], out: Path, execution: Execution, *, keep_failures: bool
+) -> tuple[str, int]:
+    """Record all tasks with Ray, or submit them to Slurm; a line for the user where it does not wait, and a status.
+
+    Raises:
+        UserError: the executor is not there, Slurm refuses, or what a recording itself raises.
+    """
+    assert execution.kind in ("slurm", "ray")
+    for one in settings:
+        one.make_env()  # mistakes come up here, not in the first job
+    asked = json.dumps([dataclasses.asdict(one) for one in settings])
+    folder = out / _FOLDER / hashlib.sha256(asked.encode()).hexdigest()[:12]  # markers hold for these settings only
+    folder.mkdir(parents=True, exist_ok=True)
+    cpus = execution.ray.cpus if execution.kind == "ray" else execution.slurm.cpus
+    step = partial(record_one, settings=settings, out=out, workers=cpus, keep_failures=keep_failures)
+    last = partial(finish, settings, out, keep_failures)
+    if execution.kind == "ray":
+        run_with_ray(step, len(settings), folder, execution.ray)
+        return "", last()
+    array, final = submit_to_slurm(step, last, len(settings), folder, out / _LOGS, execution.slurm)
+    first = f"tasks in job {array}, " if array else "all tasks are complete; "
+    return f"submitted to Slurm: {first}summed up by job {final}. What they print is in {out / _LOGS}.", 0

@@ -1,0 +1,216 @@
+"""Recording many tasks: which are chosen, where, what is kept of failures, and that a kill changes nothing."""
+
+from __future__ import annotations
+
+import json
+import os
+import random
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+import pytest
+
+from robocasa_lerobot.demos.attempts import HOPELESS, Parts, RecordingSettings, Tally
+from robocasa_lerobot.demos.choose import choose_tasks, expand_names
+from robocasa_lerobot.demos.command import EXAMPLE
+from robocasa_lerobot.demos.demonstrator import can_demonstrate
+from robocasa_lerobot.demos.hdf5 import Failure, read_summary
+from robocasa_lerobot.demos.motion import Array, action
+from robocasa_lerobot.demos.progress import Board
+from robocasa_lerobot.demos.record import FAILURES_FOLDER, record_task, record_tasks
+from robocasa_lerobot.demos.skills import SKILLS, SkillError
+from robocasa_lerobot.demos.summary import print_summary
+from robocasa_lerobot.envs.kitchen_env import KitchenEnv
+from robocasa_lerobot.envs.registry import get_task, task_names, task_set
+from robocasa_lerobot.errors import UnknownNameError, UserError
+from robocasa_lerobot.video import frames_and_rate
+
+QUICK = ("CloseDrawer", "OpenDrawer")
+
+
+def test_tasks_are_chosen_by_name_set_or_all() -> None:
+    assert "--tasks" in EXAMPLE
+    everything = choose_tasks("all")
+    assert sorted((*everything.names, *everything.left_out)) == list(task_names())
+    assert all(can_demonstrate(get_task(name)) for name in everything.names)
+    assert not any(can_demonstrate(get_task(name)) for name in everything.left_out)
+    assert set(expand_names("atomic_seen")) == set(task_set("atomic_seen"))
+    assert expand_names("OpenDrawer, CloseDrawer,OpenDrawer") == ("OpenDrawer", "CloseDrawer")
+    with pytest.raises(UnknownNameError, match="atomic_seen"):
+        expand_names("atomic_sen")
+    with pytest.raises(UserError, match="give names or sets"):
+        expand_names(" , ")
+    for name in everything.left_out[:1]:  # a set may name what cannot be shown, a user may not
+        with pytest.raises(UserError, match="no demonstrator yet"):
+            choose_tasks(f"OpenDrawer,{name}")
+
+
+def test_kitchens_can_be_restricted() -> None:
+    env = KitchenEnv("CloseDrawer", split="pretrain", cameras=(), layouts=(12, 14), styles=(20,))
+    for seed in range(3):  # of 2,500 kitchens
+        scene = env.reset(seed=seed)[1]["scene"]
+        assert scene["layout_id"] in (12, 14)
+        assert scene["style_id"] == 20
+    settings = RecordingSettings("CloseDrawer", 1, layouts=(-4,))
+    assert settings.env_kwargs()["layouts"] == (-4,)
+    assert settings.identity()["layouts"] == [-4]
+    with pytest.raises(UnknownNameError, match="layout"):
+        record_task(RecordingSettings("CloseDrawer", 1, layouts=(99,)), Path("nowhere"))
+    assert not Path("nowhere").exists()
+
+
+def _tally(outcomes: list[bool | None], wanted: int) -> tuple[Tally, RecordingSettings]:
+    done = {number: ok for number, ok in enumerate(outcomes) if ok is not None}
+    chosen, failures, tried = [], [], 0
+    while tried in done and len(chosen) < wanted:
+        if done[tried]:
+            chosen.append(tried)
+        else:
+            failures.append(Failure(tried, "no"))
+        tried += 1
+    return Tally(chosen, tried, failures, done), RecordingSettings("CloseDrawer", wanted)
+
+
+def test_attempts_that_are_made_next() -> None:
+    def wanted(outcomes: list[bool | None], episodes: int) -> list[int]:
+        tally, settings = _tally(outcomes, episodes)
+        return Parts(Path("out"), settings).wanted(tally)
+
+    assert wanted([], 3) == [0, 1, 2]
+    assert wanted([], 100) == list(range(HOPELESS))
+    assert wanted([True, None, False], 3) == [1, 3]  # the one that was jumped over, and one more
+    assert wanted([True, None, True], 2) == [1]  # decides which two are the first
+    assert wanted([True, False] * 6, 10) == list(range(12, 20))  # four are missing, and half of them fail
+    for episodes, outcomes, given_up in (
+        (1, [False] * 10, True),
+        (1, [False] * 9, False),
+        (50, [False] * HOPELESS, True),
+        (50, [False] * (HOPELESS - 1) + [True], False),
+    ):
+        tally, settings = _tally(outcomes, episodes)
+        assert bool(Parts(Path("out"), settings).gave_up(tally)) == given_up
+
+
+def test_time_left_follows_from_what_this_run_has_done(capsys: pytest.CaptureFixture[str]) -> None:
+    now = [0.0]
+    settings = RecordingSettings("CloseDrawer", 10)
+    with Board([settings], clock=lambda: now[0]) as board:
+        board.update(settings, _tally([True, False], 10)[0])  # done before
+        assert board.seconds_left(settings, _tally([True, False], 10)[0]) is None
+        now[0] = 40.0
+        later = _tally([True, False, True, True, True, False], 10)[0]
+        # 10 s an attempt, two of three succeed, six are missing
+        assert board.seconds_left(settings, later) == pytest.approx(90.0)
+        board.update(settings, later)
+        board.finish(settings, later)
+    shown = capsys.readouterr().err
+    assert "CloseDrawer  4/10 episodes, 67% of 6 attempts succeed, 2 min left" in shown
+    assert "[1/1] CloseDrawer" in shown
+
+
+def _clumsy(env: KitchenEnv, stage: Any) -> Iterator[Array]:
+    for _ in range(4):
+        yield action(gripper=1.0)
+    raise SkillError("the hand is greased")
+
+
+@pytest.mark.render
+def test_failures_are_kept_with_a_film_and_the_missing_terms(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr("robocasa_lerobot.demos.attempts.MAX_ATTEMPTS_PER_EPISODE", 1)
+    monkeypatch.setitem(SKILLS, ("drawers", "close"), _clumsy)
+    settings = RecordingSettings("CloseDrawer", episodes=1, seed=7)
+    results = record_tasks([settings], tmp_path, keep_failures=True, show_progress=False)
+    folder = tmp_path / FAILURES_FOLDER / "CloseDrawer"
+    described = json.loads((folder / "seed_000007.json").read_text())
+    assert described["reason"] == "the hand is greased"
+    assert described["false_terms"]
+    assert (described["seed"], described["steps"]) == (7, 4)
+    assert frames_and_rate(folder / described["film"]) == (2, 10.0)
+    assert print_summary(results) == 1
+    printed = capsys.readouterr().out
+    assert "given up" in printed
+    assert f"[false: {described['false_terms'][0]}" in printed
+    # What a recording without --keep-failures noted is attempted again when it is wanted, and then left alone.
+    (folder / "seed_000007.json").unlink()
+    assert Parts(tmp_path, settings).tally().done == {0: False}
+    assert Parts(tmp_path, settings, folder).tally().done == {}
+
+
+def test_what_a_skill_should_not_raise_is_a_failure_of_its_attempt(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def broken(env: KitchenEnv, stage: Any) -> Iterator[Array]:
+        raise IndexError("list index out of range")
+        yield
+
+    monkeypatch.setattr("robocasa_lerobot.demos.attempts.MAX_ATTEMPTS_PER_EPISODE", 1)
+    monkeypatch.setitem(SKILLS, ("drawers", "close"), broken)
+    result = record_tasks([RecordingSettings("CloseDrawer", 1)], tmp_path, show_progress=False)[0]
+    assert result.failures == [Failure(0, "IndexError: list index out of range")]
+    assert result.gave_up
+
+
+def _content(path: Path) -> dict[str, Any]:
+    """Everything in a file but when it was written."""
+    found: dict[str, Any] = {}
+
+    def note(name: str, item: h5py.Group | h5py.Dataset) -> None:
+        found.update({f"{name}@{key}": value for key, value in item.attrs.items() if key not in ("date", "time")})
+        if isinstance(item, h5py.Dataset):
+            found[name] = item[()]
+
+    with h5py.File(path) as file:
+        file.visititems(note)
+    return found
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("chance", range(3))
+def test_a_recording_that_is_killed_again_and_again_is_that_of_an_uninterrupted_one(
+    chance: int, tmp_path: Path
+) -> None:
+    """Killed at random moments, the whole group or the first process alone, with one worker or several."""
+    rng = random.Random(chance)
+    settings = [RecordingSettings(task, 3, seed=40, action_noise=0.1) for task in QUICK]
+    record_tasks(settings, tmp_path / "whole", show_progress=False)
+    kills = 0
+    deadline = time.monotonic() + 600
+    while True:
+        command = [
+            sys.executable, "-m", "robocasa_lerobot.cli", "demos", "--tasks", ",".join(QUICK), "--episodes", "3",
+            "--workers", str(rng.choice((1, 2, 3))), "--seed", "40", "--action-noise", "0.1",
+            "--out", str(tmp_path / "killed"),
+        ]  # fmt: skip
+        process = subprocess.Popen(
+            command, stderr=subprocess.DEVNULL, stdout=subprocess.DEVNULL, start_new_session=True
+        )
+        try:
+            # Longer each time, so that a slow machine gets on as well.
+            process.wait(rng.uniform(4.0, 12.0) * (1 + 0.2 * kills))
+            assert process.returncode == 0
+            break
+        except subprocess.TimeoutExpired:
+            kills += 1
+            if rng.random() < 0.5:
+                os.killpg(process.pid, signal.SIGKILL)
+            else:
+                process.kill()
+            process.wait()
+        assert time.monotonic() < deadline
+    assert kills > 0
+    for one in settings:
+        whole, killed = (_content(tmp_path / place / f"{one.task}.hdf5") for place in ("whole", "killed"))
+        assert list(whole) == list(killed)
+        for key, value in whole.items():
+            assert np.array_equal(value, killed[key]), key
+        assert read_summary(tmp_path / "killed" / f"{one.task}.hdf5").episodes == 3
+    assert sorted(path.name for path in (tmp_path / "killed").iterdir()) == [f"{task}.hdf5" for task in QUICK]
