@@ -9,6 +9,7 @@ import pytest
 
 from robocasa_lerobot.envs.scene.appliances.catalogue import kinds, model_of
 from robocasa_lerobot.envs.scene.fixture_types import FILTERS, FixtureType
+from robocasa_lerobot.envs.scene.fixtures.accessories import Accessory
 from robocasa_lerobot.envs.scene.fixtures.counters import Counter
 from robocasa_lerobot.envs.scene.fixtures.fronts import HANDLES, PANELS
 from robocasa_lerobot.envs.scene.fixtures.hoods import DESIGNS as HOODS
@@ -16,7 +17,7 @@ from robocasa_lerobot.envs.scene.fixtures.stools import DESIGNS as STOOLS
 from robocasa_lerobot.envs.scene.kitchens import EXCLUDED, GROUPS, expand, scene_ids, without
 from robocasa_lerobot.envs.scene.layout import Layout, layout_ids, layout_record, load_layout, split_of
 from robocasa_lerobot.envs.scene.materials import COMMON_SURFACES, load_style, style_ids
-from robocasa_lerobot.envs.scene.selection import candidates
+from robocasa_lerobot.envs.scene.selection import candidates, footprint, standing_on
 from robocasa_lerobot.envs.scene.soundness import blocked_walkways
 from robocasa_lerobot.errors import UnknownNameError, UserError
 
@@ -85,6 +86,20 @@ def test_the_lists_of_layouts_say_what_they_lack(layouts: dict[int, Layout]) -> 
     # Ovens out of the list's reach are there all the same.
     assert set(ALL) - set(EXCLUDED["oven"]) == set(STOVETOPS) - {22, 28}
     assert set(ALL) - set(EXCLUDED["freezer"]) == set(FREEZERS)
+
+
+def test_objects_keep_clear_of_what_stands_on_a_counter(layouts: dict[int, Layout]) -> None:
+    found = set()
+    for layout in layouts.values():
+        counters = [f for f in layout.fixtures.values() if isinstance(f, Counter)]
+        for thing in (f for f in layout.fixtures.values() if isinstance(f, Accessory)):
+            for counter in counters:
+                x, y = counter.to_local(thing.pos)
+                above = thing.pos[2] - thing.height / 2 - counter.surface_z
+                if abs(x) < counter.width / 2 and abs(y) < counter.depth / 2 and abs(above) < 0.005:
+                    assert footprint(thing) in standing_on(layout, counter, counter.surface_z), thing.name
+                    found.add(thing.kind)
+    assert {"box", "jar"} <= found, found
 
 
 def test_groups_of_target_layouts(layouts: dict[int, Layout]) -> None:

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from robocasa_lerobot.envs.placement import PlacementError
+from robocasa_lerobot.envs.placement import Footprint, Footprints, PlacementError
 from robocasa_lerobot.envs.registry import get_task
 from robocasa_lerobot.envs.scene.arrange import cast_roles, place_objects
 from robocasa_lerobot.envs.scene.layout import load_layout
@@ -82,6 +82,23 @@ def test_food_stands_in_its_container_and_regions_are_taken_again() -> None:
         assert plate.item.category.name == "plate"
         assert np.hypot(obj.pos[0] - plate.pos[0], obj.pos[1] - plate.pos[1]) < max(plate.item.size[:2]) / 2
         assert obj.pos[2] > plate.pos[2]
+
+
+def test_several_footprints_answer_as_each_of_them_does() -> None:
+    rng = np.random.default_rng(0)
+
+    def draw() -> Footprint:
+        x, y = rng.uniform(-1, 1, 2)
+        half_x, half_y = rng.uniform(0.02, 0.4, 2)
+        return Footprint(float(x), float(y), float(rng.uniform(-np.pi, np.pi)), (float(half_x), float(half_y)))
+
+    answers = []
+    for _ in range(400):
+        marks, other = [draw() for _ in range(int(rng.integers(4)))], draw()
+        margin = float(rng.choice([0.0, 0.1]))
+        answers.append(Footprints(marks).any_overlaps(other, margin))
+        assert answers[-1] == any(mark.overlaps(other, margin) for mark in marks)
+    assert 50 < sum(answers) < 350
 
 
 def test_what_does_not_fit_is_said_with_free_area_and_three_remedies() -> None:

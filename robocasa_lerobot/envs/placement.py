@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -42,6 +43,38 @@ class Footprint:
             if along_a.max() + margin < along_b.min() or along_b.max() + margin < along_a.min():
                 return False
         return True
+
+
+class Footprints:
+    """Several footprints, asked at once whether another one comes near: for searches with thousands of questions."""
+
+    def __init__(self, marks: Sequence[Footprint]) -> None:
+        self._axes = np.array([mark.axes() for mark in marks]).reshape(-1, 2, 2)
+        self._corners = np.array([mark.corners() for mark in marks]).reshape(-1, 4, 2)
+        own = self._corners @ self._axes.transpose(0, 2, 1)
+        self._low, self._high = own.min(axis=1), own.max(axis=1)
+
+    def any_overlaps(self, other: Footprint, margin: float = 0.0) -> bool:
+        """Whether one of them overlaps another footprint, as in `Footprint.overlaps`."""
+        corners, axes = other.corners(), other.axes()
+        ours, theirs = self._corners @ axes.T, corners @ axes.T
+        apart = _apart(ours.min(axis=1), ours.max(axis=1), theirs.min(axis=0), theirs.max(axis=0), margin)
+        theirs = corners @ self._axes.transpose(0, 2, 1)
+        apart |= _apart(self._low, self._high, theirs.min(axis=1), theirs.max(axis=1), margin)
+        return not apart.all()
+
+
+def _apart(
+    low: NDArray[np.float64],
+    high: NDArray[np.float64],
+    other_low: NDArray[np.float64],
+    other_high: NDArray[np.float64],
+    margin: float,
+) -> NDArray[np.bool_]:
+    """For each of n footprints whether one of the two axes, the last dimension, separates it from another; (n,)."""
+    separated = (high + margin < other_low) | (other_high + margin < low)
+    found: NDArray[np.bool_] = separated.any(axis=1)
+    return found
 
 
 @dataclass(frozen=True)

@@ -7,9 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from robocasa_lerobot.envs.placement import Area, Footprint, PlacementError
+from robocasa_lerobot.envs.placement import Area, Footprint, Footprints, PlacementError
 from robocasa_lerobot.envs.scene.appliances.sink import Sink
 from robocasa_lerobot.envs.scene.fixture_types import FIXTURE_KINDS
+from robocasa_lerobot.envs.scene.fixtures.accessories import Accessory
 from robocasa_lerobot.envs.scene.fixtures.base import Fixture
 from robocasa_lerobot.envs.scene.fixtures.cabinets import Drawer
 from robocasa_lerobot.envs.scene.fixtures.counters import Counter
@@ -39,7 +40,8 @@ TALL_STANDOFF_M = 0.10  # more, before fridges and tall housings (robocasa facts
 HANDLE_OUT_M = 0.05
 HOUSING_BELOW_M = 0.6  # a housing whose underside is lower stands on the floor
 
-# Fixture types that nothing on a counter meets: shells, counters themselves, what is flat on a wall.
+# Fixture types that nothing on a counter meets: shells, counters themselves, what is flat on a wall. Boxes are parts of
+# cabinets, but for those that stand on a counter as accessories.
 NOT_IN_THE_WAY = ("counter", "floor", "wall", "window", "stool", "box", "panel_cabinet", "drawer")
 
 
@@ -197,6 +199,7 @@ def robot_pose(
     options = [("right", -lateral), ("left", lateral)] if start.beside else [("", 0.0)]
     if start.setback and layout.types[fixture.name] == "fridge_bottom_freezer":
         options = [("", -start.setback)]  # out of the way of its doors (robocasa facts, blueprint of OpenFridge)
+    obstacles = Obstacles(layout.fixtures)
     for face in faces(layout, ground, fixture):
         half_range = np.array(start.deviation)
         for _ in range(SPAWN_ROUNDS):
@@ -207,7 +210,7 @@ def robot_pose(
                     side, offset = options[int(index)]
                     shift = (offset + float(deviation[0]), float(deviation[1]))
                     pose = _pose_at(layout, ground, face, at or fixture.pos[:2], shift, start.setback, side)
-                    if not _blocked(layout, pose):
+                    if obstacles.leave_free(pose):
                         return pose
             half_range = half_range + SPAWN_WIDENING_M
     raise PlacementError(f"no free place for the robot at {fixture.name}")
@@ -218,21 +221,34 @@ def _turned(point: tuple[float, float], angle: float) -> tuple[float, float]:
     return c * point[0] - s * point[1], s * point[0] + c * point[1]
 
 
+class Obstacles:
+    """What a robot may meet where it stands: at the height of its base, of the column above it, and of its hand."""
+
+    def __init__(self, fixtures: Mapping[str, Fixture]) -> None:
+        self._base, self._column = (_standing(fixtures, top) for top in (BASE_TOP_M, COLUMN_TOP_M))
+        low, high = HAND_Z_M
+        tall = [f for f in fixtures.values() if f.pos[2] - f.height / 2 < high and f.pos[2] + f.height / 2 > low]
+        self._tall = Footprints([footprint(f) for f in tall])
+
+    def leave_free(self, pose: RobotPose) -> bool:
+        """Whether the robot can stand at a pose without touching one, its arm as at the start of an episode."""
+        column = Footprint(pose.x, pose.y, pose.yaw, (COLUMN_HALF_M, COLUMN_HALF_M))
+        return not (
+            self._base.any_overlaps(pose.footprint(), SPAWN_MARGIN_M)
+            or self._column.any_overlaps(column, SPAWN_MARGIN_M)
+            or self._tall.any_overlaps(_hand(pose))
+        )
+
+
+def _standing(fixtures: Mapping[str, Fixture], top: float) -> Footprints:
+    """Fixtures but the floor that begin below a height, metres, and handles that stand out of them."""
+    standing = [f for f in fixtures.values() if f.pos[2] - f.height / 2 < top and f.name != "floor"]
+    return Footprints([mark for f in standing for mark in (footprint(f), *_handles(f, top))])
+
+
 def is_free(fixtures: Mapping[str, Fixture], pose: RobotPose) -> bool:
     """Whether the robot can stand at a pose without touching a fixture, its arm as at the start of an episode."""
-    column = Footprint(pose.x, pose.y, pose.yaw, (COLUMN_HALF_M, COLUMN_HALF_M))
-    for body, top in ((pose.footprint(), BASE_TOP_M), (column, COLUMN_TOP_M)):
-        standing = [f for f in fixtures.values() if f.pos[2] - f.height / 2 < top and f.name != "floor"]
-        if any(body.overlaps(mark, SPAWN_MARGIN_M) for f in standing for mark in (footprint(f), *_handles(f, top))):
-            return False
-    low, high = HAND_Z_M
-    tall = [f for f in fixtures.values() if f.pos[2] - f.height / 2 < high and f.pos[2] + f.height / 2 > low]
-    hand = _hand(pose)
-    return not any(hand.overlaps(footprint(f)) for f in tall)
-
-
-def _blocked(layout: Layout, pose: RobotPose) -> bool:
-    return not is_free(layout.fixtures, pose)
+    return Obstacles(fixtures).leave_free(pose)
 
 
 def _hand(pose: RobotPose) -> Footprint:
@@ -288,7 +304,7 @@ def standing_on(layout: Layout, fixture: Fixture, surface_z: float) -> list[Foot
         footprint(f)
         for f in layout.fixtures.values()
         if f is not fixture
-        and layout.types[f.name] not in NOT_IN_THE_WAY
+        and (isinstance(f, Accessory) or layout.types[f.name] not in NOT_IN_THE_WAY)
         and f.pos[2] + f.height / 2 > surface_z - 0.005
         and f.pos[2] - f.height / 2 < surface_z + 0.3
     ]
