@@ -84,6 +84,16 @@ def test_food_stands_in_its_container_and_regions_are_taken_again() -> None:
         assert obj.pos[2] > plate.pos[2]
 
 
+@pytest.mark.parametrize("style_id", [29, 11])  # slots from front to back, and along the front
+def test_a_slot_may_be_narrow(style_id: int) -> None:
+    layout = load_layout(12, style_id)
+    toaster = candidates(layout, "toaster")[0]
+    name, region = next(iter(toaster.regions.items()))
+    placement = Placement("toaster", region=SampleRegion(name=name), slot=True)
+    assert min(region.half[:2]) * 2 < 0.06
+    assert [part.name for part in choose_parts(layout, placement, toaster, None, {})] == [name]
+
+
 def test_several_footprints_answer_as_each_of_them_does() -> None:
     rng = np.random.default_rng(0)
 

@@ -60,8 +60,8 @@ class Footprints:
         ours, theirs = self._corners @ axes.T, corners @ axes.T
         apart = _apart(ours.min(axis=1), ours.max(axis=1), theirs.min(axis=0), theirs.max(axis=0), margin)
         theirs = corners @ self._axes.transpose(0, 2, 1)
-        apart |= _apart(self._low, self._high, theirs.min(axis=1), theirs.max(axis=1), margin)
-        return not apart.all()
+        apart_too = _apart(self._low, self._high, theirs.min(axis=1), theirs.max(axis=1), margin)
+        return not (apart | apart_too).all()
 
 
 def _apart(
@@ -72,9 +72,7 @@ def _apart(
     margin: float,
 ) -> NDArray[np.bool_]:
     """For each of n footprints whether one of the two axes, the last dimension, separates it from another; (n,)."""
-    separated = (high + margin < other_low) | (other_high + margin < low)
-    found: NDArray[np.bool_] = separated.any(axis=1)
-    return found
+    return np.asarray(((high + margin < other_low) | (other_high + margin < low)).any(axis=1))
 
 
 @dataclass(frozen=True)
