@@ -15,8 +15,7 @@ from robocasa_lerobot.demos.skills.drawers import close_drawer, open_drawer
 from robocasa_lerobot.demos.skills.knobs import raise_knob, turn_burner_low, turn_knob, turn_off_burner, turn_on_burner
 from robocasa_lerobot.demos.skills.levers import press_lever, turn_off_water, turn_on_water, turn_sideways
 from robocasa_lerobot.demos.skills.navigation import drive
-from robocasa_lerobot.demos.skills.pick_place import place_into_basin
-from robocasa_lerobot.demos.skills.put_down import place_on
+from robocasa_lerobot.demos.skills.put_down import place_into_basin, place_on, place_on_reaching_in
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.task import Stage
 
@@ -40,6 +39,9 @@ SKILLS: dict[tuple[str, str], Skill] = {
     ("levers", "turn"): turn_sideways,
     ("pick_place", "place"): place_into_basin,
     ("pick_place", "place_on"): place_on,
+    ("pick_place", "place_on_from_pan"): place_on,
+    ("pick_place", "drop_into"): place_on,
+    ("pick_place", "place_on_reaching_in"): place_on_reaching_in,
 }
 
 __all__ = ["SKILLS", "Skill", "SkillError"]

@@ -78,7 +78,7 @@ def find_way(scene: Scene, start: RobotPose, goal: RobotPose) -> list[RobotPose]
     Raises:
         SkillError: there is none.
     """
-    room = _Room(scene)
+    room = Room(scene)
     goal = room.nearest(goal)
     if room.straight(start, goal):
         return [goal]
@@ -89,7 +89,7 @@ def find_way(scene: Scene, start: RobotPose, goal: RobotPose) -> list[RobotPose]
     return [*(grid.pose(cell) for cell in cells[1:]), goal]
 
 
-class _Room:
+class Room:
     """Answers whether the robot can stand at a pose, asking the fixtures near it only."""
 
     def __init__(self, scene: Scene) -> None:
@@ -141,7 +141,7 @@ type _Cell = tuple[int, int, int]
 class _Grid:
     """Cells (i, j, k) of places and headings, counted from the goal's pose."""
 
-    room: _Room
+    room: Room
     start: RobotPose
     goal: RobotPose
 

@@ -153,13 +153,20 @@ class ObjectOn(Term):
 
     def holds(self, scene: Scene, data: mujoco.MjData) -> bool:
         """Look at distance, then contacts."""
-        apart = data.body(scene.fill(self.object)).xpos[:2] - data.body(self.receptacle).xpos[:2]
+        apart = data.body(scene.fill(self.object)).xpos[:2] - self._middle(scene, data)
         limit = self.within
         if limit is None:
             limit = RECEPTACLE_SHARE * max(scene.objects[self.receptacle].item.size[:2]) / 2
         return float(np.linalg.norm(apart)) < limit and touching(
             scene.model, data, scene.subtree(scene.fill(self.object)), scene.subtree(self.receptacle)
         )
+
+    def _middle(self, scene: Scene, data: mujoco.MjData) -> NDArray[np.float64]:
+        """Middle of where the receptacle holds things, (2,): a pan's origin is off it, towards the handle."""
+        body, inside = data.body(self.receptacle), scene.objects[self.receptacle].item.interior
+        middle = body.xpos if inside is None else body.xpos + body.xmat.reshape(3, 3) @ np.asarray(inside.center)
+        across: NDArray[np.float64] = middle[:2]
+        return across
 
 
 @dataclass(frozen=True)

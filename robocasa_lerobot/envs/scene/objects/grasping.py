@@ -57,15 +57,21 @@ def grasp_poses(item: Instance, count: int = 16) -> tuple[GraspPose, ...]:
 
 def grasp_poses_as_it_lies(item: Instance, turn: Array, count: int = 16) -> tuple[GraspPose, ...]:
     """The same for an object that was turned by the rotation matrix `turn`, about its origin, in axes of the room."""
-    return _plan(_pieces(item), turn)[:count]
+    return _plan(pieces(item), turn)[:count]
+
+
+def grasp_poses_of(solids: list[Solid], turn: Array, count: int = 16) -> tuple[GraspPose, ...]:
+    """The same for any body made of convex pieces, in its own frame, that was turned by the rotation matrix `turn`."""
+    return _plan(solids, turn)[:count]
 
 
 @functools.lru_cache(maxsize=512)
 def _standing(item: Instance) -> tuple[GraspPose, ...]:
-    return _plan(_pieces(item), np.eye(3))
+    return _plan(pieces(item), np.eye(3))
 
 
-def _pieces(item: Instance) -> list[Solid]:
+def pieces(item: Instance) -> list[Solid]:
+    """Convex pieces of an instance in the frame of its body, as it is put down."""
     solids = [s.scaled(item.scale) for s in model_of(item).solids]
     axis = item.upright_axis
     if axis is None:

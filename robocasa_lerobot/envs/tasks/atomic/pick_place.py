@@ -22,7 +22,13 @@ from robocasa_lerobot.envs.tasks.atomic.controls import HANDLE_TURN
 
 _TOOLS, _NOT_TOOLS = ("reamer", "strainer", "cheese_grater"), ("tool", "utensil")
 _IN_PAN_M = 0.07  # horizontally from the middle of a pan
-_PAN = Placement("stove", region=SampleRegion(name="any"), size=(0.02, 0.02), rotation=HANDLE_TURN, ensure_inside=False)
+_PAN = Placement(
+    "stove",
+    region=SampleRegion(name="any", height=(0.7, 1.2)),
+    size=(0.02, 0.02),
+    rotation=HANDLE_TURN,
+    ensure_inside=False,
+)
 _DOOR_OPEN = (0.90, 1.0)
 
 

@@ -1,0 +1,157 @@
+"""Take hold of a loose thing wherever it is: on a counter, in a basin, on a shelf, in a microwave.
+
+Of all grasp poses, approaches and ways in and out that one is taken that the arm reaches best and that meets nothing,
+after a drive where the arm falls short. A grasp that fails is followed by another one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from robocasa_lerobot.demos.motion import CLOSED, OPEN, Array, HandTarget, base_pose, grip_position, hand_rotation
+from robocasa_lerobot.demos.skills.common import SkillError, hold_hand, move_hand
+from robocasa_lerobot.demos.skills.things import Thing, grasps
+from robocasa_lerobot.demos.skills.ways import GOOD_ENOUGH, Choice, Way, approach, choose
+from robocasa_lerobot.envs.kitchen_env import KitchenEnv
+from robocasa_lerobot.envs.scene.selection import RobotPose
+
+ATTEMPTS = 5
+INSIST = 0.12
+GRASP_STEPS, RELEASE_STEPS = 11, 8
+STANDOFF_M, HOVER_M = 0.06, 0.12
+LIFT_M, OUT_M = 0.12, 0.25
+WORSE_GRASP = 0.45  # cost of a grasp's score below the best one's
+TRIED, ALIKE_M = 1.2, 0.015  # cost of a grasp like one that has failed: its place in the thing is as near as this
+# A thing that is held is nearer than this to where it was in the hand when that closed, and has risen by this.
+HELD_M, ROSE_M = 0.05, 0.008
+UP = np.array([0.0, 0.0, 1.0])
+
+
+@dataclass(frozen=True)
+class Manner:
+    """How a thing is taken.
+
+    Attributes:
+        tilts: of the hand's approach from straight down to straight ahead, radians, with their costs.
+        entries: whether the hand may come from above ("up"), or out of the front ("out"), or between ("across").
+        out_m: how far it goes on its way out, metres.
+    """
+
+    tilts: tuple[tuple[float, float], ...] = ((0.0, 0.0),)
+    entries: tuple[str, ...] = ("up",)
+    out_m: float = OUT_M
+
+
+FROM_ABOVE = Manner(((0.0, 0.0), (np.deg2rad(30.0), 0.25)))
+ANYHOW = Manner(
+    ((0.0, 0.0), (np.deg2rad(35.0), 0.1), (np.deg2rad(65.0), 0.2), (np.deg2rad(88.0), 0.3)), ("up", "across", "out")
+)
+
+
+def pick(env: KitchenEnv, what: Thing, manner: Manner = FROM_ABOVE) -> Iterator[Array]:
+    """Grasp a thing, and lift it or draw it out.
+
+    Raises:
+        SkillError: it is not in the gripper after all attempts.
+    """
+    data = env.data
+    tried: list[HandTarget] = []
+    for _ in range(ATTEMPTS):
+        body = data.body(what.name)
+        start = body.xpos.copy()
+        choice = yield from approach(env, lambda blocked: _best(env, what, manner, tried, blocked), OPEN)
+        far, before, at, lifted, out = choice.way.targets
+        # All poses move with the thing, should it have been touched meanwhile.
+        moved = data.body(what.name).xpos - start
+        yield from move_hand(data, _shifted(far, moved), OPEN, tolerance=0.03)
+        yield from move_hand(data, _shifted(before, moved), OPEN, tolerance=0.008, insist=INSIST)
+        moved = data.body(what.name).xpos - start
+        at = _shifted(at, moved)
+        yield from move_hand(data, at, OPEN, speed=0.6, tolerance=0.005, max_steps=45, insist=INSIST)
+        yield from hold_hand(data, at, CLOSED, GRASP_STEPS)
+        inside = _inside(env, what)
+        yield from move_hand(data, _shifted(lifted, moved), CLOSED, speed=0.7, tolerance=0.02, max_steps=50)
+        rise = data.body(what.name).xpos[2] - start[2] - moved[2]
+        if rise > ROSE_M and np.linalg.norm(_inside(env, what) - inside) < HELD_M:
+            yield from move_hand(data, _shifted(out, moved), CLOSED, speed=0.8, tolerance=0.03)
+            if np.linalg.norm(_inside(env, what) - inside) < HELD_M:
+                return
+        tried.append(HandTarget(data.body(what.name).xmat.reshape(3, 3).T @ (at.position - start), at.rotation))
+        yield from hold_hand(data, HandTarget(grip_position(data), hand_rotation(data)), OPEN, RELEASE_STEPS)
+        away = HandTarget(grip_position(data) - 0.08 * hand_rotation(data)[:, 2], hand_rotation(data))
+        yield from move_hand(data, away, OPEN, tolerance=0.03, max_steps=25)
+    raise SkillError(f"{what.title} was not lifted in {ATTEMPTS} attempts")
+
+
+def ahead_of(env: KitchenEnv) -> Array:
+    """Unit vector (3,) along the base's heading."""
+    _, yaw = base_pose(env.data)
+    return np.array([np.cos(yaw), np.sin(yaw), 0.0])
+
+
+def entry(env: KitchenEnv, name: str) -> Array:
+    """Unit vector out of where something is: "up", "out" to the robot, or "across" between the two."""
+    out = {"up": UP, "out": 0.1 * UP - ahead_of(env), "across": UP - ahead_of(env)}[name]
+    unit: Array = out / np.linalg.norm(out)
+    return unit
+
+
+def _best(
+    env: KitchenEnv, what: Thing, manner: Manner, tried: list[HandTarget], blocked: Sequence[RobotPose]
+) -> Choice:
+    """The first tilt's best way if that is good, else the best of all tilts.
+
+    Raises:
+        SkillError: no pose fits.
+    """
+    found: list[Choice] = []
+    point = env.data.body(what.name).xpos.copy()
+    for tilt, extra in manner.tilts:
+        ways = _ways(env, what, manner, tried, tilt, extra)
+        found += choose(env, ways, point, key=2, allowed=what.bodies, blocked=blocked)[:1]
+        if found and found[-1].cost <= GOOD_ENOUGH + extra:
+            break
+    if not found:
+        raise SkillError(f"{what.title}: no pose of the gripper fits as it lies")
+    return min(found, key=lambda choice: choice.cost)
+
+
+def _ways(
+    env: KitchenEnv, what: Thing, manner: Manner, tried: list[HandTarget], tilt: float, extra: float
+) -> list[Way]:
+    body = env.data.body(what.name)
+    found = []
+    poses = grasps(env, what, np.cos(tilt) * -UP + np.sin(tilt) * ahead_of(env))
+    best = max((pose.score for pose in poses), default=0.0)
+    for pose in poses:
+        local = body.xmat.reshape(3, 3).T @ (pose.position - body.xpos)
+        alike = sum(np.linalg.norm(local - other.position) < ALIKE_M for other in tried)
+        cost = extra + WORSE_GRASP * (best - pose.score) + TRIED * float(alike)
+        for turn in (pose.rotation, pose.rotation @ np.diag([-1.0, -1.0, 1.0])):
+            for name in manner.entries:
+                found.append(_way(pose.position, turn, entry(env, name), name, cost, manner.out_m))
+    return found
+
+
+def _way(position: Array, rotation: Array, out: Array, name: str, cost: float, out_m: float) -> Way:
+    approach = rotation[:, 2]
+    before = position - STANDOFF_M * approach
+    if name == "up":
+        far, lifted, last = position - HOVER_M * approach, position + 0.05 * UP, position + LIFT_M * UP
+    else:
+        far, lifted = before + out_m * out, position + 0.03 * UP
+        last = lifted + out_m * out
+    return Way(tuple(HandTarget(p, rotation) for p in (far, before, position, lifted, last)), cost)
+
+
+def _inside(env: KitchenEnv, what: Thing) -> Array:
+    """Where a thing's origin is in the hand, metres."""
+    inside: Array = hand_rotation(env.data).T @ (env.data.body(what.name).xpos - grip_position(env.data))
+    return inside
+
+
+def _shifted(target: HandTarget, move: Array) -> HandTarget:
+    return HandTarget(target.position + move, target.rotation)

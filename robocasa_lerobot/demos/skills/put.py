@@ -1,0 +1,189 @@
+"""Put what the hand holds to a spot: from above or through a front, then leave the way it came."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from robocasa_lerobot.demos.motion import (
+    CLOSED,
+    OPEN,
+    Array,
+    HandTarget,
+    base_pose,
+    grip_position,
+    hand_rotation,
+    rotation_about,
+)
+from robocasa_lerobot.demos.skills.common import SkillError, hold_hand, move_hand
+from robocasa_lerobot.demos.skills.navigation import drive_to
+from robocasa_lerobot.demos.skills.pick import FROM_ABOVE, INSIST, Manner, ahead_of, entry, pick
+from robocasa_lerobot.demos.skills.things import Thing
+from robocasa_lerobot.demos.skills.ways import Choice, Held, Way, approach, choose
+from robocasa_lerobot.envs.kitchen_env import KitchenEnv
+from robocasa_lerobot.envs.scene.selection import RobotPose
+
+ATTEMPTS = 4
+RELEASE_STEPS, SETTLE_STEPS = 9, 15
+GAP_M = 0.012  # of the underside above the spot when the hand opens
+CLEAR_M = 0.06  # along the hand, out of what it held, before it leaves
+AWAY_M = 0.26
+GONE_M = 0.27  # of the grip site from the thing's origin: tasks ask for 25 cm
+YAWS = 12
+AGAIN, AGAIN_M = 0.5, 0.02  # cost of a hand that goes where it went in vain, as near as this
+LEANING = 0.35  # cost of a radian that the thing is tilted
+UP = np.array([0.0, 0.0, 1.0])
+
+
+@dataclass(frozen=True)
+class Spot:
+    """Where the middle of a thing's underside may come.
+
+    Attributes:
+        point: world, metres.
+        extra: cost.
+    """
+
+    point: Array
+    extra: float = 0.0
+
+
+@dataclass(frozen=True)
+class Putting:
+    """How a thing is put down.
+
+    Attributes:
+        spots: where, asked anew at each attempt, with the thing in the hand.
+        done: whether it lies where it belongs.
+        leans: tilts of thing and hand towards straight ahead that are allowed, radians.
+        entries: ways in and out, as of `Manner`.
+        taking: how it is picked before.
+        in_m: length of the way in, metres.
+    """
+
+    spots: Callable[[], Sequence[Spot]]
+    done: Callable[[], bool]
+    leans: tuple[float, ...] = (0.0,)
+    entries: tuple[str, ...] = ("up",)
+    taking: Manner = FROM_ABOVE
+    in_m: float = 0.15
+    gap_m: float = GAP_M
+
+
+def move(env: KitchenEnv, what: Thing, how: Putting) -> Iterator[Array]:
+    """Pick a thing, put it to one of the spots, and leave; again if it is not there then.
+
+    Raises:
+        SkillError: it is not there after four attempts.
+    """
+    failed: list[Array] = []
+    for _ in range(ATTEMPTS):
+        yield from pick(env, what, how.taking)
+        yield from put(env, what, how, failed)
+        for _ in range(SETTLE_STEPS):
+            if how.done():
+                return
+            yield from hold_hand(env.data, HandTarget(grip_position(env.data), hand_rotation(env.data)), OPEN, 1)
+    raise SkillError(f"{what.title} is not where it belongs after {ATTEMPTS} attempts")
+
+
+def put(env: KitchenEnv, what: Thing, how: Putting, failed: list[Array]) -> Iterator[Array]:
+    """Bring what is in the hand to one of the spots, let go, and leave; the hand's place is noted in `failed`.
+
+    Raises:
+        SkillError: there is nowhere to put it.
+    """
+    data = env.data
+    held = Held.now(data, what.name)
+    spots = list(how.spots())
+    ways = [way for spot in spots for way in _ways(env, what, held, spot, how, failed)]
+    if not ways:
+        raise SkillError(f"{what.title}: nowhere to put it")
+    middle = np.mean([spot.point for spot in spots], axis=0)
+
+    def plan(blocked: Sequence[RobotPose]) -> Choice:
+        return choose(env, ways, middle, key=2, held=held, loaded=3, allowed=what.bodies, blocked=blocked)[0]
+
+    choice = yield from approach(env, plan, CLOSED)
+    failed.append(choice.way.targets[2].position)
+    far, above, low, clear, away = choice.way.targets
+    for target, tolerance, steps in ((far, 0.04, 110), (above, 0.02, 90)):
+        yield from move_hand(data, target, CLOSED, tolerance=tolerance, max_steps=steps)
+        if not _holds(env, held):
+            return
+    # What has slipped in the hand goes to the spot, not the hand.
+    slipped = (_origin(low, held) - _origin_now(env, what, low)) * [1.0, 1.0, 0.0]
+    low = HandTarget(low.position + np.clip(slipped, -0.03, 0.03), low.rotation)
+    yield from move_hand(data, low, CLOSED, speed=0.5, tolerance=0.008, max_steps=60, insist=INSIST)
+    at = HandTarget(grip_position(data), hand_rotation(data))
+    yield from hold_hand(data, at, OPEN, RELEASE_STEPS)
+    yield from move_hand(data, clear, OPEN, speed=0.6, tolerance=0.02, max_steps=30)
+    yield from move_hand(data, away, OPEN, tolerance=0.03, max_steps=60)
+    yield from leave(env, what)
+
+
+def leave(env: KitchenEnv, what: Thing) -> Iterator[Array]:
+    """Go farther off where the hand is still near what it has put down: up and back, then with the base."""
+    data = env.data
+    for _ in range(2):
+        if np.linalg.norm(grip_position(data) - data.body(what.name).xpos) > GONE_M:
+            return
+        away = grip_position(data) - 0.12 * ahead_of(env) + 0.06 * UP
+        yield from move_hand(data, HandTarget(away, hand_rotation(data)), OPEN, tolerance=0.03, max_steps=30)
+    if np.linalg.norm(grip_position(data) - data.body(what.name).xpos) > GONE_M:
+        return
+    base, yaw = base_pose(data)
+    back = base - 0.2 * ahead_of(env)
+    with contextlib.suppress(SkillError):
+        yield from drive_to(env, float(back[0]), float(back[1]), yaw, gripper=OPEN, tolerance_m=0.04)
+
+
+def _ways(env: KitchenEnv, what: Thing, held: Held, spot: Spot, how: Putting, failed: list[Array]) -> list[Way]:
+    ahead = ahead_of(env)
+    left = np.cross(UP, ahead)
+    present = hand_rotation(env.data)
+    level = float(present[:, 2] @ UP) > -0.85  # a hand that looks ahead keeps doing so
+    found = []
+    for index in range(YAWS):
+        yaw = 2 * np.pi * index / YAWS
+        turned = rotation_about(UP, yaw) @ present
+        if level and float(turned[:, 2] @ ahead) < 0.35:
+            continue
+        for lean in how.leans:
+            rotation = rotation_about(left, -lean) @ turned
+            thing_turn = rotation @ held.rotation
+            origin = spot.point + (what.below(thing_turn) + how.gap_m) * UP
+            low = origin - rotation @ held.position
+            again = sum(np.linalg.norm(low - other) < AGAIN_M for other in failed)
+            cost = spot.extra + AGAIN * float(again) + LEANING * lean + 0.08 * min(yaw, 2 * np.pi - yaw)
+            for name in how.entries:
+                found.append(_way(low, rotation, entry(env, name), name, how.in_m, cost))
+    return found
+
+
+def _way(low: Array, rotation: Array, out: Array, name: str, in_m: float, cost: float) -> Way:
+    clear = low - CLEAR_M * rotation[:, 2]
+    if name == "up":
+        above, far, away = low + 0.06 * UP, low + in_m * UP, clear + AWAY_M * UP
+    else:
+        above = low + 0.035 * UP
+        far, away = above + in_m * out, clear + max(AWAY_M, in_m) * out
+    return Way(tuple(HandTarget(p, rotation) for p in (far, above, low, clear, away)), cost)
+
+
+def _holds(env: KitchenEnv, held: Held) -> bool:
+    now = Held.now(env.data, held.name)
+    return bool(np.linalg.norm(now.position - held.position) < 0.06)
+
+
+def _origin(hand: HandTarget, held: Held) -> Array:
+    origin: Array = hand.position + hand.rotation @ held.position
+    return origin
+
+
+def _origin_now(env: KitchenEnv, what: Thing, hand: HandTarget) -> Array:
+    """Where a thing's origin comes with the hand at a target, as it lies in the hand now."""
+    return _origin(hand, Held.now(env.data, what.name))

@@ -1,0 +1,109 @@
+"""What can be carried: objects of a scene, and loose parts of fixtures such as a blender's lid."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+
+from robocasa_lerobot.demos.motion import Array, rotation_about
+from robocasa_lerobot.envs.kitchen_env import KitchenEnv
+from robocasa_lerobot.envs.scene.objects.catalogue import Instance
+from robocasa_lerobot.envs.scene.objects.grasping import GraspPose, grasp_poses, grasp_poses_of, pieces
+from robocasa_lerobot.envs.scene.objects.solids import Solid, hull
+
+UPRIGHT_COS = 0.98  # tilts up to 11 degrees count as standing as it was put down
+DOWN = np.array([0.0, 0.0, -1.0])
+
+
+@dataclass(frozen=True)
+class Thing:
+    """A loose body.
+
+    Attributes:
+        name: of the body.
+        title: for messages.
+        solids: convex pieces in its frame.
+        cloud: points (n, 3) whose hull it fills.
+        item: the object model, if it is one.
+        bodies: ids of what belongs to it.
+    """
+
+    name: str
+    title: str
+    solids: tuple[Solid, ...]
+    cloud: Array
+    item: Instance | None
+    bodies: frozenset[int]
+
+    def below(self, rotation: Array) -> float:
+        """How far its underside is below its origin when it is turned so, metres."""
+        return -float((self.cloud @ rotation[2]).min())
+
+    def half_extents(self, rotation: Array) -> Array:
+        """Farthest that it reaches from its origin along each axis of the room, (3,), metres."""
+        reach: Array = np.abs(self.cloud @ rotation.T).max(axis=0)
+        return reach
+
+
+def thing(env: KitchenEnv, name: str) -> Thing:
+    """The loose body of a name, which may name a role in braces."""
+    name = env.scene.fill(name)
+    bodies = frozenset(np.flatnonzero(env.scene.subtree(name)).tolist())
+    placed = env.scene.objects.get(name)
+    if placed is None:
+        solids = _solids(env.model, env.model.body(name).id)
+        return Thing(name, name, solids, np.concatenate([s.cloud() for s in solids]), None, bodies)
+    found = tuple(pieces(placed.item))
+    cloud = np.concatenate([s.cloud() for s in found])
+    return Thing(name, f"{name} ({placed.item.model})", found, cloud, placed.item, bodies)
+
+
+def grasps(env: KitchenEnv, what: Thing, approach: Array) -> list[GraspPose]:
+    """Grasp poses in the room for a thing as it lies now, by a hand that comes along `approach` (unit vector)."""
+    body = env.data.body(what.name)
+    turn = body.xmat.reshape(3, 3).copy()
+    if approach @ DOWN > 0.999:
+        upright = np.hypot(turn[0, 0], turn[1, 0])
+        if what.item is not None and turn[2, 2] > UPRIGHT_COS and upright > 1e-6:
+            yaw = np.array([[turn[0, 0], -turn[1, 0], 0], [turn[1, 0], turn[0, 0], 0], [0, 0, 1.0]])
+            yaw[:2, :2] /= upright
+            return [pose.placed(body.xpos, yaw) for pose in grasp_poses(what.item)]
+        tip = np.eye(3)
+    else:
+        tip = _to_down(approach)
+    poses = grasp_poses_of(list(what.solids), tip @ turn)
+    back = tip.T
+    return [GraspPose(body.xpos + back @ pose.position, back @ pose.rotation, pose.width, pose.score) for pose in poses]
+
+
+def _to_down(approach: Array) -> Array:
+    """The smallest rotation that brings a direction to straight down."""
+    axis = np.cross(approach, DOWN)
+    sine, cosine = float(np.linalg.norm(axis)), float(approach @ DOWN)
+    return rotation_about(axis / sine, float(np.arctan2(sine, cosine)))
+
+
+def _solids(model: mujoco.MjModel, body: int) -> tuple[Solid, ...]:
+    """What collides of a body, each as the convex hull of its geom."""
+    found = []
+    first = int(model.body_geomadr[body])
+    for geom in range(first, first + int(model.body_geomnum[body])):
+        if not (model.geom_contype[geom] or model.geom_conaffinity[geom]):
+            continue
+        out = np.empty(9)
+        mujoco.mju_quat2Mat(out, model.geom_quat[geom])
+        found.append(hull(_points(model, geom) @ out.reshape(3, 3).T + model.geom_pos[geom]))
+    return tuple(found)
+
+
+def _points(model: mujoco.MjModel, geom: int) -> Array:
+    kind, size = model.geom_type[geom], model.geom_size[geom]
+    if kind == mujoco.mjtGeom.mjGEOM_MESH:
+        mesh = model.geom_dataid[geom]
+        first = model.mesh_vertadr[mesh]
+        return np.array(model.mesh_vert[first : first + model.mesh_vertnum[mesh]], dtype=np.float64)
+    if kind == mujoco.mjtGeom.mjGEOM_CYLINDER:
+        return Solid("cylinder", (float(size[0]), float(size[1]))).cloud()
+    return Solid("box", tuple(float(s) for s in size)).cloud()
