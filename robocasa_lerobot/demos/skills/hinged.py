@@ -68,6 +68,25 @@ class Hinged:
         """Angle as a share of the range."""
         return self.angle / self.full
 
+    @property
+    def body(self) -> int:
+        """Number of its body."""
+        return self._body
+
+    def place(self, data: mujoco.MjData, angle: float) -> None:
+        """Turn it to an angle in a copy of the state: for planning only."""
+        data.qpos[self._address] = self.opening * angle
+
+    def handle(self) -> tuple[Array, Array]:
+        """Opposite corners of the bar of its handle, (3,) each."""
+        boxes = [self._box(geom) for geom in self.geoms(handle=True)]
+        return np.min([b[0] for b in boxes], axis=0), np.max([b[1] for b in boxes], axis=0)
+
+    @property
+    def inside(self) -> float:
+        """How far shelves and bins stand out of its inner face, metres."""
+        return float(max(self._box(geom)[1][1] for geom in self.geoms(handle=False)))
+
     def turned(self, angle: float) -> Array:
         """World rotation (3, 3) of what lies in the fixture's axes when shut, at an angle."""
         return self._turn @ rotation_about(self._axis, self.opening * angle)

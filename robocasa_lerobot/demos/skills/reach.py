@@ -80,7 +80,7 @@ def plan_reach(
         data.qpos[:] = env.data.qpos
         mujoco.mj_kinematics(model, data)
         mujoco.mj_comPos(model, data)
-        _move_base(model, data, shift)
+        move_base_to(model, data, shift)
         far = 0.3 * float(np.hypot(*shift))
         for way in options:
             cost = far + _cost(model, data, way, allowed, best + _WORSE - far)
@@ -137,7 +137,7 @@ def _cost(
     ranges = np.array([model.joint(name).range for name in ARM_JOINTS])
     cost = 0.0
     for target in way:
-        _solve(model, data, target, arm, dofs, home, ranges)
+        solve_arm(model, data, target, arm, dofs, home, ranges)
         error = pose_error(data, target)
         margin = np.minimum(data.qpos[arm] - ranges[:, 0], ranges[:, 1] - data.qpos[arm]).min()
         cost += min(30.0 * error.position + 2.0 * error.rotation, 4.0)
@@ -150,7 +150,8 @@ def _cost(
     return cost
 
 
-def _move_base(model: mujoco.MjModel, data: mujoco.MjData, shift: tuple[float, float]) -> None:
+def move_base_to(model: mujoco.MjModel, data: mujoco.MjData, shift: tuple[float, float]) -> None:
+    """Put the base of a copied state elsewhere, metres forward and to the left; positions are evaluated before."""
     _, yaw = base_pose(data)
     move = np.array([np.cos(yaw) * shift[0] - np.sin(yaw) * shift[1], np.sin(yaw) * shift[0] + np.cos(yaw) * shift[1]])
     jacobian = np.zeros((3, model.nv))
@@ -161,7 +162,7 @@ def _move_base(model: mujoco.MjModel, data: mujoco.MjData, shift: tuple[float, f
     mujoco.mj_kinematics(model, data)
 
 
-def _solve(
+def solve_arm(
     model: mujoco.MjModel,
     data: mujoco.MjData,
     target: HandTarget,
