@@ -17,6 +17,7 @@ from robocasa_lerobot.demos.skills.knobs import raise_knob, turn_burner_low, tur
 from robocasa_lerobot.demos.skills.levers import press_lever, turn_off_water, turn_on_water, turn_sideways
 from robocasa_lerobot.demos.skills.navigation import drive
 from robocasa_lerobot.demos.skills.put_down import place_into_basin, place_on, place_on_reaching_in
+from robocasa_lerobot.demos.skills.racks import pull, push, slide
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.task import Stage
 
@@ -28,6 +29,9 @@ SKILLS: dict[tuple[str, str], Skill] = {
     ("doors", "push_lid"): push_lid,
     ("drawers", "open"): open_drawer,
     ("drawers", "close"): close_drawer,
+    ("racks", "slide"): slide,
+    ("racks", "pull"): pull,
+    ("racks", "push"): push,
     ("navigation", "drive"): drive,
     ("buttons", "press"): press_button,
     ("knobs", "on"): turn_on_burner,

@@ -90,8 +90,11 @@ def _attempt(
     roles = cast_roles(rng, task, layout)
     choices = draw_choices(rng, task, layout.fixtures, roles)
     robot: RobotPose | None = None
+    opened = [layout.fixtures[roles[role]] for role in _opened(task)]
     if not task.robot_start.at_object:
-        robot = robot_pose(rng, layout, task.robot_start, layout.fixtures[roles[task.robot_start.fixture]])
+        robot = robot_pose(
+            rng, layout, task.robot_start, layout.fixtures[roles[task.robot_start.fixture]], opened=opened
+        )
     openness = {
         roles[initial.fixture]: float(rng.uniform(initial.low, initial.high))
         for initial in task.initial
@@ -108,7 +111,7 @@ def _attempt(
     objects = place_objects(rng, task, split, layout, roles, places, choices.values)
     if robot is None:
         at = objects[task.robot_start.at_object].pos[:2]
-        robot = robot_pose(rng, layout, task.robot_start, layout.fixtures[roles[task.robot_start.fixture]], at)
+        robot = robot_pose(rng, layout, task.robot_start, layout.fixtures[roles[task.robot_start.fixture]], at, opened)
     spots = {role: _lid_spot(rng, layout, roles[role], objects) for role, gone in lids.items() if not gone}
     spec = _assemble(layout, look, objects)
     if look.camera_noise is not None:
@@ -146,6 +149,11 @@ def _shares(
         if isinstance(entry, PartAt):
             found.setdefault(roles[entry.fixture], {})[entry.part.format(**choices.values)] = share
     return dict(found)
+
+
+def _opened(task: Task) -> list[str]:
+    """Roles of the fixtures whose doors start wide open."""
+    return [entry.fixture for entry in task.initial if isinstance(entry, InitialOpenness) and entry.low > 0.5]
 
 
 def _lids(task: Task, roles: dict[str, str]) -> dict[str, bool]:

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
 from robocasa_lerobot.envs.placement import Area, Footprint, Footprints, PlacementError
+from robocasa_lerobot.envs.scene.appliances.dishwasher import Dishwasher
+from robocasa_lerobot.envs.scene.appliances.oven import Oven
 from robocasa_lerobot.envs.scene.appliances.sink import Sink
 from robocasa_lerobot.envs.scene.fixture_types import FIXTURE_KINDS
 from robocasa_lerobot.envs.scene.fixtures.accessories import Accessory
@@ -185,10 +187,12 @@ def robot_pose(
     start: RobotStart,
     fixture: Fixture,
     at: tuple[float, float] | None = None,
+    opened: Iterable[Fixture] = (),
 ) -> RobotPose:
     """A free pose facing a fixture, by RoboCasa's rules, with the start's uniform deviation to all sides.
 
-    `at` is a point of the room to stand in line with, instead of the fixture's middle.
+    `at` is a point of the room to stand in line with, instead of the fixture's middle. The robot does not stand in
+    the doors of those `opened`, if they fold down.
 
     Raises:
         PlacementError: no pose was free.
@@ -199,7 +203,7 @@ def robot_pose(
     options = [("right", -lateral), ("left", lateral)] if start.beside else [("", 0.0)]
     if start.setback and layout.types[fixture.name] == "fridge_bottom_freezer":
         options = [("", -start.setback)]  # out of the way of its doors (robocasa facts, blueprint of OpenFridge)
-    obstacles = Obstacles(layout.fixtures)
+    obstacles = Obstacles(layout.fixtures, opened)
     for face in faces(layout, ground, fixture):
         half_range = np.array(start.deviation)
         for _ in range(SPAWN_ROUNDS):
@@ -224,8 +228,9 @@ def _turned(point: tuple[float, float], angle: float) -> tuple[float, float]:
 class Obstacles:
     """What a robot may meet where it stands: at the height of its base, of the column above it, and of its hand."""
 
-    def __init__(self, fixtures: Mapping[str, Fixture]) -> None:
-        self._base, self._column = (_standing(fixtures, top) for top in (BASE_TOP_M, COLUMN_TOP_M))
+    def __init__(self, fixtures: Mapping[str, Fixture], opened: Iterable[Fixture] = ()) -> None:
+        doors = _folded(opened)
+        self._base, self._column = (_standing(fixtures, doors, top) for top in (BASE_TOP_M, COLUMN_TOP_M))
         low, high = HAND_Z_M
         tall = [f for f in fixtures.values() if f.pos[2] - f.height / 2 < high and f.pos[2] + f.height / 2 > low]
         self._tall = Footprints([footprint(f) for f in tall])
@@ -240,10 +245,23 @@ class Obstacles:
         )
 
 
-def _standing(fixtures: Mapping[str, Fixture], top: float) -> Footprints:
-    """Fixtures but the floor that begin below a height, metres, and handles that stand out of them."""
+def _standing(fixtures: Mapping[str, Fixture], doors: list[tuple[Footprint, float]], top: float) -> Footprints:
+    """Fixtures but the floor, and doors, that begin below a height, metres; and handles that stand out of them."""
     standing = [f for f in fixtures.values() if f.pos[2] - f.height / 2 < top and f.name != "floor"]
-    return Footprints([mark for f in standing for mark in (footprint(f), *_handles(f, top))])
+    marks = [mark for f in standing for mark in (footprint(f), *_handles(f, top))]
+    return Footprints([*marks, *(mark for mark, height in doors if height < top)])
+
+
+def _folded(fixtures: Iterable[Fixture]) -> list[tuple[Footprint, float]]:
+    """Where the open doors of dishwashers and ovens lie, and how high, metres."""
+    found = []
+    for fixture in fixtures:
+        if isinstance(fixture, Dishwasher | Oven):
+            low, high = fixture.door_span
+            x, y, z = fixture.to_world((0.0, -fixture.depth / 2 - (high - low) / 2, low))
+            mark = Footprint(float(x), float(y), fixture.yaw, (fixture.width / 2, (high - low) / 2))
+            found.append((mark, float(z)))
+    return found
 
 
 def is_free(fixtures: Mapping[str, Fixture], pose: RobotPose) -> bool:

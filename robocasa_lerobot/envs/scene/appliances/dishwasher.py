@@ -23,6 +23,11 @@ class Dishwasher(Racked):
     looks: ClassVar = {"closed": {}, "open": {"door": 1.0, "rack0": 0.8, "rack1": 0.4}}
 
     @property
+    def door_span(self) -> tuple[float, float]:
+        """Lower and upper edge of the door in the fixture's frame, metres."""
+        return -self.height / 2 + _KICK_M, self.height / 2 - 0.006
+
+    @property
     def regions(self) -> dict[str, Region]:
         """Above each rack, the upper one first, moving with it; then the whole inside."""
         low, high = self.cavity()
@@ -63,7 +68,7 @@ class Dishwasher(Racked):
         parts.shell(root, *case, walls, "graphite", "steel_plain")
         for rack in self.racks:
             self._add_rack(parts, root, rack)
-        door_h = height - _KICK_M - 0.006
+        door_h = self.door_span[1] - self.door_span[0]
         door = fold_door(
             parts,
             root,

@@ -16,6 +16,9 @@ DOOR_M, _FOOT_M = 0.060, 0.035
 _WALL_M, _BACK_M = 0.035, 0.06
 _CRISPER_M = 0.19  # height of a crisper drawer
 _SHELF_M = 0.010
+# Of the crisper drawers above the floor of a fridge that reaches down to its feet: the arm, whose shoulder is a metre
+# high, does not reach farther down than 0.4 m. Below them is an open room for bottles.
+_BOTTLES_M = 0.42
 # A shelf that a goal may name (robocasa facts, section 7): its bottom this high in the room, and room above it.
 USABLE_Z, USABLE_ROOM_M = (0.5, 1.5), 0.20
 
@@ -33,7 +36,7 @@ class Fridge(Appliance):
 
     @property
     def drawers(self) -> tuple[str, ...]:
-        """Crisper drawers, all in one row, at the bottom of the fridge; left to right."""
+        """Crisper drawers, all in one row, low in the fridge; left to right."""
         return tuple(f"fridge_drawer{i}" for i in range(self.record["drawers"]))
 
     @property
@@ -109,11 +112,16 @@ class Fridge(Appliance):
                 middle = float(low[2] + high[2]) / 2
                 return [float(low[2]), middle]
             return [float(z) for z in np.linspace(low[2], high[2], self.record["shelves"] + 1)[:-1]]
-        first = float(low[2]) + _CRISPER_M + 0.02
+        first = self._crisper_floor() + _CRISPER_M + 0.02
         count = int(self.record["shelves"])
         # Rooms of the height that counts as usable at least.
         count = min(count, int((high[2] - first) / (USABLE_ROOM_M + _SHELF_M + 0.012)))
         return [float(z) for z in np.linspace(first, high[2], count + 1)[:-1]]
+
+    def _crisper_floor(self) -> float:
+        """Height of what the crisper drawers slide on, in the fixture's frame."""
+        low, _ = self._room("fridge")
+        return float(low[2]) + (_BOTTLES_M if self.record.kind == "fridge_side_by_side" else 0.0)
 
     def _drawer(self, part: str) -> tuple[np.ndarray, np.ndarray]:
         """Centre and size of a drawer when in."""
@@ -127,7 +135,11 @@ class Fridge(Appliance):
         index = int(part[-1])
         size = np.array([pitch - 0.012, (high[1] - low[1]) * 0.86, _CRISPER_M - 0.012])
         centre = np.array(
-            [low[0] + (index + 0.5) * pitch, low[1] + 0.055 + size[1] / 2, low[2] + _CRISPER_M / 2 - 0.002]
+            [
+                low[0] + (index + 0.5) * pitch,
+                low[1] + 0.055 + size[1] / 2,
+                self._crisper_floor() + _CRISPER_M / 2 - 0.002,
+            ]
         )
         return centre, size
 
@@ -175,7 +187,10 @@ class Fridge(Appliance):
             if part == "freezer" and "freezer_drawer" in self.sliding:
                 continue
             room_low, room_high = self._room(part)
-            for level in self._levels(part)[0 if part == "fridge" else 1 :]:
+            boards = self._levels(part)[0 if part == "fridge" else 1 :]
+            if part == "fridge" and self._crisper_floor() > room_low[2]:
+                boards = [self._crisper_floor() - 0.004, *boards]
+            for level in boards:
                 shelf = ((room_low[0], room_low[1] + 0.03, level - _SHELF_M), (room_high[0], room_high[1], level))
                 parts.span(root, *shelf, "shelf_glass")
                 lip = ((room_low[0], room_low[1] + 0.025, level - 0.014), (room_high[0], room_low[1] + 0.033, level))

@@ -23,6 +23,11 @@ class Oven(Racked):
 
     looks: ClassVar = {"closed": {}, "open": {"door": 1.0, "rack0": 0.7}, "on": {"knob_temp": 0.6, "power": 1.0}}
 
+    @property
+    def door_span(self) -> tuple[float, float]:
+        """Lower and upper edge of the door in the fixture's frame, metres."""
+        return -self.height / 2 + 0.012, self.height / 2 - PANEL_M - 0.004
+
     def state(self, data: mujoco.MjData) -> dict[str, float | bool]:
         """Shares of the door, racks and knobs (`time`, `temperature`), and whether it is lit (`on`)."""
         state = super().state(data)
@@ -83,7 +88,7 @@ class Oven(Racked):
         for name in self.racks:
             body = self.add_rack(parts, root, name, rack, mass=1.0, reach=0.70, bars=9, back=0.005)
             parts.box(body, (0, -rack[1] / 2 + 0.004, 0.012), (rack[0], 0.008, 0.024), "wire")
-        add_oven_door(parts, root, self.size, (-height / 2 + 0.012, height / 2 - PANEL_M - 0.004), self.record)
+        add_oven_door(parts, root, self.size, self.door_span, self.record)
 
 
 def add_oven_door(

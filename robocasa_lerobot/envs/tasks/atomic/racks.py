@@ -72,8 +72,8 @@ def _rack(
         horizon,
         "The rack is out by at least 95 % of its range, or in to at most 5 %, as the instruction says.",
         fixtures=(FixtureWanted(kind, kind),),
-        # The open door of a dishwasher, and its rack, take the place in front of it.
-        start=RobotStart(kind, beside=kind == "dishwasher"),
+        # The open door of a dishwasher, and its rack, take the place in front of it; that of an oven, the nearer part.
+        start=RobotStart(kind, beside=kind == "dishwasher", setback=0.35 if kind == "oven" else 0.0),
         choices=(DIRECTION, *choices),
         initial=(InitialOpenness(kind, *door), PartAt(kind, part, STARTS, "direction")),
         goal=When(

@@ -1,0 +1,226 @@
+"""Racks and drawers inside appliances: their front is pushed in with a closed hand, or held at its edge and pulled.
+
+Solved in target kitchens without action noise: SlideDishwasherRack 5/5 and SlideOvenRack 5/5 (seeds 0-4),
+SlideToasterOvenRack 4/4 (0-3), OpenFridgeDrawer 6/6 and CloseFridgeDrawer 6/6 (0-5).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from robocasa_lerobot.demos.motion import (
+    CLOSED,
+    OPEN,
+    Array,
+    HandTarget,
+    base_pose,
+    frame,
+    grip_position,
+    hand_rotation,
+)
+from robocasa_lerobot.demos.skills.common import SkillError, hold_hand, move_hand
+from robocasa_lerobot.demos.skills.levers import FINGER_HALF_M
+from robocasa_lerobot.demos.skills.reach import Plan, plan_reach, shift_base, untried
+from robocasa_lerobot.envs.kitchen_env import KitchenEnv
+from robocasa_lerobot.envs.scene.appliances.base import Appliance
+from robocasa_lerobot.envs.task import Stage
+
+ATTEMPTS = 3
+GRASP_STEPS = 10
+# Shares of the range that are aimed at, beyond what tasks ask for.
+IN_GOAL, OUT_GOAL = 0.02, 0.98
+STANDOFF_M, OVER_M = 0.06, 0.08
+SPEED = 0.6
+BEYOND_M = 0.05  # of the commanded end of a slide: with the servo's lag, the force of the push
+# The hand looks inwards and down by these angles, and across by those, radians.
+TILTS = tuple(np.deg2rad((15.0, 40.0, 65.0, 85.0)))
+TURNS = tuple(np.deg2rad((0.0, 35.0, -35.0)))
+SHIFTS = (
+    (0.0, 0.0),
+    (-0.15, 0.0),
+    (0.12, 0.0),
+    (0.0, 0.2),
+    (0.0, -0.2),
+    (-0.15, 0.25),
+    (-0.15, -0.25),
+    (-0.3, 0.0),
+    (0.2, 0.0),
+    (-0.3, 0.3),
+    (-0.3, -0.3),
+)
+UP = np.array([0.0, 0.0, 1.0])
+
+
+def slide(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
+    """Pull a rack out or push it in, as the episode's direction says.
+
+    Raises:
+        SkillError: it is not there after three attempts.
+    """
+    yield from (push if env.scene.choices["direction"] == "in" else pull)(env, stage)
+
+
+def push(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
+    """Push a rack or drawer in at its front with closed fingers.
+
+    Raises:
+        SkillError: it is not in after three attempts.
+    """
+    data, part = env.data, _Part.of(env, stage)
+    tried: list[Array] = []
+    for _ in range(ATTEMPTS):
+        travel = part.position
+        ways = []
+        for spot in part.spots((0.0, 0.5)):
+            for rotation in rotations(env, part.inwards):
+                support = float(FINGER_HALF_M @ np.abs(rotation.T @ part.inwards))
+                touch = spot - part.inwards * support
+                ways.append(_row(touch, rotation, -part.inwards, part.inwards * travel))
+        plan = _plan(env, part, ways, tried)
+        yield from shift_base(env, plan.shift, CLOSED)
+        yield from _approach(env, plan, CLOSED)
+        end = plan.targets[-1]
+        goal = HandTarget(end.position + part.inwards * BEYOND_M, end.rotation)
+        yield from move_hand(data, goal, CLOSED, speed=SPEED, max_steps=130, until=lambda: part.share <= IN_GOAL)
+        if part.share <= IN_GOAL:
+            return
+        yield from move_hand(data, _off(env, -part.inwards), CLOSED, max_steps=25)
+    raise SkillError(f"{part.name} is still {part.share:.0%} out after {ATTEMPTS} attempts")
+
+
+def pull(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
+    """Hold the edge of a rack or drawer, one finger before or above it and one behind or below, and pull.
+
+    Raises:
+        SkillError: it is not out after three attempts.
+    """
+    data, part = env.data, _Part.of(env, stage)
+    tried: list[Array] = []
+    for _ in range(ATTEMPTS):
+        travel = part.full - part.position
+        ways = []
+        for spot in part.spots((0.0, 0.5)):
+            for rotation in rotations(env, part.inwards):
+                # The fingers close round the edge: they open across it, not along it.
+                if abs(float(rotation[:, 1] @ part.rightwards)) > 0.3:
+                    continue
+                at = spot + part.inwards * part.thick / 2
+                ways.append(_row(at, rotation, -rotation[:, 2], -part.inwards * travel))
+        plan = _plan(env, part, ways, tried)
+        yield from shift_base(env, plan.shift, OPEN)
+        yield from _approach(env, plan, OPEN)
+        at, end = plan.targets[2], plan.targets[-1]
+        yield from hold_hand(data, at, CLOSED, GRASP_STEPS)
+        goal = HandTarget(end.position - part.inwards * BEYOND_M, end.rotation)
+        yield from move_hand(data, goal, CLOSED, speed=SPEED, max_steps=130, until=lambda: part.share >= OUT_GOAL)
+        if part.share >= OUT_GOAL:
+            return
+        yield from hold_hand(data, HandTarget(grip_position(data), hand_rotation(data)), OPEN, GRASP_STEPS)
+        yield from move_hand(data, _off(env, -at.rotation[:, 2]), OPEN, max_steps=25)
+    raise SkillError(f"{part.name} is only {part.share:.0%} out after {ATTEMPTS} attempts")
+
+
+def rotations(env: KitchenEnv, inwards: Array) -> list[Array]:
+    """Rotations of the hand that look inwards and down: tilts and turns, each with four rolls."""
+    out = []
+    across = np.cross(inwards, UP)
+    for turn in TURNS:
+        level = np.cos(turn) * inwards + np.sin(turn) * across
+        for tilt in TILTS:
+            approach = np.cos(tilt) * level - np.sin(tilt) * UP
+            other = np.cross(approach, across)
+            out += [frame(approach, opening) for opening in (across, -across, other, -other)]
+    return out
+
+
+@dataclass(frozen=True)
+class _Part:
+    """A part that slides outwards out of an appliance.
+
+    Attributes:
+        name: of the part.
+        low, high: corners of its front edge in the body's axes, metres.
+    """
+
+    env: KitchenEnv
+    appliance: Appliance
+    name: str
+    low: Array
+    high: Array
+
+    @classmethod
+    def of(cls, env: KitchenEnv, stage: Stage) -> _Part:
+        appliance, name = env.scene.appliance(stage.target), env.scene.fill(stage.part)
+        model, body = env.model, env.model.body(f"{appliance.name}_{name}")
+        first = int(body.geomadr[0])
+        solid = [
+            (model.geom_pos[g] - model.geom_size[g], model.geom_pos[g] + model.geom_size[g])
+            for g in range(first, first + int(body.geomnum[0]))
+            if model.geom_contype[g] or model.geom_conaffinity[g]
+        ]
+        # The geom that reaches farthest to the front is the lip, the grip or the ledge.
+        low, high = min(solid, key=lambda box: float(box[0][1]))
+        return cls(env, appliance, name, low, high)
+
+    @property
+    def body(self) -> int:
+        return int(self.env.model.body(f"{self.appliance.name}_{self.name}").id)
+
+    @property
+    def inwards(self) -> Array:
+        return self.env.data.xmat[self.body].reshape(3, 3)[:, 1].copy()
+
+    @property
+    def rightwards(self) -> Array:
+        return self.env.data.xmat[self.body].reshape(3, 3)[:, 0].copy()
+
+    @property
+    def thick(self) -> float:
+        return float(self.high[1] - self.low[1])
+
+    @property
+    def position(self) -> float:
+        return self.appliance.position(self.env.data, self.name)
+
+    @property
+    def share(self) -> float:
+        return self.appliance.share(self.env.data, self.name)
+
+    @property
+    def full(self) -> float:
+        low, high = self.env.model.joint(self.appliance.joint(self.name)).range
+        return float(high - low)
+
+    def spots(self, shares: tuple[float, ...]) -> list[Array]:
+        """Points of the front edge as it is now: from its middle towards the robot, shares of half of its width."""
+        data = self.env.data
+        middle = np.array([(self.low[0] + self.high[0]) / 2, self.low[1], (self.low[2] + self.high[2]) / 2])
+        origin, turn = data.xpos[self.body], data.xmat[self.body].reshape(3, 3)
+        side = float(np.sign((base_pose(data)[0] - origin) @ self.rightwards))
+        half = (self.high[0] - self.low[0]) / 2
+        return [origin + turn @ (middle + np.array([side * share * half, 0.0, 0.0])) for share in shares]
+
+
+def _row(at: Array, rotation: Array, back: Array, slide: Array) -> tuple[HandTarget, ...]:
+    """Over, before, at the edge, and where it is to be slid to."""
+    before = at + back * STANDOFF_M
+    return tuple(HandTarget(p, rotation) for p in (before + UP * OVER_M, before, at, at + slide))
+
+
+def _plan(env: KitchenEnv, part: _Part, ways: list[tuple[HandTarget, ...]], tried: list[Array]) -> Plan:
+    return untried(plan_reach(env, ways, SHIFTS, allowed=frozenset({part.body})), tried)
+
+
+def _approach(env: KitchenEnv, plan: Plan, gripper: float) -> Iterator[Array]:
+    over, before, at, _ = plan.targets
+    yield from move_hand(env.data, over, gripper, tolerance=0.03)
+    yield from move_hand(env.data, before, gripper, tolerance=0.015)
+    yield from move_hand(env.data, at, gripper, speed=SPEED, tolerance=0.006, max_steps=40)
+
+
+def _off(env: KitchenEnv, way: Array) -> HandTarget:
+    data = env.data
+    return HandTarget(grip_position(data) + way * 0.10 + UP * 0.02, hand_rotation(data))
