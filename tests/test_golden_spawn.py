@@ -17,7 +17,7 @@ from robocasa_lerobot.envs.scene.fixtures.base import Fixture
 from robocasa_lerobot.envs.scene.fixtures.counters import Counter
 from robocasa_lerobot.envs.scene.kitchens import scene_ids
 from robocasa_lerobot.envs.scene.layout import Layout, load_layout
-from robocasa_lerobot.envs.scene.selection import RobotPose, candidates, counter_of, robot_pose
+from robocasa_lerobot.envs.scene.selection import Obstacles, RobotPose, candidates, counter_of, robot_pose
 from robocasa_lerobot.envs.task import RobotStart
 
 STANDOFF_M = 0.20  # of the base centre from the counter's front edge
@@ -67,11 +67,11 @@ def test_blocked_poses_are_drawn_again_and_the_deviation_widens(monkeypatch: pyt
     counter = counter_of(layout, sink)
     tried: list[tuple[float, float]] = []
 
-    def blocked(_: Layout, pose: RobotPose) -> bool:
+    def free(_: Obstacles, pose: RobotPose) -> bool:
         tried.append(_in_counter(counter, pose))
-        return len(tried) <= 120
+        return len(tried) > 120
 
-    monkeypatch.setattr(selection, "_blocked", blocked)
+    monkeypatch.setattr(Obstacles, "leave_free", free)
     robot_pose(np.random.default_rng(1), layout, RobotStart("sink"), sink)
     assert len(tried) == 121
     centre = _in_counter(counter, RobotPose(sink.pos[0], sink.pos[1], 0.0))[0]
@@ -84,7 +84,7 @@ def test_blocked_poses_are_drawn_again_and_the_deviation_widens(monkeypatch: pyt
 
 def test_a_layout_without_a_free_place_is_given_up(monkeypatch: pytest.MonkeyPatch) -> None:
     layout, sink = _sinks()[0]
-    monkeypatch.setattr(selection, "_blocked", lambda *_: True)
+    monkeypatch.setattr(Obstacles, "leave_free", lambda *_: False)
     with pytest.raises(PlacementError, match="no free place"):
         robot_pose(np.random.default_rng(0), layout, RobotStart("sink"), sink)
 
