@@ -112,14 +112,14 @@ def pull(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
         plan = _plan(env, part, ways, tried)
         yield from shift_base(env, plan.shift, OPEN)
         yield from _approach(env, plan, OPEN)
-        at, end = plan.targets[2], plan.targets[-1]
-        yield from hold_hand(data, at, CLOSED, GRASP_STEPS)
+        _, _, held, end = plan.targets
+        yield from hold_hand(data, held, CLOSED, GRASP_STEPS)
         goal = HandTarget(end.position - part.inwards * BEYOND_M, end.rotation)
         yield from move_hand(data, goal, CLOSED, speed=SPEED, max_steps=130, until=lambda: part.share >= OUT_GOAL)
         if part.share >= OUT_GOAL:
             return
         yield from hold_hand(data, HandTarget(grip_position(data), hand_rotation(data)), OPEN, GRASP_STEPS)
-        yield from move_hand(data, _off(env, -at.rotation[:, 2]), OPEN, max_steps=25)
+        yield from move_hand(data, _off(env, -held.rotation[:, 2]), OPEN, max_steps=25)
     raise SkillError(f"{part.name} is only {part.share:.0%} out after {ATTEMPTS} attempts")
 
 
