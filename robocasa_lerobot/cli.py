@@ -29,6 +29,7 @@ class Subcommand:
 
 SUBCOMMANDS: dict[str, Subcommand] = {
     "demos": Subcommand("robocasa_lerobot.demos.command", "record demonstrations of tasks as HDF5"),
+    "replay": Subcommand("robocasa_lerobot.demos.replay_command", "check that demonstrations can be replayed"),
     "convert": Subcommand(
         "robocasa_lerobot.convert.commands.convert", "convert demonstration files to a LeRobotDataset v3.0"
     ),

@@ -1,0 +1,157 @@
+"""Do recorded demonstrations replay? Their actions open loop from the first state, and their states one by one.
+
+The kitchen is made again from the task, split and seed in the file (and the layouts and styles it was restricted to).
+"""
+
+from __future__ import annotations
+
+import json
+import multiprocessing
+from collections.abc import Iterable, Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import h5py
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from robocasa_lerobot import contract
+from robocasa_lerobot.demos.episode import SUCCESS_HOLD_STEPS
+from robocasa_lerobot.envs.kitchen_env import KitchenEnv
+from robocasa_lerobot.errors import UserError
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Replayed:
+    """What came of one demonstration.
+
+    Attributes:
+        path: the file.
+        demo: its name in the file.
+        task: name.
+        actions: whether the goal held for as long as a recording asks for, when the actions were carried out.
+        states: whether the goal holds in the last recorded state.
+        same_start: whether the kitchen's own first state is the recorded one, bit for bit.
+        deviation: largest difference of a joint position between the recorded states and those passed through.
+        note: what went wrong, or "".
+    """
+
+    path: Path
+    demo: str
+    task: str
+    actions: bool
+    states: bool
+    same_start: bool
+    deviation: float
+    note: str = ""
+
+
+def demonstrations(paths: Iterable[Path]) -> list[tuple[Path, str]]:
+    """Files and names of all demonstrations in files and folders, in order.
+
+    Raises:
+        UserError: there are none.
+    """
+    found: list[tuple[Path, str]] = []
+    for path in paths:
+        files = sorted(path.glob("*.hdf5")) if path.is_dir() else [path]
+        for file in files:
+            if not file.is_file():
+                raise UserError(f"{file}: no such file or folder; `robocasa-lerobot demos` records demonstrations.")
+            try:
+                with h5py.File(file) as opened:
+                    names = [name for name in opened.get("data", ()) if name.startswith("demo_")]
+            except OSError as error:
+                raise UserError(f"{file} is no HDF5 file ({error}).") from error
+            found += [(file, name) for name in sorted(names, key=lambda name: int(name.removeprefix("demo_")))]
+    if not found:
+        raise UserError("no demonstrations: give files or folders that `robocasa-lerobot demos` wrote.")
+    return found
+
+
+def replay_all(chosen: Sequence[tuple[Path, str]], workers: int = 1) -> Iterator[Replayed]:
+    """Replay demonstrations, in several processes, as they end."""
+    if workers <= 1:
+        for path, demo in chosen:
+            yield replay(path, demo)
+        return
+    context = multiprocessing.get_context("forkserver")
+    with ProcessPoolExecutor(min(workers, len(chosen)), mp_context=context) as pool:
+        for future in as_completed([pool.submit(replay, *one) for one in chosen]):
+            yield future.result()
+
+
+def replay(path: Path, demo: str) -> Replayed:
+    """Replay one demonstration both ways.
+
+    Raises:
+        UserError: its kitchen cannot be made again.
+    """
+    with h5py.File(path) as file:
+        group = file[f"data/{demo}"]
+        task = str(file["data"].attrs["env"])
+        meta = json.loads(group.attrs["ep_meta"])
+        states, actions = group["states"][()], contract.hdf5_to_stored(group["actions"][()])
+    if "seed" not in meta or "split" not in meta:
+        raise UserError(f"{path}, {demo}: its ep_meta has no scene seed and split; it was recorded by other software.")
+    env = _env(task, meta)
+    try:
+        env.reset(seed=int(meta["seed"]))
+        start = _state(env)
+        if start.shape != states[0].shape:
+            note = f"{states[0].size} numbers in a state, {start.size} in the kitchen as it is made now"
+            return Replayed(path, demo, task, False, False, False, np.inf, note)
+        same = bool(np.array_equal(start, states[0]))
+        final = _goal_holds_in(env, states[-1])
+        done, deviation = _carry_out(env, states, actions)
+    finally:
+        env.close()
+    return Replayed(path, demo, task, done, final, same, deviation)
+
+
+def _env(task: str, meta: dict[str, Any]) -> KitchenEnv:
+    return KitchenEnv(
+        task,
+        split=str(meta["split"]),
+        cameras=(),
+        terminate_on_success=False,
+        layouts=meta.get("layouts"),
+        styles=meta.get("styles"),
+    )
+
+
+def _carry_out(env: KitchenEnv, states: Array, actions: Array) -> tuple[bool, float]:
+    """Whether the actions reach the goal and keep it, from the recorded first state, and the largest deviation."""
+    _put(env, env.data, states[0])
+    held, deviation = 0, 0.0
+    for state, action in zip(states, actions, strict=True):
+        deviation = max(deviation, float(np.abs(env.data.qpos - state[1 : 1 + env.model.nq]).max()))
+        _, reward, _, _, _ = env.step(action.astype(np.float32))
+        held = held + 1 if reward > 0 else 0
+    return held >= SUCCESS_HOLD_STEPS, deviation
+
+
+def _goal_holds_in(env: KitchenEnv, state: Array) -> bool:
+    """Whether the goal holds in a recorded state, set into a simulation of its own; nothing sleeps in it."""
+    data = mujoco.MjData(env.model)
+    _put(env, data, state)
+    return bool(env.declaration.goal.evaluate(env.scene, data, {}))
+
+
+def _put(env: KitchenEnv, data: mujoco.MjData, state: Array) -> None:
+    """Write a recorded state, unless it is there already: what is not in it (latches, sleep) then stays."""
+    model = env.model
+    wanted = state[1 : 1 + model.nq], state[1 + model.nq :]
+    if np.array_equal(data.qpos, wanted[0]) and np.array_equal(data.qvel, wanted[1]):
+        return
+    data.time, data.qpos[:], data.qvel[:] = state[0], *wanted
+    mujoco.mj_forward(model, data)
+
+
+def _state(env: KitchenEnv) -> Array:
+    return np.concatenate([[env.data.time], env.data.qpos, env.data.qvel])
