@@ -18,7 +18,7 @@ export PYTHONUNBUFFERED := 1
 export UV_HTTP_TIMEOUT ?= 300
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
-.PHONY: help setup demo test test-slow lint format lock doctor bench bench-convert bench-grasps bench-demonstrators clean
+.PHONY: help setup demo test test-slow lint format lock docs doctor bench bench-convert bench-grasps bench-demonstrators clean
 
 help:  ## this list
 	@sed -n 's/^\([a-z-]*\):.*  ## /\1\t/p' Makefile | awk -F '\t' '{printf "  make %-13s %s\n", $$1, $$2}'
@@ -59,6 +59,9 @@ lint: $(STAMP)  ## ruff and mypy
 format: $(STAMP)  ## rewrite the sources in the project's format
 	$(BIN)/ruff check --fix .
 	$(BIN)/ruff format .
+
+docs: $(STAMP)  ## write docs/tasks.md from the declarations of the tasks
+	$(BIN)/robocasa-lerobot tasks --markdown docs/tasks.md
 
 doctor: $(STAMP)  ## check this machine
 	$(BIN)/robocasa-lerobot doctor

@@ -35,13 +35,15 @@ TRIALS = common.REPOSITORY / "outputs" / "demonstrators.jsonl"
 SPLITS = ("target", "pretrain")
 FIRST_SEED = 100_000  # below, skills are tuned
 
+type Key = tuple[str, str, int, float, bool]  # task, split, seed, action noise, whether it is varied
+
 
 @dataclass(frozen=True)
 class Trial:
     """One attempt of a demonstrator.
 
     Attributes:
-        task, split, seed, action_noise: what was tried.
+        task, split, seed, action_noise, varied: what was tried.
         success: whether the goal held at the end.
         steps: control steps of the episode.
         wall_s: seconds that it took, making the kitchen included.
@@ -55,6 +57,7 @@ class Trial:
     split: str
     seed: int
     action_noise: float
+    varied: bool
     success: bool
     steps: int
     wall_s: float
@@ -64,9 +67,9 @@ class Trial:
     commit: str
 
     @property
-    def key(self) -> tuple[str, str, int, float]:
+    def key(self) -> Key:
         """What makes it one trial."""
-        return self.task, self.split, self.seed, self.action_noise
+        return self.task, self.split, self.seed, self.action_noise, self.varied
 
 
 def parse(arguments: Sequence[str] | None = None) -> argparse.Namespace:
@@ -77,6 +80,7 @@ def parse(arguments: Sequence[str] | None = None) -> argparse.Namespace:
     parser.add_argument("--splits", default=",".join(SPLITS), help="default: both")
     parser.add_argument("--first-seed", type=int, default=FIRST_SEED, help=f"default {FIRST_SEED}")
     parser.add_argument("--action-noise", type=float, default=0.0, help="as of `demos` (default 0)")
+    parser.add_argument("--plain", action="store_true", help="without variety of speed, paths and grasps")
     parser.add_argument("--workers", type=int, default=os.cpu_count() or 1, help="processes (default: all cores)")
     parser.add_argument("--fresh", action="store_true", help="forget finished trials of these tasks and settings")
     parser.add_argument("--report", action="store_true", help="run nothing: result and picture of what is there")
@@ -85,13 +89,14 @@ def parse(arguments: Sequence[str] | None = None) -> argparse.Namespace:
     return parser.parse_args(arguments)
 
 
-def attempt(task: str, split: str, seed: int, action_noise: float, workers: int, commit: str) -> Trial:
+def attempt(key: Key, workers: int, commit: str) -> Trial:
     """Let the demonstrator try once. Nothing that goes wrong ends the benchmark: it counts as a failure."""
+    task, split, seed, action_noise, varied = key
     started = time.perf_counter()
     env = KitchenEnv(task, split=split, cameras=(), terminate_on_success=False)
     success, steps, reason, false_terms = False, 0, "", ()
     try:
-        recording = record_episode(env, seed, action_noise=action_noise)
+        recording = record_episode(env, seed, action_noise=action_noise, varied=varied)
         success, steps, reason = recording.success, len(recording.actions), recording.reason
         false_terms = recording.false_terms
     except Exception as error:
@@ -99,10 +104,10 @@ def attempt(task: str, split: str, seed: int, action_noise: float, workers: int,
     finally:
         env.close()
     seconds = round(time.perf_counter() - started, 3)
-    return Trial(task, split, seed, action_noise, success, steps, seconds, workers, reason, false_terms, commit)
+    return Trial(*key, success, steps, seconds, workers, reason, false_terms, commit)
 
 
-def read_trials(path: Path) -> dict[tuple[str, str, int, float], Trial]:
+def read_trials(path: Path) -> dict[Key, Trial]:
     """Finished trials; of one that was made twice, the later."""
     if not path.exists():
         return {}
@@ -112,7 +117,7 @@ def read_trials(path: Path) -> dict[tuple[str, str, int, float], Trial]:
     return {trial.key: trial for trial in trials}
 
 
-def forget(path: Path, keys: Iterable[tuple[str, str, int, float]]) -> None:
+def forget(path: Path, keys: Iterable[Key]) -> None:
     """Remove trials from the file."""
     gone = set(keys)
     left = [trial for key, trial in read_trials(path).items() if key not in gone]
@@ -122,7 +127,7 @@ def forget(path: Path, keys: Iterable[tuple[str, str, int, float]]) -> None:
     aside.replace(path)
 
 
-def run(jobs: list[tuple[str, str, int, float]], path: Path, workers: int) -> None:
+def run(jobs: list[Key], path: Path, workers: int) -> None:
     """Make the trials, and write each down when it has ended."""
     commit = common.versions()["commit"]
     path.parent.mkdir(parents=True, exist_ok=True)
@@ -131,7 +136,7 @@ def run(jobs: list[tuple[str, str, int, float]], path: Path, workers: int) -> No
     context.set_forkserver_preload(["robocasa_lerobot.demos.episode"])
     solved = failed = 0
     with ProcessPoolExecutor(workers, mp_context=context) as pool, path.open("a", encoding="utf-8") as file:
-        futures = [pool.submit(attempt, *job, workers, commit) for job in jobs]
+        futures = [pool.submit(attempt, job, workers, commit) for job in jobs]
         try:
             with tqdm(as_completed(futures), total=len(futures), unit="trial", smoothing=0.02) as bar:
                 for future in bar:
@@ -157,22 +162,20 @@ def main(arguments: Sequence[str] | None = None) -> int:
     names = expand_names(options.tasks)
     splits = tuple(split.strip() for split in options.splits.split(","))
     seeds = range(options.first_seed, options.first_seed + options.seeds)
-    noise = options.action_noise
+    how = options.action_noise, not options.plain
     # Seed by seed, so that a run that is stopped has seen all tasks about equally often.
     able = [name for name in names if can_demonstrate(get_task(name))]
-    jobs = [(name, split, seed, noise) for seed in seeds for split in splits for name in able]
+    jobs = [(name, split, seed, *how) for seed in seeds for split in splits for name in able]
     if not options.report:
         if options.fresh:
-            forget(options.trials, [key for key in read_trials(options.trials) if key[0] in names and key[3] == noise])
+            forget(options.trials, [key for key in read_trials(options.trials) if key[0] in names and key[3:] == how])
         done = read_trials(options.trials)
         todo = [job for job in jobs if job not in done]
         print(f"{len(able)} of {len(names)} tasks have a demonstrator; {len(todo)} of {len(jobs)} trials to make")
         if todo:
             run(todo, options.trials, options.workers)
     wanted = {(split, seed) for split in splits for seed in seeds}
-    trials = [
-        t for t in read_trials(options.trials).values() if t.action_noise == noise and (t.split, t.seed) in wanted
-    ]
+    trials = [t for t in read_trials(options.trials).values() if t.key[3:] == how and (t.split, t.seed) in wanted]
     tasks = summary(trials, {name: can_demonstrate(get_task(name)) for name in task_names()})
     body = {
         "machine": common.machine(),
@@ -181,7 +184,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
             "first_seed": options.first_seed,
             "seeds_per_split": options.seeds,
             "splits": list(splits),
-            "action_noise": noise,
+            "action_noise": options.action_noise,
+            "varied": not options.plain,
         },
         "trials": len(trials),
         "commits": {c: sum(t.commit == c for t in trials) for c in sorted({t.commit for t in trials})},

@@ -22,7 +22,7 @@ def bench(monkeypatch: pytest.MonkeyPatch) -> ModuleType:
 
 
 def _trial(bench: ModuleType, task: str, split: str, seed: int, success: bool, steps: int = 200, **values: Any) -> Any:
-    known = {"action_noise": 0.0, "wall_s": 2.0, "workers": 2, "commit": "abc", "false_terms": ()}
+    known = {"action_noise": 0.0, "varied": True, "wall_s": 2.0, "workers": 2, "commit": "abc", "false_terms": ()}
     reason = "" if success else f"the hand stayed {seed} cm away"
     return bench.Trial(
         **{**known, **values}, task=task, split=split, seed=seed, success=success, steps=steps, reason=reason
@@ -68,8 +68,8 @@ def test_finished_trials_are_kept_replaced_and_forgotten(
     def run(jobs: list[Any], path: Path, workers: int) -> None:
         made.extend(jobs)
         with path.open("a") as stream:
-            for task, split, seed, noise in jobs:
-                trial = _trial(bench, task, split, seed, True, action_noise=noise)
+            for task, split, seed, noise, varied in jobs:
+                trial = _trial(bench, task, split, seed, True, action_noise=noise, varied=varied)
                 stream.write(json.dumps(vars(trial)) + "\n")
 
     monkeypatch.setattr(bench, "run", run)
@@ -77,7 +77,7 @@ def test_finished_trials_are_kept_replaced_and_forgotten(
     options = ["--seeds", "2", "--trials", str(file), "--out", str(out)]
     assert bench.main(["--tasks", "OpenDrawer,CloseDrawer", *options]) == 0
     assert len(made) == 8
-    assert {seed for _, _, seed, _ in made} == {100_000, 100_001}
+    assert {seed for _, _, seed, _, _ in made} == {100_000, 100_001}
     file.write_text(file.read_text()[:-9])  # killed while it wrote the last line
     made.clear()
     bench._mend(file)
@@ -85,7 +85,7 @@ def test_finished_trials_are_kept_replaced_and_forgotten(
     assert len(made) == 1
     made.clear()
     bench.main(["--tasks", "OpenDrawer", "--fresh", *options])
-    assert sorted(made) == sorted(("OpenDrawer", s, n, 0.0) for s in bench.SPLITS for n in (100_000, 100_001))
+    assert sorted(made) == sorted(("OpenDrawer", s, n, 0.0, True) for s in bench.SPLITS for n in (100_000, 100_001))
     result = json.loads(out.read_text())
     assert result["trials"] == 8
     assert set(result["tasks"]) == set(task_names())

@@ -40,6 +40,7 @@ class RecordingSettings:
         image_size: of those pictures, pixels.
         layouts: ids of layouts or of groups of them; None takes the split's own.
         styles: the same for styles.
+        varied: whether each demonstration is carried out in its own way (`demos.variety`).
     """
 
     task: str
@@ -51,6 +52,7 @@ class RecordingSettings:
     image_size: int = 256
     layouts: tuple[int, ...] | None = None
     styles: tuple[int, ...] | None = None
+    varied: bool = True
 
     def env_kwargs(self) -> dict[str, Any]:
         """Arguments of the env, for the file's `env_args`."""
@@ -179,7 +181,9 @@ class Parts:
         seed = settings.seed + number
         recording: Recording | None = None
         try:
-            recording = record_episode(env, seed, action_noise=settings.action_noise, images=settings.images)
+            recording = record_episode(
+                env, seed, action_noise=settings.action_noise, images=settings.images, varied=settings.varied
+            )
         except (OSError, MemoryError, NoOpenGLError):
             raise
         except Exception as error:

@@ -43,6 +43,9 @@ def configure(parser: argparse.ArgumentParser) -> None:
         help="standard deviation of the noise on arm commands, 1 is a full command (default 0.05)",
     )
     parser.add_argument(
+        "--plain", action="store_true", help="no variety: speed, paths and choice of grasps as the skills have them"
+    )
+    parser.add_argument(
         "--images", action="store_true", help="store camera pictures too (the converter can render them)"
     )
     parser.add_argument("--image-size", type=int, default=256, help="height and width of stored pictures (default 256)")
@@ -76,6 +79,7 @@ def run(args: argparse.Namespace) -> int:
             image_size=args.image_size,
             layouts=args.layouts,
             styles=args.styles,
+            varied=not args.plain,
         )
         for name in chosen.names
     ]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from typing import Any
 
 import numpy as np
@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from robocasa_lerobot import contract
 from robocasa_lerobot.demos.demonstrator import SkillError, demonstrate
+from robocasa_lerobot.demos.variety import PLAIN, Variety
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.proprioception import read_observations
 
@@ -17,7 +18,8 @@ Array = NDArray[np.float64]
 
 # An episode ends after this many consecutive steps in which the goal holds (robocasa facts, section 4).
 SUCCESS_HOLD_STEPS = 15
-_NOISE_STREAM = 2  # key of the generator of action noise, apart from those of the scene and the arm
+# Keys of the generators of action noise and of variety, apart from those of the scene and the arm.
+_NOISE_STREAM, _VARIETY_STREAM = 2, 6
 
 
 @dataclass
@@ -70,7 +72,9 @@ class _Buffer:
                 self.observations.setdefault(f"{camera}_image", []).append(env.render_camera(camera))
 
 
-def record_episode(env: KitchenEnv, seed: int, *, action_noise: float = 0.0, images: bool = False) -> Recording:
+def record_episode(
+    env: KitchenEnv, seed: int, *, action_noise: float = 0.0, images: bool = False, varied: bool = False
+) -> Recording:
     """Attempt a demonstration of the env's task in the scene of `seed`.
 
     Args:
@@ -79,16 +83,18 @@ def record_episode(env: KitchenEnv, seed: int, *, action_noise: float = 0.0, ima
         action_noise: standard deviation of Gaussian noise on the six commanded arm components (unit: full command);
             it is part of the action that is executed and recorded.
         images: also keep the camera pictures.
+        varied: draw how the demonstration is carried out (`Variety`) from the seed; else as the skills have it.
     """
     assert not env.terminate_on_success, "the recorder decides when an episode ends"
     env.render_observations = False
     rng = np.random.default_rng([seed, _NOISE_STREAM])
+    variety = Variety.draw(np.random.default_rng([seed, _VARIETY_STREAM])) if varied else PLAIN
     _, info = env.reset(seed=seed)
     model_file = env.scene.spec.to_xml()
     buffer = _Buffer()
     held, reason = 0, ""
     try:
-        for wanted in demonstrate(env):
+        for wanted in demonstrate(env, variety):
             # Everything is carried out in single precision, as a policy's action is, and recorded as carried out.
             action = _with_noise(rng, wanted, action_noise).astype(np.float32).astype(np.float64)
             buffer.add(env, contract.binarize(action), info["success"], images=images)
@@ -114,7 +120,7 @@ def record_episode(env: KitchenEnv, seed: int, *, action_noise: float = 0.0, ima
         assets={
             name: data for name, data in env.scene.spec.assets.items() if name.startswith(("textures/", "objects/"))
         },
-        ep_meta={**env.scene.ep_meta(), **_kitchens(env), "action_noise": action_noise},
+        ep_meta={**env.scene.ep_meta(), **_kitchens(env), "action_noise": action_noise, "variety": asdict(variety)},
     )
 
 

@@ -1,59 +1,146 @@
-"""`robocasa-lerobot tasks`: list the tasks, what they need and who can demonstrate them; check that they are sound."""
+"""`robocasa-lerobot tasks`: list the tasks, describe and draw them, and check that they are sound."""
 
 from __future__ import annotations
 
 import argparse
 import json
+from pathlib import Path
+from typing import TYPE_CHECKING
 
-EXAMPLE = "robocasa-lerobot tasks --set atomic_seen"
+if TYPE_CHECKING:
+    from robocasa_lerobot.envs.task import Task
+
+EXAMPLE = (
+    "robocasa-lerobot tasks --set atomic_seen --skill doors\n  robocasa-lerobot tasks OpenDrawer --pictures drawer.png"
+)
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
     """Add the arguments."""
-    parser.add_argument("names", nargs="*", help="tasks to list (default: all)")
-    parser.add_argument("--set", dest="task_set", help="only the tasks of a set, e.g. atomic_seen")
+    parser.add_argument("names", nargs="*", help="tasks or sets (default: all); a single task is described")
+    group = parser.add_argument_group("filters")
+    group.add_argument("--set", dest="task_set", help="only the tasks of a set, e.g. atomic_seen")
+    group.add_argument("--skill", help="only tasks with a stage of a skill, e.g. doors")
+    group.add_argument("--fixture", help="only tasks with a kind of fixture, e.g. drawer_top, or part of its name")
+    shown = group.add_mutually_exclusive_group()
+    shown.add_argument("--demonstrated", action="store_true", help="only tasks that a demonstrator can solve")
+    shown.add_argument("--not-demonstrated", action="store_true", help="only tasks that none can solve")
+    parser.add_argument("--describe", action="store_true", help="everything about each, as in docs/tasks.md")
+    parser.add_argument("--pictures", type=Path, metavar="FILE", help="of one task: render its first and last state")
+    parser.add_argument("--split", default="target", help="kitchens of --pictures (default target)")
+    parser.add_argument("--seed", type=int, default=0, help="seed of --pictures (default 0)")
+    parser.add_argument("--markdown", type=Path, metavar="FILE", help="write the page docs/tasks.md")
     parser.add_argument("--check", action="store_true", help="reset and step each on 10 seeds and report what is wrong")
     parser.add_argument("--json", action="store_true", help="print JSON")
 
 
 def run(args: argparse.Namespace) -> int:
-    """Print a table of tasks, or of what the checker found; status 1 if a check failed."""
+    """Print a table or pages of tasks, or what the checker found; status 1 if a check failed."""
+    from robocasa_lerobot.demos.task_pages import page, pages
+    from robocasa_lerobot.errors import UserError
+
+    tasks = _chosen(args)
+    if args.check:
+        return _check(tasks)
+    if args.markdown:
+        aside = args.markdown.with_name(args.markdown.name + ".part")
+        aside.write_text(pages(tasks), encoding="utf-8")
+        aside.replace(args.markdown)
+        print(f"{args.markdown}: {len(tasks)} tasks")
+        return 0
+    if args.pictures:
+        from robocasa_lerobot.demos.task_pictures import render_states
+
+        if len(tasks) != 1:
+            raise UserError(f"--pictures is of one task; {len(tasks)} were asked for: name one.")
+        said = render_states(tasks[0].name, args.pictures, split=args.split, seed=args.seed)
+        print(f"{args.pictures}: {tasks[0].name}, {said}")
+        return 0
+    if args.json:
+        print(json.dumps([_facts(task) for task in tasks], indent=1))
+    elif args.describe or (len(tasks) == 1 and args.names):
+        for task in tasks:
+            print("\n".join([f"{task.name}", "", *page(task), ""]))
+    else:
+        _table(tasks)
+    return 0
+
+
+def _chosen(args: argparse.Namespace) -> list[Task]:
+    """The tasks that names and filters leave.
+
+    Raises:
+        UnknownNameError: no such task, set, skill or fixture.
+        UserError: nothing is left.
+    """
+    from robocasa_lerobot.demos.choose import expand_names
     from robocasa_lerobot.demos.demonstrator import can_demonstrate
     from robocasa_lerobot.envs.registry import get_task, task_names, task_set
+    from robocasa_lerobot.errors import UnknownNameError, UserError
 
-    names = args.names or (task_set(args.task_set) if args.task_set else task_names())
-    tasks = [get_task(name) for name in names]
-    if args.check:
-        from robocasa_lerobot.envs.check import check_task
+    tasks = [get_task(name) for name in (expand_names(",".join(args.names)) if args.names else task_names())]
+    if args.task_set:
+        members = task_set(args.task_set)
+        tasks = [task for task in tasks if task.name in members]
+    if args.skill:
+        known = {stage.skill for name in task_names() for stage in get_task(name).stages}
+        if args.skill not in known:
+            raise UnknownNameError("skill", args.skill, known)
+        tasks = [task for task in tasks if args.skill in {stage.skill for stage in task.stages}]
+    if args.fixture:
+        kinds = {fixture.kind for name in task_names() for fixture in get_task(name).fixtures}
+        if not any(args.fixture in kind for kind in kinds):
+            raise UnknownNameError("kind of fixture", args.fixture, kinds)
+        tasks = [task for task in tasks if any(args.fixture in fixture.kind for fixture in task.fixtures)]
+    if args.demonstrated or args.not_demonstrated:
+        tasks = [task for task in tasks if can_demonstrate(task) == args.demonstrated]
+    if not tasks:
+        raise UserError("no task is left by these filters: leave one out.")
+    return tasks
 
-        failures = 0
-        for task in tasks:
-            faults = check_task(task.name)
-            failures += bool(faults)
-            print(f"{task.name}: {'; '.join(faults) if faults else 'ok'}")
-        return 1 if failures else 0
-    if args.json:
-        print(
-            json.dumps(
-                [
-                    {
-                        "name": t.name,
-                        "kind": t.kind,
-                        "horizon": t.horizon,
-                        "demonstrator": can_demonstrate(t),
-                        "sets": t.sets,
-                        "instruction": t.instruction,
-                    }
-                    for t in tasks
-                ],
-                indent=1,
-            )
-        )
-        return 0
-    width = max(len(t.name) for t in tasks)
-    print(f"{'task':<{width}}  {'kind':<9}  horizon  demonstrator  instruction")
+
+def _check(tasks: list[Task]) -> int:
+    from robocasa_lerobot.envs.check import check_task
+
+    failures = 0
+    for task in tasks:
+        faults = check_task(task.name)
+        failures += bool(faults)
+        print(f"{task.name}: {'; '.join(faults) if faults else 'ok'}")
+    return 1 if failures else 0
+
+
+def _facts(task: Task) -> dict[str, object]:
+    from robocasa_lerobot.demos.demonstrator import can_demonstrate
+    from robocasa_lerobot.envs.registry import human_seconds
+
+    return {
+        "name": task.name,
+        "kind": task.kind,
+        "horizon": task.horizon,
+        "human_seconds": human_seconds(task.name),
+        "demonstrator": can_demonstrate(task),
+        "skills": sorted({stage.skill for stage in task.stages}),
+        "fixtures": {fixture.role: fixture.kind for fixture in task.fixtures},
+        "sets": task.sets,
+        "instruction": task.instruction,
+        "paraphrases": task.paraphrases,
+    }
+
+
+def _table(tasks: list[Task]) -> None:
+    from robocasa_lerobot.demos.demonstrator import can_demonstrate
+
+    width = max(len(task.name) for task in tasks)
+    skills = {task.name: ", ".join(sorted({stage.skill for stage in task.stages})) for task in tasks}
+    wide = max(len("skill"), *map(len, skills.values()))
+    print(f"{'task':<{width}}  {'kind':<9}  {'skill':<{wide}}  horizon  demonstrator  instruction")
     for task in tasks:
         able = "yes" if can_demonstrate(task) else "-"
-        print(f"{task.name:<{width}}  {task.kind:<9}  {task.horizon:>7}  {able:<12}  {task.instruction}")
-        print(f"{'':<{width}}  {'':<9}  {'':>7}  {'':<12}  sets: {', '.join(task.sets)}")
-    return 0
+        print(
+            f"{task.name:<{width}}  {task.kind:<9}  {skills[task.name]:<{wide}}  {task.horizon:>7}  {able:<12}  "
+            f"{task.instruction}"
+        )
+        print(f"{'':<{width}}  {'':<9}  {'':<{wide}}  {'':>7}  {'':<12}  sets: {', '.join(task.sets)}")
+    able_count = sum(can_demonstrate(task) for task in tasks)
+    print(f"{len(tasks)} tasks, {able_count} with a demonstrator")

@@ -81,7 +81,7 @@ class DemonstratorPolicy(_Blind):
         try:
             self._last = np.clip(next(self._actions), -1.0, 1.0)
         except (SkillError, StopIteration):
-            gripper = contract.ACTION_SLICES["gripper"]
+            gripper = contract.ACTION_SLICES["gripper_close"]
             held = np.zeros(contract.ACTION_SIZE)
             held[gripper] = self._last[gripper]
             self._last = held

@@ -22,6 +22,7 @@ from robocasa_lerobot.demos.motion import (
     limit,
     pose_error,
 )
+from robocasa_lerobot.demos.variety import variety_of
 from robocasa_lerobot.envs.bodies import subtree
 from robocasa_lerobot.envs.control.indices import joint_positions, joint_velocities
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
@@ -66,6 +67,8 @@ def plan_reach(
 ) -> list[Plan]:
     """Ways to reach, the best first: the arm gets there, far from its joints' limits and from what stands around.
 
+    Of ways that are about equally good, the one comes first that the demonstration's variety prefers.
+
     Args:
         env: its state is read, not touched.
         ways: alternatives, each a row of hand poses.
@@ -88,7 +91,8 @@ def plan_reach(
             best = min(best, cost)
         if best < GOOD_ENOUGH:
             break
-    return sorted(plans, key=lambda plan: plan.cost)
+    variety = variety_of(env)
+    return sorted(plans, key=lambda plan: plan.cost - variety.bonus(plan.targets[-1].rotation))
 
 
 def untried(plans: list[Plan], tried: list[Array]) -> Plan:

@@ -1,0 +1,96 @@
+"""Variety: what differs between two demonstrations of one task beyond the kitchen, drawn once for each.
+
+A demonstration has a speed, a side to which its free ways bow, and a preference among ways to hold the hand that are
+about equally good: grasps, rolls and approaches. Speed and bow change the actions that any skill asks for; the
+preference is asked for by skills that choose among candidates (`variety_of(env).bonus(rotation)`).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from weakref import WeakKeyDictionary
+
+import mujoco
+import numpy as np
+
+from robocasa_lerobot import contract
+from robocasa_lerobot.demos.motion import FROM_ACHIEVED, Array
+from robocasa_lerobot.envs.kitchen_env import KitchenEnv
+
+_SLOWEST = 0.75
+_BOW_RAD = 0.2
+# A candidate may cost this much more than the best one (`reach.Plan.cost`) and still be taken.
+_WEIGHT = 0.12
+# Commands up to this share of a full one are fine servoing or pushing: they stay as they are.
+_FINE = 0.4
+
+_POSITION = contract.ACTION_SLICES["end_effector_position"]
+_BASE = contract.ACTION_SLICES["base_motion"]
+_GRIPPER = contract.ACTION_SLICES["gripper_close"]
+_MODE = contract.ACTION_SLICES["control_mode"]
+
+
+@dataclass(frozen=True)
+class Variety:
+    """How a demonstration is carried out. The defaults change nothing.
+
+    Attributes:
+        speed: factor of fast commands of arm and base, in (0, 1].
+        bow_rad: angle about the vertical by which free horizontal ways of the open hand start beside their goal.
+        hand: quaternion (w, x, y, z) in the world of the hand that is preferred.
+        weight: what the preference is worth, in the cost of candidates.
+    """
+
+    speed: float = 1.0
+    bow_rad: float = 0.0
+    hand: tuple[float, float, float, float] = (1.0, 0.0, 0.0, 0.0)
+    weight: float = 0.0
+
+    @classmethod
+    def draw(cls, rng: np.random.Generator) -> Variety:
+        """A random one."""
+        quaternion = rng.normal(size=4)
+        w, x, y, z = (float(v) for v in quaternion / np.linalg.norm(quaternion))
+        return cls(
+            speed=float(rng.uniform(_SLOWEST, 1.0)),
+            bow_rad=float(rng.uniform(-_BOW_RAD, _BOW_RAD)),
+            hand=(w, x, y, z),
+            weight=_WEIGHT,
+        )
+
+    def bonus(self, rotation: Array) -> float:
+        """What a hand rotation (3, 3) gains over others by being preferred, in [0, weight]."""
+        if not self.weight:
+            return 0.0
+        matrix = np.empty(9)
+        mujoco.mju_quat2Mat(matrix, np.array(self.hand))
+        return self.weight * (float(np.trace(matrix.reshape(3, 3).T @ rotation)) + 1.0) / 4.0
+
+    def carry_out(self, action: Array) -> Array:
+        """An action (12,), stored order, as this demonstration carries it out."""
+        if self.speed == 1.0 and self.bow_rad == 0.0:
+            return action
+        out = action.copy()
+        move = out[_POSITION]
+        if out[_GRIPPER][0] < 0 and out[_MODE][0] == FROM_ACHIEVED and np.abs(move).max() > _FINE:
+            c, s = np.cos(self.bow_rad), np.sin(self.bow_rad)
+            out[_POSITION] = np.clip([c * move[0] - s * move[1], s * move[0] + c * move[1], move[2]], -1.0, 1.0)
+        for part in (_POSITION, _BASE):
+            largest = float(np.abs(out[part]).max())
+            if largest > _FINE:
+                out[part] *= max(_FINE / largest, self.speed)
+        return out
+
+
+PLAIN = Variety()
+_given: WeakKeyDictionary[KitchenEnv, Variety] = WeakKeyDictionary()
+
+
+def give_variety(env: KitchenEnv, variety: Variety) -> None:
+    """Let the demonstrations in an env be carried out so, from now on."""
+    _given[env] = variety
+
+
+def variety_of(env: KitchenEnv) -> Variety:
+    """How the demonstration that runs in an env is carried out."""
+    return _given.get(env, PLAIN)

@@ -1,0 +1,88 @@
+"""Recorded demonstrations replay from their actions and from their states, and what is not theirs does not."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+import pytest
+
+from robocasa_lerobot import cli
+from robocasa_lerobot.demos.record import RecordingSettings, record_tasks
+from robocasa_lerobot.demos.replay import Replayed, demonstrations, replay
+from robocasa_lerobot.errors import UserError
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    out = tmp_path_factory.mktemp("demos")
+    kitchens: dict[str, Any] = {"layouts": (2, 4), "styles": (3,)}
+    settings = [RecordingSettings("CloseDrawer", 1, seed=2), RecordingSettings("OpenDrawer", 1, seed=2, **kitchens)]
+    record_tasks(settings, out, show_progress=False)
+    return out
+
+
+@pytest.mark.slow
+def test_all_of_them_replay_bit_for_bit(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.main(["replay", str(folder), "--workers", "1", "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert (found["actions"], found["states"]) == (1.0, 1.0)
+    for one in found["demonstrations"]:
+        assert one["same_start"]
+        assert one["deviation"] == 0.0
+
+
+@pytest.mark.slow
+def test_what_was_changed_does_not_replay(folder: Path, tmp_path: Path) -> None:
+    def changed(name: str, change: Callable[[h5py.Group], None]) -> Replayed:
+        path = tmp_path / f"{name}.hdf5"
+        path.write_bytes((folder / "CloseDrawer.hdf5").read_bytes())
+        with h5py.File(path, "r+") as file:
+            change(file["data/demo_0"])
+        return replay(path, "demo_0")
+
+    def no_actions(demo: h5py.Group) -> None:
+        demo["actions"][:] = 0.0
+
+    def unfinished(demo: h5py.Group) -> None:
+        states = demo["states"][()]
+        del demo["states"]
+        demo["states"] = np.repeat(states[:1], len(states), axis=0)
+
+    def other_kitchen(demo: h5py.Group) -> None:
+        meta = json.loads(demo.attrs["ep_meta"])
+        demo.attrs["ep_meta"] = json.dumps({**meta, "seed": meta["seed"] + 1})
+
+    still = changed("still", no_actions)
+    assert (still.actions, still.states, still.same_start) == (False, True, True)
+    assert still.deviation > 0.01
+    first = changed("first", unfinished)
+    assert (first.actions, first.states) == (True, False)
+    other = changed("other", other_kitchen)
+    assert not other.same_start
+    assert not other.actions
+
+
+@pytest.mark.slow
+def test_a_hundred_demonstrations_replay(tmp_path: Path) -> None:
+    """Twenty each of five tasks with different skills: at least 95 from actions, all from states."""
+    tasks = ("OpenDrawer", "TurnOnSinkFaucet", "TurnOnStove", "PickPlaceCounterToSink", "CloseMicrowave")
+    record_tasks([RecordingSettings(task, 20) for task in tasks], tmp_path, workers=2, show_progress=False)
+    results = [replay(*one) for one in demonstrations([tmp_path])]
+    assert len(results) == 100
+    assert all(result.states for result in results)
+    assert sum(result.actions for result in results) >= 95
+
+
+def test_mistakes_are_named(tmp_path: Path) -> None:
+    with pytest.raises(UserError, match="no such file"):
+        demonstrations([tmp_path / "none.hdf5"])
+    with pytest.raises(UserError, match="no demonstrations"):
+        demonstrations([tmp_path])
+    (tmp_path / "text.hdf5").write_text("text")
+    with pytest.raises(UserError, match="no HDF5 file"):
+        demonstrations([tmp_path])

@@ -1,0 +1,83 @@
+"""Variety: each demonstration is carried out in its own way, which follows from its seed and is written down."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from robocasa_lerobot import contract
+from robocasa_lerobot.demos.demonstrator import demonstrate
+from robocasa_lerobot.demos.episode import record_episode
+from robocasa_lerobot.demos.motion import CLOSED, FROM_DESIRED, OPEN, action
+from robocasa_lerobot.demos.variety import PLAIN, Variety, give_variety, variety_of
+from robocasa_lerobot.envs.kitchen_env import KitchenEnv
+
+_POSITION = contract.ACTION_SLICES["end_effector_position"]
+
+
+def test_draws_follow_from_the_generator_and_stay_in_their_ranges() -> None:
+    drawn = [Variety.draw(np.random.default_rng([seed, 6])) for seed in range(200)]
+    assert drawn[7] == Variety.draw(np.random.default_rng([7, 6]))
+    assert len(set(drawn)) == 200
+    speeds, bows = np.array([v.speed for v in drawn]), np.array([v.bow_rad for v in drawn])
+    assert 0.75 <= speeds.min() < 0.78
+    assert 0.97 < speeds.max() <= 1.0
+    assert -0.2 <= bows.min() < -0.18
+    assert 0.18 < bows.max() <= 0.2
+    assert all(np.linalg.norm(v.hand) == pytest.approx(1.0) for v in drawn)
+
+
+def test_the_preference_is_greatest_for_the_hand_that_is_preferred() -> None:
+    quarter = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+    variety = Variety(weight=0.2)
+    assert variety.bonus(np.eye(3)) == pytest.approx(0.2)
+    assert variety.bonus(quarter) == pytest.approx(0.1)
+    assert variety.bonus(np.diag([-1.0, -1.0, 1.0])) == pytest.approx(0.0)
+    assert PLAIN.bonus(np.eye(3)) == 0.0
+
+
+def test_fast_commands_are_slowed_and_bowed_and_fine_ones_stay() -> None:
+    variety = Variety(speed=0.8, bow_rad=0.1)
+    fine = action(position=np.array([0.3, -0.4, 0.1]), rotation=np.array([0.9, 0.0, 0.0]), gripper=OPEN)
+    assert np.array_equal(variety.carry_out(fine), fine)
+    fast = action(position=np.array([1.0, 0.0, 0.5]), gripper=OPEN)
+    bowed = variety.carry_out(fast)[_POSITION]
+    assert np.arctan2(bowed[1], bowed[0]) == pytest.approx(0.1)
+    assert bowed[2] == pytest.approx(0.4)
+    pulled = variety.carry_out(action(position=np.array([1.0, 0.0, 0.5]), gripper=CLOSED))[_POSITION]
+    assert np.allclose(pulled, [0.8, 0.0, 0.4])  # what is held stays on its way
+    slow = variety.carry_out(action(position=np.array([0.45, 0.0, 0.0]), gripper=CLOSED))[_POSITION]
+    assert slow[0] == pytest.approx(0.4)  # no slower than what is fine
+    driven = variety.carry_out(action(gripper=OPEN, base=np.array([1.0, 0.5, -0.2, 0.0]), mode=FROM_DESIRED))
+    assert np.allclose(driven[contract.ACTION_SLICES["base_motion"]], [0.8, 0.4, -0.16, 0.0])
+    assert np.array_equal(PLAIN.carry_out(fast), fast)
+    assert np.abs(variety.carry_out(action(position=np.ones(3), gripper=OPEN))).max() <= 1.0
+
+
+def test_an_env_has_the_variety_of_its_demonstration() -> None:
+    env, other = (KitchenEnv("OpenDrawer", cameras=()) for _ in range(2))
+    give_variety(env, Variety(speed=0.8))
+    assert variety_of(env).speed == 0.8
+    assert variety_of(other) is PLAIN
+    with pytest.raises(Exception, match="reset"):
+        next(demonstrate(env))
+    assert variety_of(env) is PLAIN  # every demonstration starts with its own
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("task", ["PickPlaceCounterToSink", "TurnOnStove"])
+def test_one_kitchen_is_solved_in_many_ways(task: str) -> None:
+    env = KitchenEnv(task, cameras=(), terminate_on_success=False)
+    plain, varied = record_episode(env, 3), record_episode(env, 3, varied=True)
+    again = record_episode(env, 3, varied=True)
+    env.close()
+    assert plain.ep_meta["variety"] == dataclasses.asdict(PLAIN)
+    assert varied.ep_meta["variety"] == dataclasses.asdict(Variety.draw(np.random.default_rng([3, 6])))
+    assert np.array_equal(varied.actions, again.actions)
+    assert np.array_equal(plain.states[0], varied.states[0])
+    length = min(len(plain.actions), len(varied.actions))
+    assert np.abs(plain.actions[:length] - varied.actions[:length]).max() > 0.1
+    assert plain.success
+    assert varied.success
