@@ -19,6 +19,7 @@ from robocasa_lerobot.demos.arm import Arm
 from robocasa_lerobot.demos.motion import Array, HandTarget, base_pose, grip_position, hand_rotation
 from robocasa_lerobot.demos.skills.common import SkillError, move_hand
 from robocasa_lerobot.demos.skills.navigation import Room, drive_to
+from robocasa_lerobot.demos.variety import variety_of
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.scene.robot import ARM_HOME_QPOS, place_base
 from robocasa_lerobot.envs.scene.robot_names import ARM_CENTER_SITE, MOBILE_BASE
@@ -173,7 +174,8 @@ class _Planner:
         # (ways, poses, 3) and (ways, poses, 3, 3)
         self._positions = np.array([[t.position for t in way.targets] for way in ways])
         self._rotations = np.array([[t.rotation for t in way.targets] for way in ways])
-        self._extra = np.array([way.extra for way in ways])
+        variety = variety_of(env)
+        self._extra = np.array([way.extra - variety.bonus(way.targets[key].rotation) for way in ways])
 
     def best(self, stands: Sequence[RobotPose | None]) -> list[Choice]:
         """Choices among all ways from all stands; the costs of the first ones are complete."""
