@@ -14,6 +14,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from robocasa_lerobot.rendering.hidden_faces import shown_faces
 from robocasa_lerobot.rendering.tessellation import Surface, box, capsule, cylinder, joined
 
 Array = NDArray[np.float64]
@@ -101,14 +102,15 @@ def look_alike(model: mujoco.MjModel, groups: tuple[int, ...], loose: frozenset[
     visible = np.isin(model.geom_group, groups) & (model.geom_rgba[:, 3] > 0)
     if not np.isin(model.geom_type[visible], (*_MERGED, *_KEPT)).all():
         return None
-    parts = _parts(model, visible, loose)
+    poses = _Poses.of(model)
+    shown = _shown_faces(model, poses, visible, loose)
+    parts = _parts(model, poses, visible & shown.any(axis=1), loose)
     if visible.sum() - len(parts) < MIN_SAVED_DRAWS:
         return None
     spec = mujoco.MjSpec()
     _add_textures_and_materials(spec, model)
-    poses = _Poses.of(model)
     for index, geoms in enumerate(parts):
-        _add_part(spec, model, poses, geoms, f"part{index}")
+        _add_part(spec, model, poses, shown, geoms, f"part{index}")
     for camera in range(model.ncam):
         spec.worldbody.add_camera(name=f"camera{camera}")
     for light in range(model.nlight):
@@ -152,15 +154,35 @@ class _Poses:
         return cls(at_rest, positions, rotations, quats)
 
 
-def _parts(model: mujoco.MjModel, visible: NDArray[np.bool_], loose: frozenset[int]) -> list[list[int]]:
+def _shown_faces(
+    model: mujoco.MjModel, poses: _Poses, visible: NDArray[np.bool_], loose: frozenset[int]
+) -> NDArray[np.bool_]:
+    """Which faces of a geom, if it is a box, are drawn, (ngeom, 6): those of one body hide some."""
+    shown = np.ones((model.ngeom, 6), dtype=np.bool_)
+    boxes = [
+        geom
+        for geom in np.flatnonzero(visible & (model.geom_type == _BOX)).tolist()
+        if geom not in loose and _is_opaque(model, geom)
+    ]
+    owners = np.where(poses.fixed, 0, model.geom_bodyid)[boxes]
+    for owner in np.unique(owners):
+        geoms = np.array(boxes)[owners == owner]
+        shown[geoms] = shown_faces(poses.positions[geoms], poses.rotations[geoms], model.geom_size[geoms])
+    return shown
+
+
+def _is_opaque(model: mujoco.MjModel, geom: int) -> bool:
+    material = int(model.geom_matid[geom])
+    return bool(model.geom_rgba[geom, 3] == 1.0 and (material < 0 or model.mat_rgba[material, 3] == 1.0))
+
+
+def _parts(model: mujoco.MjModel, poses: _Poses, visible: NDArray[np.bool_], loose: frozenset[int]) -> list[list[int]]:
     """Geoms that are drawn together: of one body, or, where nothing moves, of one cell of the room."""
-    poses = _Poses.of(model)
     cells = np.floor(poses.positions[:, :2] / CELL_M)
     parts: dict[tuple[float, ...], list[int]] = {}
     for geom in np.flatnonzero(visible).tolist():
         material, rgba = int(model.geom_matid[geom]), tuple(model.geom_rgba[geom].tolist())
-        opaque = rgba[3] == 1.0 and (material < 0 or model.mat_rgba[material, 3] == 1.0)
-        mergeable = opaque and _can_be_merged(model, geom) and geom not in loose
+        mergeable = _is_opaque(model, geom) and _can_be_merged(model, geom) and geom not in loose
         own = -1 if mergeable else geom
         where = (-1, *cells[geom]) if poses.fixed[geom] and mergeable else (int(model.geom_bodyid[geom]), 0, 0)
         parts.setdefault((*where, material, own, *rgba), []).append(geom)
@@ -190,7 +212,9 @@ def _add_textures_and_materials(spec: mujoco.MjSpec, model: mujoco.MjModel) -> N
                     textures[role] = f"texture{texture}"
 
 
-def _add_part(spec: mujoco.MjSpec, model: mujoco.MjModel, poses: _Poses, geoms: list[int], name: str) -> None:
+def _add_part(
+    spec: mujoco.MjSpec, model: mujoco.MjModel, poses: _Poses, shown: NDArray[np.bool_], geoms: list[int], name: str
+) -> None:
     first = geoms[0]
     material = int(model.geom_matid[first])
     kind = int(model.geom_type[first])
@@ -198,7 +222,7 @@ def _add_part(spec: mujoco.MjSpec, model: mujoco.MjModel, poses: _Poses, geoms: 
     merged = len(geoms) > 1 or kind in (_CYLINDER, _CAPSULE)
     geom = spec.worldbody.add_geom(type=mujoco.mjtGeom(_MESH if merged else kind))
     if merged:
-        _add_mesh(spec, joined([_surface(model, poses, each) for each in geoms]), name)
+        _add_mesh(spec, joined([_surface(model, poses, each, shown[each]) for each in geoms]), name)
         geom.meshname = name
     else:
         geom.pos, geom.quat, geom.size = poses.positions[first], poses.quats[first], model.geom_size[first]
@@ -212,12 +236,12 @@ def _add_part(spec: mujoco.MjSpec, model: mujoco.MjModel, poses: _Poses, geoms: 
         geom.material = f"{'baked' if merged else 'material'}{material}"
 
 
-def _surface(model: mujoco.MjModel, poses: _Poses, geom: int) -> Surface:
+def _surface(model: mujoco.MjModel, poses: _Poses, geom: int, shown: NDArray[np.bool_]) -> Surface:
     """The shape of a geom in its body's frame, with texture coordinates as MuJoCo generates them."""
     kind, size = model.geom_type[geom], model.geom_size[geom]
     slices = int(model.vis.quality.numslices)
     if kind == _BOX:
-        shape = box(size)
+        shape = box(size, shown)
     elif kind == _MESH:
         shape = _mesh_surface(model, int(model.geom_dataid[geom]))
     elif kind == _CYLINDER:

@@ -59,9 +59,16 @@ def joined(surfaces: Sequence[Surface]) -> Surface:
     )
 
 
-def box(half_sizes: ArrayLike) -> Surface:
-    """A box of half sizes (3,) metres, with sharp edges."""
-    return Surface(_BOX_CORNERS * np.asarray(half_sizes), _BOX_NORMALS, _BOX_CORNERS[:, :2], _BOX_FACES)
+def box(half_sizes: ArrayLike, shown: NDArray[np.bool_] | None = None) -> Surface:
+    """A box of half sizes (3,) metres, with sharp edges.
+
+    Its faces look to lower and higher x, then y, then z; with `shown`, (6,), it has only some of them.
+    """
+    corners, normals, faces = _BOX_CORNERS, _BOX_NORMALS, _BOX_FACES
+    if shown is not None and not shown.all():
+        kept = np.repeat(shown, 4)
+        corners, normals, faces = corners[kept], normals[kept], faces[: 2 * int(shown.sum())]
+    return Surface(corners * np.asarray(half_sizes), normals, corners[:, :2], faces)
 
 
 def cylinder(radius: float, half_length: float, slices: int) -> Surface:
