@@ -16,7 +16,9 @@ from typing import Any
 import h5py
 import numpy as np
 import pytest
+from slurm_support import stand_in
 
+from robocasa_lerobot import cli
 from robocasa_lerobot.demos.attempts import HOPELESS, Parts, RecordingSettings, Tally
 from robocasa_lerobot.demos.choose import choose_tasks, expand_names
 from robocasa_lerobot.demos.command import EXAMPLE
@@ -171,6 +173,25 @@ def _content(path: Path) -> dict[str, Any]:
     with h5py.File(path) as file:
         file.visititems(note)
     return found
+
+
+@pytest.mark.slow
+def test_a_cluster_records_what_this_machine_does(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    folder = stand_in(tmp_path, monkeypatch)
+    options = ["--tasks", ",".join(QUICK), "--episodes", "1", "--seed", "40", "--action-noise", "0.1"]
+    slurm = ["--executor", "slurm", "--slurm.partition", "cpu", "--slurm.time", "00:10:00", "--slurm.cpus", "1"]
+    assert cli.main(["demos", *options, *slurm, "--out", str(tmp_path / "slurm_out")]) == 0
+    assert "2 tasks in job 1, summed up by job 2" in capfd.readouterr().out
+    assert len(list(folder.glob("*.script"))) == 2
+    (joined,) = (tmp_path / "slurm_out" / "slurm").glob("join-*.out")
+    assert all(task in joined.read_text() for task in QUICK)
+    settings = [RecordingSettings(task, 1, seed=40, action_noise=0.1) for task in QUICK]
+    record_tasks(settings, tmp_path / "here", show_progress=False)
+    for task in QUICK:
+        there, here = (_content(tmp_path / place / f"{task}.hdf5") for place in ("slurm_out", "here"))
+        assert all(np.array_equal(value, there[key]) for key, value in here.items())
 
 
 @pytest.mark.slow

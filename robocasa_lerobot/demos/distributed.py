@@ -57,5 +57,5 @@ def record_distributed(
         run_with_ray(step, len(settings), folder, execution.ray)
         return "", last()
     array, final = submit_to_slurm(step, last, len(settings), folder, out / _LOGS, execution.slurm)
-    first = f"tasks in job {array}, " if array else "all tasks are complete; "
+    first = f"{len(settings)} tasks in job {array}, " if array else "all tasks are complete; "
     return f"submitted to Slurm: {first}summed up by job {final}. What they print is in {out / _LOGS}.", 0

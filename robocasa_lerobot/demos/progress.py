@@ -88,7 +88,7 @@ class Board:
         if done:
             words.append(f"{tally.rate:.0%} of {done} attempts succeed")
         left = self.seconds_left(settings, tally)
-        if left is not None:
+        if left:
             words.append(f"{_span(left)} left")
         return ", ".join(words)
 
