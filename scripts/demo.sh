@@ -32,8 +32,8 @@ robocasa_lerobot() { "$PYTHON" -m robocasa_lerobot.cli "$@"; }
 mkdir -p "$OUT"
 
 step "demonstrations: $EPISODES of each of $TASKS"
-robocasa_lerobot demos --tasks "$TASKS" --episodes "$EPISODES" --split target --seed "$SEED" --workers "$WORKERS" \
-    --out "$OUT/demos"
+robocasa_lerobot demos --tasks "$TASKS" --episodes "$EPISODES" --split target --seed "$SEED" --plain --action-noise 0.05 \
+    --workers "$WORKERS" --out "$OUT/demos"
 
 step "conversion to a LeRobotDataset v3.0"
 [ -d "$OUT/data/meta" ] ||

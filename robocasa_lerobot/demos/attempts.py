@@ -47,7 +47,7 @@ class RecordingSettings:
     episodes: int
     split: str = "target"
     seed: int = 0
-    action_noise: float = 0.05
+    action_noise: float = 0.0
     images: bool = False
     image_size: int = 256
     layouts: tuple[int, ...] | None = None

@@ -39,8 +39,8 @@ def configure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--action-noise",
         type=float,
-        default=0.05,
-        help="standard deviation of the noise on arm commands, 1 is a full command (default 0.05)",
+        default=0.0,
+        help="standard deviation of noise on arm commands, 1 is a full command; 0.05 is a good one (default: none)",
     )
     parser.add_argument(
         "--plain", action="store_true", help="no variety: speed, paths and choice of grasps as the skills have them"
