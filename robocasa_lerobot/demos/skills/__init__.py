@@ -13,6 +13,7 @@ from robocasa_lerobot.demos.skills.common import SkillError
 from robocasa_lerobot.demos.skills.doors import close_doors, push_lid
 from robocasa_lerobot.demos.skills.drawers import close_drawer, open_drawer
 from robocasa_lerobot.demos.skills.handles import open_doors
+from robocasa_lerobot.demos.skills.heads import lower_head, raise_head
 from robocasa_lerobot.demos.skills.knobs import raise_knob, turn_burner_low, turn_knob, turn_off_burner, turn_on_burner
 from robocasa_lerobot.demos.skills.levers import press_lever, turn_off_water, turn_on_water, turn_sideways
 from robocasa_lerobot.demos.skills.navigation import drive
@@ -26,6 +27,8 @@ Skill = Callable[[KitchenEnv, Stage], Iterator[Array]]
 SKILLS: dict[tuple[str, str], Skill] = {
     ("doors", "close"): close_doors,
     ("doors", "open"): open_doors,
+    ("doors", "raise_head"): raise_head,
+    ("doors", "lower_head"): lower_head,
     ("doors", "push_lid"): push_lid,
     ("drawers", "open"): open_drawer,
     ("drawers", "close"): close_drawer,

@@ -1,211 +1,33 @@
-"""The arc of a hinged part as the robot goes along with it: planned on a copy of the state, then followed.
-
-A plan says where the base stands when the hand first touches the part and where it stands at the end of the arc: long
-doors are followed with the base as well as with the arm.
-"""
+"""A hinged part led along its arc: pushed with the closed finger tips, or grasped and pulled."""
 
 from __future__ import annotations
 
-import copy
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
 from robocasa_lerobot import contract
-from robocasa_lerobot.demos.motion import Array, HandTarget, arm_action, base_pose, pose_error
-from robocasa_lerobot.demos.skills.common import SkillError
+from robocasa_lerobot.demos.motion import (
+    CLOSED,
+    OPEN,
+    Array,
+    HandTarget,
+    arm_action,
+    base_pose,
+    grip_position,
+    hand_rotation,
+)
+from robocasa_lerobot.demos.skills.arc_plan import STANDOFF_M, ArcPlan, Shift, Way, plan_arc
+from robocasa_lerobot.demos.skills.common import hold_hand, move_hand
 from robocasa_lerobot.demos.skills.hinged import Hinged
-from robocasa_lerobot.demos.skills.reach import move_base_to, shift_base, solve_arm
-from robocasa_lerobot.envs.control.indices import joint_positions, joint_velocities
+from robocasa_lerobot.demos.skills.reach import shift_base
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
-from robocasa_lerobot.envs.scene.robot_names import ARM_JOINTS, HAND, MOBILE_BASE
 
-Shift = tuple[float, float]
-
-ARM_FOOT = "robot0_link0"
-GOOD_ENOUGH, HOPELESS = 0.35, 2.0
-REACH_M = 1.05  # from the arm's shoulder to the grip site
-SHOULDER_M = 0.333  # above the arm's foot
-_NEAR_LIMIT_RAD = 0.2
+GRASP_STEPS, RELEASE_STEPS = 10, 6
 _BASE_SPEED = 0.22  # metres a second while the arm moves too: the arm keeps up with about 0.26
 _DEAD_ZONE = 0.25  # of base commands (robocasa facts, section 2)
-BACK_M = 0.25  # that the base goes back before it goes to the side, where it cannot go straight
 STALL_STEPS, STALL_RAD = 25, 0.004
-
-
-@dataclass(frozen=True, eq=False)
-class Via:
-    """A pose of the hand on the way: with the part at `angle`, and the base `progress` of its way along (0 to 1)."""
-
-    angle: float
-    target: HandTarget
-    progress: float = 0.0
-
-
-@dataclass(frozen=True, eq=False)
-class Way:
-    """One way to do it.
-
-    Attributes:
-        vias: poses in their order, those off the part first.
-        contact: number of the first pose in which the hand may touch the part.
-        target_at: wanted pose of the hand with the part at an angle.
-    """
-
-    vias: tuple[Via, ...]
-    contact: int
-    target_at: Callable[[float], HandTarget]
-
-
-@dataclass(frozen=True, eq=False)
-class ArcPlan:
-    """A way, and where the base stands for it.
-
-    Attributes:
-        way: of the hand.
-        start, end: moves of the base from where it stands now, metres forward and to the left: before, and by the end.
-        cost: how bad it is; above 1 it is not to be had without a collision or a miss.
-        legs: straight moves that make up the first one.
-    """
-
-    way: Way
-    start: Shift
-    end: Shift
-    cost: float
-    legs: tuple[Shift, ...]
-
-
-def plan_arc(env: KitchenEnv, part: Hinged, ways: Iterable[Way], stances: Iterable[tuple[Shift, Shift]]) -> ArcPlan:
-    """The best way, or the first that is good enough, of those that can be reached without touching what is not meant.
-
-    Args:
-        env: its state is read, not touched.
-        part: what is moved.
-        ways: alternatives.
-        stances: moves of the base to try in this order: before, and by the end.
-
-    Raises:
-        SkillError: there is none.
-    """
-    bench = _Bench(env, part)
-    options = list(ways)
-    assert options, "no way to plan"
-    best = ArcPlan(options[0], (0.0, 0.0), (0.0, 0.0), np.inf, ())
-    for start, end in stances:
-        far = 0.15 * float(np.hypot(*start)) + 0.1 * float(np.hypot(end[0] - start[0], end[1] - start[1]))
-        legs = bench.route(start) if bench.clears(options[0].vias[-1].angle, end) else None
-        if legs is None:
-            continue
-        for way in options:
-            cost = far + bench.cost(way, start, end, min(best.cost, HOPELESS) - far)
-            if cost < best.cost:
-                best = ArcPlan(way, start, end, cost, legs)
-        if best.cost < GOOD_ENOUGH:
-            break
-    if not np.isfinite(best.cost):
-        raise SkillError(f"{part.name}: the arm reaches nowhere along its arc")
-    return best
-
-
-class _Bench:
-    """A copy of the state on which poses are tried."""
-
-    def __init__(self, env: KitchenEnv, part: Hinged) -> None:
-        self._env, self._part = env, part
-        self._model, self._data = env.model, copy.copy(env.data)
-        self._arm = joint_positions(env.model, ARM_JOINTS)
-        self._dofs = joint_velocities(env.model, ARM_JOINTS)
-        self._home = env.data.qpos[self._arm].copy()
-        self._ranges = np.array([env.model.joint(name).range for name in ARM_JOINTS])
-        self._robot = env.scene.subtree(MOBILE_BASE)
-        self._hand = env.scene.subtree(HAND)
-        self._reaching = env.scene.subtree(ARM_FOOT)
-        base, yaw = base_pose(env.data)
-        self._shoulder = base + np.array([0.0, 0.0, SHOULDER_M])
-        self._axes = np.array([[np.cos(yaw), np.sin(yaw), 0.0], [-np.sin(yaw), np.cos(yaw), 0.0]])
-
-    def route(self, shift: Shift) -> tuple[Shift, ...] | None:
-        """Straight moves, with the arm as it is, that end at a shift without touching anything; None if not found."""
-        ahead, left = shift
-        back = min(ahead, 0.0) - BACK_M
-        for legs in (
-            (shift,),
-            ((ahead, 0.0), (0.0, left)),
-            ((back, 0.0), (0.0, left), (ahead - back, 0.0)),
-        ):
-            if self._free(legs):
-                return tuple(leg for leg in legs if np.hypot(*leg) > 0.01)
-        return None
-
-    def _free(self, legs: tuple[Shift, ...]) -> bool:
-        self._data.qpos[:] = self._env.data.qpos
-        at = np.zeros(2)
-        for leg in legs:
-            count = int(np.ceil(float(np.hypot(*leg)) / 0.08))
-            for step in range(1, count + 1):
-                x, y = at + np.asarray(leg) * step / count
-                self._place(self._part.angle, (x, y))
-                if self._touched(hand_may=True):
-                    return False
-            at += leg
-        return True
-
-    def clears(self, angle: float, shift: Shift) -> bool:
-        """Whether the base is out of the part's way at an angle; the arm may still be."""
-        self._place(angle, shift)
-        return not self._touched(hand_may=False, only=self._robot & ~self._reaching)
-
-    def cost(self, way: Way, start: Shift, end: Shift, bound: float) -> float:
-        """Cost of a way; no more of it is looked at once it exceeds `bound`."""
-        cost = 0.0
-        for via in way.vias:
-            shift = self._shift(start, end, via.progress)
-            shoulder = self._shoulder + shift[0] * self._axes[0] + shift[1] * self._axes[1]
-            if np.linalg.norm(via.target.position - shoulder) > REACH_M:
-                return np.inf
-        self._data.qpos[:] = self._env.data.qpos
-        for number, via in enumerate(way.vias):
-            self._place(via.angle, self._shift(start, end, via.progress))
-            solve_arm(self._model, self._data, via.target, self._arm, self._dofs, self._home, self._ranges)
-            error = pose_error(self._data, via.target)
-            joints = self._data.qpos[self._arm]
-            margin = float(np.minimum(joints - self._ranges[:, 0], self._ranges[:, 1] - joints).min())
-            cost += min(20.0 * max(error.position - 0.005, 0.0) + 1.0 * error.rotation, 4.0)
-            cost += max(0.0, _NEAR_LIMIT_RAD - margin) * 1.0
-            if cost > bound:
-                return np.inf
-            cost += 0.8 * min(self._touched(hand_may=number >= way.contact), 3)
-        return cost + 0.05 * float(np.abs(self._data.qpos[self._arm] - self._home).max())
-
-    @staticmethod
-    def _shift(start: Shift, end: Shift, progress: float) -> Shift:
-        return (start[0] + progress * (end[0] - start[0]), start[1] + progress * (end[1] - start[1]))
-
-    def _place(self, angle: float, shift: Shift) -> None:
-        arm = self._data.qpos[self._arm].copy()
-        self._data.qpos[:] = self._env.data.qpos
-        self._data.qpos[self._arm] = arm
-        self._part.place(self._data, angle)
-        mujoco.mj_kinematics(self._model, self._data)
-        mujoco.mj_comPos(self._model, self._data)
-        move_base_to(self._model, self._data, shift)
-
-    def _touched(self, *, hand_may: bool, only: NDArray[np.bool_] | None = None) -> int:
-        """Number of bodies that the robot, or `only` these of it, touch; the hand may touch the part, if `hand_may`."""
-        mine_all = self._robot if only is None else only
-        mujoco.mj_collision(self._model, self._data)
-        touched = set()
-        pairs = self._model.geom_bodyid[self._data.contact.geom]
-        for (a, b), distance in zip(pairs, self._data.contact.dist, strict=True):
-            for mine, other in ((int(a), int(b)), (int(b), int(a))):
-                if not mine_all[mine] or self._robot[other] or distance >= 0.0:
-                    continue
-                if not (hand_may and self._hand[mine] and other == self._part.body):
-                    touched.add(other)
-        return len(touched)
 
 
 def swing(
@@ -253,6 +75,63 @@ def swing(
         progress = float(np.clip((part.angle - first) / (goal - first) + 0.15, 0.0, 1.0))
         step[contract.ACTION_SLICES["base_motion"]][:2] = _base_command(data, spot[0] + progress * (spot[1] - spot[0]))
         yield step
+
+
+def pull_arc(
+    env: KitchenEnv,
+    part: Hinged,
+    ways: Iterable[Way],
+    stances: Iterable[tuple[Shift, Shift]],
+    goal: float,
+    *,
+    lead_rad: float = 0.15,
+    speed: float = 0.7,
+) -> Iterator[Array]:
+    """Grasp a part in the best of some ways, lead it to an angle, let it go and draw the hand back.
+
+    Raises:
+        SkillError: none of them is to be had.
+    """
+    data = env.data
+    plan = plan_arc(env, part, ways, stances)
+    spot = spots(env, plan)
+    yield from take_stance(env, plan, OPEN)
+    before, at = plan.way.vias[0].target, plan.way.vias[1].target
+    yield from move_hand(data, before, OPEN, tolerance=0.015)
+    yield from move_hand(data, at, OPEN, speed=0.6, tolerance=0.006, max_steps=40)
+    yield from hold_hand(data, at, CLOSED, GRASP_STEPS)
+    yield from swing(env, part, plan, goal, gripper=CLOSED, spot=spot, lead_rad=lead_rad, speed=speed, max_steps=120)
+    rest = HandTarget(grip_position(data), hand_rotation(data))
+    yield from hold_hand(data, rest, OPEN, RELEASE_STEPS)
+    away = HandTarget(rest.position - rest.rotation[:, 2] * (STANDOFF_M + 0.02), rest.rotation)
+    yield from move_hand(data, away, OPEN, tolerance=0.03, max_steps=25)
+
+
+def push_arc(
+    env: KitchenEnv,
+    part: Hinged,
+    ways: Iterable[Way],
+    stances: Iterable[tuple[Shift, Shift]],
+    goal: float,
+    *,
+    lead_rad: float = 0.15,
+    speed: float = 0.8,
+) -> Iterator[Array]:
+    """Push a part to an angle in the best of some ways, and draw the hand back.
+
+    Raises:
+        SkillError: none of them is to be had.
+    """
+    data = env.data
+    plan = plan_arc(env, part, ways, stances)
+    spot = spots(env, plan)
+    yield from take_stance(env, plan, CLOSED)
+    for via in plan.way.vias[: plan.way.contact]:
+        yield from move_hand(data, via.target, CLOSED, tolerance=0.03)
+    yield from swing(env, part, plan, goal, gripper=CLOSED, spot=spot, lead_rad=lead_rad, speed=speed)
+    rotation = hand_rotation(data)
+    away = HandTarget(grip_position(data) - rotation[:, 2] * 0.10, rotation)
+    yield from move_hand(data, away, CLOSED, max_steps=20)
 
 
 def take_stance(env: KitchenEnv, plan: ArcPlan, gripper: float) -> Iterator[Array]:

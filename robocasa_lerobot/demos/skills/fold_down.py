@@ -13,7 +13,6 @@ import numpy as np
 
 from robocasa_lerobot.demos.motion import (
     CLOSED,
-    OPEN,
     Array,
     HandTarget,
     base_pose,
@@ -21,8 +20,9 @@ from robocasa_lerobot.demos.motion import (
     grip_position,
     hand_rotation,
 )
-from robocasa_lerobot.demos.skills.arcs import Shift, Via, Way, plan_arc, spots, swing, take_stance
-from robocasa_lerobot.demos.skills.common import SkillError, hold_hand, move_hand
+from robocasa_lerobot.demos.skills.arc_plan import Shift, Via, Way, grip_way, plan_arc
+from robocasa_lerobot.demos.skills.arcs import pull_arc, spots, swing, take_stance
+from robocasa_lerobot.demos.skills.common import SkillError, move_hand
 from robocasa_lerobot.demos.skills.hinged import UP, Hinged
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 
@@ -80,22 +80,10 @@ def _pull(env: KitchenEnv, door: Hinged, wanted: float) -> Iterator[Array]:
     """Grasp the handle and pull the door ajar."""
     data = env.data
     ways = [_pull_way(env, door, grasp, flip, wanted) for grasp in GRASPS for flip in (1.0, -1.0)]
-    plan = plan_arc(env, door, ways, _stances(env, door))
-    spot = spots(env, plan)
-    yield from take_stance(env, plan, OPEN)
-    before, at = plan.way.vias[0].target, plan.way.vias[1].target
-    yield from move_hand(data, before, OPEN, tolerance=0.015)
-    yield from move_hand(data, at, OPEN, speed=0.6, tolerance=0.006, max_steps=40)
-    yield from hold_hand(data, at, CLOSED, GRASP_STEPS)
-    yield from swing(
-        env, door, plan, wanted + 0.02, gripper=CLOSED, spot=spot, lead_rad=PULL_LEAD_RAD, speed=0.7, max_steps=120
-    )
+    yield from pull_arc(env, door, ways, _stances(env, door), wanted + 0.02)
     rest = HandTarget(grip_position(data), hand_rotation(data))
-    yield from hold_hand(data, rest, OPEN, RELEASE_STEPS)
-    away = HandTarget(rest.position - rest.rotation[:, 2] * 0.10, rest.rotation)
-    yield from move_hand(data, away, OPEN, tolerance=0.03, max_steps=25)
-    up = HandTarget(door.point(np.array([0.0, 0.0, door.high[2]]), door.angle), rest.rotation)
-    over = np.array([*away.position[:2], up.position[2] + 0.12])
+    edge = door.point(np.array([0.0, 0.0, door.high[2]]), door.angle)
+    over = np.array([*rest.position[:2], edge[2] + 0.12])
     yield from move_hand(data, HandTarget(over, rest.rotation), CLOSED, tolerance=0.05, max_steps=30)
 
 
@@ -114,15 +102,11 @@ def _pull_way(env: KitchenEnv, door: Hinged, grasp: tuple[float, float, float], 
     down, aside = np.deg2rad(grasp[:2])
     local = np.array([np.sin(aside) * np.cos(down), np.cos(aside) * np.cos(down), -np.sin(down)])
 
-    def target_at(angle: float) -> HandTarget:
+    def rotation_at(angle: float) -> Array:
         turn = door.turned(grasp[2] * angle)
-        return HandTarget(door.point(grip, angle), frame(turn @ local, flip * turn[:, 2]))
+        return frame(turn @ local, flip * turn[:, 2])
 
-    start = door.angle
-    at = target_at(start)
-    before = HandTarget(at.position - at.rotation[:, 2] * STANDOFF_M, at.rotation)
-    arc = [Via((start + wanted) / 2, target_at((start + wanted) / 2), 0.5), Via(wanted, target_at(wanted), 1.0)]
-    return Way((Via(start, before), Via(start, at), *arc), 1, target_at)
+    return grip_way(door, grip, rotation_at, wanted)
 
 
 def _push(env: KitchenEnv, door: Hinged) -> Iterator[Array]:

@@ -12,7 +12,6 @@ import numpy as np
 
 from robocasa_lerobot.demos.motion import (
     CLOSED,
-    OPEN,
     Array,
     HandTarget,
     base_pose,
@@ -20,8 +19,9 @@ from robocasa_lerobot.demos.motion import (
     grip_position,
     hand_rotation,
 )
-from robocasa_lerobot.demos.skills.arcs import Shift, Via, Way, plan_arc, spots, swing, take_stance
-from robocasa_lerobot.demos.skills.common import SkillError, hold_hand, move_hand
+from robocasa_lerobot.demos.skills.arc_plan import Shift, Via, Way, grip_way, plan_arc
+from robocasa_lerobot.demos.skills.arcs import pull_arc, spots, swing, take_stance
+from robocasa_lerobot.demos.skills.common import SkillError, move_hand
 from robocasa_lerobot.demos.skills.doors import doors
 from robocasa_lerobot.demos.skills.fold_down import fold_down
 from robocasa_lerobot.demos.skills.hinged import UP, Hinged
@@ -84,23 +84,8 @@ def _outside(door: Hinged) -> float:
 
 def _pull(env: KitchenEnv, door: Hinged) -> Iterator[Array]:
     """Grasp the handle and pull the door ajar."""
-    data = env.data
     ways = [_pull_way(env, door, tilt, flip) for tilt in GRASP_TILTS for flip in (1.0, -1.0)]
-    plan = plan_arc(env, door, ways, PULL_STANCES)
-    spot = spots(env, plan)
-    yield from take_stance(env, plan, OPEN)
-    before, at = plan.way.vias[0].target, plan.way.vias[1].target
-    yield from move_hand(data, before, OPEN, tolerance=0.015)
-    yield from move_hand(data, at, OPEN, speed=0.6, tolerance=0.006, max_steps=40)
-    yield from hold_hand(data, at, CLOSED, GRASP_STEPS)
-    yield from swing(
-        env, door, plan, AJAR_RAD + 0.02, gripper=CLOSED, spot=spot, lead_rad=PULL_LEAD_RAD, speed=0.7, max_steps=120
-    )
-    rest = HandTarget(grip_position(data), hand_rotation(data))
-    yield from hold_hand(data, rest, OPEN, RELEASE_STEPS)
-    # Back along the fingers, then aside, clear of the handle.
-    away = HandTarget(rest.position - rest.rotation[:, 2] * 0.11, rest.rotation)
-    yield from move_hand(data, away, OPEN, tolerance=0.03, max_steps=25)
+    yield from pull_arc(env, door, ways, PULL_STANCES, AJAR_RAD + 0.02)
 
 
 def _pull_way(env: KitchenEnv, door: Hinged, tilt: tuple[float, float], flip: float) -> Way:
@@ -112,16 +97,12 @@ def _pull_way(env: KitchenEnv, door: Hinged, tilt: tuple[float, float], flip: fl
     aside, up = tilt
     way = _outside(door)
 
-    def target_at(angle: float) -> HandTarget:
+    def rotation_at(angle: float) -> Array:
         turn = door.turned(TURN * angle)
         approach = turn @ np.array([-way * np.sin(aside) * np.cos(up), np.cos(aside) * np.cos(up), np.sin(up)])
-        return HandTarget(door.point(grip, angle), frame(approach, flip * turn[:, 0]))
+        return frame(approach, flip * turn[:, 0])
 
-    start = door.angle
-    at = target_at(start)
-    before = HandTarget(at.position - at.rotation[:, 2] * STANDOFF_M, at.rotation)
-    arc = [Via(angle, target_at(angle), share) for share, angle in ((0.5, (start + AJAR_RAD) / 2), (1.0, AJAR_RAD))]
-    return Way((Via(start, before), Via(start, at), *arc), 1, target_at)
+    return grip_way(door, grip, rotation_at, AJAR_RAD)
 
 
 def _push(env: KitchenEnv, door: Hinged) -> Iterator[Array]:

@@ -87,6 +87,11 @@ class Hinged:
         """How far shelves and bins stand out of its inner face, metres."""
         return float(max(self._box(geom)[1][1] for geom in self.geoms(handle=False)))
 
+    @property
+    def outside(self) -> float:
+        """How far it stands out on its outer side, without handles, metres; negative."""
+        return float(min(self._box(geom)[0][1] for geom in self.geoms(handle=False)))
+
     def turned(self, angle: float) -> Array:
         """World rotation (3, 3) of what lies in the fixture's axes when shut, at an angle."""
         return self._turn @ rotation_about(self._axis, self.opening * angle)

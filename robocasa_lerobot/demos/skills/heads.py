@@ -1,0 +1,101 @@
+"""Heads of stand mixers: lifted by the finger tips under their nose; led down by its cap, then pressed from above.
+
+Measured without action noise on seeds 0-5 of the target and of the pretrain split: OpenStandMixerHead and
+CloseStandMixerHead solve 6 and 6 of 6.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from robocasa_lerobot.demos.motion import Array, frame
+from robocasa_lerobot.demos.skills.arc_plan import Shift, Way, face_way, grip_way
+from robocasa_lerobot.demos.skills.arcs import pull_arc, push_arc
+from robocasa_lerobot.demos.skills.common import SkillError
+from robocasa_lerobot.demos.skills.hinged import UP, Hinged
+from robocasa_lerobot.envs.kitchen_env import KitchenEnv
+from robocasa_lerobot.envs.task import Stage
+
+ATTEMPTS = 5
+UP_SHARE, DOWN_SHARE = 0.998, 0.002  # beyond the 0.99 and 0.01 that tasks ask for
+# Of the hand: pitch (upwards) and turn to the right of straight ahead, degrees.
+LIFTS = ((0.0, 0.0), (0.0, 30.0), (0.0, -30.0), (15.0, 0.0), (0.0, 60.0), (0.0, -60.0))
+PRESSES = ((-20.0, 0.0), (-35.0, 0.0), (-50.0, 0.0), (-20.0, 35.0), (-20.0, -35.0))
+DRAGS = ((-40.0, 0.0), (-25.0, 0.0), (-10.0, 0.0), (5.0, 0.0), (20.0, 0.0), (-25.0, 20.0), (-25.0, -20.0))
+HALF_SHARE = 0.15  # of the way up, from where there is room over the head
+CAP_DEPTH_M, CAP_HEIGHT = 0.004, 0.56  # of the grip behind the cap's face, and its height in the head
+STANCES: tuple[tuple[Shift, Shift], ...] = tuple(
+    (shift, shift)
+    for shift in (
+        (0.0, 0.0), (-0.12, 0.0), (-0.12, 0.15), (-0.12, -0.15), (-0.25, 0.0), (-0.2, 0.3), (-0.2, -0.3), (-0.4, 0.0),
+    )
+)  # fmt: skip
+
+
+def raise_head(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
+    """Tilt a mixer's head up.
+
+    Raises:
+        SkillError: it is not up after five attempts.
+    """
+    head = _head(env, stage)
+    for _ in range(ATTEMPTS):
+        ways = [_lift_way(head, lift, roll) for lift in LIFTS for roll in (1.0, -1.0)]
+        yield from push_arc(env, head, ways, STANCES, UP_SHARE * head.full)
+        if head.share >= UP_SHARE:
+            return
+    raise SkillError(f"{head.name} is {head.share:.0%} up after {ATTEMPTS} attempts")
+
+
+def lower_head(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
+    """Press a mixer's head down.
+
+    Raises:
+        SkillError: it is not down after five attempts.
+    """
+    head = _head(env, stage)
+    for _ in range(ATTEMPTS):
+        if head.share > HALF_SHARE + 0.1:
+            ways = [_drag_way(head, drag, roll) for drag in DRAGS for roll in (1.0, -1.0)]
+            yield from pull_arc(env, head, ways, STANCES, HALF_SHARE * head.full)
+            if head.share > HALF_SHARE + 0.2:
+                continue  # the cap has slipped out of the fingers
+        ways = [_press_way(head, press, roll) for press in PRESSES for roll in (1.0, -1.0)]
+        yield from push_arc(env, head, ways, STANCES, DOWN_SHARE * head.full)
+        if head.share <= DOWN_SHARE:
+            return
+    raise SkillError(f"{head.name} is still {head.share:.1%} up after {ATTEMPTS} attempts")
+
+
+def _head(env: KitchenEnv, stage: Stage) -> Hinged:
+    mixer = env.scene.appliance(stage.target)
+    return Hinged(env.data, mixer, mixer.joint("head"))
+
+
+def _lift_way(head: Hinged, tilt: tuple[float, float], roll: float) -> Way:
+    """Push the head up near its nose, the fingers flat under it."""
+    local = np.array([0.0, 0.9 * head.low[1], head.low[2]])
+    rotation = _rotation(head, tilt, roll)
+    return face_way(head, local, -UP, lambda _: rotation, UP_SHARE * head.full, off_m=0.015, back_m=0.12)
+
+
+def _drag_way(head: Hinged, tilt: tuple[float, float], roll: float) -> Way:
+    """Hold the cap on the nose and lead it down: a head that is up is too near a wall cabinet to reach over it."""
+    local = np.array([0.0, head.outside + CAP_DEPTH_M, CAP_HEIGHT * head.high[2]])
+    rotation = _rotation(head, tilt, roll)
+    return grip_way(head, local, lambda _: rotation, HALF_SHARE * head.full, bias=abs(tilt[0] + 35.0) / 200.0)
+
+
+def _press_way(head: Hinged, tilt: tuple[float, float], roll: float) -> Way:
+    """Push the head down near its nose, the fingers flat on it."""
+    local = np.array([0.0, 0.85 * head.low[1], head.high[2]])
+    rotation = _rotation(head, tilt, roll)
+    return face_way(head, local, UP, lambda _: rotation, DOWN_SHARE * head.full, off_m=0.04, back_m=0.06)
+
+
+def _rotation(head: Hinged, tilt: tuple[float, float], roll: float) -> Array:
+    pitch, aside = np.deg2rad(tilt)
+    level = np.cos(aside) * head.inwards + np.sin(aside) * head.rightwards
+    return frame(np.cos(pitch) * level + np.sin(pitch) * UP, roll * head.rightwards)
