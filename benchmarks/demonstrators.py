@@ -12,6 +12,7 @@ import argparse
 import json
 import multiprocessing
 import os
+import signal
 import sys
 import time
 from collections.abc import Iterable, Sequence
@@ -34,6 +35,7 @@ PICTURE = common.RESULTS / "demonstrators.png"
 TRIALS = common.REPOSITORY / "outputs" / "demonstrators.jsonl"
 SPLITS = ("target", "pretrain")
 FIRST_SEED = 100_000  # below, skills are tuned
+LONGEST_S = 600  # of wall time; a trial that takes longer hangs, and has failed
 
 type Key = tuple[str, str, int, float, bool]  # task, split, seed, action noise, whether it is varied
 
@@ -93,6 +95,8 @@ def attempt(key: Key, workers: int, commit: str) -> Trial:
     """Let the demonstrator try once. Nothing that goes wrong ends the benchmark: it counts as a failure."""
     task, split, seed, action_noise, varied = key
     started = time.perf_counter()
+    signal.signal(signal.SIGALRM, _too_long)
+    signal.alarm(LONGEST_S)
     env = KitchenEnv(task, split=split, cameras=(), terminate_on_success=False)
     success, steps, reason, false_terms = False, 0, "", ()
     try:
@@ -102,9 +106,14 @@ def attempt(key: Key, workers: int, commit: str) -> Trial:
     except Exception as error:
         reason = f"{type(error).__name__}: {error}"
     finally:
+        signal.alarm(0)
         env.close()
     seconds = round(time.perf_counter() - started, 3)
     return Trial(*key, success, steps, seconds, workers, reason, false_terms, commit)
+
+
+def _too_long(number: int, frame: object) -> None:
+    raise TimeoutError(f"no end after {LONGEST_S} s of wall time")
 
 
 def read_trials(path: Path) -> dict[Key, Trial]:

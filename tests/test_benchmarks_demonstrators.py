@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib
 import json
+import time
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -91,6 +92,22 @@ def test_finished_trials_are_kept_replaced_and_forgotten(
     assert set(result["tasks"]) == set(task_names())
     assert result["tasks"]["CloseDrawer"]["success_rate"] == 1.0
     assert {"machine", "versions", "date", "ratios"} <= set(result)
+
+
+def test_whatever_goes_wrong_is_a_failed_trial(bench: ModuleType, monkeypatch: pytest.MonkeyPatch) -> None:
+    def hangs(*_: Any, **__: Any) -> None:
+        time.sleep(5.0)
+
+    def breaks(*_: Any, **__: Any) -> None:
+        raise IndexError("list index out of range")
+
+    monkeypatch.setattr(bench, "LONGEST_S", 1)
+    for replacement, reason in ((hangs, "TimeoutError: no end after 1 s"), (breaks, "IndexError: list index")):
+        monkeypatch.setattr(bench, "record_episode", replacement)
+        trial = bench.attempt(("CloseDrawer", "target", 0, 0.0, True), 1, "abc")
+        assert not trial.success
+        assert trial.reason.startswith(reason)
+        assert trial.wall_s < 4.0
 
 
 def test_published_lengths_are_those_of_the_facts(shared: Path) -> None:

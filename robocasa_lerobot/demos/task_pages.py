@@ -36,8 +36,16 @@ Horizons are control steps at {hz} Hz. The human median is the length of the pub
 are drawn at reset. Terms of the goal have the names that they have in `info["success_terms"]`; distances are metres,
 angles radians, openness and turns shares of the part's range.
 """
-# Where a published check is weaker than its instruction, and what ours does.
+_LID = "A closed lid is caught, and springs open when its button is pressed."
+_HEAD_LOCK = "The head's lock holds it while it is down; pressed it stays in, pressed again it comes out."
+# Where the published check, or what a fixture does by itself, is weak or odd, and what ours does.
 _NOTES = {
+    "CloseElectricKettleLid": _LID,
+    "OpenElectricKettleLid": _LID,
+    "CloseStandMixerHead": _HEAD_LOCK,
+    "OpenStandMixerHead": _HEAD_LOCK,
+    "TurnOnToasterOven": "The published timer loses more at each update than at the last; here it runs down evenly, its "
+    "whole range in 3000 steps.",
     "MakeIcedCoffee": "The published check accepts ice up to 0.5 m from the glass, so that contact alone decides; here "
     "an ice cube is within 6 cm of the glass's middle and touches it.",
 }
@@ -90,7 +98,7 @@ def page(task: Task) -> Iterator[str]:
     yield "- Goal:"
     yield from goal_lines(task.goal)
     notes = [note for note in (_NOTES.get(task.name), _INSIDE_NOTE if _asks_inside(task.goal) else None) if note]
-    yield from (f"- The check: {note}" for note in notes)
+    yield from (f"- Other than the original: {note}" for note in notes)
 
 
 def goal_lines(goal: Goal, indent: str = "  ") -> Iterator[str]:
