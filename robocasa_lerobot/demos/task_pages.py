@@ -44,7 +44,7 @@ _NOTES = {
     "OpenElectricKettleLid": _LID,
     "CloseStandMixerHead": _HEAD_LOCK,
     "OpenStandMixerHead": _HEAD_LOCK,
-    "TurnOnToasterOven": "The published timer loses more at each update than at the last; here it runs down evenly, its "
+    "TurnOnToasterOven": "The published timer loses more at each update than before; here it runs down evenly, its "
     "whole range in 3000 steps.",
     "MakeIcedCoffee": "The published check accepts ice up to 0.5 m from the glass, so that contact alone decides; here "
     "an ice cube is within 6 cm of the glass's middle and touches it.",
