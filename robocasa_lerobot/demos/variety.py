@@ -24,6 +24,9 @@ _WEIGHT = 0.12
 # Commands up to this share of a full one are fine servoing or pushing: they stay as they are.
 _FINE = 0.4
 
+# Of forward, left, turn and torso (robocasa facts, section 2).
+_DEAD_ZONES = np.array([0.25, 0.25, 0.11, 0.0])
+
 _POSITION = contract.ACTION_SLICES["end_effector_position"]
 _BASE = contract.ACTION_SLICES["base_motion"]
 _GRIPPER = contract.ACTION_SLICES["gripper_close"]
@@ -75,10 +78,12 @@ class Variety:
         if out[_GRIPPER][0] < 0 and out[_MODE][0] == FROM_ACHIEVED and np.abs(move).max() > _FINE:
             c, s = np.cos(self.bow_rad), np.sin(self.bow_rad)
             out[_POSITION] = np.clip([c * move[0] - s * move[1], s * move[0] + c * move[1], move[2]], -1.0, 1.0)
-        for part in (_POSITION, _BASE):
-            largest = float(np.abs(out[part]).max())
-            if largest > _FINE:
-                out[part] *= max(_FINE / largest, self.speed)
+        largest = float(np.abs(out[_POSITION]).max())
+        if largest > _FINE:
+            out[_POSITION] *= max(_FINE / largest, self.speed)
+        # A base at rest answers to what is beyond its dead zones: that is the speed.
+        beyond = np.maximum(np.abs(out[_BASE]) - _DEAD_ZONES, 0.0)
+        out[_BASE] -= np.sign(out[_BASE]) * (1.0 - self.speed) * beyond
         return out
 
 
