@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 
 from robocasa_lerobot.demos.motion import Array
+from robocasa_lerobot.demos.skills.blender_lid import cover, uncover
 from robocasa_lerobot.demos.skills.buttons import press_button
 from robocasa_lerobot.demos.skills.common import SkillError
 from robocasa_lerobot.demos.skills.doors import close_doors, push_lid
@@ -47,6 +48,8 @@ SKILLS: dict[tuple[str, str], Skill] = {
     ("levers", "off"): turn_off_water,
     ("levers", "turn"): turn_sideways,
     ("pick_place", "place"): place_into_basin,
+    ("pick_place", "uncover"): uncover,
+    ("pick_place", "cover"): cover,
     ("pick_place", "place_on"): place_on,
     ("pick_place", "place_on_from_pan"): place_on,
     ("pick_place", "drop_into"): place_on,

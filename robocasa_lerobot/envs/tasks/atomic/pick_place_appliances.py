@@ -174,7 +174,7 @@ BLENDER_AND_MIXER = (
             StateIs("blender", "lid", value=False),
             GripperFar("{blender}_lid", 0.15),
         ),
-        stages=place("{blender}_lid", verb="place_on_counter"),
+        stages=place("{blender}_lid", "blender", verb="uncover"),
     ),
     atomic(
         "CloseBlenderLid",
