@@ -11,7 +11,7 @@ from robocasa_lerobot.demos.motion import Array
 from robocasa_lerobot.demos.skills.blender_lid import cover, uncover
 from robocasa_lerobot.demos.skills.buttons import press_button
 from robocasa_lerobot.demos.skills.common import SkillError
-from robocasa_lerobot.demos.skills.doors import close_doors, push_lid
+from robocasa_lerobot.demos.skills.doors import push_lid
 from robocasa_lerobot.demos.skills.drawers import close_drawer, open_drawer
 from robocasa_lerobot.demos.skills.handles import open_doors
 from robocasa_lerobot.demos.skills.heads import lower_head, raise_head
@@ -20,6 +20,7 @@ from robocasa_lerobot.demos.skills.levers import press_lever, turn_off_water, tu
 from robocasa_lerobot.demos.skills.navigation import drive
 from robocasa_lerobot.demos.skills.put_down import place_into_basin, place_on, place_on_reaching_in
 from robocasa_lerobot.demos.skills.racks import pull, push, slide
+from robocasa_lerobot.demos.skills.shut import close_doors, lift_shut
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.task import Stage
 
@@ -30,6 +31,8 @@ SKILLS: dict[tuple[str, str], Skill] = {
     ("doors", "open"): open_doors,
     ("doors", "raise_head"): raise_head,
     ("doors", "lower_head"): lower_head,
+    ("doors", "close_large"): close_doors,
+    ("doors", "lift_shut"): lift_shut,
     ("doors", "push_lid"): push_lid,
     ("drawers", "open"): open_drawer,
     ("drawers", "close"): close_drawer,

@@ -15,12 +15,15 @@ from robocasa_lerobot.demos.motion import (
     HandTarget,
     arm_action,
     base_pose,
+    frame,
     grip_position,
     hand_rotation,
+    nearer_turn,
 )
 from robocasa_lerobot.demos.skills.arc_plan import STANDOFF_M, ArcPlan, Shift, Way, plan_arc
 from robocasa_lerobot.demos.skills.common import hold_hand, move_hand
-from robocasa_lerobot.demos.skills.hinged import Hinged
+from robocasa_lerobot.demos.skills.firm import FirmServo
+from robocasa_lerobot.demos.skills.hinged import UP, Hinged
 from robocasa_lerobot.demos.skills.reach import shift_base
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 
@@ -28,6 +31,9 @@ GRASP_STEPS, RELEASE_STEPS = 10, 6
 _BASE_SPEED = 0.22  # metres a second while the arm moves too: the arm keeps up with about 0.26
 _DEAD_ZONE = 0.25  # of base commands (robocasa facts, section 2)
 STALL_STEPS, STALL_RAD = 25, 0.004
+TUCKED_AHEAD_M, TUCKED_UP_M = 0.28, 0.58  # of the grip site from the arm's foot
+FIRM_LEAD_M = 0.09  # of the hand's goal in a firm push
+FIRMER_STEPS = 12  # without movement, after which a firm push has twice its lead
 
 
 def swing(
@@ -42,6 +48,7 @@ def swing(
     speed: float = 0.8,
     max_steps: int = 200,
     until: Callable[[], bool] = lambda: False,
+    firm: bool = False,
 ) -> Iterator[Array]:
     """Go along with a part until it stands at `goal`, `until` holds, or it turns no more.
 
@@ -56,8 +63,10 @@ def swing(
         speed: bound of each command component, in (0, 1].
         max_steps: control steps at most.
         until: ends it too.
+        firm: push harder, the harder the longer nothing moves; then neither `lead_rad` nor `speed` has an effect.
     """
     data = env.data
+    servo = FirmServo(data)
     first = part.angle
     way = 1.0 if goal > first else -1.0
     last, since = first, 0
@@ -70,8 +79,12 @@ def swing(
             since += 1
         if since >= STALL_STEPS:
             return
-        ahead = part.angle + way * lead_rad
-        step = arm_action(data, plan.way.target_at(ahead), gripper, speed=speed)
+        if firm:
+            here, near = (plan.way.target_at(part.angle + turn).position for turn in (0.0, 0.01))
+            lead = FIRM_LEAD_M / (float(np.linalg.norm(near - here)) / 0.01) * (1.0 + since / FIRMER_STEPS)
+            step = servo.action(plan.way.target_at(part.angle + way * lead), gripper)
+        else:
+            step = arm_action(data, plan.way.target_at(part.angle + way * lead_rad), gripper, speed=speed)
         progress = float(np.clip((part.angle - first) / (goal - first) + 0.15, 0.0, 1.0))
         step[contract.ACTION_SLICES["base_motion"]][:2] = _base_command(data, spot[0] + progress * (spot[1] - spot[0]))
         yield step
@@ -116,6 +129,7 @@ def push_arc(
     *,
     lead_rad: float = 0.15,
     speed: float = 0.8,
+    firm: bool = False,
 ) -> Iterator[Array]:
     """Push a part to an angle in the best of some ways, and draw the hand back.
 
@@ -128,10 +142,43 @@ def push_arc(
     yield from take_stance(env, plan, CLOSED)
     for via in plan.way.vias[: plan.way.contact]:
         yield from move_hand(data, via.target, CLOSED, tolerance=0.03)
-    yield from swing(env, part, plan, goal, gripper=CLOSED, spot=spot, lead_rad=lead_rad, speed=speed)
+    yield from swing(env, part, plan, goal, gripper=CLOSED, spot=spot, lead_rad=lead_rad, speed=speed, firm=firm)
     rotation = hand_rotation(data)
     away = HandTarget(grip_position(data) - rotation[:, 2] * 0.10, rotation)
     yield from move_hand(data, away, CLOSED, max_steps=20)
+
+
+def tuck(env: KitchenEnv, gripper: float) -> Iterator[Array]:
+    """Draw the hand back to about where it is at the beginning of an episode, before the base's middle."""
+    data = env.data
+    base, yaw = base_pose(data)
+    ahead = np.array([np.cos(yaw), np.sin(yaw), 0.0])
+    rotation = frame(0.28 * ahead - 0.96 * UP, np.cross(UP, ahead))
+    target = HandTarget(base + TUCKED_AHEAD_M * ahead + TUCKED_UP_M * UP, nearer_turn(rotation, hand_rotation(data)))
+    yield from move_hand(data, target, gripper, tolerance=0.10, max_steps=40)
+
+
+def stances_round(env: KitchenEnv, door: Hinged, near: list[Shift], *, forwards: bool) -> list[tuple[Shift, Shift]]:
+    """Moves of the base to try for a door on a vertical hinge: about where it stands, and about the door.
+
+    Args:
+        env: the kitchen.
+        door: what is opened or closed.
+        near: moves from where the robot stands now, metres forward and to the left.
+        forwards: whether the base may also follow towards the fixture.
+    """
+    base, yaw = base_pose(env.data)
+    axes = np.array([[np.cos(yaw), np.sin(yaw), 0.0], [-np.sin(yaw), np.cos(yaw), 0.0]])
+    side, width = door.side, door.width
+    spots = []
+    for before in (max(width, 0.25) + 0.35, 0.55, width + 0.6):
+        for aside in (0.5 * width, width, width + 0.35, -0.1, -0.4):
+            spot = door.point(np.zeros(3), 0.0) + side * aside * door.rightwards - before * door.inwards
+            ahead, left = axes @ (spot - base)
+            spots.append((float(ahead), float(left)))
+    ends = ((0.0, 0.0), (0.25, 0.0)) if forwards else ((0.0, 0.0),)
+    starts = [*near, *sorted(spots, key=lambda spot: float(np.hypot(*spot)))]
+    return [((x, y), (x + dx, y + dy)) for x, y in starts for dx, dy in ends]
 
 
 def take_stance(env: KitchenEnv, plan: ArcPlan, gripper: float) -> Iterator[Array]:

@@ -62,7 +62,7 @@ def fold_down(env: KitchenEnv, door: Hinged) -> Iterator[Array]:
         raise SkillError(f"{door.name} is {door.share:.0%} open after {ATTEMPTS} attempts")
 
 
-def _stances(env: KitchenEnv, door: Hinged) -> list[tuple[Shift, Shift]]:
+def stances_beside(env: KitchenEnv, door: Hinged) -> list[tuple[Shift, Shift]]:
     """Moves of the base to try: about where it stands, beside the door's way, and before it."""
     base, _ = base_pose(env.data)
     offset = base - door.point(np.zeros(3), 0.0)
@@ -80,7 +80,7 @@ def _pull(env: KitchenEnv, door: Hinged, wanted: float) -> Iterator[Array]:
     """Grasp the handle and pull the door ajar."""
     data = env.data
     ways = [_pull_way(env, door, grasp, flip, wanted) for grasp in GRASPS for flip in (1.0, -1.0)]
-    yield from pull_arc(env, door, ways, _stances(env, door), wanted + 0.02)
+    yield from pull_arc(env, door, ways, stances_beside(env, door), wanted + 0.02)
     rest = HandTarget(grip_position(data), hand_rotation(data))
     edge = door.point(np.array([0.0, 0.0, door.high[2]]), door.angle)
     over = np.array([*rest.position[:2], edge[2] + 0.12])
@@ -113,7 +113,7 @@ def _push(env: KitchenEnv, door: Hinged) -> Iterator[Array]:
     """Push the door down, from inside."""
     data = env.data
     ways = [_push_way(env, door, push, roll) for push in PUSHES for roll in range(4)]
-    plan = plan_arc(env, door, ways, _stances(env, door))
+    plan = plan_arc(env, door, ways, stances_beside(env, door))
     spot = spots(env, plan)
     yield from take_stance(env, plan, CLOSED)
     for via in plan.way.vias[: plan.way.contact]:

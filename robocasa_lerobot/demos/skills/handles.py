@@ -77,11 +77,6 @@ def open_doors(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
             raise SkillError(f"{door.name} is {door.share:.0%} open after {ATTEMPTS} attempts")
 
 
-def _outside(door: Hinged) -> float:
-    """1 if the free edge is to the right of the hinge, else -1."""
-    return 1.0 if abs(door.high[0]) > abs(door.low[0]) else -1.0
-
-
 def _pull(env: KitchenEnv, door: Hinged) -> Iterator[Array]:
     """Grasp the handle and pull the door ajar."""
     ways = [_pull_way(env, door, tilt, flip) for tilt in GRASP_TILTS for flip in (1.0, -1.0)]
@@ -95,7 +90,7 @@ def _pull_way(env: KitchenEnv, door: Hinged, tilt: tuple[float, float], flip: fl
     z = float(np.clip(height, middle - room, middle + room))
     grip = np.array([(low[0] + high[0]) / 2, low[1] + min((high[1] - low[1]) / 2, 0.012), z])
     aside, up = tilt
-    way = _outside(door)
+    way = door.side
 
     def rotation_at(angle: float) -> Array:
         turn = door.turned(TURN * angle)
@@ -130,7 +125,7 @@ def _push(env: KitchenEnv, door: Hinged) -> Iterator[Array]:
 
 def _push_way(env: KitchenEnv, door: Hinged, push: tuple[float, float, float], flip: float) -> Way:
     share, past, degrees = push
-    way = _outside(door)
+    way = door.side
     width = door.high[0] if way > 0 else -door.low[0]
     height = base_pose(env.data)[0][2] + REST_M - door.point(np.zeros(3), 0.0)[2]
     z = float(np.clip(height, door.low[2] + 0.06, door.high[2] - 0.06))

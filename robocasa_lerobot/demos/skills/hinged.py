@@ -7,15 +7,11 @@ from collections.abc import Callable, Iterator
 import mujoco
 import numpy as np
 
-from robocasa_lerobot import contract
 from robocasa_lerobot.demos.motion import (
     CLOSED,
-    FROM_DESIRED,
     Array,
     HandTarget,
-    action,
     arm_action,
-    base_pose,
     rotation_about,
 )
 from robocasa_lerobot.envs.scene.fixtures.base import Fixture
@@ -57,6 +53,16 @@ class Hinged:
     def upright(self) -> bool:
         """Whether the hinge is vertical."""
         return abs(self._axis[2]) > 0.5
+
+    @property
+    def side(self) -> float:
+        """1 if it reaches from its hinge to the right, else -1."""
+        return 1.0 if abs(self.high[0]) > abs(self.low[0]) else -1.0
+
+    @property
+    def width(self) -> float:
+        """How far it reaches from a vertical hinge, metres."""
+        return float(max(abs(self.high[0]), abs(self.low[0])))
 
     @property
     def angle(self) -> float:
@@ -146,7 +152,6 @@ def push_round(
     speed: float = 0.8,
     lead_m: float = LEAD_M,
     max_steps: int = 200,
-    follow: float = np.inf,
 ) -> Iterator[Array]:
     """Push a part round its hinge at a point until its share reaches `goal`; ends too when it stalls.
 
@@ -160,7 +165,6 @@ def push_round(
         speed: bound of each command component, in (0, 1].
         lead_m: how far before the pushed point the commanded one is, metres.
         max_steps: control steps at most.
-        follow: the base drives along where the target is farther before it than this, metres.
     """
     way = 1.0 if goal > part.share else -1.0
     lead = lead_m / part.radius(local)
@@ -176,38 +180,4 @@ def push_round(
             return
         angle = part.angle + way * lead
         target = HandTarget(part.point(local, angle), rotation(angle))
-        step = arm_action(data, target, gripper, speed=speed)
-        ahead, left = in_base(data, target.position)
-        excess = np.array([max(ahead - follow, 0.0), np.sign(left) * max(abs(left) - follow, 0.0)])
-        step[contract.ACTION_SLICES["base_motion"]][:2] = _over_dead_zone(excess)
-        yield step
-
-
-def in_base(data: mujoco.MjData, point: Array) -> Array:
-    """A point of the world as metres ahead of the base's centre and to its left, (2,)."""
-    base, yaw = base_pose(data)
-    cos, sin = np.cos(yaw), np.sin(yaw)
-    ahead: Array = np.array([[cos, sin], [-sin, cos]]) @ (point - base)[:2]
-    return ahead
-
-
-def shift_base(data: mujoco.MjData, spot: Array, gripper: float = CLOSED, *, max_steps: int = 120) -> Iterator[Array]:
-    """Drive the base's centre to a spot on the floor without turning, the arm riding along; ends if it is blocked."""
-    best, since = np.inf, 0
-    for _ in range(max_steps):
-        error = in_base(data, spot)
-        distance = float(np.linalg.norm(error))
-        best, since = (distance, 0) if distance < best - 0.02 else (best, since + 1)
-        if distance < 0.03 or since > 15:
-            break
-        motion = np.array([*_over_dead_zone(error), 0.0, 0.0])
-        yield action(gripper=gripper, base=motion, mode=FROM_DESIRED)
-
-
-def _over_dead_zone(error: Array) -> Array:
-    """Base command for an error in metres: the first quarter of a command only overcomes friction."""
-    distance = float(np.linalg.norm(error))
-    if distance < 0.01:
-        return np.zeros(2)
-    command: Array = error / distance * (0.25 + min(2.0 * distance, 0.6))
-    return command
+        yield arm_action(data, target, gripper, speed=speed)
