@@ -103,7 +103,8 @@ def record_episode(
             if held >= SUCCESS_HOLD_STEPS:
                 break
             if truncated:
-                reason = f"not done within the horizon of {env.horizon} steps"
+                late = f"; the goal holds, but for {held} steps only" if held else ""
+                reason = f"not done within the horizon of {env.horizon} steps{late}"
                 break
     except SkillError as error:
         reason = str(error)

@@ -1,7 +1,7 @@
 """Variety: what differs between two demonstrations of one task beyond the kitchen, drawn once for each.
 
 A demonstration has a speed, a side to which its free ways bow, and a preference among ways to hold the hand that are
-about equally good: grasps, rolls and approaches. Speed and bow change the actions that any skill asks for; the
+about equally good: grasps, rolls and approaches. speed and bow change the free ways of any skill; the
 preference is asked for by skills that choose among candidates (`variety_of(env).bonus(rotation)`).
 """
 
@@ -14,15 +14,15 @@ import mujoco
 import numpy as np
 
 from robocasa_lerobot import contract
-from robocasa_lerobot.demos.motion import FROM_ACHIEVED, Array
+from robocasa_lerobot.demos.motion import FROM_ACHIEVED, Array, limit
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 
-_SLOWEST = 0.75
-_BOW_RAD = 0.2
+_SLOWEST = 0.85
+_BOW_RAD = 0.1
 # A candidate may cost this much more than the best one (`reach.Plan.cost`) and still be taken.
 _WEIGHT = 0.12
-# Commands up to this share of a full one are fine servoing or pushing: they stay as they are.
-_FINE = 0.4
+# Ways with greater commands than this are free ones: skills come near to things, push and pull with smaller ones.
+_FAST = 0.9
 
 # Of forward, left, turn and torso (robocasa facts, section 2).
 _DEAD_ZONES = np.array([0.25, 0.25, 0.11, 0.0])
@@ -38,7 +38,7 @@ class Variety:
     """How a demonstration is carried out. The defaults change nothing.
 
     Attributes:
-        speed: factor of fast commands of arm and base, in (0, 1].
+        speed: bound of the arm's commands, and factor of the driving base's speed, in (0, 1].
         bow_rad: angle about the vertical by which free horizontal ways of the open hand start beside their goal.
         hand: quaternion (w, x, y, z) in the world of the hand that is preferred.
         weight: what the preference is worth, in the cost of candidates.
@@ -75,12 +75,13 @@ class Variety:
             return action
         out = action.copy()
         move = out[_POSITION]
-        if out[_GRIPPER][0] < 0 and out[_MODE][0] == FROM_ACHIEVED and np.abs(move).max() > _FINE:
+        largest = float(np.abs(move).max())
+        if largest > _FAST and out[_GRIPPER][0] < 0 and out[_MODE][0] == FROM_ACHIEVED:
             c, s = np.cos(self.bow_rad), np.sin(self.bow_rad)
-            out[_POSITION] = np.clip([c * move[0] - s * move[1], s * move[0] + c * move[1], move[2]], -1.0, 1.0)
-        largest = float(np.abs(out[_POSITION]).max())
-        if largest > _FINE:
-            out[_POSITION] *= max(_FINE / largest, self.speed)
+            out[_POSITION] = [c * move[0] - s * move[1], s * move[0] + c * move[1], move[2]]
+        out[_POSITION] = limit(out[_POSITION], self.speed)
+        if largest > 0:  # arm and base together keep step with each other
+            return out
         # A base at rest answers to what is beyond its dead zones: that is the speed.
         beyond = np.maximum(np.abs(out[_BASE]) - _DEAD_ZONES, 0.0)
         out[_BASE] -= np.sign(out[_BASE]) * (1.0 - self.speed) * beyond
