@@ -14,6 +14,9 @@ from robocasa_lerobot.envs.scene.robot import ARM_HOME_QPOS
 from robocasa_lerobot.envs.scene.robot_names import ARM_CENTER_SITE, ARM_JOINTS, GRIP_SITE, HAND
 
 ITERATIONS, DAMPING = 40, 0.05
+HOPELESS_AFTER, HOPELESS_M = 10, 0.06  # what is as far as this after so many iterations is given up
+# The wrist's centre is this far behind the grip site, and never farther than this from the shoulder, metres.
+WRIST_M, SHOULDER_M, LONGEST_M = 0.204, 0.333, 0.81
 STEP_M, STEP_RAD, TOWARDS_HOME = 0.12, 0.5, 0.15
 
 
@@ -68,11 +71,15 @@ class Arm:
             rotation = rotation @ link.rotation
             origins[:, index], axes[:, index] = position, rotation[:, :, 2]
             c, s = cos[:, index, None], sin[:, index, None]
-            x, y, z = rotation[:, :, 0], rotation[:, :, 1], rotation[:, :, 2]
-            rotation = np.stack([c * x + s * y, c * y - s * x, z], axis=2)
+            x, y = rotation[:, :, 0], rotation[:, :, 1]
+            turned = np.empty((count, 3, 3))
+            turned[:, :, 0], turned[:, :, 1], turned[:, :, 2] = c * x + s * y, c * y - s * x, rotation[:, :, 2]
+            rotation = turned
         grip = position + rotation @ self._grip
         jacobian = np.empty((count, 6, 7))
-        jacobian[:, :3] = np.cross(axes, grip[:, None] - origins).transpose(0, 2, 1)
+        arms = grip[:, None] - origins
+        for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
+            jacobian[:, i] = axes[..., j] * arms[..., k] - axes[..., k] * arms[..., j]
         jacobian[:, 3:] = axes.transpose(0, 2, 1)
         return grip, rotation @ self._hand, jacobian
 
@@ -84,12 +91,14 @@ class Arm:
         joints = start.copy()
         home = np.asarray(ARM_HOME_QPOS)
         eye6, eye7 = DAMPING**2 * np.eye(6), np.eye(7)
-        busy = np.arange(len(joints))
-        for _ in range(ITERATIONS):
+        busy = np.flatnonzero(self._within_reach(positions, rotations))
+        for iteration in range(ITERATIONS):
             grip, rotation, jacobian = self.forward(joints[busy])
             move = positions[busy] - grip
             turn = _axis_angles(rotations[busy] @ rotation.transpose(0, 2, 1))
             far = (np.linalg.norm(move, axis=1) > 0.002) | (np.linalg.norm(turn, axis=1) > 0.02)
+            if iteration == HOPELESS_AFTER:
+                far &= np.linalg.norm(move, axis=1) < HOPELESS_M
             busy = busy[far]
             if not len(busy):
                 break
@@ -108,6 +117,12 @@ class Arm:
             np.linalg.norm(_axis_angles(rotations @ rotation.transpose(0, 2, 1)), axis=1),
             margin,
         )
+
+    @staticmethod
+    def _within_reach(positions: Array, rotations: Array) -> NDArray[np.bool_]:
+        wrist = positions - WRIST_M * rotations[:, :, 2] - np.array([0.0, 0.0, SHOULDER_M])
+        near: NDArray[np.bool_] = np.linalg.norm(wrist, axis=1) < LONGEST_M
+        return near
 
 
 @dataclass(frozen=True)

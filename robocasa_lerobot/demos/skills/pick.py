@@ -14,7 +14,7 @@ import numpy as np
 from robocasa_lerobot.demos.motion import CLOSED, OPEN, Array, HandTarget, base_pose, grip_position, hand_rotation
 from robocasa_lerobot.demos.skills.common import SkillError, hold_hand, move_hand
 from robocasa_lerobot.demos.skills.things import Thing, grasps
-from robocasa_lerobot.demos.skills.ways import GOOD_ENOUGH, Choice, Way, approach, choose
+from robocasa_lerobot.demos.skills.ways import GOOD_ENOUGH, Choice, Held, Way, approach, choose, lead
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.scene.selection import RobotPose
 
@@ -23,10 +23,12 @@ INSIST = 0.12
 GRASP_STEPS, RELEASE_STEPS = 11, 8
 STANDOFF_M, HOVER_M = 0.06, 0.12
 LIFT_M, OUT_M = 0.12, 0.25
+LIFTS_M, LOW_COST = (0.035, 0.010), 0.05  # before it is drawn out of a front
 WORSE_GRASP = 0.45  # cost of a grasp's score below the best one's
 TRIED, ALIKE_M = 1.2, 0.015  # cost of a grasp like one that has failed: its place in the thing is as near as this
-# A thing that is held is nearer than this to where it was in the hand when that closed, and has risen by this.
-HELD_M, ROSE_M = 0.05, 0.008
+# A thing that is held is nearer than this to where it was in the hand when that closed, and has risen by this share of
+# the lift.
+HELD_M, ROSE_SHARE = 0.05, 0.25
 UP = np.array([0.0, 0.0, 1.0])
 
 
@@ -46,6 +48,10 @@ class Manner:
 
 
 FROM_ABOVE = Manner(((0.0, 0.0), (np.deg2rad(30.0), 0.25)))
+FROM_FRONT = Manner(
+    tuple((float(np.deg2rad(tilt)), extra) for tilt, extra in ((75.0, 0.0), (88.0, 0.0), (60.0, 0.0), (40.0, 0.2))),
+    ("up", "across", "out"),
+)
 ANYHOW = Manner(
     ((0.0, 0.0), (np.deg2rad(35.0), 0.1), (np.deg2rad(65.0), 0.2), (np.deg2rad(88.0), 0.3)), ("up", "across", "out")
 )
@@ -63,6 +69,7 @@ def pick(env: KitchenEnv, what: Thing, manner: Manner = FROM_ABOVE) -> Iterator[
         body = data.body(what.name)
         start = body.xpos.copy()
         choice = yield from approach(env, lambda blocked: _best(env, what, manner, tried, blocked), OPEN)
+        yield from lead(env, choice.joints, OPEN)
         far, before, at, lifted, out = choice.way.targets
         # All poses move with the thing, should it have been touched meanwhile.
         moved = data.body(what.name).xpos - start
@@ -75,7 +82,8 @@ def pick(env: KitchenEnv, what: Thing, manner: Manner = FROM_ABOVE) -> Iterator[
         inside = _inside(env, what)
         yield from move_hand(data, _shifted(lifted, moved), CLOSED, speed=0.7, tolerance=0.02, max_steps=50)
         rise = data.body(what.name).xpos[2] - start[2] - moved[2]
-        if rise > ROSE_M and np.linalg.norm(_inside(env, what) - inside) < HELD_M:
+        wanted = ROSE_SHARE * (lifted.position[2] - choice.way.targets[2].position[2])
+        if rise > wanted and np.linalg.norm(_inside(env, what) - inside) < HELD_M:
             yield from move_hand(data, _shifted(out, moved), CLOSED, speed=0.8, tolerance=0.03)
             if np.linalg.norm(_inside(env, what) - inside) < HELD_M:
                 return
@@ -131,20 +139,23 @@ def _ways(
         alike = sum(np.linalg.norm(local - other.position) < ALIKE_M for other in tried)
         cost = extra + WORSE_GRASP * (best - pose.score) + TRIED * float(alike)
         for turn in (pose.rotation, pose.rotation @ np.diag([-1.0, -1.0, 1.0])):
+            takes = Held(what.name, turn.T @ (body.xpos - pose.position), turn.T @ body.xmat.reshape(3, 3))
             for name in manner.entries:
-                found.append(_way(pose.position, turn, entry(env, name), name, cost, manner.out_m))
+                for lift in (LIFT_M,) if name == "up" else LIFTS_M:
+                    poses_on_way = _way(pose.position, turn, entry(env, name), name, manner.out_m, lift)
+                    found.append(Way(poses_on_way, cost + (LOW_COST if lift < LIFT_M else 0.0), takes))
     return found
 
 
-def _way(position: Array, rotation: Array, out: Array, name: str, cost: float, out_m: float) -> Way:
+def _way(position: Array, rotation: Array, out: Array, name: str, out_m: float, lift: float) -> tuple[HandTarget, ...]:
     approach = rotation[:, 2]
     before = position - STANDOFF_M * approach
     if name == "up":
-        far, lifted, last = position - HOVER_M * approach, position + 0.05 * UP, position + LIFT_M * UP
+        far, lifted, last = position - HOVER_M * approach, position + 0.05 * UP, position + lift * UP
     else:
-        far, lifted = before + out_m * out, position + 0.03 * UP
+        far, lifted = before + out_m * out, position + lift * UP
         last = lifted + out_m * out
-    return Way(tuple(HandTarget(p, rotation) for p in (far, before, position, lifted, last)), cost)
+    return tuple(HandTarget(p, rotation) for p in (far, before, position, lifted, last))
 
 
 def _inside(env: KitchenEnv, what: Thing) -> Array:

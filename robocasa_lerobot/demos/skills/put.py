@@ -22,7 +22,7 @@ from robocasa_lerobot.demos.skills.common import SkillError, hold_hand, move_han
 from robocasa_lerobot.demos.skills.navigation import drive_to
 from robocasa_lerobot.demos.skills.pick import FROM_ABOVE, INSIST, Manner, ahead_of, entry, pick
 from robocasa_lerobot.demos.skills.things import Thing
-from robocasa_lerobot.demos.skills.ways import Choice, Held, Way, approach, choose
+from robocasa_lerobot.demos.skills.ways import Choice, Held, Way, approach, choose, lead
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.scene.selection import RobotPose
 
@@ -109,6 +109,7 @@ def put(env: KitchenEnv, what: Thing, how: Putting, failed: list[Array]) -> Iter
 
     choice = yield from approach(env, plan, CLOSED)
     failed.append(choice.way.targets[2].position)
+    yield from lead(env, choice.joints, CLOSED)
     far, above, low, clear, away = choice.way.targets
     for target, tolerance, steps in ((far, 0.04, 110), (above, 0.02, 90)):
         yield from move_hand(data, target, CLOSED, tolerance=tolerance, max_steps=steps)

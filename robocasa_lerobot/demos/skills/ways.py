@@ -16,8 +16,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robocasa_lerobot.demos.arm import Arm
-from robocasa_lerobot.demos.motion import Array, HandTarget, base_pose, grip_position, hand_rotation
-from robocasa_lerobot.demos.skills.common import SkillError, move_hand
+from robocasa_lerobot.demos.motion import (
+    Array,
+    HandTarget,
+    arm_action,
+    base_pose,
+    grip_position,
+    hand_rotation,
+    pose_error,
+)
+from robocasa_lerobot.demos.skills.common import SkillError
 from robocasa_lerobot.demos.skills.navigation import Room, drive_to
 from robocasa_lerobot.demos.variety import variety_of
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
@@ -32,7 +40,9 @@ _MISS_PER_M, _MISS_PER_RAD, _MOST_MISS = 30.0, 2.0, 4.0
 _HIT, _MOST_HITS = 0.5, 3
 _DRIVE, _DRIVE_PER_M = 0.25, 0.4
 AHEAD_M, LEFT_M = (0.45, 0.55, 0.65, 0.75), (0.0, -0.15, 0.15, -0.3, 0.3)
-TUCKED_M, TUCK_FROM_M = 0.42, 0.08
+NEAR_M = 0.08  # a drive as short as this is not tested
+FOLDED_RAD = 0.35
+LEAD_M, LEAD_RAD, LEAD_STEPS = 0.06, 0.5, 10  # between the poses that the hand is led along
 ARRIVED_M, BLOCKED_M, MOST_DRIVES = 0.05, 0.10, 3
 
 
@@ -64,19 +74,22 @@ class Way:
     Attributes:
         targets: all ways that are compared have the same number.
         extra: cost that it has in any case.
+        takes: what is in the gripper after the pose that is solved first, as it will be.
     """
 
     targets: tuple[HandTarget, ...]
     extra: float = 0.0
+    takes: Held | None = None
 
 
 @dataclass(frozen=True)
 class Choice:
-    """A way, where to stand for it, and what it costs; from about 2 on it will not do."""
+    """A way, where to stand, the cost (from about 2 on it will not do), and the joint angles of the first pose."""
 
     way: Way
     stand: RobotPose | None
     cost: float
+    joints: Array
 
 
 def choose(
@@ -128,15 +141,31 @@ def approach(
         blocked.append(choice.stand)
 
 
+def lead(env: KitchenEnv, joints: Array, gripper: float) -> Iterator[Array]:
+    """Lead the hand as it goes when all joints turn evenly to `joints`, (7,) radians: the way that has been tested."""
+    arm = Arm(env.model, env.data)
+    start = np.array(env.data.qpos[arm.addresses])
+    ends, turns, _ = arm.forward(np.stack([start, joints]))
+    far = float(np.linalg.norm(ends[1] - ends[0])) + 0.15 * float(np.abs(joints - start).max())
+    count = max(int(np.ceil(far / LEAD_M)), 1)
+    shares = np.arange(1, count + 1)[:, None] / count
+    positions, turns, _ = arm.forward(start + shares * (joints - start))
+    for position, turn in zip(positions, turns, strict=True):
+        frame = env.data.site(ARM_CENTER_SITE)
+        axes = frame.xmat.reshape(3, 3)
+        target = HandTarget(frame.xpos + axes @ position, axes @ turn)
+        for _ in range(LEAD_STEPS):
+            error = pose_error(env.data, target)
+            if error.position < LEAD_M and error.rotation < LEAD_RAD:
+                break
+            yield arm_action(env.data, target, gripper)
+
+
 def _go_to(env: KitchenEnv, stand: RobotPose, gripper: float) -> Iterator[Array]:
-    """Drive with the hand drawn in, as near as it gets."""
-    base, yaw = base_pose(env.data)
-    if np.hypot(stand.x - base[0], stand.y - base[1]) > TUCK_FROM_M:
-        ahead = np.array([np.cos(yaw), np.sin(yaw)])
-        grip = grip_position(env.data)
-        tucked = HandTarget(np.array([*(base[:2] + TUCKED_M * ahead), grip[2] + 0.03]), hand_rotation(env.data))
-        if np.linalg.norm(grip[:2] - base[:2]) > TUCKED_M + 0.05:
-            yield from move_hand(env.data, tucked, gripper, tolerance=0.05, max_steps=40)
+    """Drive with the arm folded as at the start, as near as it gets."""
+    home, arm = np.array(ARM_HOME_QPOS), Arm(env.model, env.data)
+    if np.abs(env.data.qpos[arm.addresses] - home).max() > FOLDED_RAD:
+        yield from lead(env, home, gripper)
     with contextlib.suppress(SkillError):
         yield from drive_to(env, stand.x, stand.y, stand.yaw, gripper=gripper, tolerance_m=0.025)
 
@@ -170,12 +199,15 @@ class _Planner:
         self._arm = Arm(model, env.data)
         self._scratch = copy.copy(env.data)
         self._robot = env.scene.subtree(MOBILE_BASE)
-        self._carried = env.scene.subtree(held.name) if held else np.zeros_like(self._robot)
+        # What it leans on already is no reason not to go: an open drawer before the base, for one.
+        self._allowed |= self._touched(model, self._scratch, self._robot)
         # (ways, poses, 3) and (ways, poses, 3, 3)
         self._positions = np.array([[t.position for t in way.targets] for way in ways])
         self._rotations = np.array([[t.rotation for t in way.targets] for way in ways])
         variety = variety_of(env)
         self._extra = np.array([way.extra - variety.bonus(way.targets[key].rotation) for way in ways])
+        keys = np.column_stack([self._positions[:, key], self._rotations[:, key].reshape(len(ways), 9)])
+        self._same = np.unique(keys.round(4), axis=0, return_inverse=True)[1].reshape(-1)
 
     def best(self, stands: Sequence[RobotPose | None]) -> list[Choice]:
         """Choices among all ways from all stands; the costs of the first ones are complete."""
@@ -189,7 +221,11 @@ class _Planner:
         drive = np.array([self._drive(stand) for stand in stands])
         cost = self._extra[which] + drive[where]
         start = np.array(starts)[where]
-        joints, missed = self._solve(which, where, poses, self._key, start)
+        # Many ways differ in how they come and go only.
+        same = self._same[which] + where * count
+        _, first, back = np.unique(same, return_index=True, return_inverse=True)
+        joints, missed = self._solve(which[first], where[first], poses, self._key, start[first])
+        joints, missed = joints[back], missed[back]
         cost = cost + missed + 0.1 * np.abs(joints - start).max(axis=1)
         short = np.argsort(cost)[:_SHORTLIST]
         which, where, cost, start = which[short], where[short], cost[short], start[short]
@@ -204,10 +240,10 @@ class _Planner:
         for number, row in enumerate(np.argsort(cost)):
             if cost[row] > least or number >= _TESTED:
                 break
-            hits = self._hits(poses[where[row]], [joints[row] for joints in solved])
+            hits = self._hits(self._ways[which[row]], poses[where[row]], [joints[row] for joints in solved])
             total = float(cost[row]) + hits
             least = min(least, total)
-            found.append(Choice(self._ways[which[row]], stands[where[row]], total))
+            found.append(Choice(self._ways[which[row]], stands[where[row]], total, solved[1][row]))
         return sorted(found, key=lambda choice: choice.cost)
 
     def _pose(self, stand: RobotPose | None) -> tuple[float, float, float]:
@@ -249,27 +285,28 @@ class _Planner:
         cost = np.minimum(miss, _MOST_MISS) + 2.0 * np.maximum(0.0, _NEAR_LIMIT_RAD - solution.margin)
         return solution.joints, cost
 
-    def _hits(self, pose: tuple[float, float, float], joints: list[Array]) -> float:
+    def _hits(self, way: Way, pose: tuple[float, float, float], joints: list[Array]) -> float:
         """Cost of what is met from the start to the last pose."""
         model, data = self._env.model, self._scratch
         data.qpos[:] = self._env.data.qpos
         cost = self._hits_on_drive(pose, joints[0])
         place_base(model, data, *pose)
         for index in range(1, len(joints)):
-            for share in (0.5, 1.0):
+            for share in (0.2, 0.4, 0.6, 0.8, 1.0) if index == 1 else (0.5, 1.0):
                 data.qpos[self._arm.addresses] = (1 - share) * joints[index - 1] + share * joints[index]
                 mujoco.mj_kinematics(model, data)
                 mine = self._robot
-                if self._held is not None and index <= self._loaded:
-                    self._bring(data, self._held)
-                    mine = self._robot | self._carried
+                held = self._held if index <= self._loaded else way.takes if index > self._key + 1 else None
+                if held is not None:
+                    self._bring(data, held)
+                    mine = self._robot | self._env.scene.subtree(held.name)
                 cost += _HIT * min(self._met(model, data, mine), _MOST_HITS)
         return cost
 
     def _hits_on_drive(self, pose: tuple[float, float, float], joints: Array) -> float:
         """Cost of what the robot meets half-way to where it will stand, open doors for instance."""
         here = self._pose(None)
-        if np.hypot(pose[0] - here[0], pose[1] - here[1]) < TUCK_FROM_M:
+        if np.hypot(pose[0] - here[0], pose[1] - here[1]) < NEAR_M:
             return 0.0
         model, data = self._env.model, self._scratch
         data.qpos[self._arm.addresses] = joints
@@ -288,11 +325,15 @@ class _Planner:
         mujoco.mj_kinematics(self._env.model, data)
 
     def _met(self, model: mujoco.MjModel, data: mujoco.MjData, mine: NDArray[np.bool_]) -> int:
+        return len(self._touched(model, data, mine) - self._allowed)
+
+    @staticmethod
+    def _touched(model: mujoco.MjModel, data: mujoco.MjData, mine: NDArray[np.bool_]) -> set[int]:
         mujoco.mj_collision(model, data)
         if data.ncon == 0:
-            return 0
+            return set()
         pairs = model.geom_bodyid[data.contact.geom]
         inside = mine[pairs]
         crossed = (inside[:, 0] != inside[:, 1]) & (data.contact.dist < 0.0)
         others = np.where(inside[:, 0], pairs[:, 1], pairs[:, 0])[crossed]
-        return len(set(others.tolist()) - self._allowed)
+        return set(others.tolist())

@@ -18,7 +18,9 @@ from robocasa_lerobot.envs.scene.fixtures.regions import regions_of
 if TYPE_CHECKING:
     from robocasa_lerobot.envs.scene.scene import Scene
 
-INSIDE_MARGIN_M = 0.01  # the bounding box may stand out of a region by this much
+# The bounding box may stand out of a region by this much: RoboCasa's slack is 0.05 over the region's extent in metres
+# (robocasa facts, section 8), more than this; what lies tilted on a shelf has corners below it.
+INSIDE_MARGIN_M = 0.05
 RECEPTACLE_SHARE = 0.7  # of the receptacle's horizontal radius (robocasa facts, section 8)
 UPRIGHT_RAD = np.deg2rad(15.0)
 
@@ -42,7 +44,7 @@ class ObjectInBasin(Term):
 
 @dataclass(frozen=True)
 class ObjectInside(Term):
-    """All corners of an object's bounding box are in one of a fixture's regions.
+    """All corners of an object's bounding box are in one of a fixture's regions, or nearly, its origin altogether.
 
     Attributes:
         object: name.
@@ -85,8 +87,9 @@ class ObjectInside(Term):
     ) -> bool:
         half = np.asarray(region.half)
         local = np.array([region.local(data, corner) for corner in corners])
-        z = float(region.local(data, origin)[2])
-        return bool(np.all(np.abs(local) <= half + self.margin)) and z <= (2 * self.lower - 1) * half[2]
+        middle = region.local(data, origin)
+        inside = np.all(np.abs(local) <= half + self.margin) and np.all(np.abs(middle) <= half)
+        return bool(inside) and float(middle[2]) <= (2 * self.lower - 1) * half[2]
 
 
 @dataclass(frozen=True)

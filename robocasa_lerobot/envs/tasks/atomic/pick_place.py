@@ -29,6 +29,7 @@ _PAN = Placement(
     rotation=HANDLE_TURN,
     ensure_inside=False,
 )
+_WITHIN_REACH_M = (0.5, 1.65)  # heights of shelves that the arm reaches
 _DOOR_OPEN = (0.90, 1.0)
 
 
@@ -60,7 +61,12 @@ CABINET = (
         fixtures=(FixtureWanted("cab", "cabinet"), counter_near("cab")),
         start=RobotStart("cab"),
         objects=(
-            ObjectWanted("obj", ("any",), Placement("cab", size=(0.5, 0.2), pos=(0.0, -1.0)), graspable=True),
+            ObjectWanted(
+                "obj",
+                ("any",),
+                Placement("cab", region=SampleRegion(height=_WITHIN_REACH_M), size=(0.5, 0.2), pos=(0.0, -1.0)),
+                graspable=True,
+            ),
             _back("cab", (1.0, 0.3), (0.0, -0.05)),
             ObjectWanted("distr_cab", ("any",), Placement("cab", size=(1.0, 0.2), pos=(0.0, 1.0))),
         ),

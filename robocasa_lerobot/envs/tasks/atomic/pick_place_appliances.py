@@ -143,7 +143,7 @@ BLENDER_AND_MIXER = (
         ),
         initial=(LidAside("blender", gone=True),),
         goal=AllOf(ObjectInside("obj", "blender"), GripperFar("obj")),
-        stages=place(target="blender", verb="place_inside"),
+        stages=place(target="blender", verb="drop_into_jug"),
     ),
     atomic(
         "PickPlaceCounterToStandMixer",

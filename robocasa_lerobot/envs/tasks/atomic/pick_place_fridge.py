@@ -54,7 +54,7 @@ FRIDGE = (
         ),
         initial=(InitialOpenness("fridge", 1.0, 1.0), PartAt("fridge", "{drawer}", (0.8, 1.0))),
         goal=AllOf(ObjectInside("obj", "fridge", region="{drawer}"), GripperFar("obj", _FRIDGE_FAR_M)),
-        stages=place(target="fridge", verb="place_inside", part="{drawer}"),
+        stages=place(target="fridge", verb="place_inside_fridge", part="{drawer}"),
     ),
     atomic(
         "PickPlaceFridgeDrawerToShelf",
@@ -84,7 +84,7 @@ FRIDGE = (
             ObjectInside("obj", "fridge", region="fridge_shelf", lower=0.9, height=USABLE_SHELF),
             GripperFar("obj", _FRIDGE_FAR_M),
         ),
-        stages=place(target="fridge", verb="place_inside", part="fridge_shelf"),
+        stages=place(target="fridge", verb="place_inside_fridge", part="fridge_shelf"),
     ),
 )
 
