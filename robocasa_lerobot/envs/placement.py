@@ -102,19 +102,34 @@ class Area:
     rotation: tuple[float, float] = (-MAX_YAW_RAD, MAX_YAW_RAD)
     inside: bool = True
 
-    def sample(self, rng: np.random.Generator, half: tuple[float, float]) -> Footprint:
-        """A footprint of half sizes `half` whose corners lie in the area where it is large enough, else its centre."""
+    def sample(
+        self, rng: np.random.Generator, half: tuple[float, float], middle: tuple[float, float] = (0.0, 0.0)
+    ) -> Footprint:
+        """A footprint of half sizes `half` whose corners lie in the area where it is large enough, else its centre.
+
+        If only middles must lie in the area, `middle` is what counts as such, in the footprint's own frame, metres: a
+        pan stands with its round part over the burner, whatever the length of its handle.
+        """
         yaw = float(rng.uniform(*self.rotation))
         c, s = abs(np.cos(yaw)), abs(np.sin(yaw))
         reach_x, reach_y = (c * half[0] + s * half[1], s * half[0] + c * half[1]) if self.inside else (0.0, 0.0)
         x = _uniform_inside(rng, self.x0, self.x1, reach_x)
         y = _uniform_inside(rng, self.y0, self.y1, reach_y)
+        if not self.inside:
+            turned = np.array(middle) @ Footprint(0.0, 0.0, yaw, half).axes()
+            x, y = x - float(turned[0]), y - float(turned[1])
         return Footprint(*self.to_room(x, y), self.yaw + yaw, half)
 
     def to_room(self, x: float, y: float) -> tuple[float, float]:
         """Where a point of the fixture's frame is in the room, metres."""
         c, s = np.cos(self.yaw), np.sin(self.yaw)
         return float(self.origin[0] + c * x - s * y), float(self.origin[1] + s * x + c * y)
+
+    def holds(self, footprint: Footprint) -> bool:
+        """Whether all corners of a footprint lie in the rectangle."""
+        axes = Footprint(0.0, 0.0, self.yaw, (0.0, 0.0)).axes()
+        x, y = ((footprint.corners() - self.origin) @ axes.T).T
+        return bool(self.x0 <= x.min() and x.max() <= self.x1 and self.y0 <= y.min() and y.max() <= self.y1)
 
     @property
     def middle(self) -> tuple[float, float]:
@@ -151,16 +166,18 @@ def place(
     occupied: list[Footprint],
     margin: float = 0.01,
     what: str = "a footprint",
+    middle: tuple[float, float] = (0.0, 0.0),
 ) -> tuple[Footprint, Area]:
-    """Find a footprint in one of the areas that keeps `margin` metres from those occupied.
+    """Find a footprint in one of the areas that keeps `margin` metres from those occupied; `middle` as in `sample`.
 
     Raises:
         PlacementError: none found in 5000 draws; it names `what`, the region, its free area and three remedies.
     """
-    near = {id(area): _neighbours(area, half, occupied, margin) for area in areas}
+    aside = float(np.hypot(*middle))
+    near = {id(area): _neighbours(area, half, occupied, margin + aside) for area in areas}
     for _ in range(MAX_SAMPLES):
         area = areas[int(rng.integers(len(areas)))]
-        footprint = area.sample(rng, half)
+        footprint = area.sample(rng, half, middle)
         if not any(footprint.overlaps(other, margin) for other in near[id(area)]):
             return footprint, area
     free = sum(area.free_extent(occupied) for area in areas)

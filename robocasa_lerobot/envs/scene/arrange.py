@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 
@@ -18,6 +18,7 @@ from robocasa_lerobot.envs.scene.selection import candidates, counter_areas, ins
 from robocasa_lerobot.envs.task import FixtureWanted, ObjectWanted, OnCounter, Placement, Task
 
 PLACEMENT_GAP_M = 0.004  # objects start this far above their surface and settle
+_TURNS = 20  # how often a place is drawn for what hardly fits into a compartment
 IN_CONTAINER = "in_container"  # object group of what may stand in a container
 
 
@@ -141,6 +142,7 @@ def _put(
 ) -> None:
     start = wanted.start
     standing: list[Footprint] = []
+    rooms: list[Area] = []
     if isinstance(start, OnCounter):
         areas, standing = counter_areas(layout, start, layout.fixtures[roles[start.near]])
     elif not isinstance(start, Placement):
@@ -163,9 +165,12 @@ def _put(
             container = catalogue.sample(rng, (start.try_to_place_in,), split)
             holder = f"{name}_container"
             _put_down(rng, table, holder, container, areas, standing)
-            _put_on(rng, table, name, item, table.placed[holder], start)
+            # What may stick out is the container: a thing across its rim would tip over.
+            _put_on(rng, table, name, item, table.placed[holder], replace(start, ensure_inside=True))
             return
-    _put_down(rng, table, name, item, areas, standing)
+        if inside and start.ensure_inside and not start.slot:
+            rooms = [part.area for part in table.parts[name]]
+    _put_down(rng, table, name, item, areas, standing, rooms)
 
 
 def _in_slot(area: Area, item: catalogue.Instance) -> Area:
@@ -210,7 +215,9 @@ def _put_down(
     item: catalogue.Instance,
     areas: list[Area],
     standing: list[Footprint],
+    rooms: Sequence[Area] = (),
 ) -> None:
+    """Put an object onto one of the areas; if compartments are given as `rooms`, so that it is wholly in one."""
     width, depth, height = item.size
     high = [area for area in areas if area.height > height + PLACEMENT_GAP_M]
     what = f"{name} ({item.model})"
@@ -219,7 +226,17 @@ def _put_down(
             f"{what} is {height:.2f} m high, and {areas[0].name} has {max(a.height for a in areas):.2f} m. Ask for a "
             "lower object, for a higher part, or for another fixture."
         )
-    footprint, area = place(rng, high, (width / 2, depth / 2), [*table.near(high[0].z), *standing], what=what)
+    half, occupied = (width / 2, depth / 2), [*table.near(high[0].z), *standing]
+    middle = (0.0, 0.0) if item.interior is None else item.interior.center[:2]
+    for _ in range(_TURNS):
+        footprint, area = place(rng, high, half, occupied, what=what, middle=middle)
+        if not rooms or any(room.holds(footprint) for room in rooms):
+            break
+    else:
+        raise PlacementError(
+            f"{what} of {width:.2f} x {depth:.2f} m does not lie in {rooms[0].name} without touching its walls. Ask for "
+            "a smaller object, or for another fixture."
+        )
     table.taken.append((footprint, area.z))
     z = area.z + height / 2 + PLACEMENT_GAP_M
     table.placed[name] = PlacedObject(name, item, (footprint.x, footprint.y, z), footprint.yaw)

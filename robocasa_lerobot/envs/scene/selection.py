@@ -192,7 +192,7 @@ def robot_pose(
     """A free pose facing a fixture, by RoboCasa's rules, with the start's uniform deviation to all sides.
 
     `at` is a point of the room to stand in line with, instead of the fixture's middle. The robot does not stand in
-    the doors of those `opened`, if they fold down.
+    the doors of those `opened` that fold down, nor in their drawers.
 
     Raises:
         PlacementError: no pose was free.
@@ -229,7 +229,7 @@ class Obstacles:
     """What a robot may meet where it stands: at the height of its base, of the column above it, and of its hand."""
 
     def __init__(self, fixtures: Mapping[str, Fixture], opened: Iterable[Fixture] = ()) -> None:
-        doors = _folded(opened)
+        doors = _opened(opened)
         self._base, self._column = (_standing(fixtures, doors, top) for top in (BASE_TOP_M, COLUMN_TOP_M))
         low, high = HAND_Z_M
         tall = [f for f in fixtures.values() if f.pos[2] - f.height / 2 < high and f.pos[2] + f.height / 2 > low]
@@ -252,15 +252,19 @@ def _standing(fixtures: Mapping[str, Fixture], doors: list[tuple[Footprint, floa
     return Footprints([*marks, *(mark for mark, height in doors if height < top)])
 
 
-def _folded(fixtures: Iterable[Fixture]) -> list[tuple[Footprint, float]]:
-    """Where the open doors of dishwashers and ovens lie, and how high, metres."""
+def _opened(fixtures: Iterable[Fixture]) -> list[tuple[Footprint, float]]:
+    """Where the open doors of dishwashers and ovens and pulled-out drawers are, and how high, metres."""
     found = []
     for fixture in fixtures:
         if isinstance(fixture, Dishwasher | Oven):
             low, high = fixture.door_span
-            x, y, z = fixture.to_world((0.0, -fixture.depth / 2 - (high - low) / 2, low))
-            mark = Footprint(float(x), float(y), fixture.yaw, (fixture.width / 2, (high - low) / 2))
-            found.append((mark, float(z)))
+            out = high - low
+        elif isinstance(fixture, Drawer):
+            low, out = -fixture.height / 2, fixture.full_travel + HANDLE_OUT_M
+        else:
+            continue
+        x, y, z = fixture.to_world((0.0, -fixture.depth / 2 - out / 2, low))
+        found.append((Footprint(float(x), float(y), fixture.yaw, (fixture.width / 2, out / 2)), float(z)))
     return found
 
 
@@ -318,14 +322,22 @@ def counter_areas(layout: Layout, start: OnCounter, near: Fixture) -> tuple[list
 
 def standing_on(layout: Layout, fixture: Fixture, surface_z: float) -> list[Footprint]:
     """Footprints of the fixtures that stand on a surface of a fixture, or reach near it from above."""
-    return [
-        footprint(f)
+    standing = [
+        f
         for f in layout.fixtures.values()
         if f is not fixture
         and (isinstance(f, Accessory) or layout.types[f.name] not in NOT_IN_THE_WAY)
         and f.pos[2] + f.height / 2 > surface_z - 0.005
         and f.pos[2] - f.height / 2 < surface_z + 0.3
     ]
+    return [footprint(f) for f in standing] + [_faucet(f) for f in standing if isinstance(f, Sink)]
+
+
+def _faucet(sink: Sink) -> Footprint:
+    """What the faucet covers of the counter; it stands out of the sink's box."""
+    (x, y), half = sink.faucet_spot
+    at = sink.to_world((x, y, 0.0))
+    return Footprint(float(at[0]), float(at[1]), sink.yaw, half)
 
 
 def inside_area(start: InsideOf, fixture: Fixture, openness: float) -> Area:

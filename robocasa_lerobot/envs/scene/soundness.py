@@ -103,25 +103,29 @@ def blocked_walkways(layout: Layout) -> list[str]:
 
 
 def moved(scene: Scene, data: mujoco.MjData) -> dict[str, float]:
-    """Metres that each object moved in a second after it had settled; doors and drawers by their joints, too.
+    """Metres that each object, and the middle of each door, drawer and rack, moved in a second after all had settled.
 
     `data` is the state at the episode's start; it is stepped.
     """
     model = scene.model
     objects = {name: data.body(name).xpos.copy() for name in scene.objects}
-    robot = model.body("robot0_base").id
-    still = [
-        j
-        for j in range(model.njnt)
-        if model.jnt_type[j] in (mujoco.mjtJoint.mjJNT_HINGE, mujoco.mjtJoint.mjJNT_SLIDE)
-        and model.body_rootid[model.jnt_bodyid[j]] != robot
-    ]
-    before = data.qpos[model.jnt_qposadr[still]].copy()
+    parts = _moving_parts(model, scene)
+    before = data.xipos[parts].copy()
     for _ in range(round(SETTLE_S / model.opt.timestep)):
         mujoco.mj_step(model, data)
     found = {name: float(np.linalg.norm(data.body(name).xpos - start)) for name, start in objects.items()}
-    travel = np.abs(data.qpos[model.jnt_qposadr[still]] - before)
-    return found | {model.joint(j).name: float(way) for j, way in zip(still, travel, strict=True)}
+    travel = np.linalg.norm(data.xipos[parts] - before, axis=1)
+    return found | {model.body(part).name: float(way) for part, way in zip(parts, travel, strict=True)}
+
+
+def _moving_parts(model: mujoco.MjModel, scene: Scene) -> NDArray[np.intp]:
+    """Bodies of fixtures that can move and be met; what only shows a state, such as water, cannot be met."""
+    own = {model.body(name).id for name in (*scene.objects, "robot0_base")}
+    solid = set(model.geom_bodyid[model.geom_contype != 0])
+    return np.array(
+        [b for b in range(1, model.nbody) if model.body_weldid[b] and b in solid and model.body_rootid[b] not in own],
+        dtype=np.intp,
+    )
 
 
 def fell(scene: Scene, data: mujoco.MjData) -> dict[str, float]:

@@ -23,6 +23,8 @@ HANDLE_MAX, TEMP_MAX, SPOUT_MAX = 1.2, 1.6, 1.2
 TEMP_START = 0.4  # share of the temperature when nobody has set it: cold, but not by a hair
 WALL_M, RIM_M = 0.012, 0.020
 _FAUCET_BACK_M = 0.055  # from the basin's rear edge
+# What foot, bridge and levers of a faucet cover of the counter: to the left and right of its middle, half the depth.
+_FAUCET_SIDES_M, _FAUCET_HALF_DEPTH_M = (-0.13, 0.19), 0.045
 _STREAMS = ("cold_low", "cold_high", "hot_low", "hot_high")
 
 
@@ -55,6 +57,13 @@ class Sink(Appliance):
             )
             for i, (x0, x1) in enumerate(self._basins())
         }
+
+    @property
+    def faucet_spot(self) -> tuple[tuple[float, float], tuple[float, float]]:
+        """Middle and half sizes of what the faucet covers of the counter, in the frame of the sink, metres."""
+        left, right = _FAUCET_SIDES_M
+        middle = ((left + right) / 2, self.depth / 2 + _FAUCET_BACK_M)
+        return middle, ((right - left) / 2, _FAUCET_HALF_DEPTH_M)
 
     def state(self, data: mujoco.MjData) -> dict[str, float | bool]:
         """`handle` and `spout` in radians, `temperature` as a share, `water_on`, `high`, `hot`, `left`, `right`."""
