@@ -234,8 +234,8 @@ def _put_down(
             break
     else:
         raise PlacementError(
-            f"{what} of {width:.2f} x {depth:.2f} m does not lie in {rooms[0].name} without touching its walls. Ask for "
-            "a smaller object, or for another fixture."
+            f"{what} of {width:.2f} x {depth:.2f} m does not lie in {rooms[0].name} without touching its walls. "
+            "Ask for a smaller object, or for another fixture."
         )
     table.taken.append((footprint, area.z))
     z = area.z + height / 2 + PLACEMENT_GAP_M

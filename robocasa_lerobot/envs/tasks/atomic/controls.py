@@ -74,7 +74,14 @@ def _stove(
             ObjectWanted(
                 cookware,
                 groups,
-                Placement("stove", region=region, size=(0.02, 0.02), rotation=HANDLE_TURN, ensure_inside=False),
+                Placement(
+                    "stove",
+                    region=region,
+                    size=(0.02, 0.02),
+                    pos=(0.0, 0.0),
+                    rotation=HANDLE_TURN,
+                    ensure_inside=False,
+                ),
             ),
         ),
         initial=(BurnerAt("stove", "{knob}", start),),

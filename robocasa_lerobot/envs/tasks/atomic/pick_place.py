@@ -26,6 +26,7 @@ _PAN = Placement(
     "stove",
     region=SampleRegion(name="any", height=(0.7, 1.2)),
     size=(0.02, 0.02),
+    pos=(0.0, 0.0),
     rotation=HANDLE_TURN,
     ensure_inside=False,
 )

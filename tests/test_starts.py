@@ -1,0 +1,83 @@
+"""Scenes start sound: what is placed lies within where it belongs, and nothing stands in anything else."""
+
+from __future__ import annotations
+
+import mujoco
+import numpy as np
+import pytest
+
+from robocasa_lerobot.envs.placement import Area, Footprint
+from robocasa_lerobot.envs.registry import get_task
+from robocasa_lerobot.envs.scene.builder import build_scene
+from robocasa_lerobot.envs.scene.layout import load_layout
+from robocasa_lerobot.envs.scene.scene import Scene
+from robocasa_lerobot.envs.scene.selection import standing_on
+from robocasa_lerobot.envs.scene.soundness import moved
+
+
+def scene_in(task: str, layout: int, style: int) -> Scene:
+    return build_scene(get_task(task), "pretrain", 100 * layout + style, kitchens=[(layout, style)])
+
+
+def touches(scene: Scene, data: mujoco.MjData, one: str, other: str) -> bool:
+    first, second = scene.subtree(one), scene.subtree(other)
+    bodies = scene.model.geom_bodyid[data.contact.geom]
+    return bool((first[bodies[:, 0]] & second[bodies[:, 1]] | first[bodies[:, 1]] & second[bodies[:, 0]]).any())
+
+
+def test_no_robot_starts_in_a_drawer_that_stands_open() -> None:
+    scene = scene_in("PickPlaceDrawerToCounter", 40, 21)
+    data, _ = scene.initial_data(np.random.default_rng(0))
+    drawer = scene.drawer("drawer")
+    assert drawer.openness(data) == pytest.approx(1.0, abs=0.01)
+    assert not touches(scene, data, "robot0_base", drawer.name)
+
+
+def test_a_door_that_moves_by_itself_is_found() -> None:
+    scene = scene_in("PickPlaceDrawerToCounter", 40, 21)
+    data, _ = scene.initial_data(np.random.default_rng(0))
+    drawer = scene.drawer("drawer")
+    assert max(moved(scene, data).values()) < 0.01
+    data.joint(drawer.joint).qvel[:] = 0.5
+    assert moved(scene, data)[f"{drawer.name}_box"] > 0.01
+
+
+def test_a_pan_stands_with_its_round_part_on_the_burner() -> None:
+    scene = scene_in("PickPlaceCounterToStove", 58, 23)
+    pan = scene.objects["container"]
+    assert pan.item.interior is not None
+    footprint = pan.footprint
+    middle = np.array(pan.pos[:2]) + np.array(pan.item.interior.center[:2]) @ footprint.axes()
+    regions = scene.hob("stove").regions
+    burners = [scene.fixture("stove").to_world(r.center)[:2] for name, r in regions.items() if name != "interior"]
+    assert min(np.hypot(*(middle - at)) for at in burners) < 0.02
+    assert min(np.hypot(*(np.array(pan.pos[:2]) - at)) for at in burners) > 0.02
+
+
+def test_middles_are_drawn_into_areas_that_hold_no_whole_footprints() -> None:
+    area = Area(-0.01, 0.01, -0.01, 0.01, (2.0, 1.0), 0.7, 0.9, inside=False)
+    rng = np.random.default_rng(0)
+    for _ in range(20):
+        found = area.sample(rng, (0.2, 0.1), middle=(0.05, 0.02))
+        x, y = np.array([found.x, found.y]) + np.array([0.05, 0.02]) @ found.axes()
+        assert area.holds(Footprint(float(x), float(y), 0.7, (0.0, 0.0)))
+        assert not area.holds(found)
+
+
+@pytest.mark.parametrize(("layout", "style"), [(57, 55), (51, 32)])
+def test_what_lies_in_a_basin_touches_no_wall_at_first(layout: int, style: int) -> None:
+    """Placemats as large as the basin started in its walls, and were pressed through its floor."""
+    scene = scene_in("TurnSinkSpout", layout, style)
+    data, _ = scene.initial_data(np.random.default_rng(0))
+    thing = scene.objects["distr_sink"]
+    assert abs(data.body("distr_sink").xpos[2] - thing.pos[2]) < 0.02
+
+
+def test_faucets_are_in_the_way_behind_the_basin() -> None:
+    layout = load_layout(29, 59)
+    sink = next(iter(layout.of_type("sink")))
+    counter = next(f for f in layout.of_type("counter") if abs(f.to_local(sink.pos)[0]) < f.width / 2)
+    behind = sink.to_world((0.0, sink.depth / 2 + 0.055, 0.0))
+    spot = Footprint(float(behind[0]), float(behind[1]), 0.0, (0.01, 0.01))
+    marks = standing_on(layout, counter, sink.pos[2] + sink.height / 2)
+    assert any(mark.overlaps(spot) for mark in marks)
