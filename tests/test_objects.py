@@ -12,6 +12,8 @@ import numpy as np
 import pytest
 from grasping_trial import GripperTrial, try_instance
 
+from robocasa_lerobot.envs.registry import get_task
+from robocasa_lerobot.envs.scene.builder import LIQUIDS, build_scene
 from robocasa_lerobot.envs.scene.materials import MaterialPalette, load_style, style_ids
 from robocasa_lerobot.envs.scene.objects import catalogue
 from robocasa_lerobot.envs.scene.objects.draft import FORMS, find_form
@@ -270,6 +272,13 @@ def test_a_saucepan_with_a_lid_names_its_lid_and_liquids_only_look():
     liquid = model.geom("mug_liquid")
     assert liquid.contype[0] == 0
     assert liquid.conaffinity[0] == 0
+
+
+def test_the_cup_of_a_task_shows_the_coffee_that_is_in_it():
+    scene = build_scene(get_task("MakeIcedCoffee"), "target", 0)
+    liquid = scene.model.geom("cup_liquid")
+    assert scene.model.mat_rgba[liquid.matid[0]] == pytest.approx(LIQUIDS["coffee"], abs=0.01)
+    assert liquid.contype[0] == liquid.conaffinity[0] == 0
 
 
 def test_two_of_a_kind_share_their_meshes_and_a_model_is_a_pure_function():

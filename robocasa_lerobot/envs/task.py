@@ -157,7 +157,7 @@ class ObjectWanted:
         scale: factor of its size.
         upright: turned so that its longest axis points up.
         repeats: may be of a category that the scene already has.
-        filled: what is seen in it, such as "coffee".
+        filled: what is seen in it, one of `LIQUIDS` in `envs/scene/builder.py`; it is there for the eye only.
     """
 
     name: str

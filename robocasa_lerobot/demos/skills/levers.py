@@ -1,7 +1,8 @@
 """Levers: pushed with the closed finger tips, or grasped and led along the arc of their hinge.
 
 Solved in target kitchens with action noise 0.05, seeds 4-9: faucet on 6/6, off 6/6, spout 6/6, water temperature 5/6,
-toaster 5/6, kettle 3/6 (its switch lies below the handle, which the hand meets first).
+toaster 5/6. The kettle's switch, without noise: 4/4 (seeds 4, 5, 6, 9), 3/6 before the finger tips ended short of the
+case behind it.
 """
 
 from __future__ import annotations
@@ -215,7 +216,7 @@ def push_way(point: Array, way: Array, rotation: Array, travel: float) -> tuple[
     approach = rotation[:, 2]
     support = float(FINGER_HALF_M @ np.abs(rotation.T @ way))
     aside = 1.0 - abs(float(approach @ way))
-    touch = point - way * (support + 0.004) + approach * SHORT_M * aside
+    touch = point - way * (support + 0.004) - approach * SHORT_M * aside
     before = touch - way * 0.015 - approach * 0.05 * aside - way * 0.04 * (1 - aside)
     level = approach * np.array([1.0, 1.0, 0.0])
     return (

@@ -33,6 +33,9 @@ MAX_ATTEMPTS = 50
 # Key of the generator of camera noise: a stream of its own, so that noise changes nothing else of the scene.
 _CAMERA_NOISE_STREAM = 2
 
+# What is seen in a vessel: colour and opacity.
+LIQUIDS = {"coffee": (0.25, 0.13, 0.06, 1.0)}
+
 
 @dataclass(frozen=True)
 class _Look:
@@ -113,7 +116,7 @@ def _attempt(
         at = objects[task.robot_start.at_object].pos[:2]
         robot = robot_pose(rng, layout, task.robot_start, layout.fixtures[roles[task.robot_start.fixture]], at, opened)
     spots = {role: _lid_spot(rng, layout, roles[role], objects) for role, gone in lids.items() if not gone}
-    spec = _assemble(layout, look, objects)
+    spec = _assemble(task, layout, look, objects)
     if look.camera_noise is not None:
         noise_rng = np.random.default_rng([seed, _CAMERA_NOISE_STREAM])
         add_camera_noise(spec, look.camera_set, look.camera_noise, noise_rng)
@@ -200,9 +203,10 @@ def _said(wording: str, words: dict[str, str]) -> str:
     return " ".join(wording.format(**words).split())
 
 
-def _assemble(layout: Layout, look: _Look, objects: dict[str, PlacedObject]) -> mujoco.MjSpec:
+def _assemble(task: Task, layout: Layout, look: _Look, objects: dict[str, PlacedObject]) -> mujoco.MjSpec:
     spec, palette = bare_kitchen(layout, look.render_preset)
     add_robot(spec, look.render_preset, camera_set=look.camera_set)
+    liquids = {wanted.name: LIQUIDS[wanted.filled] for wanted in task.objects if wanted.filled}
     for placed in objects.values():
-        add_object(spec, palette, placed.name, placed.item)
+        add_object(spec, palette, placed.name, placed.item, liquid=liquids.get(placed.name))
     return spec
