@@ -44,6 +44,8 @@ _NOTES = {
     "OpenElectricKettleLid": _LID,
     "CloseStandMixerHead": _HEAD_LOCK,
     "OpenStandMixerHead": _HEAD_LOCK,
+    "SlideDishwasherRack": "The robot does not start where the open door lies.",
+    "SlideOvenRack": "The robot starts 0.35 m farther back, clear of the open door.",
     "TurnOnToasterOven": "The published timer loses more at each update than before; here it runs down evenly, its "
     "whole range in 3000 steps.",
     "MakeIcedCoffee": "The published check accepts ice up to 0.5 m from the glass, so that contact alone decides; here "
