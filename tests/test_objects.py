@@ -274,6 +274,7 @@ def test_a_saucepan_with_a_lid_names_its_lid_and_liquids_only_look():
     assert liquid.conaffinity[0] == 0
 
 
+@pytest.mark.slow
 def test_the_cup_of_a_task_shows_the_coffee_that_is_in_it():
     scene = build_scene(get_task("MakeIcedCoffee"), "target", 0)
     liquid = scene.model.geom("cup_liquid")
