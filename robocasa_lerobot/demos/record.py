@@ -123,6 +123,7 @@ def record_tasks(
 def _record(waiting: list[Parts], out: Path, workers: int, board: Board) -> Iterator[RecordingResult]:
     """Rounds of attempts at the tasks in their order; the result of each task when it is complete."""
     left = list(waiting)
+    most = _ROUND * workers if workers > 1 else 1
     while left:
         jobs: list[tuple[Parts, int]] = []
         for parts in list(left):
@@ -139,10 +140,10 @@ def _record(waiting: list[Parts], out: Path, workers: int, board: Board) -> Iter
                 beyond = range(max(wanted) + 1, parts.settings.limit)
                 wanted += list(beyond)[: -len(wanted) % workers]
             jobs += [(parts, number) for number in wanted]
-            if len(jobs) >= _ROUND * workers:
+            if len(jobs) >= most:
                 break
         if jobs:
-            _run_round(jobs[: _ROUND * workers], workers, board)
+            _run_round(jobs[:most], workers, board)
 
 
 def _finished(parts: Parts, tally: Tally, out: Path) -> RecordingResult | None:
