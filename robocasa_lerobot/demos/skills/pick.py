@@ -40,17 +40,20 @@ class Manner:
         tilts: of the hand's approach from straight down to straight ahead, radians, with their costs.
         entries: whether the hand may come from above ("up"), or out of the front ("out"), or between ("across").
         out_m: how far it goes on its way out, metres.
+        high: cost of a grasp for each metre that it is above the thing's middle.
     """
 
     tilts: tuple[tuple[float, float], ...] = ((0.0, 0.0),)
     entries: tuple[str, ...] = ("up",)
     out_m: float = OUT_M
+    high: float = 0.0
 
 
 FROM_ABOVE = Manner(((0.0, 0.0), (np.deg2rad(30.0), 0.25)))
 FROM_FRONT = Manner(
-    tuple((float(np.deg2rad(tilt)), extra) for tilt, extra in ((75.0, 0.0), (88.0, 0.0), (60.0, 0.0), (40.0, 0.2))),
+    tuple((float(np.deg2rad(tilt)), extra) for tilt, extra in ((88.0, 0.0), (75.0, 0.1), (60.0, 0.2))),
     ("up", "across", "out"),
+    high=8.0,
 )
 ANYHOW = Manner(
     ((0.0, 0.0), (np.deg2rad(35.0), 0.1), (np.deg2rad(65.0), 0.2), (np.deg2rad(88.0), 0.3)), ("up", "across", "out")
@@ -80,10 +83,12 @@ def pick(env: KitchenEnv, what: Thing, manner: Manner = FROM_ABOVE) -> Iterator[
         yield from move_hand(data, at, OPEN, speed=0.6, tolerance=0.005, max_steps=45, insist=INSIST)
         yield from hold_hand(data, at, CLOSED, GRASP_STEPS)
         inside = _inside(env, what)
-        yield from move_hand(data, _shifted(lifted, moved), CLOSED, speed=0.7, tolerance=0.02, max_steps=50)
+        lift = float(lifted.position[2] - choice.way.targets[2].position[2])
+        yield from move_hand(
+            data, _shifted(lifted, moved), CLOSED, speed=0.7, tolerance=0.4 * lift, max_steps=50, insist=INSIST
+        )
         rise = data.body(what.name).xpos[2] - start[2] - moved[2]
-        wanted = ROSE_SHARE * (lifted.position[2] - choice.way.targets[2].position[2])
-        if rise > wanted and np.linalg.norm(_inside(env, what) - inside) < HELD_M:
+        if rise > ROSE_SHARE * lift and np.linalg.norm(_inside(env, what) - inside) < HELD_M:
             yield from move_hand(data, _shifted(out, moved), CLOSED, speed=0.8, tolerance=0.03)
             if np.linalg.norm(_inside(env, what) - inside) < HELD_M:
                 return
@@ -138,6 +143,7 @@ def _ways(
         local = body.xmat.reshape(3, 3).T @ (pose.position - body.xpos)
         alike = sum(np.linalg.norm(local - other.position) < ALIKE_M for other in tried)
         cost = extra + WORSE_GRASP * (best - pose.score) + TRIED * float(alike)
+        cost += manner.high * max(float(pose.position[2] - body.xpos[2]), 0.0)
         for turn in (pose.rotation, pose.rotation @ np.diag([-1.0, -1.0, 1.0])):
             takes = Held(what.name, turn.T @ (body.xpos - pose.position), turn.T @ body.xmat.reshape(3, 3))
             for name in manner.entries:

@@ -33,6 +33,7 @@ CLEAR_M = 0.06  # along the hand, out of what it held, before it leaves
 AWAY_M = 0.26
 GONE_M = 0.27  # of the grip site from the thing's origin: tasks ask for 25 cm
 YAWS = 12
+UP_RISE_M, RISES_M, LOW_COST = 0.06, (0.035, 0.010), 0.05  # over where it is let go, on the way in
 AGAIN, AGAIN_M = 0.5, 0.02  # cost of a hand that goes where it went in vain, as near as this
 LEANING = 0.35  # cost of a radian that the thing is tilted
 UP = np.array([0.0, 0.0, 1.0])
@@ -111,7 +112,7 @@ def put(env: KitchenEnv, what: Thing, how: Putting, failed: list[Array]) -> Iter
     failed.append(choice.way.targets[2].position)
     yield from lead(env, choice.joints, CLOSED)
     far, above, low, clear, away = choice.way.targets
-    for target, tolerance, steps in ((far, 0.04, 110), (above, 0.02, 90)):
+    for target, tolerance, steps in ((far, 0.04, 110), (above, 0.012, 90)):
         yield from move_hand(data, target, CLOSED, tolerance=tolerance, max_steps=steps)
         if not _holds(env, held):
             return
@@ -161,16 +162,18 @@ def _ways(env: KitchenEnv, what: Thing, held: Held, spot: Spot, how: Putting, fa
             again = sum(np.linalg.norm(low - other) < AGAIN_M for other in failed)
             cost = spot.extra + AGAIN * float(again) + LEANING * lean + 0.08 * min(yaw, 2 * np.pi - yaw)
             for name in how.entries:
-                found.append(_way(low, rotation, entry(env, name), name, how.in_m, cost))
+                for rise in (UP_RISE_M,) if name == "up" else RISES_M:
+                    extra = cost + (LOW_COST if rise == min(RISES_M) else 0.0)
+                    found.append(_way(low, rotation, entry(env, name), name, how.in_m, rise, extra))
     return found
 
 
-def _way(low: Array, rotation: Array, out: Array, name: str, in_m: float, cost: float) -> Way:
+def _way(low: Array, rotation: Array, out: Array, name: str, in_m: float, rise: float, cost: float) -> Way:
     clear = low - CLEAR_M * rotation[:, 2]
     if name == "up":
-        above, far, away = low + 0.06 * UP, low + in_m * UP, clear + AWAY_M * UP
+        above, far, away = low + rise * UP, low + in_m * UP, clear + AWAY_M * UP
     else:
-        above = low + 0.035 * UP
+        above = low + rise * UP
         far, away = above + in_m * out, clear + max(AWAY_M, in_m) * out
     return Way(tuple(HandTarget(p, rotation) for p in (far, above, low, clear, away)), cost)
 

@@ -1,9 +1,10 @@
 """Put an object into a part of a fixture: onto a shelf or a rack, into a drawer, a jug or a bowl, under a spout.
 
 Solved in target scenes, without action noise, seeds 0-3: PickPlaceCounterToCabinet 4 of 4, PickPlaceCounterToDrawer
-3 of 4, PickPlaceCounterToToasterOven 4 of 4, PickPlaceCounterToStandMixer 3 of 4. What fails: a rolling pin as long as
-the drawer, bread larger than the bowl. Blenders (0 of 3, their jugs stand close below wall cabinets) and fridges (0 of
-4, the hand meets the lowest shelf over the drawers) have verbs of their own until they are solved.
+3 of 4, PickPlaceCounterToToasterOven 4 of 4, PickPlaceCounterToStandMixer 3 of 4; CoffeeSetupMug 2 of 2 (seeds 0-1).
+What fails: a rolling pin as long as the drawer, bread larger than the bowl. Blenders (0 of 3, their jugs stand close
+below wall cabinets) and fridges (0 of 4, the hand meets the lowest shelf over the drawers) have verbs of their own
+until they are solved.
 """
 
 from __future__ import annotations
@@ -31,7 +32,7 @@ EDGE_M = 0.015  # kept from a region's sides
 INWARDS = (0.0, 0.05, 0.10)  # from the front of a region, metres
 DROPS_M = (0.0, 0.04, 0.08, 0.12)  # over the floor of what is open above
 DROP_COST, DEEP_COST, ASIDE_COST = 2.0, 2.0, 0.5  # for each metre
-RIM_M = 0.012  # of the underside above a jug's rim
+RIMS_M = (0.012, 0.045, 0.08)  # of the underside above a jug's rim: a level hand needs room below it
 HIGH_COST = 0.5  # for each metre that a shelf is above the lowest one
 STEEP_LEANS = (0.0, np.deg2rad(30.0), np.deg2rad(55.0), np.deg2rad(80.0))  # a jug may stand below a cabinet
 LEANS = (0.0, np.deg2rad(30.0), np.deg2rad(55.0))
@@ -126,7 +127,7 @@ def _over(env: KitchenEnv, region: Region) -> Callable[[], list[Spot]]:
         tall = 2 * region.half[2]
         return [
             Spot(region.world(env.data, (0.0, 0.0, z - region.half[2])), DROP_COST * z)
-            for z in (tall * 0.3, tall * 0.6, tall * 0.85, tall + RIM_M)
+            for z in (tall * 0.3, tall * 0.6, tall * 0.85, *(tall + rim for rim in RIMS_M))
         ]
 
     return spots

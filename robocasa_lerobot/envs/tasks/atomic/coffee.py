@@ -37,6 +37,6 @@ TASKS = (
             ),
         ),
         goal=AllOf(ObjectTouches("obj", "counter"), GripperFar("obj")),
-        stages=(Stage("pick_place", "place_on_counter", "counter", object="obj"),),
+        stages=(Stage("pick_place", "take_from_spout", "counter", object="obj"),),
     ),
 )

@@ -97,7 +97,7 @@ TOP_DRAWER = (
         750,
         "The object is on a counter, the gripper away.",
         fixtures=(FixtureWanted("drawer", "drawer_top"), counter_near("drawer")),
-        start=RobotStart("drawer"),
+        start=RobotStart("drawer", setback=0.3),  # clear of the open drawer
         objects=(
             ObjectWanted(
                 "obj",
@@ -110,7 +110,7 @@ TOP_DRAWER = (
         ),
         initial=(InitialOpenness("drawer", 1.0, 1.0),),
         goal=AllOf(ObjectTouchesAnyCounter("obj"), GripperFar("obj")),
-        stages=place(verb="place_on_counter"),
+        stages=place(verb="take_out_of_drawer"),
         sets=SEEN,
     ),
 )

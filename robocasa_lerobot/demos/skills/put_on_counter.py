@@ -1,0 +1,91 @@
+"""Put an object down on a counter where nothing stands.
+
+PickPlaceCabinetToCounter: solved in 2 of 2 target scenes (seeds 0-1, no action noise). PickPlaceDrawerToCounter and
+CoffeeServeMug have verbs of their own until they are solved: no free spot is near enough, the mug slips on its way out.
+"""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Callable, Iterator
+
+import mujoco
+import numpy as np
+
+from robocasa_lerobot.demos.motion import Array, base_pose, grip_position
+from robocasa_lerobot.demos.skills.pick import ANYHOW
+from robocasa_lerobot.demos.skills.put import Putting, Spot, move
+from robocasa_lerobot.demos.skills.put_down import goal
+from robocasa_lerobot.demos.skills.things import Thing, thing
+from robocasa_lerobot.envs.kitchen_env import KitchenEnv
+from robocasa_lerobot.envs.scene.fixtures.counters import Counter
+from robocasa_lerobot.envs.task import Stage
+
+GRID_M, EDGE_M, NEAR_M = 0.07, 0.02, 0.75
+MOST_SPOTS = 14
+FAR_COST = 0.8  # for each metre
+UP = np.array([0.0, 0.0, 1.0])
+
+
+def place_on_counter(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
+    """Put the stage's object down on the counter that is its target.
+
+    Raises:
+        SkillError: it is not there after all attempts.
+    """
+    what = thing(env, stage.object)
+    how = Putting(
+        free_spots(env, what, stage.target),
+        goal(env),
+        leans=(0.0, np.deg2rad(30.0)),
+        entries=("up", "across"),
+        taking=ANYHOW,
+    )
+    yield from move(env, what, how)
+
+
+def free_spots(env: KitchenEnv, what: Thing, role: str) -> Callable[[], list[Spot]]:
+    """Points on a counter's top, near the robot, where a thing as it is turned now meets nothing."""
+    counter = env.scene.fixture(role)
+    assert isinstance(counter, Counter)
+
+    def spots() -> list[Spot]:
+        body = env.data.body(what.name)
+        turn = body.xmat.reshape(3, 3).copy()
+        edge = float(max(what.half_extents(turn)[:2])) + EDGE_M
+        near = _near(env, counter, edge)
+        model, scratch = env.model, copy.copy(env.data)
+        mine = np.isin(model.geom_bodyid, list(what.bodies))
+        quat = np.empty(4)
+        mujoco.mju_mat2Quat(quat, turn.reshape(9))
+        found = []
+        for point, far in near:
+            origin = point + (what.below(turn) + 0.004) * UP
+            scratch.joint(f"{what.name}_joint0").qpos[:] = [*origin, *quat]
+            mujoco.mj_kinematics(model, scratch)
+            mujoco.mj_collision(model, scratch)
+            inside = mine[scratch.contact.geom] if scratch.ncon else np.zeros((0, 2), dtype=bool)
+            if not (inside[:, 0] != inside[:, 1]).any():
+                found.append(Spot(point, FAR_COST * far))
+            if len(found) == MOST_SPOTS:
+                break
+        return found
+
+    return spots
+
+
+def _near(env: KitchenEnv, counter: Counter, edge: float) -> list[tuple[Array, float]]:
+    """Points of a grid on a counter with their distances from the hand, the nearest first."""
+    cos, sin = np.cos(counter.yaw), np.sin(counter.yaw)
+    base, _ = base_pose(env.data)
+    grip = grip_position(env.data)
+    found = []
+    for x0, x1, y0, y1 in counter.solid_rectangles():
+        for x in np.arange(x0 + edge, x1 - edge + 1e-9, GRID_M):
+            for y in np.arange(y0 + edge, y1 - edge + 1e-9, GRID_M):
+                point = np.array(
+                    [counter.pos[0] + cos * x - sin * y, counter.pos[1] + sin * x + cos * y, counter.surface_z]
+                )
+                if np.linalg.norm((point - base)[:2]) < NEAR_M:
+                    found.append((point, float(np.linalg.norm((point - grip)[:2]))))
+    return sorted(found, key=lambda pair: pair[1])
