@@ -158,14 +158,16 @@ def tuck(env: KitchenEnv, gripper: float) -> Iterator[Array]:
     yield from move_hand(data, target, gripper, tolerance=0.10, max_steps=40)
 
 
-def stances_round(env: KitchenEnv, door: Hinged, near: list[Shift], *, forwards: bool) -> list[tuple[Shift, Shift]]:
+def stances_round(
+    env: KitchenEnv, door: Hinged, near: list[Shift], *, follow: float = 0.0
+) -> list[tuple[Shift, Shift]]:
     """Moves of the base to try for a door on a vertical hinge: about where it stands, and about the door.
 
     Args:
         env: the kitchen.
         door: what is opened or closed.
         near: moves from where the robot stands now, metres forward and to the left.
-        forwards: whether the base may also follow towards the fixture.
+        follow: how far the base may go along forwards as the door turns, metres.
     """
     base, yaw = base_pose(env.data)
     axes = np.array([[np.cos(yaw), np.sin(yaw), 0.0], [-np.sin(yaw), np.cos(yaw), 0.0]])
@@ -176,9 +178,9 @@ def stances_round(env: KitchenEnv, door: Hinged, near: list[Shift], *, forwards:
             spot = door.point(np.zeros(3), 0.0) + side * aside * door.rightwards - before * door.inwards
             ahead, left = axes @ (spot - base)
             spots.append((float(ahead), float(left)))
-    ends = ((0.0, 0.0), (0.25, 0.0)) if forwards else ((0.0, 0.0),)
+    ends = (0.0, follow) if follow else (0.0,)
     starts = [*near, *sorted(spots, key=lambda spot: float(np.hypot(*spot)))]
-    return [((x, y), (x + dx, y + dy)) for x, y in starts for dx, dy in ends]
+    return [((x, y), (x + more, y)) for x, y in starts for more in ends]
 
 
 def take_stance(env: KitchenEnv, plan: ArcPlan, gripper: float) -> Iterator[Array]:

@@ -46,7 +46,7 @@ def close_doors(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
             if attempt > 0 or door.name != doors(env, stage)[0].name:
                 yield from tuck(env, CLOSED)
             ways = [_push_way(env, door, push, roll) for push in PUSHES for roll in (1.0, -1.0)]
-            stances = stances_round(env, door, NEAR, forwards=True)
+            stances = stances_round(env, door, NEAR, follow=0.25)
             yield from push_arc(env, door, ways, stances, SHUT_GOAL * door.full, firm=True)
         if door.share > SHUT_GOAL:
             raise SkillError(f"{door.name} is still {door.share:.1%} open after {ATTEMPTS} attempts")
