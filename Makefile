@@ -18,10 +18,10 @@ export PYTHONUNBUFFERED := 1
 export UV_HTTP_TIMEOUT ?= 300
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
-.PHONY: help setup demo test test-slow lint format lock docs doctor bench bench-convert bench-grasps bench-demonstrators clean
+.PHONY: help setup demo test test-slow lint format lock docs doctor bench bench-convert bench-training bench-evaluation bench-grasps bench-demonstrators bench-kitchens clean
 
 help:  ## this list
-	@sed -n 's/^\([a-z-]*\):.*  ## /\1\t/p' Makefile | awk -F '\t' '{printf "  make %-13s %s\n", $$1, $$2}'
+	@sed -n 's/^\([a-z-]*\):.*  ## /\1\t/p' Makefile | awk -F '\t' '{printf "  make %-20s %s\n", $$1, $$2}'
 
 setup: $(STAMP)  ## create .venv from requirements.lock and install the package into it
 
@@ -69,6 +69,14 @@ doctor: $(STAMP)  ## check this machine
 # `make bench BENCH_ARGS=--quick` takes about 5 minutes; the first run makes robosuite's environment as well.
 bench: $(STAMP)  ## our simulator beside robosuite's, in one run
 	$(BIN)/python benchmarks/sim_speed.py $(BENCH_ARGS)
+
+# `make bench-training BENCH_ARGS=--quick` takes about 6 minutes.
+bench-training: $(STAMP)  ## our training beside lerobot-train, and the loaders alone, in one run
+	$(BIN)/python benchmarks/training_speed.py $(BENCH_ARGS)
+
+# `make bench-evaluation BENCH_ARGS=--quick` takes about 5 minutes.
+bench-evaluation: $(STAMP)  ## our evaluation beside lerobot-eval, in one run
+	$(BIN)/python benchmarks/evaluation_speed.py $(BENCH_ARGS)
 
 # `make bench-convert BENCH_ARGS=--quick` takes about 10 minutes.
 bench-convert: $(STAMP)  ## our converter beside LeRobot's and the official one, in one run
