@@ -9,6 +9,7 @@ from types import MappingProxyType
 import numpy as np
 
 from robocasa_lerobot.envs.placement import Area, Footprint, PlacementError, place
+from robocasa_lerobot.envs.scene.appliances.sink import Sink
 from robocasa_lerobot.envs.scene.fixtures.base import Fixture
 from robocasa_lerobot.envs.scene.layout import Layout
 from robocasa_lerobot.envs.scene.objects import catalogue
@@ -168,7 +169,8 @@ def _put(
             # What may stick out is the container: a thing across its rim would tip over.
             _put_on(rng, table, name, item, table.placed[holder], replace(start, ensure_inside=True))
             return
-        if inside and start.ensure_inside and not start.slot:
+        if isinstance(fixture, Sink) and start.ensure_inside:
+            # Of other compartments a thing may stick out, as the handle of a mug does under a spout.
             rooms = [part.area for part in table.parts[name]]
     _put_down(rng, table, name, item, areas, standing, rooms)
 
@@ -217,7 +219,7 @@ def _put_down(
     standing: list[Footprint],
     rooms: Sequence[Area] = (),
 ) -> None:
-    """Put an object onto one of the areas; if compartments are given as `rooms`, so that it is wholly in one."""
+    """Put an object onto one of the areas; if basins are given as `rooms`, so that it is wholly in one."""
     width, depth, height = item.size
     high = [area for area in areas if area.height > height + PLACEMENT_GAP_M]
     what = f"{name} ({item.model})"
