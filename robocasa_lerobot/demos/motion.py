@@ -18,6 +18,7 @@ from robocasa_lerobot.envs.scene.robot_names import ARM_CENTER_SITE, BASE_CENTER
 Array = NDArray[np.float64]
 
 OPEN, CLOSED = -1.0, 1.0
+UP = np.array([0.0, 0.0, 1.0])
 # Control mode: the arm's goal starts from the pose that is achieved, or from the pose that was wanted last.
 FROM_ACHIEVED, FROM_DESIRED = -1.0, 1.0
 

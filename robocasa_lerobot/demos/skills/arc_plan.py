@@ -214,6 +214,14 @@ class _Bench:
         return len(touched)
 
 
+def arc_vias(
+    start: float, end: float, target_at: Callable[[float], HandTarget], shares: tuple[float, ...]
+) -> list[Via]:
+    """Poses at some shares of the way from one angle to another, radians."""
+    angles = [start + (end - start) * share for share in shares]
+    return [Via(angle, target_at(angle), share) for angle, share in zip(angles, shares, strict=True)]
+
+
 def face_way(
     part: Hinged,
     local: Array,
@@ -245,7 +253,7 @@ def face_way(
     at = target_at(start)
     off = HandTarget(at.position + part.turned(start) @ normal * off_m, at.rotation)
     back = HandTarget(off.position - at.rotation[:, 2] * back_m, at.rotation)
-    arc = [Via(start + (end - start) * share, target_at(start + (end - start) * share), share) for share in (0, 0.5, 1)]
+    arc = arc_vias(start, end, target_at, (0.0, 0.5, 1.0))
     return Way((Via(start, back), Via(start, off), *arc), 2, target_at)
 
 
@@ -260,5 +268,5 @@ def grip_way(
     start = part.angle
     at = target_at(start)
     before = HandTarget(at.position - at.rotation[:, 2] * STANDOFF_M, at.rotation)
-    arc = [Via(start + (end - start) * share, target_at(start + (end - start) * share), share) for share in (0.5, 1.0)]
+    arc = arc_vias(start, end, target_at, (0.5, 1.0))
     return Way((Via(start, before), Via(start, at), *arc), 1, target_at, bias)

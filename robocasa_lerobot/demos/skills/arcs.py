@@ -11,6 +11,7 @@ from robocasa_lerobot import contract
 from robocasa_lerobot.demos.motion import (
     CLOSED,
     OPEN,
+    UP,
     Array,
     HandTarget,
     arm_action,
@@ -21,17 +22,17 @@ from robocasa_lerobot.demos.motion import (
     nearer_turn,
 )
 from robocasa_lerobot.demos.skills.arc_plan import STANDOFF_M, ArcPlan, Shift, Way, plan_arc
-from robocasa_lerobot.demos.skills.common import hold_hand, move_hand
+from robocasa_lerobot.demos.skills.common import draw_back, hold_hand, move_hand
 from robocasa_lerobot.demos.skills.firm import FirmServo
-from robocasa_lerobot.demos.skills.hinged import UP, Hinged
+from robocasa_lerobot.demos.skills.hinged import Headway, Hinged
 from robocasa_lerobot.demos.skills.reach import shift_base
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 
 GRASP_STEPS, RELEASE_STEPS = 10, 6
 _BASE_SPEED = 0.22  # metres a second while the arm moves too: the arm keeps up with about 0.26
 _DEAD_ZONE = 0.25  # of base commands (robocasa facts, section 2)
-STALL_STEPS, STALL_RAD = 25, 0.004
 TUCKED_AHEAD_M, TUCKED_UP_M = 0.28, 0.58  # of the grip site from the arm's foot
+REST_M = 0.40  # height over the arm's foot at which the hand works best
 FIRM_LEAD_M = 0.09  # of the hand's goal in a firm push
 FIRMER_STEPS = 12  # without movement, after which a firm push has twice its lead
 
@@ -69,19 +70,15 @@ def swing(
     servo = FirmServo(data)
     first = part.angle
     way = 1.0 if goal > first else -1.0
-    last, since = first, 0
+    headway = Headway(part, way)
     for _ in range(max_steps):
         if way * (part.angle - goal) >= 0.0 or until():
             return
-        if way * (part.angle - last) > STALL_RAD:
-            last, since = part.angle, 0
-        else:
-            since += 1
-        if since >= STALL_STEPS:
+        if headway.ends():
             return
         if firm:
             here, near = (plan.way.target_at(part.angle + turn).position for turn in (0.0, 0.01))
-            lead = FIRM_LEAD_M / (float(np.linalg.norm(near - here)) / 0.01) * (1.0 + since / FIRMER_STEPS)
+            lead = FIRM_LEAD_M / (float(np.linalg.norm(near - here)) / 0.01) * (1.0 + headway.since / FIRMER_STEPS)
             step = servo.action(plan.way.target_at(part.angle + way * lead), gripper)
         else:
             step = arm_action(data, plan.way.target_at(part.angle + way * lead_rad), gripper, speed=speed)
@@ -143,9 +140,7 @@ def push_arc(
     for via in plan.way.vias[: plan.way.contact]:
         yield from move_hand(data, via.target, CLOSED, tolerance=0.03)
     yield from swing(env, part, plan, goal, gripper=CLOSED, spot=spot, lead_rad=lead_rad, speed=speed, firm=firm)
-    rotation = hand_rotation(data)
-    away = HandTarget(grip_position(data) - rotation[:, 2] * 0.10, rotation)
-    yield from move_hand(data, away, CLOSED, max_steps=20)
+    yield from draw_back(data, CLOSED, 0.10)
 
 
 def tuck(env: KitchenEnv, gripper: float) -> Iterator[Array]:
@@ -181,6 +176,12 @@ def stances_round(
     ends = (0.0, follow) if follow else (0.0,)
     starts = [*near, *sorted(spots, key=lambda spot: float(np.hypot(*spot)))]
     return [((x, y), (x + more, y)) for x, y in starts for more in ends]
+
+
+def working_height(env: KitchenEnv, door: Hinged, low: float, high: float) -> float:
+    """The height over the door's hinge, between two bounds, that is nearest to where the hand works best, metres."""
+    height = base_pose(env.data)[0][2] + REST_M - door.point(np.zeros(3), 0.0)[2]
+    return float(np.clip(height, low, high))
 
 
 def take_stance(env: KitchenEnv, plan: ArcPlan, gripper: float) -> Iterator[Array]:

@@ -15,6 +15,7 @@ import numpy as np
 from robocasa_lerobot.demos.motion import (
     CLOSED,
     OPEN,
+    UP,
     Array,
     HandTarget,
     base_pose,
@@ -44,7 +45,6 @@ SHIFTS = ((0.0, 0.0), (-0.12, 0.0), (0.0, 0.2), (0.0, -0.2), (-0.25, 0.0), (-0.1
 NEARLY_AS_GOOD = 0.6  # cost by which another way may be worse than the best
 LOST_M = 0.05  # a lid farther than this from the hand is no longer held
 SPOTS, SPOT_STEP_M, SPOT_MARGIN_M = 6, 0.06, 0.02
-UP = np.array([0.0, 0.0, 1.0])
 
 
 def uncover(env: KitchenEnv, stage: Stage) -> Iterator[Array]:

@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 
-from robocasa_lerobot.demos.motion import CLOSED, Array, HandTarget, base_pose, frame, grip_position, hand_rotation
+from robocasa_lerobot.demos.motion import CLOSED, UP, Array, HandTarget, base_pose, frame, grip_position, hand_rotation
 from robocasa_lerobot.demos.skills.common import SkillError, hold_hand, move_hand
 from robocasa_lerobot.demos.skills.levers import FINGER_HALF_M, level_and_down, push_way
 from robocasa_lerobot.demos.skills.reach import plan_reach, shift_base, untried
@@ -24,7 +24,6 @@ PRESS_SPEED = 0.4
 # Tilts of the hand from a front's normal downwards, radians.
 TILTS = tuple(np.deg2rad((0.0, 20.0, 40.0, 55.0, 70.0)))
 SHIFTS = ((0.0, 0.0), (-0.12, 0.0), (-0.25, 0.0), (-0.12, -0.2), (-0.12, 0.2), (-0.4, 0.0), (-0.3, -0.25), (-0.3, 0.25))
-UP = np.array([0.0, 0.0, 1.0])
 
 
 def press_button(env: KitchenEnv, stage: Stage) -> Iterator[Array]:

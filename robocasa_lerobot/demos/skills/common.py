@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator
 import mujoco
 import numpy as np
 
-from robocasa_lerobot.demos.motion import Array, HandTarget, arm_action, grip_position, limit, pose_error
+from robocasa_lerobot.demos.motion import Array, HandTarget, arm_action, grip_position, hand_rotation, limit, pose_error
 
 POSITION_TOLERANCE_M = 0.012
 ROTATION_TOLERANCE_RAD = 0.12
@@ -59,6 +59,13 @@ def hold_hand(data: mujoco.MjData, target: HandTarget, gripper: float, steps: in
     """Keep the hand at a target while the gripper moves."""
     for _ in range(steps):
         yield arm_action(data, target, gripper, speed=0.4)
+
+
+def draw_back(data: mujoco.MjData, gripper: float, distance_m: float) -> Iterator[Array]:
+    """Move the hand back against its approach direction."""
+    rotation = hand_rotation(data)
+    away = HandTarget(grip_position(data) - rotation[:, 2] * distance_m, rotation)
+    yield from move_hand(data, away, gripper, max_steps=20)
 
 
 def require_near(data: mujoco.MjData, target: HandTarget, limit_m: float, what: str) -> None:

@@ -12,15 +12,15 @@ import numpy as np
 
 from robocasa_lerobot.demos.motion import (
     CLOSED,
+    UP,
     Array,
     HandTarget,
     frame,
-    grip_position,
     hand_rotation,
     nearer_turn,
 )
-from robocasa_lerobot.demos.skills.common import SkillError, move_hand
-from robocasa_lerobot.demos.skills.hinged import UP, Hinged, push_round
+from robocasa_lerobot.demos.skills.common import SkillError, draw_back, move_hand
+from robocasa_lerobot.demos.skills.hinged import Hinged, push_round
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.scene.appliances.base import Appliance
 from robocasa_lerobot.envs.scene.fixtures.cabinets import HingeCabinet
@@ -28,6 +28,7 @@ from robocasa_lerobot.envs.task import Stage
 
 ATTEMPTS = 3
 HOVER_M = 0.06
+LEAN = 0.5  # inwards, for each metre down
 SHUT_GOAL = 0.002  # below the 0.005 that tasks ask for
 
 
@@ -42,30 +43,20 @@ def doors(env: KitchenEnv, stage: Stage) -> list[Hinged]:
     return [Hinged(env.data, fixture, joint) for joint in joints]
 
 
-def _back_off(env: KitchenEnv) -> Iterator[Array]:
-    rotation = hand_rotation(env.data)
-    away = HandTarget(grip_position(env.data) - rotation[:, 2] * 0.12, rotation)
-    yield from move_hand(env.data, away, CLOSED, max_steps=20)
-
-
 def push_lid(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
     """Push a lid over and down.
 
     Raises:
         SkillError: it is not shut after three attempts.
     """
-    yield from _press_down(env, stage, stage.part, 0.002, lean=0.5)
-
-
-def _press_down(env: KitchenEnv, stage: Stage, part: str, goal: float, *, lean: float) -> Iterator[Array]:
     data = env.data
     appliance = env.scene.appliance(stage.target)
-    lid = Hinged(data, appliance, appliance.joint(part))
+    lid = Hinged(data, appliance, appliance.joint(stage.part))
     far = lid.high[1] if abs(lid.high[1]) > abs(lid.low[1]) else lid.low[1]
 
     def rotation(angle: float) -> Array:
         # From above, leaning so that the forearm keeps below wall cabinets.
-        return nearer_turn(frame(lean * lid.inwards - UP, lid.rightwards), hand_rotation(data))
+        return nearer_turn(frame(LEAN * lid.inwards - UP, lid.rightwards), hand_rotation(data))
 
     for _ in range(ATTEMPTS):
         top = lid.high[2]
@@ -73,8 +64,8 @@ def _press_down(env: KitchenEnv, stage: Stage, part: str, goal: float, *, lean: 
         start = lid.angle
         over = HandTarget(lid.point(local + HOVER_M * UP, start), rotation(start))
         yield from move_hand(data, over, CLOSED, tolerance=0.03)
-        yield from push_round(lid, data, local, goal, rotation)
-        if lid.share <= goal:
+        yield from push_round(lid, data, local, SHUT_GOAL, rotation)
+        if lid.share <= SHUT_GOAL:
             return
-        yield from _back_off(env)
+        yield from draw_back(data, CLOSED, 0.12)
     raise SkillError(f"{lid.name} is still {lid.share:.1%} open after {ATTEMPTS} attempts")

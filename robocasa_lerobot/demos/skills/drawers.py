@@ -9,6 +9,7 @@ import numpy as np
 from robocasa_lerobot.demos.motion import (
     CLOSED,
     OPEN,
+    UP,
     Array,
     HandTarget,
     base_pose,
@@ -28,7 +29,6 @@ STANDOFF_M = 0.10
 PULL_SPEED = 0.55
 # Well beyond what tasks ask for: a demonstration that stops at the threshold teaches to stop short of it.
 OPEN_GOAL, CLOSED_GOAL = 1.15, 0.0
-UP = np.array([0.0, 0.0, 1.0])
 
 
 def open_drawer(env: KitchenEnv, stage: Stage) -> Iterator[Array]:

@@ -13,6 +13,7 @@ import numpy as np
 
 from robocasa_lerobot.demos.motion import (
     CLOSED,
+    UP,
     Array,
     HandTarget,
     base_pose,
@@ -20,18 +21,16 @@ from robocasa_lerobot.demos.motion import (
     grip_position,
     hand_rotation,
 )
-from robocasa_lerobot.demos.skills.arc_plan import Shift, Via, Way, grip_way, plan_arc
+from robocasa_lerobot.demos.skills.arc_plan import Shift, Via, Way, arc_vias, grip_way, plan_arc
 from robocasa_lerobot.demos.skills.arcs import pull_arc, spots, swing, take_stance
 from robocasa_lerobot.demos.skills.common import SkillError, move_hand
-from robocasa_lerobot.demos.skills.hinged import UP, Hinged
+from robocasa_lerobot.demos.skills.hinged import Hinged
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 
 ATTEMPTS = 4
-GRASP_STEPS, RELEASE_STEPS = 10, 6
-STANDOFF_M = 0.09
 GAP_M, ENOUGH_GAP_M = 0.20, 0.11  # between the case and the upper edge: wanted of a pull, and enough for a hand
 OPEN_SHARE = 0.95  # beyond the 0.90 that tasks ask for
-PULL_LEAD_RAD, PUSH_LEAD_RAD = 0.15, 0.20
+PUSH_LEAD_RAD = 0.20
 # Of a grasp: how far down and to the side the hand points, degrees; share of the door's angle that it turns with it.
 GRASPS = ((15, 0, 0.3), (40, 0, 0.3), (40, 35, 0.3), (40, -35, 0.3), (65, 0, 0.3), (20, 50, 0.3), (20, -50, 0.3))
 # Of a push from inside: share of the door's height, how far the hand leans inwards and sideways, degrees.
@@ -152,5 +151,5 @@ def _push_way(env: KitchenEnv, door: Hinged, push: tuple[float, float, float], r
     edge = door.point(np.array([x, door.inside, door.high[2]]), start)
     over = np.array([*beside.position[:2], edge[2] + 0.08])
     end = OPEN_SHARE * door.full
-    arc = [Via(start + (end - start) * part, target_at(start + (end - start) * part), part) for part in (0.0, 0.5, 1.0)]
+    arc = arc_vias(start, end, target_at, (0.0, 0.5, 1.0))
     return Way((Via(start, HandTarget(over, rotation)), Via(start, beside), *arc), 2, target_at)

@@ -14,17 +14,17 @@ import numpy as np
 
 from robocasa_lerobot.demos.motion import (
     OPEN,
+    UP,
     Array,
     HandTarget,
-    base_pose,
     frame,
 )
-from robocasa_lerobot.demos.skills.arc_plan import Shift, Via, Way, grip_way
-from robocasa_lerobot.demos.skills.arcs import pull_arc, push_arc, stances_round, tuck
+from robocasa_lerobot.demos.skills.arc_plan import Shift, Via, Way, arc_vias, grip_way
+from robocasa_lerobot.demos.skills.arcs import pull_arc, push_arc, stances_round, tuck, working_height
 from robocasa_lerobot.demos.skills.common import SkillError
 from robocasa_lerobot.demos.skills.doors import doors
 from robocasa_lerobot.demos.skills.fold_down import fold_down
-from robocasa_lerobot.demos.skills.hinged import UP, Hinged
+from robocasa_lerobot.demos.skills.hinged import Hinged
 from robocasa_lerobot.demos.skills.reach import shift_base
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.task import Stage
@@ -34,7 +34,6 @@ AJAR_RAD, ENOUGH_RAD = np.deg2rad(40.0), np.deg2rad(22.0)  # wanted of a pull; e
 RETREAT: Shift = (-0.2, 0.0)
 FARTHER_RAD = 0.5  # that it is pulled on where the hand does not get behind it
 OPEN_SHARE = 0.95  # beyond the 0.90 that tasks ask for
-REST_M = 0.40  # height over the arm's foot at which the hand works best
 TURN = 0.5  # share of the door's angle by which the hand turns with its handle
 # Of the hand's approach from the door's normal: to the side of the hinge and upwards, radians.
 GRASP_TILTS = ((0.0, 0.0), (0.0, -0.35), (0.0, 0.35), (-0.44, 0.0), (0.44, 0.0), (0.0, -0.75))
@@ -112,9 +111,8 @@ def _pull(env: KitchenEnv, door: Hinged, goal: float) -> Iterator[Array]:
 
 def _pull_way(env: KitchenEnv, door: Hinged, tilt: tuple[float, float], flip: float, goal: float) -> Way:
     low, high = door.handle()
-    height = base_pose(env.data)[0][2] + REST_M - door.point(np.zeros(3), 0.0)[2]
     middle, room = (low[2] + high[2]) / 2, 0.2 * (high[2] - low[2])
-    z = float(np.clip(height, middle - room, middle + room))
+    z = working_height(env, door, middle - room, middle + room)
     grip = np.array([(low[0] + high[0]) / 2, low[1] + min((high[1] - low[1]) / 2, 0.012), z])
     aside, up = tilt
     way = door.side
@@ -137,8 +135,7 @@ def _push(env: KitchenEnv, door: Hinged) -> Iterator[Array]:
 def _push_way(env: KitchenEnv, door: Hinged, push: tuple[float, float, float, float, float], flip: float) -> Way:
     share, past, degrees, pitch, bias = push
     way = door.side
-    height = base_pose(env.data)[0][2] + REST_M - door.point(np.zeros(3), 0.0)[2]
-    z = float(np.clip(height, door.low[2] + 0.06, door.high[2] - 0.06))
+    z = working_height(env, door, door.low[2] + 0.06, door.high[2] - 0.06)
     # Bins stand out of the inside of fridges' doors, but not at the edge.
     local = np.array([way * share * door.width, 0.0 if share > 0.95 else door.inside, z])
     turn, up = np.deg2rad(degrees), np.deg2rad(pitch)
@@ -156,5 +153,5 @@ def _push_way(env: KitchenEnv, door: Hinged, push: tuple[float, float, float, fl
     # Round the free edge, not through the door.
     beyond = door.point(np.array([way * (door.width + ROUND_M), -0.06, z]), start)
     end = OPEN_SHARE * door.full
-    arc = [Via(start + (end - start) * part, target_at(start + (end - start) * part), part) for part in (0.0, 0.5, 1.0)]
+    arc = arc_vias(start, end, target_at, (0.0, 0.5, 1.0))
     return Way((Via(start, HandTarget(beyond, rotation)), Via(start, beside), *arc), 2, target_at, bias)

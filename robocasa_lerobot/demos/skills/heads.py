@@ -10,11 +10,11 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from robocasa_lerobot.demos.motion import Array, frame
+from robocasa_lerobot.demos.motion import UP, Array, frame
 from robocasa_lerobot.demos.skills.arc_plan import Shift, Way, face_way, grip_way
 from robocasa_lerobot.demos.skills.arcs import pull_arc, push_arc
 from robocasa_lerobot.demos.skills.common import SkillError
-from robocasa_lerobot.demos.skills.hinged import UP, Hinged
+from robocasa_lerobot.demos.skills.hinged import Hinged
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.task import Stage
 

@@ -18,7 +18,6 @@ from robocasa_lerobot.envs.scene.fixtures.base import Fixture
 
 LEAD_M = 0.07  # of the commanded point before the one that is pushed: with the servo's lag, the force of the push
 STALL_STEPS, STALL_RAD = 25, 0.004
-UP = np.array([0.0, 0.0, 1.0])
 
 
 class Hinged:
@@ -141,6 +140,29 @@ class Hinged:
         return low, high
 
 
+class Headway:
+    """Tells when a part that is led one way turns no more.
+
+    Args:
+        part: what turns.
+        way: 1 if its angle is to grow, -1 if it is to shrink.
+
+    Attributes:
+        since: control steps without movement.
+    """
+
+    def __init__(self, part: Hinged, way: float) -> None:
+        self._part, self._way, self._last, self.since = part, way, part.angle, 0
+
+    def ends(self) -> bool:
+        """Whether it has stalled; asked once at every control step."""
+        if self._way * (self._part.angle - self._last) > STALL_RAD:
+            self._last, self.since = self._part.angle, 0
+        else:
+            self.since += 1
+        return self.since >= STALL_STEPS
+
+
 def push_round(
     part: Hinged,
     data: mujoco.MjData,
@@ -168,15 +190,11 @@ def push_round(
     """
     way = 1.0 if goal > part.share else -1.0
     lead = lead_m / part.radius(local)
-    last, since = part.angle, 0
+    headway = Headway(part, way)
     for _ in range(max_steps):
         if way * (part.share - goal) >= 0.0:
             return
-        if way * (part.angle - last) > STALL_RAD:
-            last, since = part.angle, 0
-        else:
-            since += 1
-        if since >= STALL_STEPS:
+        if headway.ends():
             return
         angle = part.angle + way * lead
         target = HandTarget(part.point(local, angle), rotation(angle))

@@ -13,6 +13,7 @@ import numpy as np
 from robocasa_lerobot.demos.motion import (
     CLOSED,
     OPEN,
+    UP,
     Array,
     HandTarget,
     frame,
@@ -38,7 +39,6 @@ DONE_RAD = 0.06
 # Where burners' knobs are turned to, radians; shares of the range for ovens.
 BURNER_ON_RAD, BURNER_LOW_RAD = 1.5, 0.87
 RAISED_SHARE, ADJUST_SHARE = 0.40, 0.26
-UP = np.array([0.0, 0.0, 1.0])
 
 
 def turn_on_burner(env: KitchenEnv, stage: Stage) -> Iterator[Array]:

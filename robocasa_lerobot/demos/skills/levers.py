@@ -15,6 +15,7 @@ import numpy as np
 from robocasa_lerobot.demos.motion import (
     CLOSED,
     OPEN,
+    UP,
     Array,
     HandTarget,
     base_pose,
@@ -40,7 +41,6 @@ WATER_ON_RAD, WATER_OFF_RAD = 0.70, 0.0
 SPOUT_RAD = 0.80
 HOT_SHARE, COLD_SHARE = 0.80, 0.20
 DONE_RAD = 0.12
-UP = np.array([0.0, 0.0, 1.0])
 SHIFTS = (
     (0.0, 0.0),
     (-0.15, 0.0),

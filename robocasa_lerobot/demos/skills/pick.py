@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from robocasa_lerobot.demos.motion import CLOSED, OPEN, Array, HandTarget, base_pose, grip_position, hand_rotation
+from robocasa_lerobot.demos.motion import CLOSED, OPEN, UP, Array, HandTarget, base_pose, grip_position, hand_rotation
 from robocasa_lerobot.demos.skills.common import SkillError, hold_hand, move_hand
 from robocasa_lerobot.demos.skills.things import Thing, grasps
 from robocasa_lerobot.demos.skills.ways import GOOD_ENOUGH, Choice, Held, Way, approach, choose, lead
@@ -29,7 +29,6 @@ TRIED, ALIKE_M = 1.2, 0.015  # cost of a grasp like one that has failed: its pla
 # A thing that is held is nearer than this to where it was in the hand when that closed, and has risen by this share of
 # the lift.
 HELD_M, ROSE_SHARE = 0.05, 0.25
-UP = np.array([0.0, 0.0, 1.0])
 
 
 @dataclass(frozen=True)

@@ -11,6 +11,7 @@ import numpy as np
 from robocasa_lerobot.demos.motion import (
     CLOSED,
     OPEN,
+    UP,
     Array,
     HandTarget,
     base_pose,
@@ -36,7 +37,6 @@ YAWS = 12
 UP_RISE_M, RISES_M, LOW_COST = 0.06, (0.035, 0.010), 0.05  # over where it is let go, on the way in
 AGAIN, AGAIN_M = 0.5, 0.02  # cost of a hand that goes where it went in vain, as near as this
 LEANING = 0.35  # cost of a radian that the thing is tilted
-UP = np.array([0.0, 0.0, 1.0])
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 
-from robocasa_lerobot.demos.motion import Array
+from robocasa_lerobot.demos.motion import UP, Array
 from robocasa_lerobot.demos.skills.pick import ANYHOW, FROM_ABOVE
 from robocasa_lerobot.demos.skills.put import Putting, Spot, move
 from robocasa_lerobot.demos.skills.things import thing
@@ -25,7 +25,6 @@ EDGE_M, OFF_SHARE, BESIDE_COST = 0.005, 0.5, 3.0  # beside the middle, with a co
 BASIN_AHEAD_M, BASIN_ASIDE_M = 0.09, 0.08  # from the basin's middle: before the faucet, whose spout reaches over it
 # Heights of the underside over the basin's rim at which an object is let go, metres, with their costs.
 BASIN_DROPS = ((-0.07, 0.0), (-0.03, 0.2), (0.02, 0.5))
-UP = np.array([0.0, 0.0, 1.0])
 
 
 def place_on(env: KitchenEnv, stage: Stage) -> Iterator[Array]:

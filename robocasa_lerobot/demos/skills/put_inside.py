@@ -36,7 +36,6 @@ RIMS_M = (0.012, 0.045, 0.08)  # of the underside above a jug's rim: a level han
 HIGH_COST = 0.5  # for each metre that a shelf is above the lowest one
 STEEP_LEANS = (0.0, np.deg2rad(30.0), np.deg2rad(55.0), np.deg2rad(80.0))  # a jug may stand below a cabinet
 LEANS = (0.0, np.deg2rad(30.0), np.deg2rad(55.0))
-UP = np.array([0.0, 0.0, 1.0])
 
 
 def place_inside(env: KitchenEnv, stage: Stage) -> Iterator[Array]:

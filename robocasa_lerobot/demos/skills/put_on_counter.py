@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterator
 import mujoco
 import numpy as np
 
-from robocasa_lerobot.demos.motion import Array, base_pose, grip_position
+from robocasa_lerobot.demos.motion import UP, Array, base_pose, grip_position
 from robocasa_lerobot.demos.skills.pick import ANYHOW
 from robocasa_lerobot.demos.skills.put import Putting, Spot, move
 from robocasa_lerobot.demos.skills.put_down import goal
@@ -24,7 +24,6 @@ from robocasa_lerobot.envs.task import Stage
 GRID_M, EDGE_M, NEAR_M = 0.07, 0.02, 0.75
 MOST_SPOTS = 14
 FAR_COST = 0.8  # for each metre
-UP = np.array([0.0, 0.0, 1.0])
 
 
 def place_on_counter(env: KitchenEnv, stage: Stage) -> Iterator[Array]:

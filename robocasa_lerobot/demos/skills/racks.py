@@ -14,6 +14,7 @@ import numpy as np
 from robocasa_lerobot.demos.motion import (
     CLOSED,
     OPEN,
+    UP,
     Array,
     HandTarget,
     base_pose,
@@ -51,7 +52,6 @@ SHIFTS = (
     (-0.3, 0.3),
     (-0.3, -0.3),
 )
-UP = np.array([0.0, 0.0, 1.0])
 
 
 def slide(env: KitchenEnv, stage: Stage) -> Iterator[Array]:

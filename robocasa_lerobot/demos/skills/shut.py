@@ -11,18 +11,17 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from robocasa_lerobot.demos.motion import CLOSED, Array, base_pose, frame
+from robocasa_lerobot.demos.motion import CLOSED, UP, Array, frame
 from robocasa_lerobot.demos.skills.arc_plan import Shift, Way, face_way
-from robocasa_lerobot.demos.skills.arcs import push_arc, stances_round, tuck
+from robocasa_lerobot.demos.skills.arcs import push_arc, stances_round, tuck, working_height
 from robocasa_lerobot.demos.skills.common import SkillError
 from robocasa_lerobot.demos.skills.doors import SHUT_GOAL, doors
 from robocasa_lerobot.demos.skills.fold_down import stances_beside
-from robocasa_lerobot.demos.skills.hinged import UP, Hinged
+from robocasa_lerobot.demos.skills.hinged import Hinged
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.task import Stage
 
 ATTEMPTS = 4
-REST_M = 0.40  # height over the arm's foot at which the hand works best
 FORWARDS = np.array([0.0, -1.0, 0.0])  # to the room, in the fixture's axes: outwards for a door that is shut
 # From below: share of the door's height, turn of the hand from across the door to inwards, its pitch, degrees.
 LIFTS = tuple(
@@ -39,11 +38,11 @@ def close_doors(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
     Raises:
         SkillError: a door is not shut after four attempts.
     """
-    for door in doors(env, stage):
+    for number, door in enumerate(doors(env, stage)):
         for attempt in range(ATTEMPTS):
             if door.share <= SHUT_GOAL:
                 break
-            if attempt > 0 or door.name != doors(env, stage)[0].name:
+            if attempt > 0 or number > 0:
                 yield from tuck(env, CLOSED)
             ways = [_push_way(env, door, push, roll) for push in PUSHES for roll in (1.0, -1.0)]
             stances = stances_round(env, door, NEAR, follow=0.25)
@@ -71,8 +70,7 @@ def lift_shut(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
 def _push_way(env: KitchenEnv, door: Hinged, push: tuple[float, float, float], roll: float) -> Way:
     share, turn, pitch = push
     side = door.side
-    height = base_pose(env.data)[0][2] + REST_M - door.point(np.zeros(3), 0.0)[2]
-    z = float(np.clip(height, door.low[2] + 0.06, door.high[2] - 0.06))
+    z = working_height(env, door, door.low[2] + 0.06, door.high[2] - 0.06)
     local = np.array([side * share * door.width, door.outside, z])
     aside, up = np.deg2rad(turn), np.deg2rad(pitch)
     level = np.cos(aside) * door.inwards + side * np.sin(aside) * door.rightwards
