@@ -6,16 +6,27 @@ after a drive where the arm falls short. A grasp that fails is followed by anoth
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from robocasa_lerobot.demos.motion import CLOSED, OPEN, UP, Array, HandTarget, base_pose, grip_position, hand_rotation
+from robocasa_lerobot.demos.motion import (
+    CLOSED,
+    OPEN,
+    UP,
+    Array,
+    HandTarget,
+    base_pose,
+    grip_position,
+    hand_rotation,
+    rotation_about,
+)
 from robocasa_lerobot.demos.skills.common import SkillError, hold_hand, move_hand
 from robocasa_lerobot.demos.skills.things import Thing, grasps
 from robocasa_lerobot.demos.skills.ways import GOOD_ENOUGH, Choice, Held, Way, approach, choose, lead
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
+from robocasa_lerobot.envs.scene.objects.grasping import GraspPose
 from robocasa_lerobot.envs.scene.selection import RobotPose
 
 ATTEMPTS = 5
@@ -24,6 +35,7 @@ GRASP_STEPS, RELEASE_STEPS = 11, 8
 STANDOFF_M, HOVER_M = 0.06, 0.12
 LIFT_M, OUT_M = 0.12, 0.25
 LIFTS_M, LOW_COST = (0.035, 0.010), 0.05  # before it is drawn out of a front
+LEVEL_LIFT_M, LEVEL_COST = 0.004, 0.1  # before it is drawn out level
 WORSE_GRASP = 0.45  # cost of a grasp's score below the best one's
 TRIED, ALIKE_M = 1.2, 0.015  # cost of a grasp like one that has failed: its place in the thing is as near as this
 # A thing that is held is nearer than this to where it was in the hand when that closed, and has risen by this share of
@@ -37,23 +49,21 @@ class Manner:
 
     Attributes:
         tilts: of the hand's approach from straight down to straight ahead, radians, with their costs.
-        entries: whether the hand may come from above ("up"), or out of the front ("out"), or between ("across").
+        entries: whether the hand may come from above ("up"), or out of the front ("out" rises a little, "level" does
+            not), or between ("across").
         out_m: how far it goes on its way out, metres.
-        high: cost of a grasp for each metre that it is above the thing's middle.
+        turns: of a tilted approach from the base's heading to the left, radians.
+        poses: grasps of a thing by a hand that comes along an approach.
     """
 
     tilts: tuple[tuple[float, float], ...] = ((0.0, 0.0),)
     entries: tuple[str, ...] = ("up",)
     out_m: float = OUT_M
-    high: float = 0.0
+    turns: tuple[float, ...] = (0.0,)
+    poses: Callable[[KitchenEnv, Thing, Array], list[GraspPose]] = grasps
 
 
 FROM_ABOVE = Manner(((0.0, 0.0), (np.deg2rad(30.0), 0.25)))
-FROM_FRONT = Manner(
-    tuple((float(np.deg2rad(tilt)), extra) for tilt, extra in ((88.0, 0.0), (75.0, 0.1), (60.0, 0.2))),
-    ("up", "across", "out"),
-    high=8.0,
-)
 ANYHOW = Manner(
     ((0.0, 0.0), (np.deg2rad(35.0), 0.1), (np.deg2rad(65.0), 0.2), (np.deg2rad(88.0), 0.3)), ("up", "across", "out")
 )
@@ -105,8 +115,9 @@ def ahead_of(env: KitchenEnv) -> Array:
 
 
 def entry(env: KitchenEnv, name: str) -> Array:
-    """Unit vector out of where something is: "up", "out" to the robot, or "across" between the two."""
-    out = {"up": UP, "out": 0.1 * UP - ahead_of(env), "across": UP - ahead_of(env)}[name]
+    """Unit vector out of where something is: "up", "out" or "level" to the robot, or "across" between the two."""
+    ahead = ahead_of(env)
+    out = {"up": UP, "out": 0.1 * UP - ahead, "across": UP - ahead, "level": -ahead}[name]
     unit: Array = out / np.linalg.norm(out)
     return unit
 
@@ -136,19 +147,20 @@ def _ways(
 ) -> list[Way]:
     body = env.data.body(what.name)
     found = []
-    poses = grasps(env, what, np.cos(tilt) * -UP + np.sin(tilt) * ahead_of(env))
+    level = [rotation_about(UP, turn) @ ahead_of(env) for turn in (manner.turns if tilt > 0.0 else (0.0,))]
+    poses = [pose for ahead in level for pose in manner.poses(env, what, np.cos(tilt) * -UP + np.sin(tilt) * ahead)]
     best = max((pose.score for pose in poses), default=0.0)
     for pose in poses:
         local = body.xmat.reshape(3, 3).T @ (pose.position - body.xpos)
         alike = sum(np.linalg.norm(local - other.position) < ALIKE_M for other in tried)
         cost = extra + WORSE_GRASP * (best - pose.score) + TRIED * float(alike)
-        cost += manner.high * max(float(pose.position[2] - body.xpos[2]), 0.0)
         for turn in (pose.rotation, pose.rotation @ np.diag([-1.0, -1.0, 1.0])):
             takes = Held(what.name, turn.T @ (body.xpos - pose.position), turn.T @ body.xmat.reshape(3, 3))
             for name in manner.entries:
-                for lift in (LIFT_M,) if name == "up" else LIFTS_M:
+                for lift in {"up": (LIFT_M,), "level": (LEVEL_LIFT_M,)}.get(name, LIFTS_M):
                     poses_on_way = _way(pose.position, turn, entry(env, name), name, manner.out_m, lift)
-                    found.append(Way(poses_on_way, cost + (LOW_COST if lift < LIFT_M else 0.0), takes))
+                    low = LEVEL_COST if name == "level" else LOW_COST if lift < LIFT_M else 0.0
+                    found.append(Way(poses_on_way, cost + low, takes))
     return found
 
 

@@ -35,6 +35,7 @@ AWAY_M = 0.26
 GONE_M = 0.27  # of the grip site from the thing's origin: tasks ask for 25 cm
 YAWS = 12
 UP_RISE_M, RISES_M, LOW_COST = 0.06, (0.035, 0.010), 0.05  # over where it is let go, on the way in
+LEVEL_RISE_M, LEVEL_COST = 0.004, 0.1
 AGAIN, AGAIN_M = 0.5, 0.02  # cost of a hand that goes where it went in vain, as near as this
 LEANING = 0.35  # cost of a radian that the thing is tilted
 
@@ -112,10 +113,16 @@ def put(env: KitchenEnv, what: Thing, how: Putting, failed: list[Array]) -> Iter
     failed.append(choice.way.targets[2].position)
     yield from lead(env, choice.joints, CLOSED)
     far, above, low, clear, away = choice.way.targets
-    for target, tolerance, steps in ((far, 0.04, 110), (above, 0.012, 90)):
-        yield from move_hand(data, target, CLOSED, tolerance=tolerance, max_steps=steps)
-        if not _holds(env, held):
-            return
+    # A way in through a front is kept from its beginning on.
+    inwards = float((far.position - above.position) @ UP) < 0.5 * float(np.linalg.norm(far.position - above.position))
+    yield from move_hand(
+        data, far, CLOSED, tolerance=0.01 if inwards else 0.04, max_steps=110, insist=INSIST if inwards else 0.0
+    )
+    if not _holds(env, held):
+        return
+    yield from move_hand(data, above, CLOSED, speed=0.7 if inwards else 1.0, max_steps=90)
+    if not _holds(env, held):
+        return
     # What has slipped in the hand goes to the spot, not the hand.
     slipped = (_origin(low, held) - _origin_now(env, what, low)) * [1.0, 1.0, 0.0]
     low = HandTarget(low.position + np.clip(slipped, -0.03, 0.03), low.rotation)
@@ -162,8 +169,8 @@ def _ways(env: KitchenEnv, what: Thing, held: Held, spot: Spot, how: Putting, fa
             again = sum(np.linalg.norm(low - other) < AGAIN_M for other in failed)
             cost = spot.extra + AGAIN * float(again) + LEANING * lean + 0.08 * min(yaw, 2 * np.pi - yaw)
             for name in how.entries:
-                for rise in (UP_RISE_M,) if name == "up" else RISES_M:
-                    extra = cost + (LOW_COST if rise == min(RISES_M) else 0.0)
+                for rise in {"up": (UP_RISE_M,), "level": (LEVEL_RISE_M,)}.get(name, RISES_M):
+                    extra = cost + (LEVEL_COST if name == "level" else LOW_COST if rise == min(RISES_M) else 0.0)
                     found.append(_way(low, rotation, entry(env, name), name, how.in_m, rise, extra))
     return found
 

@@ -1,7 +1,7 @@
 """Put an object down on a counter where nothing stands.
 
-PickPlaceCabinetToCounter: solved in 2 of 2 target scenes (seeds 0-1, no action noise). PickPlaceDrawerToCounter and
-CoffeeServeMug have verbs of their own until they are solved: no free spot is near enough, the mug slips on its way out.
+PickPlaceCabinetToCounter: solved in 2 of 2 target scenes (seeds 0-1, no action noise); for CoffeeServeMug see `cups`.
+PickPlaceDrawerToCounter has a verb of its own until it is solved: no free spot is near enough.
 """
 
 from __future__ import annotations
@@ -13,7 +13,8 @@ import mujoco
 import numpy as np
 
 from robocasa_lerobot.demos.motion import UP, Array, base_pose, grip_position
-from robocasa_lerobot.demos.skills.pick import ANYHOW
+from robocasa_lerobot.demos.skills.cups import UNDER_A_SPOUT
+from robocasa_lerobot.demos.skills.pick import ANYHOW, Manner
 from robocasa_lerobot.demos.skills.put import Putting, Spot, move
 from robocasa_lerobot.demos.skills.put_down import goal
 from robocasa_lerobot.demos.skills.things import Thing, thing
@@ -32,13 +33,26 @@ def place_on_counter(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
     Raises:
         SkillError: it is not there after all attempts.
     """
+    yield from _move(env, stage, ANYHOW)
+
+
+def take_from_spout(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
+    """Take a mug from under a spout, and put it down on the counter that is the stage's target.
+
+    Raises:
+        SkillError: it is not there after all attempts.
+    """
+    yield from _move(env, stage, UNDER_A_SPOUT)
+
+
+def _move(env: KitchenEnv, stage: Stage, taking: Manner) -> Iterator[Array]:
     what = thing(env, stage.object)
     how = Putting(
         free_spots(env, what, stage.target),
         goal(env),
         leans=(0.0, np.deg2rad(30.0)),
         entries=("up", "across"),
-        taking=ANYHOW,
+        taking=taking,
     )
     yield from move(env, what, how)
 

@@ -1,0 +1,74 @@
+"""Hold mugs by their bodies: a nearly level hand from the side, a finger at each end of a diameter.
+
+So the hand fits under a spout and below the handle of a portafilter, and what the fingers press does not turn in them.
+Solved without action noise, seeds 0-9: CoffeeServeMug 10 of 10 in target and 10 of 10 in pretrain scenes,
+CoffeeSetupMug 8 of 10 and 10 of 10. What fails: the mug is grasped beside its middle, and slips on its way.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+
+from robocasa_lerobot.demos.motion import UP, Array, frame
+from robocasa_lerobot.demos.skills.pick import Manner, ahead_of
+from robocasa_lerobot.demos.skills.things import UPRIGHT_COS, Thing, grasps
+from robocasa_lerobot.envs.kitchen_env import KitchenEnv
+from robocasa_lerobot.envs.scene.objects.grasping import PALM_ABOVE_GRIP_M, GraspPose
+
+WIDEST_M = 0.081  # at the rim; a mug's body is a little narrower where the fingers are
+LEVEL_RAD = np.deg2rad(25.0)  # a hand that looks down more than this meets the rim with its palm
+# Of the grip above what the thing stands on: low, so that the hand passes below spouts and the handles of portafilters.
+HEIGHTS_M = (0.035, 0.045)
+HANDLE_BEHIND = 0.35  # of the handle's direction along the approach: less is in the way of a finger
+HANDLE_M = 0.008  # what stands out farther than this from the body is the handle
+UPPER, ASKEW = 0.3, 4.0  # what a score loses by a higher grip, and by a radian beyond a small angle to the heading
+SMALL_RAD = np.deg2rad(21.0)
+
+
+def from_the_side(env: KitchenEnv, what: Thing, approach: Array) -> list[GraspPose]:
+    """Grasps across the body where the hand comes level and the thing stands; else of whatever kind there is."""
+    turn = env.data.body(what.name).xmat.reshape(3, 3).copy()
+    level = np.hypot(approach[0], approach[1]) > np.cos(LEVEL_RAD)
+    if level and what.item is not None and what.item.interior is not None and turn[2, 2] > UPRIGHT_COS:
+        return _across(env, what, approach, float(min(what.item.size[:2])) / 2, what.item.interior.center)
+    return grasps(env, what, approach)
+
+
+def _across(
+    env: KitchenEnv, what: Thing, approach: Array, radius: float, center: tuple[float, float, float]
+) -> list[GraspPose]:
+    body = env.data.body(what.name)
+    turn = body.xmat.reshape(3, 3)
+    middle = np.array([*center[:2], 0.0])
+    away = what.cloud - middle
+    if 2 * radius > WIDEST_M:
+        return []
+    out = np.linalg.norm(away[:, :2], axis=1)
+    ahead = np.array([*approach[:2], 0.0]) / np.hypot(approach[0], approach[1])
+    behind = 1.0
+    if out.max() > radius + HANDLE_M:
+        handle = turn @ (away[out.argmax()] * [1.0, 1.0, 0.0]) / out.max()
+        behind = float(handle @ ahead)
+    if behind < HANDLE_BEHIND:
+        return []
+    rotation = frame(approach, np.cross(UP, ahead))
+    # As deep as the palm lets it.
+    short = max(radius - PALM_ABOVE_GRIP_M, 0.0)
+    foot = body.xpos + turn @ middle - what.below(turn) * UP
+    score = min(behind, 0.6) - ASKEW * max(float(np.arccos(np.clip(ahead @ ahead_of(env), -1, 1))) - SMALL_RAD, 0.0)
+    return [
+        GraspPose(foot + height * UP - short * approach, rotation, 2 * radius, score - UPPER * index)
+        for index, height in enumerate(HEIGHTS_M)
+    ]
+
+
+FROM_THE_SIDE = Manner(
+    tuple((float(np.deg2rad(tilt)), extra) for tilt, extra in ((78.0, 0.0), (84.0, 0.05), (60.0, 0.5))),
+    ("up", "across", "out"),
+    turns=tuple(float(np.deg2rad(turn)) for turn in (20.0, -20.0, 0.0, 45.0, -45.0)),
+    poses=from_the_side,
+)
+
+UNDER_A_SPOUT = dataclasses.replace(FROM_THE_SIDE, entries=("out", "level"), out_m=0.17)
