@@ -7,21 +7,32 @@ from collections import Counter
 import mujoco
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 from task_selection import every_task
 
 from robocasa_lerobot import contract
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.rendering import SceneRenderer
 from robocasa_lerobot.rendering.look_alike import look_alike
-from robocasa_lerobot.rendering.tessellation import Surface, box, capsule, cylinder, joined
+from robocasa_lerobot.rendering.tessellation import Surface, boxes, capsule, cylinder
 
 GROUPS = (1, 2)
+
+
+def _boxes(half_sizes: list[tuple[float, float, float]]) -> Surface:
+    """In a row along x, a metre apart, each turned by another angle."""
+    turns = [Rotation.from_euler("z", 0.5 * number).as_matrix() for number in range(len(half_sizes))]
+    places = np.arange(len(half_sizes))[:, None] * np.array([[1.0, 0.0, 0.0]])
+    all_faces = np.ones((len(half_sizes), 6), dtype=bool)
+    return boxes(np.array(half_sizes), places, np.array(turns), np.ones((len(half_sizes), 2)), all_faces)
+
+
 SHAPES = {
-    "box": (box((0.3, 0.2, 0.1)), 8 * 0.3 * 0.2 * 0.1),
+    "box": (_boxes([(0.3, 0.2, 0.1)]), 8 * 0.3 * 0.2 * 0.1),
     "cylinder": (cylinder(0.5, 0.2, 64), np.pi * 0.5**2 * 0.4),
     "capsule": (capsule(0.5, 0.2, 64), np.pi * 0.5**2 * 0.4 + 4 / 3 * np.pi * 0.5**3),
     "thin bar": (capsule(0.006, 0.1, 10), np.pi * 0.006**2 * 0.2 + 4 / 3 * np.pi * 0.006**3),
-    "both": (joined([box((0.1, 0.1, 0.1)), box((0.1, 0.1, 0.2)).placed((1.0, 0.0, 0.0), np.eye(3))]), 0.008 + 0.016),
+    "both": (_boxes([(0.1, 0.1, 0.1), (0.1, 0.1, 0.2)]), 0.008 + 0.016),
 }
 
 
@@ -67,7 +78,8 @@ def test_the_look_alike_looks_alike(task: str) -> None:
         for camera in contract.CAMERAS:
             one, other = merged.render(env.data, camera), exact.render(env.data, camera)
             difference = np.abs(one.astype(int) - other.astype(int))
-            assert difference.mean() < 1.5, camera
+            # Highlights are computed at the corners of facets, and large boards have other corners.
+            assert difference.mean() < 2.5, camera
             assert (difference.max(axis=-1) > 24).mean() < 0.02, camera  # edges of round shapes
             assert one.std() > 20, camera  # something is seen
         for _ in range(10):

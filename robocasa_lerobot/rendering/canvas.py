@@ -28,6 +28,8 @@ _SPARE_GEOMS = 200  # of a scene, beyond the model's own: lights, skins and the 
 # Distances in metres between the parts of what is seen that are drawn one after the other, the nearest first. Near
 # ones hide the rest before its pixels are computed; more than a dozen parts cost more than they save.
 _LAYER_EDGES_M = (0.15, 0.3, 0.45, 0.6, 0.8, 1.0, 1.3, 1.7, 2.2, 3.0, 4.5)
+# What `MjrContext` knows of the framebuffer that pictures are drawn into.
+_FRAMEBUFFER = ("offFBO", "offFBO_r", "offColor", "offColor_r", "offDepthStencil", "offDepthStencil_r")
 _CONTEXT_SIZE = 64  # of the window that some drivers need; pictures are drawn elsewhere
 
 # Process that has made an OpenGL context; a forked child inherits the number, and the driver's dead threads with it.
@@ -117,10 +119,19 @@ class Canvas:
 
     def picture(self, *, shadows: bool) -> NDArray[np.uint8]:
         """What was last seen, RGB of shape (height, width, 3), upright; with shadows and reflections or without."""
+        self.draw(shadows=shadows)
+        return self.drawn()
+
+    def draw(self, number: int = 0, *, shadows: bool) -> None:
+        """Begin a picture of what was last seen; several may be begun, each with a number, before one is taken."""
         flags = self._scene.flags
         flags[mujoco.mjtRndFlag.mjRND_SHADOW] = shadows
         flags[mujoco.mjtRndFlag.mjRND_REFLECTION] = shadows
-        colours, _ = self._surface.draw(self._scene, depth=False)
+        self._surface.draw(self._scene, number)
+
+    def drawn(self, number: int = 0) -> NDArray[np.uint8]:
+        """The picture of that number, RGB of shape (height, width, 3), upright."""
+        colours, _ = self._surface.read(number, depth=False)
         return np.ascontiguousarray(colours[::-1])
 
     def geometry(self) -> tuple[NDArray[np.float32], NDArray[np.int32]]:
@@ -129,7 +140,8 @@ class Canvas:
         usual = scene.flags.copy()
         scene.flags[mujoco.mjtRndFlag.mjRND_SHADOW] = scene.flags[mujoco.mjtRndFlag.mjRND_REFLECTION] = False
         scene.flags[mujoco.mjtRndFlag.mjRND_SEGMENT] = scene.flags[mujoco.mjtRndFlag.mjRND_IDCOLOR] = True
-        colours, buffer = self._surface.draw(scene, depth=True)
+        self._surface.draw(scene)
+        colours, buffer = self._surface.read(depth=True)
         scene.flags[:] = usual
         assert buffer is not None
         depth, ids = self._metres(buffer), _geom_ids(scene, colours)
@@ -181,26 +193,43 @@ def _free_all() -> None:
 
 
 class _Surface:
-    """What MuJoCo's renderer keeps on the graphics card for one model: a framebuffer, meshes, textures."""
+    """What MuJoCo's renderer keeps on the graphics card for one model: framebuffers, meshes, textures.
+
+    A picture is computed while the next one is prepared, if that goes into another framebuffer and is read later.
+    """
 
     def __init__(self, model: mujoco.MjModel, height: int, width: int) -> None:
         self._height, self._width = height, width
         self._context = _shared_context()
         self._rectangle = mujoco.MjrRect(0, 0, width, height)
-        self._kept: mujoco.MjrContext | None = mujoco.MjrContext(model, mujoco.mjtFontScale.mjFONTSCALE_100.value)
-        self._kept.readDepthMap = mujoco.mjtDepthMap.mjDEPTH_ZEROFAR
+        self._kept: mujoco.MjrContext | None = _context_of(model)
+        self._samples = model.vis.quality.offsamples
+        self._more: list[mujoco.MjrContext] = []  # of nothing: their framebuffers are used
+        self._framebuffers = [_framebuffer(self._kept)]
 
-    def draw(self, scene: mujoco.MjvScene, *, depth: bool) -> tuple[NDArray[np.uint8], NDArray[np.float32] | None]:
+    def draw(self, scene: mujoco.MjvScene, number: int = 0) -> None:
+        """Have the framebuffer of that number drawn; it may not be finished yet when this returns."""
+        mujoco.mjr_render(self._rectangle, scene, self._chosen(number))
+
+    def read(self, number: int = 0, *, depth: bool) -> tuple[NDArray[np.uint8], NDArray[np.float32] | None]:
         """Colours (height, width, 3), and depth buffer (height, width) if asked for, the lowest row first."""
-        assert self._kept is not None, "it is closed"
         colours = np.empty((self._height, self._width, 3), np.uint8)
         buffer = np.empty((self._height, self._width), np.float32) if depth else None
+        mujoco.mjr_readPixels(colours, buffer, self._rectangle, self._chosen(number))
+        return colours, buffer
+
+    def _chosen(self, number: int) -> mujoco.MjrContext:
+        """MuJoCo's context, current and with the framebuffer of that number: another surface's may have been."""
+        assert self._kept is not None, "it is closed"
         if self._context is not None:
             self._context.make_current()
-        mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN.value, self._kept)  # another surface may have been
-        mujoco.mjr_render(self._rectangle, scene, self._kept)
-        mujoco.mjr_readPixels(colours, buffer, self._rectangle, self._kept)
-        return colours, buffer
+        while number >= len(self._framebuffers):
+            self._more.append(_context_of(_nothing(self._height, self._width, self._samples)))
+            self._framebuffers.append(_framebuffer(self._more[-1]))
+        for name, value in self._framebuffers[number].items():
+            setattr(self._kept, name, value)
+        mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN.value, self._kept)
+        return self._kept
 
     def close(self) -> None:
         """Free all of it."""
@@ -210,7 +239,31 @@ class _Surface:
         # MuJoCo frees objects by their numbers in whichever context is current: not in that of another thread.
         if self._context is not None:
             self._context.make_current()
-        kept.free()
+        for name, value in self._framebuffers[0].items():
+            setattr(kept, name, value)  # each frees its own
+        for context in (kept, *self._more):
+            context.free()
+        self._more.clear()
+
+
+def _context_of(model: mujoco.MjModel) -> mujoco.MjrContext:
+    context = mujoco.MjrContext(model, mujoco.mjtFontScale.mjFONTSCALE_100.value)
+    context.readDepthMap = mujoco.mjtDepthMap.mjDEPTH_ZEROFAR
+    return context
+
+
+def _framebuffer(context: mujoco.MjrContext) -> dict[str, int]:
+    """OpenGL's numbers of what a context draws into."""
+    return {name: getattr(context, name) for name in _FRAMEBUFFER}
+
+
+@cache
+def _nothing(height: int, width: int, samples: int) -> mujoco.MjModel:
+    """A model without anything in it, whose pictures have that size."""
+    spec = mujoco.MjSpec()
+    spec.visual.global_.offheight, spec.visual.global_.offwidth = height, width
+    spec.visual.quality.offsamples, spec.visual.quality.shadowsize = samples, 0
+    return spec.compile()
 
 
 def _shared_context() -> Any:

@@ -18,19 +18,24 @@ _AXES = np.repeat(np.arange(3), 2)  # of a box's faces, in the order of `tessell
 _SIDES = np.tile((-1.0, 1.0), 3)
 
 
-def shown_faces(positions: Array, rotations: Array, halves: Array) -> NDArray[np.bool_]:
-    """Which faces of opaque boxes that do not move against each other can be seen, (n, 6).
+def shown_faces(
+    positions: Array, rotations: Array, halves: Array, bodies: NDArray[np.intp] | None = None
+) -> NDArray[np.bool_]:
+    """Which faces of opaque boxes can be seen that others of their body do not cover, (n, 6).
 
     Args:
         positions: of their middles, metres, (n, 3).
         rotations: (n, 3, 3).
         halves: half sizes, metres, (n, 3).
+        bodies: which boxes do not move against each other, and share a frame, (n,); None: all.
     """
     hidden = _edges_of_thin(halves)
-    inner, outer = _touching(positions, (np.abs(rotations) @ halves[:, :, None])[:, :, 0])
-    corners = positions[:, None, None] + np.einsum("nij,nfcj->nfci", rotations, _places(halves))
-    local = np.einsum("pij,pfci->pfcj", rotations[outer], corners[inner] - positions[outer, None, None])
-    covered = (np.abs(local) <= halves[outer, None, None] + _NEAR_M).all(axis=(2, 3))
+    bodies = np.zeros(len(positions), np.intp) if bodies is None else bodies
+    inner, outer = _touching(positions, (np.abs(rotations) @ halves[:, :, None])[:, :, 0], bodies)
+    corners = positions[:, None] + _places(halves).reshape(-1, 24, 3) @ rotations.transpose(0, 2, 1)
+    local = (corners[inner] - positions[outer, None]) @ rotations[outer]
+    within = np.abs(local) <= halves[outer, None] + _NEAR_M
+    covered = within.reshape(-1, 6, 4 * 3).all(axis=2)
     np.logical_or.at(hidden, inner, covered)
     return ~hidden
 
@@ -46,9 +51,9 @@ def _places(halves: Array) -> Array:
     return out
 
 
-def _touching(positions: Array, reach: Array) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """Ordered pairs of different boxes whose bounds, (n, 3) half sizes, come near each other."""
-    near = np.ones((len(positions), len(positions)), dtype=np.bool_)
+def _touching(positions: Array, reach: Array, bodies: NDArray[np.intp]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Ordered pairs of different boxes of one body whose bounds, (n, 3) half sizes, come near each other."""
+    near = bodies[:, None] == bodies[None, :]
     np.fill_diagonal(near, False)
     for axis in range(3):
         apart = np.abs(positions[:, None, axis] - positions[None, :, axis])

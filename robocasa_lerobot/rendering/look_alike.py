@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robocasa_lerobot.rendering.hidden_faces import shown_faces
-from robocasa_lerobot.rendering.tessellation import Surface, box, capsule, cylinder, joined
+from robocasa_lerobot.rendering.tessellation import Surface, boxes, capsule, cylinder, joined
 
 Array = NDArray[np.float64]
 
@@ -159,30 +159,28 @@ def _shown_faces(
 ) -> NDArray[np.bool_]:
     """Which faces of a geom, if it is a box, are drawn, (ngeom, 6): those of one body hide some."""
     shown = np.ones((model.ngeom, 6), dtype=np.bool_)
-    boxes = [
-        geom
-        for geom in np.flatnonzero(visible & (model.geom_type == _BOX)).tolist()
-        if geom not in loose and _is_opaque(model, geom)
-    ]
-    owners = np.where(poses.fixed, 0, model.geom_bodyid)[boxes]
-    for owner in np.unique(owners):
-        geoms = np.array(boxes)[owners == owner]
-        shown[geoms] = shown_faces(poses.positions[geoms], poses.rotations[geoms], model.geom_size[geoms])
+    chosen = visible & (model.geom_type == _BOX) & _opaque(model)
+    chosen[list(loose)] = False
+    for group in (poses.fixed, ~poses.fixed):
+        geoms = np.flatnonzero(chosen & group)
+        bodies = np.where(poses.fixed, 0, model.geom_bodyid)[geoms]
+        shown[geoms] = shown_faces(poses.positions[geoms], poses.rotations[geoms], model.geom_size[geoms], bodies)
     return shown
 
 
-def _is_opaque(model: mujoco.MjModel, geom: int) -> bool:
-    material = int(model.geom_matid[geom])
-    return bool(model.geom_rgba[geom, 3] == 1.0 and (material < 0 or model.mat_rgba[material, 3] == 1.0))
+def _opaque(model: mujoco.MjModel) -> NDArray[np.bool_]:
+    """Which geoms nothing is seen through, (ngeom,)."""
+    materials = np.append(model.mat_rgba[:, 3], 1.0) == 1.0  # the last for geoms without any, number -1
+    return np.asarray((model.geom_rgba[:, 3] == 1.0) & materials[model.geom_matid])
 
 
 def _parts(model: mujoco.MjModel, poses: _Poses, visible: NDArray[np.bool_], loose: frozenset[int]) -> list[list[int]]:
     """Geoms that are drawn together: of one body, or, where nothing moves, of one cell of the room."""
-    cells = np.floor(poses.positions[:, :2] / CELL_M)
+    cells, opaque = np.floor(poses.positions[:, :2] / CELL_M).tolist(), _opaque(model)
     parts: dict[tuple[float, ...], list[int]] = {}
     for geom in np.flatnonzero(visible).tolist():
         material, rgba = int(model.geom_matid[geom]), tuple(model.geom_rgba[geom].tolist())
-        mergeable = _is_opaque(model, geom) and _can_be_merged(model, geom) and geom not in loose
+        mergeable = opaque[geom] and _can_be_merged(model, geom) and geom not in loose
         own = -1 if mergeable else geom
         where = (-1, *cells[geom]) if poses.fixed[geom] and mergeable else (int(model.geom_bodyid[geom]), 0, 0)
         parts.setdefault((*where, material, own, *rgba), []).append(geom)
@@ -222,7 +220,7 @@ def _add_part(
     merged = len(geoms) > 1 or kind in (_CYLINDER, _CAPSULE)
     geom = spec.worldbody.add_geom(type=mujoco.mjtGeom(_MESH if merged else kind))
     if merged:
-        _add_mesh(spec, joined([_surface(model, poses, each, shown[each]) for each in geoms]), name)
+        _add_mesh(spec, _merged(model, poses, shown, geoms), name)
         geom.meshname = name
     else:
         geom.pos, geom.quat, geom.size = poses.positions[first], poses.quats[first], model.geom_size[first]
@@ -236,25 +234,37 @@ def _add_part(
         geom.material = f"{'baked' if merged else 'material'}{material}"
 
 
-def _surface(model: mujoco.MjModel, poses: _Poses, geom: int, shown: NDArray[np.bool_]) -> Surface:
-    """The shape of a geom in its body's frame, with texture coordinates as MuJoCo generates them."""
+def _merged(model: mujoco.MjModel, poses: _Poses, shown: NDArray[np.bool_], geoms: list[int]) -> Surface:
+    """The shape of geoms of one body and material in its frame, with texture coordinates as MuJoCo generates them."""
+    found = [_surface(model, poses, geom) for geom in geoms if model.geom_type[geom] != _BOX]
+    box = np.array([geom for geom in geoms if model.geom_type[geom] == _BOX], dtype=np.intp)
+    if len(box):
+        sizes = model.geom_size[box]
+        repeat = _repetitions(model, geoms[0], sizes[:, :2])
+        found.append(boxes(sizes, poses.positions[box], poses.rotations[box], repeat, shown[box]))
+    return joined(found)
+
+
+def _surface(model: mujoco.MjModel, poses: _Poses, geom: int) -> Surface:
     kind, size = model.geom_type[geom], model.geom_size[geom]
     slices = int(model.vis.quality.numslices)
-    if kind == _BOX:
-        shape = box(size, shown)
-    elif kind == _MESH:
+    if kind == _MESH:
         shape = _mesh_surface(model, int(model.geom_dataid[geom]))
     elif kind == _CYLINDER:
         shape = cylinder(size[0], size[1], slices)
     else:
         shape = capsule(size[0], size[1], slices)
-    repeat = np.ones(2)
-    material = int(model.geom_matid[geom])
-    if material >= 0:
-        repeat = model.mat_texrepeat[material].astype(np.float64)
-        if model.mat_texuniform[material]:  # repetitions per metre instead of per shape
-            repeat = repeat * (size[:2] if kind == _BOX else size[[0, 0]])
+    repeat = _repetitions(model, geom, size[[0, 0]])
     return shape.textured(repeat).placed(poses.positions[geom], poses.rotations[geom])
+
+
+def _repetitions(model: mujoco.MjModel, geom: int, sizes: Array) -> Array:
+    """How often the texture of a geom is repeated over shapes of half sizes (..., 2) in its plane, (..., 2)."""
+    material = int(model.geom_matid[geom])
+    if material < 0:
+        return np.ones_like(sizes)
+    repeat = np.broadcast_to(model.mat_texrepeat[material].astype(np.float64), sizes.shape)
+    return repeat * sizes if model.mat_texuniform[material] else repeat  # uniform: per metre instead of per shape
 
 
 def _can_be_merged(model: mujoco.MjModel, geom: int) -> bool:
@@ -270,10 +280,11 @@ def _mesh_surface(model: mujoco.MjModel, index: int) -> Surface:
     start, count = int(model.mesh_faceadr[index]), int(model.mesh_facenum[index])
     places = model.mesh_face[start : start + count] + model.mesh_vertadr[index]
     normals = model.mesh_facenormal[start : start + count] + model.mesh_normaladr[index]
-    pairs, faces = np.unique(np.stack([places, normals], axis=-1).reshape(-1, 2), axis=0, return_inverse=True)
+    pairs, faces = np.unique(places * np.int64(len(model.mesh_normal)) + normals, return_inverse=True)
+    where, facing = np.divmod(pairs, len(model.mesh_normal))
     return Surface(
-        model.mesh_vert[pairs[:, 0]].astype(np.float64),
-        model.mesh_normal[pairs[:, 1]].astype(np.float64),
+        model.mesh_vert[where].astype(np.float64),
+        model.mesh_normal[facing].astype(np.float64),
         np.zeros((len(pairs), 2)),
         faces.reshape(-1, 3).astype(np.int32),
     )

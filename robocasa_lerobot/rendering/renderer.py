@@ -75,12 +75,11 @@ class SceneRenderer:
         numbers = [self._camera(camera) for camera in cameras]
         alike.follow(data)
         assert self._merged is not None
-        found = []
-        for number in numbers:
+        for place, number in enumerate(numbers):
             assert isinstance(number, int)
             self._merged.see_nearest_first(alike.data, number)
-            found.append(self._merged.picture(shadows=False))
-        return found
+            self._merged.draw(place, shadows=False)
+        return [self._merged.drawn(place) for place in range(len(numbers))]
 
     def geometry(
         self, data: mujoco.MjData, camera: str | mujoco.MjvCamera

@@ -59,16 +59,23 @@ def joined(surfaces: Sequence[Surface]) -> Surface:
     )
 
 
-def box(half_sizes: ArrayLike, shown: NDArray[np.bool_] | None = None) -> Surface:
-    """A box of half sizes (3,) metres, with sharp edges.
+def boxes(half_sizes: Array, positions: Array, rotations: Array, repeat: Array, shown: NDArray[np.bool_]) -> Surface:
+    """One surface of n boxes with sharp edges, placed and textured: many times faster than one by one.
 
-    Its faces look to lower and higher x, then y, then z; with `shown`, (6,), it has only some of them.
+    Args:
+        half_sizes: metres, (n, 3).
+        positions: of their middles, metres, (n, 3).
+        rotations: (n, 3, 3).
+        repeat: of the texture, as in `Surface.textured`, (n, 2).
+        shown: which faces they have, to lower and higher x, then y, then z, (n, 6).
     """
-    corners, normals, faces = _BOX_CORNERS, _BOX_NORMALS, _BOX_FACES
-    if shown is not None and not shown.all():
-        kept = np.repeat(shown, 4)
-        corners, normals, faces = corners[kept], normals[kept], faces[: 2 * int(shown.sum())]
-    return Surface(corners * np.asarray(half_sizes), normals, corners[:, :2], faces)
+    turned = rotations.transpose(0, 2, 1)
+    vertices = (_BOX_CORNERS * half_sizes[:, None]) @ turned + positions[:, None]
+    texcoords = 0.5 * repeat[:, None] * (1.0 + _BOX_CORNERS[:, :2] * (1.0, -1.0))
+    kept = np.repeat(shown, 4, axis=1)
+    starts = 4 * np.arange(int(shown.sum()), dtype=np.int32)
+    faces = (starts[:, None, None] + _BOX_FACES[:2]).reshape(-1, 3)
+    return Surface(vertices[kept], (_BOX_NORMALS @ turned)[kept], texcoords[kept], faces)
 
 
 def cylinder(radius: float, half_length: float, slices: int) -> Surface:
