@@ -14,18 +14,13 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from robocasa_lerobot.demos.motion import (
-    Array,
-    HandTarget,
-    base_pose,
-    pose_error,
-)
+from robocasa_lerobot.demos.arm import Arm
+from robocasa_lerobot.demos.motion import Array, HandTarget, base_pose
 from robocasa_lerobot.demos.skills.common import SkillError
 from robocasa_lerobot.demos.skills.hinged import Hinged
-from robocasa_lerobot.demos.skills.reach import move_base_to, solve_arm
-from robocasa_lerobot.envs.control.indices import joint_positions, joint_velocities
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
-from robocasa_lerobot.envs.scene.robot_names import ARM_JOINTS, HAND, MOBILE_BASE
+from robocasa_lerobot.envs.scene.robot import ARM_HOME_QPOS, place_base
+from robocasa_lerobot.envs.scene.robot_names import ARM_CENTER_SITE, HAND, MOBILE_BASE
 
 Shift = tuple[float, float]
 
@@ -33,11 +28,12 @@ Shift = tuple[float, float]
 FINGER_HALF_M = np.array([0.011, 0.026, 0.011])
 STANDOFF_M = 0.09  # of the hand before it grasps
 ARM_FOOT = "robot0_link0"
-GOOD_ENOUGH, HOPELESS = 0.35, 2.0
-REACH_M = 1.05  # from the arm's shoulder to the grip site
-SHOULDER_M = 0.333  # above the arm's foot
+HOPELESS, MOST_TESTED = 2.0, 80
+# Shares of the way to the first pose, and from one pose to the next, that are tested, with the cost of what is met.
+BEFORE, BETWEEN = ((0.3, 0.3), (0.6, 0.3), (0.8, 0.3), (1.0, 0.8)), ((0.33, 0.3), (0.67, 0.3), (1.0, 0.8))
+_DRIVE, _ALONG = 0.15, 0.10  # cost of a metre that the base goes before, and as the part turns
 _NEAR_LIMIT_RAD = 0.2
-BACK_M = 0.25  # that the base goes back before it goes to the side, where it cannot go straight
+BACKS_M = (0.25, 0.5, 0.75)  # that the base goes back before it goes to the side, where it cannot go straight
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,6 +71,7 @@ class ArcPlan:
         start, end: moves of the base from where it stands now, metres forward and to the left: before, and by the end.
         cost: how bad it is; above 1 it is not to be had without a collision or a miss.
         legs: straight moves that make up the first one.
+        joints: of the arm at the first pose, (7,) radians.
     """
 
     way: Way
@@ -82,136 +79,186 @@ class ArcPlan:
     end: Shift
     cost: float
     legs: tuple[Shift, ...]
+    joints: Array
 
 
 def plan_arc(env: KitchenEnv, part: Hinged, ways: Iterable[Way], stances: Iterable[tuple[Shift, Shift]]) -> ArcPlan:
-    """The best way, or the first that is good enough, of those that can be reached without touching what is not meant.
+    """The way that costs least of those that can be reached without touching what is not meant.
+
+    All ways are solved at once from all stances; only the cheapest ones are tested for what they meet. So planning
+    takes a bounded time, also for what is out of reach.
 
     Args:
         env: its state is read, not touched.
         part: what is moved.
-        ways: alternatives.
-        stances: moves of the base to try in this order: before, and by the end.
+        ways: alternatives, all with the same number of poses.
+        stances: moves of the base to try: before, and by the end.
 
     Raises:
         SkillError: there is none.
     """
-    bench = _Bench(env, part)
     options = list(ways)
     assert options, "no way to plan"
-    best = ArcPlan(options[0], (0.0, 0.0), (0.0, 0.0), np.inf, ())
-    for start, end in stances:
-        far = 0.15 * float(np.hypot(*start)) + 0.1 * float(np.hypot(end[0] - start[0], end[1] - start[1]))
-        legs = bench.route(start) if bench.clears(options[0].vias[-1].angle, end) else None
+    bench = _Bench(env, part, options, list(stances))
+    best: ArcPlan | None = None
+    tested = 0
+    for candidate in bench.reached():
+        if tested >= MOST_TESTED or (best is not None and candidate.cost >= best.cost):
+            break
+        legs = bench.legs(candidate)
         if legs is None:
             continue
-        for way in options:
-            cost = far + bench.cost(way, start, end, min(best.cost, HOPELESS) - far)
-            if cost < best.cost:
-                best = ArcPlan(way, start, end, cost, legs)
-        if best.cost < GOOD_ENOUGH:
-            break
-    if not np.isfinite(best.cost):
+        tested += 1
+        cost = candidate.cost + bench.hits(candidate, HOPELESS if best is None else best.cost - candidate.cost)
+        if best is None or cost < best.cost:
+            joints = candidate.joints[0]
+            best = ArcPlan(options[candidate.way], *candidate.stance, cost, legs, joints)
+    if best is None:
         raise SkillError(f"{part.name}: the arm reaches nowhere along its arc")
     return best
+
+
+@dataclass(frozen=True, eq=False)
+class _Candidate:
+    """A way from a stance, with joint angles (poses, 7), and what it costs but for what it meets."""
+
+    way: int
+    stance: tuple[Shift, Shift]
+    cost: float
+    joints: Array
 
 
 class _Bench:
     """A copy of the state on which poses are tried."""
 
-    def __init__(self, env: KitchenEnv, part: Hinged) -> None:
-        self._env, self._part = env, part
+    def __init__(self, env: KitchenEnv, part: Hinged, ways: list[Way], stances: list[tuple[Shift, Shift]]) -> None:
+        self._env, self._part, self._ways, self._stances = env, part, ways, stances
         self._model, self._data = env.model, copy.copy(env.data)
-        self._arm = joint_positions(env.model, ARM_JOINTS)
-        self._dofs = joint_velocities(env.model, ARM_JOINTS)
-        self._home = env.data.qpos[self._arm].copy()
-        self._ranges = np.array([env.model.joint(name).range for name in ARM_JOINTS])
+        self._arm = Arm(env.model, env.data)
+        self._present = env.data.qpos[self._arm.addresses].copy()
         self._robot = env.scene.subtree(MOBILE_BASE)
         self._hand = env.scene.subtree(HAND)
         self._reaching = env.scene.subtree(ARM_FOOT)
         base, yaw = base_pose(env.data)
-        self._shoulder = base + np.array([0.0, 0.0, SHOULDER_M])
+        self._base = (float(base[0]), float(base[1]), yaw)
         self._axes = np.array([[np.cos(yaw), np.sin(yaw), 0.0], [-np.sin(yaw), np.cos(yaw), 0.0]])
+        # What it leans on already is no reason not to drive: the part that it has just let go, for one.
+        self._leant_on = self._touched(hand_may=True)
+        self._known: dict[tuple[Shift, Shift], tuple[Shift, ...] | None] = {}
 
-    def route(self, shift: Shift) -> tuple[Shift, ...] | None:
-        """Straight moves, with the arm as it is, that end at a shift without touching anything; None if not found."""
+    def reached(self) -> list[_Candidate]:
+        """What the arm reaches, the cheapest first."""
+        frame = self._env.data.site(ARM_CENTER_SITE)
+        turn = frame.xmat.reshape(3, 3)
+        ways, count = self._ways, len(self._ways)
+        vias = len(ways[0].vias)
+        positions = np.array([[via.target.position for via in way.vias] for way in ways]) - frame.xpos
+        rotations = turn.T @ np.array([[via.target.rotation for via in way.vias] for way in ways])
+        progress = np.array([[via.progress for via in way.vias] for way in ways])
+        starts, ends = (np.array([stance[index] for stance in self._stances]) for index in (0, 1))
+        which = np.tile(np.arange(count), len(self._stances))
+        where = np.repeat(np.arange(len(self._stances)), count)
+        drive = np.hypot(*(ends - starts).T)
+        cost = np.array([way.bias for way in ways])[which]
+        cost = cost + (_DRIVE * np.hypot(*starts.T) + _ALONG * drive)[where]
+        solved: list[Array] = []
+        joints = np.tile(np.array(ARM_HOME_QPOS), (len(which), 1))
+        for index in range(vias):
+            shift = starts[where] + progress[which, index, None] * (ends - starts)[where]
+            position = (positions[which, index] - shift @ self._axes) @ turn
+            solution = self._arm.solve(position, rotations[which, index], joints)
+            miss = 20.0 * np.maximum(solution.position_error - 0.005, 0.0) + solution.rotation_error
+            cost = cost + np.minimum(miss, 4.0) + np.maximum(0.0, _NEAR_LIMIT_RAD - solution.margin)
+            keep = cost < HOPELESS
+            which, where, cost, joints = which[keep], where[keep], cost[keep], solution.joints[keep]
+            solved = [*(earlier[keep] for earlier in solved), joints]
+        if not len(which):
+            return []
+        cost = cost + 0.05 * np.abs(joints - self._present).max(axis=1)
+        rows = np.stack(solved, axis=1)
+        return [
+            _Candidate(int(which[row]), self._stances[where[row]], float(cost[row]), rows[row])
+            for row in np.argsort(cost, kind="stable")
+        ]
+
+    def legs(self, candidate: _Candidate) -> tuple[Shift, ...] | None:
+        """Straight moves that end at a stance, with the arm as it is, if the base is out of the part's way there."""
+        start, end = candidate.stance
+        if candidate.stance not in self._known:
+            clear = self._clears(self._ways[candidate.way].vias[-1].angle, end)
+            self._known[candidate.stance] = self._route(start) if clear else None
+        return self._known[candidate.stance]
+
+    def _route(self, shift: Shift) -> tuple[Shift, ...] | None:
         ahead, left = shift
-        back = min(ahead, 0.0) - BACK_M
-        for legs in (
-            (shift,),
-            ((ahead, 0.0), (0.0, left)),
-            ((back, 0.0), (0.0, left), (ahead - back, 0.0)),
-        ):
+        backs = [min(ahead, 0.0) - more for more in BACKS_M]
+        round_about = [((back, 0.0), (0.0, left), (ahead - back, 0.0)) for back in backs]
+        for legs in ((shift,), ((ahead, 0.0), (0.0, left)), *round_about):
             if self._free(legs):
                 return tuple(leg for leg in legs if np.hypot(*leg) > 0.01)
         return None
 
     def _free(self, legs: tuple[Shift, ...]) -> bool:
-        self._data.qpos[:] = self._env.data.qpos
         at = np.zeros(2)
         for leg in legs:
             count = int(np.ceil(float(np.hypot(*leg)) / 0.08))
             for step in range(1, count + 1):
                 x, y = at + np.asarray(leg) * step / count
-                self._place(self._part.angle, (x, y))
-                if self._touched(hand_may=True):
+                self._place(self._part.angle, (float(x), float(y)), self._present)
+                if self._touched(hand_may=True) - self._leant_on:
                     return False
             at += leg
         return True
 
-    def clears(self, angle: float, shift: Shift) -> bool:
+    def _clears(self, angle: float, shift: Shift) -> bool:
         """Whether the base is out of the part's way at an angle; the arm may still be."""
-        self._place(angle, shift)
+        self._place(angle, shift, self._present)
         return not self._touched(hand_may=False, only=self._robot & ~self._reaching)
 
-    def cost(self, way: Way, start: Shift, end: Shift, bound: float) -> float:
-        """Cost of a way; no more of it is looked at once it exceeds `bound`."""
-        cost = way.bias
-        for via in way.vias:
-            shift = self._shift(start, end, via.progress)
-            shoulder = self._shoulder + shift[0] * self._axes[0] + shift[1] * self._axes[1]
-            if np.linalg.norm(via.target.position - shoulder) > REACH_M:
-                return np.inf
-        self._data.qpos[:] = self._env.data.qpos
-        for number, via in enumerate(way.vias):
-            self._place(via.angle, self._shift(start, end, via.progress))
-            solve_arm(self._model, self._data, via.target, self._arm, self._dofs, self._home, self._ranges)
-            error = pose_error(self._data, via.target)
-            joints = self._data.qpos[self._arm]
-            margin = float(np.minimum(joints - self._ranges[:, 0], self._ranges[:, 1] - joints).min())
-            cost += min(20.0 * max(error.position - 0.005, 0.0) + 1.0 * error.rotation, 4.0)
-            cost += max(0.0, _NEAR_LIMIT_RAD - margin) * 1.0
+    def hits(self, candidate: _Candidate, bound: float) -> float:
+        """Cost of what is met at the poses of a candidate and half-way between them, up to about `bound`."""
+        way, (start, end) = self._ways[candidate.way], candidate.stance
+        cost = 0.0
+        before, angle, shift = self._present, self._part.angle, start
+        for number, (via, joints) in enumerate(zip(way.vias, candidate.joints, strict=True)):
+            there = self._shift(start, end, via.progress)
+            for share, weight in BEFORE if number == 0 else BETWEEN:
+                at = (shift[0] + share * (there[0] - shift[0]), shift[1] + share * (there[1] - shift[1]))
+                self._place(angle + share * (via.angle - angle), at, before + share * (joints - before))
+                cost += weight * min(len(self._touched(hand_may=number >= way.contact)), 3)
+            before, angle, shift = joints, via.angle, there
             if cost > bound:
-                return np.inf
-            cost += 0.8 * min(self._touched(hand_may=number >= way.contact), 3)
-        return cost + 0.05 * float(np.abs(self._data.qpos[self._arm] - self._home).max())
+                break
+        return cost
 
     @staticmethod
     def _shift(start: Shift, end: Shift, progress: float) -> Shift:
         return (start[0] + progress * (end[0] - start[0]), start[1] + progress * (end[1] - start[1]))
 
-    def _place(self, angle: float, shift: Shift) -> None:
-        arm = self._data.qpos[self._arm].copy()
+    def _place(self, angle: float, shift: Shift, joints: Array) -> None:
+        x, y, yaw = self._base
+        ahead, left = self._axes[:, :2]
+        to = shift[0] * ahead + shift[1] * left
         self._data.qpos[:] = self._env.data.qpos
-        self._data.qpos[self._arm] = arm
+        self._data.qpos[self._arm.addresses] = joints
         self._part.place(self._data, angle)
+        place_base(self._model, self._data, x + float(to[0]), y + float(to[1]), yaw)
         mujoco.mj_kinematics(self._model, self._data)
-        mujoco.mj_comPos(self._model, self._data)
-        move_base_to(self._model, self._data, shift)
 
-    def _touched(self, *, hand_may: bool, only: NDArray[np.bool_] | None = None) -> int:
-        """Number of bodies that the robot, or `only` these of it, touch; the hand may touch the part, if `hand_may`."""
+    def _touched(self, *, hand_may: bool, only: NDArray[np.bool_] | None = None) -> set[int]:
+        """The bodies that the robot, or `only` these of it, touch; the hand may touch the part, if `hand_may`."""
         mine_all = self._robot if only is None else only
         mujoco.mj_collision(self._model, self._data)
-        touched = set()
+        touched: set[int] = set()
+        if self._data.ncon == 0:
+            return touched
         pairs = self._model.geom_bodyid[self._data.contact.geom]
-        for (a, b), distance in zip(pairs, self._data.contact.dist, strict=True):
-            for mine, other in ((int(a), int(b)), (int(b), int(a))):
-                if not mine_all[mine] or self._robot[other] or distance >= 0.0:
-                    continue
-                if not (hand_may and self._hand[mine] and other == self._part.body):
-                    touched.add(other)
-        return len(touched)
+        crossed = (self._robot[pairs].sum(axis=1) == 1) & (self._data.contact.dist < 0.0)
+        for a, b in pairs[crossed]:
+            mine, other = (int(a), int(b)) if self._robot[a] else (int(b), int(a))
+            if mine_all[mine] and not (hand_may and self._hand[mine] and other == self._part.body):
+                touched.add(other)
+        return touched
 
 
 def arc_vias(
@@ -231,6 +278,7 @@ def face_way(
     *,
     off_m: float = 0.06,
     back_m: float = 0.10,
+    bias: float = 0.0,
 ) -> Way:
     """A way to push on a face with the closed finger tips.
 
@@ -242,6 +290,7 @@ def face_way(
         end: angle at which it ends, radians.
         off_m: how far off the face the hand comes, before it touches it.
         back_m: how far back from there along its fingers it comes from.
+        bias: of the way.
     """
 
     def target_at(angle: float) -> HandTarget:
@@ -254,7 +303,7 @@ def face_way(
     off = HandTarget(at.position + part.turned(start) @ normal * off_m, at.rotation)
     back = HandTarget(off.position - at.rotation[:, 2] * back_m, at.rotation)
     arc = arc_vias(start, end, target_at, (0.0, 0.5, 1.0))
-    return Way((Via(start, back), Via(start, off), *arc), 2, target_at)
+    return Way((Via(start, back), Via(start, off), *arc), 2, target_at, bias)
 
 
 def grip_way(

@@ -26,6 +26,7 @@ from robocasa_lerobot.demos.skills.common import draw_back, hold_hand, move_hand
 from robocasa_lerobot.demos.skills.firm import FirmServo
 from robocasa_lerobot.demos.skills.hinged import Headway, Hinged
 from robocasa_lerobot.demos.skills.reach import shift_base
+from robocasa_lerobot.demos.skills.ways import lead
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 
 GRASP_STEPS, RELEASE_STEPS = 10, 6
@@ -106,6 +107,7 @@ def pull_arc(
     plan = plan_arc(env, part, ways, stances)
     spot = spots(env, plan)
     yield from take_stance(env, plan, OPEN)
+    yield from lead(env, plan.joints, OPEN)
     before, at = plan.way.vias[0].target, plan.way.vias[1].target
     yield from move_hand(data, before, OPEN, tolerance=0.015)
     yield from move_hand(data, at, OPEN, speed=0.6, tolerance=0.006, max_steps=40)
@@ -137,6 +139,7 @@ def push_arc(
     plan = plan_arc(env, part, ways, stances)
     spot = spots(env, plan)
     yield from take_stance(env, plan, CLOSED)
+    yield from lead(env, plan.joints, CLOSED)
     for via in plan.way.vias[: plan.way.contact]:
         yield from move_hand(data, via.target, CLOSED, tolerance=0.03)
     yield from swing(env, part, plan, goal, gripper=CLOSED, spot=spot, lead_rad=lead_rad, speed=speed, firm=firm)
@@ -168,8 +171,8 @@ def stances_round(
     axes = np.array([[np.cos(yaw), np.sin(yaw), 0.0], [-np.sin(yaw), np.cos(yaw), 0.0]])
     side, width = door.side, door.width
     spots = []
-    for before in (max(width, 0.25) + 0.35, 0.55, width + 0.6):
-        for aside in (0.5 * width, width, width + 0.35, -0.1, -0.4):
+    for before in (max(width, 0.25) + 0.35, 0.45, 0.55, 0.7, width + 0.6):
+        for aside in (0.5 * width, width, width + 0.35, 0.0, -0.15, -0.3, -0.45, -0.6):
             spot = door.point(np.zeros(3), 0.0) + side * aside * door.rightwards - before * door.inwards
             ahead, left = axes @ (spot - base)
             spots.append((float(ahead), float(left)))

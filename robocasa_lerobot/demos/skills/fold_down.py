@@ -25,6 +25,7 @@ from robocasa_lerobot.demos.skills.arc_plan import Shift, Via, Way, arc_vias, gr
 from robocasa_lerobot.demos.skills.arcs import pull_arc, spots, swing, take_stance
 from robocasa_lerobot.demos.skills.common import SkillError, move_hand
 from robocasa_lerobot.demos.skills.hinged import Hinged
+from robocasa_lerobot.demos.skills.ways import lead
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 
 ATTEMPTS = 4
@@ -115,6 +116,7 @@ def _push(env: KitchenEnv, door: Hinged) -> Iterator[Array]:
     plan = plan_arc(env, door, ways, stances_beside(env, door))
     spot = spots(env, plan)
     yield from take_stance(env, plan, CLOSED)
+    yield from lead(env, plan.joints, CLOSED)
     for via in plan.way.vias[: plan.way.contact]:
         yield from move_hand(data, via.target, CLOSED, tolerance=0.04)
     yield from swing(

@@ -27,8 +27,14 @@ FORWARDS = np.array([0.0, -1.0, 0.0])  # to the room, in the fixture's axes: out
 LIFTS = tuple(
     (share, turn, pitch) for share in (0.65, 0.45) for turn, pitch in ((0, 0), (0, -18), (30, 0), (30, -18), (55, 0))
 )
-# From outside: share of the door's width, turn of the hand from inwards to the side of the free edge, degrees.
-PUSHES = tuple((share, turn, pitch) for share in (0.75, 0.5) for turn, pitch in ((45, 0), (25, 0), (65, 0), (45, -20)))
+# From outside: share of the door's width, turn of the hand from inwards to the side of the free edge, its pitch,
+# degrees. Round the free edge the hand comes from where the door opens to; low doors are pushed from above.
+PUSHES = (
+    *((share, turn, pitch) for share in (0.75, 0.5) for turn, pitch in ((45, 0), (25, 0), (65, 0), (45, -20))),
+    *((0.75, turn, pitch) for pitch in (-50, -75) for turn in (0, 45)),
+    *((0.93, turn, 0) for turn in (0, -30, -60)),
+)
+ROUND_BIAS = 0.4  # against reaching round the free edge: the hand may meet it
 NEAR: list[Shift] = [(0.0, 0.0), (-0.2, 0.0), (-0.2, 0.25), (-0.2, -0.25), (-0.4, 0.0)]
 
 
@@ -75,7 +81,8 @@ def _push_way(env: KitchenEnv, door: Hinged, push: tuple[float, float, float], r
     aside, up = np.deg2rad(turn), np.deg2rad(pitch)
     level = np.cos(aside) * door.inwards + side * np.sin(aside) * door.rightwards
     rotation = frame(np.cos(up) * level + np.sin(up) * UP, roll * UP)
-    return face_way(door, local, FORWARDS, lambda _: rotation, SHUT_GOAL * door.full)
+    bias = ROUND_BIAS if share > 0.9 else 0.0
+    return face_way(door, local, FORWARDS, lambda _: rotation, SHUT_GOAL * door.full, bias=bias)
 
 
 def _lift_way(door: Hinged, lift: tuple[float, float, float], side: float, roll: float) -> Way:
