@@ -19,7 +19,7 @@ from robocasa_lerobot.demos.skills.knobs import raise_knob, turn_burner_low, tur
 from robocasa_lerobot.demos.skills.levers import press_lever, turn_off_water, turn_on_water, turn_sideways
 from robocasa_lerobot.demos.skills.navigation import drive
 from robocasa_lerobot.demos.skills.put_down import place_into_basin, place_on, place_on_reaching_in
-from robocasa_lerobot.demos.skills.put_inside import place_at_site, place_inside
+from robocasa_lerobot.demos.skills.put_inside import drop_into_jug, place_at_site, place_inside
 from robocasa_lerobot.demos.skills.put_on_counter import place_on_counter, take_from_spout
 from robocasa_lerobot.demos.skills.racks import pull, push, slide
 from robocasa_lerobot.demos.skills.shut import close_doors, lift_shut
@@ -61,6 +61,7 @@ SKILLS: dict[tuple[str, str], Skill] = {
     ("pick_place", "place_at_site"): place_at_site,
     ("pick_place", "place_on_counter"): place_on_counter,
     ("pick_place", "take_from_spout"): take_from_spout,
+    ("pick_place", "drop_into_jug"): drop_into_jug,
     ("pick_place", "cover"): cover,
     ("pick_place", "place_on_reaching_in"): place_on_reaching_in,
 }

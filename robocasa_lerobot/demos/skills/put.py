@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import itertools
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
@@ -38,6 +39,7 @@ UP_RISE_M, RISES_M, LOW_COST = 0.06, (0.035, 0.010), 0.05  # over where it is le
 LEVEL_RISE_M, LEVEL_COST = 0.004, 0.1
 AGAIN, AGAIN_M = 0.5, 0.02  # cost of a hand that goes where it went in vain, as near as this
 LEANING = 0.35  # cost of a radian that the thing is tilted
+LEVEL_FINGERS = 0.35  # sine of the slope of the line between the fingers
 
 
 @dataclass(frozen=True)
@@ -64,6 +66,9 @@ class Putting:
         entries: ways in and out, as of `Manner`.
         taking: how it is picked before.
         in_m: length of the way in, metres.
+        gap_m: of the underside above the spot when the hand opens.
+        turns: of a leaning hand to the left, radians.
+        falls: the fingers are to open side by side, so that the thing falls from between them.
     """
 
     spots: Callable[[], Sequence[Spot]]
@@ -73,6 +78,8 @@ class Putting:
     taking: Manner = FROM_ABOVE
     in_m: float = 0.15
     gap_m: float = GAP_M
+    turns: tuple[float, ...] = (0.0,)
+    falls: bool = False
 
 
 def move(env: KitchenEnv, what: Thing, how: Putting) -> Iterator[Array]:
@@ -161,8 +168,10 @@ def _ways(env: KitchenEnv, what: Thing, held: Held, spot: Spot, how: Putting, fa
         turned = rotation_about(UP, yaw) @ present
         if level and float(turned[:, 2] @ ahead) < 0.35:
             continue
-        for lean in how.leans:
-            rotation = rotation_about(left, -lean) @ turned
+        for lean, turn in itertools.product(how.leans, how.turns):
+            rotation = rotation_about(UP, turn) @ rotation_about(left, -lean) @ turned
+            if how.falls and abs(float(rotation[2, 1])) > LEVEL_FINGERS:
+                continue
             thing_turn = rotation @ held.rotation
             origin = spot.point + (what.below(thing_turn) + how.gap_m) * UP
             low = origin - rotation @ held.position
