@@ -58,7 +58,8 @@ def test_middles_are_drawn_into_areas_that_hold_no_whole_footprints() -> None:
     area = Area(-0.01, 0.01, -0.01, 0.01, (2.0, 1.0), 0.7, 0.9, inside=False)
     rng = np.random.default_rng(0)
     for _ in range(20):
-        found = area.sample(rng, (0.2, 0.1), middle=(0.05, 0.02))
+        x, y, yaw = area.sample(rng, (0.2, 0.1), middle=(0.05, 0.02))[0].tolist()
+        found = Footprint(x, y, yaw, (0.2, 0.1))
         x, y = np.array([found.x, found.y]) + np.array([0.05, 0.02]) @ found.axes()
         assert area.holds(Footprint(float(x), float(y), 0.7, (0.0, 0.0)))
         assert not area.holds(found)

@@ -9,7 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 MAX_SAMPLES = 5000  # draws for an object before the scene is given up (robocasa facts, section 6)
+FEW_SAMPLES = 32  # of these, one by one: nearly always enough; the others are drawn together, much faster
 MAX_YAW_RAD = np.pi / 4  # of the default rotation range, to either side
+
+_CORNERS = np.array([[1, 1], [-1, 1], [-1, -1], [1, -1]])
 
 
 class PlacementError(RuntimeError):
@@ -32,8 +35,7 @@ class Footprint:
 
     def corners(self) -> NDArray[np.float64]:
         """Corners, shape (4, 2)."""
-        signs = np.array([[1, 1], [-1, 1], [-1, -1], [1, -1]])
-        return np.array([self.x, self.y]) + (signs * self.half) @ self.axes()
+        return np.array([self.x, self.y]) + (_CORNERS * self.half) @ self.axes()
 
     def overlaps(self, other: Footprint, margin: float = 0.0) -> bool:
         """Whether two rectangles come closer than `margin` metres (separating axis test)."""
@@ -46,7 +48,7 @@ class Footprint:
 
 
 class Footprints:
-    """Several footprints, asked at once whether another one comes near: for searches with thousands of questions."""
+    """Several footprints, asked at once whether others come near: for searches with thousands of questions."""
 
     def __init__(self, marks: Sequence[Footprint]) -> None:
         self._axes = np.array([mark.axes() for mark in marks]).reshape(-1, 2, 2)
@@ -56,12 +58,25 @@ class Footprints:
 
     def any_overlaps(self, other: Footprint, margin: float = 0.0) -> bool:
         """Whether one of them overlaps another footprint, as in `Footprint.overlaps`."""
-        corners, axes = other.corners(), other.axes()
-        ours, theirs = self._corners @ axes.T, corners @ axes.T
-        apart = _apart(ours.min(axis=1), ours.max(axis=1), theirs.min(axis=0), theirs.max(axis=0), margin)
-        theirs = corners @ self._axes.transpose(0, 2, 1)
-        apart_too = _apart(self._low, self._high, theirs.min(axis=1), theirs.max(axis=1), margin)
-        return not (apart | apart_too).all()
+        return bool(self.overlapping(np.array([[other.x, other.y, other.yaw]]), other.half, margin)[0])
+
+    def overlapping(
+        self, places: NDArray[np.float64], half: tuple[float, float], margin: float = 0.0
+    ) -> NDArray[np.bool_]:
+        """Which of n footprints overlap one of these, shape (n,).
+
+        `places` are their middles (metres) and yaws, shape (n, 3); `half` are the half sizes of all of them.
+        """
+        cos, sin = np.cos(places[:, 2]), np.sin(places[:, 2])
+        axes = np.stack([cos, sin, -sin, cos], axis=-1).reshape(-1, 2, 2)
+        corners = places[:, None, :2] + (_CORNERS * half) @ axes
+        turned = axes.transpose(0, 2, 1)
+        ours, theirs = self._corners @ turned[:, None], corners @ turned  # (n, marks, 4, 2) and (n, 4, 2)
+        low, high = theirs.min(axis=1)[:, None], theirs.max(axis=1)[:, None]
+        apart = _apart(ours.min(axis=2), ours.max(axis=2), low, high, margin)
+        theirs = corners[:, None] @ self._axes.transpose(0, 2, 1)
+        apart |= _apart(self._low, self._high, theirs.min(axis=2), theirs.max(axis=2), margin)
+        return np.asarray((~apart).any(axis=1))
 
 
 def _apart(
@@ -71,8 +86,8 @@ def _apart(
     other_high: NDArray[np.float64],
     margin: float,
 ) -> NDArray[np.bool_]:
-    """For each of n footprints whether one of the two axes, the last dimension, separates it from another; (n,)."""
-    return np.asarray(((high + margin < other_low) | (other_high + margin < low)).any(axis=1))
+    """Whether one of the two axes, the last dimension, separates footprints that cover these spans of them."""
+    return np.asarray(((high + margin < other_low) | (other_high + margin < low)).any(axis=-1))
 
 
 @dataclass(frozen=True)
@@ -103,22 +118,29 @@ class Area:
     inside: bool = True
 
     def sample(
-        self, rng: np.random.Generator, half: tuple[float, float], middle: tuple[float, float] = (0.0, 0.0)
-    ) -> Footprint:
-        """A footprint of half sizes `half` whose corners lie in the area where it is large enough, else its centre.
+        self,
+        rng: np.random.Generator,
+        half: tuple[float, float],
+        middle: tuple[float, float] = (0.0, 0.0),
+        count: int = 1,
+    ) -> NDArray[np.float64]:
+        """Places (x, y in metres and yaw, in the room) of `count` footprints of half sizes `half`, shape (count, 3).
 
-        If only middles must lie in the area, `middle` is what counts as such, in the footprint's own frame, metres: a
-        pan stands with its round part over the burner, whatever the length of its handle.
+        Their corners lie in the area where it is large enough, else they are at its centre. If only middles must lie
+        in it, `middle` is what counts as such, in the footprint's own frame, metres: a pan stands with its round part
+        over the burner, whatever the length of its handle.
         """
-        yaw = float(rng.uniform(*self.rotation))
+        yaw = rng.uniform(*self.rotation, size=count)
         c, s = abs(np.cos(yaw)), abs(np.sin(yaw))
-        reach_x, reach_y = (c * half[0] + s * half[1], s * half[0] + c * half[1]) if self.inside else (0.0, 0.0)
-        x = _uniform_inside(rng, self.x0, self.x1, reach_x)
-        y = _uniform_inside(rng, self.y0, self.y1, reach_y)
+        reach = (c * half[0] + s * half[1], s * half[0] + c * half[1]) if self.inside else (0.0 * yaw, 0.0 * yaw)
+        x = _uniform_inside(rng, self.x0, self.x1, reach[0])
+        y = _uniform_inside(rng, self.y0, self.y1, reach[1])
         if not self.inside:
-            turned = np.array(middle) @ Footprint(0.0, 0.0, yaw, half).axes()
-            x, y = x - float(turned[0]), y - float(turned[1])
-        return Footprint(*self.to_room(x, y), self.yaw + yaw, half)
+            x = x - (np.cos(yaw) * middle[0] - np.sin(yaw) * middle[1])
+            y = y - (np.sin(yaw) * middle[0] + np.cos(yaw) * middle[1])
+        c, s = np.cos(self.yaw), np.sin(self.yaw)
+        room = self.origin[0] + c * x - s * y, self.origin[1] + s * x + c * y
+        return np.stack([*room, self.yaw + yaw], axis=1)
 
     def to_room(self, x: float, y: float) -> tuple[float, float]:
         """Where a point of the fixture's frame is in the room, metres."""
@@ -153,10 +175,14 @@ class Area:
         return self.extent * float(free.mean())
 
 
-def _uniform_inside(rng: np.random.Generator, low: float, high: float, reach: float) -> float:
-    if high - low <= 2 * reach:
-        return (low + high) / 2
-    return float(rng.uniform(low + reach, high - reach))
+def _uniform_inside(
+    rng: np.random.Generator, low: float, high: float, reach: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Between two bounds, `reach` away from both, and midway where that leaves nothing."""
+    first, last = low + reach, high - reach
+    if (last <= first).all():
+        return np.full(len(reach), (low + high) / 2)
+    return np.where(last <= first, (low + high) / 2, first + (last - first) * rng.random(len(reach)))
 
 
 def place(
@@ -174,16 +200,22 @@ def place(
         PlacementError: none found in 5000 draws; it names `what`, the region, its free area and three remedies.
     """
     aside = float(np.hypot(*middle))
-    near = {id(area): _neighbours(area, half, occupied, margin + aside) for area in areas}
-    for _ in range(MAX_SAMPLES):
-        area = areas[int(rng.integers(len(areas)))]
-        footprint = area.sample(rng, half, middle)
-        if not any(footprint.overlaps(other, margin) for other in near[id(area)]):
-            return footprint, area
-    free = sum(area.free_extent(occupied) for area in areas)
+    near = [Footprints(_neighbours(area, half, occupied, margin + aside)) for area in areas]
+    for count in (*[1] * FEW_SAMPLES, MAX_SAMPLES - FEW_SAMPLES):
+        which = rng.integers(len(areas), size=count)
+        places, free = np.empty((count, 3)), np.empty(count, dtype=bool)
+        for index in np.unique(which).tolist():
+            mine = which == index
+            places[mine] = areas[index].sample(rng, half, middle, int(mine.sum()))
+            free[mine] = ~near[index].overlapping(places[mine], half, margin)
+        if free.any():
+            first = int(np.argmax(free))
+            x, y, yaw = places[first].tolist()
+            return Footprint(x, y, yaw, half), areas[int(which[first])]
+    left = sum(area.free_extent(occupied) for area in areas)
     names = ", ".join(dict.fromkeys(area.name for area in areas))
     raise PlacementError(
-        f"no free place for {what} of {half[0] * 2:.2f} x {half[1] * 2:.2f} m on {names}: {free:.3f} of "
+        f"no free place for {what} of {half[0] * 2:.2f} x {half[1] * 2:.2f} m on {names}: {left:.3f} of "
         f"{sum(area.extent for area in areas):.3f} m2 are free. Ask for a larger region, for fewer or smaller "
         "objects there, or for another fixture."
     )
