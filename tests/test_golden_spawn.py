@@ -99,6 +99,16 @@ def test_the_robot_starts_free_of_everything(task: str) -> None:
         _assert_free(scene.model, data)
 
 
+@pytest.mark.parametrize(
+    ("task", "layout", "style"), [("CloseMicrowave", 60, 45), ("PickPlaceCabinetToCounter", 33, 60)]
+)
+def test_it_does_not_stand_in_an_open_door(task: str, layout: int, style: int) -> None:
+    """Its elbow was in the door, which that pushed open."""
+    scene = build_scene(get_task(task), "pretrain", 100 * layout + style, kitchens=[(layout, style)])
+    data, _ = scene.initial_data(np.random.default_rng(100 * layout + style))
+    _assert_free(scene.model, data)
+
+
 def test_it_stands_free_even_at_the_nearest_pose() -> None:
     scene = build_scene(get_task("PickPlaceCounterToSink"), "target", 0)
     layout = load_layout(scene.layout_id)

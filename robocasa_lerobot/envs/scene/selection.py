@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,12 +10,13 @@ from numpy.typing import NDArray
 
 from robocasa_lerobot.envs.placement import Area, Footprint, Footprints, PlacementError
 from robocasa_lerobot.envs.scene.appliances.dishwasher import Dishwasher
+from robocasa_lerobot.envs.scene.appliances.microwave import Microwave
 from robocasa_lerobot.envs.scene.appliances.oven import Oven
 from robocasa_lerobot.envs.scene.appliances.sink import Sink
 from robocasa_lerobot.envs.scene.fixture_types import FIXTURE_KINDS
 from robocasa_lerobot.envs.scene.fixtures.accessories import Accessory
 from robocasa_lerobot.envs.scene.fixtures.base import Fixture
-from robocasa_lerobot.envs.scene.fixtures.cabinets import Drawer
+from robocasa_lerobot.envs.scene.fixtures.cabinets import Drawer, HingeCabinet
 from robocasa_lerobot.envs.scene.fixtures.counters import Counter
 from robocasa_lerobot.envs.scene.fixtures.stools import SEAT_M
 from robocasa_lerobot.envs.scene.islands import STOOL_OUT_M
@@ -42,6 +43,7 @@ HAND_X_M, HAND_HALF_M, HAND_Z_M = (0.0, 0.30), 0.11, (1.0, 1.6)
 MIN_REGION_WIDTH_M = 0.12
 TALL_STANDOFF_M = 0.10  # more, before fridges and tall housings (robocasa facts, section 6)
 HANDLE_OUT_M = 0.05
+DOOR_M = 0.04  # thickness of doors
 HOUSING_BELOW_M = 0.6  # a housing whose underside is lower stands on the floor
 
 # Fixture types that nothing on a counter meets: shells, counters themselves, what is flat on a wall. Boxes are parts of
@@ -188,7 +190,7 @@ def robot_pose(
     """A free pose facing a fixture, by RoboCasa's rules, with the start's uniform deviation to all sides.
 
     `at` is a point of the room to stand in line with, instead of the fixture's middle. The robot does not stand in
-    the doors of those `opened` that fold down, nor in their drawers.
+    the open doors and drawers of those `opened`.
 
     Raises:
         PlacementError: no pose was free.
@@ -232,7 +234,8 @@ class Obstacles:
         self._base, self._column = (_standing(fixtures, doors, top) for top in (BASE_TOP_M, COLUMN_TOP_M))
         low, high = HAND_Z_M
         tall = [f for f in fixtures.values() if f.pos[2] - f.height / 2 < high and f.pos[2] + f.height / 2 > low]
-        self._tall = Footprints([footprint(f) for f in tall])
+        above = [door.footprint for door in doors if door.low < high and door.high > low]
+        self._tall = Footprints([*(footprint(f) for f in tall), *above])
 
     def leave_free(self, poses: Sequence[RobotPose]) -> NDArray[np.bool_]:
         """Of n poses those at which the robot touches none, its arm as at the start of an episode; shape (n,)."""
@@ -254,27 +257,56 @@ def _half(along: tuple[float, float], across: float) -> tuple[float, float]:
     return (along[1] - along[0]) / 2, across
 
 
-def _standing(fixtures: Mapping[str, Fixture], doors: list[tuple[Footprint, float]], top: float) -> Footprints:
+@dataclass(frozen=True)
+class _Door:
+    """Where an open door or a pulled-out drawer is: on the floor plan, and from which height to which, metres."""
+
+    footprint: Footprint
+    low: float
+    high: float
+
+
+def _standing(fixtures: Mapping[str, Fixture], doors: list[_Door], top: float) -> Footprints:
     """Fixtures but the floor, and doors, that begin below a height, metres; and handles that stand out of them."""
     standing = [f for f in fixtures.values() if f.pos[2] - f.height / 2 < top and f.name != "floor"]
     marks = [mark for f in standing for mark in (footprint(f), *_handles(f, top))]
-    return Footprints([*marks, *(mark for mark, height in doors if height < top)])
+    return Footprints([*marks, *(door.footprint for door in doors if door.low < top)])
 
 
-def _opened(fixtures: Iterable[Fixture]) -> list[tuple[Footprint, float]]:
-    """Where the open doors of dishwashers and ovens and pulled-out drawers are, and how high, metres."""
-    found = []
-    for fixture in fixtures:
-        if isinstance(fixture, Dishwasher | Oven):
-            low, high = fixture.door_span
-            out = high - low
-        elif isinstance(fixture, Drawer):
-            low, out = -fixture.height / 2, fixture.full_travel + HANDLE_OUT_M
-        else:
-            continue
-        x, y, z = fixture.to_world((0.0, -fixture.depth / 2 - out / 2, low))
-        found.append((Footprint(float(x), float(y), fixture.yaw, (fixture.width / 2, out / 2)), float(z)))
-    return found
+def _opened(fixtures: Iterable[Fixture]) -> list[_Door]:
+    """The open doors of cabinets, microwaves, dishwashers and ovens, and the pulled-out drawers, of some fixtures."""
+    return [door for fixture in fixtures for door in (*_outwards(fixture), *_sideways(fixture))]
+
+
+def _outwards(fixture: Fixture) -> Iterator[_Door]:
+    """What folds down or slides out in front."""
+    if isinstance(fixture, Dishwasher | Oven):
+        low, high = fixture.door_span
+        out, thick = high - low, DOOR_M
+    elif isinstance(fixture, Drawer):
+        low, out, thick = -fixture.height / 2, fixture.full_travel + HANDLE_OUT_M, fixture.height
+    else:
+        return
+    x, y, z = fixture.to_world((0.0, -fixture.depth / 2 - out / 2, low)).tolist()
+    yield _Door(Footprint(x, y, fixture.yaw, (fixture.width / 2, out / 2)), z, z + thick)
+
+
+def _sideways(fixture: Fixture) -> Iterator[_Door]:
+    """Doors on a vertical hinge that stand open by 0.9 to 1 of a right angle, with their handles."""
+    if isinstance(fixture, Microwave):
+        hinges: tuple[str, ...] = ("left",)
+        wide = fixture.door_width
+    elif isinstance(fixture, HingeCabinet):
+        hinges, wide = fixture.hinges, fixture.width / max(len(fixture.hinges), 1)
+    else:
+        return
+    inwards, out = wide * float(np.sin(0.1 * np.pi / 2)) + DOOR_M, HANDLE_OUT_M
+    for hinge in hinges:
+        sign = -1.0 if hinge == "left" else 1.0
+        middle = sign * (fixture.width / 2 + (out - inwards) / 2)
+        x, y, z = fixture.to_world((middle, -(fixture.depth + wide) / 2, 0.0)).tolist()
+        mark = Footprint(x, y, fixture.yaw, ((inwards + out) / 2, wide / 2))
+        yield _Door(mark, z - fixture.height / 2, z + fixture.height / 2)
 
 
 def is_free(fixtures: Mapping[str, Fixture], pose: RobotPose) -> bool:

@@ -38,6 +38,11 @@ class Microwave(Appliance):
         low[2] += _TURNTABLE_M
         return {"interior": Region.between(self.name, low, high)}
 
+    @property
+    def door_width(self) -> float:
+        """From the hinge, at its left, to the panel with the buttons, metres."""
+        return self.size[0] - PANEL_M
+
     def state(self, data: mujoco.MjData) -> dict[str, float | bool]:
         """`door` as a share of its range, and whether it is `on`."""
         return {"door": self.share(data, "door"), "on": self.lit(data, "power")}
