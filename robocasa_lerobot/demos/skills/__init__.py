@@ -17,6 +17,7 @@ from robocasa_lerobot.demos.skills.handles import open_doors
 from robocasa_lerobot.demos.skills.heads import lower_head, raise_head
 from robocasa_lerobot.demos.skills.knobs import raise_knob, turn_burner_low, turn_knob, turn_off_burner, turn_on_burner
 from robocasa_lerobot.demos.skills.levers import press_lever, turn_off_water, turn_on_water, turn_sideways
+from robocasa_lerobot.demos.skills.lift_low import lift_low
 from robocasa_lerobot.demos.skills.navigation import drive
 from robocasa_lerobot.demos.skills.put_down import place_into_basin, place_on, place_on_reaching_in
 from robocasa_lerobot.demos.skills.put_inside import drop_into_jug, place_at_site, place_inside
@@ -35,6 +36,7 @@ SKILLS: dict[tuple[str, str], Skill] = {
     ("doors", "lower_head"): lower_head,
     ("doors", "close_large"): close_doors,
     ("doors", "lift_shut"): lift_shut,
+    ("doors", "lift_low"): lift_low,
     ("doors", "push_lid"): push_lid,
     ("drawers", "open"): open_drawer,
     ("drawers", "close"): close_drawer,

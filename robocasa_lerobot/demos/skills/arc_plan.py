@@ -139,6 +139,7 @@ class _Bench:
         self._robot = env.scene.subtree(MOBILE_BASE)
         self._hand = env.scene.subtree(HAND)
         self._reaching = env.scene.subtree(ARM_FOOT)
+        self._own = self._robot & ~self._reaching  # the base
         base, yaw = base_pose(env.data)
         self._base = (float(base[0]), float(base[1]), yaw)
         self._axes = np.array([[np.cos(yaw), np.sin(yaw), 0.0], [-np.sin(yaw), np.cos(yaw), 0.0]])
@@ -213,7 +214,7 @@ class _Bench:
     def _clears(self, angle: float, shift: Shift) -> bool:
         """Whether the base is out of the part's way at an angle; the arm may still be."""
         self._place(angle, shift, self._present)
-        return not self._touched(hand_may=False, only=self._robot & ~self._reaching)
+        return not self._touched(hand_may=False, only=self._own)
 
     def hits(self, candidate: _Candidate, bound: float) -> float:
         """Cost of what is met at the poses of a candidate and half-way between them, up to about `bound`."""
@@ -246,14 +247,20 @@ class _Bench:
         mujoco.mj_kinematics(self._model, self._data)
 
     def _touched(self, *, hand_may: bool, only: NDArray[np.bool_] | None = None) -> set[int]:
-        """The bodies that the robot, or `only` these of it, touch; the hand may touch the part, if `hand_may`."""
+        """The bodies that the robot, or `only` these of it, touch; the hand may touch the part, if `hand_may`.
+
+        The robot's own base is among them where the hand comes down on it.
+        """
         mine_all = self._robot if only is None else only
         mujoco.mj_collision(self._model, self._data)
         touched: set[int] = set()
         if self._data.ncon == 0:
             return touched
         pairs = self._model.geom_bodyid[self._data.contact.geom]
-        crossed = (self._robot[pairs].sum(axis=1) == 1) & (self._data.contact.dist < 0.0)
+        deep = self._data.contact.dist < 0.0
+        on_base = (self._hand[pairs].sum(axis=1) == 1) & (self._own[pairs].sum(axis=1) == 1)
+        touched.update(int(body) for body in pairs[deep & on_base].ravel() if self._own[body])
+        crossed = deep & (self._robot[pairs].sum(axis=1) == 1)
         for a, b in pairs[crossed]:
             mine, other = (int(a), int(b)) if self._robot[a] else (int(b), int(a))
             if mine_all[mine] and not (hand_may and self._hand[mine] and other == self._part.body):

@@ -12,7 +12,8 @@ from robocasa_lerobot.envs.scene.appliances.parts import Parts
 from robocasa_lerobot.envs.scene.appliances.racked import Racked, fold_door
 from robocasa_lerobot.envs.scene.fixtures.base import Region
 
-DOOR_M, _KICK_M, _WALL_M = 0.050, 0.10, 0.022
+DOOR_M, _KICK_M, _WALL_M = 0.050, 0.15, 0.022
+OPEN_RAD = 1.30  # how far the door folds down: lower than 0.30 m the gripper hardly comes, and the edge lies at 0.34 m
 _RIM_M = {"rack0": 0.12, "rack1": 0.07}
 
 
@@ -50,7 +51,7 @@ class Dishwasher(Racked):
 
     def rack_levels(self) -> tuple[float, ...]:
         """Height of each rack from below, as a share of the cavity's."""
-        return (0.10, 0.56)
+        return (0.18, 0.60)
 
     def _rack_size(self) -> np.ndarray:
         low, high = self.cavity()
@@ -78,6 +79,7 @@ class Dishwasher(Racked):
             weight_at=(0.010, 0.4),
             friction=6.0,
             damping=2.0,
+            limit=OPEN_RAD,
         )
         strip = 0.085 if self.record["family"] == "front_control" else 0.0
         parts.box(

@@ -13,9 +13,9 @@ from robocasa_lerobot.envs.task import (
 )
 from robocasa_lerobot.envs.tasks.atomic.common import COMMON, SEEN, atomic, counter_near, distractors
 
-# A door that folds down is lifted shut; the doors of a fridge are too large to reach round.
+# A door that folds down is lifted shut, that of a dishwasher from above; the doors of a fridge are too large to reach
+# round.
 _CLOSING = dict.fromkeys(("oven", "toaster_oven"), "lift_shut") | {"fridge": "close_large", "dishwasher": "lift_low"}
-_OPENING = {"dishwasher": "open_low"}  # its open door lies lower than the gripper comes
 AJAR_AT_MOST, OPEN = (0.0, 0.0), (0.90, 1.0)
 
 
@@ -48,7 +48,7 @@ def _door(
         objects=(*([inside] if inside else []), *([distractors("fxtr")] if clutter else [])),
         initial=(InitialOpenness("fxtr", *((0.0, 0.0) if opens else opened)),),
         goal=DoorsOpen("fxtr") if opens else DoorsClosed("fxtr"),
-        stages=(Stage("doors", _OPENING.get(kind, "open") if opens else _CLOSING.get(kind, "close"), "fxtr"),),
+        stages=(Stage("doors", "open" if opens else _CLOSING.get(kind, "close"), "fxtr"),),
         sets=sets,
         needs=needs,
     )
