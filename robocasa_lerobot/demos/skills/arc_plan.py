@@ -20,7 +20,7 @@ from robocasa_lerobot.demos.skills.common import SkillError
 from robocasa_lerobot.demos.skills.hinged import Hinged
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.scene.robot import ARM_HOME_QPOS, place_base
-from robocasa_lerobot.envs.scene.robot_names import ARM_CENTER_SITE, HAND, MOBILE_BASE
+from robocasa_lerobot.envs.scene.robot_names import ARM_CENTER_SITE, HAND, MOBILE_BASE, TORSO_JOINT
 
 Shift = tuple[float, float]
 
@@ -31,6 +31,7 @@ ARM_FOOT = "robot0_link0"
 HOPELESS, MOST_TESTED = 2.0, 80
 # Shares of the way to the first pose, and from one pose to the next, that are tested, with the cost of what is met.
 BEFORE, BETWEEN = ((0.3, 0.3), (0.6, 0.3), (0.8, 0.3), (1.0, 0.8)), ((0.33, 0.3), (0.67, 0.3), (1.0, 0.8))
+CLEAR_M, CLEARANCE = 0.018, 0.25  # kept from what is above, with the cost of less
 _DRIVE, _ALONG = 0.15, 0.10  # cost of a metre that the base goes before, and as the part turns
 _NEAR_LIMIT_RAD = 0.2
 BACKS_M = (0.25, 0.5, 0.75)  # that the base goes back before it goes to the side, where it cannot go straight
@@ -227,6 +228,9 @@ class _Bench:
                 at = (shift[0] + share * (there[0] - shift[0]), shift[1] + share * (there[1] - shift[1]))
                 self._place(angle + share * (via.angle - angle), at, before + share * (joints - before))
                 cost += weight * min(len(self._touched(hand_may=number >= way.contact)), 3)
+                if share == 1.0:
+                    self._raise()
+                    cost += CLEARANCE * min(len(self._touched(hand_may=number >= way.contact)), 1)
             before, angle, shift = joints, via.angle, there
             if cost > bound:
                 break
@@ -244,6 +248,11 @@ class _Bench:
         self._data.qpos[self._arm.addresses] = joints
         self._part.place(self._data, angle)
         place_base(self._model, self._data, x + float(to[0]), y + float(to[1]), yaw)
+        mujoco.mj_kinematics(self._model, self._data)
+
+    def _raise(self) -> None:
+        """Put the robot a bit higher: what it would meet then is too near, most of all wall cabinets."""
+        self._data.joint(TORSO_JOINT).qpos[0] += CLEAR_M
         mujoco.mj_kinematics(self._model, self._data)
 
     def _touched(self, *, hand_may: bool, only: NDArray[np.bool_] | None = None) -> set[int]:

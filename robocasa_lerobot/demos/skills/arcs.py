@@ -29,7 +29,8 @@ from robocasa_lerobot.demos.skills.reach import shift_base
 from robocasa_lerobot.demos.skills.ways import lead
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 
-GRASP_STEPS, RELEASE_STEPS = 10, 6
+SETTLE_STEPS, GRASP_STEPS, RELEASE_STEPS = 6, 10, 6
+INSIST = 0.12
 _BASE_SPEED = 0.22  # metres a second while the arm moves too: the arm keeps up with about 0.26
 _DEAD_ZONE = 0.25  # of base commands (robocasa facts, section 2)
 TUCKED_AHEAD_M, TUCKED_UP_M = 0.28, 0.58  # of the grip site from the arm's foot
@@ -109,8 +110,9 @@ def pull_arc(
     yield from take_stance(env, plan, OPEN)
     yield from lead(env, plan.joints, OPEN)
     before, at = plan.way.vias[0].target, plan.way.vias[1].target
-    yield from move_hand(data, before, OPEN, tolerance=0.015)
-    yield from move_hand(data, at, OPEN, speed=0.6, tolerance=0.006, max_steps=40)
+    yield from move_hand(data, before, OPEN, speed=0.7, tolerance=0.010, insist=INSIST)
+    yield from hold_hand(data, before, OPEN, SETTLE_STEPS)  # it comes with speed, and there may be little room
+    yield from move_hand(data, at, OPEN, speed=0.6, tolerance=0.006, max_steps=40, insist=INSIST)
     yield from hold_hand(data, at, CLOSED, GRASP_STEPS)
     yield from swing(env, part, plan, goal, gripper=CLOSED, spot=spot, lead_rad=lead_rad, speed=speed, max_steps=120)
     rest = HandTarget(grip_position(data), hand_rotation(data))
