@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import signal
 import time
@@ -16,6 +17,7 @@ from convert_support import moving_pictures
 
 pytest.importorskip("lerobot.datasets")
 
+from robocasa_lerobot.convert.writing import encoding_process
 from robocasa_lerobot.convert.writing.encoder import (
     CODECS,
     EncodingError,
@@ -58,6 +60,23 @@ def test_every_frame_is_kept_however_fast_they_come(yielding: bool, encoder: Enc
         sampled = sorted(sampled_frames(300))
         np.testing.assert_array_equal(video.histogram, sum(channel_histogram(pictures[key][step]) for step in sampled))
         assert video.statistics()["count"] == [len(sampled)]
+
+
+def test_frames_arrive_where_no_memory_can_be_shared(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def refused() -> None:
+        raise OSError(errno.EFBIG, os.strerror(errno.EFBIG))
+
+    monkeypatch.setattr(encoding_process, "FrameSender", refused)
+    found = []
+    for _ in range(2):
+        with EncodingProcess() as encoder:
+            encoder.start_episode(SETTINGS, ["a"], tmp_path, 40)
+            for picture in moving_pictures(40, 64, 1):
+                encoder.feed("a", picture)
+            encoder.end_episode()
+            found.append(encoder.finished()["a"].path.read_bytes())
+        monkeypatch.undo()
+    assert found[0] == found[1]
 
 
 def test_many_ended_episodes_wait_to_be_asked_for(encoder: EncodingProcess, tmp_path: Path) -> None:

@@ -1,8 +1,8 @@
 """The video encoder in a process of its own, so that pictures are made and encoded at the same time.
 
 PyAV and MuJoCo's renderer both keep Python's lock while they work, so threads of one process would take turns. Pictures
-go through a pipe, sent by a thread: the process that makes them waits only when it is far ahead. A codec that crashes
-ends the other process, not the conversion.
+go through shared memory: the process that makes them waits only when it is far ahead. A codec that crashes ends the
+other process, not the conversion.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ import signal
 import subprocess
 import sys
 import threading
+from collections import deque
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -31,14 +32,12 @@ from robocasa_lerobot.convert.writing.encoder import (
     VideoSettings,
     quiet_codecs,
 )
+from robocasa_lerobot.convert.writing.frame_ring import FrameReceiver, FrameSender
 
 # Not `-m`: the module would be there twice, and so would the classes of its messages.
 _PROGRAM = (
     "import sys; from robocasa_lerobot.convert.writing.encoding_process import serve; serve(*map(int, sys.argv[1:]))"
 )
-_AHEAD_BYTES = 24 << 20  # pictures that wait to be sent
-_PIPE_BYTES = 1 << 20
-_F_SETPIPE_SZ = 1031  # Linux
 # Beside a renderer the encoder takes what that leaves: on two cores it would otherwise hold up the renderer's own
 # threads, which makes the conversion of states 6 to 15 % slower.
 _NICE = 19
@@ -57,10 +56,11 @@ class _Start:
 
 @dataclass(frozen=True)
 class _Picture:
-    """The next frame of a video; its bytes follow: planes, or colours where the other process yields."""
+    """The next frame of a video, or its place: planes, or colours where the other process yields."""
 
     key: str
     shape: tuple[int, ...]
+    frame: int | NDArray[np.uint8]
 
 
 class _End:
@@ -85,31 +85,30 @@ class EncodingProcess:
     def __init__(self) -> None:
         down_read, down_write = os.pipe()
         up_read, up_write = os.pipe()
-        with contextlib.suppress(OSError, ImportError):  # only faster
-            import fcntl
-
-            fcntl.fcntl(down_write, _F_SETPIPE_SZ, _PIPE_BYTES)
+        self._frames: FrameSender | None = None
+        with contextlib.suppress(OSError):  # files may not grow (`ulimit -f`): through the pipe then
+            self._frames = FrameSender()
+        passed = (down_read, up_write, *(self._frames.descriptors if self._frames else ()))
         places = [str(Path(__file__).parents[3]), *filter(None, [os.environ.get("PYTHONPATH")])]
         self._process = subprocess.Popen(
-            [sys.executable, "-c", _PROGRAM, str(down_read), str(up_write)],
-            pass_fds=(down_read, up_write),
+            [sys.executable, "-c", _PROGRAM, *map(str, passed)],
+            pass_fds=passed,
             stdin=subprocess.DEVNULL,
             env={**os.environ, "PYTHONPATH": os.pathsep.join(places)},
         )
         os.close(down_read)
         os.close(up_write)
+        if self._frames:
+            self._frames.others_only()
         self._pipe = os.fdopen(down_write, "wb", buffering=0)
         self._answers = os.fdopen(up_read, "rb")
-        self._waiting: queue.SimpleQueue[tuple[Any, NDArray[np.uint8] | None] | None] = queue.SimpleQueue()
-        self._room = threading.Condition()
-        self._bytes = 0
-        self._broken: OSError | EncodingError | None = None
-        self._prepared: queue.SimpleQueue[FramePreparation] = queue.SimpleQueue()
+        self._broken = self._yielding = False
+        self._preparation: FramePreparation | None = None
+        self._prepared: deque[FramePreparation] = deque()
         self._received: queue.SimpleQueue[_Answer | None] = queue.SimpleQueue()
-        # Both directions at any time, or both processes might wait for the other to read.
-        self._threads = [threading.Thread(target=f, daemon=True) for f in (self._send_waiting, self._receive)]
-        for thread in self._threads:
-            thread.start()
+        # Answers are read at any time, or both processes might wait for the other to read.
+        self._reader = threading.Thread(target=self._receive, daemon=True)
+        self._reader.start()
 
     def __enter__(self) -> EncodingProcess:
         return self
@@ -120,7 +119,7 @@ class EncodingProcess:
     @property
     def alive(self) -> bool:
         """Whether the other process is there."""
-        return self._broken is None and self._process.poll() is None
+        return not self._broken and self._process.poll() is None
 
     def start_episode(
         self, settings: VideoSettings, keys: Sequence[str], folder: Path, length: int, yielding: bool = False
@@ -135,24 +134,33 @@ class EncodingProcess:
             yielding: making the pictures takes longer than encoding them, so the other process takes over what it can,
                 and lets this one go first, from now on.
         """
-        self._put(_Start(settings, tuple(keys), str(folder), length, yielding))
+        self._preparation, self._yielding = FramePreparation(keys, length), yielding
+        self._tell(_Start(settings, tuple(keys), str(folder), length, yielding))
 
     def feed(self, key: str, picture: NDArray[np.uint8]) -> None:
-        """Hand over the next frame (H, W, 3) of a video; it must not be changed afterwards.
+        """Hand over the next frame (H, W, 3) of a video.
 
         Raises:
-            EncodingError: the other process is gone.
+            EncodingError: the other process is gone, or the picture has an odd height or width.
         """
-        self._put(_Picture(key, picture.shape), picture)
+        assert self._preparation is not None, "an episode has been started"
+        frame = picture if self._yielding else self._preparation.prepared(key, picture)
+        try:
+            where = self._frames.put(frame) if self._frames else frame
+        except OSError:
+            raise self._gone() from None
+        self._tell(_Picture(key, frame.shape, where))
 
     def end_episode(self) -> None:
         """Say that all frames have been handed over."""
-        self._put(_End())
+        assert self._preparation is not None, "an episode has been started"
+        self._prepared.append(self._preparation)
+        self._tell(_End())
 
     def cancel_episode(self) -> None:
         """Throw the episode away that was begun and not ended; its files go."""
         with contextlib.suppress(EncodingError):  # the other process is gone, and says so where it matters
-            self._put(_Cancel())
+            self._tell(_Cancel())
 
     def finished(self) -> dict[str, EncodedVideo]:
         """Wait for the first episode that has been ended and not been asked for.
@@ -165,7 +173,7 @@ class EncodingProcess:
         if answer is None:
             self._received.put(None)  # for whoever asks again
             raise self._gone()
-        here = self._prepared.get()
+        here = self._prepared.popleft()
         if isinstance(answer, Exception):
             raise answer
         paths, there = answer
@@ -174,51 +182,22 @@ class EncodingProcess:
 
     def close(self) -> None:
         """End the other process; what it has not finished is lost."""
-        self._waiting.put(None)
         self._process.kill()
         self._process.wait()
-        for thread in self._threads:
-            thread.join()
+        self._reader.join()
         with contextlib.suppress(OSError):
             self._pipe.close()
         self._answers.close()
+        if self._frames:
+            self._frames.close()
 
-    def _put(self, message: Any, picture: NDArray[np.uint8] | None = None) -> None:
-        with self._room:
-            while self._bytes > _AHEAD_BYTES and self._broken is None:
-                self._room.wait()
-            if self._broken is not None:
-                raise self._gone()
-            self._bytes += 0 if picture is None else picture.nbytes
-        self._waiting.put((message, picture))
-
-    def _send_waiting(self) -> None:
-        frames: FramePreparation | None = None
-        yielding = False
-        while (item := self._waiting.get()) is not None:
-            message, picture = item
-            num_bytes = 0 if picture is None else picture.nbytes
-            try:
-                if isinstance(message, _Start):
-                    frames, yielding = FramePreparation(message.keys, message.length), message.yielding
-                elif isinstance(message, _End):
-                    assert frames is not None
-                    self._prepared.put(frames)
-                if self._broken is None:
-                    if picture is not None and not yielding:
-                        assert frames is not None
-                        picture = frames.prepared(message.key, picture)
-                        message = _Picture(message.key, picture.shape)
-                    _write_all(self._pipe, pickle.dumps(message))
-                    if picture is not None:
-                        _write_all(self._pipe, np.ascontiguousarray(picture).reshape(-1).data)
-            except (OSError, EncodingError) as error:
-                self._broken = error
-                with contextlib.suppress(OSError):
-                    self._pipe.close()  # which ends the other process, and so whoever waits for its answer
-            with self._room:
-                self._bytes -= num_bytes
-                self._room.notify()
+    def _tell(self, message: Any) -> None:
+        try:
+            left = memoryview(pickle.dumps(message))
+            while left:
+                left = left[self._pipe.write(left) :]
+        except (OSError, ValueError):  # closed from the other side, or from this one
+            raise self._gone() from None
 
     def _receive(self) -> None:
         with contextlib.suppress(EOFError, OSError, pickle.UnpicklingError):  # the other process is gone
@@ -227,20 +206,13 @@ class EncodingProcess:
         self._received.put(None)
 
     def _gone(self) -> EncodingError:
-        if isinstance(self._broken, EncodingError):
-            return self._broken
+        self._broken = True
         try:
             status = self._process.wait(timeout=5)
         except subprocess.TimeoutExpired:
             return EncodingError("the encoder's process does not answer.")
         how = f"signal {signal.Signals(-status).name}" if status < 0 else f"exit status {status}"
         return EncodingError(f"the encoder's process ended with {how}.")
-
-
-def _write_all(pipe: Any, content: bytes | memoryview) -> None:
-    left = memoryview(content)
-    while left:
-        left = left[pipe.write(left) :]
 
 
 class SharedEncoder:
@@ -280,29 +252,29 @@ class SharedEncoder:
 shared_encoder = SharedEncoder()
 
 
-def serve(down: int, up: int) -> None:
-    """The other process: encode what comes through a pipe until that is closed, and answer through another one.
+def serve(down: int, up: int, *frames: int) -> None:
+    """The other process: encode what comes until the pipe is closed, and answer through another one.
 
     Args:
-        down: file descriptor to read messages and pictures from.
+        down: file descriptor to read messages from.
         up: file descriptor to write answers to.
+        frames: file descriptors of a `FrameReceiver`, if frames come through shared memory.
     """
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # a user's Ctrl-C: the process that sends pictures ends this one
     quiet_codecs()
-    episode = _Episode()
-    buffers: dict[tuple[int, ...], NDArray[np.uint8]] = {}
+    episode, receiver = _Episode(), FrameReceiver(*frames) if frames else None
     with os.fdopen(down, "rb") as pipe, os.fdopen(up, "wb") as answers, contextlib.suppress(BrokenPipeError, EOFError):
         while True:
             message = pickle.load(pipe)
-            frame = None
             if isinstance(message, _Picture):
-                if message.shape not in buffers:
-                    buffers[message.shape] = np.empty(message.shape, np.uint8)
-                frame = buffers[message.shape]
-                if pipe.readinto(frame.reshape(-1).data) != frame.nbytes:
-                    return
-            answer = episode.take(message, frame)
-            if answer is not None:
+                where = message.frame
+                if not isinstance(where, int):
+                    episode.take(message, where)
+                    continue
+                assert receiver is not None
+                with receiver.taken(where, message.shape) as frame:
+                    episode.take(message, frame)
+            elif (answer := episode.take(message)) is not None:
                 pickle.dump(answer, answers)
                 answers.flush()
 
@@ -316,7 +288,7 @@ class _Episode:
         self._failure: Exception | None = None
         self._yields = False
 
-    def take(self, message: Any, frame: NDArray[np.uint8] | None) -> _Answer | None:
+    def take(self, message: Any, frame: NDArray[np.uint8] | None = None) -> _Answer | None:
         """Act on a message; gives the answer to be sent, if there is one."""
         paths: dict[str, Path] = {}
         try:
