@@ -52,6 +52,7 @@ class Manner:
         entries: whether the hand may come from above ("up"), or out of the front ("out" rises a little, "level" does
             not), or between ("across").
         out_m: how far it goes on its way out, metres.
+        hover_m, lift_m: how far over the grasp the hand comes from, and lifts to, where it comes from above, metres.
         turns: of a tilted approach from the base's heading to the left, radians.
         poses: grasps of a thing by a hand that comes along an approach.
     """
@@ -59,6 +60,8 @@ class Manner:
     tilts: tuple[tuple[float, float], ...] = ((0.0, 0.0),)
     entries: tuple[str, ...] = ("up",)
     out_m: float = OUT_M
+    hover_m: float = HOVER_M
+    lift_m: float = LIFT_M
     turns: tuple[float, ...] = (0.0,)
     poses: Callable[[KitchenEnv, Thing, Array], list[GraspPose]] = grasps
 
@@ -157,21 +160,23 @@ def _ways(
         for turn in (pose.rotation, pose.rotation @ np.diag([-1.0, -1.0, 1.0])):
             takes = Held(what.name, turn.T @ (body.xpos - pose.position), turn.T @ body.xmat.reshape(3, 3))
             for name in manner.entries:
-                for lift in {"up": (LIFT_M,), "level": (LEVEL_LIFT_M,)}.get(name, LIFTS_M):
-                    poses_on_way = _way(pose.position, turn, entry(env, name), name, manner.out_m, lift)
+                for lift in {"up": (manner.lift_m,), "level": (LEVEL_LIFT_M,)}.get(name, LIFTS_M):
+                    poses_on_way = _way(pose.position, turn, entry(env, name), name, manner, lift)
                     low = LEVEL_COST if name == "level" else LOW_COST if lift < LIFT_M else 0.0
                     found.append(Way(poses_on_way, cost + low, takes))
     return found
 
 
-def _way(position: Array, rotation: Array, out: Array, name: str, out_m: float, lift: float) -> tuple[HandTarget, ...]:
+def _way(
+    position: Array, rotation: Array, out: Array, name: str, manner: Manner, lift: float
+) -> tuple[HandTarget, ...]:
     approach = rotation[:, 2]
     before = position - STANDOFF_M * approach
     if name == "up":
-        far, lifted, last = position - HOVER_M * approach, position + 0.05 * UP, position + lift * UP
+        far, lifted, last = position - manner.hover_m * approach, position + 0.05 * UP, position + lift * UP
     else:
-        far, lifted = before + out_m * out, position + lift * UP
-        last = lifted + out_m * out
+        far, lifted = before + manner.out_m * out, position + lift * UP
+        last = lifted + manner.out_m * out
     return tuple(HandTarget(p, rotation) for p in (far, before, position, lifted, last))
 
 

@@ -1,20 +1,22 @@
 """Put an object down on a counter where nothing stands.
 
 PickPlaceCabinetToCounter: solved in 2 of 2 target scenes (seeds 0-1, no action noise); for CoffeeServeMug see `cups`.
-PickPlaceDrawerToCounter has a verb of its own until it is solved: no free spot is near enough.
+PickPlaceDrawerToCounter: 8 of 10 in the target and 7 of 10 in the pretrain split (seeds 0-9, no action noise), in 12 s.
+What fails lies so far in that the hand meets the counter's edge, and pushes the drawer in.
 """
 
 from __future__ import annotations
 
 import copy
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 
 import mujoco
 import numpy as np
 
 from robocasa_lerobot.demos.motion import UP, Array, base_pose, grip_position
 from robocasa_lerobot.demos.skills.cups import UNDER_A_SPOUT
-from robocasa_lerobot.demos.skills.pick import ANYHOW, Manner
+from robocasa_lerobot.demos.skills.pick import ANYHOW, FROM_ABOVE, Manner
 from robocasa_lerobot.demos.skills.put import Putting, Spot, move
 from robocasa_lerobot.demos.skills.put_down import goal
 from robocasa_lerobot.demos.skills.things import Thing, thing
@@ -23,6 +25,14 @@ from robocasa_lerobot.envs.scene.fixtures.counters import Counter
 from robocasa_lerobot.envs.task import Stage
 
 GRID_M, EDGE_M, NEAR_M = 0.07, 0.02, 0.75
+# Out of a drawer, whose hind part is below the counter: straight up to over its top.
+OUT_OF_DRAWER = replace(
+    FROM_ABOVE,
+    tilts=((0.0, 0.0), (np.deg2rad(20.0), 0.1), (np.deg2rad(30.0), 0.2), (np.deg2rad(45.0), 0.3)),
+    hover_m=0.26,
+    lift_m=0.30,
+)
+FARTHER_M = 1.1  # where an open drawer keeps the robot off
 MOST_SPOTS = 14
 FAR_COST = 0.8  # for each metre
 
@@ -45,10 +55,19 @@ def take_from_spout(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
     yield from _move(env, stage, UNDER_A_SPOUT)
 
 
-def _move(env: KitchenEnv, stage: Stage, taking: Manner) -> Iterator[Array]:
+def take_out_of_drawer(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
+    """Take an object out of an open drawer, from above, and put it down on the counter that is the stage's target.
+
+    Raises:
+        SkillError: it is not there after all attempts.
+    """
+    yield from _move(env, stage, OUT_OF_DRAWER, FARTHER_M)
+
+
+def _move(env: KitchenEnv, stage: Stage, taking: Manner, within_m: float = NEAR_M) -> Iterator[Array]:
     what = thing(env, stage.object)
     how = Putting(
-        free_spots(env, what, stage.target),
+        free_spots(env, what, stage.target, within_m),
         goal(env),
         leans=(0.0, np.deg2rad(30.0)),
         entries=("up", "across"),
@@ -57,7 +76,7 @@ def _move(env: KitchenEnv, stage: Stage, taking: Manner) -> Iterator[Array]:
     yield from move(env, what, how)
 
 
-def free_spots(env: KitchenEnv, what: Thing, role: str) -> Callable[[], list[Spot]]:
+def free_spots(env: KitchenEnv, what: Thing, role: str, within_m: float = NEAR_M) -> Callable[[], list[Spot]]:
     """Points on a counter's top, near the robot, where a thing as it is turned now meets nothing."""
     counter = env.scene.fixture(role)
     assert isinstance(counter, Counter)
@@ -66,7 +85,7 @@ def free_spots(env: KitchenEnv, what: Thing, role: str) -> Callable[[], list[Spo
         body = env.data.body(what.name)
         turn = body.xmat.reshape(3, 3).copy()
         edge = float(max(what.half_extents(turn)[:2])) + EDGE_M
-        near = _near(env, counter, edge)
+        near = _near(env, counter, edge, within_m)
         model, scratch = env.model, copy.copy(env.data)
         mine = np.isin(model.geom_bodyid, list(what.bodies))
         quat = np.empty(4)
@@ -87,7 +106,7 @@ def free_spots(env: KitchenEnv, what: Thing, role: str) -> Callable[[], list[Spo
     return spots
 
 
-def _near(env: KitchenEnv, counter: Counter, edge: float) -> list[tuple[Array, float]]:
+def _near(env: KitchenEnv, counter: Counter, edge: float, within_m: float) -> list[tuple[Array, float]]:
     """Points of a grid on a counter with their distances from the hand, the nearest first."""
     cos, sin = np.cos(counter.yaw), np.sin(counter.yaw)
     base, _ = base_pose(env.data)
@@ -99,6 +118,6 @@ def _near(env: KitchenEnv, counter: Counter, edge: float) -> list[tuple[Array, f
                 point = np.array(
                     [counter.pos[0] + cos * x - sin * y, counter.pos[1] + sin * x + cos * y, counter.surface_z]
                 )
-                if np.linalg.norm((point - base)[:2]) < NEAR_M:
+                if np.linalg.norm((point - base)[:2]) < within_m:
                     found.append((point, float(np.linalg.norm((point - grip)[:2]))))
     return sorted(found, key=lambda pair: pair[1])
