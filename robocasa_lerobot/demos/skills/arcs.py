@@ -22,7 +22,7 @@ from robocasa_lerobot.demos.motion import (
     nearer_turn,
 )
 from robocasa_lerobot.demos.skills.arc_plan import STANDOFF_M, ArcPlan, Shift, Way, plan_arc
-from robocasa_lerobot.demos.skills.common import draw_back, hold_hand, move_hand
+from robocasa_lerobot.demos.skills.common import SkillError, draw_back, hold_hand, move_hand
 from robocasa_lerobot.demos.skills.firm import FirmServo
 from robocasa_lerobot.demos.skills.hinged import Headway, Hinged
 from robocasa_lerobot.demos.skills.reach import shift_base
@@ -131,14 +131,17 @@ def push_arc(
     lead_rad: float = 0.15,
     speed: float = 0.8,
     firm: bool = False,
+    most_cost: float = np.inf,
 ) -> Iterator[Array]:
     """Push a part to an angle in the best of some ways, and draw the hand back.
 
     Raises:
-        SkillError: none of them is to be had.
+        SkillError: none of them is to be had, or none for `most_cost`.
     """
     data = env.data
     plan = plan_arc(env, part, ways, stances)
+    if plan.cost > most_cost:
+        raise SkillError(f"{part.name}: the arm hardly reaches along its arc")
     spot = spots(env, plan)
     yield from take_stance(env, plan, CLOSED)
     yield from lead(env, plan.joints, CLOSED)

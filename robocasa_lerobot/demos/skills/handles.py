@@ -33,6 +33,7 @@ ATTEMPTS = 4
 AJAR_RAD, ENOUGH_RAD = np.deg2rad(40.0), np.deg2rad(22.0)  # wanted of a pull; enough to get behind the edge
 RETREAT: Shift = (-0.2, 0.0)
 FARTHER_RAD = 0.5  # that it is pulled on where the hand does not get behind it
+MOST_COST = 1.4  # of a push: where the hand hardly gets behind the door, it is pulled farther
 OPEN_SHARE = 0.95  # beyond the 0.90 that tasks ask for
 TURN = 0.5  # share of the door's angle by which the hand turns with its handle
 # Of the hand's approach from the door's normal: to the side of the hinge and upwards, radians.
@@ -44,6 +45,9 @@ PUSHES = (
     (1.0, 0.07, 30.0, 0.0, 0.0),
     (1.0, 0.07, -25.0, 0.0, 0.0),
     (1.0, 0.07, 20.0, -35.0, 0.0),
+    (1.0, 0.09, 0.0, -60.0, 0.05),
+    (1.0, 0.09, 30.0, -60.0, 0.05),
+    (1.0, 0.09, 0.0, -80.0, 0.05),
     (0.9, 0.04, 50.0, 0.0, 0.1),
     (0.65, 0.0, 60.0, 0.0, 0.2),
 )
@@ -129,13 +133,13 @@ def _push(env: KitchenEnv, door: Hinged) -> Iterator[Array]:
     """Push the door open, from inside."""
     ways = [_push_way(env, door, push, flip) for push in PUSHES for flip in (1.0, -1.0)]
     stances = stances_round(env, door, PUSH_NEAR)
-    yield from push_arc(env, door, ways, stances, (OPEN_SHARE + 0.01) * door.full, firm=True)
+    yield from push_arc(env, door, ways, stances, (OPEN_SHARE + 0.01) * door.full, firm=True, most_cost=MOST_COST)
 
 
 def _push_way(env: KitchenEnv, door: Hinged, push: tuple[float, float, float, float, float], flip: float) -> Way:
     share, past, degrees, pitch, bias = push
     way = door.side
-    z = working_height(env, door, door.low[2] + 0.06, door.high[2] - 0.06)
+    z = working_height(env, door, door.low[2] + 0.06, door.high[2] - (0.06 if pitch > -50.0 else 0.02))
     # Bins stand out of the inside of fridges' doors, but not at the edge.
     local = np.array([way * share * door.width, 0.0 if share > 0.95 else door.inside, z])
     turn, up = np.deg2rad(degrees), np.deg2rad(pitch)
