@@ -34,6 +34,7 @@ BEFORE, BETWEEN = ((0.3, 0.3), (0.6, 0.3), (0.8, 0.3), (1.0, 0.8)), ((0.33, 0.3)
 CLEAR_M, CLEARANCE = 0.018, 0.25  # kept from what is above, with the cost of less
 _DRIVE, _ALONG = 0.15, 0.10  # cost of a metre that the base goes before, and as the part turns
 _NEAR_LIMIT_RAD = 0.2
+OFF_M = 0.12  # after which the base no longer leans on what it leant on
 BACKS_M = (0.25, 0.5, 0.75)  # that the base goes back before it goes to the side, where it cannot go straight
 
 
@@ -144,7 +145,7 @@ class _Bench:
         base, yaw = base_pose(env.data)
         self._base = (float(base[0]), float(base[1]), yaw)
         self._axes = np.array([[np.cos(yaw), np.sin(yaw), 0.0], [-np.sin(yaw), np.cos(yaw), 0.0]])
-        # What it leans on already is no reason not to drive: the part that it has just let go, for one.
+        # What it leans on already is no reason not to drive off: the part that it has just let go, for one.
         self._leant_on = self._touched(hand_may=True)
         self._known: dict[tuple[Shift, Shift], tuple[Shift, ...] | None] = {}
 
@@ -207,7 +208,8 @@ class _Bench:
             for step in range(1, count + 1):
                 x, y = at + np.asarray(leg) * step / count
                 self._place(self._part.angle, (float(x), float(y)), self._present)
-                if self._touched(hand_may=True) - self._leant_on:
+                leant_on = self._leant_on if np.hypot(x, y) < OFF_M else set()
+                if self._touched(hand_may=True) - leant_on:
                     return False
             at += leg
         return True

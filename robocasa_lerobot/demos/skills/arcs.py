@@ -90,22 +90,10 @@ def swing(
 
 
 def pull_arc(
-    env: KitchenEnv,
-    part: Hinged,
-    ways: Iterable[Way],
-    stances: Iterable[tuple[Shift, Shift]],
-    goal: float,
-    *,
-    lead_rad: float = 0.15,
-    speed: float = 0.7,
+    env: KitchenEnv, part: Hinged, plan: ArcPlan, goal: float, *, lead_rad: float = 0.15, speed: float = 0.9
 ) -> Iterator[Array]:
-    """Grasp a part in the best of some ways, lead it to an angle, let it go and draw the hand back.
-
-    Raises:
-        SkillError: none of them is to be had.
-    """
+    """Grasp a part as planned, lead it to an angle, let it go and draw the hand back."""
     data = env.data
-    plan = plan_arc(env, part, ways, stances)
     spot = spots(env, plan)
     yield from take_stance(env, plan, OPEN)
     yield from lead(env, plan.joints, OPEN)
@@ -114,7 +102,7 @@ def pull_arc(
     yield from hold_hand(data, before, OPEN, SETTLE_STEPS)  # it comes with speed, and there may be little room
     yield from move_hand(data, at, OPEN, speed=0.6, tolerance=0.006, max_steps=40, insist=INSIST)
     yield from hold_hand(data, at, CLOSED, GRASP_STEPS)
-    yield from swing(env, part, plan, goal, gripper=CLOSED, spot=spot, lead_rad=lead_rad, speed=speed, max_steps=120)
+    yield from swing(env, part, plan, goal, gripper=CLOSED, spot=spot, lead_rad=lead_rad, speed=speed, max_steps=160)
     rest = HandTarget(grip_position(data), hand_rotation(data))
     yield from hold_hand(data, rest, OPEN, RELEASE_STEPS)
     away = HandTarget(rest.position - rest.rotation[:, 2] * (STANDOFF_M + 0.02), rest.rotation)

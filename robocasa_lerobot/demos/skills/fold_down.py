@@ -79,7 +79,8 @@ def _pull(env: KitchenEnv, door: Hinged, wanted: float) -> Iterator[Array]:
     """Grasp the handle and pull the door ajar."""
     data = env.data
     ways = [_pull_way(env, door, grasp, flip, wanted) for grasp in GRASPS for flip in (1.0, -1.0)]
-    yield from pull_arc(env, door, ways, stances_beside(env, door), wanted + 0.02)
+    plan = plan_arc(env, door, ways, stances_beside(env, door))
+    yield from pull_arc(env, door, plan, wanted + 0.02)
     rest = HandTarget(grip_position(data), hand_rotation(data))
     edge = door.point(np.array([0.0, 0.0, door.high[2]]), door.angle)
     over = np.array([*rest.position[:2], edge[2] + 0.12])

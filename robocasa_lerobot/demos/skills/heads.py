@@ -11,7 +11,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from robocasa_lerobot.demos.motion import UP, Array, frame
-from robocasa_lerobot.demos.skills.arc_plan import FINGER_HALF_M, Shift, Way, face_way, grip_way
+from robocasa_lerobot.demos.skills.arc_plan import FINGER_HALF_M, Shift, Way, face_way, grip_way, plan_arc
 from robocasa_lerobot.demos.skills.arcs import pull_arc, push_arc
 from robocasa_lerobot.demos.skills.common import SkillError
 from robocasa_lerobot.demos.skills.hinged import Hinged
@@ -59,7 +59,7 @@ def lower_head(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
     for _ in range(ATTEMPTS):
         if head.share > HALF_SHARE + 0.1:
             ways = [_drag_way(head, drag, roll) for drag in DRAGS for roll in (1.0, -1.0)]
-            yield from pull_arc(env, head, ways, STANCES, DOWN_SHARE * head.full)
+            yield from pull_arc(env, head, plan_arc(env, head, ways, STANCES), DOWN_SHARE * head.full)
             if head.share <= DOWN_SHARE:
                 return
             if head.share > HALF_SHARE + 0.2:
