@@ -20,7 +20,7 @@ from robocasa_lerobot.demos.skills.levers import press_lever, turn_off_water, tu
 from robocasa_lerobot.demos.skills.lift_low import lift_low
 from robocasa_lerobot.demos.skills.navigation import drive
 from robocasa_lerobot.demos.skills.put_down import place_into_basin, place_on, place_on_reaching_in
-from robocasa_lerobot.demos.skills.put_inside import drop_into_jug, place_at_site, place_inside
+from robocasa_lerobot.demos.skills.put_inside import drop_into_jug, place_at_site, place_inside, place_inside_fridge
 from robocasa_lerobot.demos.skills.put_on_counter import place_on_counter, take_from_spout, take_out_of_drawer
 from robocasa_lerobot.demos.skills.racks import pull, push, slide
 from robocasa_lerobot.demos.skills.shut import close_doors, lift_shut
@@ -60,6 +60,7 @@ SKILLS: dict[tuple[str, str], Skill] = {
     ("pick_place", "place_on_from_pan"): place_on,
     ("pick_place", "drop_into"): place_on,
     ("pick_place", "place_inside"): place_inside,
+    ("pick_place", "place_inside_fridge"): place_inside_fridge,
     ("pick_place", "place_at_site"): place_at_site,
     ("pick_place", "place_on_counter"): place_on_counter,
     ("pick_place", "take_out_of_drawer"): take_out_of_drawer,

@@ -2,9 +2,10 @@
 
 Solved in target scenes, without action noise, seeds 0-3: PickPlaceCounterToCabinet 4 of 4, PickPlaceCounterToDrawer
 3 of 4, PickPlaceCounterToToasterOven 4 of 4, PickPlaceCounterToStandMixer 3 of 4; for CoffeeSetupMug see `cups`.
-Seeds 0-9: PickPlaceCounterToBlender 10 of 10 in target and 9 of 10 in pretrain scenes. What fails: a rolling pin as
-long as the drawer, bread larger than the bowl. Fridges (0 of 4, the hand meets the lowest shelf over the drawers) have
-a verb of their own until they are solved.
+Seeds 0-9: PickPlaceCounterToBlender 10 of 10 in target and 9 of 10 in pretrain scenes. Seeds
+0-5 in target and 0-9 in pretrain scenes: PickPlaceFridgeShelfToDrawer 5 of 6 and 10 of 10 in 12 s,
+PickPlaceFridgeDrawerToShelf 4 of 6 and 6 of 10 in 12 s. What fails: a rolling pin as long as the drawer, bread larger
+than the bowl, things in a fridge's drawer that lie below the shelf over it.
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ import numpy as np
 
 from robocasa_lerobot.demos.motion import Array, base_pose
 from robocasa_lerobot.demos.skills.cups import FROM_THE_SIDE
-from robocasa_lerobot.demos.skills.pick import ANYHOW, FROM_ABOVE
+from robocasa_lerobot.demos.skills.pick import ANYHOW, FROM_ABOVE, Manner
 from robocasa_lerobot.demos.skills.put import Putting, Spot, move
 from robocasa_lerobot.demos.skills.put_down import goal
 from robocasa_lerobot.demos.skills.things import Thing, thing
@@ -40,6 +41,11 @@ RIMS_M = (0.012, 0.045, 0.08)  # of the underside above a jug's rim: a level han
 HIGH_COST = 0.5  # for each metre that a shelf is above the lowest one
 STEEP_LEANS = (0.0, np.deg2rad(30.0), np.deg2rad(55.0), np.deg2rad(80.0))
 LEANS = (0.0, np.deg2rad(30.0), np.deg2rad(55.0))
+# Out of a drawer below a shelf, whose hind part the shelf covers.
+FROM_CRISPER = Manner(
+    tuple((float(np.deg2rad(tilt)), extra) for tilt, extra in ((35, 0.0), (50, 0.1), (20, 0.1), (65, 0.2), (5, 0.2))),
+    ("up", "across", "out"),
+)
 
 
 def place_inside(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
@@ -63,6 +69,23 @@ def place_inside(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
             _in(env, what, regions, (0.0,)), goal(env), leans=LEANS, entries=("up", "across", "out"), taking=ANYHOW,
             in_m=0.28,
         )  # fmt: skip
+    yield from move(env, what, how)
+
+
+def place_inside_fridge(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
+    """Put the stage's object from a shelf of a fridge into its drawer, or out of the drawer onto a shelf.
+
+    Raises:
+        SkillError: it is not there after all attempts.
+    """
+    what = thing(env, stage.object)
+    fixture, part = env.scene.fixture(stage.target), env.scene.fill(stage.part)
+    regions = [region for name, region in regions_of(fixture) if name.startswith(part) and _usable(env, region)]
+    into = "drawer" in part
+    how = Putting(
+        _in(env, what, regions, DROPS_M if into else (0.0,)), goal(env), leans=LEANS, entries=("up", "across", "out"),
+        taking=ANYHOW if into else FROM_CRISPER, in_m=0.28,
+    )  # fmt: skip
     yield from move(env, what, how)
 
 
