@@ -79,6 +79,7 @@ _TRIALS = 4
 
 
 @pytest.mark.slow
+@pytest.mark.timeout(3600)
 @pytest.mark.parametrize("policy", ["zero", "random"])
 def test_neither_doing_nothing_nor_anything_succeeds(policy: str, tmp_path: Path) -> None:
     names = task_names()
@@ -90,6 +91,7 @@ def test_neither_doing_nothing_nor_anything_succeeds(policy: str, tmp_path: Path
 
 
 @pytest.mark.slow
+@pytest.mark.timeout(3600)
 def test_the_demonstrator_reaches_what_its_table_states(tmp_path: Path) -> None:
     """Over all tasks, within two standard errors of both samples together: by chance it fails once in forty."""
     table = json.loads(TABLE.read_text(encoding="utf-8"))["tasks"]
