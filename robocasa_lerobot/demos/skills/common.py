@@ -7,13 +7,25 @@ from collections.abc import Callable, Iterator
 import mujoco
 import numpy as np
 
-from robocasa_lerobot.demos.motion import Array, HandTarget, arm_action, grip_position, hand_rotation, limit, pose_error
+from robocasa_lerobot.demos.motion import (
+    CLOSED,
+    Array,
+    HandTarget,
+    arm_action,
+    grip_position,
+    hand_rotation,
+    limit,
+    pose_error,
+)
+from robocasa_lerobot.envs.scene.robot_names import FINGER_JOINTS
 
 POSITION_TOLERANCE_M = 0.012
 ROTATION_TOLERANCE_RAD = 0.12
 # A move that makes less headway than this over `STALL_STEPS` is blocked, or as near as the arm gets.
 STALL_M, STALL_STEPS = 0.002, 12
 INSIST_NEAR_M, INSIST_MOST_M = 0.03, 0.03
+AHEAD_ON_LINE_M = 0.03  # commands this far ahead are full ones
+MORE_CLOSING_STEPS, STILL_M = 10, 0.0004  # of a finger in a step: it has met something
 
 
 class SkillError(RuntimeError):
@@ -30,11 +42,12 @@ def move_hand(
     max_steps: int = 90,
     until: Callable[[], bool] = lambda: False,
     insist: float = 0.0,
+    start: Array | None = None,
 ) -> Iterator[Array]:
     """Servo the hand to a target; ends when it is there, when `until` holds, when it stalls, or after `max_steps`.
 
     With `insist` that share of the error that is left near the target is added to the command at every step: a far
-    reach otherwise ends a centimetre short.
+    reach otherwise ends a centimetre short. With a `start` the hand keeps to the straight line from there.
     """
     best, since = np.inf, 0
     more: Array = np.zeros(3)
@@ -52,13 +65,35 @@ def move_hand(
         left_over = target.position - grip_position(data)
         if insist > 0.0 and error.position < INSIST_NEAR_M:
             more = limit(more + insist * left_over, INSIST_MOST_M)
-        yield arm_action(data, HandTarget(target.position + more, target.rotation), gripper, speed=speed)
+        position = target.position if start is None else _ahead(start, target.position, grip_position(data))
+        yield arm_action(data, HandTarget(position + more, target.rotation), gripper, speed=speed)
+
+
+def _ahead(start: Array, end: Array, now: Array) -> Array:
+    """The point of a line from `start` to `end` that lies a little before the one nearest to `now`."""
+    length = float(np.linalg.norm(end - start))
+    if length < AHEAD_ON_LINE_M:
+        return end
+    along = (end - start) / length
+    return start + along * float(np.clip((now - start) @ along + AHEAD_ON_LINE_M, 0.0, length))
 
 
 def hold_hand(data: mujoco.MjData, target: HandTarget, gripper: float, steps: int) -> Iterator[Array]:
     """Keep the hand at a target while the gripper moves."""
     for _ in range(steps):
         yield arm_action(data, target, gripper, speed=0.4)
+
+
+def close_fingers(data: mujoco.MjData, target: HandTarget, steps: int) -> Iterator[Array]:
+    """Close the gripper with the hand at a target: for some steps, and until the fingers stand still."""
+    fingers = [data.joint(name) for name in FINGER_JOINTS]
+    before: Array = np.full(2, np.inf)
+    for step in range(steps + MORE_CLOSING_STEPS):
+        now: Array = np.array([float(finger.qpos[0]) for finger in fingers])
+        if step >= steps and float(np.abs(now - before).max()) < STILL_M:
+            return
+        before = now
+        yield arm_action(data, target, CLOSED, speed=0.4)
 
 
 def draw_back(data: mujoco.MjData, gripper: float, distance_m: float) -> Iterator[Array]:

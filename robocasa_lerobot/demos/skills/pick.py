@@ -20,9 +20,10 @@ from robocasa_lerobot.demos.motion import (
     base_pose,
     grip_position,
     hand_rotation,
+    pose_error,
     rotation_about,
 )
-from robocasa_lerobot.demos.skills.common import SkillError, hold_hand, move_hand
+from robocasa_lerobot.demos.skills.common import SkillError, close_fingers, hold_hand, move_hand
 from robocasa_lerobot.demos.skills.things import Thing, grasps
 from robocasa_lerobot.demos.skills.ways import GOOD_ENOUGH, Choice, Held, Way, approach, choose, lead
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
@@ -35,6 +36,8 @@ GRASP_STEPS, RELEASE_STEPS = 11, 8
 STANDOFF_M, HOVER_M = 0.06, 0.12
 LIFT_M, OUT_M = 0.12, 0.25
 LIFTS_M, LOW_COST = (0.035, 0.010), 0.05  # before it is drawn out of a front
+HELD_UP_M, LOWER_M = 0.08, 0.03
+STEEP = 0.5  # sine of a slope
 LEVEL_LIFT_M, LEVEL_COST = 0.004, 0.1  # before it is drawn out level
 WORSE_GRASP = 0.45  # cost of a grasp's score below the best one's
 TRIED, ALIKE_M = 1.2, 0.015  # cost of a grasp like one that has failed: its place in the thing is as near as this
@@ -53,6 +56,7 @@ class Manner:
             not), or between ("across").
         out_m: how far it goes on its way out, metres.
         hover_m, lift_m: how far over the grasp the hand comes from, and lifts to, where it comes from above, metres.
+        lifts: before it is drawn out of a front, metres.
         turns: of a tilted approach from the base's heading to the left, radians.
         poses: grasps of a thing by a hand that comes along an approach.
     """
@@ -62,6 +66,7 @@ class Manner:
     out_m: float = OUT_M
     hover_m: float = HOVER_M
     lift_m: float = LIFT_M
+    lifts: tuple[float, ...] = LIFTS_M
     turns: tuple[float, ...] = (0.0,)
     poses: Callable[[KitchenEnv, Thing, Array], list[GraspPose]] = grasps
 
@@ -69,6 +74,13 @@ class Manner:
 FROM_ABOVE = Manner(((0.0, 0.0), (np.deg2rad(30.0), 0.25)))
 ANYHOW = Manner(
     ((0.0, 0.0), (np.deg2rad(35.0), 0.1), (np.deg2rad(65.0), 0.2), (np.deg2rad(88.0), 0.3)), ("up", "across", "out")
+)
+# Out of a slot in whose plane the hand may lean, below a wall cabinet.
+FROM_A_SLOT = Manner(
+    ((0.0, 0.0), (np.deg2rad(35.0), 0.1), (np.deg2rad(50.0), 0.2), (np.deg2rad(65.0), 0.3)),
+    ("across", "out"),
+    lifts=(0.06,),
+    turns=(0.0, np.pi / 2, -np.pi / 2),
 )
 
 
@@ -89,11 +101,12 @@ def pick(env: KitchenEnv, what: Thing, manner: Manner = FROM_ABOVE) -> Iterator[
         # All poses move with the thing, should it have been touched meanwhile.
         moved = data.body(what.name).xpos - start
         yield from move_hand(data, _shifted(far, moved), OPEN, tolerance=0.03)
-        yield from move_hand(data, _shifted(before, moved), OPEN, tolerance=0.008, insist=INSIST)
+        line = far.position + moved if not steep(far, before) else None
+        yield from move_hand(data, _shifted(before, moved), OPEN, tolerance=0.008, insist=INSIST, start=line)
         moved = data.body(what.name).xpos - start
         at = _shifted(at, moved)
         yield from move_hand(data, at, OPEN, speed=0.6, tolerance=0.005, max_steps=45, insist=INSIST)
-        yield from hold_hand(data, at, CLOSED, GRASP_STEPS)
+        yield from close_fingers(data, at, GRASP_STEPS)
         inside = _inside(env, what)
         lift = float(lifted.position[2] - choice.way.targets[2].position[2])
         yield from move_hand(
@@ -101,7 +114,7 @@ def pick(env: KitchenEnv, what: Thing, manner: Manner = FROM_ABOVE) -> Iterator[
         )
         rise = data.body(what.name).xpos[2] - start[2] - moved[2]
         if rise > ROSE_SHARE * lift and np.linalg.norm(_inside(env, what) - inside) < HELD_M:
-            yield from move_hand(data, _shifted(out, moved), CLOSED, speed=0.8, tolerance=0.03)
+            yield from _draw_out(env, _shifted(lifted, moved), _shifted(out, moved))
             if np.linalg.norm(_inside(env, what) - inside) < HELD_M:
                 return
         tried.append(HandTarget(data.body(what.name).xmat.reshape(3, 3).T @ (at.position - start), at.rotation))
@@ -109,6 +122,24 @@ def pick(env: KitchenEnv, what: Thing, manner: Manner = FROM_ABOVE) -> Iterator[
         away = HandTarget(grip_position(data) - 0.08 * hand_rotation(data)[:, 2], hand_rotation(data))
         yield from move_hand(data, away, OPEN, tolerance=0.03, max_steps=25)
     raise SkillError(f"{what.title} was not lifted in {ATTEMPTS} attempts")
+
+
+def _draw_out(env: KitchenEnv, lifted: HandTarget, out: HandTarget) -> Iterator[Array]:
+    """Move to where the way out ends; where the arm is held up by what is above it, a little lower."""
+    if steep(lifted, out):
+        yield from move_hand(env.data, out, CLOSED, speed=0.8, tolerance=0.03)
+        return
+    yield from move_hand(env.data, out, CLOSED, speed=0.8, tolerance=0.03, start=lifted.position)
+    if pose_error(env.data, out).position > HELD_UP_M:
+        lower = HandTarget(grip_position(env.data) - LOWER_M * UP, out.rotation)
+        yield from move_hand(env.data, lower, CLOSED, speed=0.6, tolerance=0.01, max_steps=20)
+        yield from move_hand(env.data, _shifted(out, -LOWER_M * UP), CLOSED, speed=0.8, tolerance=0.03)
+
+
+def steep(one: HandTarget, other: HandTarget) -> bool:
+    """Whether the way between two poses goes up or down rather than through a front."""
+    away = other.position - one.position
+    return abs(float(away @ UP)) > STEEP * float(np.linalg.norm(away))
 
 
 def ahead_of(env: KitchenEnv) -> Array:
@@ -160,7 +191,7 @@ def _ways(
         for turn in (pose.rotation, pose.rotation @ np.diag([-1.0, -1.0, 1.0])):
             takes = Held(what.name, turn.T @ (body.xpos - pose.position), turn.T @ body.xmat.reshape(3, 3))
             for name in manner.entries:
-                for lift in {"up": (manner.lift_m,), "level": (LEVEL_LIFT_M,)}.get(name, LIFTS_M):
+                for lift in {"up": (manner.lift_m,), "level": (LEVEL_LIFT_M,)}.get(name, manner.lifts):
                     poses_on_way = _way(pose.position, turn, entry(env, name), name, manner, lift)
                     low = LEVEL_COST if name == "level" else LOW_COST if lift < LIFT_M else 0.0
                     found.append(Way(poses_on_way, cost + low, takes))

@@ -22,7 +22,7 @@ from robocasa_lerobot.demos.motion import (
 )
 from robocasa_lerobot.demos.skills.common import SkillError, hold_hand, move_hand
 from robocasa_lerobot.demos.skills.navigation import drive_to
-from robocasa_lerobot.demos.skills.pick import FROM_ABOVE, INSIST, Manner, ahead_of, entry, pick
+from robocasa_lerobot.demos.skills.pick import FROM_ABOVE, INSIST, Manner, ahead_of, entry, pick, steep
 from robocasa_lerobot.demos.skills.things import Thing
 from robocasa_lerobot.demos.skills.ways import Choice, Held, Way, approach, choose, lead
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
@@ -121,13 +121,14 @@ def put(env: KitchenEnv, what: Thing, how: Putting, failed: list[Array]) -> Iter
     yield from lead(env, choice.joints, CLOSED)
     far, above, low, clear, away = choice.way.targets
     # A way in through a front is kept from its beginning on.
-    inwards = float((far.position - above.position) @ UP) < 0.5 * float(np.linalg.norm(far.position - above.position))
+    inwards = not steep(far, above)
+    line = far.position if inwards else None
     yield from move_hand(
         data, far, CLOSED, tolerance=0.01 if inwards else 0.04, max_steps=110, insist=INSIST if inwards else 0.0
     )
     if not _holds(env, held):
         return
-    yield from move_hand(data, above, CLOSED, speed=0.7 if inwards else 1.0, max_steps=90)
+    yield from move_hand(data, above, CLOSED, speed=0.7 if inwards else 1.0, max_steps=90, start=line)
     if not _holds(env, held):
         return
     # What has slipped in the hand goes to the spot, not the hand.
@@ -137,7 +138,8 @@ def put(env: KitchenEnv, what: Thing, how: Putting, failed: list[Array]) -> Iter
     at = HandTarget(grip_position(data), hand_rotation(data))
     yield from hold_hand(data, at, OPEN, RELEASE_STEPS)
     yield from move_hand(data, clear, OPEN, speed=0.6, tolerance=0.02, max_steps=30)
-    yield from move_hand(data, away, OPEN, tolerance=0.03, max_steps=60)
+    line = clear.position if inwards else None
+    yield from move_hand(data, away, OPEN, tolerance=0.03, max_steps=60, start=line)
     yield from leave(env, what)
 
 
