@@ -34,6 +34,7 @@ ATTEMPTS = 4
 # Wanted of a pull, with ease or at least; enough to get behind the edge.
 FAR_RAD, AJAR_RAD, ENOUGH_RAD = np.deg2rad(65.0), np.deg2rad(40.0), np.deg2rad(22.0)
 KNOB_M = 0.06  # a handle as low as this may be held from above and below, too
+SLIPPED = 0.5  # cost of a tilt of the hand in which it has lost the handle
 EASY = 0.6  # cost of a pull
 # How the base may go along with a pull: ahead, and to the side of the hinge, metres.
 PULL_ALONG = ((0.0, 0.0), (-0.25, 0.0), (-0.3, 0.25))
@@ -88,6 +89,7 @@ def open_doors(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
         if not door.upright:
             yield from fold_down(env, door)
             continue
+        slipped: list[tuple[float, float]] = []
         for attempt in range(ATTEMPTS):
             if door.share >= ENOUGH_SHARE:
                 break
@@ -95,7 +97,7 @@ def open_doors(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
                 yield from tuck(env, OPEN)
             moved = True
             try:
-                yield from _attempt(env, door)
+                yield from _attempt(env, door, slipped)
             except SkillError:
                 if attempt == ATTEMPTS - 1:
                     raise
@@ -104,19 +106,21 @@ def open_doors(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
             raise SkillError(f"{door.name} is {door.share:.0%} open after {ATTEMPTS} attempts")
 
 
-def _attempt(env: KitchenEnv, door: Hinged) -> Iterator[Array]:
+def _attempt(env: KitchenEnv, door: Hinged, slipped: list[tuple[float, float]]) -> Iterator[Array]:
     """Pull the door ajar if it is not, and push it open, or pull it farther where the hand does not get behind it."""
     if door.angle < ENOUGH_RAD:
-        yield from _pull(env, door)
+        yield from _pull(env, door, slipped)
     if ENOUGH_RAD <= door.angle < OPEN_SHARE * door.full:
         try:
             yield from _push(env, door)
         except SkillError:
-            yield from _pull(env, door)
+            yield from _pull(env, door, slipped)
 
 
-def _pull(env: KitchenEnv, door: Hinged) -> Iterator[Array]:
+def _pull(env: KitchenEnv, door: Hinged, slipped: list[tuple[float, float]]) -> Iterator[Array]:
     """Grasp the handle and pull the door open, as far as the arm gets with ease.
+
+    A tilt of the hand in which the handle slips out of it is noted in `slipped`, and is the last choice from then on.
 
     Raises:
         SkillError: it does not even get it farther by a bit.
@@ -131,7 +135,8 @@ def _pull(env: KitchenEnv, door: Hinged) -> Iterator[Array]:
     least = max(AJAR_RAD, door.angle + FARTHER_RAD)
     goals = sorted({goal for goal in (OPEN_SHARE * door.full, FAR_RAD) if goal > least}, reverse=True)
     for goal in (*goals, min(least, OPEN_SHARE * door.full)):
-        ways = [_pull_way(env, door, tilt, roll, goal) for tilt in GRASP_TILTS for roll in rolls]
+        options = [(tilt, roll) for tilt in GRASP_TILTS for roll in rolls]
+        ways = [_pull_way(env, door, *option, goal, bias=SLIPPED * (option[0] in slipped)) for option in options]
         try:
             plan = plan_arc(env, door, ways, stances)
         except SkillError:
@@ -139,7 +144,10 @@ def _pull(env: KitchenEnv, door: Hinged) -> Iterator[Array]:
                 raise
             continue
         if plan.cost < EASY or goal <= least:
+            first = door.angle
             yield from pull_arc(env, door, plan, goal + 0.02)
+            if door.angle < first + 0.5 * (goal - first):
+                slipped.append(options[ways.index(plan.way)][0])
             yield from _come_round(env, door)
             return
 
@@ -156,7 +164,7 @@ def _come_round(env: KitchenEnv, door: Hinged) -> Iterator[Array]:
         yield from move_hand(data, HandTarget(beyond, hand_rotation(data)), OPEN, tolerance=0.05, max_steps=30)
 
 
-def _pull_way(env: KitchenEnv, door: Hinged, tilt: tuple[float, float], roll: int, goal: float) -> Way:
+def _pull_way(env: KitchenEnv, door: Hinged, tilt: tuple[float, float], roll: int, goal: float, *, bias: float) -> Way:
     low, high = door.handle()
     middle, room = (low[2] + high[2]) / 2, 0.2 * (high[2] - low[2])
     z = working_height(env, door, middle - room, middle + room)
@@ -169,7 +177,7 @@ def _pull_way(env: KitchenEnv, door: Hinged, tilt: tuple[float, float], roll: in
         approach = turn @ np.array([-way * np.sin(aside) * np.cos(up), np.cos(aside) * np.cos(up), np.sin(up)])
         return frame(approach, (turn[:, 0], UP, -turn[:, 0], -UP)[roll])
 
-    return grip_way(door, grip, rotation_at, goal, bias=0.1 * (roll % 2))
+    return grip_way(door, grip, rotation_at, goal, bias=bias + 0.1 * (roll % 2))
 
 
 def _push(env: KitchenEnv, door: Hinged) -> Iterator[Array]:
