@@ -148,7 +148,7 @@ def _cost(
         cost += max(0.0, _NEAR_LIMIT_RAD - float(margin)) * 2.0
         if cost > bound:
             break
-        cost += 0.7 * min(_collisions(model, data, allowed), 3)
+        cost += 0.7 * min(collisions(model, data, allowed), 3)
     cost += 0.1 * float(np.abs(data.qpos[arm] - home).max())
     data.qpos[arm] = home
     return cost
@@ -199,7 +199,7 @@ def solve_arm(
     mujoco.mj_kinematics(model, data)
 
 
-def _collisions(model: mujoco.MjModel, data: mujoco.MjData, allowed: frozenset[int]) -> int:
+def collisions(model: mujoco.MjModel, data: mujoco.MjData, allowed: frozenset[int]) -> int:
     """Number of bodies that the robot would touch or enter, but for those allowed."""
     mujoco.mj_collision(model, data)
     if data.ncon == 0:
