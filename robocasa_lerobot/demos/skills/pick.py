@@ -53,7 +53,7 @@ class Manner:
     Attributes:
         tilts: of the hand's approach from straight down to straight ahead, radians, with their costs.
         entries: whether the hand may come from above ("up"), or out of the front ("out" rises a little, "level" does
-            not), or between ("across").
+            not), or between ("across"), or along its fingers ("along").
         out_m: how far it goes on its way out, metres.
         hover_m, lift_m: how far over the grasp the hand comes from, and lifts to, where it comes from above, metres.
         lifts: before it is drawn out of a front, metres.
@@ -156,6 +156,15 @@ def entry(env: KitchenEnv, name: str) -> Array:
     return unit
 
 
+def best_way(env: KitchenEnv, what: Thing, manner: Manner) -> Choice:
+    """How a thing would be taken now; above a cost of about 2 it cannot be.
+
+    Raises:
+        SkillError: no pose of the gripper fits.
+    """
+    return _best(env, what, manner, [], [])
+
+
 def _best(
     env: KitchenEnv, what: Thing, manner: Manner, tried: list[HandTarget], blocked: Sequence[RobotPose]
 ) -> Choice:
@@ -192,7 +201,8 @@ def _ways(
             takes = Held(what.name, turn.T @ (body.xpos - pose.position), turn.T @ body.xmat.reshape(3, 3))
             for name in manner.entries:
                 for lift in {"up": (manner.lift_m,), "level": (LEVEL_LIFT_M,)}.get(name, manner.lifts):
-                    poses_on_way = _way(pose.position, turn, entry(env, name), name, manner, lift)
+                    out = -turn[:, 2] if name == "along" else entry(env, name)
+                    poses_on_way = _way(pose.position, turn, out, name, manner, lift)
                     low = LEVEL_COST if name == "level" else LOW_COST if lift < LIFT_M else 0.0
                     found.append(Way(poses_on_way, cost + low, takes))
     return found
