@@ -53,7 +53,7 @@ class Effort:
     image_size: int = contract.IMAGE_SIZE
 
 
-FULL = Effort(16, 5, 3, 160, (10, 100, 1000), 40)
+FULL = Effort(24, 3, 1, 160, (10, 100, 1000), 40)
 QUICK = Effort(10, 2, 1, 100, (10, 100, 300), 20)
 
 
