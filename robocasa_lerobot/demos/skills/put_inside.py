@@ -1,10 +1,11 @@
 """Put an object into a part of a fixture: onto a shelf or a rack, into a drawer, a jug or a bowl, under a spout.
 
 Solved in target scenes, without action noise, seeds 0-3: PickPlaceCounterToCabinet 4 of 4, PickPlaceCounterToDrawer
-3 of 4, PickPlaceCounterToToasterOven 4 of 4, PickPlaceCounterToStandMixer 3 of 4; for CoffeeSetupMug see `cups`.
+3 of 4, PickPlaceCounterToToasterOven 4 of 4, PickPlaceCounterToStandMixer 4 of 4 (pretrain, seeds 0-9: 9 of 10);
+for CoffeeSetupMug see `cups`.
 In target and in pretrain scenes, seeds 0-9: PickPlaceCounterToBlender 10 and 9 of 10, PickPlaceFridgeDrawerToShelf 8
 and 6 of 10; PickPlaceFridgeShelfToDrawer 5 of 6 (0-5) and 10 of 10. What fails: a rolling pin as long as the drawer,
-bread larger than the bowl, small fruit in a fridge's drawer below a shelf, and drawers that the hand pushes in.
+now and then a loaf in the bowl, small fruit in a fridge's drawer below a shelf, and drawers that the hand pushes in.
 """
 
 from __future__ import annotations
