@@ -106,7 +106,8 @@ def test_several_footprints_answer_as_each_of_them_does() -> None:
     for _ in range(400):
         marks, other = [draw() for _ in range(int(rng.integers(4)))], draw()
         margin = float(rng.choice([0.0, 0.1]))
-        answers.append(Footprints(marks).any_overlaps(other, margin))
+        place = np.array([[other.x, other.y, other.yaw]])
+        answers.append(bool(Footprints(marks).overlapping(place, other.half, margin)[0]))
         assert answers[-1] == any(mark.overlaps(other, margin) for mark in marks)
     assert 50 < sum(answers) < 350
 

@@ -56,14 +56,10 @@ class Footprints:
         own = self._corners @ self._axes.transpose(0, 2, 1)
         self._low, self._high = own.min(axis=1), own.max(axis=1)
 
-    def any_overlaps(self, other: Footprint, margin: float = 0.0) -> bool:
-        """Whether one of them overlaps another footprint, as in `Footprint.overlaps`."""
-        return bool(self.overlapping(np.array([[other.x, other.y, other.yaw]]), other.half, margin)[0])
-
     def overlapping(
         self, places: NDArray[np.float64], half: tuple[float, float], margin: float = 0.0
     ) -> NDArray[np.bool_]:
-        """Which of n footprints overlap one of these, shape (n,).
+        """Which of n footprints overlap one of these, as in `Footprint.overlaps`; shape (n,).
 
         `places` are their middles (metres) and yaws, shape (n, 3); `half` are the half sizes of all of them.
         """
