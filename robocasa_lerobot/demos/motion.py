@@ -65,6 +65,11 @@ def base_pose(data: mujoco.MjData) -> tuple[Array, float]:
     return site.xpos.copy(), float(np.arctan2(rotation[1, 0], rotation[0, 0]))
 
 
+def floor_axes(yaw: float) -> Array:
+    """Forward and left of a base with that heading, radians, as rows: (2, 3)."""
+    return np.array([[np.cos(yaw), np.sin(yaw), 0.0], [-np.sin(yaw), np.cos(yaw), 0.0]])
+
+
 def pose_error(data: mujoco.MjData, target: HandTarget) -> PoseError:
     """How far the hand is from a target."""
     turn = axis_angle(target.rotation @ hand_rotation(data).T)

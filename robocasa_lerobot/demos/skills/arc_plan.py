@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robocasa_lerobot.demos.arm import Arm
-from robocasa_lerobot.demos.motion import Array, HandTarget, base_pose
+from robocasa_lerobot.demos.motion import Array, HandTarget, base_pose, floor_axes
 from robocasa_lerobot.demos.skills.common import SkillError
 from robocasa_lerobot.demos.skills.hinged import Hinged
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
@@ -144,7 +144,7 @@ class _Bench:
         self._own = self._robot & ~self._reaching  # the base
         base, yaw = base_pose(env.data)
         self._base = (float(base[0]), float(base[1]), yaw)
-        self._axes = np.array([[np.cos(yaw), np.sin(yaw), 0.0], [-np.sin(yaw), np.cos(yaw), 0.0]])
+        self._axes = floor_axes(yaw)
         # What it leans on already is no reason not to drive off: the part that it has just let go, for one.
         self._leant_on = self._touched(hand_may=True)
         self._known: dict[tuple[Shift, Shift], tuple[Shift, ...] | None] = {}

@@ -16,6 +16,7 @@ from robocasa_lerobot.demos.motion import (
     HandTarget,
     arm_action,
     base_pose,
+    floor_axes,
     frame,
     grip_position,
     hand_rotation,
@@ -161,7 +162,7 @@ def stances_round(
         follow: how far the base may go along forwards as the door turns, metres.
     """
     base, yaw = base_pose(env.data)
-    axes = np.array([[np.cos(yaw), np.sin(yaw), 0.0], [-np.sin(yaw), np.cos(yaw), 0.0]])
+    axes = floor_axes(yaw)
     side, width = door.side, door.width
     spots = []
     for before in (max(width, 0.25) + 0.35, 0.45, 0.55, 0.7, width + 0.6):
@@ -189,7 +190,7 @@ def take_stance(env: KitchenEnv, plan: ArcPlan, gripper: float) -> Iterator[Arra
 def spots(env: KitchenEnv, plan: ArcPlan) -> tuple[Array, Array]:
     """World positions (3,) of the base that a plan begins and ends at, from where it stands now."""
     base, yaw = base_pose(env.data)
-    axes = np.array([[np.cos(yaw), np.sin(yaw), 0.0], [-np.sin(yaw), np.cos(yaw), 0.0]])
+    axes = floor_axes(yaw)
     return base + np.asarray(plan.start) @ axes, base + np.asarray(plan.end) @ axes
 
 

@@ -19,6 +19,7 @@ from robocasa_lerobot.demos.motion import (
     Array,
     HandTarget,
     base_pose,
+    floor_axes,
     frame,
     grip_position,
     hand_rotation,
@@ -119,7 +120,7 @@ def _dash(env: KitchenEnv, joints: Array) -> Iterator[Array]:
 def _stances(env: KitchenEnv, door: Hinged) -> tuple[tuple[Shift, Shift], ...]:
     """Moves of the base, before and by the end: before the free edge, then beside it; the base goes along inwards."""
     base, yaw = base_pose(env.data)
-    axes = np.array([[np.cos(yaw), np.sin(yaw), 0.0], [-np.sin(yaw), np.cos(yaw), 0.0]])
+    axes = floor_axes(yaw)
     hinge = door.point(np.zeros(3), 0.0)
     out = door.high[2] * np.sin(door.angle)
 
