@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 from collections.abc import Callable
 from pathlib import Path
@@ -10,8 +11,10 @@ from typing import Any
 import h5py
 import numpy as np
 import pytest
+from PIL import Image
 
 from robocasa_lerobot import cli
+from robocasa_lerobot.demos.film_strip import STRIP_PICTURES, STRIP_SIZE
 from robocasa_lerobot.demos.record import RecordingSettings, record_tasks
 from robocasa_lerobot.demos.replay import Replayed, demonstrations, replay
 from robocasa_lerobot.errors import UserError
@@ -65,6 +68,17 @@ def test_what_was_changed_does_not_replay(folder: Path, tmp_path: Path) -> None:
     other = changed("other", other_kitchen)
     assert not other.same_start
     assert not other.actions
+
+
+@pytest.mark.slow
+@pytest.mark.render
+def test_a_film_strip_shows_the_way_from_the_first_state_to_the_last(folder: Path, tmp_path: Path) -> None:
+    assert cli.main(["replay", str(folder / "CloseDrawer.hdf5"), "--workers", "1", "--strips", str(tmp_path)]) == 0
+    with Image.open(tmp_path / "CloseDrawer_demo_0.png") as picture:
+        strip = np.asarray(picture, dtype=float)
+    assert strip.shape[1] == STRIP_PICTURES * STRIP_SIZE
+    columns = np.split(strip[-4 * STRIP_SIZE :], STRIP_PICTURES, axis=1)
+    assert all(np.abs(a - b).mean() > 1.0 for a, b in itertools.pairwise(columns[:-1]))
 
 
 @pytest.mark.slow

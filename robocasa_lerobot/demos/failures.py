@@ -11,6 +11,7 @@ import mujoco
 
 from robocasa_lerobot import contract
 from robocasa_lerobot.demos.episode import Recording
+from robocasa_lerobot.demos.film_strip import show_state
 from robocasa_lerobot.demos.hdf5 import Failure
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 
@@ -69,9 +70,7 @@ def _film(path: Path, env: KitchenEnv, recording: Recording) -> None:
     try:
         with VideoWriter(path, contract.CONTROL_HZ // FILM_EVERY) as film:
             for state in recording.states[::FILM_EVERY]:
-                data.qpos[:] = state[1 : 1 + model.nq]
-                mujoco.mj_kinematics(model, data)
-                mujoco.mj_camlight(model, data)
+                show_state(model, data, state)
                 pictures = renderer.pictures(data, contract.CAMERAS)
                 film.write(side_by_side(dict(zip(contract.CAMERAS, pictures, strict=True))))
     finally:

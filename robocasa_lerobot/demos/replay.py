@@ -51,6 +51,38 @@ class Replayed:
     note: str = ""
 
 
+@dataclass(frozen=True)
+class Demonstration:
+    """What a file holds of a demonstration of T steps.
+
+    Attributes:
+        task: name.
+        meta: its `ep_meta`.
+        states: (T, 1 + nq + nv) time, positions, velocities.
+        actions: (T, 12) in stored order.
+    """
+
+    task: str
+    meta: dict[str, Any]
+    states: Array
+    actions: Array
+
+    @property
+    def seed(self) -> int:
+        """Of the kitchen."""
+        return int(self.meta["seed"])
+
+    @property
+    def split(self) -> str:
+        """Of the kitchen."""
+        return str(self.meta["split"])
+
+    @property
+    def instruction(self) -> str:
+        """What was to be done."""
+        return str(self.meta["lang"])
+
+
 def demonstrations(paths: Iterable[Path]) -> list[tuple[Path, str]]:
     """Files and names of all demonstrations in files and folders, in order.
 
@@ -86,11 +118,11 @@ def replay_all(chosen: Sequence[tuple[Path, str]], workers: int = 1) -> Iterator
             yield future.result()
 
 
-def replay(path: Path, demo: str) -> Replayed:
-    """Replay one demonstration both ways.
+def read_demonstration(path: Path, demo: str) -> Demonstration:
+    """A demonstration that `demos` recorded.
 
     Raises:
-        UserError: its kitchen cannot be made again.
+        UserError: other software recorded it.
     """
     with h5py.File(path) as file:
         group = file[f"data/{demo}"]
@@ -99,29 +131,41 @@ def replay(path: Path, demo: str) -> Replayed:
         states, actions = group["states"][()], contract.hdf5_to_stored(group["actions"][()])
     if "seed" not in meta or "split" not in meta:
         raise UserError(f"{path}, {demo}: its ep_meta has no scene seed and split; it was recorded by other software.")
-    env = _env(task, meta)
+    return Demonstration(task, meta, states, actions)
+
+
+def replay(path: Path, demo: str) -> Replayed:
+    """Replay one demonstration both ways.
+
+    Raises:
+        UserError: its kitchen cannot be made again.
+    """
+    recorded = read_demonstration(path, demo)
+    task, states = recorded.task, recorded.states
+    env = kitchen_of(recorded)
     try:
-        env.reset(seed=int(meta["seed"]))
+        env.reset(seed=recorded.seed)
         start = _state(env)
         if start.shape != states[0].shape:
             note = f"{states[0].size} numbers in a state, {start.size} in the kitchen as it is made now"
             return Replayed(path, demo, task, False, False, False, np.inf, note)
         same = bool(np.array_equal(start, states[0]))
         final = _goal_holds_in(env, states[-1])
-        done, deviation = _carry_out(env, states, actions)
+        done, deviation = _carry_out(env, states, recorded.actions)
     finally:
         env.close()
     return Replayed(path, demo, task, done, final, same, deviation)
 
 
-def _env(task: str, meta: dict[str, Any]) -> KitchenEnv:
+def kitchen_of(recorded: Demonstration) -> KitchenEnv:
+    """An env that makes the kitchen of a demonstration when it is reset with its seed; without cameras."""
     return KitchenEnv(
-        task,
-        split=str(meta["split"]),
+        recorded.task,
+        split=recorded.split,
         cameras=(),
         terminate_on_success=False,
-        layouts=meta.get("layouts"),
-        styles=meta.get("styles"),
+        layouts=recorded.meta.get("layouts"),
+        styles=recorded.meta.get("styles"),
     )
 
 

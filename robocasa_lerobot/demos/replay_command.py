@@ -19,6 +19,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("paths", nargs="+", type=Path, metavar="PATH", help="files of demonstrations, or folders")
     parser.add_argument("--every", type=int, default=1, metavar="N", help="take every n-th demonstration (default 1)")
     parser.add_argument("--workers", type=int, default=os.cpu_count() or 1, help="processes (default: all cores)")
+    parser.add_argument("--strips", type=Path, metavar="FOLDER", help="also draw a film strip (PNG) of each")
     parser.add_argument("--json", action="store_true", help="print JSON")
 
 
@@ -26,6 +27,7 @@ def run(args: argparse.Namespace) -> int:
     """Print how many replay from their actions and from their states; status 1 where it is fewer than expected."""
     from tqdm import tqdm
 
+    from robocasa_lerobot.demos.film_strip import film_strip
     from robocasa_lerobot.demos.replay import demonstrations, replay_all
 
     chosen = demonstrations(args.paths)[:: args.every]
@@ -33,6 +35,9 @@ def run(args: argparse.Namespace) -> int:
         tqdm(replay_all(chosen, args.workers), total=len(chosen), unit="demo", disable=args.json),
         key=lambda result: chosen.index((result.path, result.demo)),
     )
+    if args.strips:
+        for path, demo in tqdm(chosen, unit="strip", disable=args.json):
+            film_strip(path, demo, args.strips / f"{path.stem}_{demo}.png")
     by_actions, by_states = sum(r.actions for r in results), sum(r.states for r in results)
     rates = by_actions / len(results), by_states / len(results)
     if args.json:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import os
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -30,7 +31,12 @@ def configure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--split", default="target", help="kitchens of --pictures (default target)")
     parser.add_argument("--seed", type=int, default=0, help="seed of --pictures (default 0)")
     parser.add_argument("--markdown", type=Path, metavar="FILE", help="write the page docs/tasks.md")
-    parser.add_argument("--check", action="store_true", help="reset and step each on 10 seeds and report what is wrong")
+    parser.add_argument(
+        "--check",
+        action="store_true",
+        help="in both splits, try each task and its demonstrator on 10 seeds",
+    )
+    parser.add_argument("--workers", type=int, default=os.cpu_count() or 1, help="of --check (default: all cores)")
     parser.add_argument("--json", action="store_true", help="print JSON")
 
 
@@ -41,7 +47,7 @@ def run(args: argparse.Namespace) -> int:
 
     tasks = _chosen(args)
     if args.check:
-        return _check(tasks)
+        return _check(tasks, args.workers)
     if args.markdown:
         aside = args.markdown.with_name(args.markdown.name + ".part")
         aside.write_text(pages(tasks), encoding="utf-8")
@@ -99,14 +105,19 @@ def _chosen(args: argparse.Namespace) -> list[Task]:
     return tasks
 
 
-def _check(tasks: list[Task]) -> int:
-    from robocasa_lerobot.envs.check import check_task
+def _check(tasks: list[Task], workers: int) -> int:
+    from tqdm import tqdm
 
+    from robocasa_lerobot.demos.task_check import check_all
+    from robocasa_lerobot.envs.scene.kitchens import SPLITS
+
+    found = check_all([task.name for task in tasks], SPLITS, workers=workers)
     failures = 0
-    for task in tasks:
-        faults = check_task(task.name)
-        failures += bool(faults)
-        print(f"{task.name}: {'; '.join(faults) if faults else 'ok'}")
+    with tqdm(found, total=len(tasks) * len(SPLITS), unit="task", disable=None) as bar:
+        for one in bar:
+            failures += bool(one.faults)
+            demonstrator = "no demonstrator" if one.solved is None else f"solved on seed {one.solved}"
+            bar.write(f"{one.task}, {one.split}: {'; '.join(one.faults) if one.faults else f'ok, {demonstrator}'}")
     return 1 if failures else 0
 
 

@@ -1,0 +1,60 @@
+"""The checker of tasks finds what is wrong with one: goals that hold by themselves, chance, demonstrators that fail."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from robocasa_lerobot import cli
+from robocasa_lerobot.demos import task_check
+from robocasa_lerobot.envs.check import check_task
+from robocasa_lerobot.envs.kitchen_env import KitchenEnv
+from robocasa_lerobot.envs.registry import task_names
+from robocasa_lerobot.envs.scene.kitchens import SPLITS
+
+pytestmark = pytest.mark.render
+TASK = "OpenDrawer"
+
+
+def test_a_goal_that_comes_to_hold_by_itself_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    real = KitchenEnv._info
+    monkeypatch.setattr(KitchenEnv, "_info", lambda env: {**real(env), "success": env._steps >= 97})
+    assert check_task(TASK, seeds=(0,)) == ["seed 0, step 97: the goal holds although nothing was done"]
+
+
+def test_a_scene_that_depends_on_more_than_the_seed_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    real = KitchenEnv.reset
+    made: list[int] = []
+
+    def reset(env: KitchenEnv, *, seed: int | None = None, options: dict | None = None):
+        made.append(0)
+        return real(env, seed=len(made), options=options)
+
+    monkeypatch.setattr(KitchenEnv, "reset", reset)
+    assert check_task("CloseDrawer", seeds=(0,))  # a drawer that is open by another angle
+
+
+def test_a_demonstrator_that_solves_nothing_is_a_fault(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(task_check, "check_task", lambda *_: [])
+    real = task_check.record_episode
+    monkeypatch.setattr(task_check, "record_episode", lambda *a, **k: replace(real(*a, **k), success=False))
+    found = task_check.check(TASK, "target", (0, 1))
+    assert (found.solved, found.failed) == (None, (0, 1))
+    assert found.faults == ("the demonstrator solved none of 2 seeds",)
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(600)
+@pytest.mark.parametrize("split", SPLITS)
+@pytest.mark.parametrize("task", task_names())
+def test_every_task_is_sound_and_solved_in_both_splits(task: str, split: str) -> None:
+    assert task_check.check(task, split).faults == ()
+
+
+@pytest.mark.slow
+def test_the_command_says_what_it_found(capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.main(["tasks", TASK, "--check", "--workers", "2"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert sorted(line.split(":")[0] for line in lines) == [f"{TASK}, {split}" for split in SPLITS]
+    assert all("ok, solved on seed" in line for line in lines)
