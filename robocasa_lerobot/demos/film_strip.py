@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from pathlib import Path
 
 import mujoco
@@ -17,7 +18,9 @@ from robocasa_lerobot.envs.scene.robot_names import GRIP_SITE
 Picture = NDArray[np.uint8]
 STRIP_PICTURES, STRIP_SIZE = 10, 224  # along the strip; pixels of each
 _TITLE = 22
-_CLOSE_M, _SIDE_DEG, _DOWN_DEG = 0.9, 40.0, -28.0  # of a camera that follows the hand, from over the shoulder
+# Of a camera that follows the hand: over a shoulder, or where nothing stands between.
+_CLOSE_M, _SIDES_DEG, _DOWN_DEG = 0.9, (40.0, -40.0, 75.0, -75.0, 10.0), (-28.0, -50.0, -8.0)
+_NEAR_HAND_M = 0.25  # what is nearer to the hand than this belongs to it
 
 
 def film_strip(path: Path, demo: str, out: Path) -> None:
@@ -41,7 +44,10 @@ def film_strip(path: Path, demo: str, out: Path) -> None:
         columns = []
         for step in shown:
             show_state(env.model, data, recorded.states[step])
-            pictures = [*renderer.pictures(data, contract.CAMERAS), renderer.render(data, _over_the_shoulder(data))]
+            pictures = [
+                *renderer.pictures(data, contract.CAMERAS),
+                renderer.render(data, _beside_the_hand(env.model, data)),
+            ]
             columns.append(_titled(np.vstack(pictures), f"{step / contract.CONTROL_HZ:.1f} s"))
     finally:
         if renderer is not None:
@@ -61,12 +67,28 @@ def show_state(model: mujoco.MjModel, data: mujoco.MjData, state: NDArray[np.flo
     mujoco.mj_camlight(model, data)
 
 
-def _over_the_shoulder(data: mujoco.MjData) -> mujoco.MjvCamera:
-    camera = mujoco.MjvCamera()
-    camera.lookat = data.site(GRIP_SITE).xpos
-    camera.distance, camera.elevation = _CLOSE_M, _DOWN_DEG
-    camera.azimuth = float(np.degrees(base_pose(data)[1])) + _SIDE_DEG
-    return camera
+def _beside_the_hand(model: mujoco.MjModel, data: mujoco.MjData) -> mujoco.MjvCamera:
+    heading = float(np.degrees(base_pose(data)[1]))
+    hand = data.site(GRIP_SITE).xpos
+    best, most = mujoco.MjvCamera(), -1.0
+    for elevation, side in itertools.product(_DOWN_DEG, _SIDES_DEG):
+        azimuth = heading + side
+        free = min(_seen_m(model, data, hand, azimuth, elevation), _CLOSE_M - _NEAR_HAND_M)
+        if free > most:
+            best.lookat, best.distance, best.azimuth, best.elevation = hand, _CLOSE_M, azimuth, elevation
+            most = free
+    return best
+
+
+def _seen_m(
+    model: mujoco.MjModel, data: mujoco.MjData, hand: NDArray[np.float64], azimuth: float, elevation: float
+) -> float:
+    """How far a camera at these angles (degrees) sees towards the hand, in metres."""
+    across, up = np.radians(azimuth), np.radians(elevation)
+    ahead = np.array([np.cos(up) * np.cos(across), np.cos(up) * np.sin(across), np.sin(up)])
+    hit = np.zeros(1, dtype=np.int32)
+    free = mujoco.mj_ray(model, data, hand - _CLOSE_M * ahead, ahead, None, 1, -1, hit)
+    return _CLOSE_M if free < 0 else float(free)
 
 
 def _titled(picture: Picture, text: str) -> Picture:
