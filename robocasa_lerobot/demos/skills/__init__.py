@@ -8,7 +8,8 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 
 from robocasa_lerobot.demos.motion import Array
-from robocasa_lerobot.demos.skills.blender_lid import cover, uncover
+from robocasa_lerobot.demos.skills.blender_cover import cover
+from robocasa_lerobot.demos.skills.blender_lid import uncover
 from robocasa_lerobot.demos.skills.buttons import press_button
 from robocasa_lerobot.demos.skills.common import SkillError
 from robocasa_lerobot.demos.skills.doors import push_lid

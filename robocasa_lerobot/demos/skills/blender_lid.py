@@ -1,15 +1,13 @@
-"""The lid of a blender: held by its knob, lifted off onto the counter, or put on the jug.
+"""The lid of a blender lifted off by its knob, and laid on the counter; `blender_cover` puts it on the jug.
 
-Solved without action noise, seeds 0-9 of the target and of the pretrain split: OpenBlenderLid 10 and 10 of 10, in 10 s;
-CloseBlenderLid on target seeds 0-3 4 of 4, on pretrain seeds 0-12 13 of 13, in 12 s. The jug stands under a wall
-cabinet: where the arm does not get under it without touching it, the hand misses the knob.
+Solved without action noise, seeds 0-9 of the target and of the pretrain split: OpenBlenderLid 10 and 10 of 10, in 10 s.
+The jug stands under a wall cabinet: where the arm does not get under it without touching it, the hand misses the knob.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 
-import mujoco
 import numpy as np
 
 from robocasa_lerobot.demos.motion import (
@@ -55,44 +53,20 @@ def uncover(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
     Raises:
         SkillError: it does not lie there after four attempts.
     """
-    blender = _blender(env, stage)
+    blender = the_blender(env, stage)
     spots = [spot + UP * PLUG_M for spot in _free_spots(env, blender)]
-    yield from _carry(env, blender, spots, lambda: (0.0,))
+    yield from _carry(env, blender, spots)
 
 
-def cover(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
-    """Put the lid on the jug.
-
-    Raises:
-        SkillError: it is not on after four attempts.
-    """
-    blender = _blender(env, stage)
-
-    def turns() -> tuple[float, ...]:
-        # The corners of a square lid fit in four ways; a round one fits in all.
-        if blender.record["jug"] == "round":
-            return (0.0, 0.6, -0.6)
-        turn = env.data.body(blender.lid).xmat.reshape(3, 3)
-        yaw = float(np.arctan2(turn[1, 0], turn[0, 0])) - blender.yaw
-        quarter = -float(np.arctan2(np.sin(4 * yaw), np.cos(4 * yaw))) / 4
-        return (quarter, quarter - float(np.sign(quarter)) * np.pi / 2)
-
-    yield from _carry(env, blender, [blender.lid_pose[0]], turns)
-
-
-def _blender(env: KitchenEnv, stage: Stage) -> Blender:
+def the_blender(env: KitchenEnv, stage: Stage) -> Blender:
+    """The blender that a stage is about."""
     blender = env.scene.fixture(stage.target)
     assert isinstance(blender, Blender)
     return blender
 
 
-def _carry(
-    env: KitchenEnv, blender: Blender, spots: list[Array], turns: Callable[[], tuple[float, ...]]
-) -> Iterator[Array]:
-    """Take the lid to one of the spots of its origin, turned about the plumb line by one of the angles, radians.
-
-    The angles are asked for at each attempt, as the lid lies then.
-    """
+def _carry(env: KitchenEnv, blender: Blender, spots: list[Array]) -> Iterator[Array]:
+    """Take the lid to one of the spots of its origin."""
     data = env.data
     if not spots:
         raise SkillError(f"no room on the counter for the lid of {blender.name}")
@@ -101,10 +75,7 @@ def _carry(
         at = data.body(blender.lid).xpos + UP * HOLD_M
         start = float(data.body(blender.lid).xpos[2])
         ways = [
-            _way(at, spot + UP * (HOLD_M + DROP_M), rotation, turn, env, blender)
-            for spot in spots
-            for rotation in _grasps(env)
-            for turn in turns()
+            _way(at, spot + UP * (HOLD_M + DROP_M), rotation, blender) for spot in spots for rotation in grasps(env)
         ]
         allowed = frozenset({int(env.model.body(blender.lid).id)})
         plans = plan_reach_of_many(env, ways, SHIFTS, allowed=allowed)
@@ -141,25 +112,19 @@ def _held_off(env: KitchenEnv, blender: Blender) -> Array:
     return off
 
 
-def _way(
-    at: Array, put: Array, rotation: Array, turn: float, env: KitchenEnv, blender: Blender
-) -> tuple[HandTarget, ...]:
+def _way(at: Array, put: Array, rotation: Array, blender: Blender) -> tuple[HandTarget, ...]:
     """Over the knob, at it, above the jug's rim with the lid, over where it goes, and there."""
-    quat, matrix = np.empty(4), np.empty(9)
-    mujoco.mju_axisAngle2Quat(quat, UP, turn)
-    mujoco.mju_quat2Mat(matrix, quat)
-    turned = matrix.reshape(3, 3) @ rotation
     height = blender.lid_pose[0][2] + HOLD_M + LIFT_M
     return (
         HandTarget(at - HOVER_M * rotation[:, 2], rotation),
         HandTarget(at, rotation),
         HandTarget(np.array([*at[:2], height]), rotation),
-        HandTarget(np.array([*put[:2], height]), turned),
-        HandTarget(put, turned),
+        HandTarget(np.array([*put[:2], height]), rotation),
+        HandTarget(put, rotation),
     )
 
 
-def _grasps(env: KitchenEnv) -> list[Array]:
+def grasps(env: KitchenEnv) -> list[Array]:
     """Rotations of the hand with a finger at either side of the knob, looking down and forwards."""
     _, yaw = base_pose(env.data)
     out = []
