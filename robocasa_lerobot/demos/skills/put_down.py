@@ -16,7 +16,8 @@ from collections.abc import Callable, Iterator
 import numpy as np
 
 from robocasa_lerobot.demos.motion import UP, Array
-from robocasa_lerobot.demos.skills.pick import ANYHOW, FROM_A_SLOT, FROM_ABOVE
+from robocasa_lerobot.demos.skills.microwaves import go_round_door, taking_out
+from robocasa_lerobot.demos.skills.pick import FROM_A_SLOT, FROM_ABOVE
 from robocasa_lerobot.demos.skills.put import Putting, Spot, move
 from robocasa_lerobot.demos.skills.things import thing
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
@@ -47,12 +48,13 @@ def place_on_reaching_in(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
         SkillError: it is not there after all attempts.
     """
     what = thing(env, stage.object)
+    yield from go_round_door(env)
     how = Putting(
         _on(env, stage),
         goal(env),
         leans=(0.0, np.deg2rad(30.0), np.deg2rad(55.0)),
         entries=("up", "across", "out"),
-        taking=FROM_A_SLOT if what.item is not None and what.item.upright_axis is not None else ANYHOW,
+        taking=FROM_A_SLOT if what.item is not None and what.item.upright_axis is not None else taking_out(env, what),
         in_m=0.25,
     )
     yield from move(env, what, how)

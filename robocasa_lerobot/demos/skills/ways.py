@@ -134,7 +134,7 @@ def approach(
         choice = plan(blocked)
         if choice.stand is None:
             return choice
-        yield from _go_to(env, choice.stand, gripper)
+        yield from go_to(env, choice.stand, gripper)
         base, _ = base_pose(env.data)
         if np.hypot(choice.stand.x - base[0], choice.stand.y - base[1]) < ARRIVED_M:
             return choice
@@ -161,7 +161,7 @@ def lead(env: KitchenEnv, joints: Array, gripper: float) -> Iterator[Array]:
             yield arm_action(env.data, target, gripper)
 
 
-def _go_to(env: KitchenEnv, stand: RobotPose, gripper: float) -> Iterator[Array]:
+def go_to(env: KitchenEnv, stand: RobotPose, gripper: float) -> Iterator[Array]:
     """Drive with the arm folded as at the start, as near as it gets."""
     home, arm = np.array(ARM_HOME_QPOS), Arm(env.model, env.data)
     if np.abs(env.data.qpos[arm.addresses] - home).max() > FOLDED_RAD:

@@ -1,0 +1,137 @@
+"""Reach into a microwave: round its open door, and under its roof to flat food on a plate."""
+
+from __future__ import annotations
+
+import copy
+import itertools
+from collections.abc import Iterator, Sequence
+
+import mujoco
+import numpy as np
+
+from robocasa_lerobot.demos.arm import Arm
+from robocasa_lerobot.demos.motion import OPEN, UP, Array, base_pose, floor_axes
+from robocasa_lerobot.demos.skills.navigation import Room
+from robocasa_lerobot.demos.skills.pick import ANYHOW, Manner
+from robocasa_lerobot.demos.skills.reach import collisions
+from robocasa_lerobot.demos.skills.things import DOWN, Thing, grasps
+from robocasa_lerobot.demos.skills.ways import go_to
+from robocasa_lerobot.envs.kitchen_env import KitchenEnv
+from robocasa_lerobot.envs.scene.appliances.microwave import Microwave
+from robocasa_lerobot.envs.scene.objects.grasping import FINGER_BELOW_GRIP_M, PALM_ABOVE_GRIP_M, GraspPose
+from robocasa_lerobot.envs.scene.robot import ARM_HOME_QPOS, place_base
+from robocasa_lerobot.envs.scene.selection import RobotPose
+
+FINGER_HALF_M = 0.0105  # along the hand's x
+PALM_HALF_M = (0.032, 0.10)  # along the hand's x and y
+GAP_M = 0.003  # between the fingers' lowest corners and what the thing lies on
+INWARDS = 0.5  # least cosine between the hand's heading and the approach's
+
+ASIDES_M = (0.08, 0.02, -0.03, -0.06, -0.09, -0.12, -0.15)  # of a stand to the right of the cavity's middle
+OPEN_SHARE = 0.3
+BACKS_M, MORE_BACK_M = (0.10, 0.20, 0.30, 0.40, 0.50, 0.60), (0.0, 0.05, 0.10, 0.15, 0.20)
+STEP_M = 0.06  # between places that are tested
+
+
+def level_grasps(env: KitchenEnv, what: Thing, approach: Array) -> list[GraspPose]:
+    """Grasps from above, tipped over the line between the fingers until the hand looks along an approach's slope.
+
+    The fingers stay level and close on the same sides of the thing; the hand is as high as its lower corners ask for.
+    Grasps that keep the approach as it is come after them.
+    """
+    ahead = approach - (approach @ UP) * UP
+    steepness = float(-approach @ UP)
+    flat = float(np.linalg.norm(ahead))
+    body = env.data.body(what.name)
+    turn = body.xmat.reshape(3, 3)
+    lowest = float(body.xpos[2]) - what.below(turn) + FINGER_BELOW_GRIP_M * steepness + FINGER_HALF_M * flat + GAP_M
+    points = body.xpos + np.concatenate([_filled(solid.cloud()) for solid in what.solids]) @ turn.T
+    found = []
+    for pose in grasps(env, what, DOWN):
+        opening = pose.rotation[:, 1]
+        heading = np.cross(UP, opening)
+        heading *= np.sign(heading @ ahead)
+        if float(heading @ ahead) < INWARDS * flat:
+            continue
+        z = flat * heading - steepness * UP
+        position = pose.position.copy()
+        position[2] = max(position[2], lowest)
+        rotation = np.column_stack([np.cross(opening, z), opening, z])
+        x, y, deep = ((points - position) @ rotation).T
+        if np.any((np.abs(x) < PALM_HALF_M[0]) & (np.abs(y) < PALM_HALF_M[1]) & (deep < -PALM_ABOVE_GRIP_M)):
+            continue
+        found.append(GraspPose(position, rotation, pose.width, pose.score))
+    return found + grasps(env, what, approach)
+
+
+def _filled(cloud: Array) -> Array:
+    """Points on the lines between the points of a convex piece."""
+    first, second = np.triu_indices(len(cloud))
+    shares = np.array([0.0, 0.25, 0.5, 0.75])[:, None, None]
+    filled: Array = ((1 - shares) * cloud[first] + shares * cloud[second]).reshape(-1, 3)
+    return filled
+
+
+OUT_OF_A_MICROWAVE = Manner(
+    tuple(
+        (float(np.deg2rad(tilt)), extra) for tilt, extra in ((60, 0.0), (72, 0.05), (48, 0.05), (35, 0.1), (86, 0.2))
+    ),
+    ("across", "out"),
+    poses=level_grasps,
+)
+
+
+def taking_out(env: KitchenEnv, what: Thing) -> Manner:
+    """How a thing is taken that may be in a microwave."""
+    oven = microwave_of(env)
+    inside = oven is not None and oven.regions["interior"].contains(env.data, env.data.body(what.name).xpos)
+    return OUT_OF_A_MICROWAVE if inside else ANYHOW
+
+
+def microwave_of(env: KitchenEnv) -> Microwave | None:
+    """The microwave among the fixtures of the task's roles, if there is one."""
+    found = (env.scene.fixture(role) for role in env.scene.roles)
+    return next((fixture for fixture in found if isinstance(fixture, Microwave)), None)
+
+
+def go_round_door(env: KitchenEnv, gripper: float = OPEN) -> Iterator[Array]:
+    """Where the open door stands between the robot and the cavity: drive back, past it, and up to the cavity."""
+    oven = microwave_of(env)
+    if oven is None or oven.share(env.data, "door") < OPEN_SHARE:
+        return
+    base, yaw = base_pose(env.data)
+    left = floor_axes(yaw)[1]
+    cavity = oven.regions["interior"]
+    beside = float((base - cavity.world(env.data)) @ left)
+    if beside < cavity.half[0]:
+        return
+    for place in _way_round(env, base, yaw, beside):
+        yield from go_to(env, place, gripper)
+
+
+def _way_round(env: KitchenEnv, base: Array, yaw: float, beside: float) -> Sequence[RobotPose]:
+    """Places of the shortest way on which the folded robot meets nothing; none where there is no such way."""
+    ahead, left = floor_axes(yaw)
+    room = Room(env.scene)
+    data = copy.copy(env.data)
+    data.qpos[Arm(env.model, env.data).addresses] = ARM_HOME_QPOS
+
+    def at(back: float, right: float) -> RobotPose:
+        x, y, _ = (base - back * ahead - right * left).tolist()
+        return RobotPose(x, y, yaw)
+
+    def clear(one: RobotPose, other: RobotPose) -> bool:
+        count = max(int(np.ceil(np.hypot(other.x - one.x, other.y - one.y) / STEP_M)), 1)
+        for share in np.arange(1, count + 1) / count:
+            x, y = one.x + share * (other.x - one.x), one.y + share * (other.y - one.y)
+            place_base(env.model, data, x, y, yaw)
+            mujoco.mj_kinematics(env.model, data)
+            if not room.free(RobotPose(x, y, yaw)) or collisions(env.model, data, frozenset()):
+                return False
+        return True
+
+    for more, aside, back in itertools.product(MORE_BACK_M, ASIDES_M, BACKS_M):
+        places = [at(0.0, 0.0), at(back, 0.0), at(back, beside + aside), at(more, beside + aside)]
+        if back > more and all(clear(one, other) for one, other in itertools.pairwise(places)):
+            return places[1:]
+    return ()
