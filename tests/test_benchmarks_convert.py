@@ -147,7 +147,9 @@ def test_lerobots_own_path_records_the_same_demos(tmp_path: Path) -> None:
 @pytest.mark.render
 def test_the_renderer_alone_draws_what_our_converter_draws(tmp_path: Path) -> None:
     work = module("convert_work")
-    render, settings = (module(f"robocasa_lerobot.convert.{name}") for name in ("render", "settings"))
+    render, scenes, settings = (
+        module(f"robocasa_lerobot.convert.{name}") for name in ("render", "scenes.compiled", "settings")
+    )
     file = write_demos(tmp_path / "a.hdf5", (3,))
     answer = work.render(str(file), ["demo_0"], at=0.0)
     assert answer["frames"] == 3
@@ -163,7 +165,8 @@ def test_the_renderer_alone_draws_what_our_converter_draws(tmp_path: Path) -> No
             return None if stored is None else stored[()].tobytes()
 
         finder = work.AssetFinder([], embedded)
-        with render.Scene(*work.loadable(group.attrs["model_file"], finder)) as ours:
+        text = work.loadable(group.attrs["model_file"], finder)
+        with render.Scene(scenes.CompiledScene.of(*text)) as ours:
             ours.set_state(group["states"][2])
             for camera, picture in mine.items():
                 assert picture.std() > 5

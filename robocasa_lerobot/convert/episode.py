@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack
-from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Self
 
@@ -14,7 +13,8 @@ from numpy.typing import NDArray
 from robocasa_lerobot.convert.mapping.instruction import instruction_of
 from robocasa_lerobot.convert.reading.demo import RejectedEpisodeError
 from robocasa_lerobot.convert.reading.demo_file import DemoFile
-from robocasa_lerobot.convert.reading.mjcf import AssetFinder, loadable
+from robocasa_lerobot.convert.scenes.ahead import ScenesAhead
+from robocasa_lerobot.convert.scenes.demo_scene import DemoScene
 from robocasa_lerobot.convert.settings import Camera, Plan, needs_scene
 from robocasa_lerobot.errors import UserError
 
@@ -25,6 +25,8 @@ if TYPE_CHECKING:
 class Episode:
     """A demo seen through a plan; use it in a `with` block (it may hold a compiled scene).
 
+    Its scene is taken from `ahead`, if that has it.
+
     Attributes: `actions` (T, A) and `states` (T, S) float64 in stored order, `extras` (feature name -> (T, k) float64),
     `instruction`, `provenance` (MimicGen's), `state_source`, and `simulator_states` (T, 1 + nq + nv) or None.
 
@@ -33,7 +35,7 @@ class Episode:
         MissingAssetsError: meshes or textures of its scene were not found.
     """
 
-    def __init__(self, file: DemoFile, name: str, plan: Plan) -> None:
+    def __init__(self, file: DemoFile, name: str, plan: Plan, ahead: ScenesAhead | None = None) -> None:
         self.demo = file.demo(name)
         self.actions = plan.mapping.actions(self.demo)
         settings = plan.settings
@@ -54,8 +56,7 @@ class Episode:
                 self.demo.image_shape(camera)
         recorded = plan.mapping.recorded_states(self.demo)
         if needs_scene(self.demo, plan.mapping, names):
-            roots = [Path(root) for root in plan.settings.asset_roots]
-            self._scene = self._stack.enter_context(self._load(AssetFinder(roots, file.asset), plan))
+            self._scene = self._stack.enter_context(self._load(file, plan, ahead))
         self.state_source = "observations" if recorded is not None else "computed from simulator states"
         try:
             self.states = recorded if recorded is not None else self._computed_states(plan)
@@ -75,6 +76,11 @@ class Episode:
     def length(self) -> int:
         """Number of steps."""
         return self.demo.length
+
+    @property
+    def has_scene(self) -> bool:
+        """Whether its scene is needed, and is there."""
+        return self._scene is not None
 
     @property
     def rendered_cameras(self) -> tuple[str, ...]:
@@ -103,13 +109,19 @@ class Episode:
             pictures |= self._scene.pictures(rendered)
         return {camera.name: pictures[camera.name] for camera in cameras}
 
-    def _load(self, finder: AssetFinder, plan: Plan) -> Scene:
-        from robocasa_lerobot.convert.render import Scene  # MuJoCo is not needed where the file has everything
+    def _load(self, file: DemoFile, plan: Plan, ahead: ScenesAhead | None) -> Scene:
+        # MuJoCo is not needed where the file has everything.
+        from robocasa_lerobot.convert.render import Scene
+        from robocasa_lerobot.convert.scenes.compiled import CompiledScene
 
         if self.demo.model_xml is None or self.simulator_states is None:
             lacking = "model_file" if self.demo.model_xml is None else "states"
             raise RejectedEpisodeError(f"it has no {lacking}, so nothing can be rendered.")
-        scene = Scene(*loadable(self.demo.model_xml, finder), preset=plan.settings.render_preset)
+        source = DemoScene.of(plan, file.path, self.demo.name)
+        compiled = ahead.take(source) if ahead is not None else None
+        if compiled is None:
+            compiled = CompiledScene.of(*source.read(file, self.demo), preset=plan.settings.render_preset)
+        scene = Scene(compiled)
         missing = [name for name in self.rendered_cameras if name not in scene.camera_names]
         if missing:
             scene.close()

@@ -38,7 +38,8 @@ from robocasa_lerobot.convert.running.work import (
     run_pieces,
     submit_pieces,
 )
-from robocasa_lerobot.convert.settings import ConversionSettings, Plan, SourceRecord, make_plan
+from robocasa_lerobot.convert.scenes.ahead import scenes_ahead
+from robocasa_lerobot.convert.settings import ConversionSettings, Plan, Shard, SourceRecord, make_plan
 from robocasa_lerobot.convert.shard import (
     DATASET,
     EPISODES_FILE,
@@ -99,7 +100,7 @@ def convert(
     Raises:
         UserError: the input or the output path cannot be used, or no episode is good. Nothing is at `out` then.
     """
-    with contextlib.closing(shared_encoder):
+    with contextlib.closing(shared_encoder), contextlib.closing(scenes_ahead):
         if workers == 1:
             shared_encoder.started()  # takes a moment, meanwhile the files are looked into
         return _convert(files, out, settings, workers, overwrite, execution or Execution())
@@ -118,12 +119,13 @@ def _convert(
         shutil.rmtree(partial)  # an earlier run was killed after its dataset had appeared, while clearing away
         return _recorded_result(plan, out)
     with locked(partial), failures_explained(out, partial):
+        num_workers = _num_workers(plan, workers)
         run_pieces(
-            _ShardTask(plan, str(partial)),
+            _ShardTask(plan, str(partial), in_order=num_workers == 1 and execution.kind == "local"),
             len(plan.shards),
             partial,
             execution,
-            _num_workers(plan, workers),
+            num_workers,
             plan.num_frames,
             "converting",
             quiet_libraries,
@@ -239,6 +241,7 @@ class _ShardTask:
 
     plan: Plan
     partial: str
+    in_order: bool = False  # one process makes all shards, one after the other
 
     def __call__(self, data: None, rank: int = 0, world_size: int = 1) -> None:
         partial = Path(self.partial)
@@ -253,9 +256,15 @@ class _ShardTask:
             if isinstance(self.plan, V2Plan):
                 convert_v2_shard(self.plan, shard, folder, report)
             else:
-                convert_shard(self.plan, shard, folder, report)
+                convert_shard(self.plan, shard, folder, report, self._next(rank))
 
         make_piece(shard_folder(partial, rank), write)
+
+    def _next(self, rank: int) -> Shard | None:
+        """The shard that this process will make next, if that is known."""
+        later = range(rank + 1, len(self.plan.shards)) if self.in_order else ()
+        coming = (r for r in later if not shard_folder(Path(self.partial), r).exists())
+        return next((self.plan.shards[r] for r in coming), None)
 
 
 def quiet_libraries() -> None:

@@ -1,12 +1,12 @@
 """Scenes of demonstrations replayed state by state: poses for proprioception, pictures for the cameras.
 
-The only module of the converter that imports MuJoCo. A process has at most one open scene at a time, and makes its
-OpenGL context when the first picture is asked for.
+Beside `scenes/compiled.py` the only module of the converter that imports MuJoCo. A process has at most one open scene
+at a time, and makes its OpenGL context when the first picture is asked for.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from types import TracebackType
 from typing import Self
 
@@ -15,41 +15,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robocasa_lerobot.convert.reading.demo_file import RejectedEpisodeError
+from robocasa_lerobot.convert.scenes.compiled import CompiledScene
 from robocasa_lerobot.convert.settings import Camera
 from robocasa_lerobot.rendering import SceneRenderer
 
-PRESETS = ("fast", "quality")
-_QUALITY_SAMPLES = 4  # multisampling of the `quality` preset
-
 
 class Scene:
-    """A compiled MJCF whose state is set from recordings; use it in a `with` block.
+    """A compiled scene whose state is set from recordings; use it in a `with` block."""
 
-    Args:
-        xml: MJCF whose files are in `assets`.
-        assets: file name -> bytes.
-        preset: `fast` (no shadows, reflections or multisampling) or `quality`.
-
-    Raises:
-        RejectedEpisodeError: MuJoCo does not load the MJCF.
-    """
-
-    def __init__(self, xml: str, assets: Mapping[str, bytes], preset: str = "fast") -> None:
-        assert preset in PRESETS, preset
-        try:
-            self._model = mujoco.MjModel.from_xml_string(xml, dict(assets))
-        except (ValueError, RuntimeError, mujoco.FatalError) as error:
-            reason = " ".join(str(error).split())
-            raise RejectedEpisodeError(
-                f"its model_file does not load in MuJoCo {mujoco.__version__}: {reason}"
-            ) from None
+    def __init__(self, compiled: CompiledScene) -> None:
+        self._model, self._alike = compiled.model, compiled.alike
         self._data = mujoco.MjData(self._model)
-        self._fast = preset == "fast"
+        self._shadows = compiled.preset != "fast"
         self._renderers: dict[tuple[int, int], SceneRenderer] = {}
-        self._model.vis.quality.offsamples = 0 if self._fast else _QUALITY_SAMPLES
-        if self._fast:
-            self._model.light_castshadow[:] = 0
-            self._model.mat_reflectance[:] = 0
 
     def __enter__(self) -> Self:
         return self
@@ -113,6 +91,7 @@ class Scene:
         for size in dict.fromkeys((camera.height, camera.width) for camera in cameras):
             names = [camera.name for camera in cameras if (camera.height, camera.width) == size]
             if size not in self._renderers:
-                self._renderers[size] = SceneRenderer(self._model, *size, shadows=not self._fast)
+                renderer = SceneRenderer(self._model, *size, shadows=self._shadows, alike=self._alike)
+                self._renderers[size] = renderer
             found.update(zip(names, self._renderers[size].pictures(self._data, names), strict=True))
         return found

@@ -7,6 +7,7 @@ import shutil
 import time
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
+from itertools import pairwise
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -17,6 +18,8 @@ from robocasa_lerobot import contract
 from robocasa_lerobot.convert.episode import Episode
 from robocasa_lerobot.convert.reading.demo_file import DemoFile, RejectedEpisodeError
 from robocasa_lerobot.convert.reading.mjcf import MissingAssetsError
+from robocasa_lerobot.convert.scenes.ahead import scenes_ahead
+from robocasa_lerobot.convert.scenes.demo_scene import DemoScene
 from robocasa_lerobot.convert.settings import Plan, Shard
 from robocasa_lerobot.convert.writing.dataset import DatasetWriter
 from robocasa_lerobot.convert.writing.encoding_process import EncodingProcess, shared_encoder
@@ -43,11 +46,13 @@ class RejectedEpisode:
     reason: str
 
 
-def convert_shard(plan: Plan, shard: Shard, folder: Path, progress: Callable[[int], None]) -> ShardOutcome:
+def convert_shard(
+    plan: Plan, shard: Shard, folder: Path, progress: Callable[[int], None], then: Shard | None = None
+) -> ShardOutcome:
     """Write the episodes of a shard into `folder`, which is emptied first (an earlier try may have been killed).
 
     `progress` is called with the number of frames done, now and then. Without a single good episode no dataset is
-    written, only `rejected.jsonl`.
+    written, only `rejected.jsonl`. While the last episode is written, the first scene of the shard `then` is compiled.
 
     Raises:
         UserError: something that concerns more than one episode, such as missing meshes.
@@ -59,11 +64,17 @@ def convert_shard(plan: Plan, shard: Shard, folder: Path, progress: Callable[[in
     with shared_encoder.borrowed() as encoder, DemoFile(Path(shard.file), plan.settings.layout) as file:
         writer = _ShardWriter(plan, folder, encoder)
         known = dict(shard.rejected)
+        scenes = [*_scenes(plan, shard), *(_scenes(plan, then)[:1] if then is not None else ())]
+        following = dict(pairwise(scenes))
         for name in shard.demos:
             try:
                 if name in known:
                     raise RejectedEpisodeError(known[name])
-                with Episode(file, name, plan) as episode:
+                with Episode(file, name, plan, scenes_ahead) as episode:
+                    coming = following.get(DemoScene.of(plan, file.path, name))
+                    if coming is not None and episode.has_scene:  # what one needs its neighbour will need
+                        pictures = bool(episode.rendered_cameras)
+                        scenes_ahead.request(coming, plan.settings.render_preset, pictures=pictures)
                     writer.write(episode, file, report)
             except (RejectedEpisodeError, MissingAssetsError) as error:
                 rejected.append(RejectedEpisode(shard.file, name, str(error)))
@@ -71,6 +82,12 @@ def convert_shard(plan: Plan, shard: Shard, folder: Path, progress: Callable[[in
     write_jsonl(folder / EPISODES_FILE, writer.episodes)
     write_jsonl(folder / REJECTED_FILE, [asdict(line) for line in rejected])
     return ShardOutcome(len(writer.episodes), len(rejected))
+
+
+def _scenes(plan: Plan, shard: Shard) -> list[DemoScene]:
+    """The scenes of the demos that will be opened."""
+    known = dict(shard.rejected)
+    return [DemoScene.of(plan, Path(shard.file), name) for name in shard.demos if name not in known]
 
 
 class _ShardWriter:

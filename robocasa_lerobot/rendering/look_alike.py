@@ -19,6 +19,7 @@ from robocasa_lerobot.rendering.tessellation import Surface, boxes, capsule, cyl
 
 Array = NDArray[np.float64]
 
+VISIBLE_GROUPS = (1, 2)  # of MuJoCo's default options, less the collision shapes
 VISIBLE_GROUP = 1  # of all geoms of a look-alike
 # Edge of the squares of floor over which things that never move are merged: culling still tells them apart.
 CELL_M = 2.0
@@ -55,12 +56,13 @@ class LookAlike:
 
     source: mujoco.MjModel
     model: mujoco.MjModel
-    data: mujoco.MjData
     bodies: NDArray[np.intp]
     geoms: NDArray[np.intp]
     loose: frozenset[int]
 
     def __post_init__(self) -> None:
+        self.data = mujoco.MjData(self.model)
+        mujoco.mj_forward(self.model, self.data)
         self._rotations = _matrices(self.model.geom_quat)
         self._colours = self.source.geom_rgba.copy()
         self._kinds = _kinds(self.source)
@@ -117,11 +119,9 @@ def look_alike(model: mujoco.MjModel, groups: tuple[int, ...], loose: frozenset[
         spec.worldbody.add_light(name=f"light{light}")
     made = spec.compile()
     _copy_looks(model, made)
-    data = mujoco.MjData(made)
-    mujoco.mj_forward(made, data)
     first = np.array([geoms[0] for geoms in parts], dtype=np.intp)
     bodies = np.where(poses.fixed[first], 0, model.geom_bodyid[first]).astype(np.intp)
-    return LookAlike(model, made, data, bodies, first, loose)
+    return LookAlike(model, made, bodies, first, loose)
 
 
 @dataclass(frozen=True)

@@ -10,9 +10,7 @@ from numpy.typing import NDArray
 
 from robocasa_lerobot.errors import UnknownNameError
 from robocasa_lerobot.rendering.canvas import Canvas
-from robocasa_lerobot.rendering.look_alike import LookAlike, look_alike
-
-_VISIBLE_GROUPS = (1, 2)  # of MuJoCo's default options, less the collision shapes
+from robocasa_lerobot.rendering.look_alike import VISIBLE_GROUPS, LookAlike, look_alike
 
 
 class SceneRenderer:
@@ -27,20 +25,23 @@ class SceneRenderer:
         height: of the pictures, pixels.
         width: of the pictures, pixels.
         shadows: shadows and reflections (render preset `quality`).
+        alike: the model's look-alike, if it has been made already.
 
     Raises:
         NoOpenGLError: nothing on this machine can render.
         ForkedContextError: this process was forked from one that had rendered.
     """
 
-    def __init__(self, model: mujoco.MjModel, height: int, width: int, *, shadows: bool = False) -> None:
+    def __init__(
+        self, model: mujoco.MjModel, height: int, width: int, *, shadows: bool = False, alike: LookAlike | None = None
+    ) -> None:
         self._model = model
         self._size = (height, width)
         self._shadows = shadows
         self._cameras = {model.camera(i).name: i for i in range(model.ncam)}
         self._exact: Canvas | None = None
         self._merged: Canvas | None = None
-        self._alike = None if shadows else look_alike(model, _VISIBLE_GROUPS)
+        self._alike = None if shadows else alike or look_alike(model, VISIBLE_GROUPS)
         if self._alike is None:
             self._open_exact()  # so that a machine without OpenGL fails here
         else:
@@ -121,6 +122,6 @@ class SceneRenderer:
         if self._alike is not None and (changed := self._alike.changed()):
             assert self._merged is not None
             self._merged.close()
-            self._alike = look_alike(self._model, _VISIBLE_GROUPS, self._alike.loose | changed)
+            self._alike = look_alike(self._model, VISIBLE_GROUPS, self._alike.loose | changed)
             self._merged = None if self._alike is None else Canvas(self._alike.model, *self._size)
         return self._alike

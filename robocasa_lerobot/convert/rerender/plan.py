@@ -14,7 +14,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +24,7 @@ from robocasa_lerobot.convert.reading.demo_file import RejectedEpisodeError
 from robocasa_lerobot.convert.reading.lerobot_v3 import ExportedDataset, ExportedEpisode
 from robocasa_lerobot.convert.reading.mjcf import AssetFinder, loadable, scene_names
 from robocasa_lerobot.convert.rerender.camera_configs import check_camera_configs, with_cameras
+from robocasa_lerobot.convert.scenes.ahead import ScenesAhead
 from robocasa_lerobot.convert.settings import SHARD_FRAMES, Camera, shard_frames
 from robocasa_lerobot.convert.shard import EXTRAS, kept_assets
 from robocasa_lerobot.convert.writing.encoder import CODECS
@@ -112,7 +113,7 @@ def make_render_plan(source: Path, settings: RenderSettings) -> RenderPlan:
     cameras = _cameras(dataset, settings)
     plan = RenderPlan(settings, source, _stamp(source), cameras, (), 0)
     try:
-        xml, _ = _scene_text(plan, dataset.episodes[0])
+        xml, _ = ExportedScene.of(plan, dataset.episodes[0])()
     except RejectedEpisodeError as error:
         raise UserError(f"episode {dataset.episodes[0].index} of {source} cannot be rendered: {error}") from None
     known = scene_names(xml).cameras
@@ -124,20 +125,58 @@ def make_render_plan(source: Path, settings: RenderSettings) -> RenderPlan:
     return RenderPlan(settings, source, plan.stamp, cameras, pieces, num_frames)
 
 
+@dataclass(frozen=True)
+class ExportedScene:
+    """Where the scene of an episode is found; calling it gives the loadable MJCF and its files, as `loadable` does."""
+
+    file: Path
+    cam_configs: str
+    asset_roots: tuple[Path, ...]
+
+    @classmethod
+    def of(cls, plan: RenderPlan, episode: ExportedEpisode) -> Self:
+        """Of an episode of the dataset that is rendered again."""
+        file = plan.dataset.extras(episode) / "model.xml.gz"
+        return cls(file, plan.settings.cam_configs, tuple(_asset_roots(plan, episode)))
+
+    def __call__(self) -> tuple[str, dict[str, bytes]]:
+        """Read the MJCF, put its cameras in place, and find its files.
+
+        Raises:
+            RejectedEpisodeError: it cannot be read, or as `loadable`.
+            MissingAssetsError: as `loadable`.
+        """
+        try:
+            with gzip.open(self.file) as stream:
+                content = stream.read(_MAX_MODEL_BYTES + 1)
+            if len(content) > _MAX_MODEL_BYTES:
+                raise RejectedEpisodeError(f"its {self.file.name} unpacks to more than {_MAX_MODEL_BYTES} bytes.")
+            xml = content.decode("utf-8")
+        except (OSError, EOFError, UnicodeDecodeError) as error:
+            raise RejectedEpisodeError(f"its {self.file.name} cannot be read ({error}).") from None
+        xml = with_cameras(xml, json.loads(self.cam_configs))
+        return loadable(xml, AssetFinder(self.asset_roots))
+
+
 class EpisodePictures:
     """The pictures of one episode, rendered step by step; use it in a `with` block.
+
+    Its scene is taken from `ahead`, if that has it.
 
     Raises:
         RejectedEpisodeError: its model or states cannot be used.
         MissingAssetsError: meshes or textures were not found.
     """
 
-    def __init__(self, plan: RenderPlan, episode: ExportedEpisode) -> None:
+    def __init__(self, plan: RenderPlan, episode: ExportedEpisode, ahead: ScenesAhead | None = None) -> None:
         from robocasa_lerobot.convert.render import Scene
+        from robocasa_lerobot.convert.scenes.compiled import CompiledScene
 
         self._cameras = plan.cameras
         self.states = _states(plan.dataset.extras(episode) / "states.npz", episode.length)
-        self._scene = Scene(*_scene_text(plan, episode), preset=plan.settings.render_preset)
+        source = ExportedScene.of(plan, episode)
+        compiled = ahead.take(source) if ahead is not None else None
+        self._scene = Scene(compiled or CompiledScene.of(*source(), preset=plan.settings.render_preset))
 
     def __enter__(self) -> EpisodePictures:
         return self
@@ -154,21 +193,6 @@ class EpisodePictures:
         self._scene.set_state(self.states[step])
         pictures = self._scene.pictures(self._cameras)
         return {contract.image_key(camera.name): pictures[camera.name] for camera in self._cameras}
-
-
-def _scene_text(plan: RenderPlan, episode: ExportedEpisode) -> tuple[str, dict[str, bytes]]:
-    """The MJCF of an episode with its cameras in place, and its files."""
-    file = plan.dataset.extras(episode) / "model.xml.gz"
-    try:
-        with gzip.open(file) as stream:
-            content = stream.read(_MAX_MODEL_BYTES + 1)
-        if len(content) > _MAX_MODEL_BYTES:
-            raise RejectedEpisodeError(f"its {file.name} unpacks to more than {_MAX_MODEL_BYTES} bytes.")
-        xml = content.decode("utf-8")
-    except (OSError, EOFError, UnicodeDecodeError) as error:
-        raise RejectedEpisodeError(f"its {file.name} cannot be read ({error}).") from None
-    xml = with_cameras(xml, json.loads(plan.settings.cam_configs))
-    return loadable(xml, AssetFinder(_asset_roots(plan, episode)))
 
 
 def _asset_roots(plan: RenderPlan, episode: ExportedEpisode) -> list[Path]:

@@ -25,6 +25,7 @@ from robocasa_lerobot.convert.reading.lerobot_v3 import ExportedEpisode
 from robocasa_lerobot.convert.rerender.plan import (
     SOURCE_FORMAT,
     EpisodePictures,
+    ExportedScene,
     RenderPlan,
     RenderSettings,
     make_render_plan,
@@ -41,6 +42,7 @@ from robocasa_lerobot.convert.running.work import (
     run_pieces,
     submit_pieces,
 )
+from robocasa_lerobot.convert.scenes.ahead import scenes_ahead
 from robocasa_lerobot.convert.writing.encoder import (
     CODECS,
     Histogram,
@@ -105,7 +107,12 @@ def render_dataset(
         most = min(os.cpu_count() or 1, _MAX_AUTOMATIC_WORKERS)
         workers = min(most, plan.num_frames // _MIN_FRAMES_PER_WORKER)
     workers = max(1, min(workers, len(plan.pieces)))
-    with locked(partial), failures_explained(out, partial), contextlib.closing(shared_encoder):
+    with (
+        locked(partial),
+        failures_explained(out, partial),
+        contextlib.closing(shared_encoder),
+        contextlib.closing(scenes_ahead),
+    ):
         run_pieces(
             step, len(plan.pieces), partial, execution, workers, plan.num_frames, "rendering", quiet_libraries, __name__
         )
@@ -126,23 +133,37 @@ class _Piece:
 
         def draw(folder: Path) -> None:
             done = 0
-            for number in self.plan.pieces[rank]:
+            numbers = self.plan.pieces[rank]
+            for number, then in zip(numbers, (*numbers[1:], None), strict=True):
+                coming = None if then is None else ExportedScene.of(self.plan, episodes[then])
                 done = _render_episode(
-                    self.plan, episodes[number], folder, done, lambda frames: report_frames(partial, rank, frames)
+                    self.plan,
+                    episodes[number],
+                    coming,
+                    folder,
+                    done,
+                    lambda frames: report_frames(partial, rank, frames),
                 )
 
         make_piece(_piece_folder(partial, rank), draw)
 
 
 def _render_episode(
-    plan: RenderPlan, episode: ExportedEpisode, folder: Path, done: int, report: Callable[[int], None]
+    plan: RenderPlan,
+    episode: ExportedEpisode,
+    coming: ExportedScene | None,
+    folder: Path,
+    done: int,
+    report: Callable[[int], None],
 ) -> int:
     settings = VideoSettings.of_codec(plan.settings.video_codec, plan.dataset.fps)
     place = _episode_folder(folder, episode.index)
     place.mkdir()
     keys = [contract.image_key(camera.name) for camera in plan.cameras]
     try:
-        with shared_encoder.borrowed() as encoder, EpisodePictures(plan, episode) as pictures:
+        with shared_encoder.borrowed() as encoder, EpisodePictures(plan, episode, scenes_ahead) as pictures:
+            if coming is not None:
+                scenes_ahead.request(coming, plan.settings.render_preset, pictures=True)
             encoder.start_episode(settings, keys, place, episode.length, yielding=True)
             for step in pictures:
                 for key, picture in step.items():

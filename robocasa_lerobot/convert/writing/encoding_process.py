@@ -13,7 +13,6 @@ import pickle
 import queue
 import signal
 import subprocess
-import sys
 import threading
 from collections import deque
 from collections.abc import Iterator, Sequence
@@ -24,6 +23,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from robocasa_lerobot.convert.python_process import start_serving
 from robocasa_lerobot.convert.writing.encoder import (
     EncodedVideo,
     EncodingError,
@@ -34,10 +34,6 @@ from robocasa_lerobot.convert.writing.encoder import (
 )
 from robocasa_lerobot.convert.writing.frame_ring import FrameReceiver, FrameSender
 
-# Not `-m`: the module would be there twice, and so would the classes of its messages.
-_PROGRAM = (
-    "import sys; from robocasa_lerobot.convert.writing.encoding_process import serve; serve(*map(int, sys.argv[1:]))"
-)
 # Beside a renderer the encoder takes what that leaves: on two cores it would otherwise hold up the renderer's own
 # threads, which makes the conversion of states 6 to 15 % slower.
 _NICE = 19
@@ -89,13 +85,7 @@ class EncodingProcess:
         with contextlib.suppress(OSError):  # files may not grow (`ulimit -f`): through the pipe then
             self._frames = FrameSender()
         passed = (down_read, up_write, *(self._frames.descriptors if self._frames else ()))
-        places = [str(Path(__file__).parents[3]), *filter(None, [os.environ.get("PYTHONPATH")])]
-        self._process = subprocess.Popen(
-            [sys.executable, "-c", _PROGRAM, *map(str, passed)],
-            pass_fds=passed,
-            stdin=subprocess.DEVNULL,
-            env={**os.environ, "PYTHONPATH": os.pathsep.join(places)},
-        )
+        self._process = start_serving(__name__, passed)
         os.close(down_read)
         os.close(up_write)
         if self._frames:

@@ -10,12 +10,13 @@ import contextlib
 import mmap
 import os
 import select
-import tempfile
 from collections import deque
 from collections.abc import Iterator
 
 import numpy as np
 from numpy.typing import NDArray
+
+from robocasa_lerobot.convert.anonymous_file import anonymous_file
 
 # The largest picture that goes through; memory is taken only where pictures have been.
 _MAX_BYTES = 1 << 30
@@ -32,7 +33,7 @@ class FrameSender:
 
     def __init__(self, ahead_bytes: int = AHEAD_BYTES) -> None:
         self._ahead = ahead_bytes
-        self._file = _anonymous_file()
+        self._file = anonymous_file("pictures")
         try:
             os.ftruncate(self._file, _MAX_BYTES)
         except OSError:
@@ -121,11 +122,3 @@ class FrameReceiver:
         """The picture at a place, to be read within the block; afterwards its place is given back."""
         yield np.frombuffer(self._memory, np.uint8, int(np.prod(shape)), start).reshape(shape)
         os.write(self._taken, b"\0")
-
-
-def _anonymous_file() -> int:
-    """File descriptor of a file without a name, in memory where the system has such files."""
-    if hasattr(os, "memfd_create"):
-        return os.memfd_create("pictures")
-    with tempfile.TemporaryFile() as file:
-        return os.dup(file.fileno())
