@@ -156,6 +156,17 @@ def test_a_kill(everything: bool, source: Path, expected: dict[str, str], tmp_pa
 
 
 @pytest.mark.slow
+@pytest.mark.render
+@pytest.mark.timeout(SECONDS * 4)
+def test_a_kill_while_pictures_are_rendered(tmp_path: Path) -> None:
+    """Then a process that compiles scenes is there, too."""
+    states = write_demos(tmp_path / "states.hdf5", [20] * EPISODES)
+    convert([states], tmp_path / "uninterrupted", ConversionSettings(), workers=1)
+    expected = _content(tmp_path / "uninterrupted")
+    assert _kill_and_repeat(states, tmp_path / "out", expected, Moment(30, 0.1), everything=False)
+
+
+@pytest.mark.slow
 @pytest.mark.timeout(SECONDS * 40)
 def test_twenty_kills(source: Path, expected: dict[str, str], tmp_path: Path) -> None:
     running = 0

@@ -11,6 +11,7 @@ from __future__ import annotations
 import contextlib
 import os
 import pickle
+import select
 import signal
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
 
 # Where a scene comes from: gives the loadable MJCF and its files. It can be pickled, and compared by value.
 SceneSource = Callable[[], tuple[str, dict[str, bytes]]]
+_STARTED = "started"  # the first thing that the other process says
 # The other process draws nothing: MuJoCo need not load a driver.
 _WITHOUT_OPENGL = {"MUJOCO_GL": "disabled"}
 
@@ -32,12 +34,15 @@ class ScenesAhead:
 
     def __init__(self) -> None:
         self._compiler: _Compiler | None = None
-        self._wanted: SceneSource | None = None  # whose answer has not been read
+        self._wanted: SceneSource | None = None  # has been asked for and not been taken
         self._given_up = False
         self._owner = os.getpid()
 
     def request(self, source: SceneSource, preset: str, *, pictures: bool) -> None:
-        """Have a scene compiled, in place of an earlier one that nobody took; with its look-alike for `pictures`."""
+        """Have a scene compiled, in place of an earlier one that nobody took; with its look-alike for `pictures`.
+
+        Nothing is asked for while the process is still starting with an earlier request.
+        """
         self._check_owner()
         if self._given_up:
             return
@@ -45,22 +50,29 @@ class ScenesAhead:
             if self._compiler is None:
                 self._compiler = _Compiler()
             if self._wanted is not None:
+                if not self._compiler.has_started():
+                    return
                 self._compiler.answer()
-            self._compiler.ask((source, preset, pictures))
             self._wanted = source
+            self._compiler.ask((source, preset, pictures))
         except (OSError, EOFError, pickle.UnpicklingError):
             self._give_up()
 
     def take(self, source: SceneSource) -> CompiledScene | None:
-        """The scene that was requested last, waiting for it; None if it is another one, or could not be made."""
+        """The scene that was requested last; None if it is another one, or could not be made.
+
+        Waits for it, but not for the process to start: that takes longer than to make the scene.
+        """
         self._check_owner()
         if self._wanted is None or self._wanted != source:
             return None
         from robocasa_lerobot.convert.scenes.compiled import kept
 
-        self._wanted = None
         assert self._compiler is not None
         try:
+            if not self._compiler.has_started():
+                return None
+            self._wanted = None
             answer = self._compiler.answer()
             return None if answer is None else kept(answer, self._compiler.files)
         except (OSError, EOFError, ValueError, pickle.UnpicklingError):
@@ -101,6 +113,12 @@ class _Compiler:
         os.close(up_write)
         self._pipe = os.fdopen(down_write, "wb")
         self._answers = os.fdopen(up_read, "rb")
+        self._started = False
+
+    def has_started(self) -> bool:
+        if not self._started and select.select([self._answers], [], [], 0)[0]:
+            self._started = pickle.load(self._answers) == _STARTED
+        return self._started
 
     def ask(self, message: Any) -> None:
         pickle.dump(message, self._pipe)
@@ -124,7 +142,8 @@ def serve(down: int, up: int, *files: int) -> None:
 
     Args:
         down: file descriptor to read requests from.
-        up: file descriptor to write answers to: what is kept beside the files, or None where something failed.
+        up: file descriptor to write to: first that it is ready, then for each request what is kept beside the files, or
+            None where something failed.
         files: file descriptors into which the models are written.
     """
     from robocasa_lerobot.convert.scenes.compiled import CompiledScene, KeptScene, keep
@@ -132,6 +151,8 @@ def serve(down: int, up: int, *files: int) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # a user's Ctrl-C: the process that asks ends this one
     model, look_alike = files
     with os.fdopen(down, "rb") as pipe, os.fdopen(up, "wb") as answers, contextlib.suppress(BrokenPipeError, EOFError):
+        pickle.dump(_STARTED, answers)
+        answers.flush()
         while True:
             source, preset, pictures = pickle.load(pipe)
             answer: KeptScene | None = None
