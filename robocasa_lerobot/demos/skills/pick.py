@@ -58,6 +58,8 @@ class Manner:
         hover_m, lift_m: how far over the grasp the hand comes from, and lifts to, where it comes from above, metres.
         lifts: before it is drawn out of a front, metres.
         turns: of a tilted approach from the base's heading to the left, radians.
+        narrow: whether the hand keeps to straight lines also where these are steep, does not press down, and goes
+            after a thing that it moves by its coming: in a drawer, which gives way.
         poses: grasps of a thing by a hand that comes along an approach.
     """
 
@@ -68,6 +70,7 @@ class Manner:
     lift_m: float = LIFT_M
     lifts: tuple[float, ...] = LIFTS_M
     turns: tuple[float, ...] = (0.0,)
+    narrow: bool = False
     poses: Callable[[KitchenEnv, Thing, Array], list[GraspPose]] = grasps
 
 
@@ -101,11 +104,16 @@ def pick(env: KitchenEnv, what: Thing, manner: Manner = FROM_ABOVE) -> Iterator[
         # All poses move with the thing, should it have been touched meanwhile.
         moved = data.body(what.name).xpos - start
         yield from move_hand(data, _shifted(far, moved), OPEN, tolerance=0.03)
-        line = far.position + moved if not steep(far, before) else None
+        line = far.position + moved if manner.narrow or not steep(far, before) else None
         yield from move_hand(data, _shifted(before, moved), OPEN, tolerance=0.008, insist=INSIST, start=line)
         moved = data.body(what.name).xpos - start
         at = _shifted(at, moved)
-        yield from move_hand(data, at, OPEN, speed=0.6, tolerance=0.005, max_steps=45, insist=INSIST)
+        insist = 0.0 if manner.narrow else INSIST
+        yield from move_hand(data, at, OPEN, speed=0.6, tolerance=0.005, max_steps=45, insist=insist)
+        if manner.narrow:
+            more = (data.body(what.name).xpos - start - moved) * [1.0, 1.0, 0.0]
+            at = HandTarget(np.array([*(at.position + more)[:2], grip_position(data)[2]]), at.rotation)
+            yield from move_hand(data, at, OPEN, speed=0.4, tolerance=0.004, max_steps=15)
         yield from close_fingers(data, at, GRASP_STEPS)
         inside = _inside(env, what)
         lift = float(lifted.position[2] - choice.way.targets[2].position[2])
@@ -114,7 +122,7 @@ def pick(env: KitchenEnv, what: Thing, manner: Manner = FROM_ABOVE) -> Iterator[
         )
         rise = data.body(what.name).xpos[2] - start[2] - moved[2]
         if rise > ROSE_SHARE * lift and np.linalg.norm(_inside(env, what) - inside) < HELD_M:
-            yield from _draw_out(env, _shifted(lifted, moved), _shifted(out, moved))
+            yield from _draw_out(env, _shifted(lifted, moved), _shifted(out, moved), manner.narrow)
             if np.linalg.norm(_inside(env, what) - inside) < HELD_M:
                 return
         tried.append(HandTarget(data.body(what.name).xmat.reshape(3, 3).T @ (at.position - start), at.rotation))
@@ -124,9 +132,9 @@ def pick(env: KitchenEnv, what: Thing, manner: Manner = FROM_ABOVE) -> Iterator[
     raise SkillError(f"{what.title} was not lifted in {ATTEMPTS} attempts")
 
 
-def _draw_out(env: KitchenEnv, lifted: HandTarget, out: HandTarget) -> Iterator[Array]:
+def _draw_out(env: KitchenEnv, lifted: HandTarget, out: HandTarget, narrow: bool) -> Iterator[Array]:
     """Move to where the way out ends; where the arm is held up by what is above it, a little lower."""
-    if steep(lifted, out):
+    if steep(lifted, out) and not narrow:
         yield from move_hand(env.data, out, CLOSED, speed=0.8, tolerance=0.03)
         return
     yield from move_hand(env.data, out, CLOSED, speed=0.8, tolerance=0.03, start=lifted.position)

@@ -69,6 +69,7 @@ class Putting:
         gap_m: of the underside above the spot when the hand opens.
         turns: of a leaning hand to the left, radians.
         falls: the fingers are to open side by side, so that the thing falls from between them.
+        narrow: whether the hand keeps to a straight line in and out also where that is steep.
     """
 
     spots: Callable[[], Sequence[Spot]]
@@ -80,6 +81,7 @@ class Putting:
     gap_m: float = GAP_M
     turns: tuple[float, ...] = (0.0,)
     falls: bool = False
+    narrow: bool = False
 
 
 def move(env: KitchenEnv, what: Thing, how: Putting) -> Iterator[Array]:
@@ -121,7 +123,7 @@ def put(env: KitchenEnv, what: Thing, how: Putting, failed: list[Array]) -> Iter
     yield from lead(env, choice.joints, CLOSED)
     far, above, low, clear, away = choice.way.targets
     # A way in through a front is kept from its beginning on.
-    inwards = not steep(far, above)
+    inwards = how.narrow or not steep(far, above)
     line = far.position if inwards else None
     yield from move_hand(
         data, far, CLOSED, tolerance=0.01 if inwards else 0.04, max_steps=110, insist=INSIST if inwards else 0.0
