@@ -23,7 +23,7 @@ from robocasa_lerobot.envs.scene.robot import ARM_HOME_QPOS, place_base
 from robocasa_lerobot.envs.scene.selection import RobotPose
 
 FINGER_HALF_M = 0.0105  # along the hand's x
-PALM_HALF_M = (0.032, 0.10)  # along the hand's x and y
+PALM_HALF_M, PALM_BACK_M = (0.028, 0.10), PALM_ABOVE_GRIP_M + 0.004  # along the hand's x and y; food gives way a little
 GAP_M = 0.003  # between the fingers' lowest corners and what the thing lies on
 INWARDS = 0.5  # least cosine between the hand's heading and the approach's
 
@@ -58,7 +58,7 @@ def level_grasps(env: KitchenEnv, what: Thing, approach: Array) -> list[GraspPos
         position[2] = max(position[2], lowest)
         rotation = np.column_stack([np.cross(opening, z), opening, z])
         x, y, deep = ((points - position) @ rotation).T
-        if np.any((np.abs(x) < PALM_HALF_M[0]) & (np.abs(y) < PALM_HALF_M[1]) & (deep < -PALM_ABOVE_GRIP_M)):
+        if np.any((np.abs(x) < PALM_HALF_M[0]) & (np.abs(y) < PALM_HALF_M[1]) & (deep < -PALM_BACK_M)):
             continue
         found.append(GraspPose(position, rotation, pose.width, pose.score))
     return found + grasps(env, what, approach)
