@@ -25,6 +25,9 @@ if TYPE_CHECKING:
 # Where a scene comes from: gives the loadable MJCF and its files. It can be pickled, and compared by value.
 SceneSource = Callable[[], tuple[str, dict[str, bytes]]]
 _STARTED = "started"  # the first thing that the other process says
+# A renderer without a graphics card uses every core, and is what everybody waits for; but a machine that is busy with
+# other things must not hold up the scene for long.
+_NICE = 10
 # The other process draws nothing: MuJoCo need not load a driver.
 _WITHOUT_OPENGL = {"MUJOCO_GL": "disabled"}
 
@@ -149,6 +152,7 @@ def serve(down: int, up: int, *files: int) -> None:
     from robocasa_lerobot.convert.scenes.compiled import CompiledScene, KeptScene, keep
 
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # a user's Ctrl-C: the process that asks ends this one
+    os.nice(_NICE)
     model, look_alike = files
     with os.fdopen(down, "rb") as pipe, os.fdopen(up, "wb") as answers, contextlib.suppress(BrokenPipeError, EOFError):
         pickle.dump(_STARTED, answers)
