@@ -29,6 +29,10 @@ STANDOFF_M = 0.10
 PULL_SPEED = 0.55
 # Well beyond what tasks ask for: a demonstration that stops at the threshold teaches to stop short of it.
 OPEN_GOAL, CLOSED_GOAL = 1.15, 0.0
+# Of a drawer that is dragged: how far it is in before it is worth while, and what the hand needs of it.
+PUSHED_IN_M, HAND_ROOM_M = 0.03, 0.08
+# The hand comes from over the front's upper edge, goes below it close behind it, and is led beyond where it ends.
+OVER_M, INTO_M, BEHIND_M, DRAG_FARTHER_M = 0.10, 0.035, 0.025, 0.04
 
 
 def open_drawer(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
@@ -61,6 +65,33 @@ def open_drawer(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
         yield from hold_hand(data, HandTarget(grip_position(data), rotation), OPEN, GRASP_STEPS)
         yield from move_hand(data, away, OPEN, max_steps=30)
     raise SkillError(f"{drawer.name} is {drawer.openness(data):.0%} open after {ATTEMPTS} attempts")
+
+
+def drag_open(env: KitchenEnv, drawer: Drawer) -> Iterator[Array]:
+    """Pull a drawer that was pushed in back to fully open, with a finger behind its front; as far as that gets.
+
+    Nothing is done where it is open, or where it is so far in that there is no room for the hand before the counter.
+    """
+    data = env.data
+    missing = drawer.full_travel * (1.0 - drawer.openness(data))
+    if missing < PUSHED_IN_M or drawer.openness(data) * drawer.full_travel < HAND_ROOM_M:
+        return
+    inwards = _inwards(drawer)
+    front = env.model.geom(f"{drawer.name}_front")
+    middle = data.geom(front.id).xpos
+    edge = middle + front.size[2] * UP + (front.size[1] + BEHIND_M) * inwards
+    rotation = frame(
+        -UP, np.cross(inwards, UP) * (1.0 if hand_rotation(data)[:, 1] @ np.cross(inwards, UP) > 0 else -1.0)
+    )
+    over, at = HandTarget(edge + OVER_M * UP, rotation), HandTarget(edge - INTO_M * UP, rotation)
+    yield from move_hand(data, over, CLOSED, tolerance=0.02)
+    yield from move_hand(data, at, CLOSED, speed=0.6, tolerance=0.015, max_steps=40)
+    goal = HandTarget(at.position - (missing + BEHIND_M + DRAG_FARTHER_M) * inwards, rotation)
+    yield from move_hand(
+        data, goal, CLOSED, speed=PULL_SPEED, tolerance=0.01, max_steps=90, until=lambda: drawer.openness(data) >= 1.0
+    )
+    up = HandTarget(grip_position(data) + (OVER_M + INTO_M) * UP + BEHIND_M * inwards, rotation)
+    yield from move_hand(data, up, CLOSED, tolerance=0.04, max_steps=30)
 
 
 def close_drawer(env: KitchenEnv, stage: Stage) -> Iterator[Array]:

@@ -61,6 +61,7 @@ class Manner:
         narrow: whether the hand keeps to straight lines also where these are steep, does not press down, and goes
             after a thing that it moves by its coming: in a drawer, which gives way.
         poses: grasps of a thing by a hand that comes along an approach.
+        first: done before each attempt.
     """
 
     tilts: tuple[tuple[float, float], ...] = ((0.0, 0.0),)
@@ -72,6 +73,7 @@ class Manner:
     turns: tuple[float, ...] = (0.0,)
     narrow: bool = False
     poses: Callable[[KitchenEnv, Thing, Array], list[GraspPose]] = grasps
+    first: Callable[[KitchenEnv], Iterator[Array]] | None = None
 
 
 FROM_ABOVE = Manner(((0.0, 0.0), (np.deg2rad(30.0), 0.25)))
@@ -96,6 +98,8 @@ def pick(env: KitchenEnv, what: Thing, manner: Manner = FROM_ABOVE) -> Iterator[
     data = env.data
     tried: list[HandTarget] = []
     for _ in range(ATTEMPTS):
+        if manner.first is not None:
+            yield from manner.first(env)
         body = data.body(what.name)
         start = body.xpos.copy()
         choice = yield from approach(env, lambda blocked: _best(env, what, manner, tried, blocked), OPEN)

@@ -16,6 +16,7 @@ import numpy as np
 
 from robocasa_lerobot.demos.motion import UP, Array, base_pose, grip_position
 from robocasa_lerobot.demos.skills.cups import UNDER_A_SPOUT
+from robocasa_lerobot.demos.skills.drawers import drag_open
 from robocasa_lerobot.demos.skills.pick import ANYHOW, FROM_ABOVE, Manner
 from robocasa_lerobot.demos.skills.put import Putting, Spot, move
 from robocasa_lerobot.demos.skills.put_down import goal
@@ -29,6 +30,9 @@ GRID_M, EDGE_M, NEAR_M = 0.07, 0.02, 0.75
 OUT_OF_DRAWER = replace(
     FROM_ABOVE,
     tilts=((0.0, 0.0), (np.deg2rad(20.0), 0.1), (np.deg2rad(30.0), 0.2), (np.deg2rad(45.0), 0.3)),
+    entries=("up", "across"),
+    out_m=0.30,
+    straight=True,
     hover_m=0.26,
     lift_m=0.30,
 )
@@ -61,7 +65,8 @@ def take_out_of_drawer(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
     Raises:
         SkillError: it is not there after all attempts.
     """
-    yield from _move(env, stage, OUT_OF_DRAWER, FARTHER_M)
+    manner = replace(OUT_OF_DRAWER, first=lambda env: drag_open(env, env.scene.drawer("drawer")))
+    yield from _move(env, stage, manner, FARTHER_M)
 
 
 def _move(env: KitchenEnv, stage: Stage, taking: Manner, within_m: float = NEAR_M) -> Iterator[Array]:
