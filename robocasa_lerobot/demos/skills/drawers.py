@@ -67,13 +67,13 @@ def open_drawer(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
     raise SkillError(f"{drawer.name} is {drawer.openness(data):.0%} open after {ATTEMPTS} attempts")
 
 
-def drag_open(env: KitchenEnv, drawer: Drawer) -> Iterator[Array]:
-    """Pull a drawer that was pushed in back to fully open, with a finger behind its front; as far as that gets.
+def drag_open(env: KitchenEnv, drawer: Drawer, openness: float = 1.0) -> Iterator[Array]:
+    """Pull a drawer that is partly open farther out, with the finger tips behind its front; as far as that gets.
 
     Nothing is done where it is open, or where it is so far in that there is no room for the hand before the counter.
     """
     data = env.data
-    missing = drawer.full_travel * (1.0 - drawer.openness(data))
+    missing = drawer.full_travel * (openness - drawer.openness(data))
     if missing < PUSHED_IN_M or drawer.openness(data) * drawer.full_travel < HAND_ROOM_M:
         return
     inwards = _inwards(drawer)
@@ -88,7 +88,13 @@ def drag_open(env: KitchenEnv, drawer: Drawer) -> Iterator[Array]:
     yield from move_hand(data, at, CLOSED, speed=0.6, tolerance=0.015, max_steps=40)
     goal = HandTarget(at.position - (missing + BEHIND_M + DRAG_FARTHER_M) * inwards, rotation)
     yield from move_hand(
-        data, goal, CLOSED, speed=PULL_SPEED, tolerance=0.01, max_steps=90, until=lambda: drawer.openness(data) >= 1.0
+        data,
+        goal,
+        CLOSED,
+        speed=PULL_SPEED,
+        tolerance=0.01,
+        max_steps=90,
+        until=lambda: drawer.openness(data) >= openness,
     )
     up = HandTarget(grip_position(data) + (OVER_M + INTO_M) * UP + BEHIND_M * inwards, rotation)
     yield from move_hand(data, up, CLOSED, tolerance=0.04, max_steps=30)

@@ -17,7 +17,7 @@ import numpy as np
 from robocasa_lerobot.demos.motion import UP, Array, base_pose, grip_position
 from robocasa_lerobot.demos.skills.cups import UNDER_A_SPOUT
 from robocasa_lerobot.demos.skills.drawers import drag_open
-from robocasa_lerobot.demos.skills.pick import ANYHOW, FROM_ABOVE, Manner
+from robocasa_lerobot.demos.skills.pick import ANYHOW, FROM_ABOVE, Manner, best_way
 from robocasa_lerobot.demos.skills.put import Putting, Spot, move
 from robocasa_lerobot.demos.skills.put_down import goal
 from robocasa_lerobot.demos.skills.things import Thing, thing
@@ -36,6 +36,7 @@ OUT_OF_DRAWER = replace(
     hover_m=0.26,
     lift_m=0.30,
 )
+HARD, FARTHER_OUT_M = 1.0, 0.12  # cost from which on it is pulled out farther first, and how far
 FARTHER_M = 1.1  # where an open drawer keeps the robot off
 MOST_SPOTS = 14
 FAR_COST = 0.8  # for each metre
@@ -65,8 +66,20 @@ def take_out_of_drawer(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
     Raises:
         SkillError: it is not there after all attempts.
     """
-    manner = replace(OUT_OF_DRAWER, first=lambda env: drag_open(env, env.scene.drawer("drawer")))
-    yield from _move(env, stage, manner, FARTHER_M)
+    yield from _move(env, stage, replace(OUT_OF_DRAWER, first=_clear_of_counter(thing(env, stage.object))), FARTHER_M)
+
+
+def _clear_of_counter(what: Thing) -> Callable[[KitchenEnv], Iterator[Array]]:
+    """Before a grasp: pull the drawer farther out where the counter over it is in the way, or where a grasp failed."""
+    before: list[str] = []
+
+    def first(env: KitchenEnv) -> Iterator[Array]:
+        drawer = env.scene.drawer("drawer")
+        if before or best_way(env, what, OUT_OF_DRAWER).cost > HARD:
+            yield from drag_open(env, drawer, 1.0 + FARTHER_OUT_M / drawer.full_travel)
+        before.append(what.name)
+
+    return first
 
 
 def _move(env: KitchenEnv, stage: Stage, taking: Manner, within_m: float = NEAR_M) -> Iterator[Array]:
