@@ -1,10 +1,11 @@
-"""Reach into a microwave: round its open door, and under its roof to flat food on a plate."""
+"""Reach into a microwave: round its open door, and under its roof to flat food on a plate; so into a toaster oven."""
 
 from __future__ import annotations
 
 import copy
 import itertools
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 
 import mujoco
 import numpy as np
@@ -17,7 +18,9 @@ from robocasa_lerobot.demos.skills.reach import collisions
 from robocasa_lerobot.demos.skills.things import DOWN, Thing, grasps
 from robocasa_lerobot.demos.skills.ways import go_to
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
+from robocasa_lerobot.envs.scene.appliances.base import Appliance
 from robocasa_lerobot.envs.scene.appliances.microwave import Microwave
+from robocasa_lerobot.envs.scene.appliances.toaster_oven import ToasterOven
 from robocasa_lerobot.envs.scene.objects.grasping import FINGER_BELOW_GRIP_M, PALM_ABOVE_GRIP_M, GraspPose
 from robocasa_lerobot.envs.scene.robot import ARM_HOME_QPOS, place_base
 from robocasa_lerobot.envs.scene.selection import RobotPose
@@ -81,22 +84,28 @@ OUT_OF_A_MICROWAVE = Manner(
 )
 
 
+OUT_OF_A_TOASTER_OVEN = replace(OUT_OF_A_MICROWAVE, narrow=True)  # between two racks
+
+
 def taking_out(env: KitchenEnv, what: Thing) -> Manner:
-    """How a thing is taken that may be in a microwave."""
-    oven = microwave_of(env)
-    inside = oven is not None and oven.regions["interior"].contains(env.data, env.data.body(what.name).xpos)
-    return OUT_OF_A_MICROWAVE if inside else ANYHOW
+    """How a thing is taken that may be in a microwave or in a toaster oven."""
+    point = env.data.body(what.name).xpos
+    for kind, manner in ((Microwave, OUT_OF_A_MICROWAVE), (ToasterOven, OUT_OF_A_TOASTER_OVEN)):
+        oven = _one_of(env, kind)
+        if oven is not None and any(region.contains(env.data, point) for region in oven.regions.values()):
+            return manner
+    return ANYHOW
 
 
-def microwave_of(env: KitchenEnv) -> Microwave | None:
-    """The microwave among the fixtures of the task's roles, if there is one."""
+def _one_of[A: Appliance](env: KitchenEnv, kind: type[A]) -> A | None:
+    """The first of a kind among the fixtures of the task's roles, if there is one."""
     found = (env.scene.fixture(role) for role in env.scene.roles)
-    return next((fixture for fixture in found if isinstance(fixture, Microwave)), None)
+    return next((fixture for fixture in found if isinstance(fixture, kind)), None)
 
 
 def go_round_door(env: KitchenEnv, gripper: float = OPEN) -> Iterator[Array]:
     """Where the open door stands between the robot and the cavity: drive back, past it, and up to the cavity."""
-    oven = microwave_of(env)
+    oven = _one_of(env, Microwave)
     if oven is None or oven.share(env.data, "door") < OPEN_SHARE:
         return
     base, yaw = base_pose(env.data)
