@@ -11,68 +11,24 @@ import mujoco
 import numpy as np
 
 from robocasa_lerobot.demos.arm import Arm
-from robocasa_lerobot.demos.motion import OPEN, UP, Array, base_pose, floor_axes
+from robocasa_lerobot.demos.motion import OPEN, Array, base_pose, floor_axes
+from robocasa_lerobot.demos.skills.level_grasps import level_grasps
 from robocasa_lerobot.demos.skills.navigation import Room
 from robocasa_lerobot.demos.skills.pick import ANYHOW, Manner
 from robocasa_lerobot.demos.skills.reach import collisions
-from robocasa_lerobot.demos.skills.things import DOWN, Thing, grasps
+from robocasa_lerobot.demos.skills.things import Thing
 from robocasa_lerobot.demos.skills.ways import go_to
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.scene.appliances.base import Appliance
 from robocasa_lerobot.envs.scene.appliances.microwave import Microwave
 from robocasa_lerobot.envs.scene.appliances.toaster_oven import ToasterOven
-from robocasa_lerobot.envs.scene.objects.grasping import FINGER_BELOW_GRIP_M, PALM_ABOVE_GRIP_M, GraspPose
 from robocasa_lerobot.envs.scene.robot import ARM_HOME_QPOS, place_base
 from robocasa_lerobot.envs.scene.selection import RobotPose
-
-FINGER_HALF_M = 0.0105  # along the hand's x
-PALM_HALF_M, PALM_BACK_M = (0.028, 0.10), PALM_ABOVE_GRIP_M + 0.004  # along the hand's x and y; food gives way a little
-GAP_M = 0.003  # between the fingers' lowest corners and what the thing lies on
-INWARDS = 0.5  # least cosine between the hand's heading and the approach's
 
 ASIDES_M = (0.08, 0.02, -0.03, -0.06, -0.09, -0.12, -0.15)  # of a stand to the right of the cavity's middle
 OPEN_SHARE = 0.3
 BACKS_M, MORE_BACK_M = (0.10, 0.20, 0.30, 0.40, 0.50, 0.60), (0.0, 0.05, 0.10, 0.15, 0.20)
 STEP_M = 0.06  # between places that are tested
-
-
-def level_grasps(env: KitchenEnv, what: Thing, approach: Array) -> list[GraspPose]:
-    """Grasps from above, tipped over the line between the fingers until the hand looks along an approach's slope.
-
-    The fingers stay level and close on the same sides of the thing; the hand is as high as its lower corners ask for.
-    Grasps that keep the approach as it is come after them.
-    """
-    ahead = approach - (approach @ UP) * UP
-    steepness = float(-approach @ UP)
-    flat = float(np.linalg.norm(ahead))
-    body = env.data.body(what.name)
-    turn = body.xmat.reshape(3, 3)
-    lowest = float(body.xpos[2]) - what.below(turn) + FINGER_BELOW_GRIP_M * steepness + FINGER_HALF_M * flat + GAP_M
-    points = body.xpos + np.concatenate([_filled(solid.cloud()) for solid in what.solids]) @ turn.T
-    found = []
-    for pose in grasps(env, what, DOWN):
-        opening = pose.rotation[:, 1]
-        heading = np.cross(UP, opening)
-        heading *= np.sign(heading @ ahead)
-        if float(heading @ ahead) < INWARDS * flat:
-            continue
-        z = flat * heading - steepness * UP
-        position = pose.position.copy()
-        position[2] = max(position[2], lowest)
-        rotation = np.column_stack([np.cross(opening, z), opening, z])
-        x, y, deep = ((points - position) @ rotation).T
-        if np.any((np.abs(x) < PALM_HALF_M[0]) & (np.abs(y) < PALM_HALF_M[1]) & (deep < -PALM_BACK_M)):
-            continue
-        found.append(GraspPose(position, rotation, pose.width, pose.score))
-    return found + grasps(env, what, approach)
-
-
-def _filled(cloud: Array) -> Array:
-    """Points on the lines between the points of a convex piece."""
-    first, second = np.triu_indices(len(cloud))
-    shares = np.array([0.0, 0.25, 0.5, 0.75])[:, None, None]
-    filled: Array = ((1 - shares) * cloud[first] + shares * cloud[second]).reshape(-1, 3)
-    return filled
 
 
 OUT_OF_A_MICROWAVE = Manner(

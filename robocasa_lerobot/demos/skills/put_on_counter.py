@@ -17,7 +17,7 @@ import numpy as np
 from robocasa_lerobot.demos.motion import UP, Array, base_pose, grip_position
 from robocasa_lerobot.demos.skills.cups import UNDER_A_SPOUT
 from robocasa_lerobot.demos.skills.drawers import drag_open
-from robocasa_lerobot.demos.skills.microwaves import level_grasps
+from robocasa_lerobot.demos.skills.level_grasps import level_grasps
 from robocasa_lerobot.demos.skills.pick import ANYHOW, FROM_ABOVE, Manner, best_way
 from robocasa_lerobot.demos.skills.put import Putting, Spot, move
 from robocasa_lerobot.demos.skills.put_down import goal

@@ -1,0 +1,54 @@
+"""Grasps of flat things under a roof: the hand comes along a slope, its fingers stay level."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from robocasa_lerobot.demos.motion import UP, Array
+from robocasa_lerobot.demos.skills.things import DOWN, Thing, grasps
+from robocasa_lerobot.envs.kitchen_env import KitchenEnv
+from robocasa_lerobot.envs.scene.objects.grasping import FINGER_BELOW_GRIP_M, PALM_ABOVE_GRIP_M, GraspPose
+
+FINGER_HALF_M = 0.0105  # along the hand's x
+PALM_HALF_M, PALM_BACK_M = (0.028, 0.10), PALM_ABOVE_GRIP_M + 0.004  # along the hand's x and y; food gives way a little
+GAP_M = 0.003  # between the fingers' lowest corners and what the thing lies on
+INWARDS = 0.5  # least cosine between the hand's heading and the approach's
+
+
+def level_grasps(env: KitchenEnv, what: Thing, approach: Array) -> list[GraspPose]:
+    """Grasps from above, tipped over the line between the fingers until the hand looks along an approach's slope.
+
+    The fingers stay level and close on the same sides of the thing; the hand is as high as its lower corners ask for.
+    Grasps that keep the approach as it is come after them.
+    """
+    ahead = approach - (approach @ UP) * UP
+    steepness = float(-approach @ UP)
+    flat = float(np.linalg.norm(ahead))
+    body = env.data.body(what.name)
+    turn = body.xmat.reshape(3, 3)
+    lowest = float(body.xpos[2]) - what.below(turn) + FINGER_BELOW_GRIP_M * steepness + FINGER_HALF_M * flat + GAP_M
+    points = body.xpos + np.concatenate([_filled(solid.cloud()) for solid in what.solids]) @ turn.T
+    found = []
+    for pose in grasps(env, what, DOWN):
+        opening = pose.rotation[:, 1]
+        heading = np.cross(UP, opening)
+        heading *= np.sign(heading @ ahead)
+        if float(heading @ ahead) < INWARDS * flat:
+            continue
+        z = flat * heading - steepness * UP
+        position = pose.position.copy()
+        position[2] = max(position[2], lowest)
+        rotation = np.column_stack([np.cross(opening, z), opening, z])
+        x, y, deep = ((points - position) @ rotation).T
+        if np.any((np.abs(x) < PALM_HALF_M[0]) & (np.abs(y) < PALM_HALF_M[1]) & (deep < -PALM_BACK_M)):
+            continue
+        found.append(GraspPose(position, rotation, pose.width, pose.score))
+    return found + grasps(env, what, approach)
+
+
+def _filled(cloud: Array) -> Array:
+    """Points on the lines between the points of a convex piece."""
+    first, second = np.triu_indices(len(cloud))
+    shares = np.array([0.0, 0.25, 0.5, 0.75])[:, None, None]
+    filled: Array = ((1 - shares) * cloud[first] + shares * cloud[second]).reshape(-1, 3)
+    return filled
