@@ -21,7 +21,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 
 import common
-from demonstrators_report import draw, ratios, summary, text
+from demonstrators_report import draw, page, ratios, summary, text
 from tqdm import tqdm
 
 from robocasa_lerobot.demos.choose import expand_names
@@ -205,7 +205,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     print(text(body))
     common.write_result(options.out, "demonstrators", body)
     draw(tasks, options.out.with_suffix(".png"))
-    print(f"{options.out}, {options.out.with_suffix('.png').name}")
+    if trials:
+        options.out.with_suffix(".md").write_text(page(body), encoding="utf-8")
+    print(f"{options.out}, and beside it a page (.md) and its picture (.png)")
     return 0
 
 

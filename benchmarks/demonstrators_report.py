@@ -70,8 +70,49 @@ def ratios(tasks: Mapping[str, Any]) -> dict[str, Any]:
 
 def text(body: Mapping[str, Any]) -> str:
     """Tables for the terminal: every task, worst first, and the averages."""
+    rows = _rows(body)
+    missing = [name for name, task in body["tasks"].items() if not task["demonstrator"]]
+    lines = [common.table(_HEADER, rows) if rows else "nothing has been tried yet", ""]
+    if rows:
+        hourly = body["demonstrations_per_hour"]
+        lines += [
+            _averages(body),
+            f"{hourly['all_processes']:.0f} demonstrations an hour, {hourly['one_process']:.0f} of one process",
+        ]
+    if missing:
+        lines.append(f"no demonstrator: {', '.join(missing)}")
+    return "\n".join(lines)
+
+
+def page(body: Mapping[str, Any]) -> str:
+    """The same for people who read it later: a page in Markdown."""
+    settings = body["settings"]
+    lines = [
+        "# Demonstrators",
+        "",
+        f"`benchmarks/demonstrators.py`, {body['trials']} trials, seeds from {settings['first_seed']} on, "
+        f"{settings['seeds_per_split']} in each split, action noise {settings['action_noise']:g}; "
+        f"MuJoCo {body['versions']['mujoco']}.",
+        f"In short: {_averages(body)}.",
+        "",
+        "![Rates with their intervals](demonstrators.png)",
+        "",
+        "|".join(["", *_HEADER, ""]),
+        "|".join(["", "---", *["--:"] * (len(_HEADER) - 2), "---", ""]),
+        *("|".join(["", *row, ""]) for row in _rows(body)),
+        "",
+        "`s`: median of the simulated seconds of the demonstrations that succeeded; `human s`: of human ones.",
+    ]
+    return "\n".join(lines) + "\n"
+
+
+_HEADER = ["task", "solved", "rate", "95 %", *_SPLITS, "s", "human s", "most frequent failure"]
+
+
+def _rows(body: Mapping[str, Any]) -> list[list[str]]:
+    """A row of cells for each task that was tried, worst first."""
     tried = {name: t for name, t in body["tasks"].items() if t["success_rate"] is not None}
-    rows = [
+    return [
         [
             name,
             f"{task['successes']}/{task['trials']}",
@@ -84,22 +125,17 @@ def text(body: Mapping[str, Any]) -> str:
         ]
         for name, task in sorted(tried.items(), key=lambda item: (item[1]["success_rate"], item[0]))
     ]
-    header = ["task", "solved", "rate", "95 %", *_SPLITS, "s", "human s", "most frequent failure"]
-    missing = [name for name, task in body["tasks"].items() if not task["demonstrator"]]
-    found = body["ratios"]
-    lines = [common.table(header, rows) if rows else "nothing has been tried yet", ""]
-    if rows:
-        quick = round(found["tasks_within_1.5_times_human"] * len(body["tasks"]))
-        hourly = body["demonstrations_per_hour"]
-        lines += [
-            f"mean {found['mean_success']:.1%} of {len(rows)} tasks (aim {AIM_MEAN:.0%}), "
-            f"worst {found['worst_task']:.0%} (aim {AIM_TASK:.0%}); "
-            f"{quick} tasks take at most {AIM_TIMES_HUMAN} times the human median",
-            f"{hourly['all_processes']:.0f} demonstrations an hour, {hourly['one_process']:.0f} of one process",
-        ]
-    if missing:
-        lines.append(f"no demonstrator: {', '.join(missing)}")
-    return "\n".join(lines)
+
+
+def _averages(body: Mapping[str, Any]) -> str:
+    found, tasks = body["ratios"], body["tasks"]
+    quick = round(found["tasks_within_1.5_times_human"] * len(tasks))
+    tried = sum(task["success_rate"] is not None for task in tasks.values())
+    return (
+        f"mean {found['mean_success']:.1%} of {tried} tasks (aim {AIM_MEAN:.0%}), "
+        f"worst {found['worst_task']:.0%} (aim {AIM_TASK:.0%}); "
+        f"{quick} tasks take at most {AIM_TIMES_HUMAN} times the human median"
+    )
 
 
 def draw(tasks: Mapping[str, Any], path: Path) -> None:

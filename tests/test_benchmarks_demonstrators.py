@@ -92,6 +92,9 @@ def test_finished_trials_are_kept_replaced_and_forgotten(
     assert set(result["tasks"]) == set(task_names())
     assert result["tasks"]["CloseDrawer"]["success_rate"] == 1.0
     assert {"machine", "versions", "date", "ratios"} <= set(result)
+    page = out.with_suffix(".md").read_text()
+    assert "|CloseDrawer|4/4|100%|" in page
+    assert "|OpenFridge|" not in page
 
 
 def test_whatever_goes_wrong_is_a_failed_trial(bench: ModuleType, monkeypatch: pytest.MonkeyPatch) -> None:
