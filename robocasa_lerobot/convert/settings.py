@@ -25,12 +25,12 @@ from robocasa_lerobot.convert.reading.survey import survey
 from robocasa_lerobot.errors import UnknownNameError, UserError
 
 # Raised when the written bytes change for the same input, so that shards of an older version are not taken up again.
-FORMAT_VERSION = 3
+FORMAT_VERSION = 4
 # A shard is what a kill can lose and what a worker takes at a time: some seconds of work, but never so many shards
 # that joining them costs more than making them.
-SHARD_FRAMES = 500
+SHARD_FRAMES = 1000
 _MIN_SHARD_FRAMES = 125
-_WANTED_SHARDS = 5  # of little work, so that several processes have something to do
+_WANTED_SHARDS = 4  # of little work, so that several processes have something to do
 MAX_SHARDS = 64
 _MAX_FAILURES = 10  # demos without a known robot, camera or mesh, after which no other is tried
 

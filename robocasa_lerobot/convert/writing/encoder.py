@@ -14,11 +14,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import av
 import numpy as np
 from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from robocasa_lerobot.convert.writing.video import VideoForm
 
 # Frames of one episode and camera that go into the statistics, evenly spaced, and about how many rows and columns of
 # pixels of each (evenly spaced, too): 50 frames of 64 x 64 pixels take a sixteenth of the time of whole 256 x 256 ones.
@@ -76,11 +79,12 @@ class VideoSettings:
 
 @dataclass(frozen=True)
 class EncodedVideo:
-    """A finished video of one episode and camera, and the sampled pixels of it."""
+    """A finished video of one episode and camera, the sampled pixels of it, and its form where that is known."""
 
     path: Path
     histogram: Histogram
     num_sampled: int  # frames
+    form: VideoForm | None = None
 
     def statistics(self) -> dict[str, NDArray[Any]]:
         """Statistics (3, 1, 1) in [0, 1] of the sampled pixels, as LeRobot keeps them for each episode."""

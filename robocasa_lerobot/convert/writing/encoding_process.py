@@ -18,7 +18,7 @@ from collections import deque
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,6 +33,9 @@ from robocasa_lerobot.convert.writing.encoder import (
     quiet_codecs,
 )
 from robocasa_lerobot.convert.writing.frame_ring import FrameReceiver, FrameSender
+
+if TYPE_CHECKING:
+    from robocasa_lerobot.convert.writing.video import VideoForm
 
 # Beside a renderer the encoder takes what that leaves: on two cores it would otherwise hold up the renderer's own
 # threads, which makes the conversion of states 6 to 15 % slower.
@@ -67,8 +70,8 @@ class _Cancel:
     """The episode is thrown away; nothing is sent back."""
 
 
-# The videos, with the preparation where the other process did it; or what went wrong.
-_Answer = tuple[dict[str, Path], FramePreparation | None] | Exception
+# The videos, with the preparation and the videos' forms where the other process did that; or what went wrong.
+_Answer = tuple[dict[str, Path], FramePreparation | None, "dict[str, VideoForm]"] | Exception
 
 
 class EncodingProcess:
@@ -166,9 +169,12 @@ class EncodingProcess:
         here = self._prepared.popleft()
         if isinstance(answer, Exception):
             raise answer
-        paths, there = answer
+        paths, there, forms = answer
         frames = here if there is None else there
-        return {key: EncodedVideo(path, frames.histograms[key], frames.num_sampled[key]) for key, path in paths.items()}
+        return {
+            key: EncodedVideo(path, frames.histograms[key], frames.num_sampled[key], forms.get(key))
+            for key, path in paths.items()
+        }
 
     def close(self) -> None:
         """End the other process; what it has not finished is lost."""
@@ -281,6 +287,7 @@ class _Episode:
     def take(self, message: Any, frame: NDArray[np.uint8] | None = None) -> _Answer | None:
         """Act on a message; gives the answer to be sent, if there is one."""
         paths: dict[str, Path] = {}
+        forms: dict[str, VideoForm] = {}
         try:
             if isinstance(message, _Start):
                 self._start(message)
@@ -292,12 +299,16 @@ class _Episode:
                     self._encoder.feed(message.key, planes)
                 else:
                     paths = self._encoder.finish()
+                    if self._frames is not None:
+                        from robocasa_lerobot.convert.writing.video import probe  # takes a moment to import
+
+                        forms = {key: probe(path) for key, path in paths.items()}
         except Exception as error:  # raised in the other process
             self._failure = error
             self._cancel()
         if not isinstance(message, _End):
             return None
-        return (paths, self._frames) if self._failure is None else self._failure
+        return (paths, self._frames, forms) if self._failure is None else self._failure
 
     def _start(self, message: _Start) -> None:
         self._failure = self._frames = None

@@ -99,7 +99,8 @@ class DatasetFiles:
             key: vector_statistics(values) for key, values in everything.items() if values.dtype.kind in "fiub"
         }
         for key, video in videos.items():
-            entries |= self._videos[key].append(video.path, probe(video.path) if forms is None else forms[key])
+            form = video.form if forms is None else forms[key]
+            entries |= self._videos[key].append(video.path, form or probe(video.path))
             statistics[key] = video.statistics()
             self.histograms[key] = self.histograms.get(key, 0) + video.histogram
         self._meta.save_episode(index, length, list(tasks), statistics, entries)
