@@ -82,6 +82,7 @@ def test_a_film_strip_shows_the_way_from_the_first_state_to_the_last(folder: Pat
 
 
 @pytest.mark.slow
+@pytest.mark.timeout(900)
 def test_a_hundred_demonstrations_replay(tmp_path: Path) -> None:
     """Twenty each of five tasks with different skills: at least 95 from actions, all from states."""
     tasks = ("OpenDrawer", "TurnOnSinkFaucet", "TurnOnStove", "PickPlaceCounterToSink", "CloseMicrowave")
