@@ -11,6 +11,8 @@ from __future__ import annotations
 
 import argparse
 import contextlib
+import datetime
+import json
 import shutil
 import sys
 import time
@@ -31,13 +33,14 @@ from venvs import prepare_venv
 from workers import BARRIER_S, Worker, WorkerError
 
 from robocasa_lerobot import contract, gl
-from robocasa_lerobot.errors import UserError
+from robocasa_lerobot.errors import UnknownNameError, UserError
 
 BENCHMARKS = Path(__file__).parent
 OUTPUT = common.RESULTS / "convert_speed.json"
 WORK = common.REPOSITORY / "outputs" / "convert_speed"
 PROGRAM = BENCHMARKS / "convert_work.py"
 PNG_THREADS = 4
+SECTIONS = tuple(convert_report.SECTIONS)
 
 
 @dataclass(frozen=True)
@@ -94,16 +97,21 @@ def parse(arguments: Sequence[str] | None = None) -> argparse.Namespace:
     )
     parser.add_argument("--without-peer", action="store_true", help="leave the official method out")
     parser.add_argument("--without-memory", action="store_true", help="leave whole commands and their memory out")
+    parser.add_argument(
+        "--only",
+        metavar="SECTIONS",
+        help=f"measure some of {', '.join(SECTIONS)} again, separated by commas; a result keeps the others' figures",
+    )
     return parser.parse_args(arguments)
 
 
-def measure(effort: Effort, work: Path, peer: bool, memory: bool) -> dict[str, Any]:
-    """Everything, as the body of the result."""
+def measure(effort: Effort, work: Path, peer: bool, memory: bool, sections: Sequence[str] = SECTIONS) -> dict[str, Any]:
+    """Everything, or some sections of it, as the body of the result."""
     data = work / "demos"
     files = convert_demos.record(data, effort.episodes, max(convert_report.PROCESSES), effort.image_size)
     lift = convert_demos.cut_lift(data, effort.lift_steps) if peer else None
     shutil.rmtree(work / "written", ignore_errors=True)
-    parts = _parts(peer)
+    parts = [part for part in _parts(peer) if part.key.partition("_")[0] in sections]
     total = sum(effort.slow_repetitions if part.slow else effort.repetitions for part in parts)
     total += 2 + (len(effort.memory_episodes) + 4 if memory else 0)
     with contextlib.ExitStack() as stack:
@@ -117,7 +125,7 @@ def measure(effort: Effort, work: Path, peer: bool, memory: bool) -> dict[str, A
         peaks = _memory(run) if memory else {}
     shutil.rmtree(work / "written", ignore_errors=True)
     rates = {key: common.spread(run.rates[key]) for key in convert_report.ROWS if key in run.rates}
-    opening, drawing, demos = (sum(column) for column in zip(*run.loading, strict=True))
+    opening, drawing, demos = (sum(column) for column in zip(*run.loading, strict=True)) if run.loading else (0, 1, 1)
     return {
         "ratios": convert_report.ratios(rates, peaks),
         "frames_per_second": rates,
@@ -319,14 +327,61 @@ def _command(run: Run, file: Path, processes: int) -> dict[str, Any]:
     return found
 
 
+def _sections(only: str | None, output: Path) -> tuple[str, ...]:
+    """The sections that are to be measured.
+
+    Raises:
+        UserError: there is no such section, or no result of the others.
+    """
+    if only is None:
+        return SECTIONS
+    chosen = tuple(word.strip() for word in only.split(","))
+    for name in chosen:
+        if name not in SECTIONS:
+            raise UnknownNameError("section", name, SECTIONS)
+    if "decode" in chosen and "images" not in chosen:
+        raise UserError("--only decode: what is decoded is written by `images`; ask for images,decode.")
+    if not output.is_file():
+        raise UserError(f"--only {only}: {output} is missing, which has the other sections; measure everything first.")
+    return chosen
+
+
+def merged(before: dict[str, Any], body: dict[str, Any], sections: Sequence[str]) -> dict[str, Any]:
+    """An earlier result with the figures of some sections replaced; `measured_again` says when and at which commit.
+
+    Ratios compare within a section only, so both sides of each are of one run.
+    """
+    found = {key: value for key, value in before.items() if key not in ("benchmark", "date")}
+    for name in ("frames_per_second", "cpu_ms_per_step", "dataset_mib"):
+        kept = {key: value for key, value in before[name].items() if key.partition("_")[0] not in sections}
+        both = kept | body[name]
+        found[name] = {key: both[key] for key in (*convert_report.ROWS, *both) if key in both}
+    if "states" in sections:
+        found["scene_loading"] = body["scene_loading"]
+    if "lift" in sections:
+        found["peer"] = body["peer"]
+    found["ratios"] = convert_report.ratios(found["frames_per_second"], found["memory"])
+    again = {
+        "date": datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds"),
+        "commit": body["versions"]["commit"],
+        "mode": body["mode"],
+        "others_share_of_cores": body["others_share_of_cores"],
+    }
+    return found | {"measured_again": before.get("measured_again", {}) | dict.fromkeys(sections, again)}
+
+
 def main(arguments: Sequence[str] | None = None) -> int:
     """Measure, print, write."""
     options = parse(arguments)
+    output = options.output or OUTPUT
     try:
         backend = gl.ensure_gl()
         renderer = gl.probe(backend).renderer if backend in gl.HEADLESS_BACKENDS else backend
         effort = QUICK if options.quick else FULL
-        body = measure(effort, options.work.absolute(), not options.without_peer, not options.without_memory)
+        sections = _sections(options.only, output)
+        peer = not options.without_peer and "lift" in sections
+        memory = not options.without_memory and options.only is None
+        body = measure(effort, options.work.absolute(), peer, memory, sections)
     except (UserError, WorkerError) as error:
         print(f"convert_speed: {error}", file=sys.stderr)
         return 2
@@ -339,9 +394,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
         **body,
     }
     print(convert_report.report(body))
-    complete = not (options.without_peer or options.without_memory)
-    output = options.output or (OUTPUT if complete else None)
-    if output is not None:
+    if options.only is not None:
+        body = merged(json.loads(output.read_text(encoding="utf-8")), body, sections)
+    if options.only is not None or options.output is not None or (peer and memory):
         common.write_result(output, "convert_speed", body)
         print(f"\nwritten: {output}")
     return 0

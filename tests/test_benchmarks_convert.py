@@ -16,6 +16,7 @@ import pytest
 from convert_support import write_demos
 
 from robocasa_lerobot import contract
+from robocasa_lerobot.errors import UnknownNameError, UserError
 
 REPOSITORY = Path(__file__).parents[1]
 BENCHMARKS = REPOSITORY / "benchmarks"
@@ -251,6 +252,31 @@ def test_parts_left_out_are_left_out_of_the_report() -> None:
     text = report.report(body)
     assert "official" not in text
     assert "peak MiB" not in text
+
+
+def test_sections_are_measured_again(tmp_path: Path) -> None:
+    speed, spread = module("convert_speed"), module("common").spread
+    before = json.loads(json.dumps(example_result()))
+    keys = ("states_ours_1", "states_renderer_1")
+    rates = {key: spread([value]) for key, value in zip(keys, (90.0, 100.0), strict=True)}
+    body = {**before, "frames_per_second": rates, "cpu_ms_per_step": {}, "dataset_mib": {}, "mode": "full"}
+    body["scene_loading"] = {"seconds_per_demo": 0.1, "share_of_drawing": 0.2}
+    found = speed.merged(before, body, ("states",))
+    assert found["ratios"]["states_of_renderer"] == pytest.approx(0.9)
+    assert "states_of_renderer_2" not in found["ratios"]
+    assert found["frames_per_second"]["images_ours_1"] == before["frames_per_second"]["images_ours_1"]
+    assert found["scene_loading"] == body["scene_loading"]
+    assert set(found["measured_again"]) == {"states"}
+    output = tmp_path / "result.json"
+    assert speed._sections(None, output) == speed.SECTIONS
+    with pytest.raises(UserError, match="is missing"):
+        speed._sections("states", output)
+    output.write_text("{}")
+    assert speed._sections("states, lift", output) == ("states", "lift")
+    with pytest.raises(UserError, match=r"images,decode"):
+        speed._sections("decode", output)
+    with pytest.raises(UnknownNameError, match="'states'"):
+        speed._sections("state", output)
 
 
 @pytest.mark.skipif(not RESULT.exists(), reason="no measured result in this checkout")
