@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import argparse
 import contextlib
-import datetime
 import json
 import shutil
 import sys
@@ -27,20 +26,20 @@ import convert_demos
 import convert_report
 from convert_demos import DemoFiles
 from convert_memory import run_command
+from convert_sections import SECTIONS, chosen_sections, merged
 from sim_speed import note_noise
 from tqdm import tqdm
 from venvs import prepare_venv
 from workers import BARRIER_S, Worker, WorkerError
 
 from robocasa_lerobot import contract, gl
-from robocasa_lerobot.errors import UnknownNameError, UserError
+from robocasa_lerobot.errors import UserError
 
 BENCHMARKS = Path(__file__).parent
 OUTPUT = common.RESULTS / "convert_speed.json"
 WORK = common.REPOSITORY / "outputs" / "convert_speed"
 PROGRAM = BENCHMARKS / "convert_work.py"
 PNG_THREADS = 4
-SECTIONS = tuple(convert_report.SECTIONS)
 
 
 @dataclass(frozen=True)
@@ -327,49 +326,6 @@ def _command(run: Run, file: Path, processes: int) -> dict[str, Any]:
     return found
 
 
-def _sections(only: str | None, output: Path) -> tuple[str, ...]:
-    """The sections that are to be measured.
-
-    Raises:
-        UserError: there is no such section, or no result of the others.
-    """
-    if only is None:
-        return SECTIONS
-    chosen = tuple(word.strip() for word in only.split(","))
-    for name in chosen:
-        if name not in SECTIONS:
-            raise UnknownNameError("section", name, SECTIONS)
-    if "decode" in chosen and "images" not in chosen:
-        raise UserError("--only decode: what is decoded is written by `images`; ask for images,decode.")
-    if not output.is_file():
-        raise UserError(f"--only {only}: {output} is missing, which has the other sections; measure everything first.")
-    return chosen
-
-
-def merged(before: dict[str, Any], body: dict[str, Any], sections: Sequence[str]) -> dict[str, Any]:
-    """An earlier result with the figures of some sections replaced; `measured_again` says when and at which commit.
-
-    Ratios compare within a section only, so both sides of each are of one run.
-    """
-    found = {key: value for key, value in before.items() if key not in ("benchmark", "date")}
-    for name in ("frames_per_second", "cpu_ms_per_step", "dataset_mib"):
-        kept = {key: value for key, value in before[name].items() if key.partition("_")[0] not in sections}
-        both = kept | body[name]
-        found[name] = {key: both[key] for key in (*convert_report.ROWS, *both) if key in both}
-    if "states" in sections:
-        found["scene_loading"] = body["scene_loading"]
-    if "lift" in sections:
-        found["peer"] = body["peer"]
-    found["ratios"] = convert_report.ratios(found["frames_per_second"], found["memory"])
-    again = {
-        "date": datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds"),
-        "commit": body["versions"]["commit"],
-        "mode": body["mode"],
-        "others_share_of_cores": body["others_share_of_cores"],
-    }
-    return found | {"measured_again": before.get("measured_again", {}) | dict.fromkeys(sections, again)}
-
-
 def main(arguments: Sequence[str] | None = None) -> int:
     """Measure, print, write."""
     options = parse(arguments)
@@ -378,7 +334,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         backend = gl.ensure_gl()
         renderer = gl.probe(backend).renderer if backend in gl.HEADLESS_BACKENDS else backend
         effort = QUICK if options.quick else FULL
-        sections = _sections(options.only, output)
+        sections = chosen_sections(options.only, output)
         peer = not options.without_peer and "lift" in sections
         memory = not options.without_memory and options.only is None
         body = measure(effort, options.work.absolute(), peer, memory, sections)

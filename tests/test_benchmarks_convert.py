@@ -255,7 +255,7 @@ def test_parts_left_out_are_left_out_of_the_report() -> None:
 
 
 def test_sections_are_measured_again(tmp_path: Path) -> None:
-    speed, spread = module("convert_speed"), module("common").spread
+    speed, spread = module("convert_sections"), module("common").spread
     before = json.loads(json.dumps(example_result()))
     keys = ("states_ours_1", "states_renderer_1")
     rates = {key: spread([value]) for key, value in zip(keys, (90.0, 100.0), strict=True)}
@@ -268,15 +268,15 @@ def test_sections_are_measured_again(tmp_path: Path) -> None:
     assert found["scene_loading"] == body["scene_loading"]
     assert set(found["measured_again"]) == {"states"}
     output = tmp_path / "result.json"
-    assert speed._sections(None, output) == speed.SECTIONS
+    assert speed.chosen_sections(None, output) == speed.SECTIONS
     with pytest.raises(UserError, match="is missing"):
-        speed._sections("states", output)
+        speed.chosen_sections("states", output)
     output.write_text("{}")
-    assert speed._sections("states, lift", output) == ("states", "lift")
+    assert speed.chosen_sections("states, lift", output) == ("states", "lift")
     with pytest.raises(UserError, match=r"images,decode"):
-        speed._sections("decode", output)
+        speed.chosen_sections("decode", output)
     with pytest.raises(UnknownNameError, match="'states'"):
-        speed._sections("state", output)
+        speed.chosen_sections("state", output)
 
 
 @pytest.mark.skipif(not RESULT.exists(), reason="no measured result in this checkout")

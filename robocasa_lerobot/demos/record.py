@@ -106,11 +106,12 @@ def record_tasks(
     for settings in all_settings:
         if _file(out, settings).exists():
             results[settings.task] = _recorded(_file(out, settings), settings)
+            _clear_away(Parts(out, settings))
         else:
             waiting.append(Parts(out, settings, out / FAILURES_FOLDER / settings.task if keep_failures else None))
     with contextlib.ExitStack() as stack:
         for parts in waiting:
-            lock = parts.folder.with_suffix(".lock")
+            lock = _lock(parts)
             stack.enter_context(locked(lock))
             stack.callback(shutil.rmtree, lock, ignore_errors=True)  # before it is released
             parts.prepare()
@@ -167,6 +168,19 @@ def _finished(parts: Parts, tally: Tally, out: Path) -> RecordingResult | None:
         remove_others(parts.films, tally.failures)
     shutil.rmtree(parts.folder)
     return RecordingResult(path, len(tally.chosen), steps, tally.tried, tally.failures)
+
+
+def _clear_away(parts: Parts) -> None:
+    """Remove what a run left that was killed after the task's file had appeared."""
+    lock = _lock(parts)
+    if lock.exists() or parts.folder.exists():
+        with contextlib.suppress(UserError), locked(lock):  # held by another run, which is about to do it
+            shutil.rmtree(parts.folder, ignore_errors=True)
+            shutil.rmtree(lock, ignore_errors=True)
+
+
+def _lock(parts: Parts) -> Path:
+    return parts.folder.with_suffix(".lock")
 
 
 def _file(out: Path, settings: RecordingSettings) -> Path:
