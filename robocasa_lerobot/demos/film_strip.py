@@ -8,16 +8,15 @@ from pathlib import Path
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
-from PIL import Image, ImageDraw
+from PIL import Image
 
 from robocasa_lerobot import contract
 from robocasa_lerobot.demos.motion import base_pose
 from robocasa_lerobot.demos.replay import kitchen_of, read_demonstration
+from robocasa_lerobot.demos.titled import titled
 from robocasa_lerobot.envs.scene.robot_names import GRIP_SITE
 
-Picture = NDArray[np.uint8]
 STRIP_PICTURES, STRIP_SIZE = 10, 224  # along the strip; pixels of each
-_TITLE = 22
 # Of a camera that follows the hand: over a shoulder, or where nothing stands between.
 _CLOSE_M, _SIDES_DEG, _DOWN_DEG = 0.9, (40.0, -40.0, 75.0, -75.0, 10.0), (-28.0, -50.0, -8.0)
 _NEAR_HAND_M = 0.25  # what is nearer to the hand than this belongs to it
@@ -48,7 +47,7 @@ def film_strip(path: Path, demo: str, out: Path) -> None:
                 *renderer.pictures(data, contract.CAMERAS),
                 renderer.render(data, _beside_the_hand(env.model, data)),
             ]
-            columns.append(_titled(np.vstack(pictures), f"{step / contract.CONTROL_HZ:.1f} s"))
+            columns.append(titled(np.vstack(pictures), f"{step / contract.CONTROL_HZ:.1f} s"))
     finally:
         if renderer is not None:
             renderer.close()
@@ -56,7 +55,7 @@ def film_strip(path: Path, demo: str, out: Path) -> None:
     title = f"{recorded.task}, {recorded.split}, seed {recorded.seed}: {recorded.instruction}"
     out.parent.mkdir(parents=True, exist_ok=True)
     aside = out.with_name(f".{out.name}")
-    Image.fromarray(_titled(np.hstack(columns), title)).save(aside, format="PNG")
+    Image.fromarray(titled(np.hstack(columns), title)).save(aside, format="PNG")
     aside.replace(out)
 
 
@@ -89,9 +88,3 @@ def _seen_m(
     hit = np.zeros(1, dtype=np.int32)
     free = mujoco.mj_ray(model, data, hand - _CLOSE_M * ahead, ahead, None, 1, -1, hit)
     return _CLOSE_M if free < 0 else float(free)
-
-
-def _titled(picture: Picture, text: str) -> Picture:
-    title = Image.new("RGB", (picture.shape[1], _TITLE), "white")
-    ImageDraw.Draw(title).text((4, 4), text, fill="black", font_size=13)
-    return np.vstack([np.asarray(title), picture])

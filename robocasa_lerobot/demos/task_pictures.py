@@ -6,10 +6,11 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
-from PIL import Image, ImageDraw
+from PIL import Image
 
 from robocasa_lerobot.demos.demonstrator import can_demonstrate
 from robocasa_lerobot.demos.episode import record_episode
+from robocasa_lerobot.demos.titled import titled
 from robocasa_lerobot.envs.gallery import visitor_camera
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.errors import UserError
@@ -17,7 +18,6 @@ from robocasa_lerobot.rendering import SceneRenderer
 
 Picture = NDArray[np.uint8]
 _HEIGHT, _WIDE = 320, 480  # of each picture; the visitor's is wider
-_TITLE = 26
 
 
 def render_states(task: str, out: Path, *, split: str = "target", seed: int = 0) -> str:
@@ -34,12 +34,12 @@ def render_states(task: str, out: Path, *, split: str = "target", seed: int = 0)
     env = KitchenEnv(task, split=split, image_size=_HEIGHT, terminate_on_success=False)
     try:
         env.reset(seed=seed)
-        rows = [_titled(_row(env), f"{task}, seed {seed}: {env.task_description}")]
+        rows = [titled(_row(env), f"{task}, seed {seed}: {env.task_description}")]
         if can_demonstrate(env.declaration):
             recording = record_episode(env, seed)
             ended = "done" if recording.success else f"not done ({recording.reason})"
             said = f"the demonstrator's end after {len(recording.actions) / 20:.1f} s: {ended}"
-            rows.append(_titled(_row(env), said))
+            rows.append(titled(_row(env), said))
         else:
             said = "no demonstrator yet, so there is no picture of the end"
     finally:
@@ -58,9 +58,3 @@ def _row(env: KitchenEnv) -> Picture:
     finally:
         renderer.close()
     return np.hstack([visitor, *(env.render_camera(camera) for camera in env.cameras)])
-
-
-def _titled(picture: Picture, text: str) -> Picture:
-    title = Image.new("RGB", (picture.shape[1], _TITLE), "white")
-    ImageDraw.Draw(title).text((8, 5), text, fill="black", font_size=14)
-    return np.vstack([np.asarray(title), picture])
