@@ -71,10 +71,14 @@ def table(header: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
 def write_result(path: Path, name: str, body: dict[str, Any]) -> None:
     """Write a benchmark's result as JSON: written aside, then renamed, so that no reader meets half of it."""
     path.parent.mkdir(parents=True, exist_ok=True)
-    date = datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds")
     aside = path.with_name(path.name + ".part")
-    aside.write_text(json.dumps({"benchmark": name, "date": date, **body}, indent=1) + "\n", encoding="utf-8")
+    aside.write_text(json.dumps({"benchmark": name, "date": now(), **body}, indent=1) + "\n", encoding="utf-8")
     aside.replace(path)
+
+
+def now() -> str:
+    """The present time as results have it."""
+    return datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds")
 
 
 def _commit() -> str:

@@ -17,10 +17,15 @@ def start_serving(module: str, descriptors: Sequence[int], **environment: str) -
 
     `environment` is added to this process's. Python's modules are found where this one finds them.
     """
-    places = [str(Path(__file__).parents[2]), *filter(None, [os.environ.get("PYTHONPATH")])]
     return subprocess.Popen(
         [sys.executable, "-c", _PROGRAM.format(module=module), *map(str, descriptors)],
         pass_fds=descriptors,
         stdin=subprocess.DEVNULL,
-        env={**os.environ, "PYTHONPATH": os.pathsep.join(places), **environment},
+        env=environment_of_python() | environment,
     )
+
+
+def environment_of_python() -> dict[str, str]:
+    """This process's environment, in which a further Python finds this package."""
+    places = [str(Path(__file__).parents[2]), *filter(None, [os.environ.get("PYTHONPATH")])]
+    return {**os.environ, "PYTHONPATH": os.pathsep.join(places)}

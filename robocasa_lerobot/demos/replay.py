@@ -6,9 +6,7 @@ The kitchen is made again from the task, split and seed in the file (and the lay
 from __future__ import annotations
 
 import json
-import multiprocessing
 from collections.abc import Iterable, Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -20,6 +18,7 @@ from numpy.typing import NDArray
 
 from robocasa_lerobot import contract
 from robocasa_lerobot.demos.episode import SUCCESS_HOLD_STEPS
+from robocasa_lerobot.demos.parallel import as_they_end
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.errors import UserError
 
@@ -108,14 +107,7 @@ def demonstrations(paths: Iterable[Path]) -> list[tuple[Path, str]]:
 
 def replay_all(chosen: Sequence[tuple[Path, str]], workers: int = 1) -> Iterator[Replayed]:
     """Replay demonstrations, in several processes, as they end."""
-    if workers <= 1:
-        for path, demo in chosen:
-            yield replay(path, demo)
-        return
-    context = multiprocessing.get_context("forkserver")
-    with ProcessPoolExecutor(min(workers, len(chosen)), mp_context=context) as pool:
-        for future in as_completed([pool.submit(replay, *one) for one in chosen]):
-            yield future.result()
+    yield from as_they_end(replay, chosen, workers)
 
 
 def read_demonstration(path: Path, demo: str) -> Demonstration:

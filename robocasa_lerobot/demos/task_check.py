@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import multiprocessing
 from collections.abc import Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import dataclass
 
 from robocasa_lerobot.demos.demonstrator import can_demonstrate
 from robocasa_lerobot.demos.episode import record_episode
+from robocasa_lerobot.demos.parallel import as_they_end
 from robocasa_lerobot.envs.check import CHECK_SEEDS, check_task
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.registry import get_task
@@ -56,14 +55,4 @@ def check_all(
 ) -> Iterator[Checked]:
     """Every task in every split, in the order in which processes finish."""
     jobs = [(task, split, seeds) for split in splits for task in tasks]
-    if workers == 1 or len(jobs) == 1:
-        yield from (check(*job) for job in jobs)
-        return
-    context = multiprocessing.get_context("forkserver")
-    with ProcessPoolExecutor(min(workers, len(jobs)), mp_context=context) as pool:
-        futures = [pool.submit(check, *job) for job in jobs]
-        try:
-            for future in as_completed(futures):
-                yield future.result()
-        finally:
-            pool.shutdown(wait=False, cancel_futures=True)
+    yield from as_they_end(check, jobs, workers)

@@ -12,7 +12,6 @@ import fnmatch
 import hashlib
 import json
 import math
-import os
 import signal
 import subprocess
 import sys
@@ -24,6 +23,7 @@ import h5py
 import numpy as np
 from tqdm import tqdm
 
+from robocasa_lerobot.convert.python_process import environment_of_python
 from robocasa_lerobot.convert.reading.hdf5 import (
     MAX_TEXT_BYTES,
     RejectedEpisodeError,
@@ -87,12 +87,12 @@ def _is_inside(place: str, pattern: str) -> bool:
 
 def _run(path: Path, found: Survey) -> tuple[str | None, int]:
     """Walk in a new process; gives the place where it was last, and its exit status."""
-    places = [str(Path(__file__).parents[3]), *filter(None, [os.environ.get("PYTHONPATH")])]
-    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(places)}
     command = [sys.executable, "-m", _MODULE, str(path), *found.traps]
     place: str | None = None
     with (
-        subprocess.Popen(command, stdout=subprocess.PIPE, env=environment, text=True, errors="replace") as process,
+        subprocess.Popen(
+            command, stdout=subprocess.PIPE, env=environment_of_python(), text=True, errors="replace"
+        ) as process,
         tqdm(desc=f"looking into {path.name}", unit="episode", delay=2.0, leave=False) as bar,
     ):
         assert process.stdout is not None

@@ -73,13 +73,14 @@ def take_out_of_drawer(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
 
 def _clear_of_counter(what: Thing) -> Callable[[KitchenEnv], Iterator[Array]]:
     """Before a grasp: pull the drawer farther out where the counter over it is in the way, or where a grasp failed."""
-    before: list[str] = []
+    again = False
 
     def first(env: KitchenEnv) -> Iterator[Array]:
+        nonlocal again
         drawer = env.scene.drawer("drawer")
-        if before or best_way(env, what, OUT_OF_DRAWER).cost > HARD:
+        if again or best_way(env, what, OUT_OF_DRAWER).cost > HARD:
             yield from drag_open(env, drawer, 1.0 + FARTHER_OUT_M / drawer.full_travel)
-        before.append(what.name)
+        again = True
 
     return first
 
