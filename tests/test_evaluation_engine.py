@@ -20,6 +20,7 @@ from evaluation_env import SlideEnv
 from robocasa_lerobot.errors import UserError
 from robocasa_lerobot.evaluation import engine, results, trials_file
 from robocasa_lerobot.evaluation.config import EvaluationConfig
+from robocasa_lerobot.evaluation.eval_info import write_eval_info
 from robocasa_lerobot.evaluation.film import FILM_EVERY, FILM_FPS, Film
 from robocasa_lerobot.evaluation.overrides import load_config
 from robocasa_lerobot.evaluation.plan import make_plan
@@ -83,6 +84,19 @@ def test_records_say_what_happened_and_what_made_it(tmp_path: Path) -> None:
     assert header.settings["seed"] == 0
     assert header.settings["factory"] == FACTORY
     assert {"robocasa_lerobot", "lerobot", "mujoco", "torch"} <= set(header.versions)
+
+
+def test_a_label_with_a_slash_is_one_folder_of_films_and_one_file_of_rates(tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    names = "demo/tune-000400,demo/tune-000800"
+    records = evaluate(out, trials=1, videos=1, **{"policy.path": "zero,random", "policy.label": names})
+    assert {Path(str(r.video)).parts[:2] for r in records} == {
+        ("videos", "demo__tune-000400"), ("videos", "demo__tune-000800"),
+    }  # fmt: skip
+    written = {path.name for path in write_eval_info(results.read_results(out), out)}
+    assert written == {"eval_info_demo__tune-000400.json", "eval_info_demo__tune-000800.json"}
+    with pytest.raises(UserError, match="would have one folder"):
+        evaluate(out, **{"policy.path": "zero,random", "policy.label": "a/b,a__b"})
 
 
 @pytest.mark.parametrize(

@@ -177,8 +177,8 @@ def test_a_torn_last_line_is_left_out_and_cut_off_at_every_length(tmp_path: Path
     [
         ("not json", "trials.jsonl:2: not a JSON object"),
         ("[1]", "found list, expected a JSON object"),
-        (json.dumps({"schema": 99}), "schema 99, this version reads 2"),
-        (json.dumps({"schema": 2, "kind": "dog"}), "kind 'dog', expected 'run' or 'trial'"),
+        (json.dumps({"schema": 99}), "schema 99, this version reads 3"),
+        (json.dumps({"schema": 3, "kind": "dog"}), "kind 'dog', expected 'run' or 'trial'"),
         (record().to_line().replace('"success"', '"sucess"'), "unknown key 'sucess'. Did you mean 'success'"),
         (record().to_line().replace('"success": true', '"success": 1'), "'success' is 1, expected bool"),
         (record().to_line().replace('"steps": 80, ', ""), "missing key.s. steps"),

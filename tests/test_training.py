@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
 import signal
 import threading
 import time
@@ -19,6 +20,7 @@ from training_support import experiment_file, losses, metrics, tiny, weights
 from robocasa_lerobot import contract
 from robocasa_lerobot.data.fake import write_fake_dataset
 from robocasa_lerobot.errors import UserError
+from robocasa_lerobot.evaluation.checkpoints import read_source
 from robocasa_lerobot.training import builders
 from robocasa_lerobot.training.checkpoint import last_checkpoint, pretrained_model
 from robocasa_lerobot.training.config import EmaConfig, load_experiment
@@ -63,6 +65,23 @@ def test_two_phases_leave_what_they_should(finished: Path) -> None:
         assert [line["step"] for line in lines] == [1, 2, 3, 4]
         assert {"loss", "learning_rate", "grad_norm", "seconds_per_step", "data_seconds_per_step"} <= lines[0].keys()
         assert [line["samples"] for line in lines] == [4, 8, 12, 16]
+
+
+def test_a_checkpoint_says_which_experiment_made_it_wherever_it_lies(finished: Path, tmp_path: Path) -> None:
+    phase = finished / "out/finetune"
+    copy = shutil.copytree(phase / "checkpoints/000004/pretrained_model", tmp_path / "copied")
+    moved = shutil.copytree(phase, tmp_path / "moved", symlinks=True)
+    for place in (phase, copy, moved):
+        source = read_source(str(place))
+        assert (source.label, source.experiment, source.phase, source.step) == (
+            "test/finetune-000004", "test", "finetune", 4,
+        )  # fmt: skip
+    # One that was written before there was an `origin.json`.
+    place = moved / "checkpoints/000004/pretrained_model"
+    fingerprint = read_source(str(place)).fingerprint
+    (place / "origin.json").unlink()
+    assert read_source(str(place)).label == "test/moved-000004"
+    assert read_source(str(place)).fingerprint == fingerprint
 
 
 @pytest.mark.parametrize("first", [1, 2, 3, 5])

@@ -11,9 +11,12 @@ from typing import Any
 from robocasa_lerobot import contract
 from robocasa_lerobot.errors import UserError
 from robocasa_lerobot.evaluation.results import PolicyInfo
+from robocasa_lerobot.policies.origin import ORIGIN_FILE, Origin, read_origin
 
 REFERENCE_POLICIES = ("demonstrator", "random", "zero")
 REPLAY = "replay"  # written replay:FILE
+# They say where a checkpoint comes from, and change nothing of what the policy does.
+_ABOUT_TRAINING = ("train_config.json", ORIGIN_FILE)
 _WEIGHTS = ("model.safetensors", "adapter_model.safetensors")
 
 
@@ -25,8 +28,8 @@ class CheckpointError(UserError):
 class PolicySource:
     """A policy to evaluate: a checkpoint folder, or a reference policy.
 
-    `fingerprint` is a SHA-256 over weights, config and processors; `phase` and `step` come from the folder's
-    place in a training's output and are None elsewhere. `image_size` is (height, width) of its camera inputs.
+    `fingerprint` is a SHA-256 over weights, config and processors; `experiment`, `phase` and
+    `step` are what the checkpoint says about its training. `image_size` is (height, width) of its camera inputs.
     """
 
     label: str
@@ -36,6 +39,7 @@ class PolicySource:
     phase: str | None = None
     step: int | None = None
     image_size: tuple[int, int] | None = None
+    experiment: str | None = None
 
     @property
     def is_reference(self) -> bool:
@@ -44,7 +48,9 @@ class PolicySource:
 
     def describe(self) -> PolicyInfo:
         """What the header of a run says about it."""
-        return PolicyInfo(self.label, self.path, self.type, self.fingerprint, self.phase, self.step)
+        return PolicyInfo(
+            self.label, self.path, self.type, self.fingerprint, self.phase, self.step, experiment=self.experiment
+        )
 
 
 def read_source(path: str, label: str | None = None) -> PolicySource:
@@ -64,10 +70,25 @@ def read_source(path: str, label: str | None = None) -> PolicySource:
         kind = config["type"]
     except (OSError, json.JSONDecodeError, KeyError, TypeError) as error:
         raise CheckpointError(f"{folder / 'config.json'}: not the config of a LeRobot policy ({error!r}).") from error
-    phase, step = _phase_and_step(folder.resolve())
-    if label is None:
-        label = f"{phase}-{step:06d}" if phase is not None and step is not None else folder.resolve().name
-    return PolicySource(label, str(folder), kind, fingerprint(folder), phase, step, camera_size(config, folder))
+    origin = read_origin(folder)
+    return PolicySource(
+        label or default_label(origin, folder.resolve()),
+        str(folder),
+        kind,
+        fingerprint(folder),
+        origin.phase,
+        origin.step,
+        camera_size(config, folder),
+        origin.experiment,
+    )
+
+
+def default_label(origin: Origin, folder: Path) -> str:
+    """`<experiment>/<phase>-<step>`, as far as it is known: phases of different experiments have the same names."""
+    if origin.phase is None:
+        return folder.name
+    own = origin.phase if origin.step is None else f"{origin.phase}-{origin.step:06d}"
+    return own if origin.experiment is None else f"{origin.experiment}/{own}"
 
 
 def find_pretrained(path: Path) -> Path:
@@ -87,7 +108,7 @@ def find_pretrained(path: Path) -> Path:
 def fingerprint(folder: Path) -> str:
     """SHA-256 over the files of a checkpoint that decide what the policy does, by name and content."""
     digest = hashlib.sha256()
-    files = [p for p in sorted(folder.rglob("*")) if p.is_file() and p.name != "train_config.json"]
+    files = [p for p in sorted(folder.rglob("*")) if p.is_file() and p.name not in _ABOUT_TRAINING]
     for file in files:
         if file.suffix not in (".json", ".safetensors", ".txt", ".model"):
             continue
@@ -145,14 +166,3 @@ def common_image_size(sources: list[PolicySource], asked: int | None) -> int:
     if height != width:
         raise UserError(f"the policy was trained at {height}x{width} pictures; the env renders square ones.")
     return height
-
-
-def _phase_and_step(folder: Path) -> tuple[str | None, int | None]:
-    # <phase>/checkpoints/<step>/pretrained_model, as written by the training
-    if (
-        folder.name == "pretrained_model"
-        and folder.parent.parent.name == "checkpoints"
-        and folder.parent.name.isdigit()
-    ):
-        return folder.parent.parent.parent.name, int(folder.parent.name)
-    return None, None

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field, fields
 from pathlib import Path
 
 from robocasa_lerobot.errors import UnknownNameError, UserError
+from robocasa_lerobot.evaluation.results import file_name
 
 KITCHEN_ENV_FACTORY = "robocasa_lerobot.envs.kitchen_env:KitchenEnv"
 SPLITS = ("target", "pretrain")
@@ -25,7 +26,7 @@ class PolicySettings:
 
     path: `pretrained_model` folders, or reference policies: `demonstrator`, `random`, `zero`, or `replay:FILE` with an
         HDF5 file of demonstrations or a LeRobotDataset; several give one report.
-    label: their names in results and report; default: phase and step of the checkpoint.
+    label: their names in results and report; default: `experiment/phase-step` of the checkpoint's training.
     device: auto, cpu, cuda or mps.
     devices: devices with a policy process each, such as cuda:0,cuda:1; default: all GPUs.
     placement: workers (a replica in each worker), servers (a process for each device, which batches the observations
@@ -232,4 +233,4 @@ def check_factory(factory: str) -> None:
 
 def output_folder(config: EvaluationConfig, labels: list[str]) -> Path:
     """Where results go: `out`, or a folder named after the policies."""
-    return Path(config.out) if config.out else Path("outputs/evaluations") / "-".join(labels)
+    return Path(config.out) if config.out else Path("outputs/evaluations") / "-".join(map(file_name, labels))

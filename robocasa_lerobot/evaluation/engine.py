@@ -7,7 +7,7 @@ import dataclasses
 import fcntl
 import os
 import sys
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
@@ -30,6 +30,7 @@ from robocasa_lerobot.evaluation.results import (
     Seconds,
     TrialKey,
     TrialRecord,
+    file_name,
     read_results,
 )
 from robocasa_lerobot.evaluation.serving import open_servers, served_labels
@@ -70,9 +71,12 @@ def prepare(config: EvaluationConfig) -> Evaluation:
     for source in sources:
         if source.label in by_label:
             raise UserError(f"two policies are called {source.label!r}: name them with --policy.label=A,B.")
-        if not source.label or "/" in source.label or source.label.startswith("."):
-            raise UserError(f"policy.label {source.label!r}: it names a folder, so no '/' and no leading '.'.")
+        if not source.label or source.label.startswith("."):
+            raise UserError(
+                f"policy.label {source.label!r}: it names a folder, so it is not empty and has no leading '.'."
+            )
         by_label[source.label] = source
+    _check_folders(by_label)
     needs_torch = not all(source.is_reference for source in sources)
     device = resolve.resolve_device(config.policy.device, needs_torch)
     settings = resolve.outcome_settings(config, common_image_size(sources, config.env.image_size), device)
@@ -88,6 +92,15 @@ def prepare(config: EvaluationConfig) -> Evaluation:
         return Evaluation(config, by_label, header, plan, plan, out)
     shard = Shard.parse(config.shard)
     return Evaluation(config, by_label, header, plan, shard.of(plan), shard_folder(out, shard))
+
+
+def _check_folders(labels: Iterable[str]) -> None:
+    """No two labels may name one folder of films."""
+    found: dict[str, str] = {}
+    for label in labels:
+        other = found.setdefault(file_name(label), label)
+        if other != label:
+            raise UserError(f"policy.label: {other!r} and {label!r} would have one folder; name one of them otherwise.")
 
 
 def shard_folder(out: Path, shard: Shard) -> Path:

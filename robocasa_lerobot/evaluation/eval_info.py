@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from robocasa_lerobot.evaluation.results import Results, TrialRecord
+from robocasa_lerobot.evaluation.results import Results, TrialRecord, file_name
 
 
 def eval_info(results: Results, label: str) -> dict[str, Any]:
@@ -38,7 +38,7 @@ def write_eval_info(results: Results, folder: Path) -> list[Path]:
     labels = list(dict.fromkeys(record.label for record in results.trials))
     paths = []
     for label in labels:
-        path = folder / ("eval_info.json" if len(labels) == 1 else f"eval_info_{label}.json")
+        path = folder / ("eval_info.json" if len(labels) == 1 else f"eval_info_{file_name(label)}.json")
         part = path.with_name(path.name + ".part")
         part.write_text(json.dumps(eval_info(results, label), indent=2), encoding="utf-8")
         part.replace(path)

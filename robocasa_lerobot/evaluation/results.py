@@ -23,11 +23,14 @@ from robocasa_lerobot.errors import UserError
 from robocasa_lerobot.evaluation.schema import SchemaError, build
 
 TRIALS_FILE = "trials.jsonl"
-SCHEMA_VERSION = 2
+SCHEMA_VERSION = 3
 # What kind of end a trial had. Only `finished` trials ran to success or horizon; the others carry an error.
 FINISHED, CRASHED, HUNG, DIVERGED = "finished", "crashed", "hung", "diverged"
 OUTCOMES = (FINISHED, CRASHED, HUNG, DIVERGED)
 UNPERTURBED = "none"
+
+# Stands for the "/" of a label in names of folders and files.
+_SLASH = "__"
 
 # What names a trial in a results file: policy label, task, perturbation, number of the trial.
 TrialKey = tuple[str, str, str, int]
@@ -72,9 +75,10 @@ class PolicyInfo:
     """A policy that a run evaluated.
 
     `type` is LeRobot's name, or that of a reference policy (`demonstrator`, `random`, `zero`, `replay`), whose `path`
-    it is too. `fingerprint` is a SHA-256 over weights, config and processors. `phase` and `step` come from the
-    checkpoint's place in a training's output. `lifelong_phase` (from 1), `demo_fraction` (of the target
-    demonstrations, 0 to 1) and `training_data` ("target only", ...) are labels that the user gave for the report.
+    it is too. `fingerprint` is a SHA-256 over weights, config and processors. `experiment`, `phase` and `step` are what
+    the checkpoint says about its training, None where it says nothing. `lifelong_phase` (from 1), `demo_fraction` (of
+    the target demonstrations, 0 to 1) and `training_data` ("target only", ...) are labels that the user gave for the
+    report.
     """
 
     label: str
@@ -87,6 +91,7 @@ class PolicyInfo:
     demo_fraction: float | None = None
     training_data: str | None = None
     weights_version: str | None = None  # of LeRobot, where the checkpoint says it
+    experiment: str | None = None
 
 
 @dataclass(frozen=True)
@@ -97,7 +102,8 @@ class RunHeader:
         protocol: name of the protocol (`leaderboard`, `paper`, `foundation`, ...), "custom" for settings of one's own.
         task_sets: each task set of the protocol with those of its tasks that the run plans; {} where tasks were named.
         tasks: all planned tasks.
-        missing_tasks: tasks that the protocol names and this version does not have, left out with the user's consent.
+        missing_tasks: tasks that the protocol names and that are not run, mostly because this version does not have
+            them: with any, the run is partial.
         trials: trials of each policy on each task under each perturbation.
         seed: the evaluation's seed, from which all others follow.
         split: "target" or "pretrain" scenes.
@@ -105,6 +111,7 @@ class RunHeader:
         image_size: height and width of the pictures, pixels.
         horizon_rule: "task" (each task's own), "fixed", or "env" (left to an env of the user's own).
         horizon_multiplier: factor on the task's own horizon.
+        horizon_version: release of RoboCasa whose horizons are the tasks' own; None with other rules.
         success_rule: "any_step", "hold" (for `success_hold_steps` in a row), or "at_end".
         success_hold_steps: control steps for which the goal must hold.
         executed_steps: actions executed of each predicted chunk; None: the policy's own.
@@ -116,6 +123,8 @@ class RunHeader:
         device: what the policy computed on.
         machine: processor, cores, GPU, system.
         started: UTC, ISO 8601.
+        registry: file whose task sets these are; None: the benchmark's.
+        missing_by_set: for each task set that is not run as a whole, its tasks that are not run.
     """
 
     protocol: str
@@ -140,6 +149,9 @@ class RunHeader:
     device: str
     machine: dict[str, str]
     started: str
+    horizon_version: str | None = None
+    registry: str | None = None
+    missing_by_set: dict[str, list[str]] = field(default_factory=dict)
     schema: int = field(default=SCHEMA_VERSION)
 
     @cached_property
@@ -309,6 +321,11 @@ def parse_line(line: str, where: str) -> RunHeader | TrialRecord:
     except SchemaError as error:
         raise ResultsError(f"{where}: {error}.") from error
     raise ResultsError(f"{where}: kind {kind!r}, expected 'run' or 'trial'.")
+
+
+def file_name(label: str) -> str:
+    """A policy's label as the name of a folder or file: `demo/finetune-000400` is `demo__finetune-000400`."""
+    return label.replace("/", _SLASH)
 
 
 def _dump(values: dict[str, Any]) -> str:

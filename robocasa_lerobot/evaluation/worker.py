@@ -26,7 +26,7 @@ from robocasa_lerobot.evaluation.plan import TrialSpec
 from robocasa_lerobot.evaluation.policy_runner import load_actor
 from robocasa_lerobot.evaluation.policy_server import RemotePolicy
 from robocasa_lerobot.evaluation.processes import take_over
-from robocasa_lerobot.evaluation.results import CRASHED, DIVERGED
+from robocasa_lerobot.evaluation.results import CRASHED, DIVERGED, file_name
 from robocasa_lerobot.evaluation.rollout import DivergedError, Outcome, horizon_of, run_trial
 from robocasa_lerobot.evaluation.success import SuccessRule
 
@@ -171,7 +171,7 @@ class _Worker:
 def video_path(spec: TrialSpec) -> str:
     """Where a trial's film lies in the results folder."""
     perturbed = "" if spec.perturbation == "none" else f"{spec.perturbation}_"
-    return f"videos/{spec.label}/{spec.task}/{perturbed}trial_{spec.trial:03d}.mp4"
+    return f"videos/{file_name(spec.label)}/{spec.task}/{perturbed}trial_{spec.trial:03d}.mp4"
 
 
 def load_factory(factory: str) -> EnvFactory:

@@ -1,6 +1,7 @@
 """Checkpoints in LeRobot's layout, complete or not there at all.
 
-<phase>/checkpoints/000100/pretrained_model/   config.json, model.safetensors, processors, train_config.json
+<phase>/checkpoints/000100/pretrained_model/   config.json, model.safetensors, processors, train_config.json,
+                                               origin.json (experiment, phase, step)
 <phase>/checkpoints/000100/training_state/     optimiser, schedule, step, log window; the weights as they are
                                                trained, where `pretrained_model` has averaged or merged ones
 <phase>/checkpoints/last -> 000100
@@ -21,6 +22,7 @@ from lerobot.policies.pretrained import PreTrainedPolicy
 from safetensors.torch import load_file, load_model, save_file, save_model
 
 from robocasa_lerobot.errors import UserError
+from robocasa_lerobot.policies.origin import Origin, experiment_of
 from robocasa_lerobot.training.adapters import merged_state
 from robocasa_lerobot.training.ema import Ema
 
@@ -120,6 +122,8 @@ def save_checkpoint(phase_dir: Path, state: TrainingState, train_config: Any) ->
     state.preprocessor.save_pretrained(model_dir)
     state.postprocessor.save_pretrained(model_dir)
     train_config.save_pretrained(model_dir)
+    experiment = experiment_of(getattr(train_config, "job_name", None), phase_dir.name)
+    Origin(experiment, phase_dir.name, state.step).write(model_dir)
     if final.exists():
         _drop(final)
     aside.rename(final)

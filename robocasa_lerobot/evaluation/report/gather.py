@@ -221,6 +221,8 @@ def describe_policy(policy: PolicyResult) -> str:
     if info.path in REFERENCES:
         return REFERENCES[info.path]
     facts = [info.type]
+    if info.experiment is not None:
+        facts.append(f"experiment {info.experiment}")
     if info.phase is not None:
         facts.append(f"phase {info.phase}, step {info.step:,}" if info.step is not None else f"phase {info.phase}")
     if info.step == 0:
@@ -263,13 +265,24 @@ def _training_order(policy: PolicyResult) -> tuple[bool, int]:
 
 
 def _with_distinct_labels(policies: tuple[PolicyResult, ...]) -> tuple[PolicyResult, ...]:
-    labels = [policy.label for policy in policies]
+    folders: dict[str, list[Path]] = {}
+    for policy in policies:
+        folders.setdefault(policy.label, []).append(policy.folder)
     return tuple(
-        dataclasses.replace(policy, label=f"{policy.label} ({policy.folder.name})")
-        if labels.count(policy.label) > 1
+        dataclasses.replace(policy, label=f"{policy.label} ({_end_of(policy.folder, folders[policy.label])})")
+        if len(folders[policy.label]) > 1
         else policy
         for policy in policies
     )
+
+
+def _end_of(folder: Path, folders: Sequence[Path]) -> str:
+    """As much of the end of a folder's path as tells it from the others."""
+    for length in range(1, len(folder.parts) + 1):
+        end = folder.parts[-length:]
+        if sum(other.parts[-length:] == end for other in folders) == 1:
+            return "/".join(end)
+    return str(folder)
 
 
 def _title(policies: Sequence[PolicyResult], names: Sequence[str]) -> str:

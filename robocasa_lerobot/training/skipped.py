@@ -1,0 +1,62 @@
+"""What a run could not do, written beside its phases, so that a report repeats what a log said once.
+
+`<output_dir>/skipped.jsonl` has a line for each phase or evaluation that was left out, that failed, or that ran on a
+part of its tasks. Every run writes the file anew: what is possible now has no line any more.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+
+SKIPPED_FILE = "skipped.jsonl"
+PHASE, EVALUATION, PARTIAL = "phase", "evaluation", "partial"
+KINDS = (PHASE, EVALUATION, PARTIAL)
+
+
+@dataclass(frozen=True)
+class Skipped:
+    """Something that was left out, and why.
+
+    Attributes:
+        kind: `phase` (not trained), `evaluation` (not run, or failed), `partial` (run on some of its tasks only).
+        phase: the phase's name.
+        evaluation: the evaluation's name; None for a phase.
+        reason: a sentence for people.
+    """
+
+    kind: str
+    phase: str
+    evaluation: str | None
+    reason: str
+
+    def __post_init__(self) -> None:
+        assert self.kind in KINDS, self.kind
+
+    def __str__(self) -> str:
+        what = f"phase {self.phase}" if self.evaluation is None else f"evaluation {self.evaluation} of {self.phase}"
+        return f"{what} {'is partial' if self.kind == PARTIAL else 'is left out'}: {self.reason}"
+
+
+def record(output_dir: Path, skipped: Iterable[Skipped]) -> None:
+    """Write the file whole or not at all; with nothing to say it is removed."""
+    path = output_dir / SKIPPED_FILE
+    lines = [json.dumps(dataclasses.asdict(item), ensure_ascii=False) + "\n" for item in dict.fromkeys(skipped)]
+    if not lines:
+        path.unlink(missing_ok=True)
+        return
+    output_dir.mkdir(parents=True, exist_ok=True)
+    aside = path.with_name(f".{path.name}")
+    aside.write_text("".join(lines), encoding="utf-8")
+    aside.replace(path)
+
+
+def read(output_dir: Path) -> list[Skipped]:
+    """The lines of the file, in their order; none where there is no file."""
+    path = output_dir / SKIPPED_FILE
+    if not path.is_file():
+        return []
+    return [Skipped(**json.loads(line)) for line in path.read_text(encoding="utf-8").splitlines()]
