@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+import re
 import shutil
 from pathlib import Path
 from typing import Any
@@ -16,7 +17,7 @@ from robocasa_lerobot import contract
 from robocasa_lerobot.data.config import MemberConfig, MixtureConfig, SelectionConfig, demo_count
 from robocasa_lerobot.data.fake import write_fake_dataset
 from robocasa_lerobot.data.mixture import MixtureDataset
-from robocasa_lerobot.data.published import PublishedDatasets, published_task_sets, published_tasks
+from robocasa_lerobot.data.published import PublishedDatasets, published_task_sets, published_tasks, task_facts
 from robocasa_lerobot.data.registry import MissingDatasetsError, missing_datasets, resolve_mixture, select_datasets
 from robocasa_lerobot.data.source import DatasetSource
 from robocasa_lerobot.envs import registry as envs
@@ -55,6 +56,39 @@ def test_published_tasks_are_those_of_the_facts(shared: Path) -> None:
     with (shared / "facts/tasks.csv").open() as file:
         rows = {row["task"]: (row["kind"], frozenset(row["sets"].split())) for row in csv.DictReader(file)}
     assert published_tasks() == rows
+
+
+def test_facts_of_tasks_are_those_of_the_list_of_attributes_and_of_the_papers_tables(shared: Path) -> None:
+    listed = {row["task"]: row for row in csv.DictReader((shared / "facts/tasks.csv").open())}
+    line = r"^([A-Z][\w ]+?) & \\texttt\{(.*?)\} & (\d+) & (Yes|No) & "
+    text = (shared / "facts/paper.txt").read_text()
+    in_tables = {
+        match[2].replace(r"\allowbreak{}", ""): (match[1].lower().replace(" ", "_"), int(match[3]), match[4] == "Yes")
+        for match in re.finditer(line, text, re.MULTILINE)
+    }
+    assert set(in_tables) == set(published_task_sets()["target50"])
+    facts = task_facts()
+    renamed = {
+        "sanitizing_cutting_board": "sanitizing_cutting_boards",
+        "washing_fruits_and_vegetables": "washing_produce",
+    }
+    for name, one in facts.items():
+        row = listed[name]
+        if one.kind == "atomic":
+            activity, own = "atomic", (one.activity or "atomic", one.subtasks, one.mobile)
+        else:
+            activity, own = renamed.get(row["activity"], row["activity"]), (one.activity, one.subtasks, one.mobile)
+        assert own == in_tables.get(name, (activity, int(row["subtasks"]), row["mobile"] == "Yes")), name
+        assert (one.family or "") == row["family"]
+        assert (one.horizon or "", one.human_seconds) == (
+            int(row["horizon"] or 0) or "",
+            float(row["human_episode_seconds"]),
+        )
+    assert len({one.activity for one in facts.values()} - {None}) == 60
+    assert len({one.family for one in facts.values()} - {None}) == 6
+    # The list alone has 232 mobile tasks, the paper's text 220; with the three corrections of its tables 229 are left.
+    assert sum(row["mobile"] == "Yes" for row in listed.values()) == 232
+    assert sum(one.mobile for one in facts.values()) == 229
 
 
 def test_published_folders_are_found_newest_first_and_old_formats_say_how_to_convert(tmp_path: Path) -> None:

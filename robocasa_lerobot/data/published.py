@@ -32,12 +32,42 @@ class DatasetEntry:
     task_filter: bool = False
 
 
+@dataclass(frozen=True)
+class TaskFacts:
+    """What the benchmark says of one of its 365 tasks, whether it can be run here or not.
+
+    `kind` is `atomic` or `composite`. `activity` (one of 60) and its `family` (one of 6) are None for atomic tasks.
+    `subtasks` is the number of skills in a row, `mobile` whether the base has to move. `horizon` is RoboCasa 1.0.1's,
+    control steps at 20 Hz, None where none is published. `human_seconds` is the mean length of a human demonstration.
+    """
+
+    task: str
+    kind: str
+    family: str | None
+    activity: str | None
+    subtasks: int
+    mobile: bool
+    horizon: int | None
+    human_seconds: float
+    sets: frozenset[str]
+
+
+@functools.cache
+def task_facts() -> dict[str, TaskFacts]:
+    """Facts of all of RoboCasa365's tasks by name: its published list of attributes, corrected by the paper's tables.
+
+    The tables list the 50 target tasks. They call three of them stationary that the list calls mobile, and name two
+    activities otherwise; all tasks of such an activity have the table's name here.
+    """
+    text = resources.files("robocasa_lerobot.data").joinpath("robocasa365.jsonl").read_text(encoding="utf-8")
+    rows = [json.loads(line) for line in text.splitlines()]
+    return {row["task"]: TaskFacts(**{**row, "sets": frozenset(row["sets"])}) for row in rows}
+
+
 @functools.cache
 def published_tasks() -> dict[str, tuple[str, frozenset[str]]]:
     """Kind (`atomic`, `composite`) and sets of each of RoboCasa365's tasks, by name."""
-    text = resources.files("robocasa_lerobot.data").joinpath("robocasa365.jsonl").read_text(encoding="utf-8")
-    rows = [json.loads(line) for line in text.splitlines()]
-    return {row["task"]: (row["kind"], frozenset(row["sets"])) for row in rows}
+    return {name: (facts.kind, facts.sets) for name, facts in task_facts().items()}
 
 
 @functools.cache
