@@ -59,6 +59,7 @@ class SelectionConfig:
         registry: `robocasa365` (the published folders, in `datasets/`) or a registry file (`data/registry.py`).
         task_set: a set of tasks such as `atomic_seen`; those of which nothing is published are left out.
         tasks: names of tasks, instead of a set or beside it.
+        tasks_per_set: so many tasks of the set, the first of which there are data; None is all.
         split: `pretrain` or `target`; None is both.
         source: `human`, `mg` and so on; None is all.
         views: `lerobot`, or `lerobot_cotraining_cams` for pictures from the real cameras' views.
@@ -72,6 +73,7 @@ class SelectionConfig:
     registry: str = ROBOCASA365
     task_set: str | None = None
     tasks: list[str] | None = None
+    tasks_per_set: int | None = None
     split: str | None = None
     source: str | None = None
     views: str = "lerobot"
@@ -83,6 +85,8 @@ class SelectionConfig:
 
     def __post_init__(self) -> None:
         what = f"selection of {self.registry!r}"
+        if self.tasks_per_set is not None and self.tasks_per_set < 1:
+            raise UserError(f"{what}: tasks_per_set is {self.tasks_per_set}, expected at least 1.")
         self.demos = _check_part(what, self.weight, self.demos)
         _check_lists(what, tasks=self.tasks, layouts=self.layouts, styles=self.styles)
 

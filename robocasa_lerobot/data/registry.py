@@ -166,7 +166,8 @@ def select_datasets(selection: SelectionConfig) -> list[DatasetEntry]:
         UserError: an unknown task, set, split or source, a named task without data, or nothing at all.
     """
     registry = open_registry(selection.registry)
-    tasks = list(selection.tasks or ())
+    named = tuple(selection.tasks or ())
+    tasks = list(named)
     for task in tasks:
         if task not in registry.tasks:
             raise UnknownNameError("task", task, registry.tasks, f"(in the registry {selection.registry})")
@@ -181,6 +182,10 @@ def select_datasets(selection: SelectionConfig) -> list[DatasetEntry]:
         if value is not None and value not in known:
             raise UnknownNameError(what, value, known, f"(in the registry {selection.registry})")
     entries = registry.find(tasks, selection.split, selection.source, selection.views)
+    if selection.tasks_per_set is not None:
+        of_set = [task for task in dict.fromkeys(entry.task for entry in entries) if task not in named]
+        kept = {*named, *of_set[: selection.tasks_per_set]}
+        entries = [entry for entry in entries if entry.task in kept]
     asked = f"split {selection.split or 'any'}, source {selection.source or 'any'}, views {selection.views}"
     without = [task for task in selection.tasks or () if task not in {entry.task for entry in entries}]
     if without:

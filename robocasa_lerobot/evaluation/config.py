@@ -58,6 +58,7 @@ class EnvSettings:
 
     tasks: registered task names; they take the place of task_sets, whose other tasks are then noted as missing.
     task_sets: sets of the benchmark, such as atomic_seen, composite_seen, composite_unseen, lifelong_phase1.
+    tasks_per_set: so many tasks of each set, the first that this version has; default: all.
     allow_missing_tasks: leave out tasks of the sets that this version does not have, and say so in the results.
     split: target or pretrain scenes.
     render_preset: fast or quality.
@@ -71,6 +72,7 @@ class EnvSettings:
 
     tasks: list[str] = field(default_factory=list)
     task_sets: list[str] = field(default_factory=list)
+    tasks_per_set: int | None = None
     allow_missing_tasks: bool = False
     split: str = "target"
     render_preset: str = "fast"
@@ -135,6 +137,7 @@ class EvaluationConfig:
     retry_errors: run trials again that are recorded with an error.
     stall_seconds: a worker that reports no progress for so long is ended, and its trial tried once more.
     report: write report.html and report.md at the end.
+    scale: name of the scale at which this is a trial of a larger experiment, for the results (training sets it).
     """
 
     policy: PolicySettings = field(default_factory=PolicySettings)
@@ -153,6 +156,7 @@ class EvaluationConfig:
     retry_errors: bool = False
     stall_seconds: float = 300.0
     report: bool = True
+    scale: str | None = None
 
     def __post_init__(self) -> None:
         """Check what can be checked without opening anything.
@@ -202,6 +206,7 @@ class EvaluationConfig:
             "executed_steps": (self.executed_steps, 1),
             "env.image_size": (env.image_size, 16),
             "env.horizon": (env.horizon, 1),
+            "env.tasks_per_set": (env.tasks_per_set, 1),
             "success.hold_steps": (self.success.hold_steps, 1),
             **{f"policy.lifelong_phase[{i}]": (phase, 1) for i, phase in enumerate(policy.lifelong_phase)},
         }

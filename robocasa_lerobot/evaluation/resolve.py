@@ -54,6 +54,11 @@ def plan_tasks(env: EnvSettings) -> PlannedTasks:
     for task in env.tasks:
         registry.get_task(task)
     named = _tasks_of_sets(env.task_sets)
+    if env.tasks_per_set is not None:  # a set of which nothing is registered keeps some that are missing
+        named = {
+            name: sorted(tasks, key=lambda task: task not in registered)[: env.tasks_per_set]
+            for name, tasks in named.items()
+        }
     wanted = [task for tasks in named.values() for task in tasks]
     if env.tasks:
         chosen = set(env.tasks)
@@ -76,7 +81,7 @@ def plan_tasks(env: EnvSettings) -> PlannedTasks:
     return PlannedTasks(horizons, sets, [task for task in dict.fromkeys(wanted) if task not in chosen])
 
 
-def _tasks_of_sets(names: Sequence[str]) -> dict[str, tuple[str, ...]]:
+def _tasks_of_sets(names: Sequence[str]) -> dict[str, Sequence[str]]:
     from robocasa_lerobot.data.published import published_task_sets
 
     known = published_task_sets()
@@ -140,7 +145,7 @@ def batch_width(asked: int, device: str) -> int:
 
 def outcome_settings(config: EvaluationConfig, image_size: int, device: str = "cpu") -> dict[str, Any]:
     """The settings that a trial's outcome depends on; trials are only ever mixed when all of these agree."""
-    places = ("tasks", "task_sets", "allow_missing_tasks", "render_devices")
+    places = ("tasks", "task_sets", "tasks_per_set", "allow_missing_tasks", "render_devices")
     env = {name: value for name, value in dataclasses.asdict(config.env).items() if name not in places}
     noise = {name: value for name, value in dataclasses.asdict(config.perturbation).items() if name != "names"}
     return {
@@ -155,6 +160,7 @@ def outcome_settings(config: EvaluationConfig, image_size: int, device: str = "c
         "success_rule": config.success.rule,
         "success_hold_steps": config.success.hold_steps,
         "perturbation": noise,
+        **({} if config.scale is None else {"scale": config.scale}),
     }
 
 

@@ -20,6 +20,11 @@ def configure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--stop_after", type=int, metavar="STEPS", help="save and end after so many steps of this run")
     parser.add_argument("--phase", metavar="NAME", help="run this phase only; what it starts from must be finished")
     parser.add_argument("--evaluate", action="store_true", help="run the phases' evaluations when they are finished")
+    parser.add_argument(
+        "--scale",
+        metavar="FILE",
+        help="make everything smaller by a file, or a name in configs/scales/, to try the whole experiment: tiny",
+    )
     parser.add_argument("--print_config", action="store_true", help="print the resolved experiment and end")
     parser.add_argument(
         "--plan", action="store_true", help="print steps, samples, missing data, disk and hours of each phase, and end"
@@ -41,7 +46,7 @@ def run(args: argparse.Namespace) -> int:
     limit_spinning()
     from robocasa_lerobot.training.config import load_experiment, to_yaml
 
-    experiment = load_experiment(args.config_path, getattr(args, "settings", ()))
+    experiment = load_experiment(args.config_path, getattr(args, "settings", ()), args.scale)
     if args.plan:
         from robocasa_lerobot.training.builders import best_device
         from robocasa_lerobot.training.plan import plan_experiment

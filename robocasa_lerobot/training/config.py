@@ -18,6 +18,7 @@ from robocasa_lerobot.errors import UnknownNameError, UserError
 from robocasa_lerobot.settings import decode, parse_overrides
 from robocasa_lerobot.training import overlay
 from robocasa_lerobot.training.phase_config import EmaConfig, PhaseConfig, check_choice
+from robocasa_lerobot.training.scale import ScaleConfig, load_scale, scaled
 
 __all__ = ["FROM_SCRATCH", "HUB", "EmaConfig", "ExperimentConfig", "PhaseConfig", "load_experiment", "to_yaml"]
 
@@ -39,6 +40,7 @@ class ExperimentConfig:
         device: `cpu`, `cuda`, `mps`, or null for the best one there is.
         mixed_precision: `no`, `bf16` or `fp16`.
         trackers: where metrics go besides `metrics.jsonl`: `tensorboard`, `trackio`, `wandb`.
+        scale: what `--scale` made smaller, as a record; null is nothing.
     """
 
     name: str
@@ -50,6 +52,7 @@ class ExperimentConfig:
     mixed_precision: str = "no"
     trackers: list[str] = field(default_factory=list)
     loader: LoaderConfig = field(default_factory=LoaderConfig)
+    scale: ScaleConfig | None = None
 
     def __post_init__(self) -> None:
         if not self.phases:
@@ -132,15 +135,16 @@ class ExperimentConfig:
         return [self.phase(n) for n in phase.replay.phases] if phase.replay.phases else self.ancestors(phase)
 
 
-def load_experiment(path: Path, overrides: Sequence[str] = ()) -> ExperimentConfig:
-    """The experiment of a file, with overrides such as `--phases.pretrain.steps=10`.
+def load_experiment(path: Path, overrides: Sequence[str] = (), scale: str | None = None) -> ExperimentConfig:
+    """The experiment of a file, with overrides such as `--phases.pretrain.steps=10`, at the scale of a file or name.
 
     Raises:
         UserError: a missing file, an unknown key (the closest match is named), or a value that does not fit.
     """
     data = overlay.resolve(path, parse_overrides(overrides))
     overlay.check_keys(ExperimentConfig, data, path.name)
-    return decode(ExperimentConfig, data, str(path))
+    experiment = decode(ExperimentConfig, data, str(path))
+    return experiment if scale is None else scaled(experiment, load_scale(scale))
 
 
 def to_yaml(experiment: ExperimentConfig) -> str:

@@ -25,7 +25,7 @@ PACKAGES = ("robocasa-lerobot", "lerobot", "torch", "accelerate", "transformers"
 # Settings that may change while a phase is under way, because the losses do not depend on them.
 FREE_SETTINGS = (
     *("loader.workers", "loader.cache", "device", "trackers", "save_every", "keep_last", "keep_every", "log_every"),
-    *("held_out.every", "held_out.samples", "evaluations"),
+    *("held_out.every", "held_out.samples", "evaluations", "scale"),
 )
 
 
