@@ -14,6 +14,7 @@ from evaluation_env import SlideEnv
 from lerobot.configs import NormalizationMode
 from policy_models_support import tiny_settings
 from policy_support import with_features
+from safetensors.torch import load_file
 from training_support import losses, weights
 
 from robocasa_lerobot import contract
@@ -25,7 +26,7 @@ from robocasa_lerobot.evaluation.plan import make_plan
 from robocasa_lerobot.evaluation.policy_runner import load_actor
 from robocasa_lerobot.evaluation.rollout import run_trial
 from robocasa_lerobot.policies.needs import NEEDS, explained
-from robocasa_lerobot.training import builders
+from robocasa_lerobot.training import builders, prepare
 from robocasa_lerobot.training.config import load_experiment
 from robocasa_lerobot.training.phases import run_experiment
 
@@ -195,6 +196,63 @@ def test_two_steps_and_two_more_equal_four_and_a_trial(kind: str, data: Path, tm
         assert np.isfinite(actions[-1]).all()
     np.testing.assert_array_equal(*actions)
     assert run_trial(SlideEnv("Slide", image_size=SIZE, horizon=6), runner, trial).steps <= 6
+
+
+def state_files(folder: Path) -> dict[str, dict[str, torch.Tensor]]:
+    state = folder / "out/train/checkpoints/000004/training_state"
+    return {name: load_file(state / f"{name}.safetensors") for name in ("master_weights", "average")}
+
+
+def test_half_precision_goes_on_as_if_never_stopped(data: Path, tmp_path: Path) -> None:
+    """SmolVLA with its language model trained, which LeRobot keeps in bfloat16: in one go, and stopped half-way."""
+    for name in ("at_once", "in_two"):
+        path = experiment_file(tmp_path / name, data, "smolvla", tmp_path / "models")
+        experiment = load_experiment(path, ["--policy.train_expert_only=false", "--policy.freeze_vision_encoder=false"])
+        assert name == "at_once" or not run_experiment(experiment, stop_after=2)
+        assert run_experiment(experiment)
+    assert losses(tmp_path / "at_once", "train") == losses(tmp_path / "in_two", "train")
+    whole, resumed = weights(tmp_path / "at_once", "train"), weights(tmp_path / "in_two", "train")
+    assert any(value.dtype == torch.bfloat16 for value in whole.values())
+    assert all(torch.equal(value, resumed[key]) for key, value in whole.items())
+    ours, theirs = state_files(tmp_path / "at_once"), state_files(tmp_path / "in_two")
+    for kind, values in ours.items():
+        assert {value.dtype for value in values.values()} == {torch.float32}
+        assert all(torch.equal(value, theirs[kind][key]) for key, value in values.items())
+
+
+def groot_config(folder: Path, **changes: Any) -> Any:
+    folder.mkdir(parents=True, exist_ok=True)
+    path = {"base_model_path": str(folder)}
+    config = builders.policy_config({**settings(FOLDER / "groot.yaml"), **path, **changes}, None, "cpu")
+    return with_features(config, contract.IMAGE_SIZE)
+
+
+def random_steps(pre: Any) -> dict[str, bool]:
+    return {type(step).__name__: step.training for step in pre.steps if hasattr(step, "training")}
+
+
+def test_processors_of_a_checkpoint_train_as_new_ones_do(tmp_path: Path) -> None:
+    """GR00T crops pictures at random and drops states: after a kill and with `statistics: keep`, too."""
+    config, made_up = groot_config(tmp_path / "base"), meta()
+    numbers = {"min": -1.0, "max": 1.0, "mean": 0.0, "std": 1.0, "q01": -0.9, "q99": 0.9, "count": 10.0}
+    sizes = {"observation.state": contract.STATE_SIZE, "action": contract.ACTION_SIZE}
+    made_up.stats = {key: {k: np.full(n, v) for k, v in numbers.items()} for key, n in sizes.items()}
+    pre, post = builders.make_processors(config, made_up, None, keep_statistics=False)
+    assert set(random_steps(pre).values()) == {True}
+    pre.save_pretrained(tmp_path / "checkpoint")
+    post.save_pretrained(tmp_path / "checkpoint")
+    again, _ = builders.make_processors(config, made_up, tmp_path / "checkpoint", keep_statistics=True)
+    assert random_steps(again) == random_steps(pre)
+
+
+@pytest.mark.parametrize("name", ["multitask_gr00t", "foundation", "lifelong", "lifelong_lora", "joint_cotraining"])
+def test_gr00t_warms_up_for_a_twentieth_of_each_phase(name: str) -> None:
+    experiment = load_experiment(FOLDER.parent / f"experiments/robocasa365/{name}.yaml")
+    for phase in experiment.phases:
+        config = builders.policy_config(*prepare.planned_policy(experiment, phase), "cpu")
+        assert config.get_scheduler_preset().num_warmup_steps == 0.05 * phase.steps
+        assert phase.drop_last_frames == 0  # published: every frame starts a sample
+        assert config.drop_n_last_frames == 15
 
 
 @pytest.mark.parametrize("kind", ["multi_task_dit", "smolvla", "xvla", "groot"])

@@ -30,6 +30,7 @@ from robocasa_lerobot.training.checkpoint import (
 )
 from robocasa_lerobot.training.config import EmaConfig
 from robocasa_lerobot.training.ema import Ema
+from robocasa_lerobot.training.master_weights import MasterWeights
 
 KILLS = 10
 STEPS = 24  # of each of the two phases
@@ -242,7 +243,8 @@ def state_at(step: int) -> TrainingState:
     policy.weight.data.fill_(float(step))
     optimizer = torch.optim.SGD(policy.parameters(), lr=0.1)
     ema = Ema(policy, EmaConfig())
-    return TrainingState(policy, Written("pre.json"), Written("post.json"), optimizer, None, ema, step=step)
+    parts = (policy, Written("pre.json"), Written("post.json"), optimizer, None, ema, MasterWeights(policy))
+    return TrainingState(*parts, step=step)
 
 
 def files_of(checkpoint: Path) -> list[str]:

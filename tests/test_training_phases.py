@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 import torch
 import yaml
+from accelerate import Accelerator
 from safetensors.torch import load_file
 from training_support import experiment_file, losses, metrics, tiny, weights
 
@@ -28,6 +29,7 @@ from robocasa_lerobot.training.phase_config import HeldOutConfig, LoraConfig, Ph
 from robocasa_lerobot.training.phases import run_experiment
 from robocasa_lerobot.training.plan import plan_experiment
 from robocasa_lerobot.training.plan_text import render_plan
+from robocasa_lerobot.training.prepare import prepare_phase
 
 FROZEN = "observation_encoder"
 
@@ -217,6 +219,17 @@ def test_low_rank_training_goes_on_and_leaves_an_ordinary_policy(tmp_path: Path,
     assert about["trainable_parameters"] < 0.5 * about["parameters"]
 
 
+def test_low_rank_changes_are_of_what_the_policy_trains() -> None:
+    """Its own frozen parts, as GR00T's vision and language models, are adapted only where `targets` names them."""
+    phase = PhaseConfig.__new__(PhaseConfig)
+    for targets, changed in ((None, {"head"}), (["*"], {"backbone", "head"})):
+        model = torch.nn.ModuleDict({"backbone": torch.nn.Linear(2, 2), "head": torch.nn.Linear(2, 2)})
+        model["backbone"].requires_grad_(False)
+        phase.freeze, phase.lora = [], LoraConfig(rank=1, targets=targets)
+        apply_training_scope(model, phase, 0)
+        assert {name.split(".")[0] for name, p in model.named_parameters() if p.requires_grad} == changed
+
+
 def test_low_rank_change_starts_at_nothing() -> None:
     model = torch.nn.ModuleDict({"a": torch.nn.Linear(4, 4), "m": torch.nn.MultiheadAttention(4, 2)})
     before = {key: value.clone() for key, value in model.state_dict().items()}
@@ -363,3 +376,25 @@ def test_evaluations_run_once_for_each_checkpoint_and_setting(
 
 def metrics_exist(folder: Path) -> bool:
     return (folder / "out/pretrain/metrics.jsonl").exists() and bool(metrics(folder, "pretrain"))
+
+
+def test_columns_that_do_not_fit_have_a_default_place(tmp_path: Path, data: Path) -> None:
+    """As in the published experiments: no frames are kept, and the columns are more than the memory for them."""
+    path = experiment_file(tmp_path, data, defaults={"steps": 1})
+    content = yaml.safe_load(path.read_text())
+    content["loader"] = {"cache_frames": False, "cache_columns_above_gb": 0.0}
+    content["phases"][1]["statistics"] = "pool"
+    path.write_text(yaml.safe_dump(content))
+    assert run_experiment(load_experiment(path))
+    assert list((tmp_path / "out/frame_cache").glob("*.npy"))
+
+
+def test_last_frames_start_no_sample_where_a_phase_says_so(tmp_path: Path, data: Path) -> None:
+    counts = {}
+    for dropped in (None, 0, 3):
+        overrides = [] if dropped is None else [f"--defaults.drop_last_frames={dropped}"]
+        experiment = tiny(tmp_path / str(dropped), data, overrides=overrides)
+        run = prepare_phase(experiment, experiment.phases[0], "cpu", Accelerator(cpu=True))
+        counts[dropped] = sum(pool.size for pool in run.batches.sampler.pools)
+    assert counts[None] < counts[0]  # its default drops one of each episode
+    assert counts[0] - counts[3] == 3 * (counts[0] - counts[None])

@@ -131,7 +131,7 @@ class LoaderConfig:
         workers: loader processes; 0 loads in the training process, the best choice with cached frames.
         cache_frames: keep decoded frames in a memory-mapped file: true, false, or null for "if they fit".
         cache_budget_gb: what "if they fit" means, in 10^9 bytes for all datasets of a phase together.
-        cache_dir: where the frames are kept; null is `<output_dir>/frame_cache`.
+        cache_dir: where frames, statistics and columns are kept; null is `<output_dir>/frame_cache`.
         image_size: height and width in pixels handed to the policy; null is the dataset's own size.
         cache_columns_above_gb: states, actions and other numbers of larger mixtures stay in memory-mapped files in
             the cache folder instead of memory (10^9 bytes for all datasets of a phase, in each loader process).

@@ -84,12 +84,18 @@ def _add_low_rank(policy: nn.Module, config: LoraConfig, seed: int) -> None:
         if not any(_fits(name, [pattern]) for name in layers):
             raise UnknownNameError("layer", pattern, layers, "(in `targets` of `lora`)")
     trained = _matching(policy, config.train, "`train` of `lora`") if config.train else []
+    targets = [
+        name
+        for name, (module, weight) in layers.items()
+        # A policy freezes by itself what it never trains, as GR00T its vision and language models.
+        if (getattr(module, weight).requires_grad if config.targets is None else _fits(name, config.targets))
+    ]
     policy.requires_grad_(False)
     generator = torch.Generator().manual_seed(seed)
-    for name, (module, weight) in layers.items():
-        if config.targets is None or _fits(name, config.targets):
-            change = LowRank(getattr(module, weight), config, generator)
-            parametrize.register_parametrization(module, weight, change)
+    for name in targets:
+        module, weight = layers[name]
+        change = LowRank(getattr(module, weight), config, generator)
+        parametrize.register_parametrization(module, weight, change)
     names = {f"{n.replace(f'.{_INSIDE}', '').removesuffix('.original')}": n for n, _ in policy.named_parameters()}
     for name in trained:
         policy.get_parameter(names[name]).requires_grad_(True)

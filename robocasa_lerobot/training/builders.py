@@ -26,6 +26,7 @@ from robocasa_lerobot.data.statistics import Statistics
 from robocasa_lerobot.errors import UnknownNameError, UserError
 from robocasa_lerobot.policies.needs import explained
 from robocasa_lerobot.policies.registry import register_policies
+from robocasa_lerobot.training.master_weights import MasterWeights
 from robocasa_lerobot.training.phase_config import PhaseConfig
 
 
@@ -127,25 +128,33 @@ def make_processors(
         if checkpoint is None or not keep_statistics:
             return make_pre_post_processors(config, dataset_stats=meta.stats, dataset_meta=meta)
         overrides = {"device_processor": {"device": str(config.device)}}
-        return make_pre_post_processors(config, pretrained_path=str(checkpoint), preprocessor_overrides=overrides)
+        # With the dataset's metadata, some policies' processors (GR00T's) go on as those of a training: random crops,
+        # dropout of the state. Without, LeRobot takes them for an evaluation's.
+        return make_pre_post_processors(
+            config, pretrained_path=str(checkpoint), preprocessor_overrides=overrides, dataset_meta=meta
+        )
 
 
 def make_optimizer(
-    policy: PreTrainedPolicy, phase: PhaseConfig
+    policy: PreTrainedPolicy, phase: PhaseConfig, masters: MasterWeights | None = None
 ) -> tuple[torch.optim.Optimizer, torch.optim.lr_scheduler.LRScheduler | None, float]:
     """The policy's own optimiser and schedule with the phase's changes, and the largest gradient norm (0: any).
+
+    It updates the float32 copies in `masters` of weights in half precision; None makes them.
 
     Raises:
         UserError: a setting that the optimiser or schedule does not have, or nothing to train.
     """
     preset = _changed(OptimizerConfig, policy.config.get_optimizer_preset(), phase.optimizer, "optimizer")
-    optimizer = preset.build(_trained_groups(policy, phase))
+    masters = MasterWeights(policy) if masters is None else masters
+    optimizer = preset.build(masters.groups(_trained_groups(policy, phase)))
     if not isinstance(optimizer, torch.optim.Optimizer):
         raise UserError(f"policy {policy.config.type!r} wants several optimisers, which training does not support.")
     for group in optimizer.param_groups:
         # One kernel for all elements instead of a dozen: on a CPU the update is several times faster.
         if "fused" in group and policy.config.device == "cpu":
             group["fused"] = True
+    masters.follow(optimizer)
     if phase.learning_rate is not None:
         for group in optimizer.param_groups:
             group["lr"] *= phase.learning_rate / preset.lr

@@ -3,7 +3,8 @@
 <phase>/checkpoints/000100/pretrained_model/   config.json, model.safetensors, processors, train_config.json,
                                                origin.json (experiment, phase, step)
 <phase>/checkpoints/000100/training_state/     optimiser, schedule, step, log window; the weights as they are
-                                               trained, where `pretrained_model` has averaged or merged ones
+                                               trained, where `pretrained_model` has averaged or merged ones; float32
+                                               weights and averages, where its own are in half precision
 <phase>/checkpoints/last -> 000100
 """
 
@@ -25,10 +26,12 @@ from robocasa_lerobot.errors import UserError
 from robocasa_lerobot.policies.origin import Origin, experiment_of
 from robocasa_lerobot.training.adapters import merged_state
 from robocasa_lerobot.training.ema import Ema
+from robocasa_lerobot.training.master_weights import MasterWeights
 
 CHECKPOINTS, LAST, LINK_ASIDE = "checkpoints", "last", ".last"
 PRETRAINED, STATE = "pretrained_model", "training_state"
 RAW_WEIGHTS, AVERAGE, LOG_WINDOW = "raw_model.safetensors", "average.safetensors", "log_window.json"
+MASTERS = "master_weights.safetensors"
 
 
 @dataclass
@@ -41,9 +44,15 @@ class TrainingState:
     optimizer: torch.optim.Optimizer
     scheduler: torch.optim.lr_scheduler.LRScheduler | None
     ema: Ema | None
+    masters: MasterWeights
     low_rank: bool = False
     step: int = 0
     log_window: dict[str, list[float]] = field(default_factory=dict)
+
+    @property
+    def average_apart(self) -> bool:
+        """Whether the weights of `pretrained_model` do not tell the averages: they are merged, or rounded."""
+        return self.ema is not None and (self.low_rank or self.ema.in_half_precision)
 
 
 def last_checkpoint(phase_dir: Path) -> Path | None:
@@ -115,8 +124,10 @@ def save_checkpoint(phase_dir: Path, state: TrainingState, train_config: Any) ->
     (state_dir / LOG_WINDOW).write_text(json.dumps(state.log_window))
     if state.ema is not None or state.low_rank:
         save_model(state.policy, str(state_dir / RAW_WEIGHTS))
-    if state.ema is not None and state.low_rank:  # merged weights do not tell the averages
+    if state.ema is not None and state.average_apart:
         save_file(state.ema.state(), state_dir / AVERAGE)
+    if len(state.masters):
+        save_file(state.masters.state(), state_dir / MASTERS)
     with state.ema.applied() if state.ema is not None else nullcontext():
         state.policy.save_pretrained(model_dir, state_dict=merged_state(state.policy))
     state.preprocessor.save_pretrained(model_dir)
@@ -148,7 +159,9 @@ def restore(checkpoint: Path, state: TrainingState) -> None:
     try:
         if raw.is_file():
             load_model(state.policy, str(raw), strict=True)
-        if state.ema is not None and state.low_rank:
+        if len(state.masters):
+            state.masters.load(load_file(folder / MASTERS))
+        if state.ema is not None and state.average_apart:
             state.ema.load(load_file(folder / AVERAGE))
     except (RuntimeError, OSError) as error:
         raise UserError(f"{folder} does not fit the phase's policy: {error}") from error

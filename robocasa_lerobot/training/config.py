@@ -24,6 +24,7 @@ __all__ = ["FROM_SCRATCH", "HUB", "EmaConfig", "ExperimentConfig", "PhaseConfig"
 
 FROM_SCRATCH = "from_scratch"
 HUB = "hub:"
+FRAME_CACHE = "frame_cache"
 MIXED_PRECISION = ("no", "bf16", "fp16")
 TRACKERS = ("tensorboard", "trackio", "wandb")
 
@@ -99,6 +100,13 @@ class ExperimentConfig:
                 raise UnknownNameError("phase", name, earlier, f"(in `replay` of phase {phase.name!r})")
         if not phase.replay.phases and not self.ancestors(phase):
             raise UserError(f"phase {phase.name!r} has a `replay` share, but builds on no earlier phase.")
+
+    @property
+    def data_loader(self) -> LoaderConfig:
+        """The loader's settings with a place for its caches: `<output_dir>/frame_cache` unless it names another."""
+        if self.loader.cache_dir is not None:
+            return self.loader
+        return dataclasses.replace(self.loader, cache_dir=str(Path(self.output_dir) / FRAME_CACHE))
 
     def phase(self, name: str) -> PhaseConfig:
         """The phase of that name.

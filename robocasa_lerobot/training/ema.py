@@ -7,6 +7,7 @@ from contextlib import contextmanager
 
 import torch
 
+from robocasa_lerobot.training.master_weights import MasterWeights
 from robocasa_lerobot.training.phase_config import EmaConfig
 
 
@@ -21,21 +22,31 @@ def ema_decay(step: int, config: EmaConfig) -> float:
 
 
 class Ema:
-    """Averages of the trainable parameters; frozen ones and buffers are the policy's own.
+    """Averages of the trainable parameters in float32; frozen ones and buffers are the policy's own.
 
-    `step` counts the updates; a new average starts from the weights that the policy has.
+    `step` counts the updates; a new average starts from the weights that the policy has. Where `masters` has float32
+    copies of weights in half precision, these are averaged: with a decay of 0.99 or more, a hundredth of a step is
+    lost in half precision.
     """
 
-    def __init__(self, policy: torch.nn.Module, config: EmaConfig, step: int = 0) -> None:
+    def __init__(
+        self, policy: torch.nn.Module, config: EmaConfig, step: int = 0, masters: MasterWeights | None = None
+    ) -> None:
         self.config, self.step = config, step
         self._live = [p for p in policy.parameters() if p.requires_grad]
-        self._average = [p.detach().clone() for p in self._live]
+        self._source = [masters.of(p) if masters is not None else p for p in self._live]
+        self._average = [p.detach().to(torch.float32, copy=True) for p in self._source]
+
+    @property
+    def in_half_precision(self) -> bool:
+        """Whether the policy's weights, and so those of a checkpoint, do not tell the averages exactly."""
+        return any(p.dtype != torch.float32 for p in self._live)
 
     @torch.no_grad()
     def update(self) -> None:
         """Take the weights after an optimiser step into the average."""
         decay = ema_decay(self.step, self.config)
-        torch._foreach_lerp_(self._average, [p.detach() for p in self._live], 1.0 - decay)
+        torch._foreach_lerp_(self._average, [p.detach().float() for p in self._source], 1.0 - decay)
         self.step += 1
 
     def state(self) -> dict[str, torch.Tensor]:
@@ -55,16 +66,26 @@ class Ema:
 
     @contextmanager
     def applied(self) -> Iterator[None]:
-        """The policy has the averaged weights inside this context, and its own again after it."""
+        """The policy has the averaged weights, in their type, inside this context, and its own again after it."""
+        rounded = [(p, a) for p, a in zip(self._live, self._average, strict=True) if p.dtype != a.dtype]
+        kept = [live.detach().clone() for live, _ in rounded]
         self._exchange()
+        with torch.no_grad():
+            for live, average in rounded:
+                live.copy_(average)
         try:
             yield
         finally:
             self._exchange()
+            with torch.no_grad():
+                for (live, _), value in zip(rounded, kept, strict=True):
+                    live.copy_(value)
 
     @torch.no_grad()
     def _exchange(self) -> None:
+        """Of the float32 weights, one after the other: no second copy of all of them is needed."""
         for live, average in zip(self._live, self._average, strict=True):
-            kept = live.detach().clone()
-            live.copy_(average)
-            average.copy_(kept)
+            if live.dtype == average.dtype:
+                value = live.detach().clone()
+                live.copy_(average)
+                average.copy_(value)

@@ -25,13 +25,13 @@ def open_phase_data(experiment: ExperimentConfig, phase: PhaseConfig, opened: Op
         UserError: as `open_mixture`.
     """
     opened = {} if opened is None else opened
-    own = open_mixture(phase.mixture, experiment.loader, opened)
+    own = open_mixture(phase.mixture, experiment.data_loader, opened)
     earlier = experiment.replayed(phase)
     if phase.replay is None or not earlier:
         return own
-    again = [open_mixture(other.mixture, experiment.loader, opened) for other in earlier]
+    again = [open_mixture(other.mixture, experiment.data_loader, opened) for other in earlier]
     shares = [1 - phase.replay.share, *[phase.replay.share / len(again)] * len(again)]
-    return open_mixture(joined([own, *again], shares), experiment.loader, opened)
+    return open_mixture(joined([own, *again], shares), experiment.data_loader, opened)
 
 
 def pooled(experiment: ExperimentConfig, phase: PhaseConfig, dataset: MixtureDataset) -> Statistics:
@@ -52,7 +52,7 @@ def pooled(experiment: ExperimentConfig, phase: PhaseConfig, dataset: MixtureDat
     shares = [count / sum(samples) for count in samples]
     opened = dict(dataset.sources)
     before = [open_phase_data(experiment, other, opened) for other in earlier]
-    return open_mixture(joined([dataset, *before], shares), experiment.loader, opened).statistics()
+    return open_mixture(joined([dataset, *before], shares), experiment.data_loader, opened).statistics()
 
 
 def joined(datasets: Sequence[MixtureDataset], shares: Sequence[float]) -> MixtureConfig:

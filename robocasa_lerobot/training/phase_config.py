@@ -37,7 +37,8 @@ class LoraConfig:
         rank: rows of A and columns of B.
         alpha: scale of the change; null is `rank`, that is, a factor of 1.
         dropout: of the change's weights while training.
-        targets: patterns (`*`, `?`) of the names of linear layers that are adapted; null is all of them.
+        targets: patterns (`*`, `?`) of the names of linear layers that are adapted; null is all that the policy
+            trains without it, so not what it keeps frozen by itself.
         train: patterns of parameters that are trained fully beside them, such as a head.
     """
 
@@ -148,6 +149,7 @@ class PhaseConfig:
             `type`, another of LeRobot's optimisers.
         scheduler: likewise for the schedule of the learning rate; `type: none` keeps the rate constant.
         schedule_steps: steps that the schedule is made for; null is `steps`.
+        drop_last_frames: frames at the end of each episode that start no sample; null is what the policy asks for.
         grad_clip_norm: largest gradient norm; null is the policy's own, 0 is none.
         save_every: steps between checkpoints; the last step always has one. 0 is the last step only.
         save_initial: also keep the policy before the first step, as checkpoint 000000.
@@ -179,6 +181,7 @@ class PhaseConfig:
     optimizer: dict[str, Any] = field(default_factory=dict)
     scheduler: dict[str, Any] = field(default_factory=dict)
     schedule_steps: int | None = None
+    drop_last_frames: int | None = None
     grad_clip_norm: float | None = None
     save_every: int = 0
     save_initial: bool = False
@@ -197,8 +200,8 @@ class PhaseConfig:
         for name in ("steps", "batch_size", "gradient_accumulation", "log_every"):
             if getattr(self, name) < 1:
                 raise UserError(f"phase {self.name!r}: {name} is {getattr(self, name)}, expected at least 1.")
-        for name in ("save_every", "keep_last", "keep_every"):
-            if getattr(self, name) < 0:
+        for name in ("save_every", "keep_last", "keep_every", "drop_last_frames"):
+            if (getattr(self, name) or 0) < 0:
                 raise UserError(f"phase {self.name!r}: {name} is {getattr(self, name)}, expected 0 or more.")
         if self.batch_size % self.gradient_accumulation:
             raise UserError(

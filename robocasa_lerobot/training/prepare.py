@@ -22,6 +22,7 @@ from robocasa_lerobot.training.config import FROM_SCRATCH, HUB, ExperimentConfig
 from robocasa_lerobot.training.ema import Ema
 from robocasa_lerobot.training.held_out import HeldOut, held_out_frames, without_held_out
 from robocasa_lerobot.training.loop import PhaseRun
+from robocasa_lerobot.training.master_weights import MasterWeights
 from robocasa_lerobot.training.metrics import truncate_metrics
 
 
@@ -44,7 +45,7 @@ def prepare_phase(
     seed = phase_seed(experiment.seed, phase.name)
     dataset, apart = joining.open_phase_data(experiment, phase), None
     if phase.held_out is not None:
-        dataset, apart = without_held_out(dataset, phase.held_out, experiment.loader, experiment.seed)
+        dataset, apart = without_held_out(dataset, phase.held_out, experiment.data_loader, experiment.seed)
     for part in (dataset, apart) if apart is not None else (dataset,):
         builders.set_windows(part, config)
         part.set_picture_size(builders.frame_size(config))
@@ -67,9 +68,15 @@ def prepare_phase(
     policy = builders.make_phase_policy(config, dataset.meta, start)
     pre, post = builders.make_processors(config, dataset.meta, start, keep_statistics=keep or last is not None)
     always_eval = apply_training_scope(policy, phase, seed)
-    optimizer, scheduler, clip = builders.make_optimizer(policy, phase)
-    ema = Ema(policy, phase.ema) if phase.ema.enabled else None
-    state = TrainingState(policy, pre, post, optimizer, scheduler, ema, low_rank=phase.lora is not None)
+    masters = MasterWeights(policy)
+    if len(masters) and experiment.mixed_precision == "fp16":
+        raise UserError(
+            f"the policy {config.type!r} has weights in half precision, whose gradients fp16 cannot scale; set "
+            "`mixed_precision: bf16`, or the policy's own type of weights to float32."
+        )
+    optimizer, scheduler, clip = builders.make_optimizer(policy, phase, masters)
+    ema = Ema(policy, phase.ema, masters=masters) if phase.ema.enabled else None
+    state = TrainingState(policy, pre, post, optimizer, scheduler, ema, masters, low_rank=phase.lora is not None)
     about = records.describe_phase(experiment, phase, dataset, policy, init)
     if last is not None:
         records.check_same_data(folder, about)
@@ -81,7 +88,10 @@ def prepare_phase(
         tidy(folder)
         truncate_metrics(folder, state.step)
     share = phase.batch_size // phase.gradient_accumulation
-    sampler = dataset.sampler(seed, drop_last_frames=getattr(config, "drop_n_last_frames", None) or 0)
+    dropped = phase.drop_last_frames
+    if dropped is None:
+        dropped = getattr(config, "drop_n_last_frames", None) or 0
+    sampler = dataset.sampler(seed, drop_last_frames=dropped)
     held_out = None
     if apart is not None and phase.held_out is not None:
         frames = held_out_frames(apart, phase.held_out.samples, experiment.seed)
@@ -116,6 +126,9 @@ def policy_settings(experiment: ExperimentConfig, phase: PhaseConfig) -> dict[st
     init = experiment.init_of(phase)
     own = experiment.policy if init in (FROM_SCRATCH, experiment.policy.get("path")) else {}
     settings = {**own, **phase.policy}
+    kind = settings.get("type", experiment.policy.get("type"))
+    if kind == "groot":  # its warm-up is `warmup_ratio` of these, which LeRobot leaves at 10,000 for any training
+        settings.setdefault("max_steps", phase.schedule_steps or phase.steps)
     if init == FROM_SCRATCH:
         settings.pop("path", None)
         if "type" not in settings:
@@ -158,12 +171,11 @@ def _folder(init: str) -> Path:
 
 
 def _cache_frames(experiment: ExperimentConfig, dataset: MixtureDataset) -> None:
-    loader = experiment.loader
-    if loader.cache_frames is False:
+    loader = experiment.data_loader
+    if loader.cache_frames is False or loader.cache_dir is None:
         return
-    folder = Path(loader.cache_dir) if loader.cache_dir else Path(experiment.output_dir) / "frame_cache"
     budget = None if loader.cache_frames else loader.cache_budget_gb * 1e9
-    dataset.cache_frames(folder, budget)
+    dataset.cache_frames(Path(loader.cache_dir), budget)
 
 
 def _lerobot_config(
