@@ -28,12 +28,12 @@ from convert_demos import DemoFiles
 from convert_memory import run_command
 from convert_sections import SECTIONS, chosen_sections, merged
 from sim_speed import note_noise
-from tqdm import tqdm
 from venvs import prepare_venv
 from workers import BARRIER_S, Worker, WorkerError
 
 from robocasa_lerobot import contract, gl
 from robocasa_lerobot.errors import UserError
+from robocasa_lerobot.progress import Bar
 
 BENCHMARKS = Path(__file__).parent
 OUTPUT = common.RESULTS / "convert_speed.json"
@@ -67,7 +67,7 @@ class Run:
     files: DemoFiles
     lift: Path | None
     effort: Effort
-    bar: tqdm[Any]
+    bar: Bar
     workers: list[Worker] = field(default_factory=list)
     peer: Worker | None = None
     rates: dict[str, list[float]] = field(default_factory=dict)
@@ -114,11 +114,11 @@ def measure(effort: Effort, work: Path, peer: bool, memory: bool, sections: Sequ
     total = sum(effort.slow_repetitions if part.slow else effort.repetitions for part in parts)
     total += 2 + (len(effort.memory_episodes) + 4 if memory else 0)
     with contextlib.ExitStack() as stack:
-        run = Run(work, files, lift, effort, stack.enter_context(tqdm(total=total, unit="part", smoothing=0)))
+        run = Run(work, files, lift, effort, stack.enter_context(Bar(total=total, unit="part", smoothing=0)))
         startup, said = _start(run, stack)
         _repeat(run, parts)
         # The measuring processes end first: what they hold in memory is not the command's.
-    with tqdm(total=len(effort.memory_episodes) + 4, unit="command", disable=not memory) as bar:
+    with Bar(total=len(effort.memory_episodes) + 4, unit="command", disable=not memory) as bar:
         run.bar = bar
         commands = _commands(run) if memory else {}
         peaks = _memory(run) if memory else {}

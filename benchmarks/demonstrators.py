@@ -22,13 +22,13 @@ from pathlib import Path
 
 import common
 from demonstrators_report import draw, page, ratios, summary, text
-from tqdm import tqdm
 
 from robocasa_lerobot.demos.choose import expand_names
 from robocasa_lerobot.demos.demonstrator import can_demonstrate
 from robocasa_lerobot.demos.episode import record_episode
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.registry import get_task, task_names
+from robocasa_lerobot.progress import Bar
 
 OUTPUT = common.RESULTS / "demonstrators.json"
 PICTURE = common.RESULTS / "demonstrators.png"
@@ -147,7 +147,7 @@ def run(jobs: list[Key], path: Path, workers: int) -> None:
     with ProcessPoolExecutor(workers, mp_context=context) as pool, path.open("a", encoding="utf-8") as file:
         futures = [pool.submit(attempt, job, workers, commit) for job in jobs]
         try:
-            with tqdm(as_completed(futures), total=len(futures), unit="trial", smoothing=0.02) as bar:
+            with Bar(as_completed(futures), total=len(futures), unit="trial", smoothing=0.02) as bar:
                 for future in bar:
                     trial = future.result()
                     file.write(json.dumps(asdict(trial)) + "\n")

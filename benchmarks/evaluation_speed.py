@@ -26,7 +26,8 @@ from typing import Any
 import common
 import evaluation_sides as sides
 import training_sides
-from tqdm import tqdm
+
+from robocasa_lerobot.progress import Bar
 
 OUTPUT = common.RESULTS / "evaluation_speed.json"
 TASKS = ["CloseDrawer", "PickPlaceCounterToSink", "OpenDrawer"]  # 450, 600 and 750 steps
@@ -144,7 +145,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     noise: list[float] = []
     chosen = tuple(side for side in sides.SIDES if not (options.without_films and side[1]))
     total = len(effort.policies) * effort.repetitions * len(chosen)
-    with tempfile.TemporaryDirectory() as folder, tqdm(total=total, unit="run", smoothing=0) as bar:
+    with tempfile.TemporaryDirectory() as folder, Bar(total=total, unit="run", smoothing=0) as bar:
         found = {
             policy: measure(policy, effort, options.workers, chosen, Path(folder), bar, noise)
             for policy in effort.policies

@@ -14,9 +14,9 @@ from pathlib import Path
 
 from common import REPOSITORY, RESULTS, machine, table, versions, write_result
 from grasping_trial import CLOSE_S, HOLD_S, LIFT_M, POSES, Outcome, try_instance
-from tqdm import tqdm
 
 from robocasa_lerobot.envs.scene.objects import catalogue
+from robocasa_lerobot.progress import Bar
 
 AIM_OVERALL, AIM_CATEGORY = 0.95, 0.60
 PROGRESS = REPOSITORY / "outputs" / "grasps.jsonl"
@@ -41,7 +41,7 @@ def measure(jobs: list[tuple[str, int]], processes: int, progress: Path | None) 
         progress.parent.mkdir(parents=True, exist_ok=True)
     with multiprocessing.get_context("forkserver").Pool(processes) as pool:
         results = pool.imap_unordered(_work, left, chunksize=4)
-        for name, index, outcome in tqdm(results, total=len(left), desc="grasps", unit="instance"):
+        for name, index, outcome in Bar(results, total=len(left), desc="grasps", unit="instance"):
             done[name, index] = outcome
             if progress is not None:
                 with progress.open("a") as file:

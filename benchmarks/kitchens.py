@@ -25,7 +25,6 @@ from typing import Any
 import common
 import mujoco
 import numpy as np
-from tqdm import tqdm
 
 from robocasa_lerobot.envs.registry import get_task, task_names
 from robocasa_lerobot.envs.scene.builder import build_scene
@@ -34,6 +33,7 @@ from robocasa_lerobot.envs.scene.layout import split_of
 from robocasa_lerobot.envs.scene.soundness import MOVED_M, blocked_walkways, fell, moved, overlaps
 from robocasa_lerobot.envs.task import Task
 from robocasa_lerobot.errors import UserError
+from robocasa_lerobot.progress import Bar
 
 OUTPUT = common.RESULTS / "kitchens.json"
 PARTS = common.REPOSITORY / "outputs" / "kitchens.jsonl"
@@ -110,7 +110,7 @@ def sweep(pairs: list[tuple[int, int]], workers: int, limit: int | None) -> list
     todo = [pair for pair in mixed if pair not in rows][:limit]
     PARTS.parent.mkdir(parents=True, exist_ok=True)
     with PARTS.open("a", encoding="utf-8") as file:
-        for row in tqdm(_work(todo, workers), total=len(todo), unit="kitchen", smoothing=0):
+        for row in Bar(_work(todo, workers), total=len(todo), unit="kitchen", smoothing=0):
             file.write(json.dumps(row) + "\n")
             file.flush()
             rows[row["layout"], row["style"]] = row
@@ -138,7 +138,7 @@ def timings(count: int) -> dict[str, Any]:
     chosen = [pairs[index] for index in np.random.default_rng(0).permutation(len(pairs))[:count]]
     task = get_task(task_names()[-1])
     rows = []
-    for pair in tqdm(chosen, unit="kitchen"):
+    for pair in Bar(chosen, unit="kitchen"):
         wall, cpu = time.perf_counter(), time.process_time()
         try:
             build_scene(task, "pretrain", 1, kitchens=[pair])

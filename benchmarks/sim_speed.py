@@ -19,12 +19,12 @@ from typing import Any
 
 import common
 import sim_report
-from tqdm import tqdm
 from venvs import prepare_venv
 from workers import Worker, WorkerError, run_together
 
 from robocasa_lerobot import gl
 from robocasa_lerobot.errors import UserError
+from robocasa_lerobot.progress import Bar
 
 BENCHMARKS = Path(__file__).parent
 OUTPUT = common.RESULTS / "sim_speed.json"
@@ -63,7 +63,7 @@ def parse(arguments: Sequence[str] | None = None) -> argparse.Namespace:
 
 
 @contextlib.contextmanager
-def started(programs: dict[str, tuple[Path, Path]], bar: tqdm[Any]) -> Iterator[tuple[dict[Any, list[Worker]], Any]]:
+def started(programs: dict[str, tuple[Path, Path]], bar: Bar) -> Iterator[tuple[dict[Any, list[Worker]], Any]]:
     """All processes, by (program, cameras), two of each, and what each program's second one said of its env.
 
     The second one, because the first may have compiled things that all later ones find on disk.
@@ -85,7 +85,7 @@ def started(programs: dict[str, tuple[Path, Path]], bar: tqdm[Any]) -> Iterator[
 
 
 def measure_steps(
-    workers: dict[Any, list[Worker]], names: Sequence[str], effort: Effort, bar: tqdm[Any], noise: list[float]
+    workers: dict[Any, list[Worker]], names: Sequence[str], effort: Effort, bar: Bar, noise: list[float]
 ) -> dict[str, dict[str, Any]]:
     """Control steps per second of each program in each configuration: the sum over the processes, and its spread."""
     rates: dict[str, dict[str, list[float]]] = {name: {} for name in names}
@@ -103,7 +103,7 @@ def measure_steps(
 
 
 def measure_resets(
-    workers: dict[Any, list[Worker]], names: Sequence[str], effort: Effort, bar: tqdm[Any], noise: list[float]
+    workers: dict[Any, list[Worker]], names: Sequence[str], effort: Effort, bar: Bar, noise: list[float]
 ) -> dict[str, Any]:
     """Seconds of a reset to a new scene and to the same scene, without and with cameras (and their first pictures)."""
     seconds: dict[str, Any] = {name: {} for name in names}
@@ -133,7 +133,7 @@ def measure(programs: dict[str, tuple[Path, Path]], effort: Effort) -> dict[str,
     names = list(programs)
     total = len(names) * (2 * MAX_PROCESSES + 4 + effort.repetitions * len(sim_report.CONFIGURATIONS)) + 1
     noise: list[float] = []
-    with tqdm(total=total, unit="part", smoothing=0) as bar, started(programs, bar) as (workers, said):
+    with Bar(total=total, unit="part", smoothing=0) as bar, started(programs, bar) as (workers, said):
         check_peer(said)
         steps = measure_steps(workers, names, effort, bar, noise)
         resets = measure_resets(workers, names, effort, bar, noise)

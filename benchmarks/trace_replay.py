@@ -18,7 +18,6 @@ from typing import Any
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
-from tqdm import tqdm
 
 from robocasa_lerobot.envs.control.controller import RobotController
 from robocasa_lerobot.envs.control.step import control_step
@@ -26,6 +25,7 @@ from robocasa_lerobot.envs.proprioception import read_observations
 from robocasa_lerobot.envs.scene.robot import SPAWN_POSITION, add_robot, apply_simulation_options, place_base, set_home
 from robocasa_lerobot.envs.scene.scene import SETTLE_STEPS
 from robocasa_lerobot.errors import UserError
+from robocasa_lerobot.progress import Bar
 
 REPOSITORY = Path(__file__).parents[1]
 TRACES = REPOSITORY.parent / "shared" / "real" / "robosuite_traces" / "panda_omron_traces.npz"
@@ -229,7 +229,7 @@ def main(arguments: list[str] | None = None) -> int:
     for multiccd in (False, True):
         model = empty_room(multiccd)
         errors = []
-        for name, trace in tqdm(traces.items(), desc=f"multiccd {'on' if multiccd else 'off'}", unit="trace"):
+        for name, trace in Bar(traces.items(), desc=f"multiccd {'on' if multiccd else 'off'}", unit="trace"):
             errors.append(compare(name, trace, replay(model, trace["actions"])))
         print(f"\n## {'As in our kitchens: multiccd on' if multiccd else 'As recorded: multiccd off'}\n")
         print(table(errors))

@@ -23,9 +23,9 @@ import common
 import training_data
 import training_report
 import training_sides
-from tqdm import tqdm
 
 from robocasa_lerobot.errors import UserError
+from robocasa_lerobot.progress import Bar
 
 OUTPUT = common.RESULTS / "training_speed.json"
 WORK = common.REPOSITORY / "outputs" / "training_speed"
@@ -75,7 +75,7 @@ def worker_counts(device: str, cores: int) -> tuple[int, ...]:
 
 
 def measure_training(
-    effort: Effort, dataset: Path, device: str, counts: Sequence[int], bar: tqdm[Any], noise: list[float]
+    effort: Effort, dataset: Path, device: str, counts: Sequence[int], bar: Bar, noise: list[float]
 ) -> dict[str, dict[str, Any]]:
     """Figures of every side, by policy."""
     sides = training_sides.sides(counts, counts[:1] if device == "cpu" else counts)
@@ -101,7 +101,7 @@ def measure_training(
     return found
 
 
-def measure_loaders(effort: Effort, dataset: Path, bar: tqdm[Any], noise: list[float]) -> dict[str, dict[str, Any]]:
+def measure_loaders(effort: Effort, dataset: Path, bar: Bar, noise: list[float]) -> dict[str, dict[str, Any]]:
     """Samples per second of each loader in this process, by `<observations>x<actions>`."""
     import training_loaders as loaders
 
@@ -163,7 +163,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         parts += effort.repetitions * len(effort.policies) * len(sides)
     try:
         dataset, kind = prepare_dataset(options, effort, machine["cores"])
-        with tqdm(total=parts, unit="part", smoothing=0) as bar:
+        with Bar(total=parts, unit="part", smoothing=0) as bar:
             training: dict[str, Any] = {}
             if not options.loaders_only:
                 training = measure_training(effort, dataset, device, counts, bar, noise)

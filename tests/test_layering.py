@@ -19,13 +19,14 @@ REPOSITORY = Path(__file__).parents[1]
 PACKAGE = REPOSITORY / "robocasa_lerobot"
 
 # What each part of the package may import of the rest of the package. Parts on one level stay apart.
-BASE = {"contract", "errors", "gl", "parallel", "rendering", "settings", "video"}
+BASE = {"contract", "errors", "gl", "parallel", "progress", "rendering", "settings", "video"}
 LOW = {"envs", "convert", "data", "policies"}
 MAY_IMPORT: dict[str, set[str]] = {
     "contract": {"errors"},
     "errors": set(),
     "gl": {"errors"},
     "parallel": {"errors"},
+    "progress": set(),
     "settings": {"errors"},
     "video": {"contract"},
     "rendering": {"errors", "gl"},
@@ -44,6 +45,7 @@ FORBIDDEN: dict[str, set[str]] = {
     "errors": TORCH | PHYSICS,
     "gl": TORCH,
     "parallel": TORCH | PHYSICS,
+    "progress": TORCH | PHYSICS,
     "settings": TORCH | PHYSICS,
     "video": TORCH | PHYSICS,
     "rendering": TORCH,

@@ -11,7 +11,6 @@ import av
 import numpy as np
 from lerobot.datasets.lerobot_dataset import LeRobotDataset
 from numpy.typing import NDArray
-from tqdm import tqdm
 
 from robocasa_lerobot import contract
 from robocasa_lerobot.convert.episode import Episode
@@ -26,6 +25,7 @@ from robocasa_lerobot.convert.settings import Camera, ConversionSettings, Plan, 
 from robocasa_lerobot.convert.shard import EPISODES_FILE, REJECTED_FILE, read_jsonl
 from robocasa_lerobot.convert.writing.statistics import column_of
 from robocasa_lerobot.errors import UserError
+from robocasa_lerobot.progress import Bar
 
 _CHECKS = (
     "source files",
@@ -95,7 +95,7 @@ def verify(
     settings = recorded_settings(record, asset_roots)
     verification.check_structure()
     verification.check_videos()
-    with tqdm(total=len(episodes), unit="episode", desc="verifying") as bar:
+    with Bar(total=len(episodes), unit="episode", desc="verifying") as bar:
         for recorded_name, path, sha256 in files:
             verification.check_file(recorded_name, path, sha256, settings, record, bar)
     return verification.report()
@@ -170,7 +170,7 @@ class Verification:
             check.expect(count == total, f"{camera}: {count} frames in the videos, {total} in the tables")
 
     def check_file(
-        self, recorded: str, path: Path, sha256: str, settings: ConversionSettings, record: dict[str, Any], bar: tqdm
+        self, recorded: str, path: Path, sha256: str, settings: ConversionSettings, record: dict[str, Any], bar: Bar
     ) -> None:
         """All episodes of one source file, and that none of its demos is unaccounted for."""
         self._checks["source files"].expect(

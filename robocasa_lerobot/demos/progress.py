@@ -2,18 +2,12 @@
 
 from __future__ import annotations
 
-import sys
 import time
 from collections.abc import Callable, Sequence
 from types import TracebackType
 
-from rich.console import Console
-from rich.progress import BarColumn, Progress, TaskID, TextColumn
-
 from robocasa_lerobot.demos.attempts import RecordingSettings, Tally
-
-# Between two lines about a task, where there is no terminal; less than a minute between rounds.
-_LINE_SECONDS = 30.0
+from robocasa_lerobot.progress import Rows
 
 
 class Board:
@@ -33,53 +27,31 @@ class Board:
         self._clock = clock
         self._begun: dict[str, tuple[float, int]] = {}  # when this run first saw a task work, attempts done by then
         self._seen: dict[str, int] = {}
-        self._printed: dict[str, float] = {}
-        self._rows: dict[str, TaskID] = {}
         self._finished = 0
-        self._show = show and bool(tasks)
-        console = Console(file=sys.stderr)
-        self._bars = Progress(
-            TextColumn("{task.description}"),
-            BarColumn(bar_width=24),
-            TextColumn("{task.fields[text]}"),
-            console=console,
-            disable=not (self._show and console.is_terminal),
-            transient=True,
-        )
-        self._live = not self._bars.disable
+        self._rows = Rows(self._tasks, show=show, clock=clock)
 
     def update(self, settings: RecordingSettings, tally: Tally) -> None:
         """Show how far a task is; its clock runs from the first call on."""
-        name, done, now = settings.task, len(tally.done), self._clock()
+        name, done = settings.task, len(tally.done)
         if name not in self._begun or done == self._begun[name][1]:
-            self._begun.setdefault(name, (now, done))
-            self._printed.setdefault(name, now)
-        if not self._show or self._seen.get(name) == done:
+            self._begun.setdefault(name, (self._clock(), done))
+        if self._seen.get(name) == done:
             return
         self._seen[name] = done
-        line = self.line(settings, tally)
-        if self._live:
-            if name not in self._rows:
-                self._rows[name] = self._bars.add_task(f"{name:<{self._width}}", total=settings.episodes, text="")
-            succeeded = min(sum(tally.done.values()), settings.episodes)
-            self._bars.update(self._rows[name], completed=succeeded, text=line)
-        elif now - self._printed[name] >= _LINE_SECONDS:
-            self._printed[name] = now
-            self._print(f"{name:<{self._width}}  {line}")
+        succeeded = min(sum(tally.done.values()), settings.episodes)
+        self._rows.update(name, succeeded, settings.episodes, self.line(settings, tally))
 
     def finish(self, settings: RecordingSettings, tally: Tally) -> None:
         """Say that a task is done, or given up."""
         self._finished += 1
-        if settings.task in self._rows:
-            self._bars.remove_task(self._rows.pop(settings.task))
-        if self._show:
-            number = f"[{self._finished}/{len(self._tasks)}]"
-            short = "" if len(tally.chosen) == settings.episodes else ", given up"
-            rate = 1 - len(tally.failures) / max(tally.tried, 1)
-            self._print(
-                f"{number} {settings.task:<{self._width}}  {len(tally.chosen)} episodes, "
-                f"{rate:.0%} of {tally.tried} attempts succeeded{short}"
-            )
+        number = f"[{self._finished}/{len(self._tasks)}]"
+        short = "" if len(tally.chosen) == settings.episodes else ", given up"
+        rate = 1 - len(tally.failures) / max(tally.tried, 1)
+        self._rows.finish(
+            settings.task,
+            f"{number} {settings.task:<{self._width}}  {len(tally.chosen)} episodes, "
+            f"{rate:.0%} of {tally.tried} attempts succeeded{short}",
+        )
 
     def line(self, settings: RecordingSettings, tally: Tally) -> str:
         """Episodes, success rate and time left, in words."""
@@ -101,20 +73,14 @@ class Board:
         missing = max(settings.episodes - succeeded, 0)
         return (self._clock() - begun) / made * missing / tally.rate
 
-    def _print(self, text: str) -> None:
-        if self._live:
-            self._bars.console.print(text, highlight=False, markup=False)
-        else:
-            print(text, file=sys.stderr, flush=True)
-
     def __enter__(self) -> Board:
-        self._bars.start()
+        self._rows.__enter__()
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        self._bars.stop()
+        self._rows.__exit__(kind, error, trace)
 
 
 def _span(seconds: float) -> str:

@@ -25,18 +25,17 @@ def configure(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Print how many replay from their actions and from their states; status 1 where it is fewer than expected."""
-    from tqdm import tqdm
-
     from robocasa_lerobot.demos.film_strip import film_strip
     from robocasa_lerobot.demos.replay import demonstrations, replay_all
+    from robocasa_lerobot.progress import Bar
 
     chosen = demonstrations(args.paths)[:: args.every]
     results = sorted(
-        tqdm(replay_all(chosen, args.workers), total=len(chosen), unit="demo", disable=args.json),
+        Bar(replay_all(chosen, args.workers), total=len(chosen), unit="demo", disable=args.json),
         key=lambda result: chosen.index((result.path, result.demo)),
     )
     if args.strips:
-        for path, demo in tqdm(chosen, unit="strip", disable=args.json):
+        for path, demo in Bar(chosen, unit="strip", disable=args.json):
             film_strip(path, demo, args.strips / f"{path.stem}_{demo}.png")
     by_actions, by_states = sum(r.actions for r in results), sum(r.states for r in results)
     rates = by_actions / len(results), by_states / len(results)

@@ -81,17 +81,16 @@ def _tasks(args: argparse.Namespace) -> None:
 
 
 def _sections(args: argparse.Namespace, names: list[str]) -> None:
-    from tqdm import tqdm
-
     from robocasa_lerobot.envs.gallery_page import write_page
     from robocasa_lerobot.envs.gallery_sections import SPLITS, Tile, tiles_of, write_sheets
     from robocasa_lerobot.errors import UserError
+    from robocasa_lerobot.progress import Bar
 
     splits = (args.split,) if args.split else SPLITS
     categories = tuple(c.strip() for c in args.category.split(",")) if args.category else ()
     made: dict[str, list[Tile]] = {}
     for name in names:
-        made[name] = list(tqdm(tiles_of(name, splits, categories), desc=name, unit="picture"))
+        made[name] = list(Bar(tiles_of(name, splits, categories), desc=name, unit="picture"))
     if not any(made.values()):
         raise UserError(
             f"nothing in {', '.join(names)} is of category {args.category!r} and split {', '.join(splits)}."

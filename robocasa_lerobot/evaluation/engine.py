@@ -13,7 +13,6 @@ from pathlib import Path
 from typing import Any
 
 import yaml
-from tqdm import tqdm
 
 from robocasa_lerobot.errors import UserError
 from robocasa_lerobot.evaluation import resolve
@@ -37,6 +36,7 @@ from robocasa_lerobot.evaluation.serving import open_servers, served_labels
 from robocasa_lerobot.evaluation.trials_file import append, check_same_run, drop_torn_line
 from robocasa_lerobot.evaluation.worker import WorkerSettings
 from robocasa_lerobot.evaluation.workers import Completed, WorkerPool
+from robocasa_lerobot.progress import Bar
 
 CONFIG_FILE = "evaluation.yaml"
 SHARDS_FOLDER = "shards"
@@ -239,7 +239,7 @@ def _run(
     counts = collections.Counter[str]()
     with (
         open_servers(settings, config) as servers,
-        tqdm(total=total, initial=total - len(todo), unit="trial", desc="trials", dynamic_ncols=True) as bar,
+        Bar(total=total, initial=total - len(todo), unit="trial", desc="trials", dynamic_ncols=True) as bar,
     ):
         pool = WorkerPool(settings, config.worker_count(max(1, len(todo))), config.stall_seconds, servers)
 

@@ -7,7 +7,6 @@ the step, and the samples follow from their position, so a run that was killed g
 from __future__ import annotations
 
 import math
-import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, nullcontext
@@ -18,10 +17,10 @@ from typing import Any
 import numpy as np
 import torch
 from accelerate import Accelerator
-from tqdm import tqdm
 
 from robocasa_lerobot.data.mixture import StepBatches
 from robocasa_lerobot.errors import UserError
+from robocasa_lerobot.progress import Bar
 from robocasa_lerobot.training.allocator import keep_freed_memory
 from robocasa_lerobot.training.augment import augment
 from robocasa_lerobot.training.checkpoint import TrainingState, prune, save_checkpoint
@@ -75,13 +74,13 @@ def train_phase(run: PhaseRun, accelerator: Accelerator) -> bool:
     batches = _loader(run, first=state.step * parts, end=config.steps * parts)
     if state.step == 0 and config.save_initial:
         _save(run, accelerator)
-    progress = tqdm(
+    progress = Bar(
         total=config.steps,
         initial=state.step,
         desc=config.name,
         unit="step",
         smoothing=0.05,
-        mininterval=0.2 if sys.stderr.isatty() else 10.0,  # seconds; a log file needs few lines
+        mininterval=0.2,  # seconds
         disable=not accelerator.is_main_process,
     )
     began, stopped = time.perf_counter(), False

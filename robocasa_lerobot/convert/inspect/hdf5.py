@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from tqdm import tqdm
 
 from robocasa_lerobot.convert.mapping.instruction import instruction_of
 from robocasa_lerobot.convert.mapping.robot_mapping import RobotMapping
@@ -21,6 +20,7 @@ from robocasa_lerobot.convert.reading.layout import DEFAULT_EPISODES, Layout
 from robocasa_lerobot.convert.reading.mjcf import scene_names
 from robocasa_lerobot.convert.reading.survey import Survey, survey
 from robocasa_lerobot.errors import UserError
+from robocasa_lerobot.progress import Bar
 
 _ACTION = re.compile(r"(^|/)actions?$")
 _MAX_DEPTH = 3  # groups below the file in which episodes are looked for
@@ -105,7 +105,7 @@ def _walk(file: DemoFile, found: Survey, report: FileReport) -> Demo | None:
     sources: Counter[str] = Counter()
     first: dict[str, tuple[tuple[int, ...], str]] = {}
     sample: Demo | None = None
-    for name in tqdm(file.demo_names, unit="episode", desc="looking", disable=None, leave=False):
+    for name in Bar(file.demo_names, unit="episode", desc="looking", leave=False):
         try:
             if trap := found.reason(file.place(name)):
                 raise RejectedEpisodeError(trap)

@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from tqdm import tqdm
 
 from robocasa_lerobot import contract
 from robocasa_lerobot.convert.lerobot_v2.dataset import EXTRAS, V2Dataset
@@ -21,6 +20,7 @@ from robocasa_lerobot.convert.shard import REJECTED_FILE, episode_folder, read_j
 from robocasa_lerobot.convert.verify import Verification, compare_bits, spread
 from robocasa_lerobot.convert.writing.statistics import column_of
 from robocasa_lerobot.convert.writing.video import digests
+from robocasa_lerobot.progress import Bar
 
 _MORE_CHECKS = ("other columns", "extras", "copied frames")
 
@@ -34,7 +34,7 @@ class V2Verification(Verification):
         self._cameras = {camera["name"]: Camera(**camera) for camera in self._record["cameras"]}
 
     def check_file(
-        self, recorded: str, path: Path, sha256: str, settings: ConversionSettings, record: dict[str, Any], bar: tqdm
+        self, recorded: str, path: Path, sha256: str, settings: ConversionSettings, record: dict[str, Any], bar: Bar
     ) -> None:
         """All episodes of one source dataset, and that none of them is unaccounted for."""
         source = V2Dataset(path)

@@ -21,7 +21,6 @@ from pathlib import Path
 
 import h5py
 import numpy as np
-from tqdm import tqdm
 
 from robocasa_lerobot.convert.python_process import environment_of_python
 from robocasa_lerobot.convert.reading.hdf5 import (
@@ -35,6 +34,7 @@ from robocasa_lerobot.convert.reading.hdf5 import (
     text_attribute,
 )
 from robocasa_lerobot.convert.reading.layout import DEFAULT_EPISODES
+from robocasa_lerobot.progress import Bar
 
 # Processor time for one attribute, header or small array: so long none takes, however busy the machine is.
 CPU_SECONDS = 3.0
@@ -93,7 +93,7 @@ def _run(path: Path, found: Survey) -> tuple[str | None, int]:
         subprocess.Popen(
             command, stdout=subprocess.PIPE, env=environment_of_python(), text=True, errors="replace"
         ) as process,
-        tqdm(desc=f"looking into {path.name}", unit="episode", delay=2.0, leave=False) as bar,
+        Bar(desc=f"looking into {path.name}", unit="episode", delay=2.0, leave=False) as bar,
     ):
         assert process.stdout is not None
         for line in process.stdout:

@@ -12,7 +12,6 @@ import numpy as np
 import pyarrow.parquet as pq
 from lerobot.datasets.lerobot_dataset import LeRobotDataset
 from numpy.typing import NDArray
-from tqdm import tqdm
 
 from robocasa_lerobot import contract
 from robocasa_lerobot.convert.reading.demo_file import RejectedEpisodeError
@@ -21,6 +20,7 @@ from robocasa_lerobot.convert.rerender.plan import EpisodePictures, RenderPlan, 
 from robocasa_lerobot.convert.shard import EXTRAS
 from robocasa_lerobot.convert.verify import num_video_frames, psnr_db, spread
 from robocasa_lerobot.errors import UserError
+from robocasa_lerobot.progress import Bar
 
 _CHECKS = ("tables", "extras", "entries", "video frames", "pictures")
 
@@ -66,7 +66,7 @@ def verify_rerendered(
             count == plan.num_frames, f"{camera}: {count} frames in the videos, {plan.num_frames} in the tables"
         )
     first = 0
-    for episode in tqdm(plan.dataset.episodes, unit="episode", desc="verifying"):
+    for episode in Bar(plan.dataset.episodes, unit="episode", desc="verifying"):
         steps = spread(episode.length, pictures_per_episode)
         label = f"episode {episode.index}"
         try:

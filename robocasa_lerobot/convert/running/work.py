@@ -10,11 +10,10 @@ import shutil
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
-from tqdm import tqdm
-
 from robocasa_lerobot.convert.running.executors import Execution, run_with_ray, submit_to_slurm
 from robocasa_lerobot.errors import UserError
 from robocasa_lerobot.parallel import PoolExecutor, exit_if_orphaned, polled
+from robocasa_lerobot.progress import Bar
 
 _EXECUTOR = "executor"  # folder of completion markers
 Step = Callable[..., None]
@@ -192,7 +191,7 @@ def _progress_bar(pieces: int, partial: Path, num_frames: int, what: str) -> Ite
         bar.n = min(num_frames, sum(done(rank) for rank in range(pieces)))
         bar.refresh()
 
-    with tqdm(total=num_frames, unit="frame", desc=what, smoothing=0.05) as bar:
+    with Bar(total=num_frames, unit="frame", desc=what, smoothing=0.05) as bar:
         with polled(show):
             yield
         bar.n = num_frames
