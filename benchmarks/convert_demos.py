@@ -68,8 +68,9 @@ def strip(source: h5py.File, target: h5py.File, steps: int | None = None) -> Non
             for key in ("states", "actions"):
                 demo[key] = group[key][:steps]
             demo.attrs["num_samples"] = len(demo["actions"])
-        else:
-            source.copy(group, data, name=name)
+    for place in ("assets", "data/assets"):  # the second in files of earlier versions
+        if place in source and "assets" not in target:
+            source.copy(source[place], target, name="assets")
     data.attrs["total"] = sum(len(data[name]["actions"]) for name in data if name.startswith("demo_"))
 
 

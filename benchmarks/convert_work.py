@@ -171,7 +171,7 @@ class RecordedScene:
         self._states = group["states"][:]
 
         def embedded(path: str) -> bytes | None:
-            stored = source["data"].get(f"assets/{path}")
+            stored = source.get(f"assets/{path}")
             return None if stored is None else stored[()].tobytes()
 
         xml, assets = loadable(group.attrs["model_file"], AssetFinder([], embedded))

@@ -85,7 +85,7 @@ def write_demos(
         data.attrs["env"] = env_name
         data.attrs["env_args"] = json.dumps({"env_name": env_name, "type": 1, "env_kwargs": {"control_freq": 20}})
         data.attrs["total"] = sum(lengths)
-        data.create_dataset(f"assets/{TEXTURE}", data=np.frombuffer(_texture(), np.uint8))
+        file.create_dataset(f"assets/{TEXTURE}", data=np.frombuffer(_texture(), np.uint8))
         for index, length in enumerate(lengths):
             _write_demo(data.create_group(f"demo_{index}"), length, rng, images, proprioception, instruction)
     return path

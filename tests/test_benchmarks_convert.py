@@ -80,7 +80,7 @@ def test_a_stripped_file_has_the_same_states_and_nothing_to_see(tmp_path: Path) 
             np.testing.assert_array_equal(ours["states"], theirs["states"][:length])
             np.testing.assert_array_equal(ours["actions"], theirs["actions"][:length])
         assert target["data"].attrs["total"] == 7
-        assert set(target["data/assets"]) == set(source["data/assets"])
+        assert set(target["assets"]) == set(source["assets"])
     assert demos.demo_lengths(tmp_path / "b.hdf5") == {"demo_0": 4, "demo_1": 3}
     with np.load(demos.states_for_peer(tmp_path / "b.hdf5")) as states:
         assert {name: len(rows) for name, rows in states.items()} == {"demo_0": 4, "demo_1": 3}
@@ -162,7 +162,7 @@ def test_the_renderer_alone_draws_what_our_converter_draws(tmp_path: Path) -> No
         group = source["data/demo_0"]
 
         def embedded(path: str) -> bytes | None:
-            stored = source["data"].get(f"assets/{path}")
+            stored = source.get(f"assets/{path}")
             return None if stored is None else stored[()].tobytes()
 
         finder = work.AssetFinder([], embedded)

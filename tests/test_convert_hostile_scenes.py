@@ -132,8 +132,8 @@ def test_files_inside_the_hdf5_file_have_the_same_bounds(tmp_path: Path) -> None
     source = write_demos(tmp_path / "a.hdf5", (2,))
     (tmp_path / "other.hdf5").write_bytes(source.read_bytes())
     with h5py.File(source, "a") as file:
-        assets = file["data/assets"]
-        assets["linked.png"] = h5py.ExternalLink("other.hdf5", "/data/assets/textures/checks.png")
+        assets = file["assets"]
+        assets["linked.png"] = h5py.ExternalLink("other.hdf5", "/assets/textures/checks.png")
         assets.create_dataset("huge.png", (2**40,), "u1", chunks=(2**20,))
         assets["text.png"] = "hello"
     with DemoFile(source) as file:
@@ -154,7 +154,7 @@ def test_missing_meshes_of_one_demo_reject_only_it(tmp_path: Path) -> None:
     assert "/home/someone/textures/no.png" in result.rejected[0]["reason"]
     assert "--asset-root" in result.rejected[0]["reason"]
     with h5py.File(source, "a") as file:
-        del file["data/assets"]
+        del file["assets"]
     with pytest.raises(UserError, match="--asset-root"):
         convert([source], tmp_path / "none", ConversionSettings(image_size=32))
     assert leftovers(tmp_path / "none") == []

@@ -212,12 +212,14 @@ def test_modality_names_every_part() -> None:
     assert unknown["state"] == {"state": {"original_key": "observation.state", "start": 0, "end": 16}}
 
 
-def test_converted_datasets_keep_what_replaying_needs(tmp_path: Path) -> None:
+@pytest.mark.parametrize("place", ["assets", "data/assets"])  # the second in files of earlier versions
+def test_converted_datasets_keep_what_replaying_needs(place: str, tmp_path: Path) -> None:
     source = write_demos(tmp_path / "a.hdf5", (5,), images=16)
     with h5py.File(source, "a") as file:
-        file["data/assets"].create_dataset("../../escaped.txt".replace("/", "\\"), data=np.zeros(3, np.uint8))
-        file["data/assets/numbers"] = np.zeros(3)
-        texture = file[f"data/assets/{TEXTURE}"][:].tobytes()
+        file["assets"].create_dataset("../../escaped.txt".replace("/", "\\"), data=np.zeros(3, np.uint8))
+        file["assets/numbers"] = np.zeros(3)
+        texture = file[f"assets/{TEXTURE}"][:].tobytes()
+        file.move("assets", place)
     convert([source], tmp_path / "data", ConversionSettings())
     record = json.loads((tmp_path / "data" / "meta" / "robocasa" / "conversion.json").read_text())
     kept = tmp_path / "data" / "extras" / "assets" / record["sources"][0]["sha256"][:12]

@@ -141,7 +141,8 @@ def test_a_file_is_the_same_for_any_number_of_workers(tmp_path):
         assert result.episodes == 2
         with h5py.File(result.path) as file:
             data = file["data"]
-            assert sorted(data) == ["assets", "demo_0", "demo_1"]
+            assert sorted(file) == ["assets", "data"]
+            assert sorted(data) == ["demo_0", "demo_1"]
             assert data.attrs["env"] == "CloseDrawer"
             assert data.attrs["total"] == result.steps == sum(len(data[f"demo_{i}/actions"]) for i in range(2))
             assert data.attrs["episodes_tried"] == result.tried

@@ -164,7 +164,8 @@ def test_datasets_of_several_tasks_are_exported_one_by_one(tmp_path: Path) -> No
     path = export(root, tmp_path / "out.hdf5", ExportSettings(task="B")).path
     with h5py.File(path) as file:
         assert file["data"].attrs["env"] == "B"
-        assert list(file["data"]) == ["assets", "demo_0"]
+        assert list(file["data"]) == ["demo_0"]
+        assert list(file["assets"]) == ["textures"]
     assert items(path)["data/demo_0/actions"].tobytes() == items(files[1])["data/demo_0/actions"].tobytes()
 
 

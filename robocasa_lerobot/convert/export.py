@@ -17,12 +17,12 @@ from typing import Any
 import h5py
 import numpy as np
 from numpy.typing import NDArray
-from tqdm import tqdm
 
 from robocasa_lerobot import __version__, contract
 from robocasa_lerobot.convert.reading.demo_file import ASSETS_GROUP, IMAGE_SUFFIX
 from robocasa_lerobot.convert.reading.lerobot_v3 import EXTRA_PREFIX, ExportedDataset, ExportedEpisode
 from robocasa_lerobot.errors import UnknownNameError, UserError
+from robocasa_lerobot.progress import Bar
 
 COMPRESSIONS = ("gzip", "lzf", "none")
 _GZIP_LEVEL = 1  # pictures hardly get smaller with more, only slower
@@ -121,7 +121,7 @@ def _write(
     compression = _compression(settings.compression)
     lacking: dict[str, int] = {}
     num_frames = 0
-    with tqdm(total=sum(episode.length for episode in episodes), unit="frame", desc="exporting") as bar:
+    with Bar(total=sum(episode.length for episode in episodes), unit="frame", desc="exporting") as bar:
         for index, episode in enumerate(episodes):
             group = data.create_group(f"demo_{index}")
             for what in _write_vectors(group, dataset, episode, compression):
@@ -133,7 +133,7 @@ def _write(
     notes += [f"{what} of {count} episodes are not in the dataset: left out" for what, count in lacking.items()]
     data.attrs.update(_attributes(dataset, episodes))
     data.attrs["total"] = num_frames
-    _copy_assets(data, dataset, notes)
+    _copy_assets(file, dataset, notes)
     return num_frames
 
 
@@ -252,14 +252,15 @@ def _attributes(dataset: ExportedDataset, episodes: Sequence[ExportedEpisode]) -
     return {key: value for key, value in recorded.items() if isinstance(value, str | int | float | bool)}
 
 
-def _copy_assets(data: h5py.Group, dataset: ExportedDataset, notes: list[str]) -> None:
+def _copy_assets(file: h5py.File, dataset: ExportedDataset, notes: list[str]) -> None:
     """Files that the scenes name and that the source files hold themselves, where these are still to be found."""
     for path in dataset.source_files():
         try:
             with h5py.File(path, "r") as source:
-                group = source.get(f"data/{ASSETS_GROUP}")
-                if isinstance(group, h5py.Group) and ASSETS_GROUP not in data:
-                    source.copy(group, data, name=ASSETS_GROUP)
+                for place in (ASSETS_GROUP, f"data/{ASSETS_GROUP}"):
+                    group = source.get(place)
+                    if isinstance(group, h5py.Group) and ASSETS_GROUP not in file:
+                        source.copy(group, file, name=ASSETS_GROUP)
         except OSError as error:
             notes.append(f"textures stored in {path} could not be taken over ({error})")
 

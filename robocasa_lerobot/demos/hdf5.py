@@ -17,7 +17,8 @@ from robocasa_lerobot import __version__
 from robocasa_lerobot.demos.episode import Recording
 
 ENV_TYPE_ROBOSUITE = 1  # robomimic's number for environments of this family
-# Group of files that MJCFs name; MuJoCo needs them to load a `model_file` again.
+# Group of files that MJCFs name; MuJoCo needs them to load a `model_file` again. It lies beside `data`, not in it:
+# robomimic takes every member of `data` for a demonstration.
 ASSETS_GROUP = "assets"
 
 
@@ -107,8 +108,8 @@ def merge_parts(
             with h5py.File(part, "r") as source:
                 source.copy(source["demo"], data, name=f"demo_{index}")
                 for name in _asset_names(source):
-                    if f"{ASSETS_GROUP}/{name}" not in data:
-                        source.copy(source[f"{ASSETS_GROUP}/{name}"], data, name=f"{ASSETS_GROUP}/{name}")
+                    if f"{ASSETS_GROUP}/{name}" not in file:
+                        source.copy(source[f"{ASSETS_GROUP}/{name}"], file, name=f"{ASSETS_GROUP}/{name}")
                 total += int(source["demo"].attrs["num_samples"])
         data.attrs.update(
             {
