@@ -14,13 +14,13 @@ import numpy as np
 import pytest
 from convert_support import INSTRUCTION, leftovers, write_demos
 
-from robocasa_lerobot import contract
+from robocasa_lerobot import cli, contract
 from robocasa_lerobot.errors import UserError
 
 pytest.importorskip("lerobot.datasets")
 from lerobot.datasets.lerobot_dataset import LeRobotDataset
 
-from robocasa_lerobot.convert.pipeline import META_FOLDER, convert
+from robocasa_lerobot.convert.pipeline import ACTIONS_OUT_OF_RANGE, CONVERSION_FILE, META_FOLDER, convert
 from robocasa_lerobot.convert.reading import hdf5
 from robocasa_lerobot.convert.reading.survey import CPU_SECONDS
 from robocasa_lerobot.convert.settings import ConversionSettings, make_plan
@@ -316,3 +316,45 @@ def test_a_file_that_traps_hdf5_ends(tmp_path: Path) -> None:
     reasons = {line["source_demo"]: line["reason"] for line in result.rejected}
     assert reasons.keys() == {"demo_1"}, "this file no longer traps HDF5: find another one"
     assert f"not coming to an end in {CPU_SECONDS:g} s" in reasons["demo_1"]
+
+
+def test_groups_that_are_not_named_as_episodes_are_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    source = write_demos(tmp_path / "demos.hdf5", (5, 4, 6), images=32)
+    with h5py.File(source, "a") as file:
+        file.move("data/demo_1", "data/Demo_1")
+        file["data/elsewhere"] = h5py.ExternalLink("other.hdf5", "/data/demo_0")
+        file["data/note"] = "not a group"
+        file.move("assets", "data/assets")  # where earlier versions kept them
+    out = tmp_path / "data"
+    assert cli.main(["convert", str(source), "--out", str(out)]) == 0
+    printed = capsys.readouterr().out
+    rejected = {line["source_demo"]: line["reason"] for line in read_jsonl(out / META_FOLDER / "rejected.jsonl")}
+    assert rejected.keys() == {"Demo_1", "elsewhere"}
+    assert "demo_<number>" in rejected["Demo_1"]
+    assert "another file" in rejected["elsewhere"]
+    assert "2 episodes rejected" in printed
+    assert "Demo_1" in printed
+    assert verify(out).passed
+    assert not convert([source], tmp_path / "chosen", ConversionSettings(demos="demo_0")).rejected  # not asked for
+    with h5py.File(source, "a") as file:
+        del file["data/demo_0"], file["data/demo_2"]
+    with pytest.raises(UserError, match=r"no demos \(groups data/demo_<i>; found: Demo_1, assets"):
+        convert([source], tmp_path / "none", SETTINGS)
+
+
+def test_actions_beyond_the_controllers_range_are_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    source = write_demos(tmp_path / "demos.hdf5", (10, 10), images=32)
+    with h5py.File(source, "a") as file:
+        file["data/demo_0/actions"][2:5, 1] = -30.0
+        file["data/demo_1/actions"][0, 4] = 1.02  # noise
+    for name, steps in (("both", 3), ("one", 0)):
+        out = tmp_path / name
+        demos = [] if name == "both" else ["--demos", "demo_1"]
+        assert cli.main(["convert", str(source), "--out", str(out), *demos]) == 0
+        printed = capsys.readouterr().out
+        found = json.loads((out / META_FOLDER / CONVERSION_FILE).read_text())[ACTIONS_OUT_OF_RANGE]
+        assert found["steps"] == steps
+        assert ("warning: 15.0% of the steps (3)" in printed) == (steps > 0)
+        assert verify(out).passed
+    found = json.loads((tmp_path / "both" / META_FOLDER / CONVERSION_FILE).read_text())[ACTIONS_OUT_OF_RANGE]
+    assert (found["share"], found["largest"], found["component"]) == (0.15, 30.0, "eef_dy")

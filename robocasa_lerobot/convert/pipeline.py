@@ -19,7 +19,8 @@ from typing import Any
 
 import numpy as np
 
-from robocasa_lerobot import __version__
+from robocasa_lerobot import __version__, contract
+from robocasa_lerobot.convert.action_range import out_of_range, warning_of
 from robocasa_lerobot.convert.lerobot_v2.dataset import V2Dataset
 from robocasa_lerobot.convert.lerobot_v2.finish import conversion_facts, finish_dataset
 from robocasa_lerobot.convert.lerobot_v2.plan import V2Plan, make_v2_plan, takes
@@ -60,6 +61,7 @@ from robocasa_lerobot.errors import UserError
 # Our part of a dataset's folder; LeRobot reads nothing in it.
 META_FOLDER = "meta/robocasa"
 CONVERSION_FILE = "conversion.json"
+ACTIONS_OUT_OF_RANGE = "actions_out_of_range"  # in it
 # Starting a worker imports LeRobot and MuJoCo (about 6 s of CPU time); below this much work that does not pay: 3,150
 # frames took as long with two workers as with one.
 _MIN_FRAMES_PER_WORKER = 2000
@@ -77,6 +79,7 @@ class ConversionResult:
     cameras: tuple[str, ...]
     instruction_sources: dict[str, int]
     notes: tuple[str, ...] = ()  # what the sources hold that was left out or changed
+    warnings: tuple[str, ...] = ()  # what in the data may be wrong
 
 
 def convert(
@@ -206,10 +209,23 @@ def _left_behind(out: Path) -> Path | None:
 def _recorded_result(plan: Plan, out: Path) -> ConversionResult:
     """What a conversion that has been completed wrote."""
     episodes, rejected = (read_jsonl(out / META_FOLDER / name) for name in (EPISODES_FILE, REJECTED_FILE))
-    sources = dict(Counter(line["instruction_source"] for line in episodes))
-    num_frames = sum(line["length"] for line in episodes)
+    record = json.loads((out / META_FOLDER / CONVERSION_FILE).read_text(encoding="utf-8"))
+    return _result(plan, out, episodes, rejected, record)
+
+
+def _result(
+    plan: Plan, out: Path, episodes: list[dict[str, Any]], rejected: list[dict[str, Any]], record: dict[str, Any]
+) -> ConversionResult:
+    warning = warning_of(record.get(ACTIONS_OUT_OF_RANGE))
     return ConversionResult(
-        out, len(episodes), num_frames, rejected, tuple(camera.name for camera in plan.cameras), sources
+        root=out,
+        num_episodes=len(episodes),
+        num_frames=sum(line["length"] for line in episodes),
+        rejected=rejected,
+        cameras=tuple(camera.name for camera in plan.cameras),
+        instruction_sources=dict(Counter(line["instruction_source"] for line in episodes)),
+        notes=plan.notes if isinstance(plan, V2Plan) else (),
+        warnings=(warning,) if warning else (),
     )
 
 
@@ -291,7 +307,7 @@ def _join(plan: Plan, partial: Path, out: Path) -> ConversionResult | None:
     from lerobot.datasets.io_utils import write_stats
 
     from robocasa_lerobot.convert.writing.joining import copy_tree, join_datasets
-    from robocasa_lerobot.convert.writing.statistics import dataset_statistics
+    from robocasa_lerobot.convert.writing.statistics import column, dataset_statistics
 
     merged = partial / "merged"
     shutil.rmtree(merged, ignore_errors=True)  # an earlier try may have been killed here
@@ -326,6 +342,7 @@ def _join(plan: Plan, partial: Path, out: Path) -> ConversionResult | None:
     write_jsonl(ours / EPISODES_FILE, episodes)
     write_jsonl(ours / REJECTED_FILE, rejected)
     record = _conversion_record(plan, out)
+    record[ACTIONS_OUT_OF_RANGE] = out_of_range(plan.mapping, column(merged, contract.ACTION_KEY))
     if isinstance(plan, V2Plan):
         finish_dataset(plan, merged)
         record |= conversion_facts(plan, episodes)
@@ -334,10 +351,7 @@ def _join(plan: Plan, partial: Path, out: Path) -> ConversionResult | None:
     (ours / CONVERSION_FILE).write_text(
         json.dumps(record, indent=2, ensure_ascii=False, default=str) + "\n", encoding="utf-8"
     )
-    sources = dict(Counter(line["instruction_source"] for line in episodes))
-    cameras = tuple(camera.name for camera in plan.cameras)
-    notes = plan.notes if isinstance(plan, V2Plan) else ()
-    return ConversionResult(out, len(episodes), num_frames, rejected, cameras, sources, notes)
+    return _result(plan, out, episodes, rejected, record)
 
 
 def _conversion_record(plan: Plan, out: Path) -> dict[str, Any]:

@@ -217,6 +217,7 @@ class _Look:
     cameras: tuple[Camera, ...]
     fps: int
     demos: tuple[tuple[str, int], ...]  # name, number of steps (0 where it will be rejected)
+    strays: dict[str, str]  # groups that are not named as demos are, and why they are none
     all_demos: bool
     traps: dict[str, str]  # demos that end the process that reads them, and how
     digests: dict[str, str]  # of whole demos
@@ -248,7 +249,9 @@ def _look(path: Path, settings: ConversionSettings, roots: Sequence[Path]) -> _L
         mapping, cameras = _robot_and_cameras(file, widths, settings, roots)
         digests = {name: found.digests[file.place(name)] for name in widths if file.place(name) in found.digests}
         all_demos = len(selected) == len(file.demo_names)
-        return _Look(path, mapping, cameras, file.control_hz, tuple(demos), all_demos, traps, digests)
+        # Who names demos has not asked for others.
+        strays = file.strays() if settings.filter_key is None and settings.demos is None else {}
+        return _Look(path, mapping, cameras, file.control_hz, tuple(demos), strays, all_demos, traps, digests)
 
 
 def _robot_and_cameras(
@@ -329,9 +332,9 @@ def _cameras(file: DemoFile, demo: Demo, mapping: RobotMapping, settings: Conver
 
 
 def _cut(look: _Look, target: int, copies: Mapping[tuple[Path, str], str]) -> list[Shard]:
-    rejected = look.traps | {name: reason for (file, name), reason in copies.items() if file == look.file}
+    rejected = look.traps | {name: reason for (file, name), reason in copies.items() if file == look.file} | look.strays
     shards: list[Shard] = []
-    names: list[str] = []
+    names = list(look.strays)
     frames = 0
     for position, (name, length) in enumerate(look.demos, start=1):
         names.append(name)

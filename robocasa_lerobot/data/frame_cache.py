@@ -20,11 +20,11 @@ import numpy as np
 import torch
 from lerobot.datasets.video_utils import decode_video_frames
 from numpy.typing import NDArray
-from tqdm import tqdm
 
 from robocasa_lerobot.data.cache_folder import check_disk, locked
 from robocasa_lerobot.data.source import DatasetSource
 from robocasa_lerobot.errors import UserError
+from robocasa_lerobot.progress import Bar
 
 FORMAT = 1  # counted up when the content of a cache changes
 _TOLERANCE_S = 1e-4  # LeRobot's tolerance between the asked and the decoded timestamp
@@ -96,7 +96,7 @@ def _fill(source: DatasetSource, keys: list[str], size: tuple[int, int], folder:
         for key in keys
     }
     timestamps = source.columns["timestamp"]
-    episodes = tqdm(
+    episodes = Bar(
         range(done, len(source.starts)),
         initial=done,
         total=len(source.starts),

@@ -16,12 +16,12 @@ from typing import Any
 import numpy as np
 import pyarrow.parquet as pq
 from numpy.typing import NDArray
-from tqdm import tqdm
 
 from robocasa_lerobot.data.cache_folder import locked
 from robocasa_lerobot.data.quantiles import QuantileSearch
 from robocasa_lerobot.data.source import DatasetSource
 from robocasa_lerobot.errors import UserError
+from robocasa_lerobot.progress import Bar
 
 Statistics = dict[str, dict[str, NDArray[Any]]]
 QUANTILES = {"q01": 0.01, "q10": 0.10, "q50": 0.50, "q90": 0.90, "q99": 0.99}
@@ -76,7 +76,7 @@ def pooled_statistics(parts: Sequence[Part], images: bool = True) -> Statistics:
             columns[key] = _Column(int(np.prod(feature["shape"])), str(feature["dtype"]))
             out[key] = {}  # in the order of the features
     for number in range(max((c.quantiles.passes for c in columns.values()), default=0)):
-        progress = tqdm(
+        progress = Bar(
             parts,
             desc=f"statistics, pass {number + 1}",
             unit="dataset",

@@ -106,14 +106,13 @@ def _chosen(args: argparse.Namespace) -> list[Task]:
 
 
 def _check(tasks: list[Task], workers: int) -> int:
-    from tqdm import tqdm
-
     from robocasa_lerobot.demos.task_check import check_all
     from robocasa_lerobot.envs.scene.kitchens import SPLITS
+    from robocasa_lerobot.progress import Bar
 
     found = check_all([task.name for task in tasks], SPLITS, workers=workers)
     failures = 0
-    with tqdm(found, total=len(tasks) * len(SPLITS), unit="task", disable=None) as bar:
+    with Bar(found, total=len(tasks) * len(SPLITS), unit="task", disable=None) as bar:
         for one in bar:
             failures += bool(one.faults)
             demonstrator = "no demonstrator" if one.solved is None else f"solved on seed {one.solved}"

@@ -83,6 +83,8 @@ def run(args: argparse.Namespace) -> int:
     print(f"{result.root}: {result.num_episodes} episodes, {result.num_frames} frames, cameras {cameras}")
     for note in result.notes:
         print(f"note: {note}")
+    for warning in result.warnings:
+        print(f"warning: {warning}")
     for source, count in result.instruction_sources.items():
         if source != "ep_meta.lang" and not source.startswith("tasks.jsonl"):
             print(f"{count} episodes record no instruction; theirs is taken from: {source}")

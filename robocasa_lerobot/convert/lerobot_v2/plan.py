@@ -246,6 +246,7 @@ def _columns(dataset: V2Dataset, notes: list[str]) -> tuple[tuple[Column, ...], 
         state_columns=(),
         action_columns=(),
         default_cameras=(),
+        unit_commands=action_parts == contract.ACTION_PARTS,
     )
     return tuple(by_name.values()), mapping
 

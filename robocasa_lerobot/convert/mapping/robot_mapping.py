@@ -66,6 +66,7 @@ class RobotMapping:
 
     `state_columns` and `action_columns` give the source of each part; `arms` and `base_site` are used where the file
     has no observations and the state is computed from the scene. `base_site` is empty for robots with a fixed base.
+    `unit_commands` says that actions go to robosuite's controllers, where 1 is a full command.
     """
 
     robot_type: str
@@ -77,6 +78,7 @@ class RobotMapping:
     arms: tuple[Arm, ...] = ()
     base_site: str = ""
     extra_columns: tuple[Columns, ...] = ()
+    unit_commands: bool = False
 
     @property
     def action_size(self) -> int:

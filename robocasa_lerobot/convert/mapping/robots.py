@@ -94,6 +94,7 @@ def _panda_omron(file: DemoFile, demo: Demo, names: SceneNames) -> RobotMapping 
         default_cameras=contract.CAMERAS,
         arms=(arm,),
         base_site=BASE_SITE,
+        unit_commands=True,
     )
 
 
@@ -145,6 +146,7 @@ def _arms(file: DemoFile, demo: Demo, names: SceneNames) -> RobotMapping | None:
         ),
         default_cameras=default_cameras(demo.image_cameras or names.cameras),
         arms=tuple(arms),
+        unit_commands=not (absolute and parts[0].name == "action"),
     )
 
 

@@ -49,10 +49,12 @@ WHOLE_FILE = "episode"  # name of the only episode of a file that is one episode
 UNKNOWN = "unknown"  # name of an environment that the file does not name
 MASKS_GROUP = "mask"  # mask/<filter key>: names of the demos that belong to it
 MAX_RATE_HZ = 10_000
-ASSETS_GROUP = "assets"  # data/assets/<path>: files that the MJCF names, stored once for each HDF5 file
+# assets/<path>: files that the MJCF names, stored once for each HDF5 file; in older files of ours `data/assets/<path>`.
+ASSETS_GROUP = "assets"
 _DEMO = re.compile(r"demo_[0-9]{1,18}")
 _NUMBERS = re.compile(r"([0-9]{1,18})")
 _MAX_ASSET_NAME = 200
+_SHOWN_NAMES = 8
 
 
 class DemoFile:
@@ -116,8 +118,27 @@ class DemoFile:
             found_names = [name for name in matching if isinstance(member(data, name), h5py.Group)]
         if not found_names:
             wanted = "data/demo_<i>" if pattern == DEFAULT_EPISODES else pattern
-            raise SourceError(f"{self.path} has no demos (groups {wanted}): leave it out, or record it again.")
+            there = ", ".join(sorted(names(data, where))[:_SHOWN_NAMES]) or "nothing"
+            raise SourceError(
+                f"{self.path} has no demos (groups {wanted}; found: {there}): leave it out, or record it again."
+            )
         return data, sorted(found_names, key=_natural)
+
+    def strays(self) -> dict[str, str]:
+        """Groups among the episodes that are not named as episodes are, and for each why it is none."""
+        found: dict[str, str] = {}
+        if self.layout.episodes != DEFAULT_EPISODES:
+            return found
+        for name in names(self._data, "data"):
+            if _DEMO.fullmatch(name) or name == ASSETS_GROUP:
+                continue
+            reason = f"its group is named {name!r}, and episodes are named demo_<number>: rename it if it is one."
+            try:
+                if isinstance(member(self._data, name), h5py.Group):
+                    found[name] = reason
+            except RejectedEpisodeError as error:
+                found[name] = f"{reason} {error}"
+        return found
 
     def members(self, path: str) -> tuple[str, ...]:
         """Names in a group of the file; none where there is no such group."""
@@ -177,9 +198,11 @@ class DemoFile:
         return Demo(self.path, name, group, self.layout)
 
     def asset(self, path: str) -> bytes | None:
-        """Bytes of a file that is stored in the HDF5 file itself (`data/assets/<path>`), or None."""
-        dataset = member(self._data, f"{ASSETS_GROUP}/{path.lstrip('/')}") if path.strip("/") else None
-        if not isinstance(dataset, h5py.Dataset):
+        """Bytes of a file that is stored in the HDF5 file itself (`assets/<path>` or `data/assets/<path>`), or None."""
+        inside = f"{ASSETS_GROUP}/{path.lstrip('/')}" if path.strip("/") else ""
+        found = (member(place, inside) for place in (self._file, self._data)) if inside else iter(())
+        dataset = next((node for node in found if isinstance(node, h5py.Dataset)), None)
+        if dataset is None:
             return None
         _, dtype = shape_and_type(dataset, path, MAX_ASSET_BYTES)
         if dtype != np.uint8:
@@ -189,12 +212,13 @@ class DemoFile:
 
     def assets(self) -> Iterator[tuple[str, bytes]]:
         """Path and bytes of the files that are stored in the HDF5 file itself, but what no scene could use."""
-        group = member(self._data, ASSETS_GROUP)
-        names: list[str] = []
-        if isinstance(group, h5py.Group):
-            with reading(ASSETS_GROUP):
-                group.visit(names.append)
-        for name in names:
+        found: list[str] = []
+        for place in (self._file, self._data):
+            group = member(place, ASSETS_GROUP)
+            if isinstance(group, h5py.Group):
+                with reading(ASSETS_GROUP):
+                    group.visit(found.append)
+        for name in dict.fromkeys(found):
             if {"..", "."} & set(name.split("/")) or len(name) > _MAX_ASSET_NAME:
                 continue
             with contextlib.suppress(RejectedEpisodeError):
