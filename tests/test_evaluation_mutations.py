@@ -105,8 +105,8 @@ def success_never_noticed(patch: pytest.MonkeyPatch) -> None:
 def horizon_off_by_one(patch: pytest.MonkeyPatch) -> None:
     original = resolve.plan_tasks
 
-    def shorter(env: Any) -> Any:
-        tasks = original(env)
+    def shorter(env: Any, first_sets: int | None = None) -> Any:
+        tasks = original(env, first_sets)
         return resolve.PlannedTasks({t: h - 1 for t, h in tasks.horizons.items() if h}, tasks.sets, tasks.missing)
 
     patch.setattr(engine.resolve, "plan_tasks", shorter)

@@ -16,7 +16,7 @@ from robocasa_lerobot.evaluation import engine
 from robocasa_lerobot.evaluation.config import PERTURBATIONS, EvaluationConfig
 from robocasa_lerobot.evaluation.overrides import load_config
 from robocasa_lerobot.evaluation.plan import Shard, running_order
-from robocasa_lerobot.evaluation.resolve import env_arguments, plan_tasks
+from robocasa_lerobot.evaluation.resolve import NothingRegisteredError, env_arguments, partial_sentence, plan_tasks
 
 CONFIGS = Path(__file__).parents[1] / "configs/evaluations"
 TARGET_SETS = {"atomic_seen": 18, "composite_seen": 16, "composite_unseen": 16}
@@ -54,18 +54,19 @@ def test_numbers_of_the_protocols(
     if {task for task_set in sets for task in known[task_set]} <= set(task_names()):
         assert len(plan_tasks(config.env).horizons) == sum(sets.values())
     else:
-        with pytest.raises(UserError, match="not registered in this version: "):
+        config.env.allow_missing_tasks = False
+        with pytest.raises(UserError, match=r"not registered in this version: |this version has none"):
             plan_tasks(config.env)
 
 
-def test_missing_tasks_are_listed_and_can_be_left_out_by_name_or_by_consent() -> None:
-    config = protocol("leaderboard")
+def test_missing_tasks_are_left_out_and_listed_unless_all_are_wanted() -> None:
+    config = protocol("leaderboard", "--env.allow_missing_tasks=false")
     with pytest.raises(UserError) as error:
         plan_tasks(config.env)
     for part in ("WashLettuce", "KettleBoiling", "--env.allow_missing_tasks=true", "--env.tasks=Close"):
         assert part in str(error.value)
     there = [t for name in config.env.task_sets for t in published_task_sets()[name] if t in task_names()]
-    consented = engine.prepare(protocol("leaderboard", "--env.allow_missing_tasks=true"))
+    consented = engine.prepare(protocol("leaderboard"))
     named = engine.prepare(protocol("leaderboard", f"--env.tasks={','.join(there)}"))
     for evaluation in (consented, named):
         header = evaluation.header
@@ -74,10 +75,48 @@ def test_missing_tasks_are_listed_and_can_be_left_out_by_name_or_by_consent() ->
         assert not set(header.missing_tasks) & set(there)
         assert sorted(t for tasks in header.task_sets.values() for t in tasks) == sorted(there)
         assert len(evaluation.plan) == 50 * len(there)
+        missing = {name: len(tasks) for name, tasks in header.missing_by_set.items()}
+        assert {n: missing.get(n, 0) + len(header.task_sets[n]) for n in TARGET_SETS} == TARGET_SETS
+        assert "partial: without 16 of 16 tasks of composite_seen" in str(partial_sentence(header))
     outside = engine.prepare(protocol("leaderboard", "--env.tasks=CloseDrawer")).header
     assert (outside.tasks, len(outside.missing_tasks)) == (["CloseDrawer"], 50)
     with pytest.raises(UserError, match="Did you mean 'atomic_seen'"):
         engine.prepare(protocol("leaderboard", "--env.task_sets=atomic_sen"))
+    with pytest.raises(NothingRegisteredError, match="has none of the tasks of composite_seen"):
+        engine.prepare(protocol("leaderboard", "--env.task_sets=composite_seen"))
+    # A task of the benchmark that is not there yet is missing; one that the benchmark does not have is a mistake.
+    some = engine.prepare(protocol("leaderboard", "--env.task_sets=", "--env.tasks=OpenDrawer,WashLettuce")).header
+    assert (some.tasks, some.missing_tasks, some.task_sets) == (["OpenDrawer"], ["WashLettuce"], {})
+    with pytest.raises(UserError, match="Did you mean 'OpenDrawer'"):
+        engine.prepare(protocol("leaderboard", "--env.tasks=OpenDrawr"))
+
+
+def test_a_lifelong_phase_needs_no_tasks_of_later_phases() -> None:
+    evaluation = engine.prepare(protocol("lifelong", "--policy.lifelong_phase=1"))
+    assert len(evaluation.header.tasks) == 65
+    assert evaluation.header.missing_tasks == []
+    assert list(evaluation.header.task_sets) == ["lifelong_phase1"]
+
+
+def test_task_sets_of_a_registry_file(tmp_path: Path) -> None:
+    file = tmp_path / "own.yaml"
+    file.write_text(
+        "task_sets: {lifelong_phase1: [OpenDrawer, CloseDrawer], lifelong_phase2: [TurnOnStove], drawers: [OpenDrawer]}"
+    )
+    phase2 = protocol("lifelong", "--policy.lifelong_phase=2", f"--env.registry={file}")
+    header = engine.prepare(phase2).header
+    # Two of the benchmark's 65 are a part of its set; the second set is the file's own, and whole.
+    assert header.task_sets == {"lifelong_phase1": ["OpenDrawer", "CloseDrawer"], "lifelong_phase2": ["TurnOnStove"]}
+    assert {name: len(tasks) for name, tasks in header.missing_by_set.items()} == {"lifelong_phase1": 63}
+    assert header.registry == str(file)
+    both = protocol("leaderboard", "--env.task_sets=drawers,atomic_seen", f"--env.registry={file}")
+    header = engine.prepare(both).header
+    assert (header.task_sets["drawers"], len(header.task_sets["atomic_seen"])) == (["OpenDrawer"], 18)
+    assert header.missing_by_set == {}
+    with pytest.raises(UserError, match="Did you mean 'drawers'"):
+        engine.prepare(protocol("leaderboard", "--env.task_sets=drawrs", f"--env.registry={file}"))
+    # Where the file of a set lies does not decide how a trial goes.
+    assert header.settings == engine.prepare(protocol("leaderboard", "--env.task_sets=atomic_seen")).header.settings
 
 
 def test_lifelong_policies_run_the_tasks_of_their_phases(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -77,7 +77,7 @@ def test_two_tasks_of_a_selection_are_the_first_that_have_data() -> None:
     two = select_datasets(SelectionConfig(task_set="atomic_seen", split="pretrain", source="mg", tasks_per_set=2))
     assert two == every[:2]
     named = SelectionConfig(task_set="atomic_seen", tasks=["OpenDrawer"], split="target", tasks_per_set=1)
-    assert [entry.task for entry in select_datasets(named)][0] == "OpenDrawer"
+    assert next(entry.task for entry in select_datasets(named)) == "OpenDrawer"
     assert len(select_datasets(named)) == 2
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import dataclasses
 import inspect
+import sys
 import textwrap
 import typing
 from collections.abc import Iterator
@@ -50,6 +51,7 @@ def run(args: argparse.Namespace) -> int:
     from robocasa_lerobot.evaluation.finishing import write_outputs
     from robocasa_lerobot.evaluation.merging import merge
     from robocasa_lerobot.evaluation.overrides import load_config
+    from robocasa_lerobot.evaluation.resolve import partial_sentence
     from robocasa_lerobot.gl import announce_backend, check_device, ensure_gl
 
     given = [f"--{key.removeprefix('set:')}={value}" for key, value in vars(args).items() if key.startswith("set:")]
@@ -62,6 +64,9 @@ def run(args: argparse.Namespace) -> int:
     if args.shards is not None:
         raise UserError("--shards is for --executor slurm or ray; here give --shard=I/N, and --merge at the end.")
     evaluation = prepare(config)
+    partial = partial_sentence(evaluation.header)
+    if partial is not None:
+        print(f"robocasa-lerobot eval: this run is {partial}", file=sys.stderr)
     if args.merge:
         if config.shard is not None:
             raise UserError("--merge joins all shards: leave --shard out.")

@@ -56,10 +56,13 @@ class PolicySettings:
 class EnvSettings:
     """In which kitchens, on which tasks, and for how long.
 
-    tasks: registered task names; they take the place of task_sets, whose other tasks are then noted as missing.
-    task_sets: sets of the benchmark, such as atomic_seen, composite_seen, composite_unseen, lifelong_phase1.
+    tasks: task names; they take the place of task_sets, whose other tasks are then noted as missing.
+    task_sets: sets of the benchmark, such as atomic_seen, composite_seen, composite_unseen, lifelong_phase1, or of
+        the registry.
+    registry: YAML file of datasets whose `task_sets` are meant too; its own win. Default: the benchmark's alone.
     tasks_per_set: so many tasks of each set, the first that this version has; default: all.
-    allow_missing_tasks: leave out tasks of the sets that this version does not have, and say so in the results.
+    allow_missing_tasks: tasks that this version does not have are left out, and the results are marked as partial;
+        false refuses to run without them.
     split: target or pretrain scenes.
     render_preset: fast or quality.
     image_size: pixels, height and width; default: what the checkpoint was trained at, else 256.
@@ -72,8 +75,9 @@ class EnvSettings:
 
     tasks: list[str] = field(default_factory=list)
     task_sets: list[str] = field(default_factory=list)
+    registry: str | None = None
     tasks_per_set: int | None = None
-    allow_missing_tasks: bool = False
+    allow_missing_tasks: bool = True
     split: str = "target"
     render_preset: str = "fast"
     image_size: int | None = None
@@ -193,6 +197,11 @@ class EvaluationConfig:
             if value not in known:
                 raise UnknownNameError(name, value, known)
         self._check_numbers()
+
+    @property
+    def first_sets(self) -> int | None:
+        """How many of the task sets any policy runs; None is all."""
+        return max(self.policy.lifelong_phase) if self.lifelong else None
 
     def _check_numbers(self) -> None:
         env, policy = self.env, self.policy

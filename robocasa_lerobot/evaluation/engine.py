@@ -64,7 +64,7 @@ def prepare(config: EvaluationConfig) -> Evaluation:
         UserError: an unknown task, a folder that is no checkpoint, two policies with one label, ...
     """
     check_factory(config.env.factory)
-    tasks = resolve.plan_tasks(config.env)
+    tasks = resolve.plan_tasks(config.env, config.first_sets)
     asked: list[str | None] = [*config.policy.label] or [None] * len(config.policy.path)
     sources = [read_source(path, label) for path, label in zip(config.policy.path, asked, strict=True)]
     by_label: dict[str, PolicySource] = {}

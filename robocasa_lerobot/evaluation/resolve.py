@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -14,16 +14,27 @@ from robocasa_lerobot.evaluation.provenance import git_commit, machine, utc_now,
 from robocasa_lerobot.evaluation.results import PolicyInfo, RunHeader
 
 GPU_BATCH_WIDTH = 8
+# The release of RoboCasa whose horizons our tasks have; those of 1.0.0 were two thirds of them.
+HORIZON_VERSION = "1.0.1"
 _SHOWN = 60
+
+
+class NothingRegisteredError(UserError):
+    """An evaluation none of whose tasks this version has: there is nothing wrong with it, and nothing to run."""
 
 
 @dataclass(frozen=True)
 class PlannedTasks:
-    """What is run: `horizons` of tasks (control steps), `sets` with their planned tasks, `missing` tasks of sets."""
+    """What is run: `horizons` of tasks (control steps), and `sets` with those of their tasks that are run.
+
+    `missing` are tasks that were named, or that belong to a named set, and are not run; `missing_by_set` has them by
+    set, for those sets that are not run as a whole.
+    """
 
     horizons: dict[str, int | None]
     sets: dict[str, list[str]]
     missing: list[str]
+    missing_by_set: dict[str, list[str]] = field(default_factory=dict)
 
     def of_policy(self, lifelong_phase: int | None) -> list[str]:
         """The tasks of a policy: all, or those of the first sets."""
@@ -35,12 +46,17 @@ class PlannedTasks:
         return list(dict.fromkeys(chosen))
 
 
-def plan_tasks(env: EnvSettings) -> PlannedTasks:
+def plan_tasks(env: EnvSettings, first_sets: int | None = None) -> PlannedTasks:
     """The tasks of the settings, with their horizons: fixed ones, or the registry's times the multiplier.
 
+    Args:
+        env: the settings.
+        first_sets: how many of the task sets count; None is all.
+
     Raises:
-        UnknownNameError: a task that is not registered, or a task set that the benchmark does not have.
-        UserError: a set with tasks that are not registered yet (all are named), or no task is left.
+        UnknownNameError: a task or a task set that neither the benchmark nor the registry file has.
+        NothingRegisteredError: this version has none of the tasks.
+        UserError: tasks are not registered yet and may not be left out (all are named).
     """
     if env.factory != KITCHEN_ENV_FACTORY:
         if env.task_sets:
@@ -48,59 +64,87 @@ def plan_tasks(env: EnvSettings) -> PlannedTasks:
         if env.horizon_multiplier != 1.0:
             raise UserError("env.horizon_multiplier needs the kitchen env; give env.horizon for an env of your own.")
         return PlannedTasks(dict.fromkeys(env.tasks, env.horizon), {}, [])
+    from robocasa_lerobot.data.published import published_tasks
     from robocasa_lerobot.envs import registry
 
     registered = set(registry.task_names())
     for task in env.tasks:
-        registry.get_task(task)
-    named = _tasks_of_sets(env.task_sets)
+        if task not in published_tasks():
+            registry.get_task(task)
+    named, whole = _tasks_of_sets(env.task_sets[:first_sets], env.registry)
     if env.tasks_per_set is not None:  # a set of which nothing is registered keeps some that are missing
-        named = {
-            name: sorted(tasks, key=lambda task: task not in registered)[: env.tasks_per_set]
-            for name, tasks in named.items()
-        }
-    wanted = [task for tasks in named.values() for task in tasks]
-    if env.tasks:
-        chosen = set(env.tasks)
-    else:
-        chosen = registered & set(wanted)
-        lacking = [task for task in dict.fromkeys(wanted) if task not in registered]
-        if lacking and not env.allow_missing_tasks:
-            raise UserError(_lacking(named, lacking, registered))
+        named, whole = _first_of_sets(named, whole, registered, env.tasks_per_set)
+    wanted = list(dict.fromkeys(env.tasks or (task for tasks in named.values() for task in tasks)))
+    chosen = registered & set(wanted)
     if not chosen:
-        raise UserError(f"none of the tasks of {', '.join(named)} is registered: there is nothing to run.")
-    order = [task for task in dict.fromkeys((*wanted, *env.tasks)) if task in chosen]
-    if not named:
-        order = env.tasks
+        what = ", ".join(named) or ", ".join(env.tasks)
+        raise NothingRegisteredError(f"this version has none of the tasks of {what}: there is nothing to run.")
+    lacking = [task for task in wanted if task not in registered]
+    if lacking and not env.allow_missing_tasks:
+        raise UserError(_lacking(list(named), lacking, sorted(chosen)))
+    order = [task for tasks in named.values() for task in tasks] if named else []
+    order = [task for task in dict.fromkeys((*order, *env.tasks)) if task in chosen]
     steps = {task: int(registry.get_task(task).horizon) for task in order}
     horizons: dict[str, int | None] = {
         task: env.horizon if env.horizon is not None else max(1, round(own * env.horizon_multiplier))
         for task, own in steps.items()
     }
     sets = {name: [task for task in tasks if task in chosen] for name, tasks in named.items()}
-    return PlannedTasks(horizons, sets, [task for task in dict.fromkeys(wanted) if task not in chosen])
+    left_out = {name: [task for task in tasks if task not in sets[name]] for name, tasks in whole.items()}
+    missing = dict.fromkeys((*(t for tasks in left_out.values() for t in tasks if t not in chosen), *lacking))
+    return PlannedTasks(horizons, sets, list(missing), {name: tasks for name, tasks in left_out.items() if tasks})
 
 
-def _tasks_of_sets(names: Sequence[str]) -> dict[str, Sequence[str]]:
+def _tasks_of_sets(names: Sequence[str], registry: str | None) -> tuple[dict[str, Sequence[str]], ...]:
+    """The tasks of each set, and those of which it is a part.
+
+    A set of a registry file that holds some tasks of the benchmark's set of the same name is a part of that; with any
+    other task it is a set of the file's own.
+    """
     from robocasa_lerobot.data.published import published_task_sets
+    from robocasa_lerobot.data.registry import open_registry
 
-    known = published_task_sets()
+    published = published_task_sets()
+    known = {**published, **(open_registry(registry).task_sets if registry is not None else {})}
     for name in names:
         if name not in known:
-            raise UnknownNameError("task set", name, known)
-    return {name: known[name] for name in names}
+            raise UnknownNameError("task set", name, known, f"(in the registry {registry})" if registry else "")
+    named: dict[str, Sequence[str]] = {name: known[name] for name in names}
+    whole: dict[str, Sequence[str]] = {
+        name: published[name] if set(tasks) <= set(published.get(name, ())) and name in published else tasks
+        for name, tasks in named.items()
+    }
+    return named, whole
 
 
-def _lacking(named: Mapping[str, Sequence[str]], lacking: list[str], registered: set[str]) -> str:
-    there = sorted(registered & {task for tasks in named.values() for task in tasks})
+def _first_of_sets(
+    named: Mapping[str, Sequence[str]], whole: Mapping[str, Sequence[str]], registered: set[str], count: int
+) -> tuple[dict[str, Sequence[str]], ...]:
+    """So many tasks of each set, registered ones first."""
+    some = {name: sorted(tasks, key=lambda task: task not in registered)[:count] for name, tasks in named.items()}
+    return dict(some), {name: list(dict.fromkeys((*some[name], *tasks)))[:count] for name, tasks in whole.items()}
+
+
+def _lacking(sets: Sequence[str], lacking: list[str], there: list[str]) -> str:
     shown = ", ".join(lacking[:_SHOWN]) + (f" and {len(lacking) - _SHOWN} more" if len(lacking) > _SHOWN else "")
-    remedy = (
-        f"Run those that are there with --env.tasks={','.join(there)} or --env.allow_missing_tasks=true; the results "
-        "then say that the protocol is incomplete."
-        if there
-        else "None of them is there yet."
+    return (
+        f"{len(lacking)} task(s) of {', '.join(sets) or 'env.tasks'} are not registered in this version: {shown}. Run "
+        f"those that are there with --env.tasks={','.join(there)} or --env.allow_missing_tasks=true; the results then "
+        "say that the evaluation is partial."
     )
-    return f"{len(lacking)} task(s) of {', '.join(named)} are not registered in this version: {shown}. {remedy}"
+
+
+def partial_sentence(header: RunHeader) -> str | None:
+    """What a run leaves out of its task sets and tasks, as a sentence; None where it is whole."""
+    if not header.missing_tasks:
+        return None
+    parts = [
+        f"{len(lacking)} of {len(lacking) + len(header.task_sets.get(name, []))} tasks of {name}"
+        for name, lacking in header.missing_by_set.items()
+    ]
+    in_sets = {task for tasks in header.missing_by_set.values() for task in tasks}
+    parts += [task for task in header.missing_tasks if task not in in_sets]
+    return f"partial: without {', '.join(parts)}; over these no average is given."
 
 
 def perturbation_parameters(settings: PerturbationSettings) -> dict[str, dict[str, Any]]:
@@ -145,7 +189,7 @@ def batch_width(asked: int, device: str) -> int:
 
 def outcome_settings(config: EvaluationConfig, image_size: int, device: str = "cpu") -> dict[str, Any]:
     """The settings that a trial's outcome depends on; trials are only ever mixed when all of these agree."""
-    places = ("tasks", "task_sets", "tasks_per_set", "allow_missing_tasks", "render_devices")
+    places = ("tasks", "task_sets", "registry", "tasks_per_set", "allow_missing_tasks", "render_devices")
     env = {name: value for name, value in dataclasses.asdict(config.env).items() if name not in places}
     noise = {name: value for name, value in dataclasses.asdict(config.perturbation).items() if name != "names"}
     return {
@@ -196,6 +240,9 @@ def run_header(
         device=settings["device"],
         machine=machine(),
         started=utc_now(),
+        horizon_version=HORIZON_VERSION if rule == "task" else None,
+        registry=env.registry,
+        missing_by_set=tasks.missing_by_set,
     )
 
 

@@ -40,6 +40,8 @@ class ExperimentConfig:
         seed: of everything random, together with the phase's name.
         device: `cpu`, `cuda`, `mps`, or null for the best one there is.
         mixed_precision: `no`, `bf16` or `fp16`.
+        registry: where selections of datasets look that name no registry, and whose task sets evaluations mean that
+            name none; null is the benchmark's.
         trackers: where metrics go besides `metrics.jsonl`: `tensorboard`, `trackio`, `wandb`.
         scale: what `--scale` made smaller, as a record; null is nothing.
     """
@@ -52,6 +54,7 @@ class ExperimentConfig:
     device: str | None = None
     mixed_precision: str = "no"
     trackers: list[str] = field(default_factory=list)
+    registry: str | None = None
     loader: LoaderConfig = field(default_factory=LoaderConfig)
     scale: ScaleConfig | None = None
 

@@ -9,7 +9,9 @@ import sys
 from dataclasses import dataclass
 from pathlib import Path
 
+from robocasa_lerobot.data.config import ROBOCASA365
 from robocasa_lerobot.errors import UserError, suggest
+from robocasa_lerobot.settings import load_yaml, parse_overrides
 from robocasa_lerobot.training.checkpoint import LAST, PRETRAINED, last_checkpoint
 from robocasa_lerobot.training.phase_config import PhaseConfig
 
@@ -50,8 +52,19 @@ def phase_evaluations(phase: PhaseConfig) -> list[PhaseEvaluation]:
     return found
 
 
-def run_evaluations(phase: PhaseConfig, folder: Path) -> None:
+def registry_setting(evaluation: PhaseEvaluation, registry: str | None) -> list[str]:
+    """The setting that gives an evaluation the experiment's registry, where it names none itself."""
+    if registry in (None, ROBOCASA365):
+        return []
+    env = load_yaml(evaluation.file).get("env") or {}
+    own = [key for key, _ in parse_overrides(evaluation.settings, flags=True)]
+    return [] if "registry" in env or "env.registry" in own else [f"--env.registry={registry}"]
+
+
+def run_evaluations(phase: PhaseConfig, folder: Path, registry: str | None = None) -> None:
     """Run the phase's evaluations that are not finished yet; results go to `<folder>/evaluations/<name>/`.
+
+    `registry` is the experiment's: its task sets are meant by an evaluation that names none.
 
     Raises:
         UserError: one failed; its own message stands above.
@@ -68,7 +81,7 @@ def run_evaluations(phase: PhaseConfig, folder: Path) -> None:
             continue
         command = [sys.executable, "-m", "robocasa_lerobot.cli", "eval", "--config_path", str(file)]
         command += [f"--policy.path={folder / 'checkpoints' / LAST / PRETRAINED}", f"--out={out}"]
-        command += evaluation.settings
+        command += [*registry_setting(evaluation, registry), *evaluation.settings]
         # It is no part of this process group of trainers.
         environment = {k: v for k, v in os.environ.items() if not k.startswith(_LAUNCHER)}
         status = subprocess.run(command, env=environment, check=False).returncode

@@ -11,6 +11,7 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from robocasa_lerobot.data.config import ROBOCASA365
 from robocasa_lerobot.errors import UnknownNameError, UserError
 from robocasa_lerobot.settings import Data, load_yaml, set_dotted
 
@@ -66,7 +67,7 @@ def resolve(path: Path, overrides: Sequence[tuple[str, Any]] = ()) -> Data:
         data["phases"] = [merge(defaults, p) if isinstance(p, Mapping) else p for p in data["phases"]]
         for phase in data["phases"] if registry is not None else ():
             _set_registry(phase, registry)
-    return data
+    return data if registry is None else {**data, REGISTRY: registry}
 
 
 def _set_registry(phase: Any, registry: str) -> None:
@@ -84,7 +85,7 @@ def _load(path: Path, above: tuple[Path, ...]) -> Data:
     data = load_yaml(path)
     bases, without = data.pop(BASE, None) or [], data.pop(WITHOUT, None) or []
     own = _at_file_keys(data, functools.partial(_anchored, folder=path.parent))
-    if isinstance(own.get(REGISTRY), str):
+    if isinstance(own.get(REGISTRY), str) and own[REGISTRY] != ROBOCASA365:
         own[REGISTRY] = _anchored(own[REGISTRY], path.parent)["file"]
     out: Data = {}
     for name in [bases] if isinstance(bases, str) else bases:

@@ -111,6 +111,6 @@ def _run(
                 return False
         if evaluate:
             if accelerator.is_main_process:
-                run_evaluations(phase, output / phase.name)
+                run_evaluations(phase, output / phase.name, experiment.registry)
             accelerator.wait_for_everyone()
     return True

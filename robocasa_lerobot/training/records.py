@@ -124,7 +124,7 @@ def _may_change(key: str, begun: set[str]) -> bool:
     if key.startswith("phases."):
         name = next((name for name in begun if key.startswith(f"phases.{name}.")), None)
         return name is None or key.removeprefix(f"phases.{name}.").startswith(FREE_SETTINGS)
-    return key.startswith(FREE_SETTINGS) or key in ("name", "output_dir")
+    return key.startswith(FREE_SETTINGS) or key in ("name", "output_dir", "registry")
 
 
 def _versions() -> dict[str, str]:
