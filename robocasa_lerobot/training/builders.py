@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
+import io
 import json
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
 import draccus
 import lerobot.policies  # noqa: F401  registers LeRobot's own policy types
 import torch
-from huggingface_hub import snapshot_download
+from huggingface_hub import hf_hub_download, snapshot_download, try_to_load_from_cache
 from lerobot.configs.policies import PreTrainedConfig
 from lerobot.datasets.factory import resolve_delta_timestamps
 from lerobot.optim.optimizers import OptimizerConfig
@@ -19,15 +21,19 @@ from lerobot.optim.schedulers import LRSchedulerConfig
 from lerobot.policies.factory import get_policy_class, make_policy, make_pre_post_processors
 from lerobot.policies.pretrained import PreTrainedPolicy
 from lerobot.utils.constants import IMAGENET_STATS
-from lerobot.utils.feature_utils import dataset_to_policy_features
 
 from robocasa_lerobot.data.mixture import MixtureDataset, MixtureMeta
 from robocasa_lerobot.data.statistics import Statistics
 from robocasa_lerobot.errors import UnknownNameError, UserError
 from robocasa_lerobot.policies.needs import explained
 from robocasa_lerobot.policies.registry import register_policies
+from robocasa_lerobot.training.features import LEAVE_OUT, RENAME, fit_features, renamed_inputs
+from robocasa_lerobot.training.features import check_features as _check_features
 from robocasa_lerobot.training.master_weights import MasterWeights
 from robocasa_lerobot.training.phase_config import PhaseConfig
+
+_NO_FIELDS = ("type", "path", RENAME, LEAVE_OUT)  # settings of a policy that are no fields of its configuration
+_NOT_LOADED = "Could not load state dict"
 
 
 def best_device(wanted: str | None) -> str:
@@ -49,18 +55,23 @@ def best_device(wanted: str | None) -> str:
 def policy_config(settings: Mapping[str, Any], checkpoint: Path | None, device: str) -> PreTrainedConfig:
     """A LeRobot policy configuration from `type` and fields, or from a checkpoint's and the fields to change.
 
+    `rename` and `leave_out` among the settings say which inputs of the checkpoint are which of the data
+    (`features.py`); a start from scratch takes the data's own.
+
     Raises:
         UserError: an unknown policy type or field (with the closest match), a wrong value, or no checkpoint there.
     """
     register_policies()
     known = PreTrainedConfig.get_known_choices()
-    fields = {key: value for key, value in settings.items() if key not in ("type", "path")}
+    fields = {key: value for key, value in settings.items() if key not in _NO_FIELDS}
     kind = settings.get("type")
     if checkpoint is not None:
-        base = _read_config(checkpoint)
+        base = read_config(checkpoint)
         if kind is not None and kind != base["type"]:
             raise UserError(f"{checkpoint} holds a {base['type']!r} policy, the experiment asks for {kind!r}.")
         kind = base.pop("type")
+        rename, left_out = settings.get(RENAME) or {}, settings.get(LEAVE_OUT) or []
+        base["input_features"] = renamed_inputs(base.get("input_features") or {}, rename, left_out, str(checkpoint))
     else:
         base = {}
     if kind not in known:
@@ -103,6 +114,7 @@ def make_phase_policy(config: PreTrainedConfig, meta: MixtureMeta, checkpoint: P
             policy = make_policy(config, ds_meta=meta)
         else:
             _check_features(config, meta)
+            fit_features(config, meta)
             policy = _load(config, meta, checkpoint)
     policy.to(config.device)
     return policy
@@ -110,10 +122,19 @@ def make_phase_policy(config: PreTrainedConfig, meta: MixtureMeta, checkpoint: P
 
 def _load(config: PreTrainedConfig, meta: MixtureMeta, checkpoint: Path) -> PreTrainedPolicy:
     kwargs = {"dataset_stats": meta.stats, "dataset_meta": meta}
+    said = io.StringIO()
     try:
-        return get_policy_class(config.type).from_pretrained(checkpoint, config=config, strict=True, **kwargs)
+        with contextlib.redirect_stdout(said):
+            policy = get_policy_class(config.type).from_pretrained(checkpoint, config=config, strict=True, **kwargs)
     except RuntimeError as error:
         raise UserError(f"the weights of {checkpoint} do not fit the policy's settings: {error}") from error
+    finally:
+        print(said.getvalue(), end="")
+    # LeRobot's pi0 and pi0.5 go on with random weights where theirs cannot be read or do not fit, and only print it.
+    failed = [line for line in said.getvalue().splitlines() if _NOT_LOADED in line]
+    if failed:
+        raise UserError(f"the weights of {checkpoint} do not fit the policy's settings: {' '.join(failed)}")
+    return policy
 
 
 def make_processors(
@@ -212,8 +233,30 @@ def hub_checkpoint(name: str) -> Path:
     Raises:
         UserError: there is none of that name, or no way to get it.
     """
-    try:
+    with _from_hub(name):
         return Path(snapshot_download(name))
+
+
+def hub_config(name: str) -> Path:
+    """Folder with the config.json of a policy on the hub, and perhaps nothing else: to check without its weights.
+
+    Raises:
+        UserError: there is none of that name, or no way to get it.
+    """
+    with _from_hub(name):
+        return Path(hf_hub_download(name, "config.json")).parent
+
+
+def cached_hub_config(name: str) -> Path | None:
+    """As `hub_config`, if it was downloaded before; else None."""
+    found = try_to_load_from_cache(name, "config.json")
+    return Path(found).parent if isinstance(found, str) else None
+
+
+@contextlib.contextmanager
+def _from_hub(name: str) -> Iterator[None]:
+    try:
+        yield
     except Exception as error:  # the hub's client raises many kinds
         raise UserError(
             f"cannot get the policy {name!r} from the hub: {error} Where there is no network, download it elsewhere "
@@ -227,23 +270,18 @@ def with_imagenet_statistics(stats: Statistics, camera_keys: list[str]) -> Stati
     return {**stats, **{key: {**stats.get(key, {}), **values} for key, values in cameras.items()}}
 
 
-def _read_config(checkpoint: Path) -> dict[str, Any]:
+def read_config(checkpoint: Path) -> dict[str, Any]:
+    """The config.json of a checkpoint.
+
+    Raises:
+        UserError: there is none, or it is of something else.
+    """
     path = checkpoint / "config.json"
     if not path.is_file():
         raise UserError(
             f"no policy at {checkpoint} (no config.json); give the `pretrained_model` folder of a checkpoint."
         )
     data: dict[str, Any] = json.loads(path.read_text())
+    if "type" not in data:
+        raise UserError(f"{path} is not of a LeRobot policy: it has no `type`.")
     return data
-
-
-def _check_features(config: PreTrainedConfig, meta: MixtureMeta) -> None:
-    found = dataset_to_policy_features(meta.features)
-    for key, wanted in {**(config.input_features or {}), **(config.output_features or {})}.items():
-        if key not in found:
-            raise UnknownNameError("feature", key, found, "(the checkpoint's policy needs it; the data lack it)")
-        if tuple(found[key].shape) != tuple(wanted.shape):
-            raise UserError(
-                f"feature {key!r}: the checkpoint's policy has shape {tuple(wanted.shape)}, the data "
-                f"{tuple(found[key].shape)}. For pictures, set `loader.image_size` to the policy's size."
-            )

@@ -6,9 +6,9 @@ from pathlib import Path
 
 from accelerate import Accelerator, DistributedDataParallelKwargs
 
-from robocasa_lerobot.training import builders, joining, metrics, records
+from robocasa_lerobot.training import builders, features, joining, metrics, records
 from robocasa_lerobot.training.checkpoint import checkpoint_step, last_checkpoint, tidy
-from robocasa_lerobot.training.config import ExperimentConfig, PhaseConfig, to_yaml
+from robocasa_lerobot.training.config import HUB, ExperimentConfig, PhaseConfig, to_yaml
 from robocasa_lerobot.training.evaluations import phase_evaluations, run_evaluations
 from robocasa_lerobot.training.interrupts import Interrupts
 from robocasa_lerobot.training.loop import train_phase
@@ -55,6 +55,9 @@ def run_experiment(
         for phase in phases:
             if not is_finished(output, phase):
                 check_phase(experiment, phase, device, only is not None)
+        for phase in phases:  # weights on the hub, once all is well: a later phase should not wait for them either
+            if not is_finished(output, phase) and experiment.init_of(phase).startswith(HUB):
+                start_of(experiment, phase)
     if accelerator.is_main_process:
         output.mkdir(parents=True, exist_ok=True)
         records.write_text(output / records.EXPERIMENT_FILE, to_yaml(experiment))
@@ -76,11 +79,18 @@ def is_finished(output: Path, phase: PhaseConfig) -> bool:
 def check_phase(experiment: ExperimentConfig, phase: PhaseConfig, device: str, alone: bool = False) -> None:
     """Check what can be checked before training: policy, data, evaluation files, and with `alone` the start.
 
+    No weights are read for it.
+
     Raises:
         UserError: something is missing, or does not fit.
     """
-    builders.policy_config(*planned_policy(experiment, phase), device)
-    joining.open_phase_data(experiment, phase)
+    settings, checkpoint = planned_policy(experiment, phase)
+    config = builders.policy_config(settings, checkpoint, device)
+    meta = joining.open_phase_data(experiment, phase).meta
+    if checkpoint is not None:
+        features.check_features(config, meta)
+        if phase.statistics == "keep" and experiment.parent(phase) is None:
+            features.check_kept_statistics(builders.read_config(checkpoint), meta)
     phase_evaluations(phase)
     if alone:
         start_of(experiment, phase)

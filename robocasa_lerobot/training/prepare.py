@@ -124,7 +124,7 @@ def policy_settings(experiment: ExperimentConfig, phase: PhaseConfig) -> dict[st
         UserError: the phase starts from scratch, and no type of policy is given.
     """
     init = experiment.init_of(phase)
-    own = experiment.policy if init in (FROM_SCRATCH, experiment.policy.get("path")) else {}
+    own = experiment.policy if experiment.parent(phase) is None else {}  # a phase before has them already
     settings = {**own, **phase.policy}
     kind = settings.get("type", experiment.policy.get("type"))
     if kind == "groot":  # its warm-up is `warmup_ratio` of these, which LeRobot leaves at 10,000 for any training
@@ -136,14 +136,27 @@ def policy_settings(experiment: ExperimentConfig, phase: PhaseConfig) -> dict[st
     return settings
 
 
-def planned_policy(experiment: ExperimentConfig, phase: PhaseConfig) -> tuple[dict[str, Any], Path | None]:
-    """Settings of a phase's policy, with those of the phases it builds on, and the checkpoint at their beginning."""
+def planned_policy(
+    experiment: ExperimentConfig, phase: PhaseConfig, offline: bool = False
+) -> tuple[dict[str, Any], Path | None]:
+    """Settings of a phase's policy, with those of the phases it builds on, and the checkpoint at their beginning.
+
+    Of a checkpoint on the hub, the folder has its config.json alone; with `offline` it is None unless it was
+    downloaded before.
+    """
     parent = experiment.parent(phase)
     if parent is None:
         init = experiment.init_of(phase)
-        return policy_settings(experiment, phase), None if init == FROM_SCRATCH else _folder(init)
-    settings, checkpoint = planned_policy(experiment, parent)
+        return policy_settings(experiment, phase), None if init == FROM_SCRATCH else _config_folder(init, offline)
+    settings, checkpoint = planned_policy(experiment, parent, offline)
     return {**settings, **policy_settings(experiment, phase)}, checkpoint
+
+
+def _config_folder(init: str, offline: bool) -> Path | None:
+    name = init.removeprefix(HUB)
+    if name == init:
+        return Path(init)
+    return builders.cached_hub_config(name) if offline else builders.hub_config(name)
 
 
 def start_of(experiment: ExperimentConfig, phase: PhaseConfig) -> Path | None:
