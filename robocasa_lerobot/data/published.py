@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
 
+from robocasa_lerobot.data.registry_file import RegisteredDataset
 from robocasa_lerobot.errors import UserError
 
 VERSION_FOLDER = "v1.0"  # of RoboCasa365's datasets
@@ -21,7 +22,7 @@ class DatasetEntry:
     """A dataset of one task, or the part of a dataset that is one task's; `missing` says how to get it, if it is.
 
     `root` is where it is or should be, relative to the working directory if the registry is; `task_filter` says
-    that the dataset has other tasks too.
+    that the dataset has other tasks too; `registered` is what a registry file says of it, None for published ones.
     """
 
     task: str
@@ -30,6 +31,7 @@ class DatasetEntry:
     root: Path
     missing: str | None = None
     task_filter: bool = False
+    registered: RegisteredDataset | None = None
 
 
 @dataclass(frozen=True)
@@ -86,8 +88,9 @@ def published_task_sets() -> dict[str, tuple[str, ...]]:
     return {name: tuple(tasks) for name, tasks in sorted(sets.items())}
 
 
-# Which tasks have data, by split and source. The folders of the two reduced MimicGen sets are not described
-# anywhere: they are looked for by the same pattern, with the source's own name in the place of `mg`.
+# Which tasks have data, by split and source. The two reduced MimicGen sets are used in the published experiment on
+# scene diversity, but no download of them is known: they are looked for by the same pattern of folders, with the
+# source's own name in the place of `mg`, and recipes of our own make them.
 PUBLISHED: dict[tuple[str, str], str] = {
     ("pretrain", "human"): "pretrain300",
     ("pretrain", "mg"): "mimicgen60",
@@ -95,6 +98,14 @@ PUBLISHED: dict[tuple[str, str], str] = {
     ("pretrain", "mg_5x1"): "diversity17",
     ("target", "human"): "target50",
 }
+# RoboCasa's own command, in an environment with RoboCasa 1.0 (not on PyPI), as its documentation gives it.
+DOWNLOAD_PAGE = "https://robocasa.ai/docs/build/html/datasets/using_datasets.html"
+DOWNLOADS: dict[tuple[str, str], str] = {
+    ("pretrain", "human"): "python -m robocasa.scripts.download_datasets --split pretrain --source human",
+    ("pretrain", "mg"): "python -m robocasa.scripts.download_datasets --split pretrain --source mimicgen",
+    ("target", "human"): "python -m robocasa.scripts.download_datasets --split target --source human",
+}
+PUBLISHED_VIEWS = "lerobot"  # last name of the folders that are downloads
 
 
 class PublishedDatasets:
@@ -130,14 +141,35 @@ class PublishedDatasets:
             version = dataset_version(folder / views)
             if version is not None:
                 old, new = folder / views, folder / (views + CONVERTED)
-                remedy = f"{version} there, v3.0 is needed: `robocasa-lerobot convert {old} --out {new}`"
+                all_ = f"`robocasa-lerobot data --convert {self.root}`"
+                remedy = (
+                    f"{version} there, v3.0 is needed: `robocasa-lerobot convert {old} --out {new}`, or all: {all_}"
+                )
                 return DatasetEntry(task, split, source, new, remedy)
-        expected = parent.parent / "<Task>" / inner.replace("*", "<date>", 1).replace("*", "<time>") / views
-        remedy = (
-            f"get them with RoboCasa's own downloads, so that they lie at {expected}, and convert them with "
-            f"`robocasa-lerobot convert <folder> --out <folder>{CONVERTED}`"
+        inside = inner.replace("*", "<date>", 1).replace("*", "<time>")
+        return DatasetEntry(task, split, source, parent, _remedy(split, source, views, parent.parent, inside))
+
+
+def _remedy(split: str, source: str, views: str, kind: Path, inside: str) -> str:
+    """What to do about a dataset of which nothing is there; the same words for all tasks."""
+    expected = kind / "<Task>" / inside / views
+    command = DOWNLOADS.get((split, source))
+    make = "robocasa-lerobot data EXPERIMENT_FILE --make"
+    ours = f"our demonstrators make their own for the experiments in configs/experiments/small/: `{make}`"
+    if command is None:
+        return f"no download of {source} is known; {ours}. Data of your own are looked for at {expected}"
+    if views != PUBLISHED_VIEWS:
+        plain = expected.with_name(PUBLISHED_VIEWS + CONVERTED)
+        return (
+            f"no download of these views is known: `{command}` ({DOWNLOAD_PAGE}), `robocasa-lerobot data --convert "
+            f"{kind.parent.parent}`, then draw each again with `robocasa-lerobot render {plain} --out {expected} "
+            "--camera-set cotraining`"
         )
-        return DatasetEntry(task, split, source, parent, remedy)
+    return (
+        f"`{command}` ({DOWNLOAD_PAGE}) in an environment with RoboCasa puts them at {expected}, below RoboCasa's "
+        f"`datasets` folder or DATASET_BASE_PATH; then `robocasa-lerobot data --convert {kind.parent.parent}`. "
+        f"Without downloads, {ours}"
+    )
 
 
 def dataset_version(root: Path) -> str | None:

@@ -1,14 +1,4 @@
-"""Where datasets are: RoboCasa365's published folders, a user's own registry file, and what is missing of them.
-
-A registry file is YAML; every path counts from `root`, which counts from the working directory:
-
-    root: datasets
-    scheme: robocasa365         # also look for the published datasets in `root`; leave out otherwise
-    task_sets: {drawers: [OpenDrawer, CloseDrawer]}
-    datasets:
-      - {path: mine/drawers, tasks: [OpenDrawer, CloseDrawer], split: pretrain, source: demonstrator,
-         get: "robocasa-lerobot demos ..."}
-"""
+"""Where datasets are: RoboCasa365's published folders, a user's own registry file, and what is missing of them."""
 
 from __future__ import annotations
 
@@ -16,7 +6,6 @@ import dataclasses
 import functools
 import json
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field
 from pathlib import Path
 
 from robocasa_lerobot.data.config import ROBOCASA365, MemberConfig, MixtureConfig, SelectionConfig
@@ -28,11 +17,17 @@ from robocasa_lerobot.data.published import (
     published_task_sets,
     published_tasks,
 )
+from robocasa_lerobot.data.recipes import demonstrated_tasks
+from robocasa_lerobot.data.registry_file import DEMONSTRATED, TASK, RegisteredDataset, RegistryConfig, load_registry
 from robocasa_lerobot.data.source import EPISODE_TABLE
 from robocasa_lerobot.errors import UnknownNameError, UserError
-from robocasa_lerobot.settings import decode, load_yaml
 
+MAKE = "`robocasa-lerobot data EXPERIMENT_FILE --make` records and converts it with our demonstrators"
 _SHOWN = 20  # missing datasets that an error lists
+
+
+class NothingRegisteredError(UserError):
+    """A selection of a task set of which the registry has no task, because none is in this version yet."""
 
 
 class MissingDatasetsError(UserError):
@@ -52,41 +47,6 @@ class MissingDatasetsError(UserError):
         super().__init__("\n".join(lines))
 
 
-@dataclass
-class RegisteredDataset:
-    """A dataset of a registry file.
-
-    Attributes:
-        path: folder of a LeRobotDataset v3.0, counted from the registry's `root`.
-        tasks: the tasks in it; None reads them from its `meta/robocasa/episodes.jsonl`.
-        split: `pretrain` or `target`, or a name of the user's own.
-        source: where it comes from, such as `human`, `demonstrator` or `real`.
-        views: as the published folders' last name; selections ask for it.
-        get: what to do if it is not there.
-    """
-
-    path: str
-    tasks: list[str] | None = None
-    split: str = "pretrain"
-    source: str = "human"
-    views: str = "lerobot"
-    get: str | None = None
-
-
-@dataclass
-class RegistryConfig:
-    """A registry file; see the top of this module."""
-
-    root: str = "."
-    scheme: str | None = None
-    task_sets: dict[str, list[str]] = field(default_factory=dict)
-    datasets: list[RegisteredDataset] = field(default_factory=list)
-
-    def __post_init__(self) -> None:
-        if self.scheme not in (None, ROBOCASA365):
-            raise UnknownNameError("scheme of a registry:", str(self.scheme), [ROBOCASA365])
-
-
 class Registry:
     """The datasets of a registry file, and the published ones if it says so."""
 
@@ -97,8 +57,19 @@ class Registry:
 
     @functools.cached_property
     def task_sets(self) -> dict[str, tuple[str, ...]]:
-        """The benchmark's task sets and the file's own, which win."""
-        return {**published_task_sets(), **{name: tuple(tasks) for name, tasks in self.config.task_sets.items()}}
+        """The benchmark's task sets, or what of them can be demonstrated, and the file's own, which win."""
+        sets = published_task_sets()
+        if self.config.only == DEMONSTRATED:
+            there = demonstrated_tasks()
+            sets = {name: tuple(task for task in tasks if task in there) for name, tasks in sets.items()}
+        return {**sets, **{name: tuple(tasks) for name, tasks in self.config.task_sets.items()}}
+
+    def lacking(self, task_set: str) -> tuple[int, int]:
+        """How many of the tasks of one of the benchmark's sets are not in this version, and how many it has."""
+        if task_set in self.config.task_sets or task_set not in published_task_sets():
+            return 0, len(self.task_sets.get(task_set, ()))
+        total = len(published_task_sets()[task_set])
+        return total - len(self.task_sets[task_set]), total
 
     @functools.cached_property
     def tasks(self) -> frozenset[str]:
@@ -122,20 +93,33 @@ class Registry:
         return sorted(found, key=lambda entry: place[entry.task])
 
     def _entries(self, dataset: RegisteredDataset, tasks: Sequence[str]) -> Iterable[DatasetEntry]:
-        root = Path(self.config.root) / dataset.path
-        version, listed = dataset_version(root), self._tasks_of(dataset)
-        missing = None
-        if version != "v3.0":
-            what = f"LeRobotDataset {version} there, v3.0 is needed" if version else "nothing there"
-            missing = f"{root}: {what}; {dataset.get or 'correct the `path` in the registry, or convert it'}"
+        listed = self._tasks_of(dataset)
+        known: dict[Path, str | None] = {}
         for task in tasks if listed is None else [task for task in tasks if task in listed]:
-            filtered = listed is None or len(listed) > 1
-            yield DatasetEntry(task, dataset.split, dataset.source, root, missing, filtered)
+            root = Path(self.config.root) / dataset.path.replace(TASK, task)
+            if root not in known:
+                known[root] = self._missing(dataset, root)
+            filtered = TASK not in dataset.path and (listed is None or len(listed) > 1)
+            yield DatasetEntry(task, dataset.split, dataset.source, root, known[root], filtered, dataset)
+
+    def _missing(self, dataset: RegisteredDataset, root: Path) -> str | None:
+        """What to do about a dataset of the file that is not there."""
+        version = dataset_version(root)
+        if version == "v3.0":
+            return None
+        what = f"LeRobotDataset {version} there, v3.0 is needed" if version else "nothing there"
+        place = Path(self.config.root) / dataset.path  # the same words for all tasks, so that they are said once
+        remedy = dataset.get or "correct the `path` in the registry, or convert it"
+        return f"{place}: {what}; {MAKE if dataset.make else remedy}"
 
     def _tasks_of(self, dataset: RegisteredDataset) -> tuple[str, ...] | None:
         """The dataset's tasks; None if the registry does not say and the dataset cannot."""
         if dataset.tasks is not None:
             return tuple(dataset.tasks)
+        if dataset.task_set is not None:
+            if dataset.task_set not in self.task_sets:
+                raise UnknownNameError("task set", dataset.task_set, self.task_sets, f"(of dataset {dataset.path})")
+            return self.task_sets[dataset.task_set]
         if dataset.path not in self._read:
             self._read[dataset.path] = _tasks_in(Path(self.config.root) / dataset.path / EPISODE_TABLE)
         return self._read[dataset.path]
@@ -152,11 +136,7 @@ def open_registry(name: str) -> Registry:
     path = Path(name)
     if not path.is_file() and path.suffix not in (".yaml", ".yml"):
         raise UnknownNameError("registry", name, [ROBOCASA365], "A registry is that name, or a YAML file.")
-    data = load_yaml(path)
-    _check_keys(RegistryConfig, data, path)
-    for item in data.get("datasets") or []:
-        _check_keys(RegisteredDataset, item, path)
-    return Registry(decode(RegistryConfig, data, str(path)))
+    return Registry(load_registry(path))
 
 
 def select_datasets(selection: SelectionConfig) -> list[DatasetEntry]:
@@ -174,6 +154,9 @@ def select_datasets(selection: SelectionConfig) -> list[DatasetEntry]:
     if selection.task_set is not None:
         if selection.task_set not in registry.task_sets:
             raise UnknownNameError("task set", selection.task_set, registry.task_sets)
+        lacking, total = registry.lacking(selection.task_set)
+        if total and lacking == total and not tasks:
+            raise NothingRegisteredError(f"none of the {total} tasks of {selection.task_set} is in this version yet.")
         tasks += [task for task in registry.task_sets[selection.task_set] if task not in tasks]
     elif not tasks:
         tasks = sorted(registry.tasks)
@@ -206,6 +189,35 @@ def missing_datasets(config: MixtureConfig) -> list[DatasetEntry]:
             tasks = "+".join(member.tasks or ["all tasks"])
             entries.append(DatasetEntry(tasks, "-", "member", Path(member.root), remedy))
     return entries
+
+
+def registered_part(config: MixtureConfig) -> tuple[MixtureConfig | None, list[str]]:
+    """The mixture without selections of which no task is in this version, and what is lacking of the others.
+
+    The mixture is None where nothing is left. The sentences are the same whether or not datasets are there.
+
+    Raises:
+        UserError: as `select_datasets`.
+    """
+    kept: list[SelectionConfig] = []
+    said: list[str] = []
+    for selection in config.select:
+        try:
+            select_datasets(selection)
+        except NothingRegisteredError as error:
+            said.append(str(error))
+            continue
+        kept.append(selection)
+        if selection.task_set is not None:
+            lacking, total = open_registry(selection.registry).lacking(selection.task_set)
+            if lacking:
+                said.append(f"{total - lacking} of the {total} tasks of {selection.task_set} are in this version.")
+    said = list(dict.fromkeys(said))
+    if not kept and not config.members:
+        return None, said
+    groups = {member.group for member in config.members} | {selection.group for selection in kept}
+    shares = config.shares and {group: share for group, share in config.shares.items() if group in groups}
+    return dataclasses.replace(config, select=kept, shares=shares), said
 
 
 def resolve_mixture(config: MixtureConfig) -> MixtureConfig:
@@ -245,12 +257,3 @@ def _tasks_in(table: Path) -> tuple[str, ...] | None:
         return None
     rows = (json.loads(line) for line in table.read_text(encoding="utf-8").splitlines() if line.strip())
     return tuple(sorted({str(row["task_name"]) for row in rows}))
-
-
-def _check_keys(kind: type, data: object, path: Path) -> None:
-    known = {f.name for f in dataclasses.fields(kind)}
-    if not isinstance(data, dict):
-        raise UserError(f"{path}: found {data!r} in `datasets`, expected mappings with {sorted(known)}.")
-    for key in data:
-        if key not in known:
-            raise UnknownNameError("key", str(key), known, f"(in {path})")

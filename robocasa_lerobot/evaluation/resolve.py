@@ -98,21 +98,22 @@ def plan_tasks(env: EnvSettings, first_sets: int | None = None) -> PlannedTasks:
 def _tasks_of_sets(names: Sequence[str], registry: str | None) -> tuple[dict[str, Sequence[str]], ...]:
     """The tasks of each set, and those of which it is a part.
 
-    A set of a registry file that holds some tasks of the benchmark's set of the same name is a part of that; with any
-    other task it is a set of the file's own.
+    What a registry leaves of the benchmark's sets (`only` in its file) is a part of them; a set that the file itself
+    defines is its own, whatever its name.
     """
     from robocasa_lerobot.data.published import published_task_sets
     from robocasa_lerobot.data.registry import open_registry
 
     published = published_task_sets()
-    known = {**published, **(open_registry(registry).task_sets if registry is not None else {})}
+    opened = open_registry(registry) if registry is not None else None
+    known = {**published, **(opened.task_sets if opened is not None else {})}
+    own = opened.config.task_sets if opened is not None else {}
     for name in names:
         if name not in known:
             raise UnknownNameError("task set", name, known, f"(in the registry {registry})" if registry else "")
     named: dict[str, Sequence[str]] = {name: known[name] for name in names}
     whole: dict[str, Sequence[str]] = {
-        name: published[name] if set(tasks) <= set(published.get(name, ())) and name in published else tasks
-        for name, tasks in named.items()
+        name: published[name] if name in published and name not in own else tasks for name, tasks in named.items()
     }
     return named, whole
 

@@ -6,13 +6,14 @@ from pathlib import Path
 
 from accelerate import Accelerator, DistributedDataParallelKwargs
 
-from robocasa_lerobot.training import builders, features, joining, metrics, records
+from robocasa_lerobot.training import builders, features, joining, metrics, records, skipped
 from robocasa_lerobot.training.checkpoint import checkpoint_step, last_checkpoint, tidy
-from robocasa_lerobot.training.config import HUB, ExperimentConfig, PhaseConfig, to_yaml
+from robocasa_lerobot.training.config import HUB, ExperimentConfig, PhaseConfig
 from robocasa_lerobot.training.evaluations import phase_evaluations, run_evaluations
 from robocasa_lerobot.training.interrupts import Interrupts
 from robocasa_lerobot.training.loop import train_phase
 from robocasa_lerobot.training.prepare import planned_policy, prepare_phase, start_of
+from robocasa_lerobot.training.unavailable import runnable
 
 
 def run_experiment(
@@ -48,8 +49,12 @@ def run_experiment(
         log_with=list(experiment.trackers) or None,
         project_dir=str(output),
     )
-    phases = [experiment.phase(only)] if only is not None else experiment.phases
+    asked = experiment.phases if only is None else [experiment.phase(only)]
     records.check_unchanged(experiment, output, force)
+    whole, (experiment, left_out) = experiment, runnable(experiment)
+    phases = [phase for phase in experiment.phases if phase.name in {other.name for other in asked}]
+    for item in left_out:
+        accelerator.print(item)
     # A mistake in the last phase should not wait for the first to finish. The first process makes fake datasets.
     with accelerator.main_process_first():
         for phase in phases:
@@ -60,7 +65,8 @@ def run_experiment(
                 start_of(experiment, phase)
     if accelerator.is_main_process:
         output.mkdir(parents=True, exist_ok=True)
-        records.write_text(output / records.EXPERIMENT_FILE, to_yaml(experiment))
+        records.write_experiment(output, whole)
+        skipped.record(output, left_out)
     accelerator.wait_for_everyone()
     metrics.start_trackers(accelerator, experiment.name, {"seed": experiment.seed, "policy": experiment.policy})
     try:

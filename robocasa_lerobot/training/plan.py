@@ -27,6 +27,8 @@ from robocasa_lerobot.training.evaluations import phase_evaluations
 from robocasa_lerobot.training.loop import train_phase
 from robocasa_lerobot.training.metrics import METRICS, read_lines
 from robocasa_lerobot.training.prepare import planned_policy, prepare_phase
+from robocasa_lerobot.training.skipped import PHASE
+from robocasa_lerobot.training.unavailable import runnable
 
 MEASURED_STEPS = 20
 _LARGEST_ON_CPU = 2e8  # parameters; 20 steps of more take hours without an accelerator
@@ -48,6 +50,7 @@ class PhasePlan:
         cache_bytes: decoded frames on disk.
         seconds: per optimiser step on this device, without waiting for data; None where not measured.
         notes: what stands in the way, or was left out.
+        left_out: why the phase will not run at all, or "".
     """
 
     phase: PhaseConfig
@@ -62,11 +65,12 @@ class PhasePlan:
     cache_bytes: int = 0
     seconds: float | None = None
     notes: list[str] = field(default_factory=list)
+    left_out: str = ""
 
     @property
     def samples(self) -> int:
         """Samples that the whole phase sees."""
-        return self.phase.steps * self.phase.batch_size
+        return 0 if self.left_out else self.phase.steps * self.phase.batch_size
 
     @property
     def hours(self) -> float | None:
@@ -89,8 +93,16 @@ def plan_experiment(
     """
     device = builders.best_device(experiment.device)
     plans, measured = [], dict[str, float | str]()
-    for phase in [experiment.phase(only)] if only is not None else experiment.phases:
+    whole, (experiment, said) = experiment, runnable(experiment)
+    for asked in [whole.phase(only)] if only is not None else whole.phases:
+        about = [item for item in said if item.phase == asked.name]
+        if any(item.kind == PHASE for item in about):
+            depth, start = len(whole.ancestors(asked)), whole.init_of(asked)
+            plans.append(PhasePlan(asked, depth, start, left_out=" ".join(item.reason for item in about)))
+            continue
+        phase = experiment.phase(asked.name)
         plan = _plan_phase(experiment, phase, device)
+        plan.notes += [item.reason for item in about]
         if measured_steps and plan.parameters is not None and plan.done < phase.steps:
             if device == "cpu" and plan.parameters[0] > _LARGEST_ON_CPU:
                 plan.notes.append("not measured: too large for a CPU; plan on the machine that will train")

@@ -30,6 +30,8 @@ def render_plan(experiment: ExperimentConfig, plans: Sequence[PhasePlan], device
 
 def _phase_lines(experiment: ExperimentConfig, plan: PhasePlan) -> list[str]:
     phase, indent = plan.phase, "  " * plan.depth
+    if plan.left_out:
+        return [f"{indent}{phase.name} <- {plan.start} (left out)", f"{indent}  {plan.left_out}"]
     state = "finished" if plan.done >= phase.steps else f"at step {plan.done:,}" if plan.done else "to do"
     lines = [f"{indent}{phase.name} <- {plan.start} ({state})"]
     epochs = f", {plan.samples / plan.frames:.2g} times its {plan.frames:,} frames" if plan.frames else ""
@@ -56,11 +58,11 @@ def _phase_lines(experiment: ExperimentConfig, plan: PhasePlan) -> list[str]:
 
 def _sums(plans: Sequence[PhasePlan], device: str) -> list[str]:
     disk = sum((p.checkpoint_bytes or 0) * p.kept + p.cache_bytes for p in plans)
-    unknown = [p.phase.name for p in plans if p.checkpoint_bytes is None]
+    unknown = [p.phase.name for p in plans if p.checkpoint_bytes is None and not p.left_out]
     without = f" (without {', '.join(unknown)})" if unknown else ""
     lines = [f"samples: {sum(p.samples for p in plans):,}", f"disk: {disk / 1e9:,.1f} GB{without}"]
     timed = [p.hours for p in plans if p.hours is not None]
-    untimed = [p.phase.name for p in plans if p.hours is None and p.done < p.phase.steps]
+    untimed = [p.phase.name for p in plans if p.hours is None and p.done < p.phase.steps and not p.left_out]
     if timed:
         name = torch.cuda.get_device_name() if device == "cuda" else device.upper()
         unit = "GPU-hours" if device == "cuda" else "hours"

@@ -36,6 +36,21 @@ def write_text(path: Path, text: str) -> None:
     aside.replace(path)
 
 
+def write_experiment(output: Path, experiment: ExperimentConfig) -> None:
+    """Write the experiment; phases of another one in the same folder stay in the file, after its own.
+
+    So experiments of which one is a part of the other can take turns in a folder, and share what is trained.
+    """
+    path, own = output / EXPERIMENT_FILE, dataclasses.asdict(experiment)
+    before = yaml.safe_load(path.read_text(encoding="utf-8"))["phases"] if path.is_file() else []
+    names = {phase.name for phase in experiment.phases}
+    for number, phase in enumerate(before):
+        if phase["name"] not in names:
+            previous = before[number - 1]["name"] if number else None
+            own["phases"].append(phase | {"init": phase["init"] or previous})
+    write_text(path, yaml.safe_dump(own, sort_keys=False, width=120))
+
+
 def describe_phase(
     experiment: ExperimentConfig,
     phase: PhaseConfig,

@@ -1,0 +1,69 @@
+"""How our own demonstrators make a dataset of a registry: a recipe, as data, and which tasks there are to make."""
+
+from __future__ import annotations
+
+import functools
+import json
+import os
+import subprocess
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+
+from robocasa_lerobot.errors import UserError
+
+_NAMES = "robocasa_lerobot.demos.names"
+IMAGE_SIZE = 128  # pixels: what the policies of the small experiments look at
+
+
+@dataclass
+class RecipeConfig:
+    """What `robocasa-lerobot data --make` records and converts, for each task of a dataset.
+
+    Attributes:
+        episodes: kind of dataset, which names its number of demonstrations in `episodes` of the registry.
+        seed: of the first attempt; datasets of one split have ranges of their own, apart from evaluations' seeds.
+        layouts: kitchens by layout; null is the split's own.
+        styles: likewise by style.
+        action_noise: standard deviation of noise on arm commands, as `demos --action-noise`.
+        varied: each demonstration in its own way, as `demos` without `--plain`.
+        image_size: height and width of the pictures, pixels.
+        redraw: instead of recording: `path` of the registry's dataset whose episodes are drawn again.
+        camera_set: of the cameras that `redraw` draws with, as `render --camera-set`.
+    """
+
+    episodes: str = "human"
+    seed: int = 0
+    layouts: list[int] | None = None
+    styles: list[int] | None = None
+    action_noise: float = 0.0
+    varied: bool = True
+    image_size: int = IMAGE_SIZE
+    redraw: str | None = None
+    camera_set: str | None = None
+
+    def __post_init__(self) -> None:
+        if (self.redraw is None) != (self.camera_set is None):
+            raise UserError("recipe of a dataset: `redraw` and `camera_set` go together; one of them is missing.")
+
+
+@functools.cache
+def demonstrated_tasks() -> frozenset[str]:
+    """Names of the tasks that a demonstrator of this installation can solve.
+
+    The simulator is asked in a process of its own, which takes a second: datasets know nothing of simulators.
+
+    Raises:
+        UserError: it did not answer; its own message stands in it.
+    """
+    here = str(Path(__file__).parents[2])  # this very code answers, wherever it was imported from
+    path = os.pathsep.join(filter(None, (here, os.environ.get("PYTHONPATH"))))
+    environment = {**os.environ, "PYTHONPATH": path}
+    command = [sys.executable, "-m", _NAMES]
+    done = subprocess.run(command, capture_output=True, text=True, check=False, env=environment)
+    if done.returncode:
+        said = (done.stderr.strip().splitlines() or ["nothing"])[-1]
+        raise UserError(
+            f"`python -m {_NAMES}` ended with status {done.returncode}: {said}; try `robocasa-lerobot tasks`."
+        )
+    return frozenset(json.loads(done.stdout.splitlines()[-1]))
