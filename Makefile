@@ -18,7 +18,7 @@ export PYTHONUNBUFFERED := 1
 export UV_HTTP_TIMEOUT ?= 300
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
-.PHONY: help setup demo test test-slow lint format lock docs doctor bench bench-convert bench-training bench-evaluation bench-grasps bench-demonstrators bench-kitchens clean
+.PHONY: help setup demo test test-slow walk lint format lock docs doctor bench bench-convert bench-training bench-evaluation bench-grasps bench-demonstrators bench-kitchens clean
 
 help:  ## this list
 	@sed -n 's/^\([a-z-]*\):.*  ## /\1\t/p' Makefile | awk -F '\t' '{printf "  make %-20s %s\n", $$1, $$2}'
@@ -50,6 +50,10 @@ test: $(STAMP)  ## the fast tests
 
 test-slow: $(STAMP)  ## the slow tests: every task and kitchen, long trainings
 	$(BIN)/python -m pytest -m slow $(PYTEST_ARGS)
+
+# 25 minutes on two idle cores; PYTEST_ARGS="-k lifelong" walks some. File, phases and minutes go to outputs/walk.md.
+walk: $(STAMP)  ## every experiment file from its first step to its report, at a tiny scale
+	WALK_LOG=outputs/walk.md $(BIN)/python -m pytest -m slow tests/test_experiments_walk.py $(PYTEST_ARGS)
 
 lint: $(STAMP)  ## ruff and mypy
 	$(BIN)/ruff check .

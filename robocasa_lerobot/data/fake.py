@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 import logging
+import re
 import shutil
 import tempfile
 from collections.abc import Sequence
@@ -77,7 +78,7 @@ def _write(
                 {
                     "episode_index": episode,
                     "task_name": task,
-                    "instruction": INSTRUCTIONS[task],
+                    "instruction": _instruction(task),
                     "length": length,
                     "layout_id": kitchen[0],
                     "style_id": kitchen[1],
@@ -106,5 +107,10 @@ def _frames(task: str, length: int, image_size: int, generator: np.random.Genera
         shade = np.clip(127 + 100 * swing + 20 * ramp, 0, 255).astype(np.uint8)
         picture = np.broadcast_to(shade[None, :, None], (image_size, image_size, 3)).copy()
         frame: dict[str, object] = dict.fromkeys(contract.IMAGE_KEYS, picture)
-        out.append(frame | {contract.STATE_KEY: state, contract.ACTION_KEY: action, "task": INSTRUCTIONS[task]})
+        out.append(frame | {contract.STATE_KEY: state, contract.ACTION_KEY: action, "task": _instruction(task)})
     return out
+
+
+def _instruction(task: str) -> str:
+    """The task's instruction; of a task that has none here, the words of its name."""
+    return INSTRUCTIONS.get(task) or " ".join(re.findall(r"[A-Z]?[a-z0-9]+|[A-Z]+(?![a-z])", task)).lower()
