@@ -38,20 +38,25 @@ def environment(**more: str) -> dict[str, str]:
 
 
 def run_in_two_processes(path: Path) -> None:
-    """As `torchrun` starts them, on this machine and with gloo."""
+    assert [status for status, _ in in_two_processes(command(path), path.parent)] == [0, 0]
+
+
+def in_two_processes(words: list[str], folder: Path) -> list[tuple[int, str]]:
+    """Exit status and log of each, started as `torchrun` does, on this machine and with gloo."""
     with socket.socket() as free:
         free.bind(("127.0.0.1", 0))
         port = str(free.getsockname()[1])
     common = {"WORLD_SIZE": "2", "MASTER_ADDR": "127.0.0.1", "MASTER_PORT": port, "LOCAL_WORLD_SIZE": "2"}
-    logs = [path.with_name(f"rank{rank}.log") for rank in range(2)]
+    logs = [folder / f"rank{rank}.log" for rank in range(2)]
     processes = []
     try:
         for rank, log in enumerate(logs):
             with log.open("w") as file:
                 own = environment(**common, RANK=str(rank), LOCAL_RANK=str(rank), ACCELERATE_USE_CPU="true")
-                processes.append(subprocess.Popen(command(path), env=own, stdout=file, stderr=file))
-        for process, log in zip(processes, logs, strict=True):
-            assert process.wait(timeout=280) == 0, log.read_text()[-3000:]
+                processes.append(subprocess.Popen(words, env=own, stdout=file, stderr=file))
+        return [
+            (process.wait(timeout=280), log.read_text()[-3000:]) for process, log in zip(processes, logs, strict=True)
+        ]
     finally:
         for process in processes:
             process.kill()
@@ -69,3 +74,33 @@ def test_two_processes_train_as_one_does(tmp_path: Path, data: Path, kind: str) 
     for phase in ("pretrain", "finetune"):
         ours, theirs = losses(tmp_path / "two", phase), losses(tmp_path / "one", phase)
         np.testing.assert_allclose(ours, theirs, rtol=1e-5)
+
+
+WAITING = """
+import sys, time
+from datetime import timedelta
+from pathlib import Path
+from accelerate import Accelerator, InitProcessGroupKwargs
+from robocasa_lerobot.training.waiting import first_process_works
+
+accelerator = Accelerator(cpu=True, kwargs_handlers=[InitProcessGroupKwargs(timeout=timedelta(seconds=3))])
+first_process_works(accelerator, Path(sys.argv[1]), lambda: time.sleep(6))
+print("waited", flush=True)
+
+def fail():
+    raise RuntimeError("no kitchen")
+
+first_process_works(accelerator, Path(sys.argv[1]), fail)
+"""
+
+
+def test_no_process_gives_up_while_the_first_one_evaluates(tmp_path: Path) -> None:
+    """Work of twice the time after which a barrier fails; and where it fails, no process hangs."""
+    (tmp_path / "waiting.py").write_text(WAITING)
+    (tmp_path / ".first_process_is_done").write_text("")  # of a run that was killed
+    results = in_two_processes([sys.executable, str(tmp_path / "waiting.py"), str(tmp_path)], tmp_path)
+    for rank, (status, log) in enumerate(results):
+        assert "waited" in log, (rank, log)
+        assert status == 1
+        assert "no kitchen" in log
+    assert "the first process could not go on: no kitchen" in results[1][1]

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import functools
 from pathlib import Path
 
-from accelerate import Accelerator, DistributedDataParallelKwargs
+from accelerate import Accelerator, DistributedDataParallelKwargs, InitProcessGroupKwargs
 
 from robocasa_lerobot.training import builders, features, joining, metrics, records, skipped
 from robocasa_lerobot.training.checkpoint import checkpoint_step, last_checkpoint, tidy
@@ -14,6 +15,7 @@ from robocasa_lerobot.training.interrupts import Interrupts
 from robocasa_lerobot.training.loop import train_phase
 from robocasa_lerobot.training.prepare import planned_policy, prepare_phase, start_of
 from robocasa_lerobot.training.unavailable import runnable
+from robocasa_lerobot.training.waiting import BARRIER, first_process_works
 
 
 def run_experiment(
@@ -45,7 +47,10 @@ def run_experiment(
         cpu=device == "cpu",
         mixed_precision=experiment.mixed_precision,
         # As in LeRobot's training: some policies leave parameters unused.
-        kwargs_handlers=[DistributedDataParallelKwargs(find_unused_parameters=True)],
+        kwargs_handlers=[
+            DistributedDataParallelKwargs(find_unused_parameters=True),
+            InitProcessGroupKwargs(timeout=BARRIER),
+        ],
         log_with=list(experiment.trackers) or None,
         project_dir=str(output),
     )
@@ -126,7 +131,6 @@ def _run(
                 accelerator.print(f"stopped in phase {phase.name} at step {step}; the same command goes on")
                 return False
         if evaluate:
-            if accelerator.is_main_process:
-                run_evaluations(phase, output / phase.name, experiment.registry)
-            accelerator.wait_for_everyone()
+            work = functools.partial(run_evaluations, phase, output / phase.name, experiment.registry)
+            first_process_works(accelerator, output, work)
     return True
