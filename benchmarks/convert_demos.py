@@ -14,13 +14,15 @@ from typing import Any
 
 import h5py
 import numpy as np
+from venvs import prepare_venv
 
 import robocasa_lerobot
 from robocasa_lerobot import contract
 from robocasa_lerobot.errors import UserError
 
 TASK = "OpenDrawer"
-LIFT = Path(__file__).parents[2] / "shared" / "real" / "robosuite_lift"
+# Where the wheel of `requirements/robosuite_demos.lock` keeps human demonstrations of Lift, and what their scenes name.
+LIFT_FILE = "demonstrations/lift/demo.hdf5"
 LIFT_CAMERAS = ("agentview", "frontview", "robot0_eye_in_hand")
 TINY_FRAMES, TINY_SIZE = 8, 64
 
@@ -74,15 +76,22 @@ def strip(source: h5py.File, target: h5py.File, steps: int | None = None) -> Non
     data.attrs["total"] = sum(len(data[name]["actions"]) for name in data if name.startswith("demo_"))
 
 
-def cut_lift(folder: Path, steps: int, source: Path = LIFT) -> Path:
-    """robosuite's Lift demonstrations, the first `steps` steps of each.
+def lift_assets() -> Path:
+    """robosuite's folder of assets with the demonstrations, installed first if it is missing.
 
     Raises:
-        UserError: the recorded file is not there.
+        UserError: it cannot be installed, or has no demonstrations.
     """
-    recorded = source / "demo.hdf5"
-    if not recorded.exists():
-        raise UserError(f"{recorded} is not there: leave the official method out with --without-peer.")
+    python = prepare_venv("robosuite_demos")
+    assets = next(python.parents[1].glob("lib/python*/site-packages/robosuite/models/assets"))
+    if not (assets / LIFT_FILE).exists():
+        raise UserError(f"{assets / LIFT_FILE} is not there: leave the official method out with --without-peer.")
+    return assets
+
+
+def cut_lift(folder: Path, steps: int, assets: Path) -> Path:
+    """robosuite's Lift demonstrations below `assets`, the first `steps` steps of each."""
+    recorded = assets / LIFT_FILE
     path = folder / f"lift-{steps}.hdf5"
     if not path.exists():
         with h5py.File(recorded, "r") as lift, _written(path) as target:

@@ -66,6 +66,7 @@ class Run:
     work: Path
     files: DemoFiles
     lift: Path | None
+    assets: Path | None  # that its scenes name
     effort: Effort
     bar: Bar
     workers: list[Worker] = field(default_factory=list)
@@ -108,13 +109,14 @@ def measure(effort: Effort, work: Path, peer: bool, memory: bool, sections: Sequ
     """Everything, or some sections of it, as the body of the result."""
     data = work / "demos"
     files = convert_demos.record(data, effort.episodes, max(convert_report.PROCESSES), effort.image_size)
-    lift = convert_demos.cut_lift(data, effort.lift_steps) if peer else None
+    assets = convert_demos.lift_assets() if peer else None
+    lift = convert_demos.cut_lift(data, effort.lift_steps, assets) if assets is not None else None
     shutil.rmtree(work / "written", ignore_errors=True)
     parts = [part for part in _parts(peer) if part.key.partition("_")[0] in sections]
     total = sum(effort.slow_repetitions if part.slow else effort.repetitions for part in parts)
     total += 2 + (len(effort.memory_episodes) + 4 if memory else 0)
     with contextlib.ExitStack() as stack:
-        run = Run(work, files, lift, effort, stack.enter_context(Bar(total=total, unit="part", smoothing=0)))
+        run = Run(work, files, lift, assets, effort, stack.enter_context(Bar(total=total, unit="part", smoothing=0)))
         startup, said = _start(run, stack)
         _repeat(run, parts)
         # The measuring processes end first: what they hold in memory is not the command's.
@@ -262,7 +264,7 @@ def _lift_ours(run: Run, key: str, processes: int, preset: str = "fast") -> floa
         out=run.place(key),
         workers=processes,
         cameras=list(convert_demos.LIFT_CAMERAS),
-        asset_roots=[str(convert_demos.LIFT / "assets")],
+        asset_roots=[str(run.assets)],
         preset=preset,
     )
     return _rate(run, key, answer)

@@ -1,8 +1,8 @@
 """Replay recorded robosuite action sequences in our simulator and tabulate how far the two robots drift apart.
 
-The recordings (`--traces`, by default those beside the checkout) are robosuite 1.5.1's PandaOmron on MuJoCo 3.3.7 in an
-empty room. Each sequence starts from the settled initial pose and is replayed open-loop: nothing of the recording but
-its actions enters our simulation.
+The recordings are robosuite 1.5.1's PandaOmron on MuJoCo 3.3.7 in an empty room. A dozen travel with the tests, at every
+fifth step; `--traces` names a file with all of them, whose figures go to `results/`. Each sequence starts from the
+settled initial pose and is replayed open-loop: nothing of the recording but its actions enters our simulation.
 
     python benchmarks/trace_replay.py
 """
@@ -28,7 +28,7 @@ from robocasa_lerobot.errors import UserError
 from robocasa_lerobot.progress import Bar
 
 REPOSITORY = Path(__file__).parents[1]
-TRACES = REPOSITORY.parent / "shared" / "real" / "robosuite_traces" / "panda_omron_traces.npz"
+KEPT_TRACES = REPOSITORY / "tests" / "data" / "robosuite_traces.npz"
 RESULTS = REPOSITORY / "benchmarks" / "results" / "trace_replay.json"
 
 # Limits: end-effector error at every step of a single-direction trace, and at the end of a random one.
@@ -88,7 +88,24 @@ class TraceError:
         return out
 
 
-def load_traces(path: Path = TRACES) -> dict[str, Recording]:
+def kept_traces(path: Path = KEPT_TRACES) -> dict[str, Recording]:
+    """The recordings that travel with the tests, as `load_traces` gives them, but only at their `steps` (S,)."""
+    out: dict[str, Recording] = {}
+    with np.load(path) as file:
+        for key in file.files:
+            name, part = key.rsplit("/", 1)
+            out.setdefault(name, {})[part] = file[key]
+    return out
+
+
+def at_steps(ours: Recording, recorded: Recording) -> Recording:
+    """Our run (T+1, ...) at the steps that a recording has."""
+    if "steps" not in recorded:
+        return ours
+    return {key: values[recorded["steps"].astype(int)] for key, values in ours.items()}
+
+
+def load_traces(path: Path) -> dict[str, Recording]:
     """The recordings by name: `actions` (T, 12) in HDF5 order, `qpos` (T+1, 13) in our joint order and with our spawn
     offset, and each observation (T+1, ...) under its robosuite name.
 
@@ -208,11 +225,11 @@ def main(arguments: list[str] | None = None) -> int:
     from common import machine, versions, write_result  # here: the tests use the rest of this file without it
 
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--traces", type=Path, default=TRACES, help="the recordings (.npz)")
-    parser.add_argument("--output", type=Path, default=RESULTS, help="where the figures go (.json)")
+    parser.add_argument("--traces", type=Path, help="all recordings (.npz); default: those that travel with the tests")
+    parser.add_argument("--output", type=Path, help="where the figures go (.json); default with --traces: results/")
     options = parser.parse_args(arguments)
     try:
-        traces = load_traces(options.traces)
+        traces = load_traces(options.traces) if options.traces else kept_traces()
     except UserError as error:
         print(error, file=sys.stderr)
         return 2
@@ -230,7 +247,7 @@ def main(arguments: list[str] | None = None) -> int:
         model = empty_room(multiccd)
         errors = []
         for name, trace in Bar(traces.items(), desc=f"multiccd {'on' if multiccd else 'off'}", unit="trace"):
-            errors.append(compare(name, trace, replay(model, trace["actions"])))
+            errors.append(compare(name, trace, at_steps(replay(model, trace["actions"]), trace)))
         print(f"\n## {'As in our kitchens: multiccd on' if multiccd else 'As recorded: multiccd off'}\n")
         print(table(errors))
         entry: dict[str, Any] = {"ratios": worst_ratios(errors), "traces": [asdict(error) for error in errors]}
@@ -248,7 +265,9 @@ def main(arguments: list[str] | None = None) -> int:
         print("\nWorst error over its limit: " + ", ".join(f"{k} {v:.2f}" for k, v in entry["ratios"].items()))
         result["multiccd_on" if multiccd else "multiccd_off"] = entry
     result["ratios"] = result["multiccd_on"]["ratios"]  # the production setting
-    write_result(options.output, "trace_replay", result)
+    output = options.output or (RESULTS if options.traces else None)
+    if output is not None:
+        write_result(output, "trace_replay", result)
     return 0
 
 

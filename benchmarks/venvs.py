@@ -7,6 +7,7 @@ import os
 import shutil
 import subprocess
 import sys
+import sysconfig
 from pathlib import Path
 
 from robocasa_lerobot.errors import UserError
@@ -24,8 +25,10 @@ def venv_folder(name: str) -> Path:
     return BENCHMARKS / ".venvs" / name
 
 
-def prepare_venv(name: str) -> Path:
+def prepare_venv(name: str, *, on_ours: bool = False) -> Path:
     """The Python of the environment of `requirements/<name>.lock`, made first if it is missing or of another lock.
+
+    With `on_ours` it also sees the packages of the environment that runs this, after its own.
 
     Raises:
         VenvError: uv is missing, or the packages could not be installed (no network, most often).
@@ -43,6 +46,9 @@ def prepare_venv(name: str) -> Path:
     _run([uv, "venv", "--quiet", "--python", sys.executable, str(folder)], name)
     arguments = ["--python", str(python), "--require-hashes", "--compile-bytecode", str(lock)]
     _run([uv, "pip", "sync", "--quiet", *arguments], name)
+    if on_ours:
+        inside = next(folder.glob("lib/python*/site-packages"))
+        (inside / "ours.pth").write_text(sysconfig.get_path("purelib") + "\n")
     stamp.write_text(digest + "\n")
     return python
 

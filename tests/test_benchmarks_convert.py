@@ -86,13 +86,19 @@ def test_a_stripped_file_has_the_same_states_and_nothing_to_see(tmp_path: Path) 
         assert {name: len(rows) for name, rows in states.items()} == {"demo_0": 4, "demo_1": 3}
 
 
-def test_lift_is_cut_or_said_to_be_missing(tmp_path: Path) -> None:
+@pytest.mark.slow  # installs robosuite once
+@pytest.mark.render
+def test_lift_comes_from_the_package_that_carries_it(tmp_path: Path) -> None:
     demos = module("convert_demos")
-    with pytest.raises(demos.UserError, match="--without-peer"):
-        demos.cut_lift(tmp_path, 2, source=tmp_path / "nowhere")
-    if not demos.LIFT.is_dir():
-        pytest.skip(f"no {demos.LIFT.name} beside this checkout")
-    assert set(demos.demo_lengths(demos.cut_lift(tmp_path, 2)).values()) == {2}
+    try:
+        assets = demos.lift_assets()
+    except module("venvs").VenvError as error:
+        pytest.skip(str(error))
+    path = demos.cut_lift(tmp_path, 2, assets)
+    assert list(demos.demo_lengths(path).values()) == [2, 2, 2]
+    pipeline = pytest.importorskip("robocasa_lerobot.convert.pipeline")
+    settings = pipeline.ConversionSettings(asset_roots=(str(assets),), image_size=32)
+    assert pipeline.convert([path], tmp_path / "lift", settings).num_frames == 6
 
 
 def test_tiny_episodes_convert_and_ours_decode(tmp_path: Path) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gzip
 import shutil
 from pathlib import Path
 from typing import Any
@@ -217,3 +218,40 @@ def test_all_human_demonstrations(shared: Path, tmp_path: Path) -> None:
     assert report.passed, report.as_json()
     assert (report.num_episodes, report.num_frames) == (3, 1384)
     assert min(camera.minimum for camera in report.cameras) > 30
+
+
+OLD_SCENE = (
+    SCENE.replace(
+        "</asset>", '<texture name="cube" type="cube" file="square.png"/><material name="c" texture="cube"/></asset>'
+    )
+    .replace('rgba="0.8 0.2 0.1 1"', 'material="c"')
+    .replace('pos="1.5 0.2 0.5"', 'pos="[1.5, 0.2, 0.5]"')
+)
+
+
+@pytest.mark.render
+def test_scenes_that_are_named_by_file_are_found_under_the_asset_roots(tmp_path: Path) -> None:
+    """As in robosuite 1.0's demonstrations, which also have lists for vectors and one picture for six faces."""
+    pytest.importorskip("lerobot.datasets")
+    from robocasa_lerobot.convert.pipeline import convert
+    from robocasa_lerobot.convert.verify import verify
+
+    source = write_demos(tmp_path / "demo.hdf5", (4,))
+    scenes = tmp_path / "models"
+    scenes.mkdir()
+    with h5py.File(source, "a") as file:
+        file["data/demo_0"].attrs["model_file"] = "panda_wipe.xml"
+        (scenes / "square.png").write_bytes(file[f"assets/{TEXTURE}"][:].tobytes())
+    with pytest.raises(UserError, match=r"only a file's name, 'panda_wipe.xml'.*--asset-root"):
+        convert([source], tmp_path / "none", ConversionSettings(image_size=32))
+    (tmp_path / "panda_wipe.xml").write_text(OLD_SCENE)
+    with h5py.File(source, "a") as file:
+        file["data/demo_0"].attrs["model_file"] = "../panda_wipe.xml"
+    settings = ConversionSettings(image_size=32, asset_roots=(str(scenes),))
+    with pytest.raises(UserError, match="only a file's name"):
+        convert([source], tmp_path / "none", settings)  # outside of the root
+    (scenes / "panda_wipe.xml").write_text(OLD_SCENE)
+    out = convert([source], tmp_path / "data", settings).root
+    assert verify(out).passed
+    kept = gzip.decompress((out / "extras" / "episode_000000" / "model.xml.gz").read_bytes()).decode()
+    assert kept == OLD_SCENE

@@ -7,15 +7,25 @@ checkout. `benchmarks/trace_replay.py` has the limits, the comparison and the ta
 from __future__ import annotations
 
 from functools import cache
-from pathlib import Path
 
 import mujoco
 import numpy as np
 import pytest
 import trace_replay
-from trace_replay import CHAOTIC_AFTER, CHAOTIC_TRACE, Recording, compare, empty_room, load_traces, replay
+from trace_replay import (
+    CHAOTIC_AFTER,
+    CHAOTIC_TRACE,
+    REPOSITORY,
+    Recording,
+    at_steps,
+    compare,
+    empty_room,
+    kept_traces,
+    load_traces,
+    replay,
+)
 
-GOLDEN = Path(__file__).parent / "data" / "robosuite_traces.npz"
+ALL_TRACES = REPOSITORY.parent / "shared" / "real" / "robosuite_traces" / "panda_omron_traces.npz"
 JOINTS = 5e-5  # m, rad: the two simulators at the same instant
 # Here the arm comes near its stretched pose, where small differences grow (to 1.5e-4); the base stays within 2e-6.
 COMBINED_TRACE, COMBINED_JOINTS = "arm_and_base_random", 3e-4
@@ -35,23 +45,14 @@ def production_room() -> mujoco.MjModel:
 
 @cache
 def _golden() -> dict[str, Recording]:
-    out: dict[str, Recording] = {}
-    with np.load(GOLDEN) as file:
-        for key in file.files:
-            name, part = key.rsplit("/", 1)
-            out.setdefault(name, {})[part] = file[key]
-    return out
-
-
-def _at(ours: Recording, steps: np.ndarray) -> Recording:
-    return {key: values[steps] for key, values in ours.items()}
+    return kept_traces()
 
 
 @pytest.mark.parametrize("name", _golden())
 def test_kept_traces(room: mujoco.MjModel, name: str) -> None:
     recorded = _golden()[name]
     ours = replay(room, recorded["actions"])
-    error = compare(name, recorded, _at(ours, recorded["steps"].astype(int)))
+    error = compare(name, recorded, at_steps(ours, recorded))
     assert max(error.ratios().values()) < 1.0
     assert error.joints_max < (COMBINED_JOINTS if name == COMBINED_TRACE else JOINTS)
 
@@ -60,7 +61,7 @@ def test_kept_traces(room: mujoco.MjModel, name: str) -> None:
 def test_kept_traces_with_the_contacts_of_our_kitchens(production_room: mujoco.MjModel, name: str) -> None:
     recorded = _golden()[name]
     ours = replay(production_room, recorded["actions"])
-    assert max(compare(name, recorded, _at(ours, recorded["steps"].astype(int))).ratios().values()) < 1.0
+    assert max(compare(name, recorded, at_steps(ours, recorded)).ratios().values()) < 1.0
 
 
 def test_base_commands_are_turned_by_the_yaw(room: mujoco.MjModel) -> None:
@@ -82,7 +83,7 @@ def test_the_comparison_sees_a_wrong_replay(room: mujoco.MjModel) -> None:
     recorded = _golden()["arm_x+1_mode-1"]
     actions = recorded["actions"].copy()
     actions[:, 11] = 1.0
-    error = compare("arm_x+1_mode-1", recorded, _at(replay(room, actions), recorded["steps"].astype(int)))
+    error = compare("arm_x+1_mode-1", recorded, at_steps(replay(room, actions), recorded))
     assert error.ratios()["position"] > 10.0
 
 
@@ -93,21 +94,29 @@ def test_rotation_distance() -> None:
     assert trace_replay.rotation_distance(-turned, straight) == pytest.approx(np.degrees(0.4))
 
 
+def test_a_user_without_further_recordings_sees_the_table(capsys: pytest.CaptureFixture[str]) -> None:
+    written = trace_replay.RESULTS.read_bytes()
+    assert trace_replay.main([]) == 0
+    printed = capsys.readouterr().out
+    assert printed.count("| yes |") == 2 * len(_golden())
+    assert trace_replay.RESULTS.read_bytes() == written
+
+
 # --- all 48 --------------------------------------------------------------------------------------------------------
 
 
 @cache
 def _recorded() -> dict[str, Recording]:
-    return load_traces()
+    return load_traces(ALL_TRACES)
 
 
-NEEDS_TRACES = pytest.mark.skipif(not trace_replay.TRACES.exists(), reason="the recorded traces are not here")
+NEEDS_TRACES = pytest.mark.skipif(not ALL_TRACES.exists(), reason="the recorded traces are not here")
 
 
 @pytest.mark.slow
 @NEEDS_TRACES
 @pytest.mark.parametrize("multiccd", [False, True])
-@pytest.mark.parametrize("name", _recorded() if trace_replay.TRACES.exists() else [])
+@pytest.mark.parametrize("name", _recorded() if ALL_TRACES.exists() else [])
 def test_all_traces(request: pytest.FixtureRequest, name: str, multiccd: bool) -> None:
     model = request.getfixturevalue("production_room" if multiccd else "room")
     recorded = _recorded()[name]

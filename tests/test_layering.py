@@ -217,3 +217,16 @@ def test_no_paths_of_one_machine_and_no_download_addresses() -> None:
         assert not machine.search(text), f"{path}: {machine.search(text)}"
         if path.name in ("requirements.lock", "pyproject.toml", "Makefile", "run"):
             assert not index.search(text), f"{path}: {index.search(text)}"
+
+
+def test_only_tests_look_beside_the_checkout() -> None:
+    """What lies there is not what users have."""
+    files = [path for folder in (PACKAGE, REPOSITORY / "benchmarks") for path in folder.rglob("*.py")]
+    files += [REPOSITORY / name for name in ("Makefile", "train.py", "eval.py")] + sorted(REPOSITORY.glob("scripts/*"))
+    ours = [path for path in files if ".venvs" not in path.parts]
+    looking = [
+        path.name
+        for path in ours
+        if re.search(r'\.\./shared|parents?(\[\d\])? / "shared"', path.read_text(encoding="utf-8"))
+    ]
+    assert not looking

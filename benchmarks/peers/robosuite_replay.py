@@ -2,7 +2,7 @@
 
 Runs in robosuite's environment, which `benchmarks/sim_speed.py` prepares, not in ours:
 
-    benchmarks/.venvs/robosuite/bin/python benchmarks/peers/robosuite_replay.py
+    benchmarks/.venvs/robosuite/bin/python benchmarks/peers/robosuite_replay.py --traces panda_omron_traces.npz
 """
 
 from __future__ import annotations
@@ -16,7 +16,6 @@ from robosuite.environments.manipulation.manipulation_env import ManipulationEnv
 from robosuite.models.arenas import EmptyArena
 from robosuite.models.tasks import ManipulationTask
 
-TRACES = Path(__file__).parents[3] / "shared" / "real" / "robosuite_traces" / "panda_omron_traces.npz"
 ARM_HOME = (-0.01612974, -1.03446714, -0.02397936, -2.27550888, 0.03932365, 1.51639493, 0.69615947)
 SETTLE_STEPS = 10
 # HDF5 order to robosuite 1.5.1's: arm, torso, base, gripper, mode.
@@ -79,7 +78,7 @@ def replay(actions: np.ndarray, joints: list[str], perturbation: float) -> tuple
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--traces", type=Path, default=TRACES, help="the recordings (.npz)")
+    parser.add_argument("--traces", type=Path, required=True, help="the recordings (.npz)")
     parser.add_argument("--trace", default="arm_random_mode+1", help="which of them")
     options = parser.parse_args()
     with np.load(options.traces) as file:

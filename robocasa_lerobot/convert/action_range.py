@@ -44,8 +44,8 @@ def warning_of(found: dict[str, Any] | None) -> str | None:
         return None
     return (
         f"{found['share']:.1%} of the steps ({found['steps']}) have actions outside of [-1, 1], up to "
-        f"{found['largest']:.3g} in {found['component']}: controllers clip them, so that what was recorded is not what "
-        "was carried out, or they are in another unit. They are kept as they are."
+        f"{found['largest']:.3g} in {found['component']}: controllers clip them, or they are in "
+        "another unit. They are kept as they are."
     )
 
 

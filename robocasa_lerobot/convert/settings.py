@@ -91,7 +91,7 @@ class ConversionSettings:
     def layout(self) -> Layout:
         """How HDF5 files are read."""
         layout = parse_mapping(self.mapping) if self.mapping is not None else Layout(action_key=self.action_key)
-        return replace(layout, extra_columns=self.extra_columns)
+        return replace(layout, extra_columns=self.extra_columns, model_roots=self.asset_roots)
 
     def select(self, file: DemoFile) -> tuple[str, ...]:
         """Names of the demos of a file that are converted."""

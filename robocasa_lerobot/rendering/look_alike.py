@@ -319,8 +319,20 @@ def _copied_mesh(spec: mujoco.MjSpec, model: mujoco.MjModel, index: int) -> str:
     return name
 
 
+def _copy_textures(source: mujoco.MjModel, made: mujoco.MjModel) -> None:
+    """Copy pixels; a cube whose faces are one picture of a file has it once there, and six times where it is made."""
+
+    def pixels(model: mujoco.MjModel, index: int) -> NDArray[np.uint8]:
+        size = model.tex_width[index] * model.tex_height[index] * model.tex_nchannel[index]
+        return model.tex_data[model.tex_adr[index] : model.tex_adr[index] + size]
+
+    for index in range(source.ntex):
+        old, new = pixels(source, index), pixels(made, index)
+        new[:] = np.tile(old, len(new) // len(old))
+
+
 def _copy_looks(source: mujoco.MjModel, made: mujoco.MjModel) -> None:
-    made.tex_data[:] = source.tex_data
+    _copy_textures(source, made)
     for kind, names in (("light", _LIGHT_FIELDS), ("cam", _CAMERA_FIELDS)):
         for name in names:
             getattr(made, f"{kind}_{name}")[:] = getattr(source, f"{kind}_{name}")

@@ -38,14 +38,14 @@ EVERY = 5
 
 def main() -> None:
     sys.path.append(str(REPOSITORY / "benchmarks"))
-    from trace_replay import TRACES as RECORDING
     from trace_replay import load_traces
 
-    table = REPOSITORY.parent / "shared" / "facts" / "panda_omron_bodies.jsonl"
+    shared = REPOSITORY.parent / "shared"
+    table = shared / "facts" / "panda_omron_bodies.jsonl"
     rows = [list(json.loads(line).values()) for line in table.read_text().splitlines()]
     body = ",\n".join(json.dumps(row) for row in rows)
     (FOLDER / "panda_omron_bodies.json").write_text(f"[\n{body}\n]\n")
-    recordings = load_traces(RECORDING)
+    recordings = load_traces(shared / "real" / "robosuite_traces" / "panda_omron_traces.npz")
     out = {}
     for name in TRACES:
         recording = recordings[name]

@@ -28,6 +28,7 @@ from robocasa_lerobot.convert.reading.hdf5 import (
     text_attribute,
 )
 from robocasa_lerobot.convert.reading.layout import ROBOMIMIC, Layout, Picture
+from robocasa_lerobot.convert.reading.mjcf import names_model, read_model
 
 __all__ = ["IMAGE_SUFFIX", "MAX_COLUMN_VALUES", "Demo", "RejectedEpisodeError", "SourceError", "first_line"]
 
@@ -137,8 +138,15 @@ class Demo:
 
     @cached_property
     def model_xml(self) -> str | None:
-        """The MJCF of the episode's scene, or None."""
-        return text_attribute(self._group, "model_file")
+        """The MJCF of the episode's scene, or None; that of a file under `model_roots` where the episode names one.
+
+        Raises:
+            RejectedEpisodeError: that file is not there, or the attribute is damaged.
+        """
+        text = text_attribute(self._group, "model_file")
+        if text is None or not names_model(text):
+            return text
+        return read_model(text, [Path(root) for root in self.layout.model_roots])
 
     @cached_property
     def ep_meta(self) -> dict[str, Any]:

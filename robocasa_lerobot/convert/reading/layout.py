@@ -64,6 +64,7 @@ class Layout:
         pictures: dataset of each stored camera; None means that of robomimic, `obs/<camera>_image`.
         extra_columns: further datasets below an episode that are kept as features of their own.
         robot: None means to recognise it.
+        model_roots: folders for scenes that an episode names by file instead of holding them.
     """
 
     episodes: str = DEFAULT_EPISODES
@@ -71,6 +72,7 @@ class Layout:
     pictures: tuple[tuple[str, Picture], ...] | None = None
     extra_columns: tuple[str, ...] = ()
     robot: CustomRobot | None = None
+    model_roots: tuple[str, ...] = ()
 
 
 ROBOMIMIC = Layout()

@@ -8,12 +8,13 @@ from __future__ import annotations
 
 import importlib.util
 import posixpath
+import re
 import xml.etree.ElementTree as ET
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from robocasa_lerobot.convert.reading.hdf5 import MAX_ASSET_BYTES, RejectedEpisodeError
+from robocasa_lerobot.convert.reading.hdf5 import MAX_ASSET_BYTES, MAX_TEXT_BYTES, RejectedEpisodeError
 from robocasa_lerobot.convert.reading.mjcf_limits import check_limits, parse_mjcf
 from robocasa_lerobot.errors import UserError
 
@@ -40,6 +41,8 @@ REPAIRS: tuple[tuple[str, str], ...] = (
     ("flag", "passive"),
     ("flag", "sensornoise"),
 )
+# Numbers as Python prints a list, which MuJoCo took when robosuite 1.0 wrote them.
+_LISTED = re.compile(r"\s*\[([-+0-9.eE,\s]*)\]\s*")
 _MAX_PATH = 4096  # characters; longer ones no file system has
 
 
@@ -85,6 +88,32 @@ class AssetFinder:
         return None
 
 
+def names_model(text: str) -> bool:
+    """Whether a `model_file` is the name of an MJCF file, as in robosuite's first files, instead of its text."""
+    return len(text) <= _MAX_PATH and "<" not in text and text.strip().lower().endswith((".xml", ".mjcf"))
+
+
+def read_model(name: str, roots: Sequence[Path]) -> str:
+    """The MJCF text of a file that an episode names, found by the end of its path under one of the roots.
+
+    Raises:
+        RejectedEpisodeError: it is not there, too long, or no text.
+    """
+    content = AssetFinder(roots).read(name.strip())
+    if content is None:
+        raise RejectedEpisodeError(
+            f"its model_file is only a file's name, {name.strip()!r}, not the scene (MJCF) itself, as in robosuite's "
+            "first files. Give the folder that holds this file with --asset-root DIR, besides that of its meshes."
+        )
+    try:
+        text = content.decode("utf-8")
+    except UnicodeDecodeError:
+        raise RejectedEpisodeError(f"its model_file {name.strip()!r} is a file that is no text.") from None
+    if len(content) > MAX_TEXT_BYTES:
+        raise RejectedEpisodeError(f"its model_file {name.strip()!r} is a file of {len(content)} bytes.")
+    return text
+
+
 @dataclass(frozen=True)
 class SceneNames:
     """Names of the elements of an MJCF, in document order."""
@@ -123,6 +152,10 @@ def loadable(xml: str, finder: AssetFinder) -> tuple[str, dict[str, bytes]]:
         for tag, attribute in REPAIRS:
             if element.tag == tag:
                 element.attrib.pop(attribute, None)
+        for attribute, value in element.attrib.items():
+            listed = _LISTED.fullmatch(value)
+            if listed:
+                element.set(attribute, listed[1].replace(",", " "))
     folders = _take_folders(root)
     assets: dict[str, bytes] = {}
     flat: dict[str, str] = {}
