@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import json
-import subprocess
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -359,11 +357,11 @@ def test_evaluations_run_once_for_each_checkpoint_and_setting(
 ) -> None:
     commands: list[list[str]] = []
 
-    def run(command: list[str], **_: Any) -> subprocess.CompletedProcess[bytes]:
+    def run(command: list[str], _: object) -> int:
         commands.append(command)
-        return subprocess.CompletedProcess(command, 0)
+        return 0
 
-    monkeypatch.setattr(evaluations, "subprocess", SimpleNamespace(run=run))
+    monkeypatch.setattr(evaluations, "_run", run)
     common = ["--defaults.steps=1"]
     for settings in ("--seed=1", "--seed=1", '--policy.training_data="a b"'):
         names = [*common, f"--phases.pretrain.evaluations=['quick {settings}']"]

@@ -77,30 +77,30 @@ def test_two_processes_train_as_one_does(tmp_path: Path, data: Path, kind: str) 
 
 
 WAITING = """
-import sys, time
+import os, sys, time
 from datetime import timedelta
-from pathlib import Path
 from accelerate import Accelerator, InitProcessGroupKwargs
 from robocasa_lerobot.training.waiting import first_process_works
 
 accelerator = Accelerator(cpu=True, kwargs_handlers=[InitProcessGroupKwargs(timeout=timedelta(seconds=3))])
-first_process_works(accelerator, Path(sys.argv[1]), lambda: time.sleep(6))
-print("waited", flush=True)
+first_process_works(accelerator, lambda: time.sleep(6))
+print("waited", first_process_works(accelerator, lambda: accelerator.process_index + 7), flush=True)
 
 def fail():
+    if sys.argv[1] == "dies":
+        os._exit(9)
     raise RuntimeError("no kitchen")
 
-first_process_works(accelerator, Path(sys.argv[1]), fail)
+first_process_works(accelerator, fail)
 """
 
 
-def test_no_process_gives_up_while_the_first_one_evaluates(tmp_path: Path) -> None:
-    """Work of twice the time after which a barrier fails; and where it fails, no process hangs."""
+@pytest.mark.parametrize("end", ["fails", "dies"])
+def test_no_process_gives_up_while_the_first_one_evaluates(tmp_path: Path, end: str) -> None:
+    """Work of twice the time after which a barrier fails; and where it fails or is killed, no process hangs."""
     (tmp_path / "waiting.py").write_text(WAITING)
-    (tmp_path / ".first_process_is_done").write_text("")  # of a run that was killed
-    results = in_two_processes([sys.executable, str(tmp_path / "waiting.py"), str(tmp_path)], tmp_path)
-    for rank, (status, log) in enumerate(results):
-        assert "waited" in log, (rank, log)
-        assert status == 1
-        assert "no kitchen" in log
-    assert "the first process could not go on: no kitchen" in results[1][1]
+    results = in_two_processes([sys.executable, str(tmp_path / "waiting.py"), end], tmp_path)
+    assert ["waited 7" in log for _, log in results] == [True, True]
+    assert [status for status, _ in results] == [1 if end == "fails" else 9, 1]
+    words = "could not go on: no kitchen" if end == "fails" else "is not there any more"
+    assert f"the first process {words}" in results[1][1]

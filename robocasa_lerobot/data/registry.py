@@ -19,7 +19,6 @@ from robocasa_lerobot.data.published import (
 )
 from robocasa_lerobot.data.recipes import demonstrated_tasks
 from robocasa_lerobot.data.registry_file import DEMONSTRATED, TASK, RegisteredDataset, RegistryConfig, load_registry
-from robocasa_lerobot.data.source import EPISODE_TABLE
 from robocasa_lerobot.errors import UnknownNameError, UserError
 
 MAKE = "`robocasa-lerobot data EXPERIMENT_FILE --make` records and converts it with our demonstrators"
@@ -120,6 +119,8 @@ class Registry:
             if dataset.task_set not in self.task_sets:
                 raise UnknownNameError("task set", dataset.task_set, self.task_sets, f"(of dataset {dataset.path})")
             return self.task_sets[dataset.task_set]
+        from robocasa_lerobot.data.source import EPISODE_TABLE  # with torch, which a list of task sets needs not
+
         if dataset.path not in self._read:
             self._read[dataset.path] = _tasks_in(Path(self.config.root) / dataset.path / EPISODE_TABLE)
         return self._read[dataset.path]

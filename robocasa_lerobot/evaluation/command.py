@@ -30,6 +30,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
     add_options(parser)
     parser.add_argument("--shards", type=int, metavar="N", help="with --executor: into how many parts the plan is cut")
     parser.add_argument("--merge", action="store_true", help="join the results of --shard=1/N to N/N, run nothing")
+    parser.add_argument("--check", action="store_true", help="print what would run, and end; no checkpoint is needed")
     parser.add_argument("--config_path", metavar="FILE", help="YAML file of settings; options win over it")
     short = "what to evaluate, short for --policy.path: a checkpoint, demonstrator, random, zero, replay:FILE"
     parser.add_argument("--policy", dest="set:policy", metavar="A,B", default=argparse.SUPPRESS, help=short)
@@ -57,6 +58,11 @@ def run(args: argparse.Namespace) -> int:
     given = [f"--{key.removeprefix('set:')}={value}" for key, value in vars(args).items() if key.startswith("set:")]
     path = [f"--config_path={args.config_path}"] if args.config_path else []
     config = load_config(EvaluationConfig, [*path, *given, *args.settings])
+    if args.check:
+        from robocasa_lerobot.evaluation.check import lines, planned
+
+        print("\n".join(lines(config, planned(config))))
+        return 0
     for device in config.env.render_devices:
         check_device(device)
     if args.executor != "local":
@@ -64,7 +70,8 @@ def run(args: argparse.Namespace) -> int:
     if args.shards is not None:
         raise UserError("--shards is for --executor slurm or ray; here give --shard=I/N, and --merge at the end.")
     evaluation = prepare(config)
-    partial = partial_sentence(evaluation.header)
+    header = evaluation.header
+    partial = partial_sentence(header.task_sets, header.missing_tasks, header.missing_by_set)
     if partial is not None:
         print(f"robocasa-lerobot eval: this run is {partial}", file=sys.stderr)
     if args.merge:

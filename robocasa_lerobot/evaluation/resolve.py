@@ -102,12 +102,15 @@ def _tasks_of_sets(names: Sequence[str], registry: str | None) -> tuple[dict[str
     defines is its own, whatever its name.
     """
     from robocasa_lerobot.data.published import published_task_sets
-    from robocasa_lerobot.data.registry import open_registry
 
     published = published_task_sets()
-    opened = open_registry(registry) if registry is not None else None
-    known = {**published, **(opened.task_sets if opened is not None else {})}
-    own = opened.config.task_sets if opened is not None else {}
+    known, own = dict(published), dict[str, list[str]]()
+    if registry is not None:
+        from robocasa_lerobot.data.registry import open_registry
+
+        opened = open_registry(registry)
+        known |= opened.task_sets
+        own = opened.config.task_sets
     for name in names:
         if name not in known:
             raise UnknownNameError("task set", name, known, f"(in the registry {registry})" if registry else "")
@@ -135,17 +138,19 @@ def _lacking(sets: Sequence[str], lacking: list[str], there: list[str]) -> str:
     )
 
 
-def partial_sentence(header: RunHeader) -> str | None:
+def partial_sentence(
+    sets: Mapping[str, Sequence[str]], missing: Sequence[str], missing_by_set: Mapping[str, Sequence[str]]
+) -> str | None:
     """What a run leaves out of its task sets and tasks, as a sentence; None where it is whole."""
-    if not header.missing_tasks:
+    if not missing and not missing_by_set:
         return None
     parts = [
-        f"{len(lacking)} of {len(lacking) + len(header.task_sets.get(name, []))} tasks of {name}"
-        for name, lacking in header.missing_by_set.items()
+        f"{len(lacking)} of {len(lacking) + len(sets.get(name, ()))} tasks of {name}"
+        for name, lacking in missing_by_set.items()
     ]
-    in_sets = {task for tasks in header.missing_by_set.values() for task in tasks}
-    parts += [task for task in header.missing_tasks if task not in in_sets]
-    return f"partial: without {', '.join(parts)}; over these no average is given."
+    in_sets = {task for tasks in missing_by_set.values() for task in tasks}
+    parts += [task for task in missing if task not in in_sets]
+    return f"partial: without {', '.join(parts)}; no average is given over what is not whole."
 
 
 def perturbation_parameters(settings: PerturbationSettings) -> dict[str, dict[str, Any]]:

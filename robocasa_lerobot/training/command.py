@@ -49,11 +49,13 @@ def run(args: argparse.Namespace) -> int:
     experiment = load_experiment(args.config_path, getattr(args, "settings", ()), args.scale)
     if args.plan:
         from robocasa_lerobot.training.builders import best_device
+        from robocasa_lerobot.training.evaluations import plan_evaluations
         from robocasa_lerobot.training.plan import plan_experiment
         from robocasa_lerobot.training.plan_text import render_plan
 
         plans = plan_experiment(experiment, args.phase, args.measure)
-        print(render_plan(experiment, plans, best_device(experiment.device)))
+        evaluations = plan_evaluations(experiment, [plan.phase for plan in plans if not plan.left_out])
+        print(render_plan(experiment, plans, best_device(experiment.device), evaluations))
         return 0
     print(to_yaml(experiment), flush=True)
     if args.print_config:

@@ -10,7 +10,7 @@ from accelerate import Accelerator, DistributedDataParallelKwargs, InitProcessGr
 from robocasa_lerobot.training import builders, features, joining, metrics, records, skipped
 from robocasa_lerobot.training.checkpoint import checkpoint_step, last_checkpoint, tidy
 from robocasa_lerobot.training.config import HUB, ExperimentConfig, PhaseConfig
-from robocasa_lerobot.training.evaluations import phase_evaluations, run_evaluations
+from robocasa_lerobot.training.evaluations import Evaluations, phase_evaluations
 from robocasa_lerobot.training.interrupts import Interrupts
 from robocasa_lerobot.training.loop import train_phase
 from robocasa_lerobot.training.prepare import planned_policy, prepare_phase, start_of
@@ -37,7 +37,8 @@ def run_experiment(
         interrupts: tells afterwards why it ended; None makes one.
 
     Raises:
-        UserError: settings or data of a begun phase have changed, or something in the configuration does not fit.
+        UserError: settings or data of a begun phase have changed, or something in the configuration does not fit; at
+            the end, evaluations that failed.
     """
     interrupts = interrupts or Interrupts(stop_after)
     output = Path(experiment.output_dir)
@@ -58,27 +59,32 @@ def run_experiment(
     records.check_unchanged(experiment, output, force)
     whole, (experiment, left_out) = experiment, runnable(experiment)
     phases = [phase for phase in experiment.phases if phase.name in {other.name for other in asked}]
-    for item in left_out:
-        accelerator.print(item)
     # A mistake in the last phase should not wait for the first to finish. The first process makes fake datasets.
     with accelerator.main_process_first():
         for phase in phases:
             if not is_finished(output, phase):
                 check_phase(experiment, phase, device, only is not None)
+        evaluations = Evaluations(experiment, phases, accelerator.is_main_process) if evaluate else None
         for phase in phases:  # weights on the hub, once all is well: a later phase should not wait for them either
             if not is_finished(output, phase) and experiment.init_of(phase).startswith(HUB):
                 start_of(experiment, phase)
+    left_out += evaluations.left_out if evaluations is not None else []
+    for item in left_out:
+        accelerator.print(item)
     if accelerator.is_main_process:
         output.mkdir(parents=True, exist_ok=True)
         records.write_experiment(output, whole)
-        skipped.record(output, left_out)
+        skipped.decide(output, left_out, {phase.name for phase in phases}, evaluate)
     accelerator.wait_for_everyone()
     metrics.start_trackers(accelerator, experiment.name, {"seed": experiment.seed, "policy": experiment.policy})
     try:
         with interrupts.listening():
-            return _run(experiment, phases, device, accelerator, interrupts, evaluate)
+            finished = _run(experiment, phases, device, accelerator, interrupts, evaluations)
     finally:
         accelerator.end_training()
+    if evaluations is not None:
+        evaluations.check_none_failed()
+    return finished
 
 
 def is_finished(output: Path, phase: PhaseConfig) -> bool:
@@ -113,7 +119,7 @@ def _run(
     device: str,
     accelerator: Accelerator,
     interrupts: Interrupts,
-    evaluate: bool,
+    evaluations: Evaluations | None,
 ) -> bool:
     output = Path(experiment.output_dir)
     for phase in phases:
@@ -130,7 +136,9 @@ def _run(
             if not finished:
                 accelerator.print(f"stopped in phase {phase.name} at step {step}; the same command goes on")
                 return False
-        if evaluate:
-            work = functools.partial(run_evaluations, phase, output / phase.name, experiment.registry)
-            first_process_works(accelerator, output, work)
+        if evaluations is not None:
+            planned = functools.partial(evaluations.run, phase.name, lambda: interrupts.signalled)
+            if first_process_works(accelerator, planned):
+                accelerator.print(f"stopped in the evaluations of phase {phase.name}; the same command goes on")
+                return False
     return True

@@ -7,16 +7,23 @@ from collections.abc import Sequence
 import torch
 
 from robocasa_lerobot.training.config import ExperimentConfig
+from robocasa_lerobot.training.evaluations import PlannedEvaluation
 from robocasa_lerobot.training.plan import PhasePlan
 
 _SHOWN = 10  # missing datasets that are listed for each phase
 
 
-def render_plan(experiment: ExperimentConfig, plans: Sequence[PhasePlan], device: str) -> str:
+def render_plan(
+    experiment: ExperimentConfig,
+    plans: Sequence[PhasePlan],
+    device: str,
+    evaluations: Sequence[PlannedEvaluation] = (),
+) -> str:
     """Lines for people."""
     out = [f"experiment {experiment.name}: {len(plans)} phase(s), results in {experiment.output_dir}", ""]
     for plan in plans:
         out += _phase_lines(experiment, plan)
+    out += _evaluation_lines(evaluations)
     missing = list(dict.fromkeys(line for plan in plans for line in plan.missing))
     if missing:
         out += ["", f"missing datasets: {len(missing)}", *(f"  {line}" for line in missing[:_SHOWN])]
@@ -43,8 +50,6 @@ def _phase_lines(experiment: ExperimentConfig, plan: PhasePlan) -> list[str]:
     if plan.parameters is not None:
         total, trained = plan.parameters
         details.append(f"parameters: {total / 1e6:,.1f} M" + (f", {trained / 1e6:,.2f} M trained" * (trained != total)))
-    if phase.evaluations:
-        details.append(f"evaluations: {', '.join(phase.evaluations)}")
     if plan.missing:
         details.append(f"{len(plan.missing)} dataset(s) missing")
     lines += [f"  {'; '.join(details)}"] if details else []
@@ -54,6 +59,18 @@ def _phase_lines(experiment: ExperimentConfig, plan: PhasePlan) -> list[str]:
     if plan.hours is not None and plan.seconds is not None:
         lines.append(f"  time: {plan.seconds:.3f} s per step, {plan.hours:,.1f} h to go")
     return [lines[0], *(indent + line for line in lines[1:])]
+
+
+def _evaluation_lines(evaluations: Sequence[PlannedEvaluation]) -> list[str]:
+    lines = []
+    for item in evaluations:
+        called = " ".join((item.evaluation.name, *item.evaluation.settings))
+        if item.nothing is not None:
+            lines.append(f"  {item.phase}: {called}: left out, {item.nothing}")
+            continue
+        lines.append(f"  {item.phase}: {called}: {item.trials:,} trials on {item.tasks} tasks")
+        lines += [f"    {item.partial}"] if item.partial is not None else []
+    return ["", "evaluations (with --evaluate):", *lines] if lines else []
 
 
 def _sums(plans: Sequence[PhasePlan], device: str) -> list[str]:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import dataclasses
 import json
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -52,6 +52,19 @@ def record(output_dir: Path, skipped: Iterable[Skipped]) -> None:
     aside = path.with_name(f".{path.name}")
     aside.write_text("".join(lines), encoding="utf-8")
     aside.replace(path)
+
+
+def decide(output_dir: Path, skipped: Iterable[Skipped], phases: Collection[str], evaluations: bool) -> None:
+    """Write what a command leaves out, and keep what earlier ones said of evaluations that it is not about.
+
+    Args:
+        output_dir: the experiment's.
+        skipped: what is left out.
+        phases: names of the phases that the command runs.
+        evaluations: whether it runs their evaluations.
+    """
+    kept = [i for i in read(output_dir) if i.evaluation is not None and not (evaluations and i.phase in phases)]
+    record(output_dir, [*kept, *skipped])
 
 
 def read(output_dir: Path) -> list[Skipped]:
