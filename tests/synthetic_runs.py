@@ -1,6 +1,6 @@
-"""Runs of the benchmark's four kinds from synthetic trials, to show and test reports. No policy ever ran.
+"""Runs of the benchmark's kinds from synthetic trials, to show and test reports. No policy ever ran.
 
-    python tests/synthetic_runs.py outputs/synthetic   # four runs and their reports
+    python tests/synthetic_runs.py outputs/synthetic   # runs of each kind and their reports
 
 Every header says `synthetic: true` in its settings, which the report shows on top of the page.
 """
@@ -17,6 +17,8 @@ from scipy.stats import norm
 
 from robocasa_lerobot.data.published import published_task_sets
 from robocasa_lerobot.evaluation import published
+from robocasa_lerobot.evaluation.config import EvaluationConfig
+from robocasa_lerobot.evaluation.overrides import load_config
 from robocasa_lerobot.evaluation.results import (
     TRIALS_FILE,
     PolicyInfo,
@@ -25,11 +27,15 @@ from robocasa_lerobot.evaluation.results import (
     TermSummary,
     TrialRecord,
 )
+from robocasa_lerobot.training.config import load_experiment
+from robocasa_lerobot.training.evaluations import PhaseEvaluation, phase_evaluations
+from robocasa_lerobot.training.phase_config import PhaseConfig
 from robocasa_lerobot.video import VideoWriter
 
 TERMS = ("reached", "grasped", "placed", "gripper_away")
 GROUPS = published.group_of_task()
-LIFELONG = {f"lifelong_phase{k}": published_task_sets()[f"lifelong_phase{k}"] for k in range(1, 5)}
+EXPERIMENTS = Path(__file__).parents[1] / "configs/experiments/robocasa365"
+LABELS = ("lifelong_phase", "demo_fraction", "training_data")
 Rates = Mapping[str, float]
 
 
@@ -156,7 +162,7 @@ def scaled(averages: Mapping[str, float], tasks: Sequence[str]) -> dict[str, flo
     return out
 
 
-def multi_task(folder: Path, count: int = 50, films: bool = True) -> Path:
+def multi_task(folder: Path, count: int = 50, films: bool = True) -> list[Path]:
     table = published.table("multi_task")
     tasks = list(GROUPS)
     names = {"diffusion_policy": "diffusion transformer", "pi05": "flow VLA", "gr00t": "flow VLA, large"}
@@ -168,64 +174,106 @@ def multi_task(folder: Path, count: int = 50, films: bool = True) -> Path:
         rates = scaled(averages, tasks)
         filmed = dict.fromkeys(tasks[:3], (0, 1, 2)) if films and key == "gr00t" else None
         records += trials(head, name, rates, count, films=filmed)
-    return write(folder, head, records)
+    return [write(folder, head, records)]
 
 
-def foundation(folder: Path, count: int = 30) -> Path:
-    table = published.table("foundation")
-    tasks = list(GROUPS)
-    policies, rates = [], {}
-    for column in table.columns:
-        demos = column.facts["target_demos"]
-        data = "pretraining + target" if column.facts["pretrained"] else "target only"
-        name = f"pretrained, {demos // 5} %" if column.facts["pretrained"] else f"target only, {demos // 5} %"
-        policies.append(policy(name, demo_fraction=demos / 500, training_data=data, phase="target", step=60_000))
-        rates[name] = scaled({row: table.percent[row][column.key] for row in published.GROUPS}, tasks)
-    head = header("foundation", policies, tasks, trials=count)
-    return write(folder, head, [r for name, own in rates.items() for r in trials(head, name, own, count)])
+def experiment(name: str, folder: Path, count: int = 30, type: str = "groot") -> list[Path]:
+    """The runs that `train.py --evaluate` leaves of an experiment file of the benchmark: a folder for each evaluation
+    of each phase, with the one policy of that phase, evaluated on what the file says and with the labels it gives."""
+    own = load_experiment(EXPERIMENTS / f"{name}.yaml")
+    return [
+        _evaluation(own.name, phase, evaluation, folder / own.name, count, type)
+        for phase in own.phases
+        for evaluation in phase_evaluations(phase)
+    ]
 
 
-def lifelong(folder: Path, count: int = 20) -> Path:
-    table = published.table("lifelong")
-    tasks = [task for members in LIFELONG.values() for task in members]
-    policies = [policy(f"after phase {k}", lifelong_phase=k, phase=f"phase{k}", step=60_000) for k in range(1, 5)]
+def _evaluation(name: str, phase: PhaseConfig, evaluation: PhaseEvaluation, root: Path, count: int, type: str) -> Path:
+    checkpoint = root / phase.name / "checkpoints/last/pretrained_model"
+    given = ["--config_path", str(evaluation.file), f"--policy={checkpoint}", *evaluation.settings]
+    config = load_config(EvaluationConfig, given)
+    first = {key: (values or [None])[0] for key, values in vars(config.policy).items() if key in LABELS}
+    label = f"{name}/{phase.name}-{phase.steps:06d}"
+    about = policy(label, experiment=name, phase=phase.name, step=phase.steps, path=str(checkpoint), type=type, **first)
+    names = config.env.task_sets[: about.lifelong_phase] if config.lifelong else config.env.task_sets
+    sets = {key: list(published_task_sets()[key]) for key in names}
+    tasks = [task for members in sets.values() for task in members]
     head = header(
-        "lifelong",
-        policies,
+        config.protocol,
+        [about],
         tasks,
-        task_sets={name: list(tasks) for name, tasks in LIFELONG.items()},
-        split="pretrain",
+        task_sets=sets,
+        split=config.env.split,
         trials=count,
+        perturbations={key: {} for key in config.perturbation.names},
     )
     records = []
-    for k in range(1, 5):
-        rates = {}
-        for j, (name, members) in enumerate(LIFELONG.items(), start=1):
-            value = table.value(str(k), name) if j <= k else None
-            rates |= dict.fromkeys(members, value / 100) if value is not None else {}
-        records += trials(head, f"after phase {k}", rates, count)
-    return write(folder, head, records)
+    for perturbation in config.perturbation.names:
+        rates = _rates(about, sets, perturbation)
+        records += trials(head, label, rates, count, perturbation=perturbation, luck_share=0.8)
+    return write(root / phase.name / "evaluations" / evaluation.file.stem, head, records)
 
 
-def robustness(folder: Path, count: int = 50) -> Path:
-    table = published.table("robustness")
-    tasks = [task for task, group in GROUPS.items() if group != "atomic_seen"]
-    perturbations = {
-        "none": {},
-        "language": {},
-        "camera": {"camera_position_m": 0.03, "camera_angle_deg": 3.0},
-        "joint": {"joint_rad": 0.05},
-        "base": {"base_position_m": 0.05, "base_yaw_deg": 5.0},
-    }
-    head = header("robustness", [policy("pretrained + target")], tasks, perturbations=perturbations, trials=count)
-    records = []
-    for name in perturbations:
-        rates = scaled({row: table.percent[row][name] for row in ("composite_seen", "composite_unseen")}, tasks)
-        records += trials(head, "pretrained + target", rates, count, perturbation=name, luck_share=0.8)
-    return write(folder, head, records)
+def _rates(about: PolicyInfo, sets: Mapping[str, Sequence[str]], perturbation: str) -> dict[str, float]:
+    """Rates about the published ones of the experiment and phase; those of other experiments are foundation's."""
+    assert about.experiment is not None
+    share = {0.0: "pretraining", 0.1: "10", 0.3: "30", 1.0: "100"}.get(about.demo_fraction or 0.0, "100")
+    if about.lifelong_phase is not None:
+        values = published.table("lifelong").percent[str(about.lifelong_phase)]
+        return {task: values[name] / 100 for name, members in sets.items() for task in members}
+    tasks = [task for members in sets.values() for task in members]
+    if about.experiment.startswith("scene_diversity"):
+        values = published.table("scene_diversity").percent["zero_shot" if share == "pretraining" else "target_10"]
+        value = values[about.experiment.rpartition("_")[2]]
+        return scaled(dict.fromkeys(published.GROUPS, value), tasks)
+    if len(sets) == 1 and about.demo_fraction is None:
+        values = published.table("robustness").percent[next(iter(sets))]
+        return scaled(dict.fromkeys(published.GROUPS, values[perturbation]), tasks)
+    table, column = {
+        "composition_human50": ("pretraining_composition", f"human50_{share}"),
+        "composition_human300": ("pretraining_composition", f"human300_{share}"),
+        "target_only": ("foundation", f"target_{share}"),
+        "composition_none": ("foundation", f"target_{share}"),
+        "multitask_diffusion_policy": ("multi_task", "diffusion_policy"),
+        "multitask_pi0": ("multi_task", "pi0"),
+        "multitask_pi05": ("multi_task", "pi05"),
+        "multitask_gr00t": ("multi_task", "gr00t"),
+        "multitask_gr00t_lora": ("low_rank", "lora"),
+        "joint_cotraining": ("joint_cotraining", "gr00t"),
+    }.get(about.experiment, ("foundation", f"both_{share}"))
+    if share == "pretraining" and table in ("pretraining_composition", "foundation"):
+        table, column = "foundation", "pretraining"
+    percent = published.table(table).percent
+    return scaled({row: percent[row][column] for row in published.GROUPS}, tasks)
 
 
-RUNS = {"multi_task": multi_task, "foundation": foundation, "lifelong": lifelong, "robustness": robustness}
+def foundation(folder: Path, count: int = 30) -> list[Path]:
+    return [*experiment("target_only", folder, count), *experiment("foundation", folder, count)]
+
+
+def lifelong(folder: Path, count: int = 20) -> list[Path]:
+    return experiment("lifelong", folder, count)
+
+
+def robustness(folder: Path, count: int = 50) -> list[Path]:
+    return [run for run in experiment("foundation", folder, count) if run.name == "robustness"]
+
+
+def ablations(folder: Path, count: int = 20) -> list[Path]:
+    names = ("composition_none", "composition_human50", "composition_human300", "composition_human300_mg60")
+    names += ("scene_diversity_5", "scene_diversity_25", "scene_diversity_2500", "joint_cotraining")
+    return [
+        run for name in (*names, "multitask_gr00t", "multitask_gr00t_lora") for run in experiment(name, folder, count)
+    ]
+
+
+RUNS = {
+    "multi_task": multi_task,
+    "foundation": foundation,
+    "lifelong": lifelong,
+    "robustness": robustness,
+    "ablations": ablations,
+}
 
 
 def _film(path: Path, record: TrialRecord, frames: int = 60) -> None:
@@ -253,8 +301,7 @@ def main() -> None:
     from robocasa_lerobot.evaluation.report_command import write_report
 
     for name, make in RUNS.items():
-        run = make(folder / name)
-        write_report([run], out=run / "report.html")
+        write_report(make(folder / name), out=folder / name / "report.html")
 
 
 if __name__ == "__main__":

@@ -30,6 +30,7 @@ TABLES = (
     "low_rank",
     "real_robot",
 )
+GR00T = "groot"
 # How many tasks each group of the 50 has; averages are weighted by it.
 GROUPS = {"atomic_seen": 18, "composite_seen": 16, "composite_unseen": 16}
 
@@ -81,6 +82,13 @@ def table(name: str) -> PublishedTable:
     values = read(name)
     rows, columns = (tuple(_entry(dict(one)) for one in values.pop(part)) for part in ("rows", "columns"))
     return PublishedTable(rows=rows, columns=columns, **values)
+
+
+def policy_type(name: str, column: str) -> str:
+    """LeRobot's type of the policy whose results a column holds: GR00T, where a table does not say."""
+    if name not in TABLES:
+        return GR00T
+    return next((str(one.facts.get("type", GR00T)) for one in table(name).columns if one.key == column), GR00T)
 
 
 @functools.cache

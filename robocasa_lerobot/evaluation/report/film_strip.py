@@ -34,7 +34,7 @@ def choose_films(data: ReportData, embed: bool = True, budget: int = BUDGET_BYTE
     The most trained policy is last. A success and a failure of one task are taken together; tasks are taken in turn
     over the whole list, so that films do not all come from its beginning.
     """
-    found = [(task, chosen) for task in data.task_names if (chosen := _chosen(data.policies, task))]
+    found = [(task, chosen) for task in data.task_names if (chosen := _chosen(data.single, task))]
     # Tasks with both a success and a failure first.
     found.sort(key=lambda pair: -len(pair[1]))
     step = max(1, len(found) // max(1, MAX_FILMS // 2))

@@ -13,6 +13,8 @@ import numpy as np
 from robocasa_lerobot import contract
 from robocasa_lerobot.errors import UserError
 from robocasa_lerobot.evaluation import published
+from robocasa_lerobot.evaluation.published.places import PERTURBATIONS, Place, places, tables
+from robocasa_lerobot.evaluation.report.joining import join
 from robocasa_lerobot.evaluation.results import UNPERTURBED, PolicyInfo, Results, RunHeader, TrialRecord, read_results
 from robocasa_lerobot.evaluation.statistics import Estimate, Rate, average_over_tasks, success_rate
 from robocasa_lerobot.evaluation.statistics.horizon import time_to_success
@@ -65,11 +67,12 @@ class TaskResult:
         return self.rate.successes, self.rate.trials
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class PolicyResult:
     """All trials of one policy in one run; `folder` is where they and their videos lie.
 
-    `conditions` has the tasks under each perturbation, the unperturbed ones (where there are any) first.
+    `conditions` has the tasks under each perturbation, the unperturbed ones (where there are any) first. One that was
+    joined of several policies (`joining`) has these in `parts`; `folder` is then that of the first.
     """
 
     label: str
@@ -77,6 +80,15 @@ class PolicyResult:
     info: PolicyInfo
     headers: tuple[RunHeader, ...]
     conditions: dict[str, tuple[TaskResult, ...]]
+    parts: tuple[PolicyResult, ...] = ()
+
+    @cached_property
+    def places(self) -> tuple[Place, ...]:
+        """Where the policy stands in the published tables."""
+        one = self.parts[0] if self.parts else self
+        perturbed = len(one.conditions) > 1
+        found = places(one.info, one.header)
+        return tuple(p for p in found if perturbed or tables()[p.table].get("columns_are") != PERTURBATIONS)
 
     @property
     def header(self) -> RunHeader:
@@ -127,11 +139,16 @@ class PolicyResult:
 
 @dataclass(frozen=True)
 class ReportData:
-    """The policies that a report compares, in its order, and the names of their tasks."""
+    """The policies that a report compares, in its order, and the names of their tasks; joined ones count once."""
 
     title: str
     policies: tuple[PolicyResult, ...]
     task_names: tuple[str, ...]
+
+    @property
+    def single(self) -> tuple[PolicyResult, ...]:
+        """The policies as they were evaluated, each with one run's trials."""
+        return tuple(part for policy in self.policies for part in (policy.parts or (policy,)))
 
     @property
     def synthetic(self) -> bool:
@@ -156,7 +173,7 @@ def gather(results: Sequence[Path], title: str | None = None) -> ReportData:
     policies = tuple(policy for folder in results for policy in _read_policies(folder))
     if not policies:
         raise UserError(f"no trials in {', '.join(map(str, results))}: run `robocasa-lerobot eval` first.")
-    policies = _with_distinct_labels(policies)
+    policies = _with_distinct_labels(join(_with_distinct_labels(policies)))
     names = tuple(dict.fromkeys(result.task for policy in policies for result in policy.tasks))
     return ReportData(title or _title(policies, names), policies, names)
 
@@ -221,6 +238,9 @@ def describe_policy(policy: PolicyResult) -> str:
     if info.path in REFERENCES:
         return REFERENCES[info.path]
     facts = [info.type]
+    if policy.parts:
+        phases = [part.info.phase or part.label for part in policy.parts]
+        facts.append(f"{len(policy.parts)} policies ({', '.join(phases)})")
     if info.experiment is not None:
         facts.append(f"experiment {info.experiment}")
     if info.phase is not None:

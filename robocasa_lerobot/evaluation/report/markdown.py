@@ -84,7 +84,7 @@ def _cell(cell: Cell) -> str:
 
 def _videos(data: ReportData, folder: Path) -> list[str]:
     lines = []
-    for policy in data.policies:
+    for policy in data.single:
         for result in policy.tasks:
             for record in result.trials:
                 if record.video is None or not (policy.folder / record.video).is_file():

@@ -1,4 +1,4 @@
-"""`report.html` (one self-contained file), `report.md`, `report.tex` and `report.csv`, all from one document."""
+"""`report.html` (one self-contained file), `.md`, `.tex` and two `.csv`, all from the same data."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ import jinja2
 from markupsafe import Markup
 
 from robocasa_lerobot.errors import UserError
-from robocasa_lerobot.evaluation.report import latex, markdown, tidy
+from robocasa_lerobot.evaluation.report import latex, markdown, tables_csv, tidy
 from robocasa_lerobot.evaluation.report.charts import SERIES
 from robocasa_lerobot.evaluation.report.gather import ReportData
 from robocasa_lerobot.evaluation.report.model import Document, Part
 
 
 def write_report(document: Document, data: ReportData, out: Path) -> list[Path]:
-    """Write `out` (HTML) and its Markdown, LaTeX and CSV beside it; returns all four paths.
+    """Write `out` (HTML) and its Markdown, LaTeX and CSV files beside it; returns all paths.
 
     Raises:
         UserError: `out` does not end in .html.
@@ -31,6 +31,7 @@ def write_report(document: Document, data: ReportData, out: Path) -> list[Path]:
         out.with_suffix(".md"): markdown.render(document, data, out.parent),
         out.with_suffix(".tex"): latex.render(document),
         out.with_suffix(".csv"): tidy.render(data),
+        out.with_name(f"{out.stem}_tables.csv"): tables_csv.render(data),
     }
     for path, text in texts.items():
         _write(path, text)

@@ -32,7 +32,7 @@ def render(data: ReportData) -> str:
     text = io.StringIO()
     writer = csv.DictWriter(text, COLUMNS, lineterminator="\n", restval="")
     writer.writeheader()
-    for policy in data.policies:
+    for policy in data.single:
         for condition, tasks in policy.conditions.items():
             common = {
                 "policy": policy.label,

@@ -8,26 +8,127 @@ from typing import Any
 from robocasa_lerobot.evaluation import published
 from robocasa_lerobot.evaluation.published import Entry, PublishedTable
 from robocasa_lerobot.evaluation.report import format as fmt
-from robocasa_lerobot.evaluation.report.gather import PolicyResult, ReportData, average_of
+from robocasa_lerobot.evaluation.report.gather import PolicyResult, ReportData
+from robocasa_lerobot.evaluation.report.joining import same_training
 from robocasa_lerobot.evaluation.report.model import Cell, Column, Section, Table
+from robocasa_lerobot.evaluation.report.published_cells import OurCell, our_cells
 
-# Target demonstrations per task of the whole benchmark: 100 %.
-ALL_DEMOS = 500
-TARGET_ONLY = "target only"
+# Tables whose columns are kinds of policies or of trials, which are rows on the page, in the order there.
+TRANSPOSED = (
+    "foundation",
+    "multi_task",
+    "pretraining_composition",
+    "scene_diversity",
+    "joint_cotraining",
+    "low_rank",
+)
 SPLITS = {"target": "target scenes", "pretrain": "pretraining scenes"}
 
 
 def section(data: ReportData) -> Section | None:
-    """The group table that fits the run's scenes; None where no policy has half of the tasks of a published group."""
-    policies = [policy for policy in data.policies if _covers_a_group(policy)]
+    """The published tables that policies of the report fill; None where they fill none."""
+    found = [table for name in TRANSPOSED if (table := beside_table(data, name)) is not None]
+    text = (
+        "Each published number with ours beside it, where a policy of this report was trained and evaluated alike. An "
+        "average weighs every task alike; its interval is for exactly these tasks, in kitchens drawn like these. Where "
+        "tasks are missing there is no average, since it would be another number.",
+    )
+    return Section("beside", "Beside the published tables", text, parts=tuple(found)) if found else None
+
+
+def counterpart(policy: PolicyResult, table: PublishedTable) -> Entry | None:
+    """The published column that a policy stands beside, if there is one."""
+    keys = [place.column for place in policy.places if place.table == table.name]
+    return next((column for column in table.columns if column.key in keys), None)
+
+
+def beside_table(data: ReportData, name: str) -> Table | None:
+    """A published table with a row for each published column and each of our policies in it; None without ours."""
+    cells = our_cells(data, name)
+    if not cells:
+        return None
+    table = published.table(name)
+    heads = [Column("ours and published")]
+    for row in table.rows:
+        heads += [Column(row.label, numeric=True, ours=True), Column(row.label, numeric=True, published=True)]
+    rows = []
+    for column in table.columns:
+        for line in _lines([cell for cell in cells if cell.column == column.key]) or [{}]:
+            rows.append(_row(table, column, line))
+    policies = list(dict.fromkeys(cell.policy for cell in cells))
+    return Table(
+        f"beside-{name}",
+        f"{table.title}: ours and published success",
+        tuple(heads),
+        tuple(rows),
+        notes=(f"Published: {table.source}. {table.notes}".strip(),),
+        warnings=(published.DIFFERENT_KITCHENS_SHORT, *differences(policies, table.protocol), *other_types(cells)),
+        cards=True,
+        sortable=False,
+    )
+
+
+def our_cell(cell: OurCell | None) -> Cell:
+    """Ours in a cell: the mean with its interval; how many of its tasks were run, where not all were."""
+    if cell is None:
+        return Cell("")
+    if cell.mean is None:
+        return Cell(fmt.NONE, None, f"partial: {len(cell.tasks)} of {cell.of} tasks")
+    return Cell(fmt.percent(cell.mean.value), cell.mean.value, fmt.interval(cell.mean), strong=True)
+
+
+def published_cell(value: float | None) -> Cell:
+    """A published percentage, or nothing."""
+    return Cell("") if value is None else Cell(fmt.published(value), value / 100)
+
+
+def other_types(cells: Sequence[OurCell]) -> list[str]:
+    """A sentence for each kind of policy of ours that is not the published one of its column."""
+    found: dict[str, None] = {}
+    for cell in cells:
+        wanted, own = published.policy_type(cell.table, cell.column), cell.policy.info.type
+        if own == wanted == published.GR00T:
+            found["Policies differ: ours is GR00T N1.7, which LeRobot has; published is N1.5."] = None
+        elif own != wanted:
+            found[f"Policies differ: ours of the type {own} stands in the place of {wanted}."] = None
+    return list(found)
+
+
+def _lines(cells: Sequence[OurCell]) -> list[dict[str, OurCell]]:
+    """Cells of one published column as rows of the page: those of one training together, two of one place apart."""
+    lines: list[dict[str, OurCell]] = []
+    for cell in cells:
+        for line in lines:
+            other = next(iter(line.values())).policy
+            if cell.row not in line and (other is cell.policy or same_training(other, cell.policy)):
+                line[cell.row] = cell
+                break
+        else:
+            lines.append({cell.row: cell})
+    return lines
+
+
+def _row(table: PublishedTable, column: Entry, line: dict[str, OurCell]) -> tuple[Cell, ...]:
+    labels = dict.fromkeys(cell.policy.label for cell in line.values())
+    out = [Cell(column.label, interval=f"ours: {fmt.listed(list(labels))}" if labels else "")]
+    for row in table.rows:
+        out += [our_cell(line.get(row.key)), published_cell(table.value(row.key, column.key))]
+    return tuple(out)
+
+
+def others(data: ReportData) -> Section | None:
+    """Groups of tasks of policies that are like none of the published ones; None where there are none."""
+    policies = [policy for policy in data.policies if not _stands(policy) and _covers_a_group(policy)]
     if not policies:
         return None
+    text = ("Policies that stand in no published table: their groups of tasks, with published numbers for context.",)
     table = published.table(table_for(policies))
-    text = (
-        "The benchmark's groups of tasks. An average weighs every task alike; its interval is for exactly these tasks, "
-        "in kitchens drawn like these.",
-    )
-    return Section("groups", "Groups of tasks, beside published numbers", text, parts=(_table(data, policies, table),))
+    return Section("groups", "Groups of tasks", text, parts=(_table(data, policies, table),))
+
+
+def _stands(policy: PolicyResult) -> bool:
+    tables = (*TRANSPOSED, "robustness")
+    return any(place.table in tables for place in policy.places) or policy.info.lifelong_phase is not None
 
 
 def table_for(policies: list[PolicyResult]) -> str:
@@ -35,37 +136,20 @@ def table_for(policies: list[PolicyResult]) -> str:
     return "multi_task" if policies[-1].header.split == "pretrain" else "foundation"
 
 
-def counterpart(policy: PolicyResult, table: PublishedTable) -> Entry | None:
-    """The published column that a policy's labels name: with or without pretraining, at the same target data."""
-    if policy.info.demo_fraction is None:
-        return None
-    demos = round(ALL_DEMOS * policy.info.demo_fraction)
-    pretrained = (policy.info.training_data or "").strip().lower() != TARGET_ONLY
-    for column in table.columns:
-        if column.facts.get("target_demos") == demos and column.facts.get("pretrained") is pretrained:
-            return column
-    return None
-
-
 def _table(data: ReportData, policies: list[PolicyResult], table: PublishedTable) -> Table:
     columns = (Column("policy"), *(Column(row.label, numeric=True) for row in table.rows))
-    matched = {policy.label: counterpart(policy, table) for policy in policies}
     rows = []
     for policy in policies:
         cells = [Cell(policy.label, series=data.series(policy))]
         for row in table.rows:
             tasks = policy.group(row.key)
-            if not tasks:
-                cells.append(Cell(fmt.NONE))
-                continue
-            mean, full = average_of(tasks), group_size(row.key)
-            some = "" if len(tasks) == full else f" · {len(tasks)} of {full} tasks"
-            cells.append(Cell(fmt.percent(mean.value), mean.value, fmt.interval(mean) + some, strong=True))
+            cells.append(
+                our_cell(OurCell(table.name, row.key, "", None, policy, tasks, group_size(row.key)))
+                if tasks
+                else Cell(fmt.NONE)
+            )
         rows.append(tuple(cells))
-        column = matched[policy.label]
-        if column is not None:
-            rows.append(_published_row(table, column))
-    rows += [_published_row(table, column) for column in table.columns if column not in matched.values()]
+    rows += [_published_row(table, column) for column in table.columns]
     return Table(
         "groups-published",
         f"{table.title}: ours and published success",
@@ -88,7 +172,7 @@ def _published_row(table: PublishedTable, column: Entry) -> tuple[Cell, ...]:
 
 
 def _covers_a_group(policy: PolicyResult) -> bool:
-    return any(2 * len(policy.group(group)) >= size for group, size in published.GROUPS.items())
+    return any(len(policy.group(group)) == size for group, size in published.GROUPS.items())
 
 
 def group_size(key: str) -> int:

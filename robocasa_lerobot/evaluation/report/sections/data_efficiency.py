@@ -1,83 +1,100 @@
-"""Data efficiency: success against target demonstrations, with and without pretraining."""
+"""Data efficiency: success against target demonstrations, with and without pretraining, per group and on average."""
 
 from __future__ import annotations
-
-import numpy as np
 
 from robocasa_lerobot.evaluation import published
 from robocasa_lerobot.evaluation.report import format as fmt
 from robocasa_lerobot.evaluation.report.charts import Line, line_chart
-from robocasa_lerobot.evaluation.report.gather import PolicyResult, ReportData, average_of
+from robocasa_lerobot.evaluation.report.efficiency_curves import (
+    AVERAGE,
+    Curve,
+    GroupCurves,
+    all_curves,
+    groups,
+    published_percent,
+)
+from robocasa_lerobot.evaluation.report.gather import PolicyResult, ReportData
 from robocasa_lerobot.evaluation.report.model import Cell, Column, Figure, Section, Series, Table
-from robocasa_lerobot.evaluation.report.sections.beside_published import ALL_DEMOS, TARGET_ONLY
-from robocasa_lerobot.evaluation.statistics.data_efficiency import DataWorth, worth_of_pretraining
+from robocasa_lerobot.evaluation.statistics.averages import average_over_tasks
+from robocasa_lerobot.evaluation.statistics.data_efficiency import DataWorth
 
 
 def section(data: ReportData) -> Section | None:
     """None where the labels do not give a curve of several amounts of target data."""
-    only, pretrained = curves(data)
-    if len(only) + len(pretrained) < 3:
+    found = _groups(data)
+    if not found:
         return None
-    worth = _worth(only, pretrained)
-    parts: list[Figure | Table] = [_figure(only, pretrained)]
-    if worth:
-        parts.append(_worth_table(worth))
-    text = (
+    parts: list[Figure | Table] = [_figure(group) for group in found]
+    if any(group.worth() for group in found):
+        parts.append(_worth_table(found))
+    text = [
         "How success grows with target demonstrations, and how many of them the same success would take without "
         "pretraining.",
-    )
-    return Section("data-efficiency", "What pretraining is worth", text, parts=tuple(parts))
+        *_said(data, found),
+    ]
+    return Section("data-efficiency", "What pretraining is worth", tuple(text), parts=tuple(parts))
 
 
 def curves(data: ReportData) -> tuple[dict[int, PolicyResult], dict[int, PolicyResult]]:
-    """Target demonstrations per task -> policy, without and with pretraining."""
-    only: dict[int, PolicyResult] = {}
-    pretrained: dict[int, PolicyResult] = {}
-    for policy in data.policies:
-        if policy.info.demo_fraction is None:
-            continue
-        demos = round(ALL_DEMOS * policy.info.demo_fraction)
-        side = only if (policy.info.training_data or "").strip().lower() == TARGET_ONLY else pretrained
-        side[demos] = policy
-    return dict(sorted(only.items())), dict(sorted(pretrained.items()))
+    """Target demonstrations per task -> policy, without and with pretraining, of the curves that are compared."""
+    only, pretrained = _chosen(data)
+    return (only.points if only else {}), (pretrained.points if pretrained else {})
 
 
 def sentence(data: ReportData) -> str | None:
-    """The worth at the smallest amount of target data, in plain words."""
+    """The worth at the smallest amount of target data, in plain words, for the average where there is one."""
+    for group in _groups(data):
+        for one in group.worth():
+            if one.demos > 0:
+                bound = f"{one.bound} " if one.bound else ""
+                return (
+                    f"With {one.demos} target demonstrations per task the pretrained policy does as well as {bound}"
+                    f"{one.equal_demos:.0f} without pretraining{_range(one)}, on {_which(group)}: pretraining is worth "
+                    f"{bound}{one.factor:.1f} times the target data."
+                )
+    return None
+
+
+def _chosen(data: ReportData) -> tuple[Curve | None, Curve | None]:
+    found = all_curves(data)
+    only = next((curve for curve in found if not curve.pretrained), None)
+    return only, next((curve for curve in found if curve.pretrained), None)
+
+
+def _groups(data: ReportData) -> list[GroupCurves]:
     only, pretrained = curves(data)
-    found = [one for one in _worth(only, pretrained) if one.demos > 0]
-    if not found:
-        return None
-    one = found[0]
-    bound = f"{one.bound} " if one.bound else ""
-    return (
-        f"With {one.demos} target demonstrations per task the pretrained policy does as well as {bound}"
-        f"{one.equal_demos:.0f} without pretraining{_range(one)}: pretraining is worth {bound}{one.factor:.1f} times "
-        "the target data."
-    )
+    return groups(only, pretrained) if len(only) + len(pretrained) >= 3 else []
 
 
-def _worth(only: dict[int, PolicyResult], pretrained: dict[int, PolicyResult]) -> list[DataWorth]:
-    only = {demos: policy for demos, policy in only.items() if demos > 0}
-    if len(only) < 2 or not pretrained:
-        return []
-    tasks = set.intersection(*({r.task for r in p.tasks} for p in (*only.values(), *pretrained.values())))
-    if not tasks:
-        return []
-    counts = [
-        {demos: [r.counts for r in policy.tasks if r.task in tasks] for demos, policy in side.items()}
-        for side in (only, pretrained)
-    ]
-    # A report must say the same each time that it is written.
-    return worth_of_pretraining(counts[0], counts[1], np.random.default_rng(0))
+def _which(group: GroupCurves) -> str:
+    if group.key == AVERAGE:
+        return f"the average over {fmt.count(group.tasks, 'task')}"
+    return f"{fmt.count(group.tasks, 'task')} ({group.label.lower()})"
 
 
-def _figure(only: dict[int, PolicyResult], pretrained: dict[int, PolicyResult]) -> Figure:
+def _said(data: ReportData, found: list[GroupCurves]) -> list[str]:
+    """Which policies are on no curve or not on every one, so that none is left out in silence."""
+    shown = [curve for curve in _chosen(data) if curve is not None]
+    rest = [curve for curve in all_curves(data) if curve not in shown]
+    out = []
+    if rest:
+        names = [f"{curve.label} ({', '.join(f'{demos}' for demos in curve.points)})" for curve in rest]
+        out.append(
+            f"The curves are those of {fmt.listed([curve.label for curve in shown])}. Further policies with their "
+            f"demonstrations per task are in the other tables: {fmt.listed(names, 12)}."
+        )
+    for group in found:
+        if group.left_out:
+            out.append(f"{group.label}: without {fmt.listed(list(group.left_out))}, which lack some of these tasks.")
+    return out
+
+
+def _figure(group: GroupCurves) -> Figure:
     lines, rows = [], []
-    for number, (name, side) in enumerate((("with pretraining", pretrained), ("target data only", only))):
+    for number, (name, side) in enumerate((("with pretraining", group.pretrained), ("target data only", group.only))):
         if not side:
             continue
-        means = {demos: average_of(policy.tasks) for demos, policy in side.items()}
+        means = {demos: average_over_tasks(counts) for demos, counts in side.items()}
         lines.append(
             Line(
                 name,
@@ -95,14 +112,16 @@ def _figure(only: dict[int, PolicyResult], pretrained: dict[int, PolicyResult]) 
                     Cell(name),
                     Cell(f"{demos}", demos),
                     Cell(fmt.percent(mean.value), mean.value, fmt.interval(mean)),
-                    Cell(_published_text(number == 0, demos)),
+                    Cell(_published_text(number == 0, demos, group.key) if group.whole else fmt.NONE),
                 )
             )
+    some = "" if group.whole else f", {group.tasks} of {group.of} tasks"
+    title = f"{group.label}{some}: success against target demonstrations per task"
     svg = line_chart(
-        "data-efficiency-chart",
-        "Success against target demonstrations",
-        "Success averaged over tasks with 95 % intervals, against target demonstrations per task, with and without "
-        "pretraining; the table below has the numbers.",
+        f"data-efficiency-{group.key}-chart",
+        title,
+        f"Success averaged over {fmt.count(group.tasks, 'task')} with 95 % intervals, against target demonstrations "
+        "per task, with and without pretraining; the table below has the numbers.",
         lines,
         "target demonstrations per task",
         "success, %",
@@ -110,66 +129,79 @@ def _figure(only: dict[int, PolicyResult], pretrained: dict[int, PolicyResult]) 
         y_range=(0, 100),
     )
     table = Table(
-        "data-efficiency-numbers",
-        "Success against target demonstrations",
+        f"data-efficiency-{group.key}-numbers",
+        title,
         (
             Column("training"),
             Column("demonstrations per task", numeric=True),
             Column("success", numeric=True),
-            Column("published average", numeric=True, published=True),
+            Column(group.label, numeric=True, published=True),
         ),
         tuple(rows),
-        notes=("Published: GR00T N1.5, average of 50 tasks in target scenes. " + published.DIFFERENT_KITCHENS_SHORT,),
+        notes=("Published: GR00T N1.5 in target scenes. " + published.DIFFERENT_KITCHENS_SHORT,),
     )
     return Figure(
-        "data-efficiency-figure",
-        "Success against target demonstrations per task",
+        f"data-efficiency-{group.key}-figure",
+        f"{group.label}{some}",
         svg,
         table,
-        "Averages over tasks with 95 % intervals.",
+        f"Averages over {fmt.count(group.tasks, 'task')} with 95 % intervals.",
         tuple(Series(line.label, line.series) for line in lines),
     )
 
 
-def _published_text(pretrained: bool, demos: int) -> str:
-    table = published.table("foundation")
-    for column in table.columns:
-        if column.facts["pretrained"] is pretrained and column.facts["target_demos"] == demos:
-            value = table.value("average", column.key)
-            return fmt.NONE if value is None else fmt.published(value)
-    return fmt.NONE
+def _published_text(pretrained: bool, demos: int, key: str = AVERAGE) -> str:
+    value = published_percent(key, pretrained, demos)
+    return fmt.NONE if value is None else fmt.published(value)
 
 
-def _worth_table(worth: list[DataWorth]) -> Table:
-    rows = []
-    for one in worth:
-        factor = fmt.NONE if one.factor is None else f"{_bound(one.bound)}{one.factor:.1f}×"
-        rows.append(
-            (
-                Cell(f"{one.demos}", one.demos),
-                Cell(fmt.percent(one.success), one.success),
-                Cell(f"{_bound(one.bound)}{one.equal_demos:.0f}", one.equal_demos, _ends(one), strong=True),
-                Cell(factor, one.factor, strong=True),
-            )
-        )
+def _worth_table(found: list[GroupCurves]) -> Table:
+    rows = [_worth_row(group, one, group.published_worth().get(one.demos)) for group in found for one in group.worth()]
     return Table(
         "data-worth",
         "How many demonstrations the same success takes without pretraining",
         (
-            Column("target demonstrations per task"),
+            Column("tasks"),
+            Column("target demonstrations per task", numeric=True),
             Column("success", numeric=True),
             Column("equal to, without pretraining", numeric=True),
-            Column("worth", numeric=True),
+            Column("worth", numeric=True, ours=True),
+            Column("worth", numeric=True, published=True),
         ),
         tuple(rows),
         notes=(
             "Read off the curve without pretraining, which is taken as straight between its points on a logarithmic "
             "axis of demonstrations. Beyond its ends only a bound can be said (≥ or ≤). Intervals are 95 %, from "
-            "trials drawn again within tasks.",
-            "Published curves read the same way: 50 demonstrations after pretraining equal 184, worth 3.7×.",
+            "trials drawn again within tasks. The published curves are read the same way.",
         ),
         sortable=False,
     )
+
+
+def _worth_row(group: GroupCurves, one: DataWorth, known: DataWorth | None) -> tuple[Cell, ...]:
+    some = "" if group.whole else f"{group.tasks} of {group.of} tasks"
+    return (
+        Cell(group.label, interval=some),
+        Cell(f"{one.demos}", one.demos),
+        Cell(fmt.percent(one.success), one.success),
+        Cell(f"{_bound(one.bound)}{one.equal_demos:.0f}", one.equal_demos, _ends(one), strong=True),
+        Cell(_factor(one), one.factor, _factor_ends(one), strong=True),
+        Cell(fmt.NONE) if known is None else Cell(_factor(known), known.factor),
+    )
+
+
+def _factor(one: DataWorth) -> str:
+    return fmt.NONE if one.factor is None else f"{_bound(one.bound)}{one.factor:.1f}×"
+
+
+def _factor_ends(one: DataWorth) -> str:
+    if one.low is None or one.high is None or not one.demos:
+        return ""
+    low, high = (
+        f"{_bound(one.low_bound)}{one.low / one.demos:.1f}",
+        f"{_bound(one.high_bound)}{one.high / one.demos:.1f}",
+    )
+    return "" if low == high and one.bound else f"{low} to {high}"
 
 
 def _bound(bound: str | None) -> str:

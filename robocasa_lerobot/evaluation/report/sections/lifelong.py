@@ -2,73 +2,62 @@
 
 from __future__ import annotations
 
-from robocasa_lerobot.data.published import published_task_sets
 from robocasa_lerobot.evaluation import published
 from robocasa_lerobot.evaluation.report import format as fmt
-from robocasa_lerobot.evaluation.report.gather import GROUP_LABELS, LIFELONG_SETS, PolicyResult, ReportData, average_of
+from robocasa_lerobot.evaluation.report.gather import PolicyResult, ReportData
+from robocasa_lerobot.evaluation.report.lifelong_series import LifelongSeries, all_series
 from robocasa_lerobot.evaluation.report.model import Cell, Column, Section, Table
-from robocasa_lerobot.evaluation.report.sections.beside_published import differences
+from robocasa_lerobot.evaluation.report.published_cells import OurCell, our_cells
+from robocasa_lerobot.evaluation.report.sections.beside_published import (
+    differences,
+    other_types,
+    our_cell,
+    published_cell,
+)
 from robocasa_lerobot.evaluation.statistics import Estimate
-from robocasa_lerobot.evaluation.statistics.lifelong import Lifelong, lifelong
+from robocasa_lerobot.evaluation.statistics.lifelong import Lifelong
 
 
 def section(data: ReportData) -> Section | None:
-    """None where fewer than two policies are labelled with the phase that they were trained up to."""
-    policies = policies_by_phase(data)
-    result = matrix(data)
-    if result is None:
+    """None where no policy is labelled with the phase that it was trained up to, or nothing can be said of them."""
+    found = all_series(data)
+    parts: list[Table] = []
+    for number, one in enumerate(found, start=1):
+        result = one.matrix()
+        if result is not None:
+            end = f"-{number}" if len(found) > 1 else ""
+            of = f" of {one.label}" if len(found) > 1 else ""
+            parts += [_heat_map(result, one, end, of), _summary(result, max(result.matrix), end, of)]
+    parts += [table] if (table := _published(data)) is not None else []
+    if not parts:
         return None
-    last = max(result.matrix)
-    parts = (
-        _heat_map(result),
-        _summary(result, last),
-        _published(policies),
-    )
-    text = (
+    text = [
         "Rows are the policy after each phase of training, columns the tasks of each phase. Reading down a column "
         "shows what later phases cost; the diagonal is what a phase reached when it was new.",
-    )
-    return Section("lifelong", "Lifelong learning", text, parts=parts)
-
-
-def policies_by_phase(data: ReportData) -> dict[int, PolicyResult]:
-    """Lifelong phase -> the policy trained up to it."""
-    return {
-        policy.info.lifelong_phase: policy
-        for policy in sorted(data.policies, key=lambda policy: policy.info.lifelong_phase or 0)
-        if policy.info.lifelong_phase is not None
-    }
+    ]
+    text += [
+        f"The phases of {one.label} have other tasks than the published ones, or not all of them: its matrix is to be "
+        "read by itself, not beside the published numbers."
+        for one in found
+        if one.sets and one.other_tasks
+    ]
+    return Section("lifelong", "Lifelong learning", tuple(text), parts=tuple(parts))
 
 
 def matrix(data: ReportData) -> Lifelong | None:
-    """The matrix and its summaries, if there is one."""
-    policies = policies_by_phase(data)
-    counts = {
-        phase: {
-            j: [result.counts for result in policy.group(name)]
-            for j, name in enumerate(LIFELONG_SETS, start=1)
-            if policy.group(name)
-        }
-        for phase, policy in policies.items()
-        if phase > 0
-    }
-    counts = {phase: row for phase, row in counts.items() if row}
-    if len(counts) < 2:
-        return None
-    untrained = policies.get(0)
-    start = (
-        {j: [r.counts for r in untrained.group(name)] for j, name in enumerate(LIFELONG_SETS, 1)} if untrained else {}
-    )
-    return lifelong(counts, {j: tasks for j, tasks in start.items() if tasks})
+    """The matrix of the last training that has one, and its summaries."""
+    found = _with_matrix(data)
+    return found[-1].matrix() if found else None
 
 
 def sentence(data: ReportData) -> str | None:
-    """What was kept and what was lost, in plain words."""
+    """What was kept and what was lost in the last training, in plain words."""
     result = matrix(data)
     if result is None:
         return None
-    last = max(result.matrix)
-    text = f"After phase {last} the policy solves {_with_interval(result.average[last])} averaged over the phases"
+    last, found = max(result.matrix), _with_matrix(data)
+    who = f"the policy of {found[-1].label}" if len(found) > 1 else "the policy"
+    text = f"After phase {last} {who} solves {_with_interval(result.average[last])} averaged over the phases"
     if last in result.forgetting:
         lost = result.forgetting[last]
         text += (
@@ -78,9 +67,9 @@ def sentence(data: ReportData) -> str | None:
     return text + "."
 
 
-def _heat_map(result: Lifelong) -> Table:
+def _heat_map(result: Lifelong, series: LifelongSeries, end: str, of: str) -> Table:
     phases = sorted({j for row in result.matrix.values() for j in row})
-    columns = (Column("trained up to"), *(Column(GROUP_LABELS[LIFELONG_SETS[j - 1]], numeric=True) for j in phases))
+    columns = (Column("trained up to"), *(Column(series.heading(j), numeric=True) for j in phases))
     columns = (*columns, Column("average so far", numeric=True), Column("forgetting, points", numeric=True))
     top = max((one.value for row in result.matrix.values() for one in row.values()), default=0) or 1.0
     rows = []
@@ -106,8 +95,8 @@ def _heat_map(result: Lifelong) -> Table:
         )
         rows.append(tuple(cells))
     return Table(
-        "lifelong-matrix",
-        "Success after each phase on the tasks of each phase",
+        f"lifelong-matrix{end}",
+        f"Success{of} after each phase on the tasks of each phase",
         columns,
         tuple(rows),
         notes=("Darker is more success (lighter in the dark theme). Intervals are 95 %, over exactly these tasks.",),
@@ -115,7 +104,7 @@ def _heat_map(result: Lifelong) -> Table:
     )
 
 
-def _summary(result: Lifelong, last: int) -> Table:
+def _summary(result: Lifelong, last: int, end: str, of: str) -> Table:
     def row(name: str, one: Estimate | None, meaning: str, signed: bool = True) -> tuple[Cell, ...]:
         if one is None:
             return (Cell(name), Cell(fmt.NONE), Cell(meaning))
@@ -142,8 +131,8 @@ def _summary(result: Lifelong, last: int) -> Table:
     )
     columns = (Column("summary"), Column("percent or points", numeric=True), Column("what it is"))
     return Table(
-        "lifelong-summary",
-        "Lifelong learning in four numbers",
+        f"lifelong-summary{end}",
+        f"Lifelong learning{of} in four numbers",
         columns,
         rows,
         notes=(
@@ -154,34 +143,37 @@ def _summary(result: Lifelong, last: int) -> Table:
     )
 
 
-def _published(policies: dict[int, PolicyResult]) -> Table:
+def _with_matrix(data: ReportData) -> list[LifelongSeries]:
+    return [one for one in all_series(data) if one.matrix() is not None]
+
+
+def _published(data: ReportData) -> Table | None:
+    cells = our_cells(data, "lifelong")
+    if not cells:
+        return None
     table = published.table("lifelong")
     columns = [Column("trained")]
     for column in table.columns:
         columns += [Column(column.label, numeric=True, ours=True), Column(column.label, numeric=True, published=True)]
     rows = []
     for row in table.rows:
-        policy = policies.get(int(row.key))
-        cells = [Cell(row.label)]
-        for column in table.columns:
-            tasks = policy.group(column.key) if policy else ()
-            if tasks:
-                mean = average_of(tasks)
-                full = len(published_task_sets()[column.key])
-                some = "" if len(tasks) == full else f"{len(tasks)} of {full} tasks"
-                cells.append(Cell(fmt.percent(mean.value), mean.value, some, strong=True))
-            else:
-                cells.append(Cell(""))
-            value = table.value(row.key, column.key)
-            cells.append(Cell("") if value is None else Cell(fmt.published(value), value / 100))
-        rows.append(tuple(cells))
+        by_policy: dict[PolicyResult, dict[str, OurCell]] = {}
+        for cell in cells:
+            if cell.row == row.key:
+                by_policy.setdefault(cell.policy, {})[cell.column] = cell
+        for policy, own in by_policy.items() or [(None, {})]:
+            line = [Cell(row.label, interval=f"ours: {policy.label}" if policy is not None else "")]
+            for column in table.columns:
+                line += [our_cell(own.get(column.key)), published_cell(table.value(row.key, column.key))]
+            rows.append(tuple(line))
+    policies = list(dict.fromkeys(cell.policy for cell in cells))
     return Table(
         "lifelong-published",
         f"{table.title}: ours and published success",
         tuple(columns),
         tuple(rows),
         notes=(f"Published: {table.source}. {table.notes}",),
-        warnings=(published.DIFFERENT_KITCHENS_SHORT, *differences(list(policies.values()), table.protocol)),
+        warnings=(published.DIFFERENT_KITCHENS_SHORT, *differences(policies, table.protocol), *other_types(cells)),
         sortable=False,
     )
 

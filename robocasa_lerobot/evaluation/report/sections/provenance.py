@@ -15,15 +15,15 @@ MAX_ERRORS = 30
 
 def section(data: ReportData) -> Section:
     """Settings in common first, then each policy."""
-    parts: list[Listing | Block] = [Listing("Settings and versions", tuple(common_settings(data.policies)))]
-    for policy in data.policies:
+    parts: list[Listing | Block] = [Listing("Settings and versions", tuple(common_settings(data.single)))]
+    for policy in data.single:
         items = (
             ("what", describe_policy(policy)),
             ("path", policy.info.path),
             ("weights", f"{policy.info.fingerprint} (SHA-256)"),
             ("results", f"{policy.folder.name}/{TRIALS_FILE}"),
         )
-        parts.append(Listing(policy.label, items, folded=len(data.policies) > 2))
+        parts.append(Listing(policy.label, items, folded=len(data.single) > 2))
     return Section("settings", "Settings and provenance", parts=tuple(parts))
 
 

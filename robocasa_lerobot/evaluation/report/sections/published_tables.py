@@ -7,11 +7,16 @@ from robocasa_lerobot.evaluation.report import format as fmt
 from robocasa_lerobot.evaluation.report.gather import ReportData
 from robocasa_lerobot.evaluation.report.model import Cell, Column, Section, Table
 
+NO_TRIALS = (
+    "Measured on a real robot, of which this project has no trials: constants, with nothing of ours beside them."
+)
+INSPECT = "What lies on this machine: `robocasa-lerobot inspect REGISTRY`."
+
 
 def section(_: ReportData) -> Section:
     """Every table of the paper, and the leaderboard."""
     parts = [_table(name) for name in published.TABLES]
-    parts.append(_leaderboard())
+    parts += [_datasets(), _leaderboard()]
     text = (published.DIFFERENT_KITCHENS,)
     return Section("published", "The benchmark's published results", text, parts=tuple(parts))
 
@@ -26,9 +31,30 @@ def _table(name: str) -> Table:
             value = table.value(row.key, column.key)
             cells.append(Cell("") if value is None else Cell(fmt.published(value), value / 100))
         rows.append(tuple(cells))
+    constants = (NO_TRIALS,) if name == "real_robot" else ()
     protocol = f"{table.source}; {table.protocol['split']} scenes, {table.protocol['trials_per_task']} trials per task."
     return Table(
-        f"published-{name}", table.title, columns, tuple(rows), (f"{protocol} {table.notes}".strip(),), folded=True
+        f"published-{name}",
+        table.title,
+        columns,
+        tuple(rows),
+        (f"{protocol} {table.notes}".strip(), *constants),
+        folded=True,
+    )
+
+
+def _datasets() -> Table:
+    """How much data there is of what, the benchmark's Table 7."""
+    values = published.read("data")
+    names = {"tasks": "tasks", "scenes": "scenes", "demos_per_task": "demonstrations per task", "hours": "hours"}
+    rows = tuple((Cell(row["setting"]), *(Cell(f"{row[key]:,}", row[key]) for key in names)) for row in values["rows"])
+    return Table(
+        "published-data",
+        values["title"],
+        (Column("setting"), *(Column(label, numeric=True, published=True) for label in names.values())),
+        rows,
+        (f"{values['source']}. {values['notes']} {INSPECT}",),
+        folded=True,
     )
 
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from robocasa_lerobot.evaluation import published
 from robocasa_lerobot.evaluation.report import format as fmt
-from robocasa_lerobot.evaluation.report.gather import GROUP_LABELS, PolicyResult, ReportData, average_of, same_trials
+from robocasa_lerobot.evaluation.report.gather import PolicyResult, ReportData, average_of, same_trials
 from robocasa_lerobot.evaluation.report.model import Bar, Cell, Column, Section, Table
-from robocasa_lerobot.evaluation.report.sections.beside_published import differences
+from robocasa_lerobot.evaluation.report.sections.beside_published import beside_table
 from robocasa_lerobot.evaluation.results import UNPERTURBED
 from robocasa_lerobot.evaluation.statistics.paired import Paired, compare
 
@@ -23,7 +23,8 @@ def section(data: ReportData) -> Section | None:
         "the perturbation and not of other scenes.",
     )
     parts = [_table(data, policy) for policy in policies]
-    parts += [table for policy in policies if (table := _published(policy)) is not None]
+    beside = beside_table(data, "robustness")
+    parts += [beside] if beside is not None else []
     return Section("robustness", "Robustness", text, parts=tuple(parts))
 
 
@@ -105,39 +106,4 @@ def _table(data: ReportData, policy: PolicyResult) -> Table:
         tuple(rows),
         notes=("Changes are against the unperturbed trials with the same seeds; intervals are 95 %.",),
         cards=True,
-    )
-
-
-def _published(policy: PolicyResult) -> Table | None:
-    table = published.table("robustness")
-    known = {column.key: column for column in table.columns}
-    names = [name for name in policy.conditions if name in known]
-    groups = [row.key for row in table.rows if policy.group(row.key)]
-    if len(names) < 2 or not groups:
-        return None
-    columns = [Column("perturbation")]
-    for key in groups:
-        label = GROUP_LABELS[key]
-        columns += [Column(label, numeric=True, ours=True), Column(label, numeric=True, published=True)]
-    rows = []
-    for name in names:
-        cells = [Cell(known[name].label)]
-        for key in groups:
-            tasks, value = policy.group(key, name), table.value(key, name)
-            mean = average_of(tasks) if tasks else None
-            cells.append(
-                Cell(fmt.NONE)
-                if mean is None
-                else Cell(fmt.percent(mean.value), mean.value, fmt.interval(mean), strong=True)
-            )
-            cells.append(Cell(fmt.NONE) if value is None else Cell(fmt.published(value), value / 100))
-        rows.append(tuple(cells))
-    return Table(
-        "robustness-published",
-        f"{policy.label}: ours and published success under perturbations",
-        tuple(columns),
-        tuple(rows),
-        notes=(f"Published: {table.source}, GR00T N1.5. {table.notes}",),
-        warnings=(published.DIFFERENT_KITCHENS_SHORT, *differences([policy], table.protocol)),
-        sortable=False,
     )

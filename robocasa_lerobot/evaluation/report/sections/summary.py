@@ -64,7 +64,7 @@ def headline(data: ReportData) -> str:
 
 def what_was_run(data: ReportData) -> str:
     """Policies, tasks, trials, scenes and rules."""
-    policies = data.policies
+    policies = data.single
     trials = sum(r.rate.trials for policy in policies for tasks in policy.conditions.values() for r in tasks)
     per_task = sorted({r.rate.trials for policy in policies for r in policy.tasks})
     each = f"{per_task[0]}" if len(per_task) == 1 else f"{per_task[0]} to {per_task[-1]}"
@@ -90,7 +90,7 @@ def how_sure(data: ReportData) -> str:
 
 def beside(data: ReportData) -> str | None:
     """The published numbers that stand in the tables, and that the kitchens differ."""
-    if not any(policy.group("average") for policy in data.policies) and not lifelong.policies_by_phase(data):
+    if not any(policy.group("average") or policy.places for policy in data.policies):
         return None
     return f"Published results stand beside ours in the tables. {published.DIFFERENT_KITCHENS}"
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from robocasa_lerobot.data.published import TaskFacts, task_facts
 from robocasa_lerobot.evaluation import published
 from robocasa_lerobot.evaluation.report import format as fmt
 from robocasa_lerobot.evaluation.report.gather import PolicyResult, ReportData, TaskResult
@@ -21,13 +22,16 @@ def section(data: ReportData) -> Section:
     )
     roomy = len(data.policies) <= MAX_MARKED_POLICIES
     known = {task: rate for task, rate in published.per_task_rates().items() if task in data.task_names}
+    facts = {task: one for task, one in task_facts().items() if task in data.task_names}
     columns = [Column("task")]
+    columns += [Column("stages", numeric=True), Column("mobile")] if facts else []
     columns += [Column(policy.label, numeric=True, wide=roomy, series=data.series(policy)) for policy in data.policies]
     if known:
         columns.append(Column("best", numeric=True, published=True))
     rows = []
     for task in data.task_names:
         cells = [Cell(task, code=True)]
+        cells += _facts(facts.get(task)) if facts else []
         for policy in data.policies:
             cells.append(_cell(data, policy, policy.task(task), known.get(task), marks))
         if known:
@@ -52,6 +56,13 @@ def section(data: ReportData) -> Section:
     )
     series = tuple(Series(policy.label, data.series(policy)) for policy in data.policies)
     return Section("tasks", "Task by task", parts=(table,), legend=series, marks_legend=marks)
+
+
+def _facts(facts: TaskFacts | None) -> list[Cell]:
+    """How many stages a task has, and whether the base must move."""
+    if facts is None:
+        return [Cell(fmt.NONE), Cell(fmt.NONE)]
+    return [Cell(f"{facts.subtasks}", facts.subtasks), Cell("yes" if facts.mobile else "no", int(facts.mobile))]
 
 
 def _cell(data: ReportData, policy: PolicyResult, result: TaskResult | None, known: float | None, marks: bool) -> Cell:
