@@ -233,7 +233,6 @@ def _rates(about: PolicyInfo, sets: Mapping[str, Sequence[str]], perturbation: s
         "composition_human50": ("pretraining_composition", f"human50_{share}"),
         "composition_human300": ("pretraining_composition", f"human300_{share}"),
         "target_only": ("foundation", f"target_{share}"),
-        "composition_none": ("foundation", f"target_{share}"),
         "multitask_diffusion_policy": ("multi_task", "diffusion_policy"),
         "multitask_pi0": ("multi_task", "pi0"),
         "multitask_pi05": ("multi_task", "pi05"),
@@ -260,7 +259,7 @@ def robustness(folder: Path, count: int = 50) -> list[Path]:
 
 
 def ablations(folder: Path, count: int = 20) -> list[Path]:
-    names = ("composition_none", "composition_human50", "composition_human300", "composition_human300_mg60")
+    names: tuple[str, ...] = ("composition_human50", "composition_human300")
     names += ("scene_diversity_5", "scene_diversity_25", "scene_diversity_2500", "joint_cotraining")
     return [
         run for name in (*names, "multitask_gr00t", "multitask_gr00t_lora") for run in experiment(name, folder, count)

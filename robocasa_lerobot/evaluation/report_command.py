@@ -1,4 +1,4 @@
-"""`robocasa-lerobot report`: write report.html, .md, .tex and .csv from the results of evaluations."""
+"""`robocasa-lerobot report`: write report.html, .md, .tex and two .csv files from the results of evaluations."""
 
 from __future__ import annotations
 

@@ -16,6 +16,7 @@ from robocasa_lerobot.evaluation.results import PolicyInfo, RunHeader
 
 PER_TASK = "per_task"
 PERTURBATIONS = "perturbations"
+_UNPUBLISHED = "unpublished"
 _KEYS = ("experiment", "phase", "type", "protocol", "demo_fraction", "training_data", "lifelong_phase")
 Description = Mapping[str, Sequence[object]]
 
@@ -39,13 +40,12 @@ def places(info: PolicyInfo, header: RunHeader) -> tuple[Place, ...]:
 
 @functools.cache
 def tables() -> dict[str, dict[str, Any]]:
-    """The content of `places.yaml` by table.
+    """The tables of `places.yaml` by name.
 
     Raises:
         UserError: a table, column, row or key that there is not.
     """
-    text = resources.files(__package__).joinpath("places.yaml").read_text(encoding="utf-8")
-    found: dict[str, dict[str, Any]] = yaml.safe_load(text)
+    found = {name: table for name, table in _content().items() if name != _UNPUBLISHED}
     for name, table in found.items():
         published = read(name)
         for part in ("columns", "rows"):
@@ -61,7 +61,14 @@ def tables() -> dict[str, dict[str, Any]]:
 @functools.cache
 def named_experiments() -> frozenset[str]:
     """The experiments that `places.yaml` names; other experiments' policies are placed by their labels."""
-    return frozenset(str(name) for one in _descriptions(tables()) for name in one.get("experiment", ()))
+    own = (str(name) for one in _descriptions(tables()) for name in one.get("experiment", ()))
+    return frozenset((*own, *_content()[_UNPUBLISHED]))
+
+
+@functools.cache
+def _content() -> dict[str, Any]:
+    text = resources.files(__package__).joinpath("places.yaml").read_text(encoding="utf-8")
+    return dict(yaml.safe_load(text))
 
 
 def _descriptions(found: Mapping[str, Mapping[str, Any]]) -> Iterator[Description]:

@@ -170,7 +170,8 @@ def gather(results: Sequence[Path], title: str | None = None) -> ReportData:
     Raises:
         UserError: a folder without results, an empty results file, or a file that cannot be read.
     """
-    policies = tuple(policy for folder in results for policy in _read_policies(folder))
+    once = {folder.resolve(): folder for folder in results}  # a run that is named twice is one
+    policies = tuple(policy for folder in once.values() for policy in _read_policies(folder))
     if not policies:
         raise UserError(f"no trials in {', '.join(map(str, results))}: run `robocasa-lerobot eval` first.")
     policies = _with_distinct_labels(join(_with_distinct_labels(policies)))

@@ -104,13 +104,13 @@ def _label(group: Sequence[PolicyResult]) -> str:
     return ", ".join(word for word in words if word)
 
 
-def _order(policy: PolicyResult) -> tuple[int, int, int]:
-    """Policies without a place first, as they came; then in the order of the published columns and rows."""
+def _order(policy: PolicyResult) -> tuple[int, ...]:
+    """Policies without a place first, as they came, then perturbed ones; then in the order of the published columns."""
     found = policy.places
     if not found:
-        return (-1, -1, -1)
+        return (0,)
     names, first = list(tables()), found[0]
     table = tables()[first.table]
     column = list(table.get("columns", ())).index(first.column) if first.column is not None else -1
     row = list(table.get("rows", ())).index(first.row) if first.row is not None else -1
-    return (names.index(first.table), column, row)
+    return (1 if len(policy.conditions) > 1 else 2, names.index(first.table), column, row)

@@ -22,6 +22,7 @@ TRANSPOSED = (
     "joint_cotraining",
     "low_rank",
 )
+LONGER_HORIZONS = "1.0.1"  # release of RoboCasa that multiplied them by 1.5
 SPLITS = {"target": "target scenes", "pretrain": "pretraining scenes"}
 
 
@@ -196,6 +197,8 @@ def differences(policies: Sequence[PolicyResult], protocol: Mapping[str, Any]) -
             found[f"Horizons differ: {who} are {horizon_phrase(policy)}, published are each task's own."] = None
         elif header.horizon_multiplier != 1.0:
             found[f"Horizons differ: {who} are {header.horizon_multiplier:g} times each task's own."] = None
+        elif header.horizon_version == LONGER_HORIZONS and "horizon_note" in protocol:
+            found[f"Horizons differ: {protocol['horizon_note']}"] = None
         if header.success_rule != "any_step" or header.success_hold_steps > 1:
             found[f"Success differs: {who} {success_phrase(policy)}, published at any step."] = None
     return list(found)
