@@ -41,6 +41,9 @@ SUBCOMMANDS: dict[str, Subcommand] = {
     "render": Subcommand(
         "robocasa_lerobot.convert.commands.render", "render a dataset again with other cameras, sizes or presets"
     ),
+    "data": Subcommand(
+        "robocasa_lerobot.making.command", "list the data that an experiment needs, and make what is missing"
+    ),
     "train": Subcommand("robocasa_lerobot.training.command", "run the training phases of an experiment file"),
     "eval": Subcommand("robocasa_lerobot.evaluation.command", "run seeded trials of a policy and report"),
     "report": Subcommand("robocasa_lerobot.evaluation.report_command", "compare runs: report.html, .md, .tex and .csv"),

@@ -34,6 +34,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     "demos": BASE | {"envs", "convert"},
     "training": BASE | {"data", "policies"},
     "evaluation": BASE | {"envs", "convert", "data", "policies", "demos"},  # demos: a reference policy
+    "making": BASE | {"envs", "convert", "data", "demos", "training"},  # data that an experiment needs
     "plugins": BASE | LOW | {"demos", "training", "evaluation"},
     "doctor": BASE,
     "cli": BASE,  # and the command modules, by name

@@ -105,6 +105,12 @@ DOWNLOADS: dict[tuple[str, str], str] = {
     ("pretrain", "mg"): "python -m robocasa.scripts.download_datasets --split pretrain --source mimicgen",
     ("target", "human"): "python -m robocasa.scripts.download_datasets --split target --source human",
 }
+# Demonstrations of each task; OpenCabinet has half as many of MimicGen's.
+DEMONSTRATIONS: dict[tuple[str, str], int] = {
+    ("pretrain", "human"): 100,
+    ("pretrain", "mg"): 10_000,
+    ("target", "human"): 500,
+}
 PUBLISHED_VIEWS = "lerobot"  # last name of the folders that are downloads
 
 

@@ -1,0 +1,72 @@
+"""How long our demonstrators and the conversion take, and what comes of it on disk: measured means, no promises.
+
+On two cores of an AMD EPYC without a GPU: demonstrations by `make bench-demonstrators` (65 tasks, 2,600 trials:
+`benchmarks/results/demonstrators.json`), drawing and encoding by `make bench-convert` (states of 256 pixels in two
+processes: `benchmarks/results/convert_speed.json`; smaller pictures are not slower), sizes of three tasks' datasets at
+128 pixels that `robocasa-lerobot data --make` made.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+from robocasa_lerobot.data.published import task_facts
+from robocasa_lerobot.making.needs import Need
+
+SECONDS_PER_DEMONSTRATION = 4.3  # of one core, failed attempts included: 844.5 an hour
+STEPS_PER_DEMONSTRATION = 160  # mean of the tasks' medians: 8.0 s
+STEPS_PER_SECOND = 53.0  # of one core, with three cameras
+BYTES_PER_STEP = 6_000
+BYTES_PER_EPISODE = 500_000  # scene, textures and states, kept so that it can be drawn again
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """Of several datasets: demonstrations, steps, hours on so many cores, and bytes.
+
+    Attributes:
+        demonstrations, frames: in all.
+        recording_hours, converting_hours: on `cores`; of downloads None.
+        size: bytes on disk; of downloads None.
+        cores: of this machine, or as many as asked for.
+    """
+
+    demonstrations: int
+    frames: int
+    recording_hours: float
+    converting_hours: float
+    size: int
+    cores: int
+
+
+def cores_here() -> int:
+    """Cores that this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def estimate(needs: Iterable[Need], cores: int) -> Estimate:
+    """What making the datasets takes; those that are drawn again are not recorded."""
+    recorded = demonstrations = 0
+    for need in needs:
+        count = need.demonstrations or 0
+        demonstrations += count
+        recorded += count if need.redrawn is None else 0
+    frames = demonstrations * STEPS_PER_DEMONSTRATION
+    return Estimate(
+        demonstrations,
+        frames,
+        recorded * SECONDS_PER_DEMONSTRATION / cores / 3600,
+        frames / STEPS_PER_SECOND / cores / 3600,
+        frames * BYTES_PER_STEP + demonstrations * BYTES_PER_EPISODE,
+        cores,
+    )
+
+
+def published_hours(needs: Iterable[Need]) -> float:
+    """Hours of demonstrations in published datasets, from the mean length of each task's."""
+    facts = task_facts()
+    return (
+        sum((need.demonstrations or 0) * facts[need.task].human_seconds for need in needs if need.task in facts) / 3600
+    )

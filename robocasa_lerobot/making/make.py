@@ -1,0 +1,161 @@
+"""Recording and converting what an experiment lacks, by the recipes of its registries."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import shutil
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from robocasa_lerobot.convert.running.executors import Execution
+from robocasa_lerobot.data.published import dataset_version
+from robocasa_lerobot.data.recipes import RecipeConfig
+from robocasa_lerobot.demos.attempts import Parts, RecordingSettings
+from robocasa_lerobot.making.needs import WORK, Need
+from robocasa_lerobot.making.pieces import Outcome, run_pieces
+
+_PRELOAD = ("robocasa_lerobot.envs.kitchen_env", "robocasa_lerobot.convert.shard")
+_HALF = 0.5  # of the work on a dataset is recording, half drawing and encoding
+
+
+@dataclass(frozen=True)
+class MadeDataset:
+    """A piece: a dataset that is recorded and converted, and those that are drawn again from it.
+
+    Attributes:
+        need: the dataset.
+        drawn: the others.
+        replace: make those anew that have fewer demonstrations than asked for.
+        keep: leave the HDF5 file that was recorded.
+    """
+
+    need: Need
+    drawn: tuple[Need, ...] = ()
+    replace: bool = False
+    keep: bool = False
+
+    @property
+    def name(self) -> str:
+        """Its folder."""
+        return str(self.need.root)
+
+    @property
+    def work(self) -> Path:
+        """Recordings and the log."""
+        return self.need.work.absolute()
+
+    @property
+    def size(self) -> int:
+        """Demonstrations, those that are drawn again counted again."""
+        return sum(need.demonstrations or 0 for need in (self.need, *self.drawn))
+
+    def done(self) -> float:
+        """Demonstrations that are recorded count half until their dataset is there."""
+        count = sum(need.demonstrations or 0 for need in (self.need, *self.drawn) if not self._lacks(need))
+        if not self._lacks(self.need):
+            return count
+        settings = recording_settings(self.need)
+        if (self.work / f"{settings.task}.hdf5").exists():
+            return _HALF * settings.episodes
+        recorded = sum(1 for _ in Parts(self.work, settings).folder.glob("[0-9]*.hdf5"))
+        return _HALF * min(recorded, settings.episodes)
+
+    def make(self, workers: int) -> None:
+        """Record, convert, and draw again; what is there is left alone.
+
+        Raises:
+            UserError: too many attempts failed, or a dataset of other making is in the way.
+        """
+        if self._lacks(self.need):
+            self._record_and_convert(workers)
+        for need in self.drawn:
+            if self._lacks(need):
+                self._draw_again(need, workers)
+
+    def _lacks(self, need: Need) -> bool:
+        if dataset_version(need.root) != "v3.0":
+            return True
+        if not self.replace:
+            return False
+        info = json.loads((need.root / "meta/info.json").read_text(encoding="utf-8"))
+        return int(info["total_episodes"]) < (need.demonstrations or 0)
+
+    def _record_and_convert(self, workers: int) -> None:
+        from robocasa_lerobot.convert.pipeline import convert
+        from robocasa_lerobot.convert.settings import ConversionSettings
+        from robocasa_lerobot.demos.record import record_task
+
+        recorded = record_task(recording_settings(self.need), self.work, workers=workers, show_progress=False)
+        self.need.root.parent.mkdir(parents=True, exist_ok=True)
+        settings = ConversionSettings(image_size=_recipe(self.need).image_size)
+        convert([recorded.path], self.need.root, settings, workers, overwrite=self.replace)
+        if self.keep:
+            kept = self.need.root.with_name(f"{self.need.root.name}.hdf5")
+            shutil.move(recorded.path, kept)
+
+    def _draw_again(self, need: Need, workers: int) -> None:
+        from robocasa_lerobot.convert.rerender.camera_configs import camera_set
+        from robocasa_lerobot.convert.rerender.plan import RenderSettings
+        from robocasa_lerobot.convert.rerender.work import render_dataset
+
+        need.root.parent.mkdir(parents=True, exist_ok=True)
+        configs = camera_set(str(_recipe(need).camera_set))
+        settings = RenderSettings(cam_configs=json.dumps(configs, sort_keys=True))
+        render_dataset(self.need.root, need.root, settings, workers, overwrite=self.replace)
+
+
+def recording_settings(need: Need) -> RecordingSettings:
+    """What `demos` records for a dataset."""
+    recipe = _recipe(need)
+    return RecordingSettings(
+        need.task,
+        need.demonstrations or 1,
+        split=need.split,
+        seed=recipe.seed,
+        action_noise=recipe.action_noise,
+        layouts=tuple(recipe.layouts) if recipe.layouts is not None else None,
+        styles=tuple(recipe.styles) if recipe.styles is not None else None,
+        varied=recipe.varied,
+    )
+
+
+def pieces_of(needs: Sequence[Need], replace: bool = False, keep: bool = False) -> list[MadeDataset]:
+    """The pieces that make what is missing, or has too few demonstrations, of what recipes can make."""
+    made = [need for need in needs if need.made is not None]
+    pieces = [
+        MadeDataset(need, tuple(other for other in made if other.redrawn == need.root), replace, keep)
+        for need in made
+        if need.redrawn is None
+    ]
+    return [piece for piece in pieces if any(piece._lacks(need) for need in (piece.need, *piece.drawn))]
+
+
+def make_datasets(pieces: Sequence[MadeDataset], execution: Execution, cores: int) -> Outcome:
+    """Make them; see `run_pieces`."""
+    from robocasa_lerobot.gl import ensure_gl
+
+    if execution.kind == "local":
+        ensure_gl()
+    root = pieces[0].need.registry_root
+    outcome = run_pieces(pieces, root / WORK, execution, cores, "making", "demo", _PRELOAD)
+    if not outcome.submitted:
+        _clear_empty(root / WORK)
+    return outcome
+
+
+def _clear_empty(folder: Path) -> None:
+    """Remove folders in which nothing is left."""
+    for path in sorted(folder.rglob("*"), reverse=True):
+        if path.is_dir():
+            with contextlib.suppress(OSError):
+                path.rmdir()
+    with contextlib.suppress(OSError):
+        folder.rmdir()
+
+
+def _recipe(need: Need) -> RecipeConfig:
+    assert need.made is not None
+    assert need.made.make is not None
+    return need.made.make

@@ -1,0 +1,150 @@
+"""Which datasets an experiment needs, what of them is there, and how many demonstrations our recipes would record."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from robocasa_lerobot.data.config import MixtureConfig
+from robocasa_lerobot.data.published import DEMONSTRATIONS, DatasetEntry, dataset_version
+from robocasa_lerobot.data.registry import Registry, missing_datasets, open_registry, select_datasets
+from robocasa_lerobot.data.registry_file import TASK, RegisteredDataset
+from robocasa_lerobot.errors import UnknownNameError, UserError
+from robocasa_lerobot.training.config import ExperimentConfig
+from robocasa_lerobot.training.skipped import Skipped
+from robocasa_lerobot.training.unavailable import runnable
+
+WORK = ".making"  # in the root of a registry: recordings and logs of datasets that are being made
+
+
+@dataclass(frozen=True)
+class Content:
+    """What of a dataset is there: demonstrations, steps and bytes on disk."""
+
+    episodes: int
+    frames: int
+    size: int
+
+
+@dataclass(frozen=True)
+class Need:
+    """A dataset that an experiment needs.
+
+    Attributes:
+        group: what it is listed under: the `path` of a registry, or split and source of published data.
+        task, split, source: what is in it.
+        root: its folder.
+        missing: what to do if it is not there; None where it is.
+        demonstrations: how many there should be; None where nobody says.
+        made: how our demonstrators make it, if they do.
+        registry_root: folder of the registry that it is from.
+        redrawn: the dataset whose episodes are drawn again for it, if it is made so.
+    """
+
+    group: str
+    task: str
+    split: str
+    source: str
+    root: Path
+    missing: str | None
+    demonstrations: int | None = None
+    made: RegisteredDataset | None = None
+    registry_root: Path = Path()
+    redrawn: Path | None = None
+
+    @property
+    def work(self) -> Path:
+        """Folder for what is recorded of it, and for the log."""
+        return self.registry_root / WORK / self.root.relative_to(self.registry_root)
+
+    def content(self) -> Content | None:
+        """What is there, if it is."""
+        if dataset_version(self.root) != "v3.0":
+            return None
+        info = json.loads((self.root / "meta/info.json").read_text(encoding="utf-8"))
+        size = sum(file.stat().st_size for file in self.root.rglob("*") if file.is_file())
+        return Content(int(info["total_episodes"]), int(info["total_frames"]), size)
+
+
+def needs_of(
+    experiment: ExperimentConfig, episodes: Mapping[str, int] | None = None
+) -> tuple[list[Need], list[Skipped]]:
+    """The datasets of all phases that can run, each once, and what is left out or partial.
+
+    Args:
+        experiment: what is to be trained.
+        episodes: demonstrations of each kind of dataset, over those that the registries say.
+
+    Raises:
+        UserError: a selection does not fit its registry, or `episodes` has a kind that none of them has.
+    """
+    part, said = runnable(experiment)
+    found: dict[tuple[Path, str, str, str], Need] = {}  # what is missing of published data has no folders yet
+    kinds: set[str] = set()
+    for mixture in [phase.mixture for phase in part.phases]:
+        for selection in mixture.select:
+            registry = open_registry(selection.registry)
+            kinds |= set(registry.config.episodes)
+            numbers = {**registry.config.episodes, **(episodes or {})}
+            for entry in select_datasets(selection):
+                for need in _needs_of_entry(entry, registry, numbers):
+                    found.setdefault((need.root, need.task, need.split, need.source), need)
+        alone = MixtureConfig(members=mixture.members) if mixture.members else None
+        lacking = {entry.root: entry for entry in missing_datasets(alone)} if alone else {}
+        for member in mixture.members:
+            root = Path(member.root)
+            tasks = "+".join(member.tasks or ["all tasks"])
+            missing = lacking[root].missing if root in lacking else None
+            need = Need(str(root), tasks, "-", "member", root, missing)
+            found.setdefault((root, tasks, "-", "member"), need)
+    unknown = sorted(set(episodes or ()) - kinds)
+    if unknown and kinds:
+        raise UnknownNameError("kind of dataset", unknown[0], kinds, "(in --episodes)")
+    if unknown:
+        raise UserError("--episodes is of datasets that our demonstrators make; this experiment has none.")
+    return list(found.values()), said
+
+
+def _needs_of_entry(entry: DatasetEntry, registry: Registry, numbers: Mapping[str, int]) -> list[Need]:
+    """The need of a registry's entry; before it, that of the dataset that is drawn again for it."""
+    dataset, root = entry.registered, Path(registry.config.root)
+    if dataset is None:
+        group, count = f"published {entry.split}, {entry.source}", DEMONSTRATIONS.get((entry.split, entry.source))
+        return [Need(group, entry.task, entry.split, entry.source, entry.root, entry.missing, count, None, root)]
+    need = Need(dataset.path, entry.task, dataset.split, dataset.source, entry.root, entry.missing, registry_root=root)
+    if dataset.make is None:
+        return [need]
+    need = dataclasses.replace(need, demonstrations=numbers[dataset.make.episodes], made=dataset)
+    if dataset.make.redraw is None:
+        return [need]
+    source = _dataset_of_path(registry.config.datasets, dataset.make.redraw)
+    (before,) = registry.find([entry.task], source.split, source.source, source.views)
+    return [
+        *_needs_of_entry(before, registry, numbers),
+        dataclasses.replace(need, redrawn=before.root),
+    ]
+
+
+def _dataset_of_path(datasets: Sequence[RegisteredDataset], path: str) -> RegisteredDataset:
+    for dataset in datasets:
+        if dataset.path == path and dataset.make is not None and TASK in path:
+            return dataset
+    raise UnknownNameError("dataset", path, [dataset.path for dataset in datasets], "(`redraw` of a recipe)")
+
+
+def parse_episodes(text: str) -> dict[str, int]:
+    """`human=20,mg=40` as numbers by kind.
+
+    Raises:
+        UserError: it is written otherwise, or a number is below 1.
+    """
+    out: dict[str, int] = {}
+    for part in text.split(","):
+        kind, equals, number = part.strip().partition("=")
+        if not (kind and equals and number.strip().isdigit() and int(number) > 0):
+            raise UserError(f"--episodes: {part!r} is not KIND=NUMBER, as in human=20,mg=40,target=20.")
+        out[kind] = int(number)
+    return out

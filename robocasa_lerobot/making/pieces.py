@@ -1,0 +1,176 @@
+"""Datasets made one after the other by several processes: on this machine, on a Slurm cluster, or with Ray.
+
+A piece is one dataset, or one and what is drawn again from it. What a piece cannot make it says in a file, and the
+others go on. Nothing but the datasets themselves says what is done, so the same command takes up the rest.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import shutil
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import Any, Protocol
+
+from robocasa_lerobot.convert.running.executors import Execution, run_with_ray, submit_to_slurm
+from robocasa_lerobot.errors import UserError
+from robocasa_lerobot.parallel import PoolExecutor, polled
+from robocasa_lerobot.progress import Bar
+
+FAILED, LOG = "failed.txt", "log.txt"
+_LOGS = "slurm"
+
+
+class Piece(Protocol):
+    """Work that leaves datasets."""
+
+    @property
+    def name(self) -> str:
+        """For people, and different from all others."""
+        ...
+
+    @property
+    def work(self) -> Path:
+        """Folder of its own for what is on the way."""
+        ...
+
+    @property
+    def size(self) -> int:
+        """How much there is to do, in the unit of the bar."""
+        ...
+
+    def done(self) -> float:
+        """How much of `size` has been done."""
+        ...
+
+    def make(self, workers: int) -> None:
+        """Do it, or what is lacking of it."""
+        ...
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What came of the pieces: the failed ones with their reasons; `submitted` where nothing was waited for."""
+
+    failed: dict[str, str]
+    submitted: str = ""
+
+
+def run_piece(data: Any, rank: int = 0, world_size: int = 1, *, pieces: Sequence[Piece], workers: int) -> None:
+    """Make one of the pieces, in datatrove's calling convention; what it prints goes to its log."""
+    piece = pieces[rank]
+    piece.work.mkdir(parents=True, exist_ok=True)
+    note = piece.work / FAILED
+    note.unlink(missing_ok=True)
+    with (piece.work / LOG).open("a", encoding="utf-8") as log, contextlib.redirect_stderr(log):
+        try:
+            piece.make(workers)
+        except UserError as error:
+            aside = note.with_suffix(".partial")
+            aside.write_text(str(error), encoding="utf-8")
+            aside.replace(note)
+            return
+    shutil.rmtree(piece.work, ignore_errors=True)
+
+
+def run_pieces(
+    pieces: Sequence[Piece],
+    folder: Path,
+    execution: Execution,
+    cores: int,
+    what: str,
+    unit: str,
+    preload: Sequence[str],
+) -> Outcome:
+    """Run the pieces, each in a process of its own; with fewer pieces than cores one after the other on all of them.
+
+    Args:
+        pieces: what is to be made.
+        folder: for logs and completion markers; it goes when all is done.
+        execution: local, Ray (both wait), or Slurm (submits, and the last job sums up).
+        cores: processes of this machine.
+        what: title of the bar.
+        unit: what the bar counts.
+        preload: modules with slow imports.
+
+    Raises:
+        UserError: a process died, or the executor is not there or refuses.
+    """
+    names = "\n".join(piece.name for piece in pieces)
+    logs = folder / hashlib.sha256(names.encode()).hexdigest()[:12]
+    logs.mkdir(parents=True, exist_ok=True)
+    if execution.kind == "slurm":
+        step = partial(run_piece, pieces=pieces, workers=execution.slurm.cpus)
+        last = partial(_summed_up, pieces, logs)
+        array, final = submit_to_slurm(step, last, len(pieces), logs, folder / _LOGS, execution.slurm)
+        line = (
+            f"submitted to Slurm: {len(pieces)} pieces in job {array}, summed up by job {final}; see {folder / _LOGS}"
+        )
+        return Outcome({}, line)
+    with _progress(pieces, what, unit):
+        if execution.kind == "ray":
+            step = partial(run_piece, pieces=pieces, workers=execution.ray.cpus)
+            run_with_ray(step, len(pieces), logs, execution.ray)
+        else:
+            _run_here(pieces, logs, cores, preload)
+    return _outcome(pieces, logs)
+
+
+def _run_here(pieces: Sequence[Piece], logs: Path, cores: int, preload: Sequence[str]) -> None:
+    if len(pieces) < cores or cores == 1:
+        for rank in range(len(pieces)):
+            run_piece(None, rank, pieces=pieces, workers=cores)
+        return
+    PoolExecutor(
+        pipeline=[partial(run_piece, pieces=pieces, workers=1)],
+        tasks=len(pieces),
+        workers=cores,
+        skip_completed=False,  # the datasets are the markers
+        logging_dir=str(logs),
+        preload=list(preload),
+    ).run()
+
+
+def _outcome(pieces: Sequence[Piece], logs: Path) -> Outcome:
+    notes = {piece.name: piece.work / FAILED for piece in pieces}
+    failed = {name: note.read_text(encoding="utf-8") for name, note in notes.items() if note.is_file()}
+    shutil.rmtree(logs, ignore_errors=True)
+    return Outcome(failed)
+
+
+def _summed_up(pieces: Sequence[Piece], logs: Path) -> None:
+    """What Slurm's last job prints."""
+    for line in outcome_lines(_outcome(pieces, logs)):
+        print(line)
+
+
+def outcome_lines(outcome: Outcome) -> list[str]:
+    """For people."""
+    if outcome.submitted:
+        return [outcome.submitted]
+    return [f"not made: {name}: {reason}" for name, reason in outcome.failed.items()]
+
+
+@contextlib.contextmanager
+def _progress(pieces: Sequence[Piece], what: str, unit: str) -> Iterator[None]:
+    done: dict[str, float] = {}
+
+    def show(bar: Any) -> Callable[[], None]:
+        def count() -> None:
+            for piece in pieces:
+                if done.get(piece.name, 0) < piece.size:
+                    with contextlib.suppress(OSError):
+                        done[piece.name] = piece.done()
+            bar.n = int(sum(done.values()))
+            bar.refresh()
+
+        return count
+
+    with Bar(total=sum(piece.size for piece in pieces), unit=unit, desc=what, smoothing=0.05) as bar:
+        update = show(bar)
+        with polled(update):
+            yield
+        update()
