@@ -93,10 +93,12 @@ def test_lifelong_phases_are_evaluated_on_the_tasks_so_far() -> None:
 
 @pytest.mark.parametrize("path", EXPERIMENTS, ids=name_of)
 def test_experiment_plans(path: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Without any data, and without the policies' weights: the plan says what is missing, and sizes every policy."""
+    """Without any data, and for the published ones without the policies' weights: the plan says what is missing."""
     plan = pytest.importorskip("robocasa_lerobot.training.plan")
     plan_text = pytest.importorskip("robocasa_lerobot.training.plan_text")
     monkeypatch.chdir(tmp_path)  # there are no datasets here
+    if path not in OWN:  # building pi0 takes minutes even without memory for its weights
+        monkeypatch.setattr(plan, "_plan_policy", lambda *_: None)
     experiment = load_experiment(path, ["--device=cpu"])
     plans = plan.plan_experiment(experiment, measured_steps=0)
     assert [p.phase.name for p in plans] == [phase.name for phase in experiment.phases]
@@ -105,7 +107,7 @@ def test_experiment_plans(path: Path, tmp_path: Path, monkeypatch: pytest.Monkey
         assert f"{p.phase.name} <- " in text
         assert f"{p.samples:,} samples" in text or p.left_out in text
         assert p.missing or p.left_out or path.name == "debug.yaml"
-        assert p.left_out or p.parameters is not None, p.notes
+        assert path not in OWN or p.left_out or p.parameters is not None, p.notes
 
 
 @pytest.mark.parametrize("path", OWN, ids=name_of)

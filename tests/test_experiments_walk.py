@@ -15,12 +15,16 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
+from walk_numbers import expected_cells, shown_cells, with_known_numbers
 from walk_support import EPISODES, LENGTH, ROOT, SCALE, Walked, Walker, steps_of, write_datasets, write_hub, write_log
 
 from robocasa_lerobot.evaluation import published
+from robocasa_lerobot.evaluation.results import read_results
 from robocasa_lerobot.training.config import ExperimentConfig, load_experiment
+from robocasa_lerobot.training.evaluations import phase_evaluations
 from robocasa_lerobot.training.scale import load_scale
 from robocasa_lerobot.training.skipped import PHASE, read
+from robocasa_lerobot.training.unavailable import runnable
 
 EXPERIMENTS = ROOT / "configs/experiments"
 PATHS = sorted(path for path in EXPERIMENTS.rglob("*.yaml") if "parts" not in path.relative_to(EXPERIMENTS).parts)
@@ -44,6 +48,15 @@ class Walk:
     walker: Walker
     found: dict[Path, Future[Walked]]
 
+    def run(self, members: dict[Path, ExperimentConfig]) -> None:
+        for path, experiment in members.items():
+            if not self.found[path].set_running_or_notify_cancel():
+                continue
+            try:
+                self.found[path].set_result(self.walker.walk(path, experiment, name_of(path), SECONDS))
+            except BaseException as error:  # the test of this file raises it
+                self.found[path].set_exception(error)
+
     def of(self, path: Path) -> Walked:
         return self.found[path].result()
 
@@ -52,39 +65,68 @@ class Walk:
 def walk(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Walk]:
     """The walk through the files that were asked for, two at once; all data lie in one working directory."""
     asked = {item.callspec.params.get("path") for item in request.session.items if hasattr(item, "callspec")}
-    paths = [path for path in PATHS if path in asked]
+    experiments = {path: scaled(path) for path in PATHS if path in asked}
     base = tmp_path_factory.mktemp("walk")
     work, before = base / "work", Path.cwd()
     work.mkdir()
-    experiments = {path: scaled(path) for path in paths}
     os.chdir(work)  # registries count from the working directory
     try:
         write_datasets(work, experiments.values())
     finally:
         os.chdir(before)
-    walker = Walker(work, write_hub(base / "hub"))
+    walk = Walk(Walker(work, write_hub(base / "hub")), {path: Future() for path in experiments})
     with ThreadPoolExecutor(AT_ONCE) as pool:
-        found = {path: pool.submit(walker.walk, path, experiments[path], SECONDS) for path in paths}
-        yield Walk(walker, found)
-        for future in found.values():
+        running = [pool.submit(walk.run, members) for members in groups(experiments)]
+        yield walk
+        for future in (*running, *walk.found.values()):
             future.cancel()
-    write_log({name_of(p): f.result() for p, f in found.items() if not f.cancelled() and not f.exception()})
+    write_log(f.result() for f in walk.found.values() if f.done() and not f.cancelled() and not f.exception())
+
+
+def groups(experiments: dict[Path, ExperimentConfig]) -> list[dict[Path, ExperimentConfig]]:
+    """Experiments that share a folder, one after the other; the groups with most phases come first."""
+    found: dict[str, dict[Path, ExperimentConfig]] = {}
+    for path, experiment in experiments.items():
+        found.setdefault(experiment.output_dir, {})[path] = experiment
+    return sorted(found.values(), key=lambda group: -sum(len(one.phases) for one in group.values()))
 
 
 @pytest.mark.timeout(2 * 3600)
 @pytest.mark.parametrize("path", PATHS, ids=name_of)
 def test_experiment_walks(path: Path, walk: Walk) -> None:
-    walked, experiment = walk.of(path), scaled(path)
+    walked = walk.of(path)
+    experiment, left_out = runnable(scaled(path))
     out = walk.walker.work / experiment.output_dir
-    left_out = {item.phase for item in read(out) if item.kind == PHASE}
-    assert walked.killed_in is not None, "it ended before the kill"
-    assert f"phase {walked.killed_in}: going on from step" in walked.output
+    if walked.finished_before != walked.phases:
+        assert walked.killed_in is not None, "it ended before the kill"
+        assert f"phase {walked.killed_in}: going on from step" in walked.output
+    skipped = read(out)
+    assert {item.phase for item in skipped if item.kind == PHASE} == {i.phase for i in left_out if i.kind == PHASE}
     for phase in experiment.phases:
-        if phase.name in left_out:
-            assert not (out / phase.name / "checkpoints").exists()
-            continue
-        assert (out / phase.name / f"checkpoints/{phase.steps:06d}/pretrained_model/model.safetensors").is_file()
-        assert steps_of(out / phase.name) == list(range(1, phase.steps + 1))
+        folder = out / phase.name
+        assert (folder / f"checkpoints/{phase.steps:06d}/pretrained_model/model.safetensors").is_file()
+        assert steps_of(folder) == list(range(1, phase.steps + 1))
+        for evaluation in phase_evaluations(phase):
+            results = folder / "evaluations" / evaluation.file.stem
+            if any((item.phase, item.evaluation) == (phase.name, evaluation.file.stem) for item in skipped):
+                continue
+            trials = read_results(results).trials
+            assert trials
+            assert {trial.error for trial in trials} == {None}
+
+
+@pytest.mark.timeout(2 * 3600)
+@pytest.mark.parametrize("kind", ["robocasa365", "small"])
+def test_every_number_stands_in_its_row_and_published_column(kind: str, walk: Walk, tmp_path: Path) -> None:
+    """One report of all that was walked of a kind, with successes that tell every policy and task apart."""
+    folders = {f: None for path in walk.found if path.parent.name == kind for f in walk.of(path).results}
+    if not folders:
+        pytest.skip(f"no experiment of {kind} was asked for")
+    known = with_known_numbers(list(folders), tmp_path / "known")
+    walk.walker.report(known, tmp_path / "report.html", SECONDS)
+    shown, expected = shown_cells(tmp_path / "report_tables.csv"), expected_cells(known)
+    assert expected
+    assert {key: round(value, 3) for key, value in shown.items()} == pytest.approx(expected, abs=1e-3)
 
 
 def test_limits_shrink_with_the_data() -> None:

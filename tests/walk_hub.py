@@ -90,7 +90,10 @@ def write_pi(kind: str) -> Callable[[Path], None]:
 
 
 def write_paligemma(folder: Path) -> None:
-    write_tokenizer(folder)  # all that is loaded of it
+    from transformers import PaliGemmaConfig
+
+    write_tokenizer(folder)
+    PaliGemmaConfig().save_pretrained(folder)  # says which tokenizer it is; its weights are never loaded
 
 
 def qwen_config() -> Any:

@@ -9,7 +9,7 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -17,6 +17,8 @@ from robocasa_lerobot.data.config import ROBOCASA365, MixtureConfig
 from robocasa_lerobot.data.fake import write_fake_dataset
 from robocasa_lerobot.data.registry import missing_datasets, select_datasets
 from robocasa_lerobot.training.config import ExperimentConfig
+from robocasa_lerobot.training.phases import is_finished
+from robocasa_lerobot.training.unavailable import runnable
 
 ROOT = Path(__file__).parents[1]
 SCALE = ROOT / "configs/scales/tiny.yaml"
@@ -31,6 +33,7 @@ class Walked:
 
     name: str
     phases: list[str]
+    finished_before: list[str]  # by another experiment in the same folder
     killed_in: str | None = None
     minutes: float = 0.0
     output: str = ""
@@ -40,11 +43,11 @@ class Walked:
 def write_datasets(work: Path, experiments: Iterable[ExperimentConfig]) -> dict[Path, tuple[str, ...]]:
     """Make every dataset that the experiments miss in the folder `work`, and tell the tasks of each.
 
-    What is missing is what the experiments' own mixtures and registries say, seen from `work`.
+    What is missing is what the mixtures and registries of their phases that can run say, in the working directory.
     """
     tasks: dict[Path, dict[str, None]] = {}
     for experiment in experiments:
-        for phase in experiment.phases:
+        for phase in runnable(experiment)[0].phases:
             for place, task in _missing(phase.mixture):
                 tasks.setdefault(place, {})[task] = None
     written: dict[tuple[str, ...], Path] = {}
@@ -95,34 +98,35 @@ class Walker:
     def __init__(self, work: Path, home: Path) -> None:
         self.work, self.home = work, home
 
-    def walk(self, path: Path, experiment: ExperimentConfig, seconds: float = 900) -> Walked:
+    def walk(self, path: Path, experiment: ExperimentConfig, name: str, seconds: float) -> Walked:
         """Train and evaluate the experiment of a file, killed once in the middle, and report.
 
         `experiment` is what the file says at this scale. Raises an AssertionError with the output of what failed.
         """
-        began = time.monotonic()
-        walked = Walked(experiment.name, [phase.name for phase in experiment.phases])
-        log = self.work / f"{experiment.name}.log"
+        began, out = time.monotonic(), self.work / experiment.output_dir
+        phases = runnable(experiment)[0].phases
+        before = [phase.name for phase in phases if is_finished(out, phase)]
+        walked = Walked(name, [phase.name for phase in phases], before)
+        log = self.work / f"{name.replace('/', '__')}.log"
         command = [str(ROOT / "train.py"), "--config_path", str(path), "--evaluate", "--scale", str(SCALE)]
-        middle = experiment.phases[len(experiment.phases) // 2]
-        checkpoint = self.work / experiment.output_dir / middle.name / f"checkpoints/{middle.save_every:06d}"
-        if self._run(command, log, seconds, kill_at=checkpoint):
-            walked.killed_in = middle.name
-            self._run(command, log, seconds)
+        ahead = [phase for phase in phases if phase.name not in before]
+        if ahead:
+            middle = ahead[len(ahead) // 2]
+            if self._run(command, log, seconds, kill_at=out / middle.name / f"checkpoints/{middle.save_every:06d}"):
+                walked.killed_in = middle.name
+        self._run(command, log, seconds)
         walked.output = log.read_text(encoding="utf-8")
-        walked.results = sorted(
-            p.parent for p in (self.work / experiment.output_dir).glob("*/evaluations/*/trials.jsonl")
-        )
+        found = [results for phase in phases for results in (out / phase.name / "evaluations").glob("*/trials.jsonl")]
+        walked.results = sorted(results.parent for results in found)
         if walked.results:
-            out = self.work / experiment.output_dir / "report.html"
-            self.report(walked.results, out, seconds)
+            self.report(walked.results, log.with_suffix(".html"), seconds)
         walked.minutes = (time.monotonic() - began) / 60
         return walked
 
-    def report(self, results: Sequence[Path], out: Path, seconds: float = 900) -> None:
+    def report(self, results: Sequence[Path], out: Path, seconds: float) -> None:
         """`robocasa-lerobot report` of the results."""
         command = ["-m", "robocasa_lerobot.cli", "report", *map(str, results), "--out", str(out)]
-        self._run(command, out.with_suffix(".log"), seconds)
+        self._run(command, out.with_name(f"{out.stem}.report.log"), seconds)
 
     def _run(self, arguments: Sequence[str], log: Path, seconds: float, kill_at: Path | None = None) -> bool:
         """Run a command to its end, or kill it as soon as the folder `kill_at` is there; returns whether it was."""
@@ -156,15 +160,15 @@ def steps_of(folder: Path) -> list[int]:
     return [json.loads(line)["step"] for line in (folder / "metrics.jsonl").read_text().splitlines()]
 
 
-def write_log(found: Mapping[str, Walked]) -> None:
+def write_log(walked: Iterable[Walked]) -> None:
     """File, phases, evaluations and minutes of what was walked, at $WALK_LOG (.md), and for machines beside it."""
-    target = os.environ.get("WALK_LOG")
+    target, found = os.environ.get("WALK_LOG"), list(walked)
     if not target or not found:
         return
-    rows = [(name, len(w.phases), len(w.results), w.killed_in or "-", f"{w.minutes:.1f}") for name, w in found.items()]
+    rows = [(w.name, len(w.phases), len(w.results), w.killed_in or "-", f"{w.minutes:.1f}") for w in found]
     lines = ["| file | phases | evaluations | killed in | minutes |", "|---|---|---|---|---|"]
     lines += [f"| {' | '.join(map(str, row))} |" for row in rows]
-    total = sum(w.minutes for w in found.values())
+    total = sum(w.minutes for w in found)
     lines.append(
         f"| {len(rows)} files | {sum(row[1] for row in rows)} | {sum(row[2] for row in rows)} | | {total:.1f} |"
     )

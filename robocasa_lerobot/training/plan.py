@@ -20,22 +20,18 @@ from robocasa_lerobot.data.fake import write_fake_dataset
 from robocasa_lerobot.data.mixture import MixtureMeta
 from robocasa_lerobot.data.registry import missing_datasets
 from robocasa_lerobot.errors import UserError
-from robocasa_lerobot.training import builders, features, joining
-from robocasa_lerobot.training.adapters import apply_training_scope
+from robocasa_lerobot.training import builders, joining
 from robocasa_lerobot.training.checkpoint import checkpoint_step, last_checkpoint
 from robocasa_lerobot.training.config import FROM_SCRATCH, ExperimentConfig, PhaseConfig
 from robocasa_lerobot.training.evaluations import phase_evaluations
 from robocasa_lerobot.training.loop import train_phase
-from robocasa_lerobot.training.master_weights import half_parameters
 from robocasa_lerobot.training.metrics import METRICS, read_lines
 from robocasa_lerobot.training.prepare import planned_policy, prepare_phase
 from robocasa_lerobot.training.skipped import PHASE
 from robocasa_lerobot.training.unavailable import runnable
-from robocasa_lerobot.training.weightless import without_weights
 
 MEASURED_STEPS = 20
 _LARGEST_ON_CPU = 2e8  # parameters; 20 steps of more take hours without an accelerator
-WEIGHTS = "model.safetensors"
 _IMAGE_SIZE = 256  # pixels of the published datasets and ours
 
 
@@ -50,7 +46,6 @@ class PhasePlan:
         frames: of its data, or None where some are missing.
         missing: its datasets that are not there, each with how to get it.
         parameters: of its policy, and those of them that are trained; None where it cannot be built here.
-        memory_bytes: on the device, of weights, gradients, optimiser and averages; activations come on top.
         checkpoint_bytes: size of a checkpoint, and `kept` how many stay.
         cache_bytes: decoded frames on disk.
         seconds: per optimiser step on this device, without waiting for data; None where not measured.
@@ -65,7 +60,6 @@ class PhasePlan:
     frames: int | None = None
     missing: list[str] = field(default_factory=list)
     parameters: tuple[int, int] | None = None
-    memory_bytes: int | None = None
     checkpoint_bytes: int | None = None
     kept: int = 1
     cache_bytes: int = 0
@@ -84,17 +78,10 @@ class PhasePlan:
         return None if self.seconds is None else self.seconds * (self.phase.steps - self.done) / 3600
 
 
-@dataclass(frozen=True)
-class _Sizes:
-    parameters: tuple[int, int]
-    memory_bytes: int
-    checkpoint_bytes: int
-
-
 def plan_experiment(
     experiment: ExperimentConfig, only: str | None = None, measured_steps: int = MEASURED_STEPS
 ) -> list[PhasePlan]:
-    """The plan of each phase, or of one; nothing is trained, downloaded or written in `output_dir`.
+    """The plan of each phase, or of one; nothing is trained or written in `output_dir`.
 
     Args:
         experiment: what to plan.
@@ -105,7 +92,7 @@ def plan_experiment(
         UserError: a mistake in the settings. Missing data or weights are not one: the plan tells of them.
     """
     device = builders.best_device(experiment.device)
-    plans, measured, sizes = [], dict[str, float | str](), dict[str, _Sizes | str]()
+    plans, measured = [], dict[str, float | str]()
     whole, (experiment, said) = experiment, runnable(experiment)
     for asked in [whole.phase(only)] if only is not None else whole.phases:
         about = [item for item in said if item.phase == asked.name]
@@ -114,7 +101,7 @@ def plan_experiment(
             plans.append(PhasePlan(asked, depth, start, left_out=" ".join(item.reason for item in about)))
             continue
         phase = experiment.phase(asked.name)
-        plan = _plan_phase(experiment, phase, device, sizes)
+        plan = _plan_phase(experiment, phase, device)
         plan.notes += [item.reason for item in about]
         if measured_steps and plan.parameters is not None and plan.done < phase.steps:
             if device == "cpu" and plan.parameters[0] > _LARGEST_ON_CPU:
@@ -130,42 +117,29 @@ def plan_experiment(
     return plans
 
 
-def _plan_phase(
-    experiment: ExperimentConfig, phase: PhaseConfig, device: str, sizes: dict[str, _Sizes | str]
-) -> PhasePlan:
+def _plan_phase(experiment: ExperimentConfig, phase: PhaseConfig, device: str) -> PhasePlan:
     last = last_checkpoint(Path(experiment.output_dir) / phase.name)
     done = min(checkpoint_step(last), phase.steps) if last is not None else 0
     plan = PhasePlan(phase, len(experiment.ancestors(phase)), experiment.init_of(phase), done)
     phase_evaluations(phase)
-    meta = _plan_data(experiment, phase, plan)
-    settings, checkpoint = planned_policy(experiment, phase, offline=True)
-    if checkpoint is None and "type" not in settings:
-        plan.notes.append(
-            "the policy's type is in the config.json of its start on the hub, which is not downloaded yet"
-        )
+    _plan_data(experiment, phase, plan)
+    try:
+        settings, checkpoint = planned_policy(experiment, phase)
+        config = builders.policy_config(settings, checkpoint, device)
+    except UserError as error:
+        if not experiment.init_of(phase).startswith("hub:") and "hub" not in str(error):
+            raise
+        plan.notes.append(str(error))
         return plan
-    config = builders.policy_config(settings, checkpoint, device)
-    if checkpoint is not None and meta is not None:
-        features.check_features(config, meta)
-    meta = meta or _made_up_meta(_IMAGE_SIZE)
-    key = json.dumps([_what_a_step_is(experiment, phase), str(meta.features)])
-    if key not in sizes:
-        sizes[key] = _sizes(config, phase, meta)
-    found = sizes[key]
-    if isinstance(found, str):
-        plan.notes.append(found)
-        return plan
-    plan.parameters, plan.memory_bytes = found.parameters, found.memory_bytes
-    plan.checkpoint_bytes, plan.kept = found.checkpoint_bytes, _checkpoints_kept(phase)
+    _plan_policy(config, phase, plan)
     return plan
 
 
-def _plan_data(experiment: ExperimentConfig, phase: PhaseConfig, plan: PhasePlan) -> MixtureMeta | None:
-    """Notes what is missing, or frames and their cache; returns what is known of the data."""
+def _plan_data(experiment: ExperimentConfig, phase: PhaseConfig, plan: PhasePlan) -> None:
     for mixture in [phase.mixture, *(other.mixture for other in experiment.replayed(phase))]:
         plan.missing += [f"{e.task} ({e.split}, {e.source}): {e.missing}" for e in missing_datasets(mixture)]
     if plan.missing:
-        return None
+        return
     dataset = joining.open_phase_data(experiment, phase)
     plan.frames = dataset.meta.total_frames
     loader = experiment.loader
@@ -174,34 +148,36 @@ def _plan_data(experiment: ExperimentConfig, phase: PhaseConfig, plan: PhasePlan
     cache *= int(size[0]) * int(size[1])
     fits = cache <= loader.cache_budget_gb * 1e9
     plan.cache_bytes = cache if loader.cache_frames or (loader.cache_frames is None and fits) else 0
-    return dataset.meta
 
 
-def _sizes(config: Any, phase: PhaseConfig, meta: MixtureMeta) -> _Sizes | str:
-    """Sizes of the policy, which is built without memory for its weights, and without loading any; or why not."""
+def _plan_policy(config: Any, phase: PhaseConfig, plan: PhasePlan) -> None:
+    """Sizes of the policy, which is built without memory for its weights."""
     device, config.device = config.device, "meta"
-    if getattr(config, "pretrained_backbone_weights", None) is not None:
-        config.pretrained_backbone_weights = None  # of a ResNet, which has its sizes without them
-    features.fit_features(config, meta)
     try:
-        with without_weights(), torch.device("meta"):
-            policy = builders.make_phase_policy(config, meta, None)
-        total = sum(p.numel() for p in policy.parameters())
-        apply_training_scope(policy, phase, seed=0)
+        with torch.device("meta"):
+            policy = builders.make_phase_policy(config, _made_up_meta(_IMAGE_SIZE), None)
     except Exception as error:  # policies of LeRobot raise all kinds where weights or packages are missing
-        return f"the policy {config.type!r} cannot be built here: {_first_line(error)}"
+        plan.notes.append(f"the policy {config.type!r} cannot be built here: {_first_line(error)}")
+        return
     finally:
         config.device = device
-    live = [p for p in policy.parameters() if p.requires_grad]
-    trained, gradients = sum(p.numel() for p in live), sum(p.nbytes for p in live)
-    weights = sum(p.nbytes for p in policy.parameters())
-    half = sum(p.numel() for p in half_parameters(policy))
-    adam, masters = 8 * trained, 4 * half  # two float32 states each; `master_weights.py`
-    average = 4 * trained if phase.ema.enabled else 0
-    apart = average if half or phase.lora is not None else 0
-    raw = weights if phase.ema.enabled or phase.lora is not None else 0
-    memory = weights + gradients + adam + masters + average
-    return _Sizes((total, trained), memory, weights + raw + adam + masters + apart)
+    total = sum(p.numel() for p in policy.parameters())
+    trained = total
+    if phase.freeze or phase.lora is not None:
+        trained = _trained(policy, phase)
+    plan.parameters = (total, trained)
+    bytes_ = sum(p.numel() * p.element_size() for p in policy.parameters())
+    two_states = 8 * trained  # Adam's, float32
+    raw = bytes_ if phase.ema.enabled or phase.lora is not None else 0
+    plan.checkpoint_bytes = bytes_ + raw + two_states
+    plan.kept = _checkpoints_kept(phase)
+
+
+def _trained(policy: torch.nn.Module, phase: PhaseConfig) -> int:
+    from robocasa_lerobot.training.adapters import apply_training_scope
+
+    apply_training_scope(policy, phase, seed=0)
+    return sum(p.numel() for p in policy.parameters() if p.requires_grad)
 
 
 def _checkpoints_kept(phase: PhaseConfig) -> int:
@@ -213,8 +189,7 @@ def _checkpoints_kept(phase: PhaseConfig) -> int:
 
 
 def _what_a_step_is(experiment: ExperimentConfig, phase: PhaseConfig) -> str:
-    settings, checkpoint = planned_policy(experiment, phase, offline=True)
-    settings = {name: value for name, value in settings.items() if name != "max_steps"}  # a step is the same
+    settings, checkpoint = planned_policy(experiment, phase)
     names = ("batch_size", "gradient_accumulation", "freeze", "lora", "augment", "compile", "ema")
     asked = dataclasses.asdict(phase)
     return json.dumps([settings, str(checkpoint), {name: asked[name] for name in names}], sort_keys=True, default=str)
@@ -222,12 +197,7 @@ def _what_a_step_is(experiment: ExperimentConfig, phase: PhaseConfig) -> str:
 
 def _measure(experiment: ExperimentConfig, phase: PhaseConfig, device: str, steps: int) -> float | str:
     """Seconds per step, the median after the first quarter; or why there are none."""
-    settings, checkpoint = planned_policy(experiment, phase, offline=True)
-    if checkpoint is not None and not (checkpoint / WEIGHTS).is_file():  # on the hub; random ones take as long
-        settings, checkpoint = {**builders.read_config(checkpoint), **settings}, None
-        settings = {
-            name: value for name, value in settings.items() if name not in ("input_features", "output_features")
-        }
+    settings, checkpoint = planned_policy(experiment, phase)
     with tempfile.TemporaryDirectory(prefix="plan_") as folder:
         size = experiment.loader.image_size or _IMAGE_SIZE
         data = write_fake_dataset(Path(folder) / "fake", episodes=2, length=64, image_size=size)
@@ -248,8 +218,7 @@ def _measure(experiment: ExperimentConfig, phase: PhaseConfig, device: str, step
         trial = dataclasses.replace(experiment, output_dir=folder, phases=[alone], loader=loader, trackers=[])
         accelerator = Accelerator(cpu=device == "cpu", mixed_precision=experiment.mixed_precision)
         try:
-            with without_weights():
-                run = prepare_phase(trial, alone, device, accelerator)
+            run = prepare_phase(trial, alone, device, accelerator)
             run.save = False
             train_phase(run, accelerator)
         except (UserError, RuntimeError) as error:  # too little memory is a RuntimeError

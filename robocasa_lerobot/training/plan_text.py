@@ -56,8 +56,6 @@ def _phase_lines(experiment: ExperimentConfig, plan: PhasePlan) -> list[str]:
     if plan.checkpoint_bytes is not None:
         size = f"{plan.checkpoint_bytes / 1e9:,.2f} GB"
         lines.append(f"  disk: {plan.kept} checkpoint(s) of {size}, frame cache {plan.cache_bytes / 1e9:,.2f} GB")
-    if plan.memory_bytes is not None:
-        lines.append(f"  memory: {plan.memory_bytes / 1e9:,.2f} GB for weights, gradients, optimiser and average")
     if plan.hours is not None and plan.seconds is not None:
         lines.append(f"  time: {plan.seconds:.3f} s per step, {plan.hours:,.1f} h to go")
     return [lines[0], *(indent + line for line in lines[1:])]

@@ -24,7 +24,6 @@ from robocasa_lerobot.training.held_out import HeldOut, held_out_frames, without
 from robocasa_lerobot.training.loop import PhaseRun
 from robocasa_lerobot.training.master_weights import MasterWeights
 from robocasa_lerobot.training.metrics import truncate_metrics
-from robocasa_lerobot.training.weightless import policy_architecture
 
 
 def prepare_phase(
@@ -147,11 +146,8 @@ def planned_policy(
     """
     parent = experiment.parent(phase)
     if parent is None:
-        init, settings = experiment.init_of(phase), policy_settings(experiment, phase)
-        checkpoint = None if init == FROM_SCRATCH else _config_folder(init, offline)
-        if checkpoint is None:
-            settings = {**policy_architecture(init.removeprefix(HUB)), **settings}
-        return settings, checkpoint
+        init = experiment.init_of(phase)
+        return policy_settings(experiment, phase), None if init == FROM_SCRATCH else _config_folder(init, offline)
     settings, checkpoint = planned_policy(experiment, parent, offline)
     return {**settings, **policy_settings(experiment, phase)}, checkpoint
 

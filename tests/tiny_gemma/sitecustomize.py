@@ -44,10 +44,10 @@ def known_to_model(module: Any) -> None:
     own, paligemma = module.get_gemma_config, module.PaliGemmaForConditionalGenerationWithPiGemma
     gemma = module.PiGemmaForCausalLM
 
-    def get_gemma_config(variant: str) -> Any:
+    def get_gemma_config(variant: str) -> Any:  # eight heads are written into the networks
         if variant != VARIANT:
             return own(variant)
-        return module.GemmaConfig(width=WIDTH, depth=2, mlp_dim=WIDTH, num_heads=2, num_kv_heads=1, head_dim=16)
+        return module.GemmaConfig(width=WIDTH, depth=2, mlp_dim=WIDTH, num_heads=8, num_kv_heads=1, head_dim=8)
 
     class Sized(paligemma):  # type: ignore[misc, valid-type]
         def __init__(self, config: Any) -> None:
