@@ -13,11 +13,12 @@ from training_support import TINY
 from robocasa_lerobot import contract
 from robocasa_lerobot.data.config import MixtureConfig
 from robocasa_lerobot.data.registry_file import load_registry
+from robocasa_lerobot.evaluation.check import check
 from robocasa_lerobot.evaluation.config import EvaluationConfig
 from robocasa_lerobot.evaluation.overrides import load_config
 from robocasa_lerobot.training import overlay, skipped
 from robocasa_lerobot.training.config import FROM_SCRATCH, HUB, ExperimentConfig, load_experiment, to_yaml
-from robocasa_lerobot.training.evaluations import phase_evaluations
+from robocasa_lerobot.training.evaluations import command_arguments, phase_evaluations
 
 CONFIGS = Path(__file__).parents[1] / "configs"
 PARTS = CONFIGS / "experiments" / "parts"  # bases that are no experiments by themselves
@@ -69,15 +70,16 @@ def test_every_experiment_has_its_own_folder_and_name_but_parts_of_others() -> N
 @pytest.mark.parametrize("path", EXPERIMENTS, ids=name_of)
 def test_evaluations_of_an_experiment_are_evaluations(path: Path) -> None:
     """As the command of an evaluation reads them; of the benchmark's protocols, each simulated experiment has one."""
-    found = []
-    for phase in load_experiment(path).phases:
+    found, experiment = [], load_experiment(path)
+    for phase in experiment.phases:
         for evaluation in phase_evaluations(phase):
-            arguments = ["--config_path", str(evaluation.file), "--policy.path=checkpoint", *evaluation.settings]
-            config = load_config(EvaluationConfig, arguments)
-            assert config.policy.path == ["checkpoint"]
-            found.append(config)
+            arguments = command_arguments(experiment, phase, evaluation)
+            assert check(arguments).mistake is None
+            found.append(load_config(EvaluationConfig, arguments))
     if path.parent.name == "robocasa365" and path.stem not in ("real_only", "sim_and_real"):
-        assert {config.protocol for config in found} <= {"leaderboard", "foundation", "lifelong", "robustness"}
+        # The paper's protocols: 30 trials of each task; the leaderboard's 50 are for submissions.
+        assert {config.trials for config in found} == {30}
+        assert {config.protocol for config in found} <= {"paper", "foundation", "lifelong", "robustness"}
         assert found
     twin = path.parent.with_name("robocasa365") / path.name
     if path.parent.name == "small" and twin.is_file():  # what fills the report's tables is the same

@@ -16,11 +16,12 @@ from robocasa_lerobot import contract
 from robocasa_lerobot.envs.registry import task_names
 from robocasa_lerobot.errors import UserError
 from robocasa_lerobot.evaluation import checkpoints, results, trials_file
-from robocasa_lerobot.evaluation.config import EvaluationConfig
+from robocasa_lerobot.evaluation.config import EvaluationConfig, PolicySettings
 from robocasa_lerobot.evaluation.overrides import load_config
 from robocasa_lerobot.evaluation.plan import make_plan, trial_seed
 from robocasa_lerobot.evaluation.resolve import outcome_settings, plan_tasks
 from robocasa_lerobot.evaluation.results import PolicyInfo, ResultsError, RunHeader, Seconds, TermSummary, TrialRecord
+from robocasa_lerobot.evaluation.serving import served_labels
 from robocasa_lerobot.evaluation.statistics import success_rate, wilson_interval
 
 ROOT = Path(__file__).parents[1]
@@ -327,6 +328,50 @@ def test_policies_of_different_picture_sizes_do_not_share_an_evaluation(tmp_path
     assert checkpoints.common_image_size(sources, 96) == 96
     assert checkpoints.common_image_size(sources[:1], None) == 64
     assert checkpoints.common_image_size([checkpoints.read_source("zero")], None) == contract.IMAGE_SIZE
+
+
+def hub_checkpoint(folder: Path, rename: dict[str, str], **config: Any) -> Path:
+    """As pi0's weights on the hub: cameras of another robot at 224 pixels, and what LeRobot saves to rename ours."""
+    folder.mkdir()
+    slots = ("base_0_rgb", "left_wrist_0_rgb", "empty_camera_0")
+    features = {f"observation.images.{name}": {"type": "VISUAL", "shape": [3, 224, 224]} for name in slots}
+    features["observation.state"] = {"type": "STATE", "shape": [32]}
+    (folder / "config.json").write_text(json.dumps({"type": "pi0", "input_features": features, **config}))
+    (folder / "model.safetensors").write_bytes(b"w")
+    step = {"registry_name": "rename_observations_processor", "config": {"rename_map": rename}}
+    (folder / "policy_preprocessor.json").write_text(json.dumps({"steps": [step]}))
+    return folder
+
+
+def test_cameras_of_other_names_are_those_that_the_saved_preprocessor_renames(tmp_path: Path) -> None:
+    rename = {contract.IMAGE_KEYS[0]: "observation.images.base_0_rgb"}
+    source = checkpoints.read_source(str(hub_checkpoint(tmp_path / "renamed", rename)))
+    assert checkpoints.common_image_size([source], None) == 224
+    with pytest.raises(UserError, match=r"base_0_rgb.* renames none of these"):
+        checkpoints.read_source(str(hub_checkpoint(tmp_path / "not", {})))
+
+
+def test_policies_are_served_by_one_process_for_each_gpu_where_a_chunk_follows_from_one_look(tmp_path: Path) -> None:
+    kinds = ("act", "diffusion_transformer", "flow_vla", "groot", "pi0", "pi05", "smolvla", "xvla")
+    rename = {contract.IMAGE_KEYS[0]: "observation.images.base_0_rgb"}
+    for kind in kinds:
+        folder = hub_checkpoint(tmp_path / kind, rename, type=kind)
+        sources = {kind: checkpoints.read_source(str(folder), kind)}
+        assert served_labels(sources, PolicySettings(path=[kind]), "cuda") == {kind}
+        assert served_labels(sources, PolicySettings(path=[kind]), "cpu") == set()
+    for number, changes in enumerate(({"n_obs_steps": 2}, {"temporal_ensemble_coeff": 0.01}, {"type": "diffusion"})):
+        folder = hub_checkpoint(tmp_path / str(number), rename, **{"type": "act", **changes})
+        assert served_labels({"p": checkpoints.read_source(str(folder))}, PolicySettings(path=["p"]), "cuda") == set()
+
+
+def test_noise_for_a_whole_batch_is_drawn_for_one_observation_at_a_time() -> None:
+    config = load_config(EvaluationConfig, ["--policy.path=x", "--env.tasks=A"])
+
+    def width(*kinds: str, device: str = "cuda") -> int:
+        return int(outcome_settings(config, 64, device, kinds)["batch_width"])
+
+    assert [width(kind) for kind in ("act", "flow_vla", "groot", "pi0", "smolvla")] == [8, 8, 1, 1, 1]
+    assert (width("flow_vla", "groot"), width("flow_vla", device="cpu")) == (1, 1)
 
 
 def test_the_saved_configuration_loads_again(tmp_path: Path) -> None:

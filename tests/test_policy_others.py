@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import math
+import os
+import subprocess
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -21,9 +24,11 @@ from robocasa_lerobot import contract
 from robocasa_lerobot.data.fake import write_fake_dataset
 from robocasa_lerobot.data.mixture import MixtureMeta
 from robocasa_lerobot.errors import UserError
+from robocasa_lerobot.evaluation.actor import chunk_seed
 from robocasa_lerobot.evaluation.checkpoints import read_source
+from robocasa_lerobot.evaluation.chunk_policy import STATELESS_TYPES, ChunkPolicy, LoadedCheckpoint
 from robocasa_lerobot.evaluation.plan import make_plan
-from robocasa_lerobot.evaluation.policy_runner import load_actor
+from robocasa_lerobot.evaluation.policy_runner import StepPolicy, load_actor
 from robocasa_lerobot.evaluation.rollout import run_trial
 from robocasa_lerobot.policies.needs import NEEDS, explained
 from robocasa_lerobot.training import builders, prepare
@@ -195,7 +200,38 @@ def test_two_steps_and_two_more_equal_four_and_a_trial(kind: str, data: Path, tm
         assert actions[-1].shape == (6, contract.ACTION_SIZE)
         assert np.isfinite(actions[-1]).all()
     np.testing.assert_array_equal(*actions)
+    check_chunk(read_source(str(at_once / "out/train")), actions[0])
     assert run_trial(SlideEnv("Slide", image_size=SIZE, horizon=6), runner, trial).steps <= 6
+
+
+def check_chunk(source: Any, actions: np.ndarray) -> None:
+    """Where a policy is asked for whole chunks: the first is what LeRobot's own queue gives, one call for each step."""
+    loaded = LoadedCheckpoint(source, "cpu", None)
+    if source.type not in STATELESS_TYPES:
+        return
+    assert ChunkPolicy.serves(loaded)
+    steps, env = StepPolicy(loaded), SlideEnv("Slide", image_size=SIZE)
+    observation, _ = env.reset(seed=1)
+    steps.reset(chunk_seed(5, 0), env)
+    executed = ChunkPolicy(loaded, 1).shape.executed
+    theirs = np.stack([steps.act(observation, "open the left drawer") for _ in range(min(executed, len(actions)))])
+    np.testing.assert_array_equal(actions[: len(theirs)], theirs)
+
+
+@pytest.mark.slow
+def test_gr00t_is_asked_for_chunks_as_its_own_queue_gives_them(tmp_path: Path) -> None:
+    """A tiny one with the published names in a cache of the hub, which a process looks for when it starts."""
+    pytest.importorskip("tree", reason="GR00T needs dm-tree")
+    script = Path(__file__).with_name("groot_chunks.py")
+    tests = str(script.parent)
+    environment = {
+        **os.environ, "HF_HOME": str(tmp_path), "HF_HUB_OFFLINE": "1", "OMP_NUM_THREADS": "1",
+        "PYTHONPATH": os.pathsep.join((f"{tests}/tiny_gemma", tests, str(script.parents[1]))),
+    }  # fmt: skip
+    done = subprocess.run(
+        [sys.executable, str(script), str(tmp_path)], env=environment, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr[-3000:]
 
 
 def state_files(folder: Path) -> dict[str, dict[str, torch.Tensor]]:

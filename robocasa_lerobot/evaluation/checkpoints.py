@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -17,6 +18,8 @@ REFERENCE_POLICIES = ("demonstrator", "random", "zero")
 REPLAY = "replay"  # written replay:FILE
 # They say where a checkpoint comes from, and change nothing of what the policy does.
 _ABOUT_TRAINING = ("train_config.json", ORIGIN_FILE)
+_PREPROCESSOR, _RENAMES = "policy_preprocessor.json", "rename_observations_processor"  # LeRobot's names
+_PICTURES = "observation.image"
 _WEIGHTS = ("model.safetensors", "adapter_model.safetensors")
 
 
@@ -28,8 +31,9 @@ class CheckpointError(UserError):
 class PolicySource:
     """A policy to evaluate: a checkpoint folder, or a reference policy.
 
-    `fingerprint` is a SHA-256 over weights, config and processors; `experiment`, `phase` and
-    `step` are what the checkpoint says about its training. `image_size` is (height, width) of its camera inputs.
+    `fingerprint` is a SHA-256 over weights, config and processors; `experiment`, `phase` and `step` are what the
+    checkpoint says about its training. `image_size` is (height, width) of its camera inputs. `queues`: by its settings
+    it remembers earlier steps.
     """
 
     label: str
@@ -40,6 +44,7 @@ class PolicySource:
     step: int | None = None
     image_size: tuple[int, int] | None = None
     experiment: str | None = None
+    queues: bool = False
 
     @property
     def is_reference(self) -> bool:
@@ -80,6 +85,7 @@ def read_source(path: str, label: str | None = None) -> PolicySource:
         origin.step,
         camera_size(config, folder),
         origin.experiment,
+        has_queues(config),
     )
 
 
@@ -136,16 +142,50 @@ def stored_fingerprint(path: Path) -> str:
     return digest.hexdigest()
 
 
+def has_queues(config: Mapping[str, Any]) -> bool:
+    """Whether a policy with this config.json keeps observations or actions of earlier steps, whatever its type does."""
+    return config.get("n_obs_steps", 1) != 1 or config.get("temporal_ensemble_coeff") is not None
+
+
 def camera_size(config: dict[str, Any], folder: Path) -> tuple[int, int] | None:
-    """(height, width) of the camera inputs in a policy's config; None for a policy without cameras."""
-    sizes = set()
-    for name, feature in (config.get("input_features") or {}).items():
-        if name.startswith(contract.IMAGE_PREFIX):
-            channels_first = feature["shape"]
-            sizes.add((int(channels_first[-2]), int(channels_first[-1])))
+    """(height, width) of those camera inputs of a policy that the env fills; None for a policy without cameras.
+
+    Inputs have the env's names, or the saved preprocessor gives the env's cameras the policy's names.
+
+    Raises:
+        CheckpointError: the policy has cameras, and none of them is the env's; or they have several sizes.
+    """
+    inputs = {
+        name: feature
+        for name, feature in (config.get("input_features") or {}).items()
+        if feature.get("type", "VISUAL") == "VISUAL" and name.startswith(_PICTURES)
+    }
+    renamed = _renamed(folder)
+    filled = [renamed.get(key, key) for key in contract.IMAGE_KEYS]
+    sizes = {tuple(map(int, inputs[name]["shape"][-2:])) for name in filled if name in inputs}
+    if inputs and not sizes:
+        raise CheckpointError(
+            f"{folder}: the policy takes the pictures {', '.join(inputs)}, and the env has "
+            f"{', '.join(contract.IMAGE_KEYS)}: its saved preprocessor renames none of these to those. Train it with "
+            "`rename` in the policy's settings, or add a `rename_observations_processor` to its preprocessor."
+        )
     if len(sizes) > 1:
         raise CheckpointError(f"{folder}: cameras of several sizes {sorted(sizes)}; one size is expected.")
-    return sizes.pop() if sizes else None
+    height, width = sizes.pop() if sizes else (None, None)
+    return None if height is None or width is None else (height, width)
+
+
+def _renamed(folder: Path) -> dict[str, str]:
+    """The names that a checkpoint's saved preprocessor gives to observations, by the env's."""
+    try:
+        saved = json.loads((folder / _PREPROCESSOR).read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return {}
+    out: dict[str, str] = {}
+    for step in saved.get("steps", []):
+        if step.get("registry_name") == _RENAMES:
+            out |= step.get("config", {}).get("rename_map") or {}
+    return out
 
 
 def common_image_size(sources: list[PolicySource], asked: int | None) -> int:

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import inspect
 import time
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
@@ -20,14 +20,27 @@ from numpy.typing import NDArray
 
 from robocasa_lerobot.errors import UserError
 from robocasa_lerobot.evaluation.actor import ChunkReply, ChunkRequest, ChunkShape, chunk_seed
-from robocasa_lerobot.evaluation.checkpoints import PolicySource
+from robocasa_lerobot.evaluation.checkpoints import PolicySource, has_queues
 
+GPU_BATCH_WIDTH = 8
 # LeRobot's own types whose chunks follow from one observation; the others keep observations in queues of their own.
-STATELESS_TYPES = frozenset({"act", "pi0", "pi05"})
+STATELESS_TYPES = frozenset({"act", "groot", "pi0", "pi05", "smolvla", "xvla"})
+_WITHOUT_NOISE = "act"
+_WHOLE_CHUNKS = (
+    "groot"  # its actions may be relative to the state at the chunk's start, and scaled by their place in it
+)
+
+
+def default_width(kinds: Iterable[str], device: str) -> int:
+    """Observations that policies of these types compute at once: 1 on a CPU, and where noise is drawn for a batch."""
+    from robocasa_lerobot.policies.registry import POLICY_TYPES
+
+    each_alone = all(kind in (*POLICY_TYPES, _WITHOUT_NOISE) for kind in kinds)
+    return GPU_BATCH_WIDTH if device != "cpu" and each_alone else 1
 
 
 class BatchingError(UserError):
-    """A sample's actions depend on its place in the batch."""
+    """A policy's actions are no function of the request: they depend on others, or come in other numbers."""
 
 
 class ChunkPolicy:
@@ -46,10 +59,12 @@ class ChunkPolicy:
         self._checked: set[bool] = set()
         config = loaded.config
         self._history = int(getattr(config, "n_obs_steps", 1))
-        self.shape = ChunkShape(executed=int(config.n_action_steps), history=self._history)
+        # GR00T's own weights may say that fewer actions are executed than its settings ask for.
+        executed = getattr(loaded.policy, "_action_queue_steps", config.n_action_steps)
+        self.shape = ChunkShape(executed=int(executed), history=self._history)
         parameters = inspect.signature(loaded.policy.predict_action_chunk).parameters
         self._takes_generators = "generator" in parameters
-        if width > 1 and not self._takes_generators and config.type != "act":
+        if width > 1 and not self._takes_generators and config.type != _WITHOUT_NOISE:
             raise UserError(
                 f"policy.batch_width={width}: policies of type {config.type!r} draw their noise for a whole batch, so "
                 "that a trial would depend on the others; use --policy.batch_width=1."
@@ -58,12 +73,10 @@ class ChunkPolicy:
     @staticmethod
     def serves(loaded: LoadedCheckpoint) -> bool:
         """Whether the chunks of this policy follow from its last observations alone."""
-        config = loaded.config
         parameters = inspect.signature(loaded.policy.predict_action_chunk).parameters
-        if "generator" in parameters:
-            return True
-        ensembled = getattr(config, "temporal_ensemble_coeff", None) is not None
-        return config.type in STATELESS_TYPES and getattr(config, "n_obs_steps", 1) == 1 and not ensembled
+        return "generator" in parameters or (
+            loaded.config.type in STATELESS_TYPES and not has_queues(vars(loaded.config))
+        )
 
     def predict(self, requests: Sequence[ChunkRequest]) -> list[ChunkReply]:
         """The chunk of each request, `width` at a time.
@@ -119,7 +132,15 @@ class ChunkPolicy:
             torch.manual_seed(seeds[0])
         with torch.inference_mode():
             chunk = loaded.policy.predict_action_chunk(batch, **arguments)[:, : self.shape.executed]
-            actions = loaded.post(chunk.reshape(-1, chunk.shape[-1])).reshape(count, chunk.shape[1], -1)
+            if chunk.shape[1] != self.shape.executed:
+                raise BatchingError(
+                    f"a policy of type {loaded.config.type!r} predicts {chunk.shape[1]} actions at once, and "
+                    f"{self.shape.executed} are to be executed: use --executed_steps={chunk.shape[1]} or fewer."
+                )
+            if loaded.config.type == _WHOLE_CHUNKS:
+                actions = loaded.post(chunk)
+            else:
+                actions = loaded.post(chunk.reshape(-1, chunk.shape[-1])).reshape(count, chunk.shape[1], -1)
         return np.asarray(actions.to("cpu").float().numpy(), dtype=np.float32)
 
     def _with_time(self, key: str, value: Any, count: int) -> Any:

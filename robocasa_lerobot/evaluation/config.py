@@ -32,7 +32,7 @@ class PolicySettings:
     placement: workers (a replica in each worker), servers (a process for each device, which batches the observations
         that wait), or auto (servers on a GPU). Outcomes do not depend on it.
     batch_width: observations that are computed at once; fewer are filled up, so that an outcome does not depend on
-        who shares a batch. 0: 1 on a CPU, 8 on a GPU.
+        who shares a batch. 0: 8 on a GPU for policies that draw the noise of each observation by itself, else 1.
     threads: CPU threads of each policy. Fixed, not derived from the number of workers, because sums of floats depend
         on it, and a trial's outcome must not depend on how trials are spread over processes.
     lifelong_phase: for each policy, the phase (from 1) that it was trained up to; a label, and what `lifelong` reads.

@@ -79,7 +79,8 @@ def prepare(config: EvaluationConfig) -> Evaluation:
     _check_folders(by_label)
     needs_torch = not all(source.is_reference for source in sources)
     device = resolve.resolve_device(config.policy.device, needs_torch)
-    settings = resolve.outcome_settings(config, common_image_size(sources, config.env.image_size), device)
+    kinds = [source.type for source in sources if not source.is_reference]
+    settings = resolve.outcome_settings(config, common_image_size(sources, config.env.image_size), device, kinds)
     seeds = _stored_seeds(sources, config, settings, list(tasks.horizons))
     phases: list[int | None] = [*config.policy.lifelong_phase] if config.lifelong else [None] * len(sources)
     own_tasks = {label: tasks.of_policy(phase) for label, phase in zip(by_label, phases, strict=True)}

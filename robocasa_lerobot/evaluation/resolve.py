@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from robocasa_lerobot.errors import UnknownNameError, UserError
+from robocasa_lerobot.evaluation.chunk_policy import default_width
 from robocasa_lerobot.evaluation.config import KITCHEN_ENV_FACTORY, EnvSettings, EvaluationConfig, PerturbationSettings
 from robocasa_lerobot.evaluation.provenance import git_commit, machine, utc_now, versions
 from robocasa_lerobot.evaluation.results import PolicyInfo, RunHeader
 
-GPU_BATCH_WIDTH = 8
 # The release of RoboCasa whose horizons our tasks have; those of 1.0.0 were two thirds of them.
 HORIZON_VERSION = "1.0.1"
 _SHOWN = 60
@@ -188,13 +188,13 @@ def env_arguments(name: str, settings: PerturbationSettings) -> dict[str, Any]:
     return {}
 
 
-def batch_width(asked: int, device: str) -> int:
-    """Observations that a policy computes at once: what was asked for, else 1 on a CPU and 8 on a GPU."""
-    return asked or (1 if device == "cpu" else GPU_BATCH_WIDTH)
+def outcome_settings(
+    config: EvaluationConfig, image_size: int, device: str = "cpu", kinds: Iterable[str] = ()
+) -> dict[str, Any]:
+    """The settings that a trial's outcome depends on; trials are only ever mixed when all of these agree.
 
-
-def outcome_settings(config: EvaluationConfig, image_size: int, device: str = "cpu") -> dict[str, Any]:
-    """The settings that a trial's outcome depends on; trials are only ever mixed when all of these agree."""
+    `kinds` are the types of the policies that are computed.
+    """
     places = ("tasks", "task_sets", "registry", "tasks_per_set", "allow_missing_tasks", "render_devices")
     env = {name: value for name, value in dataclasses.asdict(config.env).items() if name not in places}
     noise = {name: value for name, value in dataclasses.asdict(config.perturbation).items() if name != "names"}
@@ -206,7 +206,7 @@ def outcome_settings(config: EvaluationConfig, image_size: int, device: str = "c
         "executed_steps": config.executed_steps,
         "device": device,
         "threads": config.policy.threads,
-        "batch_width": batch_width(config.policy.batch_width, device),
+        "batch_width": config.policy.batch_width or default_width(kinds, device),
         "success_rule": config.success.rule,
         "success_hold_steps": config.success.hold_steps,
         "perturbation": noise,

@@ -23,7 +23,11 @@ def served_labels(sources: Mapping[str, PolicySource], settings: PolicySettings,
     from robocasa_lerobot.policies.registry import POLICY_TYPES
 
     checkpoints = {label: source for label, source in sources.items() if not source.is_reference}
-    able = {label for label, source in checkpoints.items() if source.type in (*POLICY_TYPES, *STATELESS_TYPES)}
+    able = {
+        label
+        for label, source in checkpoints.items()
+        if source.type in POLICY_TYPES or (source.type in STATELESS_TYPES and not source.queues)
+    }
     if settings.placement == "workers" or (settings.placement == "auto" and device == "cpu"):
         return frozenset()
     if settings.placement == "servers" and set(checkpoints) - able:
