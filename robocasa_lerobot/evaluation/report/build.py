@@ -5,6 +5,7 @@ from __future__ import annotations
 import datetime
 from collections.abc import Sequence
 
+from robocasa_lerobot.evaluation.report import left_out
 from robocasa_lerobot.evaluation.report.film_strip import choose_films
 from robocasa_lerobot.evaluation.report.gather import ReportData
 from robocasa_lerobot.evaluation.report.model import Document, Section
@@ -35,6 +36,7 @@ def build(
     """The report on `data`; `videos` embeds short films beside the film strips."""
     sections = [
         summary.section(data),
+        left_out.section(data),
         data_efficiency.section(data),
         lifelong.section(data),
         robustness.section(data),

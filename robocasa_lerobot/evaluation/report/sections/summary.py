@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from robocasa_lerobot.evaluation import published
 from robocasa_lerobot.evaluation.report import format as fmt
+from robocasa_lerobot.evaluation.report import left_out
 from robocasa_lerobot.evaluation.report.gather import PolicyResult, ReportData, describe_policy
 from robocasa_lerobot.evaluation.report.model import Bar, Card, Cell, Column, Section, Table
 from robocasa_lerobot.evaluation.report.sections import (
@@ -24,6 +25,8 @@ def section(data: ReportData) -> Section:
     special = special_sentence(data)
     sentences = (
         ("Run", what_was_run(data)),
+        ("Partial", left_out.partial_runs(data)),
+        ("Left out", left_out.sentence(data)),
         ("Comparison", comparison.sentence(data) if special is None or len(data.policies) == 2 else None),
         ("Certainty", how_sure(data)),
         ("Published", beside(data)),
@@ -57,6 +60,8 @@ def headline(data: ReportData) -> str:
     )
     if len(last.tasks) > 1:
         text += f", averaged over {fmt.count(len(last.tasks), 'task')}"
+    if left_out.is_partial(last):
+        text += " of a partial run"
     if 0 < len(before) <= 3:
         text += "; " + fmt.listed([f"{policy.label} {fmt.percent(policy.average.value)}" for policy in before])
     return text[:1].upper() + text[1:] + "."
@@ -112,7 +117,7 @@ def _card(data: ReportData, policy: PolicyResult) -> Card:
         text=fmt.percent(policy.average.value),
         bar=Bar(policy.average, data.series(policy)),
         line=f"95 % interval {fmt.interval(policy.average)} · {solved:,} of {policy.trials:,} trials · "
-        f"{fmt.count(len(policy.tasks), 'task')}",
+        f"{fmt.count(len(policy.tasks), 'task')}{' · partial' * left_out.is_partial(policy)}",
         what=describe_policy(policy),
     )
 
@@ -128,7 +133,7 @@ def _policies(data: ReportData) -> Table:
                 Bar(policy.average, data.series(policy)),
                 strong=True,
             ),
-            Cell(f"{len(policy.tasks)}", len(policy.tasks)),
+            Cell(f"{len(policy.tasks)}", len(policy.tasks), tag="partial" if left_out.is_partial(policy) else ""),
             Cell(f"{policy.trials:,}", policy.trials),
             Cell(describe_policy(policy)),
         )
