@@ -19,7 +19,7 @@ from test_evaluation_records import header, record
 
 from robocasa_lerobot.cli import main
 from robocasa_lerobot.errors import UserError
-from robocasa_lerobot.evaluation import report_command, results, trials_file
+from robocasa_lerobot.evaluation import results, trials_file
 from robocasa_lerobot.evaluation.published import table
 from robocasa_lerobot.evaluation.report import film_strip, latex, markdown
 from robocasa_lerobot.evaluation.report.charts import (
@@ -36,8 +36,6 @@ from robocasa_lerobot.evaluation.report.sections.beside_published import differe
 from robocasa_lerobot.evaluation.report.training import TrainingPhase, find_trainings, read_demonstrator, read_training
 from robocasa_lerobot.evaluation.results import TermSummary
 from robocasa_lerobot.evaluation.statistics import success_rate
-from robocasa_lerobot.training import skipped
-from robocasa_lerobot.training.skipped import Skipped
 from robocasa_lerobot.video import VideoWriter, frames_and_rate
 
 # Elements without an end tag.
@@ -243,44 +241,6 @@ def test_everything_asked_for_is_in_both_files(folder: Path, training: Path, dem
     assert "Traceback &lt;script&gt;" in html
     assert "<script>alert" not in html
     assert "videos/untrained/8.mp4" in text
-
-
-def test_what_a_training_left_out_and_what_a_run_lacks_is_said(tmp_path: Path) -> None:
-    out = tmp_path / "out"
-    lines = [
-        Skipped("phase", "phase2", None, "none of its 20 tasks is in this version yet."),
-        Skipped("evaluation", "phase1", "robustness", "it ended with status 2"),
-        Skipped("partial", "phase1", "paper", "partial: its run says so itself"),
-    ]
-    skipped.record(out, lines)
-    sets = {"task_sets": {"atomic_seen": ["OpenDrawer"], "composite_seen": []}}
-    lacking = {"missing_tasks": ["WashLettuce"], "missing_by_set": {"composite_seen": ["WashLettuce"]}}
-    one = dataclasses.replace(header(experiment="lifelong"), **sets, **lacking)
-    folder = out / "phase1/evaluations/paper"
-    folder.mkdir(parents=True)
-    for item in (one, *(record(run=one.id, trial=t, seed=t) for t in range(3))):
-        trials_file.append(folder / results.TRIALS_FILE, item)
-    report_command.write_report([folder], out=folder / "report.html")
-    text = (folder / "report.md").read_text()
-    for said in (
-        "lifelong: phase phase2 is left out: none of its 20 tasks is in this version yet.",
-        "lifelong: evaluation robustness of phase phase1 is left out: it ended with status 2.",
-        "finetune-000400: partial: without 1 of 1 tasks of composite",
-        "of a partial run", "1 task · partial",
-    ):  # fmt: skip
-        assert said in text.replace("\\", "")
-    assert "its run says so itself" not in text
-    skipped.record(out, [])
-    report_command.write_report([folder], out=folder / "report.html")
-    assert "What was left out" not in (folder / "report.md").read_text()
-
-
-def test_equal_labels_are_told_apart_by_as_much_of_their_folders_as_it_takes(tmp_path: Path) -> None:
-    places = [tmp_path / name / "atomic/evaluations/foundation" for name in ("a", "b")]
-    folders = [write_results(place, [{"label": "x", "trial": t} for t in range(2)]) for place in places]
-    assert [p.label for p in gather(folders).policies] == [
-        "x (a/atomic/evaluations/foundation)", "x (b/atomic/evaluations/foundation)",
-    ]  # fmt: skip
 
 
 def test_two_results_folders_and_equal_labels_are_told_apart_and_compared(folder: Path, tmp_path: Path) -> None:
