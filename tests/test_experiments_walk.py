@@ -9,25 +9,52 @@ runs it, with a log of file, phases and minutes.
 from __future__ import annotations
 
 import dataclasses
+import json
 import os
+import re
+import subprocess
+import sys
 from collections.abc import Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
+import walk_hub
 from walk_numbers import expected_cells, shown_cells, with_known_numbers
-from walk_support import EPISODES, LENGTH, ROOT, SCALE, Walked, Walker, steps_of, write_datasets, write_hub, write_log
+from walk_support import (
+    EPISODES,
+    LENGTH,
+    ROOT,
+    SCALE,
+    Walked,
+    Walker,
+    environment,
+    steps_of,
+    write_datasets,
+    write_hub,
+    write_log,
+)
 
+from robocasa_lerobot.data.published import PUBLISHED, published_task_sets
 from robocasa_lerobot.evaluation import published
 from robocasa_lerobot.evaluation.results import read_results
 from robocasa_lerobot.training.config import ExperimentConfig, load_experiment
 from robocasa_lerobot.training.evaluations import phase_evaluations
+from robocasa_lerobot.training.phase_config import PhaseConfig
 from robocasa_lerobot.training.scale import load_scale
 from robocasa_lerobot.training.skipped import PHASE, read
 from robocasa_lerobot.training.unavailable import runnable
 
 EXPERIMENTS = ROOT / "configs/experiments"
 PATHS = sorted(path for path in EXPERIMENTS.rglob("*.yaml") if "parts" not in path.relative_to(EXPERIMENTS).parts)
+COLUMN_BYTES = 113  # of a frame's states, actions and other numbers
+# Runs a command and prints the most memory that it took, in gigabytes.
+LIMITED = """
+import resource, subprocess, sys
+status = subprocess.call(sys.argv[1:])
+print(resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss / 1e6)
+sys.exit(status)
+"""
 AT_ONCE = 2  # experiments that run beside each other
 SECONDS = 1800  # for one experiment; the other of the two may be the slower one
 pytestmark = [pytest.mark.slow, pytest.mark.render]
@@ -94,7 +121,7 @@ def groups(experiments: dict[Path, ExperimentConfig]) -> list[dict[Path, Experim
 @pytest.mark.timeout(2 * 3600)
 @pytest.mark.parametrize("path", PATHS, ids=name_of)
 def test_experiment_walks(path: Path, walk: Walk) -> None:
-    walked = walk.of(path)
+    walked, whole = walk.of(path), load_experiment(path)
     experiment, left_out = runnable(scaled(path))
     out = walk.walker.work / experiment.output_dir
     if walked.finished_before != walked.phases:
@@ -106,6 +133,8 @@ def test_experiment_walks(path: Path, walk: Walk) -> None:
         folder = out / phase.name
         assert (folder / f"checkpoints/{phase.steps:06d}/pretrained_model/model.safetensors").is_file()
         assert steps_of(folder) == list(range(1, phase.steps + 1))
+        if path.parent.name == "robocasa365" and beyond_memory(whole.phase(phase.name), 2.0):
+            assert list((out / "frame_cache").glob("*.npy")), "what is beyond memory at full size has to be here"
         for evaluation in phase_evaluations(phase):
             results = folder / "evaluations" / evaluation.file.stem
             if any((item.phase, item.evaluation) == (phase.name, evaluation.file.stem) for item in skipped):
@@ -131,7 +160,50 @@ def test_every_number_stands_in_its_row_and_published_column(kind: str, walk: Wa
 
 def test_limits_shrink_with_the_data() -> None:
     """The fakes of two tasks of the human data, as a share of all of its frames."""
-    hours = {row["setting"]: row["hours"] for row in published.read("data")["rows"]}
-    frames = hours["pretraining, human"] * 3600 * 20
-    ours = load_scale(str(SCALE)).tasks_per_set * EPISODES * LENGTH
-    assert load_scale(str(SCALE)).data_share == pytest.approx(ours / frames, rel=0.1)
+    ours = (load_scale(str(SCALE)).tasks_per_set or 0) * EPISODES * LENGTH
+    assert load_scale(str(SCALE)).data_share == pytest.approx(ours / full_frames("pretrain", "human"), rel=0.1)
+
+
+def full_frames(split: str, source: str) -> float:
+    """Frames of the published data, at 20 a second."""
+    settings = {("pretrain", "human"): "pretraining, human", ("target", "human"): "target, human"}
+    setting = settings.get((split, source), "pretraining, MimicGen")
+    return next(row["hours"] for row in published.read("data")["rows"] if row["setting"] == setting) * 3600 * 20
+
+
+def beyond_memory(phase: PhaseConfig, limit_gb: float) -> bool:
+    """Whether states and actions of a phase, with its published data, are more than the loader keeps in memory."""
+    total = 0.0
+    for part in phase.mixture.select:
+        tasks = published_task_sets()[str(part.task_set)]
+        of_all = published_task_sets()[PUBLISHED[str(part.split), str(part.source)]]
+        share = float(str(part.demos or "100%").removesuffix("%")) / 100
+        total += full_frames(str(part.split), str(part.source)) * len({*tasks} & {*of_all}) / len(of_all) * share
+    return total * COLUMN_BYTES > limit_gb * 1e9
+
+
+@pytest.mark.timeout(2 * 3600)
+@pytest.mark.parametrize("kind", ["pi0", "pi05"])
+def test_the_real_sizes_are_planned_without_memory_for_them(kind: str, tmp_path: Path) -> None:
+    """Of the repository on the hub nothing but its configuration is there, as before a download."""
+    snapshot = tmp_path / f"hub/models--lerobot--{kind}_base/snapshots/{walk_hub.COMMIT}"
+    snapshot.mkdir(parents=True)
+    (snapshot.parents[1] / "refs").mkdir()
+    (snapshot.parents[1] / "refs/main").write_text(walk_hub.COMMIT)
+    cameras = {f"observation.images.{name}": walk_hub.VISION for name in walk_hub.PI_CAMERAS}
+    state, action = ({"type": name, "shape": [32]} for name in ("STATE", "ACTION"))
+    config = {
+        "input_features": {**cameras, "observation.state": state},
+        "output_features": {"action": action},
+        **{"type": kind, "paligemma_variant": "gemma_2b", "action_expert_variant": "gemma_300m"},
+    }
+    (snapshot / "config.json").write_text(json.dumps(config))
+    command = [sys.executable, str(ROOT / "train.py"), "--plan", "--measure=0", "--device=cpu"]
+    command += ["--config_path", str(EXPERIMENTS / f"robocasa365/multitask_{kind}.yaml")]
+    limited = [sys.executable, "-c", LIMITED, *command]
+    done = subprocess.run(limited, cwd=tmp_path, env=environment(tmp_path), capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr[-3000:]
+    millions = re.search(r"parameters: ([\d,.]+) M", done.stdout)
+    assert millions is not None, done.stdout[:3000]
+    assert 3_300 < float(millions[1].replace(",", "")) < 4_500
+    assert float(done.stdout.splitlines()[-1]) < 4, "gigabytes of memory: less than the weights alone"

@@ -276,6 +276,15 @@ def test_a_small_part_of_a_dataset_has_held_out_episodes_too(tmp_path: Path, dat
             assert {e % 2 for e in held} == {e % 2 for e in trained} == {0, 1}  # of both tasks
 
 
+def test_single_demonstrations_are_trained_on_and_none_is_held_out(
+    tmp_path: Path, data: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    overrides = ["--defaults.held_out={share: 0.1}", f"--phases.pretrain.mixture.members=[{{root: {data}, demos: 1}}]"]
+    assert run_experiment(tiny(tmp_path, data, overrides=overrides), only="pretrain")
+    assert not (tmp_path / "out/pretrain/held_out.jsonl").exists()
+    assert "no task has two episodes" in capfd.readouterr().out
+
+
 def test_measuring_held_out_episodes_does_not_change_the_training(tmp_path: Path, data: Path) -> None:
     common = ["--defaults.steps=3"]
     often = [*common, "--defaults.held_out={share: 0.25, every: 1, samples: 8}"]

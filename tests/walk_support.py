@@ -72,11 +72,10 @@ def _missing(mixture: MixtureConfig) -> Iterable[tuple[Path, str]]:
                 yield entry.root / inner / selection.views, entry.task
             else:
                 yield entry.root, entry.task
-    members = MixtureConfig(members=mixture.members) if mixture.members else None
-    for entry in missing_datasets(members) if members else ():
-        own = next(member.tasks for member in mixture.members if Path(member.root) == entry.root)
-        for task in own or ("OpenDrawer", "CloseDrawer"):
-            yield entry.root, task
+    for member in mixture.members:
+        if missing_datasets(MixtureConfig(members=[member])):
+            for task in member.tasks or ("OpenDrawer", "CloseDrawer"):
+                yield Path(member.root), task
 
 
 def write_hub(home: Path) -> Path:

@@ -25,8 +25,8 @@ Forward = Callable[[dict[str, Any]], tuple[torch.Tensor, Any]]
 
 def without_held_out(
     dataset: MixtureDataset, config: HeldOutConfig, loader: LoaderConfig, seed: int
-) -> tuple[MixtureDataset, MixtureDataset]:
-    """The mixture without its held-out episodes, and one of those alone.
+) -> tuple[MixtureDataset, MixtureDataset | None]:
+    """The mixture without its held-out episodes, and one of those alone; None where no task has two episodes.
 
     A dataset that is a member twice has the same ones held out.
 
@@ -53,7 +53,7 @@ def without_held_out(
         if len(held):
             apart.append(dataclasses.replace(plain, episodes=held.tolist()))
     if not apart:
-        raise UserError("`held_out`: no task has two or more episodes, so none can be held out.")
+        return dataset, None
     return open_mixture(MixtureConfig(members=kept), loader), open_mixture(MixtureConfig(members=apart), loader)
 
 
@@ -125,7 +125,7 @@ def task_names(source: DatasetSource) -> list[str]:
 def _held_out(source: DatasetSource, used: NDArray[np.int64], share: float, seed: int) -> NDArray[np.int64]:
     """Episodes that are held out: of each task its share of the whole dataset, so that phases agree, as far as used.
 
-    Where none of these is among the `used` ones and there are two or more, it is one of them.
+    Where none of these is among the `used` ones it is one of them, and one of them is always left to train on.
     """
     names = np.array(task_names(source))
     chosen = []
@@ -136,5 +136,6 @@ def _held_out(source: DatasetSource, used: NDArray[np.int64], share: float, seed
         order = generator.permutation(episodes)
         among = order[np.isin(order, used)]
         held = np.intersect1d(order[:count], used)
-        chosen.append(held if len(held) or len(among) < 2 else among[:1])
+        held = held if len(held) else among[:1]
+        chosen.append(held if len(held) < len(among) else among[:-1])
     return np.sort(np.concatenate(chosen)).astype(np.int64)

@@ -46,6 +46,8 @@ def prepare_phase(
     dataset, apart = joining.open_phase_data(experiment, phase), None
     if phase.held_out is not None:
         dataset, apart = without_held_out(dataset, phase.held_out, experiment.data_loader, experiment.seed)
+        if apart is None:
+            accelerator.print(f"phase {phase.name}: no task has two episodes, so that none is held out")
     for part in (dataset, apart) if apart is not None else (dataset,):
         builders.set_windows(part, config)
         part.set_picture_size(builders.frame_size(config))
