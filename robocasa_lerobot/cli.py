@@ -34,7 +34,7 @@ SUBCOMMANDS: dict[str, Subcommand] = {
         "robocasa_lerobot.convert.commands.convert", "convert demonstration files to a LeRobotDataset v3.0"
     ),
     "inspect": Subcommand(
-        "robocasa_lerobot.convert.commands.inspect", "print what a demonstration file or dataset holds, draft a mapping"
+        "robocasa_lerobot.evaluation.inspect_command", "print what a file, dataset or registry holds, draft a mapping"
     ),
     "verify": Subcommand("robocasa_lerobot.convert.commands.verify", "compare a converted dataset with its source"),
     "export": Subcommand("robocasa_lerobot.convert.commands.export", "write a LeRobotDataset v3.0 back to HDF5"),

@@ -42,6 +42,15 @@ class Line:
     errorbars: bool = False
 
 
+@dataclass(frozen=True)
+class Bars:
+    """A series of a bar chart: `series` is its place in the palette."""
+
+    label: str
+    series: int
+    heights: tuple[float, ...]
+
+
 def line_chart(
     name: str,
     title: str,
@@ -90,6 +99,28 @@ def line_chart(
         top = max(max(line.high or line.y) for line in lines)
         # The whole range up to 100 %, unless everything lies in its lowest part.
         axes.set_ylim(y_range[0], y_range[1] if top > y_range[1] / 3 else max(1.0, 1.4 * top))
+    axes.set_xlabel(x_label, color=_INK)
+    axes.set_ylabel(y_label, color=_INK)
+    return _svg(figure, name, title, description)
+
+
+def bar_chart(
+    name: str,
+    title: str,
+    description: str,
+    labels: Sequence[str],
+    bars: Sequence[Bars],
+    x_label: str,
+    y_label: str,
+) -> str:
+    """Bars side by side at each label; the arguments are those of `line_chart`."""
+    figure, axes = _axes(name, (4.4, 3.0))
+    places, width = np.arange(len(labels)), 0.84 / max(1, len(bars))
+    for number, one in enumerate(bars):
+        left = places + (number - (len(bars) - 1) / 2) * width
+        axes.bar(left, one.heights, width, color=_SERIES[one.series % SERIES], linewidth=0)
+    axes.set_xticks(places, labels, rotation=45 if max(map(len, labels), default=0) > 3 else 0)
+    axes.grid(False, axis="x")
     axes.set_xlabel(x_label, color=_INK)
     axes.set_ylabel(y_label, color=_INK)
     return _svg(figure, name, title, description)

@@ -170,4 +170,5 @@ class Document:
     made: str
     synthetic: bool
     subtitle: str = ""
+    source: str = "trials.jsonl"
     tags: tuple[str, ...] = field(default=())

@@ -38,6 +38,18 @@ def write_report(document: Document, data: ReportData, out: Path) -> list[Path]:
     return list(texts)
 
 
+def write_page(document: Document, out: Path) -> None:
+    """Write a document as one HTML file.
+
+    Raises:
+        UserError: `out` does not end in .html.
+    """
+    if out.suffix != ".html":
+        raise UserError(f"--out {out}: found the ending {out.suffix!r}, expected .html.")
+    out.parent.mkdir(parents=True, exist_ok=True)
+    _write(out, html(document))
+
+
 def html(document: Document) -> str:
     """The page: styles, script, charts, pictures and films inside, nothing loaded from anywhere."""
     environment = jinja2.Environment(
