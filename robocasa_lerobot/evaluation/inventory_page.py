@@ -59,13 +59,17 @@ def page(name: str, holdings: Sequence[Holding]) -> Document:
     )
     return Document(
         title=f"Data of the registry {name}",
-        headline=f"{fmt.count(demonstrations, 'demonstration')} of {hours:.1f} hours in "
+        headline=f"{fmt.count(demonstrations, 'demonstration')} of {_hours(hours)} hours in "
         f"{fmt.count(sum(len(holding.folders) for holding in there), 'dataset')}.",
         sections=[section, figures],
         made=datetime.datetime.now(datetime.UTC).strftime("%Y-%m-%d %H:%M UTC"),
         synthetic=False,
         source="the datasets' own tables",
     )
+
+
+def _hours(hours: float) -> str:
+    return f"{hours:,.2f}" if hours < 10 else f"{hours:,.1f}"
 
 
 def _ours(holding: Holding) -> tuple[Cell, ...]:
@@ -77,7 +81,7 @@ def _ours(holding: Holding) -> tuple[Cell, ...]:
         Cell(fmt.NONE) if scenes is None else Cell(f"{scenes:,}", scenes),
         Cell(f"{number:,}", number),
         Cell(f"{number / tasks:,.0f}", number / tasks) if tasks else Cell(fmt.NONE),
-        Cell(f"{holding.hours:,.1f}", holding.hours),
+        Cell(_hours(holding.hours), holding.hours),
     )
 
 
