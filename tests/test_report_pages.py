@@ -87,7 +87,7 @@ def pages(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     folder, out = tmp_path_factory.mktemp("reports"), {}
     for kind, make in synthetic_runs.RUNS.items():
         out[kind] = folder / kind / "report.html"
-        write_report(make(folder / kind, count=6), out=out[kind])
+        write_report(make(folder / kind, count=2 if kind == "ablations" else 6), out=out[kind])
     return out
 
 

@@ -223,6 +223,14 @@ def test_two_trainings_of_one_experiment_stay_apart_and_are_both_shown(
     assert any("Further policies" in text for text in section.text)
 
 
+def test_the_output_of_a_training_stands_for_its_evaluations(foundation: tuple[Path, list[Path]]) -> None:
+    folder, runs = foundation
+    outputs = [folder / "foundation", folder / "target_only"]
+    named, found = gather(runs), gather([*outputs, runs[0]])
+    assert {policy.label for policy in found.policies} == {policy.label for policy in named.policies}
+    assert len(found.single) == len(runs)
+
+
 def test_an_average_over_missing_tasks_is_not_given(foundation: tuple[Path, list[Path]], tmp_path: Path) -> None:
     folder, runs = foundation
     without = [run for run in runs if run.relative_to(folder).parts[:2] != ("foundation", "composite_unseen_10")]

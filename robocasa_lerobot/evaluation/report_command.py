@@ -11,7 +11,13 @@ EXAMPLE = "robocasa-lerobot report outputs/demo/evaluation --training outputs/de
 
 def configure(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
-    parser.add_argument("results", nargs="+", type=Path, metavar="RUN", help="folder with a trials.jsonl")
+    parser.add_argument(
+        "results",
+        nargs="+",
+        type=Path,
+        metavar="RUN",
+        help="folder with a trials.jsonl, or output of a training with evaluations",
+    )
     parser.add_argument(
         "--training",
         nargs="*",

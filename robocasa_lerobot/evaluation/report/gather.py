@@ -15,7 +15,15 @@ from robocasa_lerobot.errors import UserError
 from robocasa_lerobot.evaluation import published
 from robocasa_lerobot.evaluation.published.places import PERTURBATIONS, Place, places, tables
 from robocasa_lerobot.evaluation.report.joining import join
-from robocasa_lerobot.evaluation.results import UNPERTURBED, PolicyInfo, Results, RunHeader, TrialRecord, read_results
+from robocasa_lerobot.evaluation.results import (
+    TRIALS_FILE,
+    UNPERTURBED,
+    PolicyInfo,
+    Results,
+    RunHeader,
+    TrialRecord,
+    read_results,
+)
 from robocasa_lerobot.evaluation.statistics import Estimate, Rate, average_over_tasks, success_rate
 from robocasa_lerobot.evaluation.statistics.horizon import time_to_success
 from robocasa_lerobot.evaluation.statistics.paired import Outcomes
@@ -164,19 +172,27 @@ def gather(results: Sequence[Path], title: str | None = None) -> ReportData:
     """Read runs.
 
     Args:
-        results: folders with a `trials.jsonl`.
+        results: folders with a `trials.jsonl`, or outputs of trainings with evaluations.
         title: heading; default: made from the protocol and the tasks.
 
     Raises:
         UserError: a folder without results, an empty results file, or a file that cannot be read.
     """
-    once = {folder.resolve(): folder for folder in results}  # a run that is named twice is one
+    once = {run.resolve(): run for folder in results for run in runs_in(folder)}  # one that is named twice is one
     policies = tuple(policy for folder in once.values() for policy in _read_policies(folder))
     if not policies:
         raise UserError(f"no trials in {', '.join(map(str, results))}: run `robocasa-lerobot eval` first.")
     policies = _with_distinct_labels(join(_with_distinct_labels(policies)))
     names = tuple(dict.fromkeys(result.task for policy in policies for result in policy.tasks))
     return ReportData(title or _title(policies, names), policies, names)
+
+
+def runs_in(folder: Path) -> list[Path]:
+    """The folder itself, or the evaluations of each phase where it is the output of a training."""
+    if not folder.is_dir() or (folder / TRIALS_FILE).is_file():
+        return [folder]
+    found = sorted(folder.glob(f"*/evaluations/*/{TRIALS_FILE}"), key=lambda path: path.stat().st_mtime)
+    return [path.parent for path in found] or [folder]
 
 
 def summarize(task: str, trials: Sequence[TrialRecord]) -> TaskResult:
