@@ -1,6 +1,6 @@
 """Replay recorded robosuite action sequences in our simulator and tabulate how far the two robots drift apart.
 
-The recordings are robosuite 1.5.1's PandaOmron on MuJoCo 3.3.7 in an empty room. A dozen travel with the tests, at every
+The recordings are robosuite 1.5.1's PandaOmron on MuJoCo 3.3.7 in an empty room. A dozen travel with the tests, at each
 fifth step; `--traces` names a file with all of them, whose figures go to `results/`. Each sequence starts from the
 settled initial pose and is replayed open-loop: nothing of the recording but its actions enters our simulation.
 

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import ast
 import dataclasses
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -17,7 +19,7 @@ import numpy as np
 import pytest
 from task_selection import demonstrated, sample
 
-from robocasa_lerobot import contract
+from robocasa_lerobot import contract, demos
 from robocasa_lerobot.demos.demonstrator import demonstrate
 from robocasa_lerobot.demos.episode import SUCCESS_HOLD_STEPS, Recording, record_episode
 from robocasa_lerobot.demos.hdf5 import read_summary
@@ -226,3 +228,17 @@ def test_mistakes_are_named(tmp_path, monkeypatch):
     with pytest.raises(UnknownNameError, match="drawers close"):
         next(demonstrate(env))
     env.close()
+
+
+@pytest.mark.parametrize("path", sorted(Path(demos.__file__).parent.rglob("*.py")), ids=lambda path: path.stem)
+def test_rates_stand_in_results_not_in_docstrings(path: Path) -> None:
+    """`benchmarks/results/demonstrators.md` has them as measured; what a docstring says of them is soon wrong."""
+    tree = ast.parse(path.read_text(encoding="utf-8"))
+    kinds = (ast.Module, ast.ClassDef, ast.FunctionDef, ast.AsyncFunctionDef)
+    texts = [ast.get_docstring(node) or "" for node in ast.walk(tree) if isinstance(node, kinds)]
+    rates = [
+        rate
+        for text in texts
+        for rate in re.findall(r"\d+ of \d+|\d+/\d+|\d+ and \d+ of|\d+ ?%", " ".join(text.split()))
+    ]
+    assert not rates

@@ -4,8 +4,7 @@ The jug stands below a wall cabinet, so the way there is planned anew with the l
 stands or from a better place. The lid has its place, not the hand: how it lies in the hand is looked at before each
 move, and it is let go only over the jug.
 
-Solved without action noise: on pretrain seeds 20-50 26 of 31, on target seeds 0-15 with variety 15 of 16, in 12 s. What
-fails: low wall cabinets that the forearm leans on, and lids that are knocked over before they are held.
+What fails: low wall cabinets that the forearm leans on, and lids that are knocked over before they are held.
 """
 
 from __future__ import annotations

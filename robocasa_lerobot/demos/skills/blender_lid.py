@@ -1,6 +1,5 @@
 """The lid of a blender lifted off by its knob, and laid on the counter; `blender_cover` puts it on the jug.
 
-Solved without action noise, seeds 0-9 of the target and of the pretrain split: OpenBlenderLid 10 and 10 of 10, in 10 s.
 The jug stands under a wall cabinet: where the arm does not get under it without touching it, the hand misses the knob.
 """
 

@@ -1,7 +1,6 @@
 """Buttons: pressed with the closed finger tips, then left alone.
 
-Solved in target kitchens with action noise 0.05: microwave on 5/5, coffee machine 5/5, blender 5/5 (seeds 4-8), kettle
-lid 6/6, microwave off 4/6 (seeds 4-9): its stop button is low over the counter, where tilted hands meet the case.
+What fails most is a microwave's stop button: it is low over the counter, where tilted hands meet the case.
 """
 
 from __future__ import annotations

@@ -1,8 +1,7 @@
 """Hold mugs by their bodies: a nearly level hand from the side, a finger at each end of a diameter.
 
 So the hand fits under a spout and below the handle of a portafilter, and what the fingers press does not turn in them.
-Solved without action noise, seeds 0-9: CoffeeServeMug 9 of 10 in target and 10 of 10 in pretrain scenes,
-CoffeeSetupMug 9 of 10 and 10 of 10. What fails: the mug is grasped beside its middle, and slips on its way.
+What fails: the mug is grasped beside its middle, and slips on its way.
 """
 
 from __future__ import annotations

@@ -1,8 +1,4 @@
-"""Doors of a stage's fixture; lids, pushed shut from above.
-
-Measured without action noise on seeds 0-5 of the target and of the pretrain split: CloseElectricKettleLid solves 5 and
-6 of 6.
-"""
+"""Doors of a stage's fixture; lids, pushed shut from above."""
 
 from __future__ import annotations
 

@@ -1,8 +1,4 @@
-"""Doors that fold down, opened: pulled ajar by their handle, then pushed down from inside.
-
-Measured without action noise on seeds 0-5 of the target and of the pretrain split: OpenOven solves 6 and 6 of 6,
-OpenToasterOvenDoor 6 and 5; on seeds 0-9 OpenDishwasher solves 10 and 10 of 10.
-"""
+"""Doors that fold down, opened: pulled ajar by their handle, then pushed down from inside."""
 
 from __future__ import annotations
 

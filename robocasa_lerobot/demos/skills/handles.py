@@ -1,7 +1,6 @@
 """Doors on a vertical hinge, opened: pulled by their handle, and pushed on from inside at their free edge.
 
-Measured without action noise on seeds 0-9 of the target and of the pretrain split: OpenCabinet solves 10 and 10 of 10,
-OpenMicrowave on seeds 0-7 8 and 8 of 8, OpenFridge 10 and 7 of 10. What fails are fridges with a freezer below, before
+What fails are fridges with a freezer below, before
 an island or a wall, where the base gets to no place from which the arm reaches low.
 """
 

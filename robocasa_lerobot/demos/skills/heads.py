@@ -1,8 +1,4 @@
-"""Heads of stand mixers: lifted by the finger tips under their nose; led down by its cap, or pressed from above.
-
-Measured without action noise on seeds 0-9 of the target and of the pretrain split: CloseStandMixerHead solves 10 and 9
-of 10, in 7 s; OpenStandMixerHead on seeds 0-7 8 and 8 of 8.
-"""
+"""Heads of stand mixers: lifted by the finger tips under their nose; led down by its cap, or pressed from above."""
 
 from __future__ import annotations
 

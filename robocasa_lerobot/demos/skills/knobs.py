@@ -1,8 +1,4 @@
-"""Knobs: held between the finger tips along their axis, and turned with the wrist.
-
-Solved in target kitchens with action noise 0.05: burner off 6/6, low 5/6 (seeds 4-9); oven 4/4, toaster oven's timer
-4/4 and temperature 4/4 (seeds 4-7); burner on 4/4 (seeds 0-3, no noise).
-"""
+"""Knobs: held between the finger tips along their axis, and turned with the wrist."""
 
 from __future__ import annotations
 

@@ -1,8 +1,6 @@
 """Levers: pushed with the closed finger tips, or grasped and led along the arc of their hinge.
 
-Solved in target kitchens with action noise 0.05, seeds 4-9: faucet on 6/6, off 6/6, spout 6/6, water temperature 5/6,
-toaster 5/6. With finger tips that end short of the case behind the lever, without noise: kettle 4/4 (seeds 4, 5, 6, 9),
-toaster 4/4 (4-7).
+The finger tips end short of the case behind a lever.
 """
 
 from __future__ import annotations

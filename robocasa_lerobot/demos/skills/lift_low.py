@@ -1,8 +1,7 @@
 """Doors that fold down nearly to the floor, shut: lifted at their free edge by the finger tips, then pushed.
 
 The hand points down before the edge and presses its finger tips inwards against the outer corner while it goes up: the
-arm does not get below the door. Measured without action noise on seeds 0-9 of the target and of the pretrain split:
-CloseDishwasher solves 10 and 9 of 10, in 9 s. What fails is a kitchen in which the robot can stand only beside the
+arm does not get below the door. What fails is a kitchen in which the robot can stand only beside the
 door, on its left.
 """
 

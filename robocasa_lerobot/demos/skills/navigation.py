@@ -2,9 +2,6 @@
 
 The base can move to all sides, so the way keeps one heading where it can: it turns at the start, on the way, or at the
 end, whichever has room. Every grid pose is tested with `is_free`, the test that start poses pass.
-
-NavigateKitchen: solved in 7 of 8 target scenes and 8 of 8 pretrain scenes (seeds 0 to 7). The failure: stuck 26 cm from
-its way, before a stove.
 """
 
 from __future__ import annotations

@@ -1,12 +1,6 @@
 """Put an object on, or into, another one, or into the basin of a sink.
 
-Solved in target scenes, without action noise, seeds 0-5 (0-7 where of eight): PickPlaceCounterToSink 8 of 8,
-PickPlaceSinkToCounter 8 of 8, PickPlaceCounterToStove 6 of 6, PickPlaceStoveToCounter 4 of 6, PackDessert 4 of 6,
-CheesyBread 6 of 6, MakeIcedCoffee 5 of 6. Target and pretrain scenes:
-PickPlaceToasterToCounter 6 of 10 and 7 of 10 (in the others the wrist is held up below a wall cabinet on its way out),
-PickPlaceCounterToOven 4 of 8 and 10 of 10. The same, with variety: PickPlaceMicrowaveToCounter 25 and 25 of 30 (seeds
-0-29; 3 of 7 where the microwave stands in a corner), PickPlaceCounterToMicrowave 13 and 13 of 15 (seeds 0-14),
-PickPlaceToasterOvenToCounter 11 of 13 and 7 of 10.
+What fails: the wrist is held up under a wall cabinet on its way out; a microwave in a corner leaves no place to stand.
 """
 
 from __future__ import annotations

@@ -1,11 +1,7 @@
 """Put an object into a part of a fixture: onto a shelf or a rack, into a drawer, a jug or a bowl, under a spout.
 
-Solved in target scenes, without action noise, seeds 0-3: PickPlaceCounterToCabinet 4 of 4, PickPlaceCounterToDrawer
-3 of 4, PickPlaceCounterToToasterOven 4 of 4, PickPlaceCounterToStandMixer 4 of 4 (pretrain, seeds 0-9: 9 of 10);
-for CoffeeSetupMug see `cups`.
-In target and in pretrain scenes, seeds 0-9: PickPlaceCounterToBlender 10 and 9 of 10; PickPlaceFridgeShelfToDrawer 5 of
-6 (0-5) and 10 of 10. PickPlaceFridgeDrawerToShelf, with variety: 11 of 14 (0-13) and 8 of 10, in 14 s. What fails: a
-rolling pin as long as the drawer, now and then a loaf in the bowl, long food deep in a fridge's drawer below a shelf.
+What fails: a rolling pin as long as the drawer, now and then a loaf in the bowl, long food deep in a fridge's drawer
+below a shelf. For CoffeeSetupMug see `cups`.
 """
 
 from __future__ import annotations

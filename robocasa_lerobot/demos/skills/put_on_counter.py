@@ -1,7 +1,6 @@
 """Put an object down on a counter where nothing stands.
 
-With variety, without action noise, on seeds from 0 on: PickPlaceCabinetToCounter 8 of 10 in the pretrain split;
-PickPlaceDrawerToCounter 7 of 8 in the target and 7 of 8 in the pretrain split, in 16 s. What fails lies far under the
+What fails lies far under the
 counter or is longer than a shelf is deep. For CoffeeServeMug see `cups`.
 """
 

@@ -1,8 +1,4 @@
-"""Racks and drawers inside appliances: their front is pushed in with a closed hand, or held at its edge and pulled.
-
-Solved in target kitchens without action noise: SlideDishwasherRack 5/5 and SlideOvenRack 5/5 (seeds 0-4),
-SlideToasterOvenRack 4/4 (0-3), OpenFridgeDrawer 6/6 and CloseFridgeDrawer 6/6 (0-5).
-"""
+"""Racks and drawers inside appliances: their front is pushed in with a closed hand, or held at its edge and pulled."""
 
 from __future__ import annotations
 

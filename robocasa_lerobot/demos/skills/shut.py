@@ -1,8 +1,6 @@
 """Doors pushed shut along their whole arc: on a vertical hinge from outside, folding ones lifted from below.
 
-Measured without action noise on seeds 0-9 of the target and of the pretrain split: CloseFridge solves 9 and 9 of 10,
-CloseCabinet 10 and 9, CloseMicrowave 10 and 10; on seeds 0-7 CloseOven 8 and 8, CloseToasterOvenDoor 8 and 8. What
-fails is the second of two doors where walls and islands leave no place beyond it.
+What fails is the second of two doors where walls and islands leave no place beyond it.
 """
 
 from __future__ import annotations

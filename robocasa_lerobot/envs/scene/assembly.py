@@ -7,6 +7,7 @@ import mujoco
 from robocasa_lerobot.envs.scene.layout import Layout
 from robocasa_lerobot.envs.scene.materials import MaterialPalette, load_style
 from robocasa_lerobot.envs.scene.robot import apply_simulation_options
+from robocasa_lerobot.envs.scene.surroundings import add_surroundings
 
 
 def bare_kitchen(layout: Layout, render_preset: str = "fast") -> tuple[mujoco.MjSpec, MaterialPalette]:
@@ -22,6 +23,7 @@ def bare_kitchen(layout: Layout, render_preset: str = "fast") -> tuple[mujoco.Mj
     palette = MaterialPalette(spec, load_style(layout.style_id))
     for fixture in layout.fixtures.values():
         fixture.build(spec, palette)
+    add_surroundings(spec, palette, layout)
     return spec, palette
 
 

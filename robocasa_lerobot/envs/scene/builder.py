@@ -44,6 +44,29 @@ class _Look:
     camera_noise: CameraNoise | None
 
 
+@dataclass(frozen=True)
+class Arrangement:
+    """What stands where at the start of a task.
+
+    Attributes:
+        roles: fixtures by role.
+        choices: what was chosen among equals.
+        openness: of doors and drawers, by fixture.
+        drawn: numbers of the task's further initial state.
+        lids: roles of the blenders whose lid is not on, and whether it is gone altogether.
+        objects: by name.
+        robot: where it stands.
+    """
+
+    roles: dict[str, str]
+    choices: Choices
+    openness: dict[str, float]
+    drawn: tuple[float, ...]
+    lids: dict[str, bool]
+    objects: dict[str, PlacedObject]
+    robot: RobotPose
+
+
 def build_scene(
     task: Task,
     split: str,
@@ -90,6 +113,42 @@ def _attempt(
     rng: np.random.Generator,
 ) -> Scene:
     layout = load_layout(layout_id, style_id)
+    arranged = arrange(rng, task, split, layout)
+    roles, choices, objects, robot = arranged.roles, arranged.choices, arranged.objects, arranged.robot
+    spots = {role: _lid_spot(rng, layout, roles[role], objects) for role, gone in arranged.lids.items() if not gone}
+    spec = _assemble(task, layout, look, objects)
+    if look.camera_noise is not None:
+        noise_rng = np.random.default_rng([seed, _CAMERA_NOISE_STREAM])
+        add_camera_noise(spec, look.camera_set, look.camera_noise, noise_rng)
+    model = spec.compile()
+    words = _words(layout, roles, objects) | choices.words | {"side": robot.side}
+    return Scene(
+        task=task,
+        split=split,
+        seed=seed,
+        layout_id=layout_id,
+        style_id=style_id,
+        spec=spec,
+        model=model,
+        layout=layout,
+        roles=roles,
+        objects=objects,
+        openness=arranged.openness,
+        robot=robot,
+        instruction=_said(task.instruction, words),
+        paraphrases=tuple(_said(wording, words) for wording in task.paraphrases),
+        choices=choices.values,
+        drawn=arranged.drawn,
+        lid_spots=spots,
+    )
+
+
+def arrange(rng: np.random.Generator, task: Task, split: str, layout: Layout) -> Arrangement:
+    """Draw what stands where in a layout at the start of a task.
+
+    Raises:
+        PlacementError: the layout has not what the task needs, or not the room for it.
+    """
     roles = cast_roles(rng, task, layout)
     choices = draw_choices(rng, task, layout.fixtures, roles)
     robot: RobotPose | None = None
@@ -115,32 +174,7 @@ def _attempt(
     if robot is None:
         at = objects[task.robot_start.at_object].pos[:2]
         robot = robot_pose(rng, layout, task.robot_start, layout.fixtures[roles[task.robot_start.fixture]], at, opened)
-    spots = {role: _lid_spot(rng, layout, roles[role], objects) for role, gone in lids.items() if not gone}
-    spec = _assemble(task, layout, look, objects)
-    if look.camera_noise is not None:
-        noise_rng = np.random.default_rng([seed, _CAMERA_NOISE_STREAM])
-        add_camera_noise(spec, look.camera_set, look.camera_noise, noise_rng)
-    model = spec.compile()
-    words = _words(layout, roles, objects) | choices.words | {"side": robot.side}
-    return Scene(
-        task=task,
-        split=split,
-        seed=seed,
-        layout_id=layout_id,
-        style_id=style_id,
-        spec=spec,
-        model=model,
-        layout=layout,
-        roles=roles,
-        objects=objects,
-        openness=openness,
-        robot=robot,
-        instruction=_said(task.instruction, words),
-        paraphrases=tuple(_said(wording, words) for wording in task.paraphrases),
-        choices=choices.values,
-        drawn=drawn,
-        lid_spots=spots,
-    )
+    return Arrangement(roles, choices, openness, drawn, lids, objects, robot)
 
 
 def _shares(

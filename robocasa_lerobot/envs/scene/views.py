@@ -1,0 +1,96 @@
+"""What a robot's cameras see from where tasks may start it in a kitchen: whether they see past the room's walls."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+
+from robocasa_lerobot.envs.cameras import cameras_of_set
+from robocasa_lerobot.envs.placement import PlacementError
+from robocasa_lerobot.envs.scene.assembly import bare_kitchen
+from robocasa_lerobot.envs.scene.builder import arrange
+from robocasa_lerobot.envs.scene.layout import load_layout, split_of
+from robocasa_lerobot.envs.scene.robot import add_robot, place_base, set_home
+from robocasa_lerobot.envs.task import Task
+from robocasa_lerobot.rendering import SceneRenderer
+
+TRIES = 20  # arrangements of a task in a kitchen until it counts as one that the kitchen does not admit
+
+
+@dataclass(frozen=True)
+class View:
+    """What one camera sees at the start of a task.
+
+    Attributes:
+        layout_id: of the kitchen.
+        task, camera: names.
+        background: share of the pixels that show nothing at all.
+        beyond_m: how far the camera is outside of the room, 0 inside, metres.
+        pose: of the robot: x, y and yaw.
+    """
+
+    layout_id: int
+    task: str
+    camera: str
+    background: float
+    beyond_m: float
+    pose: tuple[float, float, float]
+
+
+def views(
+    layout_id: int, tasks: Sequence[Task], seed: int, *, starts: int = 1, size: int = 48, camera_set: str = "default"
+) -> Iterator[View]:
+    """What every camera of a set sees in a bare kitchen, from `starts` starts of each task that the kitchen admits.
+
+    Objects are left out: they can only hide what is behind them. Doors are closed.
+
+    Args:
+        layout_id: of the kitchen; its style is that of the same number.
+        tasks: whose starts are tried.
+        seed: of the starts.
+        starts: of each task.
+        size: of the pictures, pixels.
+        camera_set: name.
+    """
+    layout = load_layout(layout_id)
+    spec, _ = bare_kitchen(layout)
+    add_robot(spec, "fast", camera_set=camera_set)
+    model = spec.compile()
+    data = mujoco.MjData(model)
+    set_home(model, data)
+    room = layout.room
+    low = np.array([room["x_min"], room["y_min"], 0.0])
+    high = np.array([room["x_max"], 0.0, room["height"]])
+    renderer = SceneRenderer(model, size, size)
+    try:
+        for task in tasks:
+            rng = np.random.default_rng([seed, layout_id, *task.name.encode()])
+            for _ in range(starts):
+                pose = _start(rng, task, layout_id)
+                if pose is None:
+                    break
+                place_base(model, data, *pose)
+                mujoco.mj_kinematics(model, data)
+                mujoco.mj_comPos(model, data)
+                mujoco.mj_camlight(model, data)
+                for camera in cameras_of_set(camera_set):
+                    _, geoms = renderer.geometry(data, camera.name)
+                    at = data.camera(camera.name).xpos
+                    beyond = float(np.maximum(np.maximum(low - at, at - high), 0.0).max())
+                    yield View(layout_id, task.name, camera.name, float((geoms == -1).mean()), beyond, pose)
+    finally:
+        renderer.close()
+
+
+def _start(rng: np.random.Generator, task: Task, layout_id: int) -> tuple[float, float, float] | None:
+    """Where a start of the task puts the robot; None where the kitchen does not admit it."""
+    for _ in range(TRIES):
+        try:
+            robot = arrange(rng, task, split_of(layout_id), load_layout(layout_id)).robot
+        except PlacementError:
+            continue
+        return robot.x, robot.y, robot.yaw
+    return None
