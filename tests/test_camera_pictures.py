@@ -20,6 +20,7 @@ from robocasa_lerobot.envs.pictures import BACKGROUND
 from robocasa_lerobot.envs.projection import back_project, camera_matrix, project
 from robocasa_lerobot.envs.scene.builder import RENDER_PRESETS
 from robocasa_lerobot.envs.scene.robot_bodies import BODIES
+from robocasa_lerobot.envs.scene.surroundings import SURROUNDINGS
 from robocasa_lerobot.rendering import canvas
 
 pytestmark = pytest.mark.render
@@ -155,6 +156,7 @@ def test_names_of_ids(shown: Shown) -> None:
     assert names[-1] == BACKGROUND
     loose = {f"{name}_lid" for name in shown.env.scene.fixtures}  # parts that can be taken off
     known = {*shown.env.scene.fixtures, *loose, *shown.env.scene.objects, *(body.name for body in BODIES)}
+    known.add(SURROUNDINGS)
     assert set(names[:-1]) <= known
     for name in ("obj", "sink", "floor", "robot0_link0"):
         assert any(name in shown.owner(camera) for camera in CAMERAS), name

@@ -10,6 +10,7 @@ import mujoco
 import numpy as np
 
 from robocasa_lerobot.envs.scene.robot_names import ROBOT_BASE
+from robocasa_lerobot.envs.scene.surroundings import SURROUNDINGS
 from robocasa_lerobot.rendering import SceneRenderer
 
 BACKGROUND = "background"
@@ -53,7 +54,8 @@ def take_pictures(
 
 
 def segmentation_names(model: mujoco.MjModel) -> tuple[str, ...]:
-    """What each geom id of a segmentation belongs to (ngeom + 1,): a fixture, an object, or a body of the robot.
+    """What each geom id of a segmentation belongs to (ngeom + 1,): a fixture, an object, a body of the robot,
+    or what is around the room.
 
     The last entry is the background's, which id -1 finds: `numpy.array(names)[segmentation]` is right as it stands.
     """
@@ -64,5 +66,6 @@ def segmentation_names(model: mujoco.MjModel) -> tuple[str, ...]:
         root = body
         while root != robot and int(model.body_parentid[root]) != 0:
             root = int(model.body_parentid[root])
-        owners.append(model.body(body if root == robot else root).name)
+        # The world's own geoms are what is around the room.
+        owners.append(SURROUNDINGS if root == 0 else model.body(body if root == robot else root).name)
     return (*owners, BACKGROUND)
