@@ -20,7 +20,7 @@ from robocasa_lerobot.envs.scene.appliances.pictures import appliance_pictures
 from robocasa_lerobot.envs.scene.materials import MaterialPalette, load_style
 from robocasa_lerobot.errors import UnknownNameError
 
-# Inventory of RoboCasa365 (facts, benchmark).
+# Inventory of RoboCasa365 (docs/robocasa.md, section 9).
 COUNTS = {
     "blender": 22,
     "coffee_machine": 48,

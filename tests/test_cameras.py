@@ -32,7 +32,7 @@ LEFT, RIGHT, WRIST = contract.CAMERAS
 CENTER, FRONT = "robot0_agentview_center", "robot0_frontview"
 SUPPORT, HAND = "mobilebase0_support", "robot0_right_hand"
 LENS = "606 606 pixels of 640 480 on 5.5 3"
-# Position, quaternion wxyz, body, vertical field of view: RoboCasa's numbers (facts, section 3).
+# Position, quaternion wxyz, body, vertical field of view: RoboCasa's numbers (docs/robocasa.md, section 3).
 _SHARED = {
     CENTER: ((-0.6, 0, 1.15), (0.6369459, 0.33251855, -0.31992382, -0.61755961), SUPPORT, 60),
     FRONT: ((-0.5, 0, 0.95), (0.60889369, 0.38146779, -0.36739075, -0.59055454), SUPPORT, 60),

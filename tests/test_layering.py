@@ -220,6 +220,25 @@ def test_no_paths_of_one_machine_and_no_download_addresses() -> None:
             assert not index.search(text), f"{path}: {index.search(text)}"
 
 
+def test_facts_that_comments_cite_are_there() -> None:
+    page = (REPOSITORY / "docs" / "robocasa.md").read_text(encoding="utf-8")
+    there = set(re.findall(r"^## (\d+)\.", page, re.MULTILINE))
+    texts = [path.read_text(encoding="utf-8") for path in PACKAGE.rglob("*.py")]
+    cited = {number for text in texts for number in re.findall(r"docs/robocasa\.md, section (\d+)", text)}
+    assert len(cited) > 5
+    assert cited <= there
+    assert not [text for text in texts if re.search(r"(?i)robocasa facts|\(facts, section", text)]
+
+
+def test_every_decision_is_in_the_list() -> None:
+    folder = REPOSITORY / "docs" / "decisions"
+    pages = {path.name for path in folder.glob("0*.md")}
+    text = (folder / "README.md").read_text(encoding="utf-8")
+    assert set(re.findall(r"\((0\d+-[^)]*\.md)\)", text)) == pages
+    numbers = [int(number) for number in re.findall(r"^\| \[?(\d{4})", text, re.MULTILINE)]
+    assert numbers == list(range(1, len(numbers) + 1))
+
+
 def test_only_tests_look_beside_the_checkout() -> None:
     """What lies there is not what users have."""
     files = [path for folder in (PACKAGE, REPOSITORY / "benchmarks") for path in folder.rglob("*.py")]

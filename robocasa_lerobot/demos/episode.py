@@ -16,7 +16,7 @@ from robocasa_lerobot.envs.proprioception import read_observations
 
 Array = NDArray[np.float64]
 
-# An episode ends after this many consecutive steps in which the goal holds (robocasa facts, section 4).
+# An episode ends after this many consecutive steps in which the goal holds (docs/robocasa.md, section 4).
 SUCCESS_HOLD_STEPS = 15
 # Keys of the generators of action noise and of variety, apart from those of the scene and the arm.
 _NOISE_STREAM, _VARIETY_STREAM = 2, 6

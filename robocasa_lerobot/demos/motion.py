@@ -22,7 +22,7 @@ UP = np.array([0.0, 0.0, 1.0])
 # Control mode: the arm's goal starts from the pose that is achieved, or from the pose that was wanted last.
 FROM_ACHIEVED, FROM_DESIRED = -1.0, 1.0
 
-# In mode FROM_ACHIEVED the arm covers about a quarter of a commanded step (robocasa facts, section 2), so errors are
+# In mode FROM_ACHIEVED the arm covers about a quarter of a commanded step (docs/robocasa.md, section 2), so errors are
 # commanded more than once over; above about 3 the arm overshoots.
 ARM_GAIN = 2.0
 

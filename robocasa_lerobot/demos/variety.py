@@ -24,7 +24,7 @@ _WEIGHT = 0.12
 # Ways with greater commands than this are free ones: skills come near to things, push and pull with smaller ones.
 _FAST = 0.9
 
-# Of forward, left, turn and torso (robocasa facts, section 2).
+# Of forward, left, turn and torso (docs/robocasa.md, section 2).
 _DEAD_ZONES = np.array([0.25, 0.25, 0.11, 0.0])
 
 _POSITION = contract.ACTION_SLICES["end_effector_position"]

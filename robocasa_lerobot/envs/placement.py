@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-MAX_SAMPLES = 5000  # draws for an object before the scene is given up (robocasa facts, section 6)
+MAX_SAMPLES = 5000  # draws for an object before the scene is given up (docs/robocasa.md, section 6)
 FEW_SAMPLES = 32  # of these, one by one: nearly always enough; the others are drawn together, much faster
 MAX_YAW_RAD = np.pi / 4  # of the default rotation range, to either side
 

@@ -33,7 +33,7 @@ from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 SETTLE_STEPS, GRASP_STEPS, RELEASE_STEPS = 6, 10, 6
 INSIST = 0.12
 _BASE_SPEED = 0.22  # metres a second while the arm moves too: the arm keeps up with about 0.26
-_DEAD_ZONE = 0.25  # of base commands (robocasa facts, section 2)
+_DEAD_ZONE = 0.25  # of base commands (docs/robocasa.md, section 2)
 TUCKED_AHEAD_M, TUCKED_UP_M = 0.28, 0.58  # of the grip site from the arm's foot
 REST_M = 0.40  # height over the arm's foot at which the hand works best
 FIRM_LEAD_M = 0.09  # of the hand's goal in a firm push

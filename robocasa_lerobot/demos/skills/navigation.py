@@ -25,7 +25,7 @@ TURN_COST_M = 0.30  # of one heading to the next
 REACH_M = 0.7  # fixtures whose boxes are farther than this from the base centre cannot touch it
 # A goal that touches something is exchanged for the nearest free pose up to this far away.
 SHIFT_M, SHIFT_STEP_M = 0.18, 0.03
-# A base at rest answers to commands above these only (robocasa facts, section 2): metres and radians a second are
+# A base at rest answers to commands above these only (docs/robocasa.md, section 2): metres and radians a second are
 # |command| - 0.25 and 1.5 |command| - 0.167.
 DEAD_ZONE, TURN_DEAD_ZONE = 0.25, 0.11
 MOVE_GAIN, TURN_GAIN = 2.5, 2.0  # per second

@@ -38,7 +38,7 @@ _ITERATIONS, _DAMPING = 36, 0.05
 GOOD_ENOUGH = 0.30  # cost from which no other place to stand is looked at
 _WORSE = 0.6  # ways worse than the best by this much are not looked at to their end
 _NEAR_LIMIT_RAD = 0.25
-# Of base_motion, a command below this moves nothing (robocasa facts, section 2).
+# Of base_motion, a command below this moves nothing (docs/robocasa.md, section 2).
 _DEAD_ZONE = 0.25
 _BASE_TOLERANCE_M = 0.02
 

@@ -19,9 +19,9 @@ if TYPE_CHECKING:
     from robocasa_lerobot.envs.scene.scene import Scene
 
 # The bounding box may stand out of a region by this much: RoboCasa's slack is 0.05 over the region's extent in metres
-# (robocasa facts, section 8), more than this; what lies tilted on a shelf has corners below it.
+# (docs/robocasa.md, section 8), more than this; what lies tilted on a shelf has corners below it.
 INSIDE_MARGIN_M = 0.05
-RECEPTACLE_SHARE = 0.7  # of the receptacle's horizontal radius (robocasa facts, section 8)
+RECEPTACLE_SHARE = 0.7  # of the receptacle's horizontal radius (docs/robocasa.md, section 8)
 UPRIGHT_RAD = np.deg2rad(15.0)
 
 

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from robocasa_lerobot.envs.scene.scene import Scene
 
 GRIPPER_FAR_M, BUTTON_FAR_M = 0.25, 0.15
-# Of the base from the pose in front of a fixture (robocasa facts, section 8).
+# Of the base from the pose in front of a fixture (docs/robocasa.md, section 8).
 STANDS_WITHIN_M, STANDS_COSINE = 0.20, 0.98
 
 

@@ -1,4 +1,4 @@
-"""Fixture types that tasks ask for, and what counts as one: RoboCasa's enum with its filters (facts, section 6)."""
+"""Fixture types that tasks ask for, and what counts as one, by RoboCasa's rules (docs/robocasa.md, section 6)."""
 
 from __future__ import annotations
 
@@ -136,7 +136,7 @@ def _with_drawer(layout: Layout, fixture: Fixture) -> bool:
     return isinstance(fixture, Fridge) and bool(fixture.drawers)
 
 
-# What a robot is sent from and to (robocasa facts, blueprint of NavigateKitchen).
+# What a robot is sent from and to (docs/robocasa.md, section 8).
 _LANDMARKS = (
     "coffee_machine", "toaster", "toaster_oven", "stove", "stove_wide", "stovetop", "open_cabinet", "microwave", "sink",
     "hood", "oven", "fridge_french_door", "fridge_side_by_side", "fridge_bottom_freezer", "dishwasher",

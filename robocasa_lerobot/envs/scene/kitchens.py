@@ -11,7 +11,7 @@ from robocasa_lerobot.errors import UnknownNameError, UserError
 SPLITS = ("pretrain", "target")
 Pairs = list[tuple[int, int]]
 
-# Ids of groups of layouts, or of styles, by RoboCasa's negative numbers (robocasa facts, section 6).
+# Ids of groups of layouts, or of styles, by RoboCasa's negative numbers (docs/robocasa.md, section 6).
 GROUPS: dict[int, tuple[int, ...]] = {
     -1: tuple(range(1, 11)),
     -2: tuple(range(11, 61)),

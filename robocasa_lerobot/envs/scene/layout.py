@@ -22,7 +22,7 @@ from robocasa_lerobot.envs.scene.splash import add_splash
 from robocasa_lerobot.errors import UnknownNameError
 
 WALLS = ("back", "left", "right", "front")
-LAST_TARGET_ID = 10  # ids 1..10 are target, 11..60 pretraining (robocasa facts, section 6)
+LAST_TARGET_ID = 10  # ids 1..10 are target, 11..60 pretraining (docs/robocasa.md, section 6)
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""Where objects may start: the tops and insides of fixtures as rectangles, by RoboCasa's rules (facts, section 6)."""
+"""Where objects may start: tops and insides of fixtures as rectangles (docs/robocasa.md, section 6)."""
 
 from __future__ import annotations
 

@@ -29,7 +29,7 @@ from robocasa_lerobot.envs.scene.robot_names import GRIPPER
 from robocasa_lerobot.envs.scene.selection import RobotPose, standing_pose
 from robocasa_lerobot.envs.task import Task
 
-SETTLE_STEPS = 10  # control steps without a command after placing everything (robocasa facts, section 1)
+SETTLE_STEPS = 10  # control steps without a command after placing everything (docs/robocasa.md, section 1)
 
 
 @dataclass(frozen=True)

@@ -24,10 +24,10 @@ from robocasa_lerobot.envs.scene.layout import Layout
 from robocasa_lerobot.envs.task import InsideOf, OnCounter, RobotStart
 from robocasa_lerobot.errors import UnknownNameError
 
-# Distance of the base centre from the front edge of the counter that it faces, metres (robocasa facts, section 6).
+# Distance of the base centre from the front edge of the counter that it faces, metres (docs/robocasa.md, section 6).
 ROBOT_STANDOFF_M = 0.20
 BESIDE_CLEARANCE_M = 0.20
-# Free poses are searched for with the start's deviation, then with wider ones (robocasa facts, section 6); RoboCasa
+# Free poses are searched for with the start's deviation, then with wider ones (docs/robocasa.md, section 6); RoboCasa
 # widens without end, ours gives the layout up and takes another.
 SPAWN_TRIES, SPAWN_ROUNDS = 50, 4
 SPAWN_WIDENING_M = (0.10, 0.05)
@@ -41,7 +41,7 @@ COLUMN_HALF_M, COLUMN_TOP_M = 0.13, 1.0
 # Forearm and hand in the initial pose: before the base centre, half width, and heights.
 HAND_X_M, HAND_HALF_M, HAND_Z_M = (0.0, 0.30), 0.11, (1.0, 1.6)
 MIN_REGION_WIDTH_M = 0.12
-TALL_STANDOFF_M = 0.10  # more, before fridges and tall housings (robocasa facts, section 6)
+TALL_STANDOFF_M = 0.10  # more, before fridges and tall housings (docs/robocasa.md, section 6)
 HANDLE_OUT_M = 0.05
 DOOR_M = 0.04  # thickness of doors
 HOUSING_BELOW_M = 0.6  # a housing whose underside is lower stands on the floor
@@ -200,7 +200,7 @@ def robot_pose(
     # Standing to the left of the fixture, it is at the robot's right, and the other way round.
     options = [("right", -lateral), ("left", lateral)] if start.beside else [("", 0.0)]
     if start.setback and layout.types[fixture.name] == "fridge_bottom_freezer":
-        options = [("", -start.setback)]  # out of the way of its doors (robocasa facts, blueprint of OpenFridge)
+        options = [("", -start.setback)]  # out of the way of its doors (docs/robocasa.md, section 6)
     obstacles = Obstacles(layout.fixtures, opened)
     for face in faces(layout, ground, fixture):
         half_range = np.array(start.deviation)

@@ -22,7 +22,7 @@ from robocasa_lerobot.envs.scene.appliances.records import ModelRecord
 from robocasa_lerobot.envs.scene.fixtures.base import Fixture, Region
 from robocasa_lerobot.envs.scene.materials import MaterialPalette
 
-# A door counts as open, or as closed, by these shares of its range (robocasa facts, section 7).
+# A door counts as open, or as closed, by these shares of its range (docs/robocasa.md, section 7).
 OPEN_FROM, CLOSED_UP_TO = 0.90, 0.005
 RACK_DOOR_FROM = 0.99  # the door must be this open for a rack to slide
 _AWAKE = -(1 + 10)  # of `tree_asleep`: awake, and 10 quiet steps (mjMINAWAKE) away from sleep

@@ -14,7 +14,7 @@ from robocasa_lerobot.envs.scene.appliances.base import Appliance, Touches
 from robocasa_lerobot.envs.scene.appliances.parts import Parts
 from robocasa_lerobot.envs.scene.fixtures.base import Region, yaw_quat
 
-# Robocasa facts, section 7.
+# docs/robocasa.md, section 7.
 LID_NEAR_M, LID_TILT_RAD = 0.04, float(np.radians(7.0))
 
 _WALL_M, _PLUG_M, _FLANGE_M = 0.005, 0.016, 0.008

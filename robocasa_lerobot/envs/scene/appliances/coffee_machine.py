@@ -16,7 +16,7 @@ from robocasa_lerobot.envs.scene.fixtures.base import Region
 
 POUR_STEPS = 160  # control steps that coffee is seen to run
 _TRAY_M, _CUP_ROOM_M = 0.030, 0.145
-# Of a mug's middle to where it belongs, horizontally and up or down, metres (robocasa facts, section 7).
+# Of a mug's middle to where it belongs, horizontally and up or down, metres (docs/robocasa.md, section 7).
 UNDER_SPOUT_M = (0.04, 0.10)
 _PLACE_ABOVE_TRAY_M = 0.045
 

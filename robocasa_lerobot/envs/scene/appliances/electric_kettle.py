@@ -12,7 +12,7 @@ from robocasa_lerobot.envs.scene.appliances import meshes
 from robocasa_lerobot.envs.scene.appliances.base import Appliance, Touches
 from robocasa_lerobot.envs.scene.appliances.parts import Parts
 
-# Robocasa facts, section 7; times in control steps.
+# docs/robocasa.md, section 7; times in control steps.
 ON_FROM, ON_STEPS = 0.95, 500
 PRESSED_FROM, SHUT_UP_TO = 0.1, 0.01
 

@@ -19,7 +19,7 @@ _SHELF_M = 0.010
 # Of the crisper drawers above the floor of a fridge that reaches down to its feet: the arm, whose shoulder is a metre
 # high, does not reach farther down than 0.4 m. Below them is an open room for bottles.
 _BOTTLES_M = 0.42
-# A shelf that a goal may name (robocasa facts, section 7): its bottom this high in the room, and room above it.
+# A shelf that a goal may name (docs/robocasa.md, section 7): its bottom this high in the room, and room above it.
 USABLE_Z, USABLE_ROOM_M = (0.5, 1.5), 0.20
 
 Box = tuple[np.ndarray, np.ndarray]  # low and high corner

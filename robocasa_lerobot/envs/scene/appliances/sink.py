@@ -13,7 +13,7 @@ from robocasa_lerobot.envs.scene.appliances.base import Appliance, Touches
 from robocasa_lerobot.envs.scene.appliances.parts import HIDDEN_M, Parts
 from robocasa_lerobot.envs.scene.fixtures.base import Region
 
-# Robocasa facts, section 7: angles in radians, shares of ranges.
+# docs/robocasa.md, section 7: angles in radians, shares of ranges.
 WATER_FROM, WATER_TO = 0.40, np.pi
 HIGH_FROM, HOT_FROM = 0.5, 0.5
 SIDE_FROM = np.pi / 6

@@ -13,7 +13,7 @@ from robocasa_lerobot.envs.scene.appliances.base import Appliance, Touches
 from robocasa_lerobot.envs.scene.appliances.parts import Parts
 from robocasa_lerobot.envs.scene.fixtures.base import Region, yaw_quat
 
-# Robocasa facts, section 7.
+# docs/robocasa.md, section 7.
 LOCK_FROM, HEAD_DOWN = 0.75, 0.01
 LOCK_RELEASED = 0.25  # the lock has come out
 HEAD_MAX = 0.75  # radians

@@ -15,7 +15,7 @@ from robocasa_lerobot.envs.scene.appliances.oven import DOOR_M, add_oven_door
 from robocasa_lerobot.envs.scene.appliances.parts import Parts
 from robocasa_lerobot.envs.scene.fixtures.base import Region
 
-# Angles of a knob, radians (robocasa facts, section 7).
+# Angles of a knob, radians (docs/robocasa.md, section 7).
 ON_FROM, HIGH_FROM = 0.35, float(np.radians(80.0))
 KNOB_MAX = 1.5 * np.pi
 

@@ -13,7 +13,7 @@ from robocasa_lerobot.envs.scene.appliances.base import Appliance, Touches
 from robocasa_lerobot.envs.scene.appliances.parts import Parts
 from robocasa_lerobot.envs.scene.fixtures.base import Region
 
-# Thresholds and times in control steps of 50 ms (robocasa facts, section 7).
+# Thresholds and times in control steps of 50 ms (docs/robocasa.md, section 7).
 ON_FROM, COOL_BELOW = 0.90, 0.70
 HELD_STEPS, COOLDOWN_STEPS = 500, 1000
 

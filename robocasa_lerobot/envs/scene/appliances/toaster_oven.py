@@ -12,7 +12,7 @@ from robocasa_lerobot.envs.scene.appliances.base import Touches
 from robocasa_lerobot.envs.scene.appliances.parts import Parts
 from robocasa_lerobot.envs.scene.appliances.racked import Racked, fold_door
 
-# Robocasa facts, section 7; the timer runs down over its whole range in 3000 control steps.
+# docs/robocasa.md, section 7; the timer runs down over its whole range in 3000 control steps.
 SNAP_BELOW, TIMER_STEPS = 0.01, 3000
 _TICK_STEPS = 10  # the clockwork moves its knob twice a second
 _RESTING_SHARE = 0.0005  # of the door: closer than this it is shut

@@ -31,7 +31,7 @@ Size = tuple[float, float, float]
 
 _SPREAD = 0.06  # of sizes around a category's own, to either side, all axes alike
 _STRETCH = 0.05  # of single axes, on top of it
-# Groups that are made of others (robocasa facts, section 6).
+# Groups that are made of others (docs/robocasa.md, section 6).
 _UNIONS: dict[str, tuple[str, ...]] = {
     "food": ("vegetable", "fruit", "sweets", "dairy", "meat", "bread_food", "pastry", "cooked_food"),
     "in_container": ("food", "tool", "iced_item"),

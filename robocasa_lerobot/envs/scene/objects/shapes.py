@@ -14,7 +14,7 @@ from robocasa_lerobot.envs.scene.objects.catalogue import Instance, Rgba, model_
 from robocasa_lerobot.envs.scene.objects.draft import FINISHES, Model
 from robocasa_lerobot.envs.scene.objects.solids import IDENTITY, Solid, about, times
 
-# Contact parameters of objects (robocasa facts, section 6); torsional friction keeps them from spinning in a grasp.
+# Contact parameters of objects (docs/robocasa.md, section 6); torsional friction keeps them from spinning in a grasp.
 FRICTION = (0.95, 0.3, 0.1)
 ROLLING_FRICTION = (0.95, 0.05, 0.004)
 SOLIMP, SOLREF = (0.998, 0.998, 0.001, 0.5, 2.0), (0.004, 2.0)
