@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import fcntl
 import os
+import subprocess
 import sys
+import time
 from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
 
 import pytest
@@ -113,6 +117,28 @@ def test_evaluations_mean_the_experiments_registry_where_they_name_none(tmp_path
     assert f"--env.registry={registry}" in own.arguments
     assert benchmark.tasks == 18
     assert load_experiment(path).registry == str(registry)
+
+
+def test_nothing_of_a_killed_training_goes_on_evaluating(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The evaluation of a trainer that is killed ends, so that the next one may write to its folder."""
+    monkeypatch.setenv("PYTHONPATH", f"{ROOT / 'tests'}{os.pathsep}{ROOT}")
+    command = [
+        sys.executable, "-m", "robocasa_lerobot.cli", "eval", "--end-with-input", "--policy=zero", "--trials=1",
+        "--env.factory=evaluation_env:SlideEnv", "--env.tasks=Slide+slow", "--env.horizon=30000", "--workers=1",
+        f"--out={tmp_path}",
+    ]  # fmt: skip
+    trainer = f"from robocasa_lerobot.training import evaluations as e; e._run({command!r}, lambda: False)"
+    with subprocess.Popen([sys.executable, "-c", trainer]) as process:
+        while not (tmp_path / "trials.jsonl").exists():
+            time.sleep(0.1)
+        process.kill()
+    with (tmp_path / ".lock").open() as lock:
+        for _ in range(300):
+            with suppress(BlockingIOError):
+                fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                return
+            time.sleep(0.1)
+    pytest.fail("the evaluation goes on")
 
 
 def test_a_signal_ends_a_running_evaluation() -> None:

@@ -173,7 +173,7 @@ def run_evaluations(
         what = " ".join((last.name, item.plan, *item.evaluation.settings))
         if item.nothing is not None or (done.is_file() and done.read_text() == what):
             continue
-        command = [sys.executable, "-m", "robocasa_lerobot.cli", "eval", *item.arguments]
+        command = [sys.executable, "-m", "robocasa_lerobot.cli", "eval", "--end-with-input", *item.arguments]
         status = _run(command, stop)
         if status is None:
             break
@@ -219,8 +219,11 @@ class Evaluations:
 
 
 def _run(command: list[str], stop: Callable[[], bool]) -> int | None:
-    """The exit status of a command; None where it was ended because of `stop`."""
-    process = subprocess.Popen(command, env=_environment())
+    """The exit status of a command; None where it was ended because of `stop`.
+
+    Its standard input closes when this process ends in whatever way: nothing of a killed run may go on writing.
+    """
+    process = subprocess.Popen(command, env=_environment(), stdin=subprocess.PIPE)
     try:
         while True:
             try:
@@ -245,7 +248,7 @@ def _checked(evaluations: list[list[str]]) -> list[dict[str, Any]]:
     )
     if done.returncode:
         raise UserError(f"evaluations cannot be planned here (`{shlex.join(command)}`):\n{done.stderr.strip()}")
-    return list(json.loads(done.stdout))
+    return list(json.loads(done.stdout.splitlines()[-1]))  # whatever a library prints stands above
 
 
 def _environment() -> dict[str, str]:
