@@ -131,9 +131,11 @@ def _load(config: PreTrainedConfig, meta: MixtureMeta, checkpoint: Path) -> PreT
     finally:
         print(said.getvalue(), end="")
     # LeRobot's pi0 and pi0.5 go on with random weights where theirs cannot be read or do not fit, and only print it.
-    failed = [line for line in said.getvalue().splitlines() if _NOT_LOADED in line]
+    _, failed, reason = said.getvalue().partition(_NOT_LOADED)
     if failed:
-        raise UserError(f"the weights of {checkpoint} do not fit the policy's settings: {' '.join(failed)}")
+        raise UserError(
+            f"the weights of {checkpoint} do not fit the policy's settings: {' '.join(reason.split())[:500]}"
+        )
     return policy
 
 
