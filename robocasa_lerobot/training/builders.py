@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import copy
 import dataclasses
 import io
 import json
@@ -21,6 +22,7 @@ from lerobot.optim.schedulers import LRSchedulerConfig
 from lerobot.policies.factory import get_policy_class, make_policy, make_pre_post_processors
 from lerobot.policies.pretrained import PreTrainedPolicy
 from lerobot.utils.constants import IMAGENET_STATS
+from lerobot.utils.feature_utils import dataset_to_policy_features
 
 from robocasa_lerobot.data.mixture import MixtureDataset, MixtureMeta
 from robocasa_lerobot.data.statistics import Statistics
@@ -33,6 +35,7 @@ from robocasa_lerobot.training.master_weights import MasterWeights
 from robocasa_lerobot.training.phase_config import PhaseConfig
 
 _NO_FIELDS = ("type", "path", RENAME, LEAVE_OUT)  # settings of a policy that are no fields of its configuration
+_LOAD_TOKENIZERS = ("pi0", "pi05", "smolvla", "xvla")  # by name, in their processors
 _NOT_LOADED = "Could not load state dict"
 
 
@@ -156,6 +159,18 @@ def make_processors(
         return make_pre_post_processors(
             config, pretrained_path=str(checkpoint), preprocessor_overrides=overrides, dataset_meta=meta
         )
+
+
+def check_processors(config: PreTrainedConfig, meta: MixtureMeta) -> None:
+    """Check that what a policy's processors load by name is there, such as a tokenizer: they are made and forgotten.
+
+    Raises:
+        UserError: it is not; how to get it is said.
+    """
+    if config.type in _LOAD_TOKENIZERS:
+        config = copy.deepcopy(config)
+        config.input_features = config.input_features or dataset_to_policy_features(meta.features)
+        make_processors(config, dataclasses.replace(meta, stats=None), None, keep_statistics=False)
 
 
 def make_optimizer(

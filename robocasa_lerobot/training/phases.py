@@ -108,6 +108,8 @@ def check_phase(experiment: ExperimentConfig, phase: PhaseConfig, device: str, a
         features.check_features(config, meta)
         if phase.statistics == "keep" and experiment.parent(phase) is None:
             features.check_kept_statistics(builders.read_config(checkpoint), meta)
+    if experiment.parent(phase) is None and last_checkpoint(Path(experiment.output_dir) / phase.name) is None:
+        builders.check_processors(config, meta)
     phase_evaluations(phase)
     if alone:
         start_of(experiment, phase)
