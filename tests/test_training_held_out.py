@@ -1,0 +1,71 @@
+"""Episodes that are held out: which ones, the loss on them, and that training is the same with and without measuring."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from training_support import losses, tiny
+
+from robocasa_lerobot.data.config import MemberConfig, MixtureConfig
+from robocasa_lerobot.data.fake import write_fake_dataset
+from robocasa_lerobot.data.mixture import open_mixture
+from robocasa_lerobot.training.held_out import without_held_out
+from robocasa_lerobot.training.phase_config import HeldOutConfig
+from robocasa_lerobot.training.phases import run_experiment
+
+
+@pytest.fixture(scope="module")
+def data(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return write_fake_dataset(tmp_path_factory.mktemp("data") / "fake", episodes=8, length=12, image_size=32)
+
+
+def test_held_out_episodes_are_not_trained_on(tmp_path: Path, data: Path) -> None:
+    overrides = ["--defaults.steps=2", "--defaults.held_out={share: 0.25, every: 1, samples: 8}"]
+    experiment = tiny(tmp_path, data, overrides=overrides)
+    mixture = open_mixture(experiment.phases[0].mixture, experiment.loader)
+    kept, apart = without_held_out(mixture, HeldOutConfig(share=0.25), experiment.loader, seed=0)
+    numbers = [dataset.config.members[0].episodes or [] for dataset in (kept, apart)]
+    assert sorted([*numbers[0], *numbers[1]]) == list(range(8))
+    assert len(numbers[1]) == 2  # one of four of each task
+    assert {number % 2 for number in numbers[1]} == {0, 1}
+    assert run_experiment(experiment, only="pretrain")
+    lines = [json.loads(line) for line in (tmp_path / "out/pretrain/held_out.jsonl").read_text().splitlines()]
+    assert [line["step"] for line in lines] == [1, 2]
+    assert lines[0]["tasks"].keys() == {"OpenDrawer", "CloseDrawer"}
+    assert lines[0]["loss"] == pytest.approx(np.mean(list(lines[0]["tasks"].values())))
+    assert lines[0] != lines[1]
+
+
+def test_a_small_part_of_a_dataset_has_held_out_episodes_too(tmp_path: Path, data: Path) -> None:
+    experiment = tiny(tmp_path, data)
+    for demos in ("2", "3"):
+        for seed in range(8):
+            config = MixtureConfig([MemberConfig(str(data), demos=demos), MemberConfig(str(data), ["OpenDrawer"])])
+            mixture = open_mixture(config, experiment.loader)
+            kept, apart = without_held_out(mixture, HeldOutConfig(share=0.25), experiment.loader, seed)
+            trained = {e for member in kept.config.members for e in member.episodes or []}
+            held = {e for member in apart.config.members for e in member.episodes or []}
+            assert held
+            assert not held & trained
+            assert {e % 2 for e in held} == {e % 2 for e in trained} == {0, 1}  # of both tasks
+
+
+def test_single_demonstrations_are_trained_on_and_none_is_held_out(
+    tmp_path: Path, data: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    overrides = ["--defaults.held_out={share: 0.1}", f"--phases.pretrain.mixture.members=[{{root: {data}, demos: 1}}]"]
+    assert run_experiment(tiny(tmp_path, data, overrides=overrides), only="pretrain")
+    assert not (tmp_path / "out/pretrain/held_out.jsonl").exists()
+    assert "no task has two episodes" in capfd.readouterr().out
+
+
+def test_measuring_held_out_episodes_does_not_change_the_training(tmp_path: Path, data: Path) -> None:
+    common = ["--defaults.steps=3"]
+    often = [*common, "--defaults.held_out={share: 0.25, every: 1, samples: 8}"]
+    seldom = [*common, "--defaults.held_out={share: 0.25, every: 9, samples: 8}"]
+    for name, overrides in (("often", often), ("seldom", seldom)):
+        assert run_experiment(tiny(tmp_path / name, data, overrides=overrides), only="pretrain")
+    assert losses(tmp_path / "often", "pretrain") == losses(tmp_path / "seldom", "pretrain")
