@@ -296,7 +296,7 @@ def test_damage_found_half_way_through_an_episode_rejects_only_it(tmp_path: Path
     assert "cannot be read" in result.rejected[0]["reason"]
     assert result.num_frames == 8
     assert verify(tmp_path / "out", pictures_per_episode=None).passed
-    assert {path.name for path in (tmp_path / "out").iterdir()} == {"data", "extras", "meta", "videos"}
+    assert {path.name for path in (tmp_path / "out").iterdir()} == {"README.md", "data", "extras", "meta", "videos"}
 
 
 def test_unknown_camera_names_the_closest(tmp_path: Path) -> None:

@@ -27,7 +27,7 @@ from robocasa_lerobot.convert.settings import ConversionSettings
 
 EPISODES = 60
 RECORD = f"{META_FOLDER}/conversion.json"  # names the output's place
-COMPLETE = {"data", "extras", "meta", "videos"}
+COMPLETE = {"README.md", "data", "extras", "meta", "videos"}
 SECONDS = 240
 
 

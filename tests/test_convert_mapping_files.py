@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 import yaml
 from convert_layouts import write_aloha, write_libero
-from convert_support import INSTRUCTION, write_demos
+from convert_support import INSTRUCTION, moving_pictures, write_demos
 
-from robocasa_lerobot.convert.mapping.custom import EXAMPLE, parse_mapping, read_mapping
+from robocasa_lerobot.convert.mapping.custom import EXAMPLE, FIXED_ARM_EXAMPLE, parse_mapping, read_mapping
 from robocasa_lerobot.convert.settings import ConversionSettings, make_plan
 from robocasa_lerobot.errors import UserError
 
@@ -148,3 +148,52 @@ def test_the_documented_example_parses(tmp_path: Path) -> None:
 def test_the_documentation_shows_the_same_example() -> None:
     text = (Path(__file__).parents[1] / "docs" / "convert.md").read_text(encoding="utf-8")
     assert EXAMPLE in text
+
+
+def test_a_fixed_arm_becomes_data_that_mix_with_the_mobile_robots(tmp_path: Path) -> None:
+    from robocasa_lerobot import contract
+    from robocasa_lerobot.data.config import MemberConfig, MixtureConfig
+    from robocasa_lerobot.data.fake import write_fake_dataset
+    from robocasa_lerobot.data.mixture import MixtureDataset
+
+    rng = np.random.default_rng(0)
+    sizes = {"eef_pos": 3, "eef_quat": 4, "gripper_qpos": 2}
+    with h5py.File(tmp_path / "real.hdf5", "w") as file:
+        demo = file.create_group("data/demo_0")
+        demo.attrs["task"] = "close the lid"
+        demo["actions"] = rng.uniform(-1, 1, (6, 7))
+        for name, size in sizes.items():
+            demo[f"obs/{name}"] = rng.normal(size=(6, size))
+        for camera in ("left", "right", "wrist"):
+            demo[f"obs/{camera}_image"] = moving_pictures(6, 32)
+    settings = ConversionSettings(mapping=_mapping(tmp_path, yaml.safe_load(FIXED_ARM_EXAMPLE)))
+    convert([tmp_path / "real.hdf5"], tmp_path / "real", settings)
+    assert verify(tmp_path / "real", pictures_per_episode=None).passed
+    with h5py.File(tmp_path / "real.hdf5") as file:
+        actions, position = file["data/demo_0/actions"][()], file["data/demo_0/obs/eef_pos"][()]
+    stored = column(tmp_path / "real", "action")
+    assert np.array_equal(stored[:, contract.ACTION_SLICES["end_effector_position"]], actions[:, :3])
+    assert np.array_equal(stored[:, contract.ACTION_SLICES["control_mode"]], -np.ones((6, 1)))
+    state = column(tmp_path / "real", "observation.state")
+    assert np.array_equal(state[:, contract.STATE_SLICES["end_effector_position_relative"]], position)
+    assert np.array_equal(state[:, :7], np.tile([0, 0, 0, 0, 0, 0, 1], (6, 1)))
+    simulated = write_fake_dataset(tmp_path / "simulated", episodes=1, length=4, image_size=32)
+    together = MixtureDataset(MixtureConfig([MemberConfig(str(tmp_path / "real")), MemberConfig(str(simulated))]))
+    assert together.meta.total_frames == 10
+
+
+@pytest.mark.parametrize(
+    "part",
+    [
+        {"constant": []},
+        {"constant": ["a"]},
+        {"constant": [0, True]},
+        {"constant": [0], "key": "obs/x"},
+        {"constant": 1},
+    ],
+)
+def test_constants_of_a_mapping_that_mean_nothing_are_refused(tmp_path: Path, part: dict[str, Any]) -> None:
+    with pytest.raises(UserError, match="a constant is a list of numbers"):
+        _mapping(tmp_path, {**LIBERO, "state": {"base": part}})
+    with pytest.raises(UserError, match="constants only"):
+        _mapping(tmp_path, {**LIBERO, "action": {"base": {"constant": [0.0]}}})

@@ -14,7 +14,7 @@ from training_support import TINY
 from robocasa_lerobot import cli
 from robocasa_lerobot.data.config import MixtureConfig, SelectionConfig
 from robocasa_lerobot.data.fake import write_fake_dataset
-from robocasa_lerobot.data.published import published_task_sets
+from robocasa_lerobot.data.published import published_task_sets, task_facts
 from robocasa_lerobot.data.recipes import demonstrated_tasks
 from robocasa_lerobot.data.registry import (
     MissingDatasetsError,
@@ -243,3 +243,40 @@ def test_unknown_sets_of_datasets_are_told(tmp_path: Path) -> None:
     (tmp_path / "r.yaml").write_text(yaml.safe_dump({"datasets": [{"path": "{task}", "task_set": "atomic_sen"}]}))
     with pytest.raises(UnknownNameError, match="Did you mean 'atomic_seen'"):
         select_datasets(SelectionConfig(str(tmp_path / "r.yaml"), tasks=["OpenDrawer"]))
+
+
+def test_a_tenth_of_few_demonstrations_trains_without_any_held_out(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """10 % of two demonstrations is one, of which none can be held out; that must not end an experiment."""
+    monkeypatch.chdir(tmp_path)
+    mixture = {"select": [{"task_set": "there", "demos": "10%"}]}
+    file = _chain(tmp_path, ["there"], p0={"held_out": {"share": 0.1}, "mixture": mixture})
+    assert cli.main(["train", "--config_path", str(file)]) == 0
+    assert not (tmp_path / "out/p0/held_out.jsonl").exists()
+    card = (tmp_path / "out/p0/checkpoints/last/pretrained_model/README.md").read_text()
+    assert "# chain: p0, step 1" in card
+    assert "data (all tasks): 1 episodes" in card
+
+
+@pytest.mark.parametrize("folder", ["robocasa365", "small"])
+def test_sim_and_real_is_the_papers_protocol(folder: str) -> None:
+    experiment = load_experiment(EXPERIMENTS / folder / "sim_and_real.yaml")
+    assert [(p.name, experiment.init_of(p)) for p in experiment.phases] == [
+        ("midtrain", "from_scratch"),
+        ("cofinetune", "midtrain"),
+    ]
+    (middle,), (same,) = (phase.mixture.select for phase in experiment.phases)
+    assert {middle.views, same.views} == {"lerobot_cotraining_cams"}
+    sets = load_registry(Path(str(middle.registry))).task_sets
+    assert (len(sets["best150"]), len(set(sets["best150"]))) == (150, 150)
+    facts = {name: task_facts()[name] for name in published_task_sets()["pretrain300"]}
+    composite = sorted((f.subtasks, f.human_seconds, name) for name, f in facts.items() if f.kind == "composite")
+    best = {name for name, f in facts.items() if f.kind == "atomic"} | {name for *_, name in composite[:85]}
+    assert set(sets["best150"]) == best
+    real = [Path(member.root).name for member in experiment.phases[1].mixture.members]
+    assert real == sets["real4"]
+    entries = {entry.task for entry in select_datasets(same)}
+    assert entries == set(real) - {"PlaceOnDishRack"}
+    expected = 150 if folder == "robocasa365" else 65
+    assert len(select_datasets(middle)) == expected

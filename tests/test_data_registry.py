@@ -16,6 +16,7 @@ import yaml
 from robocasa_lerobot import contract
 from robocasa_lerobot.data.config import MemberConfig, MixtureConfig, SelectionConfig, demo_count
 from robocasa_lerobot.data.fake import write_fake_dataset
+from robocasa_lerobot.data.hub import fetch_missing
 from robocasa_lerobot.data.mixture import MixtureDataset
 from robocasa_lerobot.data.published import PublishedDatasets, published_task_sets, published_tasks, task_facts
 from robocasa_lerobot.data.registry import MissingDatasetsError, missing_datasets, resolve_mixture, select_datasets
@@ -286,3 +287,41 @@ def test_mixture_files_of_the_benchmark_select_its_datasets(name: str) -> None:
     config = decode(MixtureConfig, load_yaml(path))
     counts = {"human300": 300, "human300_mg60": 360, "target_10": 50}
     assert sum(len(select_datasets(selection)) for selection in config.select) == counts[name]
+
+
+def test_datasets_of_the_hub_are_fetched_once_and_only_for_training(
+    fake: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    import huggingface_hub
+
+    monkeypatch.chdir(tmp_path)
+    mixture = MixtureConfig([MemberConfig(repo_id="owner/name", weight=1.0)])
+    assert mixture.members[0].root == "datasets/hub/owner/name"
+    (entry,) = missing_datasets(mixture)  # what a plan asks: nothing is fetched for it
+    assert "training fetches owner/name" in str(entry.missing)
+    asked = []
+
+    def download(name: str, *, repo_type: str, local_dir: str) -> str:
+        asked.append((name, repo_type))
+        shutil.copytree(fake, local_dir, dirs_exist_ok=True)
+        return local_dir
+
+    monkeypatch.setattr(huggingface_hub, "snapshot_download", download)
+    assert fetch_missing([mixture, mixture]) == [Path("datasets/hub/owner/name")]
+    assert fetch_missing([mixture]) == []
+    assert asked == [("owner/name", "dataset")]
+    assert MixtureDataset(mixture).meta.total_episodes == 12
+    assert [path.name for path in Path("datasets/hub/owner").iterdir()] == ["name"]
+
+
+def test_what_the_hub_cannot_give_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    from huggingface_hub import constants
+
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(constants, "HF_HUB_OFFLINE", True)
+    with pytest.raises(UserError, match="hf download owner/name --repo-type dataset"):
+        fetch_missing([MixtureConfig([MemberConfig(repo_id="owner/name")])])
+    assert not Path("datasets/hub/owner/name").exists()
+    for name in ("name", None):
+        with pytest.raises(UserError, match="repo_id"):
+            MemberConfig(repo_id=name)

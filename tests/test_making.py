@@ -150,6 +150,7 @@ def test_downloads_are_converted_in_bulk(tmp_path: Path, capsys: pytest.CaptureF
     assert "2 dataset(s) below datasets to convert" in said
     assert "not made: datasets/v1.0/pretrain/atomic/CloseDrawer/20250101/lerobot" in said
     assert dataset_version(human / "lerobot_v3") == "v3.0"
+    assert "license: other" in (human / "lerobot_v3/README.md").read_text()
     assert not broken.with_name("lerobot_v3").exists()
     assert cli.main(["data", "--convert", "datasets", "--to", "elsewhere", "--workers", "1"]) == 1
     assert "4 dataset(s) below datasets to convert" in capsys.readouterr().out
@@ -175,6 +176,11 @@ def test_missing_data_are_recorded_converted_and_drawn_again(
         assert info["total_episodes"] == 1
         shapes = [f["shape"] for key, f in info["features"].items() if key.startswith("observation.images")]
         assert shapes == [[128, 128, 3]] * 3
+        card = (root / "README.md").read_text()
+        assert "license: apache-2.0" in card.split("---")[1]
+        assert "| CloseDrawer | 1 |" in card
+        assert f"1 episodes, {info['total_frames']:,} steps" in card
+        assert str(tmp_path) not in card
     episode = json.loads((roots[0] / "meta/robocasa/episodes.jsonl").read_text())
     assert episode["task_name"] == "CloseDrawer"
     assert sorted(path.name for path in Path("datasets/kitchens").iterdir()) == ["pretrain"]  # recordings are gone

@@ -53,6 +53,7 @@ from robocasa_lerobot.convert.shard import (
     read_jsonl,
     write_jsonl,
 )
+from robocasa_lerobot.convert.writing.card import write_dataset_card
 from robocasa_lerobot.convert.writing.encoder import CODECS, SAMPLED_FRAMES, SAMPLED_PIXELS, Histogram, quiet_codecs
 from robocasa_lerobot.convert.writing.encoding_process import shared_encoder
 from robocasa_lerobot.convert.writing.modality import MODALITY_FILE, modality, write_modality
@@ -351,6 +352,7 @@ def _join(plan: Plan, partial: Path, out: Path) -> ConversionResult | None:
     (ours / CONVERSION_FILE).write_text(
         json.dumps(record, indent=2, ensure_ascii=False, default=str) + "\n", encoding="utf-8"
     )
+    write_dataset_card(merged, [Path(source.file) for source in plan.sources])
     return _result(plan, out, episodes, rejected, record)
 
 

@@ -23,7 +23,8 @@ class MemberConfig:
     """One dataset of a mixture, or a part of it.
 
     Attributes:
-        root: folder of a LeRobotDataset v3.0, relative to the working directory.
+        root: folder of a LeRobotDataset v3.0, relative to the working directory; with a `repo_id`,
+            `datasets/hub/<owner>/<name>` if it is not said.
         tasks: task names to keep (`task_name` of `meta/robocasa/episodes.jsonl`); None keeps all.
         episodes: episode indices to keep; None keeps all. Of all that is given here, each must hold.
         layouts: kitchens to keep, by their layout (`layout_id` of the same table); None keeps all.
@@ -33,9 +34,10 @@ class MemberConfig:
         demos: of the episodes that are left, so many of each task: `50` (or `50_demos`) or `10%`, by the
             benchmark's rule (`contract.demo_subset`).
         group: class of the member, for `shares` of the mixture.
+        repo_id: `owner/name` of a LeRobotDataset v3.0 on the hub, which training fetches to `root` if it is not there.
     """
 
-    root: str
+    root: str = ""
     tasks: list[str] | None = None
     episodes: list[int] | None = None
     weight: float | None = None
@@ -44,8 +46,14 @@ class MemberConfig:
     group: str | None = None
     layouts: list[int] | None = None
     styles: list[int] | None = None
+    repo_id: str | None = None
 
     def __post_init__(self) -> None:
+        if self.repo_id is not None and not re.fullmatch(r"[\w.-]+/[\w.-]+", self.repo_id):
+            raise UserError(f"mixture: repo_id is {self.repo_id!r}, expected OWNER/NAME of a dataset on the hub.")
+        if not self.root and self.repo_id is None:
+            raise UserError("mixture: a member needs the `root` of a dataset, or the `repo_id` of one on the hub.")
+        self.root = self.root or f"datasets/hub/{self.repo_id}"
         what = f"mixture member {self.root!r}"
         self.demos = _check_part(what, self.weight, self.demos)
         _check_lists(what, tasks=self.tasks, episodes=self.episodes, layouts=self.layouts, styles=self.styles)

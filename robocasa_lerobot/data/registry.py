@@ -187,6 +187,8 @@ def missing_datasets(config: MixtureConfig) -> list[DatasetEntry]:
             remedy = (
                 f"record with `robocasa-lerobot demos` and convert with `robocasa-lerobot convert` to {member.root}"
             )
+            if member.repo_id is not None:
+                remedy = f"training fetches {member.repo_id} from the hub to {member.root}"
             tasks = "+".join(member.tasks or ["all tasks"])
             entries.append(DatasetEntry(tasks, "-", "member", Path(member.root), remedy))
     return entries

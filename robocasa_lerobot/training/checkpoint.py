@@ -25,6 +25,7 @@ from safetensors.torch import load_file, load_model, save_file, save_model
 from robocasa_lerobot.errors import UserError
 from robocasa_lerobot.policies.origin import Origin, experiment_of
 from robocasa_lerobot.training.adapters import merged_state
+from robocasa_lerobot.training.card import write_model_card
 from robocasa_lerobot.training.ema import Ema
 from robocasa_lerobot.training.master_weights import MasterWeights
 
@@ -135,6 +136,7 @@ def save_checkpoint(phase_dir: Path, state: TrainingState, train_config: Any) ->
     train_config.save_pretrained(model_dir)
     experiment = experiment_of(getattr(train_config, "job_name", None), phase_dir.name)
     Origin(experiment, phase_dir.name, state.step).write(model_dir)
+    write_model_card(model_dir, str(state.policy.name), experiment, phase_dir, state.step)
     if final.exists():
         _drop(final)
     aside.rename(final)

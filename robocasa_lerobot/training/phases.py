@@ -7,6 +7,7 @@ from pathlib import Path
 
 from accelerate import Accelerator, DistributedDataParallelKwargs, InitProcessGroupKwargs
 
+from robocasa_lerobot.data.hub import fetch_missing
 from robocasa_lerobot.training import builders, features, joining, metrics, records, skipped
 from robocasa_lerobot.training.checkpoint import checkpoint_step, last_checkpoint, tidy
 from robocasa_lerobot.training.config import HUB, ExperimentConfig, PhaseConfig
@@ -61,6 +62,8 @@ def run_experiment(
     phases = [phase for phase in experiment.phases if phase.name in {other.name for other in asked}]
     # A mistake in the last phase should not wait for the first to finish. The first process makes fake datasets.
     with accelerator.main_process_first():
+        if accelerator.is_local_main_process:
+            fetch_missing(phase.mixture for phase in phases if not is_finished(output, phase))
         for phase in phases:
             if not is_finished(output, phase):
                 check_phase(experiment, phase, device, only is not None)

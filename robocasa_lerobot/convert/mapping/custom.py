@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+import math
+from collections.abc import Mapping, Sequence
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
+from robocasa_lerobot import contract
 from robocasa_lerobot.contract import Part
 from robocasa_lerobot.convert.mapping.robot_mapping import Columns, RobotMapping
 from robocasa_lerobot.convert.reading.demo import Demo, SourceError
@@ -38,9 +40,31 @@ cameras:
   overview: render              # not stored: from model_file and states
 instruction: put the lid onto the cup
 """
+# Of a fixed arm whose data are to be mixed with the mobile robot's: base and mode are said, not recorded.
+FIXED_ARM_EXAMPLE = """\
+robot_type: PandaOmron
+fps: 20
+state:
+  base_position: {constant: [0, 0, 0]}
+  base_rotation: {constant: [0, 0, 0, 1]}
+  end_effector_position_relative: obs/eef_pos          # in the frame of the arm's base
+  end_effector_rotation_relative: obs/eef_quat         # xyzw
+  gripper_qpos: obs/gripper_qpos
+action:
+  base_motion: {constant: [0, 0, 0, 0]}
+  control_mode: {constant: [-1]}                       # the arm moves, not the base
+  end_effector_position: {key: actions, slice: [0, 3]}
+  end_effector_rotation: {key: actions, slice: [3, 6]}
+  gripper_close: {key: actions, slice: [6, 7]}
+cameras:
+  robot0_agentview_left: obs/left_image
+  robot0_agentview_right: obs/right_image
+  robot0_eye_in_hand: obs/wrist_image
+instruction: {attribute: task}
+"""
 RENDERED = "render"
 _KEYS = ("robot_type", "fps", "episodes", "state", "action", "cameras", "instruction")
-_PART_KEYS = ("key", "slice", "components")
+_PART_KEYS = ("key", "slice", "components", "constant")
 _CAMERA_KEYS = ("key", "flip")
 _INSTRUCTION_KEYS = ("text", "attribute", "field", "dataset")
 
@@ -87,9 +111,12 @@ def parse_mapping(text: str) -> Layout:
     pictures = tuple(
         (str(name), _picture(value, f"cameras.{name}")) for name, value in cameras.items() if value != RENDERED
     )
+    recorded = [part for part in action if not part.constant]
+    if not recorded:
+        raise MappingError("the action has constants only; at least one part needs a `key`.")
     return Layout(
         episodes=_episodes(content.get("episodes", DEFAULT_EPISODES)),
-        action_key=action[0].key,
+        action_key=recorded[0].key,
         pictures=pictures,
         robot=CustomRobot(
             robot_type=_text(content["robot_type"], "robot_type"),
@@ -111,6 +138,9 @@ def custom_mapping(robot: CustomRobot, demo: Demo) -> RobotMapping:
     """
     state = [_resolved(part, demo, "state") for part in robot.state]
     action = [_resolved(part, demo, "action") for part in robot.action]
+    if robot.robot_type == contract.ROBOT_TYPE:  # other data of this robot have these names: they go together then
+        state = [(_named(part, contract.STATE_PARTS), columns) for part, columns in state]
+        action = [(_named(part, contract.ACTION_PARTS), columns) for part, columns in action]
     return RobotMapping(
         robot_type=robot.robot_type,
         state_parts=tuple(part for part, _ in state),
@@ -121,7 +151,16 @@ def custom_mapping(robot: CustomRobot, demo: Demo) -> RobotMapping:
     )
 
 
+def _named(part: Part, known: Sequence[Part]) -> Part:
+    """The contract's part of that name and size, with its names of components; else the part itself."""
+    return next((other for other in known if (other.name, other.size) == (part.name, part.size)), part)
+
+
 def _resolved(part: PartColumns, demo: Demo, where: str) -> tuple[Part, Columns]:
+    if part.constant:
+        size = len(part.constant)
+        names = (part.name,) if size == 1 else tuple(f"{part.name}_{i}" for i in range(size))
+        return Part(part.name, part.components or names), Columns("", size, 0, size, part.constant)
     values = demo.column(part.key)
     if values is None:
         known = [path for path, (shape, _) in demo.shapes().items() if len(shape) < 4]
@@ -159,7 +198,20 @@ def _part(name: str, value: Any, where: str) -> PartColumns:
     components: Any = entry.get("components", [])
     if not isinstance(components, list) or not all(isinstance(c, str) and c for c in components):
         raise MappingError(f"{where}.components is {components!r}, expected a list of names.")
+    if "constant" in entry:
+        return PartColumns(name, "", components=tuple(components), constant=_constant(entry, where))
     return PartColumns(name, _key(entry.get("key"), f"{where}.key"), start, stop, tuple(components))
+
+
+def _constant(entry: Mapping[str, Any], where: str) -> tuple[float, ...]:
+    numbers = entry["constant"]
+    good = isinstance(numbers, list) and numbers and all(type(n) in (int, float) and math.isfinite(n) for n in numbers)
+    if not good or "key" in entry or "slice" in entry or len(entry.get("components") or numbers) != len(numbers):
+        raise MappingError(
+            f"{where}: a constant is a list of numbers, such as [0, 0, 0], and has no key, slice or other number of "
+            f"components; found {dict(entry)}."
+        )
+    return tuple(float(number) for number in numbers)
 
 
 def _picture(value: Any, where: str) -> Picture:

@@ -37,12 +37,13 @@ class Poses(Protocol):
 
 @dataclass(frozen=True)
 class Columns:
-    """Components `start` to `stop` of an HDF5 dataset (T, width) below an episode."""
+    """Components `start` to `stop` of an HDF5 dataset (T, width) below an episode, or the same numbers at each step."""
 
     key: str
     width: int
     start: int
     stop: int
+    constant: tuple[float, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -91,7 +92,7 @@ class RobotMapping:
         Raises:
             RejectedEpisodeError: a column is missing or has not the width that this robot's has.
         """
-        first = self.action_columns[0].width
+        first = next(columns.width for columns in self.action_columns if not columns.constant)
         if demo.actions.shape[1] != first:
             raise RejectedEpisodeError(
                 f"its {demo.layout.action_key} have {demo.actions.shape[1]} numbers, expected {first} for "
@@ -106,7 +107,9 @@ class RobotMapping:
             RejectedEpisodeError: a column has not the width that this robot's has, or is missing and nothing is known
                 of how to compute it.
         """
-        if self.arms and any(demo.column(columns.key) is None for columns in self.state_columns):
+        if self.arms and any(
+            demo.column(columns.key) is None for columns in self.state_columns if not columns.constant
+        ):
             return None
         return np.concatenate([_needed(demo, columns) for columns in self.state_columns], axis=1)
 
@@ -165,6 +168,8 @@ def extra_feature(key: str) -> str:
 
 
 def _needed(demo: Demo, columns: Columns) -> NDArray[np.float64]:
+    if columns.constant:
+        return np.tile(np.asarray(columns.constant, np.float64), (demo.length, 1))
     values = demo.column(columns.key)
     if values is None:
         raise RejectedEpisodeError(f"it has no dataset {columns.key!r}.")

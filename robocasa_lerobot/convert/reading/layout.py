@@ -23,6 +23,7 @@ class PartColumns:
     """A part of the state or action: components `start` to `stop` of the dataset `key` below an episode.
 
     `stop` None means to the end. `components` are the names of the single numbers; empty means made from the part's.
+    `constant` are the numbers of every step, instead of a dataset: what the user says of a part that the robot lacks.
     """
 
     name: str
@@ -30,6 +31,7 @@ class PartColumns:
     start: int = 0
     stop: int | None = None
     components: tuple[str, ...] = ()
+    constant: tuple[float, ...] = ()
 
 
 @dataclass(frozen=True)

@@ -43,6 +43,7 @@ from robocasa_lerobot.convert.running.work import (
     submit_pieces,
 )
 from robocasa_lerobot.convert.scenes.ahead import scenes_ahead
+from robocasa_lerobot.convert.writing.card import renew_dataset_card
 from robocasa_lerobot.convert.writing.encoder import (
     CODECS,
     Histogram,
@@ -238,6 +239,7 @@ def _complete(plan: RenderPlan, partial: Path, out: Path) -> RenderResult:
     names = read_modality(merged) or modality(info["features"], (), ())
     write_modality(merged, names | {"video": modality(new, (), ())["video"]})
     _write_record(plan, merged, out)
+    renew_dataset_card(merged)
     publish(merged, out, partial / "replaced")
     shutil.rmtree(partial)
     cameras = tuple(camera.name for camera in plan.cameras)
