@@ -310,7 +310,7 @@ def test_lifelong_phases_of_other_tasks_have_a_matrix_and_no_published_numbers(t
     assert [part.id for part in section.parts] == ["lifelong-matrix", "lifelong-summary"]  # type: ignore[union-attr]
     assert any("other tasks than the published ones" in text for text in section.text)
     heads = [column.label for column in section.parts[0].columns]  # type: ignore[union-attr]
-    assert heads[1:3] == ["Phase 1: atomic (2 of 65)", "Phase 2 (1 other tasks)"]
+    assert heads[1:3] == ["Phase 1: atomic (2 of 65)", "Phase 2 (1 other task)"]
 
 
 def test_two_lifelong_trainings_have_a_matrix_each(tmp_path: Path) -> None:

@@ -52,7 +52,7 @@ def run(args: argparse.Namespace) -> int:
             raise UserError(f"{args.check} is no submission:\n" + "\n".join(f"- {problem}" for problem in found))
         print(f"{args.check}: a valid submission, overall {overall(values)} %")
         return 0
-    policies = {policy.label: policy for policy in gather([args.results]).policies}
+    policies = {policy.label: policy for policy in gather([args.results]).single}
     if args.policy is None and len(policies) > 1:
         raise UserError(
             f"{args.results} has {len(policies)} policies: choose one with --policy ({', '.join(policies)})."

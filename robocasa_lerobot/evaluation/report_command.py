@@ -61,7 +61,7 @@ def print_rates(results: Sequence[Path]) -> None:
     from robocasa_lerobot.evaluation.results import UNPERTURBED
 
     rows = [("policy", "task", "success", "95 % interval", "trials", "errors")]
-    for policy in gather(results).policies:
+    for policy in gather(results).single:
         for condition, tasks in policy.conditions.items():
             label = policy.label if condition == UNPERTURBED else f"{policy.label} ({condition})"
             for result in tasks:

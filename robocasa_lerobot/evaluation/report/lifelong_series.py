@@ -6,6 +6,7 @@ import re
 from collections.abc import Hashable
 from dataclasses import dataclass
 
+from robocasa_lerobot.evaluation.report import format as fmt
 from robocasa_lerobot.evaluation.report.gather import GROUP_LABELS, LIFELONG_SETS, PolicyResult, ReportData
 from robocasa_lerobot.evaluation.report.joining import training_folder
 from robocasa_lerobot.evaluation.report.published_cells import tasks_of
@@ -28,8 +29,9 @@ class LifelongSeries:
         whole = tasks_of(name)
         if self.tasks(phase) == whole:
             return GROUP_LABELS[name]
-        some = f"{number} of {len(whole)}" if self.tasks(phase) <= whole else f"{number} other tasks"
-        return f"{GROUP_LABELS[name]} ({some})" if self.tasks(phase) <= whole else f"Phase {phase} ({some})"
+        if self.tasks(phase) <= whole:
+            return f"{GROUP_LABELS[name]} ({number} of {len(whole)})"
+        return f"Phase {phase} ({fmt.count(number, 'other task')})"
 
     def tasks(self, phase: int) -> frozenset[str]:
         """The tasks of a phase that were run."""
