@@ -1,4 +1,4 @@
-"""Episodes that are held out: which ones, the loss on them, and that training is the same with and without measuring."""
+"""Episodes that are held out: which ones, the loss on them, and that measuring it does not change the training."""
 
 from __future__ import annotations
 
