@@ -18,7 +18,7 @@ export PYTHONUNBUFFERED := 1
 export UV_HTTP_TIMEOUT ?= 300
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
-.PHONY: help setup demo test test-slow walk lint format lock docs doctor bench bench-convert bench-training bench-evaluation bench-grasps bench-demonstrators bench-kitchens clean
+.PHONY: help setup demo test test-slow walk lint format lock docs doctor bench bench-convert bench-training bench-evaluation bench-grasps bench-demonstrators bench-demo bench-kitchens clean
 
 help:  ## this list
 	@sed -n 's/^\([a-z-]*\):.*  ## /\1\t/p' Makefile | awk -F '\t' '{printf "  make %-20s %s\n", $$1, $$2}'
@@ -93,6 +93,10 @@ bench-grasps: $(STAMP)  ## which objects a gripper can lift: every instance, the
 # Goes on where it was stopped. BENCH_ARGS='--tasks OpenDrawer --fresh' runs a task again, `--seeds N` takes N of each split.
 bench-demonstrators: $(STAMP)  ## how often and how fast each demonstrator solves its task
 	$(BIN)/python benchmarks/demonstrators.py $(BENCH_ARGS)
+
+# Takes about an hour; goes on where it was stopped, BENCH_ARGS=--fresh begins again.
+bench-demo: $(STAMP)  ## what the demo learns, over three seeds, with 40 trials for each policy and task
+	$(BIN)/python benchmarks/demo.py $(BENCH_ARGS)
 
 # Goes on where it was stopped; BENCH_ARGS=--fresh begins again, BENCH_ARGS='--every 31' takes a sample.
 bench-kitchens: $(STAMP)  ## build, check and settle all 2,510 kitchens

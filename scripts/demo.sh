@@ -1,18 +1,19 @@
 #!/bin/sh
 # From a kitchen to a report: demonstrations -> dataset -> two training phases -> seeded trials -> report.
 # Only public commands, so each line can be typed by hand. Run through `make demo`; when it was interrupted, the
-# same command goes on where it stopped. `rm -r outputs/demo` starts over.
+# same command goes on where it stopped. `rm -r outputs/demo` starts over. Everything is written below the working
+# directory, so that `make bench-demo` can run it with several seeds beside each other.
 set -eu
 
-PYTHON=${PYTHON:-.venv/bin/python}
-OUT=${OUT:-outputs/demo}
-TASKS=${TASKS:-OpenDrawer,CloseDrawer}
-EPISODES=${EPISODES:-36}      # demonstrations of each task
-IMAGE_SIZE=${IMAGE_SIZE:-96}  # pixels
+ROOT=$(cd "$(dirname "$0")/.." && pwd)
+PYTHON=${PYTHON:-$ROOT/.venv/bin/python}
+OUT=outputs/demo              # where configs/experiments/demo.yaml has its dataset and its results
+DEMOS=${DEMOS:-OpenDrawer=280 CloseDrawer=100} # tasks, and how many demonstrations of each
+IMAGE_SIZE=${IMAGE_SIZE:-64}  # pixels
 TRIALS=${TRIALS:-8}           # trials of each policy on each task
 HORIZON=${HORIZON:-250}       # control steps of a trial: twice what a demonstration takes, a third of OpenDrawer's own
-EXPERIMENT=${EXPERIMENT:-configs/experiments/demo.yaml}
-SEED=${SEED:-0}
+EXPERIMENT=${EXPERIMENT:-$ROOT/configs/experiments/demo.yaml}
+SEED=${SEED:-0}               # of demonstrations, training and trials
 CORES=$("$PYTHON" -c 'import os; print(len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count())')
 WORKERS=${WORKERS:-$CORES}
 
@@ -31,9 +32,11 @@ robocasa_lerobot() { "$PYTHON" -m robocasa_lerobot.cli "$@"; }
 
 mkdir -p "$OUT"
 
-step "demonstrations: $EPISODES of each of $TASKS"
-robocasa_lerobot demos --tasks "$TASKS" --episodes "$EPISODES" --split target --seed "$SEED" --plain --action-noise 0.05 \
-    --workers "$WORKERS" --out "$OUT/demos"
+step "demonstrations: $DEMOS"
+for demos in $DEMOS; do
+    robocasa_lerobot demos --tasks "${demos%=*}" --episodes "${demos#*=}" --split target --seed $((SEED * 1000)) \
+        --action-noise 0.05 --workers "$WORKERS" --out "$OUT/demos"
+done
 
 step "conversion to a LeRobotDataset v3.0"
 [ -d "$OUT/data/meta" ] ||
@@ -41,13 +44,15 @@ step "conversion to a LeRobotDataset v3.0"
 robocasa_lerobot verify "$OUT/data" --pictures-per-episode 3
 
 step "training: pretraining on all tasks, then fine-tuning on one"
-"$PYTHON" train.py --config_path "$EXPERIMENT"
+"$PYTHON" "$ROOT/train.py" --config_path "$EXPERIMENT" --seed="$SEED"
 
 step "evaluation: $TRIALS trials of the untrained, the pretrained and the fine-tuned policy on each task"
+tasks=$(for demos in $DEMOS; do printf '%s,' "${demos%=*}"; done)
+tasks=${tasks%,}
 checkpoints="$OUT/pretrain/checkpoints/000000/pretrained_model,$OUT/pretrain/checkpoints/last/pretrained_model"
 checkpoints="$checkpoints,$OUT/finetune/checkpoints/last/pretrained_model"
-"$PYTHON" eval.py --policy.path="$checkpoints" --policy.label=untrained,pretrained,finetuned \
-    --env.tasks="$TASKS" --env.horizon="$HORIZON" --trials="$TRIALS" --seed=$((SEED + 1000)) --workers="$WORKERS" \
+"$PYTHON" "$ROOT/eval.py" --policy.path="$checkpoints" --policy.label=untrained,pretrained,finetuned \
+    --env.tasks="$tasks" --env.horizon="$HORIZON" --trials="$TRIALS" --seed=$((SEED + 1000)) --workers="$WORKERS" \
     --videos=1 --report=false --out="$OUT/evaluation"
 
 step "report"

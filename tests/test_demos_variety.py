@@ -57,6 +57,34 @@ def test_fast_commands_are_slowed_and_bowed_and_fine_ones_stay() -> None:
     assert np.abs(variety.carry_out(action(position=np.ones(3), gripper=OPEN))).max() <= 1.0
 
 
+def test_a_hand_waits_beside_the_straight_line_to_its_goal() -> None:
+    approach = np.array([0.0, 0.96, -0.28])  # forwards and a little downwards
+    assert np.array_equal(PLAIN.beside(approach), np.zeros(3))
+    across, up, along = (Variety(wait_m=wait).beside(approach) for wait in np.eye(3).tolist())
+    assert np.allclose(across, [1.0, 0.0, 0.0])
+    assert np.allclose(along, approach)
+    assert up[2] > 0.9
+    assert abs(up @ approach) < 1e-12
+    assert np.allclose(Variety(wait_m=(1.0, 0.0, 0.0)).beside(np.array([0.0, 0.0, -1.0])), [1.0, 0.0, 0.0])
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+def test_a_drawer_is_opened_from_beside_its_handle(seed: int) -> None:
+    """The hands of varied demonstrations come to the handle from different places, those of plain ones from one."""
+
+    def waited(varied: bool) -> np.ndarray:
+        env = KitchenEnv("OpenDrawer", cameras=(), terminate_on_success=False)
+        recording = record_episode(env, seed, varied=varied)
+        env.close()
+        assert recording.success
+        closing = int(np.argmax(recording.actions[:, 6] > 0))
+        positions = recording.observations["robot0_base_to_eef_pos"]
+        return np.asarray(positions[closing - 8] - positions[closing])
+
+    offset = np.linalg.norm(waited(True) - waited(False))
+    assert offset > 0.005
+
+
 def test_an_env_has_the_variety_of_its_demonstration() -> None:
     env, other = (KitchenEnv("OpenDrawer", cameras=()) for _ in range(2))
     give_variety(env, Variety(speed=0.8))

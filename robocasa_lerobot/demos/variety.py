@@ -1,8 +1,10 @@
 """Variety: what differs between two demonstrations of one task beyond the kitchen, drawn once for each.
 
 A demonstration has a speed, a side to which its free ways bow, and a preference among ways to hold the hand that are
-about equally good: grasps, rolls and approaches. speed and bow change the free ways of any skill; the
-preference is asked for by skills that choose among candidates (`variety_of(env).bonus(rotation)`).
+about equally good: grasps, rolls and approaches. Where a hand waits before it goes straight to a handle is drawn too:
+a policy that is trained on it has seen how a hand comes back from beside its goal, which one that always waits at the
+same place has not. speed and bow change the free ways of any skill; the preference is asked for by skills that choose
+among candidates (`variety_of(env).bonus(rotation)`), and so is the place (`variety_of(env).beside(rotation)`).
 """
 
 from __future__ import annotations
@@ -21,6 +23,9 @@ _SLOWEST = 0.85
 _BOW_RAD = 0.1
 # A candidate may cost this much more than the best one (`reach.Plan.cost`) and still be taken.
 _WEIGHT = 0.12
+# Half sizes in metres of the box in which a hand waits, along the world's horizontal across the approach, upwards (the
+# counter's edge is near) and along the approach (backwards).
+_ACROSS_M, _DOWN_M, _UP_M, _BACK_M = 0.05, 0.04, 0.015, 0.03
 # Ways with greater commands than this are free ones: skills come near to things, push and pull with smaller ones.
 _FAST = 0.9
 
@@ -42,24 +47,32 @@ class Variety:
         bow_rad: angle about the vertical by which free horizontal ways of the open hand start beside their goal.
         hand: quaternion (w, x, y, z) in the world of the hand that is preferred.
         weight: what the preference is worth, in the cost of candidates.
+        wait_m: where a hand waits before it goes straight to its goal, beside the skill's own place: across the
+            approach, upwards, and along the approach.
     """
 
     speed: float = 1.0
     bow_rad: float = 0.0
     hand: tuple[float, float, float, float] = (1.0, 0.0, 0.0, 0.0)
     weight: float = 0.0
+    wait_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
     @classmethod
     def draw(cls, rng: np.random.Generator) -> Variety:
         """A random one."""
         quaternion = rng.normal(size=4)
         w, x, y, z = (float(v) for v in quaternion / np.linalg.norm(quaternion))
-        return cls(
-            speed=float(rng.uniform(_SLOWEST, 1.0)),
-            bow_rad=float(rng.uniform(-_BOW_RAD, _BOW_RAD)),
-            hand=(w, x, y, z),
-            weight=_WEIGHT,
-        )
+        speed, bow = float(rng.uniform(_SLOWEST, 1.0)), float(rng.uniform(-_BOW_RAD, _BOW_RAD))
+        across, up, along = (float(v) for v in rng.uniform((-_ACROSS_M, -_DOWN_M, -_BACK_M), (_ACROSS_M, _UP_M, 0.0)))
+        return cls(speed=speed, bow_rad=bow, hand=(w, x, y, z), weight=_WEIGHT, wait_m=(across, up, along))
+
+    def beside(self, approach: Array) -> Array:
+        """Offset (3,) in metres of the place where a hand waits that will go along `approach`, a unit vector (3,)."""
+        across, up, along = self.wait_m
+        sideways = np.cross(approach, [0.0, 0.0, 1.0])
+        length = float(np.linalg.norm(sideways))
+        sideways = sideways / length if length > 1e-6 else np.array([1.0, 0.0, 0.0])
+        return across * sideways + up * np.cross(sideways, approach) + along * approach
 
     def bonus(self, rotation: Array) -> float:
         """What a hand rotation (3, 3) gains over others by being preferred, in [0, weight]."""

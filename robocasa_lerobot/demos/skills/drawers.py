@@ -18,6 +18,7 @@ from robocasa_lerobot.demos.motion import (
     hand_rotation,
 )
 from robocasa_lerobot.demos.skills.common import SkillError, hold_hand, move_hand, require_near
+from robocasa_lerobot.demos.variety import variety_of
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.scene.fixtures.cabinets import Drawer
 from robocasa_lerobot.envs.task import Stage
@@ -47,7 +48,7 @@ def open_drawer(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
     approach = rotation[:, 2]
     for _ in range(ATTEMPTS):
         handle = data.geom(drawer.handle_geom).xpos.copy()
-        before = HandTarget(handle - approach * STANDOFF_M, rotation)
+        before = HandTarget(handle - approach * STANDOFF_M + variety_of(env).beside(approach), rotation)
         at = HandTarget(handle, rotation)
         yield from move_hand(data, before, OPEN, tolerance=0.02)
         yield from move_hand(data, at, OPEN, speed=0.6, max_steps=40)
