@@ -36,6 +36,7 @@ from walk_support import (
 )
 
 from robocasa_lerobot.data.published import PUBLISHED, published_task_sets
+from robocasa_lerobot.data.registry import select_datasets
 from robocasa_lerobot.evaluation import published
 from robocasa_lerobot.evaluation.results import read_results
 from robocasa_lerobot.training.config import ExperimentConfig, load_experiment
@@ -175,10 +176,10 @@ def beyond_memory(phase: PhaseConfig, limit_gb: float) -> bool:
     """Whether states and actions of a phase, with its published data, are more than the loader keeps in memory."""
     total = 0.0
     for part in phase.mixture.select:
-        tasks = published_task_sets()[str(part.task_set)]
+        tasks = {entry.task for entry in select_datasets(part)}
         of_all = published_task_sets()[PUBLISHED[str(part.split), str(part.source)]]
         share = float(str(part.demos or "100%").removesuffix("%")) / 100
-        total += full_frames(str(part.split), str(part.source)) * len({*tasks} & {*of_all}) / len(of_all) * share
+        total += full_frames(str(part.split), str(part.source)) * len(tasks & {*of_all}) / len(of_all) * share
     return total * COLUMN_BYTES > limit_gb * 1e9
 
 

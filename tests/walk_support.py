@@ -13,7 +13,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from robocasa_lerobot.data.config import ROBOCASA365, MixtureConfig
+from robocasa_lerobot.data.config import MixtureConfig
 from robocasa_lerobot.data.fake import write_fake_dataset
 from robocasa_lerobot.data.registry import missing_datasets, select_datasets
 from robocasa_lerobot.training.config import ExperimentConfig
@@ -67,7 +67,7 @@ def _missing(mixture: MixtureConfig) -> Iterable[tuple[Path, str]]:
         for entry in select_datasets(selection):
             if not entry.missing:
                 continue
-            if selection.registry == ROBOCASA365:  # of these the entry names the task's folder
+            if entry.registered is None:  # a published one, of which the entry names the task's folder
                 inner = DATE if entry.source == "human" else f"{DATE}/{entry.source}/demo/000000"
                 yield entry.root / inner / selection.views, entry.task
             else:
