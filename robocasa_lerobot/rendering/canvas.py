@@ -23,6 +23,8 @@ from robocasa_lerobot.rendering.frustum import clipping_planes, distances, in_vi
 
 # robosuite's and RoboCasa's convention: group 0 holds collision shapes, group 1 what cameras see.
 COLLISION_GROUP = 0
+# Of what is behind everything else, however near its box is: drawn last, it costs next to nothing where it is hidden.
+BACKDROP_GROUP = 2
 _HIDDEN_GROUP = 5  # MuJoCo's last geom group, which no camera draws
 _SPARE_GEOMS = 200  # of a scene, beyond the model's own: lights, skins and the like
 # Distances in metres between the parts of what is seen that are drawn one after the other, the nearest first. Near
@@ -103,10 +105,11 @@ class Canvas:
         seen = np.flatnonzero(in_view(model, data, camera, self._aspect))
         # By distance alone: where faces lie in one plane, the order decides, and must not hang on what was left out.
         layers = np.searchsorted(_LAYER_EDGES_M, distances(model, data, camera)[seen])
+        layers[groups[seen] == BACKDROP_GROUP] = len(_LAYER_EDGES_M) + 1
         try:
             model.geom_group[:] = _HIDDEN_GROUP
             self._update(data, camera)
-            for number in range(len(_LAYER_EDGES_M) + 1):
+            for number in range(len(_LAYER_EDGES_M) + 2):
                 layer = seen[layers == number]
                 if len(layer) == 0:
                     continue

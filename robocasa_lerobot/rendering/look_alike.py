@@ -14,13 +14,14 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from robocasa_lerobot.rendering.canvas import BACKDROP_GROUP
 from robocasa_lerobot.rendering.hidden_faces import shown_faces
 from robocasa_lerobot.rendering.tessellation import Surface, boxes, capsule, cylinder, joined
 
 Array = NDArray[np.float64]
 
 VISIBLE_GROUPS = (1, 2)  # of MuJoCo's default options, less the collision shapes
-VISIBLE_GROUP = 1  # of all geoms of a look-alike
+VISIBLE_GROUP = 1  # of all geoms of a look-alike but its backdrop
 # Edge of the squares of floor over which things that never move are merged: culling still tells them apart.
 CELL_M = 2.0
 MIN_SAVED_DRAWS = 50  # below it, a look-alike costs more memory and building time than it is worth
@@ -226,7 +227,8 @@ def _add_part(
         geom.pos, geom.quat, geom.size = poses.positions[first], poses.quats[first], model.geom_size[first]
         if kind == _MESH:
             geom.meshname = _copied_mesh(spec, model, int(model.geom_dataid[first]))
-    geom.group = VISIBLE_GROUP
+    backdrop = model.geom_bodyid[first] == 0 and model.geom_group[first] == BACKDROP_GROUP
+    geom.group = BACKDROP_GROUP if backdrop else VISIBLE_GROUP
     geom.contype = geom.conaffinity = 0
     geom.mass = 0.0
     geom.rgba = model.geom_rgba[first]

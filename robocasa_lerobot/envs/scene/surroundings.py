@@ -12,6 +12,7 @@ import mujoco
 from robocasa_lerobot.envs.scene.fixtures.base import add_box
 from robocasa_lerobot.envs.scene.layout import Layout
 from robocasa_lerobot.envs.scene.materials import MaterialPalette
+from robocasa_lerobot.rendering.canvas import BACKDROP_GROUP
 
 SURROUNDINGS = "surroundings"  # what it is called in segmentations
 # From the room's walls to those of the shell; and how much lower its floor is, and higher its ceiling: what does not
@@ -42,4 +43,4 @@ def add_surroundings(spec: mujoco.MjSpec, palette: MaterialPalette, layout: Layo
         boxes.append(("wall", (x0, y, (low + high) / 2), (across, _THICK_M, high - low)))
     for role, position, size in boxes:
         material = palette.add(f"surroundings_{role}", palette.style.surface(role))
-        add_box(spec.worldbody, position, size, material, collide=False)
+        add_box(spec.worldbody, position, size, material, collide=False).group = BACKDROP_GROUP
