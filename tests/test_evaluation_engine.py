@@ -184,7 +184,7 @@ def test_what_no_trial_can_get_around_ends_the_run_with_its_reason(tmp_path: Pat
         ({"env.factory": "evaluation_env"}, "expected module:callable"),
         ({"env.horizon_multiplier": 1.5}, "needs the kitchen env"),
         ({"policy.path": "zero,zero"}, "two policies are called 'zero'"),
-        ({"policy.label": "a/b"}, "no '/'"),
+        ({"policy.label": ".a/b"}, "no leading"),
     ]
     for number, (change, message) in enumerate(changes):
         with pytest.raises(UserError, match=message):

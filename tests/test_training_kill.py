@@ -222,6 +222,8 @@ class KillSwitch:
 class Layer(torch.nn.Linear):
     """As much of a policy as a checkpoint needs."""
 
+    name = "layer"
+
     def save_pretrained(self, folder: Path, state_dict: dict[str, torch.Tensor] | None = None) -> None:
         folder.mkdir(parents=True)
         save_file(state_dict or self.state_dict(), folder / "model.safetensors")

@@ -72,4 +72,4 @@ def read(output_dir: Path) -> list[Skipped]:
     path = output_dir / SKIPPED_FILE
     if not path.is_file():
         return []
-    return [Skipped(**json.loads(line)) for line in path.read_text(encoding="utf-8").splitlines()]
+    return [Skipped(**json.loads(line)) for line in path.read_text(encoding="utf-8").split("\n") if line]
