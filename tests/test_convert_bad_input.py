@@ -16,6 +16,7 @@ from convert_support import INSTRUCTION, leftovers, write_demos
 
 from robocasa_lerobot import cli, contract
 from robocasa_lerobot.errors import UserError
+from robocasa_lerobot.jsonl import read_jsonl
 
 pytest.importorskip("lerobot.datasets")
 from lerobot.datasets.lerobot_dataset import LeRobotDataset
@@ -24,7 +25,6 @@ from robocasa_lerobot.convert.pipeline import ACTIONS_OUT_OF_RANGE, CONVERSION_F
 from robocasa_lerobot.convert.reading import hdf5
 from robocasa_lerobot.convert.reading.survey import CPU_SECONDS
 from robocasa_lerobot.convert.settings import ConversionSettings, make_plan
-from robocasa_lerobot.convert.shard import read_jsonl
 from robocasa_lerobot.convert.verify import verify
 
 SETTINGS = ConversionSettings()

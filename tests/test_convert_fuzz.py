@@ -14,12 +14,12 @@ from fuzz_support import DAMAGES, base_file, in_child, mutate
 
 from robocasa_lerobot import contract
 from robocasa_lerobot.errors import UserError
+from robocasa_lerobot.jsonl import read_jsonl
 
 pytest.importorskip("lerobot.datasets")
 
 from robocasa_lerobot.convert.pipeline import META_FOLDER, convert
 from robocasa_lerobot.convert.settings import ConversionSettings
-from robocasa_lerobot.convert.shard import read_jsonl
 from robocasa_lerobot.convert.verify import verify
 from robocasa_lerobot.convert.writing.statistics import column
 

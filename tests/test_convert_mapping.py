@@ -25,12 +25,12 @@ from robocasa_lerobot.convert.mapping.robots import choose_mapping
 from robocasa_lerobot.convert.reading.demo_file import DemoFile
 from robocasa_lerobot.convert.settings import ConversionSettings, make_plan
 from robocasa_lerobot.errors import UserError
+from robocasa_lerobot.jsonl import read_jsonl
 
 pytest.importorskip("lerobot.datasets")
 from lerobot.datasets.lerobot_dataset import LeRobotDataset
 
 from robocasa_lerobot.convert.pipeline import META_FOLDER, convert
-from robocasa_lerobot.convert.shard import read_jsonl
 from robocasa_lerobot.convert.verify import verify
 from robocasa_lerobot.convert.writing.statistics import column
 

@@ -14,6 +14,7 @@ import v2_support as v2
 from convert_support import leftovers, tree_hashes
 
 from robocasa_lerobot import cli, contract
+from robocasa_lerobot.jsonl import read_jsonl
 
 pytest.importorskip("lerobot.datasets")
 from lerobot.datasets.lerobot_dataset import LeRobotDataset
@@ -22,7 +23,6 @@ from robocasa_lerobot.convert import pipeline
 from robocasa_lerobot.convert.lerobot_v2.plan import V2Plan
 from robocasa_lerobot.convert.pipeline import META_FOLDER, convert
 from robocasa_lerobot.convert.settings import ConversionSettings, Shard
-from robocasa_lerobot.convert.shard import read_jsonl
 from robocasa_lerobot.convert.verify import verify
 from robocasa_lerobot.convert.writing.statistics import column
 from robocasa_lerobot.convert.writing.video import digests, probe

@@ -16,11 +16,11 @@ from convert_support import leftovers, write_demos
 
 from robocasa_lerobot import contract
 from robocasa_lerobot.errors import UserError
+from robocasa_lerobot.jsonl import read_jsonl
 
 pytest.importorskip("lerobot.datasets")
 from robocasa_lerobot.convert.pipeline import META_FOLDER, convert
 from robocasa_lerobot.convert.settings import ConversionSettings
-from robocasa_lerobot.convert.shard import read_jsonl
 from robocasa_lerobot.convert.verify import verify
 from robocasa_lerobot.convert.writing.video import digests
 

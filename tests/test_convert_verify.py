@@ -17,13 +17,13 @@ from convert_support import write_demos
 
 from robocasa_lerobot import cli, contract
 from robocasa_lerobot.errors import UserError
+from robocasa_lerobot.jsonl import read_jsonl, write_jsonl
 
 pytest.importorskip("lerobot.datasets")
 import av
 
 from robocasa_lerobot.convert.pipeline import META_FOLDER, convert
 from robocasa_lerobot.convert.settings import ConversionSettings
-from robocasa_lerobot.convert.shard import read_jsonl, write_jsonl
 from robocasa_lerobot.convert.verify import verify
 
 CAMERA = contract.CAMERAS[1]

@@ -15,13 +15,13 @@ from convert_support import INSTRUCTION, write_demos
 
 from robocasa_lerobot import cli, contract
 from robocasa_lerobot.errors import UserError
+from robocasa_lerobot.jsonl import read_jsonl
 
 pytest.importorskip("lerobot.datasets")
 from robocasa_lerobot.convert.export import ExportSettings, export
 from robocasa_lerobot.convert.pipeline import META_FOLDER, convert
 from robocasa_lerobot.convert.reading.lerobot_v3 import ExportedDataset
 from robocasa_lerobot.convert.settings import ConversionSettings
-from robocasa_lerobot.convert.shard import read_jsonl
 from robocasa_lerobot.convert.verify import verify
 from robocasa_lerobot.convert.writing.statistics import column
 

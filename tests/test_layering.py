@@ -19,12 +19,13 @@ REPOSITORY = Path(__file__).parents[1]
 PACKAGE = REPOSITORY / "robocasa_lerobot"
 
 # What each part of the package may import of the rest of the package. Parts on one level stay apart.
-BASE = {"contract", "errors", "gl", "parallel", "progress", "rendering", "settings", "video"}
+BASE = {"contract", "errors", "gl", "jsonl", "parallel", "progress", "rendering", "settings", "video"}
 LOW = {"envs", "convert", "data", "policies"}
 MAY_IMPORT: dict[str, set[str]] = {
     "contract": {"errors"},
     "errors": set(),
     "gl": {"errors"},
+    "jsonl": set(),
     "parallel": {"errors"},
     "progress": set(),
     "settings": {"errors"},
@@ -45,6 +46,7 @@ FORBIDDEN: dict[str, set[str]] = {
     "contract": TORCH | PHYSICS,
     "errors": TORCH | PHYSICS,
     "gl": TORCH,
+    "jsonl": TORCH | PHYSICS,
     "parallel": TORCH | PHYSICS,
     "progress": TORCH | PHYSICS,
     "settings": TORCH | PHYSICS,

@@ -50,14 +50,13 @@ from robocasa_lerobot.convert.shard import (
     convert_shard,
     episode_folder,
     kept_assets,
-    read_jsonl,
-    write_jsonl,
 )
 from robocasa_lerobot.convert.writing.card import write_dataset_card
 from robocasa_lerobot.convert.writing.encoder import CODECS, SAMPLED_FRAMES, SAMPLED_PIXELS, Histogram, quiet_codecs
 from robocasa_lerobot.convert.writing.encoding_process import shared_encoder
 from robocasa_lerobot.convert.writing.modality import MODALITY_FILE, modality, write_modality
 from robocasa_lerobot.errors import UserError
+from robocasa_lerobot.jsonl import read_jsonl, write_jsonl
 
 # Our part of a dataset's folder; LeRobot reads nothing in it.
 META_FOLDER = "meta/robocasa"

@@ -23,6 +23,7 @@ from robocasa_lerobot.convert.scenes.demo_scene import DemoScene
 from robocasa_lerobot.convert.settings import Plan, Shard
 from robocasa_lerobot.convert.writing.dataset import DatasetWriter
 from robocasa_lerobot.convert.writing.encoding_process import EncodingProcess, shared_encoder
+from robocasa_lerobot.jsonl import write_jsonl
 
 _PROGRESS_SECONDS = 0.5
 
@@ -167,17 +168,6 @@ def _write_extras(episode: Episode, folder: Path) -> None:
         (folder / "model.xml.gz").write_bytes(igzip.compress(demo.model_xml.encode(), mtime=0))
     if episode.simulator_states is not None:
         np.savez_compressed(folder / "states.npz", states=episode.simulator_states)
-
-
-def write_jsonl(path: Path, lines: list[dict[str, Any]]) -> None:
-    """Write one JSON object on each line."""
-    path.write_text("".join(json.dumps(line, ensure_ascii=False) + "\n" for line in lines), encoding="utf-8")
-
-
-def read_jsonl(path: Path) -> list[dict[str, Any]]:
-    """The JSON objects of a file with one on each line."""
-    # Not `splitlines`, which also breaks at other characters that instructions may hold.
-    return [json.loads(line) for line in path.read_text(encoding="utf-8").split("\n") if line]
 
 
 class _Throttled:

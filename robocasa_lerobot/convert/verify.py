@@ -22,9 +22,10 @@ from robocasa_lerobot.convert.pipeline import CONVERSION_FILE, META_FOLDER, quie
 from robocasa_lerobot.convert.reading.demo_file import DemoFile, RejectedEpisodeError
 from robocasa_lerobot.convert.report import CameraQuality, Check, Report
 from robocasa_lerobot.convert.settings import Camera, ConversionSettings, Plan, SourceRecord, file_sha256
-from robocasa_lerobot.convert.shard import EPISODES_FILE, REJECTED_FILE, read_jsonl
+from robocasa_lerobot.convert.shard import EPISODES_FILE, REJECTED_FILE
 from robocasa_lerobot.convert.writing.statistics import column_of
 from robocasa_lerobot.errors import UserError
+from robocasa_lerobot.jsonl import read_jsonl
 from robocasa_lerobot.progress import Bar
 
 _CHECKS = (

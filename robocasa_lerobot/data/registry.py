@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import functools
-import json
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
@@ -20,6 +19,7 @@ from robocasa_lerobot.data.published import (
 from robocasa_lerobot.data.recipes import demonstrated_tasks
 from robocasa_lerobot.data.registry_file import DEMONSTRATED, TASK, RegisteredDataset, RegistryConfig, load_registry
 from robocasa_lerobot.errors import UnknownNameError, UserError
+from robocasa_lerobot.jsonl import read_jsonl
 
 MAKE = "`robocasa-lerobot data EXPERIMENT_FILE --make` records and converts it with our demonstrators"
 _SHOWN = 20  # missing datasets that an error lists
@@ -258,5 +258,4 @@ def _tasks_in(table: Path) -> tuple[str, ...] | None:
     """Names of the tasks in the table of episodes of a converted dataset, if it has one."""
     if not table.is_file():
         return None
-    rows = (json.loads(line) for line in table.read_text(encoding="utf-8").splitlines() if line.strip())
-    return tuple(sorted({str(row["task_name"]) for row in rows}))
+    return tuple(sorted({str(row["task_name"]) for row in read_jsonl(table)}))

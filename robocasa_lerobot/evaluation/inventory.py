@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,6 +11,7 @@ from robocasa_lerobot.convert.inspect.dataset import inspect_dataset
 from robocasa_lerobot.data.published import PUBLISHED, DatasetEntry
 from robocasa_lerobot.data.registry import Registry
 from robocasa_lerobot.errors import UserError
+from robocasa_lerobot.jsonl import read_jsonl
 
 _EPISODES = "meta/robocasa/episodes.jsonl"
 VIEWS = "lerobot"
@@ -111,10 +111,9 @@ def _demonstrations(root: Path, entries: Iterable[DatasetEntry]) -> list[Demonst
         # Only a dataset of one task can do without the table.
         task = next(iter(wanted))
         return [Demonstration(task, length / rate, None) for length in report["lengths"]]
-    rows = [json.loads(line) for line in path.read_text(encoding="utf-8").splitlines() if line.strip()]
     lengths = report["lengths"]
     out = []
-    for row in rows:
+    for row in read_jsonl(path):
         task, index = str(row.get("task_name")), int(row["episode_index"])
         if task in wanted or not any(wanted.values()):
             layout, style = row.get("layout_id"), row.get("style_id")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import json
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -18,6 +17,7 @@ from robocasa_lerobot.data.config import LoaderConfig, MemberConfig, MixtureConf
 from robocasa_lerobot.data.mixture import MixtureDataset, open_mixture
 from robocasa_lerobot.data.source import EPISODE_TABLE, DatasetSource
 from robocasa_lerobot.errors import UserError
+from robocasa_lerobot.jsonl import read_jsonl
 from robocasa_lerobot.training.phase_config import HeldOutConfig
 
 Forward = Callable[[dict[str, Any]], tuple[torch.Tensor, Any]]
@@ -117,8 +117,7 @@ def task_names(source: DatasetSource) -> list[str]:
     table = source.root / EPISODE_TABLE
     if not table.is_file():
         return [source.root.as_posix()] * len(source.starts)
-    rows = [json.loads(line) for line in table.read_text(encoding="utf-8").splitlines() if line.strip()]
-    by_episode = {int(row["episode_index"]): str(row["task_name"]) for row in rows}
+    by_episode = {int(row["episode_index"]): str(row["task_name"]) for row in read_jsonl(table)}
     return [by_episode.get(index, source.root.as_posix()) for index in range(len(source.starts))]
 
 

@@ -7,10 +7,11 @@ part of its tasks. Every run writes the file anew: what is possible now has no l
 from __future__ import annotations
 
 import dataclasses
-import json
 from collections.abc import Collection, Iterable
 from dataclasses import dataclass
 from pathlib import Path
+
+from robocasa_lerobot.jsonl import read_jsonl, write_jsonl
 
 SKIPPED_FILE = "skipped.jsonl"
 PHASE, EVALUATION, PARTIAL = "phase", "evaluation", "partial"
@@ -44,13 +45,13 @@ class Skipped:
 def record(output_dir: Path, skipped: Iterable[Skipped]) -> None:
     """Write the file whole or not at all; with nothing to say it is removed."""
     path = output_dir / SKIPPED_FILE
-    lines = [json.dumps(dataclasses.asdict(item), ensure_ascii=False) + "\n" for item in dict.fromkeys(skipped)]
+    lines = [dataclasses.asdict(item) for item in dict.fromkeys(skipped)]
     if not lines:
         path.unlink(missing_ok=True)
         return
     output_dir.mkdir(parents=True, exist_ok=True)
     aside = path.with_name(f".{path.name}")
-    aside.write_text("".join(lines), encoding="utf-8")
+    write_jsonl(aside, lines)
     aside.replace(path)
 
 
@@ -72,4 +73,4 @@ def read(output_dir: Path) -> list[Skipped]:
     path = output_dir / SKIPPED_FILE
     if not path.is_file():
         return []
-    return [Skipped(**json.loads(line)) for line in path.read_text(encoding="utf-8").split("\n") if line]
+    return [Skipped(**line) for line in read_jsonl(path)]

@@ -10,6 +10,7 @@ from typing import Any
 import pyarrow.parquet as pq
 
 from robocasa_lerobot.errors import UserError
+from robocasa_lerobot.jsonl import read_jsonl
 
 # Where `convert` keeps its own records (its pipeline imports LeRobot, which takes seconds).
 _RECORDS = "meta/robocasa"
@@ -97,6 +98,4 @@ def _tasks(root: Path) -> list[str]:
 
 
 def _json_lines(file: Path) -> list[dict[str, Any]]:
-    if not file.is_file():
-        return []
-    return [json.loads(line) for line in file.read_text(encoding="utf-8").splitlines() if line.strip()]
+    return read_jsonl(file) if file.is_file() else []

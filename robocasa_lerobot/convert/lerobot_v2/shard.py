@@ -31,7 +31,6 @@ from robocasa_lerobot.convert.shard import (
     RejectedEpisode,
     ShardOutcome,
     episode_folder,
-    write_jsonl,
 )
 from robocasa_lerobot.convert.writing.encoder import (
     EncodedVideo,
@@ -42,6 +41,7 @@ from robocasa_lerobot.convert.writing.encoder import (
 from robocasa_lerobot.convert.writing.encoding_process import shared_encoder
 from robocasa_lerobot.convert.writing.files import DatasetFiles
 from robocasa_lerobot.convert.writing.video import VideoForm, frames, probe, rgb
+from robocasa_lerobot.jsonl import write_jsonl
 
 
 @dataclass(frozen=True)

@@ -16,10 +16,11 @@ from robocasa_lerobot.convert.pipeline import META_FOLDER
 from robocasa_lerobot.convert.reading.demo_file import RejectedEpisodeError
 from robocasa_lerobot.convert.report import Check
 from robocasa_lerobot.convert.settings import Camera, ConversionSettings
-from robocasa_lerobot.convert.shard import REJECTED_FILE, episode_folder, read_jsonl
+from robocasa_lerobot.convert.shard import REJECTED_FILE, episode_folder
 from robocasa_lerobot.convert.verify import Verification, compare_bits, spread
 from robocasa_lerobot.convert.writing.statistics import column_of
 from robocasa_lerobot.convert.writing.video import digests
+from robocasa_lerobot.jsonl import read_jsonl
 from robocasa_lerobot.progress import Bar
 
 _MORE_CHECKS = ("other columns", "extras", "copied frames")

@@ -18,9 +18,10 @@ from numpy.typing import NDArray
 
 from robocasa_lerobot import contract
 from robocasa_lerobot.convert.mapping.robot_mapping import EXTRA_PREFIX
-from robocasa_lerobot.convert.shard import EPISODES_FILE, EXTRAS, episode_folder, read_jsonl
+from robocasa_lerobot.convert.shard import EPISODES_FILE, EXTRAS, episode_folder
 from robocasa_lerobot.convert.writing.statistics import column_of
 from robocasa_lerobot.errors import UserError
+from robocasa_lerobot.jsonl import read_jsonl
 
 __all__ = ["EXTRA_PREFIX", "ExportedDataset", "ExportedEpisode"]
 

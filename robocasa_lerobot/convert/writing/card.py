@@ -13,6 +13,8 @@ from typing import Any
 
 import h5py
 
+from robocasa_lerobot.jsonl import read_jsonl
+
 CARD = "README.md"
 _RECORDS = "meta/robocasa"
 _OURS = "apache-2.0"  # of this project: kitchens, objects and demonstrators are its own code
@@ -32,8 +34,7 @@ def write_dataset_card(root: Path, sources: Sequence[Path] = ()) -> None:
 def _write(root: Path, ours: bool) -> None:
     info = json.loads((root / "meta/info.json").read_text(encoding="utf-8"))
     record = json.loads((root / _RECORDS / "conversion.json").read_text(encoding="utf-8"))
-    text = (root / _RECORDS / "episodes.jsonl").read_text(encoding="utf-8")
-    episodes = [json.loads(line) for line in text.split("\n") if line]
+    episodes = read_jsonl(root / _RECORDS / "episodes.jsonl")
     (root / CARD).write_text(_card(info, record, episodes, ours), encoding="utf-8")
 
 
@@ -64,8 +65,8 @@ def _card(info: dict[str, Any], record: dict[str, Any], episodes: list[dict[str,
         else "Converted from demonstrations of another source; see there how they were made."
     )
     licence = (
-        "Apache 2.0: scenes, objects and motions are made by that project's code; the arm's meshes in the pictures are those "
-        "of gymnasium-robotics (MIT)."
+        "Apache 2.0: scenes, objects and motions are made by that project's code; the arm's meshes in the pictures are "
+        "those of gymnasium-robotics (MIT)."
         if ours
         else "That of the sources, which the conversion does not know: look it up, and name the authors, before you "
         "publish this."

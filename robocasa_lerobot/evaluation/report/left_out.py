@@ -73,7 +73,7 @@ def _output_folders(policy: PolicyResult) -> Iterator[Path]:
 
 
 def _read(path: Path) -> Iterator[str]:
-    for number, text in enumerate(path.read_text(encoding="utf-8").splitlines(), start=1):
+    for number, text in enumerate(path.read_text(encoding="utf-8").rstrip("\n").split("\n"), start=1):
         try:
             item = json.loads(text)
             kind, phase, evaluation, reason = (item[key] for key in ("kind", "phase", "evaluation", "reason"))

@@ -1,0 +1,19 @@
+"""Files with one JSON object on each line."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+
+def write_jsonl(path: Path, lines: Iterable[dict[str, Any]]) -> None:
+    """Write one JSON object on each line."""
+    path.write_text("".join(json.dumps(line, ensure_ascii=False) + "\n" for line in lines), encoding="utf-8")
+
+
+def read_jsonl(path: Path) -> list[dict[str, Any]]:
+    """The JSON objects of a file with one on each line."""
+    # Not `splitlines`, which also breaks at other characters that instructions may hold.
+    return [json.loads(line) for line in path.read_text(encoding="utf-8").split("\n") if line.strip()]
