@@ -41,7 +41,7 @@ done
 step "conversion to a LeRobotDataset v3.0"
 [ -d "$OUT/data/meta" ] ||
     robocasa_lerobot convert "$OUT"/demos/*.hdf5 --image-size "$IMAGE_SIZE" --workers "$WORKERS" --out "$OUT/data"
-robocasa_lerobot verify "$OUT/data" --pictures-per-episode 3
+robocasa_lerobot verify "$OUT/data" --pictures-per-episode 1
 
 step "training: pretraining on all tasks, then fine-tuning on one"
 "$PYTHON" "$ROOT/train.py" --config_path "$EXPERIMENT" --seed="$SEED"
