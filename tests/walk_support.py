@@ -18,6 +18,7 @@ from robocasa_lerobot.data.fake import write_fake_dataset
 from robocasa_lerobot.data.registry import missing_datasets, select_datasets
 from robocasa_lerobot.training.config import ExperimentConfig
 from robocasa_lerobot.training.phases import is_finished
+from robocasa_lerobot.training.skipped import Skipped, read
 from robocasa_lerobot.training.unavailable import runnable
 
 ROOT = Path(__file__).parents[1]
@@ -38,6 +39,7 @@ class Walked:
     minutes: float = 0.0
     output: str = ""
     results: list[Path] = field(default_factory=list)
+    skipped: list[Skipped] = field(default_factory=list)  # another experiment in the same folder says other things
 
 
 def write_datasets(work: Path, experiments: Iterable[ExperimentConfig]) -> dict[Path, tuple[str, ...]]:
@@ -114,6 +116,7 @@ class Walker:
             if self._run(command, log, seconds, kill_at=out / middle.name / f"checkpoints/{middle.save_every:06d}"):
                 walked.killed_in = middle.name
         self._run(command, log, seconds)
+        walked.skipped = read(out)
         walked.output = log.read_text(encoding="utf-8")
         found = [results for phase in phases for results in (out / phase.name / "evaluations").glob("*/trials.jsonl")]
         walked.results = sorted(results.parent for results in found)
