@@ -31,7 +31,8 @@ from robocasa_lerobot.evaluation.report.charts import (
     thin_out,
 )
 from robocasa_lerobot.evaluation.report.format import count, interval, listed, p_value, percent, points, published
-from robocasa_lerobot.evaluation.report.gather import gather, same_trials, summarize
+from robocasa_lerobot.evaluation.report.gather import gather, summarize
+from robocasa_lerobot.evaluation.report.policies import same_trials
 from robocasa_lerobot.evaluation.report.sections.beside_published import differences
 from robocasa_lerobot.evaluation.report.training import TrainingPhase, find_trainings, read_demonstrator, read_training
 from robocasa_lerobot.evaluation.results import TermSummary

@@ -17,7 +17,8 @@ from robocasa_lerobot.cli import main
 from robocasa_lerobot.data.published import published_task_sets, task_facts
 from robocasa_lerobot.evaluation import published
 from robocasa_lerobot.evaluation.published.places import named_experiments
-from robocasa_lerobot.evaluation.report.gather import PolicyResult, ReportData, gather
+from robocasa_lerobot.evaluation.report.gather import gather
+from robocasa_lerobot.evaluation.report.policies import PolicyResult, ReportData
 from robocasa_lerobot.evaluation.report.sections import beside_published, data_efficiency, kinds, lifelong
 from robocasa_lerobot.evaluation.results import UNPERTURBED
 from robocasa_lerobot.training.config import load_experiment

@@ -155,7 +155,11 @@ def load_experiment(path: Path, overrides: Sequence[str] = (), scale: str | None
     data = overlay.resolve(path, parse_overrides(overrides))
     overlay.check_keys(ExperimentConfig, data, path.name)
     experiment = decode(ExperimentConfig, data, str(path))
-    return experiment if scale is None else scaled(experiment, load_scale(scale))
+    if scale is None:
+        return experiment
+    asked = load_scale(scale)
+    policy, phases, loader = scaled(asked, experiment.policy, experiment.phases, experiment.loader)
+    return dataclasses.replace(experiment, policy=policy, phases=phases, loader=loader, scale=asked)
 
 
 def to_yaml(experiment: ExperimentConfig) -> str:

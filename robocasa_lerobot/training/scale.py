@@ -12,16 +12,13 @@ import shlex
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from robocasa_lerobot.data.config import LoaderConfig, MixtureConfig
 from robocasa_lerobot.errors import UserError, suggest
 from robocasa_lerobot.settings import decode, load_yaml
 from robocasa_lerobot.training.overlay import check_keys
 from robocasa_lerobot.training.phase_config import PhaseConfig
-
-if TYPE_CHECKING:
-    from robocasa_lerobot.training.config import ExperimentConfig
 
 NAMED = Path(__file__).parents[2] / "configs" / "scales"
 _IDENTITY = ("type", "path", "file")  # settings that say which policy it is
@@ -109,15 +106,12 @@ def load_scale(name: str) -> ScaleConfig:
     return decode(ScaleConfig, {"name": path.stem, **data}, str(path))
 
 
-def scaled(experiment: ExperimentConfig, scale: ScaleConfig) -> ExperimentConfig:
-    """The experiment at that scale, which it then records; the scale holds over what the experiment says."""
-    return dataclasses.replace(
-        experiment,
-        policy={**experiment.policy, **scale.policies.get(str(experiment.policy.get("type")), {})},
-        phases=[_phase(phase, str(experiment.policy.get("type")), scale) for phase in experiment.phases],
-        loader=_loader(experiment.loader, scale),
-        scale=scale,
-    )
+def scaled(
+    scale: ScaleConfig, policy: dict[str, Any], phases: Sequence[PhaseConfig], loader: LoaderConfig
+) -> tuple[dict[str, Any], list[PhaseConfig], LoaderConfig]:
+    """An experiment's policy, phases and loader at that scale; the scale holds over what the experiment says."""
+    kind = str(policy.get("type"))
+    return {**policy, **scale.policies.get(kind, {})}, [_phase(p, kind, scale) for p in phases], _loader(loader, scale)
 
 
 def _phase(phase: PhaseConfig, kind: str, scale: ScaleConfig) -> PhaseConfig:

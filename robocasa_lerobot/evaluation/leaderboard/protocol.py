@@ -5,7 +5,7 @@ from __future__ import annotations
 import collections
 
 from robocasa_lerobot.evaluation import published
-from robocasa_lerobot.evaluation.report.gather import REFERENCES, PolicyResult
+from robocasa_lerobot.evaluation.report.policies import REFERENCES, PolicyResult
 from robocasa_lerobot.evaluation.results import UNPERTURBED, TrialRecord
 
 SPLIT = "pretrain"

@@ -12,7 +12,7 @@ from typing import Any
 from robocasa_lerobot.errors import UserError
 from robocasa_lerobot.evaluation import published
 from robocasa_lerobot.evaluation.leaderboard.protocol import reasons
-from robocasa_lerobot.evaluation.report.gather import PolicyResult, average_of
+from robocasa_lerobot.evaluation.report.policies import PolicyResult, average_of
 from robocasa_lerobot.evaluation.results import UNPERTURBED
 
 NOT_AVAILABLE = "N/A"

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from robocasa_lerobot.evaluation import published
-from robocasa_lerobot.evaluation.report.gather import GROUP_LABELS, PolicyResult, ReportData
+from robocasa_lerobot.evaluation.report.policies import GROUP_LABELS, PolicyResult, ReportData
 from robocasa_lerobot.evaluation.report.published_cells import AVERAGE, tasks_of
 from robocasa_lerobot.evaluation.statistics.averages import Counts
 from robocasa_lerobot.evaluation.statistics.data_efficiency import DataWorth, worth_of_pretraining

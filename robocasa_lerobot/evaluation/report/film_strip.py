@@ -13,8 +13,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from robocasa_lerobot.evaluation.report.gather import PolicyResult, ReportData
 from robocasa_lerobot.evaluation.report.model import Film, Frame
+from robocasa_lerobot.evaluation.report.policies import PolicyResult, ReportData
 from robocasa_lerobot.evaluation.results import TrialRecord
 from robocasa_lerobot.video import frames_and_rate, read_frames
 

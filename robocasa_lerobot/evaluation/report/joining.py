@@ -11,12 +11,9 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Hashable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from robocasa_lerobot.evaluation.published.places import tables
-
-if TYPE_CHECKING:
-    from robocasa_lerobot.evaluation.report.gather import PolicyResult, TaskResult
+from robocasa_lerobot.evaluation.report.policies import PolicyResult, TaskResult
 
 _RULES = (
     "protocol",

@@ -8,8 +8,8 @@ from pathlib import Path
 
 from robocasa_lerobot.errors import UserError
 from robocasa_lerobot.evaluation.report import format as fmt
-from robocasa_lerobot.evaluation.report.gather import PolicyResult, ReportData
 from robocasa_lerobot.evaluation.report.model import Section
+from robocasa_lerobot.evaluation.report.policies import PolicyResult, ReportData
 from robocasa_lerobot.evaluation.resolve import partial_sentence
 
 SKIPPED_FILE = "skipped.jsonl"  # that a training writes into its output folder

@@ -7,8 +7,8 @@ import re
 import urllib.parse
 from pathlib import Path
 
-from robocasa_lerobot.evaluation.report.gather import ReportData
 from robocasa_lerobot.evaluation.report.model import Block, Cell, Document, Figure, Film, Listing, Part, Table
+from robocasa_lerobot.evaluation.report.policies import ReportData
 from robocasa_lerobot.evaluation.report.sections.tasks import trial_title
 
 SYNTHETIC = "Synthetic trials: drawn at random to show what a report looks like. No policy ran."

@@ -11,8 +11,8 @@ from markupsafe import Markup
 from robocasa_lerobot.errors import UserError
 from robocasa_lerobot.evaluation.report import latex, markdown, tables_csv, tidy
 from robocasa_lerobot.evaluation.report.charts import SERIES
-from robocasa_lerobot.evaluation.report.gather import ReportData
 from robocasa_lerobot.evaluation.report.model import Document, Part
+from robocasa_lerobot.evaluation.report.policies import ReportData
 
 
 def write_report(document: Document, data: ReportData, out: Path) -> list[Path]:

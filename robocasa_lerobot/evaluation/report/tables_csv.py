@@ -8,7 +8,7 @@ from collections.abc import Iterator
 
 from robocasa_lerobot.evaluation import published
 from robocasa_lerobot.evaluation.published.places import PER_TASK, tables
-from robocasa_lerobot.evaluation.report.gather import ReportData
+from robocasa_lerobot.evaluation.report.policies import ReportData
 from robocasa_lerobot.evaluation.report.published_cells import OurCell, our_cells
 
 COLUMNS = (

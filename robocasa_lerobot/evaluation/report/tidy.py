@@ -6,7 +6,7 @@ import csv
 import io
 
 from robocasa_lerobot.evaluation import published
-from robocasa_lerobot.evaluation.report.gather import PolicyResult, ReportData, average_of
+from robocasa_lerobot.evaluation.report.policies import PolicyResult, ReportData, average_of
 
 COLUMNS = (
     "policy",

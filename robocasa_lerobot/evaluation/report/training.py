@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from robocasa_lerobot.errors import UserError
-from robocasa_lerobot.evaluation.report.gather import PolicyResult
+from robocasa_lerobot.evaluation.report.policies import PolicyResult
 from robocasa_lerobot.evaluation.statistics import Rate, success_rate
 
 

@@ -8,9 +8,9 @@ from typing import Any
 from robocasa_lerobot.evaluation import published
 from robocasa_lerobot.evaluation.published import Entry, PublishedTable
 from robocasa_lerobot.evaluation.report import format as fmt
-from robocasa_lerobot.evaluation.report.gather import PolicyResult, ReportData
 from robocasa_lerobot.evaluation.report.joining import same_training
 from robocasa_lerobot.evaluation.report.model import Cell, Column, Section, Table
+from robocasa_lerobot.evaluation.report.policies import PolicyResult, ReportData
 from robocasa_lerobot.evaluation.report.published_cells import OurCell, our_cells
 
 # Tables whose columns are kinds of policies or of trials, which are rows on the page, in the order there.

@@ -6,8 +6,8 @@ import itertools
 from dataclasses import dataclass
 
 from robocasa_lerobot.evaluation.report import format as fmt
-from robocasa_lerobot.evaluation.report.gather import REFERENCES, PolicyResult, ReportData, same_trials
 from robocasa_lerobot.evaluation.report.model import Cell, Column, Section, Table
+from robocasa_lerobot.evaluation.report.policies import REFERENCES, PolicyResult, ReportData, same_trials
 from robocasa_lerobot.evaluation.statistics.paired import Comparison, Paired, compare
 from robocasa_lerobot.evaluation.statistics.power import POWER, smallest_difference
 

@@ -13,8 +13,8 @@ from robocasa_lerobot.evaluation.report.efficiency_curves import (
     groups,
     published_percent,
 )
-from robocasa_lerobot.evaluation.report.gather import PolicyResult, ReportData
 from robocasa_lerobot.evaluation.report.model import Cell, Column, Figure, Section, Series, Table
+from robocasa_lerobot.evaluation.report.policies import PolicyResult, ReportData
 from robocasa_lerobot.evaluation.statistics.averages import average_over_tasks
 from robocasa_lerobot.evaluation.statistics.data_efficiency import DataWorth
 

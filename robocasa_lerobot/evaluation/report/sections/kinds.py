@@ -7,8 +7,8 @@ from collections.abc import Callable
 from robocasa_lerobot.data.published import TaskFacts, task_facts
 from robocasa_lerobot.evaluation import published
 from robocasa_lerobot.evaluation.report import format as fmt
-from robocasa_lerobot.evaluation.report.gather import PolicyResult, ReportData, average_of
 from robocasa_lerobot.evaluation.report.model import Cell, Column, Section, Table
+from robocasa_lerobot.evaluation.report.policies import PolicyResult, ReportData, average_of
 
 # A kind with fewer tasks is an anecdote; a breakdown with one kind says nothing.
 MIN_TASKS = 3

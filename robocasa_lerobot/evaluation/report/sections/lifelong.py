@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from robocasa_lerobot.evaluation import published
 from robocasa_lerobot.evaluation.report import format as fmt
-from robocasa_lerobot.evaluation.report.gather import PolicyResult, ReportData
 from robocasa_lerobot.evaluation.report.lifelong_series import LifelongSeries, all_series
 from robocasa_lerobot.evaluation.report.model import Cell, Column, Section, Table
+from robocasa_lerobot.evaluation.report.policies import PolicyResult, ReportData
 from robocasa_lerobot.evaluation.report.published_cells import OurCell, our_cells
 from robocasa_lerobot.evaluation.report.sections.beside_published import (
     differences,

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from robocasa_lerobot.evaluation import published
 from robocasa_lerobot.evaluation.report import format as fmt
-from robocasa_lerobot.evaluation.report.gather import ReportData
 from robocasa_lerobot.evaluation.report.model import Cell, Column, Section, Table
+from robocasa_lerobot.evaluation.report.policies import ReportData
 
 NO_TRIALS = (
     "Measured on a real robot, of which this project has no trials: constants, with nothing of ours beside them."

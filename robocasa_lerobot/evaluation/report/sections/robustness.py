@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from robocasa_lerobot.evaluation import published
 from robocasa_lerobot.evaluation.report import format as fmt
-from robocasa_lerobot.evaluation.report.gather import PolicyResult, ReportData, average_of, same_trials
 from robocasa_lerobot.evaluation.report.model import Bar, Cell, Column, Section, Table
+from robocasa_lerobot.evaluation.report.policies import PolicyResult, ReportData, average_of, same_trials
 from robocasa_lerobot.evaluation.report.sections.beside_published import beside_table
 from robocasa_lerobot.evaluation.results import UNPERTURBED
 from robocasa_lerobot.evaluation.statistics.paired import Paired, compare

@@ -5,8 +5,8 @@ from __future__ import annotations
 from robocasa_lerobot.data.published import TaskFacts, task_facts
 from robocasa_lerobot.evaluation import published
 from robocasa_lerobot.evaluation.report import format as fmt
-from robocasa_lerobot.evaluation.report.gather import PolicyResult, ReportData, TaskResult
 from robocasa_lerobot.evaluation.report.model import Bar, Cell, Column, Section, Series, Table
+from robocasa_lerobot.evaluation.report.policies import PolicyResult, ReportData, TaskResult
 from robocasa_lerobot.evaluation.report.sections.beside_published import differences
 from robocasa_lerobot.evaluation.results import TrialRecord
 from robocasa_lerobot.evaluation.statistics import Estimate
