@@ -17,11 +17,12 @@ import sys
 import time
 from collections.abc import Iterable, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from pathlib import Path
 
 import common
 from demonstrators_report import draw, page, ratios, summary, text
+from demonstrators_trial import Key, Trial
 
 from robocasa_lerobot.demos.choose import expand_names
 from robocasa_lerobot.demos.demonstrator import can_demonstrate
@@ -36,42 +37,6 @@ TRIALS = common.REPOSITORY / "outputs" / "demonstrators.jsonl"
 SPLITS = ("target", "pretrain")
 FIRST_SEED = 100_000  # below, skills are tuned
 LONGEST_S = 600  # of wall time; a trial that takes longer hangs, and has failed
-
-type Key = tuple[str, str, int, float, bool]  # task, split, seed, action noise, whether it is varied
-
-
-@dataclass(frozen=True)
-class Trial:
-    """One attempt of a demonstrator.
-
-    Attributes:
-        task, split, seed, action_noise, varied: what was tried.
-        success: whether the goal held at the end.
-        steps: control steps of the episode.
-        wall_s: seconds that it took, making the kitchen included.
-        workers: processes that worked at the time.
-        reason: why it failed.
-        false_terms: terms of the goal that did not hold then.
-        commit: of the checkout.
-    """
-
-    task: str
-    split: str
-    seed: int
-    action_noise: float
-    varied: bool
-    success: bool
-    steps: int
-    wall_s: float
-    workers: int
-    reason: str
-    false_terms: tuple[str, ...]
-    commit: str
-
-    @property
-    def key(self) -> Key:
-        """What makes it one trial."""
-        return self.task, self.split, self.seed, self.action_noise, self.varied
 
 
 def parse(arguments: Sequence[str] | None = None) -> argparse.Namespace:

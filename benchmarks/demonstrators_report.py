@@ -6,16 +6,14 @@ import statistics
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import common
+from demonstrators_trial import Trial
 
 from robocasa_lerobot import contract
 from robocasa_lerobot.envs.registry import human_seconds
 from robocasa_lerobot.evaluation.statistics.rates import success_rate
-
-if TYPE_CHECKING:
-    from demonstrators import Trial
 
 # What a finished set of demonstrators is to reach: mean rate, lowest rate, and seconds over the human median.
 AIM_MEAN, AIM_TASK, AIM_TIMES_HUMAN = 0.85, 0.50, 1.5

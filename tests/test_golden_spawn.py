@@ -20,7 +20,7 @@ from robocasa_lerobot.envs.scene.fixtures.counters import Counter
 from robocasa_lerobot.envs.scene.kitchens import scene_ids
 from robocasa_lerobot.envs.scene.layout import Layout, load_layout
 from robocasa_lerobot.envs.scene.selection import Obstacles, RobotPose, candidates, counter_of, robot_pose
-from robocasa_lerobot.envs.task import RobotStart
+from robocasa_lerobot.envs.scene.wanted import RobotStart
 
 STANDOFF_M = 0.20  # of the base centre from the counter's front edge
 DEVIATION_M = (0.15, 0.05)  # half ranges along the counter and towards it

@@ -16,7 +16,8 @@ from robocasa_lerobot.envs.registry import get_task
 from robocasa_lerobot.envs.scene.builder import LIQUIDS, build_scene
 from robocasa_lerobot.envs.scene.materials import MaterialPalette, load_style, style_ids
 from robocasa_lerobot.envs.scene.objects import catalogue
-from robocasa_lerobot.envs.scene.objects.draft import FORMS, find_form
+from robocasa_lerobot.envs.scene.objects.draft import FORMS
+from robocasa_lerobot.envs.scene.objects.forms import find_form
 from robocasa_lerobot.envs.scene.objects.grasping import grasp_poses
 from robocasa_lerobot.envs.scene.objects.pictures import object_pictures
 from robocasa_lerobot.envs.scene.objects.shapes import add_object

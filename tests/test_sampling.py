@@ -13,7 +13,7 @@ from robocasa_lerobot.envs.scene.arrange import cast_roles, place_objects
 from robocasa_lerobot.envs.scene.layout import load_layout
 from robocasa_lerobot.envs.scene.sampling import choose_parts, parts_of, rectangle_in
 from robocasa_lerobot.envs.scene.selection import candidates, faces, ground_fixture, is_free, robot_pose
-from robocasa_lerobot.envs.task import FixtureWanted, ObjectWanted, Placement, RobotStart, SampleRegion
+from robocasa_lerobot.envs.scene.wanted import FixtureWanted, ObjectWanted, Placement, RobotStart, SampleRegion
 
 LAYOUT = load_layout(2)
 SINK = candidates(LAYOUT, "sink")[0]

@@ -13,18 +13,17 @@ from robocasa_lerobot.demos.demonstrator import can_demonstrate
 from robocasa_lerobot.envs.initial import Initial
 from robocasa_lerobot.envs.predicates import AllOf, AnyOf, Goal, Not, ObjectInside, Term, When
 from robocasa_lerobot.envs.registry import human_seconds
-from robocasa_lerobot.envs.task import (
+from robocasa_lerobot.envs.scene.wanted import (
     Choice,
     FixtureWanted,
     InitialOpenness,
-    InitialState,
     InsideOf,
     ObjectWanted,
     OnCounter,
     Placement,
     RobotStart,
-    Task,
 )
+from robocasa_lerobot.envs.task import InitialState, Task
 
 DEMONSTRATOR = "Demonstrator: "  # start of the line that says whether there is one
 _HEAD = """# Tasks

@@ -111,3 +111,12 @@ class LidAside(Initial):
     def apply(self, scene: Scene, data: mujoco.MjData, drawn: float) -> None:
         """Lay it down where the scene found room for it."""
         scene.lay_lid(self.fixture, data, drawn, gone=self.gone)
+
+
+def initial_share(scene: Scene, role: str, part: str) -> float:
+    """Where a part of an appliance was at reset, as a share of its range."""
+    return next(
+        drawn
+        for entry, drawn in scene.initial
+        if isinstance(entry, PartAt) and (entry.fixture, entry.part) == (role, part)
+    )

@@ -163,7 +163,7 @@ class LoadedCheckpoint:
         from lerobot.configs.policies import PreTrainedConfig
         from lerobot.policies.factory import get_policy_class, make_pre_post_processors
 
-        from robocasa_lerobot.evaluation.policy_runner import register_policy_type
+        from robocasa_lerobot.policies.registry import register_policy_type
         from robocasa_lerobot.settings import user_error_in
 
         register_policy_type(source.type)

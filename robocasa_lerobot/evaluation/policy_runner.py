@@ -88,23 +88,6 @@ def load_reference(source: PolicySource) -> Actor:
     return made[source.type]()
 
 
-def register_policy_type(kind: str) -> None:
-    """Import what registers policy type `kind` with LeRobot: ours by its name, else installed plugins."""
-    from lerobot.configs.policies import PreTrainedConfig
-
-    from robocasa_lerobot.policies.registry import POLICY_TYPES, register_policies
-
-    if kind in POLICY_TYPES:
-        register_policies()
-    if kind not in PreTrainedConfig.get_known_choices():
-        from lerobot.utils.import_utils import register_third_party_plugins
-
-        register_third_party_plugins()
-    if kind not in PreTrainedConfig.get_known_choices():
-        known = ", ".join(sorted(PreTrainedConfig.get_known_choices()))
-        raise UserError(f"policy type {kind!r} is not registered; known: {known}. Install the package that has it.")
-
-
 def pick_device(device: str) -> str:
     """`auto` resolved to cuda where there is one, else cpu.
 

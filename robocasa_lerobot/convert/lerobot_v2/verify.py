@@ -17,7 +17,7 @@ from robocasa_lerobot.convert.reading.demo_file import RejectedEpisodeError
 from robocasa_lerobot.convert.report import Check
 from robocasa_lerobot.convert.settings import Camera, ConversionSettings
 from robocasa_lerobot.convert.shard import REJECTED_FILE, episode_folder
-from robocasa_lerobot.convert.verify import Verification, compare_bits, spread
+from robocasa_lerobot.convert.verification import Verification, compare_bits, spread
 from robocasa_lerobot.convert.writing.statistics import column_of
 from robocasa_lerobot.convert.writing.video import digests
 from robocasa_lerobot.jsonl import read_jsonl

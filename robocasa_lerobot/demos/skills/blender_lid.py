@@ -27,7 +27,8 @@ from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.placement import Area, Footprint
 from robocasa_lerobot.envs.scene.appliances.blender import Blender
 from robocasa_lerobot.envs.scene.selection import counter_areas, footprint
-from robocasa_lerobot.envs.task import OnCounter, Stage
+from robocasa_lerobot.envs.scene.wanted import OnCounter
+from robocasa_lerobot.envs.task import Stage
 
 ATTEMPTS = 4
 GRASP_STEPS, RELEASE_STEPS = 12, 10

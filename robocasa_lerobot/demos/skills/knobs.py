@@ -19,6 +19,7 @@ from robocasa_lerobot.demos.motion import (
 )
 from robocasa_lerobot.demos.skills.common import SkillError, hold_hand, move_hand
 from robocasa_lerobot.demos.skills.reach import plan_reach, shift_base
+from robocasa_lerobot.envs.initial import initial_share
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.task import Stage
 
@@ -60,7 +61,7 @@ def raise_knob(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
 def turn_knob(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
     """Turn a knob up or down from where it was at reset, as the task's direction asks."""
     way = ADJUST_SHARE if env.scene.choices["direction"] == "increase" else -ADJUST_SHARE
-    share = env.scene.initial_share(stage.target, stage.part) + way
+    share = initial_share(env.scene, stage.target, stage.part) + way
     yield from _turn_to(env, stage, float(np.clip(share, 0.0, 1.0)) * _range(env, stage))
 
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import mujoco
 import numpy as np
 
+from robocasa_lerobot.envs.initial import initial_share
 from robocasa_lerobot.envs.predicates.logic import Term, plain
 from robocasa_lerobot.envs.scene.appliances.base import CLOSED_UP_TO, OPEN_FROM, Appliance
 from robocasa_lerobot.envs.scene.fixtures.base import Fixture
@@ -129,7 +130,7 @@ class PartTurned(Term):
 
     def holds(self, scene: Scene, data: mujoco.MjData) -> bool:
         """Compare the change with what is wanted."""
-        change = scene.appliance(self.fixture).share(data, self.part) - scene.initial_share(self.fixture, self.part)
+        change = scene.appliance(self.fixture).share(data, self.part) - initial_share(scene, self.fixture, self.part)
         return change >= self.by if self.by > 0 else change <= self.by
 
 

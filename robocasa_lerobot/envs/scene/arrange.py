@@ -16,7 +16,8 @@ from robocasa_lerobot.envs.scene.objects import catalogue
 from robocasa_lerobot.envs.scene.sampling import Part, Shares, choose_parts, rectangle_in
 from robocasa_lerobot.envs.scene.scene import PlacedObject
 from robocasa_lerobot.envs.scene.selection import candidates, counter_areas, inside_area, standing_on
-from robocasa_lerobot.envs.task import FixtureWanted, ObjectWanted, OnCounter, Placement, Task
+from robocasa_lerobot.envs.scene.wanted import FixtureWanted, ObjectWanted, OnCounter, Placement
+from robocasa_lerobot.envs.task import Task
 
 PLACEMENT_GAP_M = 0.004  # objects start this far above their surface and settle
 _TURNS = 20  # how often a place is drawn for what hardly fits into a compartment

@@ -25,7 +25,8 @@ from robocasa_lerobot.envs.scene.robot import add_robot
 from robocasa_lerobot.envs.scene.sampling import Shares
 from robocasa_lerobot.envs.scene.scene import PlacedObject, Scene
 from robocasa_lerobot.envs.scene.selection import RobotPose, counter_areas, counter_of, robot_pose
-from robocasa_lerobot.envs.task import InitialOpenness, OnCounter, Task
+from robocasa_lerobot.envs.scene.wanted import InitialOpenness, OnCounter
+from robocasa_lerobot.envs.task import Task
 from robocasa_lerobot.errors import UnknownNameError, UserError
 
 RENDER_PRESETS = ("fast", "quality")
@@ -52,7 +53,7 @@ class Arrangement:
         roles: fixtures by role.
         choices: what was chosen among equals.
         openness: of doors and drawers, by fixture.
-        drawn: numbers of the task's further initial state.
+        initial: the task's further initial state, each entry with the number drawn for it.
         lids: roles of the blenders whose lid is not on, and whether it is gone altogether.
         objects: by name.
         robot: where it stands.
@@ -61,7 +62,7 @@ class Arrangement:
     roles: dict[str, str]
     choices: Choices
     openness: dict[str, float]
-    drawn: tuple[float, ...]
+    initial: tuple[tuple[Initial, float], ...]
     lids: dict[str, bool]
     objects: dict[str, PlacedObject]
     robot: RobotPose
@@ -123,7 +124,6 @@ def _attempt(
     model = spec.compile()
     words = _words(layout, roles, objects) | choices.words | {"side": robot.side}
     return Scene(
-        task=task,
         split=split,
         seed=seed,
         layout_id=layout_id,
@@ -138,7 +138,7 @@ def _attempt(
         instruction=_said(task.instruction, words),
         paraphrases=tuple(_said(wording, words) for wording in task.paraphrases),
         choices=choices.values,
-        drawn=arranged.drawn,
+        initial=arranged.initial,
         lid_spots=spots,
     )
 
@@ -158,31 +158,29 @@ def arrange(rng: np.random.Generator, task: Task, split: str, layout: Layout) ->
             rng, layout, task.robot_start, layout.fixtures[roles[task.robot_start.fixture]], opened=opened
         )
     openness = {
-        roles[initial.fixture]: float(rng.uniform(initial.low, initial.high))
-        for initial in task.initial
-        if isinstance(initial, InitialOpenness)
+        roles[entry.fixture]: float(rng.uniform(entry.low, entry.high))
+        for entry in task.initial
+        if isinstance(entry, InitialOpenness)
     }
-    setup = [entry for entry in task.initial if isinstance(entry, Initial)]
-    drawn = tuple(entry.draw(rng, choices.values) for entry in setup)
+    further = [entry for entry in task.initial if isinstance(entry, Initial)]
+    initial = tuple((entry, entry.draw(rng, choices.values)) for entry in further)
     lids = _lids(task, roles)
     for role, gone in lids.items():
         blender = layout.fixtures[roles[role]]
         assert isinstance(blender, Blender)
         blender.with_lid = not gone
-    places: dict[str, float | Shares] = {**openness, **_shares(setup, drawn, roles, choices)}
+    places: dict[str, float | Shares] = {**openness, **_shares(initial, roles, choices)}
     objects = place_objects(rng, task, split, layout, roles, places, choices.values)
     if robot is None:
         at = objects[task.robot_start.at_object].pos[:2]
         robot = robot_pose(rng, layout, task.robot_start, layout.fixtures[roles[task.robot_start.fixture]], at, opened)
-    return Arrangement(roles, choices, openness, drawn, lids, objects, robot)
+    return Arrangement(roles, choices, openness, initial, lids, objects, robot)
 
 
-def _shares(
-    setup: list[Initial], drawn: tuple[float, ...], roles: dict[str, str], choices: Choices
-) -> dict[str, Shares]:
+def _shares(initial: tuple[tuple[Initial, float], ...], roles: dict[str, str], choices: Choices) -> dict[str, Shares]:
     """Where parts stand that objects may lie on, by fixture."""
     found: dict[str, dict[str, float]] = {}
-    for entry, share in zip(setup, drawn, strict=True):
+    for entry, share in initial:
         if isinstance(entry, PartAt):
             found.setdefault(roles[entry.fixture], {})[entry.part.format(**choices.values)] = share
     return dict(found)

@@ -14,7 +14,8 @@ from robocasa_lerobot.envs.scene.appliances.stove import Hob
 from robocasa_lerobot.envs.scene.appliances.toaster import Toaster
 from robocasa_lerobot.envs.scene.appliances.toaster_oven import ToasterOven
 from robocasa_lerobot.envs.scene.fixtures.base import Fixture
-from robocasa_lerobot.envs.task import Choice, Task
+from robocasa_lerobot.envs.scene.wanted import Choice
+from robocasa_lerobot.envs.task import Task
 
 type Options = dict[str, dict[str, str]]
 

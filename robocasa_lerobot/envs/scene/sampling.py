@@ -15,7 +15,7 @@ from robocasa_lerobot.envs.scene.fixtures.counters import Counter
 from robocasa_lerobot.envs.scene.fixtures.regions import regions_of
 from robocasa_lerobot.envs.scene.layout import Layout
 from robocasa_lerobot.envs.scene.materials import MaterialPalette, load_style
-from robocasa_lerobot.envs.task import Placement
+from robocasa_lerobot.envs.scene.wanted import Placement
 
 # Shares of the ranges of an appliance's parts, by name.
 type Shares = Mapping[str, float]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Protocol
 
 import mujoco
 import numpy as np
@@ -14,7 +14,6 @@ from robocasa_lerobot.envs.bodies import subtree
 from robocasa_lerobot.envs.cameras import camera_configs
 from robocasa_lerobot.envs.control.controller import RobotController
 from robocasa_lerobot.envs.control.step import control_step
-from robocasa_lerobot.envs.initial import Initial, PartAt
 from robocasa_lerobot.envs.placement import Footprint
 from robocasa_lerobot.envs.scene.appliances.base import Appliance, update_all
 from robocasa_lerobot.envs.scene.appliances.blender import Blender
@@ -27,7 +26,6 @@ from robocasa_lerobot.envs.scene.objects.catalogue import Instance
 from robocasa_lerobot.envs.scene.robot import place_base, set_home
 from robocasa_lerobot.envs.scene.robot_names import GRIPPER
 from robocasa_lerobot.envs.scene.selection import RobotPose, standing_pose
-from robocasa_lerobot.envs.task import Task
 
 SETTLE_STEPS = 10  # control steps without a command after placing everything (docs/robocasa.md, section 1)
 
@@ -48,12 +46,19 @@ class PlacedObject:
         return Footprint(self.pos[0], self.pos[1], self.yaw, (width / 2, depth / 2))
 
 
+class FirstState(Protocol):
+    """Something of a task that writes a part of the first state; `envs/initial.py` has them all."""
+
+    def apply(self, scene: Scene, data: mujoco.MjData, drawn: float) -> None:
+        """Write it, with the number drawn for it."""
+
+
 @dataclass
 class Scene:
     """A kitchen made for an episode.
 
     Attributes:
-        task, split, seed: what it was made from.
+        split, seed: what it was made from, with the task.
         layout_id, style_id: of the kitchen.
         spec: the MjSpec; its XML names assets by portable paths.
         model: compiled.
@@ -65,12 +70,11 @@ class Scene:
         instruction: what the robot is told.
         paraphrases: the same in other words.
         choices: what was drawn for the task's choices, and the roles' fixtures, by name.
-        drawn: numbers of the task's initial states, in their order.
+        initial: what the task has written into the first state, each with the number drawn for it, in that order.
         lid_spots: where the lid of a blender may lie, by role.
         arm_noise_rad: standard deviation of the noise on the initial arm pose.
     """
 
-    task: Task
     split: str
     seed: int
     layout_id: int
@@ -85,7 +89,7 @@ class Scene:
     instruction: str
     paraphrases: tuple[str, ...] = ()
     choices: dict[str, str] = field(default_factory=dict)
-    drawn: tuple[float, ...] = ()
+    initial: tuple[tuple[FirstState, float], ...] = ()
     lid_spots: dict[str, NDArray[np.float64]] = field(default_factory=dict)
     arm_noise_rad: float = 0.02
     _subtrees: dict[tuple[str, ...], NDArray[np.bool_]] = field(default_factory=dict, init=False, repr=False)
@@ -127,19 +131,6 @@ class Scene:
         """A name of a declaration with its choices and roles filled in, e.g. "knob_{knob}"."""
         return text.format(**self.choices) if "{" in text else text
 
-    def initial_share(self, role: str, part: str) -> float:
-        """Where a part of an appliance was at reset, as a share of its range."""
-        return next(
-            drawn
-            for entry, drawn in self._setup()
-            if isinstance(entry, PartAt) and (entry.fixture, entry.part) == (role, part)
-        )
-
-    def _setup(self) -> list[tuple[Initial, float]]:
-        """The initial states that write positions, each with its drawn number."""
-        setup = [entry for entry in self.task.initial if isinstance(entry, Initial)]
-        return list(zip(setup, self.drawn, strict=True))
-
     def subtree(self, *bodies: str) -> NDArray[np.bool_]:
         """For each body of the model whether it is one of the named ones or hangs on one, (nbody,); kept."""
         if bodies not in self._subtrees:
@@ -165,7 +156,7 @@ class Scene:
         for name, openness in self.openness.items():
             fixture = self.fixtures[name]
             set_openness(fixture, data, openness)
-        for entry, drawn in self._setup():
+        for entry, drawn in self.initial:
             entry.apply(self, data, drawn)
         for placed in self.objects.values():
             data.joint(f"{placed.name}_joint0").qpos[:] = [*placed.pos, *yaw_quat(placed.yaw)]

@@ -21,7 +21,7 @@ from robocasa_lerobot.envs.scene.fixtures.counters import Counter
 from robocasa_lerobot.envs.scene.fixtures.stools import SEAT_M
 from robocasa_lerobot.envs.scene.islands import STOOL_OUT_M
 from robocasa_lerobot.envs.scene.layout import Layout
-from robocasa_lerobot.envs.task import InsideOf, OnCounter, RobotStart
+from robocasa_lerobot.envs.scene.wanted import InsideOf, OnCounter, RobotStart
 from robocasa_lerobot.errors import UnknownNameError
 
 # Distance of the base centre from the front edge of the counter that it faces, metres (docs/robocasa.md, section 6).

@@ -18,7 +18,8 @@ from typing import Any
 import numpy as np
 import yaml
 
-from robocasa_lerobot.envs.scene.objects.draft import Draft, Interior, Model, find_form
+from robocasa_lerobot.envs.scene.objects.draft import Draft, Interior, Model
+from robocasa_lerobot.envs.scene.objects.forms import find_form
 from robocasa_lerobot.envs.scene.objects.paint import Rgb
 from robocasa_lerobot.errors import UnknownNameError, UserError
 

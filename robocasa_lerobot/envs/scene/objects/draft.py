@@ -11,7 +11,6 @@ import numpy as np
 from robocasa_lerobot.envs.scene.objects.mesh import Array, Mesh, joined
 from robocasa_lerobot.envs.scene.objects.paint import Paint, Rgb, pack
 from robocasa_lerobot.envs.scene.objects.solids import IDENTITY, Solid, about, frame, hull, times, wall
-from robocasa_lerobot.errors import UnknownNameError
 
 # Shininess, specular and opacity of each finish.
 FINISHES: dict[str, tuple[float, float, float]] = {
@@ -197,17 +196,3 @@ def form(function: Form) -> Form:
     """Register a form under the name of its function."""
     FORMS[function.__name__] = function
     return function
-
-
-def find_form(name: str) -> Form:
-    """The form of a name.
-
-    Raises:
-        UnknownNameError: there is none.
-    """
-    # The forms register themselves when they are imported.
-    from robocasa_lerobot.envs.scene.objects import forms  # noqa: F401
-
-    if name not in FORMS:
-        raise UnknownNameError("form of objects", name, FORMS)
-    return FORMS[name]

@@ -1,7 +1,8 @@
 """A mug at the coffee machine: put under its spout, and taken away."""
 
 from robocasa_lerobot.envs.predicates import AllOf, GripperFar, ObjectAtSite, ObjectTouches
-from robocasa_lerobot.envs.task import FixtureWanted, ObjectWanted, Placement, RobotStart, SampleRegion, Stage
+from robocasa_lerobot.envs.scene.wanted import FixtureWanted, ObjectWanted, Placement, RobotStart, SampleRegion
+from robocasa_lerobot.envs.task import Stage
 from robocasa_lerobot.envs.tasks.atomic.common import SEEN, atomic, counter_near, on_counter
 
 _FIXTURES = (FixtureWanted("coffee_machine", "coffee_machine"), counter_near("coffee_machine"))

@@ -3,17 +3,8 @@
 from __future__ import annotations
 
 from robocasa_lerobot.envs.predicates import Goal
-from robocasa_lerobot.envs.task import (
-    Choice,
-    FixtureWanted,
-    InitialState,
-    ObjectWanted,
-    Placement,
-    RobotStart,
-    SampleRegion,
-    Stage,
-    Task,
-)
+from robocasa_lerobot.envs.scene.wanted import Choice, FixtureWanted, ObjectWanted, Placement, RobotStart, SampleRegion
+from robocasa_lerobot.envs.task import InitialState, Stage, Task
 from robocasa_lerobot.envs.wording.atomic import WORDING
 
 PHASE1 = ("pretrain300", "lifelong_phase1")

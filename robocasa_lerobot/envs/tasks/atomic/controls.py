@@ -10,7 +10,7 @@ from robocasa_lerobot.envs.predicates import (
     StateIs,
     When,
 )
-from robocasa_lerobot.envs.task import (
+from robocasa_lerobot.envs.scene.wanted import (
     Choice,
     FixtureWanted,
     InitialOpenness,
@@ -18,9 +18,8 @@ from robocasa_lerobot.envs.task import (
     Placement,
     RobotStart,
     SampleRegion,
-    Stage,
-    Task,
 )
+from robocasa_lerobot.envs.task import Stage, Task
 from robocasa_lerobot.envs.tasks.atomic.common import (
     COMMON,
     SEEN,

@@ -2,15 +2,8 @@
 
 from robocasa_lerobot.envs.initial import PartAt
 from robocasa_lerobot.envs.predicates import DoorsClosed, DoorsOpen, PartWithin
-from robocasa_lerobot.envs.task import (
-    FixtureWanted,
-    InitialOpenness,
-    ObjectWanted,
-    Placement,
-    RobotStart,
-    Stage,
-    Task,
-)
+from robocasa_lerobot.envs.scene.wanted import FixtureWanted, InitialOpenness, ObjectWanted, Placement, RobotStart
+from robocasa_lerobot.envs.task import Stage, Task
 from robocasa_lerobot.envs.tasks.atomic.common import COMMON, SEEN, atomic, counter_near, distractors
 
 # A door that folds down is lifted shut, that of a dishwasher from above; the doors of a fridge are too large to reach

@@ -1,16 +1,15 @@
 """OpenDrawer and CloseDrawer: one top drawer, the robot standing beside it."""
 
 from robocasa_lerobot.envs.predicates import DrawerClosed, DrawerOpen
-from robocasa_lerobot.envs.task import (
+from robocasa_lerobot.envs.scene.wanted import (
     FixtureWanted,
     InitialOpenness,
     InsideOf,
     ObjectWanted,
     OnCounter,
     RobotStart,
-    Stage,
-    Task,
 )
+from robocasa_lerobot.envs.task import Stage, Task
 
 _FIXTURES = (FixtureWanted("drawer", "drawer_top"),)
 # The base is placed as exactly as the original does for tasks beside a fixture.

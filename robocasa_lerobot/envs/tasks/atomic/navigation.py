@@ -1,7 +1,8 @@
 """NavigateKitchen: drive from one fixture to another."""
 
 from robocasa_lerobot.envs.predicates import StandsBefore
-from robocasa_lerobot.envs.task import FixtureWanted, RobotStart, Stage
+from robocasa_lerobot.envs.scene.wanted import FixtureWanted, RobotStart
+from robocasa_lerobot.envs.task import Stage
 from robocasa_lerobot.envs.tasks.atomic.common import UNMULTIPLIED, atomic
 
 TASKS = (

@@ -9,7 +9,7 @@ from robocasa_lerobot.envs.predicates import (
     ObjectTouches,
     ObjectTouchesAnyCounter,
 )
-from robocasa_lerobot.envs.task import (
+from robocasa_lerobot.envs.scene.wanted import (
     FixtureWanted,
     InitialOpenness,
     ObjectWanted,

@@ -10,7 +10,7 @@ from robocasa_lerobot.envs.predicates import (
     ObjectTouchesAnyCounter,
     StateIs,
 )
-from robocasa_lerobot.envs.task import (
+from robocasa_lerobot.envs.scene.wanted import (
     Choice,
     FixtureWanted,
     InitialOpenness,

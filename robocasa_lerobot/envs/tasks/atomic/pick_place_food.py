@@ -7,12 +7,7 @@ from robocasa_lerobot.envs.predicates import (
     ObjectOn,
     ObjectTouches,
 )
-from robocasa_lerobot.envs.task import (
-    FixtureWanted,
-    ObjectWanted,
-    Placement,
-    RobotStart,
-)
+from robocasa_lerobot.envs.scene.wanted import FixtureWanted, ObjectWanted, Placement, RobotStart
 from robocasa_lerobot.envs.tasks.atomic.common import PHASE1, UNMULTIPLIED, atomic, counter_near, on_counter, place
 
 COUNTER = (

@@ -6,7 +6,7 @@ from robocasa_lerobot.envs.predicates import (
     GripperFar,
     ObjectInside,
 )
-from robocasa_lerobot.envs.task import (
+from robocasa_lerobot.envs.scene.wanted import (
     Choice,
     FixtureWanted,
     InitialOpenness,

@@ -2,7 +2,7 @@
 
 from robocasa_lerobot.envs.initial import PartAt
 from robocasa_lerobot.envs.predicates import PartWithin, When
-from robocasa_lerobot.envs.task import (
+from robocasa_lerobot.envs.scene.wanted import (
     Choice,
     FixtureWanted,
     InitialOpenness,
@@ -10,9 +10,8 @@ from robocasa_lerobot.envs.task import (
     Placement,
     RobotStart,
     SampleRegion,
-    Stage,
-    Task,
 )
+from robocasa_lerobot.envs.task import Stage, Task
 from robocasa_lerobot.envs.tasks.atomic.common import COMMON, SEEN, atomic
 
 # Which way a rack is to go, with the words for it; one that is to come out starts half out, one to go in all the way.

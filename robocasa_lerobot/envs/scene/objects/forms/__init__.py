@@ -1,5 +1,6 @@
 """What each kind of object looks like: one function per form, by family; importing them registers them."""
 
+from robocasa_lerobot.envs.scene.objects.draft import FORMS, Form
 from robocasa_lerobot.envs.scene.objects.forms import (
     bakery,
     bottles,
@@ -16,6 +17,7 @@ from robocasa_lerobot.envs.scene.objects.forms import (
     vegetables,
     vessels,
 )
+from robocasa_lerobot.errors import UnknownNameError
 
 __all__ = [
     "bakery",
@@ -24,6 +26,7 @@ __all__ = [
     "crockery",
     "cutlery",
     "dishes",
+    "find_form",
     "fruit",
     "meat",
     "packages",
@@ -33,3 +36,14 @@ __all__ = [
     "vegetables",
     "vessels",
 ]
+
+
+def find_form(name: str) -> Form:
+    """The form of a name.
+
+    Raises:
+        UnknownNameError: there is none.
+    """
+    if name not in FORMS:
+        raise UnknownNameError("form of objects", name, FORMS)
+    return FORMS[name]
