@@ -7,8 +7,9 @@ import json
 import re
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from functools import cache
+from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
 import pytest
@@ -116,6 +117,38 @@ def test_import_direction(source: str) -> None:
     allowed = MAY_IMPORT[part] | {part}
     wrong = [name for target, name in own_parts(imports(PACKAGE / source)) if target not in allowed]
     assert not wrong, f"{part} may import only {sorted(allowed)}"
+
+
+def imported_files(files: Mapping[str, Path]) -> dict[str, set[str]]:
+    """For each module the others of `files` that it imports, wherever in it and be it for types alone."""
+    graph: dict[str, set[str]] = {}
+    for module, path in files.items():
+        found = {name if name in files else name.rpartition(".")[0] for name in imports(path)}
+        graph[module] = (found & files.keys()) - {module}
+    return graph
+
+
+def circle(graph: Mapping[str, set[str]]) -> list[str]:
+    """A circle of modules that import each other; empty where there is none."""
+    try:
+        TopologicalSorter(graph).prepare()
+    except CycleError as error:
+        return list(error.args[1])
+    return []
+
+
+def test_no_files_import_each_other_in_a_circle() -> None:
+    files = {module_name(source): PACKAGE / source for source in sources()}
+    files |= {path.stem: path for path in (REPOSITORY / "benchmarks").glob("*.py")}
+    assert circle(imported_files(files)) == []
+
+
+def test_a_circle_is_found_wherever_its_imports_stand(tmp_path: Path) -> None:
+    (tmp_path / "a.py").write_text("def f() -> None:\n    from b import g\n")
+    (tmp_path / "b.py").write_text("from typing import TYPE_CHECKING\nif TYPE_CHECKING:\n    import a\n")
+    (tmp_path / "c.py").write_text("import a\n")
+    files = {path.stem: path for path in tmp_path.glob("*.py")}
+    assert set(circle(imported_files(files))) == {"a", "b"}
 
 
 @pytest.mark.parametrize("source", sources())
