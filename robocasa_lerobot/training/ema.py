@@ -7,6 +7,7 @@ from contextlib import contextmanager
 
 import torch
 
+from robocasa_lerobot.training.by_place import by_place, take_over
 from robocasa_lerobot.training.master_weights import MasterWeights
 from robocasa_lerobot.training.phase_config import EmaConfig
 
@@ -51,7 +52,7 @@ class Ema:
 
     def state(self) -> dict[str, torch.Tensor]:
         """The averages, by the place of their parameter."""
-        return {f"{number:06d}": average for number, average in enumerate(self._average)}
+        return by_place(self._average)
 
     def load(self, state: dict[str, torch.Tensor]) -> None:
         """Take averages over that `state` gave.
@@ -59,10 +60,7 @@ class Ema:
         Raises:
             RuntimeError: they are of other parameters.
         """
-        if len(state) != len(self._average):
-            raise RuntimeError(f"{len(state)} averages for {len(self._average)} parameters")
-        for number, average in enumerate(self._average):
-            average.copy_(state[f"{number:06d}"])
+        take_over(self._average, state, "averages")
 
     @contextmanager
     def applied(self) -> Iterator[None]:

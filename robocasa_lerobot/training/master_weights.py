@@ -13,6 +13,8 @@ from typing import Any
 import torch
 from torch import Tensor, nn
 
+from robocasa_lerobot.training.by_place import by_place, take_over
+
 HALF = (torch.bfloat16, torch.float16)
 
 
@@ -66,17 +68,13 @@ class MasterWeights:
 
     def state(self) -> dict[str, Tensor]:
         """The float32 copies, by the place of their parameter."""
-        return {f"{number:06d}": master.detach() for number, master in enumerate(self._masters)}
+        return by_place(self._masters)
 
-    @torch.no_grad()
     def load(self, state: Mapping[str, Tensor]) -> None:
         """Take copies over that `state` gave; the policy's weights become these, rounded.
 
         Raises:
             RuntimeError: they are of other parameters.
         """
-        if len(state) != len(self._masters):
-            raise RuntimeError(f"{len(state)} master weights for {len(self._masters)} parameters")
-        for number, master in enumerate(self._masters):
-            master.copy_(state[f"{number:06d}"])
+        take_over(self._masters, state, "master weights")
         self.write_back()

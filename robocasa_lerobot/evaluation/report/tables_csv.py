@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import csv
-import io
 from collections.abc import Iterator
 
 from robocasa_lerobot.evaluation import published
 from robocasa_lerobot.evaluation.published.places import PER_TASK, tables
+from robocasa_lerobot.evaluation.report.csv_text import csv_text
 from robocasa_lerobot.evaluation.report.policies import ReportData
 from robocasa_lerobot.evaluation.report.published_cells import OurCell, our_cells
 
@@ -37,20 +36,25 @@ COLUMNS = (
 
 def render(data: ReportData) -> str:
     """All numbers in percent. `ours` is empty where not all of a cell's tasks were run: see `partial` then."""
-    text = io.StringIO()
-    writer = csv.DictWriter(text, COLUMNS, lineterminator="\n", restval="")
-    writer.writeheader()
+    return csv_text(COLUMNS, _lines(data))
+
+
+def _lines(data: ReportData) -> Iterator[dict[str, object]]:
     for name in (*published.TABLES, PER_TASK):
         filled: dict[tuple[str, str], list[OurCell]] = {}
         for cell in our_cells(data, name) if name in tables() else ():
             filled.setdefault((cell.row, cell.column), []).append(cell)
         for row, column, percent in _published_cells(name):
-            line = {"table": name, "row": row, "column": column, "published": "" if percent is None else f"{percent:g}"}
+            line: dict[str, object] = {
+                "table": name,
+                "row": row,
+                "column": column,
+                "published": "" if percent is None else f"{percent:g}",
+            }
             ours = filled.get((row, column), [])
-            writer.writerows({**line, **_ours(cell)} for cell in ours)
+            yield from ({**line, **_ours(cell)} for cell in ours)
             if not ours and percent is not None:
-                writer.writerow(line)
-    return text.getvalue()
+                yield line
 
 
 def _published_cells(name: str) -> Iterator[tuple[str, str, float | None]]:

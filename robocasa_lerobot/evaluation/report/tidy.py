@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import csv
-import io
+from collections.abc import Iterator
 
 from robocasa_lerobot.evaluation import published
+from robocasa_lerobot.evaluation.report.csv_text import csv_text
 from robocasa_lerobot.evaluation.report.policies import PolicyResult, ReportData, average_of
 
 COLUMNS = (
@@ -29,12 +29,13 @@ COLUMNS = (
 
 def render(data: ReportData) -> str:
     """Rates and ends of intervals lie in [0, 1]; `task` is empty in rows of averages."""
-    text = io.StringIO()
-    writer = csv.DictWriter(text, COLUMNS, lineterminator="\n", restval="")
-    writer.writeheader()
+    return csv_text(COLUMNS, _rows(data))
+
+
+def _rows(data: ReportData) -> Iterator[dict[str, object]]:
     for policy in data.single:
         for condition, tasks in policy.conditions.items():
-            common = {
+            common: dict[str, object] = {
                 "policy": policy.label,
                 "perturbation": condition,
                 "split": policy.header.split,
@@ -42,40 +43,35 @@ def render(data: ReportData) -> str:
             }
             for result in tasks:
                 rate, known = result.rate, published.per_task_rates().get(result.task)
-                writer.writerow(
-                    {
-                        **common,
-                        "task": result.task,
-                        "group": published.group_of_task().get(result.task, ""),
-                        "tasks": 1,
-                        "successes": rate.successes,
-                        "trials": rate.trials,
-                        "rate": f"{rate.rate:.6f}",
-                        "low": f"{rate.low:.6f}",
-                        "high": f"{rate.high:.6f}",
-                        "errors": result.errors,
-                        "median_seconds_to_success": "" if result.median_seconds is None else result.median_seconds,
-                        "published_rate": "" if known is None else known / 100,
-                    }
-                )
+                yield {
+                    **common,
+                    "task": result.task,
+                    "group": published.group_of_task().get(result.task, ""),
+                    "tasks": 1,
+                    "successes": rate.successes,
+                    "trials": rate.trials,
+                    "rate": f"{rate.rate:.6f}",
+                    "low": f"{rate.low:.6f}",
+                    "high": f"{rate.high:.6f}",
+                    "errors": result.errors,
+                    "median_seconds_to_success": "" if result.median_seconds is None else result.median_seconds,
+                    "published_rate": "" if known is None else known / 100,
+                }
             for group in _groups(policy):
                 results = tasks if group == "all" else policy.group(group, condition)
                 if results:
                     mean = average_of(results)
-                    writer.writerow(
-                        {
-                            **common,
-                            "group": group,
-                            "tasks": len(results),
-                            "successes": sum(r.rate.successes for r in results),
-                            "trials": sum(r.rate.trials for r in results),
-                            "rate": f"{mean.value:.6f}",
-                            "low": f"{mean.low:.6f}",
-                            "high": f"{mean.high:.6f}",
-                            "errors": sum(r.errors for r in results),
-                        }
-                    )
-    return text.getvalue()
+                    yield {
+                        **common,
+                        "group": group,
+                        "tasks": len(results),
+                        "successes": sum(r.rate.successes for r in results),
+                        "trials": sum(r.rate.trials for r in results),
+                        "rate": f"{mean.value:.6f}",
+                        "low": f"{mean.low:.6f}",
+                        "high": f"{mean.high:.6f}",
+                        "errors": sum(r.errors for r in results),
+                    }
 
 
 def _groups(policy: PolicyResult) -> list[str]:
