@@ -11,9 +11,11 @@ import pytest
 import torch
 from lerobot.policies.factory import make_pre_post_processors
 from policy_support import batch_for, tiny_config, unit_stats
+from torch.nn import functional
 
 from robocasa_lerobot import contract
 from robocasa_lerobot.errors import UserError
+from robocasa_lerobot.policies.common.attention import short_attention
 from robocasa_lerobot.policies.common.images import center_crop, crop_size, random_crop, resize, to_signed_float
 from robocasa_lerobot.policies.common.language import PADDING, SUBWORDS, TokenEncoder, hashed_words, token_tensor
 from robocasa_lerobot.policies.common.language_processor import ClipTokensStep
@@ -237,3 +239,11 @@ def test_missing_clip_is_explained(tmp_path: Path, monkeypatch: pytest.MonkeyPat
         DiffusionTransformerPolicy(tiny_config(text_encoder="clip", clip_path=missing))
     with pytest.raises(UserError, match="the CLIP tokenizer could not be loaded"):
         ClipTokensStep(path=missing).tokenize(["open"])
+
+
+def test_short_attention_is_the_same_attention() -> None:
+    q, k, v = torch.randn(3, 2, 4, 10, 24, generator=torch.Generator().manual_seed(0)).unbind()
+    fused = functional.scaled_dot_product_attention(q, k, v)
+    with short_attention(q.device):
+        plain = functional.scaled_dot_product_attention(q, k, v)
+    torch.testing.assert_close(plain, fused, rtol=1e-5, atol=1e-6)

@@ -12,6 +12,7 @@ from lerobot.policies.pretrained import PreTrainedPolicy
 from lerobot.utils.constants import OBS_LANGUAGE_ATTENTION_MASK, OBS_LANGUAGE_TOKENS, OBS_STATE
 from torch import Tensor
 
+from robocasa_lerobot.policies.common.attention import short_attention
 from robocasa_lerobot.policies.common.chunks import (
     Generators,
     decay_groups,
@@ -97,7 +98,9 @@ class DiffusionTransformerPolicy(PreTrainedPolicy):
             times = torch.randint(steps, actions.shape[:1], generator=generator).to(actions.device)
         noisy = self.scheduler.add_noise(actions, noise, times)
         target = noise if self.config.prediction_type == "epsilon" else actions
-        losses = sample_losses(self.denoiser(noisy, times, features).float(), target, batch, self.config)
+        with short_attention(actions.device):
+            predicted = self.denoiser(noisy, times, features).float()
+        losses = sample_losses(predicted, target, batch, self.config)
         return (losses if reduction == "none" else losses.mean()), {}
 
     @torch.no_grad()
