@@ -321,6 +321,7 @@ def test_verify_finds_a_changed_number(name: str, good: Path, tmp_path: Path) ->
     pq.write_table(table.set_column(table.column_names.index(key), table.schema.field(key), changed), path)
     report = verify(result.root, pictures_per_episode=1)
     assert [check.name for check in report.checks if not check.passed] == [check]
+    assert verify(result.root, pictures_per_episode=1, workers=2).as_json() == report.as_json()
 
 
 def test_verify_finds_another_frame_and_other_extras(good: Path, tmp_path: Path) -> None:

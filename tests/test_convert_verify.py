@@ -163,6 +163,14 @@ def test_damage_is_noticed(case: str, damaged: Path) -> None:
     assert next(check for check in report.checks if check.name == name).differences
 
 
+@pytest.mark.parametrize("case", ["one action by one unit in the last place", "two frames swapped"])
+def test_several_processes_find_the_same(case: str, damaged: Path) -> None:
+    DAMAGES[case][0](damaged / "data")
+    alone, several = (verify(damaged / "data", [damaged / "demos.hdf5"], workers=number) for number in (1, 2))
+    assert not alone.passed
+    assert several.as_json() == alone.as_json()
+
+
 def test_undamaged_copy_passes_with_its_source_moved(damaged: Path) -> None:
     moved = (damaged / "demos.hdf5").rename(damaged / "elsewhere.hdf5")
     assert verify(damaged / "data", [moved], pictures_per_episode=None).passed
@@ -170,7 +178,7 @@ def test_undamaged_copy_passes_with_its_source_moved(damaged: Path) -> None:
 
 def test_exit_status_and_outputs(damaged: Path, capsys: pytest.CaptureFixture[str]) -> None:
     command = ["verify", str(damaged / "data"), "--source", str(damaged / "demos.hdf5"), "--pictures-per-episode"]
-    assert cli.main([*command, "3"]) == 0
+    assert cli.main([*command, "3", "--workers", "2"]) == 0
     table = capsys.readouterr().out
     assert "PASSED" in table
     assert all(camera in table for camera in contract.CAMERAS)
@@ -187,6 +195,8 @@ def test_exit_status_and_outputs(damaged: Path, capsys: pytest.CaptureFixture[st
 def test_what_is_no_dataset_of_ours_is_refused(good: Path, tmp_path: Path) -> None:
     with pytest.raises(UserError, match="no dataset"):
         verify(tmp_path)
+    with pytest.raises(UserError, match="0 workers"):
+        verify(good / "data", workers=0)
     copy = Path(shutil.copytree(good / "data", tmp_path / "copy"))
     with pytest.raises(UserError, match="--source"):
         verify(copy, [copy / "nothing.hdf5"])

@@ -30,6 +30,12 @@ class Check:
         if len(self.differences) < _MAX_DIFFERENCES:
             self.differences.append(difference)
 
+    def add(self, other: Check) -> None:
+        """Take what another process found of the same thing."""
+        self.compared += other.compared
+        self.num_differences += other.num_differences
+        self.differences += other.differences[: _MAX_DIFFERENCES - len(self.differences)]
+
     def expect(self, equal: bool, difference: str) -> None:
         """Count one comparison."""
         self.compared += 1
@@ -64,6 +70,19 @@ class Report:
     num_frames: int
     checks: list[Check]
     cameras: list[CameraQuality]
+
+    def add(self, other: Report) -> None:
+        """Take what another process found in a part of the same dataset.
+
+        Raises:
+            KeyError: it made a check that this one did not.
+        """
+        checks = {check.name: check for check in self.checks}
+        cameras = {camera.camera: camera for camera in self.cameras}
+        for check in other.checks:
+            checks[check.name].add(check)
+        for camera in other.cameras:
+            cameras[camera.camera].psnr_db += camera.psnr_db
 
     @property
     def passed(self) -> bool:

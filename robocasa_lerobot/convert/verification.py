@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -59,8 +60,17 @@ _PEAK = 255.0
 _MISPLACED_FACTOR = 1.5
 
 
+@dataclass(frozen=True)
+class Source:
+    """A source file or dataset: as the conversion recorded it, where it is now, and its recorded SHA-256."""
+
+    recorded: str
+    path: Path
+    sha256: str
+
+
 class Verification:
-    """The comparison of a dataset with its sources; `check_*` may be called once each, then `report`."""
+    """The comparison of a dataset with its sources: any of `check_*`, then `report`."""
 
     def __init__(
         self,
@@ -127,32 +137,41 @@ class Verification:
             total = self._dataset.num_frames
             check.expect(count == total, f"{camera}: {count} frames in the videos, {total} in the tables")
 
-    def check_file(
-        self, recorded: str, path: Path, sha256: str, settings: ConversionSettings, record: dict[str, Any], bar: Bar
-    ) -> None:
-        """All episodes of one source file, and that none of its demos is unaccounted for."""
+    def check_source(self, source: Source, settings: ConversionSettings) -> None:
+        """That a source file is the one that was converted, and none of its demos is unaccounted for."""
+        path = source.path
         self._checks["source files"].expect(
-            file_sha256(path) == sha256, f"{path} has changed since the conversion (its SHA-256 is another)"
+            file_sha256(path) == source.sha256, f"{path} has changed since the conversion (its SHA-256 is another)"
         )
-        mine = [line for line in self._episodes if line["source_file"] == recorded]
-        rejected = read_jsonl(self._root / META_FOLDER / REJECTED_FILE)
-        out = {line["source_demo"] for line in rejected if line["source_file"] == recorded}
+        written, out = {line["source_demo"] for line in self._written(source)}, self._rejected(source)
         with DemoFile(path, settings.layout) as file:
-            written = {line["source_demo"] for line in mine}
             for name in settings.select(file):
                 self._checks["episodes"].expect(
                     (name in written) != (name in out), f"{path} {name} is neither converted nor rejected, or both"
                 )
-            if not mine:
-                return
-            plan = _plan(file, mine, settings, record)
+
+    def check_episodes(self, source: Source, settings: ConversionSettings, part: range, bar: Bar | None) -> None:
+        """Those episodes of a source file whose index is in `part`."""
+        mine = [line for line in self._written(source) if line["episode_index"] in part]
+        if not mine:
+            return
+        with DemoFile(source.path, settings.layout) as file:
+            plan = _plan(file, mine, settings, self._record)
             for line in mine:
                 try:
                     with Episode(file, line["source_demo"], plan) as episode:
                         self._check_episode(line, episode)
                 except RejectedEpisodeError as error:
-                    self._checks["episodes"].fail(f"{path} {line['source_demo']}: {error}")
-                bar.update()
+                    self._checks["episodes"].fail(f"{source.path} {line['source_demo']}: {error}")
+                if bar is not None:
+                    bar.update()
+
+    def _written(self, source: Source) -> list[dict[str, Any]]:
+        return [line for line in self._episodes if line["source_file"] == source.recorded]
+
+    def _rejected(self, source: Source) -> set[str]:
+        rejected = read_jsonl(self._root / META_FOLDER / REJECTED_FILE)
+        return {line["source_demo"] for line in rejected if line["source_file"] == source.recorded}
 
     def _check_episode(self, line: dict[str, Any], episode: Episode) -> None:
         index, length = line["episode_index"], episode.length

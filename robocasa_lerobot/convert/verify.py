@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
+import os
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -18,10 +21,15 @@ from robocasa_lerobot.convert.rerender.plan import SOURCE_FORMAT as RERENDERED
 from robocasa_lerobot.convert.rerender.verify import verify_rerendered
 from robocasa_lerobot.convert.settings import ConversionSettings, SourceRecord, file_sha256
 from robocasa_lerobot.convert.shard import EPISODES_FILE
-from robocasa_lerobot.convert.verification import Verification
+from robocasa_lerobot.convert.verification import Source, Verification
 from robocasa_lerobot.errors import UserError
 from robocasa_lerobot.jsonl import read_jsonl
+from robocasa_lerobot.parallel import as_they_end
 from robocasa_lerobot.progress import Bar
+
+# Each further process imports LeRobot and MuJoCo, which takes as long as looking at some dozens of episodes.
+_MIN_EPISODES_PER_WORKER = 64
+_PARTS_PER_WORKER = 4  # so that none waits long for the last
 
 
 def verify(
@@ -30,6 +38,7 @@ def verify(
     asset_roots: Sequence[str] = (),
     pictures_per_episode: int | None = 8,
     min_psnr_db: float = 25.0,
+    workers: int | None = None,
 ) -> Report:
     """Compare a converted dataset with its source files.
 
@@ -39,32 +48,81 @@ def verify(
         asset_roots: folders with meshes and textures, besides the recorded ones.
         pictures_per_episode: evenly spaced steps whose pictures are decoded and compared; None takes all.
         min_psnr_db: the least that a decoded picture must reach.
+        workers: processes; None chooses by the number of episodes and cores. The outcome does not depend on it.
 
     Raises:
         UserError: the folder is no dataset of `convert`, it does not open, or a source file is not to be found.
     """
+    if workers is not None and workers < 1:
+        raise UserError(f"{workers} workers: at least 1 is needed.")
     if not (root / META_FOLDER / CONVERSION_FILE).is_file():
         what = "a dataset without our records" if (root / "meta" / "info.json").is_file() else "no dataset"
         raise UserError(f"{root} is {what}: {META_FOLDER}/{CONVERSION_FILE}, which `convert` writes, is not there.")
-    quiet_libraries()
     record = json.loads((root / META_FOLDER / CONVERSION_FILE).read_text(encoding="utf-8"))
-    episodes = read_jsonl(root / META_FOLDER / EPISODES_FILE)
-    try:
-        dataset = LeRobotDataset(f"local/{root.name}", root=root, video_backend="pyav", return_uint8=True)
-    except Exception as error:
-        raise UserError(f"LeRobot does not open {root}: {type(error).__name__}: {error}") from error
     if record.get("source_format") == RERENDERED:
+        dataset = _opened(root)
         return verify_rerendered(root, dataset, record, sources, asset_roots, pictures_per_episode, min_psnr_db)
-    kind = V2Verification if record.get("source_format") == SOURCE_FORMAT else Verification
-    verification = kind(root, dataset, episodes, record, pictures_per_episode, min_psnr_db)
-    files = _find_sources(root, record["sources"], sources)
-    settings = recorded_settings(record, asset_roots)
+    job = _Job(root, (), recorded_settings(record, asset_roots), pictures_per_episode, min_psnr_db)
+    verification = job.verification()
+    job = dataclasses.replace(job, sources=tuple(_find_sources(root, record["sources"], sources)))
     verification.check_structure()
     verification.check_videos()
-    with Bar(total=len(episodes), unit="episode", desc="verifying") as bar:
-        for recorded_name, path, sha256 in files:
-            verification.check_file(recorded_name, path, sha256, settings, record, bar)
-    return verification.report()
+    for source in job.sources:
+        verification.check_source(source, job.settings)
+    count = len(read_jsonl(root / META_FOLDER / EPISODES_FILE))
+    number = workers or max(1, min(os.cpu_count() or 1, count // _MIN_EPISODES_PER_WORKER))
+    with Bar(total=count, unit="episode", desc="verifying") as bar:
+        if number == 1:
+            for source in job.sources:
+                verification.check_episodes(source, job.settings, range(count), bar)
+            return verification.report()
+        found: dict[int, Report] = {}
+        for part, report in as_they_end(_check_part, [(job, part) for part in _parts(count, number)], number):
+            found[part.start] = report
+            bar.update(len(part))
+    whole = verification.report()
+    for _, report in sorted(found.items()):
+        whole.add(report)
+    return whole
+
+
+@dataclass(frozen=True)
+class _Job:
+    """What a process must know to check some of the episodes."""
+
+    root: Path
+    sources: tuple[Source, ...]
+    settings: ConversionSettings
+    pictures_per_episode: int | None
+    min_psnr_db: float
+
+    def verification(self) -> Verification:
+        """The dataset, opened, with nothing checked yet."""
+        record = json.loads((self.root / META_FOLDER / CONVERSION_FILE).read_text(encoding="utf-8"))
+        episodes = read_jsonl(self.root / META_FOLDER / EPISODES_FILE)
+        kind = V2Verification if record.get("source_format") == SOURCE_FORMAT else Verification
+        dataset = _opened(self.root)
+        return kind(self.root, dataset, episodes, record, self.pictures_per_episode, self.min_psnr_db)
+
+
+def _check_part(job: _Job, part: range) -> tuple[range, Report]:
+    verification = job.verification()
+    for source in job.sources:
+        verification.check_episodes(source, job.settings, part, None)
+    return part, verification.report()
+
+
+def _parts(count: int, workers: int) -> list[range]:
+    number = min(count, workers * _PARTS_PER_WORKER)
+    return [range(count * part // number, count * (part + 1) // number) for part in range(number)]
+
+
+def _opened(root: Path) -> LeRobotDataset:
+    quiet_libraries()
+    try:
+        return LeRobotDataset(f"local/{root.name}", root=root, video_backend="pyav", return_uint8=True)
+    except Exception as error:
+        raise UserError(f"LeRobot does not open {root}: {type(error).__name__}: {error}") from error
 
 
 def recorded_settings(record: dict[str, Any], asset_roots: Sequence[str]) -> ConversionSettings:
@@ -85,8 +143,7 @@ def _sha256(path: Path) -> str:
     return source_record(V2Dataset(path)).sha256 if is_dataset_folder(path) else file_sha256(path)
 
 
-def _find_sources(root: Path, recorded: list[dict[str, Any]], given: Sequence[Path]) -> Iterator[tuple[str, Path, str]]:
-    """For each recorded source: its recorded name, where it is now, and its recorded SHA-256."""
+def _find_sources(root: Path, recorded: list[dict[str, Any]], given: Sequence[Path]) -> Iterator[Source]:
     by_sha = {_sha256(path): path for path in given if path.exists()}
     missing = [path for path in given if not path.exists()]
     if missing:
@@ -102,4 +159,4 @@ def _find_sources(root: Path, recorded: list[dict[str, Any]], given: Sequence[Pa
             raise UserError(
                 f"the source {source.file} is not there any more. Give the source files with --source FILE ..."
             )
-        yield source.file, path, source.sha256
+        yield Source(source.file, path, source.sha256)

@@ -32,6 +32,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
         help="steps of each episode whose pictures are compared, or `all` (default: %(default)s)",
     )
     parser.add_argument("--min-psnr", type=float, default=25.0, metavar="DB", help="default: %(default)s dB")
+    parser.add_argument("--workers", type=int, help="processes (default: by the number of episodes and cores)")
     parser.add_argument("--report", choices=("table", "json"), default="table", help="default: %(default)s")
 
 
@@ -39,7 +40,8 @@ def run(args: argparse.Namespace) -> int:
     """Verify; exit status 1 where anything differs."""
     from robocasa_lerobot.convert.verify import verify
 
-    report = verify(args.dataset, args.source, args.asset_root, args.pictures_per_episode, args.min_psnr)
+    pictures, least_db = args.pictures_per_episode, args.min_psnr
+    report = verify(args.dataset, args.source, args.asset_root, pictures, least_db, args.workers)
     print(json.dumps(report.as_json(), indent=2) if args.report == "json" else _table(report))
     return 0 if report.passed else 1
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -12,15 +11,13 @@ from robocasa_lerobot import contract
 from robocasa_lerobot.convert.lerobot_v2.dataset import EXTRAS, V2Dataset
 from robocasa_lerobot.convert.lerobot_v2.episode import Column, V2Episode
 from robocasa_lerobot.convert.lerobot_v2.plan import look_into, source_record
-from robocasa_lerobot.convert.pipeline import META_FOLDER
 from robocasa_lerobot.convert.reading.demo_file import RejectedEpisodeError
 from robocasa_lerobot.convert.report import Check
 from robocasa_lerobot.convert.settings import Camera, ConversionSettings
-from robocasa_lerobot.convert.shard import REJECTED_FILE, episode_folder
-from robocasa_lerobot.convert.verification import Verification, compare_bits, spread
+from robocasa_lerobot.convert.shard import episode_folder
+from robocasa_lerobot.convert.verification import Source, Verification, compare_bits, spread
 from robocasa_lerobot.convert.writing.statistics import column_of
 from robocasa_lerobot.convert.writing.video import digests
-from robocasa_lerobot.jsonl import read_jsonl
 from robocasa_lerobot.progress import Bar
 
 _MORE_CHECKS = ("other columns", "extras", "copied frames")
@@ -34,34 +31,44 @@ class V2Verification(Verification):
         self._checks |= {name: Check(name) for name in _MORE_CHECKS}
         self._cameras = {camera["name"]: Camera(**camera) for camera in self._record["cameras"]}
 
-    def check_file(
-        self, recorded: str, path: Path, sha256: str, settings: ConversionSettings, record: dict[str, Any], bar: Bar
-    ) -> None:
-        """All episodes of one source dataset, and that none of them is unaccounted for."""
-        source = V2Dataset(path)
+    def check_source(self, source: Source, settings: ConversionSettings) -> None:
+        """That a source dataset is the one that was converted, and none of its episodes is unaccounted for."""
+        path, dataset = source.path, V2Dataset(source.path)
         self._checks["source files"].expect(
-            source_record(source).sha256 == sha256, f"{path} has changed since the conversion (its SHA-256 is another)"
+            source_record(dataset).sha256 == source.sha256,
+            f"{path} has changed since the conversion (its SHA-256 is another)",
         )
-        mine = {line["source_demo"]: line for line in self._episodes if line["source_file"] == recorded}
-        rejected = read_jsonl(self._root / META_FOLDER / REJECTED_FILE)
-        out = {line["source_demo"] for line in rejected if line["source_file"] == recorded}
-        look = look_into(source, settings)
-        tasks = tuple(self._tasks[row] for row in sorted(self._tasks))
-        lost = [text for text in source.tasks.values() if text not in tasks]
+        written, out = {line["source_demo"] for line in self._written(source)}, self._rejected(source)
+        lost = self._lost_tasks(dataset)
         self._checks["instructions"].expect(not lost, f"rows of {path}'s tasks are missing: {lost[:3]}")
-        for line in look.episodes:
-            name = line.name
+        for line in look_into(dataset, settings).episodes:
             self._checks["episodes"].expect(
-                (name in mine) != (name in out), f"{path} {name} is neither converted nor rejected, or both"
+                (line.name in written) != (line.name in out),
+                f"{path} {line.name} is neither converted nor rejected, or both",
             )
-            if name not in mine or lost:
+
+    def check_episodes(self, source: Source, settings: ConversionSettings, part: range, bar: Bar | None) -> None:
+        """Those episodes of a source dataset whose index is in `part`."""
+        mine = {line["source_demo"]: line for line in self._written(source) if line["episode_index"] in part}
+        dataset = V2Dataset(source.path) if mine else None
+        if dataset is None or self._lost_tasks(dataset):
+            return
+        look = look_into(dataset, settings)
+        tasks = tuple(self._tasks[row] for row in sorted(self._tasks))
+        for line in look.episodes:
+            if line.name not in mine:
                 continue
             try:
-                episode = V2Episode(source, line, look.columns, tasks, settings)
-                self._check_v2_episode(mine[name], episode, look.columns, dict(look.camera_keys))
+                episode = V2Episode(dataset, line, look.columns, tasks, settings)
+                self._check_v2_episode(mine[line.name], episode, look.columns, dict(look.camera_keys))
             except RejectedEpisodeError as error:
-                self._checks["episodes"].fail(f"{path} {name}: {error}")
-            bar.update()
+                self._checks["episodes"].fail(f"{source.path} {line.name}: {error}")
+            if bar is not None:
+                bar.update()
+
+    def _lost_tasks(self, dataset: V2Dataset) -> list[str]:
+        """The source's instructions that are no row of the dataset's table of them."""
+        return [text for text in dataset.tasks.values() if text not in self._tasks.values()]
 
     def _check_v2_episode(
         self, line: dict[str, Any], episode: V2Episode, columns: tuple[Column, ...], keys: dict[str, str]
