@@ -157,12 +157,15 @@ def page(body: dict[str, Any]) -> str:
             f"| {policy} | {task} | {cell['solved']}/{cell['trials']} | {100 * cell['rate']:.0f} % "
             f"| {low:.0f} to {high:.0f} % | {', '.join(cell['per_seed'])} |"
         )
-    lines += ["", "| seed | minutes of the demo | its steps, seconds |", "|---|--:|---|"]
+    lines += ["", "Minutes of a demo beside other work say little: see what share of the cores was busy when it began."]
+    lines += ["", "| seed | minutes of the demo | cores busy before | its steps, seconds |", "|---|--:|--:|---|"]
     for seed, times in body["demo"].items():
         steps = (
             ", ".join(f"{name} {seconds:.0f}" for name, seconds in times["steps"].items()) if times else "stopped once"
         )
-        lines.append(f"| {seed} | {times['minutes'] if times else ''} | {steps} |")
+        minutes, share = (times["minutes"], times["busy_before"]) if times else ("", None)
+        busy = "" if share is None else f"{share:.0%}"
+        lines.append(f"| {seed} | {minutes} | {busy} | {steps} |")
     return "\n".join(lines) + "\n"
 
 

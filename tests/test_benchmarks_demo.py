@@ -49,6 +49,7 @@ def test_trials_of_all_seeds_count_and_broken_ones_as_failed(bench: ModuleType, 
     assert body["ratios"]["pretrained_OpenDrawer_over_aim"] == pytest.approx(4 / 6 / 0.60, abs=1e-3)
     assert body["ratios"]["finetuned_over_pretrained_OpenDrawer"] == pytest.approx(1.5)
     assert "| pretrained | OpenDrawer | 4/6 | 67 % |" in bench.page(body)
+    assert "| 0 | 11.5 | 0% | training 300 |" in bench.page(body)
 
 
 def test_a_trial_that_was_made_twice_counts_once(bench: ModuleType, tmp_path: Path) -> None:
