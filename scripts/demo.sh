@@ -8,7 +8,7 @@ set -eu
 ROOT=$(cd "$(dirname "$0")/.." && pwd)
 PYTHON=${PYTHON:-$ROOT/.venv/bin/python}
 OUT=outputs/demo              # where configs/experiments/demo.yaml has its dataset and its results
-DEMOS=${DEMOS:-OpenDrawer=200 CloseDrawer=60} # tasks, and how many demonstrations of each
+DEMOS=${DEMOS:-OpenDrawer=280 CloseDrawer=100} # tasks, and how many demonstrations of each
 IMAGE_SIZE=${IMAGE_SIZE:-64}  # pixels
 TRIALS=${TRIALS:-8}           # trials of each policy on each task
 HORIZON=${HORIZON:-250}       # control steps of a trial: twice what a demonstration takes, a third of OpenDrawer's own
