@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import contextlib
-import multiprocessing
 import os
 import signal
 import threading
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
 from typing import Any
 
 import multiprocess
@@ -114,24 +112,3 @@ def _start_worker(initializer: Callable[[], None] | None) -> None:
         threading.Thread(target=_end_with, args=(parent,), daemon=True).start()
     if initializer is not None:
         initializer()
-
-
-def as_they_end[Result](
-    function: Callable[..., Result], jobs: Sequence[tuple[Any, ...]], workers: int
-) -> Iterator[Result]:
-    """A function's results for the arguments of each job, in the order in which they end; here if one process will do.
-
-    Jobs that have not begun are dropped where nobody asks for further results.
-    """
-    if workers <= 1 or len(jobs) == 1:
-        for job in jobs:
-            yield function(*job)
-        return
-    context = multiprocessing.get_context("forkserver")
-    with ProcessPoolExecutor(min(workers, len(jobs)), mp_context=context) as pool:
-        futures = [pool.submit(function, *job) for job in jobs]
-        try:
-            for future in as_completed(futures):
-                yield future.result()
-        finally:
-            pool.shutdown(wait=False, cancel_futures=True)

@@ -20,13 +20,14 @@ REPOSITORY = Path(__file__).parents[1]
 PACKAGE = REPOSITORY / "robocasa_lerobot"
 
 # What each part of the package may import of the rest of the package. Parts on one level stay apart.
-BASE = {"contract", "errors", "gl", "jsonl", "parallel", "progress", "rendering", "settings", "video"}
+BASE = {"contract", "errors", "gl", "jobs", "jsonl", "parallel", "progress", "rendering", "settings", "video"}
 LOW = {"envs", "convert", "data", "policies"}
 MAY_IMPORT: dict[str, set[str]] = {
     "contract": {"errors"},
     "errors": set(),
     "gl": {"errors"},
     "jsonl": set(),
+    "jobs": set(),
     "parallel": {"errors"},
     "progress": set(),
     "settings": {"errors"},
@@ -48,6 +49,7 @@ FORBIDDEN: dict[str, set[str]] = {
     "errors": TORCH | PHYSICS,
     "gl": TORCH,
     "jsonl": TORCH | PHYSICS,
+    "jobs": TORCH | PHYSICS,
     "parallel": TORCH | PHYSICS,
     "progress": TORCH | PHYSICS,
     "settings": TORCH | PHYSICS,

@@ -39,6 +39,7 @@ from robocasa_lerobot.convert.running.work import (
     run_pieces,
     submit_pieces,
 )
+from robocasa_lerobot.convert.running.workers import num_workers
 from robocasa_lerobot.convert.scenes.ahead import scenes_ahead
 from robocasa_lerobot.convert.settings import ConversionSettings, Plan, Shard, SourceRecord, make_plan
 from robocasa_lerobot.convert.shard import (
@@ -65,7 +66,6 @@ ACTIONS_OUT_OF_RANGE = "actions_out_of_range"  # in it
 # Starting a worker imports LeRobot and MuJoCo (about 6 s of CPU time); below this much work that does not pay: 3,150
 # frames took as long with two workers as with one.
 _MIN_FRAMES_PER_WORKER = 2000
-_MAX_AUTOMATIC_WORKERS = 8
 
 
 @dataclass(frozen=True)
@@ -122,13 +122,13 @@ def _convert(
         shutil.rmtree(partial)  # an earlier run was killed after its dataset had appeared, while clearing away
         return _recorded_result(plan, out)
     with locked(partial), failures_explained(out, partial):
-        num_workers = _num_workers(plan, workers)
+        processes = num_workers(workers, len(plan.shards), plan.num_frames, _MIN_FRAMES_PER_WORKER)
         run_pieces(
-            _ShardTask(plan, str(partial), in_order=num_workers == 1 and execution.kind == "local"),
+            _ShardTask(plan, str(partial), in_order=processes == 1 and execution.kind == "local"),
             len(plan.shards),
             partial,
             execution,
-            num_workers,
+            processes,
             plan.num_frames,
             "converting",
             quiet_libraries,
@@ -240,15 +240,6 @@ def _completed(plan: Plan, partial: Path, out: Path) -> ConversionResult:
         lines = "".join(f"\n  {r['source_file']} {r['source_demo']}: {r['reason']}" for r in rejected[:5])
         raise UserError(f"no episode could be converted ({len(rejected)} rejected), nothing was written:{lines}")
     return result
-
-
-def _num_workers(plan: Plan, workers: int | None) -> int:
-    if workers is not None:
-        if workers < 1:
-            raise UserError(f"{workers} workers: at least 1 is needed.")
-        return min(workers, len(plan.shards))
-    cores = min(os.cpu_count() or 1, _MAX_AUTOMATIC_WORKERS)
-    return max(1, min(cores, len(plan.shards), plan.num_frames // _MIN_FRAMES_PER_WORKER))
 
 
 @dataclass

@@ -38,7 +38,6 @@ _CHECKS = (
     "pictures",
 )
 
-
 _COLUMNS = (
     contract.ACTION_KEY,
     contract.STATE_KEY,
@@ -48,14 +47,8 @@ _COLUMNS = (
     "index",
     "task_index",
 )
-
-
 _EXTRAS = "extra columns"  # a check of datasets that have such
-
-
 _PEAK = 255.0
-
-
 # A picture counts as misplaced where another step's true picture fits it better by this factor in squared error.
 _MISPLACED_FACTOR = 1.5
 
@@ -93,6 +86,11 @@ class Verification:
         table = dataset.hf_dataset.select_columns(keys).with_format("arrow")[:]
         self._columns: dict[str, NDArray[Any]] = {key: column_of(table, key) for key in keys}
         self._tasks = {int(row.task_index): str(task) for task, row in dataset.meta.tasks.iterrows()}
+
+    @property
+    def num_episodes(self) -> int:
+        """Episodes that the conversion wrote."""
+        return len(self._episodes)
 
     def report(self) -> Report:
         """What was found so far."""

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import dataclasses
 import json
-import os
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -19,12 +17,13 @@ from robocasa_lerobot.convert.pipeline import CONVERSION_FILE, META_FOLDER, quie
 from robocasa_lerobot.convert.report import Report
 from robocasa_lerobot.convert.rerender.plan import SOURCE_FORMAT as RERENDERED
 from robocasa_lerobot.convert.rerender.verify import verify_rerendered
+from robocasa_lerobot.convert.running.workers import num_workers
 from robocasa_lerobot.convert.settings import ConversionSettings, SourceRecord, file_sha256
 from robocasa_lerobot.convert.shard import EPISODES_FILE
 from robocasa_lerobot.convert.verification import Source, Verification
 from robocasa_lerobot.errors import UserError
+from robocasa_lerobot.jobs import as_they_end
 from robocasa_lerobot.jsonl import read_jsonl
-from robocasa_lerobot.parallel import as_they_end
 from robocasa_lerobot.progress import Bar
 
 # Each further process imports LeRobot and MuJoCo, which takes as long as looking at some dozens of episodes.
@@ -48,13 +47,12 @@ def verify(
         asset_roots: folders with meshes and textures, besides the recorded ones.
         pictures_per_episode: evenly spaced steps whose pictures are decoded and compared; None takes all.
         min_psnr_db: the least that a decoded picture must reach.
-        workers: processes; None chooses by the number of episodes and cores. The outcome does not depend on it.
+        workers: processes; None chooses by the number of episodes and cores. The outcome does not depend on it. A
+            dataset that was rendered again is checked by one.
 
     Raises:
         UserError: the folder is no dataset of `convert`, it does not open, or a source file is not to be found.
     """
-    if workers is not None and workers < 1:
-        raise UserError(f"{workers} workers: at least 1 is needed.")
     if not (root / META_FOLDER / CONVERSION_FILE).is_file():
         what = "a dataset without our records" if (root / "meta" / "info.json").is_file() else "no dataset"
         raise UserError(f"{root} is {what}: {META_FOLDER}/{CONVERSION_FILE}, which `convert` writes, is not there.")
@@ -62,22 +60,23 @@ def verify(
     if record.get("source_format") == RERENDERED:
         dataset = _opened(root)
         return verify_rerendered(root, dataset, record, sources, asset_roots, pictures_per_episode, min_psnr_db)
-    job = _Job(root, (), recorded_settings(record, asset_roots), pictures_per_episode, min_psnr_db)
+    job = _Job(root, record, recorded_settings(record, asset_roots), pictures_per_episode, min_psnr_db)
     verification = job.verification()
-    job = dataclasses.replace(job, sources=tuple(_find_sources(root, record["sources"], sources)))
+    count = verification.num_episodes
+    number = num_workers(workers, count, count, _MIN_EPISODES_PER_WORKER)
+    found_sources = tuple(_find_sources(root, record["sources"], sources))
     verification.check_structure()
     verification.check_videos()
-    for source in job.sources:
+    for source in found_sources:
         verification.check_source(source, job.settings)
-    count = len(read_jsonl(root / META_FOLDER / EPISODES_FILE))
-    number = workers or max(1, min(os.cpu_count() or 1, count // _MIN_EPISODES_PER_WORKER))
     with Bar(total=count, unit="episode", desc="verifying") as bar:
         if number == 1:
-            for source in job.sources:
+            for source in found_sources:
                 verification.check_episodes(source, job.settings, range(count), bar)
             return verification.report()
         found: dict[int, Report] = {}
-        for part, report in as_they_end(_check_part, [(job, part) for part in _parts(count, number)], number):
+        jobs = [(job, found_sources, part) for part in _parts(count, number)]
+        for part, report in as_they_end(_check_part, jobs, number):
             found[part.start] = report
             bar.update(len(part))
     whole = verification.report()
@@ -88,26 +87,25 @@ def verify(
 
 @dataclass(frozen=True)
 class _Job:
-    """What a process must know to check some of the episodes."""
+    """What a process must know to open a dataset for comparison."""
 
     root: Path
-    sources: tuple[Source, ...]
+    record: dict[str, Any]
     settings: ConversionSettings
     pictures_per_episode: int | None
     min_psnr_db: float
 
     def verification(self) -> Verification:
         """The dataset, opened, with nothing checked yet."""
-        record = json.loads((self.root / META_FOLDER / CONVERSION_FILE).read_text(encoding="utf-8"))
         episodes = read_jsonl(self.root / META_FOLDER / EPISODES_FILE)
-        kind = V2Verification if record.get("source_format") == SOURCE_FORMAT else Verification
+        kind = V2Verification if self.record.get("source_format") == SOURCE_FORMAT else Verification
         dataset = _opened(self.root)
-        return kind(self.root, dataset, episodes, record, self.pictures_per_episode, self.min_psnr_db)
+        return kind(self.root, dataset, episodes, self.record, self.pictures_per_episode, self.min_psnr_db)
 
 
-def _check_part(job: _Job, part: range) -> tuple[range, Report]:
+def _check_part(job: _Job, sources: Sequence[Source], part: range) -> tuple[range, Report]:
     verification = job.verification()
-    for source in job.sources:
+    for source in sources:
         verification.check_episodes(source, job.settings, part, None)
     return part, verification.report()
 

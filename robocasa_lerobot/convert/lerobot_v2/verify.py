@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -10,7 +11,7 @@ from numpy.typing import NDArray
 from robocasa_lerobot import contract
 from robocasa_lerobot.convert.lerobot_v2.dataset import EXTRAS, V2Dataset
 from robocasa_lerobot.convert.lerobot_v2.episode import Column, V2Episode
-from robocasa_lerobot.convert.lerobot_v2.plan import look_into, source_record
+from robocasa_lerobot.convert.lerobot_v2.plan import Look, look_into, source_record
 from robocasa_lerobot.convert.reading.demo_file import RejectedEpisodeError
 from robocasa_lerobot.convert.report import Check
 from robocasa_lerobot.convert.settings import Camera, ConversionSettings
@@ -29,19 +30,20 @@ class V2Verification(Verification):
     def __init__(self, *args: Any) -> None:
         super().__init__(*args)
         self._checks |= {name: Check(name) for name in _MORE_CHECKS}
+        self._looks: dict[Path, Look] = {}
         self._cameras = {camera["name"]: Camera(**camera) for camera in self._record["cameras"]}
 
     def check_source(self, source: Source, settings: ConversionSettings) -> None:
         """That a source dataset is the one that was converted, and none of its episodes is unaccounted for."""
-        path, dataset = source.path, V2Dataset(source.path)
+        path, look = source.path, self._look(source, settings)
         self._checks["source files"].expect(
-            source_record(dataset).sha256 == source.sha256,
+            source_record(look.dataset).sha256 == source.sha256,
             f"{path} has changed since the conversion (its SHA-256 is another)",
         )
         written, out = {line["source_demo"] for line in self._written(source)}, self._rejected(source)
-        lost = self._lost_tasks(dataset)
+        lost = self._lost_tasks(look.dataset)
         self._checks["instructions"].expect(not lost, f"rows of {path}'s tasks are missing: {lost[:3]}")
-        for line in look_into(dataset, settings).episodes:
+        for line in look.episodes:
             self._checks["episodes"].expect(
                 (line.name in written) != (line.name in out),
                 f"{path} {line.name} is neither converted nor rejected, or both",
@@ -50,21 +52,26 @@ class V2Verification(Verification):
     def check_episodes(self, source: Source, settings: ConversionSettings, part: range, bar: Bar | None) -> None:
         """Those episodes of a source dataset whose index is in `part`."""
         mine = {line["source_demo"]: line for line in self._written(source) if line["episode_index"] in part}
-        dataset = V2Dataset(source.path) if mine else None
-        if dataset is None or self._lost_tasks(dataset):
+        look = self._look(source, settings) if mine else None
+        if look is None or self._lost_tasks(look.dataset):
             return
-        look = look_into(dataset, settings)
         tasks = tuple(self._tasks[row] for row in sorted(self._tasks))
         for line in look.episodes:
             if line.name not in mine:
                 continue
             try:
-                episode = V2Episode(dataset, line, look.columns, tasks, settings)
+                episode = V2Episode(look.dataset, line, look.columns, tasks, settings)
                 self._check_v2_episode(mine[line.name], episode, look.columns, dict(look.camera_keys))
             except RejectedEpisodeError as error:
                 self._checks["episodes"].fail(f"{source.path} {line.name}: {error}")
             if bar is not None:
                 bar.update()
+
+    def _look(self, source: Source, settings: ConversionSettings) -> Look:
+        """What a source dataset holds, looked into once."""
+        if source.path not in self._looks:
+            self._looks[source.path] = look_into(V2Dataset(source.path), settings)
+        return self._looks[source.path]
 
     def _lost_tasks(self, dataset: V2Dataset) -> list[str]:
         """The source's instructions that are no row of the dataset's table of them."""

@@ -42,6 +42,7 @@ from robocasa_lerobot.convert.running.work import (
     run_pieces,
     submit_pieces,
 )
+from robocasa_lerobot.convert.running.workers import automatic_workers
 from robocasa_lerobot.convert.scenes.ahead import scenes_ahead
 from robocasa_lerobot.convert.writing.card import renew_dataset_card
 from robocasa_lerobot.convert.writing.encoder import (
@@ -60,7 +61,6 @@ from robocasa_lerobot.errors import UserError
 
 _HISTOGRAMS = "histograms.npz"
 _MIN_FRAMES_PER_WORKER = 200
-_MAX_AUTOMATIC_WORKERS = 8
 _REPORT_FRAMES = 10
 
 
@@ -105,8 +105,7 @@ def render_dataset(
     if execution.kind == "slurm":
         return submit_pieces(step, last, len(plan.pieces), partial, out, execution)
     if workers is None:
-        most = min(os.cpu_count() or 1, _MAX_AUTOMATIC_WORKERS)
-        workers = min(most, plan.num_frames // _MIN_FRAMES_PER_WORKER)
+        workers = automatic_workers(len(plan.pieces), plan.num_frames, _MIN_FRAMES_PER_WORKER)
     workers = max(1, min(workers, len(plan.pieces)))
     with (
         locked(partial),

@@ -1,0 +1,27 @@
+"""How many processes of this machine a conversion, a rendering or a verification takes."""
+
+from __future__ import annotations
+
+import os
+
+from robocasa_lerobot.errors import UserError
+
+_MAX_AUTOMATIC_WORKERS = 8
+
+
+def automatic_workers(pieces: int, work: int, least_work: int) -> int:
+    """By cores, number of pieces, and the least work that pays for starting a process; `work` is all there is."""
+    return max(1, min(os.cpu_count() or 1, _MAX_AUTOMATIC_WORKERS, pieces, work // least_work))
+
+
+def num_workers(asked: int | None, pieces: int, work: int, least_work: int) -> int:
+    """As many as were asked for, at most one for each piece; None chooses.
+
+    Raises:
+        UserError: fewer than one was asked for.
+    """
+    if asked is None:
+        return automatic_workers(pieces, work, least_work)
+    if asked < 1:
+        raise UserError(f"{asked} workers: at least 1 is needed.")
+    return min(asked, pieces)
