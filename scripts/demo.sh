@@ -8,10 +8,10 @@ set -eu
 ROOT=$(cd "$(dirname "$0")/.." && pwd)
 PYTHON=${PYTHON:-$ROOT/.venv/bin/python}
 OUT=outputs/demo              # where configs/experiments/demo.yaml has its dataset and its results
-DEMOS=${DEMOS:-OpenDrawer=280 CloseDrawer=100} # tasks, and how many demonstrations of each
+DEMOS=${DEMOS:-OpenDrawer=280 CloseDrawer=80} # tasks, and how many demonstrations of each
 IMAGE_SIZE=${IMAGE_SIZE:-64}  # pixels
 TRIALS=${TRIALS:-8}           # trials of each policy on each task
-HORIZON=${HORIZON:-250}       # control steps of a trial: twice what a demonstration takes, a third of OpenDrawer's own
+HORIZON=${HORIZON:-250}       # control steps of a trial: much more than a demonstration takes, a third of OpenDrawer's own
 EXPERIMENT=${EXPERIMENT:-$ROOT/configs/experiments/demo.yaml}
 SEED=${SEED:-0}               # of demonstrations, training and trials
 CORES=$("$PYTHON" -c 'import os; print(len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count())')
@@ -35,7 +35,7 @@ mkdir -p "$OUT"
 step "demonstrations: $DEMOS"
 for demos in $DEMOS; do
     robocasa_lerobot demos --tasks "${demos%=*}" --episodes "${demos#*=}" --split target --seed $((SEED * 1000)) \
-        --action-noise 0.05 --workers "$WORKERS" --out "$OUT/demos"
+        --workers "$WORKERS" --out "$OUT/demos"
 done
 
 step "conversion to a LeRobotDataset v3.0"

@@ -20,7 +20,7 @@ from robocasa_lerobot.policies.common.images import center_crop, crop_size, rand
 from robocasa_lerobot.policies.common.language import PADDING, SUBWORDS, TokenEncoder, hashed_words, token_tensor
 from robocasa_lerobot.policies.common.language_processor import ClipTokensStep
 from robocasa_lerobot.policies.common.statistics import leave_components, widen_constant_components
-from robocasa_lerobot.policies.common.vision import SpatialSoftmax
+from robocasa_lerobot.policies.common.vision import ConvNet, FeatureGrid, SpatialSoftmax
 from robocasa_lerobot.policies.diffusion_transformer.modeling_diffusion_transformer import DiffusionTransformerPolicy
 from robocasa_lerobot.policies.diffusion_transformer.processor_diffusion_transformer import QUATERNION_COMPONENTS
 
@@ -56,6 +56,25 @@ def test_spatial_softmax_finds_a_peak() -> None:
         heat[0, 0, row, column] = 100.0
         expected = torch.tensor([[column / 2 - 1, row / 2 - 1]])
         torch.testing.assert_close(pool(heat), expected)
+
+
+def test_a_feature_grid_keeps_what_is_in_each_cell() -> None:
+    images = torch.zeros(1, 2, 6, 6)
+    images[0, 1, 4, 1] = 8.0  # second channel, lower left of 2x2 cells
+    grid = FeatureGrid(2, 2)
+    expected = torch.zeros(1, 8)
+    expected[0, 4 + 2] = 8.0 / 9
+    torch.testing.assert_close(grid(images), expected)
+    torch.testing.assert_close(FeatureGrid(2, 6)(images), images.flatten(1))
+    assert (grid.features, FeatureGrid(2, 6).features) == (8, 72)
+
+
+@pytest.mark.parametrize(("stem", "side"), [(2, 64), (2, 60), (4, 64), (4, 60)])
+def test_a_convnet_ends_at_the_resolution_that_it_names(stem: int, side: int) -> None:
+    net = ConvNet([8, 16, 16], None, stem)
+    out = net(torch.rand(2, 3, side, side), torch.zeros(2, 1))
+    expected = -(-side // (4 * stem))  # rounded up
+    assert out.shape == (2, 16, expected, expected)
 
 
 def test_hashed_words() -> None:

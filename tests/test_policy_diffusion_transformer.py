@@ -41,6 +41,9 @@ VARIANTS: dict[str, dict[str, Any]] = {
     "several draws": {"noise_draws": 3},
     "unmasked": {"mask_padded_actions": False},
     "resnet18": {"vision_encoder": "resnet18"},
+    "grid": {"vision_grid": 3},
+    "coarse stem": {"vision_stem": 4, "image_size": (32, 32)},
+    "resnet18 with a grid": {"vision_encoder": "resnet18", "vision_grid": 2},
 }
 
 
@@ -288,6 +291,9 @@ def test_select_action_steps_through_chunks_of_the_true_history(n_obs_steps: int
         ({"language_film": False}, "would not be used"),
         ({"vision_channels": [12]}, "multiples of 8"),
         ({"horizon": 0}, "expected at least 1"),
+        ({"vision_grid": 0}, "vision_grid is 0"),
+        ({"vision_stem": 0}, "vision_stem is 0"),
+        ({"vision_keypoints": 0}, "vision_keypoints is 0"),
     ],
 )
 def test_wrong_fields_are_explained(overrides: dict[str, Any], message: str) -> None:

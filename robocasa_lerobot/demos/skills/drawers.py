@@ -25,8 +25,13 @@ from robocasa_lerobot.envs.task import Stage
 
 ATTEMPTS = 3
 GRASP_STEPS = 10  # the gripper needs ten control steps for its whole way
+# A pull that begins just when the fingers arrive teaches to pull a little too early, and the bar slips out.
+FIRM_STEPS = 6
 APPROACH_PITCH_RAD = np.deg2rad(15.0)  # downwards: keeps the forearm above the handle
-STANDOFF_M = 0.10
+# A hand that waits beside its goal (`Variety.wait_m`) first goes in front of it: a slant all the way to the handle is a
+# small share of each command, which a policy does not learn.
+STANDOFF_M, ALIGNED_M = 0.15, 0.08
+ALIGN_SPEED, APPROACH_SPEED = 0.7, 0.45
 PULL_SPEED = 0.55
 # Well beyond what tasks ask for: a demonstration that stops at the threshold teaches to stop short of it.
 OPEN_GOAL, CLOSED_GOAL = 1.15, 0.0
@@ -49,10 +54,12 @@ def open_drawer(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
     for _ in range(ATTEMPTS):
         handle = data.geom(drawer.handle_geom).xpos.copy()
         before = HandTarget(handle - approach * STANDOFF_M + variety_of(env).beside(approach), rotation)
+        aligned = HandTarget(handle - approach * ALIGNED_M, rotation)
         at = HandTarget(handle, rotation)
         yield from move_hand(data, before, OPEN, tolerance=0.02)
-        yield from move_hand(data, at, OPEN, speed=0.6, max_steps=40)
-        yield from hold_hand(data, at, CLOSED, GRASP_STEPS)
+        yield from move_hand(data, aligned, OPEN, speed=ALIGN_SPEED, max_steps=40)
+        yield from move_hand(data, at, OPEN, speed=APPROACH_SPEED, max_steps=60)
+        yield from hold_hand(data, at, CLOSED, GRASP_STEPS + FIRM_STEPS)
         reach = drawer.full_travel * (OPEN_GOAL + 0.1 - drawer.openness(data))
         start = grip_position(data)
         # The hand keeps the turn that the grasp left it with: a stiff bar turns the wrist, not the other way round.

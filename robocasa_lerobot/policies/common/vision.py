@@ -34,6 +34,7 @@ class SpatialSoftmax(nn.Module):
     def __init__(self, channels: int, keypoints: int) -> None:
         super().__init__()
         self.to_keypoints = nn.Conv2d(channels, keypoints, kernel_size=1)
+        self.features = 2 * keypoints
 
     def forward(self, x: Tensor) -> Tensor:
         """Maps (N, C, H, W) to (N, 2 * keypoints), ordered x0, y0, x1, y1 ..."""
@@ -45,6 +46,21 @@ class SpatialSoftmax(nn.Module):
         expected_x = (weight.sum(dim=2) * xs).sum(dim=-1)
         expected_y = (weight.sum(dim=3) * ys).sum(dim=-1)
         return torch.stack([expected_x, expected_y], dim=-1).flatten(1)
+
+
+class FeatureGrid(nn.Module):
+    """What is in each cell of a coarse grid over the picture; tells small things apart where few pictures train it."""
+
+    def __init__(self, channels: int, cells: int) -> None:
+        super().__init__()
+        self.cells = cells  # of a side
+        self.features = channels * cells**2
+
+    def forward(self, x: Tensor) -> Tensor:
+        """Maps (N, C, H, W) to (N, C * cells^2): the average of each cell."""
+        if x.shape[-2:] != (self.cells, self.cells):
+            x = functional.adaptive_avg_pool2d(x, self.cells)
+        return x.flatten(1)
 
 
 class ResidualBlock(nn.Module):
@@ -100,15 +116,22 @@ class ResNet18(nn.Module):
 
 
 class ConvNet(nn.Module):
-    """A few strided convolutions with FiLM, for small images and for CPUs; halves the resolution in each."""
+    """A few strided convolutions with FiLM, for small images and for CPUs.
 
-    def __init__(self, channels: Sequence[int], condition_dim: int | None) -> None:
+    The first has stride `stem`, each of the others halves the resolution. A stem of 4 takes 8x8 pixels, as in Mnih et
+    al. 2015.
+    """
+
+    def __init__(self, channels: Sequence[int], condition_dim: int | None, stem: int = 2) -> None:
         super().__init__()
         self.convolutions, self.norms, self.films = nn.ModuleList(), nn.ModuleList(), nn.ModuleList()
         previous = 3
         for i, size in enumerate(channels):
-            kernel = 5 if i == 0 else 3
-            self.convolutions.append(nn.Conv2d(previous, size, kernel, stride=2, padding=kernel // 2, bias=False))
+            stride = stem if i == 0 else 2
+            kernel, padding = (5, 2) if i == 0 else (3, 1)
+            if stride > 2:
+                kernel, padding = 2 * stride, stride // 2
+            self.convolutions.append(nn.Conv2d(previous, size, kernel, stride=stride, padding=padding, bias=False))
             self.norms.append(nn.GroupNorm(size // 8, size))
             if condition_dim:
                 self.films.append(FiLM(condition_dim, size))
@@ -116,7 +139,7 @@ class ConvNet(nn.Module):
         self.out_channels = previous
 
     def forward(self, x: Tensor, condition: Tensor) -> Tensor:
-        """Maps (N, 3, H, W) to (N, channels[-1], H / 2^n, W / 2^n)."""
+        """Maps (N, 3, H, W) to (N, channels[-1], H / s, W / s), s = stem * 2^(n - 1)."""
         for i, (convolution, norm) in enumerate(zip(self.convolutions, self.norms, strict=True)):
             x = norm(convolution(x))
             if self.films:
@@ -126,13 +149,14 @@ class ConvNet(nn.Module):
 
 
 class VisionEncoder(nn.Module):
-    """A backbone, spatial softmax and a linear layer: one feature vector per picture."""
+    """A backbone, spatial softmax (or with `cells` a grid) and a linear layer: one feature vector per picture."""
 
-    def __init__(self, backbone: ResNet18 | ConvNet, keypoints: int, features: int) -> None:
+    def __init__(self, backbone: ResNet18 | ConvNet, keypoints: int, features: int, cells: int | None = None) -> None:
         super().__init__()
         self.backbone = backbone
-        self.pool = SpatialSoftmax(backbone.out_channels, keypoints)
-        self.project = nn.Linear(2 * keypoints, features)
+        channels = backbone.out_channels
+        self.pool = SpatialSoftmax(channels, keypoints) if cells is None else FeatureGrid(channels, cells)
+        self.project = nn.Linear(self.pool.features, features)
 
     def forward(self, images: Tensor, condition: Tensor) -> Tensor:
         """Maps images (N, 3, H, W) in [-1, 1] and condition (N, D) to (N, features), all >= 0."""

@@ -42,7 +42,9 @@ class DiffusionTransformerConfig(ActionChunkConfig):
     crop_shared_over_time: bool = True  # the frames of one sample and camera get the same random crop
     vision_encoder: str = "resnet18"
     vision_shared: bool = False  # one encoder for all cameras (told apart by an embedding) instead of one each
+    vision_stem: int = 2  # stride of a convnet's first convolution; the others have 2
     vision_keypoints: int = 32
+    vision_grid: int | None = None  # instead of keypoints, what is in each cell of a grid of so many rows and columns
     vision_features: int = 64  # per camera
 
     # Language. `token`: hashed words and character trigrams, trained with the policy, no download.
@@ -108,7 +110,9 @@ class DiffusionTransformerConfig(ActionChunkConfig):
 
     def _check_sizes(self) -> None:
         self.check_at_least_one(("n_obs_steps", "horizon", "n_action_steps", "noise_draws"))
-        self.check_at_least_one(("width", "n_heads", "n_decoder_layers"))
+        self.check_at_least_one(("width", "n_heads", "n_decoder_layers", "vision_keypoints", "vision_stem"))
+        if self.vision_grid is not None:
+            self.check_at_least_one(("vision_grid",))
         longest = self.horizon - self.n_obs_steps + 1
         if self.n_action_steps > longest:
             raise UserError(

@@ -103,7 +103,9 @@ def _text_encoder(config: DiffusionTransformerConfig) -> TokenEncoder | ClipText
 
 
 def _vision_encoder(config: DiffusionTransformerConfig, condition_dim: int | None) -> VisionEncoder:
+    backbone: ResNet18 | ConvNet
     if config.vision_encoder == "resnet18":
-        return VisionEncoder(ResNet18(condition_dim), config.vision_keypoints, config.vision_features)
-    backbone = ConvNet(config.vision_channels, condition_dim)
-    return VisionEncoder(backbone, config.vision_keypoints, config.vision_features)
+        backbone = ResNet18(condition_dim)
+    else:
+        backbone = ConvNet(config.vision_channels, condition_dim, config.vision_stem)
+    return VisionEncoder(backbone, config.vision_keypoints, config.vision_features, config.vision_grid)
