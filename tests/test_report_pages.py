@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import time
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -194,9 +195,13 @@ def test_the_theme_follows_the_system_until_it_is_chosen(
         assert browser.ask(paper) == themes[choice]
         pressed = "[...document.querySelectorAll('[aria-pressed=true]')].map(b => b.dataset.themeChoice)"
         assert browser.ask(pressed) == [choice]
-    # The choice outlives the page.
-    browser.open(pages["robustness"], DESKTOP, dark=system_dark)
-    assert browser.ask(paper) == themes["dark"]
+    # The choice outlives the page; a browser that is busy stores it a little later than the click.
+    until = time.monotonic() + 5.0
+    while time.monotonic() < until:
+        browser.open(pages["robustness"], DESKTOP, dark=system_dark)
+        if (kept := browser.ask(paper)) == themes["dark"]:
+            break
+    assert kept == themes["dark"]
     browser.ask("document.querySelector('[data-theme-choice=auto]').click()")
 
 
