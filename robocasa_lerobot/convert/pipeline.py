@@ -39,7 +39,7 @@ from robocasa_lerobot.convert.running.work import (
     run_pieces,
     submit_pieces,
 )
-from robocasa_lerobot.convert.running.workers import num_workers
+from robocasa_lerobot.convert.running.workers import check_workers, num_workers
 from robocasa_lerobot.convert.scenes.ahead import scenes_ahead
 from robocasa_lerobot.convert.settings import ConversionSettings, Plan, Shard, SourceRecord, make_plan
 from robocasa_lerobot.convert.shard import (
@@ -103,6 +103,7 @@ def convert(
     Raises:
         UserError: the input or the output path cannot be used, or no episode is good. Nothing is at `out` then.
     """
+    check_workers(workers)
     with contextlib.closing(shared_encoder), contextlib.closing(scenes_ahead):
         if workers == 1:
             shared_encoder.started()  # takes a moment, meanwhile the files are looked into

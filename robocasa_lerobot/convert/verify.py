@@ -17,7 +17,7 @@ from robocasa_lerobot.convert.pipeline import CONVERSION_FILE, META_FOLDER, quie
 from robocasa_lerobot.convert.report import Report
 from robocasa_lerobot.convert.rerender.plan import SOURCE_FORMAT as RERENDERED
 from robocasa_lerobot.convert.rerender.verify import verify_rerendered
-from robocasa_lerobot.convert.running.workers import num_workers
+from robocasa_lerobot.convert.running.workers import check_workers, num_workers
 from robocasa_lerobot.convert.settings import ConversionSettings, SourceRecord, file_sha256
 from robocasa_lerobot.convert.shard import EPISODES_FILE
 from robocasa_lerobot.convert.verification import Source, Verification
@@ -51,8 +51,10 @@ def verify(
             dataset that was rendered again is checked by one.
 
     Raises:
-        UserError: the folder is no dataset of `convert`, it does not open, or a source file is not to be found.
+        UserError: the folder is no dataset of `convert`, it does not open, a source file is not to be found, or fewer
+            than one process was asked for.
     """
+    check_workers(workers)
     if not (root / META_FOLDER / CONVERSION_FILE).is_file():
         what = "a dataset without our records" if (root / "meta" / "info.json").is_file() else "no dataset"
         raise UserError(f"{root} is {what}: {META_FOLDER}/{CONVERSION_FILE}, which `convert` writes, is not there.")

@@ -42,7 +42,7 @@ from robocasa_lerobot.convert.running.work import (
     run_pieces,
     submit_pieces,
 )
-from robocasa_lerobot.convert.running.workers import automatic_workers
+from robocasa_lerobot.convert.running.workers import check_workers, num_workers
 from robocasa_lerobot.convert.scenes.ahead import scenes_ahead
 from robocasa_lerobot.convert.writing.card import renew_dataset_card
 from robocasa_lerobot.convert.writing.encoder import (
@@ -95,6 +95,7 @@ def render_dataset(
     Raises:
         UserError: the dataset or the output path cannot be used. Nothing is at `out` then.
     """
+    check_workers(workers)
     out, execution = out.absolute(), execution or Execution()
     check_output(out, overwrite)
     if out == source.absolute():
@@ -104,9 +105,7 @@ def render_dataset(
     step, last = _Piece(plan, str(partial)), _LastJob(plan, str(partial), str(out), overwrite)
     if execution.kind == "slurm":
         return submit_pieces(step, last, len(plan.pieces), partial, out, execution)
-    if workers is None:
-        workers = automatic_workers(len(plan.pieces), plan.num_frames, _MIN_FRAMES_PER_WORKER)
-    workers = max(1, min(workers, len(plan.pieces)))
+    workers = num_workers(workers, len(plan.pieces), plan.num_frames, _MIN_FRAMES_PER_WORKER)
     with (
         locked(partial),
         failures_explained(out, partial),

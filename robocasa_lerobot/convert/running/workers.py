@@ -14,14 +14,23 @@ def automatic_workers(pieces: int, work: int, least_work: int) -> int:
     return max(1, min(os.cpu_count() or 1, _MAX_AUTOMATIC_WORKERS, pieces, work // least_work))
 
 
+def check_workers(asked: int | None) -> None:
+    """Refuse a number of processes that does nothing, before any work has begun; None is one that is chosen later.
+
+    Raises:
+        UserError: fewer than one was asked for.
+    """
+    if asked is not None and asked < 1:
+        raise UserError(f"{asked} workers: at least 1 is needed.")
+
+
 def num_workers(asked: int | None, pieces: int, work: int, least_work: int) -> int:
     """As many as were asked for, at most one for each piece; None chooses.
 
     Raises:
         UserError: fewer than one was asked for.
     """
+    check_workers(asked)
     if asked is None:
         return automatic_workers(pieces, work, least_work)
-    if asked < 1:
-        raise UserError(f"{asked} workers: at least 1 is needed.")
     return min(asked, pieces)

@@ -127,10 +127,7 @@ class ConvNet(nn.Module):
         self.convolutions, self.norms, self.films = nn.ModuleList(), nn.ModuleList(), nn.ModuleList()
         previous = 3
         for i, size in enumerate(channels):
-            stride = stem if i == 0 else 2
-            kernel, padding = (5, 2) if i == 0 else (3, 1)
-            if stride > 2:
-                kernel, padding = 2 * stride, stride // 2
+            kernel, stride, padding = _first_convolution(stem) if i == 0 else (3, 2, 1)
             self.convolutions.append(nn.Conv2d(previous, size, kernel, stride=stride, padding=padding, bias=False))
             self.norms.append(nn.GroupNorm(size // 8, size))
             if condition_dim:
@@ -161,6 +158,11 @@ class VisionEncoder(nn.Module):
     def forward(self, images: Tensor, condition: Tensor) -> Tensor:
         """Maps images (N, 3, H, W) in [-1, 1] and condition (N, D) to (N, features), all >= 0."""
         return functional.relu(self.project(self.pool(self.backbone(images, condition))))
+
+
+def _first_convolution(stride: int) -> tuple[int, int, int]:
+    """Kernel, stride and padding: five pixels up to a stride of 2, twice the stride above it."""
+    return (5, stride, 2) if stride <= 2 else (2 * stride, stride, stride // 2)
 
 
 def _group_norm(channels: int) -> nn.GroupNorm:
