@@ -65,11 +65,10 @@ def test_an_unknown_policy_is_refused(bench: ModuleType, tmp_path: Path) -> None
         bench.main(["--policies", "pretrain", "--work", str(tmp_path), "--out", str(tmp_path / "demo.json")])
 
 
-def test_the_committed_result_has_three_seeds_and_meets_the_aims_of_pretraining(bench: ModuleType) -> None:
+def test_the_committed_result_has_three_seeds_and_meets_the_aims(bench: ModuleType) -> None:
     body = json.loads(bench.OUTPUT.read_text(encoding="utf-8"))
     assert body["settings"]["seeds"] == [0, 1, 2]
     assert all(cell["trials"] == 120 for cell in body["cells"].values())
     for (policy, task), aim in bench.AIMS.items():
         assert body["cells"][f"{policy}/{task}"]["rate"] >= aim
-    # Fine-tuning is neither better nor worse: docs/decisions/0024.
-    assert body["cells"]["finetuned/OpenDrawer"]["interval_95"][1] >= body["cells"]["pretrained/OpenDrawer"]["rate"]
+    assert body["cells"]["finetuned/OpenDrawer"]["rate"] >= body["cells"]["pretrained/OpenDrawer"]["rate"]
