@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-import datetime
 import importlib.metadata
 import json
 import os
 import platform
 import statistics
-import subprocess
 import time
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
+
+from robocasa_lerobot.files import write_text
+from robocasa_lerobot.provenance import git_commit, utc_now
 
 REPOSITORY = Path(__file__).parents[1]
 RESULTS = REPOSITORY / "benchmarks" / "results"
@@ -71,28 +72,13 @@ def table(header: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
 def write_result(path: Path, name: str, body: dict[str, Any]) -> None:
     """Write a benchmark's result as JSON: written aside, then renamed, so that no reader meets half of it."""
     path.parent.mkdir(parents=True, exist_ok=True)
-    aside = path.with_name(path.name + ".part")
-    aside.write_text(json.dumps({"benchmark": name, "date": now(), **body}, indent=1) + "\n", encoding="utf-8")
-    aside.replace(path)
-
-
-def now() -> str:
-    """The present time as results have it."""
-    return datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds")
+    write_text(path, json.dumps({"benchmark": name, "date": utc_now(), **body}, indent=1) + "\n")
 
 
 def _commit() -> str:
-    def git(*arguments: str) -> str:
-        return subprocess.run(
-            ["git", *arguments], cwd=REPOSITORY, capture_output=True, text=True, check=True
-        ).stdout.strip()
-
-    try:
-        # Results written by an earlier benchmark are no change of what is measured.
-        changes = git("status", "--porcelain", "--untracked-files=no", "--", ".", ":!benchmarks/results")
-        return git("rev-parse", "--short=12", "HEAD") + ("+changes" if changes else "")
-    except (OSError, subprocess.CalledProcessError):
-        return "unknown"
+    # Results written by an earlier benchmark are no change of what is measured.
+    commit = git_commit("benchmarks/results")
+    return "unknown" if commit is None else commit[:12] + ("+changes" if commit.endswith("-dirty") else "")
 
 
 def _cpu_times() -> tuple[int, int] | None:

@@ -6,10 +6,10 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-import common
 import convert_report
 
 from robocasa_lerobot.errors import UnknownNameError, UserError
+from robocasa_lerobot.provenance import utc_now
 
 SECTIONS = tuple(convert_report.SECTIONS)
 
@@ -49,7 +49,7 @@ def merged(before: dict[str, Any], body: dict[str, Any], sections: Sequence[str]
         found["peer"] = body["peer"]
     found["ratios"] = convert_report.ratios(found["frames_per_second"], found["memory"])
     again = {
-        "date": common.now(),
+        "date": utc_now(),
         "commit": body["versions"]["commit"],
         "mode": body["mode"],
         "others_share_of_cores": body["others_share_of_cores"],

@@ -36,7 +36,7 @@ class VideoWriter:
     """
 
     def __init__(self, path: Path, fps: int) -> None:
-        self._path, self._part, self._fps = path, path.with_name(path.name + ".part"), fps
+        self._path, self._part, self._fps = path, path.with_name(path.name + ".partial"), fps
         self._container: Any = None
         self._stream: Any = None
 

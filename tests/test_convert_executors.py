@@ -15,8 +15,8 @@ from robocasa_lerobot.errors import UserError
 pytest.importorskip("lerobot.datasets")
 
 from robocasa_lerobot.convert.pipeline import META_FOLDER, convert
-from robocasa_lerobot.convert.running.executors import Execution, RaySettings, SlurmSettings
 from robocasa_lerobot.convert.settings import ConversionSettings
+from robocasa_lerobot.jobs.executors import Execution, RaySettings, SlurmSettings
 
 
 @pytest.fixture

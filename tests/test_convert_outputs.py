@@ -131,7 +131,7 @@ def test_a_worker_that_dies_is_reported(tmp_path: Path) -> None:
 
 _DYING = """
 import sys
-from robocasa_lerobot.parallel import PoolExecutor, WorkerDiedError
+from robocasa_lerobot.jobs.pool import PoolExecutor, WorkerDiedError
 
 def die(data, rank=0, world_size=1):
     import os, signal, time

@@ -69,7 +69,7 @@ def test_outcomes_do_not_depend_on_workers_order_or_films(tmp_path: Path) -> Non
     for record in filmed:
         frames, rate = frames_and_rate(tmp_path / "two" / str(record.video))
         assert (frames, rate) == (1 + record.steps // FILM_EVERY, FILM_FPS)
-    assert not list((tmp_path / "two").rglob("*.part"))
+    assert not list((tmp_path / "two").rglob("*.partial"))
 
 
 def test_records_say_what_happened_and_what_made_it(tmp_path: Path) -> None:

@@ -20,21 +20,25 @@ REPOSITORY = Path(__file__).parents[1]
 PACKAGE = REPOSITORY / "robocasa_lerobot"
 
 # What each part of the package may import of the rest of the package. Parts on one level stay apart.
-BASE = {"contract", "errors", "gl", "jobs", "jsonl", "parallel", "progress", "rendering", "settings", "video"}
+BASE = {
+    *("contract", "errors", "files", "gl", "jobs", "jsonl", "progress", "provenance", "rendering", "settings"),
+    "video",
+}
 LOW = {"envs", "convert", "data", "policies"}
 MAY_IMPORT: dict[str, set[str]] = {
     "contract": {"errors"},
     "errors": set(),
     "gl": {"errors"},
+    "files": set(),
     "jsonl": set(),
-    "jobs": set(),
-    "parallel": {"errors"},
+    "provenance": set(),
     "progress": set(),
+    "jobs": {"errors", "progress"},
     "settings": {"errors"},
     "video": {"contract"},
     "rendering": {"errors", "gl"},
     **dict.fromkeys(LOW, BASE),
-    "demos": BASE | {"envs", "convert"},
+    "demos": BASE | {"envs"},
     "training": BASE | {"data", "policies"},
     "evaluation": BASE | {"envs", "convert", "data", "policies", "demos"},  # demos: a reference policy
     "making": BASE | {"envs", "convert", "data", "demos", "training"},  # data that an experiment needs
@@ -48,9 +52,10 @@ FORBIDDEN: dict[str, set[str]] = {
     "contract": TORCH | PHYSICS,
     "errors": TORCH | PHYSICS,
     "gl": TORCH,
+    "files": TORCH | PHYSICS,
     "jsonl": TORCH | PHYSICS,
+    "provenance": TORCH | PHYSICS,
     "jobs": TORCH | PHYSICS,
-    "parallel": TORCH | PHYSICS,
     "progress": TORCH | PHYSICS,
     "settings": TORCH | PHYSICS,
     "video": TORCH | PHYSICS,

@@ -153,7 +153,7 @@ def check_same(killed: Run, whole: Run) -> None:
         assert different == []
         names = sorted(path.name for path in (killed.out / phase / "checkpoints").iterdir())
         assert names == sorted(path.name for path in (whole.out / phase / "checkpoints").iterdir())
-    assert not [path for path in killed.out.rglob("*") if path.name.endswith(".tmp")]
+    assert not [path for path in killed.out.rglob("*") if path.name.endswith(".partial")]
 
 
 @pytest.mark.slow

@@ -22,6 +22,7 @@ from robocasa_lerobot import __version__, contract
 from robocasa_lerobot.convert.reading.demo_file import ASSETS_GROUP, IMAGE_SUFFIX
 from robocasa_lerobot.convert.reading.lerobot_v3 import EXTRA_PREFIX, ExportedDataset, ExportedEpisode
 from robocasa_lerobot.errors import UnknownNameError, UserError
+from robocasa_lerobot.files import written_aside
 from robocasa_lerobot.progress import Bar
 
 COMPRESSIONS = ("gzip", "lzf", "none")
@@ -76,15 +77,11 @@ def export(root: Path, out: Path, settings: ExportSettings | None = None, overwr
     cameras = _cameras(dataset, settings)
     notes: list[str] = []
     out.parent.mkdir(parents=True, exist_ok=True)
-    partial = out.with_name(f"{out.name}.partial")
     try:
-        with h5py.File(partial, "w") as file:
+        with written_aside(out) as aside, h5py.File(aside, "w") as file:
             num_frames = _write(file, dataset, episodes, cameras, settings, notes)
-        partial.replace(out)
     except OSError as error:
         raise UserError(f"writing {out} failed: {error}. Nothing is there; free what is lacking and repeat.") from error
-    finally:
-        partial.unlink(missing_ok=True)
     return ExportResult(out, len(episodes), num_frames, tuple(notes))
 
 

@@ -26,20 +26,6 @@ from robocasa_lerobot.convert.lerobot_v2.finish import conversion_facts, finish_
 from robocasa_lerobot.convert.lerobot_v2.plan import V2Plan, make_v2_plan, takes
 from robocasa_lerobot.convert.lerobot_v2.shard import convert_v2_shard
 from robocasa_lerobot.convert.reading.demo_file import DemoFile
-from robocasa_lerobot.convert.running.executors import Execution
-from robocasa_lerobot.convert.running.work import (
-    check_output,
-    failures_explained,
-    locked,
-    make_piece,
-    partial_folder,
-    publish,
-    report_frames,
-    require_complete,
-    run_pieces,
-    submit_pieces,
-)
-from robocasa_lerobot.convert.running.workers import check_workers, num_workers
 from robocasa_lerobot.convert.scenes.ahead import scenes_ahead
 from robocasa_lerobot.convert.settings import ConversionSettings, Plan, Shard, SourceRecord, make_plan
 from robocasa_lerobot.convert.shard import (
@@ -57,6 +43,17 @@ from robocasa_lerobot.convert.writing.encoder import CODECS, SAMPLED_FRAMES, SAM
 from robocasa_lerobot.convert.writing.encoding_process import shared_encoder
 from robocasa_lerobot.convert.writing.modality import MODALITY_FILE, modality, write_modality
 from robocasa_lerobot.errors import UserError
+from robocasa_lerobot.jobs.executors import Execution
+from robocasa_lerobot.jobs.pieces import report_frames, require_complete, run_pieces, submit_pieces
+from robocasa_lerobot.jobs.publish import (
+    check_output,
+    failures_explained,
+    held_folder,
+    make_piece,
+    partial_folder,
+    publish,
+)
+from robocasa_lerobot.jobs.workers import check_workers, num_workers
 from robocasa_lerobot.jsonl import read_jsonl, write_jsonl
 
 # Our part of a dataset's folder; LeRobot reads nothing in it.
@@ -122,7 +119,7 @@ def _convert(
     if out.exists() and not overwrite and _left_behind(out) == partial:
         shutil.rmtree(partial)  # an earlier run was killed after its dataset had appeared, while clearing away
         return _recorded_result(plan, out)
-    with locked(partial), failures_explained(out, partial):
+    with held_folder(partial), failures_explained(out, partial):
         processes = num_workers(workers, len(plan.shards), plan.num_frames, _MIN_FRAMES_PER_WORKER)
         run_pieces(
             _ShardTask(plan, str(partial), in_order=processes == 1 and execution.kind == "local"),
@@ -179,7 +176,7 @@ class _LastJob:
         check_output(out, self.overwrite)
         require_complete(len(self.plan.shards), partial)
         quiet_libraries()
-        with locked(partial), failures_explained(out, partial):
+        with held_folder(partial), failures_explained(out, partial):
             return _completed(self.plan, partial, out)
 
 

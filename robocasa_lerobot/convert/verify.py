@@ -17,12 +17,12 @@ from robocasa_lerobot.convert.pipeline import CONVERSION_FILE, META_FOLDER, quie
 from robocasa_lerobot.convert.report import Report
 from robocasa_lerobot.convert.rerender.plan import SOURCE_FORMAT as RERENDERED
 from robocasa_lerobot.convert.rerender.verify import verify_rerendered
-from robocasa_lerobot.convert.running.workers import check_workers, num_workers
 from robocasa_lerobot.convert.settings import ConversionSettings, SourceRecord, file_sha256
 from robocasa_lerobot.convert.shard import EPISODES_FILE
 from robocasa_lerobot.convert.verification import Source, Verification
 from robocasa_lerobot.errors import UserError
-from robocasa_lerobot.jobs import as_they_end
+from robocasa_lerobot.jobs.as_completed import as_they_end
+from robocasa_lerobot.jobs.workers import check_workers, num_workers
 from robocasa_lerobot.jsonl import read_jsonl
 from robocasa_lerobot.progress import Bar
 

@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import fcntl
 import shutil
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 
 from robocasa_lerobot.errors import UserError
@@ -25,11 +22,3 @@ def check_disk(needed: int, folder: Path, what: str, remedy: str) -> None:
             f"{what} needs {needed / 1e9:.1f} GB but {folder} has {free / 1e9:.1f} GB free. Set `loader.cache_dir` to "
             f"a larger disk{remedy}."
         )
-
-
-@contextmanager
-def locked(path: Path) -> Iterator[None]:
-    """An exclusive lock on a file, which the system frees when its holder dies."""
-    with path.open("w") as file:
-        fcntl.flock(file, fcntl.LOCK_EX)
-        yield

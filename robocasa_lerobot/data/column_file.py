@@ -14,8 +14,10 @@ import numpy as np
 import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
-from robocasa_lerobot.data.cache_folder import check_disk, locked
+from robocasa_lerobot.data.cache_folder import check_disk
 from robocasa_lerobot.errors import UserError
+from robocasa_lerobot.files import written_aside
+from robocasa_lerobot.jobs.locks import locked
 
 FORMAT = 1  # counted up when the content changes
 _ROWS = 65_536  # read at a time
@@ -53,17 +55,16 @@ def map_columns(root: Path, row: np.dtype[Any], total: int, fingerprint: str, fo
     assert row.names is not None
     folder.mkdir(parents=True, exist_ok=True)
     path = folder / f"{root.name}_{fingerprint[:16]}_{FORMAT}.npy"
-    with locked(path.with_suffix(".lock")):
+    with locked(path.with_suffix(".lock"), wait=True):
         if not path.is_file():
             check_disk(total * row.itemsize, folder, "the cache of states and actions", "")
-            aside = path.with_suffix(".partial.npy")
-            rows = np.lib.format.open_memmap(aside, mode="w+", dtype=row, shape=(total,))
-            for start, part in _parts(root, row, total):
-                for name, values in part.items():
-                    rows[name][start : start + len(values)] = values
-            rows.flush()
-            del rows
-            aside.replace(path)
+            with written_aside(path) as aside:
+                rows = np.lib.format.open_memmap(aside, mode="w+", dtype=row, shape=(total,))
+                for start, part in _parts(root, row, total):
+                    for name, values in part.items():
+                        rows[name][start : start + len(values)] = values
+                rows.flush()
+                del rows
     mapped = np.load(path, mmap_mode="r")
     return {name: mapped[name] for name in row.names}
 

@@ -21,9 +21,11 @@ import torch
 from lerobot.datasets.video_utils import decode_video_frames
 from numpy.typing import NDArray
 
-from robocasa_lerobot.data.cache_folder import check_disk, locked
+from robocasa_lerobot.data.cache_folder import check_disk
 from robocasa_lerobot.data.source import DatasetSource
 from robocasa_lerobot.errors import UserError
+from robocasa_lerobot.files import write_text
+from robocasa_lerobot.jobs.locks import locked
 from robocasa_lerobot.progress import Bar
 
 FORMAT = 1  # counted up when the content of a cache changes
@@ -76,7 +78,7 @@ def open_or_build(source: DatasetSource, keys: Sequence[str], size: tuple[int, i
     name = f"{source.root.name}_{size[0]}x{size[1]}_{hashlib.sha256(text.encode()).hexdigest()[:16]}"
     folder, partial = cache_dir / name, cache_dir / f"{name}.partial"
     cache_dir.mkdir(parents=True, exist_ok=True)
-    with locked(cache_dir / f"{name}.lock"):
+    with locked(cache_dir / f"{name}.lock", wait=True):
         if not folder.is_dir():
             remedy = ", a smaller `loader.image_size`, or `loader.cache_frames: false`"
             check_disk(cache_bytes(source, keys, size), cache_dir, "the frame cache", remedy)
@@ -112,9 +114,7 @@ def _fill(source: DatasetSource, keys: list[str], size: tuple[int, int], folder:
                 arrays[key][where] = job.result().numpy()
             for array in arrays.values():
                 array.flush()
-            aside = progress.with_suffix(".tmp")
-            aside.write_text(json.dumps({"episodes": episode + 1, "keys": keys}))
-            aside.replace(progress)
+            write_text(progress, json.dumps({"episodes": episode + 1, "keys": keys}))
 
 
 def _decode(

@@ -17,10 +17,11 @@ import numpy as np
 import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
-from robocasa_lerobot.data.cache_folder import locked
 from robocasa_lerobot.data.quantiles import QuantileSearch
 from robocasa_lerobot.data.source import DatasetSource
 from robocasa_lerobot.errors import UserError
+from robocasa_lerobot.files import write_text
+from robocasa_lerobot.jobs.locks import locked
 from robocasa_lerobot.progress import Bar
 
 Statistics = dict[str, dict[str, NDArray[Any]]]
@@ -105,13 +106,11 @@ def cached_statistics(parts: Sequence[Part], folder: Path, images: bool = True) 
         digest.update(np.float64(part.probability).tobytes())
     folder.mkdir(parents=True, exist_ok=True)
     path = folder / f"statistics_{digest.hexdigest()[:16]}.json"
-    with locked(path.with_suffix(".lock")):
+    with locked(path.with_suffix(".lock"), wait=True):
         if not path.is_file():
             stats = pooled_statistics(parts, images)
             text = {key: {name: v.tolist() for name, v in values.items()} for key, values in stats.items()}
-            aside = path.with_suffix(".tmp")
-            aside.write_text(json.dumps(text))
-            aside.replace(path)
+            write_text(path, json.dumps(text))
     stored = json.loads(path.read_text())
     return {key: {name: np.array(v) for name, v in values.items()} for key, values in stored.items()}
 

@@ -18,8 +18,9 @@ from robocasa_lerobot.demos.episode import Recording, record_episode
 from robocasa_lerobot.demos.failures import film_of, keep_failure
 from robocasa_lerobot.demos.hdf5 import Failure, write_part
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
+from robocasa_lerobot.files import write_text
 from robocasa_lerobot.gl import NoOpenGLError
-from robocasa_lerobot.parallel import exit_if_orphaned
+from robocasa_lerobot.jobs.pool import exit_if_orphaned
 
 # Give up when this many attempts per wanted episode were not enough, or when none of the first ones has succeeded.
 MAX_ATTEMPTS_PER_EPISODE, HOPELESS = 10, 20
@@ -120,9 +121,7 @@ class Parts:
         if self.folder.exists() and (not note.exists() or json.loads(note.read_text()) != identity):
             shutil.rmtree(self.folder)
         self.folder.mkdir(parents=True, exist_ok=True)
-        aside = note.with_suffix(".partial")
-        aside.write_text(json.dumps(identity))
-        aside.replace(note)
+        write_text(note, json.dumps(identity))
 
     def episode(self, attempt: int) -> Path:
         """File of an attempt that succeeded."""
@@ -196,6 +195,4 @@ class Parts:
         if self.films is not None:
             keep_failure(self.films, env, failure, recording)
         note = self.folder / f"{number:06d}.json"
-        aside = note.with_suffix(".partial")
-        aside.write_text(json.dumps(dataclasses.asdict(failure)))
-        aside.replace(note)
+        write_text(note, json.dumps(dataclasses.asdict(failure)))

@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from robocasa_lerobot.convert.running.executors import Execution
     from robocasa_lerobot.demos.record import RecordingSettings
+    from robocasa_lerobot.jobs.executors import Execution
 
 EXAMPLE = (
     "robocasa-lerobot demos --tasks OpenDrawer --episodes 20 --split target --seed 0 --out demos/\n"
@@ -19,7 +19,7 @@ EXAMPLE = (
 
 def configure(parser: argparse.ArgumentParser) -> None:
     """Add the arguments."""
-    from robocasa_lerobot.convert.running.executors import add_options
+    from robocasa_lerobot.jobs.executors import add_options
 
     parser.add_argument(
         "--tasks", required=True, help="names and sets (atomic_seen, ...) separated by commas, or `all`; see `tasks`"
@@ -59,10 +59,10 @@ def configure(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Record every task and print a table; status 1 if one had to be given up."""
-    from robocasa_lerobot.convert.running.executors import execution_of
     from robocasa_lerobot.demos.choose import choose_tasks
     from robocasa_lerobot.demos.record import RecordingSettings, record_tasks
     from robocasa_lerobot.demos.summary import print_summary
+    from robocasa_lerobot.jobs.executors import execution_of
 
     execution = execution_of(args)
     chosen = choose_tasks(args.tasks)

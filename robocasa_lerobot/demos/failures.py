@@ -14,6 +14,7 @@ from robocasa_lerobot.demos.episode import Recording
 from robocasa_lerobot.demos.film_strip import show_state
 from robocasa_lerobot.demos.hdf5 import Failure
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
+from robocasa_lerobot.files import write_text
 
 # Half the control rate and small pictures: on a CPU, filming takes longer than the attempt.
 FILM_EVERY, FILM_SIZE = 2, 192
@@ -46,9 +47,7 @@ def keep_failure(folder: Path, env: KitchenEnv, failure: Failure, recording: Rec
         if len(recording.states):
             _film(place.with_suffix(".mp4"), env, recording)
             described["film"] = place.with_suffix(".mp4").name
-    aside = place.with_suffix(".partial")
-    aside.write_text(json.dumps(described, indent=1) + "\n", encoding="utf-8")
-    aside.replace(place)
+    write_text(place, json.dumps(described, indent=1) + "\n")
 
 
 def remove_others(folder: Path, failures: list[Failure]) -> None:

@@ -15,6 +15,7 @@ from robocasa_lerobot.demos.motion import base_pose
 from robocasa_lerobot.demos.replay import kitchen_of, read_demonstration
 from robocasa_lerobot.demos.titled import titled
 from robocasa_lerobot.envs.scene.robot_names import GRIP_SITE
+from robocasa_lerobot.files import written_aside
 
 STRIP_PICTURES, STRIP_SIZE = 10, 224  # along the strip; pixels of each
 # Of a camera that follows the hand: over a shoulder, or where nothing stands between.
@@ -54,9 +55,8 @@ def film_strip(path: Path, demo: str, out: Path) -> None:
         env.close()
     title = f"{recorded.task}, {recorded.split}, seed {recorded.seed}: {recorded.instruction}"
     out.parent.mkdir(parents=True, exist_ok=True)
-    aside = out.with_name(f".{out.name}")
-    Image.fromarray(titled(np.hstack(columns), title)).save(aside, format="PNG")
-    aside.replace(out)
+    with written_aside(out) as aside:
+        Image.fromarray(titled(np.hstack(columns), title)).save(aside, format="PNG")
 
 
 def show_state(model: mujoco.MjModel, data: mujoco.MjData, state: NDArray[np.float64]) -> None:

@@ -15,6 +15,7 @@ import numpy as np
 
 from robocasa_lerobot import __version__
 from robocasa_lerobot.demos.episode import Recording
+from robocasa_lerobot.files import written_aside
 
 ENV_TYPE_ROBOSUITE = 1  # robomimic's number for environments of this family
 # Group of files that MJCFs name; MuJoCo needs them to load a `model_file` again. It lies beside `data`, not in it:
@@ -38,8 +39,7 @@ class Failure:
 
 def write_part(path: Path, recording: Recording) -> None:
     """Write one episode to a file of its own; it appears under its name only when complete."""
-    partial = path.with_suffix(".partial")
-    with h5py.File(partial, "w") as file:
+    with written_aside(path) as aside, h5py.File(aside, "w") as file:
         demo = file.create_group("demo")
         demo.attrs["model_file"] = recording.model_file
         demo.attrs["ep_meta"] = json.dumps(recording.ep_meta)
@@ -58,7 +58,6 @@ def write_part(path: Path, recording: Recording) -> None:
             demo.create_dataset(f"obs/{key}", data=values, compression="gzip", chunks=chunks)
         for name, content in recording.assets.items():
             file.create_dataset(f"{ASSETS_GROUP}/{name}", data=np.frombuffer(content, dtype=np.uint8))
-    partial.replace(path)
 
 
 @dataclass(frozen=True)
@@ -99,10 +98,9 @@ def merge_parts(
 
     The file appears under its name only when complete.
     """
-    partial = path.with_suffix(".partial")
     now = datetime.datetime.now(datetime.UTC)
     total = 0
-    with h5py.File(partial, "w") as file:
+    with written_aside(path) as aside, h5py.File(aside, "w") as file:
         data = file.create_group("data")
         for index, part in enumerate(parts):
             with h5py.File(part, "r") as source:
@@ -135,7 +133,6 @@ def merge_parts(
                 "failures": json.dumps([asdict(f) for f in failures]),
             }
         )
-    partial.replace(path)
     return total
 
 

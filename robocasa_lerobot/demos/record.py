@@ -10,7 +10,6 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from robocasa_lerobot.convert.running.work import locked
 from robocasa_lerobot.demos.attempts import Parts, RecordingSettings, Tally
 from robocasa_lerobot.demos.failures import remove_others
 from robocasa_lerobot.demos.hdf5 import Failure, merge_parts, read_summary
@@ -18,7 +17,8 @@ from robocasa_lerobot.demos.progress import Board
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.errors import UserError
 from robocasa_lerobot.gl import ensure_gl
-from robocasa_lerobot.parallel import PoolExecutor, polled
+from robocasa_lerobot.jobs.pool import PoolExecutor, polled
+from robocasa_lerobot.jobs.publish import held_folder
 
 __all__ = ["FAILURES_FOLDER", "RecordingResult", "RecordingSettings", "record_task", "record_tasks"]
 
@@ -112,7 +112,7 @@ def record_tasks(
     with contextlib.ExitStack() as stack:
         for parts in waiting:
             lock = _lock(parts)
-            stack.enter_context(locked(lock))
+            stack.enter_context(held_folder(lock))
             stack.callback(shutil.rmtree, lock, ignore_errors=True)  # before it is released
             parts.prepare()
         board = stack.enter_context(Board([parts.settings for parts in waiting], show=show_progress))
@@ -174,7 +174,7 @@ def _clear_away(parts: Parts) -> None:
     """Remove what a run left that was killed after the task's file had appeared."""
     lock = _lock(parts)
     if lock.exists() or parts.folder.exists():
-        with contextlib.suppress(UserError), locked(lock):  # held by another run, which is about to do it
+        with contextlib.suppress(UserError), held_folder(lock):  # held by another run, which is about to do it
             shutil.rmtree(parts.folder, ignore_errors=True)
             shutil.rmtree(lock, ignore_errors=True)
 

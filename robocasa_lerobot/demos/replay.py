@@ -20,7 +20,7 @@ from robocasa_lerobot import contract
 from robocasa_lerobot.demos.episode import SUCCESS_HOLD_STEPS
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.errors import UserError
-from robocasa_lerobot.jobs import as_they_end
+from robocasa_lerobot.jobs.as_completed import as_they_end
 
 Array = NDArray[np.float64]
 

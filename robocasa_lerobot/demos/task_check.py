@@ -10,7 +10,7 @@ from robocasa_lerobot.demos.episode import record_episode
 from robocasa_lerobot.envs.check import CHECK_SEEDS, check_task
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.registry import get_task
-from robocasa_lerobot.jobs import as_they_end
+from robocasa_lerobot.jobs.as_completed import as_they_end
 
 
 @dataclass(frozen=True)

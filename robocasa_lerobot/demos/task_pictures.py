@@ -14,6 +14,7 @@ from robocasa_lerobot.demos.titled import titled
 from robocasa_lerobot.envs.gallery import visitor_camera
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.errors import UserError
+from robocasa_lerobot.files import written_aside
 from robocasa_lerobot.rendering import SceneRenderer
 
 Picture = NDArray[np.uint8]
@@ -45,9 +46,9 @@ def render_states(task: str, out: Path, *, split: str = "target", seed: int = 0)
     finally:
         env.close()
     out.parent.mkdir(parents=True, exist_ok=True)
-    aside = out.with_name(f".{out.name}")
-    Image.fromarray(np.vstack(rows)).save(aside, format="PNG" if out.suffix.lower() == ".png" else "JPEG", quality=90)
-    aside.replace(out)
+    kind = "PNG" if out.suffix.lower() == ".png" else "JPEG"
+    with written_aside(out) as aside:
+        Image.fromarray(np.vstack(rows)).save(aside, format=kind, quality=90)
     return said
 
 

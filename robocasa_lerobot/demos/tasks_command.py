@@ -44,14 +44,13 @@ def run(args: argparse.Namespace) -> int:
     """Print a table or pages of tasks, or what the checker found; status 1 if a check failed."""
     from robocasa_lerobot.demos.task_pages import page, pages
     from robocasa_lerobot.errors import UserError
+    from robocasa_lerobot.files import write_text
 
     tasks = _chosen(args)
     if args.check:
         return _check(tasks, args.workers)
     if args.markdown:
-        aside = args.markdown.with_name(args.markdown.name + ".part")
-        aside.write_text(pages(tasks), encoding="utf-8")
-        aside.replace(args.markdown)
+        write_text(args.markdown, pages(tasks))
         print(f"{args.markdown}: {len(tasks)} tasks")
         return 0
     if args.pictures:

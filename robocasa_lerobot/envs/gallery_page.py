@@ -10,6 +10,7 @@ from pathlib import Path
 from PIL import Image
 
 from robocasa_lerobot.envs.gallery_sections import Tile
+from robocasa_lerobot.files import write_text
 
 _HEAD = """<!doctype html>
 <html lang="en"><head><meta charset="utf-8"><title>Kitchens</title>
@@ -47,9 +48,8 @@ def write_page(path: Path, sections: dict[str, list[Tile]]) -> Path:
         parts.append(f"<section><h2>{html.escape(name)} ({len(tiles)})</h2><div class=grid>")
         parts += [_figure(tile) for tile in tiles]
         parts.append("</div></section>")
-    aside = path.with_name(path.name + ".part")
-    aside.write_text("\n".join([*parts, _SCRIPT]), encoding="utf-8")
-    return aside.replace(path)
+    write_text(path, "\n".join([*parts, _SCRIPT]))
+    return path
 
 
 def _choice(name: str, values: list[str]) -> str:

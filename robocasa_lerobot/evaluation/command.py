@@ -26,8 +26,8 @@ EXAMPLE = (
 
 def configure(parser: argparse.ArgumentParser) -> None:
     """Declare every setting of `EvaluationConfig` as an option, with the help of its docstring."""
-    from robocasa_lerobot.convert.running.executors import add_options
     from robocasa_lerobot.evaluation.config import EvaluationConfig
+    from robocasa_lerobot.jobs.executors import add_options
 
     add_options(parser)
     parser.add_argument("--shards", type=int, metavar="N", help="with --executor: into how many parts the plan is cut")
@@ -106,8 +106,8 @@ def _end_with_input() -> None:
 
 
 def _run_elsewhere(config: EvaluationConfig, args: argparse.Namespace) -> int:
-    from robocasa_lerobot.convert.running.executors import execution_of
     from robocasa_lerobot.evaluation.distributed import run_distributed
+    from robocasa_lerobot.jobs.executors import execution_of
 
     if args.shards is None:
         raise UserError(f"--executor {args.executor} needs --shards=N: into how many parts the plan is cut.")

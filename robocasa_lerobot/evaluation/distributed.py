@@ -6,9 +6,9 @@ import dataclasses
 from functools import partial
 from typing import Any
 
-from robocasa_lerobot.convert.running.executors import Execution, run_with_ray, submit_to_slurm
 from robocasa_lerobot.errors import UserError
 from robocasa_lerobot.evaluation.config import EvaluationConfig
+from robocasa_lerobot.jobs.executors import Execution, run_with_ray, submit_to_slurm
 
 _FOLDER, _LOGS = ".executor", "slurm"
 

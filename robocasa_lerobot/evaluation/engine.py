@@ -4,11 +4,9 @@ from __future__ import annotations
 
 import collections
 import dataclasses
-import fcntl
-import os
 import sys
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +17,6 @@ from robocasa_lerobot.evaluation import resolve
 from robocasa_lerobot.evaluation.checkpoints import REPLAY, PolicySource, common_image_size, read_source
 from robocasa_lerobot.evaluation.config import EvaluationConfig, check_factory, output_folder
 from robocasa_lerobot.evaluation.plan import Shard, TrialSpec, make_plan, running_order, to_film
-from robocasa_lerobot.evaluation.provenance import utc_now
 from robocasa_lerobot.evaluation.results import (
     TRIALS_FILE,
     PolicyInfo,
@@ -36,7 +33,10 @@ from robocasa_lerobot.evaluation.serving import open_servers, served_labels
 from robocasa_lerobot.evaluation.trials_file import append, check_same_run, drop_torn_line
 from robocasa_lerobot.evaluation.worker import WorkerSettings
 from robocasa_lerobot.evaluation.workers import Completed, WorkerPool
+from robocasa_lerobot.files import write_text
+from robocasa_lerobot.jobs.locks import LockHeldError, locked
 from robocasa_lerobot.progress import Bar
+from robocasa_lerobot.provenance import utc_now
 
 CONFIG_FILE = "evaluation.yaml"
 SHARDS_FOLDER = "shards"
@@ -168,7 +168,7 @@ def evaluate(evaluation: Evaluation) -> list[TrialRecord]:
         check_same_run(path, earlier_runs.headers.values(), header)
         records = {record.key: record for record in earlier_runs.trials}
         check_plan(path, records, evaluation.todo_plan)
-        _write_config(out / CONFIG_FILE, evaluation.config)
+        write_text(out / CONFIG_FILE, yaml.safe_dump(dataclasses.asdict(evaluation.config), sort_keys=False))
         retry = evaluation.config.retry_errors
         todo = [spec for spec in evaluation.todo_plan if _is_missing(records.get(spec.key), retry)]
         if header.id not in earlier_runs.headers:
@@ -340,24 +340,13 @@ def _last_line(text: str) -> str:
     return next((line for line in reversed(text.splitlines()) if line.strip()), "")
 
 
-def _write_config(path: Path, config: EvaluationConfig) -> None:
-    part = path.with_name(path.name + ".part")
-    part.write_text(yaml.safe_dump(dataclasses.asdict(config), sort_keys=False), encoding="utf-8")
-    part.replace(path)
-
-
 @contextmanager
 def _only_writer(out: Path) -> Iterator[None]:
-    """Hold the folder's lock, which the system frees when this process ends in whatever way."""
-    descriptor = os.open(out / ".lock", os.O_RDWR | os.O_CREAT, 0o644)
+    """Hold the folder's lock."""
     try:
-        try:
-            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError as error:
-            raise ResultsError(
-                f"{out}: another evaluation is writing here; wait for it, or choose another --out."
-            ) from error
-        yield
-    finally:
-        with suppress(OSError):
-            os.close(descriptor)
+        with locked(out / ".lock", wait=False):
+            yield
+    except LockHeldError:
+        raise ResultsError(
+            f"{out}: another evaluation is writing here; wait for it, or choose another --out."
+        ) from None

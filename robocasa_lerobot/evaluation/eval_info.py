@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from robocasa_lerobot.evaluation.results import Results, TrialRecord, file_name
+from robocasa_lerobot.files import write_text
 
 
 def eval_info(results: Results, label: str) -> dict[str, Any]:
@@ -39,9 +40,7 @@ def write_eval_info(results: Results, folder: Path) -> list[Path]:
     paths = []
     for label in labels:
         path = folder / ("eval_info.json" if len(labels) == 1 else f"eval_info_{file_name(label)}.json")
-        part = path.with_name(path.name + ".part")
-        part.write_text(json.dumps(eval_info(results, label), indent=2), encoding="utf-8")
-        part.replace(path)
+        write_text(path, json.dumps(eval_info(results, label), indent=2))
         paths.append(path)
     return paths
 

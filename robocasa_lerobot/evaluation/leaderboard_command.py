@@ -39,6 +39,7 @@ def run(args: argparse.Namespace) -> int:
 
     from robocasa_lerobot.evaluation.leaderboard.submission import SubmissionFacts, make_submission, overall, problems
     from robocasa_lerobot.evaluation.report.gather import gather
+    from robocasa_lerobot.files import write_text
 
     if (args.results is None) == (args.check is None):
         raise UserError("give the folder of a run, or --check with a submission file.")
@@ -63,8 +64,6 @@ def run(args: argparse.Namespace) -> int:
     facts = SubmissionFacts(**{field.name: getattr(args, field.name) for field in dataclasses.fields(SubmissionFacts)})
     values = make_submission(policies[label], facts)
     args.out.parent.mkdir(parents=True, exist_ok=True)
-    part = args.out.with_name(args.out.name + ".part")
-    part.write_text(json.dumps(values, indent=2, ensure_ascii=False) + "\n", encoding="utf-8")
-    part.replace(args.out)
+    write_text(args.out, json.dumps(values, indent=2, ensure_ascii=False) + "\n")
     print(f"{args.out}: {label}, overall {overall(values)} % as the leaderboard computes it")
     return 0

@@ -17,6 +17,7 @@ from robocasa_lerobot.evaluation.results import (
     read_results,
 )
 from robocasa_lerobot.evaluation.trials_file import check_same_run
+from robocasa_lerobot.files import written_aside
 
 _SHOWN = 10
 
@@ -72,13 +73,11 @@ def merge(evaluation: Evaluation) -> list[TrialRecord]:
 
 def write_results(path: Path, headers: Iterable[RunHeader], records: Iterable[TrialRecord]) -> None:
     """Write a whole results file, which appears at its place only when it is complete."""
-    part = path.with_name(path.name + ".part")
-    with part.open("w", encoding="utf-8") as file:
+    with written_aside(path) as aside, aside.open("w", encoding="utf-8") as file:
         for line in (*(header.to_line() for header in headers), *(record.to_line() for record in records)):
             file.write(line + "\n")
         file.flush()
         os.fsync(file.fileno())
-    part.replace(path)
 
 
 def _moved(record: TrialRecord, folder: Path, out: Path) -> TrialRecord:

@@ -11,12 +11,14 @@ from typing import Any
 from robocasa_lerobot.errors import UnknownNameError, UserError
 from robocasa_lerobot.evaluation.chunk_policy import default_width
 from robocasa_lerobot.evaluation.config import KITCHEN_ENV_FACTORY, EnvSettings, EvaluationConfig, PerturbationSettings
-from robocasa_lerobot.evaluation.provenance import git_commit, machine, utc_now, versions
 from robocasa_lerobot.evaluation.results import PolicyInfo, RunHeader
+from robocasa_lerobot.provenance import git_commit, machine, utc_now, versions
 
 # The release of RoboCasa whose horizons our tasks have; those of 1.0.0 were two thirds of them.
 HORIZON_VERSION = "1.0.1"
 _SHOWN = 60
+
+PACKAGES = ("lerobot", "mujoco", "torch", "gymnasium", "numpy")  # what simulates and infers
 
 
 class NothingRegisteredError(UserError):
@@ -241,7 +243,7 @@ def run_header(
         perturbations=perturbation_parameters(config.perturbation),
         settings=settings,
         policies=policies,
-        versions=versions(),
+        versions=versions(*PACKAGES),
         git_commit=git_commit(),
         device=settings["device"],
         machine=machine(),

@@ -21,7 +21,7 @@ EXAMPLE = (
 
 def configure(parser: argparse.ArgumentParser) -> None:
     """Add the options; everything else on the command line is a dotted setting of the experiment, as in `train`."""
-    from robocasa_lerobot.convert.running.executors import add_options
+    from robocasa_lerobot.jobs.executors import add_options
 
     parser.add_argument("experiment", nargs="?", type=Path, metavar="EXPERIMENT", help="the experiment file")
     does = parser.add_mutually_exclusive_group()
@@ -57,7 +57,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """List, make or convert; status 1 if `--check` finds something missing or something could not be made."""
-    from robocasa_lerobot.convert.running.executors import execution_of
+    from robocasa_lerobot.jobs.executors import execution_of
     from robocasa_lerobot.making.estimate import cores_here
     from robocasa_lerobot.making.listing import listing
     from robocasa_lerobot.making.needs import needs_of, parse_episodes

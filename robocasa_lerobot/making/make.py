@@ -9,10 +9,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from robocasa_lerobot.convert.running.executors import Execution
 from robocasa_lerobot.data.published import dataset_version
 from robocasa_lerobot.data.recipes import RecipeConfig
 from robocasa_lerobot.demos.attempts import Parts, RecordingSettings
+from robocasa_lerobot.jobs.executors import Execution
 from robocasa_lerobot.making.needs import WORK, Need
 from robocasa_lerobot.making.pieces import Outcome, run_pieces
 

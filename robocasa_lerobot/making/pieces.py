@@ -15,9 +15,10 @@ from functools import partial
 from pathlib import Path
 from typing import Any, Protocol
 
-from robocasa_lerobot.convert.running.executors import Execution, run_with_ray, submit_to_slurm
 from robocasa_lerobot.errors import UserError
-from robocasa_lerobot.parallel import PoolExecutor, polled
+from robocasa_lerobot.files import write_text
+from robocasa_lerobot.jobs.executors import Execution, run_with_ray, submit_to_slurm
+from robocasa_lerobot.jobs.pool import PoolExecutor, polled
 from robocasa_lerobot.progress import Bar
 
 FAILED, LOG = "failed.txt", "log.txt"
@@ -69,9 +70,7 @@ def run_piece(data: Any, rank: int = 0, world_size: int = 1, *, pieces: Sequence
         try:
             piece.make(workers)
         except UserError as error:
-            aside = note.with_suffix(".partial")
-            aside.write_text(str(error), encoding="utf-8")
-            aside.replace(note)
+            write_text(note, str(error))
             return
     shutil.rmtree(piece.work, ignore_errors=True)
 

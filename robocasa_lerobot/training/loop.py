@@ -20,6 +20,7 @@ from accelerate import Accelerator
 
 from robocasa_lerobot.data.mixture import StepBatches
 from robocasa_lerobot.errors import UserError
+from robocasa_lerobot.files import written_aside
 from robocasa_lerobot.progress import Bar
 from robocasa_lerobot.training.allocator import keep_freed_memory
 from robocasa_lerobot.training.augment import augment
@@ -206,9 +207,8 @@ def _check_finite(
         return
     step, state = run.state.step, run.state
     path = run.folder / f"{BAD_BATCH}_{step:06d}_rank{accelerator.process_index}.pt"
-    aside = path.with_suffix(".tmp")
-    torch.save({"step": step, "loss": float(loss), "grad_norm": norm, "parts": loaded}, aside)
-    aside.replace(path)
+    with written_aside(path) as aside:
+        torch.save({"step": step, "loss": float(loss), "grad_norm": norm, "parts": loaded}, aside)
     bad = sorted(
         {
             k

@@ -12,6 +12,7 @@ from accelerate import Accelerator
 from accelerate.tracking import get_available_trackers
 
 from robocasa_lerobot.errors import UserError
+from robocasa_lerobot.files import write_text
 
 METRICS, HELD_OUT, CURVE = "metrics.jsonl", "held_out.jsonl", "learning_curve.png"
 
@@ -36,9 +37,7 @@ def truncate_metrics(folder: Path, step: int) -> None:
         path = folder / name
         if path.is_file():
             kept = [line for line in read_lines(path) if line["step"] <= step]
-            aside = path.with_suffix(".tmp")
-            aside.write_text("".join(json.dumps(line) + "\n" for line in kept), encoding="utf-8")
-            aside.replace(path)
+            write_text(path, "".join(json.dumps(line) + "\n" for line in kept))
 
 
 def draw_curve(folder: Path) -> None:

@@ -3,11 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-import functools
 import json
-import platform
-import subprocess
-from importlib import metadata
 from pathlib import Path
 from typing import Any
 
@@ -16,24 +12,19 @@ import yaml
 
 from robocasa_lerobot.data.mixture import MixtureDataset
 from robocasa_lerobot.errors import UserError
+from robocasa_lerobot.files import write_text
+from robocasa_lerobot.provenance import git_commit, versions
 from robocasa_lerobot.training import overlay
 from robocasa_lerobot.training.checkpoint import last_checkpoint
 from robocasa_lerobot.training.config import FROM_SCRATCH, ExperimentConfig, PhaseConfig, to_yaml
 
 EXPERIMENT_FILE, PHASE_FILE, CONFIG_FILE = "experiment.yaml", "phase.json", "config.yaml"
-PACKAGES = ("robocasa-lerobot", "lerobot", "torch", "accelerate", "transformers", "diffusers", "numpy")
+PACKAGES = ("lerobot", "torch", "accelerate", "transformers", "diffusers", "numpy")
 # Settings that may change while a phase is under way, because the losses do not depend on them.
 FREE_SETTINGS = (
     *("loader.workers", "loader.cache", "device", "trackers", "save_every", "keep_last", "keep_every", "log_every"),
     *("held_out.every", "held_out.samples", "evaluations", "scale"),
 )
-
-
-def write_text(path: Path, text: str) -> None:
-    """Write a file whole or not at all."""
-    aside = path.with_name(f".{path.name}")
-    aside.write_text(text, encoding="utf-8")
-    aside.replace(path)
 
 
 def write_experiment(output: Path, experiment: ExperimentConfig) -> None:
@@ -68,7 +59,7 @@ def describe_phase(
         "data_fingerprint": dataset.fingerprint,
         "parameters": sum(p.numel() for p in policy.parameters()),
         "trainable_parameters": sum(p.numel() for p in policy.parameters() if p.requires_grad),
-        "versions": {"python": platform.python_version(), **_versions()},
+        "versions": versions(*PACKAGES),
         "git_commit": git_commit(),
     }
 
@@ -123,30 +114,8 @@ def check_same_data(folder: Path, about: dict[str, Any]) -> None:
         )
 
 
-@functools.cache
-def git_commit() -> str | None:
-    """Commit of the checkout that holds this code, if it is one; with `-dirty` where files differ from it."""
-    here = str(Path(__file__).parent)
-    command = ["git", "-C", here, "describe", "--always", "--abbrev=40", "--dirty", "--exclude=*"]
-    try:
-        out = subprocess.run(command, capture_output=True, text=True, check=False)
-    except OSError:  # no git on this machine
-        return None
-    return out.stdout.strip() or None if out.returncode == 0 else None
-
-
 def _may_change(key: str, begun: set[str]) -> bool:
     if key.startswith("phases."):
         name = next((name for name in begun if key.startswith(f"phases.{name}.")), None)
         return name is None or key.removeprefix(f"phases.{name}.").startswith(FREE_SETTINGS)
     return key.startswith(FREE_SETTINGS) or key in ("name", "output_dir", "registry")
-
-
-def _versions() -> dict[str, str]:
-    found = {}
-    for name in PACKAGES:
-        try:
-            found[name] = metadata.version(name)
-        except metadata.PackageNotFoundError:
-            continue
-    return found

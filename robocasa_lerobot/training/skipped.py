@@ -11,6 +11,7 @@ from collections.abc import Collection, Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
+from robocasa_lerobot.files import written_aside
 from robocasa_lerobot.jsonl import read_jsonl, write_jsonl
 
 SKIPPED_FILE = "skipped.jsonl"
@@ -50,9 +51,8 @@ def record(output_dir: Path, skipped: Iterable[Skipped]) -> None:
         path.unlink(missing_ok=True)
         return
     output_dir.mkdir(parents=True, exist_ok=True)
-    aside = path.with_name(f".{path.name}")
-    write_jsonl(aside, lines)
-    aside.replace(path)
+    with written_aside(path) as aside:
+        write_jsonl(aside, lines)
 
 
 def decide(output_dir: Path, skipped: Iterable[Skipped], phases: Collection[str], evaluations: bool) -> None:

@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 
 from robocasa_lerobot.convert.commands.options import add_source_options, source_settings
-from robocasa_lerobot.convert.running.executors import add_options, execution_of
+from robocasa_lerobot.jobs.executors import add_options, execution_of
 
 EXAMPLE = "robocasa-lerobot convert demos/*.hdf5 --out data/demos"
 

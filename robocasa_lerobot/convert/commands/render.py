@@ -6,7 +6,7 @@ import argparse
 import json
 from pathlib import Path
 
-from robocasa_lerobot.convert.running.executors import add_options, execution_of
+from robocasa_lerobot.jobs.executors import add_options, execution_of
 
 EXAMPLE = "robocasa-lerobot render data/demos --out data/demos_cotraining --camera-set cotraining"
 

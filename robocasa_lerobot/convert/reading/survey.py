@@ -22,7 +22,6 @@ from pathlib import Path
 import h5py
 import numpy as np
 
-from robocasa_lerobot.convert.python_process import environment_of_python
 from robocasa_lerobot.convert.reading.hdf5 import (
     MAX_TEXT_BYTES,
     RejectedEpisodeError,
@@ -34,6 +33,7 @@ from robocasa_lerobot.convert.reading.hdf5 import (
     text_attribute,
 )
 from robocasa_lerobot.convert.reading.layout import DEFAULT_EPISODES
+from robocasa_lerobot.jobs.child_process import environment_of_python
 from robocasa_lerobot.progress import Bar
 
 # Processor time for one attribute, header or small array: so long none takes, however busy the machine is.

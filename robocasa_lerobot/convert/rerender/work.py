@@ -30,19 +30,6 @@ from robocasa_lerobot.convert.rerender.plan import (
     RenderSettings,
     make_render_plan,
 )
-from robocasa_lerobot.convert.running.executors import Execution
-from robocasa_lerobot.convert.running.work import (
-    check_output,
-    failures_explained,
-    locked,
-    make_piece,
-    partial_folder,
-    publish,
-    report_frames,
-    run_pieces,
-    submit_pieces,
-)
-from robocasa_lerobot.convert.running.workers import check_workers, num_workers
 from robocasa_lerobot.convert.scenes.ahead import scenes_ahead
 from robocasa_lerobot.convert.writing.card import renew_dataset_card
 from robocasa_lerobot.convert.writing.encoder import (
@@ -58,6 +45,17 @@ from robocasa_lerobot.convert.writing.modality import modality, read_modality, w
 from robocasa_lerobot.convert.writing.statistics import picture_statistics
 from robocasa_lerobot.convert.writing.video import VideoFiles, probe
 from robocasa_lerobot.errors import UserError
+from robocasa_lerobot.jobs.executors import Execution
+from robocasa_lerobot.jobs.pieces import report_frames, run_pieces, submit_pieces
+from robocasa_lerobot.jobs.publish import (
+    check_output,
+    failures_explained,
+    held_folder,
+    make_piece,
+    partial_folder,
+    publish,
+)
+from robocasa_lerobot.jobs.workers import check_workers, num_workers
 
 _HISTOGRAMS = "histograms.npz"
 _MIN_FRAMES_PER_WORKER = 200
@@ -107,7 +105,7 @@ def render_dataset(
         return submit_pieces(step, last, len(plan.pieces), partial, out, execution)
     workers = num_workers(workers, len(plan.pieces), plan.num_frames, _MIN_FRAMES_PER_WORKER)
     with (
-        locked(partial),
+        held_folder(partial),
         failures_explained(out, partial),
         contextlib.closing(shared_encoder),
         contextlib.closing(scenes_ahead),
@@ -198,7 +196,7 @@ class _LastJob:
         if missing:
             raise UserError(f"{len(missing)} of {len(self.plan.pieces)} pieces are not complete: submit them again.")
         quiet_libraries()
-        with locked(partial), failures_explained(out, partial):
+        with held_folder(partial), failures_explained(out, partial):
             return _complete(self.plan, partial, out)
 
 

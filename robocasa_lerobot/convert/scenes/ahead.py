@@ -17,7 +17,7 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 from robocasa_lerobot.convert.anonymous_file import anonymous_file
-from robocasa_lerobot.convert.python_process import start_serving
+from robocasa_lerobot.jobs.child_process import start_serving
 
 if TYPE_CHECKING:
     from robocasa_lerobot.convert.scenes.compiled import CompiledScene

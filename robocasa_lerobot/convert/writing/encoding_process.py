@@ -23,7 +23,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from robocasa_lerobot.convert.python_process import start_serving
 from robocasa_lerobot.convert.writing.encoder import (
     EncodedVideo,
     EncodingError,
@@ -33,6 +32,7 @@ from robocasa_lerobot.convert.writing.encoder import (
     quiet_codecs,
 )
 from robocasa_lerobot.convert.writing.frame_ring import FrameReceiver, FrameSender
+from robocasa_lerobot.jobs.child_process import start_serving
 
 if TYPE_CHECKING:
     from robocasa_lerobot.convert.writing.video import VideoForm

@@ -13,6 +13,7 @@ from robocasa_lerobot.evaluation.report import latex, markdown, tables_csv, tidy
 from robocasa_lerobot.evaluation.report.charts import SERIES
 from robocasa_lerobot.evaluation.report.model import Document, Part
 from robocasa_lerobot.evaluation.report.policies import ReportData
+from robocasa_lerobot.files import write_text
 
 
 def write_report(document: Document, data: ReportData, out: Path) -> list[Path]:
@@ -34,7 +35,7 @@ def write_report(document: Document, data: ReportData, out: Path) -> list[Path]:
         out.with_name(f"{out.stem}_tables.csv"): tables_csv.render(data),
     }
     for path, text in texts.items():
-        _write(path, text)
+        write_text(path, text)
     return list(texts)
 
 
@@ -47,7 +48,7 @@ def write_page(document: Document, out: Path) -> None:
     if out.suffix != ".html":
         raise UserError(f"--out {out}: found the ending {out.suffix!r}, expected .html.")
     out.parent.mkdir(parents=True, exist_ok=True)
-    _write(out, html(document))
+    write_text(out, html(document))
 
 
 def html(document: Document) -> str:
@@ -81,9 +82,3 @@ def _unbroken(value: object) -> object:
     if isinstance(value, Markup) or not isinstance(value, str):
         return value
     return re.sub(r"(?<=\d) %", "\N{NO-BREAK SPACE}%", value)
-
-
-def _write(path: Path, text: str) -> None:
-    part = path.with_name(path.name + ".part")
-    part.write_text(text, encoding="utf-8")
-    part.replace(path)

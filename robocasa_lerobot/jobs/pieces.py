@@ -1,82 +1,18 @@
-"""Long work in pieces, whose result appears at once: a folder beside the output, a lock, an executor, one rename."""
+"""The pieces of a long work on this machine, on Ray or on Slurm, with completion markers and one bar over all."""
 
 from __future__ import annotations
 
 import contextlib
-import fcntl
-import os
-import platform
-import shutil
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
-from robocasa_lerobot.convert.running.executors import Execution, run_with_ray, submit_to_slurm
 from robocasa_lerobot.errors import UserError
-from robocasa_lerobot.parallel import PoolExecutor, exit_if_orphaned, polled
+from robocasa_lerobot.jobs.executors import Execution, run_with_ray, submit_to_slurm
+from robocasa_lerobot.jobs.pool import PoolExecutor, exit_if_orphaned, polled
 from robocasa_lerobot.progress import Bar
 
 _EXECUTOR = "executor"  # folder of completion markers
 Step = Callable[..., None]
-
-
-def check_output(out: Path, overwrite: bool) -> None:
-    """Whether a dataset may appear at `out`.
-
-    Raises:
-        UserError: there is something.
-    """
-    if not out.exists() or (out.is_dir() and not any(out.iterdir())):
-        return
-    if not overwrite:
-        raise UserError(f"{out} exists already. Choose another --out, or replace it with --overwrite.")
-    if not (out / "meta" / "info.json").is_file():
-        raise UserError(f"{out} is not a LeRobotDataset, so --overwrite leaves it alone. Choose another --out.")
-
-
-def partial_folder(out: Path, fingerprint: str) -> Path:
-    """Where the work is done: named by what decides its bytes, so that the same command finds it again."""
-    return out.with_name(f"{out.name}.partial-{fingerprint}")
-
-
-@contextlib.contextmanager
-def locked(partial: Path) -> Iterator[None]:
-    """Make the folder and keep others out of it.
-
-    Raises:
-        UserError: the same work is running already, or the folder cannot be made.
-    """
-    try:
-        partial.mkdir(parents=True, exist_ok=True)
-        file = (partial / "lock").open("w")
-    except OSError as error:
-        raise UserError(f"nothing can be written beside the output: {error}. Choose another --out.") from None
-    with file as lock:
-        try:
-            # A record lock is not inherited, so no orphaned child holds it after the parent was killed.
-            fcntl.lockf(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except OSError:
-            raise UserError(f"the same work is running already (it holds {partial}). Wait until it ends.") from None
-        yield
-
-
-@contextlib.contextmanager
-def failures_explained(out: Path, partial: Path) -> Iterator[None]:
-    """Turn errors of the file system, such as a full disk, into ones that say what is kept and what to do."""
-    try:
-        yield
-    except OSError as error:
-        raise UserError(
-            f"writing failed: {error}. Nothing is at {out}; finished parts are kept in {partial}: free what is "
-            "lacking and give the same command to go on."
-        ) from error
-
-
-def publish(merged: Path, out: Path, replaced: Path) -> None:
-    """Let the finished dataset appear at `out` by a rename, after moving an old one aside."""
-    if out.exists():
-        shutil.rmtree(replaced, ignore_errors=True)
-        out.rename(replaced)
-    merged.rename(out)
 
 
 def run_pieces(
@@ -147,26 +83,6 @@ def require_complete(pieces: int, partial: Path) -> None:
             f"{len(missing)} of {pieces} pieces are not complete (the first: {missing[0]}): there is nothing to join "
             "yet. Give the same command without --merge to run them."
         )
-
-
-def make_piece(folder: Path, make: Callable[[Path], object]) -> None:
-    """Let `make` fill a folder that then gets its name; nothing is done where it is there already.
-
-    Each process fills one of its own, since the worker of a run that was killed may still be at the same piece for a
-    moment. Whoever is first wins: the bytes are the same.
-    """
-    if folder.exists():
-        return  # complete; only the executor's marker was lost
-    attempt = folder.with_name(f"{folder.name}.attempt-{platform.node()}-{os.getpid()}")
-    shutil.rmtree(attempt, ignore_errors=True)
-    attempt.mkdir(parents=True)
-    make(attempt)
-    try:
-        attempt.rename(folder)
-    except OSError:
-        if not folder.exists():
-            raise
-        shutil.rmtree(attempt)
 
 
 def report_frames(partial: Path, rank: int, count: int) -> None:

@@ -145,7 +145,7 @@ def submit_to_slurm(
     Raises:
         UserError: jobs of an earlier call are still in the queue, or Slurm refuses.
     """
-    from robocasa_lerobot.convert.running.slurm import ArrayExecutor
+    from robocasa_lerobot.jobs.slurm import ArrayExecutor
 
     record = logs / JOBS_FILE  # not in the folder of the work, which the last job removes
     if record.is_file():
@@ -180,7 +180,7 @@ def submit_to_slurm(
     try:
         executor.run()
         array = None if executor.job_id == -1 else str(executor.job_id)
-        command = [sys.executable, "-m", "robocasa_lerobot.convert.running.slurm", str(pickled)]
+        command = [sys.executable, "-m", "robocasa_lerobot.jobs.slurm", str(pickled)]
         last = executor.submit_after(array, shlex.join(command))
     except (subprocess.CalledProcessError, OSError) as error:
         raise UserError(f"Slurm did not take the jobs: {error}. Its message stands above.") from error

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import datetime
+import functools
 import importlib.metadata
 import os
 import platform
@@ -11,18 +12,16 @@ from pathlib import Path
 
 import robocasa_lerobot
 
-PACKAGES = ("lerobot", "mujoco", "torch", "gymnasium", "numpy")
-
 
 def utc_now() -> str:
     """This moment, ISO 8601 with seconds."""
     return datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds")
 
 
-def versions() -> dict[str, str]:
-    """Versions of this package, of Python and of what simulates and infers; without importing any of them."""
+def versions(*packages: str) -> dict[str, str]:
+    """Versions of this package, of Python and of the packages named; without importing any of them."""
     out = {"robocasa_lerobot": robocasa_lerobot.__version__, "python": platform.python_version()}
-    for name in PACKAGES:
+    for name in packages:
         try:
             out[name] = importlib.metadata.version(name)
         except importlib.metadata.PackageNotFoundError:
@@ -57,14 +56,20 @@ def _gpus() -> list[str]:
     return found
 
 
-def git_commit() -> str | None:
-    """Commit of the checkout that this package runs from, with `-dirty` when tracked files differ; None elsewhere."""
+@functools.cache
+def git_commit(*beside: str) -> str | None:
+    """Commit of the checkout that this package runs from, with `-dirty` when tracked files differ; None elsewhere.
+
+    `beside` are folders of the checkout whose changes do not count.
+    """
     root = Path(robocasa_lerobot.__file__).parents[1]
     if not (root / ".git").exists():
         return None
     try:
         commit = _git(root, "rev-parse", "HEAD")
-        dirty = _git(root, "status", "--porcelain", "--untracked-files=no")
+        dirty = _git(
+            root, "status", "--porcelain", "--untracked-files=no", "--", ".", *(f":!{folder}" for folder in beside)
+        )
     except (OSError, subprocess.SubprocessError):
         return None
     return commit + ("-dirty" if dirty else "")

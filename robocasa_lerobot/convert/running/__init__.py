@@ -1,1 +1,0 @@
-"""Pieces of work on this machine or a cluster."""

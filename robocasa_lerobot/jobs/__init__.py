@@ -1,0 +1,1 @@
+"""Long work in pieces: processes, Slurm and Ray, locks, and results that appear whole or not at all."""
