@@ -12,7 +12,7 @@ import common
 from demonstrators_trial import Trial
 
 from robocasa_lerobot import contract
-from robocasa_lerobot.envs.registry import human_seconds
+from robocasa_lerobot.benchmark.tasks import facts_of
 from robocasa_lerobot.evaluation.statistics.rates import success_rate
 
 # What a finished set of demonstrators is to reach: mean rate, lowest rate, and seconds over the human median.
@@ -29,7 +29,7 @@ def summary(trials: Sequence[Trial], able: Mapping[str, bool]) -> dict[str, Any]
     out: dict[str, Any] = {}
     for name in sorted(able):
         mine = [trial for trial in trials if trial.task == name]
-        human = human_seconds(name)
+        human = facts_of(name).human_seconds
         entry: dict[str, Any] = {"demonstrator": able[name], **_rate(mine), "human_seconds": human}
         if mine:
             entry["splits"] = {

@@ -28,7 +28,7 @@ Z = 1.959963984540054
 
 def scenarios() -> dict[str, tuple[Array, Array]]:
     """Name -> true rates and trials of the tasks."""
-    from robocasa_lerobot.evaluation.published import per_task_rates
+    from robocasa_lerobot.benchmark.published import per_task_rates
 
     best = np.array(list(per_task_rates().values())) / 100
     out = {}

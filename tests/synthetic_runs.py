@@ -15,8 +15,8 @@ from typing import Any
 import numpy as np
 from scipy.stats import norm
 
-from robocasa_lerobot.data.published import published_task_sets
-from robocasa_lerobot.evaluation import published
+from robocasa_lerobot.benchmark import published
+from robocasa_lerobot.benchmark.tasks import published_task_sets
 from robocasa_lerobot.evaluation.config import EvaluationConfig
 from robocasa_lerobot.evaluation.overrides import load_config
 from robocasa_lerobot.evaluation.results import (

@@ -11,7 +11,8 @@ from typing import Any
 
 import pytest
 
-from robocasa_lerobot.envs.registry import human_seconds, task_names
+from robocasa_lerobot.benchmark.tasks import facts_of
+from robocasa_lerobot.envs.registry import task_names
 
 BENCHMARKS = Path(__file__).parents[1] / "benchmarks"
 
@@ -46,7 +47,7 @@ def test_rates_times_and_reasons_are_counted(bench: ModuleType, tmp_path: Path) 
     assert drawer["failed_seeds"] == [["pretrain", 0], ["pretrain", 1], ["target", 1]]
     assert tasks["OpenFridge"] == {
         "demonstrator": False, "success_rate": None, "successes": 0, "trials": 0,
-        "human_seconds": human_seconds("OpenFridge"),
+        "human_seconds": facts_of("OpenFridge").human_seconds,
     }  # fmt: skip
     found = report.ratios(tasks)
     assert found["mean_success"] == found["worst_task"] == 0.5
@@ -117,4 +118,4 @@ def test_published_lengths_are_those_of_the_facts(shared: Path) -> None:
     lines = (shared / "facts" / "tasks.csv").read_text().splitlines()
     column = lines[0].split(",").index("human_episode_seconds")
     facts = {fields[0]: float(fields[column]) for fields in (line.split(",") for line in lines[1:])}
-    assert {name: human_seconds(name) for name in facts} == facts
+    assert {name: facts_of(name).human_seconds for name in facts} == facts

@@ -162,8 +162,9 @@ def shrunk(experiment: ExperimentConfig, folder: Path) -> ExperimentConfig:
 @pytest.fixture(scope="module")
 def all_datasets(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A working directory in which every dataset of the experiments lies where they look: one of two fake ones."""
+    from robocasa_lerobot.benchmark.tasks import published_task_sets, published_tasks
     from robocasa_lerobot.data.fake import INSTRUCTIONS, write_fake_dataset
-    from robocasa_lerobot.data.published import PUBLISHED, published_task_sets, published_tasks
+    from robocasa_lerobot.data.published import PUBLISHED
 
     work = tmp_path_factory.mktemp("work")
     small = write_fake_dataset(work / "small", episodes=4, length=4, image_size=32)

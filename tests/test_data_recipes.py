@@ -12,9 +12,9 @@ import yaml
 from training_support import TINY
 
 from robocasa_lerobot import cli
+from robocasa_lerobot.benchmark.tasks import published_task_sets, task_facts
 from robocasa_lerobot.data.config import MixtureConfig, SelectionConfig
 from robocasa_lerobot.data.fake import write_fake_dataset
-from robocasa_lerobot.data.published import published_task_sets, task_facts
 from robocasa_lerobot.data.recipes import demonstrated_tasks
 from robocasa_lerobot.data.registry import (
     MissingDatasetsError,

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from robocasa_lerobot.data.published import published_task_sets
+from robocasa_lerobot.benchmark.tasks import published_task_sets
 from robocasa_lerobot.envs.camera_noise import CameraNoise
 from robocasa_lerobot.envs.initial_noise import InitialNoise
 from robocasa_lerobot.envs.registry import task_names

@@ -35,9 +35,10 @@ from walk_support import (
     write_log,
 )
 
-from robocasa_lerobot.data.published import PUBLISHED, published_task_sets
+from robocasa_lerobot.benchmark import published
+from robocasa_lerobot.benchmark.tasks import published_task_sets
+from robocasa_lerobot.data.published import PUBLISHED
 from robocasa_lerobot.data.registry import select_datasets
-from robocasa_lerobot.evaluation import published
 from robocasa_lerobot.evaluation.results import read_results
 from robocasa_lerobot.training.config import ExperimentConfig, load_experiment
 from robocasa_lerobot.training.evaluations import phase_evaluations

@@ -38,9 +38,14 @@ def test_a_file_appears_when_it_is_complete(tmp_path: Path) -> None:
 def test_what_fails_leaves_the_file_before(tmp_path: Path) -> None:
     path = tmp_path / "a.txt"
     write_text(path, "before")
-    with pytest.raises(OSError, match="no space"), written_aside(path) as aside:
-        aside.write_text("half")
-        raise OSError("no space")
+
+    def fail() -> None:
+        with written_aside(path) as aside:
+            aside.write_text("half")
+            raise OSError("no space")
+
+    with pytest.raises(OSError, match="no space"):
+        fail()
     assert path.read_text() == "before"
     assert list(tmp_path.iterdir()) == [path]
 

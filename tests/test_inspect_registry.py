@@ -11,9 +11,9 @@ from pathlib import Path
 import pytest
 import yaml
 
+from robocasa_lerobot.benchmark.tasks import task_facts
 from robocasa_lerobot.cli import main
 from robocasa_lerobot.data.fake import write_fake_dataset
-from robocasa_lerobot.data.published import task_facts
 from robocasa_lerobot.data.registry import open_registry
 from robocasa_lerobot.evaluation.inventory import take_inventory
 from robocasa_lerobot.evaluation.inventory_page import page

@@ -21,7 +21,19 @@ PACKAGE = REPOSITORY / "robocasa_lerobot"
 
 # What each part of the package may import of the rest of the package. Parts on one level stay apart.
 BASE = {
-    *("contract", "errors", "files", "gl", "jobs", "jsonl", "progress", "provenance", "rendering", "settings"),
+    *(
+        "benchmark",
+        "contract",
+        "errors",
+        "files",
+        "gl",
+        "jobs",
+        "jsonl",
+        "progress",
+        "provenance",
+        "rendering",
+        "settings",
+    ),
     "video",
 }
 LOW = {"envs", "convert", "data", "policies"}
@@ -29,6 +41,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     "contract": {"errors"},
     "errors": set(),
     "gl": {"errors"},
+    "benchmark": {"errors"},
     "files": set(),
     "jsonl": set(),
     "provenance": set(),
@@ -52,6 +65,7 @@ FORBIDDEN: dict[str, set[str]] = {
     "contract": TORCH | PHYSICS,
     "errors": TORCH | PHYSICS,
     "gl": TORCH,
+    "benchmark": TORCH | PHYSICS,
     "files": TORCH | PHYSICS,
     "jsonl": TORCH | PHYSICS,
     "provenance": TORCH | PHYSICS,

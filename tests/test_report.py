@@ -17,10 +17,10 @@ import numpy as np
 import pytest
 from test_evaluation_records import header, record
 
+from robocasa_lerobot.benchmark.published import table
 from robocasa_lerobot.cli import main
 from robocasa_lerobot.errors import UserError
 from robocasa_lerobot.evaluation import results, trials_file
-from robocasa_lerobot.evaluation.published import table
 from robocasa_lerobot.evaluation.report import film_strip, latex, markdown
 from robocasa_lerobot.evaluation.report.charts import (
     MAX_POINTS,

@@ -13,11 +13,12 @@ import pytest
 import synthetic_runs
 import yaml
 
+from robocasa_lerobot.benchmark import published
+from robocasa_lerobot.benchmark.tasks import published_task_sets, task_facts
 from robocasa_lerobot.cli import main
-from robocasa_lerobot.data.published import published_task_sets, task_facts
-from robocasa_lerobot.evaluation import published
-from robocasa_lerobot.evaluation.published.places import named_experiments
+from robocasa_lerobot.evaluation.report import places
 from robocasa_lerobot.evaluation.report.gather import gather
+from robocasa_lerobot.evaluation.report.places import named_experiments
 from robocasa_lerobot.evaluation.report.policies import PolicyResult, ReportData
 from robocasa_lerobot.evaluation.report.sections import beside_published, data_efficiency, kinds, lifelong
 from robocasa_lerobot.evaluation.results import UNPERTURBED
@@ -366,6 +367,6 @@ def test_horizons_of_a_release_are_told_where_the_published_ones_are_shorter(tmp
 
 
 def test_places_are_data_that_yaml_reads_as_it_looks() -> None:
-    text = (Path(published.__file__).parent / "places.yaml").read_text()
+    text = (Path(places.__file__).parent / "places.yaml").read_text()
     tables = yaml.safe_load(text)
     assert set(tables) == {*published.TABLES, "per_task", "unpublished"} - {"real_robot"}

@@ -137,9 +137,9 @@ def test_declarations_agree_with_the_published_facts(name, shared):
         row = next(r for r in csv.DictReader(file) if r["task"] == name)
     task = get_task(name)
     assert task.horizon == int(row["horizon"])
-    assert task.kind == row["kind"]
-    assert task.activity == row["activity"]
-    assert set(task.sets) == set(row["sets"].split())
+    assert task.facts.kind == row["kind"]
+    assert task.facts.human_seconds == int(row["human_episode_seconds"])
+    assert task.facts.sets == set(row["sets"].split())
     assert len(task.stages) == int(row["subtasks"])
     assert len(task.paraphrases) >= 4
     assert task.instruction not in task.paraphrases

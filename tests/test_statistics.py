@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from robocasa_lerobot.benchmark.published import table
 from robocasa_lerobot.errors import UserError
-from robocasa_lerobot.evaluation.published import table
 from robocasa_lerobot.evaluation.statistics import Estimate, average_over_tasks, linear_combination, wilson_interval
 from robocasa_lerobot.evaluation.statistics.data_efficiency import demos_for_success, worth_of_pretraining
 from robocasa_lerobot.evaluation.statistics.horizon import success_curve, time_to_success

@@ -35,7 +35,7 @@ def test_the_page_names_the_demonstrators_that_there_are() -> None:
 def test_a_page_has_everything(name: str) -> None:
     task = get_task(name)
     text = "\n".join(page(task))
-    for said in (task.instruction, task.summary, *task.paraphrases, *(f.role for f in task.fixtures), *task.sets):
+    for said in (task.instruction, task.summary, *task.paraphrases, *(f.role for f in task.fixtures), *task.facts.sets):
         assert said in text
     assert all(wanted.name in text for wanted in task.objects)
     assert f"{task.horizon} steps" in text

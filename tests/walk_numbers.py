@@ -9,8 +9,8 @@ import zlib
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-from robocasa_lerobot.data.published import published_task_sets
-from robocasa_lerobot.evaluation import published
+from robocasa_lerobot.benchmark import published
+from robocasa_lerobot.benchmark.tasks import published_task_sets
 from robocasa_lerobot.evaluation.results import TRIALS_FILE, UNPERTURBED, Results, TrialRecord, read_results
 
 TRIALS = 97

@@ -7,15 +7,9 @@ import functools
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
+from robocasa_lerobot.benchmark.tasks import published_task_sets, published_tasks
 from robocasa_lerobot.data.config import ROBOCASA365, MemberConfig, MixtureConfig, SelectionConfig
-from robocasa_lerobot.data.published import (
-    PUBLISHED,
-    DatasetEntry,
-    PublishedDatasets,
-    dataset_version,
-    published_task_sets,
-    published_tasks,
-)
+from robocasa_lerobot.data.published import PUBLISHED, DatasetEntry, PublishedDatasets, dataset_version
 from robocasa_lerobot.data.recipes import demonstrated_tasks
 from robocasa_lerobot.data.registry_file import DEMONSTRATED, TASK, RegisteredDataset, RegistryConfig, load_registry
 from robocasa_lerobot.errors import UnknownNameError, UserError

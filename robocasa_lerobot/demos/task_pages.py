@@ -12,7 +12,6 @@ from robocasa_lerobot import contract
 from robocasa_lerobot.demos.demonstrator import can_demonstrate
 from robocasa_lerobot.envs.initial import Initial
 from robocasa_lerobot.envs.predicates import AllOf, AnyOf, Goal, Not, ObjectInside, Term, When
-from robocasa_lerobot.envs.registry import human_seconds
 from robocasa_lerobot.envs.scene.wanted import (
     Choice,
     FixtureWanted,
@@ -35,21 +34,6 @@ Horizons are control steps at {hz} Hz. The human median is the length of the pub
 are drawn at reset. Terms of the goal have the names that they have in `info["success_terms"]`; distances are metres,
 angles radians, openness and turns shares of the part's range.
 """
-_LID = "A closed lid is caught, and springs open when its button is pressed."
-_HEAD_LOCK = "The head's lock holds it while it is down; pressed it stays in, pressed again it comes out."
-# Where the published check, or what a fixture does by itself, is weak or odd, and what ours does.
-_NOTES = {
-    "CloseElectricKettleLid": _LID,
-    "OpenElectricKettleLid": _LID,
-    "CloseStandMixerHead": _HEAD_LOCK,
-    "OpenStandMixerHead": _HEAD_LOCK,
-    "SlideDishwasherRack": "The robot does not start where the open door lies.",
-    "SlideOvenRack": "The robot starts 0.35 m farther back, clear of the open door.",
-    "TurnOnToasterOven": "The published timer loses more at each update than before; here it runs down evenly, its "
-    "whole range in 3000 steps.",
-    "MakeIcedCoffee": "The published check accepts ice up to 0.5 m from the glass, so that contact alone decides; here "
-    "an ice cube is within 6 cm of the glass's middle and touches it.",
-}
 _INSIDE_NOTE = (
     "The published test of being inside grows more lenient the shorter an edge of the region is; here the corners of "
     "the object's bounding box are inside by metres, the same for every region."
@@ -69,7 +53,7 @@ def pages(tasks: Iterable[Task]) -> str:
 
 def page(task: Task) -> Iterator[str]:
     """Lines of Markdown about one task."""
-    human = human_seconds(task.name)
+    human = task.facts.human_seconds
     able = "yes" if can_demonstrate(task) else "none yet"
     yield f"> {task.instruction}"
     yield ""
@@ -83,7 +67,7 @@ def page(task: Task) -> Iterator[str]:
     yield f"- {DEMONSTRATOR}{able}; stages: " + ", ".join(
         " ".join(filter(None, (s.skill, s.verb, s.object, s.target, s.part))) for s in task.stages
     )
-    yield f"- Sets: {', '.join(task.sets)}"
+    yield f"- Sets: {', '.join(sorted(task.facts.sets))}"
     yield f"- Fixtures: {'; '.join(map(_fixture, task.fixtures))}"
     if task.choices:
         yield f"- Drawn at reset: {'; '.join(map(_choice, task.choices))}"
@@ -98,7 +82,7 @@ def page(task: Task) -> Iterator[str]:
         yield f"- Kitchens: those with {', '.join(task.needs) or 'anything'}{without}"
     yield "- Goal:"
     yield from goal_lines(task.goal)
-    notes = [note for note in (_NOTES.get(task.name), _INSIDE_NOTE if _asks_inside(task.goal) else None) if note]
+    notes = [note for note in (task.facts.note, _INSIDE_NOTE if _asks_inside(task.goal) else None) if note]
     yield from (f"- Other than the original: {note}" for note in notes)
 
 

@@ -121,17 +121,16 @@ def _check(tasks: list[Task], workers: int) -> int:
 
 def _facts(task: Task) -> dict[str, object]:
     from robocasa_lerobot.demos.demonstrator import can_demonstrate
-    from robocasa_lerobot.envs.registry import human_seconds
 
     return {
         "name": task.name,
-        "kind": task.kind,
+        "kind": task.facts.kind,
         "horizon": task.horizon,
-        "human_seconds": human_seconds(task.name),
+        "human_seconds": task.facts.human_seconds,
         "demonstrator": can_demonstrate(task),
         "skills": sorted({stage.skill for stage in task.stages}),
         "fixtures": {fixture.role: fixture.kind for fixture in task.fixtures},
-        "sets": task.sets,
+        "sets": sorted(task.facts.sets),
         "instruction": task.instruction,
         "paraphrases": task.paraphrases,
     }
@@ -147,9 +146,9 @@ def _table(tasks: list[Task]) -> None:
     for task in tasks:
         able = "yes" if can_demonstrate(task) else "-"
         print(
-            f"{task.name:<{width}}  {task.kind:<9}  {skills[task.name]:<{wide}}  {task.horizon:>7}  {able:<12}  "
+            f"{task.name:<{width}}  {task.facts.kind:<9}  {skills[task.name]:<{wide}}  {task.horizon:>7}  {able:<12}  "
             f"{task.instruction}"
         )
-        print(f"{'':<{width}}  {'':<9}  {'':<{wide}}  {'':>7}  {'':<12}  sets: {', '.join(task.sets)}")
+        print(f"{'':<{width}}  {'':<9}  {'':<{wide}}  {'':>7}  {'':<12}  sets: {', '.join(sorted(task.facts.sets))}")
     able_count = sum(can_demonstrate(task) for task in tasks)
     print(f"{len(tasks)} tasks, {able_count} with a demonstrator")

@@ -5,9 +5,6 @@ from __future__ import annotations
 import functools
 import importlib
 import pkgutil
-from importlib.resources import files
-
-import yaml
 
 from robocasa_lerobot.envs import tasks as tasks_package
 from robocasa_lerobot.envs.task import Task
@@ -49,7 +46,7 @@ def task_set(name: str) -> tuple[str, ...]:
     Raises:
         UnknownNameError: no registered task belongs to such a set.
     """
-    members = tuple(task.name for task in _tasks().values() if name in task.sets)
+    members = tuple(task.name for task in _tasks().values() if name in task.facts.sets)
     if not members:
         raise UnknownNameError("task set", name, task_sets())
     return members
@@ -57,15 +54,4 @@ def task_set(name: str) -> tuple[str, ...]:
 
 def task_sets() -> tuple[str, ...]:
     """Names of the sets that registered tasks belong to, sorted."""
-    return tuple(sorted({s for task in _tasks().values() for s in task.sets}))
-
-
-@functools.cache
-def _human_seconds() -> dict[str, float]:
-    text = files(tasks_package).joinpath("human_seconds.yaml").read_text(encoding="utf-8")
-    return {name: float(seconds) for name, seconds in yaml.safe_load(text).items()}
-
-
-def human_seconds(name: str) -> float | None:
-    """Median length of the published human demonstrations of a task, seconds; None where there are none."""
-    return _human_seconds().get(name)
+    return tuple(sorted({s for task in _tasks().values() for s in task.facts.sets}))

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+from robocasa_lerobot.benchmark.tasks import TaskFacts, facts_of
 from robocasa_lerobot.envs.initial import Initial
 from robocasa_lerobot.envs.predicates.logic import Goal
 from robocasa_lerobot.envs.scene.wanted import Choice, FixtureWanted, InitialOpenness, ObjectWanted, RobotStart
@@ -35,28 +36,23 @@ class Stage:
 
 @dataclass(frozen=True)
 class Task:
-    """A task declaration.
+    """A task declaration; what the benchmark says of the task besides is in `facts`.
 
     Attributes:
         name: id, as in RoboCasa365.
-        kind: "atomic" or "composite".
-        activity: for composite tasks the activity group, else "atomic".
-        horizon: control steps at 20 Hz until an episode counts as failed.
+        summary: when it counts as solved, in a sentence.
         fixtures, objects, robot_start, initial: the scene.
         choices: what is drawn at reset.
         goal: what must hold; its terms are reported one by one.
         instruction: template; fields are "{side}" and names of objects.
         paraphrases: other wordings, kept apart as novel language.
         stages: the plan.
-        sets: names of the task sets it belongs to.
         needs: names of `scene.kitchens.EXCLUDED`, of what a layout must have: the others are left out, always.
         exclude_styles: ids of styles that do not suit it.
     """
 
     name: str
-    kind: str
-    activity: str
-    horizon: int
+    summary: str = field(compare=False)
     fixtures: tuple[FixtureWanted, ...]
     robot_start: RobotStart
     goal: Goal
@@ -66,7 +62,16 @@ class Task:
     initial: tuple[InitialState, ...] = ()
     choices: tuple[Choice, ...] = ()
     paraphrases: tuple[str, ...] = ()
-    sets: tuple[str, ...] = ()
     needs: tuple[str, ...] = ()
     exclude_styles: tuple[int, ...] = ()
-    summary: str = field(default="", compare=False)
+
+    @property
+    def facts(self) -> TaskFacts:
+        """Kind, sets, horizon and what else is published of it."""
+        return facts_of(self.name)
+
+    @property
+    def horizon(self) -> int:
+        """Control steps at 20 Hz until an episode counts as failed."""
+        assert self.facts.horizon is not None, f"{self.name}: no horizon is published"
+        return self.facts.horizon

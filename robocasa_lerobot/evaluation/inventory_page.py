@@ -8,8 +8,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from robocasa_lerobot.data.published import task_facts
-from robocasa_lerobot.evaluation import published
+from robocasa_lerobot.benchmark import published
+from robocasa_lerobot.benchmark.tasks import task_facts
 from robocasa_lerobot.evaluation.inventory import VIEWS, Holding
 from robocasa_lerobot.evaluation.report import format as fmt
 from robocasa_lerobot.evaluation.report.charts import Bars, bar_chart

@@ -66,7 +66,7 @@ def plan_tasks(env: EnvSettings, first_sets: int | None = None) -> PlannedTasks:
         if env.horizon_multiplier != 1.0:
             raise UserError("env.horizon_multiplier needs the kitchen env; give env.horizon for an env of your own.")
         return PlannedTasks(dict.fromkeys(env.tasks, env.horizon), {}, [])
-    from robocasa_lerobot.data.published import published_tasks
+    from robocasa_lerobot.benchmark.tasks import published_tasks
     from robocasa_lerobot.envs import registry
 
     registered = set(registry.task_names())
@@ -103,7 +103,7 @@ def _tasks_of_sets(names: Sequence[str], registry: str | None) -> tuple[dict[str
     What a registry leaves of the benchmark's sets (`only` in its file) is a part of them; a set that the file itself
     defines is its own, whatever its name.
     """
-    from robocasa_lerobot.data.published import published_task_sets
+    from robocasa_lerobot.benchmark.tasks import published_task_sets
 
     published = published_task_sets()
     known, own = dict(published), dict[str, list[str]]()

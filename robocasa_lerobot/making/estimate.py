@@ -12,7 +12,7 @@ import os
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from robocasa_lerobot.data.published import task_facts
+from robocasa_lerobot.benchmark.tasks import task_facts
 from robocasa_lerobot.making.needs import Need
 
 SECONDS_PER_DEMONSTRATION = 4.3  # of one core, failed attempts included: 844.5 an hour

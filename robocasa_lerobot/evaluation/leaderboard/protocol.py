@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import collections
 
-from robocasa_lerobot.evaluation import published
+from robocasa_lerobot.benchmark import published
 from robocasa_lerobot.evaluation.report.policies import REFERENCES, PolicyResult
 from robocasa_lerobot.evaluation.results import UNPERTURBED, TrialRecord
 

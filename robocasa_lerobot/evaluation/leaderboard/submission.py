@@ -9,8 +9,8 @@ from importlib import resources
 from pathlib import Path
 from typing import Any
 
+from robocasa_lerobot.benchmark import published
 from robocasa_lerobot.errors import UserError
-from robocasa_lerobot.evaluation import published
 from robocasa_lerobot.evaluation.leaderboard.protocol import reasons
 from robocasa_lerobot.evaluation.report.policies import PolicyResult, average_of
 from robocasa_lerobot.evaluation.results import UNPERTURBED

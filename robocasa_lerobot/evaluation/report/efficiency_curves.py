@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from robocasa_lerobot.evaluation import published
+from robocasa_lerobot.benchmark import published
 from robocasa_lerobot.evaluation.report.policies import GROUP_LABELS, PolicyResult, ReportData
 from robocasa_lerobot.evaluation.report.published_cells import AVERAGE, tasks_of
 from robocasa_lerobot.evaluation.statistics.averages import Counts

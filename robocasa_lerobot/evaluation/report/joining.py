@@ -12,7 +12,7 @@ import dataclasses
 from collections.abc import Hashable, Sequence
 from pathlib import Path
 
-from robocasa_lerobot.evaluation.published.places import tables
+from robocasa_lerobot.evaluation.report.places import tables
 from robocasa_lerobot.evaluation.report.policies import PolicyResult, TaskResult
 
 _RULES = (

@@ -9,8 +9,8 @@ from pathlib import Path
 
 import numpy as np
 
-from robocasa_lerobot.evaluation import published
-from robocasa_lerobot.evaluation.published.places import PERTURBATIONS, Place, places, tables
+from robocasa_lerobot.benchmark import published
+from robocasa_lerobot.evaluation.report.places import PERTURBATIONS, Place, places, tables
 from robocasa_lerobot.evaluation.results import PolicyInfo, RunHeader, TrialRecord
 from robocasa_lerobot.evaluation.statistics import Estimate, Rate, average_over_tasks
 from robocasa_lerobot.evaluation.statistics.paired import Outcomes

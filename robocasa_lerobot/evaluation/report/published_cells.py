@@ -5,9 +5,9 @@ from __future__ import annotations
 import functools
 from dataclasses import dataclass
 
-from robocasa_lerobot.data.published import published_task_sets
-from robocasa_lerobot.evaluation import published
-from robocasa_lerobot.evaluation.published.places import PER_TASK, PERTURBATIONS, Place, tables
+from robocasa_lerobot.benchmark import published
+from robocasa_lerobot.benchmark.tasks import published_task_sets
+from robocasa_lerobot.evaluation.report.places import PER_TASK, PERTURBATIONS, Place, tables
 from robocasa_lerobot.evaluation.report.policies import PolicyResult, ReportData, TaskResult, average_of
 from robocasa_lerobot.evaluation.results import UNPERTURBED
 from robocasa_lerobot.evaluation.statistics import Estimate

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from robocasa_lerobot.evaluation import published
-from robocasa_lerobot.evaluation.published.places import PER_TASK, tables
+from robocasa_lerobot.benchmark import published
 from robocasa_lerobot.evaluation.report.csv_text import csv_text
+from robocasa_lerobot.evaluation.report.places import PER_TASK, tables
 from robocasa_lerobot.evaluation.report.policies import ReportData
 from robocasa_lerobot.evaluation.report.published_cells import OurCell, our_cells
 

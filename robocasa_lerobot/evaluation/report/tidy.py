@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from robocasa_lerobot.evaluation import published
+from robocasa_lerobot.benchmark import published
 from robocasa_lerobot.evaluation.report.csv_text import csv_text
 from robocasa_lerobot.evaluation.report.policies import PolicyResult, ReportData, average_of
 

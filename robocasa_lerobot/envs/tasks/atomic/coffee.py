@@ -2,18 +2,17 @@
 
 from robocasa_lerobot.envs.predicates import AllOf, GripperFar, ObjectAtSite, ObjectTouches
 from robocasa_lerobot.envs.scene.wanted import FixtureWanted, ObjectWanted, Placement, RobotStart, SampleRegion
-from robocasa_lerobot.envs.task import Stage
-from robocasa_lerobot.envs.tasks.atomic.common import SEEN, atomic, counter_near, on_counter
+from robocasa_lerobot.envs.task import Stage, Task
+from robocasa_lerobot.envs.tasks.atomic.common import counter_near, on_counter
 
 _FIXTURES = (FixtureWanted("coffee_machine", "coffee_machine"), counter_near("coffee_machine"))
 
 TASKS = (
-    atomic(
-        "CoffeeSetupMug",
-        600,
-        "The mug stands under the spout, the gripper away.",
+    Task(
+        name="CoffeeSetupMug",
+        summary="The mug stands under the spout, the gripper away.",
         fixtures=_FIXTURES,
-        start=RobotStart("coffee_machine"),
+        robot_start=RobotStart("coffee_machine"),
         objects=(
             ObjectWanted(
                 "obj", ("mug",), on_counter("coffee_machine", (0.3, 0.4), rotation=(0.79, 1.57)), graspable=True
@@ -21,14 +20,19 @@ TASKS = (
         ),
         goal=AllOf(ObjectAtSite("obj", "coffee_machine", "receptacle", across=0.04, high=0.10), GripperFar("obj")),
         stages=(Stage("pick_place", "place_at_site", "coffee_machine", object="obj", part="receptacle"),),
-        sets=SEEN,
+        instruction="Put the {obj} under the coffee machine's dispenser.",
+        paraphrases=(
+            "The {obj} should stand where the coffee comes out.",
+            "Get the {obj} from the counter ready for coffee.",
+            "Place the {obj} below the outlet of the coffee machine.",
+            "Bring the {obj} to the coffee machine.",
+        ),
     ),
-    atomic(
-        "CoffeeServeMug",
-        450,
-        "The mug stands on the counter, the gripper away.",
+    Task(
+        name="CoffeeServeMug",
+        summary="The mug stands on the counter, the gripper away.",
         fixtures=_FIXTURES,
-        start=RobotStart("coffee_machine"),
+        robot_start=RobotStart("coffee_machine"),
         objects=(
             ObjectWanted(
                 "obj",
@@ -39,5 +43,12 @@ TASKS = (
         ),
         goal=AllOf(ObjectTouches("obj", "counter"), GripperFar("obj")),
         stages=(Stage("pick_place", "take_from_spout", "counter", object="obj"),),
+        instruction="Take the {obj} from under the coffee machine's dispenser and put it on the counter.",
+        paraphrases=(
+            "The coffee is ready: set the {obj} on the worktop.",
+            "Bring the {obj} from the coffee machine to the counter.",
+            "Serve the {obj} that stands under the outlet.",
+            "Get the {obj} out of the coffee machine onto the counter.",
+        ),
     ),
 )

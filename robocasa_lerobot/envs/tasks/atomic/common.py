@@ -1,56 +1,13 @@
-"""What atomic tasks share: their sets, distractors, and a short way to declare one."""
+"""What declarations of atomic tasks share."""
 
 from __future__ import annotations
 
-from robocasa_lerobot.envs.predicates import Goal
-from robocasa_lerobot.envs.scene.wanted import Choice, FixtureWanted, ObjectWanted, Placement, RobotStart, SampleRegion
-from robocasa_lerobot.envs.task import InitialState, Stage, Task
-from robocasa_lerobot.envs.wording.atomic import WORDING
+from robocasa_lerobot.envs.scene.wanted import FixtureWanted, ObjectWanted, Placement, SampleRegion
+from robocasa_lerobot.envs.task import Stage, Task
 
-PHASE1 = ("pretrain300", "lifelong_phase1")
-UNMULTIPLIED = ("pretrain100", "pretrain200", *PHASE1)
-COMMON = (*UNMULTIPLIED, "mimicgen60")
-SEEN = ("pretrain50", *COMMON, "atomic_seen")
+# Handles of cookware point away from the knobs by this much to either side, radians.
+HANDLE_TURN = (0.785, 1.178)
 TASKS: tuple[Task, ...] = ()
-
-
-def atomic(
-    name: str,
-    horizon: int,
-    summary: str,
-    *,
-    fixtures: tuple[FixtureWanted, ...],
-    start: RobotStart,
-    goal: Goal,
-    stages: tuple[Stage, ...],
-    objects: tuple[ObjectWanted, ...] = (),
-    initial: tuple[InitialState, ...] = (),
-    choices: tuple[Choice, ...] = (),
-    sets: tuple[str, ...] = COMMON,
-    needs: tuple[str, ...] = (),
-    exclude_styles: tuple[int, ...] = (),
-) -> Task:
-    """An atomic task with its wording."""
-    wording = WORDING[name]
-    return Task(
-        name=name,
-        kind="atomic",
-        activity="atomic",
-        horizon=horizon,
-        summary=summary,
-        fixtures=fixtures,
-        robot_start=start,
-        objects=objects,
-        initial=initial,
-        choices=choices,
-        goal=goal,
-        instruction=wording.instruction,
-        paraphrases=wording.paraphrases,
-        stages=stages,
-        sets=sets,
-        needs=needs,
-        exclude_styles=exclude_styles,
-    )
 
 
 def counter_near(role: str, *, size: tuple[float, float] = (0.0, 0.0), name: str = "counter") -> FixtureWanted:

@@ -4,7 +4,7 @@ from robocasa_lerobot.envs.initial import PartAt
 from robocasa_lerobot.envs.predicates import DoorsClosed, DoorsOpen, PartWithin
 from robocasa_lerobot.envs.scene.wanted import FixtureWanted, InitialOpenness, ObjectWanted, Placement, RobotStart
 from robocasa_lerobot.envs.task import Stage, Task
-from robocasa_lerobot.envs.tasks.atomic.common import COMMON, SEEN, atomic, counter_near, distractors
+from robocasa_lerobot.envs.tasks.atomic.common import counter_near, distractors
 
 # A door that folds down is lifted shut, that of a dishwasher from above; the doors of a fridge are too large to reach
 # round.
@@ -19,30 +19,30 @@ def _inside(size: tuple[float, float] = (0.3, 0.3), **more: object) -> ObjectWan
 def _door(
     name: str,
     kind: str,
-    horizon: int,
     *,
+    instruction: str,
+    paraphrases: tuple[str, ...],
     inside: ObjectWanted | None = None,
     clutter: bool = True,
     beside: bool = False,
     setback: float = 0.0,
     opened: tuple[float, float] = OPEN,
-    sets: tuple[str, ...] = COMMON,
     needs: tuple[str, ...] = (),
 ) -> Task:
     opens = name.startswith("Open")
-    return atomic(
-        name,
-        horizon,
-        "Every door is open by at least 90 % of its range."
+    return Task(
+        name=name,
+        summary="Every door is open by at least 90 % of its range."
         if opens
         else "Every door is within 0.5 % of its range of being shut.",
         fixtures=(FixtureWanted("fxtr", kind), *([counter_near("fxtr")] if clutter else [])),
-        start=RobotStart("fxtr", beside=beside, setback=setback),
+        robot_start=RobotStart("fxtr", beside=beside, setback=setback),
         objects=(*([inside] if inside else []), *([distractors("fxtr")] if clutter else [])),
         initial=(InitialOpenness("fxtr", *((0.0, 0.0) if opens else opened)),),
         goal=DoorsOpen("fxtr") if opens else DoorsClosed("fxtr"),
         stages=(Stage("doors", "open" if opens else _CLOSING.get(kind, "close"), "fxtr"),),
-        sets=sets,
+        instruction=instruction,
+        paraphrases=paraphrases,
         needs=needs,
     )
 
@@ -55,57 +55,220 @@ _OVEN_DISH = ObjectWanted(
 )
 
 TASKS = (
-    _door("OpenCabinet", "cabinet_with_door", 1050, inside=_inside(), sets=SEEN),
-    _door("CloseCabinet", "cabinet_with_door", 750, inside=_inside()),
-    _door("OpenFridge", "fridge", 900, inside=_inside(properties=("fridgable",)), setback=0.3),
-    _door("CloseFridge", "fridge", 900, inside=_inside(properties=("fridgable",)), setback=0.3, sets=SEEN),
-    _door("OpenMicrowave", "microwave", 600, inside=_inside(properties=("microwavable",))),
-    _door("CloseMicrowave", "microwave", 450, inside=_inside(properties=("microwavable",))),
-    _door("OpenOven", "oven", 300, inside=_OVEN_DISH, beside=True, needs=("oven",)),
-    _door("CloseOven", "oven", 450, inside=_OVEN_DISH, beside=True, opened=(1.0, 1.0), needs=("oven",)),
-    _door("OpenDishwasher", "dishwasher", 450, beside=True),
-    _door("CloseDishwasher", "dishwasher", 300, beside=True),
-    _door("OpenToasterOvenDoor", "toaster_oven", 450, clutter=False),
-    _door("CloseToasterOvenDoor", "toaster_oven", 450, clutter=False, opened=(1.0, 1.0), sets=SEEN),
-    atomic(
-        "OpenStandMixerHead",
-        450,
-        "The head is up by more than 99 % of its range.",
+    _door(
+        "OpenCabinet",
+        "cabinet_with_door",
+        inside=_inside(),
+        instruction="Open the cabinet {doors}.",
+        paraphrases=(
+            "The cabinet in front of you should stand wide open.",
+            "Swing the cabinet {doors} out as far as possible.",
+            "Give me access to the inside of the cabinet.",
+            "Take hold of the cabinet and open it up.",
+        ),
+    ),
+    _door(
+        "CloseCabinet",
+        "cabinet_with_door",
+        inside=_inside(),
+        instruction="Close the cabinet {doors}.",
+        paraphrases=(
+            "The cabinet should be shut again.",
+            "Swing the cabinet {doors} back until nothing is left open.",
+            "Hide what is in the cabinet by shutting it.",
+            "Leave no gap at the cabinet.",
+        ),
+    ),
+    _door(
+        "OpenFridge",
+        "fridge",
+        inside=_inside(properties=("fridgable",)),
+        setback=0.3,
+        instruction="Open the fridge {doors}.",
+        paraphrases=(
+            "I need to see into the fridge.",
+            "Swing the {doors} of the refrigerator out as far as possible.",
+            "The fridge should stand wide open.",
+            "Get the refrigerator open.",
+        ),
+    ),
+    _door(
+        "CloseFridge",
+        "fridge",
+        inside=_inside(properties=("fridgable",)),
+        setback=0.3,
+        instruction="Close the fridge {doors}.",
+        paraphrases=(
+            "The fridge is losing its cold; shut it.",
+            "Swing the {doors} of the refrigerator back until shut.",
+            "No door of the fridge should be left open.",
+            "Get the refrigerator closed.",
+        ),
+    ),
+    _door(
+        "OpenMicrowave",
+        "microwave",
+        inside=_inside(properties=("microwavable",)),
+        instruction="Open the door of the microwave.",
+        paraphrases=(
+            "The microwave should stand wide open.",
+            "Swing out the door on the microwave.",
+            "I want to put something into the microwave; open it.",
+            "Make the inside of the microwave reachable.",
+        ),
+    ),
+    _door(
+        "CloseMicrowave",
+        "microwave",
+        inside=_inside(properties=("microwavable",)),
+        instruction="Close the door of the microwave.",
+        paraphrases=(
+            "The microwave door should be shut.",
+            "Swing the microwave door back to the case.",
+            "Get the microwave ready by shutting its door.",
+            "Leave the microwave closed.",
+        ),
+    ),
+    _door(
+        "OpenOven",
+        "oven",
+        inside=_OVEN_DISH,
+        beside=True,
+        needs=("oven",),
+        instruction="Open the oven door.",
+        paraphrases=(
+            "Fold the front of the oven down.",
+            "The oven should stand open.",
+            "Lower the door of the oven all the way.",
+            "Get the oven open so that a tray fits in.",
+        ),
+    ),
+    _door(
+        "CloseOven",
+        "oven",
+        inside=_OVEN_DISH,
+        beside=True,
+        opened=(1.0, 1.0),
+        needs=("oven",),
+        instruction="Close the oven door.",
+        paraphrases=(
+            "Fold the front of the oven up.",
+            "The oven should be shut.",
+            "Raise the door of the oven until it meets the frame.",
+            "Keep the heat in by shutting the oven.",
+        ),
+    ),
+    _door(
+        "OpenDishwasher",
+        "dishwasher",
+        beside=True,
+        instruction="Open the dishwasher door.",
+        paraphrases=(
+            "Fold the dishwasher's front down.",
+            "The dishwasher should stand open for loading.",
+            "Lower the door of the dishwasher all the way.",
+            "Get the dishwasher open.",
+        ),
+    ),
+    _door(
+        "CloseDishwasher",
+        "dishwasher",
+        beside=True,
+        instruction="Close the dishwasher door.",
+        paraphrases=(
+            "Fold the dishwasher's front up.",
+            "The dishwasher should be shut.",
+            "Raise the door of the dishwasher until it is flush.",
+            "Get the dishwasher closed.",
+        ),
+    ),
+    _door(
+        "OpenToasterOvenDoor",
+        "toaster_oven",
+        clutter=False,
+        instruction="Open the toaster oven.",
+        paraphrases=(
+            "Fold down the door of the toaster oven.",
+            "The toaster oven should stand open.",
+            "Lower the glass door of the toaster oven all the way.",
+            "Get the toaster oven ready to be filled by opening it.",
+        ),
+    ),
+    _door(
+        "CloseToasterOvenDoor",
+        "toaster_oven",
+        clutter=False,
+        opened=(1.0, 1.0),
+        instruction="Close the toaster oven.",
+        paraphrases=(
+            "Fold up the door of the toaster oven.",
+            "The toaster oven should be shut.",
+            "Raise the glass door of the toaster oven until it snaps to.",
+            "Leave the toaster oven closed.",
+        ),
+    ),
+    Task(
+        name="OpenStandMixerHead",
+        summary="The head is up by more than 99 % of its range.",
         fixtures=(FixtureWanted("stand_mixer", "stand_mixer"),),
-        start=RobotStart("stand_mixer"),
+        robot_start=RobotStart("stand_mixer"),
         initial=(PartAt("stand_mixer", "head", (0.0, 0.0)),),
         goal=PartWithin("stand_mixer", "head", low=0.99, label="up"),
         stages=(Stage("doors", "raise_head", "stand_mixer"),),
-        sets=SEEN,
+        instruction="Raise the head of the stand mixer.",
+        paraphrases=(
+            "Tip the mixer's head back.",
+            "The bowl of the stand mixer should be free from above.",
+            "Unlock the stand mixer and lift its head.",
+            "Get the top part of the mixer up.",
+        ),
     ),
-    atomic(
-        "CloseStandMixerHead",
-        450,
-        "The head is down to less than 1 % of its range.",
+    Task(
+        name="CloseStandMixerHead",
+        summary="The head is down to less than 1 % of its range.",
         fixtures=(FixtureWanted("stand_mixer", "stand_mixer"),),
-        start=RobotStart("stand_mixer"),
+        robot_start=RobotStart("stand_mixer"),
         initial=(PartAt("stand_mixer", "head", (1.0, 1.0)),),
         goal=PartWithin("stand_mixer", "head", high=0.01, label="down"),
         stages=(Stage("doors", "lower_head", "stand_mixer"),),
+        instruction="Bring the head of the stand mixer down.",
+        paraphrases=(
+            "Tip the mixer's head forward until it is level.",
+            "The stand mixer should be ready to stir: put its head down.",
+            "Press the raised head of the mixer down.",
+            "Get the top part of the mixer back over the bowl.",
+        ),
     ),
-    atomic(
-        "OpenElectricKettleLid",
-        300,
-        "The lid is open by at least 95 % of its range; its button makes it spring open.",
+    Task(
+        name="OpenElectricKettleLid",
+        summary="The lid is open by at least 95 % of its range; its button makes it spring open.",
         fixtures=(FixtureWanted("electric_kettle", "electric_kettle"),),
-        start=RobotStart("electric_kettle"),
+        robot_start=RobotStart("electric_kettle"),
         initial=(PartAt("electric_kettle", "lid", (0.0, 0.0)),),
         goal=PartWithin("electric_kettle", "lid", low=0.95, label="open"),
         stages=(Stage("buttons", "press", "electric_kettle", part="lid_button"),),
+        instruction="Open the lid of the electric kettle with its button.",
+        paraphrases=(
+            "Make the kettle's lid pop up.",
+            "The electric kettle needs filling; open it.",
+            "Use the release of the kettle lid.",
+            "Get the top of the electric kettle open.",
+        ),
     ),
-    atomic(
-        "CloseElectricKettleLid",
-        300,
-        "The lid is shut to at most 1 % of its range.",
+    Task(
+        name="CloseElectricKettleLid",
+        summary="The lid is shut to at most 1 % of its range.",
         fixtures=(FixtureWanted("electric_kettle", "electric_kettle"),),
-        start=RobotStart("electric_kettle"),
+        robot_start=RobotStart("electric_kettle"),
         initial=(PartAt("electric_kettle", "lid", (1.0, 1.0)),),
         goal=PartWithin("electric_kettle", "lid", high=0.01, label="closed"),
         stages=(Stage("doors", "push_lid", "electric_kettle", part="lid"),),
+        instruction="Close the lid of the electric kettle.",
+        paraphrases=(
+            "Push the kettle's lid back down.",
+            "The electric kettle should be covered.",
+            "Snap the lid of the kettle shut.",
+            "Get the top of the electric kettle closed.",
+        ),
     ),
 )

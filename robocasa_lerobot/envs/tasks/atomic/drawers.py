@@ -23,15 +23,13 @@ _OBJECTS = (
 
 OPEN_DRAWER = Task(
     name="OpenDrawer",
-    kind="atomic",
-    activity="atomic",
-    horizon=750,
     summary="Goal: pull a closed top drawer out. Success: at least 95 % of its full travel.",
     fixtures=_FIXTURES,
     robot_start=_START,
     objects=_OBJECTS,
     initial=(InitialOpenness("drawer", 0.0, 0.0),),
     goal=DrawerOpen("drawer", at_least=0.95),
+    stages=(Stage("drawers", "open", "drawer"),),
     instruction="Pull the {side} drawer out as far as it goes.",
     paraphrases=(
         "Slide out the drawer on your {side}.",
@@ -39,21 +37,17 @@ OPEN_DRAWER = Task(
         "Take the handle of the {side} drawer and draw it towards you.",
         "Get the drawer to the {side} fully extended.",
     ),
-    stages=(Stage("drawers", "open", "drawer"),),
-    sets=("pretrain50", "pretrain100", "pretrain200", "pretrain300", "atomic_seen", "lifelong_phase1", "mimicgen60"),
 )
 
 CLOSE_DRAWER = Task(
     name="CloseDrawer",
-    kind="atomic",
-    activity="atomic",
-    horizon=450,
     summary="Goal: push an open top drawer in. Success: at most 5 % of its full travel left.",
     fixtures=_FIXTURES,
     robot_start=_START,
     objects=_OBJECTS,
     initial=(InitialOpenness("drawer", 0.90, 1.0),),
     goal=DrawerClosed("drawer", at_most=0.05),
+    stages=(Stage("drawers", "close", "drawer"),),
     instruction="Push the {side} drawer shut.",
     paraphrases=(
         "Slide the drawer on your {side} back in.",
@@ -61,8 +55,6 @@ CLOSE_DRAWER = Task(
         "Put the {side} drawer back all the way into the cabinet.",
         "Make sure that no gap is left at the {side} drawer.",
     ),
-    stages=(Stage("drawers", "close", "drawer"),),
-    sets=("pretrain100", "pretrain200", "pretrain300", "lifelong_phase1", "mimicgen60"),
 )
 
 TASKS = (OPEN_DRAWER, CLOSE_DRAWER)

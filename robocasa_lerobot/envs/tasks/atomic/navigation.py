@@ -2,21 +2,25 @@
 
 from robocasa_lerobot.envs.predicates import StandsBefore
 from robocasa_lerobot.envs.scene.wanted import FixtureWanted, RobotStart
-from robocasa_lerobot.envs.task import Stage
-from robocasa_lerobot.envs.tasks.atomic.common import UNMULTIPLIED, atomic
+from robocasa_lerobot.envs.task import Stage, Task
 
 TASKS = (
-    atomic(
-        "NavigateKitchen",
-        450,
-        "The base stands within 20 cm of the place in front of the fixture, and faces it.",
+    Task(
+        name="NavigateKitchen",
+        summary="The base stands within 20 cm of the place in front of the fixture, and faces it.",
         fixtures=(
             FixtureWanted("source", "landmark"),
             FixtureWanted("target", "landmark_once", other_than=("source",), apart_m=1.0),
         ),
-        start=RobotStart("source"),
+        robot_start=RobotStart("source"),
         goal=StandsBefore("target"),
         stages=(Stage("navigation", "drive", "target"),),
-        sets=("pretrain50", *UNMULTIPLIED, "atomic_seen"),
+        instruction="Go to the {target}.",
+        paraphrases=(
+            "Drive to the {target} and stop in front of it.",
+            "I need you at the {target}.",
+            "Move your base until you face the {target}.",
+            "The {target} is where you should stand.",
+        ),
     ),
 )

@@ -17,8 +17,8 @@ from robocasa_lerobot.envs.scene.wanted import (
     RobotStart,
     SampleRegion,
 )
-from robocasa_lerobot.envs.tasks.atomic.common import SEEN, atomic, counter_near, on_counter, place
-from robocasa_lerobot.envs.tasks.atomic.controls import HANDLE_TURN
+from robocasa_lerobot.envs.task import Task
+from robocasa_lerobot.envs.tasks.atomic.common import HANDLE_TURN, counter_near, on_counter, place
 
 _TOOLS, _NOT_TOOLS = ("reamer", "strainer", "cheese_grater"), ("tool", "utensil")
 _IN_PAN_M = 0.07  # horizontally from the middle of a pan
@@ -39,12 +39,11 @@ def _back(ref: str, size: tuple[float, float], offset: tuple[float, float] = (0.
 
 
 CABINET = (
-    atomic(
-        "PickPlaceCounterToCabinet",
-        750,
-        "The object is inside the cabinet, the gripper away.",
+    Task(
+        name="PickPlaceCounterToCabinet",
+        summary="The object is inside the cabinet, the gripper away.",
         fixtures=(FixtureWanted("cab", "cabinet"), counter_near("cab")),
-        start=RobotStart("cab"),
+        robot_start=RobotStart("cab"),
         objects=(
             ObjectWanted("obj", ("any",), on_counter("cab", (0.6, 0.3), offset=(0.0, 0.1)), graspable=True),
             ObjectWanted("distr_counter", ("any",), on_counter("cab", (1.0, 0.3), offset=(0.0, 0.3))),
@@ -53,14 +52,19 @@ CABINET = (
         initial=(InitialOpenness("cab", *_DOOR_OPEN),),
         goal=AllOf(ObjectInside("obj", "cab"), GripperFar("obj")),
         stages=place(target="cab", verb="place_inside"),
-        sets=SEEN,
+        instruction="Take the {obj} off the counter and put it into the cabinet.",
+        paraphrases=(
+            "The {obj} belongs in the cabinet.",
+            "Store the {obj} behind the open cabinet door.",
+            "Move the {obj} from the worktop up into the cabinet.",
+            "Clear the {obj} away into the cabinet.",
+        ),
     ),
-    atomic(
-        "PickPlaceCabinetToCounter",
-        450,
-        "The object is on the counter below the cabinet, the gripper away.",
+    Task(
+        name="PickPlaceCabinetToCounter",
+        summary="The object is on the counter below the cabinet, the gripper away.",
         fixtures=(FixtureWanted("cab", "cabinet"), counter_near("cab")),
-        start=RobotStart("cab"),
+        robot_start=RobotStart("cab"),
         objects=(
             ObjectWanted(
                 "obj",
@@ -74,16 +78,22 @@ CABINET = (
         initial=(InitialOpenness("cab", *_DOOR_OPEN),),
         goal=AllOf(ObjectTouches("obj", "counter"), GripperFar("obj")),
         stages=place(verb="place_on_counter"),
+        instruction="Take the {obj} out of the cabinet and put it on the counter.",
+        paraphrases=(
+            "Bring the {obj} from the cabinet to the worktop.",
+            "I need the {obj} from the cabinet down on the counter.",
+            "The {obj} should stand on the counter instead of in the cabinet.",
+            "Fetch the {obj} out of the open cabinet.",
+        ),
     ),
 )
 
 TOP_DRAWER = (
-    atomic(
-        "PickPlaceCounterToDrawer",
-        750,
-        "The object is inside the drawer and touches no counter, the gripper away.",
+    Task(
+        name="PickPlaceCounterToDrawer",
+        summary="The object is inside the drawer and touches no counter, the gripper away.",
         fixtures=(FixtureWanted("drawer", "drawer_top"), counter_near("drawer")),
-        start=RobotStart("drawer"),
+        robot_start=RobotStart("drawer"),
         objects=(
             ObjectWanted("obj", _NOT_TOOLS, on_counter("drawer", (0.6, 0.3)), graspable=True, exclude=_TOOLS),
             ObjectWanted("distr", ("any",), on_counter("drawer", (0.6, 0.3), pos=("ref", -0.5)), exclude=_NOT_TOOLS),
@@ -91,13 +101,19 @@ TOP_DRAWER = (
         initial=(InitialOpenness("drawer", *_DOOR_OPEN),),
         goal=AllOf(ObjectInside("obj", "drawer"), Not(ObjectTouchesAnyCounter("obj")), GripperFar("obj")),
         stages=place(target="drawer", verb="place_inside"),
+        instruction="Take the {obj} off the counter and put it into the drawer.",
+        paraphrases=(
+            "The {obj} belongs in the open drawer.",
+            "Drop the {obj} from the worktop into the drawer.",
+            "Clear the {obj} away into the drawer.",
+            "Stow the {obj} in the drawer before you.",
+        ),
     ),
-    atomic(
-        "PickPlaceDrawerToCounter",
-        750,
-        "The object is on a counter, the gripper away.",
+    Task(
+        name="PickPlaceDrawerToCounter",
+        summary="The object is on a counter, the gripper away.",
         fixtures=(FixtureWanted("drawer", "drawer_top"), counter_near("drawer")),
-        start=RobotStart("drawer", setback=0.3),  # clear of the open drawer
+        robot_start=RobotStart("drawer", setback=0.3),
         objects=(
             ObjectWanted(
                 "obj",
@@ -111,17 +127,22 @@ TOP_DRAWER = (
         initial=(InitialOpenness("drawer", 1.0, 1.0),),
         goal=AllOf(ObjectTouchesAnyCounter("obj"), GripperFar("obj")),
         stages=place(verb="take_out_of_drawer"),
-        sets=SEEN,
+        instruction="Take the {obj} out of the drawer and put it on the counter.",
+        paraphrases=(
+            "Bring the {obj} from the drawer to the worktop.",
+            "I need the {obj} from the open drawer up on the counter.",
+            "The {obj} should lie on the counter instead of in the drawer.",
+            "Fetch the {obj} out of the drawer.",
+        ),
     ),
 )
 
 SINK = (
-    atomic(
-        "PickPlaceSinkToCounter",
-        900,
-        "The object is on the plate, the plate on the counter, the gripper away.",
+    Task(
+        name="PickPlaceSinkToCounter",
+        summary="The object is on the plate, the plate on the counter, the gripper away.",
         fixtures=(FixtureWanted("sink", "sink"), counter_near("sink")),
-        start=RobotStart("sink"),
+        robot_start=RobotStart("sink"),
         objects=(
             ObjectWanted(
                 "obj", ("food",), Placement("sink", size=(0.25, 0.25), pos=(0.0, 1.0)), graspable=True, washable=True
@@ -133,17 +154,22 @@ SINK = (
         ),
         goal=AllOf(ObjectOn("obj", "container"), ObjectTouches("container", "counter"), GripperFar("obj")),
         stages=place(target="container", verb="place_on"),
-        sets=SEEN,
+        instruction="Take the {obj} out of the sink and put it on the {container} on the counter.",
+        paraphrases=(
+            "The washed {obj} goes onto the {container} beside the sink.",
+            "Bring the {obj} from the basin to the {container}.",
+            "Lay the {obj} that is in the sink on the {container}.",
+            "Get the {obj} from the sink to the {container} on the worktop.",
+        ),
     ),
 )
 
 STOVE = (
-    atomic(
-        "PickPlaceCounterToStove",
-        600,
-        "The object is in the pan, the gripper away.",
+    Task(
+        name="PickPlaceCounterToStove",
+        summary="The object is in the pan, the gripper away.",
         fixtures=(FixtureWanted("stove", "stove"), counter_near("stove", size=(0.3, 0.4))),
-        start=RobotStart("stove"),
+        robot_start=RobotStart("stove"),
         objects=(
             ObjectWanted("container", ("pan",), _PAN),
             ObjectWanted(
@@ -156,14 +182,19 @@ STOVE = (
         ),
         goal=AllOf(ObjectOn("obj", "container", within=_IN_PAN_M), GripperFar("obj")),
         stages=place(target="container", verb="place_on"),
-        sets=SEEN,
+        instruction="Take the {obj} off the plate and put it into the {container} on the stove.",
+        paraphrases=(
+            "The {obj} should be cooked: move it into the {container}.",
+            "Bring the {obj} from the counter to the {container} on the burner.",
+            "Lay the {obj} in the {container} that stands on the stove.",
+            "Transfer the {obj} from its plate into the {container}.",
+        ),
     ),
-    atomic(
-        "PickPlaceStoveToCounter",
-        450,
-        "The object is in the plate or bowl on the counter, the gripper away.",
+    Task(
+        name="PickPlaceStoveToCounter",
+        summary="The object is in the plate or bowl on the counter, the gripper away.",
         fixtures=(FixtureWanted("stove", "stove"), counter_near("stove", size=(0.3, 0.4))),
-        start=RobotStart("stove"),
+        robot_start=RobotStart("stove"),
         objects=(
             ObjectWanted("obj_container", ("pan",), _PAN),
             ObjectWanted(
@@ -178,16 +209,22 @@ STOVE = (
         ),
         goal=AllOf(ObjectOn("obj", "container", within=_IN_PAN_M), GripperFar("obj")),
         stages=place(target="container", verb="place_on_from_pan"),
+        instruction="Take the {obj} out of the {obj_container} and put it on the {container} on the counter.",
+        paraphrases=(
+            "Serve the {obj} from the stove on the {container}.",
+            "Bring the {obj} from the {obj_container} to the {container}.",
+            "The {obj} is done; it goes onto the {container}.",
+            "Move the {obj} off the stove to the {container} beside it.",
+        ),
     ),
 )
 
 MICROWAVE = (
-    atomic(
-        "PickPlaceCounterToMicrowave",
-        1050,
-        "The object is on the plate in the microwave, the gripper away.",
+    Task(
+        name="PickPlaceCounterToMicrowave",
+        summary="The object is on the plate in the microwave, the gripper away.",
         fixtures=(FixtureWanted("microwave", "microwave"), counter_near("microwave")),
-        start=RobotStart("microwave"),
+        robot_start=RobotStart("microwave"),
         objects=(
             ObjectWanted(
                 "obj",
@@ -204,13 +241,19 @@ MICROWAVE = (
         initial=(InitialOpenness("microwave", *_DOOR_OPEN),),
         goal=AllOf(ObjectTouches("obj", "container"), ObjectTouches("container", "microwave"), GripperFar("obj")),
         stages=place(target="container", verb="place_on_reaching_in"),
+        instruction="Take the {obj} off its plate and put it on the plate in the microwave.",
+        paraphrases=(
+            "The {obj} should be warmed: move it into the microwave.",
+            "Bring the {obj} from the counter into the open microwave.",
+            "Lay the {obj} on the plate that is inside the microwave.",
+            "Transfer the {obj} to the microwave's plate.",
+        ),
     ),
-    atomic(
-        "PickPlaceMicrowaveToCounter",
-        750,
-        "The object is on the plate on the counter, the gripper away.",
+    Task(
+        name="PickPlaceMicrowaveToCounter",
+        summary="The object is on the plate on the counter, the gripper away.",
         fixtures=(FixtureWanted("microwave", "microwave"), counter_near("microwave")),
-        start=RobotStart("microwave"),
+        robot_start=RobotStart("microwave"),
         objects=(
             ObjectWanted(
                 "obj",
@@ -225,6 +268,13 @@ MICROWAVE = (
         initial=(InitialOpenness("microwave", *_DOOR_OPEN),),
         goal=AllOf(ObjectOn("obj", "container"), GripperFar("obj")),
         stages=place(target="container", verb="place_on_reaching_in"),
+        instruction="Take the {obj} out of the microwave and put it on the {container} on the counter.",
+        paraphrases=(
+            "The {obj} is warm; it goes onto the {container}.",
+            "Bring the {obj} from the microwave to the {container}.",
+            "Move the {obj} out of the open microwave to the {container} beside it.",
+            "Serve the {obj} from the microwave on the {container}.",
+        ),
     ),
 )
 

@@ -19,21 +19,15 @@ from robocasa_lerobot.envs.scene.wanted import (
     RobotStart,
     SampleRegion,
 )
-from robocasa_lerobot.envs.tasks.atomic.common import (
-    SEEN,
-    atomic,
-    counter_near,
-    on_counter,
-    place,
-)
+from robocasa_lerobot.envs.task import Task
+from robocasa_lerobot.envs.tasks.atomic.common import counter_near, on_counter, place
 
 OVENS = (
-    atomic(
-        "PickPlaceCounterToOven",
-        600,
-        "The object is on the tray, the tray on the rack, the gripper away.",
+    Task(
+        name="PickPlaceCounterToOven",
+        summary="The object is on the tray, the tray on the rack, the gripper away.",
         fixtures=(FixtureWanted("oven", "oven"), counter_near("oven")),
-        start=RobotStart("counter", at_object="obj"),
+        robot_start=RobotStart("counter", at_object="obj"),
         choices=(Choice("rack", of="oven"),),
         objects=(
             ObjectWanted(
@@ -50,14 +44,20 @@ OVENS = (
         initial=(InitialOpenness("oven", 1.0, 1.0), PartAt("oven", "{rack}", (1.0, 1.0))),
         goal=AllOf(ObjectTouches("oven_tray", "oven", part="{rack}"), ObjectOn("obj", "oven_tray"), GripperFar("obj")),
         stages=place(target="oven_tray", verb="place_on_reaching_in"),
+        instruction="Take the {obj} off the plate and put it on the tray on the {rack} rack of the oven.",
+        paraphrases=(
+            "The {obj} should be baked: it goes onto the oven's tray.",
+            "Bring the {obj} from the counter to the tray on the {rack} rack.",
+            "Lay the {obj} on the tray of the open oven.",
+            "Transfer the {obj} from its plate to the oven tray.",
+        ),
         needs=("oven",),
     ),
-    atomic(
-        "PickPlaceCounterToToasterOven",
-        450,
-        "The object lies on the pulled-out rack, the gripper away.",
+    Task(
+        name="PickPlaceCounterToToasterOven",
+        summary="The object lies on the pulled-out rack, the gripper away.",
         fixtures=(FixtureWanted("toaster_oven", "toaster_oven"), counter_near("toaster_oven")),
-        start=RobotStart("toaster_oven"),
+        robot_start=RobotStart("toaster_oven"),
         choices=(Choice("rack", of="toaster_oven"),),
         objects=(
             ObjectWanted(
@@ -71,13 +71,19 @@ OVENS = (
         initial=(InitialOpenness("toaster_oven", 1.0, 1.0), PartAt("toaster_oven", "{rack}", (1.0, 1.0))),
         goal=AllOf(ObjectTouches("obj", "toaster_oven", part="{rack}"), GripperFar("obj")),
         stages=place(target="toaster_oven", verb="place_inside", part="{rack}"),
+        instruction="Take the {obj} off the plate and put it on the {rack} of the toaster oven.",
+        paraphrases=(
+            "The {obj} should be toasted: it goes onto the toaster oven's {rack}.",
+            "Bring the {obj} from the counter to the pulled-out {rack}.",
+            "Lay the {obj} on the {rack} of the open toaster oven.",
+            "Transfer the {obj} from its plate to the toaster oven.",
+        ),
     ),
-    atomic(
-        "PickPlaceToasterOvenToCounter",
-        450,
-        "The object is on the plate, the plate on the counter, the gripper away.",
+    Task(
+        name="PickPlaceToasterOvenToCounter",
+        summary="The object is on the plate, the plate on the counter, the gripper away.",
         fixtures=(FixtureWanted("toaster_oven", "toaster_oven"), counter_near("toaster_oven")),
-        start=RobotStart("toaster_oven"),
+        robot_start=RobotStart("toaster_oven"),
         choices=(Choice("rack", of="toaster_oven"),),
         objects=(
             ObjectWanted(
@@ -92,13 +98,19 @@ OVENS = (
         initial=(InitialOpenness("toaster_oven", 1.0, 1.0), PartAt("toaster_oven", "{rack}", (1.0, 1.0))),
         goal=AllOf(ObjectOn("obj", "container"), ObjectTouches("container", "counter"), GripperFar("obj")),
         stages=place(target="container", verb="place_on_reaching_in"),
+        instruction="Take the {obj} off the {rack} of the toaster oven and put it on the plate.",
+        paraphrases=(
+            "The {obj} is toasted; it goes onto the plate.",
+            "Bring the {obj} from the toaster oven to the plate on the counter.",
+            "Move the {obj} from the pulled-out {rack} to the plate.",
+            "Serve the {obj} from the toaster oven on the plate.",
+        ),
     ),
-    atomic(
-        "PickPlaceToasterToCounter",
-        600,
-        "The slice is on the plate, the gripper away.",
+    Task(
+        name="PickPlaceToasterToCounter",
+        summary="The slice is on the plate, the gripper away.",
         fixtures=(FixtureWanted("toaster", "toaster"), counter_near("toaster")),
-        start=RobotStart("toaster"),
+        robot_start=RobotStart("toaster"),
         choices=(Choice("slot", of="toaster"),),
         objects=(
             ObjectWanted(
@@ -114,17 +126,22 @@ OVENS = (
         ),
         goal=AllOf(ObjectOn("obj", "plate"), GripperFar("obj")),
         stages=place(target="plate", verb="place_on_reaching_in"),
-        sets=SEEN,
+        instruction="Take the bread out of the toaster and put it on the plate.",
+        paraphrases=(
+            "The toast goes onto the plate.",
+            "Bring the slice from the toaster to the plate.",
+            "Serve the bread that is in the toaster on the plate.",
+            "Lift the slice of bread from its slot and lay it on the plate.",
+        ),
     ),
 )
 
 BLENDER_AND_MIXER = (
-    atomic(
-        "PickPlaceCounterToBlender",
-        750,
-        "The fruit is in the blender's jar, the gripper away.",
+    Task(
+        name="PickPlaceCounterToBlender",
+        summary="The fruit is in the blender's jar, the gripper away.",
         fixtures=(FixtureWanted("blender", "blender"), counter_near("blender")),
-        start=RobotStart("blender"),
+        robot_start=RobotStart("blender"),
         objects=(
             ObjectWanted(
                 "obj",
@@ -144,13 +161,19 @@ BLENDER_AND_MIXER = (
         initial=(LidAside("blender", gone=True),),
         goal=AllOf(ObjectInside("obj", "blender"), GripperFar("obj")),
         stages=place(target="blender", verb="drop_into_jug"),
+        instruction="Take the {obj} off the counter and put it into the blender.",
+        paraphrases=(
+            "The {obj} should go into the blender jar.",
+            "Fill the blender with the {obj} from the worktop.",
+            "Let the {obj} drop into the open blender.",
+            "Bring the {obj} from the counter into the blender.",
+        ),
     ),
-    atomic(
-        "PickPlaceCounterToStandMixer",
-        600,
-        "The object is in the lower half of the mixer's bowl, the gripper away.",
+    Task(
+        name="PickPlaceCounterToStandMixer",
+        summary="The object is in the lower half of the mixer's bowl, the gripper away.",
         fixtures=(FixtureWanted("stand_mixer", "stand_mixer"), counter_near("stand_mixer")),
-        start=RobotStart("stand_mixer"),
+        robot_start=RobotStart("stand_mixer"),
         objects=(
             ObjectWanted(
                 "obj",
@@ -162,30 +185,48 @@ BLENDER_AND_MIXER = (
         initial=(PartAt("stand_mixer", "head", (1.0, 1.0)),),
         goal=AllOf(ObjectInside("obj", "stand_mixer", lower=0.5), GripperFar("obj")),
         stages=place(target="stand_mixer", verb="place_inside"),
+        instruction="Take the {obj} off the counter and put it into the bowl of the stand mixer.",
+        paraphrases=(
+            "The {obj} should go into the mixer's bowl.",
+            "Fill the mixing bowl with the {obj} from the worktop.",
+            "Let the {obj} drop into the bowl under the mixer's head.",
+            "Bring the {obj} from the counter into the stand mixer.",
+        ),
     ),
-    atomic(
-        "OpenBlenderLid",
-        450,
-        "The lid lies on a counter, the gripper 15 cm away.",
+    Task(
+        name="OpenBlenderLid",
+        summary="The lid lies on a counter, the gripper 15 cm away.",
         fixtures=(FixtureWanted("blender", "blender"), counter_near("blender")),
-        start=RobotStart("blender"),
+        robot_start=RobotStart("blender"),
         goal=AllOf(
             ObjectTouchesAnyCounter("{blender}_lid"),
             StateIs("blender", "lid", value=False),
             GripperFar("{blender}_lid", 0.15),
         ),
         stages=place("{blender}_lid", "blender", verb="uncover"),
+        instruction="Take the lid off the blender and lay it on the counter.",
+        paraphrases=(
+            "Uncover the blender; its lid goes onto the worktop.",
+            "The blender's lid should lie on the counter.",
+            "Lift off the cover of the blender and put it aside.",
+            "Open the blender jar and leave the lid beside it.",
+        ),
     ),
-    atomic(
-        "CloseBlenderLid",
-        900,
-        "The lid sits on the jar, the gripper 15 cm away.",
+    Task(
+        name="CloseBlenderLid",
+        summary="The lid sits on the jar, the gripper 15 cm away.",
         fixtures=(FixtureWanted("blender", "blender"), counter_near("blender")),
-        start=RobotStart("blender"),
+        robot_start=RobotStart("blender"),
         initial=(LidAside("blender"),),
         goal=AllOf(StateIs("blender", "lid"), GripperFar("{blender}_lid", 0.15)),
         stages=place("{blender}_lid", "blender", verb="cover"),
-        sets=SEEN,
+        instruction="Put the lid on the blender.",
+        paraphrases=(
+            "Cover the blender jar.",
+            "The blender's lid belongs on top of the jar.",
+            "Pick the blender lid up from the counter and close the jar with it.",
+            "Get the blender closed.",
+        ),
     ),
 )
 

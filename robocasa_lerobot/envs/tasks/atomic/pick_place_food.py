@@ -8,15 +8,15 @@ from robocasa_lerobot.envs.predicates import (
     ObjectTouches,
 )
 from robocasa_lerobot.envs.scene.wanted import FixtureWanted, ObjectWanted, Placement, RobotStart
-from robocasa_lerobot.envs.tasks.atomic.common import PHASE1, UNMULTIPLIED, atomic, counter_near, on_counter, place
+from robocasa_lerobot.envs.task import Task
+from robocasa_lerobot.envs.tasks.atomic.common import counter_near, on_counter, place
 
 COUNTER = (
-    atomic(
-        "CheesyBread",
-        750,
-        "The bread is on the board, the cheese on the bread, the gripper away.",
+    Task(
+        name="CheesyBread",
+        summary="The bread is on the board, the cheese on the bread, the gripper away.",
         fixtures=(FixtureWanted("counter", "counter", size=(0.6, 0.6)),),
-        start=RobotStart("counter", at_object="cheese"),
+        robot_start=RobotStart("counter", at_object="cheese"),
         objects=(
             ObjectWanted("bread_container", ("cutting_board",), Placement("counter", size=(0.5, 0.7), pos=(0.0, -1.0))),
             ObjectWanted("bread", ("bread_flat",), Placement(object="bread_container"), scale=1.5),
@@ -34,14 +34,19 @@ COUNTER = (
         ),
         goal=AllOf(ObjectOn("bread", "bread_container"), ObjectTouches("cheese", "bread"), GripperFar("cheese")),
         stages=place("cheese", "bread", verb="place_on"),
-        sets=UNMULTIPLIED,
+        instruction="Put the cheese on the bread on the cutting board.",
+        paraphrases=(
+            "Make cheese bread: the cheese goes on top of the bread.",
+            "Lay the piece of cheese onto the bread.",
+            "The bread on the board should be covered with the cheese.",
+            "Pick up the cheese and place it on the slice of bread.",
+        ),
     ),
-    atomic(
-        "MakeIcedCoffee",
-        750,
-        "One of the ice cubes is inside the glass, the gripper 15 cm away from both.",
+    Task(
+        name="MakeIcedCoffee",
+        summary="One of the ice cubes is inside the glass, the gripper 15 cm away from both.",
         fixtures=(FixtureWanted("cabinet", "cabinet"), counter_near("cabinet")),
-        start=RobotStart("counter", at_object="ice_bowl"),
+        robot_start=RobotStart("counter", at_object="ice_bowl"),
         objects=(
             ObjectWanted("ice_bowl", ("bowl",), on_counter("cabinet", (1.0, 0.4), pos=(0.0, -1.0))),
             ObjectWanted("ice_cube1", ("ice_cube",), Placement(object="ice_bowl"), graspable=True, scale=0.8),
@@ -56,21 +61,25 @@ COUNTER = (
                 filled="coffee",
             ),
         ),
-        # The original's distance of half a metre decides nothing: inside means within the glass.
         goal=AllOf(
             AnyOf(ObjectOn("ice_cube1", "cup", within=0.06), ObjectOn("ice_cube2", "cup", within=0.06)),
             GripperFar("ice_cube1", 0.15),
             GripperFar("ice_cube2", 0.15),
         ),
         stages=place("ice_cube1", "cup", verb="drop_into"),
-        sets=UNMULTIPLIED,
+        instruction="Put an ice cube from the bowl into the glass of coffee.",
+        paraphrases=(
+            "The coffee should be cold: add one ice cube.",
+            "Drop one cube of ice into the glass.",
+            "Bring an ice cube from the bowl to the coffee.",
+            "Make an iced coffee with ice from the bowl.",
+        ),
     ),
-    atomic(
-        "PackDessert",
-        600,
-        "Both foods are in the box, the gripper away.",
+    Task(
+        name="PackDessert",
+        summary="Both foods are in the box, the gripper away.",
         fixtures=(FixtureWanted("counter", "counter"),),
-        start=RobotStart("counter", at_object="cooked_food_container"),
+        robot_start=RobotStart("counter", at_object="cooked_food_container"),
         objects=(
             ObjectWanted(
                 "cooked_food_container",
@@ -93,7 +102,13 @@ COUNTER = (
             GripperFar("dessert"),
         ),
         stages=place("dessert", "cooked_food_container", verb="place_on"),
-        sets=PHASE1,
+        instruction="Put the {dessert} into the tupperware with the {cooked_food}.",
+        paraphrases=(
+            "The {dessert} goes into the box next to the {cooked_food}.",
+            "Pack the {dessert} with the meal.",
+            "Add the {dessert} to the lunch box.",
+            "Bring the {dessert} from the counter into the tupperware.",
+        ),
     ),
 )
 

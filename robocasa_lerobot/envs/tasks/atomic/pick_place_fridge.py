@@ -15,7 +15,8 @@ from robocasa_lerobot.envs.scene.wanted import (
     RobotStart,
     SampleRegion,
 )
-from robocasa_lerobot.envs.tasks.atomic.common import atomic, place
+from robocasa_lerobot.envs.task import Task
+from robocasa_lerobot.envs.tasks.atomic.common import place
 from robocasa_lerobot.envs.tasks.atomic.racks import DRAWER
 
 _FRIDGE_FAR_M = 0.15
@@ -24,12 +25,11 @@ USABLE_SHELF = (0.5, 1.5, 0.20)
 
 
 FRIDGE = (
-    atomic(
-        "PickPlaceFridgeShelfToDrawer",
-        600,
-        "The object is inside the highest drawer of the fridge, the gripper 15 cm away.",
+    Task(
+        name="PickPlaceFridgeShelfToDrawer",
+        summary="The object is inside the highest drawer of the fridge, the gripper 15 cm away.",
         fixtures=(FixtureWanted("fridge", "fridge_with_drawer"),),
-        start=RobotStart("fridge", setback=0.3),
+        robot_start=RobotStart("fridge", setback=0.3),
         choices=(Choice("level", {"-1": {}, "-2": {}}), DRAWER),
         objects=(
             ObjectWanted(
@@ -55,13 +55,19 @@ FRIDGE = (
         initial=(InitialOpenness("fridge", 1.0, 1.0), PartAt("fridge", "{drawer}", (0.8, 1.0))),
         goal=AllOf(ObjectInside("obj", "fridge", region="{drawer}"), GripperFar("obj", _FRIDGE_FAR_M)),
         stages=place(target="fridge", verb="place_inside_fridge", part="{drawer}"),
+        instruction="Take the {obj} off the fridge shelf and put it into the fridge drawer.",
+        paraphrases=(
+            "The {obj} belongs in the drawer of the fridge.",
+            "Move the {obj} from its shelf down to the refrigerator's drawer.",
+            "Drop the {obj} into the open drawer inside the fridge.",
+            "Sort the {obj} into the fridge drawer.",
+        ),
     ),
-    atomic(
-        "PickPlaceFridgeDrawerToShelf",
-        600,
-        "The object is on a shelf of the fridge, the gripper 15 cm away.",
+    Task(
+        name="PickPlaceFridgeDrawerToShelf",
+        summary="The object is on a shelf of the fridge, the gripper 15 cm away.",
         fixtures=(FixtureWanted("fridge", "fridge_with_drawer"),),
-        start=RobotStart("fridge", setback=0.3),
+        robot_start=RobotStart("fridge", setback=0.3),
         choices=(DRAWER,),
         objects=(
             ObjectWanted(
@@ -85,6 +91,13 @@ FRIDGE = (
             GripperFar("obj", _FRIDGE_FAR_M),
         ),
         stages=place(target="fridge", verb="place_inside_fridge", part="fridge_shelf"),
+        instruction="Take the {obj} out of the fridge drawer and put it on a shelf of the fridge.",
+        paraphrases=(
+            "The {obj} belongs on a shelf of the fridge.",
+            "Move the {obj} from the refrigerator's drawer up to a shelf.",
+            "Lay the {obj} from the drawer on any shelf inside the fridge.",
+            "Sort the {obj} onto a shelf in the fridge.",
+        ),
     ),
 )
 

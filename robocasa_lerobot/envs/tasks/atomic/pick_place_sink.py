@@ -6,9 +6,6 @@ from robocasa_lerobot.envs.task import Stage, Task
 
 COUNTER_TO_SINK = Task(
     name="PickPlaceCounterToSink",
-    kind="atomic",
-    activity="atomic",
-    horizon=600,
     summary="Goal: an object from the counter lies in the sink. Success: its centre is in the basin, the gripper away.",
     fixtures=(FixtureWanted("sink", "sink"),),
     robot_start=RobotStart("sink"),
@@ -28,6 +25,7 @@ COUNTER_TO_SINK = Task(
         ObjectWanted("distr_sink", ("any",), InsideOf("sink", size=(0.25, 0.25), at=1.0), washable=True),
     ),
     goal=AllOf(ObjectInBasin("obj", "sink"), GripperFar("obj")),
+    stages=(Stage("pick_place", "place", "sink", object="obj"),),
     instruction="Take the {obj} off the counter and put it into the sink.",
     paraphrases=(
         "The {obj} belongs in the sink basin; bring it there.",
@@ -35,8 +33,6 @@ COUNTER_TO_SINK = Task(
         "Move the {obj} from the worktop to the basin.",
         "Place the {obj} in the sink so that it can be washed.",
     ),
-    stages=(Stage("pick_place", "place", "sink", object="obj"),),
-    sets=("pretrain100", "pretrain200", "pretrain300", "lifelong_phase1", "mimicgen60"),
 )
 
 TASKS = (COUNTER_TO_SINK,)

@@ -12,7 +12,6 @@ from robocasa_lerobot.envs.scene.wanted import (
     SampleRegion,
 )
 from robocasa_lerobot.envs.task import Stage, Task
-from robocasa_lerobot.envs.tasks.atomic.common import COMMON, SEEN, atomic
 
 # Which way a rack is to go, with the words for it; one that is to come out starts half out, one to go in all the way.
 DIRECTION = Choice("direction", {"out": {"verb": "Pull"}, "in": {"verb": "Push"}})
@@ -39,40 +38,47 @@ _FRIDGE_OBJECTS = (
 )
 
 
-def _fridge_drawer(name: str, summary: str, at: tuple[float, float], goal: PartWithin, verb: str) -> Task:
-    return atomic(
-        name,
-        450,
-        summary,
+def _fridge_drawer(
+    name: str,
+    summary: str,
+    at: tuple[float, float],
+    goal: PartWithin,
+    verb: str,
+    *,
+    instruction: str,
+    paraphrases: tuple[str, ...],
+) -> Task:
+    return Task(
+        name=name,
+        summary=summary,
         fixtures=(FixtureWanted("fridge", "fridge_with_drawer"),),
-        # A drawer that is out would meet a robot at the usual distance.
-        start=RobotStart("fridge", setback=0.3),
+        robot_start=RobotStart("fridge", setback=0.3),
         choices=(DRAWER,),
         objects=_FRIDGE_OBJECTS,
         initial=(InitialOpenness("fridge", 1.0, 1.0), PartAt("fridge", FRIDGE_DRAWER, at)),
         goal=goal,
         stages=(Stage("racks", verb, "fridge", part=FRIDGE_DRAWER),),
+        instruction=instruction,
+        paraphrases=paraphrases,
     )
 
 
 def _rack(
     name: str,
     kind: str,
-    horizon: int,
     part: str,
     *,
+    instruction: str,
+    paraphrases: tuple[str, ...],
     choices: tuple[Choice, ...] = (),
     door: tuple[float, float] = (1.0, 1.0),
-    sets: tuple[str, ...] = COMMON,
     needs: tuple[str, ...] = (),
 ) -> Task:
-    return atomic(
-        name,
-        horizon,
-        "The rack is out by at least 95 % of its range, or in to at most 5 %, as the instruction says.",
+    return Task(
+        name=name,
+        summary="The rack is out by at least 95 % of its range, or in to at most 5 %, as the instruction says.",
         fixtures=(FixtureWanted(kind, kind),),
-        # The open door of a dishwasher, and its rack, take the place in front of it; that of an oven, the nearer part.
-        start=RobotStart(kind, beside=kind == "dishwasher", setback=0.35 if kind == "oven" else 0.0),
+        robot_start=RobotStart(kind, beside=kind == "dishwasher", setback=0.35 if kind == "oven" else 0.0),
         choices=(DIRECTION, *choices),
         initial=(InitialOpenness(kind, *door), PartAt(kind, part, STARTS, "direction")),
         goal=When(
@@ -83,7 +89,8 @@ def _rack(
             },
         ),
         stages=(Stage("racks", "slide", kind, part=part),),
-        sets=sets,
+        instruction=instruction,
+        paraphrases=paraphrases,
         needs=needs,
     )
 
@@ -95,6 +102,13 @@ TASKS = (
         (0.1, 0.3),
         PartWithin("fridge", FRIDGE_DRAWER, low=0.70, label="open"),
         "pull",
+        instruction="Pull the fridge drawer out all the way.",
+        paraphrases=(
+            "The half-open drawer in the fridge should be fully out.",
+            "Slide the drawer of the refrigerator further open.",
+            "Draw the vegetable drawer in the fridge towards you.",
+            "Get the fridge drawer completely open.",
+        ),
     ),
     _fridge_drawer(
         "CloseFridgeDrawer",
@@ -102,8 +116,52 @@ TASKS = (
         (0.8, 1.0),
         PartWithin("fridge", FRIDGE_DRAWER, high=0.05, label="closed"),
         "push",
+        instruction="Push the drawer in the fridge shut.",
+        paraphrases=(
+            "Slide the refrigerator's drawer back.",
+            "The drawer inside the fridge should be closed.",
+            "Put the fridge drawer back to where it belongs.",
+            "No part of the fridge drawer should stick out.",
+        ),
     ),
-    _rack("SlideDishwasherRack", "dishwasher", 450, "rack1", door=(0.90, 1.0), sets=SEEN),
-    _rack("SlideOvenRack", "oven", 450, "{rack}", choices=(Choice("rack", of="oven"),), needs=("oven",)),
-    _rack("SlideToasterOvenRack", "toaster_oven", 300, "{rack}", choices=(Choice("rack", of="toaster_oven"),)),
+    _rack(
+        "SlideDishwasherRack",
+        "dishwasher",
+        "rack1",
+        door=(0.90, 1.0),
+        instruction="{verb} the top rack of the dishwasher all the way {direction}.",
+        paraphrases=(
+            "Make the upper dishwasher rack go {direction} completely.",
+            "The dishwasher's top rack should be all the way {direction}.",
+            "Slide the upper basket of the dishwasher {direction} until it stops.",
+            "Move the dishwasher's upper rack {direction}.",
+        ),
+    ),
+    _rack(
+        "SlideOvenRack",
+        "oven",
+        "{rack}",
+        choices=(Choice("rack", of="oven"),),
+        needs=("oven",),
+        instruction="{verb} the {rack} rack of the oven all the way {direction}.",
+        paraphrases=(
+            "Make the oven's {rack} rack go {direction} completely.",
+            "The {rack} rack in the oven should be all the way {direction}.",
+            "Slide the {rack} grid of the oven {direction} until it stops.",
+            "Move the oven's {rack} rack {direction}.",
+        ),
+    ),
+    _rack(
+        "SlideToasterOvenRack",
+        "toaster_oven",
+        "{rack}",
+        choices=(Choice("rack", of="toaster_oven"),),
+        instruction="{verb} the {rack} of the toaster oven all the way {direction}.",
+        paraphrases=(
+            "Make the toaster oven's {rack} go {direction} completely.",
+            "The {rack} in the toaster oven should be all the way {direction}.",
+            "Slide the {rack} of the toaster oven {direction} until it stops.",
+            "Move the toaster oven's {rack} {direction}.",
+        ),
+    ),
 )

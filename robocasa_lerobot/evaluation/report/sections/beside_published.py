@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from robocasa_lerobot.evaluation import published
-from robocasa_lerobot.evaluation.published import Entry, PublishedTable
+from robocasa_lerobot.benchmark import published
+from robocasa_lerobot.benchmark.published import Entry, PublishedTable
 from robocasa_lerobot.evaluation.report import format as fmt
 from robocasa_lerobot.evaluation.report.joining import same_training
 from robocasa_lerobot.evaluation.report.model import Cell, Column, Section, Table

@@ -10,8 +10,8 @@ from typing import Any
 
 import yaml
 
+from robocasa_lerobot.benchmark.published import read
 from robocasa_lerobot.errors import UserError
-from robocasa_lerobot.evaluation.published import read
 from robocasa_lerobot.evaluation.results import PolicyInfo, RunHeader
 
 PER_TASK = "per_task"

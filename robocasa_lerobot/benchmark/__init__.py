@@ -1,0 +1,1 @@
+"""What RoboCasa365 publishes, as data: its tasks, and its results."""
