@@ -46,7 +46,7 @@ def record(folder: Path, episodes: int, workers: int, image_size: int = contract
 
     The states-only copy has neither pictures nor proprioception, as human recordings come: both must be computed.
     """
-    from robocasa_lerobot.demos.record import RecordingSettings, record_task
+    from robocasa_lerobot.demos.recording import RecordingSettings, record_task
 
     version = robocasa_lerobot.__version__  # another version may record other demonstrations
     place = folder / f"{TASK}-{episodes}-{image_size}-{version}"

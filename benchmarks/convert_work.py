@@ -32,7 +32,7 @@ from robocasa_lerobot.convert.reading.mjcf import AssetFinder, loadable
 from robocasa_lerobot.convert.settings import ConversionSettings
 from robocasa_lerobot.convert.writing.encoder import ENCODER_THREADS
 from robocasa_lerobot.convert.writing.statistics import column
-from robocasa_lerobot.rendering import SceneRenderer
+from robocasa_lerobot.envs.rendering import SceneRenderer
 
 Picture = NDArray[np.uint8]
 BATCH = 16

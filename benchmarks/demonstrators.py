@@ -26,9 +26,9 @@ from demonstrators_trial import Key, Trial
 
 from robocasa_lerobot.demos.choose import expand_names
 from robocasa_lerobot.demos.demonstrator import can_demonstrate
-from robocasa_lerobot.demos.episode import record_episode
+from robocasa_lerobot.demos.recorder import record_episode
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
-from robocasa_lerobot.envs.registry import get_task, task_names
+from robocasa_lerobot.envs.tasks.registry import get_task, task_names
 from robocasa_lerobot.progress import Bar
 
 OUTPUT = common.RESULTS / "demonstrators.json"
@@ -107,7 +107,7 @@ def run(jobs: list[Key], path: Path, workers: int) -> None:
     path.parent.mkdir(parents=True, exist_ok=True)
     _mend(path)
     context = multiprocessing.get_context("forkserver")
-    context.set_forkserver_preload(["robocasa_lerobot.demos.episode"])
+    context.set_forkserver_preload(["robocasa_lerobot.demos.recorder"])
     solved = failed = 0
     with ProcessPoolExecutor(workers, mp_context=context) as pool, path.open("a", encoding="utf-8") as file:
         futures = [pool.submit(attempt, job, workers, commit) for job in jobs]

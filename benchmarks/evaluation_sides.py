@@ -67,8 +67,8 @@ def make_checkpoint(folder: Path, settings: dict[str, Any], image_size: int) -> 
 
 def run_ours(job: Job) -> dict[str, Any]:
     """Our engine, on the seeds that LeRobot gives its episodes: seed, seed + 1, ... for each task."""
-    from robocasa_lerobot.evaluation.config import EnvSettings, EvaluationConfig, PolicySettings
-    from robocasa_lerobot.evaluation.engine import evaluate, prepare
+    from robocasa_lerobot.evaluation.config.evaluation import EnvSettings, EvaluationConfig, PolicySettings
+    from robocasa_lerobot.evaluation.run.engine import evaluate, prepare
     from robocasa_lerobot.gl import ensure_gl
 
     ensure_gl()

@@ -7,14 +7,14 @@ from dataclasses import dataclass
 import mujoco
 import numpy as np
 
-from robocasa_lerobot.envs.scene import robot_names as names
-from robocasa_lerobot.envs.scene.materials import MaterialPalette, load_style, style_ids
-from robocasa_lerobot.envs.scene.objects import catalogue
-from robocasa_lerobot.envs.scene.objects.grasping import GraspPose, grasp_poses_as_it_lies
-from robocasa_lerobot.envs.scene.objects.shapes import add_object
-from robocasa_lerobot.envs.scene.robot import _add_meshes, apply_simulation_options
-from robocasa_lerobot.envs.scene.robot_bodies import BODIES
-from robocasa_lerobot.envs.scene.robot_shapes import _HAND_MESH_QUAT, _MATERIALS, _fingers, _mesh
+from robocasa_lerobot.envs.kitchens.materials import MaterialPalette, load_style, style_ids
+from robocasa_lerobot.envs.objects import catalogue
+from robocasa_lerobot.envs.objects.grasping import GraspPose, grasp_poses_as_it_lies
+from robocasa_lerobot.envs.objects.shapes import add_object
+from robocasa_lerobot.envs.robots.panda_omron import names
+from robocasa_lerobot.envs.robots.panda_omron.bodies import BODIES
+from robocasa_lerobot.envs.robots.panda_omron.model import _add_meshes, apply_simulation_options
+from robocasa_lerobot.envs.robots.panda_omron.shapes import _HAND_MESH_QUAT, _MATERIALS, _fingers, _mesh
 
 SLIDES = ("slide_x", "slide_y", "slide_z")
 LIFT_M, HOVER_M = 0.10, 0.06

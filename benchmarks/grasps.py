@@ -15,7 +15,7 @@ from pathlib import Path
 from common import REPOSITORY, RESULTS, machine, table, versions, write_result
 from grasping_trial import CLOSE_S, HOLD_S, LIFT_M, POSES, Outcome, try_instance
 
-from robocasa_lerobot.envs.scene.objects import catalogue
+from robocasa_lerobot.envs.objects import catalogue
 from robocasa_lerobot.progress import Bar
 
 AIM_OVERALL, AIM_CATEGORY = 0.95, 0.60

@@ -18,9 +18,9 @@ from peers import sim_loop
 
 import robocasa_lerobot
 from robocasa_lerobot import contract
-from robocasa_lerobot.envs.control.controller import RobotController
-from robocasa_lerobot.envs.control.step import control_step
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
+from robocasa_lerobot.envs.robots.panda_omron.control.controller import RobotController
+from robocasa_lerobot.envs.robots.panda_omron.control.step import control_step
 
 TASK = "PickPlaceCounterToSink"
 SPLIT_PASSES = 3

@@ -19,10 +19,16 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from robocasa_lerobot.envs.control.controller import RobotController
-from robocasa_lerobot.envs.control.step import control_step
-from robocasa_lerobot.envs.proprioception import read_observations
-from robocasa_lerobot.envs.scene.robot import SPAWN_POSITION, add_robot, apply_simulation_options, place_base, set_home
+from robocasa_lerobot.envs.robots.panda_omron.control.controller import RobotController
+from robocasa_lerobot.envs.robots.panda_omron.control.step import control_step
+from robocasa_lerobot.envs.robots.panda_omron.model import (
+    SPAWN_POSITION,
+    add_robot,
+    apply_simulation_options,
+    place_base,
+    set_home,
+)
+from robocasa_lerobot.envs.robots.panda_omron.proprioception import read_observations
 from robocasa_lerobot.envs.scene.scene import SETTLE_STEPS
 from robocasa_lerobot.errors import UserError
 from robocasa_lerobot.progress import Bar

@@ -14,8 +14,8 @@ from lerobot.datasets.lerobot_dataset import LeRobotDataset
 from lerobot.datasets.sampler import EpisodeAwareSampler
 
 from robocasa_lerobot import contract
-from robocasa_lerobot.data.config import MemberConfig, MixtureConfig
 from robocasa_lerobot.data.mixture import MixtureDataset, StepBatches
+from robocasa_lerobot.data.mixture_config import MemberConfig, MixtureConfig
 
 type Windows = Mapping[str, Sequence[float]]
 WARM_UP = 2  # batches before the clock starts: decoders open, worker processes are there

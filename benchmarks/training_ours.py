@@ -15,11 +15,11 @@ from accelerate import Accelerator
 from lerobot.datasets.factory import resolve_delta_timestamps
 from training_loaders import LeRobotBatches, lerobot_dataset
 
-from robocasa_lerobot.training import builders
-from robocasa_lerobot.training.config import load_experiment
+from robocasa_lerobot.training.config.experiment import load_experiment
 from robocasa_lerobot.training.loop import train_phase
 from robocasa_lerobot.training.phases import run_experiment
-from robocasa_lerobot.training.prepare import prepare_phase
+from robocasa_lerobot.training.setup import builders
+from robocasa_lerobot.training.setup.build_phase import prepare_phase
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -10,11 +10,11 @@ import mujoco
 import numpy as np
 
 from robocasa_lerobot.contract import SUBSTEPS
-from robocasa_lerobot.envs.bodies import subtree
-from robocasa_lerobot.envs.scene.appliances.base import update_all
-from robocasa_lerobot.envs.scene.appliances.catalogue import build_appliance
-from robocasa_lerobot.envs.scene.materials import MaterialPalette, load_style
-from robocasa_lerobot.envs.scene.robot import apply_simulation_options
+from robocasa_lerobot.envs.kitchens.appliances.base import update_all
+from robocasa_lerobot.envs.kitchens.appliances.catalogue import build_appliance
+from robocasa_lerobot.envs.kitchens.materials import MaterialPalette, load_style
+from robocasa_lerobot.envs.robots.panda_omron.model import apply_simulation_options
+from robocasa_lerobot.envs.scene.bodies import subtree
 
 FINGER_M = 0.008  # radius
 SPRING, MOST_GIVE_M = 3000.0, 0.016

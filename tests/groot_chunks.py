@@ -15,11 +15,11 @@ from walk_hub import REPOSITORIES, TINY_BACKBONE, write_hub
 
 from robocasa_lerobot import contract
 from robocasa_lerobot.data.mixture import MixtureMeta
-from robocasa_lerobot.evaluation.actor import ChunkRequest, chunk_seed
-from robocasa_lerobot.evaluation.checkpoints import read_source
-from robocasa_lerobot.evaluation.chunk_policy import ChunkPolicy, LoadedCheckpoint
-from robocasa_lerobot.evaluation.policy_runner import StepPolicy
-from robocasa_lerobot.training import builders
+from robocasa_lerobot.evaluation.actors.actor import ChunkRequest, chunk_seed
+from robocasa_lerobot.evaluation.actors.checkpoint import read_source
+from robocasa_lerobot.evaluation.actors.chunk_policy import ChunkPolicy, LoadedCheckpoint
+from robocasa_lerobot.evaluation.actors.policy_runner import StepPolicy
+from robocasa_lerobot.training.setup import builders
 
 SIZE = 64
 NEEDED = (TINY_BACKBONE, "nvidia/Cosmos-Reason2-2B", "nvidia/GR00T-N1.7-3B")

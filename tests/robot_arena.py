@@ -9,10 +9,10 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from robocasa_lerobot.envs.control.controller import RobotController
-from robocasa_lerobot.envs.control.step import control_step
-from robocasa_lerobot.envs.proprioception import read_observations, read_state
-from robocasa_lerobot.envs.scene.robot import add_robot, apply_simulation_options, place_base, set_home
+from robocasa_lerobot.envs.robots.panda_omron.control.controller import RobotController
+from robocasa_lerobot.envs.robots.panda_omron.control.step import control_step
+from robocasa_lerobot.envs.robots.panda_omron.model import add_robot, apply_simulation_options, place_base, set_home
+from robocasa_lerobot.envs.robots.panda_omron.proprioception import read_observations, read_state
 
 SHARED = Path(__file__).parents[2] / "shared"
 SETTLE_STEPS = 10

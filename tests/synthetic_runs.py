@@ -17,9 +17,9 @@ from scipy.stats import norm
 
 from robocasa_lerobot.benchmark import published
 from robocasa_lerobot.benchmark.tasks import published_task_sets
-from robocasa_lerobot.evaluation.config import EvaluationConfig
-from robocasa_lerobot.evaluation.overrides import load_config
-from robocasa_lerobot.evaluation.results import (
+from robocasa_lerobot.evaluation.config.evaluation import EvaluationConfig
+from robocasa_lerobot.evaluation.config.loader import load_config
+from robocasa_lerobot.evaluation.records.results import (
     TRIALS_FILE,
     PolicyInfo,
     RunHeader,
@@ -27,9 +27,9 @@ from robocasa_lerobot.evaluation.results import (
     TermSummary,
     TrialRecord,
 )
-from robocasa_lerobot.training.config import load_experiment
-from robocasa_lerobot.training.evaluations import PhaseEvaluation, phase_evaluations
-from robocasa_lerobot.training.phase_config import PhaseConfig
+from robocasa_lerobot.training.config.experiment import load_experiment
+from robocasa_lerobot.training.config.phase import PhaseConfig
+from robocasa_lerobot.training.planning.evaluations import PhaseEvaluation, phase_evaluations
 from robocasa_lerobot.video import VideoWriter
 
 TERMS = ("reached", "grasped", "placed", "gripper_away")
@@ -297,7 +297,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("out", type=Path)
     folder = parser.parse_args().out
-    from robocasa_lerobot.evaluation.report_command import write_report
+    from robocasa_lerobot.evaluation.report.output import write_report
 
     for name, make in RUNS.items():
         write_report(make(folder / name), out=folder / name / "report.html")

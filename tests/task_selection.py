@@ -8,8 +8,8 @@ from typing import Any
 import pytest
 
 from robocasa_lerobot.demos.demonstrator import can_demonstrate
-from robocasa_lerobot.envs.registry import get_task, task_names
-from robocasa_lerobot.envs.task import Task
+from robocasa_lerobot.envs.tasks.registry import get_task, task_names
+from robocasa_lerobot.envs.tasks.task import Task
 
 # Among the fast tests: one task of every sort that is declared, and one of every sort that a demonstrator solves.
 _SORTS = ("OpenFridge", "TurnOnStove", "PickPlaceToasterToCounter")

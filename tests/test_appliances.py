@@ -6,8 +6,8 @@ import mujoco
 import numpy as np
 import pytest
 
-from robocasa_lerobot.envs.scene.appliances.base import OPEN_FROM
-from robocasa_lerobot.envs.scene.appliances.catalogue import (
+from robocasa_lerobot.envs.kitchens.appliances.base import OPEN_FROM
+from robocasa_lerobot.envs.kitchens.appliances.catalogue import (
     build_appliance,
     categories,
     kinds,
@@ -15,10 +15,10 @@ from robocasa_lerobot.envs.scene.appliances.catalogue import (
     models_in,
     models_of,
 )
-from robocasa_lerobot.envs.scene.appliances.finishes import finish, finish_names
-from robocasa_lerobot.envs.scene.appliances.pictures import appliance_pictures
-from robocasa_lerobot.envs.scene.materials import MaterialPalette, load_style
+from robocasa_lerobot.envs.kitchens.appliances.finishes import finish, finish_names
+from robocasa_lerobot.envs.kitchens.materials import MaterialPalette, load_style
 from robocasa_lerobot.errors import UnknownNameError
+from robocasa_lerobot.gallery.appliance_pictures import appliance_pictures
 
 # Inventory of RoboCasa365 (docs/robocasa.md, section 9).
 COUNTS = {

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from appliance_rig import Bench
 
-from robocasa_lerobot.envs.scene.appliances.catalogue import categories, kinds, models_in, models_of
+from robocasa_lerobot.envs.kitchens.appliances.catalogue import categories, kinds, models_in, models_of
 
 ALL = [record.model_id for category in categories() for record in models_in(category)]
 # Of every kind one model of each split, and for those with several designs one more.

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
-from robocasa_lerobot.envs.scene.appliances.base import Appliance, take_effect
+from robocasa_lerobot.envs.kitchens.appliances.base import Appliance, take_effect
 
 STILL = np.zeros(12, dtype=np.float32)
 

@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 
 from robocasa_lerobot.benchmark.tasks import facts_of
-from robocasa_lerobot.envs.registry import task_names
+from robocasa_lerobot.envs.tasks.registry import task_names
 
 BENCHMARKS = Path(__file__).parents[1] / "benchmarks"
 

@@ -33,7 +33,7 @@ def test_ratios_are_of_trials_per_hour_on_the_same_films() -> None:
 
 
 def test_tasks_have_different_lengths_and_options_are_read() -> None:
-    from robocasa_lerobot.envs.registry import get_task
+    from robocasa_lerobot.envs.tasks.registry import get_task
 
     speed = module("evaluation_speed")
     assert len({get_task(task).horizon for task in speed.TASKS}) == 3

@@ -6,7 +6,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from robocasa_lerobot.envs.bodies import subtree
+from robocasa_lerobot.envs.scene.bodies import subtree
 
 
 def hangs_on(model: mujoco.MjModel, body: int, root: int) -> bool:

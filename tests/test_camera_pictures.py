@@ -13,15 +13,15 @@ import pytest
 from gymnasium.utils.env_checker import check_env
 
 from robocasa_lerobot import contract
-from robocasa_lerobot.envs.camera_noise import CameraNoise
-from robocasa_lerobot.envs.cameras import CAMERA_SETS, apply_camera_configs
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
+from robocasa_lerobot.envs.kitchens.surroundings import SURROUNDINGS
 from robocasa_lerobot.envs.pictures import BACKGROUND
 from robocasa_lerobot.envs.projection import back_project, camera_matrix, project
-from robocasa_lerobot.envs.scene.builder import RENDER_PRESETS
-from robocasa_lerobot.envs.scene.robot_bodies import BODIES
-from robocasa_lerobot.envs.scene.surroundings import SURROUNDINGS
-from robocasa_lerobot.rendering import canvas
+from robocasa_lerobot.envs.rendering import canvas
+from robocasa_lerobot.envs.robots.panda_omron.bodies import BODIES
+from robocasa_lerobot.envs.robots.panda_omron.camera_noise import CameraNoise
+from robocasa_lerobot.envs.robots.panda_omron.cameras import CAMERA_SETS, apply_camera_configs
+from robocasa_lerobot.envs.scene.build import RENDER_PRESETS
 
 pytestmark = pytest.mark.render
 

@@ -11,8 +11,10 @@ import pytest
 from robot_arena import Arena, arena_spec
 
 from robocasa_lerobot import contract
-from robocasa_lerobot.envs.camera_noise import CAMERA_NOISE, CameraNoise, add_camera_noise
-from robocasa_lerobot.envs.cameras import (
+from robocasa_lerobot.envs.kitchen_env import KitchenEnv
+from robocasa_lerobot.envs.projection import back_project, camera_matrix, project, raw_depth
+from robocasa_lerobot.envs.robots.panda_omron.camera_noise import CAMERA_NOISE, CameraNoise, add_camera_noise
+from robocasa_lerobot.envs.robots.panda_omron.cameras import (
     CAMERA_SETS,
     add_cameras,
     apply_camera_configs,
@@ -20,12 +22,10 @@ from robocasa_lerobot.envs.cameras import (
     cameras_of_set,
     check_camera_names,
 )
-from robocasa_lerobot.envs.kitchen_env import KitchenEnv
-from robocasa_lerobot.envs.projection import back_project, camera_matrix, project, raw_depth
-from robocasa_lerobot.envs.registry import get_task
-from robocasa_lerobot.envs.scene.builder import build_scene
-from robocasa_lerobot.envs.scene.robot import add_robot, apply_simulation_options
+from robocasa_lerobot.envs.robots.panda_omron.model import add_robot, apply_simulation_options
+from robocasa_lerobot.envs.scene.build import build_scene
 from robocasa_lerobot.envs.scene.scene import Scene
+from robocasa_lerobot.envs.tasks.registry import get_task
 from robocasa_lerobot.errors import UnknownNameError, UserError
 
 LEFT, RIGHT, WRIST = contract.CAMERAS

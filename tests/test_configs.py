@@ -11,14 +11,15 @@ import pytest
 from training_support import TINY
 
 from robocasa_lerobot import contract
-from robocasa_lerobot.data.config import MixtureConfig
-from robocasa_lerobot.data.registry_file import load_registry
-from robocasa_lerobot.evaluation.check import check
-from robocasa_lerobot.evaluation.config import EvaluationConfig
-from robocasa_lerobot.evaluation.overrides import load_config
-from robocasa_lerobot.training import overlay, skipped
-from robocasa_lerobot.training.config import FROM_SCRATCH, HUB, ExperimentConfig, load_experiment, to_yaml
-from robocasa_lerobot.training.evaluations import command_arguments, phase_evaluations
+from robocasa_lerobot.data.mixture_config import MixtureConfig
+from robocasa_lerobot.data.registry.registry_file import load_registry
+from robocasa_lerobot.evaluation.config.evaluation import EvaluationConfig
+from robocasa_lerobot.evaluation.config.loader import load_config
+from robocasa_lerobot.evaluation.planning.check import check
+from robocasa_lerobot.training.config import experiment_files as overlay
+from robocasa_lerobot.training.config.experiment import FROM_SCRATCH, HUB, ExperimentConfig, load_experiment, to_yaml
+from robocasa_lerobot.training.planning import skipped
+from robocasa_lerobot.training.planning.evaluations import command_arguments, phase_evaluations
 
 CONFIGS = Path(__file__).parents[1] / "configs"
 PARTS = CONFIGS / "experiments" / "parts"  # bases that are no experiments by themselves
@@ -96,8 +97,8 @@ def test_lifelong_phases_are_evaluated_on_the_tasks_so_far() -> None:
 @pytest.mark.parametrize("path", EXPERIMENTS, ids=name_of)
 def test_experiment_plans(path: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Without any data, and for the published ones without the policies' weights: the plan says what is missing."""
-    plan = pytest.importorskip("robocasa_lerobot.training.plan")
-    plan_text = pytest.importorskip("robocasa_lerobot.training.plan_text")
+    plan = pytest.importorskip("robocasa_lerobot.training.planning.plan")
+    plan_text = pytest.importorskip("robocasa_lerobot.training.planning.plan_text")
     monkeypatch.chdir(tmp_path)  # there are no datasets here
     if path not in OWN:  # building pi0 takes minutes even without memory for its weights
         monkeypatch.setattr(plan, "_plan_policy", lambda *_: None)
@@ -114,8 +115,8 @@ def test_experiment_plans(path: Path, tmp_path: Path, monkeypatch: pytest.Monkey
 
 @pytest.mark.parametrize("path", OWN, ids=name_of)
 def test_policies_of_our_own_experiments_build(path: Path) -> None:
-    builders = pytest.importorskip("robocasa_lerobot.training.builders")
-    adapters = pytest.importorskip("robocasa_lerobot.training.adapters")
+    builders = pytest.importorskip("robocasa_lerobot.training.setup.builders")
+    adapters = pytest.importorskip("robocasa_lerobot.training.weights.adapters")
     from robocasa_lerobot.data.mixture import MixtureMeta
 
     experiment = load_experiment(path)
@@ -164,7 +165,7 @@ def all_datasets(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A working directory in which every dataset of the experiments lies where they look: one of two fake ones."""
     from robocasa_lerobot.benchmark.tasks import published_task_sets, published_tasks
     from robocasa_lerobot.data.fake import INSTRUCTIONS, write_fake_dataset
-    from robocasa_lerobot.data.published import PUBLISHED
+    from robocasa_lerobot.data.registry.published import PUBLISHED
 
     work = tmp_path_factory.mktemp("work")
     small = write_fake_dataset(work / "small", episodes=4, length=4, image_size=32)

@@ -8,8 +8,8 @@ import pytest
 from robot_arena import Arena, action, arena_spec
 
 from robocasa_lerobot.contract import ContractError
-from robocasa_lerobot.envs.control import indices
-from robocasa_lerobot.envs.scene import robot_names as names
+from robocasa_lerobot.envs.robots.panda_omron import names
+from robocasa_lerobot.envs.robots.panda_omron.control import indices
 
 TORSO = names.TORSO_JOINT
 # RoboCasa's gains: stiffness per unit of mass, critically damped.

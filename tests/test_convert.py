@@ -26,7 +26,8 @@ pytest.importorskip("lerobot.datasets")
 from lerobot.datasets.lerobot_dataset import LeRobotDataset
 
 from robocasa_lerobot.convert import pipeline
-from robocasa_lerobot.convert.pipeline import META_FOLDER, convert
+from robocasa_lerobot.convert.pipeline import convert
+from robocasa_lerobot.convert.record_files import META_FOLDER
 from robocasa_lerobot.convert.settings import ConversionSettings, Plan, Shard
 from robocasa_lerobot.convert.shard import ShardOutcome
 from robocasa_lerobot.convert.verify import verify

@@ -14,7 +14,8 @@ from robocasa_lerobot.errors import UserError
 
 pytest.importorskip("lerobot.datasets")
 
-from robocasa_lerobot.convert.pipeline import META_FOLDER, convert
+from robocasa_lerobot.convert.pipeline import convert
+from robocasa_lerobot.convert.record_files import META_FOLDER
 from robocasa_lerobot.convert.settings import ConversionSettings
 from robocasa_lerobot.jobs.executors import Execution, RaySettings, SlurmSettings
 

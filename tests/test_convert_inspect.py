@@ -21,9 +21,9 @@ from convert_layouts import (
 from convert_support import INSTRUCTION, moving_pictures, write_demos
 
 from robocasa_lerobot import cli, contract
+from robocasa_lerobot.convert.inspect.draft import draft_mapping
 from robocasa_lerobot.convert.inspect.hdf5 import describe, inspect_hdf5
 from robocasa_lerobot.convert.mapping.custom import read_mapping
-from robocasa_lerobot.convert.mapping.draft import draft_mapping
 from robocasa_lerobot.convert.settings import ConversionSettings
 from robocasa_lerobot.errors import UserError
 

@@ -30,7 +30,8 @@ from robocasa_lerobot.jsonl import read_jsonl
 pytest.importorskip("lerobot.datasets")
 from lerobot.datasets.lerobot_dataset import LeRobotDataset
 
-from robocasa_lerobot.convert.pipeline import META_FOLDER, convert
+from robocasa_lerobot.convert.pipeline import convert
+from robocasa_lerobot.convert.record_files import META_FOLDER
 from robocasa_lerobot.convert.verify import verify
 from robocasa_lerobot.convert.writing.statistics import column
 

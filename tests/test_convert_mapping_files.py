@@ -152,9 +152,9 @@ def test_the_documentation_shows_the_same_example() -> None:
 
 def test_a_fixed_arm_becomes_data_that_mix_with_the_mobile_robots(tmp_path: Path) -> None:
     from robocasa_lerobot import contract
-    from robocasa_lerobot.data.config import MemberConfig, MixtureConfig
     from robocasa_lerobot.data.fake import write_fake_dataset
     from robocasa_lerobot.data.mixture import MixtureDataset
+    from robocasa_lerobot.data.mixture_config import MemberConfig, MixtureConfig
 
     rng = np.random.default_rng(0)
     sizes = {"eef_pos": 3, "eef_quat": 4, "gripper_qpos": 2}

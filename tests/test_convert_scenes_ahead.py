@@ -25,7 +25,8 @@ from robocasa_lerobot.convert.settings import Camera, ConversionSettings
 
 pytest.importorskip("lerobot.datasets")
 
-from robocasa_lerobot.convert.pipeline import META_FOLDER, ConversionResult, convert
+from robocasa_lerobot.convert.pipeline import ConversionResult, convert
+from robocasa_lerobot.convert.record_files import META_FOLDER
 
 SECONDS = 60
 SETTINGS = ConversionSettings(image_size=32)

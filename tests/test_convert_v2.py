@@ -21,7 +21,8 @@ from lerobot.datasets.lerobot_dataset import LeRobotDataset
 
 from robocasa_lerobot.convert import pipeline
 from robocasa_lerobot.convert.lerobot_v2.plan import V2Plan
-from robocasa_lerobot.convert.pipeline import META_FOLDER, convert
+from robocasa_lerobot.convert.pipeline import convert
+from robocasa_lerobot.convert.record_files import META_FOLDER
 from robocasa_lerobot.convert.settings import ConversionSettings, Shard
 from robocasa_lerobot.convert.verify import verify
 from robocasa_lerobot.convert.writing.statistics import column

@@ -22,7 +22,8 @@ from robocasa_lerobot.jsonl import read_jsonl, write_jsonl
 pytest.importorskip("lerobot.datasets")
 import av
 
-from robocasa_lerobot.convert.pipeline import META_FOLDER, convert
+from robocasa_lerobot.convert.pipeline import convert
+from robocasa_lerobot.convert.record_files import META_FOLDER
 from robocasa_lerobot.convert.settings import ConversionSettings
 from robocasa_lerobot.convert.verify import verify
 

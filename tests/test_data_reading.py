@@ -13,13 +13,13 @@ from lerobot.datasets.lerobot_dataset import LeRobotDataset
 from lerobot.datasets.video_utils import decode_video_frames
 
 from robocasa_lerobot import contract
-from robocasa_lerobot.data.column_file import map_columns
-from robocasa_lerobot.data.config import LoaderConfig, MemberConfig, MixtureConfig
 from robocasa_lerobot.data.fake import write_fake_dataset
 from robocasa_lerobot.data.mixture import MixtureDataset, StepBatches
-from robocasa_lerobot.data.pictures import PictureReader
-from robocasa_lerobot.data.source import DatasetSource
-from robocasa_lerobot.data.video_reader import VideoReader
+from robocasa_lerobot.data.mixture_config import LoaderConfig, MemberConfig, MixtureConfig
+from robocasa_lerobot.data.reading.column_file import map_columns
+from robocasa_lerobot.data.reading.pictures import PictureReader
+from robocasa_lerobot.data.reading.source import DatasetSource
+from robocasa_lerobot.data.reading.video_reader import VideoReader
 from robocasa_lerobot.errors import UserError
 
 KEY = contract.IMAGE_KEYS[0]

@@ -13,10 +13,10 @@ from training_support import TINY
 
 from robocasa_lerobot import cli
 from robocasa_lerobot.benchmark.tasks import published_task_sets, task_facts
-from robocasa_lerobot.data.config import MixtureConfig, SelectionConfig
 from robocasa_lerobot.data.fake import write_fake_dataset
-from robocasa_lerobot.data.recipes import demonstrated_tasks
-from robocasa_lerobot.data.registry import (
+from robocasa_lerobot.data.mixture_config import MixtureConfig, SelectionConfig
+from robocasa_lerobot.data.registry.recipes import demonstrated_tasks
+from robocasa_lerobot.data.registry.registry import (
     MissingDatasetsError,
     NothingRegisteredError,
     open_registry,
@@ -24,14 +24,14 @@ from robocasa_lerobot.data.registry import (
     resolve_mixture,
     select_datasets,
 )
-from robocasa_lerobot.data.registry_file import load_registry
+from robocasa_lerobot.data.registry.registry_file import load_registry
 from robocasa_lerobot.demos.attempts import MAX_ATTEMPTS_PER_EPISODE
 from robocasa_lerobot.demos.demonstrator import can_demonstrate
-from robocasa_lerobot.envs.registry import get_task, task_names
+from robocasa_lerobot.envs.tasks.registry import get_task, task_names
 from robocasa_lerobot.errors import UnknownNameError, UserError
-from robocasa_lerobot.training.config import load_experiment
-from robocasa_lerobot.training.skipped import PARTIAL, PHASE
-from robocasa_lerobot.training.unavailable import runnable
+from robocasa_lerobot.training.config.experiment import load_experiment
+from robocasa_lerobot.training.planning.skipped import PARTIAL, PHASE
+from robocasa_lerobot.training.planning.unavailable import runnable
 
 EXPERIMENTS = Path(__file__).parents[1] / "configs/experiments"
 KITCHENS = str(EXPERIMENTS / "parts/kitchens.yaml")

@@ -15,14 +15,19 @@ import yaml
 
 from robocasa_lerobot import contract
 from robocasa_lerobot.benchmark.tasks import published_task_sets, published_tasks, task_facts
-from robocasa_lerobot.data.config import MemberConfig, MixtureConfig, SelectionConfig, demo_count
 from robocasa_lerobot.data.fake import write_fake_dataset
-from robocasa_lerobot.data.hub import fetch_missing
 from robocasa_lerobot.data.mixture import MixtureDataset
-from robocasa_lerobot.data.published import PublishedDatasets
-from robocasa_lerobot.data.registry import MissingDatasetsError, missing_datasets, resolve_mixture, select_datasets
-from robocasa_lerobot.data.source import DatasetSource
-from robocasa_lerobot.envs import registry as envs
+from robocasa_lerobot.data.mixture_config import MemberConfig, MixtureConfig, SelectionConfig, demo_count
+from robocasa_lerobot.data.reading.source import DatasetSource
+from robocasa_lerobot.data.registry.hub import fetch_missing
+from robocasa_lerobot.data.registry.published import PublishedDatasets
+from robocasa_lerobot.data.registry.registry import (
+    MissingDatasetsError,
+    missing_datasets,
+    resolve_mixture,
+    select_datasets,
+)
+from robocasa_lerobot.envs.tasks import registry as envs
 from robocasa_lerobot.errors import UnknownNameError, UserError
 from robocasa_lerobot.settings import decode, load_yaml
 

@@ -11,9 +11,9 @@ import torch
 from hypothesis import given
 from hypothesis import strategies as st
 
-from robocasa_lerobot.data.config import LoaderConfig, MemberConfig, MixtureConfig
 from robocasa_lerobot.data.fake import write_fake_dataset
 from robocasa_lerobot.data.mixture import MixtureDataset, StepBatches
+from robocasa_lerobot.data.mixture_config import LoaderConfig, MemberConfig, MixtureConfig
 from robocasa_lerobot.data.sampler import FramePool, MixtureSampler, mixture_probabilities
 
 SIZES = ((1, 4), (2, 8), (4, 16))  # episodes, frames of each

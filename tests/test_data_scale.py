@@ -25,7 +25,7 @@ START = """
 import json, resource, sys, time
 from pathlib import Path
 began = time.perf_counter()
-from robocasa_lerobot.data.config import LoaderConfig, MemberConfig, MixtureConfig
+from robocasa_lerobot.data.mixture_config import LoaderConfig, MemberConfig, MixtureConfig
 from robocasa_lerobot.data.mixture import MixtureDataset, StepBatches
 folder, open_files, keys = json.loads(sys.argv[1])
 marks = {}

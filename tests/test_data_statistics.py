@@ -12,11 +12,11 @@ from hypothesis import strategies as st
 
 from robocasa_lerobot import contract
 from robocasa_lerobot.data import statistics
-from robocasa_lerobot.data.config import LoaderConfig, MemberConfig, MixtureConfig
 from robocasa_lerobot.data.fake import write_fake_dataset
 from robocasa_lerobot.data.mixture import MixtureDataset
+from robocasa_lerobot.data.mixture_config import LoaderConfig, MemberConfig, MixtureConfig
 from robocasa_lerobot.data.quantiles import QuantileSearch
-from robocasa_lerobot.data.source import DatasetSource
+from robocasa_lerobot.data.reading.source import DatasetSource
 from robocasa_lerobot.data.statistics import QUANTILES, Part, pooled_statistics
 from robocasa_lerobot.errors import UserError
 

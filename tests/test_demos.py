@@ -21,12 +21,12 @@ from task_selection import demonstrated, sample
 
 from robocasa_lerobot import contract, demos
 from robocasa_lerobot.demos.demonstrator import demonstrate
-from robocasa_lerobot.demos.episode import SUCCESS_HOLD_STEPS, Recording, record_episode
 from robocasa_lerobot.demos.hdf5 import read_summary
-from robocasa_lerobot.demos.record import RecordingSettings, record_task
+from robocasa_lerobot.demos.recorder import SUCCESS_HOLD_STEPS, Recording, record_episode
+from robocasa_lerobot.demos.recording import RecordingSettings, record_task
 from robocasa_lerobot.demos.skills import SKILLS, SkillError
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
-from robocasa_lerobot.envs.registry import get_task
+from robocasa_lerobot.envs.tasks.registry import get_task
 from robocasa_lerobot.errors import UnknownNameError, UserError
 
 pytestmark = pytest.mark.render
@@ -121,7 +121,7 @@ def test_states_and_proprioception_belong_together(recordings):
 
 
 def _meshes() -> dict[str, bytes]:
-    from robocasa_lerobot.envs.scene.robot import mesh_bytes
+    from robocasa_lerobot.envs.robots.panda_omron.model import mesh_bytes
 
     return mesh_bytes("fast")
 

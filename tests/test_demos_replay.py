@@ -15,7 +15,7 @@ from PIL import Image
 
 from robocasa_lerobot import cli
 from robocasa_lerobot.demos.film_strip import STRIP_PICTURES, STRIP_SIZE
-from robocasa_lerobot.demos.record import RecordingSettings, record_tasks
+from robocasa_lerobot.demos.recording import RecordingSettings, record_tasks
 from robocasa_lerobot.demos.replay import Replayed, demonstrations, replay
 from robocasa_lerobot.errors import UserError
 

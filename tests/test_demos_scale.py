@@ -19,18 +19,18 @@ import pytest
 from slurm_support import stand_in
 
 from robocasa_lerobot import cli
+from robocasa_lerobot.cli.demos import EXAMPLE
 from robocasa_lerobot.demos.attempts import HOPELESS, Parts, RecordingSettings, Tally
 from robocasa_lerobot.demos.choose import choose_tasks, expand_names
-from robocasa_lerobot.demos.command import EXAMPLE
 from robocasa_lerobot.demos.demonstrator import can_demonstrate
 from robocasa_lerobot.demos.hdf5 import Failure, read_summary
 from robocasa_lerobot.demos.motion import Array, action
 from robocasa_lerobot.demos.progress import Board
-from robocasa_lerobot.demos.record import FAILURES_FOLDER, record_task, record_tasks
+from robocasa_lerobot.demos.recording import FAILURES_FOLDER, record_task, record_tasks
 from robocasa_lerobot.demos.skills import SKILLS, SkillError
 from robocasa_lerobot.demos.summary import print_summary
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
-from robocasa_lerobot.envs.registry import get_task, task_names, task_set
+from robocasa_lerobot.envs.tasks.registry import get_task, task_names, task_set
 from robocasa_lerobot.errors import UnknownNameError, UserError
 from robocasa_lerobot.video import frames_and_rate
 

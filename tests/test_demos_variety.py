@@ -9,9 +9,9 @@ import pytest
 
 from robocasa_lerobot import contract
 from robocasa_lerobot.demos.demonstrator import demonstrate
-from robocasa_lerobot.demos.episode import record_episode
 from robocasa_lerobot.demos.motion import CLOSED, FROM_DESIRED, OPEN, action
-from robocasa_lerobot.demos.variety import PLAIN, Variety, give_variety, variety_of
+from robocasa_lerobot.demos.motion_style import PLAIN, Variety, give_variety, variety_of
+from robocasa_lerobot.demos.recorder import record_episode
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 
 _POSITION = contract.ACTION_SLICES["end_effector_position"]

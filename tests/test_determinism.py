@@ -17,7 +17,7 @@ from task_selection import demonstrated, sample
 from robocasa_lerobot.demos.demonstrator import demonstrate
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.state import KitchenState
-from robocasa_lerobot.envs.vector import make_vector_env
+from robocasa_lerobot.envs.vector.kitchens import make_vector_env
 
 EPISODE_STEPS = 15
 

@@ -8,8 +8,9 @@ from pathlib import Path
 
 import pytest
 
-from robocasa_lerobot import cli, doctor, gl
-from robocasa_lerobot.doctor import Finding
+from robocasa_lerobot import cli, gl
+from robocasa_lerobot.cli import doctor
+from robocasa_lerobot.cli.doctor import Finding
 
 SOFTWARE = gl.GLProbe("egl", "llvmpipe (LLVM 15.0.6, 256 bits)")
 HARDWARE = gl.GLProbe("egl", "NVIDIA H200/PCIe/SSE2")

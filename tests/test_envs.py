@@ -16,8 +16,8 @@ from robocasa_lerobot import contract
 from robocasa_lerobot.contract import ContractError
 from robocasa_lerobot.envs.check import check_task
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
-from robocasa_lerobot.envs.registry import get_task, task_names, task_set, task_sets
-from robocasa_lerobot.envs.scene.kitchens import scene_ids
+from robocasa_lerobot.envs.kitchens.splits import scene_ids
+from robocasa_lerobot.envs.tasks.registry import get_task, task_names, task_set, task_sets
 from robocasa_lerobot.errors import UnknownNameError, UserError
 
 pytestmark = pytest.mark.render
@@ -140,7 +140,7 @@ def test_success_needs_every_term():
     env.data.joint("obj_joint0").qpos[:3] = basin.world(env.data)
     mujoco.mj_forward(env.model, env.data)
     assert env._info()["success_terms"] == {"obj_in_sink": True, "gripper_far_from_obj": True}
-    from robocasa_lerobot.envs.scene.robot_names import GRIP_SITE
+    from robocasa_lerobot.envs.robots.panda_omron.names import GRIP_SITE
 
     env.data.joint("obj_joint0").qpos[:3] = env.data.site(GRIP_SITE).xpos
     mujoco.mj_forward(env.model, env.data)

@@ -18,15 +18,16 @@ import test_evaluation_records
 from evaluation_env import SlideEnv
 
 from robocasa_lerobot.errors import UserError
-from robocasa_lerobot.evaluation import engine, results, trials_file
-from robocasa_lerobot.evaluation.config import EvaluationConfig
-from robocasa_lerobot.evaluation.eval_info import write_eval_info
-from robocasa_lerobot.evaluation.film import FILM_EVERY, FILM_FPS, Film
-from robocasa_lerobot.evaluation.overrides import load_config
-from robocasa_lerobot.evaluation.plan import make_plan
-from robocasa_lerobot.evaluation.reference_policies import RandomPolicy, ZeroPolicy
-from robocasa_lerobot.evaluation.results import TrialRecord
-from robocasa_lerobot.evaluation.rollout import RolloutError, run_trial
+from robocasa_lerobot.evaluation.actors.reference_policies import RandomPolicy, ZeroPolicy
+from robocasa_lerobot.evaluation.config.evaluation import EvaluationConfig
+from robocasa_lerobot.evaluation.config.loader import load_config
+from robocasa_lerobot.evaluation.planning.trials import make_plan
+from robocasa_lerobot.evaluation.records import results, trials_file
+from robocasa_lerobot.evaluation.records.eval_info import write_eval_info
+from robocasa_lerobot.evaluation.records.results import TrialRecord
+from robocasa_lerobot.evaluation.run import engine
+from robocasa_lerobot.evaluation.run.film import FILM_EVERY, FILM_FPS, Film
+from robocasa_lerobot.evaluation.run.rollout import RolloutError, run_trial
 from robocasa_lerobot.video import frames_and_rate
 
 ROOT = Path(__file__).parents[1]

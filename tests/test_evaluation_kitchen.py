@@ -6,11 +6,11 @@ from pathlib import Path
 
 import pytest
 
-from robocasa_lerobot.evaluation import engine
-from robocasa_lerobot.evaluation.config import EvaluationConfig
-from robocasa_lerobot.evaluation.film import FILM_SIZE
-from robocasa_lerobot.evaluation.overrides import load_config
-from robocasa_lerobot.evaluation.results import TrialRecord
+from robocasa_lerobot.evaluation.config.evaluation import EvaluationConfig
+from robocasa_lerobot.evaluation.config.loader import load_config
+from robocasa_lerobot.evaluation.records.results import TrialRecord
+from robocasa_lerobot.evaluation.run import engine
+from robocasa_lerobot.evaluation.run.film import FILM_SIZE
 from robocasa_lerobot.gl import ensure_gl
 from robocasa_lerobot.video import read_frames
 

@@ -15,14 +15,17 @@ import pytest
 from evaluation_env import SlideEnv
 
 from robocasa_lerobot import contract
-from robocasa_lerobot.envs import registry
-from robocasa_lerobot.evaluation import actor, engine, plan, resolve, rollout, success
-from robocasa_lerobot.evaluation.actor import ChunkActor, ChunkReply, ChunkRequest, ChunkShape
-from robocasa_lerobot.evaluation.config import EvaluationConfig
-from robocasa_lerobot.evaluation.overrides import load_config
-from robocasa_lerobot.evaluation.plan import TrialSpec
-from robocasa_lerobot.evaluation.reference_policies import ZeroPolicy
-from robocasa_lerobot.evaluation.rollout import Outcome
+from robocasa_lerobot.envs.tasks import registry
+from robocasa_lerobot.evaluation.actors import actor
+from robocasa_lerobot.evaluation.actors.actor import ChunkActor, ChunkReply, ChunkRequest, ChunkShape
+from robocasa_lerobot.evaluation.actors.reference_policies import ZeroPolicy
+from robocasa_lerobot.evaluation.config.evaluation import EvaluationConfig
+from robocasa_lerobot.evaluation.config.loader import load_config
+from robocasa_lerobot.evaluation.planning import run_header as resolve
+from robocasa_lerobot.evaluation.planning import trials as plan
+from robocasa_lerobot.evaluation.planning.trials import TrialSpec
+from robocasa_lerobot.evaluation.run import engine, rollout, success
+from robocasa_lerobot.evaluation.run.rollout import Outcome
 
 TASKS_CSV = Path(__file__).parents[2] / "shared/facts/tasks.csv"
 

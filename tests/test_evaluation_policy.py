@@ -14,12 +14,12 @@ from evaluation_env import SlideEnv
 
 from robocasa_lerobot import contract
 from robocasa_lerobot.errors import UserError
-from robocasa_lerobot.evaluation.actor import ChunkActor, ChunkRequest, chunk_seed
-from robocasa_lerobot.evaluation.checkpoints import read_source
-from robocasa_lerobot.evaluation.chunk_policy import ChunkPolicy, LoadedCheckpoint
-from robocasa_lerobot.evaluation.plan import TrialSpec, make_plan
-from robocasa_lerobot.evaluation.policy_runner import StepPolicy, load_actor
-from robocasa_lerobot.evaluation.rollout import run_trial
+from robocasa_lerobot.evaluation.actors.actor import ChunkActor, ChunkRequest, chunk_seed
+from robocasa_lerobot.evaluation.actors.checkpoint import read_source
+from robocasa_lerobot.evaluation.actors.chunk_policy import ChunkPolicy, LoadedCheckpoint
+from robocasa_lerobot.evaluation.actors.policy_runner import StepPolicy, load_actor
+from robocasa_lerobot.evaluation.planning.trials import TrialSpec, make_plan
+from robocasa_lerobot.evaluation.run.rollout import run_trial
 
 SIZE, HORIZON = 32, 30
 

@@ -8,15 +8,20 @@ from typing import Any
 import pytest
 
 from robocasa_lerobot.benchmark.tasks import published_task_sets
-from robocasa_lerobot.envs.camera_noise import CameraNoise
-from robocasa_lerobot.envs.initial_noise import InitialNoise
-from robocasa_lerobot.envs.registry import task_names
+from robocasa_lerobot.envs.robots.panda_omron.camera_noise import CameraNoise
+from robocasa_lerobot.envs.scene.reset_noise import InitialNoise
+from robocasa_lerobot.envs.tasks.registry import task_names
 from robocasa_lerobot.errors import UserError
-from robocasa_lerobot.evaluation import engine
-from robocasa_lerobot.evaluation.config import PERTURBATIONS, EvaluationConfig
-from robocasa_lerobot.evaluation.overrides import load_config
-from robocasa_lerobot.evaluation.plan import Shard, running_order
-from robocasa_lerobot.evaluation.resolve import NothingRegisteredError, env_arguments, partial_sentence, plan_tasks
+from robocasa_lerobot.evaluation.config.evaluation import PERTURBATIONS, EvaluationConfig
+from robocasa_lerobot.evaluation.config.loader import load_config
+from robocasa_lerobot.evaluation.planning.run_header import (
+    NothingRegisteredError,
+    env_arguments,
+    partial_sentence,
+    plan_tasks,
+)
+from robocasa_lerobot.evaluation.planning.trials import Shard, running_order
+from robocasa_lerobot.evaluation.run import engine
 
 CONFIGS = Path(__file__).parents[1] / "configs/evaluations"
 TARGET_SETS = {"atomic_seen": 18, "composite_seen": 16, "composite_unseen": 16}
@@ -127,7 +132,7 @@ def test_task_sets_of_a_registry_file(tmp_path: Path) -> None:
 
 def test_lifelong_policies_run_the_tasks_of_their_phases(monkeypatch: pytest.MonkeyPatch) -> None:
     sets = {"first": ("OpenDrawer", "CloseDrawer"), "second": ("PickPlaceCounterToSink",)}
-    monkeypatch.setattr("robocasa_lerobot.data.published.published_task_sets", lambda: sets)
+    monkeypatch.setattr("robocasa_lerobot.data.registry.published.published_task_sets", lambda: sets)
     given = ["--env.task_sets=first,second", "--lifelong", "--policy=zero,random", "--trials=1"]
     evaluation = engine.prepare(load_config(EvaluationConfig, [*given, "--policy.lifelong_phase=1,2"]))
     assert [(s.label, s.task) for s in evaluation.plan] == [

@@ -13,15 +13,23 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from robocasa_lerobot import contract
-from robocasa_lerobot.envs.registry import task_names
+from robocasa_lerobot.envs.tasks.registry import task_names
 from robocasa_lerobot.errors import UserError
-from robocasa_lerobot.evaluation import checkpoints, results, trials_file
-from robocasa_lerobot.evaluation.config import EvaluationConfig, PolicySettings
-from robocasa_lerobot.evaluation.overrides import load_config
-from robocasa_lerobot.evaluation.plan import make_plan, trial_seed
-from robocasa_lerobot.evaluation.resolve import outcome_settings, plan_tasks
-from robocasa_lerobot.evaluation.results import PolicyInfo, ResultsError, RunHeader, Seconds, TermSummary, TrialRecord
-from robocasa_lerobot.evaluation.serving import served_labels
+from robocasa_lerobot.evaluation.actors import checkpoint as checkpoints
+from robocasa_lerobot.evaluation.config.evaluation import EvaluationConfig, PolicySettings
+from robocasa_lerobot.evaluation.config.loader import load_config
+from robocasa_lerobot.evaluation.planning.run_header import outcome_settings, plan_tasks
+from robocasa_lerobot.evaluation.planning.trials import make_plan, trial_seed
+from robocasa_lerobot.evaluation.records import results, trials_file
+from robocasa_lerobot.evaluation.records.results import (
+    PolicyInfo,
+    ResultsError,
+    RunHeader,
+    Seconds,
+    TermSummary,
+    TrialRecord,
+)
+from robocasa_lerobot.evaluation.run.serving import served_labels
 from robocasa_lerobot.evaluation.statistics import success_rate, wilson_interval
 
 ROOT = Path(__file__).parents[1]

@@ -9,14 +9,14 @@ from pathlib import Path
 import pytest
 from task_selection import solvable
 
-from robocasa_lerobot.demos.record import RecordingSettings, record_task
-from robocasa_lerobot.envs.registry import task_names
+from robocasa_lerobot.demos.recording import RecordingSettings, record_task
+from robocasa_lerobot.envs.tasks.registry import task_names
 from robocasa_lerobot.errors import UserError
-from robocasa_lerobot.evaluation import engine
-from robocasa_lerobot.evaluation.config import EvaluationConfig
-from robocasa_lerobot.evaluation.overrides import load_config
-from robocasa_lerobot.evaluation.results import TrialRecord
-from robocasa_lerobot.evaluation.stored_episodes import read_episodes
+from robocasa_lerobot.evaluation.actors.stored_episodes import read_episodes
+from robocasa_lerobot.evaluation.config.evaluation import EvaluationConfig
+from robocasa_lerobot.evaluation.config.loader import load_config
+from robocasa_lerobot.evaluation.records.results import TrialRecord
+from robocasa_lerobot.evaluation.run import engine
 
 TABLE = Path(__file__).parents[1] / "benchmarks/results/demonstrators.json"
 

@@ -18,12 +18,12 @@ from test_evaluation_policy import SIZE, checkpoint  # noqa: F401 (a fixture)
 
 from robocasa_lerobot.cli import main
 from robocasa_lerobot.errors import UserError
-from robocasa_lerobot.evaluation import engine
-from robocasa_lerobot.evaluation.config import EvaluationConfig
-from robocasa_lerobot.evaluation.merging import merge
-from robocasa_lerobot.evaluation.overrides import load_config
-from robocasa_lerobot.evaluation.plan import trial_seed
-from robocasa_lerobot.evaluation.results import TRIALS_FILE, TrialRecord, read_results
+from robocasa_lerobot.evaluation.config.evaluation import EvaluationConfig
+from robocasa_lerobot.evaluation.config.loader import load_config
+from robocasa_lerobot.evaluation.planning.trials import trial_seed
+from robocasa_lerobot.evaluation.records.results import TRIALS_FILE, TrialRecord, read_results
+from robocasa_lerobot.evaluation.run import engine
+from robocasa_lerobot.evaluation.run.merging import merge
 
 ROOT = Path(__file__).parents[1]
 TESTS = str(ROOT / "tests")

@@ -37,15 +37,15 @@ from walk_support import (
 
 from robocasa_lerobot.benchmark import published
 from robocasa_lerobot.benchmark.tasks import published_task_sets
-from robocasa_lerobot.data.published import PUBLISHED
-from robocasa_lerobot.data.registry import select_datasets
-from robocasa_lerobot.evaluation.results import read_results
-from robocasa_lerobot.training.config import ExperimentConfig, load_experiment
-from robocasa_lerobot.training.evaluations import phase_evaluations
-from robocasa_lerobot.training.phase_config import PhaseConfig
-from robocasa_lerobot.training.scale import load_scale
-from robocasa_lerobot.training.skipped import PHASE
-from robocasa_lerobot.training.unavailable import runnable
+from robocasa_lerobot.data.registry.published import PUBLISHED
+from robocasa_lerobot.data.registry.registry import select_datasets
+from robocasa_lerobot.evaluation.records.results import read_results
+from robocasa_lerobot.training.config.experiment import ExperimentConfig, load_experiment
+from robocasa_lerobot.training.config.phase import PhaseConfig
+from robocasa_lerobot.training.config.scale import load_scale
+from robocasa_lerobot.training.planning.evaluations import phase_evaluations
+from robocasa_lerobot.training.planning.skipped import PHASE
+from robocasa_lerobot.training.planning.unavailable import runnable
 
 EXPERIMENTS = ROOT / "configs/experiments"
 PATHS = sorted(path for path in EXPERIMENTS.rglob("*.yaml") if "parts" not in path.relative_to(EXPERIMENTS).parts)

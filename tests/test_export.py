@@ -19,8 +19,9 @@ from robocasa_lerobot.jsonl import read_jsonl
 
 pytest.importorskip("lerobot.datasets")
 from robocasa_lerobot.convert.export import ExportSettings, export
-from robocasa_lerobot.convert.pipeline import META_FOLDER, convert
-from robocasa_lerobot.convert.reading.lerobot_v3 import ExportedDataset
+from robocasa_lerobot.convert.lerobot_v3 import ExportedDataset
+from robocasa_lerobot.convert.pipeline import convert
+from robocasa_lerobot.convert.record_files import META_FOLDER
 from robocasa_lerobot.convert.settings import ConversionSettings
 from robocasa_lerobot.convert.verify import verify
 from robocasa_lerobot.convert.writing.statistics import column

@@ -9,9 +9,9 @@ import pytest
 from PIL import Image
 
 from robocasa_lerobot.cli import main
-from robocasa_lerobot.envs.gallery_page import write_page
-from robocasa_lerobot.envs.gallery_sections import SECTIONS, Tile, tiles_of, write_sheets
 from robocasa_lerobot.errors import UnknownNameError
+from robocasa_lerobot.gallery.page import write_page
+from robocasa_lerobot.gallery.sections import SECTIONS, Tile, tiles_of, write_sheets
 
 TILES = [
     Tile(

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from robot_arena import Arena, action, arena_spec
 
-from robocasa_lerobot.envs.scene import robot_names as names
+from robocasa_lerobot.envs.robots.panda_omron import names
 
 TORSO_KP, TORSO_KD = 2000.0, 2.0 * np.sqrt(2000.0)  # 89.4
 POSITION_STEP_M, ROTATION_STEP_RAD, TORSO_STEP_M = 0.05, 0.5, 0.05

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from robot_arena import Arena, action, arena_spec
 
-from robocasa_lerobot.envs.scene import robot_names as names
+from robocasa_lerobot.envs.robots.panda_omron import names
 
 FORWARD, SIDE, YAW = names.BASE_JOINTS
 TORSO = names.TORSO_JOINT

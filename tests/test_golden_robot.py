@@ -16,10 +16,10 @@ import pytest
 from robot_arena import Arena, arena_spec
 
 from robocasa_lerobot import contract
-from robocasa_lerobot.envs.registry import get_task
-from robocasa_lerobot.envs.scene.builder import build_scene
-from robocasa_lerobot.envs.scene.robot import set_home
+from robocasa_lerobot.envs.robots.panda_omron.model import set_home
+from robocasa_lerobot.envs.scene.build import build_scene
 from robocasa_lerobot.envs.scene.scene import SETTLE_STEPS, Scene
+from robocasa_lerobot.envs.tasks.registry import get_task
 
 BODY_TABLE = Path(__file__).parent / "data" / "panda_omron_bodies.json"
 BODY_ROWS: list[list[Any]] = json.loads(BODY_TABLE.read_text())

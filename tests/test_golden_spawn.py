@@ -11,16 +11,16 @@ import pytest
 from numpy.typing import NDArray
 from task_selection import every_task
 
-from robocasa_lerobot.envs.placement import PlacementError
-from robocasa_lerobot.envs.registry import get_task
-from robocasa_lerobot.envs.scene import selection
-from robocasa_lerobot.envs.scene.builder import build_scene
-from robocasa_lerobot.envs.scene.fixtures.base import Fixture
-from robocasa_lerobot.envs.scene.fixtures.counters import Counter
-from robocasa_lerobot.envs.scene.kitchens import scene_ids
-from robocasa_lerobot.envs.scene.layout import Layout, load_layout
-from robocasa_lerobot.envs.scene.selection import Obstacles, RobotPose, candidates, counter_of, robot_pose
-from robocasa_lerobot.envs.scene.wanted import RobotStart
+from robocasa_lerobot.envs.kitchens.fixtures.base import Fixture
+from robocasa_lerobot.envs.kitchens.fixtures.counters import Counter
+from robocasa_lerobot.envs.kitchens.footprints import PlacementError
+from robocasa_lerobot.envs.kitchens.layout import Layout, load_layout
+from robocasa_lerobot.envs.kitchens.splits import scene_ids
+from robocasa_lerobot.envs.scene import roles as selection
+from robocasa_lerobot.envs.scene.build import build_scene
+from robocasa_lerobot.envs.scene.roles import Obstacles, RobotPose, candidates, counter_of, robot_pose
+from robocasa_lerobot.envs.scene.spec import RobotStart
+from robocasa_lerobot.envs.tasks.registry import get_task
 
 STANDOFF_M = 0.20  # of the base centre from the counter's front edge
 DEVIATION_M = (0.15, 0.05)  # half ranges along the counter and towards it

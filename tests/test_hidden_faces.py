@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from robocasa_lerobot.rendering.hidden_faces import shown_faces
+from robocasa_lerobot.envs.rendering.hidden_faces import shown_faces
 
 LEFT, RIGHT, FRONT, BACK, BOTTOM, TOP = range(6)
 

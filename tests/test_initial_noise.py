@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from task_selection import every_task
 
-from robocasa_lerobot.envs.initial_noise import InitialNoise
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
-from robocasa_lerobot.envs.scene.robot import ARM_HOME_QPOS
-from robocasa_lerobot.envs.scene.selection import is_free
+from robocasa_lerobot.envs.robots.panda_omron.model import ARM_HOME_QPOS
+from robocasa_lerobot.envs.scene.reset_noise import InitialNoise
+from robocasa_lerobot.envs.scene.roles import is_free
 from robocasa_lerobot.errors import UserError
 
 SEEDS = range(6)

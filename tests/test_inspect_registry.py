@@ -14,9 +14,9 @@ import yaml
 from robocasa_lerobot.benchmark.tasks import task_facts
 from robocasa_lerobot.cli import main
 from robocasa_lerobot.data.fake import write_fake_dataset
-from robocasa_lerobot.data.registry import open_registry
-from robocasa_lerobot.evaluation.inventory import take_inventory
-from robocasa_lerobot.evaluation.inventory_page import page
+from robocasa_lerobot.data.registry.registry import open_registry
+from robocasa_lerobot.evaluation.inventory.inventory import take_inventory
+from robocasa_lerobot.evaluation.inventory.page import page
 
 
 @pytest.fixture(scope="module")

@@ -21,20 +21,8 @@ PACKAGE = REPOSITORY / "robocasa_lerobot"
 
 # What each part of the package may import of the rest of the package. Parts on one level stay apart.
 BASE = {
-    *(
-        "benchmark",
-        "contract",
-        "errors",
-        "files",
-        "gl",
-        "jobs",
-        "jsonl",
-        "progress",
-        "provenance",
-        "rendering",
-        "settings",
-    ),
-    "video",
+    *("benchmark", "contract", "errors", "files", "gl", "jobs", "jsonl", "progress"),
+    *("provenance", "settings", "video"),
 }
 LOW = {"envs", "convert", "data", "policies"}
 MAY_IMPORT: dict[str, set[str]] = {
@@ -49,16 +37,29 @@ MAY_IMPORT: dict[str, set[str]] = {
     "jobs": {"errors", "progress"},
     "settings": {"errors"},
     "video": {"contract"},
-    "rendering": {"errors", "gl"},
     **dict.fromkeys(LOW, BASE),
+    "convert": BASE | {"envs"},  # its rendering alone: see ONLY_ROOMS
     "demos": BASE | {"envs"},
     "training": BASE | {"data", "policies"},
     "evaluation": BASE | {"envs", "convert", "data", "policies", "demos"},  # demos: a reference policy
     "making": BASE | {"envs", "convert", "data", "demos", "training"},  # data that an experiment needs
+    "gallery": BASE | {"envs", "demos"},
     "plugins": BASE | LOW | {"demos", "training", "evaluation"},
-    "doctor": BASE,
-    "cli": BASE,  # and the command modules, by name
+    "cli": BASE | LOW | {"demos", "training", "evaluation", "making", "gallery"},
 }
+# Of these parts, what each room (a folder, or a file beside the folders) may import of the other rooms.
+ROOMS: dict[str, dict[str, set[str]]] = {
+    "envs": {
+        "rendering": set(),
+        "robots": {"rendering"},
+        "kitchens": {"rendering", "robots"},
+        "objects": {"rendering", "kitchens"},
+        "scene": {"rendering", "robots", "kitchens", "objects"},
+        "predicates": {"robots", "kitchens", "objects", "scene"},
+        "tasks": {"kitchens", "objects", "scene", "predicates"},
+    },
+}
+ONLY_ROOMS = {("convert", "envs"): {"rendering"}}  # what a part may import of another, where that is not all of it
 TORCH = {"torch", "torchvision", "lerobot", "accelerate", "transformers", "diffusers", "safetensors"}
 PHYSICS = {"mujoco", "gymnasium_robotics"}
 FORBIDDEN: dict[str, set[str]] = {
@@ -73,7 +74,6 @@ FORBIDDEN: dict[str, set[str]] = {
     "progress": TORCH | PHYSICS,
     "settings": TORCH | PHYSICS,
     "video": TORCH | PHYSICS,
-    "rendering": TORCH,
     "envs": TORCH,
     "demos": TORCH,
     "data": PHYSICS,
@@ -89,6 +89,13 @@ EXCEPTIONS: dict[str, set[str]] = {
 }
 MAX_LINES = 400
 LONGER_FILES: dict[str, str] = {}  # path in the repository: reason
+MAX_FILES = 15  # of a folder, `__init__.py` apart
+LARGER_FOLDERS = {
+    "cli": 18,  # one file for each command
+    "envs/objects/forms": 20,  # one file for each family of shapes
+    "demos": 18,
+    "demos/skills": 31,
+}
 SCRIPT_LINES = 80
 # MuJoCo is not among them: `import robocasa_lerobot.envs` registers the tasks, which takes half a second in all.
 HEAVY = {"torch", "lerobot", "datasets", "transformers", "av", "matplotlib"}
@@ -138,6 +145,58 @@ def test_import_direction(source: str) -> None:
     allowed = MAY_IMPORT[part] | {part}
     wrong = [name for target, name in own_parts(imports(PACKAGE / source)) if target not in allowed]
     assert not wrong, f"{part} may import only {sorted(allowed)}"
+
+
+def rooms_of(name: str) -> tuple[str, str]:
+    """Part and room of a module's name."""
+    pieces = [*name.split(".")[1:], "", ""]
+    return pieces[0], pieces[1]
+
+
+@pytest.mark.parametrize("source", sources())
+def test_rooms_import_in_their_order(source: str) -> None:
+    part, room = rooms_of(module_name(source))
+    for name in imports(PACKAGE / source):
+        if not name.startswith("robocasa_lerobot."):
+            continue
+        other_part, other = rooms_of(name)
+        if other_part == part and room in ROOMS.get(part, {}):
+            assert other in ROOMS[part][room] | {room}, f"{part}/{room} may import only {ROOMS[part][room]}"
+        if (part, other_part) in ONLY_ROOMS:
+            assert other in ONLY_ROOMS[part, other_part], name
+
+
+def folder_graph(graph: Mapping[str, set[str]], folder: str) -> dict[str, set[str]]:
+    """What the folders and files that lie directly in a folder import of each other."""
+
+    def inside(module: str) -> str:
+        return module.removeprefix(folder + ".").split(".")[0] if module.startswith(folder + ".") else ""
+
+    out: dict[str, set[str]] = {}
+    for module, others in graph.items():
+        if room := inside(module):
+            out.setdefault(room, set()).update({inside(other) for other in others} - {"", room})
+    return out
+
+
+def test_folders_import_each_other_in_one_direction() -> None:
+    graph = imported_files({module_name(source): PACKAGE / source for source in sources()})
+    folders = {module.rpartition(".")[0] for module in graph if "." in module}
+    found = {folder: circle(folder_graph(graph, folder)) for folder in folders}
+    assert not {folder: names for folder, names in found.items() if names}
+
+
+def test_a_circle_of_folders_is_found_where_files_have_none() -> None:
+    graph = {"p.a.one": {"p.b.one"}, "p.b.one": set[str](), "p.b.two": {"p.a.two"}, "p.a.two": set[str]()}
+    assert circle(graph) == []
+    assert set(circle(folder_graph(graph, "p"))) == {"a", "b"}
+
+
+def test_folders_are_readable_at_a_glance() -> None:
+    for folder in {path.parent for path in PACKAGE.rglob("*.py")}:
+        name = folder.relative_to(PACKAGE).as_posix()
+        files = [path.name for path in folder.glob("*.py") if path.name != "__init__.py"]
+        assert len(files) <= LARGER_FOLDERS.get(name, MAX_FILES), f"{name} has {len(files)} files: make rooms"
 
 
 def imported_files(files: Mapping[str, Path]) -> dict[str, set[str]]:

@@ -7,17 +7,17 @@ from collections import Counter as Tally
 
 import pytest
 
-from robocasa_lerobot.envs.scene.appliances.catalogue import kinds, model_of
-from robocasa_lerobot.envs.scene.fixture_types import FILTERS, FixtureType
-from robocasa_lerobot.envs.scene.fixtures.accessories import Accessory
-from robocasa_lerobot.envs.scene.fixtures.counters import Counter
-from robocasa_lerobot.envs.scene.fixtures.fronts import HANDLES, PANELS
-from robocasa_lerobot.envs.scene.fixtures.hoods import DESIGNS as HOODS
-from robocasa_lerobot.envs.scene.fixtures.stools import DESIGNS as STOOLS
-from robocasa_lerobot.envs.scene.kitchens import EXCLUDED, GROUPS, expand, scene_ids, without
-from robocasa_lerobot.envs.scene.layout import Layout, layout_ids, layout_record, load_layout, split_of
-from robocasa_lerobot.envs.scene.materials import COMMON_SURFACES, load_style, style_ids
-from robocasa_lerobot.envs.scene.selection import candidates, footprint, standing_on
+from robocasa_lerobot.envs.kitchens.appliances.catalogue import kinds, model_of
+from robocasa_lerobot.envs.kitchens.fixture_types import FILTERS, FixtureType
+from robocasa_lerobot.envs.kitchens.fixtures.accessories import Accessory
+from robocasa_lerobot.envs.kitchens.fixtures.counters import Counter
+from robocasa_lerobot.envs.kitchens.fixtures.fronts import HANDLES, PANELS
+from robocasa_lerobot.envs.kitchens.fixtures.hoods import DESIGNS as HOODS
+from robocasa_lerobot.envs.kitchens.fixtures.stools import DESIGNS as STOOLS
+from robocasa_lerobot.envs.kitchens.layout import Layout, layout_ids, layout_record, load_layout, split_of
+from robocasa_lerobot.envs.kitchens.materials import COMMON_SURFACES, load_style, style_ids
+from robocasa_lerobot.envs.kitchens.splits import EXCLUDED, GROUPS, expand, scene_ids, without
+from robocasa_lerobot.envs.scene.roles import candidates, footprint, standing_on
 from robocasa_lerobot.envs.scene.soundness import blocked_walkways
 from robocasa_lerobot.errors import UnknownNameError, UserError
 

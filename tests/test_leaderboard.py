@@ -13,8 +13,8 @@ import synthetic_runs
 from robocasa_lerobot.cli import main
 from robocasa_lerobot.evaluation.leaderboard import protocol
 from robocasa_lerobot.evaluation.leaderboard.submission import overall, problems
+from robocasa_lerobot.evaluation.records.results import RunHeader, TrialRecord
 from robocasa_lerobot.evaluation.report.gather import gather
-from robocasa_lerobot.evaluation.results import RunHeader, TrialRecord
 
 FACTS = ("--model-name", "Test", "--batch-size", "128", "--num-training-steps", "1000")
 RATES = {"atomic_seen": 43.0, "composite_seen": 9.6, "composite_unseen": 4.4}

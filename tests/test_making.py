@@ -17,10 +17,10 @@ from slurm_support import stand_in
 
 from robocasa_lerobot import cli
 from robocasa_lerobot.data.fake import write_fake_dataset
-from robocasa_lerobot.data.published import dataset_version
+from robocasa_lerobot.data.registry.published import dataset_version
 from robocasa_lerobot.making import estimate
 from robocasa_lerobot.making.needs import WORK, needs_of, parse_episodes
-from robocasa_lerobot.training.config import load_experiment
+from robocasa_lerobot.training.config.experiment import load_experiment
 
 ROOT = Path(__file__).parents[1]
 EXPERIMENTS = ROOT / "configs/experiments"

@@ -12,17 +12,17 @@ import numpy as np
 import pytest
 from grasping_trial import GripperTrial, try_instance
 
-from robocasa_lerobot.envs.registry import get_task
-from robocasa_lerobot.envs.scene.builder import LIQUIDS, build_scene
-from robocasa_lerobot.envs.scene.materials import MaterialPalette, load_style, style_ids
-from robocasa_lerobot.envs.scene.objects import catalogue
-from robocasa_lerobot.envs.scene.objects.draft import FORMS
-from robocasa_lerobot.envs.scene.objects.forms import find_form
-from robocasa_lerobot.envs.scene.objects.grasping import grasp_poses
-from robocasa_lerobot.envs.scene.objects.pictures import object_pictures
-from robocasa_lerobot.envs.scene.objects.shapes import add_object
-from robocasa_lerobot.envs.scene.robot import apply_simulation_options
+from robocasa_lerobot.envs.kitchens.materials import MaterialPalette, load_style, style_ids
+from robocasa_lerobot.envs.objects import catalogue
+from robocasa_lerobot.envs.objects.draft import FORMS
+from robocasa_lerobot.envs.objects.forms import find_form
+from robocasa_lerobot.envs.objects.grasping import grasp_poses
+from robocasa_lerobot.envs.objects.shapes import add_object
+from robocasa_lerobot.envs.robots.panda_omron.model import apply_simulation_options
+from robocasa_lerobot.envs.scene.build import LIQUIDS, build_scene
+from robocasa_lerobot.envs.tasks.registry import get_task
 from robocasa_lerobot.errors import UnknownNameError, UserError
+from robocasa_lerobot.gallery.object_pictures import object_pictures
 
 INDICES = range(catalogue.INSTANCES_PER_CATEGORY)
 NAMES = tuple(catalogue.CATEGORIES)

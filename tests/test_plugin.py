@@ -21,9 +21,10 @@ from lerobot.envs.configs import EnvConfig, RoboCasaEnv
 from lerobot.envs.factory import make_env_config
 from lerobot.envs.utils import close_envs, env_to_policy_features
 
-from robocasa_lerobot import contract, doctor
-from robocasa_lerobot.envs import registry
+from robocasa_lerobot import contract
+from robocasa_lerobot.cli import doctor
 from robocasa_lerobot.envs.lerobot_plugin import ENV_TYPE, RobocasaKitchenEnvConfig
+from robocasa_lerobot.envs.tasks import registry
 from robocasa_lerobot.errors import UnknownNameError, UserError
 
 COMPANION = "lerobot_policy_robocasa"

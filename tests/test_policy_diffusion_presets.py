@@ -17,16 +17,16 @@ from policy_support import batch_for, tiny_config, unit_stats, with_features
 from torch import nn
 
 from robocasa_lerobot import contract
-from robocasa_lerobot.data.config import MemberConfig, MixtureConfig
 from robocasa_lerobot.data.fake import write_fake_dataset
 from robocasa_lerobot.data.mixture import MixtureDataset
+from robocasa_lerobot.data.mixture_config import MemberConfig, MixtureConfig
 from robocasa_lerobot.policies.common.vision import ResNet18
 from robocasa_lerobot.policies.diffusion_transformer.configuration_diffusion_transformer import (
     DiffusionTransformerConfig,
 )
 from robocasa_lerobot.policies.diffusion_transformer.modeling_diffusion_transformer import DiffusionTransformerPolicy
-from robocasa_lerobot.training.builders import set_windows
-from robocasa_lerobot.training.phase_config import EmaConfig
+from robocasa_lerobot.training.config.phase import EmaConfig
+from robocasa_lerobot.training.setup.builders import set_windows
 
 PRESETS = sorted((Path(__file__).parents[1] / "configs/policies").glob("diffusion_transformer*.yaml"))
 

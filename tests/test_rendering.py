@@ -12,9 +12,9 @@ from task_selection import every_task
 
 from robocasa_lerobot import contract
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
-from robocasa_lerobot.rendering import SceneRenderer
-from robocasa_lerobot.rendering.look_alike import look_alike
-from robocasa_lerobot.rendering.tessellation import Surface, boxes, capsule, cylinder
+from robocasa_lerobot.envs.rendering import SceneRenderer
+from robocasa_lerobot.envs.rendering.look_alike import look_alike
+from robocasa_lerobot.envs.rendering.tessellation import Surface, boxes, capsule, cylinder
 
 GROUPS = (1, 2)
 

@@ -20,9 +20,10 @@ from test_evaluation_records import header, record
 from robocasa_lerobot.benchmark.published import table
 from robocasa_lerobot.cli import main
 from robocasa_lerobot.errors import UserError
-from robocasa_lerobot.evaluation import results, trials_file
-from robocasa_lerobot.evaluation.report import film_strip, latex, markdown
-from robocasa_lerobot.evaluation.report.charts import (
+from robocasa_lerobot.evaluation.records import results, trials_file
+from robocasa_lerobot.evaluation.records.results import TermSummary
+from robocasa_lerobot.evaluation.report.formats import film_strip, latex, markdown
+from robocasa_lerobot.evaluation.report.formats.charts import (
     MAX_POINTS,
     Line,
     learning_curve,
@@ -30,12 +31,19 @@ from robocasa_lerobot.evaluation.report.charts import (
     running_mean,
     thin_out,
 )
-from robocasa_lerobot.evaluation.report.format import count, interval, listed, p_value, percent, points, published
 from robocasa_lerobot.evaluation.report.gather import gather, summarize
+from robocasa_lerobot.evaluation.report.numbers import (
+    count,
+    interval,
+    listed,
+    p_value,
+    percent,
+    points,
+    published,
+)
 from robocasa_lerobot.evaluation.report.policies import same_trials
 from robocasa_lerobot.evaluation.report.sections.beside_published import differences
 from robocasa_lerobot.evaluation.report.training import TrainingPhase, find_trainings, read_demonstrator, read_training
-from robocasa_lerobot.evaluation.results import TermSummary
 from robocasa_lerobot.evaluation.statistics import success_rate
 from robocasa_lerobot.video import VideoWriter, frames_and_rate
 

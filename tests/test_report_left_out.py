@@ -8,10 +8,11 @@ from pathlib import Path
 from test_evaluation_records import header, record
 from test_report import write_results
 
-from robocasa_lerobot.evaluation import report_command, results, trials_file
+from robocasa_lerobot.cli import report as report_command
+from robocasa_lerobot.evaluation.records import results, trials_file
 from robocasa_lerobot.evaluation.report.gather import gather
-from robocasa_lerobot.training import skipped
-from robocasa_lerobot.training.skipped import Skipped
+from robocasa_lerobot.training.planning import skipped
+from robocasa_lerobot.training.planning.skipped import Skipped
 
 
 def test_what_a_training_left_out_and_what_a_run_lacks_is_said(tmp_path: Path) -> None:

@@ -12,7 +12,7 @@ import report_colours
 import synthetic_runs
 from browser import Browser, find_chromium
 
-from robocasa_lerobot.evaluation.report_command import write_report
+from robocasa_lerobot.evaluation.report.output import write_report
 
 CHROMIUM = find_chromium()
 needs_chromium = pytest.mark.skipif(CHROMIUM is None, reason="no Chromium on this machine (set $CHROMIUM to its path)")

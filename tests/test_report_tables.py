@@ -16,13 +16,13 @@ import yaml
 from robocasa_lerobot.benchmark import published
 from robocasa_lerobot.benchmark.tasks import published_task_sets, task_facts
 from robocasa_lerobot.cli import main
+from robocasa_lerobot.evaluation.records.results import UNPERTURBED
 from robocasa_lerobot.evaluation.report import places
 from robocasa_lerobot.evaluation.report.gather import gather
 from robocasa_lerobot.evaluation.report.places import named_experiments
 from robocasa_lerobot.evaluation.report.policies import PolicyResult, ReportData
 from robocasa_lerobot.evaluation.report.sections import beside_published, data_efficiency, kinds, lifelong
-from robocasa_lerobot.evaluation.results import UNPERTURBED
-from robocasa_lerobot.training.config import load_experiment
+from robocasa_lerobot.training.config.experiment import load_experiment
 
 CONFIGS = Path(__file__).parents[1] / "configs/experiments"
 SPLITS = ("atomic", "composite_seen", "composite_unseen")

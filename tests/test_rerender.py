@@ -18,8 +18,9 @@ from robocasa_lerobot.errors import UserError
 pytest.importorskip("lerobot.datasets")
 from lerobot.datasets.lerobot_dataset import LeRobotDataset
 
-from robocasa_lerobot.convert.pipeline import META_FOLDER, convert
+from robocasa_lerobot.convert.pipeline import convert
 from robocasa_lerobot.convert.reading.demo_file import RejectedEpisodeError
+from robocasa_lerobot.convert.record_files import META_FOLDER
 from robocasa_lerobot.convert.rerender import work as rerender_work
 from robocasa_lerobot.convert.rerender.camera_configs import camera_set, read_camera_configs, with_cameras
 from robocasa_lerobot.convert.rerender.plan import RenderSettings, make_render_plan
@@ -229,8 +230,8 @@ def test_cameras_are_moved_and_added_in_the_scene() -> None:
 
 
 def test_cotraining_set_is_the_environments_own() -> None:
-    from robocasa_lerobot.envs.cameras import apply_camera_configs, cameras_of_set
-    from robocasa_lerobot.envs.scene import robot_names as names
+    from robocasa_lerobot.envs.robots.panda_omron import names
+    from robocasa_lerobot.envs.robots.panda_omron.cameras import apply_camera_configs, cameras_of_set
 
     bodies = ""
     for body, cameras in ((names.SUPPORT, contract.CAMERAS[:2]), (names.HAND, contract.CAMERAS[2:])):

@@ -8,10 +8,10 @@ import pytest
 from robot_arena import Arena, arena_spec
 
 from robocasa_lerobot import contract
-from robocasa_lerobot.envs.cameras import CAMERA_SETS
-from robocasa_lerobot.envs.scene import robot_names as names
-from robocasa_lerobot.envs.scene.robot import QUALITIES, add_robot, mesh_bytes, place_base, set_home
-from robocasa_lerobot.envs.scene.robot_bodies import BODIES
+from robocasa_lerobot.envs.robots.panda_omron import names
+from robocasa_lerobot.envs.robots.panda_omron.bodies import BODIES
+from robocasa_lerobot.envs.robots.panda_omron.cameras import CAMERA_SETS
+from robocasa_lerobot.envs.robots.panda_omron.model import QUALITIES, add_robot, mesh_bytes, place_base, set_home
 from robocasa_lerobot.errors import UnknownNameError
 
 

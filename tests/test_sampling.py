@@ -7,13 +7,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from robocasa_lerobot.envs.placement import Footprint, Footprints, PlacementError
-from robocasa_lerobot.envs.registry import get_task
-from robocasa_lerobot.envs.scene.arrange import cast_roles, place_objects
-from robocasa_lerobot.envs.scene.layout import load_layout
-from robocasa_lerobot.envs.scene.sampling import choose_parts, parts_of, rectangle_in
-from robocasa_lerobot.envs.scene.selection import candidates, faces, ground_fixture, is_free, robot_pose
-from robocasa_lerobot.envs.scene.wanted import FixtureWanted, ObjectWanted, Placement, RobotStart, SampleRegion
+from robocasa_lerobot.envs.kitchens.footprints import Footprint, Footprints, PlacementError
+from robocasa_lerobot.envs.kitchens.layout import load_layout
+from robocasa_lerobot.envs.scene.placement import cast_roles, place_objects
+from robocasa_lerobot.envs.scene.regions import choose_parts, parts_of, rectangle_in
+from robocasa_lerobot.envs.scene.roles import candidates, faces, ground_fixture, is_free, robot_pose
+from robocasa_lerobot.envs.scene.spec import FixtureWanted, ObjectWanted, Placement, RobotStart, SampleRegion
+from robocasa_lerobot.envs.tasks.registry import get_task
 
 LAYOUT = load_layout(2)
 SINK = candidates(LAYOUT, "sink")[0]

@@ -12,15 +12,15 @@ import pytest
 from PIL import Image
 from task_selection import every_task
 
-from robocasa_lerobot.envs.placement import Area, Footprint, PlacementError, place
-from robocasa_lerobot.envs.registry import get_task, task_names
+from robocasa_lerobot.envs.kitchens.fixtures.cabinets import FULL_TRAVEL_OF_DEPTH, Drawer
+from robocasa_lerobot.envs.kitchens.footprints import Area, Footprint, PlacementError, place
+from robocasa_lerobot.envs.kitchens.layout import layout_ids, load_layout, split_of
+from robocasa_lerobot.envs.kitchens.materials import style_ids
+from robocasa_lerobot.envs.kitchens.textures import GENERATORS, TextureRecord, texture_png
 from robocasa_lerobot.envs.scene.assembly import bare_kitchen
-from robocasa_lerobot.envs.scene.builder import build_scene
-from robocasa_lerobot.envs.scene.fixtures.cabinets import FULL_TRAVEL_OF_DEPTH, Drawer
-from robocasa_lerobot.envs.scene.layout import layout_ids, load_layout, split_of
-from robocasa_lerobot.envs.scene.materials import style_ids
+from robocasa_lerobot.envs.scene.build import build_scene
 from robocasa_lerobot.envs.scene.soundness import overlaps
-from robocasa_lerobot.envs.scene.textures import GENERATORS, TextureRecord, texture_png
+from robocasa_lerobot.envs.tasks.registry import get_task, task_names
 
 
 @pytest.mark.parametrize("kind", GENERATORS)

@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
-from robocasa_lerobot.envs.registry import get_task, task_names
-from robocasa_lerobot.envs.scene.kitchens import without
-from robocasa_lerobot.envs.scene.layout import layout_ids
-from robocasa_lerobot.envs.scene.rows import WALL_THICKNESS
+from robocasa_lerobot.envs.kitchens.layout import layout_ids
+from robocasa_lerobot.envs.kitchens.plan.fixture_rows import WALL_THICKNESS
+from robocasa_lerobot.envs.kitchens.splits import without
 from robocasa_lerobot.envs.scene.views import views
-from robocasa_lerobot.envs.task import Task
+from robocasa_lerobot.envs.tasks.registry import get_task, task_names
+from robocasa_lerobot.envs.tasks.task import Task
 from robocasa_lerobot.errors import UserError
 
 pytestmark = pytest.mark.render

@@ -10,8 +10,8 @@ from robocasa_lerobot import cli
 from robocasa_lerobot.demos import task_check
 from robocasa_lerobot.envs.check import check_task
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
-from robocasa_lerobot.envs.registry import task_names
-from robocasa_lerobot.envs.scene.kitchens import SPLITS
+from robocasa_lerobot.envs.kitchens.splits import SPLITS
+from robocasa_lerobot.envs.tasks.registry import task_names
 
 pytestmark = pytest.mark.render
 TASK = "OpenDrawer"

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 from task_selection import every_task
 
-from robocasa_lerobot.envs.initial import PartAt
+from robocasa_lerobot.envs.kitchens.appliances.base import take_effect
+from robocasa_lerobot.envs.kitchens.appliances.kinds.blender import Blender
 from robocasa_lerobot.envs.predicates import (
     AllOf,
     AnyOf,
@@ -36,12 +37,11 @@ from robocasa_lerobot.envs.predicates import (
     When,
 )
 from robocasa_lerobot.envs.predicates.contacts import touching
-from robocasa_lerobot.envs.registry import get_task, task_names
-from robocasa_lerobot.envs.scene.appliances.base import take_effect
-from robocasa_lerobot.envs.scene.appliances.blender import Blender
-from robocasa_lerobot.envs.scene.builder import build_scene
+from robocasa_lerobot.envs.scene.build import build_scene
+from robocasa_lerobot.envs.scene.initial_states import PartAt
 from robocasa_lerobot.envs.scene.scene import Scene, set_openness
-from robocasa_lerobot.envs.task import Task
+from robocasa_lerobot.envs.tasks.registry import get_task, task_names
+from robocasa_lerobot.envs.tasks.task import Task
 
 
 def test_there_are_sixty_five() -> None:

@@ -10,8 +10,8 @@ from PIL import Image
 
 from robocasa_lerobot import cli
 from robocasa_lerobot.demos.demonstrator import can_demonstrate
-from robocasa_lerobot.demos.task_pages import DEMONSTRATOR, page, pages
-from robocasa_lerobot.envs.registry import get_task, task_names
+from robocasa_lerobot.envs.tasks.registry import get_task, task_names
+from robocasa_lerobot.gallery.task_pages import DEMONSTRATOR, page, pages
 
 DOCS = Path(__file__).parents[1] / "docs" / "tasks.md"
 TASKS = [get_task(name) for name in task_names()]

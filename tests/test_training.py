@@ -20,12 +20,12 @@ from training_support import experiment_file, losses, metrics, tiny, weights
 from robocasa_lerobot import contract
 from robocasa_lerobot.data.fake import write_fake_dataset
 from robocasa_lerobot.errors import UserError
-from robocasa_lerobot.evaluation.checkpoints import read_source
-from robocasa_lerobot.training import builders
-from robocasa_lerobot.training.checkpoint import last_checkpoint, pretrained_model
-from robocasa_lerobot.training.config import EmaConfig, load_experiment
-from robocasa_lerobot.training.ema import Ema, ema_decay
+from robocasa_lerobot.evaluation.actors.checkpoint import read_source
+from robocasa_lerobot.training.config.experiment import EmaConfig, load_experiment
 from robocasa_lerobot.training.phases import run_experiment
+from robocasa_lerobot.training.setup import builders
+from robocasa_lerobot.training.weights.checkpoint import last_checkpoint, pretrained_model
+from robocasa_lerobot.training.weights.ema import Ema, ema_decay
 
 
 @pytest.fixture(scope="module")

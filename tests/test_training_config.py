@@ -8,8 +8,8 @@ import pytest
 import yaml
 
 from robocasa_lerobot.errors import UserError
-from robocasa_lerobot.training import overlay
-from robocasa_lerobot.training.config import ExperimentConfig, load_experiment, to_yaml
+from robocasa_lerobot.training.config import experiment_files as overlay
+from robocasa_lerobot.training.config.experiment import ExperimentConfig, load_experiment, to_yaml
 
 EXPERIMENT = """
 name: try

@@ -17,10 +17,10 @@ from training_support import ROOT, experiment_file
 
 from robocasa_lerobot.cli import main
 from robocasa_lerobot.data.fake import write_fake_dataset
-from robocasa_lerobot.evaluation.results import read_results
-from robocasa_lerobot.training import evaluations, skipped
-from robocasa_lerobot.training.checkpoint import checkpoint_step, last_checkpoint
-from robocasa_lerobot.training.config import load_experiment
+from robocasa_lerobot.evaluation.records.results import read_results
+from robocasa_lerobot.training.config.experiment import load_experiment
+from robocasa_lerobot.training.planning import evaluations, skipped
+from robocasa_lerobot.training.weights.checkpoint import checkpoint_step, last_checkpoint
 
 
 @pytest.fixture(scope="module")

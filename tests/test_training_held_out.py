@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 from training_support import losses, tiny
 
-from robocasa_lerobot.data.config import MemberConfig, MixtureConfig
 from robocasa_lerobot.data.fake import write_fake_dataset
 from robocasa_lerobot.data.mixture import open_mixture
+from robocasa_lerobot.data.mixture_config import MemberConfig, MixtureConfig
+from robocasa_lerobot.training.config.phase import HeldOutConfig
 from robocasa_lerobot.training.held_out import without_held_out
-from robocasa_lerobot.training.phase_config import HeldOutConfig
 from robocasa_lerobot.training.phases import run_experiment
 
 

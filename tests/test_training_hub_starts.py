@@ -24,13 +24,14 @@ from robocasa_lerobot import contract
 from robocasa_lerobot.data.fake import write_fake_dataset
 from robocasa_lerobot.data.mixture import MixtureMeta
 from robocasa_lerobot.errors import UserError
-from robocasa_lerobot.evaluation.checkpoints import read_source
-from robocasa_lerobot.evaluation.plan import make_plan
-from robocasa_lerobot.evaluation.policy_runner import load_actor
-from robocasa_lerobot.evaluation.rollout import run_trial
-from robocasa_lerobot.training import builders, features, prepare
-from robocasa_lerobot.training.config import load_experiment
+from robocasa_lerobot.evaluation.actors.checkpoint import read_source
+from robocasa_lerobot.evaluation.actors.policy_runner import load_actor
+from robocasa_lerobot.evaluation.planning.trials import make_plan
+from robocasa_lerobot.evaluation.run.rollout import run_trial
+from robocasa_lerobot.training.config.experiment import load_experiment
 from robocasa_lerobot.training.phases import check_phase, run_experiment
+from robocasa_lerobot.training.setup import build_phase as prepare
+from robocasa_lerobot.training.setup import builders, features
 
 CONFIGS = Path(__file__).parents[1] / "configs"
 SIZE = 32

@@ -20,7 +20,8 @@ from safetensors.torch import load_file, save_file
 from training_support import ROOT, experiment_file
 
 from robocasa_lerobot.data.fake import write_fake_dataset
-from robocasa_lerobot.training.checkpoint import (
+from robocasa_lerobot.training.config.experiment import EmaConfig
+from robocasa_lerobot.training.weights.checkpoint import (
     TrainingState,
     checkpoint_step,
     last_checkpoint,
@@ -28,9 +29,8 @@ from robocasa_lerobot.training.checkpoint import (
     save_checkpoint,
     tidy,
 )
-from robocasa_lerobot.training.config import EmaConfig
-from robocasa_lerobot.training.ema import Ema
-from robocasa_lerobot.training.master_weights import MasterWeights
+from robocasa_lerobot.training.weights.ema import Ema
+from robocasa_lerobot.training.weights.master_weights import MasterWeights
 
 KILLS = 10
 STEPS = 24  # of each of the two phases

@@ -22,13 +22,13 @@ from robocasa_lerobot.data.fake import write_fake_dataset
 from robocasa_lerobot.errors import UserError
 from robocasa_lerobot.training import metrics as module
 from robocasa_lerobot.training.augment import augment
-from robocasa_lerobot.training.builders import frame_size, policy_config
-from robocasa_lerobot.training.checkpoint import CHECKPOINTS, last_checkpoint, prune, tidy
-from robocasa_lerobot.training.config import TRACKERS
+from robocasa_lerobot.training.config.experiment import TRACKERS
+from robocasa_lerobot.training.config.phase import AugmentConfig
 from robocasa_lerobot.training.interrupts import REQUEUE
-from robocasa_lerobot.training.phase_config import AugmentConfig
 from robocasa_lerobot.training.phases import run_experiment
+from robocasa_lerobot.training.setup.builders import frame_size, policy_config
 from robocasa_lerobot.training.shared_noise import SharedNoise
+from robocasa_lerobot.training.weights.checkpoint import CHECKPOINTS, last_checkpoint, prune, tidy
 
 CAMERA = contract.IMAGE_KEYS[0]
 

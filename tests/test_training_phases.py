@@ -16,16 +16,18 @@ from training_support import experiment_file, losses, metrics, tiny, weights
 
 from robocasa_lerobot.data.fake import write_fake_dataset
 from robocasa_lerobot.data.mixture import open_mixture
-from robocasa_lerobot.data.source import DatasetSource
+from robocasa_lerobot.data.reading.source import DatasetSource
 from robocasa_lerobot.errors import UserError
-from robocasa_lerobot.training import builders, evaluations, joining
-from robocasa_lerobot.training.adapters import apply_training_scope, merged_state
-from robocasa_lerobot.training.config import load_experiment
-from robocasa_lerobot.training.phase_config import LoraConfig, PhaseConfig
+from robocasa_lerobot.training.config.experiment import load_experiment
+from robocasa_lerobot.training.config.phase import LoraConfig, PhaseConfig
 from robocasa_lerobot.training.phases import run_experiment
-from robocasa_lerobot.training.plan import plan_experiment
-from robocasa_lerobot.training.plan_text import render_plan
-from robocasa_lerobot.training.prepare import prepare_phase
+from robocasa_lerobot.training.planning import evaluations
+from robocasa_lerobot.training.planning.plan import plan_experiment
+from robocasa_lerobot.training.planning.plan_text import render_plan
+from robocasa_lerobot.training.setup import builders
+from robocasa_lerobot.training.setup import phase_data as joining
+from robocasa_lerobot.training.setup.build_phase import prepare_phase
+from robocasa_lerobot.training.weights.adapters import apply_training_scope, merged_state
 
 FROZEN = "observation_encoder"
 

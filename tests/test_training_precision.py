@@ -5,9 +5,9 @@ from __future__ import annotations
 import pytest
 import torch
 
-from robocasa_lerobot.training.ema import Ema
-from robocasa_lerobot.training.master_weights import MasterWeights
-from robocasa_lerobot.training.phase_config import EmaConfig
+from robocasa_lerobot.training.config.phase import EmaConfig
+from robocasa_lerobot.training.weights.ema import Ema
+from robocasa_lerobot.training.weights.master_weights import MasterWeights
 
 STEPS = 200
 

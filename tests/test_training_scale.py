@@ -8,15 +8,15 @@ import pytest
 import yaml
 
 from robocasa_lerobot.cli import main
-from robocasa_lerobot.data.config import SelectionConfig
-from robocasa_lerobot.data.registry import select_datasets
+from robocasa_lerobot.data.mixture_config import SelectionConfig
+from robocasa_lerobot.data.registry.registry import select_datasets
 from robocasa_lerobot.errors import UserError
-from robocasa_lerobot.evaluation.config import EnvSettings, EvaluationConfig
-from robocasa_lerobot.evaluation.overrides import load_config
-from robocasa_lerobot.evaluation.resolve import outcome_settings, plan_tasks
-from robocasa_lerobot.training.config import load_experiment, to_yaml
-from robocasa_lerobot.training.evaluations import phase_evaluations
-from robocasa_lerobot.training.scale import NAMED, load_scale
+from robocasa_lerobot.evaluation.config.evaluation import EnvSettings, EvaluationConfig
+from robocasa_lerobot.evaluation.config.loader import load_config
+from robocasa_lerobot.evaluation.planning.run_header import outcome_settings, plan_tasks
+from robocasa_lerobot.training.config.experiment import load_experiment, to_yaml
+from robocasa_lerobot.training.config.scale import NAMED, load_scale
+from robocasa_lerobot.training.planning.evaluations import phase_evaluations
 
 EXPERIMENTS = Path(__file__).parents[1] / "configs/experiments"
 PUBLISHED = EXPERIMENTS / "robocasa365"

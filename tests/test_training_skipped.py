@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from robocasa_lerobot.training import skipped
-from robocasa_lerobot.training.skipped import Skipped
+from robocasa_lerobot.training.planning import skipped
+from robocasa_lerobot.training.planning.skipped import Skipped
 
 
 def test_what_is_recorded_is_read_and_a_later_run_writes_anew(tmp_path: Path) -> None:

@@ -20,7 +20,8 @@ def test_the_users_own_setting_stays(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_the_train_command_sets_it_before_torch_is_loaded() -> None:
     program = """
 import argparse, os, sys
-from robocasa_lerobot.training import command, spinning
+from robocasa_lerobot.training import spinning
+from robocasa_lerobot.cli import train as command
 def check():
     assert "torch" not in sys.modules
     print("set")

@@ -16,9 +16,9 @@ from gymnasium.vector import AutoresetMode
 from vector_support import STILL, FaultyEnv, clean_workers  # noqa: F401 (a fixture)
 
 from robocasa_lerobot import contract
-from robocasa_lerobot.envs import hold
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
-from robocasa_lerobot.envs.vector import KitchenVectorEnv, WorkerError, env_info, make_vector_env
+from robocasa_lerobot.envs.vector import freeze_at_end as hold
+from robocasa_lerobot.envs.vector.kitchens import KitchenVectorEnv, WorkerError, env_info, make_vector_env
 from robocasa_lerobot.errors import UnknownNameError, UserError
 
 

@@ -21,8 +21,8 @@ import vector_support
 from gymnasium.error import ClosedEnvironmentError
 from vector_support import STILL, FaultyEnv, clean_workers, two_workers  # noqa: F401 (a fixture)
 
-from robocasa_lerobot.envs import vector_env
-from robocasa_lerobot.envs.vector import WorkerError, make_vector_env
+from robocasa_lerobot.envs.vector import env as vector_env
+from robocasa_lerobot.envs.vector.kitchens import WorkerError, make_vector_env
 
 IN_STEP = ("step", 21, 2)
 NEXT_SEED = int(np.random.default_rng(21).integers(1000))

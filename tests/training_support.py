@@ -10,8 +10,8 @@ from typing import Any
 import torch
 import yaml
 
-from robocasa_lerobot.training.config import ExperimentConfig, load_experiment
-from robocasa_lerobot.training.overlay import merge
+from robocasa_lerobot.training.config.experiment import ExperimentConfig, load_experiment
+from robocasa_lerobot.training.config.experiment_files import merge
 
 ROOT = Path(__file__).parents[1]
 TINY: dict[str, dict[str, Any]] = {

@@ -113,7 +113,7 @@ def two_workers(fault):
 
 
 if __name__ == "__main__":  # a process that a test kills, whose workers must then end
-    from robocasa_lerobot.envs.vector import make_vector_env
+    from robocasa_lerobot.envs.vector.kitchens import make_vector_env
 
     envs = make_vector_env([FaultyEnv, lambda: FaultyEnv(fault="hang@step")])
     envs.reset(seed=1)

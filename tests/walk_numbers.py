@@ -11,7 +11,7 @@ from pathlib import Path
 
 from robocasa_lerobot.benchmark import published
 from robocasa_lerobot.benchmark.tasks import published_task_sets
-from robocasa_lerobot.evaluation.results import TRIALS_FILE, UNPERTURBED, Results, TrialRecord, read_results
+from robocasa_lerobot.evaluation.records.results import TRIALS_FILE, UNPERTURBED, Results, TrialRecord, read_results
 
 TRIALS = 97
 SPLITS = ("atomic_seen", "composite_seen", "composite_unseen", "average")

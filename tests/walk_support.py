@@ -13,13 +13,13 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from robocasa_lerobot.data.config import MixtureConfig
 from robocasa_lerobot.data.fake import write_fake_dataset
-from robocasa_lerobot.data.registry import missing_datasets, select_datasets
-from robocasa_lerobot.training.config import ExperimentConfig
+from robocasa_lerobot.data.mixture_config import MixtureConfig
+from robocasa_lerobot.data.registry.registry import missing_datasets, select_datasets
+from robocasa_lerobot.training.config.experiment import ExperimentConfig
 from robocasa_lerobot.training.phases import is_finished
-from robocasa_lerobot.training.skipped import Skipped, read
-from robocasa_lerobot.training.unavailable import runnable
+from robocasa_lerobot.training.planning.skipped import Skipped, read
+from robocasa_lerobot.training.planning.unavailable import runnable
 
 ROOT = Path(__file__).parents[1]
 SCALE = ROOT / "configs/scales/tiny.yaml"

@@ -19,8 +19,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robocasa_lerobot import __version__, contract
+from robocasa_lerobot.convert.lerobot_v3 import EXTRA_PREFIX, ExportedDataset, ExportedEpisode
 from robocasa_lerobot.convert.reading.demo_file import ASSETS_GROUP, IMAGE_SUFFIX
-from robocasa_lerobot.convert.reading.lerobot_v3 import EXTRA_PREFIX, ExportedDataset, ExportedEpisode
 from robocasa_lerobot.errors import UnknownNameError, UserError
 from robocasa_lerobot.files import written_aside
 from robocasa_lerobot.progress import Bar

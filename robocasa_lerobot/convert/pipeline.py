@@ -26,20 +26,23 @@ from robocasa_lerobot.convert.lerobot_v2.finish import conversion_facts, finish_
 from robocasa_lerobot.convert.lerobot_v2.plan import V2Plan, make_v2_plan, takes
 from robocasa_lerobot.convert.lerobot_v2.shard import convert_v2_shard
 from robocasa_lerobot.convert.reading.demo_file import DemoFile
-from robocasa_lerobot.convert.scenes.ahead import scenes_ahead
-from robocasa_lerobot.convert.settings import ConversionSettings, Plan, Shard, SourceRecord, make_plan
-from robocasa_lerobot.convert.shard import (
+from robocasa_lerobot.convert.record_files import (
+    ACTIONS_OUT_OF_RANGE,
+    CONVERSION_FILE,
     DATASET,
     EPISODES_FILE,
     EXTRAS,
     HISTOGRAMS_FILE,
+    META_FOLDER,
     REJECTED_FILE,
-    convert_shard,
     episode_folder,
     kept_assets,
 )
+from robocasa_lerobot.convert.scenes.ahead import scenes_ahead
+from robocasa_lerobot.convert.settings import ConversionSettings, Plan, Shard, SourceRecord, make_plan
+from robocasa_lerobot.convert.shard import convert_shard
 from robocasa_lerobot.convert.writing.card import write_dataset_card
-from robocasa_lerobot.convert.writing.encoder import CODECS, SAMPLED_FRAMES, SAMPLED_PIXELS, Histogram, quiet_codecs
+from robocasa_lerobot.convert.writing.encoder import CODECS, SAMPLED_FRAMES, SAMPLED_PIXELS, Histogram, quiet_libraries
 from robocasa_lerobot.convert.writing.encoding_process import shared_encoder
 from robocasa_lerobot.convert.writing.modality import MODALITY_FILE, modality, write_modality
 from robocasa_lerobot.errors import UserError
@@ -57,9 +60,6 @@ from robocasa_lerobot.jobs.workers import check_workers, num_workers
 from robocasa_lerobot.jsonl import read_jsonl, write_jsonl
 
 # Our part of a dataset's folder; LeRobot reads nothing in it.
-META_FOLDER = "meta/robocasa"
-CONVERSION_FILE = "conversion.json"
-ACTIONS_OUT_OF_RANGE = "actions_out_of_range"  # in it
 # Starting a worker imports LeRobot and MuJoCo (about 6 s of CPU time); below this much work that does not pay: 3,150
 # frames took as long with two workers as with one.
 _MIN_FRAMES_PER_WORKER = 2000
@@ -270,14 +270,6 @@ class _ShardTask:
         later = range(rank + 1, len(self.plan.shards)) if self.in_order else ()
         coming = (r for r in later if not shard_folder(Path(self.partial), r).exists())
         return next((self.plan.shards[r] for r in coming), None)
-
-
-def quiet_libraries() -> None:
-    """Silence what libraries print about every file they write; their errors still arrive as exceptions."""
-    import datasets
-
-    datasets.disable_progress_bars()
-    quiet_codecs()
 
 
 def shard_folder(partial: Path, rank: int) -> Path:

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from robocasa_lerobot.convert.reading.demo_file import RejectedEpisodeError
 from robocasa_lerobot.convert.scenes.compiled import CompiledScene
 from robocasa_lerobot.convert.settings import Camera
-from robocasa_lerobot.rendering import SceneRenderer
+from robocasa_lerobot.envs.rendering import SceneRenderer
 
 
 class Scene:

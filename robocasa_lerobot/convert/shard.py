@@ -18,6 +18,14 @@ from robocasa_lerobot import contract
 from robocasa_lerobot.convert.episode import Episode
 from robocasa_lerobot.convert.reading.demo_file import DemoFile, RejectedEpisodeError
 from robocasa_lerobot.convert.reading.mjcf import MissingAssetsError
+from robocasa_lerobot.convert.record_files import (
+    DATASET,
+    EPISODES_FILE,
+    EXTRAS,
+    HISTOGRAMS_FILE,
+    REJECTED_FILE,
+    episode_folder,
+)
 from robocasa_lerobot.convert.scenes.ahead import scenes_ahead
 from robocasa_lerobot.convert.scenes.demo_scene import DemoScene
 from robocasa_lerobot.convert.settings import Plan, Shard
@@ -26,9 +34,6 @@ from robocasa_lerobot.convert.writing.encoding_process import EncodingProcess, s
 from robocasa_lerobot.jsonl import write_jsonl
 
 _PROGRESS_SECONDS = 0.5
-
-DATASET, EXTRAS = "dataset", "extras"
-EPISODES_FILE, REJECTED_FILE, HISTOGRAMS_FILE = "episodes.jsonl", "rejected.jsonl", "histograms.npz"
 
 
 class ShardOutcome(NamedTuple):
@@ -146,16 +151,6 @@ class _ShardWriter:
             np.savez_compressed(self._folder / HISTOGRAMS_FILE, **histograms)
         else:
             shutil.rmtree(self._folder / DATASET)
-
-
-def episode_folder(index: int) -> str:
-    """Name of an episode's folder under `extras`, as in RoboCasa's datasets."""
-    return f"episode_{index:06d}"
-
-
-def kept_assets(sha256: str) -> str:
-    """Folder under `extras` with the meshes and textures that a source file held itself."""
-    return f"assets/{sha256[:12]}"
 
 
 def _write_extras(episode: Episode, folder: Path) -> None:

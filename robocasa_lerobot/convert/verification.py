@@ -16,11 +16,10 @@ from robocasa_lerobot import contract
 from robocasa_lerobot.convert.episode import Episode
 from robocasa_lerobot.convert.mapping.robot_mapping import EXTRA_PREFIX, RobotMapping
 from robocasa_lerobot.convert.mapping.robots import choose_mapping
-from robocasa_lerobot.convert.pipeline import META_FOLDER
 from robocasa_lerobot.convert.reading.demo_file import DemoFile, RejectedEpisodeError
+from robocasa_lerobot.convert.record_files import META_FOLDER, REJECTED_FILE
 from robocasa_lerobot.convert.report import CameraQuality, Check, Report
 from robocasa_lerobot.convert.settings import Camera, ConversionSettings, Plan, file_sha256
-from robocasa_lerobot.convert.shard import REJECTED_FILE
 from robocasa_lerobot.convert.writing.statistics import column_of
 from robocasa_lerobot.errors import UserError
 from robocasa_lerobot.jsonl import read_jsonl

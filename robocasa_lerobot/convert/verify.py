@@ -13,13 +13,13 @@ from lerobot.datasets.lerobot_dataset import LeRobotDataset
 from robocasa_lerobot.convert.lerobot_v2.dataset import V2Dataset, is_dataset_folder
 from robocasa_lerobot.convert.lerobot_v2.plan import SOURCE_FORMAT, source_record
 from robocasa_lerobot.convert.lerobot_v2.verify import V2Verification
-from robocasa_lerobot.convert.pipeline import CONVERSION_FILE, META_FOLDER, quiet_libraries
+from robocasa_lerobot.convert.record_files import CONVERSION_FILE, EPISODES_FILE, META_FOLDER
 from robocasa_lerobot.convert.report import Report
 from robocasa_lerobot.convert.rerender.plan import SOURCE_FORMAT as RERENDERED
 from robocasa_lerobot.convert.rerender.verify import verify_rerendered
 from robocasa_lerobot.convert.settings import ConversionSettings, SourceRecord, file_sha256
-from robocasa_lerobot.convert.shard import EPISODES_FILE
 from robocasa_lerobot.convert.verification import Source, Verification
+from robocasa_lerobot.convert.writing.encoder import quiet_libraries
 from robocasa_lerobot.errors import UserError
 from robocasa_lerobot.jobs.as_completed import as_they_end
 from robocasa_lerobot.jobs.workers import check_workers, num_workers

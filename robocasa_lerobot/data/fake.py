@@ -19,7 +19,7 @@ from lerobot.configs import RGBEncoderConfig
 from lerobot.datasets.lerobot_dataset import LeRobotDataset
 
 from robocasa_lerobot import contract
-from robocasa_lerobot.data.source import EPISODE_TABLE
+from robocasa_lerobot.data.reading.source import EPISODE_TABLE
 
 INSTRUCTIONS = {
     "OpenDrawer": "open the left drawer",

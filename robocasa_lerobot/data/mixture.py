@@ -16,12 +16,12 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from robocasa_lerobot.data.config import LoaderConfig, MemberConfig, MixtureConfig
-from robocasa_lerobot.data.frame_cache import FrameCache, cache_bytes, open_or_build, resize_images
-from robocasa_lerobot.data.pictures import PictureReader
-from robocasa_lerobot.data.registry import resolve_mixture
+from robocasa_lerobot.data.mixture_config import LoaderConfig, MemberConfig, MixtureConfig
+from robocasa_lerobot.data.reading.frame_cache import FrameCache, cache_bytes, open_or_build, resize_images
+from robocasa_lerobot.data.reading.pictures import PictureReader
+from robocasa_lerobot.data.reading.source import DatasetSource
+from robocasa_lerobot.data.registry.registry import resolve_mixture
 from robocasa_lerobot.data.sampler import FramePool, MixtureSampler, mixture_probabilities
-from robocasa_lerobot.data.source import DatasetSource
 from robocasa_lerobot.data.statistics import (
     Part,
     Statistics,
@@ -66,7 +66,7 @@ class _Member:
 class MixtureDataset(torch.utils.data.Dataset[Item]):
     """Items as LeRobot's datasets give them, over the members of a mixture.
 
-    `config` is the mixture with its selections written out as members (`data/registry.py`).
+    `config` is the mixture with its selections written out as members (`data/registry/registry.py`).
     An item has every column of the frame, and for the keys of `delta_timestamps` a leading time axis and
     `<key>_is_pad` (true where the window leaves the episode and repeats its edge). Images are uint8
     (time, 3, H, W), other floats float32; `task` is the instruction and `task_index` its place in `meta.tasks`.

@@ -18,7 +18,7 @@ import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
 from robocasa_lerobot.data.quantiles import QuantileSearch
-from robocasa_lerobot.data.source import DatasetSource
+from robocasa_lerobot.data.reading.source import DatasetSource
 from robocasa_lerobot.errors import UserError
 from robocasa_lerobot.files import write_text
 from robocasa_lerobot.jobs.locks import locked

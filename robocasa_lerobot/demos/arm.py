@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robocasa_lerobot.demos.motion import Array
-from robocasa_lerobot.envs.control.indices import joint_positions
-from robocasa_lerobot.envs.scene.robot import ARM_HOME_QPOS
-from robocasa_lerobot.envs.scene.robot_names import ARM_CENTER_SITE, ARM_JOINTS, GRIP_SITE, HAND
+from robocasa_lerobot.envs.robots.panda_omron.control.indices import joint_positions
+from robocasa_lerobot.envs.robots.panda_omron.model import ARM_HOME_QPOS
+from robocasa_lerobot.envs.robots.panda_omron.names import ARM_CENTER_SITE, ARM_JOINTS, GRIP_SITE, HAND
 
 ITERATIONS, DAMPING = 40, 0.05
 HOPELESS_AFTER, HOPELESS_M = 10, 0.06  # what is as far as this after so many iterations is given up

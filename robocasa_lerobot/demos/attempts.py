@@ -14,9 +14,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from robocasa_lerobot.demos.episode import Recording, record_episode
 from robocasa_lerobot.demos.failures import film_of, keep_failure
 from robocasa_lerobot.demos.hdf5 import Failure, write_part
+from robocasa_lerobot.demos.recorder import Recording, record_episode
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.files import write_text
 from robocasa_lerobot.gl import NoOpenGLError

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from robocasa_lerobot.demos.demonstrator import can_demonstrate, check_demonstrable
-from robocasa_lerobot.envs.registry import get_task, task_names, task_set, task_sets
+from robocasa_lerobot.envs.tasks.registry import get_task, task_names, task_set, task_sets
 from robocasa_lerobot.errors import UnknownNameError, UserError
 
 ALL = "all"

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 
 from robocasa_lerobot.demos.motion import Array, action
+from robocasa_lerobot.demos.motion_style import PLAIN, Variety, give_variety
 from robocasa_lerobot.demos.skills import SKILLS, SkillError
-from robocasa_lerobot.demos.variety import PLAIN, Variety, give_variety
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
-from robocasa_lerobot.envs.registry import get_task, task_names
-from robocasa_lerobot.envs.task import Task
+from robocasa_lerobot.envs.tasks.registry import get_task, task_names
+from robocasa_lerobot.envs.tasks.task import Task
 from robocasa_lerobot.errors import UnknownNameError, UserError
 
 __all__ = ["SkillError", "can_demonstrate", "demonstrate"]

@@ -10,7 +10,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from robocasa_lerobot.demos.record import RecordingSettings, record_tasks
+from robocasa_lerobot.demos.recording import RecordingSettings, record_tasks
 from robocasa_lerobot.demos.summary import print_summary
 from robocasa_lerobot.jobs.executors import Execution, run_with_ray, submit_to_slurm
 

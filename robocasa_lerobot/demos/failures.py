@@ -10,9 +10,9 @@ from typing import Any
 import mujoco
 
 from robocasa_lerobot import contract
-from robocasa_lerobot.demos.episode import Recording
 from robocasa_lerobot.demos.film_strip import show_state
 from robocasa_lerobot.demos.hdf5 import Failure
+from robocasa_lerobot.demos.recorder import Recording
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.files import write_text
 
@@ -59,8 +59,8 @@ def remove_others(folder: Path, failures: list[Failure]) -> None:
 
 
 def _film(path: Path, env: KitchenEnv, recording: Recording) -> None:
+    from robocasa_lerobot.envs.rendering import SceneRenderer
     from robocasa_lerobot.gl import ensure_gl
-    from robocasa_lerobot.rendering import SceneRenderer
     from robocasa_lerobot.video import VideoWriter, side_by_side
 
     ensure_gl()

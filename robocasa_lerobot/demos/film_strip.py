@@ -14,7 +14,7 @@ from robocasa_lerobot import contract
 from robocasa_lerobot.demos.motion import base_pose
 from robocasa_lerobot.demos.replay import kitchen_of, read_demonstration
 from robocasa_lerobot.demos.titled import titled
-from robocasa_lerobot.envs.scene.robot_names import GRIP_SITE
+from robocasa_lerobot.envs.robots.panda_omron.names import GRIP_SITE
 from robocasa_lerobot.files import written_aside
 
 STRIP_PICTURES, STRIP_SIZE = 10, 224  # along the strip; pixels of each
@@ -29,8 +29,8 @@ def film_strip(path: Path, demo: str, out: Path) -> None:
     Raises:
         UserError: the kitchen of the demonstration cannot be made again.
     """
+    from robocasa_lerobot.envs.rendering import SceneRenderer
     from robocasa_lerobot.gl import ensure_gl
-    from robocasa_lerobot.rendering import SceneRenderer
 
     ensure_gl()
     recorded = read_demonstration(path, demo)

@@ -14,7 +14,7 @@ import mujoco
 import numpy as np
 
 from robocasa_lerobot import __version__
-from robocasa_lerobot.demos.episode import Recording
+from robocasa_lerobot.demos.recorder import Recording
 from robocasa_lerobot.files import written_aside
 
 ENV_TYPE_ROBOSUITE = 1  # robomimic's number for environments of this family

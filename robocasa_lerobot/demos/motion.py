@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robocasa_lerobot import contract
-from robocasa_lerobot.envs.control.kernel import POSITION_SCALE_M, ROTATION_SCALE_RAD
-from robocasa_lerobot.envs.scene.robot_names import ARM_CENTER_SITE, BASE_CENTER_SITE, GRIP_SITE, HAND
+from robocasa_lerobot.envs.robots.panda_omron.control.kernel import POSITION_SCALE_M, ROTATION_SCALE_RAD
+from robocasa_lerobot.envs.robots.panda_omron.names import ARM_CENTER_SITE, BASE_CENTER_SITE, GRIP_SITE, HAND
 
 Array = NDArray[np.float64]
 

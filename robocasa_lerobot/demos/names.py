@@ -11,7 +11,7 @@ import json
 def main() -> None:
     """Print the names."""
     from robocasa_lerobot.demos.demonstrator import can_demonstrate
-    from robocasa_lerobot.envs.registry import get_task, task_names
+    from robocasa_lerobot.envs.tasks.registry import get_task, task_names
 
     print(json.dumps([name for name in task_names() if can_demonstrate(get_task(name))]))
 

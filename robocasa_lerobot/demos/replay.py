@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robocasa_lerobot import contract
-from robocasa_lerobot.demos.episode import SUCCESS_HOLD_STEPS
+from robocasa_lerobot.demos.recorder import SUCCESS_HOLD_STEPS
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.errors import UserError
 from robocasa_lerobot.jobs.as_completed import as_they_end

@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Sequence
 
 from robocasa_lerobot import contract
-from robocasa_lerobot.demos.record import RecordingResult
+from robocasa_lerobot.demos.recording import RecordingResult
 
 _REASONS = 3
 

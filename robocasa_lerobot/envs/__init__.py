@@ -6,7 +6,7 @@ Importing this package makes the tasks known to Gymnasium: `gymnasium.make("robo
 
 import gymnasium
 
-from robocasa_lerobot.envs.registry import get_task, task_names
+from robocasa_lerobot.envs.tasks.registry import get_task, task_names
 
 __all__ = ["get_task", "task_names"]
 
@@ -17,6 +17,6 @@ for _name in task_names():
         gymnasium.register(
             f"{NAMESPACE}/{_name}",
             entry_point="robocasa_lerobot.envs.kitchen_env:KitchenEnv",
-            vector_entry_point="robocasa_lerobot.envs.vector:make_vector_env",
+            vector_entry_point="robocasa_lerobot.envs.vector.kitchens:make_vector_env",
             kwargs={"task": _name},
         )

@@ -13,21 +13,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robocasa_lerobot import contract, gl
-from robocasa_lerobot.envs.camera_noise import CameraNoise, choose_noise
-from robocasa_lerobot.envs.cameras import check_camera_names
-from robocasa_lerobot.envs.control.controller import RobotController
-from robocasa_lerobot.envs.control.physics import read_physics
-from robocasa_lerobot.envs.control.step import control_step
-from robocasa_lerobot.envs.initial_noise import InitialNoise, add_initial_noise
+from robocasa_lerobot.envs.kitchens.splits import scene_ids, without
 from robocasa_lerobot.envs.pictures import Pictures, picture_spaces, segmentation_names, take_pictures
-from robocasa_lerobot.envs.proprioception import read_state
-from robocasa_lerobot.envs.registry import get_task
-from robocasa_lerobot.envs.scene.builder import RENDER_PRESETS, build_scene
-from robocasa_lerobot.envs.scene.kitchens import scene_ids, without
+from robocasa_lerobot.envs.rendering import SceneRenderer
+from robocasa_lerobot.envs.robots.panda_omron.camera_noise import CameraNoise, choose_noise
+from robocasa_lerobot.envs.robots.panda_omron.cameras import check_camera_names
+from robocasa_lerobot.envs.robots.panda_omron.control.controller import RobotController
+from robocasa_lerobot.envs.robots.panda_omron.control.physics import read_physics
+from robocasa_lerobot.envs.robots.panda_omron.control.step import control_step
+from robocasa_lerobot.envs.robots.panda_omron.proprioception import read_state
+from robocasa_lerobot.envs.scene.build import RENDER_PRESETS, build_scene
+from robocasa_lerobot.envs.scene.reset_noise import InitialNoise, add_initial_noise
 from robocasa_lerobot.envs.scene.scene import Scene
 from robocasa_lerobot.envs.state import KitchenState, restore
+from robocasa_lerobot.envs.tasks.registry import get_task
 from robocasa_lerobot.errors import UnknownNameError, UserError
-from robocasa_lerobot.rendering import SceneRenderer
 
 Observation = dict[str, Any]
 # Key of the generator that noise on the initial arm pose comes from, apart from the one that makes the scene.

@@ -17,10 +17,10 @@ from lerobot.envs.configs import EnvConfig
 from lerobot.envs.utils import _LazyAsyncVectorEnv
 
 from robocasa_lerobot import contract
-from robocasa_lerobot.envs import registry
-from robocasa_lerobot.envs.hold import held
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
-from robocasa_lerobot.envs.vector import make_vector_env
+from robocasa_lerobot.envs.tasks import registry
+from robocasa_lerobot.envs.vector.freeze_at_end import held
+from robocasa_lerobot.envs.vector.kitchens import make_vector_env
 from robocasa_lerobot.errors import UnknownNameError, UserError
 from robocasa_lerobot.gl import ensure_gl
 

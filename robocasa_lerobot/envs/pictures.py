@@ -9,9 +9,9 @@ import gymnasium
 import mujoco
 import numpy as np
 
-from robocasa_lerobot.envs.scene.robot_names import ROBOT_BASE
-from robocasa_lerobot.envs.scene.surroundings import SURROUNDINGS
-from robocasa_lerobot.rendering import SceneRenderer
+from robocasa_lerobot.envs.kitchens.surroundings import SURROUNDINGS
+from robocasa_lerobot.envs.rendering import SceneRenderer
+from robocasa_lerobot.envs.robots.panda_omron.names import ROBOT_BASE
 
 BACKGROUND = "background"
 Pictures = dict[str, dict[str, Any]]

@@ -10,8 +10,8 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from robocasa_lerobot.envs.rendering import clipping_planes, view_frustum
 from robocasa_lerobot.errors import UnknownNameError, UserError
-from robocasa_lerobot.rendering import clipping_planes, view_frustum
 
 Array = NDArray[np.float64]
 

@@ -9,8 +9,8 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from robocasa_lerobot.envs.control.controller import RobotController
-from robocasa_lerobot.envs.control.physics import physics_size, write_physics
+from robocasa_lerobot.envs.robots.panda_omron.control.controller import RobotController
+from robocasa_lerobot.envs.robots.panda_omron.control.physics import physics_size, write_physics
 from robocasa_lerobot.errors import UserError
 
 

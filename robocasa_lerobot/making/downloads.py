@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from robocasa_lerobot.benchmark.tasks import published_tasks
-from robocasa_lerobot.data.published import CONVERTED, dataset_version
+from robocasa_lerobot.data.registry.published import CONVERTED, dataset_version
 from robocasa_lerobot.errors import UserError
 from robocasa_lerobot.jobs.executors import Execution
 from robocasa_lerobot.making.needs import WORK, Need

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from robocasa_lerobot.data.published import DOWNLOADS
+from robocasa_lerobot.data.registry.published import DOWNLOADS
 from robocasa_lerobot.making.estimate import estimate, published_hours
 from robocasa_lerobot.making.needs import Content, Need
-from robocasa_lerobot.training.skipped import Skipped
+from robocasa_lerobot.training.planning.skipped import Skipped
 
 _SHOWN = 8  # names of tasks in a line
 

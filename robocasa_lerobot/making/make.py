@@ -9,8 +9,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from robocasa_lerobot.data.published import dataset_version
-from robocasa_lerobot.data.recipes import RecipeConfig
+from robocasa_lerobot.data.registry.published import dataset_version
+from robocasa_lerobot.data.registry.recipes import RecipeConfig
 from robocasa_lerobot.demos.attempts import Parts, RecordingSettings
 from robocasa_lerobot.jobs.executors import Execution
 from robocasa_lerobot.making.needs import WORK, Need
@@ -85,7 +85,7 @@ class MadeDataset:
     def _record_and_convert(self, workers: int) -> None:
         from robocasa_lerobot.convert.pipeline import convert
         from robocasa_lerobot.convert.settings import ConversionSettings
-        from robocasa_lerobot.demos.record import record_task
+        from robocasa_lerobot.demos.recording import record_task
 
         recorded = record_task(recording_settings(self.need), self.work, workers=workers, show_progress=False)
         self.need.root.parent.mkdir(parents=True, exist_ok=True)

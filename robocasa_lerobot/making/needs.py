@@ -8,14 +8,14 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from robocasa_lerobot.data.config import MixtureConfig
-from robocasa_lerobot.data.published import DEMONSTRATIONS, DatasetEntry, dataset_version
-from robocasa_lerobot.data.registry import Registry, missing_datasets, open_registry, select_datasets
-from robocasa_lerobot.data.registry_file import TASK, RegisteredDataset
+from robocasa_lerobot.data.mixture_config import MixtureConfig
+from robocasa_lerobot.data.registry.published import DEMONSTRATIONS, DatasetEntry, dataset_version
+from robocasa_lerobot.data.registry.registry import Registry, missing_datasets, open_registry, select_datasets
+from robocasa_lerobot.data.registry.registry_file import TASK, RegisteredDataset
 from robocasa_lerobot.errors import UnknownNameError, UserError
-from robocasa_lerobot.training.config import ExperimentConfig
-from robocasa_lerobot.training.skipped import Skipped
-from robocasa_lerobot.training.unavailable import runnable
+from robocasa_lerobot.training.config.experiment import ExperimentConfig
+from robocasa_lerobot.training.planning.skipped import Skipped
+from robocasa_lerobot.training.planning.unavailable import runnable
 
 WORK = ".making"  # in the root of a registry: recordings and logs of datasets that are being made
 

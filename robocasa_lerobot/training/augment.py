@@ -10,7 +10,7 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from robocasa_lerobot.training.phase_config import AugmentConfig
+from robocasa_lerobot.training.config.phase import AugmentConfig
 
 _GREY = (0.299, 0.587, 0.114)  # luma of ITU-R BT.601
 # YIQ of the NTSC standard: the hue is the angle in the plane of its last two coordinates.

@@ -13,12 +13,12 @@ from accelerate import Accelerator
 from accelerate.utils import gather_object
 from numpy.typing import NDArray
 
-from robocasa_lerobot.data.config import LoaderConfig, MemberConfig, MixtureConfig
 from robocasa_lerobot.data.mixture import MixtureDataset, open_mixture
-from robocasa_lerobot.data.source import EPISODE_TABLE, DatasetSource
+from robocasa_lerobot.data.mixture_config import LoaderConfig, MemberConfig, MixtureConfig
+from robocasa_lerobot.data.reading.source import EPISODE_TABLE, DatasetSource
 from robocasa_lerobot.errors import UserError
 from robocasa_lerobot.jsonl import read_jsonl
-from robocasa_lerobot.training.phase_config import HeldOutConfig
+from robocasa_lerobot.training.config.phase import HeldOutConfig
 
 Forward = Callable[[dict[str, Any]], tuple[torch.Tensor, Any]]
 

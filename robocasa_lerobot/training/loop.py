@@ -24,11 +24,11 @@ from robocasa_lerobot.files import written_aside
 from robocasa_lerobot.progress import Bar
 from robocasa_lerobot.training.allocator import keep_freed_memory
 from robocasa_lerobot.training.augment import augment
-from robocasa_lerobot.training.checkpoint import TrainingState, prune, save_checkpoint
+from robocasa_lerobot.training.config.phase import PhaseConfig
 from robocasa_lerobot.training.held_out import HeldOut
 from robocasa_lerobot.training.metrics import HELD_OUT, METRICS, append_line, draw_curve, track
-from robocasa_lerobot.training.phase_config import PhaseConfig
 from robocasa_lerobot.training.shared_noise import SharedNoise
+from robocasa_lerobot.training.weights.checkpoint import TrainingState, prune, save_checkpoint
 
 BAD_BATCH = "bad_batch"
 # Policies whose loss is a mean over the actions inside the episode, of which parts of a batch have different numbers.

@@ -7,16 +7,19 @@ from pathlib import Path
 
 from accelerate import Accelerator, DistributedDataParallelKwargs, InitProcessGroupKwargs
 
-from robocasa_lerobot.data.hub import fetch_missing
-from robocasa_lerobot.training import builders, features, joining, metrics, records, skipped
-from robocasa_lerobot.training.checkpoint import checkpoint_step, last_checkpoint, tidy
-from robocasa_lerobot.training.config import HUB, ExperimentConfig, PhaseConfig
-from robocasa_lerobot.training.evaluations import Evaluations, phase_evaluations
+from robocasa_lerobot.data.registry.hub import fetch_missing
+from robocasa_lerobot.training import metrics, records
+from robocasa_lerobot.training.config.experiment import HUB, ExperimentConfig, PhaseConfig
 from robocasa_lerobot.training.interrupts import Interrupts
 from robocasa_lerobot.training.loop import train_phase
-from robocasa_lerobot.training.prepare import planned_policy, prepare_phase, start_of
-from robocasa_lerobot.training.unavailable import runnable
+from robocasa_lerobot.training.planning import skipped
+from robocasa_lerobot.training.planning.evaluations import Evaluations, phase_evaluations
+from robocasa_lerobot.training.planning.unavailable import runnable
+from robocasa_lerobot.training.setup import builders, features
+from robocasa_lerobot.training.setup import phase_data as joining
+from robocasa_lerobot.training.setup.build_phase import planned_policy, prepare_phase, start_of
 from robocasa_lerobot.training.waiting import BARRIER, first_process_works
+from robocasa_lerobot.training.weights.checkpoint import checkpoint_step, last_checkpoint, tidy
 
 
 def run_experiment(

@@ -14,9 +14,9 @@ from robocasa_lerobot.data.mixture import MixtureDataset
 from robocasa_lerobot.errors import UserError
 from robocasa_lerobot.files import write_text
 from robocasa_lerobot.provenance import git_commit, versions
-from robocasa_lerobot.training import overlay
-from robocasa_lerobot.training.checkpoint import last_checkpoint
-from robocasa_lerobot.training.config import FROM_SCRATCH, ExperimentConfig, PhaseConfig, to_yaml
+from robocasa_lerobot.training.config import experiment_files as overlay
+from robocasa_lerobot.training.config.experiment import FROM_SCRATCH, ExperimentConfig, PhaseConfig, to_yaml
+from robocasa_lerobot.training.weights.checkpoint import last_checkpoint
 
 EXPERIMENT_FILE, PHASE_FILE, CONFIG_FILE = "experiment.yaml", "phase.json", "config.yaml"
 PACKAGES = ("lerobot", "torch", "accelerate", "transformers", "diffusers", "numpy")

@@ -21,17 +21,16 @@ from robocasa_lerobot.convert.lerobot_v2.dataset import V2Dataset
 from robocasa_lerobot.convert.lerobot_v2.episode import EP_META, V2Episode
 from robocasa_lerobot.convert.lerobot_v2.plan import V2Plan
 from robocasa_lerobot.convert.reading.demo_file import RejectedEpisodeError
-from robocasa_lerobot.convert.settings import Camera, Shard
-from robocasa_lerobot.convert.shard import (
+from robocasa_lerobot.convert.record_files import (
     DATASET,
     EPISODES_FILE,
     EXTRAS,
     HISTOGRAMS_FILE,
     REJECTED_FILE,
-    RejectedEpisode,
-    ShardOutcome,
     episode_folder,
 )
+from robocasa_lerobot.convert.settings import Camera, Shard
+from robocasa_lerobot.convert.shard import RejectedEpisode, ShardOutcome
 from robocasa_lerobot.convert.writing.encoder import (
     EncodedVideo,
     VideoSettings,

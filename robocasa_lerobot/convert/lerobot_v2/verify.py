@@ -13,9 +13,9 @@ from robocasa_lerobot.convert.lerobot_v2.dataset import EXTRAS, V2Dataset
 from robocasa_lerobot.convert.lerobot_v2.episode import Column, V2Episode
 from robocasa_lerobot.convert.lerobot_v2.plan import Look, look_into, source_record
 from robocasa_lerobot.convert.reading.demo_file import RejectedEpisodeError
+from robocasa_lerobot.convert.record_files import episode_folder
 from robocasa_lerobot.convert.report import Check
 from robocasa_lerobot.convert.settings import Camera, ConversionSettings
-from robocasa_lerobot.convert.shard import episode_folder
 from robocasa_lerobot.convert.verification import Source, Verification, compare_bits, spread
 from robocasa_lerobot.convert.writing.statistics import column_of
 from robocasa_lerobot.convert.writing.video import digests

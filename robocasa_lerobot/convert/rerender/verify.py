@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 
 from robocasa_lerobot import contract
 from robocasa_lerobot.convert.reading.demo_file import RejectedEpisodeError
+from robocasa_lerobot.convert.record_files import EXTRAS
 from robocasa_lerobot.convert.report import CameraQuality, Check, Report
 from robocasa_lerobot.convert.rerender.plan import EpisodePictures, RenderPlan, RenderSettings, make_render_plan
-from robocasa_lerobot.convert.shard import EXTRAS
 from robocasa_lerobot.convert.verification import num_video_frames, psnr_db, spread
 from robocasa_lerobot.errors import UserError
 from robocasa_lerobot.progress import Bar

@@ -19,9 +19,9 @@ from lerobot.configs import RGBEncoderConfig
 from lerobot.datasets.video_utils import get_video_info
 
 from robocasa_lerobot import __version__, contract
-from robocasa_lerobot.convert.pipeline import CONVERSION_FILE, META_FOLDER, quiet_libraries
+from robocasa_lerobot.convert.lerobot_v3 import ExportedEpisode
 from robocasa_lerobot.convert.reading.demo_file import RejectedEpisodeError
-from robocasa_lerobot.convert.reading.lerobot_v3 import ExportedEpisode
+from robocasa_lerobot.convert.record_files import CONVERSION_FILE, META_FOLDER
 from robocasa_lerobot.convert.rerender.plan import (
     SOURCE_FORMAT,
     EpisodePictures,
@@ -36,6 +36,7 @@ from robocasa_lerobot.convert.writing.encoder import (
     CODECS,
     Histogram,
     VideoSettings,
+    quiet_libraries,
     sampled_frames,
     unit_statistics,
 )

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robocasa_lerobot.convert.reading.hdf5 import RejectedEpisodeError
-from robocasa_lerobot.rendering.look_alike import VISIBLE_GROUPS, LookAlike, look_alike
+from robocasa_lerobot.envs.rendering.look_alike import VISIBLE_GROUPS, LookAlike, look_alike
 
 PRESETS = ("fast", "quality")
 _QUALITY_SAMPLES = 4  # multisampling of the `quality` preset

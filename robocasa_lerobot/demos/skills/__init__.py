@@ -26,7 +26,7 @@ from robocasa_lerobot.demos.skills.put_on_counter import place_on_counter, take_
 from robocasa_lerobot.demos.skills.racks import pull, push, slide
 from robocasa_lerobot.demos.skills.shut import close_doors, lift_shut
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
-from robocasa_lerobot.envs.task import Stage
+from robocasa_lerobot.envs.tasks.task import Stage
 
 Skill = Callable[[KitchenEnv, Stage], Iterator[Array]]
 

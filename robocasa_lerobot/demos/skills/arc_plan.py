@@ -19,8 +19,8 @@ from robocasa_lerobot.demos.motion import Array, HandTarget, base_pose, floor_ax
 from robocasa_lerobot.demos.skills.common import SkillError
 from robocasa_lerobot.demos.skills.hinged import Hinged
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
-from robocasa_lerobot.envs.scene.robot import ARM_HOME_QPOS, place_base
-from robocasa_lerobot.envs.scene.robot_names import ARM_CENTER_SITE, HAND, MOBILE_BASE, TORSO_JOINT
+from robocasa_lerobot.envs.robots.panda_omron.model import ARM_HOME_QPOS, place_base
+from robocasa_lerobot.envs.robots.panda_omron.names import ARM_CENTER_SITE, HAND, MOBILE_BASE, TORSO_JOINT
 
 Shift = tuple[float, float]
 

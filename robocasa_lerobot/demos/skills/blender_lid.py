@@ -24,11 +24,11 @@ from robocasa_lerobot.demos.skills.common import SkillError, hold_hand, move_han
 from robocasa_lerobot.demos.skills.reach import shift_base, untried
 from robocasa_lerobot.demos.skills.reach_many import plan_reach_of_many
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
-from robocasa_lerobot.envs.placement import Area, Footprint
-from robocasa_lerobot.envs.scene.appliances.blender import Blender
-from robocasa_lerobot.envs.scene.selection import counter_areas, footprint
-from robocasa_lerobot.envs.scene.wanted import OnCounter
-from robocasa_lerobot.envs.task import Stage
+from robocasa_lerobot.envs.kitchens.appliances.kinds.blender import Blender
+from robocasa_lerobot.envs.kitchens.footprints import Area, Footprint
+from robocasa_lerobot.envs.scene.roles import counter_areas, footprint
+from robocasa_lerobot.envs.scene.spec import OnCounter
+from robocasa_lerobot.envs.tasks.task import Stage
 
 ATTEMPTS = 4
 GRASP_STEPS, RELEASE_STEPS = 12, 10

@@ -14,7 +14,7 @@ from robocasa_lerobot.demos.skills.common import SkillError, hold_hand, move_han
 from robocasa_lerobot.demos.skills.levers import FINGER_HALF_M, level_and_down, push_way
 from robocasa_lerobot.demos.skills.reach import plan_reach, shift_base, untried
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
-from robocasa_lerobot.envs.task import Stage
+from robocasa_lerobot.envs.tasks.task import Stage
 
 ATTEMPTS = 4
 STANDOFF_M, RETREAT_M = 0.07, 0.20

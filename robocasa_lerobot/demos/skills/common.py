@@ -17,7 +17,7 @@ from robocasa_lerobot.demos.motion import (
     limit,
     pose_error,
 )
-from robocasa_lerobot.envs.scene.robot_names import FINGER_JOINTS
+from robocasa_lerobot.envs.robots.panda_omron.names import FINGER_JOINTS
 
 POSITION_TOLERANCE_M = 0.012
 ROTATION_TOLERANCE_RAD = 0.12

@@ -14,7 +14,7 @@ from robocasa_lerobot.demos.motion import UP, Array, frame
 from robocasa_lerobot.demos.skills.pick import Manner, ahead_of
 from robocasa_lerobot.demos.skills.things import UPRIGHT_COS, Thing, grasps
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
-from robocasa_lerobot.envs.scene.objects.grasping import PALM_ABOVE_GRIP_M, GraspPose
+from robocasa_lerobot.envs.objects.grasping import PALM_ABOVE_GRIP_M, GraspPose
 
 WIDEST_M = 0.081  # at the rim; a mug's body is a little narrower where the fingers are
 LEVEL_RAD = np.deg2rad(25.0)  # a hand that looks down more than this meets the rim with its palm

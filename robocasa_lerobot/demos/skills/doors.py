@@ -18,9 +18,9 @@ from robocasa_lerobot.demos.motion import (
 from robocasa_lerobot.demos.skills.common import SkillError, draw_back, move_hand
 from robocasa_lerobot.demos.skills.hinged import Hinged, push_round
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
-from robocasa_lerobot.envs.scene.appliances.base import Appliance
-from robocasa_lerobot.envs.scene.fixtures.cabinets import HingeCabinet
-from robocasa_lerobot.envs.task import Stage
+from robocasa_lerobot.envs.kitchens.appliances.base import Appliance
+from robocasa_lerobot.envs.kitchens.fixtures.cabinets import HingeCabinet
+from robocasa_lerobot.envs.tasks.task import Stage
 
 ATTEMPTS = 3
 HOVER_M = 0.06

@@ -17,11 +17,11 @@ from robocasa_lerobot.demos.motion import (
     grip_position,
     hand_rotation,
 )
+from robocasa_lerobot.demos.motion_style import variety_of
 from robocasa_lerobot.demos.skills.common import SkillError, hold_hand, move_hand, require_near
-from robocasa_lerobot.demos.variety import variety_of
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
-from robocasa_lerobot.envs.scene.fixtures.cabinets import Drawer
-from robocasa_lerobot.envs.task import Stage
+from robocasa_lerobot.envs.kitchens.fixtures.cabinets import Drawer
+from robocasa_lerobot.envs.tasks.task import Stage
 
 ATTEMPTS = 3
 GRASP_STEPS = 10  # the gripper needs ten control steps for its whole way

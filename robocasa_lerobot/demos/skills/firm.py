@@ -23,8 +23,8 @@ from robocasa_lerobot.demos.motion import (
     limit,
     rotation_about,
 )
-from robocasa_lerobot.envs.control.kernel import POSITION_SCALE_M, ROTATION_SCALE_RAD
-from robocasa_lerobot.envs.scene.robot_names import ARM_CENTER_SITE
+from robocasa_lerobot.envs.robots.panda_omron.control.kernel import POSITION_SCALE_M, ROTATION_SCALE_RAD
+from robocasa_lerobot.envs.robots.panda_omron.names import ARM_CENTER_SITE
 
 ANEW_STEPS = 40
 STEP_M, STEP_RAD = 0.025, 0.12  # that the goal moves in a control step at most

@@ -27,7 +27,7 @@ from robocasa_lerobot.demos.skills.fold_down import fold_down
 from robocasa_lerobot.demos.skills.hinged import Hinged
 from robocasa_lerobot.demos.skills.reach import shift_base
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
-from robocasa_lerobot.envs.task import Stage
+from robocasa_lerobot.envs.tasks.task import Stage
 
 ATTEMPTS = 4
 # Wanted of a pull, with ease or at least; enough to get behind the edge.

@@ -12,7 +12,7 @@ from robocasa_lerobot.demos.skills.arcs import pull_arc, push_arc
 from robocasa_lerobot.demos.skills.common import SkillError
 from robocasa_lerobot.demos.skills.hinged import Hinged
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
-from robocasa_lerobot.envs.task import Stage
+from robocasa_lerobot.envs.tasks.task import Stage
 
 ATTEMPTS = 5
 UP_SHARE, DOWN_SHARE = 0.998, 0.002  # beyond the 0.99 and 0.01 that tasks ask for

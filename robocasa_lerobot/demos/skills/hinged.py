@@ -14,7 +14,7 @@ from robocasa_lerobot.demos.motion import (
     arm_action,
     rotation_about,
 )
-from robocasa_lerobot.envs.scene.fixtures.base import Fixture
+from robocasa_lerobot.envs.kitchens.fixtures.base import Fixture
 
 LEAD_M = 0.07  # of the commanded point before the one that is pushed: with the servo's lag, the force of the push
 STALL_STEPS, STALL_RAD = 25, 0.004

@@ -19,9 +19,9 @@ from robocasa_lerobot.demos.motion import (
 )
 from robocasa_lerobot.demos.skills.common import SkillError, hold_hand, move_hand
 from robocasa_lerobot.demos.skills.reach import plan_reach, shift_base
-from robocasa_lerobot.envs.initial import initial_share
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
-from robocasa_lerobot.envs.task import Stage
+from robocasa_lerobot.envs.scene.initial_states import initial_share
+from robocasa_lerobot.envs.tasks.task import Stage
 
 GRASPS = 6  # at most; a turn that the wrist cannot make in one goes on with another grasp
 GRASP_STEPS = 10

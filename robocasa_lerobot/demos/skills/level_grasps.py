@@ -7,7 +7,7 @@ import numpy as np
 from robocasa_lerobot.demos.motion import UP, Array
 from robocasa_lerobot.demos.skills.things import DOWN, Thing, grasps
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
-from robocasa_lerobot.envs.scene.objects.grasping import FINGER_BELOW_GRIP_M, PALM_ABOVE_GRIP_M, GraspPose
+from robocasa_lerobot.envs.objects.grasping import FINGER_BELOW_GRIP_M, PALM_ABOVE_GRIP_M, GraspPose
 
 FINGER_HALF_M = 0.0105  # along the hand's x
 PALM_HALF_M, PALM_BACK_M = (0.028, 0.10), PALM_ABOVE_GRIP_M + 0.004  # along the hand's x and y; food gives way a little

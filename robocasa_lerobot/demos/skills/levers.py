@@ -24,7 +24,7 @@ from robocasa_lerobot.demos.motion import (
 from robocasa_lerobot.demos.skills.common import SkillError, hold_hand, move_hand
 from robocasa_lerobot.demos.skills.reach import plan_reach, shift_base, untried
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
-from robocasa_lerobot.envs.task import Stage
+from robocasa_lerobot.envs.tasks.task import Stage
 
 ATTEMPTS = 4
 GRASP_STEPS = 10

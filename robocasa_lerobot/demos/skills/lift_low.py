@@ -33,9 +33,9 @@ from robocasa_lerobot.demos.skills.fold_down import BASE_FRONT_M, BASE_HALF_M, s
 from robocasa_lerobot.demos.skills.hinged import Hinged
 from robocasa_lerobot.demos.skills.reach import shift_base
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
-from robocasa_lerobot.envs.scene.robot import ARM_HOME_QPOS
-from robocasa_lerobot.envs.scene.robot_names import ARM_CENTER_SITE
-from robocasa_lerobot.envs.task import Stage
+from robocasa_lerobot.envs.robots.panda_omron.model import ARM_HOME_QPOS
+from robocasa_lerobot.envs.robots.panda_omron.names import ARM_CENTER_SITE
+from robocasa_lerobot.envs.tasks.task import Stage
 
 ATTEMPTS = 6
 FORWARDS = np.array([0.0, -1.0, 0.0])  # to the room, in the fixture's axes: outwards for a door that is shut

@@ -19,11 +19,11 @@ from robocasa_lerobot.demos.skills.reach import collisions
 from robocasa_lerobot.demos.skills.things import Thing
 from robocasa_lerobot.demos.skills.ways import go_to
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
-from robocasa_lerobot.envs.scene.appliances.base import Appliance
-from robocasa_lerobot.envs.scene.appliances.microwave import Microwave
-from robocasa_lerobot.envs.scene.appliances.toaster_oven import ToasterOven
-from robocasa_lerobot.envs.scene.robot import ARM_HOME_QPOS, place_base
-from robocasa_lerobot.envs.scene.selection import RobotPose
+from robocasa_lerobot.envs.kitchens.appliances.base import Appliance
+from robocasa_lerobot.envs.kitchens.appliances.kinds.microwave import Microwave
+from robocasa_lerobot.envs.kitchens.appliances.kinds.toaster_oven import ToasterOven
+from robocasa_lerobot.envs.robots.panda_omron.model import ARM_HOME_QPOS, place_base
+from robocasa_lerobot.envs.scene.roles import RobotPose
 
 ASIDES_M = (0.08, 0.02, -0.03, -0.06, -0.09, -0.12, -0.15)  # of a stand to the right of the cavity's middle
 OPEN_SHARE = 0.3

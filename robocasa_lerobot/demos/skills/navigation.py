@@ -15,9 +15,9 @@ import numpy as np
 from robocasa_lerobot.demos.motion import FROM_DESIRED, OPEN, Array, action, base_pose, limit
 from robocasa_lerobot.demos.skills.common import SkillError
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
+from robocasa_lerobot.envs.scene.roles import RobotPose, is_free
 from robocasa_lerobot.envs.scene.scene import Scene
-from robocasa_lerobot.envs.scene.selection import RobotPose, is_free
-from robocasa_lerobot.envs.task import Stage
+from robocasa_lerobot.envs.tasks.task import Stage
 
 CELL_M = 0.10
 HEADINGS = 8

@@ -27,8 +27,8 @@ from robocasa_lerobot.demos.skills.common import SkillError, close_fingers, hold
 from robocasa_lerobot.demos.skills.things import Thing, grasps
 from robocasa_lerobot.demos.skills.ways import GOOD_ENOUGH, Choice, Held, Way, approach, choose, lead
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
-from robocasa_lerobot.envs.scene.objects.grasping import GraspPose
-from robocasa_lerobot.envs.scene.selection import RobotPose
+from robocasa_lerobot.envs.objects.grasping import GraspPose
+from robocasa_lerobot.envs.scene.roles import RobotPose
 
 ATTEMPTS = 5
 INSIST = 0.12

@@ -15,7 +15,7 @@ from robocasa_lerobot.demos.skills.pick import FROM_A_SLOT, FROM_ABOVE
 from robocasa_lerobot.demos.skills.put import Putting, Spot, move
 from robocasa_lerobot.demos.skills.things import thing
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
-from robocasa_lerobot.envs.task import Stage
+from robocasa_lerobot.envs.tasks.task import Stage
 
 # Shares of the depth of what it goes into at which an object may be let go, with their costs.
 DROPS = ((0.0, 0.0), (0.5, 0.4), (1.1, 0.7))

@@ -20,13 +20,13 @@ from robocasa_lerobot.demos.skills.put_down import goal
 from robocasa_lerobot.demos.skills.racks import pull
 from robocasa_lerobot.demos.skills.things import Thing, thing
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
+from robocasa_lerobot.envs.kitchens.appliances.kinds.stand_mixer import StandMixer
+from robocasa_lerobot.envs.kitchens.fixtures.base import Region
+from robocasa_lerobot.envs.kitchens.fixtures.cabinets import Drawer
+from robocasa_lerobot.envs.kitchens.fixtures.regions import regions_of
 from robocasa_lerobot.envs.predicates.logic import AllOf
 from robocasa_lerobot.envs.predicates.objects import ObjectInside
-from robocasa_lerobot.envs.scene.appliances.stand_mixer import StandMixer
-from robocasa_lerobot.envs.scene.fixtures.base import Region
-from robocasa_lerobot.envs.scene.fixtures.cabinets import Drawer
-from robocasa_lerobot.envs.scene.fixtures.regions import regions_of
-from robocasa_lerobot.envs.task import Stage
+from robocasa_lerobot.envs.tasks.task import Stage
 
 EDGE_M = 0.015  # kept from a region's sides
 INWARDS = (0.0, 0.05, 0.10)  # from the front of a region, metres

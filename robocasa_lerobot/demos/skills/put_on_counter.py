@@ -22,8 +22,8 @@ from robocasa_lerobot.demos.skills.put import Putting, Spot, move
 from robocasa_lerobot.demos.skills.put_down import goal
 from robocasa_lerobot.demos.skills.things import Thing, thing
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
-from robocasa_lerobot.envs.scene.fixtures.counters import Counter
-from robocasa_lerobot.envs.task import Stage
+from robocasa_lerobot.envs.kitchens.fixtures.counters import Counter
+from robocasa_lerobot.envs.tasks.task import Stage
 
 GRID_M, EDGE_M, NEAR_M = 0.07, 0.02, 0.75
 OUT_OF_CABINET = replace(ANYHOW, narrow=True, poses=level_grasps)

@@ -22,8 +22,8 @@ from robocasa_lerobot.demos.skills.common import SkillError, hold_hand, move_han
 from robocasa_lerobot.demos.skills.levers import FINGER_HALF_M
 from robocasa_lerobot.demos.skills.reach import Plan, plan_reach, shift_base, untried
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
-from robocasa_lerobot.envs.scene.appliances.base import Appliance
-from robocasa_lerobot.envs.task import Stage
+from robocasa_lerobot.envs.kitchens.appliances.base import Appliance
+from robocasa_lerobot.envs.tasks.task import Stage
 
 ATTEMPTS = 3
 GRASP_STEPS = 10

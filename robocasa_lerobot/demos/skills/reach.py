@@ -22,17 +22,17 @@ from robocasa_lerobot.demos.motion import (
     limit,
     pose_error,
 )
-from robocasa_lerobot.demos.variety import variety_of
-from robocasa_lerobot.envs.bodies import subtree
-from robocasa_lerobot.envs.control.indices import joint_positions, joint_velocities
+from robocasa_lerobot.demos.motion_style import variety_of
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
-from robocasa_lerobot.envs.scene.robot_names import (
+from robocasa_lerobot.envs.robots.panda_omron.control.indices import joint_positions, joint_velocities
+from robocasa_lerobot.envs.robots.panda_omron.names import (
     ARM_JOINTS,
     BASE_CENTER_SITE,
     BASE_JOINTS,
     GRIP_SITE,
     MOBILE_BASE,
 )
+from robocasa_lerobot.envs.scene.bodies import subtree
 
 _ITERATIONS, _DAMPING = 36, 0.05
 GOOD_ENOUGH = 0.30  # cost from which no other place to stand is looked at

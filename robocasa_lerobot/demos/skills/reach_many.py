@@ -14,11 +14,11 @@ import numpy as np
 
 from robocasa_lerobot.demos.arm import Arm
 from robocasa_lerobot.demos.motion import Array, HandTarget, base_pose
+from robocasa_lerobot.demos.motion_style import variety_of
 from robocasa_lerobot.demos.skills.reach import GOOD_ENOUGH, Plan, collisions
-from robocasa_lerobot.demos.variety import variety_of
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
-from robocasa_lerobot.envs.scene.robot import place_base
-from robocasa_lerobot.envs.scene.robot_names import ARM_CENTER_SITE
+from robocasa_lerobot.envs.robots.panda_omron.model import place_base
+from robocasa_lerobot.envs.robots.panda_omron.names import ARM_CENTER_SITE
 
 _WORSE = 0.6  # what ways worse than the best by this much meet is not tested
 _TESTED = 60  # ways from each stand for which it is tested

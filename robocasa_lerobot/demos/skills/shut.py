@@ -17,7 +17,7 @@ from robocasa_lerobot.demos.skills.doors import SHUT_GOAL, doors
 from robocasa_lerobot.demos.skills.fold_down import stances_beside
 from robocasa_lerobot.demos.skills.hinged import Hinged
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
-from robocasa_lerobot.envs.task import Stage
+from robocasa_lerobot.envs.tasks.task import Stage
 
 ATTEMPTS = 4
 FORWARDS = np.array([0.0, -1.0, 0.0])  # to the room, in the fixture's axes: outwards for a door that is shut

@@ -9,9 +9,9 @@ import numpy as np
 
 from robocasa_lerobot.demos.motion import Array, rotation_about
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
-from robocasa_lerobot.envs.scene.objects.catalogue import Instance
-from robocasa_lerobot.envs.scene.objects.grasping import GraspPose, grasp_poses, grasp_poses_of, pieces
-from robocasa_lerobot.envs.scene.objects.solids import Solid, hull
+from robocasa_lerobot.envs.objects.catalogue import Instance
+from robocasa_lerobot.envs.objects.grasping import GraspPose, grasp_poses, grasp_poses_of, pieces
+from robocasa_lerobot.envs.objects.solids import Solid, hull
 
 UPRIGHT_COS = 0.98  # tilts up to 11 degrees count as standing as it was put down
 DOWN = np.array([0.0, 0.0, -1.0])

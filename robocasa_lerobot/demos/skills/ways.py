@@ -25,13 +25,13 @@ from robocasa_lerobot.demos.motion import (
     hand_rotation,
     pose_error,
 )
+from robocasa_lerobot.demos.motion_style import variety_of
 from robocasa_lerobot.demos.skills.common import SkillError
 from robocasa_lerobot.demos.skills.navigation import Room, drive_to
-from robocasa_lerobot.demos.variety import variety_of
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
-from robocasa_lerobot.envs.scene.robot import ARM_HOME_QPOS, place_base
-from robocasa_lerobot.envs.scene.robot_names import ARM_CENTER_SITE, MOBILE_BASE
-from robocasa_lerobot.envs.scene.selection import RobotPose
+from robocasa_lerobot.envs.robots.panda_omron.model import ARM_HOME_QPOS, place_base
+from robocasa_lerobot.envs.robots.panda_omron.names import ARM_CENTER_SITE, MOBILE_BASE
+from robocasa_lerobot.envs.scene.roles import RobotPose
 
 GOOD_ENOUGH = 0.8  # cost up to which no other place to stand is looked at
 _SHORTLIST, _TESTED = 160, 60

@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING
 import mujoco
 import numpy as np
 
-from robocasa_lerobot.envs.initial import initial_share
+from robocasa_lerobot.envs.kitchens.appliances.base import CLOSED_UP_TO, OPEN_FROM, Appliance
+from robocasa_lerobot.envs.kitchens.fixtures.base import Fixture
+from robocasa_lerobot.envs.kitchens.fixtures.cabinets import HingeCabinet
 from robocasa_lerobot.envs.predicates.logic import Term, plain
-from robocasa_lerobot.envs.scene.appliances.base import CLOSED_UP_TO, OPEN_FROM, Appliance
-from robocasa_lerobot.envs.scene.fixtures.base import Fixture
-from robocasa_lerobot.envs.scene.fixtures.cabinets import HingeCabinet
+from robocasa_lerobot.envs.scene.initial_states import initial_share
 
 if TYPE_CHECKING:
     from robocasa_lerobot.envs.scene.scene import Scene

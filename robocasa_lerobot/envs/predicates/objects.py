@@ -9,11 +9,11 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from robocasa_lerobot.envs.kitchens.fixtures.base import Region
+from robocasa_lerobot.envs.kitchens.fixtures.counters import Counter
+from robocasa_lerobot.envs.kitchens.fixtures.regions import regions_of
 from robocasa_lerobot.envs.predicates.contacts import touching
 from robocasa_lerobot.envs.predicates.logic import Term, plain
-from robocasa_lerobot.envs.scene.fixtures.base import Region
-from robocasa_lerobot.envs.scene.fixtures.counters import Counter
-from robocasa_lerobot.envs.scene.fixtures.regions import regions_of
 
 if TYPE_CHECKING:
     from robocasa_lerobot.envs.scene.scene import Scene

@@ -9,7 +9,7 @@ import mujoco
 import numpy as np
 
 from robocasa_lerobot.envs.predicates.logic import Term, plain
-from robocasa_lerobot.envs.scene.robot_names import BASE_CENTER_SITE, GRIP_SITE
+from robocasa_lerobot.envs.robots.panda_omron.names import BASE_CENTER_SITE, GRIP_SITE
 
 if TYPE_CHECKING:
     from robocasa_lerobot.envs.scene.scene import Scene

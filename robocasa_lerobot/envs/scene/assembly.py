@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import mujoco
 
-from robocasa_lerobot.envs.scene.layout import Layout
-from robocasa_lerobot.envs.scene.materials import MaterialPalette, load_style
-from robocasa_lerobot.envs.scene.robot import apply_simulation_options
-from robocasa_lerobot.envs.scene.surroundings import add_surroundings
+from robocasa_lerobot.envs.kitchens.layout import Layout
+from robocasa_lerobot.envs.kitchens.materials import MaterialPalette, load_style
+from robocasa_lerobot.envs.kitchens.surroundings import add_surroundings
+from robocasa_lerobot.envs.robots.panda_omron.model import apply_simulation_options
 
 
 def bare_kitchen(layout: Layout, render_preset: str = "fast") -> tuple[mujoco.MjSpec, MaterialPalette]:

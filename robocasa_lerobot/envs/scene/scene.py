@@ -10,22 +10,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robocasa_lerobot.contract import ACTION_SIZE
-from robocasa_lerobot.envs.bodies import subtree
-from robocasa_lerobot.envs.cameras import camera_configs
-from robocasa_lerobot.envs.control.controller import RobotController
-from robocasa_lerobot.envs.control.step import control_step
-from robocasa_lerobot.envs.placement import Footprint
-from robocasa_lerobot.envs.scene.appliances.base import Appliance, update_all
-from robocasa_lerobot.envs.scene.appliances.blender import Blender
-from robocasa_lerobot.envs.scene.appliances.sink import Sink
-from robocasa_lerobot.envs.scene.appliances.stove import Hob
-from robocasa_lerobot.envs.scene.fixtures.base import Fixture, yaw_quat
-from robocasa_lerobot.envs.scene.fixtures.cabinets import Drawer, HingeCabinet
-from robocasa_lerobot.envs.scene.layout import Layout
-from robocasa_lerobot.envs.scene.objects.catalogue import Instance
-from robocasa_lerobot.envs.scene.robot import place_base, set_home
-from robocasa_lerobot.envs.scene.robot_names import GRIPPER
-from robocasa_lerobot.envs.scene.selection import RobotPose, standing_pose
+from robocasa_lerobot.envs.kitchens.appliances.base import Appliance, update_all
+from robocasa_lerobot.envs.kitchens.appliances.kinds.blender import Blender
+from robocasa_lerobot.envs.kitchens.appliances.kinds.sink import Sink
+from robocasa_lerobot.envs.kitchens.appliances.kinds.stove import Hob
+from robocasa_lerobot.envs.kitchens.fixtures.base import Fixture, yaw_quat
+from robocasa_lerobot.envs.kitchens.fixtures.cabinets import Drawer, HingeCabinet
+from robocasa_lerobot.envs.kitchens.footprints import Footprint
+from robocasa_lerobot.envs.kitchens.layout import Layout
+from robocasa_lerobot.envs.objects.catalogue import Instance
+from robocasa_lerobot.envs.robots.panda_omron.cameras import camera_configs
+from robocasa_lerobot.envs.robots.panda_omron.control.controller import RobotController
+from robocasa_lerobot.envs.robots.panda_omron.control.step import control_step
+from robocasa_lerobot.envs.robots.panda_omron.model import place_base, set_home
+from robocasa_lerobot.envs.robots.panda_omron.names import GRIPPER
+from robocasa_lerobot.envs.scene.bodies import subtree
+from robocasa_lerobot.envs.scene.roles import RobotPose, standing_pose
 
 SETTLE_STEPS = 10  # control steps without a command after placing everything (docs/robocasa.md, section 1)
 
@@ -47,7 +47,7 @@ class PlacedObject:
 
 
 class FirstState(Protocol):
-    """Something of a task that writes a part of the first state; `envs/initial.py` has them all."""
+    """Something of a task that writes a part of the first state; `envs/scene/initial_states.py` has them all."""
 
     def apply(self, scene: Scene, data: mujoco.MjData, drawn: float) -> None:
         """Write it, with the number drawn for it."""

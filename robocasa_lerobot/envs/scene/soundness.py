@@ -8,11 +8,11 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from robocasa_lerobot.envs.placement import Footprint
-from robocasa_lerobot.envs.scene.fixtures.base import Fixture
-from robocasa_lerobot.envs.scene.layout import Layout
+from robocasa_lerobot.envs.kitchens.fixtures.base import Fixture
+from robocasa_lerobot.envs.kitchens.footprints import Footprint
+from robocasa_lerobot.envs.kitchens.layout import Layout
+from robocasa_lerobot.envs.scene.roles import footprint
 from robocasa_lerobot.envs.scene.scene import Scene
-from robocasa_lerobot.envs.scene.selection import footprint
 
 PENETRATION_M = 0.002  # that fixtures may have
 WALKWAY_M = 1.0  # free before everything that opens

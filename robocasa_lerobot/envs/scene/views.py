@@ -8,14 +8,14 @@ from dataclasses import dataclass
 import mujoco
 import numpy as np
 
-from robocasa_lerobot.envs.cameras import cameras_of_set
-from robocasa_lerobot.envs.placement import PlacementError
+from robocasa_lerobot.envs.kitchens.footprints import PlacementError
+from robocasa_lerobot.envs.kitchens.layout import load_layout, split_of
+from robocasa_lerobot.envs.rendering import SceneRenderer
+from robocasa_lerobot.envs.robots.panda_omron.cameras import cameras_of_set
+from robocasa_lerobot.envs.robots.panda_omron.model import add_robot, place_base, set_home
 from robocasa_lerobot.envs.scene.assembly import bare_kitchen
-from robocasa_lerobot.envs.scene.builder import arrange
-from robocasa_lerobot.envs.scene.layout import load_layout, split_of
-from robocasa_lerobot.envs.scene.robot import add_robot, place_base, set_home
-from robocasa_lerobot.envs.task import Task
-from robocasa_lerobot.rendering import SceneRenderer
+from robocasa_lerobot.envs.scene.build import arrange
+from robocasa_lerobot.envs.scene.scene_spec import SceneSpec
 
 TRIES = 20  # arrangements of a task in a kitchen until it counts as one that the kitchen does not admit
 
@@ -41,7 +41,13 @@ class View:
 
 
 def views(
-    layout_id: int, tasks: Sequence[Task], seed: int, *, starts: int = 1, size: int = 48, camera_set: str = "default"
+    layout_id: int,
+    tasks: Sequence[SceneSpec],
+    seed: int,
+    *,
+    starts: int = 1,
+    size: int = 48,
+    camera_set: str = "default",
 ) -> Iterator[View]:
     """What every camera of a set sees in a bare kitchen, from `starts` starts of each task that the kitchen admits.
 
@@ -85,7 +91,7 @@ def views(
         renderer.close()
 
 
-def _start(rng: np.random.Generator, task: Task, layout_id: int) -> tuple[float, float, float] | None:
+def _start(rng: np.random.Generator, task: SceneSpec, layout_id: int) -> tuple[float, float, float] | None:
     """Where a start of the task puts the robot; None where the kitchen does not admit it."""
     for _ in range(TRIES):
         try:

@@ -5,8 +5,8 @@ from __future__ import annotations
 import collections
 
 from robocasa_lerobot.benchmark import published
+from robocasa_lerobot.evaluation.records.results import UNPERTURBED, TrialRecord
 from robocasa_lerobot.evaluation.report.policies import REFERENCES, PolicyResult
-from robocasa_lerobot.evaluation.results import UNPERTURBED, TrialRecord
 
 SPLIT = "pretrain"
 TRIALS_PER_TASK = 50

@@ -12,8 +12,8 @@ from typing import Any
 from robocasa_lerobot.benchmark import published
 from robocasa_lerobot.errors import UserError
 from robocasa_lerobot.evaluation.leaderboard.protocol import reasons
+from robocasa_lerobot.evaluation.records.results import UNPERTURBED
 from robocasa_lerobot.evaluation.report.policies import PolicyResult, average_of
-from robocasa_lerobot.evaluation.results import UNPERTURBED
 
 NOT_AVAILABLE = "N/A"
 

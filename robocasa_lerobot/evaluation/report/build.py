@@ -6,7 +6,7 @@ import datetime
 from collections.abc import Sequence
 
 from robocasa_lerobot.evaluation.report import left_out
-from robocasa_lerobot.evaluation.report.film_strip import choose_films
+from robocasa_lerobot.evaluation.report.formats.film_strip import choose_films
 from robocasa_lerobot.evaluation.report.model import Document, Section
 from robocasa_lerobot.evaluation.report.policies import ReportData
 from robocasa_lerobot.evaluation.report.sections import (

@@ -8,9 +8,7 @@ from pathlib import Path
 
 from robocasa_lerobot import contract
 from robocasa_lerobot.errors import UserError
-from robocasa_lerobot.evaluation.report.joining import join
-from robocasa_lerobot.evaluation.report.policies import REFERENCES, PolicyResult, ReportData, TaskResult, TermCount
-from robocasa_lerobot.evaluation.results import (
+from robocasa_lerobot.evaluation.records.results import (
     TRIALS_FILE,
     UNPERTURBED,
     PolicyInfo,
@@ -19,6 +17,8 @@ from robocasa_lerobot.evaluation.results import (
     TrialRecord,
     read_results,
 )
+from robocasa_lerobot.evaluation.report.joining import join
+from robocasa_lerobot.evaluation.report.policies import REFERENCES, PolicyResult, ReportData, TaskResult, TermCount
 from robocasa_lerobot.evaluation.statistics import success_rate
 from robocasa_lerobot.evaluation.statistics.horizon import time_to_success
 

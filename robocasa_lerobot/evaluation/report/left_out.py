@@ -7,10 +7,10 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from robocasa_lerobot.errors import UserError
-from robocasa_lerobot.evaluation.report import format as fmt
+from robocasa_lerobot.evaluation.planning.run_header import partial_sentence
+from robocasa_lerobot.evaluation.report import numbers as fmt
 from robocasa_lerobot.evaluation.report.model import Section
 from robocasa_lerobot.evaluation.report.policies import PolicyResult, ReportData
-from robocasa_lerobot.evaluation.resolve import partial_sentence
 
 SKIPPED_FILE = "skipped.jsonl"  # that a training writes into its output folder
 _SHOWN = 3

@@ -6,7 +6,7 @@ import re
 from collections.abc import Hashable
 from dataclasses import dataclass
 
-from robocasa_lerobot.evaluation.report import format as fmt
+from robocasa_lerobot.evaluation.report import numbers as fmt
 from robocasa_lerobot.evaluation.report.joining import training_folder
 from robocasa_lerobot.evaluation.report.policies import GROUP_LABELS, LIFELONG_SETS, PolicyResult, ReportData
 from robocasa_lerobot.evaluation.report.published_cells import tasks_of

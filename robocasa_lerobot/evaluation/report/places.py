@@ -12,7 +12,7 @@ import yaml
 
 from robocasa_lerobot.benchmark.published import read
 from robocasa_lerobot.errors import UserError
-from robocasa_lerobot.evaluation.results import PolicyInfo, RunHeader
+from robocasa_lerobot.evaluation.records.results import PolicyInfo, RunHeader
 
 PER_TASK = "per_task"
 PERTURBATIONS = "perturbations"

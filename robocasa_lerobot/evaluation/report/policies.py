@@ -10,8 +10,8 @@ from pathlib import Path
 import numpy as np
 
 from robocasa_lerobot.benchmark import published
+from robocasa_lerobot.evaluation.records.results import PolicyInfo, RunHeader, TrialRecord
 from robocasa_lerobot.evaluation.report.places import PERTURBATIONS, Place, places, tables
-from robocasa_lerobot.evaluation.results import PolicyInfo, RunHeader, TrialRecord
 from robocasa_lerobot.evaluation.statistics import Estimate, Rate, average_over_tasks
 from robocasa_lerobot.evaluation.statistics.paired import Outcomes
 
@@ -209,3 +209,11 @@ def describe_policy(policy: PolicyResult) -> str:
     if info.lifelong_phase is not None:
         facts.append(f"after lifelong phase {info.lifelong_phase}")
     return ", ".join(facts)
+
+
+def trial_title(record: TrialRecord) -> str:
+    """What a trial's square says when pointed at."""
+    if record.error is not None:
+        return f"trial {record.trial}, seed {record.seed}: {record.outcome}"
+    result = f"success at step {record.first_success_step}" if record.success else f"failure after {record.steps} steps"
+    return f"trial {record.trial}, seed {record.seed}: {result}"

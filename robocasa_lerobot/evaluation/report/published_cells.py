@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 from robocasa_lerobot.benchmark import published
 from robocasa_lerobot.benchmark.tasks import published_task_sets
+from robocasa_lerobot.evaluation.records.results import UNPERTURBED
 from robocasa_lerobot.evaluation.report.places import PER_TASK, PERTURBATIONS, Place, tables
 from robocasa_lerobot.evaluation.report.policies import PolicyResult, ReportData, TaskResult, average_of
-from robocasa_lerobot.evaluation.results import UNPERTURBED
 from robocasa_lerobot.evaluation.statistics import Estimate
 
 AVERAGE = "average"

@@ -1,12 +1,12 @@
 """Buttons: microwave, coffee machine, blender."""
 
-from robocasa_lerobot.envs.initial import SwitchedOn
 from robocasa_lerobot.envs.predicates import (
     AllOf,
     GripperFarFromPart,
     StateIs,
 )
-from robocasa_lerobot.envs.scene.wanted import (
+from robocasa_lerobot.envs.scene.initial_states import SwitchedOn
+from robocasa_lerobot.envs.scene.spec import (
     FixtureWanted,
     InitialOpenness,
     ObjectWanted,
@@ -14,8 +14,8 @@ from robocasa_lerobot.envs.scene.wanted import (
     RobotStart,
     SampleRegion,
 )
-from robocasa_lerobot.envs.task import Stage, Task
 from robocasa_lerobot.envs.tasks.atomic.common import counter_near
+from robocasa_lerobot.envs.tasks.task import Stage, Task
 
 _HEATED = (
     ObjectWanted(

@@ -1,9 +1,9 @@
 """A mug at the coffee machine: put under its spout, and taken away."""
 
 from robocasa_lerobot.envs.predicates import AllOf, GripperFar, ObjectAtSite, ObjectTouches
-from robocasa_lerobot.envs.scene.wanted import FixtureWanted, ObjectWanted, Placement, RobotStart, SampleRegion
-from robocasa_lerobot.envs.task import Stage, Task
+from robocasa_lerobot.envs.scene.spec import FixtureWanted, ObjectWanted, Placement, RobotStart, SampleRegion
 from robocasa_lerobot.envs.tasks.atomic.common import counter_near, on_counter
+from robocasa_lerobot.envs.tasks.task import Stage, Task
 
 _FIXTURES = (FixtureWanted("coffee_machine", "coffee_machine"), counter_near("coffee_machine"))
 

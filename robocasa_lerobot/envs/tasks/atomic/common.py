@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from robocasa_lerobot.envs.scene.wanted import FixtureWanted, ObjectWanted, Placement, SampleRegion
-from robocasa_lerobot.envs.task import Stage, Task
+from robocasa_lerobot.envs.scene.spec import FixtureWanted, ObjectWanted, Placement, SampleRegion
+from robocasa_lerobot.envs.tasks.task import Stage, Task
 
 # Handles of cookware point away from the knobs by this much to either side, radians.
 HANDLE_TURN = (0.785, 1.178)

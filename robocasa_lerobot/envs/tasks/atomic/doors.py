@@ -1,10 +1,10 @@
 """Doors of cabinets and appliances, heads and lids that turn on a hinge: opened and closed."""
 
-from robocasa_lerobot.envs.initial import PartAt
 from robocasa_lerobot.envs.predicates import DoorsClosed, DoorsOpen, PartWithin
-from robocasa_lerobot.envs.scene.wanted import FixtureWanted, InitialOpenness, ObjectWanted, Placement, RobotStart
-from robocasa_lerobot.envs.task import Stage, Task
+from robocasa_lerobot.envs.scene.initial_states import PartAt
+from robocasa_lerobot.envs.scene.spec import FixtureWanted, InitialOpenness, ObjectWanted, Placement, RobotStart
 from robocasa_lerobot.envs.tasks.atomic.common import counter_near, distractors
+from robocasa_lerobot.envs.tasks.task import Stage, Task
 
 # A door that folds down is lifted shut, that of a dishwasher from above; the doors of a fridge are too large to reach
 # round.

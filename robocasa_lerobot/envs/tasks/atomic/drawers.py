@@ -1,7 +1,7 @@
 """OpenDrawer and CloseDrawer: one top drawer, the robot standing beside it."""
 
 from robocasa_lerobot.envs.predicates import DrawerClosed, DrawerOpen
-from robocasa_lerobot.envs.scene.wanted import (
+from robocasa_lerobot.envs.scene.spec import (
     FixtureWanted,
     InitialOpenness,
     InsideOf,
@@ -9,7 +9,7 @@ from robocasa_lerobot.envs.scene.wanted import (
     OnCounter,
     RobotStart,
 )
-from robocasa_lerobot.envs.task import Stage, Task
+from robocasa_lerobot.envs.tasks.task import Stage, Task
 
 _FIXTURES = (FixtureWanted("drawer", "drawer_top"),)
 # The base is placed as exactly as the original does for tasks beside a fixture.

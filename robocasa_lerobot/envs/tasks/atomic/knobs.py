@@ -1,6 +1,5 @@
 """Knobs: burners of a stove, temperature and timer of ovens."""
 
-from robocasa_lerobot.envs.initial import BurnerAt, PartAt
 from robocasa_lerobot.envs.predicates import (
     BurnerLevel,
     PartTurned,
@@ -8,7 +7,8 @@ from robocasa_lerobot.envs.predicates import (
     StateIs,
     When,
 )
-from robocasa_lerobot.envs.scene.wanted import (
+from robocasa_lerobot.envs.scene.initial_states import BurnerAt, PartAt
+from robocasa_lerobot.envs.scene.spec import (
     Choice,
     FixtureWanted,
     ObjectWanted,
@@ -16,8 +16,8 @@ from robocasa_lerobot.envs.scene.wanted import (
     RobotStart,
     SampleRegion,
 )
-from robocasa_lerobot.envs.task import Stage, Task
 from robocasa_lerobot.envs.tasks.atomic.common import HANDLE_TURN
+from robocasa_lerobot.envs.tasks.task import Stage, Task
 
 KNOB = Choice("knob", of="stove")
 

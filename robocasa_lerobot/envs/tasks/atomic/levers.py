@@ -1,13 +1,13 @@
 """Levers: the faucet of a sink, the switch of a kettle, a toaster."""
 
-from robocasa_lerobot.envs.initial import PartAt, Water
 from robocasa_lerobot.envs.predicates import (
     AllOf,
     PartWithin,
     StateIs,
     When,
 )
-from robocasa_lerobot.envs.scene.wanted import (
+from robocasa_lerobot.envs.scene.initial_states import PartAt, Water
+from robocasa_lerobot.envs.scene.spec import (
     Choice,
     FixtureWanted,
     ObjectWanted,
@@ -15,8 +15,8 @@ from robocasa_lerobot.envs.scene.wanted import (
     RobotStart,
     SampleRegion,
 )
-from robocasa_lerobot.envs.task import Stage, Task
 from robocasa_lerobot.envs.tasks.atomic.common import counter_near, on_counter
+from robocasa_lerobot.envs.tasks.task import Stage, Task
 
 _SINK = (FixtureWanted("sink", "sink"), counter_near("sink"))
 

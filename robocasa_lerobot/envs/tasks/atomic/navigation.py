@@ -1,8 +1,8 @@
 """NavigateKitchen: drive from one fixture to another."""
 
 from robocasa_lerobot.envs.predicates import StandsBefore
-from robocasa_lerobot.envs.scene.wanted import FixtureWanted, RobotStart
-from robocasa_lerobot.envs.task import Stage, Task
+from robocasa_lerobot.envs.scene.spec import FixtureWanted, RobotStart
+from robocasa_lerobot.envs.tasks.task import Stage, Task
 
 TASKS = (
     Task(

@@ -9,7 +9,7 @@ from robocasa_lerobot.envs.predicates import (
     ObjectTouches,
     ObjectTouchesAnyCounter,
 )
-from robocasa_lerobot.envs.scene.wanted import (
+from robocasa_lerobot.envs.scene.spec import (
     FixtureWanted,
     InitialOpenness,
     ObjectWanted,
@@ -17,8 +17,8 @@ from robocasa_lerobot.envs.scene.wanted import (
     RobotStart,
     SampleRegion,
 )
-from robocasa_lerobot.envs.task import Task
 from robocasa_lerobot.envs.tasks.atomic.common import HANDLE_TURN, counter_near, on_counter, place
+from robocasa_lerobot.envs.tasks.task import Task
 
 _TOOLS, _NOT_TOOLS = ("reamer", "strainer", "cheese_grater"), ("tool", "utensil")
 _IN_PAN_M = 0.07  # horizontally from the middle of a pan

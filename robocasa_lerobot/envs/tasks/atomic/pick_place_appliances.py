@@ -1,6 +1,5 @@
 """Pick and place at ovens, toaster, blender and stand mixer."""
 
-from robocasa_lerobot.envs.initial import LidAside, PartAt
 from robocasa_lerobot.envs.predicates import (
     AllOf,
     GripperFar,
@@ -10,7 +9,8 @@ from robocasa_lerobot.envs.predicates import (
     ObjectTouchesAnyCounter,
     StateIs,
 )
-from robocasa_lerobot.envs.scene.wanted import (
+from robocasa_lerobot.envs.scene.initial_states import LidAside, PartAt
+from robocasa_lerobot.envs.scene.spec import (
     Choice,
     FixtureWanted,
     InitialOpenness,
@@ -19,8 +19,8 @@ from robocasa_lerobot.envs.scene.wanted import (
     RobotStart,
     SampleRegion,
 )
-from robocasa_lerobot.envs.task import Task
 from robocasa_lerobot.envs.tasks.atomic.common import counter_near, on_counter, place
+from robocasa_lerobot.envs.tasks.task import Task
 
 OVENS = (
     Task(

@@ -7,9 +7,9 @@ from robocasa_lerobot.envs.predicates import (
     ObjectOn,
     ObjectTouches,
 )
-from robocasa_lerobot.envs.scene.wanted import FixtureWanted, ObjectWanted, Placement, RobotStart
-from robocasa_lerobot.envs.task import Task
+from robocasa_lerobot.envs.scene.spec import FixtureWanted, ObjectWanted, Placement, RobotStart
 from robocasa_lerobot.envs.tasks.atomic.common import counter_near, on_counter, place
+from robocasa_lerobot.envs.tasks.task import Task
 
 COUNTER = (
     Task(

@@ -1,12 +1,12 @@
 """Pick and place inside the fridge: between its shelves and its drawers."""
 
-from robocasa_lerobot.envs.initial import PartAt
 from robocasa_lerobot.envs.predicates import (
     AllOf,
     GripperFar,
     ObjectInside,
 )
-from robocasa_lerobot.envs.scene.wanted import (
+from robocasa_lerobot.envs.scene.initial_states import PartAt
+from robocasa_lerobot.envs.scene.spec import (
     Choice,
     FixtureWanted,
     InitialOpenness,
@@ -15,9 +15,9 @@ from robocasa_lerobot.envs.scene.wanted import (
     RobotStart,
     SampleRegion,
 )
-from robocasa_lerobot.envs.task import Task
 from robocasa_lerobot.envs.tasks.atomic.common import place
 from robocasa_lerobot.envs.tasks.atomic.racks import DRAWER
+from robocasa_lerobot.envs.tasks.task import Task
 
 _FRIDGE_FAR_M = 0.15
 # A fridge shelf that counts: its floor between these heights, and at least so high, metres.

@@ -1,8 +1,8 @@
 """PickPlaceCounterToSink: take an object from the counter beside the sink and put it into the basin."""
 
 from robocasa_lerobot.envs.predicates import AllOf, GripperFar, ObjectInBasin
-from robocasa_lerobot.envs.scene.wanted import FixtureWanted, InsideOf, ObjectWanted, OnCounter, RobotStart
-from robocasa_lerobot.envs.task import Stage, Task
+from robocasa_lerobot.envs.scene.spec import FixtureWanted, InsideOf, ObjectWanted, OnCounter, RobotStart
+from robocasa_lerobot.envs.tasks.task import Stage, Task
 
 COUNTER_TO_SINK = Task(
     name="PickPlaceCounterToSink",

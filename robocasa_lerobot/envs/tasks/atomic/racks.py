@@ -1,8 +1,8 @@
 """Drawers inside a fridge, and racks of dishwasher, oven and toaster oven."""
 
-from robocasa_lerobot.envs.initial import PartAt
 from robocasa_lerobot.envs.predicates import PartWithin, When
-from robocasa_lerobot.envs.scene.wanted import (
+from robocasa_lerobot.envs.scene.initial_states import PartAt
+from robocasa_lerobot.envs.scene.spec import (
     Choice,
     FixtureWanted,
     InitialOpenness,
@@ -11,7 +11,7 @@ from robocasa_lerobot.envs.scene.wanted import (
     RobotStart,
     SampleRegion,
 )
-from robocasa_lerobot.envs.task import Stage, Task
+from robocasa_lerobot.envs.tasks.task import Stage, Task
 
 # Which way a rack is to go, with the words for it; one that is to come out starts half out, one to go in all the way.
 DIRECTION = Choice("direction", {"out": {"verb": "Pull"}, "in": {"verb": "Push"}})

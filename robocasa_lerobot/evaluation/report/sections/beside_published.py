@@ -7,7 +7,7 @@ from typing import Any
 
 from robocasa_lerobot.benchmark import published
 from robocasa_lerobot.benchmark.published import Entry, PublishedTable
-from robocasa_lerobot.evaluation.report import format as fmt
+from robocasa_lerobot.evaluation.report import numbers as fmt
 from robocasa_lerobot.evaluation.report.joining import same_training
 from robocasa_lerobot.evaluation.report.model import Cell, Column, Section, Table
 from robocasa_lerobot.evaluation.report.policies import PolicyResult, ReportData

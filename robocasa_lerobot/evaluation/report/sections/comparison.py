@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 from dataclasses import dataclass
 
-from robocasa_lerobot.evaluation.report import format as fmt
+from robocasa_lerobot.evaluation.report import numbers as fmt
 from robocasa_lerobot.evaluation.report.model import Cell, Column, Section, Table
 from robocasa_lerobot.evaluation.report.policies import REFERENCES, PolicyResult, ReportData, same_trials
 from robocasa_lerobot.evaluation.statistics.paired import Comparison, Paired, compare

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from robocasa_lerobot.benchmark import published
-from robocasa_lerobot.evaluation.report import format as fmt
-from robocasa_lerobot.evaluation.report.charts import Line, line_chart
+from robocasa_lerobot.evaluation.report import numbers as fmt
 from robocasa_lerobot.evaluation.report.efficiency_curves import (
     AVERAGE,
     Curve,
@@ -13,6 +12,7 @@ from robocasa_lerobot.evaluation.report.efficiency_curves import (
     groups,
     published_percent,
 )
+from robocasa_lerobot.evaluation.report.formats.charts import Line, line_chart
 from robocasa_lerobot.evaluation.report.model import Cell, Column, Figure, Section, Series, Table
 from robocasa_lerobot.evaluation.report.policies import PolicyResult, ReportData
 from robocasa_lerobot.evaluation.statistics.averages import average_over_tasks

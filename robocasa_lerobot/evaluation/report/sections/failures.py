@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from robocasa_lerobot.evaluation.report import format as fmt
+from robocasa_lerobot.evaluation.report import numbers as fmt
 from robocasa_lerobot.evaluation.report.model import Bar, Cell, Column, Section, Table
 from robocasa_lerobot.evaluation.report.policies import PolicyResult, ReportData
 from robocasa_lerobot.evaluation.statistics import Estimate

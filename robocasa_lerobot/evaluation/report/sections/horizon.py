@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from robocasa_lerobot import contract
-from robocasa_lerobot.evaluation.report import format as fmt
-from robocasa_lerobot.evaluation.report.charts import Line, line_chart
+from robocasa_lerobot.evaluation.report import numbers as fmt
+from robocasa_lerobot.evaluation.report.formats.charts import Line, line_chart
 from robocasa_lerobot.evaluation.report.model import Cell, Column, Figure, Section, Series, Table
 from robocasa_lerobot.evaluation.report.policies import PolicyResult, ReportData
 from robocasa_lerobot.evaluation.statistics.horizon import success_curve, time_to_success

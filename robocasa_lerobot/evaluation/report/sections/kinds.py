@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 from robocasa_lerobot.benchmark import published
 from robocasa_lerobot.benchmark.tasks import TaskFacts, task_facts
-from robocasa_lerobot.evaluation.report import format as fmt
+from robocasa_lerobot.evaluation.report import numbers as fmt
 from robocasa_lerobot.evaluation.report.model import Cell, Column, Section, Table
 from robocasa_lerobot.evaluation.report.policies import PolicyResult, ReportData, average_of
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from robocasa_lerobot.benchmark import published
-from robocasa_lerobot.evaluation.report import format as fmt
+from robocasa_lerobot.evaluation.report import numbers as fmt
 from robocasa_lerobot.evaluation.report.lifelong_series import LifelongSeries, all_series
 from robocasa_lerobot.evaluation.report.model import Cell, Column, Section, Table
 from robocasa_lerobot.evaluation.report.policies import PolicyResult, ReportData

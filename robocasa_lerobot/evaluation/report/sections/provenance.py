@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
+from robocasa_lerobot.evaluation.records.results import TRIALS_FILE
 from robocasa_lerobot.evaluation.report.model import Block, Listing, Section
 from robocasa_lerobot.evaluation.report.policies import PolicyResult, ReportData, describe_policy
 from robocasa_lerobot.evaluation.report.sections.beside_published import horizon_phrase, success_phrase
-from robocasa_lerobot.evaluation.results import TRIALS_FILE
 
 MAX_ERRORS = 30
 

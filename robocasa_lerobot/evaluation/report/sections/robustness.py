@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from robocasa_lerobot.benchmark import published
-from robocasa_lerobot.evaluation.report import format as fmt
+from robocasa_lerobot.evaluation.records.results import UNPERTURBED
+from robocasa_lerobot.evaluation.report import numbers as fmt
 from robocasa_lerobot.evaluation.report.model import Bar, Cell, Column, Section, Table
 from robocasa_lerobot.evaluation.report.policies import PolicyResult, ReportData, average_of, same_trials
 from robocasa_lerobot.evaluation.report.sections.beside_published import beside_table
-from robocasa_lerobot.evaluation.results import UNPERTURBED
 from robocasa_lerobot.evaluation.statistics.paired import Paired, compare
 
 UNITS = {"m": "m", "deg": "°", "rad": "rad"}

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from robocasa_lerobot.benchmark import published
-from robocasa_lerobot.evaluation.report import format as fmt
 from robocasa_lerobot.evaluation.report import left_out
+from robocasa_lerobot.evaluation.report import numbers as fmt
 from robocasa_lerobot.evaluation.report.model import Bar, Card, Cell, Column, Section, Table
 from robocasa_lerobot.evaluation.report.policies import PolicyResult, ReportData, describe_policy
 from robocasa_lerobot.evaluation.report.sections import (

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from robocasa_lerobot.benchmark import published
 from robocasa_lerobot.benchmark.tasks import TaskFacts, task_facts
-from robocasa_lerobot.evaluation.report import format as fmt
+from robocasa_lerobot.evaluation.records.results import TrialRecord
+from robocasa_lerobot.evaluation.report import numbers as fmt
 from robocasa_lerobot.evaluation.report.model import Bar, Cell, Column, Section, Series, Table
-from robocasa_lerobot.evaluation.report.policies import PolicyResult, ReportData, TaskResult
+from robocasa_lerobot.evaluation.report.policies import PolicyResult, ReportData, TaskResult, trial_title
 from robocasa_lerobot.evaluation.report.sections.beside_published import differences
-from robocasa_lerobot.evaluation.results import TrialRecord
 from robocasa_lerobot.evaluation.statistics import Estimate
 
 # More trials than this are a texture, no longer something to point at; with many policies there is no room.
@@ -83,11 +83,3 @@ def _cell(data: ReportData, policy: PolicyResult, result: TaskResult | None, kno
 
 def _mark(record: TrialRecord) -> str:
     return "e" if record.error is not None else "s" if record.success else "f"
-
-
-def trial_title(record: TrialRecord) -> str:
-    """What a trial's square says when pointed at."""
-    if record.error is not None:
-        return f"trial {record.trial}, seed {record.seed}: {record.outcome}"
-    result = f"success at step {record.first_success_step}" if record.success else f"failure after {record.steps} steps"
-    return f"trial {record.trial}, seed {record.seed}: {result}"

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from robocasa_lerobot.evaluation.report import format as fmt
-from robocasa_lerobot.evaluation.report.charts import learning_curve
+from robocasa_lerobot.evaluation.report import numbers as fmt
+from robocasa_lerobot.evaluation.report.formats.charts import learning_curve
 from robocasa_lerobot.evaluation.report.model import Bar, Block, Cell, Column, Figure, Section, Table
 from robocasa_lerobot.evaluation.report.training import DemonstratorResult, Training, TrainingPhase
 from robocasa_lerobot.evaluation.statistics import Estimate

@@ -1,0 +1,104 @@
+"""The console command `robocasa-lerobot`: one subcommand per job, each in a module of its own, imported on use."""
+
+from __future__ import annotations
+
+import argparse
+import importlib
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass
+from types import ModuleType
+
+from robocasa_lerobot import __version__
+from robocasa_lerobot.errors import UserError, suggest
+
+
+@dataclass(frozen=True)
+class Subcommand:
+    """Where a subcommand lives.
+
+    Its module has `EXAMPLE: str`, `configure(parser: argparse.ArgumentParser) -> None` and
+    `run(args: argparse.Namespace) -> int`, and imports anything heavy (torch, mujoco, lerobot) inside `run`.
+    With `parser.set_defaults(takes_settings=True, settings=[])` arguments that the parser does not know come in
+    `args.settings`: a command with a typed configuration answers them better than argparse would.
+    """
+
+    module: str
+    summary: str
+
+
+SUBCOMMANDS: dict[str, Subcommand] = {
+    "demos": Subcommand("robocasa_lerobot.cli.demos", "record demonstrations of tasks as HDF5"),
+    "replay": Subcommand("robocasa_lerobot.cli.replay", "check that demonstrations can be replayed"),
+    "convert": Subcommand("robocasa_lerobot.cli.convert", "convert demonstration files to a LeRobotDataset v3.0"),
+    "inspect": Subcommand(
+        "robocasa_lerobot.cli.inspect", "print what a file, dataset or registry holds, draft a mapping"
+    ),
+    "verify": Subcommand("robocasa_lerobot.cli.verify", "compare a converted dataset with its source"),
+    "export": Subcommand("robocasa_lerobot.cli.export", "write a LeRobotDataset v3.0 back to HDF5"),
+    "render": Subcommand("robocasa_lerobot.cli.render", "render a dataset again with other cameras, sizes or presets"),
+    "data": Subcommand("robocasa_lerobot.cli.data", "list the data that an experiment needs, and make what is missing"),
+    "train": Subcommand("robocasa_lerobot.cli.train", "run the training phases of an experiment file"),
+    "eval": Subcommand("robocasa_lerobot.cli.eval", "run seeded trials of a policy and report"),
+    "report": Subcommand("robocasa_lerobot.cli.report", "compare runs: report.html, .md, .tex and .csv"),
+    "leaderboard": Subcommand(
+        "robocasa_lerobot.cli.leaderboard", "write or check a submission to the public leaderboard"
+    ),
+    "gallery": Subcommand("robocasa_lerobot.cli.gallery", "render tasks, kitchens, appliances and objects to pictures"),
+    "view": Subcommand("robocasa_lerobot.cli.view", "open a task's scene in MuJoCo's viewer"),
+    "tasks": Subcommand("robocasa_lerobot.cli.tasks", "list the tasks, their sets and horizons"),
+    "doctor": Subcommand("robocasa_lerobot.cli.doctor", "check this machine and name the command that mends a fault"),
+}
+
+
+def build_parser(names: Sequence[str] = tuple(SUBCOMMANDS)) -> argparse.ArgumentParser:
+    """The parser with the given subcommands configured (importing only their modules)."""
+    parser = argparse.ArgumentParser(prog="robocasa-lerobot", description="Train and benchmark robots in kitchens.")
+    parser.add_argument("--version", action="version", version=f"robocasa-lerobot {__version__}")
+    subparsers = parser.add_subparsers(dest="subcommand", metavar="COMMAND")
+    for name, subcommand in SUBCOMMANDS.items():
+        if name not in names:
+            subparsers.add_parser(name, help=subcommand.summary)
+            continue
+        module: ModuleType = importlib.import_module(subcommand.module)
+        child = subparsers.add_parser(
+            name,
+            help=subcommand.summary,
+            description=subcommand.summary[0].upper() + subcommand.summary[1:] + ".",
+            epilog=f"example:\n  {module.EXAMPLE}",
+            formatter_class=argparse.RawDescriptionHelpFormatter,
+        )
+        module.configure(child)
+        child.set_defaults(run=module.run)
+    return parser
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run a subcommand; returns its exit status. A user's mistake is printed in one paragraph, with status 2."""
+    arguments = list(sys.argv[1:] if argv is None else argv)
+    name = next((a for a in arguments if not a.startswith("-")), None)
+    if name is not None and name not in SUBCOMMANDS:
+        print(f"robocasa-lerobot: unknown command {name!r}. {suggest(name, SUBCOMMANDS)}", file=sys.stderr)
+        return 2
+    parser = build_parser([name] if name else [])
+    if name is None:
+        parser.parse_args(arguments)
+        parser.print_help()
+        return 0
+    args, unknown = parser.parse_known_args(arguments)
+    if unknown and not getattr(args, "takes_settings", False):
+        parser.error(f"unrecognized arguments: {' '.join(unknown)}")
+    try:
+        if unknown:
+            args.settings = unknown
+        return int(args.run(args) or 0)
+    except UserError as error:
+        print(f"robocasa-lerobot {name}: {error}", file=sys.stderr)
+        return 2
+    except KeyboardInterrupt:
+        print(f"\nrobocasa-lerobot {name}: interrupted", file=sys.stderr)
+        return 130
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())

@@ -1,0 +1,102 @@
+"""`robocasa-lerobot data`: which datasets an experiment needs, what is missing, and making it."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from robocasa_lerobot.errors import UserError
+
+if TYPE_CHECKING:
+    from robocasa_lerobot.making.needs import Need
+    from robocasa_lerobot.making.pieces import Outcome
+
+EXAMPLE = (
+    "robocasa-lerobot data configs/experiments/small/foundation.yaml\n"
+    "  robocasa-lerobot data configs/experiments/small/foundation.yaml --make --episodes human=2,mg=2,target=2\n"
+    "  robocasa-lerobot data configs/experiments/robocasa365/foundation.yaml --convert datasets"
+)
+
+
+def configure(parser: argparse.ArgumentParser) -> None:
+    """Add the options; everything else on the command line is a dotted setting of the experiment, as in `train`."""
+    from robocasa_lerobot.jobs.executors import add_options
+
+    parser.add_argument("experiment", nargs="?", type=Path, metavar="EXPERIMENT", help="the experiment file")
+    does = parser.add_mutually_exclusive_group()
+    does.add_argument("--make", action="store_true", help="record and convert what our demonstrators can make")
+    does.add_argument(
+        "--convert",
+        type=Path,
+        metavar="DOWNLOADS",
+        help="convert the published (v2.1) datasets below a folder: those that the experiment lacks, or all",
+    )
+    does.add_argument("--check", action="store_true", help="list, and end with status 1 where something is missing")
+    parser.add_argument(
+        "--episodes",
+        metavar="KIND=N,...",
+        help="demonstrations of each task by kind of dataset, as in human=20,mg=40 (default: the registry's)",
+    )
+    parser.add_argument(
+        "--replace", action="store_true", help="with --make: make those anew that have fewer demonstrations"
+    )
+    parser.add_argument(
+        "--keep-recordings",
+        action="store_true",
+        help="with --make: keep the HDF5 files beside the datasets (`export` makes them again)",
+    )
+    parser.add_argument(
+        "--to", type=Path, metavar="DIR", help="with --convert: folder for the results (default: beside each, with _v3)"
+    )
+    parser.add_argument("--scale", metavar="NAME", help="as in `train`: what the experiment needs at that scale")
+    parser.add_argument("--workers", type=int, help="processes of this machine (default: all cores)")
+    add_options(parser)
+    parser.set_defaults(takes_settings=True)
+
+
+def run(args: argparse.Namespace) -> int:
+    """List, make or convert; status 1 if `--check` finds something missing or something could not be made."""
+    from robocasa_lerobot.jobs.executors import execution_of
+    from robocasa_lerobot.making.estimate import cores_here
+    from robocasa_lerobot.making.listing import listing
+    from robocasa_lerobot.making.needs import needs_of, parse_episodes
+    from robocasa_lerobot.training.config.experiment import load_experiment
+
+    execution = execution_of(args)
+    if args.workers is not None and args.workers < 1:
+        raise UserError(f"--workers is {args.workers}, expected at least 1.")
+    cores = args.workers or cores_here()
+    needs: list[Need] | None = None
+    if args.experiment is not None:
+        episodes = parse_episodes(args.episodes) if args.episodes else {}
+        experiment = load_experiment(args.experiment, getattr(args, "settings", ()), args.scale)
+        needs, said = needs_of(experiment, episodes)
+        asked = f" --episodes {args.episodes}" if args.episodes else ""
+        print(listing(experiment.name, str(args.experiment), needs, said, cores, asked), flush=True)
+    elif args.convert is None:
+        raise UserError(
+            "no experiment: `robocasa-lerobot data configs/experiments/small/foundation.yaml` lists its data."
+        )
+    if args.convert is not None:
+        from robocasa_lerobot.making.downloads import convert_downloads, find_downloads
+
+        downloads = find_downloads(args.convert, args.to, needs)
+        print(f"{len(downloads)} dataset(s) below {args.convert} to convert", flush=True)
+        return _said(convert_downloads(downloads, execution, cores)) if downloads else 0
+    if args.make:
+        from robocasa_lerobot.making.make import make_datasets, pieces_of
+
+        pieces = pieces_of(needs or [], args.replace, args.keep_recordings)
+        return _said(make_datasets(pieces, execution, cores)) if pieces else 0
+    return int(args.check and any(need.missing for need in needs or []))
+
+
+def _said(outcome: Outcome) -> int:
+    from robocasa_lerobot.making.pieces import outcome_lines
+
+    for line in outcome_lines(outcome):
+        print(line)
+    if not outcome.submitted and not outcome.failed:
+        print("done: all of it is there")
+    return int(bool(outcome.failed))

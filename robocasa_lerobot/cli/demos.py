@@ -1,0 +1,106 @@
+"""`robocasa-lerobot demos`: record demonstrations."""
+
+from __future__ import annotations
+
+import argparse
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from robocasa_lerobot.demos.recording import RecordingSettings
+    from robocasa_lerobot.jobs.executors import Execution
+
+EXAMPLE = (
+    "robocasa-lerobot demos --tasks OpenDrawer --episodes 20 --split target --seed 0 --out demos/\n"
+    "  robocasa-lerobot demos --tasks atomic_seen --episodes 50 --split pretrain --keep-failures --out demos/"
+)
+
+
+def configure(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments."""
+    from robocasa_lerobot.jobs.executors import add_options
+
+    parser.add_argument(
+        "--tasks", required=True, help="names and sets (atomic_seen, ...) separated by commas, or `all`; see `tasks`"
+    )
+    parser.add_argument("--episodes", type=int, default=20, help="successful episodes per task (default 20)")
+    parser.add_argument("--split", default="target", help="kitchens: target or pretrain (default target)")
+    for what in ("layouts", "styles"):
+        parser.add_argument(
+            f"--{what}",
+            type=_ids,
+            metavar="IDS",
+            help=f"{what} by id or group id, separated by commas, instead of the split's own (--{what}=-1,12)",
+        )
+    parser.add_argument("--seed", type=int, default=0, help="seed of the first attempt (default 0)")
+    parser.add_argument("--out", type=Path, required=True, help="folder that gets one <task>.hdf5 per task")
+    parser.add_argument("--workers", type=int, help="processes of this machine (default: all cores)")
+    parser.add_argument(
+        "--action-noise",
+        type=float,
+        default=0.0,
+        help="standard deviation of noise on arm commands, 1 is a full command; 0.05 is a good one (default: none)",
+    )
+    parser.add_argument(
+        "--plain", action="store_true", help="no variety: speed, paths and choice of grasps as the skills have them"
+    )
+    parser.add_argument(
+        "--images", action="store_true", help="store camera pictures too (the converter can render them)"
+    )
+    parser.add_argument("--image-size", type=int, default=256, help="height and width of stored pictures (default 256)")
+    parser.add_argument(
+        "--keep-failures",
+        action="store_true",
+        help="write failures/<task>/seed_<n>.mp4 and .json: a film, why, and the terms of the goal that did not hold",
+    )
+    add_options(parser)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Record every task and print a table; status 1 if one had to be given up."""
+    from robocasa_lerobot.demos.choose import choose_tasks
+    from robocasa_lerobot.demos.recording import RecordingSettings, record_tasks
+    from robocasa_lerobot.demos.summary import print_summary
+    from robocasa_lerobot.jobs.executors import execution_of
+
+    execution = execution_of(args)
+    chosen = choose_tasks(args.tasks)
+    if chosen.left_out:
+        print(f"left out, for want of a demonstrator: {', '.join(chosen.left_out)}", flush=True)
+    settings = [
+        RecordingSettings(
+            task=name,
+            episodes=args.episodes,
+            split=args.split,
+            seed=args.seed,
+            action_noise=args.action_noise,
+            images=args.images,
+            image_size=args.image_size,
+            layouts=args.layouts,
+            styles=args.styles,
+            varied=not args.plain,
+        )
+        for name in chosen.names
+    ]
+    if execution.kind != "local":
+        return _distribute(settings, args, execution)
+    workers = args.workers if args.workers is not None else os.cpu_count() or 1
+    results = record_tasks(settings, args.out, workers=workers, keep_failures=args.keep_failures)
+    return print_summary(results)
+
+
+def _distribute(settings: list[RecordingSettings], args: argparse.Namespace, execution: Execution) -> int:
+    from robocasa_lerobot.demos.distributed import record_distributed
+
+    line, status = record_distributed(settings, args.out, execution, keep_failures=args.keep_failures)
+    if line:
+        print(line)
+    return status
+
+
+def _ids(text: str) -> tuple[int, ...]:
+    try:
+        return tuple(int(part) for part in text.split(","))
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"{text!r} is no list of ids such as 1,2,-4") from None

@@ -1,0 +1,145 @@
+"""`robocasa-lerobot eval`: run seeded trials of policies, here or in shards elsewhere, and write the report."""
+
+from __future__ import annotations
+
+import argparse
+import dataclasses
+import inspect
+import os
+import sys
+import textwrap
+import threading
+import typing
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any
+
+from robocasa_lerobot.errors import UserError
+
+if TYPE_CHECKING:
+    from robocasa_lerobot.evaluation.config.evaluation import EvaluationConfig
+
+EXAMPLE = (
+    "robocasa-lerobot eval --policy.path=outputs/demo/finetune/checkpoints/last/pretrained_model"
+    " --env.tasks=OpenDrawer --trials=10"
+)
+
+
+def configure(parser: argparse.ArgumentParser) -> None:
+    """Declare every setting of `EvaluationConfig` as an option, with the help of its docstring."""
+    from robocasa_lerobot.evaluation.config.evaluation import EvaluationConfig
+    from robocasa_lerobot.jobs.executors import add_options
+
+    add_options(parser)
+    parser.add_argument("--shards", type=int, metavar="N", help="with --executor: into how many parts the plan is cut")
+    parser.add_argument("--merge", action="store_true", help="join the results of --shard=1/N to N/N, run nothing")
+    parser.add_argument(
+        "--end-with-input", action="store_true", help="end when standard input closes, as when the caller is killed"
+    )
+    parser.add_argument("--check", action="store_true", help="print what would run, and end; no checkpoint is needed")
+    parser.add_argument("--config_path", metavar="FILE", help="YAML file of settings; options win over it")
+    short = "what to evaluate, short for --policy.path: a checkpoint, demonstrator, random, zero, replay:FILE"
+    parser.add_argument("--policy", dest="set:policy", metavar="A,B", default=argparse.SUPPRESS, help=short)
+    for name, hint, help_text in describe_settings(EvaluationConfig):
+        options: dict[str, Any] = {"nargs": "?", "const": "true"} if hint is bool else {}
+        shown = {list[str]: "A,B", bool: "true"}.get(hint, "VALUE")
+        text = help_text.replace("%", "%%")
+        parser.add_argument(
+            f"--{name}", dest=f"set:{name}", metavar=shown, default=argparse.SUPPRESS, help=text, **options
+        )
+    # A misspelt setting comes here as well, and is answered with the closest name.
+    parser.set_defaults(takes_settings=True, settings=[])
+
+
+def run(args: argparse.Namespace) -> int:
+    """Evaluate, print the success rates, write the report."""
+    if args.end_with_input:
+        threading.Thread(target=_end_with_input, daemon=True).start()
+    from robocasa_lerobot.evaluation.config.evaluation import KITCHEN_ENV_FACTORY, EvaluationConfig
+    from robocasa_lerobot.evaluation.config.loader import load_config
+    from robocasa_lerobot.evaluation.planning.run_header import partial_sentence
+    from robocasa_lerobot.evaluation.run.engine import evaluate, prepare
+    from robocasa_lerobot.evaluation.run.merging import merge
+    from robocasa_lerobot.evaluation.run.outputs import write_outputs
+    from robocasa_lerobot.gl import announce_backend, check_device, ensure_gl
+
+    given = [f"--{key.removeprefix('set:')}={value}" for key, value in vars(args).items() if key.startswith("set:")]
+    path = [f"--config_path={args.config_path}"] if args.config_path else []
+    config = load_config(EvaluationConfig, [*path, *given, *args.settings])
+    if args.check:
+        from robocasa_lerobot.evaluation.planning.check import lines, planned
+
+        print("\n".join(lines(config, planned(config))))
+        return 0
+    for device in config.env.render_devices:
+        check_device(device)
+    if args.executor != "local":
+        return _run_elsewhere(config, args)
+    if args.shards is not None:
+        raise UserError("--shards is for --executor slurm or ray; here give --shard=I/N, and --merge at the end.")
+    evaluation = prepare(config)
+    header = evaluation.header
+    partial = partial_sentence(header.task_sets, header.missing_tasks, header.missing_by_set)
+    if partial is not None:
+        print(f"robocasa-lerobot eval: this run is {partial}", file=sys.stderr)
+    if args.merge:
+        if config.shard is not None:
+            raise UserError("--merge joins all shards: leave --shard out.")
+        merge(evaluation)
+        write_outputs(evaluation)
+        return 0
+    if config.env.factory == KITCHEN_ENV_FACTORY:
+        ensure_gl()  # Inherited by the workers.
+        announce_backend()
+    evaluate(evaluation)
+    if config.shard is None:
+        write_outputs(evaluation)
+    else:
+        print(f"shard {config.shard} is complete. When all are: the same command with --merge instead of --shard.")
+    return 0
+
+
+def _end_with_input() -> None:
+    """Wait for the end of standard input, and end with it; the workers end when their pipes close."""
+    while os.read(0, 4096):
+        pass
+    os._exit(1)
+
+
+def _run_elsewhere(config: EvaluationConfig, args: argparse.Namespace) -> int:
+    from robocasa_lerobot.evaluation.run.distributed import run_distributed
+    from robocasa_lerobot.jobs.executors import execution_of
+
+    if args.shards is None:
+        raise UserError(f"--executor {args.executor} needs --shards=N: into how many parts the plan is cut.")
+    args.workers = None  # the setting `workers` is for each shard
+    line = run_distributed(config, args.shards, execution_of(args))
+    if line is not None:
+        print(line)
+    return 0
+
+
+def describe_settings(cls: type, prefix: str = "") -> Iterator[tuple[str, Any, str]]:
+    """(dotted name, type, help) of each leaf setting of a dataclass; the help is its docstring's `name: text` line."""
+    hints = typing.get_type_hints(cls)
+    documented = _documented(inspect.getdoc(cls) or "")
+    for field in dataclasses.fields(cls):
+        hint: Any = hints[field.name]
+        if dataclasses.is_dataclass(hint):
+            yield from describe_settings(typing.cast(type, hint), f"{prefix}{field.name}.")
+        else:
+            yield f"{prefix}{field.name}", hint, documented[field.name]
+
+
+def _documented(doc: str) -> dict[str, str]:
+    out: dict[str, str] = {}
+    name = ""
+    for line in textwrap.dedent(doc).splitlines():
+        head, colon, text = line.partition(": ")
+        if colon and head.isidentifier():
+            name = head
+            out[name] = text.strip()
+        elif name and line.startswith("    "):
+            out[name] += " " + line.strip()
+        else:
+            name = ""
+    return out

@@ -1,0 +1,55 @@
+"""`robocasa-lerobot report`: write report.html, .md, .tex and two .csv files from the results of evaluations."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+EXAMPLE = "robocasa-lerobot report outputs/demo/evaluation --training outputs/demo --demos demos/OpenDrawer.hdf5"
+
+
+def configure(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments."""
+    parser.add_argument(
+        "results",
+        nargs="+",
+        type=Path,
+        metavar="RUN",
+        help="folder with a trials.jsonl, or output of a training with evaluations",
+    )
+    parser.add_argument(
+        "--training",
+        nargs="*",
+        type=Path,
+        default=[],
+        metavar="DIR",
+        help="output folder of a training, for its loss curves; default: where the evaluated checkpoints lie",
+    )
+    parser.add_argument(
+        "--demos",
+        nargs="*",
+        type=Path,
+        default=[],
+        metavar="FILE",
+        help="HDF5 files of demonstrations, for the demonstrator's own success rate",
+    )
+    parser.add_argument(
+        "--out",
+        "-o",
+        type=Path,
+        default=None,
+        metavar="FILE",
+        help="HTML file, with .md, .tex and .csv beside it; default: report.html in the first RUN",
+    )
+    parser.add_argument("--title", default=None, help="heading of the report")
+    parser.add_argument("--no-videos", action="store_true", help="film strips only, for a smaller file")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Write the report and print the rates."""
+    from robocasa_lerobot.evaluation.report.output import print_rates, write_report
+
+    out = args.out or args.results[0] / "report.html"
+    print_rates(args.results)
+    write_report(args.results, args.training, args.demos, out, args.title, videos=not args.no_videos)
+    return 0

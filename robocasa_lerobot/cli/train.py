@@ -1,0 +1,72 @@
+"""`robocasa-lerobot train`, which `train.py` runs too."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+EXAMPLE = "robocasa-lerobot train --config_path configs/experiments/demo.yaml"
+
+
+def configure(parser: argparse.ArgumentParser) -> None:
+    """Add the options; everything else on the command line is a dotted setting of the experiment."""
+    parser.add_argument("--config_path", type=Path, required=True, metavar="FILE", help="the experiment file")
+    parser.add_argument(
+        "--resume",
+        choices=("auto", "force"),
+        default="auto",
+        help="auto: continue what was begun, if its settings are the same; force: even if they are not",
+    )
+    parser.add_argument("--stop_after", type=int, metavar="STEPS", help="save and end after so many steps of this run")
+    parser.add_argument("--phase", metavar="NAME", help="run this phase only; what it starts from must be finished")
+    parser.add_argument("--evaluate", action="store_true", help="run the phases' evaluations when they are finished")
+    parser.add_argument(
+        "--scale",
+        metavar="FILE",
+        help="make everything smaller by a file, or a name in configs/scales/, to try the whole experiment: tiny",
+    )
+    parser.add_argument("--print_config", action="store_true", help="print the resolved experiment and end")
+    parser.add_argument(
+        "--plan", action="store_true", help="print steps, samples, missing data, disk and hours of each phase, and end"
+    )
+    parser.add_argument(
+        "--measure", type=int, default=20, metavar="STEPS", help="steps that --plan times; 0: none (default 20)"
+    )
+    parser.epilog = (
+        f"{parser.epilog or ''}\n\nAny setting of the experiment can be given as --name=value, such as\n"
+        "  --output_dir=outputs/try --phases.pretrain.batch_size=16 --policy.horizon=16 --defaults.learning_rate=1e-4"
+    )
+    parser.set_defaults(takes_settings=True)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Run the experiment; 0 when finished, 3 when it stopped as asked, 75 when a signal ended it (run it again)."""
+    from robocasa_lerobot.training.spinning import limit_spinning
+
+    limit_spinning()
+    from robocasa_lerobot.training.config.experiment import load_experiment, to_yaml
+
+    experiment = load_experiment(args.config_path, getattr(args, "settings", ()), args.scale)
+    if args.plan:
+        from robocasa_lerobot.training.planning.evaluations import plan_evaluations
+        from robocasa_lerobot.training.planning.plan import plan_experiment
+        from robocasa_lerobot.training.planning.plan_text import render_plan
+        from robocasa_lerobot.training.setup.builders import best_device
+
+        plans = plan_experiment(experiment, args.phase, args.measure)
+        evaluations = plan_evaluations(experiment, [plan.phase for plan in plans if not plan.left_out])
+        print(render_plan(experiment, plans, best_device(experiment.device), evaluations))
+        return 0
+    print(to_yaml(experiment), flush=True)
+    if args.print_config:
+        return 0
+    from robocasa_lerobot.training.interrupts import REQUEUE, STOPPED, Interrupts
+    from robocasa_lerobot.training.phases import run_experiment
+
+    interrupts = Interrupts(args.stop_after)
+    finished = run_experiment(
+        experiment, force=args.resume == "force", only=args.phase, evaluate=args.evaluate, interrupts=interrupts
+    )
+    if finished:
+        return 0
+    return REQUEUE if interrupts.signalled else STOPPED

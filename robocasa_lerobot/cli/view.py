@@ -1,0 +1,45 @@
+"""`robocasa-lerobot view`: a task's scene in MuJoCo's viewer."""
+
+from __future__ import annotations
+
+import argparse
+
+EXAMPLE = "robocasa-lerobot view --task OpenDrawer --split pretrain --seed 3"
+
+
+def configure(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments."""
+    parser.add_argument("--task", default="PickPlaceCounterToSink", help="task name")
+    parser.add_argument("--split", default="target", help="kitchens: target or pretrain (default target)")
+    parser.add_argument("--seed", type=int, default=0, help="of the scene (default 0)")
+    parser.add_argument("--layout", type=int, help="layout id, with --style, instead of the split's choice")
+    parser.add_argument("--style", type=int, help="style id, with --layout")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Open the viewer and let the scene run until its window is closed."""
+    import os
+    import sys
+
+    import numpy as np
+
+    from robocasa_lerobot.envs.scene.build import build_scene
+    from robocasa_lerobot.envs.tasks.registry import get_task
+    from robocasa_lerobot.errors import UserError
+
+    if (args.layout is None) != (args.style is None):
+        raise UserError("--layout and --style belong together: give both, or neither.")
+    task = get_task(args.task)
+    if sys.platform.startswith("linux") and not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
+        raise UserError(
+            "there is no display here (neither DISPLAY nor WAYLAND_DISPLAY is set): run this on a desktop, or use "
+            "`robocasa-lerobot gallery`, which needs none."
+        )
+    import mujoco.viewer
+
+    kitchens = None if args.layout is None else [(args.layout, args.style)]
+    scene = build_scene(task, args.split, args.seed, kitchens=kitchens)
+    data, _ = scene.initial_data(np.random.default_rng(args.seed))
+    print(f"layout {scene.layout_id}, style {scene.style_id}: {scene.instruction}")
+    mujoco.viewer.launch(scene.model, data)
+    return 0

@@ -1,0 +1,1 @@
+"""One dataset on disk: its numbers and its pictures."""

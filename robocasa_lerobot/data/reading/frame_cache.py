@@ -1,0 +1,129 @@
+"""Decoded frames of a dataset as memory-mapped arrays, because decoding video is what a CPU spends its time on.
+
+A cache is a folder with one `<camera feature>.npy` per camera, uint8 (frames, 3, height, width), row i being
+the dataset's frame i. It is filled next to its final place and renamed when complete; a filling that was
+killed continues with the episode where it stopped.
+"""
+
+from __future__ import annotations
+
+import functools
+import hashlib
+import json
+import sys
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+from lerobot.datasets.video_utils import decode_video_frames
+from numpy.typing import NDArray
+
+from robocasa_lerobot.data.reading.cache_disk import check_disk
+from robocasa_lerobot.data.reading.source import DatasetSource
+from robocasa_lerobot.errors import UserError
+from robocasa_lerobot.files import write_text
+from robocasa_lerobot.jobs.locks import locked
+from robocasa_lerobot.progress import Bar
+
+FORMAT = 1  # counted up when the content of a cache changes
+_TOLERANCE_S = 1e-4  # LeRobot's tolerance between the asked and the decoded timestamp
+
+
+def resize_images(images: torch.Tensor, size: tuple[int, int]) -> torch.Tensor:
+    """Uint8 images (..., 3, H, W) at (height, width) `size`, bilinear with antialiasing as torchvision's Resize."""
+    if tuple(images.shape[-2:]) == tuple(size):
+        return images
+    flat = images.reshape(-1, *images.shape[-3:]).float()
+    out = torch.nn.functional.interpolate(flat, size=size, mode="bilinear", antialias=True, align_corners=False)
+    return out.round().clamp(0, 255).to(torch.uint8).reshape(*images.shape[:-2], *size)
+
+
+def cache_bytes(source: DatasetSource, keys: Sequence[str], size: tuple[int, int]) -> int:
+    """Bytes that a cache of all frames of `source` takes."""
+    return source.total_frames * len(keys) * 3 * size[0] * size[1]
+
+
+class FrameCache:
+    """A complete cache, opened for reading."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+
+    @functools.cached_property
+    def _arrays(self) -> dict[str, NDArray[np.uint8]]:
+        keys = json.loads((self.folder / "cache.json").read_text())["keys"]
+        return {key: np.load(self.folder / f"{key}.npy", mmap_mode="r") for key in keys}
+
+    def frames(self, key: str, indices: NDArray[np.int64]) -> torch.Tensor:
+        """Frames of a camera feature: uint8 (*indices.shape, 3, height, width)."""
+        return torch.from_numpy(self._arrays[key][indices])
+
+    def __getstate__(self) -> dict[str, Any]:
+        """A worker process maps the files itself; the arrays must not travel."""
+        return {"folder": self.folder}
+
+
+def open_or_build(source: DatasetSource, keys: Sequence[str], size: tuple[int, int], cache_dir: Path) -> FrameCache:
+    """The cache of the camera features `keys` of `source` at (height, width) `size`, decoded if not there yet.
+
+    Several processes may ask at once: one decodes, the others wait.
+
+    Raises:
+        UserError: too little free disk for it, or a video that lacks frames.
+    """
+    text = json.dumps([FORMAT, source.fingerprint, sorted(keys), list(size)])
+    name = f"{source.root.name}_{size[0]}x{size[1]}_{hashlib.sha256(text.encode()).hexdigest()[:16]}"
+    folder, partial = cache_dir / name, cache_dir / f"{name}.partial"
+    cache_dir.mkdir(parents=True, exist_ok=True)
+    with locked(cache_dir / f"{name}.lock", wait=True):
+        if not folder.is_dir():
+            remedy = ", a smaller `loader.image_size`, or `loader.cache_frames: false`"
+            check_disk(cache_bytes(source, keys, size), cache_dir, "the frame cache", remedy)
+            _fill(source, sorted(keys), size, partial)
+            partial.rename(folder)
+    return FrameCache(folder)
+
+
+def _fill(source: DatasetSource, keys: list[str], size: tuple[int, int], folder: Path) -> None:
+    progress = folder / "cache.json"
+    done = json.loads(progress.read_text())["episodes"] if progress.is_file() else 0
+    folder.mkdir(exist_ok=True)
+    shape = (source.total_frames, 3, *size)
+    mode: Any = "r+" if done else "w+"
+    arrays = {
+        key: np.lib.format.open_memmap(folder / f"{key}.npy", mode=mode, dtype=np.uint8, shape=None if done else shape)
+        for key in keys
+    }
+    timestamps = source.columns["timestamp"]
+    episodes = Bar(
+        range(done, len(source.starts)),
+        initial=done,
+        total=len(source.starts),
+        desc=f"decoding {source.root.name}",
+        unit="episode",
+        mininterval=0.2 if sys.stderr.isatty() else 10.0,  # seconds; a log file needs few lines
+    )
+    with ThreadPoolExecutor(max_workers=len(keys)) as pool:
+        for episode in episodes:
+            where = slice(int(source.starts[episode]), int(source.ends[episode]))
+            jobs = {key: pool.submit(_decode, source, key, episode, timestamps[where], size) for key in keys}
+            for key, job in jobs.items():
+                arrays[key][where] = job.result().numpy()
+            for array in arrays.values():
+                array.flush()
+            write_text(progress, json.dumps({"episodes": episode + 1, "keys": keys}))
+
+
+def _decode(
+    source: DatasetSource, key: str, episode: int, timestamps: NDArray[np.float32], size: tuple[int, int]
+) -> torch.Tensor:
+    path, start = source.video(episode, key)
+    shifted = [start + float(t) for t in timestamps]
+    try:
+        frames = decode_video_frames(path, shifted, _TOLERANCE_S, backend="pyav", return_uint8=True)
+    except Exception as error:
+        raise UserError(f"{path}: cannot decode episode {episode}: {error}. Run `robocasa-lerobot verify`.") from error
+    return resize_images(frames, size)

@@ -1,0 +1,140 @@
+"""One attempt at a demonstration: run the demonstrator in a fresh scene and keep what RoboCasa's files keep."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from robocasa_lerobot import contract
+from robocasa_lerobot.demos.demonstrator import SkillError, demonstrate
+from robocasa_lerobot.demos.motion_style import PLAIN, Variety
+from robocasa_lerobot.envs.kitchen_env import KitchenEnv
+from robocasa_lerobot.envs.robots.panda_omron.proprioception import read_observations
+
+Array = NDArray[np.float64]
+
+# An episode ends after this many consecutive steps in which the goal holds (docs/robocasa.md, section 4).
+SUCCESS_HOLD_STEPS = 15
+# Keys of the generators of action noise and of variety, apart from those of the scene and the arm.
+_NOISE_STREAM, _VARIETY_STREAM = 2, 6
+
+
+@dataclass
+class Recording:
+    """A recorded episode of T steps; entry t is the state before action t, and that action.
+
+    Attributes:
+        seed: of the scene.
+        success: whether the goal held at the end.
+        reason: why not, if not.
+        false_terms: names of the goal's terms that did not hold at the end.
+        states: (T, 1 + nq + nv) time, positions, velocities.
+        actions: (T, 12) in HDF5 order, as executed.
+        observations: robosuite-named proprioception, each (T, k); pictures (T, S, S, 3) uint8 if asked for.
+        rewards: (T,) 1 where the goal held in states[t].
+        model_file: MJCF.
+        assets: files of textures and objects that the MJCF names.
+        ep_meta: description of the scene.
+    """
+
+    seed: int
+    success: bool
+    reason: str
+    false_terms: tuple[str, ...]
+    states: Array
+    actions: Array
+    observations: dict[str, NDArray[Any]]
+    rewards: Array
+    model_file: str
+    assets: dict[str, bytes]
+    ep_meta: dict[str, Any]
+
+
+@dataclass
+class _Buffer:
+    states: list[Array] = field(default_factory=list)
+    actions: list[Array] = field(default_factory=list)
+    rewards: list[float] = field(default_factory=list)
+    observations: dict[str, list[NDArray[Any]]] = field(default_factory=dict)
+
+    def add(self, env: KitchenEnv, action: Array, success: bool, *, images: bool) -> None:
+        data = env.data
+        self.states.append(np.concatenate([[data.time], data.qpos, data.qvel]))
+        self.actions.append(contract.stored_to_hdf5(action))
+        self.rewards.append(float(success))
+        for key, value in read_observations(env.model, data).items():
+            self.observations.setdefault(key, []).append(np.array(value, dtype=np.float64))
+        if images:
+            for camera in env.cameras:
+                self.observations.setdefault(f"{camera}_image", []).append(env.render_camera(camera))
+
+
+def record_episode(
+    env: KitchenEnv, seed: int, *, action_noise: float = 0.0, images: bool = False, varied: bool = False
+) -> Recording:
+    """Attempt a demonstration of the env's task in the scene of `seed`.
+
+    Args:
+        env: made with `terminate_on_success=False`.
+        seed: of the scene, the arm's initial noise and the action noise.
+        action_noise: standard deviation of Gaussian noise on the six commanded arm components (unit: full command);
+            it is part of the action that is executed and recorded.
+        images: also keep the camera pictures.
+        varied: draw how the demonstration is carried out (`Variety`) from the seed; else as the skills have it.
+    """
+    assert not env.terminate_on_success, "the recorder decides when an episode ends"
+    env.render_observations = False
+    rng = np.random.default_rng([seed, _NOISE_STREAM])
+    variety = Variety.draw(np.random.default_rng([seed, _VARIETY_STREAM])) if varied else PLAIN
+    _, info = env.reset(seed=seed)
+    model_file = env.scene.spec.to_xml()
+    buffer = _Buffer()
+    held, reason = 0, ""
+    try:
+        for wanted in demonstrate(env, variety):
+            # Everything is carried out in single precision, as a policy's action is, and recorded as carried out.
+            action = _with_noise(rng, wanted, action_noise).astype(np.float32).astype(np.float64)
+            buffer.add(env, contract.binarize(action), info["success"], images=images)
+            _, _, _, truncated, info = env.step(action.astype(np.float32))
+            held = held + 1 if info["success"] else 0
+            if held >= SUCCESS_HOLD_STEPS:
+                break
+            if truncated:
+                late = f"; the goal holds, but for {held} steps only" if held else ""
+                reason = f"not done within the horizon of {env.horizon} steps{late}"
+                break
+    except SkillError as error:
+        reason = str(error)
+    return Recording(
+        seed=seed,
+        success=held >= SUCCESS_HOLD_STEPS,
+        reason=reason,
+        false_terms=tuple(name for name, held in info["success_terms"].items() if not held),
+        states=np.array(buffer.states),
+        actions=np.array(buffer.actions),
+        observations={key: np.array(values) for key, values in buffer.observations.items()},
+        rewards=np.array(buffer.rewards),
+        model_file=model_file,
+        assets={
+            name: data for name, data in env.scene.spec.assets.items() if name.startswith(("textures/", "objects/"))
+        },
+        ep_meta={**env.scene.ep_meta(), **_kitchens(env), "action_noise": action_noise, "variety": asdict(variety)},
+    )
+
+
+def _kitchens(env: KitchenEnv) -> dict[str, Any]:
+    """What the env was restricted to: with the seed, it decides the scene."""
+    asked = {"layouts": env.layouts, "styles": env.styles}
+    return {key: list(ids) for key, ids in asked.items() if ids is not None}
+
+
+def _with_noise(rng: np.random.Generator, action: Array, noise: float) -> Array:
+    out = action.copy()
+    if noise > 0:
+        for part in ("end_effector_position", "end_effector_rotation"):
+            where = contract.ACTION_SLICES[part]
+            out[where] += rng.normal(0.0, noise, size=out[where].shape)
+    return np.clip(out, -1.0, 1.0)

@@ -1,0 +1,1 @@
+"""Kitchens in code: layouts, styles, fixtures and appliances."""

@@ -1,0 +1,153 @@
+"""Fixture types that tasks ask for, and what counts as one, by RoboCasa's rules (docs/robocasa.md, section 6)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from enum import IntEnum
+
+from robocasa_lerobot.envs.kitchens.appliances.kinds.fridge import Fridge
+from robocasa_lerobot.envs.kitchens.fixtures.base import Fixture
+from robocasa_lerobot.envs.kitchens.fixtures.counters import Counter
+from robocasa_lerobot.envs.kitchens.layout import Layout
+
+Filter = Callable[[Layout, Fixture], bool]
+
+
+class FixtureType(IntEnum):
+    """What a task may ask for; the numbers are RoboCasa's."""
+
+    MICROWAVE = 1
+    STOVE = 2
+    OVEN = 3
+    SINK = 4
+    COFFEE_MACHINE = 5
+    TOASTER = 6
+    TOASTER_OVEN = 7
+    FRIDGE = 8
+    DISHWASHER = 9
+    BLENDER = 10
+    STAND_MIXER = 11
+    ELECTRIC_KETTLE = 12
+    STOOL = 13
+    COUNTER = 14
+    ISLAND = 15
+    COUNTER_NON_CORNER = 16
+    DINING_COUNTER = 17
+    CABINET = 18
+    CABINET_WITH_DOOR = 19
+    CABINET_SINGLE_DOOR = 20
+    CABINET_DOUBLE_DOOR = 21
+    SHELF = 22
+    DRAWER = 23
+    TOP_DRAWER = 24
+    WINDOW = 25
+    DISH_RACK = 26
+    COUNTER_NON_DINING = 27
+
+
+# Heights of the floor of a cabinet that objects are put into, metres.
+_CABINET_FLOOR = (1.0, 1.5)
+_TOP_DRAWER_MIDDLE = (0.7, 0.9)
+_CABINETS = ("single_cabinet", "hinge_cabinet", "open_cabinet")
+
+
+def _types(*types: str) -> Filter:
+    return lambda layout, fixture: layout.types[fixture.name] in types
+
+
+def _cabinet(*types: str) -> Filter:
+    def found(layout: Layout, fixture: Fixture) -> bool:
+        low, high = _CABINET_FLOOR
+        return (
+            layout.types[fixture.name] in types
+            and low <= fixture.pos[2] - fixture.height / 2 <= high
+            and not any(part in fixture.name for part in ("stack", "corner"))
+            and not _over_corner(layout, fixture)
+        )
+
+    return found
+
+
+def _over_corner(layout: Layout, fixture: Fixture) -> bool:
+    """Whether it hangs over the counter of a corner, which no robot can stand before."""
+    x, y, _ = fixture.pos
+    return any(
+        isinstance(f, Counter) and "corner" in f.name and max(abs(f.pos[0] - x), abs(f.pos[1] - y)) < f.width / 2
+        for f in layout.fixtures.values()
+    )
+
+
+def _top_drawer(layout: Layout, fixture: Fixture) -> bool:
+    low, high = _TOP_DRAWER_MIDDLE
+    return layout.types[fixture.name] == "drawer" and low <= fixture.pos[2] <= high
+
+
+def _counter(_: Layout, fixture: Fixture) -> bool:
+    return isinstance(fixture, Counter) and "corner" not in fixture.name
+
+
+def _island(_: Layout, fixture: Fixture) -> bool:
+    return isinstance(fixture, Counter) and (fixture.island_only or "island" in fixture.name)
+
+
+def _dining_counter(_: Layout, fixture: Fixture) -> bool:
+    return (
+        isinstance(fixture, Counter)
+        and not fixture.island_only
+        and (fixture.name.startswith(("island", "dining")) or fixture.table)
+    )
+
+
+FILTERS: dict[FixtureType, Filter] = {
+    FixtureType.MICROWAVE: _types("microwave"),
+    FixtureType.STOVE: _types("stove", "stove_wide", "stovetop"),
+    FixtureType.OVEN: _types("oven"),
+    FixtureType.SINK: _types("sink"),
+    FixtureType.COFFEE_MACHINE: _types("coffee_machine"),
+    FixtureType.TOASTER: _types("toaster"),
+    FixtureType.TOASTER_OVEN: _types("toaster_oven"),
+    FixtureType.FRIDGE: _types("fridge_french_door", "fridge_side_by_side", "fridge_bottom_freezer"),
+    FixtureType.DISHWASHER: _types("dishwasher"),
+    FixtureType.BLENDER: _types("blender"),
+    FixtureType.STAND_MIXER: _types("stand_mixer"),
+    FixtureType.ELECTRIC_KETTLE: _types("electric_kettle"),
+    FixtureType.STOOL: _types("stool"),
+    FixtureType.COUNTER: _counter,
+    FixtureType.ISLAND: _island,
+    FixtureType.COUNTER_NON_CORNER: _counter,
+    FixtureType.DINING_COUNTER: _dining_counter,
+    FixtureType.CABINET: _cabinet(*_CABINETS),
+    FixtureType.CABINET_WITH_DOOR: _cabinet("single_cabinet", "hinge_cabinet"),
+    FixtureType.CABINET_SINGLE_DOOR: _cabinet("single_cabinet"),
+    FixtureType.CABINET_DOUBLE_DOOR: _cabinet("hinge_cabinet"),
+    FixtureType.SHELF: _types("shelf"),
+    FixtureType.DRAWER: _types("drawer"),
+    FixtureType.TOP_DRAWER: _top_drawer,
+    FixtureType.WINDOW: _types("window"),
+    FixtureType.DISH_RACK: _types("dish_rack"),
+    FixtureType.COUNTER_NON_DINING: lambda layout, f: _counter(layout, f) and not _dining_counter(layout, f),
+}
+# By the words of task declarations: the enum's names in small letters.
+FIXTURE_KINDS: dict[str, Filter] = {kind.name.lower(): FILTERS[kind] for kind in FixtureType}
+FIXTURE_KINDS["drawer_top"] = FILTERS[FixtureType.TOP_DRAWER]
+
+
+def _with_drawer(layout: Layout, fixture: Fixture) -> bool:
+    return isinstance(fixture, Fridge) and bool(fixture.drawers)
+
+
+# What a robot is sent from and to (docs/robocasa.md, section 8).
+_LANDMARKS = (
+    "coffee_machine", "toaster", "toaster_oven", "stove", "stove_wide", "stovetop", "open_cabinet", "microwave", "sink",
+    "hood", "oven", "fridge_french_door", "fridge_side_by_side", "fridge_bottom_freezer", "dishwasher",
+    "electric_kettle", "stand_mixer",
+)  # fmt: skip
+_SOURCES = (*_LANDMARKS, "single_cabinet", "hinge_cabinet", "drawer")
+
+
+def _once(layout: Layout, fixture: Fixture) -> bool:
+    kind = layout.types[fixture.name]
+    return kind in _LANDMARKS and list(layout.types.values()).count(kind) == 1
+
+
+FIXTURE_KINDS |= {"fridge_with_drawer": _with_drawer, "landmark": _types(*_SOURCES), "landmark_once": _once}

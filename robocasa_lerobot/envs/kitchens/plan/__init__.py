@@ -1,0 +1,1 @@
+"""From a layout's file to where its fixtures stand: rows, islands, the room around them."""

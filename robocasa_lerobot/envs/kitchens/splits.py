@@ -1,0 +1,111 @@
+"""Which kitchens a split has: pairs of a layout and a style, and the groups and lists that users name them by."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+from robocasa_lerobot.envs.kitchens.layout import LAST_TARGET_ID, layout_ids
+from robocasa_lerobot.envs.kitchens.materials import style_ids
+from robocasa_lerobot.errors import UnknownNameError, UserError
+
+SPLITS = ("pretrain", "target")
+Pairs = list[tuple[int, int]]
+
+# Ids of groups of layouts, or of styles, by RoboCasa's negative numbers (docs/robocasa.md, section 6).
+GROUPS: dict[int, tuple[int, ...]] = {
+    -1: tuple(range(1, 11)),
+    -2: tuple(range(11, 61)),
+    -3: tuple(range(1, 61)),
+    -4: (1, 3, 5, 6, 8),
+    -5: (2, 4, 7, 9, 10),
+    -6: (2, 4, 7, 8, 9, 10),
+}
+FIVE_LAYOUTS, FIVE_STYLES = (11, 15, 18, 40, 50), (14, 28, 34, 46, 58)
+NAMED: dict[str, Pairs] = {
+    "5x5": [(layout, style) for layout in FIVE_LAYOUTS for style in FIVE_STYLES],
+    "5x1": [(layout, 34) for layout in FIVE_LAYOUTS],
+}
+
+# Layouts that lack something, or have it out of reach, by what tasks call them.
+EXCLUDED: dict[str, tuple[int, ...]] = {
+    "double_cab": (32, 41, 59),
+    "dining_counter": (1, 3, 5, 6, 18, 20, 36, 39, 40, 43, 47, 50, 52),
+    "island": (1, 3, 5, 6, 8, 9, 10, 11, 13, 18, 19, 22, 27, 30, 36, 40, 43, 46, 47, 52, 53, 60),
+}
+_WITH = {
+    "oven": (2, 4, 7, 9, 12, 15, 17, 18, 29, 31, 34, 35, 37, 39, 42),
+    "freezer": (2, 7, 9, 18, 21, 24, 29, 32, 38, 41, 43, 44, 45, 47, 57),
+}
+EXCLUDED |= {need: tuple(i for i in range(1, 61) if i not in usable) for need, usable in _WITH.items()}
+PROBLEMATIC_BLENDER_LID_STYLES = (13, 29, 31)
+
+
+def expand(ids: int | Iterable[int], what: str) -> tuple[int, ...]:
+    """Ids, of which negative ones stand for groups; `what` is "layout" or "style".
+
+    Raises:
+        UnknownNameError: an id or group that does not exist.
+    """
+    known = layout_ids() if what == "layout" else style_ids()
+    found: list[int] = []
+    for number in [ids] if isinstance(ids, int) else ids:
+        if number in GROUPS:
+            found += GROUPS[number]
+        elif number in known:
+            found.append(number)
+        else:
+            raise UnknownNameError(what, str(number), [*map(str, known), *map(str, GROUPS)])
+    return tuple(dict.fromkeys(found))
+
+
+def scene_ids(
+    split: str,
+    *,
+    layouts: int | Iterable[int] | None = None,
+    styles: int | Iterable[int] | None = None,
+    exclude: Sequence[str] = (),
+    exclude_styles: Sequence[int] = (),
+) -> Pairs:
+    """(layout, style) pairs of a split: target pairs (i, i), pretraining every layout with every style.
+
+    Args:
+        split: "pretrain" or "target".
+        layouts: of these only (ids or group ids); then every layout with every style.
+        styles: the same for styles.
+        exclude: names of `EXCLUDED`: what the task needs.
+        exclude_styles: style ids.
+
+    Raises:
+        UnknownNameError: no such split, layout, style, group or need.
+        UserError: nothing is left.
+    """
+    if split not in SPLITS:
+        raise UnknownNameError("split", split, SPLITS)
+    of_split = GROUPS[-1] if split == "target" else GROUPS[-2]
+    if layouts is None and styles is None and split == "target":
+        pairs = [(i, i) for i in range(1, LAST_TARGET_ID + 1)]
+    else:
+        chosen = [
+            of_split if ids is None else expand(ids, what) for ids, what in ((layouts, "layout"), (styles, "style"))
+        ]
+        pairs = [(i, j) for i in chosen[0] for j in chosen[1]]
+    return without(pairs, exclude, exclude_styles)
+
+
+def without(pairs: Pairs, exclude: Sequence[str], exclude_styles: Sequence[int] = ()) -> Pairs:
+    """Pairs whose layouts have what a task needs.
+
+    Raises:
+        UnknownNameError: no such need.
+        UserError: nothing is left.
+    """
+    for need in exclude:
+        if need not in EXCLUDED:
+            raise UnknownNameError("need of a kitchen", need, EXCLUDED)
+    barred = {i for need in exclude for i in EXCLUDED[need]}
+    left = [(i, j) for i, j in pairs if i not in barred and j not in exclude_styles]
+    if not left:
+        raise UserError(
+            f"none of {len(pairs)} kitchens has what is asked for ({', '.join(exclude) or 'styles'}): name others."
+        )
+    return left

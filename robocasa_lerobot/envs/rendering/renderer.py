@@ -1,0 +1,127 @@
+"""Renders the cameras of a model: upright RGB, depth and geom ids."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from robocasa_lerobot.envs.rendering.canvas import Canvas
+from robocasa_lerobot.envs.rendering.look_alike import VISIBLE_GROUPS, LookAlike, look_alike
+from robocasa_lerobot.errors import UnknownNameError
+
+
+class SceneRenderer:
+    """Renders cameras of one model.
+
+    Without shadows, RGB pictures are drawn from a look-alike of the model with merged shapes, the nearest first:
+    measured in a kitchen of 390 geoms on a software rasterizer, two thirds of the time, and pictures that differ by
+    0.2 to 0.3 of 255 levels on average, at the facets of round shapes.
+
+    Args:
+        model: to render.
+        height: of the pictures, pixels.
+        width: of the pictures, pixels.
+        shadows: shadows and reflections (render preset `quality`).
+        alike: the model's look-alike, if it has been made already.
+
+    Raises:
+        NoOpenGLError: nothing on this machine can render.
+        ForkedContextError: this process was forked from one that had rendered.
+    """
+
+    def __init__(
+        self, model: mujoco.MjModel, height: int, width: int, *, shadows: bool = False, alike: LookAlike | None = None
+    ) -> None:
+        self._model = model
+        self._size = (height, width)
+        self._shadows = shadows
+        self._cameras = {model.camera(i).name: i for i in range(model.ncam)}
+        self._exact: Canvas | None = None
+        self._merged: Canvas | None = None
+        self._alike = None if shadows else alike or look_alike(model, VISIBLE_GROUPS)
+        if self._alike is None:
+            self._open_exact()  # so that a machine without OpenGL fails here
+        else:
+            self._merged = Canvas(self._alike.model, height, width)
+
+    def render(self, data: mujoco.MjData, camera: str | mujoco.MjvCamera) -> NDArray[np.uint8]:
+        """A picture of shape (height, width, 3), upright.
+
+        Raises:
+            UnknownNameError: the model has no camera of that name.
+        """
+        which = self._camera(camera)
+        alike = self._look_alike()
+        if alike is None or not isinstance(which, int):
+            canvas = self._open_exact()
+            canvas.see(data, which, cull=not self._shadows)  # shadows and reflections come from out of view, too
+            return canvas.picture(shadows=self._shadows)
+        assert self._merged is not None
+        alike.follow(data)
+        self._merged.see_nearest_first(alike.data, which)
+        return self._merged.picture(shadows=False)
+
+    def pictures(self, data: mujoco.MjData, cameras: Sequence[str]) -> list[NDArray[np.uint8]]:
+        """One picture (height, width, 3) of each camera, all of the same state: cheaper than one by one.
+
+        Raises:
+            UnknownNameError: the model has no camera of that name.
+        """
+        alike = self._look_alike()
+        if alike is None:
+            return [self.render(data, camera) for camera in cameras]
+        numbers = [self._camera(camera) for camera in cameras]
+        alike.follow(data)
+        assert self._merged is not None
+        for place, number in enumerate(numbers):
+            assert isinstance(number, int)
+            self._merged.see_nearest_first(alike.data, number)
+            self._merged.draw(place, shadows=False)
+        return [self._merged.drawn(place) for place in range(len(numbers))]
+
+    def geometry(
+        self, data: mujoco.MjData, camera: str | mujoco.MjvCamera
+    ) -> tuple[NDArray[np.float32], NDArray[np.int32]]:
+        """Depth and geom ids of what a camera sees, in one pass: two upright arrays of shape (height, width).
+
+        Depth is in metres along the optical axis (not along the ray), between the model's clipping planes; where
+        nothing is seen it is the distance of the far one. Ids count the model's geoms, -1 where none is seen. What
+        looks transparent counts as opaque. The same in both render presets, but for the meshes that are drawn.
+
+        Raises:
+            UnknownNameError: the model has no camera of that name.
+        """
+        which = self._camera(camera)
+        canvas = self._open_exact()
+        canvas.see(data, which, cull=True)
+        return canvas.geometry()
+
+    def close(self) -> None:
+        """Free the OpenGL contexts."""
+        for canvas in (self._exact, self._merged):
+            if canvas is not None:
+                canvas.close()
+
+    def _camera(self, camera: str | mujoco.MjvCamera) -> int | mujoco.MjvCamera:
+        if not isinstance(camera, str):
+            return camera
+        if camera not in self._cameras:
+            raise UnknownNameError("camera", camera, self._cameras)
+        return self._cameras[camera]
+
+    def _open_exact(self) -> Canvas:
+        if self._exact is None:
+            self._exact = Canvas(self._model, *self._size, shadows=self._shadows)
+        return self._exact
+
+    def _look_alike(self) -> LookAlike | None:
+        """The look-alike, made anew when shapes have changed their looks in a way that it cannot follow."""
+        if self._alike is not None and (changed := self._alike.changed()):
+            assert self._merged is not None
+            self._merged.close()
+            self._alike = look_alike(self._model, VISIBLE_GROUPS, self._alike.loose | changed)
+            self._merged = None if self._alike is None else Canvas(self._alike.model, *self._size)
+        return self._alike

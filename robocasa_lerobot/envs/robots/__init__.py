@@ -1,0 +1,1 @@
+"""Robots: one folder for each, with all that is known of it."""

@@ -1,0 +1,1 @@
+"""The PandaOmron: a Franka arm on a mobile base with a torso."""

@@ -1,0 +1,244 @@
+"""Builds scenes: picks layout and style of a split, casts fixtures, places robot and objects, compiles the model."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from robocasa_lerobot.envs.kitchens.appliances.base import Appliance
+from robocasa_lerobot.envs.kitchens.appliances.kinds.blender import Blender
+from robocasa_lerobot.envs.kitchens.fixtures.cabinets import HingeCabinet
+from robocasa_lerobot.envs.kitchens.footprints import PlacementError, place
+from robocasa_lerobot.envs.kitchens.layout import Layout, load_layout
+from robocasa_lerobot.envs.kitchens.splits import Pairs, scene_ids, without
+from robocasa_lerobot.envs.objects.shapes import add_object
+from robocasa_lerobot.envs.robots.panda_omron.camera_noise import CameraNoise, add_camera_noise
+from robocasa_lerobot.envs.robots.panda_omron.cameras import cameras_of_set
+from robocasa_lerobot.envs.robots.panda_omron.model import add_robot
+from robocasa_lerobot.envs.scene.assembly import bare_kitchen
+from robocasa_lerobot.envs.scene.initial_states import Initial, LidAside, PartAt
+from robocasa_lerobot.envs.scene.placement import cast_roles, place_objects
+from robocasa_lerobot.envs.scene.regions import Shares
+from robocasa_lerobot.envs.scene.roles import RobotPose, counter_areas, counter_of, robot_pose
+from robocasa_lerobot.envs.scene.scene import PlacedObject, Scene
+from robocasa_lerobot.envs.scene.scene_spec import SceneSpec
+from robocasa_lerobot.envs.scene.spec import InitialOpenness, OnCounter
+from robocasa_lerobot.envs.scene.task_parameters import Choices, draw_choices
+from robocasa_lerobot.errors import UnknownNameError, UserError
+
+RENDER_PRESETS = ("fast", "quality")
+MAX_ATTEMPTS = 50
+# Key of the generator of camera noise: a stream of its own, so that noise changes nothing else of the scene.
+_CAMERA_NOISE_STREAM = 2
+
+# What is seen in a vessel: colour and opacity.
+LIQUIDS = {"coffee": (0.25, 0.13, 0.06, 1.0)}
+
+
+@dataclass(frozen=True)
+class _Look:
+    render_preset: str
+    camera_set: str
+    camera_noise: CameraNoise | None
+
+
+@dataclass(frozen=True)
+class Arrangement:
+    """What stands where at the start of a task.
+
+    Attributes:
+        roles: fixtures by role.
+        choices: what was chosen among equals.
+        openness: of doors and drawers, by fixture.
+        initial: the task's further initial state, each entry with the number drawn for it.
+        lids: roles of the blenders whose lid is not on, and whether it is gone altogether.
+        objects: by name.
+        robot: where it stands.
+    """
+
+    roles: dict[str, str]
+    choices: Choices
+    openness: dict[str, float]
+    initial: tuple[tuple[Initial, float], ...]
+    lids: dict[str, bool]
+    objects: dict[str, PlacedObject]
+    robot: RobotPose
+
+
+def build_scene(
+    task: SceneSpec,
+    split: str,
+    seed: int,
+    render_preset: str = "fast",
+    camera_set: str = "default",
+    camera_noise: CameraNoise | None = None,
+    kitchens: Pairs | None = None,
+) -> Scene:
+    """The scene of an episode. Render preset, cameras and their noise change looks only: never physics or placement.
+
+    `kitchens` are (layout, style) pairs to choose from instead of the split's own; the split still says which objects.
+
+    Raises:
+        UnknownNameError: no such split, preset or camera set.
+        UserError: no arrangement was found in 50 attempts.
+    """
+    if render_preset not in RENDER_PRESETS:
+        raise UnknownNameError("render preset", render_preset, RENDER_PRESETS)
+    cameras_of_set(camera_set)
+    look = _Look(render_preset, camera_set, camera_noise)
+    pairs = without(scene_ids(split) if kitchens is None else kitchens, task.needs, task.exclude_styles)
+    rng = np.random.default_rng(seed)
+    failure = ""
+    for _ in range(MAX_ATTEMPTS):
+        layout_id, style_id = pairs[int(rng.integers(len(pairs)))]
+        try:
+            return _attempt(task, split, seed, layout_id, style_id, look, rng)
+        except PlacementError as error:
+            failure = str(error)
+    raise UserError(
+        f"{task.name}, split {split}, seed {seed}: no arrangement in {MAX_ATTEMPTS} attempts (last: {failure}). "
+        "Use another seed."
+    )
+
+
+def _attempt(
+    task: SceneSpec,
+    split: str,
+    seed: int,
+    layout_id: int,
+    style_id: int,
+    look: _Look,
+    rng: np.random.Generator,
+) -> Scene:
+    layout = load_layout(layout_id, style_id)
+    arranged = arrange(rng, task, split, layout)
+    roles, choices, objects, robot = arranged.roles, arranged.choices, arranged.objects, arranged.robot
+    spots = {role: _lid_spot(rng, layout, roles[role], objects) for role, gone in arranged.lids.items() if not gone}
+    spec = _assemble(task, layout, look, objects)
+    if look.camera_noise is not None:
+        noise_rng = np.random.default_rng([seed, _CAMERA_NOISE_STREAM])
+        add_camera_noise(spec, look.camera_set, look.camera_noise, noise_rng)
+    model = spec.compile()
+    words = _words(layout, roles, objects) | choices.words | {"side": robot.side}
+    return Scene(
+        split=split,
+        seed=seed,
+        layout_id=layout_id,
+        style_id=style_id,
+        spec=spec,
+        model=model,
+        layout=layout,
+        roles=roles,
+        objects=objects,
+        openness=arranged.openness,
+        robot=robot,
+        instruction=_said(task.instruction, words),
+        paraphrases=tuple(_said(wording, words) for wording in task.paraphrases),
+        choices=choices.values,
+        initial=arranged.initial,
+        lid_spots=spots,
+    )
+
+
+def arrange(rng: np.random.Generator, task: SceneSpec, split: str, layout: Layout) -> Arrangement:
+    """Draw what stands where in a layout at the start of a task.
+
+    Raises:
+        PlacementError: the layout has not what the task needs, or not the room for it.
+    """
+    roles = cast_roles(rng, task, layout)
+    choices = draw_choices(rng, task, layout.fixtures, roles)
+    robot: RobotPose | None = None
+    opened = [layout.fixtures[roles[role]] for role in _opened(task)]
+    if not task.robot_start.at_object:
+        robot = robot_pose(
+            rng, layout, task.robot_start, layout.fixtures[roles[task.robot_start.fixture]], opened=opened
+        )
+    openness = {
+        roles[entry.fixture]: float(rng.uniform(entry.low, entry.high))
+        for entry in task.initial
+        if isinstance(entry, InitialOpenness)
+    }
+    further = [entry for entry in task.initial if isinstance(entry, Initial)]
+    initial = tuple((entry, entry.draw(rng, choices.values)) for entry in further)
+    lids = _lids(task, roles)
+    for role, gone in lids.items():
+        blender = layout.fixtures[roles[role]]
+        assert isinstance(blender, Blender)
+        blender.with_lid = not gone
+    places: dict[str, float | Shares] = {**openness, **_shares(initial, roles, choices)}
+    objects = place_objects(rng, task, split, layout, roles, places, choices.values)
+    if robot is None:
+        at = objects[task.robot_start.at_object].pos[:2]
+        robot = robot_pose(rng, layout, task.robot_start, layout.fixtures[roles[task.robot_start.fixture]], at, opened)
+    return Arrangement(roles, choices, openness, initial, lids, objects, robot)
+
+
+def _shares(initial: tuple[tuple[Initial, float], ...], roles: dict[str, str], choices: Choices) -> dict[str, Shares]:
+    """Where parts stand that objects may lie on, by fixture."""
+    found: dict[str, dict[str, float]] = {}
+    for entry, share in initial:
+        if isinstance(entry, PartAt):
+            found.setdefault(roles[entry.fixture], {})[entry.part.format(**choices.values)] = share
+    return dict(found)
+
+
+def _opened(task: SceneSpec) -> list[str]:
+    """Roles of the fixtures whose doors start wide open."""
+    return [entry.fixture for entry in task.initial if isinstance(entry, InitialOpenness) and entry.low > 0.5]
+
+
+def _lids(task: SceneSpec, roles: dict[str, str]) -> dict[str, bool]:
+    """Roles of the blenders whose lid is not on, and whether it is gone altogether."""
+    return {entry.fixture: entry.gone for entry in task.initial if isinstance(entry, LidAside)}
+
+
+def _lid_spot(
+    rng: np.random.Generator, layout: Layout, name: str, objects: dict[str, PlacedObject]
+) -> NDArray[np.float64]:
+    """Where the lid of a blender may lie on its counter: in the room, metres.
+
+    Raises:
+        PlacementError: there is no room for it.
+    """
+    blender = layout.fixtures[name]
+    assert isinstance(blender, Blender)
+    counter = counter_of(layout, blender)
+    areas, standing = counter_areas(layout, OnCounter("", "left_right", size=(0.35, 0.35)), blender)
+    taken = [placed.footprint for placed in objects.values()]
+    width, depth, _ = blender.lid_size
+    spot, _ = place(rng, areas, (width / 2, depth / 2), [*standing, *taken], what="the blender's lid")
+    return np.array([spot.x, spot.y, counter.surface_z + 0.002])
+
+
+def _words(layout: Layout, roles: dict[str, str], objects: dict[str, PlacedObject]) -> dict[str, str]:
+    """What instructions call fixtures and objects, by role and name."""
+    names = {role: _fixture_word(layout.types[name]) for role, name in roles.items()}
+    for name in roles.values():
+        fixture = layout.fixtures[name]
+        doors = fixture.doors if isinstance(fixture, HingeCabinet | Appliance) else ()
+        if doors:
+            number = doors if isinstance(doors, int) else len(doors)
+            names.setdefault("doors", "door" if number == 1 else "doors")
+    return names | {name: placed.item.category.name.replace("_", " ") for name, placed in objects.items()}
+
+
+def _fixture_word(kind: str) -> str:
+    return "fridge" if kind.startswith("fridge") else "stove" if kind.startswith("stove") else kind.replace("_", " ")
+
+
+def _said(wording: str, words: dict[str, str]) -> str:
+    """A wording with its words; a missing one (a rack that needs no name) leaves no double space."""
+    return " ".join(wording.format(**words).split())
+
+
+def _assemble(task: SceneSpec, layout: Layout, look: _Look, objects: dict[str, PlacedObject]) -> mujoco.MjSpec:
+    spec, palette = bare_kitchen(layout, look.render_preset)
+    add_robot(spec, look.render_preset, camera_set=look.camera_set)
+    liquids = {wanted.name: LIQUIDS[wanted.filled] for wanted in task.objects if wanted.filled}
+    for placed in objects.values():
+        add_object(spec, palette, placed.name, placed.item, liquid=liquids.get(placed.name))
+    return spec

@@ -1,0 +1,277 @@
+"""Casts a layout's fixtures in the roles of a task, and puts the task's objects where they start."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from types import MappingProxyType
+
+import numpy as np
+
+from robocasa_lerobot.envs.kitchens.appliances.kinds.sink import Sink
+from robocasa_lerobot.envs.kitchens.fixtures.base import Fixture
+from robocasa_lerobot.envs.kitchens.footprints import Area, Footprint, PlacementError, place
+from robocasa_lerobot.envs.kitchens.layout import Layout
+from robocasa_lerobot.envs.objects import catalogue
+from robocasa_lerobot.envs.scene.regions import Part, Shares, choose_parts, rectangle_in
+from robocasa_lerobot.envs.scene.roles import candidates, counter_areas, inside_area, standing_on
+from robocasa_lerobot.envs.scene.scene import PlacedObject
+from robocasa_lerobot.envs.scene.scene_spec import SceneSpec
+from robocasa_lerobot.envs.scene.spec import FixtureWanted, ObjectWanted, OnCounter, Placement
+
+PLACEMENT_GAP_M = 0.004  # objects start this far above their surface and settle
+_TURNS = 20  # how often a place is drawn for what hardly fits into a compartment
+IN_CONTAINER = "in_container"  # object group of what may stand in a container
+
+
+def cast_roles(rng: np.random.Generator, task: SceneSpec, layout: Layout) -> dict[str, str]:
+    """Fixture name of each role of a task.
+
+    Raises:
+        PlacementError: the layout has nothing for a role.
+    """
+    roles: dict[str, str] = {}
+    for wanted in task.fixtures:
+        pool = [f for f in candidates(layout, wanted.kind) if _suits(f, wanted, layout, roles)]
+        if not pool:
+            raise PlacementError(
+                f"layout {layout.layout_id} has no {wanted.kind} for {wanted.role!r}. Name another kind, a smaller "
+                "size, or in `needs` what layouts must have."
+            )
+        if wanted.near:
+            ref = layout.fixtures[roles[wanted.near]]
+            roles[wanted.role] = min(pool, key=lambda f: _distance(f, ref)).name
+        else:
+            roles[wanted.role] = pool[int(rng.integers(len(pool)))].name
+    return roles
+
+
+def _suits(fixture: Fixture, wanted: FixtureWanted, layout: Layout, roles: dict[str, str]) -> bool:
+    others = {roles[role] for role in wanted.other_than}
+    large = fixture.width >= wanted.size[0] and fixture.depth >= wanted.size[1]
+    apart = all(_distance(layout.fixtures[name], fixture) >= wanted.apart_m for name in others)
+    return fixture.name not in others and large and apart
+
+
+def _distance(fixture: Fixture, ref: Fixture) -> float:
+    """Metres on the floor plan from a point to the rectangle of a fixture."""
+    x, y = fixture.to_local(ref.pos)
+    return float(np.hypot(max(abs(x) - fixture.width / 2, 0.0), max(abs(y) - fixture.depth / 2, 0.0)))
+
+
+@dataclass
+class _Table:
+    """Where things have been put so far.
+
+    Attributes:
+        placed: objects by name.
+        taken: their footprints.
+        parts: which part of a fixture each object stands on.
+        used: categories.
+    """
+
+    placed: dict[str, PlacedObject] = field(default_factory=dict)
+    taken: list[tuple[Footprint, float]] = field(default_factory=list)
+    parts: dict[str, list[Part]] = field(default_factory=dict)
+    used: set[str] = field(default_factory=set)
+
+    def near(self, z: float) -> list[Footprint]:
+        """Footprints of what stands at about a height (metres), or on something there."""
+        return [footprint for footprint, height in self.taken if abs(height - z) < 0.15]
+
+
+def place_objects(
+    rng: np.random.Generator,
+    task: SceneSpec,
+    split: str,
+    layout: Layout,
+    roles: dict[str, str],
+    openness: Mapping[str, float | Shares],
+    choices: Mapping[str, str] = MappingProxyType({}),
+) -> dict[str, PlacedObject]:
+    """Draw the objects of a task and put them down, in the order in which they are declared.
+
+    Raises:
+        PlacementError: something has no free place.
+    """
+    table = _Table()
+    for wanted in task.objects:
+        count = int(rng.integers(wanted.count[0], wanted.count[1] + 1))
+        for index in range(count):
+            name = wanted.name if wanted.count == (1, 1) else f"{wanted.name}_{index}"
+            item = catalogue.sample(
+                rng,
+                wanted.groups,
+                split,
+                graspable=wanted.graspable,
+                washable=wanted.washable,
+                max_height=wanted.max_height,
+                # An instruction names one object of the scene.
+                exclude=frozenset(() if wanted.repeats else table.used) | frozenset(wanted.exclude),
+                properties=wanted.properties,
+                max_size=wanted.max_size,
+                object_scale=wanted.scale,
+                rotate_upright=wanted.upright,
+            )
+            table.used.add(item.category.name)
+            _put(rng, table, _filled(rng, wanted, choices), name, item, split, layout, roles, openness)
+    return table.placed
+
+
+def _filled(rng: np.random.Generator, wanted: ObjectWanted, choices: Mapping[str, str]) -> ObjectWanted:
+    """With the choices filled into the names of its place, and one taken of several ("{knob}|any")."""
+    start = wanted.start
+    if not isinstance(start, Placement) or not (start.region.name or isinstance(start.region.level, str)):
+        return wanted
+    region = start.region
+    names = region.name.split("|")
+    name = names[int(rng.integers(len(names)))].format(**choices)
+    level = region.level.format(**choices) if isinstance(region.level, str) else region.level
+    region = replace(region, name="" if name == "any" else name, level=level)
+    return replace(wanted, start=replace(start, region=region))
+
+
+def _put(
+    rng: np.random.Generator,
+    table: _Table,
+    wanted: ObjectWanted,
+    name: str,
+    item: catalogue.Instance,
+    split: str,
+    layout: Layout,
+    roles: dict[str, str],
+    openness: Mapping[str, float | Shares],
+) -> None:
+    start = wanted.start
+    standing: list[Footprint] = []
+    rooms: list[Area] = []
+    if isinstance(start, OnCounter):
+        areas, standing = counter_areas(layout, start, layout.fixtures[roles[start.near]])
+    elif not isinstance(start, Placement):
+        fixture = layout.fixtures[roles[start.fixture]]
+        share = openness.get(fixture.name, 0.0)
+        assert isinstance(share, float)
+        areas = [inside_area(start, fixture, share)]
+    elif start.object:
+        _put_on(rng, table, name, item, table.placed[start.object], start)
+        return
+    else:
+        fixture = layout.fixtures[roles[start.fixture]]
+        areas = _areas(table, name, start, fixture, layout, roles, openness)
+        if start.slot:
+            areas = [_in_slot(area, item) for area in areas]
+        # What stands around a compartment is not in it.
+        inside = any(part.name for part in table.parts[name])
+        standing = [] if inside else standing_on(layout, fixture, areas[0].z)
+        if start.try_to_place_in and IN_CONTAINER in _groups_of(item):
+            container = catalogue.sample(rng, (start.try_to_place_in,), split)
+            holder = f"{name}_container"
+            _put_down(rng, table, holder, container, areas, standing)
+            # What may stick out is the container: a thing across its rim would tip over.
+            _put_on(rng, table, name, item, table.placed[holder], replace(start, ensure_inside=True))
+            return
+        if isinstance(fixture, Sink) and start.ensure_inside:
+            # Of other compartments a thing may stick out, as the handle of a mug does under a spout.
+            rooms = [part.area for part in table.parts[name]]
+    _put_down(rng, table, name, item, areas, standing, rooms)
+
+
+def _in_slot(area: Area, item: catalogue.Instance) -> Area:
+    """A slot, in which the item's longer side lies along the slot's, and whose top is open."""
+    crossed = (area.x1 - area.x0 > area.y1 - area.y0) != (item.size[0] > item.size[1])
+    low, high = area.rotation
+    turn = np.pi / 2 if crossed else 0.0
+    return replace(area, height=np.inf, rotation=(low + turn, high + turn))
+
+
+def _groups_of(item: catalogue.Instance) -> set[str]:
+    """Groups of an object's category, with those that are made of others."""
+    found = set(item.category.groups)
+    if IN_CONTAINER in catalogue.GROUPS and item.category in catalogue.categories_of(IN_CONTAINER):
+        found.add(IN_CONTAINER)
+    return found
+
+
+def _areas(
+    table: _Table,
+    name: str,
+    start: Placement,
+    fixture: Fixture,
+    layout: Layout,
+    roles: dict[str, str],
+    openness: Mapping[str, float | Shares],
+) -> list[Area]:
+    region = start.region
+    ref = layout.fixtures[roles[region.ref]] if region.ref else None
+    if start.reuse_region_from:
+        parts = table.parts[start.reuse_region_from]
+    else:
+        parts = choose_parts(layout, start, fixture, ref, openness.get(fixture.name, 0.0))
+    table.parts[name] = parts
+    return [rectangle_in(part, start, fixture, ref) for part in parts]
+
+
+def _put_down(
+    rng: np.random.Generator,
+    table: _Table,
+    name: str,
+    item: catalogue.Instance,
+    areas: list[Area],
+    standing: list[Footprint],
+    rooms: Sequence[Area] = (),
+) -> None:
+    """Put an object onto one of the areas; if basins are given as `rooms`, so that it is wholly in one."""
+    width, depth, height = item.size
+    high = [area for area in areas if area.height > height + PLACEMENT_GAP_M]
+    what = f"{name} ({item.model})"
+    if not high:
+        raise PlacementError(
+            f"{what} is {height:.2f} m high, and {areas[0].name} has {max(a.height for a in areas):.2f} m. Ask for a "
+            "lower object, for a higher part, or for another fixture."
+        )
+    half, occupied = (width / 2, depth / 2), [*table.near(high[0].z), *standing]
+    middle = (0.0, 0.0) if item.interior is None else item.interior.center[:2]
+    for _ in range(_TURNS):
+        footprint, area = place(rng, high, half, occupied, what=what, middle=middle)
+        if not rooms or any(room.holds(footprint) for room in rooms):
+            break
+    else:
+        raise PlacementError(
+            f"{what} of {width:.2f} x {depth:.2f} m does not lie in {rooms[0].name} without touching its walls. "
+            "Ask for a smaller object, or for another fixture."
+        )
+    table.taken.append((footprint, area.z))
+    z = area.z + height / 2 + PLACEMENT_GAP_M
+    table.placed[name] = PlacedObject(name, item, (footprint.x, footprint.y, z), footprint.yaw)
+
+
+def _put_on(
+    rng: np.random.Generator,
+    table: _Table,
+    name: str,
+    item: catalogue.Instance,
+    holder: PlacedObject,
+    start: Placement,
+) -> None:
+    """Put an object into, or onto, one that was placed: on the floor of its inside, else on its top."""
+    x, y, z = holder.pos
+    inside = getattr(holder.item, "interior", None)
+    if inside is not None:
+        (cx, cy, cz), half = inside.center, inside.half
+        floor = z + cz - half[2]
+    else:
+        (cx, cy), half = (0.0, 0.0), (0.35 * holder.item.size[0], 0.35 * holder.item.size[1], 0.0)
+        floor = z + holder.item.size[2] / 2
+    area = Area(cx - half[0], cx + half[0], cy - half[1], cy + half[1], (x, y), holder.yaw, floor, holder.name)
+    area = replace(area, rotation=start.rotation, inside=start.ensure_inside)
+    others = [
+        p.footprint
+        for other, p in table.placed.items()
+        if other != holder.name and abs(p.pos[2] - p.item.size[2] / 2 - floor) < 0.03
+    ]
+    width, depth, height = item.size
+    what = f"{name} ({item.model})"
+    footprint, _ = place(rng, [area], (width / 2, depth / 2), others, margin=0.002, what=what)
+    at = (footprint.x, footprint.y, floor + height / 2 + PLACEMENT_GAP_M)
+    table.placed[name] = PlacedObject(name, item, at, footprint.yaw)
+    table.taken.append((footprint, floor))

@@ -1,0 +1,36 @@
+"""What a scene is made from, as a whole: the part of a task's declaration that the scene builder reads."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from robocasa_lerobot.envs.scene.initial_states import Initial
+from robocasa_lerobot.envs.scene.spec import Choice, FixtureWanted, InitialOpenness, ObjectWanted, RobotStart
+
+type InitialState = InitialOpenness | Initial
+
+
+@dataclass(frozen=True, kw_only=True)
+class SceneSpec:
+    """Fixtures, objects, where the robot starts, what is drawn at reset, and what the robot is told.
+
+    Attributes:
+        name: id, as in RoboCasa365.
+        fixtures, objects, robot_start, initial: the scene.
+        choices: what is drawn at reset.
+        instruction: template; fields are "{side}" and names of objects.
+        paraphrases: other wordings, kept apart as novel language.
+        needs: names of `kitchens.splits.EXCLUDED`, of what a layout must have: the others are left out, always.
+        exclude_styles: ids of styles that do not suit it.
+    """
+
+    name: str
+    fixtures: tuple[FixtureWanted, ...]
+    robot_start: RobotStart
+    instruction: str
+    objects: tuple[ObjectWanted, ...] = ()
+    initial: tuple[InitialState, ...] = ()
+    choices: tuple[Choice, ...] = ()
+    paraphrases: tuple[str, ...] = ()
+    needs: tuple[str, ...] = ()
+    exclude_styles: tuple[int, ...] = ()

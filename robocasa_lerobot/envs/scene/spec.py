@@ -1,0 +1,201 @@
+"""What a scene is made from: fixtures and objects that are wanted, where they start, and where the robot stands.
+
+Records of task declarations, which the scene builder reads.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+
+@dataclass(frozen=True)
+class FixtureWanted:
+    """A fixture that plays a role in a task.
+
+    Attributes:
+        role: name by which the rest of the declaration calls it.
+        kind: a key of `scene.fixture_types.FIXTURE_KINDS`, e.g. "drawer_top" or "sink".
+        near: role of an earlier fixture that it is the nearest to.
+        other_than: roles of earlier fixtures that it is none of.
+        size: least width and depth of its top, metres; of counters.
+        apart_m: least distance on the floor from the fixtures of `other_than`, metres.
+    """
+
+    role: str
+    kind: str
+    near: str = ""
+    other_than: tuple[str, ...] = ()
+    size: tuple[float, float] = (0.0, 0.0)
+    apart_m: float = 0.0
+
+
+@dataclass(frozen=True)
+class Choice:
+    """A value that is drawn at reset: which knob, which rack, which way.
+
+    Declarations name it in braces, as in `part="knob_{knob}"`; instructions too.
+
+    Attributes:
+        name: of the choice.
+        options: by value, the words that instructions may use besides the value itself.
+        of: role of a fixture whose parts are the options instead: burners, racks, or slots.
+    """
+
+    name: str
+    options: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
+    of: str = ""
+
+
+@dataclass(frozen=True)
+class OnCounter:
+    """Start on the counter that carries, or is cut by, the fixture of a role.
+
+    Attributes:
+        near: role of the reference fixture.
+        loc: "above" centres the region on the fixture; "left_right" puts it directly left or right of it.
+        size: width and depth of the region, metres.
+        at: "front" or "back" edge of the counter that the region starts from.
+        offset: shift of the region to the right and towards the wall, metres.
+    """
+
+    near: str
+    loc: str = "above"
+    size: tuple[float, float] = (1.0, 0.5)
+    at: str = "front"
+    offset: tuple[float, float] = (0.0, 0.0)
+
+
+@dataclass(frozen=True)
+class InsideOf:
+    """Start inside the fixture of a role.
+
+    Attributes:
+        fixture: role.
+        size: width and depth of the part of its floor that is used, metres.
+        at: where that part lies: -1 at the front, 0 in the middle, 1 at the back.
+    """
+
+    fixture: str
+    size: tuple[float, float]
+    at: float = 0.0
+
+
+@dataclass(frozen=True)
+class SampleRegion:
+    """Which part of a fixture's tops or insides is used.
+
+    Attributes:
+        ref: role of a reference fixture; none uses the whole fixture.
+        loc: "nn" takes the part nearest to the reference, "left" or "right" those on one side of it, "left_right" those
+            on either, "any" all.
+        top_size: least width and depth of the part, metres.
+        height: bounds of the height in the room of the part's floor, metres.
+        level: number of the part from below; -1 is the highest. May name a choice in braces.
+        name: start of the part's name, such as "shelf" or "rack0"; may name a choice in braces.
+    """
+
+    ref: str = ""
+    loc: str = "any"
+    top_size: tuple[float, float] = (0.0, 0.0)
+    height: tuple[float, float] = (0.0, 3.0)
+    level: int | str | None = None
+    name: str = ""
+
+
+@dataclass(frozen=True)
+class Placement:
+    """Start on or in a fixture, or on an object that was placed before, as RoboCasa's placement records say it.
+
+    Attributes:
+        fixture: role.
+        object: name of an object of the scene, instead of a fixture.
+        region: which part of the fixture.
+        size: width and depth of the rectangle that is used, metres; the whole part if None.
+        pos: where the rectangle lies, -1 left or front, 1 right or back; "ref" is in line with the reference, None
+            anywhere. Of an object on an object it is not used.
+        offset: shift to the right and to the back, metres.
+        margin: kept from the rectangle's edges, metres.
+        rotation: bounds of the turn, radians.
+        try_to_place_in: object group: what can be in a container stands in one of that group, `<name>_container`.
+        reuse_region_from: name of an object whose part of the fixture is taken again.
+        ensure_inside: the whole footprint lies in the rectangle, not its middle alone.
+        slot: it stands along the longer side of the part, and out of its top, as bread does in a toaster.
+    """
+
+    fixture: str = ""
+    object: str = ""
+    region: SampleRegion = SampleRegion()
+    size: tuple[float, float] | None = None
+    pos: tuple[float | str | None, float | str | None] = (None, None)
+    offset: tuple[float, float] = (0.0, 0.0)
+    margin: float = 0.04
+    rotation: tuple[float, float] = (-0.7853981633974483, 0.7853981633974483)
+    try_to_place_in: str = ""
+    reuse_region_from: str = ""
+    ensure_inside: bool = True
+    slot: bool = False
+
+
+@dataclass(frozen=True)
+class ObjectWanted:
+    """An object, or several alike, and where it starts.
+
+    Attributes:
+        name: in the scene; several get `<name>_<i>`.
+        groups: object groups to draw from.
+        start: where.
+        count: least and greatest number, both possible.
+        graspable, washable: properties asked for.
+        max_height: bound of its size along z, metres.
+        properties: further properties asked for, such as "cookable".
+        exclude: groups or categories that are not wanted.
+        max_size: bounds of its size along x, y, z, metres; None leaves an axis free.
+        scale: factor of its size.
+        upright: turned so that its longest axis points up.
+        repeats: may be of a category that the scene already has.
+        filled: what is seen in it, one of `LIQUIDS` in `envs/scene/build.py`; it is there for the eye only.
+    """
+
+    name: str
+    groups: tuple[str, ...]
+    start: OnCounter | InsideOf | Placement
+    count: tuple[int, int] = (1, 1)
+    graspable: bool = False
+    washable: bool = False
+    max_height: float | None = None
+    properties: tuple[str, ...] = ()
+    exclude: tuple[str, ...] = ()
+    max_size: tuple[float | None, float | None, float | None] | None = None
+    scale: float = 1.0
+    upright: bool = False
+    repeats: bool = False
+    filled: str = ""
+
+
+@dataclass(frozen=True)
+class RobotStart:
+    """Where the robot stands: facing a fixture, in front of it or beside it.
+
+    Attributes:
+        fixture: role.
+        beside: stand half the fixture's width plus 0.2 m to its left or right, whichever is free.
+        deviation: half ranges of the uniform noise along and towards the counter, metres.
+        setback: farther from it than usual, metres.
+        at_object: name of an object that it stands in line with, instead of the fixture's middle.
+    """
+
+    fixture: str
+    beside: bool = False
+    deviation: tuple[float, float] = (0.15, 0.05)
+    setback: float = 0.0
+    at_object: str = ""
+
+
+@dataclass(frozen=True)
+class InitialOpenness:
+    """Initial openness of a drawer or door, uniform between two shares of its full travel."""
+
+    fixture: str
+    low: float
+    high: float

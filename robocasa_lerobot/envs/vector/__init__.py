@@ -1,0 +1,1 @@
+"""Several kitchens at once, each in a process of its own."""

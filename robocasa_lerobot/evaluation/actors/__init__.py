@@ -1,0 +1,1 @@
+"""What gives a trial its actions: checkpoints here or behind a policy server, and reference policies."""

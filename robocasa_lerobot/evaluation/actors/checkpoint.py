@@ -1,0 +1,208 @@
+"""What a policy checkpoint says about itself, read without importing LeRobot."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from robocasa_lerobot import contract
+from robocasa_lerobot.errors import UserError
+from robocasa_lerobot.evaluation.records.results import PolicyInfo
+from robocasa_lerobot.policies.origin import ORIGIN_FILE, Origin, read_origin
+
+REFERENCE_POLICIES = ("demonstrator", "random", "zero")
+REPLAY = "replay"  # written replay:FILE
+# They say where a checkpoint comes from, and change nothing of what the policy does.
+_ABOUT_TRAINING = ("train_config.json", ORIGIN_FILE)
+_PREPROCESSOR, _RENAMES = "policy_preprocessor.json", "rename_observations_processor"  # LeRobot's names
+_PICTURES = "observation.image"
+_WEIGHTS = ("model.safetensors", "adapter_model.safetensors")
+
+
+class CheckpointError(UserError):
+    """A folder that is not a LeRobot `pretrained_model`."""
+
+
+@dataclass(frozen=True)
+class PolicySource:
+    """A policy to evaluate: a checkpoint folder, or a reference policy.
+
+    `fingerprint` is a SHA-256 over weights, config and processors; `experiment`, `phase` and `step` are what the
+    checkpoint says about its training. `image_size` is (height, width) of its camera inputs. `queues`: by its settings
+    it remembers earlier steps.
+    """
+
+    label: str
+    path: str
+    type: str
+    fingerprint: str
+    phase: str | None = None
+    step: int | None = None
+    image_size: tuple[int, int] | None = None
+    experiment: str | None = None
+    queues: bool = False
+
+    @property
+    def is_reference(self) -> bool:
+        """Whether this is `demonstrator`, `random`, `zero` or `replay`, and not a checkpoint."""
+        return self.type in (*REFERENCE_POLICIES, REPLAY)
+
+    def describe(self) -> PolicyInfo:
+        """What the header of a run says about it."""
+        return PolicyInfo(
+            self.label, self.path, self.type, self.fingerprint, self.phase, self.step, experiment=self.experiment
+        )
+
+
+def read_source(path: str, label: str | None = None) -> PolicySource:
+    """The policy at `path`.
+
+    Raises:
+        CheckpointError: not a `pretrained_model` folder; the message says where one was expected.
+    """
+    if path in REFERENCE_POLICIES:
+        return PolicySource(label or path, path, path, fingerprint=path)
+    kind, colon, file = path.partition(":")
+    if kind == REPLAY and colon:
+        return PolicySource(label or REPLAY, path, REPLAY, fingerprint=stored_fingerprint(Path(file)))
+    folder = find_pretrained(Path(path))
+    try:
+        config = json.loads((folder / "config.json").read_text(encoding="utf-8"))
+        kind = config["type"]
+    except (OSError, json.JSONDecodeError, KeyError, TypeError) as error:
+        raise CheckpointError(f"{folder / 'config.json'}: not the config of a LeRobot policy ({error!r}).") from error
+    origin = read_origin(folder)
+    return PolicySource(
+        label or default_label(origin, folder.resolve()),
+        str(folder),
+        kind,
+        fingerprint(folder),
+        origin.phase,
+        origin.step,
+        camera_size(config, folder),
+        origin.experiment,
+        has_queues(config),
+    )
+
+
+def default_label(origin: Origin, folder: Path) -> str:
+    """`<experiment>/<phase>-<step>`, as far as it is known: phases of different experiments have the same names."""
+    if origin.phase is None:
+        return folder.name
+    own = origin.phase if origin.step is None else f"{origin.phase}-{origin.step:06d}"
+    return own if origin.experiment is None else f"{origin.experiment}/{own}"
+
+
+def find_pretrained(path: Path) -> Path:
+    """The `pretrained_model` folder at `path`, at a checkpoint, or under the last checkpoint of a phase."""
+    for candidate in (path, path / "pretrained_model", path / "checkpoints" / "last" / "pretrained_model"):
+        if (candidate / "config.json").is_file():
+            if not any((candidate / name).is_file() for name in _WEIGHTS):
+                raise CheckpointError(f"{candidate}: config.json without {_WEIGHTS[0]}: the checkpoint is incomplete.")
+            return candidate
+    what = "has no config.json" if path.is_dir() else "no such folder"
+    found = sorted(str(p.parent) for p in path.glob("**/pretrained_model/config.json"))[:3] if path.is_dir() else []
+    hint = f" Did you mean {' or '.join(found)}?" if found else ""
+    known = ", ".join((*REFERENCE_POLICIES, "replay:FILE"))
+    raise CheckpointError(f"policy.path {path}: {what}; expected a pretrained_model folder, or one of {known}.{hint}")
+
+
+def fingerprint(folder: Path) -> str:
+    """SHA-256 over the files of a checkpoint that decide what the policy does, by name and content."""
+    digest = hashlib.sha256()
+    files = [p for p in sorted(folder.rglob("*")) if p.is_file() and p.name not in _ABOUT_TRAINING]
+    for file in files:
+        if file.suffix not in (".json", ".safetensors", ".txt", ".model"):
+            continue
+        with file.open("rb") as stream:
+            content = hashlib.file_digest(stream, "sha256").hexdigest()
+        digest.update(f"{file.relative_to(folder).as_posix()} {content}\n".encode())
+    return digest.hexdigest()
+
+
+def stored_fingerprint(path: Path) -> str:
+    """SHA-256 over a file of demonstrations, or over the parts of a dataset that decide what `replay` does.
+
+    Raises:
+        CheckpointError: no such file or folder.
+    """
+    files = [path] if path.is_file() else sorted([*path.glob("meta/**/*.json*"), *path.glob("data/**/*.parquet")])
+    if not files:
+        raise CheckpointError(
+            f"policy.path replay:{path}: expected an HDF5 file of demonstrations or a LeRobotDataset."
+        )
+    digest = hashlib.sha256()
+    for file in files:
+        with file.open("rb") as stream:
+            digest.update(hashlib.file_digest(stream, "sha256").digest())
+    return digest.hexdigest()
+
+
+def has_queues(config: Mapping[str, Any]) -> bool:
+    """Whether a policy with this config.json keeps observations or actions of earlier steps, whatever its type does."""
+    return config.get("n_obs_steps", 1) != 1 or config.get("temporal_ensemble_coeff") is not None
+
+
+def camera_size(config: dict[str, Any], folder: Path) -> tuple[int, int] | None:
+    """(height, width) of those camera inputs of a policy that the env fills; None for a policy without cameras.
+
+    Inputs have the env's names, or the saved preprocessor gives the env's cameras the policy's names.
+
+    Raises:
+        CheckpointError: the policy has cameras, and none of them is the env's; or they have several sizes.
+    """
+    inputs = {
+        name: feature
+        for name, feature in (config.get("input_features") or {}).items()
+        if feature.get("type", "VISUAL") == "VISUAL" and name.startswith(_PICTURES)
+    }
+    renamed = _renamed(folder)
+    filled = [renamed.get(key, key) for key in contract.IMAGE_KEYS]
+    sizes = {tuple(map(int, inputs[name]["shape"][-2:])) for name in filled if name in inputs}
+    if inputs and not sizes:
+        raise CheckpointError(
+            f"{folder}: the policy takes the pictures {', '.join(inputs)}, and the env has "
+            f"{', '.join(contract.IMAGE_KEYS)}: its saved preprocessor renames none of these to those. Train it with "
+            "`rename` in the policy's settings, or add a `rename_observations_processor` to its preprocessor."
+        )
+    if len(sizes) > 1:
+        raise CheckpointError(f"{folder}: cameras of several sizes {sorted(sizes)}; one size is expected.")
+    height, width = sizes.pop() if sizes else (None, None)
+    return None if height is None or width is None else (height, width)
+
+
+def _renamed(folder: Path) -> dict[str, str]:
+    """The names that a checkpoint's saved preprocessor gives to observations, by the env's."""
+    try:
+        saved = json.loads((folder / _PREPROCESSOR).read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return {}
+    out: dict[str, str] = {}
+    for step in saved.get("steps", []):
+        if step.get("registry_name") == _RENAMES:
+            out |= step.get("config", {}).get("rename_map") or {}
+    return out
+
+
+def common_image_size(sources: list[PolicySource], asked: int | None) -> int:
+    """Pixels of the env's square pictures: what was asked for, else what all the checkpoints were trained at.
+
+    Raises:
+        UserError: checkpoints of different sizes in one evaluation, or pictures that are not square.
+    """
+    if asked is not None:
+        return asked
+    sizes = {source.image_size: source.label for source in sources if source.image_size is not None}
+    if len(sizes) > 1:
+        listed = ", ".join(f"{label} {h}x{w}" for (h, w), label in sizes.items())
+        raise UserError(f"policies trained at different picture sizes ({listed}): evaluate them in separate runs.")
+    if not sizes:
+        return contract.IMAGE_SIZE
+    height, width = next(iter(sizes))
+    if height != width:
+        raise UserError(f"the policy was trained at {height}x{width} pictures; the env renders square ones.")
+    return height

@@ -1,0 +1,1 @@
+"""Settings of an evaluation, and how they are read."""

@@ -1,0 +1,1 @@
+"""What data there are, in numbers and on a page."""

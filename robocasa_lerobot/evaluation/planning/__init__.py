@@ -1,0 +1,1 @@
+"""What an evaluation will do, decided before anything runs."""

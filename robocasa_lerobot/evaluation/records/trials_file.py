@@ -1,0 +1,83 @@
+"""Writing `trials.jsonl`: whole lines at its end, what a kill left behind, and never two settings in one file."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+from robocasa_lerobot.evaluation.records.results import ResultsError, RunHeader, TrialRecord
+
+# Other versions of these may let the same trial go another way.
+_DECIDING_VERSIONS = ("robocasa_lerobot", "mujoco")
+
+
+def append(path: Path, item: RunHeader | TrialRecord) -> None:
+    """Append one line, with one write to the end of the file and a sync, so that a kill leaves it whole or torn."""
+    line = (item.to_line() + "\n").encode()
+    descriptor = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o644)
+    try:
+        written = os.write(descriptor, line)
+        if written != len(line):
+            raise OSError(f"{path}: wrote {written} of {len(line)} bytes; is the disk full?")
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)
+
+
+def drop_torn_line(path: Path) -> int:
+    """Cut off a last line without newline; the number of bytes removed (0: the file was whole or is missing)."""
+    if not path.is_file():
+        return 0
+    data = path.read_bytes()
+    keep = data.rfind(b"\n") + 1
+    if keep < len(data):
+        with path.open("r+b") as file:
+            file.truncate(keep)
+            os.fsync(file.fileno())
+    return len(data) - keep
+
+
+def differences(old: RunHeader, new: RunHeader) -> list[str]:
+    """What keeps the trials of two runs apart, a sentence each: settings, versions, or weights behind one label."""
+    found = []
+    flat_old, flat_new = _flat(old.settings), _flat(new.settings)
+    for name in dict.fromkeys((*flat_old, *flat_new)):
+        before, now = flat_old.get(name), flat_new.get(name)
+        if before != now:
+            found.append(f"{name}: {before!r} in the file, {now!r} now")
+    for name in _DECIDING_VERSIONS:
+        before, now = old.versions.get(name), new.versions.get(name)
+        if before != now:
+            found.append(f"version of {name}: {before} in the file, {now} now")
+    for label in old.policies.keys() & new.policies.keys():
+        before, now = old.policies[label].fingerprint, new.policies[label].fingerprint
+        if before != now:
+            found.append(f"policy {label!r}: weights {before[:12]} in the file, {now[:12]} now")
+    return found
+
+
+def check_same_run(path: Path, headers: Iterable[RunHeader], new: RunHeader) -> None:
+    """Refuse to mix trials of different settings or checkpoints in one results file.
+
+    Raises:
+        ResultsError: a setting, a deciding version or a checkpoint differs; all differences are named.
+    """
+    found = dict.fromkeys(line for old in headers for line in differences(old, new))
+    if found:
+        raise ResultsError(
+            f"{path} holds trials made with other settings:\n  " + "\n  ".join(found) + "\n"
+            "Trials of different settings are never mixed: choose another --out (or --policy.label for another "
+            "checkpoint), or go back to the settings of the file."
+        )
+
+
+def _flat(values: dict[str, Any], prefix: str = "") -> dict[str, Any]:
+    out: dict[str, Any] = {}
+    for name, value in values.items():
+        if isinstance(value, dict) and value:
+            out |= _flat(value, f"{prefix}{name}.")
+        else:
+            out[prefix + name] = value
+    return out

@@ -1,0 +1,1 @@
+"""A report's sections as HTML, Markdown, LaTeX and CSV."""

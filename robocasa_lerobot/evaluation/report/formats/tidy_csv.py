@@ -1,0 +1,79 @@
+"""The report's numbers as CSV: one row for each policy, perturbation and task, and one for each average."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from robocasa_lerobot.benchmark import published
+from robocasa_lerobot.evaluation.report.formats.csv_text import csv_text
+from robocasa_lerobot.evaluation.report.policies import PolicyResult, ReportData, average_of
+
+COLUMNS = (
+    "policy",
+    "perturbation",
+    "split",
+    "task",
+    "group",
+    "tasks",
+    "successes",
+    "trials",
+    "rate",
+    "low",
+    "high",
+    "errors",
+    "median_seconds_to_success",
+    "published_rate",
+    "synthetic",
+)
+
+
+def render(data: ReportData) -> str:
+    """Rates and ends of intervals lie in [0, 1]; `task` is empty in rows of averages."""
+    return csv_text(COLUMNS, _rows(data))
+
+
+def _rows(data: ReportData) -> Iterator[dict[str, object]]:
+    for policy in data.single:
+        for condition, tasks in policy.conditions.items():
+            common: dict[str, object] = {
+                "policy": policy.label,
+                "perturbation": condition,
+                "split": policy.header.split,
+                "synthetic": int(bool(policy.header.settings.get("synthetic"))),
+            }
+            for result in tasks:
+                rate, known = result.rate, published.per_task_rates().get(result.task)
+                yield {
+                    **common,
+                    "task": result.task,
+                    "group": published.group_of_task().get(result.task, ""),
+                    "tasks": 1,
+                    "successes": rate.successes,
+                    "trials": rate.trials,
+                    "rate": f"{rate.rate:.6f}",
+                    "low": f"{rate.low:.6f}",
+                    "high": f"{rate.high:.6f}",
+                    "errors": result.errors,
+                    "median_seconds_to_success": "" if result.median_seconds is None else result.median_seconds,
+                    "published_rate": "" if known is None else known / 100,
+                }
+            for group in _groups(policy):
+                results = tasks if group == "all" else policy.group(group, condition)
+                if results:
+                    mean = average_of(results)
+                    yield {
+                        **common,
+                        "group": group,
+                        "tasks": len(results),
+                        "successes": sum(r.rate.successes for r in results),
+                        "trials": sum(r.rate.trials for r in results),
+                        "rate": f"{mean.value:.6f}",
+                        "low": f"{mean.low:.6f}",
+                        "high": f"{mean.high:.6f}",
+                        "errors": sum(r.errors for r in results),
+                    }
+
+
+def _groups(policy: PolicyResult) -> list[str]:
+    named = (name for header in policy.headers for name in header.task_sets)
+    return list(dict.fromkeys(("all", *published.GROUPS, *named)))

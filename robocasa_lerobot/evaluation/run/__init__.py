@@ -1,0 +1,1 @@
+"""The trials of an evaluation: engine, worker processes, one rollout."""

@@ -1,0 +1,57 @@
+"""Shards of an evaluation on a Slurm cluster or on Ray, through datatrove, as conversions run there."""
+
+from __future__ import annotations
+
+import dataclasses
+from functools import partial
+from typing import Any
+
+from robocasa_lerobot.errors import UserError
+from robocasa_lerobot.evaluation.config.evaluation import EvaluationConfig
+from robocasa_lerobot.jobs.executors import Execution, run_with_ray, submit_to_slurm
+
+_FOLDER, _LOGS = ".executor", "slurm"
+
+
+def run_shard(data: Any, rank: int = 0, world_size: int = 1, *, config: EvaluationConfig) -> None:
+    """Evaluate one shard, in datatrove's calling convention."""
+    from robocasa_lerobot.evaluation.run.engine import evaluate, prepare
+
+    evaluate(prepare(dataclasses.replace(config, shard=f"{rank + 1}/{world_size}")))
+
+
+def finish(config: EvaluationConfig) -> None:
+    """Join the shards, and write the report."""
+    from robocasa_lerobot.evaluation.run.engine import prepare
+    from robocasa_lerobot.evaluation.run.merging import merge
+    from robocasa_lerobot.evaluation.run.outputs import write_outputs
+
+    evaluation = prepare(config)
+    merge(evaluation)
+    write_outputs(evaluation)
+
+
+def run_distributed(config: EvaluationConfig, shards: int, execution: Execution) -> str | None:
+    """Run all shards with Ray and join them, or submit them to Slurm; a line for the user where it does not wait.
+
+    Raises:
+        UserError: the executor is not there, Slurm refuses, or what an evaluation itself raises.
+    """
+    from robocasa_lerobot.evaluation.run.engine import prepare
+
+    if shards < 1:
+        raise UserError(f"--shards: found {shards}, expected at least 1.")
+    if config.shard is not None:
+        raise UserError("--executor runs all shards: leave --shard out.")
+    evaluation = prepare(config)  # mistakes come up here, not in the first job
+    out = evaluation.out
+    step = partial(run_shard, config=config)
+    folder = out / _FOLDER / f"{evaluation.header.id}-{shards}"  # markers hold for these settings and shards only
+    folder.mkdir(parents=True, exist_ok=True)
+    if execution.kind == "ray":
+        run_with_ray(step, shards, folder, execution.ray)
+        finish(config)
+        return None
+    array, last = submit_to_slurm(step, partial(finish, config), shards, folder, out / _LOGS, execution.slurm)
+    first = f"shards in job {array}, " if array else "all shards are complete; "
+    return f"submitted to Slurm: {first}joined by job {last}. What they print is in {out / _LOGS}."

@@ -1,0 +1,61 @@
+"""Filming a trial: pictures from the contract's cameras, large enough to look at, into a streamed video."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from types import TracebackType
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from robocasa_lerobot import contract
+from robocasa_lerobot.video import VideoWriter, side_by_side
+
+# Half the control rate and 192 pixels: on a CPU, rendering every step at full size would take longer than the trial.
+FILM_EVERY = 2
+FILM_FPS = contract.CONTROL_HZ // FILM_EVERY
+FILM_SIZE = 192
+
+
+class Film:
+    """A video of one trial, in real time at 10 fps.
+
+    An env with a MuJoCo `model` and `data` is filmed by a renderer of its own, so that a policy with small inputs
+    still gets a film that shows something, and the env renders what the policy sees and no more. Of any other env
+    the observation's pictures are filmed.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self._writer = VideoWriter(path, FILM_FPS)
+        self._renderer: Any = None
+
+    def shoot(self, env: Any, observation: dict[str, Any], step: int) -> None:
+        """Film the present state; `env` is unwrapped, `step` counts from 0 at the reset."""
+        if step % FILM_EVERY == 0:
+            self._writer.write(side_by_side(self._pictures(env, observation)))
+
+    def needs_observation(self, env: Any) -> bool:
+        """Whether the env itself has to render at each step for the film."""
+        return not hasattr(type(env), "model")
+
+    def _pictures(self, env: Any, observation: dict[str, Any]) -> dict[str, NDArray[np.uint8]]:
+        if self.needs_observation(env):
+            pixels: dict[str, NDArray[np.uint8]] = observation["pixels"]
+            return pixels
+        if self._renderer is None:
+            from robocasa_lerobot.envs.rendering import SceneRenderer
+
+            shadows = env.render_preset == "quality"
+            self._renderer = SceneRenderer(env.model, FILM_SIZE, FILM_SIZE, shadows=shadows)
+        return {camera: self._renderer.render(env.data, camera) for camera in contract.CAMERAS}
+
+    def __enter__(self) -> Film:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if self._renderer is not None:
+            self._renderer.close()
+        self._writer.close(keep=kind is None)

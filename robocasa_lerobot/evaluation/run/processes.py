@@ -1,0 +1,65 @@
+"""Starting and burying the processes of an evaluation.
+
+They are forked from a server process that has done the slow imports once (Python's forkserver), so that a worker is
+there at once and shares that memory. The server has the environment of its own start: what a worker needs of the
+present one is handed over.
+"""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import signal
+from collections.abc import Iterator
+from contextlib import contextmanager
+from multiprocessing.context import ForkServerContext, ForkServerProcess
+
+POLICY_MODULES = (
+    "torch",
+    "robocasa_lerobot.policies.diffusion_transformer.modeling_diffusion_transformer",
+    "lerobot.policies.factory",
+    "lerobot.envs.utils",
+    "robocasa_lerobot.envs.kitchen_env",
+)
+
+
+def cause_of_death(process: ForkServerProcess, what: str = "worker process") -> str:
+    """Why a process has ended, in words."""
+    process.join(timeout=10)
+    code = process.exitcode
+    if code is not None and code < 0:
+        name = signal.Signals(-code).name
+        note = " (out of memory?)" if name == "SIGKILL" else ""
+        return f"the {what} was ended by {name}{note}"
+    return f"the {what} ended with exit status {code}"
+
+
+def process_context(checkpoints: bool) -> ForkServerContext:
+    """The context that processes are started in; with `checkpoints`, what they need is imported beforehand."""
+    context = multiprocessing.get_context("forkserver")
+    modules = ["robocasa_lerobot.evaluation.run.worker", "robocasa_lerobot.evaluation.run.policy_server"]
+    # An import that fails there is silently left to the worker, which reports it.
+    context.set_forkserver_preload([*modules, *(POLICY_MODULES if checkpoints else ())])
+    return context
+
+
+def take_over(environment: dict[str, str]) -> None:
+    """Give this process the environment of the one that asked for it."""
+    os.environ.clear()
+    os.environ.update(environment)
+
+
+@contextmanager
+def thread_limit(threads: int) -> Iterator[None]:
+    """Environment for a child that is about to start: its numeric libraries read these when they are loaded."""
+    names = ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS")
+    before = {name: os.environ.get(name) for name in names}
+    os.environ.update(dict.fromkeys(names, str(threads)))
+    try:
+        yield
+    finally:
+        for name, value in before.items():
+            if value is None:
+                del os.environ[name]
+            else:
+                os.environ[name] = value

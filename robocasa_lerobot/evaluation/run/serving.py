@@ -1,0 +1,69 @@
+"""Which policies are computed by policy servers, and on which devices."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+
+from robocasa_lerobot.errors import UserError
+from robocasa_lerobot.evaluation.actors.checkpoint import PolicySource
+from robocasa_lerobot.evaluation.actors.chunk_policy import STATELESS_TYPES
+from robocasa_lerobot.evaluation.config.evaluation import EvaluationConfig, PolicySettings
+from robocasa_lerobot.evaluation.run.policy_server import ServerSettings
+from robocasa_lerobot.evaluation.run.policy_servers import ServerPool
+from robocasa_lerobot.evaluation.run.worker import WorkerSettings
+
+
+def served_labels(sources: Mapping[str, PolicySource], settings: PolicySettings, device: str) -> frozenset[str]:
+    """The policies that policy servers compute: on a GPU those that can be batched, elsewhere none.
+
+    Raises:
+        UserError: servers were asked for, for a policy that keeps observations in queues of its own.
+    """
+    from robocasa_lerobot.policies.registry import POLICY_TYPES
+
+    checkpoints = {label: source for label, source in sources.items() if not source.is_reference}
+    able = {
+        label
+        for label, source in checkpoints.items()
+        if source.type in POLICY_TYPES or (source.type in STATELESS_TYPES and not source.queues)
+    }
+    if settings.placement == "workers" or (settings.placement == "auto" and device == "cpu"):
+        return frozenset()
+    if settings.placement == "servers" and set(checkpoints) - able:
+        label = sorted(set(checkpoints) - able)[0]
+        raise UserError(
+            f"policy.placement=servers: policy {label!r} of type {sources[label].type!r} keeps observations in queues "
+            "of its own, so that it runs in the workers: use auto or workers."
+        )
+    return frozenset(able)
+
+
+@contextmanager
+def open_servers(settings: WorkerSettings, config: EvaluationConfig) -> Iterator[ServerPool | None]:
+    """The policy servers of a run, one for each device; None where nothing is served."""
+    if not settings.served:
+        yield None
+        return
+    server = ServerSettings(
+        sources={label: settings.sources[label] for label in settings.served},
+        device=settings.device,
+        threads=settings.threads,
+        width=settings.width,
+        executed_steps=settings.executed_steps,
+        address="",
+    )
+    pool = ServerPool(server, config.policy.devices or _devices(settings.device), config.stall_seconds)
+    try:
+        yield pool
+    finally:
+        pool.close()
+
+
+def _devices(device: str) -> list[str]:
+    """All devices of a kind that this process sees."""
+    if device != "cuda":
+        return [device]
+    import torch
+
+    return [f"cuda:{index}" for index in range(torch.cuda.device_count())]

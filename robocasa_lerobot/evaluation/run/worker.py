@@ -1,0 +1,188 @@
+"""A worker process: its own env, one trial after another from its pipe; the policy here, or in a policy server."""
+
+from __future__ import annotations
+
+import importlib
+import signal
+import time
+import traceback
+import warnings
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from multiprocessing.connection import Connection
+from pathlib import Path
+from typing import Any
+
+import gymnasium
+
+from robocasa_lerobot import gl
+from robocasa_lerobot.errors import UserError
+from robocasa_lerobot.evaluation.actors.actor import Actor
+from robocasa_lerobot.evaluation.actors.checkpoint import PolicySource
+from robocasa_lerobot.evaluation.actors.chunk_policy import BatchingError
+from robocasa_lerobot.evaluation.actors.policy_runner import load_actor
+from robocasa_lerobot.evaluation.planning.trials import TrialSpec
+from robocasa_lerobot.evaluation.records.results import CRASHED, DIVERGED, file_name
+from robocasa_lerobot.evaluation.run.film import Film
+from robocasa_lerobot.evaluation.run.messages import Alive, Finished, Ready, Refused
+from robocasa_lerobot.evaluation.run.policy_server import RemotePolicy
+from robocasa_lerobot.evaluation.run.processes import take_over
+from robocasa_lerobot.evaluation.run.rollout import DivergedError, Outcome, horizon_of, run_trial
+from robocasa_lerobot.evaluation.run.success import SuccessRule
+
+EnvFactory = Callable[..., gymnasium.Env[Any, Any]]
+
+
+@dataclass(frozen=True)
+class WorkerSettings:
+    """What a worker needs beside the trials themselves; picklable.
+
+    `perturbations` are the arguments that each of them adds to the env's, `served` the labels of policies that a
+    policy server computes.
+    """
+
+    sources: dict[str, PolicySource]
+    factory: str
+    env_kwargs: dict[str, Any]
+    device: str
+    threads: int
+    executed_steps: int | None
+    out: str
+    render_devices: tuple[int, ...] = ()
+    perturbations: dict[str, dict[str, Any]] = field(default_factory=dict)
+    success_rule: str = "any_step"
+    success_hold_steps: int = 1
+    width: int = 1
+    served: frozenset[str] = frozenset()
+
+
+def worker_main(
+    connection: Connection,
+    settings: WorkerSettings,
+    render_device: int | None,
+    server: str | None,
+    environment: dict[str, str],
+) -> None:
+    """Serve trials from `connection` until it gives None or closes.
+
+    Pictures are drawn on `render_device`; `server` is the address of the policy server.
+    """
+    take_over(environment)
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches the whole group; the parent ends its workers.
+    warnings.filterwarnings("ignore", category=gl.SoftwareRenderingWarning)  # the parent has announced it
+    if render_device is not None:
+        gl.use("egl", render_device)  # the parent has checked it
+    worker = _Worker(connection, settings, server)
+    try:
+        connection.send(Ready())
+        while (spec := connection.recv()) is not None:
+            connection.send(worker.run(spec))
+    except (EOFError, BrokenPipeError, ConnectionResetError):
+        pass  # The parent is gone: nobody waits for this worker any more.
+    finally:
+        worker.close_env()
+
+
+class _Worker:
+    def __init__(self, connection: Connection, settings: WorkerSettings, server: str | None) -> None:
+        self._connection, self._settings = connection, settings
+        self._remote = None if server is None else RemotePolicy(server, self._alive)
+        self._policy: tuple[str, Actor] | None = None
+        self._env: tuple[tuple[Any, ...], gymnasium.Env[Any, Any]] | None = None
+
+    def run(self, spec: TrialSpec) -> Finished | Refused:
+        started = time.monotonic()
+        video: str | None = None
+        try:
+            self._alive(-1)
+            try:
+                env = self._env_of(spec)
+            except UserError as error:
+                return Refused(str(error))
+            policy = self._policy_of(spec.label)
+            if isinstance(policy, Refused):
+                return policy
+            rule = SuccessRule(self._settings.success_rule, self._settings.success_hold_steps)
+            if spec.film:
+                video = video_path(spec)
+                with Film(Path(self._settings.out) / video) as film:
+                    outcome = run_trial(env, policy, spec, film, self._alive, rule)
+            else:
+                outcome = run_trial(env, policy, spec, None, self._alive, rule)
+        except (EOFError, BrokenPipeError, ConnectionResetError):
+            raise
+        except BatchingError as error:
+            return Refused(str(error))
+        except Exception as error:
+            # What the trial left behind may be broken as well: the next one starts from a new env and policy.
+            self.close_env()
+            self._policy = None
+            kind = DIVERGED if isinstance(error, DivergedError) else CRASHED
+            return Finished(Outcome(), None, time.monotonic() - started, traceback.format_exc(), kind)
+        return Finished(outcome, video, time.monotonic() - started, None)
+
+    def close_env(self) -> None:
+        if self._env is not None:
+            env, self._env = self._env[1], None
+            try:
+                env.close()
+            except Exception:
+                traceback.print_exc()
+
+    def _alive(self, step: int) -> None:
+        self._connection.send(Alive(step))
+
+    def _policy_of(self, label: str) -> Actor | Refused:
+        if self._policy is None or self._policy[0] != label:
+            self._policy = None  # Free the last one first: two large policies may not fit.
+            settings = self._settings
+            source = settings.sources[label]
+            if label in settings.served:
+                assert self._remote is not None, "a policy is to be served, but there is no server"
+                self._policy = (label, self._remote.actor(label))
+                return self._policy[1]
+            try:
+                if not source.is_reference:
+                    import torch
+
+                    torch.set_num_threads(settings.threads)
+                actor = load_actor(source, settings.device, settings.executed_steps, settings.width)
+            except Exception as error:
+                # No other trial will load it either.
+                detail = "" if isinstance(error, UserError) else "\n" + traceback.format_exc()
+                return Refused(f"policy {label!r} cannot be loaded: {error}{detail}")
+            self._policy = (label, actor)
+        return self._policy[1]
+
+    def _env_of(self, spec: TrialSpec) -> gymnasium.Env[Any, Any]:
+        wanted = (spec.task, spec.horizon, spec.perturbation)
+        if self._env is None or self._env[0] != wanted:
+            self.close_env()
+            settings = self._settings
+            arguments = {**settings.env_kwargs, **settings.perturbations.get(spec.perturbation, {})}
+            if not SuccessRule(settings.success_rule, settings.success_hold_steps).ends_early:
+                arguments["terminate_on_success"] = False
+            env = load_factory(settings.factory)(task=spec.task, horizon=spec.horizon, **arguments)
+            self._env = (wanted, env)
+            horizon_of(env, spec)
+        return self._env[1]
+
+
+def video_path(spec: TrialSpec) -> str:
+    """Where a trial's film lies in the results folder."""
+    perturbed = "" if spec.perturbation == "none" else f"{spec.perturbation}_"
+    return f"videos/{file_name(spec.label)}/{spec.task}/{perturbed}trial_{spec.trial:03d}.mp4"
+
+
+def load_factory(factory: str) -> EnvFactory:
+    """The callable named `module:callable`.
+
+    Raises:
+        UserError: no such module or name.
+    """
+    module, _, name = factory.partition(":")
+    try:
+        found: EnvFactory = getattr(importlib.import_module(module), name)
+    except (ImportError, AttributeError) as error:
+        raise UserError(f"env.factory {factory!r} cannot be imported: {error}") from error
+    return found

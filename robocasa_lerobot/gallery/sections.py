@@ -1,0 +1,129 @@
+"""What a gallery shows beside tasks: layouts, styles, appliances and objects, as pictures with a title."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image, ImageDraw
+
+from robocasa_lerobot.envs.kitchens.appliances.catalogue import kinds, models_of
+from robocasa_lerobot.envs.kitchens.layout import layout_ids, layout_record, split_of
+from robocasa_lerobot.envs.kitchens.materials import load_style, style_ids
+from robocasa_lerobot.envs.objects.catalogue import CATEGORIES, instance, split_indices
+from robocasa_lerobot.errors import UnknownNameError
+from robocasa_lerobot.gallery.appliance_pictures import appliance_pictures
+from robocasa_lerobot.gallery.kitchen_pictures import kitchen_photo, kitchen_plan
+from robocasa_lerobot.gallery.object_pictures import object_tiles
+
+SPLITS = ("pretrain", "target")
+_SHOWN_IN = {"target": 2, "pretrain": 12}  # the layout that a style is shown in: an L with an island
+_OBJECTS_AT_ONCE = 24
+_CAPTION_PX = 16
+
+
+@dataclass(frozen=True)
+class Tile:
+    """A picture of a gallery.
+
+    Attributes:
+        title: below it.
+        category: that pages are filtered by.
+        split: "pretrain" or "target".
+        picture: (height, width, 3).
+    """
+
+    title: str
+    category: str
+    split: str
+    picture: NDArray[np.uint8]
+
+
+def layouts(splits: tuple[str, ...], categories: tuple[str, ...], size: int) -> Iterator[Tile]:
+    """Every layout from above, in the style of its number; categories are plans."""
+    for layout_id in layout_ids():
+        record = layout_record(layout_id)
+        if split_of(layout_id) in splits and (not categories or record["plan"] in categories):
+            picture = kitchen_plan(layout_id, layout_id, (size, round(1.2 * size)))
+            yield Tile(f"layout {layout_id}: {record['name']}", record["plan"], split_of(layout_id), picture)
+
+
+def styles(splits: tuple[str, ...], categories: tuple[str, ...], size: int) -> Iterator[Tile]:
+    """Every style in a kitchen of its split; categories are the designs of fronts."""
+    for style_id in style_ids():
+        style, split = load_style(style_id), split_of(style_id)
+        if split in splits and (not categories or style.panel in categories):
+            picture = kitchen_photo(_SHOWN_IN[split], style_id, (size, round(1.6 * size)))
+            yield Tile(f"style {style_id}: {style.name}", style.panel, split, picture)
+
+
+def appliances(splits: tuple[str, ...], categories: tuple[str, ...], size: int) -> Iterator[Tile]:
+    """Every appliance in its states side by side; categories are fixture types."""
+    for kind in kinds():
+        for record in models_of(kind):
+            if record.kind == kind and record.split in splits and (not categories or kind in categories):
+                states = appliance_pictures(record.model_id, size=size)
+                yield Tile(f"{record.model_id}: {', '.join(states)}", kind, record.split, np.hstack([*states.values()]))
+
+
+def objects(splits: tuple[str, ...], categories: tuple[str, ...], size: int) -> Iterator[Tile]:
+    """The first instance of every object category in each split; categories are theirs, or groups."""
+    chosen = [
+        (split, instance(category, split_indices(split)[0]))
+        for name, category in sorted(CATEGORIES.items())
+        for split in splits
+        if not categories or name in categories or set(category.groups) & set(categories)
+    ]
+    for start in range(0, len(chosen), _OBJECTS_AT_ONCE):
+        batch = chosen[start : start + _OBJECTS_AT_ONCE]
+        pictures = object_tiles([item for _, item in batch], size)
+        for (split, item), picture in zip(batch, pictures, strict=True):
+            yield Tile(item.model, item.category.groups[0] if item.category.groups else "untyped", split, picture)
+
+
+Section = Callable[[tuple[str, ...], tuple[str, ...], int], Iterator[Tile]]
+# By name: how its pictures are made, their height in pixels, and the columns of a contact sheet.
+SECTIONS: dict[str, tuple[Section, int, int]] = {
+    "layouts": (layouts, 300, 4),
+    "styles": (styles, 270, 4),
+    "appliances": (appliances, 150, 3),
+    "objects": (objects, 140, 10),
+}
+
+
+def tiles_of(section: str, splits: tuple[str, ...] = SPLITS, categories: tuple[str, ...] = ()) -> Iterator[Tile]:
+    """Pictures of a section.
+
+    Raises:
+        UnknownNameError: no such section or split.
+    """
+    if section not in SECTIONS:
+        raise UnknownNameError("section of the gallery", section, SECTIONS)
+    for split in splits:
+        if split not in SPLITS:
+            raise UnknownNameError("split", split, SPLITS)
+    make, size, _ = SECTIONS[section]
+    yield from make(splits, categories, size)
+
+
+def write_sheets(section: str, tiles: list[Tile], out: Path, rows: int = 6) -> list[Path]:
+    """Write contact sheets `<section>_<i>.png` to a folder; returns their paths."""
+    out.mkdir(parents=True, exist_ok=True)
+    columns = SECTIONS[section][2]
+    paths = []
+    for sheet, start in enumerate(range(0, len(tiles), columns * rows)):
+        chosen = tiles[start : start + columns * rows]
+        width = max(tile.picture.shape[1] for tile in chosen)
+        height = max(tile.picture.shape[0] for tile in chosen) + _CAPTION_PX
+        picture = Image.new("RGB", (columns * width, -(-len(chosen) // columns) * height), (250, 250, 250))
+        draw = ImageDraw.Draw(picture)
+        for index, tile in enumerate(chosen):
+            x, y = index % columns * width, index // columns * height
+            picture.paste(Image.fromarray(tile.picture), (x, y))
+            draw.text((x + 4, y + height - _CAPTION_PX + 2), tile.title[: width // 6], fill=(20, 20, 20))
+        paths.append(out / f"{section}_{sheet}.png")
+        picture.save(paths[-1])
+    return paths

@@ -1,0 +1,1 @@
+"""Experiments as typed configuration, from their files."""

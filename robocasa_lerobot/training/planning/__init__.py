@@ -1,0 +1,1 @@
+"""What an experiment would do, and what it leaves out and why."""

@@ -1,0 +1,241 @@
+"""What an experiment would do: its graph with steps and samples, what is missing, disk, and hours on this device."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import statistics
+import tempfile
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import torch
+from accelerate import Accelerator
+
+from robocasa_lerobot import contract
+from robocasa_lerobot.data.fake import write_fake_dataset
+from robocasa_lerobot.data.mixture import MixtureMeta
+from robocasa_lerobot.data.mixture_config import MemberConfig, MixtureConfig
+from robocasa_lerobot.data.registry.registry import missing_datasets
+from robocasa_lerobot.errors import UserError
+from robocasa_lerobot.training.config.experiment import FROM_SCRATCH, ExperimentConfig, PhaseConfig
+from robocasa_lerobot.training.loop import train_phase
+from robocasa_lerobot.training.metrics import METRICS, read_lines
+from robocasa_lerobot.training.planning.evaluations import phase_evaluations
+from robocasa_lerobot.training.planning.skipped import PHASE
+from robocasa_lerobot.training.planning.unavailable import runnable
+from robocasa_lerobot.training.setup import builders
+from robocasa_lerobot.training.setup import phase_data as joining
+from robocasa_lerobot.training.setup.build_phase import planned_policy, prepare_phase
+from robocasa_lerobot.training.weights.checkpoint import checkpoint_step, last_checkpoint
+
+MEASURED_STEPS = 20
+_LARGEST_ON_CPU = 2e8  # parameters; 20 steps of more take hours without an accelerator
+_IMAGE_SIZE = 256  # pixels of the published datasets and ours
+
+
+@dataclass
+class PhasePlan:
+    """A phase to come.
+
+    Attributes:
+        depth: phases that it builds on.
+        start: where its weights come from.
+        done: optimiser steps that are done already.
+        frames: of its data, or None where some are missing.
+        missing: its datasets that are not there, each with how to get it.
+        parameters: of its policy, and those of them that are trained; None where it cannot be built here.
+        checkpoint_bytes: size of a checkpoint, and `kept` how many stay.
+        cache_bytes: decoded frames on disk.
+        seconds: per optimiser step on this device, without waiting for data; None where not measured.
+        notes: what stands in the way, or was left out.
+        left_out: why the phase will not run at all, or "".
+    """
+
+    phase: PhaseConfig
+    depth: int
+    start: str
+    done: int = 0
+    frames: int | None = None
+    missing: list[str] = field(default_factory=list)
+    parameters: tuple[int, int] | None = None
+    checkpoint_bytes: int | None = None
+    kept: int = 1
+    cache_bytes: int = 0
+    seconds: float | None = None
+    notes: list[str] = field(default_factory=list)
+    left_out: str = ""
+
+    @property
+    def samples(self) -> int:
+        """Samples that the whole phase sees."""
+        return 0 if self.left_out else self.phase.steps * self.phase.batch_size
+
+    @property
+    def hours(self) -> float | None:
+        """Hours of the steps that are still to do."""
+        return None if self.seconds is None else self.seconds * (self.phase.steps - self.done) / 3600
+
+
+def plan_experiment(
+    experiment: ExperimentConfig, only: str | None = None, measured_steps: int = MEASURED_STEPS
+) -> list[PhasePlan]:
+    """The plan of each phase, or of one; nothing is trained or written in `output_dir`.
+
+    Args:
+        experiment: what to plan.
+        only: the one phase to plan; None is all.
+        measured_steps: optimiser steps with made-up data that are timed for each kind of step that differs; 0: none.
+
+    Raises:
+        UserError: a mistake in the settings. Missing data or weights are not one: the plan tells of them.
+    """
+    device = builders.best_device(experiment.device)
+    plans, measured = [], dict[str, float | str]()
+    whole, (experiment, said) = experiment, runnable(experiment)
+    for asked in [whole.phase(only)] if only is not None else whole.phases:
+        about = [item for item in said if item.phase == asked.name]
+        if any(item.kind == PHASE for item in about):
+            depth, start = len(whole.ancestors(asked)), whole.init_of(asked)
+            plans.append(PhasePlan(asked, depth, start, left_out=" ".join(item.reason for item in about)))
+            continue
+        phase = experiment.phase(asked.name)
+        plan = _plan_phase(experiment, phase, device)
+        plan.notes += [item.reason for item in about]
+        if measured_steps and plan.parameters is not None and plan.done < phase.steps:
+            if device == "cpu" and plan.parameters[0] > _LARGEST_ON_CPU:
+                plan.notes.append("not measured: too large for a CPU; plan on the machine that will train")
+            else:
+                key = _what_a_step_is(experiment, phase)
+                if key not in measured:
+                    measured[key] = _measure(experiment, phase, device, measured_steps)
+                found = measured[key]
+                plan.seconds = found if isinstance(found, float) else None
+                plan.notes += [found] if isinstance(found, str) else []
+        plans.append(plan)
+    return plans
+
+
+def _plan_phase(experiment: ExperimentConfig, phase: PhaseConfig, device: str) -> PhasePlan:
+    last = last_checkpoint(Path(experiment.output_dir) / phase.name)
+    done = min(checkpoint_step(last), phase.steps) if last is not None else 0
+    plan = PhasePlan(phase, len(experiment.ancestors(phase)), experiment.init_of(phase), done)
+    phase_evaluations(phase)
+    _plan_data(experiment, phase, plan)
+    try:
+        settings, checkpoint = planned_policy(experiment, phase)
+        config = builders.policy_config(settings, checkpoint, device)
+    except UserError as error:
+        if not experiment.init_of(phase).startswith("hub:") and "hub" not in str(error):
+            raise
+        plan.notes.append(str(error))
+        return plan
+    _plan_policy(config, phase, plan)
+    return plan
+
+
+def _plan_data(experiment: ExperimentConfig, phase: PhaseConfig, plan: PhasePlan) -> None:
+    for mixture in [phase.mixture, *(other.mixture for other in experiment.replayed(phase))]:
+        plan.missing += [f"{e.task} ({e.split}, {e.source}): {e.missing}" for e in missing_datasets(mixture)]
+    if plan.missing:
+        return
+    dataset = joining.open_phase_data(experiment, phase)
+    plan.frames = dataset.meta.total_frames
+    loader = experiment.loader
+    size = dataset.meta.features[dataset.meta.camera_keys[0]]["shape"][:2] if dataset.meta.camera_keys else (0, 0)
+    cache = sum(s.total_frames for s in dataset.sources.values()) * len(dataset.meta.camera_keys) * 3
+    cache *= int(size[0]) * int(size[1])
+    fits = cache <= loader.cache_budget_gb * 1e9
+    plan.cache_bytes = cache if loader.cache_frames or (loader.cache_frames is None and fits) else 0
+
+
+def _plan_policy(config: Any, phase: PhaseConfig, plan: PhasePlan) -> None:
+    """Sizes of the policy, which is built without memory for its weights."""
+    device, config.device = config.device, "meta"
+    try:
+        with torch.device("meta"):
+            policy = builders.make_phase_policy(config, _made_up_meta(_IMAGE_SIZE), None)
+    except Exception as error:  # policies of LeRobot raise all kinds where weights or packages are missing
+        plan.notes.append(f"the policy {config.type!r} cannot be built here: {_first_line(error)}")
+        return
+    finally:
+        config.device = device
+    total = sum(p.numel() for p in policy.parameters())
+    trained = total
+    if phase.freeze or phase.lora is not None:
+        trained = _trained(policy, phase)
+    plan.parameters = (total, trained)
+    bytes_ = sum(p.numel() * p.element_size() for p in policy.parameters())
+    two_states = 8 * trained  # Adam's, float32
+    raw = bytes_ if phase.ema.enabled or phase.lora is not None else 0
+    plan.checkpoint_bytes = bytes_ + raw + two_states
+    plan.kept = _checkpoints_kept(phase)
+
+
+def _trained(policy: torch.nn.Module, phase: PhaseConfig) -> int:
+    from robocasa_lerobot.training.weights.adapters import apply_training_scope
+
+    apply_training_scope(policy, phase, seed=0)
+    return sum(p.numel() for p in policy.parameters() if p.requires_grad)
+
+
+def _checkpoints_kept(phase: PhaseConfig) -> int:
+    steps = {phase.steps, *(range(phase.save_every, phase.steps, phase.save_every) if phase.save_every else ())}
+    if phase.keep_last:
+        always = {s for s in steps if phase.keep_every and s % phase.keep_every == 0}
+        steps = always | set(sorted(steps)[-phase.keep_last :])
+    return len(steps) + phase.save_initial
+
+
+def _what_a_step_is(experiment: ExperimentConfig, phase: PhaseConfig) -> str:
+    settings, checkpoint = planned_policy(experiment, phase)
+    names = ("batch_size", "gradient_accumulation", "freeze", "lora", "augment", "compile", "ema")
+    asked = dataclasses.asdict(phase)
+    return json.dumps([settings, str(checkpoint), {name: asked[name] for name in names}], sort_keys=True, default=str)
+
+
+def _measure(experiment: ExperimentConfig, phase: PhaseConfig, device: str, steps: int) -> float | str:
+    """Seconds per step, the median after the first quarter; or why there are none."""
+    settings, checkpoint = planned_policy(experiment, phase)
+    with tempfile.TemporaryDirectory(prefix="plan_") as folder:
+        size = experiment.loader.image_size or _IMAGE_SIZE
+        data = write_fake_dataset(Path(folder) / "fake", episodes=2, length=64, image_size=size)
+        alone = dataclasses.replace(
+            phase,
+            mixture=MixtureConfig(members=[MemberConfig(str(data))]),
+            steps=steps,
+            init=str(checkpoint) if checkpoint else FROM_SCRATCH,
+            statistics="replace",
+            policy=settings,
+            replay=None,
+            held_out=None,
+            save_every=0,
+            save_initial=False,
+            log_every=1,
+        )
+        loader = dataclasses.replace(experiment.loader, cache_dir=None, cache_frames=None, workers=0)
+        trial = dataclasses.replace(experiment, output_dir=folder, phases=[alone], loader=loader, trackers=[])
+        accelerator = Accelerator(cpu=device == "cpu", mixed_precision=experiment.mixed_precision)
+        try:
+            run = prepare_phase(trial, alone, device, accelerator)
+            run.save = False
+            train_phase(run, accelerator)
+        except (UserError, RuntimeError) as error:  # too little memory is a RuntimeError
+            return f"could not be measured: {_first_line(error)}"
+        finally:
+            accelerator.free_memory()
+        lines = read_lines(Path(folder) / phase.name / METRICS)
+    times = [line["seconds_per_step"] - line["data_seconds_per_step"] for line in lines]
+    return statistics.median(times[len(times) // 4 :])
+
+
+def _made_up_meta(size: int) -> MixtureMeta:
+    features: Mapping[str, Any] = contract.dataset_features((size, size))
+    return MixtureMeta(dict(features), contract.VIDEO_FPS, contract.ROBOT_TYPE, ["-"], 1, 1)
+
+
+def _first_line(error: BaseException) -> str:
+    lines = [line.strip() for line in str(error).splitlines() if line.strip()]
+    return (lines[0] if lines else type(error).__name__)[:300]

@@ -1,0 +1,1 @@
+"""From a phase's settings to what it trains with."""

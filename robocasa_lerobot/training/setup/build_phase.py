@@ -1,0 +1,216 @@
+"""From a phase's settings to everything that it trains with, fresh or continued from its last checkpoint."""
+
+from __future__ import annotations
+
+import dataclasses
+import hashlib
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import torch
+from accelerate import Accelerator
+from lerobot.configs.default import DatasetConfig
+from lerobot.configs.train import TrainPipelineConfig
+
+from robocasa_lerobot.data.mixture import MixtureDataset, StepBatches
+from robocasa_lerobot.errors import UserError
+from robocasa_lerobot.training import records
+from robocasa_lerobot.training.config.experiment import FROM_SCRATCH, HUB, ExperimentConfig, PhaseConfig
+from robocasa_lerobot.training.held_out import HeldOut, held_out_frames, without_held_out
+from robocasa_lerobot.training.loop import PhaseRun
+from robocasa_lerobot.training.metrics import truncate_metrics
+from robocasa_lerobot.training.setup import builders
+from robocasa_lerobot.training.setup import phase_data as joining
+from robocasa_lerobot.training.weights.adapters import apply_training_scope
+from robocasa_lerobot.training.weights.checkpoint import TrainingState, last_checkpoint, pretrained_model, restore, tidy
+from robocasa_lerobot.training.weights.ema import Ema
+from robocasa_lerobot.training.weights.master_weights import MasterWeights
+
+
+def prepare_phase(
+    experiment: ExperimentConfig,
+    phase: PhaseConfig,
+    device: str,
+    accelerator: Accelerator,
+    stop: Callable[[], bool] = lambda: False,
+) -> PhaseRun:
+    """Data, policy, processors and optimiser of a phase, continued from its last checkpoint if it has one.
+
+    Raises:
+        UserError: data, start and settings do not fit each other, or the phase was begun with other data.
+    """
+    folder = Path(experiment.output_dir) / phase.name
+    init, last = start_of(experiment, phase), last_checkpoint(folder)
+    settings = {} if last is not None else policy_settings(experiment, phase)
+    config = builders.policy_config(settings, pretrained_model(last) if last is not None else init, device)
+    seed = phase_seed(experiment.seed, phase.name)
+    dataset, apart = joining.open_phase_data(experiment, phase), None
+    if phase.held_out is not None:
+        dataset, apart = without_held_out(dataset, phase.held_out, experiment.data_loader, experiment.seed)
+        if apart is None:
+            accelerator.print(f"phase {phase.name}: no task has two episodes, so that none is held out")
+    for part in (dataset, apart) if apart is not None else (dataset,):
+        builders.set_windows(part, config)
+        part.set_picture_size(builders.frame_size(config))
+    keep = init is not None and phase.statistics == "keep"
+    accelerator.print(f"phase {phase.name}: {phase.steps} steps from {init or 'scratch'} on")
+    accelerator.print("  " + dataset.describe().replace("\n", "\n  "))
+    if init is not None:
+        accelerator.print(f"  statistics of normalisation: {phase.statistics}")
+    for part in (dataset, apart) if apart is not None else (dataset,):
+        _cache_frames(experiment, part)
+    if last is None and not keep:
+        pool = init is not None and phase.statistics == "pool"
+        stats = joining.pooled(experiment, phase, dataset) if pool else dataset.statistics()
+        imagenet = phase.image_statistics == "imagenet"
+        cameras = dataset.meta.camera_keys
+        dataset.meta.stats = builders.with_imagenet_statistics(stats, cameras) if imagenet else stats
+
+    torch.manual_seed(seed)
+    start = pretrained_model(last) if last is not None else init
+    policy = builders.make_phase_policy(config, dataset.meta, start)
+    pre, post = builders.make_processors(config, dataset.meta, start, keep_statistics=keep or last is not None)
+    always_eval = apply_training_scope(policy, phase, seed)
+    masters = MasterWeights(policy)
+    if len(masters) and experiment.mixed_precision == "fp16":
+        raise UserError(
+            f"the policy {config.type!r} has weights in half precision, whose gradients fp16 cannot scale; set "
+            "`mixed_precision: bf16`, or the policy's own type of weights to float32."
+        )
+    optimizer, scheduler, clip = builders.make_optimizer(policy, phase, masters)
+    ema = Ema(policy, phase.ema, masters=masters) if phase.ema.enabled else None
+    state = TrainingState(policy, pre, post, optimizer, scheduler, ema, masters, low_rank=phase.lora is not None)
+    about = records.describe_phase(experiment, phase, dataset, policy, init)
+    if last is not None:
+        records.check_same_data(folder, about)
+        restore(last, state)
+        accelerator.print(f"phase {phase.name}: going on from step {state.step}")
+    accelerator.wait_for_everyone()  # all have read what is replaced now
+    if accelerator.is_main_process:
+        records.write_records(folder, about, experiment, phase)
+        tidy(folder)
+        truncate_metrics(folder, state.step)
+    share = phase.batch_size // phase.gradient_accumulation
+    dropped = phase.drop_last_frames
+    if dropped is None:
+        dropped = getattr(config, "drop_n_last_frames", None) or 0
+    sampler = dataset.sampler(seed, drop_last_frames=dropped)
+    held_out = None
+    if apart is not None and phase.held_out is not None:
+        frames = held_out_frames(apart, phase.held_out.samples, experiment.seed)
+        held_out = HeldOut(phase.held_out, apart, frames, max(1, share // accelerator.num_processes))
+    return PhaseRun(
+        config=phase,
+        folder=folder,
+        state=state,
+        batches=StepBatches(dataset, sampler, share, accelerator.process_index, accelerator.num_processes),
+        camera_keys=dataset.meta.camera_keys,
+        grad_clip_norm=clip,
+        seed=seed,
+        workers=experiment.loader.workers,
+        train_config=_lerobot_config(experiment, phase, config, dataset),
+        stop=stop,
+        held_out=held_out,
+        always_eval=always_eval,
+    )
+
+
+def phase_seed(seed: int, name: str) -> int:
+    """The seed of a phase: no two phases of an experiment see the same noise or sample order."""
+    return int.from_bytes(hashlib.sha256(f"{seed}/{name}".encode()).digest()[:4], "big")
+
+
+def policy_settings(experiment: ExperimentConfig, phase: PhaseConfig) -> dict[str, Any]:
+    """What the policy's configuration is made of, or what changes in the checkpoint's it starts from.
+
+    Raises:
+        UserError: the phase starts from scratch, and no type of policy is given.
+    """
+    init = experiment.init_of(phase)
+    own = experiment.policy if experiment.parent(phase) is None else {}  # a phase before has them already
+    settings = {**own, **phase.policy}
+    kind = settings.get("type", experiment.policy.get("type"))
+    if kind == "groot":  # its warm-up is `warmup_ratio` of these, which LeRobot leaves at 10,000 for any training
+        settings.setdefault("max_steps", phase.schedule_steps or phase.steps)
+    if init == FROM_SCRATCH:
+        settings.pop("path", None)
+        if "type" not in settings:
+            raise UserError(f"phase {phase.name!r} starts {FROM_SCRATCH}, so `policy` needs a `type`.")
+    return settings
+
+
+def planned_policy(
+    experiment: ExperimentConfig, phase: PhaseConfig, offline: bool = False
+) -> tuple[dict[str, Any], Path | None]:
+    """Settings of a phase's policy, with those of the phases it builds on, and the checkpoint at their beginning.
+
+    Of a checkpoint on the hub, the folder has its config.json alone; with `offline` it is None unless it was
+    downloaded before.
+    """
+    parent = experiment.parent(phase)
+    if parent is None:
+        init = experiment.init_of(phase)
+        return policy_settings(experiment, phase), None if init == FROM_SCRATCH else _config_folder(init, offline)
+    settings, checkpoint = planned_policy(experiment, parent, offline)
+    return {**settings, **policy_settings(experiment, phase)}, checkpoint
+
+
+def _config_folder(init: str, offline: bool) -> Path | None:
+    name = init.removeprefix(HUB)
+    if name == init:
+        return Path(init)
+    return builders.cached_hub_config(name) if offline else builders.hub_config(name)
+
+
+def start_of(experiment: ExperimentConfig, phase: PhaseConfig) -> Path | None:
+    """The `pretrained_model` folder that a phase starts from, or None.
+
+    Raises:
+        UserError: the phase that it starts from has no checkpoint yet.
+    """
+    init, parent = experiment.init_of(phase), experiment.parent(phase)
+    if init == FROM_SCRATCH:
+        return None
+    if parent is None:
+        return _folder(init)
+    last = last_checkpoint(Path(experiment.output_dir) / parent.name)
+    if last is None or int(last.name) < parent.steps:
+        raise UserError(
+            f"phase {phase.name!r} starts from {init!r}, which is not finished in {experiment.output_dir}: run it "
+            f"first, with `--phase {init}` or all phases."
+        )
+    return pretrained_model(last)
+
+
+def _folder(init: str) -> Path:
+    return builders.hub_checkpoint(init.removeprefix(HUB)) if init.startswith(HUB) else Path(init)
+
+
+def _cache_frames(experiment: ExperimentConfig, dataset: MixtureDataset) -> None:
+    loader = experiment.data_loader
+    if loader.cache_frames is False or loader.cache_dir is None:
+        return
+    budget = None if loader.cache_frames else loader.cache_budget_gb * 1e9
+    dataset.cache_frames(Path(loader.cache_dir), budget)
+
+
+def _lerobot_config(
+    experiment: ExperimentConfig, phase: PhaseConfig, config: Any, dataset: MixtureDataset
+) -> TrainPipelineConfig:
+    """The settings in LeRobot's own form, for `train_config.json`; it has room for one dataset, the first."""
+    root = Path(dataset.config.members[0].root)
+    return TrainPipelineConfig(
+        dataset=DatasetConfig(repo_id=root.name, root=str(root), video_backend="pyav"),
+        policy=config,
+        output_dir=Path(experiment.output_dir) / phase.name,
+        job_name=f"{experiment.name}_{phase.name}",
+        seed=experiment.seed,
+        batch_size=phase.batch_size,
+        steps=phase.steps,
+        log_freq=phase.log_every,
+        save_freq=phase.save_every,
+        num_workers=experiment.loader.workers,
+        optimizer=dataclasses.replace(config.get_optimizer_preset()),
+        scheduler=config.get_scheduler_preset(),
+    )

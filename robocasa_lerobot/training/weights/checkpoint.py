@@ -1,0 +1,176 @@
+"""Checkpoints in LeRobot's layout, complete or not there at all.
+
+<phase>/checkpoints/000100/pretrained_model/   config.json, model.safetensors, processors, train_config.json,
+                                               origin.json (experiment, phase, step)
+<phase>/checkpoints/000100/training_state/     optimiser, schedule, step, log window; the weights as they are
+                                               trained, where `pretrained_model` has averaged or merged ones; float32
+                                               weights and averages, where its own are in half precision
+<phase>/checkpoints/last -> 000100
+"""
+
+from __future__ import annotations
+
+import json
+import shutil
+from contextlib import nullcontext
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import torch
+from lerobot.common.train_utils import load_training_state, save_training_state
+from lerobot.policies.pretrained import PreTrainedPolicy
+from safetensors.torch import load_file, load_model, save_file, save_model
+
+from robocasa_lerobot.errors import UserError
+from robocasa_lerobot.policies.origin import Origin, experiment_of
+from robocasa_lerobot.training.weights.adapters import merged_state
+from robocasa_lerobot.training.weights.card import write_model_card
+from robocasa_lerobot.training.weights.ema import Ema
+from robocasa_lerobot.training.weights.master_weights import MasterWeights
+
+CHECKPOINTS, LAST, LINK_ASIDE = "checkpoints", "last", ".last"
+PRETRAINED, STATE = "pretrained_model", "training_state"
+RAW_WEIGHTS, AVERAGE, LOG_WINDOW = "raw_model.safetensors", "average.safetensors", "log_window.json"
+MASTERS = "master_weights.safetensors"
+
+
+@dataclass
+class TrainingState:
+    """What training changes, and a checkpoint therefore holds; `step` optimiser steps are done."""
+
+    policy: PreTrainedPolicy
+    preprocessor: Any
+    postprocessor: Any
+    optimizer: torch.optim.Optimizer
+    scheduler: torch.optim.lr_scheduler.LRScheduler | None
+    ema: Ema | None
+    masters: MasterWeights
+    low_rank: bool = False
+    step: int = 0
+    log_window: dict[str, list[float]] = field(default_factory=dict)
+
+    @property
+    def average_apart(self) -> bool:
+        """Whether the weights of `pretrained_model` do not tell the averages: they are merged, or rounded."""
+        return self.ema is not None and (self.low_rank or self.ema.in_half_precision)
+
+
+def last_checkpoint(phase_dir: Path) -> Path | None:
+    """The newest complete checkpoint of a phase, or None."""
+    return max(_checkpoints(phase_dir), key=checkpoint_step, default=None)
+
+
+def tidy(phase_dir: Path) -> None:
+    """Bring a phase's checkpoints in order after a kill: nothing half-written, and `last` points at the newest."""
+    parent = phase_dir / CHECKPOINTS
+    for stale in [*parent.glob(".writing-*"), *parent.glob(".dropped-*")]:
+        shutil.rmtree(stale)
+    (parent / LINK_ASIDE).unlink(missing_ok=True)
+    newest = last_checkpoint(phase_dir)
+    link = parent / LAST
+    if newest is not None and not (link.is_symlink() and link.readlink() == Path(newest.name)):
+        _point_last_at(newest)
+
+
+def prune(phase_dir: Path, keep_last: int, keep_every: int) -> None:
+    """Remove checkpoints beyond the newest `keep_last` (0 keeps all).
+
+    The initial one stays, and so do those whose step is a multiple of `keep_every` (0: none).
+    """
+    if not keep_last:
+        return
+    for checkpoint in sorted(_checkpoints(phase_dir), key=checkpoint_step)[:-keep_last]:
+        step = checkpoint_step(checkpoint)
+        if step and not (keep_every and step % keep_every == 0):
+            _drop(checkpoint)
+
+
+def _checkpoints(phase_dir: Path) -> list[Path]:
+    return [path for path in (phase_dir / CHECKPOINTS).glob("[0-9]*") if path.name.isdigit() and path.is_dir()]
+
+
+def _drop(checkpoint: Path) -> None:
+    """Remove it whole or not at all: a folder with half its files would look like a checkpoint."""
+    aside = checkpoint.with_name(f".dropped-{checkpoint.name}")
+    checkpoint.rename(aside)
+    shutil.rmtree(aside)
+
+
+def _point_last_at(checkpoint: Path) -> None:
+    link = checkpoint.with_name(LINK_ASIDE)
+    link.unlink(missing_ok=True)
+    link.symlink_to(checkpoint.name)
+    link.replace(checkpoint.with_name(LAST))
+
+
+def checkpoint_step(checkpoint: Path) -> int:
+    """The number of steps that made a checkpoint."""
+    return int(checkpoint.name)
+
+
+def pretrained_model(checkpoint: Path) -> Path:
+    """Its folder that LeRobot loads."""
+    return checkpoint / PRETRAINED
+
+
+def save_checkpoint(phase_dir: Path, state: TrainingState, train_config: Any) -> Path:
+    """Write a checkpoint aside, rename it, and point `last` at it."""
+    parent = phase_dir / CHECKPOINTS
+    parent.mkdir(parents=True, exist_ok=True)
+    tidy(phase_dir)
+    final, aside = parent / f"{state.step:06d}", parent / f".writing-{state.step:06d}"
+    model_dir, state_dir = aside / PRETRAINED, aside / STATE
+    save_training_state(aside, state.step, state.optimizer, state.scheduler)
+    (state_dir / LOG_WINDOW).write_text(json.dumps(state.log_window))
+    if state.ema is not None or state.low_rank:
+        save_model(state.policy, str(state_dir / RAW_WEIGHTS))
+    if state.ema is not None and state.average_apart:
+        save_file(state.ema.state(), state_dir / AVERAGE)
+    if len(state.masters):
+        save_file(state.masters.state(), state_dir / MASTERS)
+    with state.ema.applied() if state.ema is not None else nullcontext():
+        state.policy.save_pretrained(model_dir, state_dict=merged_state(state.policy))
+    state.preprocessor.save_pretrained(model_dir)
+    state.postprocessor.save_pretrained(model_dir)
+    train_config.save_pretrained(model_dir)
+    experiment = experiment_of(getattr(train_config, "job_name", None), phase_dir.name)
+    Origin(experiment, phase_dir.name, state.step).write(model_dir)
+    write_model_card(model_dir, str(state.policy.name), experiment, phase_dir, state.step)
+    if final.exists():
+        _drop(final)
+    aside.rename(final)
+    _point_last_at(final)
+    return final
+
+
+def restore(checkpoint: Path, state: TrainingState) -> None:
+    """Continue from a checkpoint whose `pretrained_model` weights the policy (and its average) already has.
+
+    Raises:
+        UserError: the checkpoint has no training state, or one of another optimiser or policy.
+    """
+    folder = checkpoint / STATE
+    if not folder.is_dir():
+        raise UserError(f"{checkpoint} has no {STATE}/, so training cannot go on from it; start a new phase from it.")
+    raw = folder / RAW_WEIGHTS
+    if raw.is_file() != (state.ema is not None or state.low_rank):
+        raise UserError(
+            f"{checkpoint} was written with{'' if raw.is_file() else 'out'} `ema` or `lora`; the phase says otherwise."
+        )
+    try:
+        if raw.is_file():
+            load_model(state.policy, str(raw), strict=True)
+        if len(state.masters):
+            state.masters.load(load_file(folder / MASTERS))
+        if state.ema is not None and state.average_apart:
+            state.ema.load(load_file(folder / AVERAGE))
+    except (RuntimeError, OSError) as error:
+        raise UserError(f"{folder} does not fit the phase's policy: {error}") from error
+    try:
+        state.step, _, _ = load_training_state(checkpoint, state.optimizer, state.scheduler)
+    except (KeyError, ValueError, TypeError) as error:
+        raise UserError(f"{folder} does not fit the phase's optimiser: {error}") from error
+    state.log_window = json.loads((folder / LOG_WINDOW).read_text())
+    if state.ema is not None:
+        state.ema.step = state.step
