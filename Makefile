@@ -53,7 +53,7 @@ test-slow: $(STAMP)  ## the slow tests: every task and kitchen, long trainings
 
 # 25 minutes on two idle cores; PYTEST_ARGS="-k lifelong" walks some. File, phases and minutes go to outputs/walk.md.
 walk: $(STAMP)  ## every experiment file from its first step to its report, at a tiny scale
-	WALK_LOG=outputs/walk.md $(BIN)/python -m pytest -m slow tests/test_experiments_walk.py $(PYTEST_ARGS)
+	WALK_LOG=outputs/walk.md $(BIN)/python -m pytest -m slow tests/training/test_experiments_walk.py $(PYTEST_ARGS)
 
 lint: $(STAMP)  ## ruff and mypy
 	$(BIN)/ruff check .

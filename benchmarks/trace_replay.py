@@ -34,7 +34,7 @@ from robocasa_lerobot.errors import UserError
 from robocasa_lerobot.progress import Bar
 
 REPOSITORY = Path(__file__).parents[1]
-KEPT_TRACES = REPOSITORY / "tests" / "data" / "robosuite_traces.npz"
+KEPT_TRACES = REPOSITORY / "tests" / "envs" / "golden" / "robosuite_traces.npz"
 RESULTS = REPOSITORY / "benchmarks" / "results" / "trace_replay.json"
 
 # Limits: end-effector error at every step of a single-direction trace, and at the end of a random one.

@@ -23,7 +23,9 @@ def configure(parser: argparse.ArgumentParser) -> None:
     """Add the options; everything else on the command line is a dotted setting of the experiment, as in `train`."""
     from robocasa_lerobot.jobs.executors import add_options
 
-    parser.add_argument("experiment", nargs="?", type=Path, metavar="EXPERIMENT", help="the experiment file")
+    parser.add_argument(
+        "experiment", nargs="?", metavar="EXPERIMENT", help="the experiment file, or its name in configs/experiments/"
+    )
     does = parser.add_mutually_exclusive_group()
     does.add_argument("--make", action="store_true", help="record and convert what our demonstrators can make")
     does.add_argument(
@@ -57,6 +59,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """List, make or convert; status 1 if `--check` finds something missing or something could not be made."""
+    from robocasa_lerobot.config_files import find_config
     from robocasa_lerobot.jobs.executors import execution_of
     from robocasa_lerobot.making.estimate import cores_here
     from robocasa_lerobot.making.listing import listing
@@ -70,7 +73,9 @@ def run(args: argparse.Namespace) -> int:
     needs: list[Need] | None = None
     if args.experiment is not None:
         episodes = parse_episodes(args.episodes) if args.episodes else {}
-        experiment = load_experiment(args.experiment, getattr(args, "settings", ()), args.scale)
+        experiment = load_experiment(
+            find_config(args.experiment, "experiments"), getattr(args, "settings", ()), args.scale
+        )
         needs, said = needs_of(experiment, episodes)
         asked = f" --episodes {args.episodes}" if args.episodes else ""
         print(listing(experiment.name, str(args.experiment), needs, said, cores, asked), flush=True)

@@ -36,7 +36,11 @@ def configure(parser: argparse.ArgumentParser) -> None:
         "--end-with-input", action="store_true", help="end when standard input closes, as when the caller is killed"
     )
     parser.add_argument("--check", action="store_true", help="print what would run, and end; no checkpoint is needed")
-    parser.add_argument("--config_path", metavar="FILE", help="YAML file of settings; options win over it")
+    parser.add_argument(
+        "--config_path",
+        metavar="FILE",
+        help="YAML file of settings, or a name in configs/evaluations/: quick; options win over it",
+    )
     short = "what to evaluate, short for --policy.path: a checkpoint, demonstrator, random, zero, replay:FILE"
     parser.add_argument("--policy", dest="set:policy", metavar="A,B", default=argparse.SUPPRESS, help=short)
     for name, hint, help_text in describe_settings(EvaluationConfig):

@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
 
 EXAMPLE = "robocasa-lerobot train --config_path configs/experiments/demo.yaml"
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
     """Add the options; everything else on the command line is a dotted setting of the experiment."""
-    parser.add_argument("--config_path", type=Path, required=True, metavar="FILE", help="the experiment file")
+    parser.add_argument(
+        "--config_path",
+        required=True,
+        metavar="FILE",
+        help="the experiment file, or a name in configs/experiments/: small/foundation",
+    )
     parser.add_argument(
         "--resume",
         choices=("auto", "force"),
@@ -44,9 +48,12 @@ def run(args: argparse.Namespace) -> int:
     from robocasa_lerobot.training.spinning import limit_spinning
 
     limit_spinning()
+    from robocasa_lerobot.config_files import find_config
     from robocasa_lerobot.training.config.experiment import load_experiment, to_yaml
 
-    experiment = load_experiment(args.config_path, getattr(args, "settings", ()), args.scale)
+    experiment = load_experiment(
+        find_config(args.config_path, "experiments"), getattr(args, "settings", ()), args.scale
+    )
     if args.plan:
         from robocasa_lerobot.training.planning.evaluations import plan_evaluations
         from robocasa_lerobot.training.planning.plan import plan_experiment

@@ -5,9 +5,9 @@ from __future__ import annotations
 import dataclasses
 import typing
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 from typing import Any
 
+from robocasa_lerobot.config_files import find_config
 from robocasa_lerobot.errors import suggest
 from robocasa_lerobot.settings import ConfigError, decode, load_yaml, parse_overrides, set_dotted
 
@@ -18,8 +18,8 @@ _SHORT = {"policy": "path"}
 def load_config[T](cls: type[T], arguments: Sequence[str]) -> T:
     """An instance of the dataclass `cls` from command-line arguments.
 
-    `--config_path FILE` names a YAML file; every other argument is `--dotted.key=value` or `--dotted.key value`
-    and wins over the file. Values are YAML; a list may be written `A,B`.
+    `--config_path FILE` names a YAML file, or one in `configs/evaluations/`; every other argument is
+    `--dotted.key=value` or `--dotted.key value` and wins over the file. Values are YAML; a list may be written `A,B`.
 
     Raises:
         ConfigError: what was found, what was expected, and the closest name of an unknown key.
@@ -28,7 +28,7 @@ def load_config[T](cls: type[T], arguments: Sequence[str]) -> T:
     overrides = parse_overrides(arguments, flags=True)
     for key, value in overrides:
         if key == "config_path":
-            tree = load_yaml(Path(str(value)))
+            tree = load_yaml(find_config(str(value), "evaluations"))
     for key, value in overrides:
         if key != "config_path":
             set_dotted(tree, f"{key}.{_SHORT[key]}" if key in _SHORT else key, value)

@@ -11,16 +11,15 @@ import math
 import shlex
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Any
 
+from robocasa_lerobot.config_files import find_config
 from robocasa_lerobot.data.mixture_config import LoaderConfig, MixtureConfig
-from robocasa_lerobot.errors import UserError, suggest
+from robocasa_lerobot.errors import UserError
 from robocasa_lerobot.settings import decode, load_yaml
 from robocasa_lerobot.training.config.experiment_files import check_keys
 from robocasa_lerobot.training.config.phase import PhaseConfig
 
-NAMED = Path(__file__).parents[2] / "configs" / "scales"
 _IDENTITY = ("type", "path", "file")  # settings that say which policy it is
 
 
@@ -98,9 +97,7 @@ def load_scale(name: str) -> ScaleConfig:
     Raises:
         UserError: no such file, a key that a scale may not change (the closest match is named), or a wrong value.
     """
-    path = next((p for p in (Path(name), NAMED / f"{name}.yaml") if p.is_file()), None)
-    if path is None:
-        raise UserError(f"no scale file {name}. {suggest(name, [known.stem for known in NAMED.glob('*.yaml')])}")
+    path = find_config(name, "scales")
     data = load_yaml(path)
     check_keys(ScaleConfig, data, path.name)
     return decode(ScaleConfig, {"name": path.stem, **data}, str(path))

@@ -17,8 +17,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from robocasa_lerobot.config_files import find_config
 from robocasa_lerobot.data.mixture_config import ROBOCASA365
-from robocasa_lerobot.errors import UserError, suggest
+from robocasa_lerobot.errors import UserError
 from robocasa_lerobot.settings import load_yaml, parse_overrides
 from robocasa_lerobot.training.config.experiment import ExperimentConfig, PhaseConfig
 from robocasa_lerobot.training.planning import skipped
@@ -26,7 +27,6 @@ from robocasa_lerobot.training.planning.skipped import EVALUATION, PARTIAL, Skip
 from robocasa_lerobot.training.weights.checkpoint import LAST, PRETRAINED, last_checkpoint
 
 FOLDER = "evaluations"
-NAMED = Path(__file__).parents[2] / "configs" / "evaluations"
 _LAUNCHER = ("RANK", "LOCAL_RANK", "WORLD_SIZE", "MASTER_ADDR", "MASTER_PORT", "ACCELERATE_", "TORCHELASTIC_")
 _POLL_SECONDS = 0.5
 _END_SECONDS = 30.0
@@ -91,10 +91,10 @@ def phase_evaluations(phase: PhaseConfig) -> list[PhaseEvaluation]:
             raise UserError(
                 f"phase {phase.name!r}: evaluation {text!r} ({error}); expected `NAME --setting=value ...`."
             ) from error
-        file = next((p for p in (Path(name), NAMED / f"{name}.yaml") if p.is_file()), None)
-        if file is None:
-            known = suggest(name, [path.stem for path in NAMED.glob("*.yaml")])
-            raise UserError(f"phase {phase.name!r}: no evaluation file {name}. {known}")
+        try:
+            file = find_config(name, "evaluations")
+        except UserError as error:
+            raise UserError(f"phase {phase.name!r}: evaluation {name}: {error}") from None
         if file.stem in [other.name for other in found]:
             raise UserError(f"phase {phase.name!r}: two evaluations would write to the folder {file.stem!r}.")
         found.append(PhaseEvaluation(file, tuple(settings)))

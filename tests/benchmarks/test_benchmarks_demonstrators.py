@@ -1,0 +1,121 @@
+"""The demonstrators' benchmark: its arithmetic, and that it goes on where it was stopped."""
+
+from __future__ import annotations
+
+import importlib
+import json
+import time
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import pytest
+
+from robocasa_lerobot.benchmark.tasks import facts_of
+from robocasa_lerobot.envs.tasks.registry import task_names
+
+BENCHMARKS = Path(__file__).parents[2] / "benchmarks"
+
+
+@pytest.fixture
+def bench(monkeypatch: pytest.MonkeyPatch) -> ModuleType:
+    monkeypatch.syspath_prepend(BENCHMARKS)
+    return importlib.import_module("demonstrators")
+
+
+def _trial(bench: ModuleType, task: str, split: str, seed: int, success: bool, steps: int = 200, **values: Any) -> Any:
+    known = {"action_noise": 0.0, "varied": True, "wall_s": 2.0, "workers": 2, "commit": "abc", "false_terms": ()}
+    reason = "" if success else f"the hand stayed {seed} cm away"
+    return bench.Trial(
+        **{**known, **values}, task=task, split=split, seed=seed, success=success, steps=steps, reason=reason
+    )
+
+
+def test_rates_times_and_reasons_are_counted(bench: ModuleType, tmp_path: Path) -> None:
+    report = importlib.import_module("demonstrators_report")
+    trials = [_trial(bench, "OpenDrawer", "target", seed, seed != 1) for seed in range(4)]
+    trials += [_trial(bench, "OpenDrawer", "pretrain", seed, False) for seed in range(2)]
+    tasks = report.summary(trials, {"OpenDrawer": True, "CloseDrawer": True, "OpenFridge": False})
+    drawer = tasks["OpenDrawer"]
+    assert (drawer["success_rate"], drawer["successes"], drawer["trials"]) == (0.5, 3, 6)
+    assert drawer["low"] < 0.5 < drawer["high"]
+    assert drawer["splits"]["target"]["success_rate"] == 0.75
+    assert drawer["splits"]["pretrain"]["success_rate"] == 0.0
+    assert drawer["seconds_median"] == 10.0
+    assert drawer["times_human"] == round(10.0 / drawer["human_seconds"], 3)
+    assert drawer["failures"] == {"the hand stayed # cm away": 3}
+    assert drawer["failed_seeds"] == [["pretrain", 0], ["pretrain", 1], ["target", 1]]
+    assert tasks["OpenFridge"] == {
+        "demonstrator": False, "success_rate": None, "successes": 0, "trials": 0,
+        "human_seconds": facts_of("OpenFridge").human_seconds,
+    }  # fmt: skip
+    found = report.ratios(tasks)
+    assert found["mean_success"] == found["worst_task"] == 0.5
+    assert found["mean_success_counting_missing_as_0"] == pytest.approx(0.5 / 3)
+    assert found["tasks_with_demonstrator"] == pytest.approx(2 / 3)
+    assert bench.per_hour(trials) == {"one_process": 900.0, "all_processes": 1800.0}
+    body = {"tasks": tasks, "ratios": found, "demonstrations_per_hour": bench.per_hour(trials)}
+    assert "OpenDrawer" in report.text(body)
+    assert "no demonstrator: OpenFridge" in report.text(body)
+    report.draw(tasks, tmp_path / "rates.png")
+    assert (tmp_path / "rates.png").stat().st_size > 10_000
+
+
+def test_finished_trials_are_kept_replaced_and_forgotten(
+    bench: ModuleType, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    file, out = tmp_path / "trials.jsonl", tmp_path / "result.json"
+    made: list[tuple[Any, ...]] = []
+
+    def run(jobs: list[Any], path: Path, workers: int) -> None:
+        made.extend(jobs)
+        with path.open("a") as stream:
+            for task, split, seed, noise, varied in jobs:
+                trial = _trial(bench, task, split, seed, True, action_noise=noise, varied=varied)
+                stream.write(json.dumps(vars(trial)) + "\n")
+
+    monkeypatch.setattr(bench, "run", run)
+    monkeypatch.setattr(bench, "draw", lambda *_: None)
+    options = ["--seeds", "2", "--trials", str(file), "--out", str(out)]
+    assert bench.main(["--tasks", "OpenDrawer,CloseDrawer", *options]) == 0
+    assert len(made) == 8
+    assert {seed for _, _, seed, _, _ in made} == {100_000, 100_001}
+    file.write_text(file.read_text()[:-9])  # killed while it wrote the last line
+    made.clear()
+    bench._mend(file)
+    bench.main(["--tasks", "OpenDrawer,CloseDrawer", *options])
+    assert len(made) == 1
+    made.clear()
+    bench.main(["--tasks", "OpenDrawer", "--fresh", *options])
+    assert sorted(made) == sorted(("OpenDrawer", s, n, 0.0, True) for s in bench.SPLITS for n in (100_000, 100_001))
+    result = json.loads(out.read_text())
+    assert result["trials"] == 8
+    assert set(result["tasks"]) == set(task_names())
+    assert result["tasks"]["CloseDrawer"]["success_rate"] == 1.0
+    assert {"machine", "versions", "date", "ratios"} <= set(result)
+    page = out.with_suffix(".md").read_text()
+    assert "|CloseDrawer|4/4|100%|" in page
+    assert "|OpenFridge|" not in page
+
+
+def test_whatever_goes_wrong_is_a_failed_trial(bench: ModuleType, monkeypatch: pytest.MonkeyPatch) -> None:
+    def hangs(*_: Any, **__: Any) -> None:
+        time.sleep(5.0)
+
+    def breaks(*_: Any, **__: Any) -> None:
+        raise IndexError("list index out of range")
+
+    monkeypatch.setattr(bench, "LONGEST_S", 1)
+    for replacement, reason in ((hangs, "TimeoutError: no end after 1 s"), (breaks, "IndexError: list index")):
+        monkeypatch.setattr(bench, "record_episode", replacement)
+        trial = bench.attempt(("CloseDrawer", "target", 0, 0.0, True), 1, "abc")
+        assert not trial.success
+        assert trial.reason.startswith(reason)
+        assert trial.wall_s < 4.0
+
+
+def test_published_lengths_are_those_of_the_facts(shared: Path) -> None:
+    lines = (shared / "facts" / "tasks.csv").read_text().splitlines()
+    column = lines[0].split(",").index("human_episode_seconds")
+    facts = {fields[0]: float(fields[column]) for fields in (line.split(",") for line in lines[1:])}
+    assert {name: facts_of(name).human_seconds for name in facts} == facts

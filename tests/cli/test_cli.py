@@ -1,0 +1,92 @@
+"""The console command: every subcommand helps with an example, and mistakes are answered in one sentence."""
+
+from __future__ import annotations
+
+import argparse
+import re
+import subprocess
+import sys
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+
+from robocasa_lerobot import __version__, cli
+from robocasa_lerobot.errors import UserError
+
+REPOSITORY = Path(__file__).parents[2]
+
+
+@pytest.mark.parametrize("name", cli.SUBCOMMANDS)
+def test_help_shows_an_example(name: str, capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as exit_:
+        cli.main([name, "--help"])
+    assert exit_.value.code == 0
+    shown = capsys.readouterr().out
+    assert f"usage: robocasa-lerobot {name}" in shown
+    assert "example:" in shown
+    assert f"robocasa-lerobot {name}" in shown.split("example:")[1]
+
+
+@pytest.mark.parametrize("name", cli.SUBCOMMANDS)
+def test_example_parses(name: str) -> None:
+    """The example of the help text is a command line that the parser accepts."""
+    parser = cli.build_parser([name])
+    example = str(sys.modules[cli.SUBCOMMANDS[name].module].EXAMPLE)  # type: ignore[attr-defined]
+    for line in example.strip().splitlines():
+        words = line.split("#")[0].split()
+        assert words[:2] == ["robocasa-lerobot", name]
+        args, settings = parser.parse_known_args(words[1:])
+        assert callable(args.run)
+        assert not settings or args.takes_settings
+        assert all(re.match(r"--[\w.]+=", setting) for setting in settings)
+        for path in re.findall(r"configs/\S+", line):
+            assert (REPOSITORY / path).is_file(), f"{path} of the example does not exist"
+
+
+def test_no_command_lists_them(capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.main([]) == 0
+    shown = capsys.readouterr().out
+    for name, subcommand in cli.SUBCOMMANDS.items():
+        assert name in shown
+        assert subcommand.summary.split()[0] in shown
+
+
+def test_version(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as exit_:
+        cli.main(["--version"])
+    assert exit_.value.code == 0
+    assert __version__ in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("typed", "meant"), [("convret", "convert"), ("demo", "demos"), ("Doctor", "doctor"), ("evaluate", "eval")]
+)
+def test_misspelt_command_names_the_closest(typed: str, meant: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.main([typed]) == 2
+    assert f"'{meant}'" in capsys.readouterr().err
+
+
+def test_users_mistake_is_one_sentence_and_status_2(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def run(args: argparse.Namespace) -> int:
+        raise UserError("found a cat, expected a dog; call a vet.")
+
+    def configure(parser: argparse.ArgumentParser) -> None:
+        parser.add_argument("--animal")
+
+    module = SimpleNamespace(EXAMPLE="robocasa-lerobot vet", configure=configure, run=run)
+    monkeypatch.setitem(sys.modules, "a_vet", module)
+    monkeypatch.setitem(cli.SUBCOMMANDS, "vet", cli.Subcommand("a_vet", "look after animals"))
+    assert cli.main(["vet", "--animal", "cat"]) == 2
+    printed = capsys.readouterr()
+    assert printed.err == "robocasa-lerobot vet: found a cat, expected a dog; call a vet.\n"
+    assert printed.out == ""
+
+
+def test_console_script_is_installed() -> None:
+    done = subprocess.run(
+        [sys.executable, "-m", "robocasa_lerobot.cli", "--version"], capture_output=True, text=True, check=False
+    )
+    assert (done.returncode, done.stdout) == (0, f"robocasa-lerobot {__version__}\n")

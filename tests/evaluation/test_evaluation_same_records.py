@@ -1,0 +1,185 @@
+"""The same plan gives the same trial records, times aside, however it is run: that is what makes them comparable."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import pytest
+from tiny_checkpoint import SIZE
+
+from robocasa_lerobot.cli import main
+from robocasa_lerobot.errors import UserError
+from robocasa_lerobot.evaluation.config.evaluation import EvaluationConfig
+from robocasa_lerobot.evaluation.config.loader import load_config
+from robocasa_lerobot.evaluation.planning.trials import trial_seed
+from robocasa_lerobot.evaluation.records.results import TRIALS_FILE, TrialRecord, read_results
+from robocasa_lerobot.evaluation.run import engine
+from robocasa_lerobot.evaluation.run.merging import merge
+
+ROOT = Path(__file__).parents[2]
+TESTS = str(ROOT / "tests" / "support")
+
+
+def arguments(out: Path, **changes: Any) -> list[str]:
+    values = {
+        "env.factory": "evaluation_env:SlideEnv",
+        "env.tasks": "Slide,Push",
+        "env.image_size": SIZE,
+        "policy": "random,zero",
+        "trials": 5,
+        "videos": 0,
+        "workers": 1,
+        "report": "false",
+        **changes,
+    }
+    return [f"--out={out}", *(f"--{name}={value}" for name, value in values.items())]
+
+
+def evaluate(out: Path, **changes: Any) -> list[TrialRecord]:
+    return engine.evaluate(engine.prepare(load_config(EvaluationConfig, arguments(out, **changes))))
+
+
+def comparable(records: Sequence[TrialRecord]) -> list[dict[str, Any]]:
+    return [record.comparable() for record in sorted(records, key=lambda record: record.key)]
+
+
+@pytest.fixture
+def plain(tmp_path: Path) -> list[dict[str, Any]]:
+    return comparable(evaluate(tmp_path / "plain"))
+
+
+def test_shards_joined_are_the_whole(tmp_path: Path, plain: list[dict[str, Any]]) -> None:
+    out = tmp_path / "out"
+    assert main(["eval", *arguments(out), "--shard=2/3", "--videos=1"]) == 0
+    whole = engine.prepare(load_config(EvaluationConfig, arguments(out)))
+    with pytest.raises(UserError, match=r"13 of 20 trials are recorded in no shard .* run the shards again"):
+        merge(whole)
+    for shard in (1, 3):
+        assert main(["eval", *arguments(out), f"--shard={shard}/3"]) == 0
+    assert main(["eval", *arguments(out), "--merge"]) == 0
+    merged = read_results(out)
+    assert comparable(merged.trials) == plain
+    films = [record.video for record in merged.trials if record.video]
+    assert films
+    assert all((out / film).is_file() for film in films)
+    info = json.loads((out / "eval_info_random.json").read_text())
+    assert info["overall"]["n_episodes"] == 10
+    successes = {(r.task, r.trial): r.success for r in merged.trials if r.label == "random"}
+    assert {g["task_group"]: g["metrics"]["successes"] for g in info["per_task"]} == {
+        task: [successes[task, trial] for trial in range(5)] for task in ("Slide", "Push")
+    }
+    # A shard of other settings is refused, with what differs.
+    (out / TRIALS_FILE).unlink()
+    other = engine.prepare(load_config(EvaluationConfig, arguments(out, seed=4)))
+    with pytest.raises(UserError, match="seed: 0 in the file, 4 now"):
+        merge(other)
+
+
+def kill_and_rerun(out: Path, kills: int) -> list[TrialRecord]:
+    """Evaluate in a process that is killed each time it has recorded some more trials, until it gets through."""
+    command = [
+        sys.executable,
+        str(ROOT / "eval.py"),
+        *arguments(out, workers=2, **{"env.tasks": "Slide+slow"}, trials=12),
+    ]
+    environment = {**os.environ, "PYTHONPATH": TESTS}
+    path = out / TRIALS_FILE
+    for _ in range(kills):
+        before = path.read_bytes().count(b"\n") if path.exists() else 0
+        process = subprocess.Popen(command, env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        deadline = time.monotonic() + 120
+        while process.poll() is None and (path.read_bytes().count(b"\n") if path.exists() else 0) <= before + 1:
+            assert time.monotonic() < deadline
+            time.sleep(0.005)
+        process.send_signal(signal.SIGKILL)
+        process.wait()
+    subprocess.run(command, env=environment, capture_output=True, timeout=300, check=True)
+    lines = [json.loads(line) for line in path.read_text().splitlines()]
+    keys = [(line["label"], line["task"], line["trial"]) for line in lines if line["kind"] == "trial"]
+    assert len(keys) == len(set(keys)) == 24, "a recorded trial ran again"
+    return read_results(out).trials
+
+
+@pytest.mark.parametrize("kills", [1, pytest.param(10, marks=pytest.mark.slow)])
+def test_killed_and_given_again(tmp_path: Path, kills: int) -> None:
+    whole = evaluate(tmp_path / "whole", **{"env.tasks": "Slide+slow"}, trials=12)
+    assert comparable(kill_and_rerun(tmp_path / "out", kills)) == comparable(whole)
+
+
+@pytest.mark.parametrize("devices", ["cpu", pytest.param("cpu,cpu", marks=pytest.mark.slow)])
+def test_workers_policy_servers_and_their_number_change_nothing(
+    tmp_path: Path,
+    checkpoint: Path,
+    devices: str,
+) -> None:
+    own: dict[str, Any] = {
+        "policy": checkpoint,
+        "policy.label": "tiny",
+        "env.tasks": "Slide",
+        "trials": 4,
+    }
+    in_workers = evaluate(tmp_path / "a", **own)
+    in_servers = evaluate(
+        tmp_path / "b", **{**own, "workers": 2}, **{"policy.placement": "servers", "policy.devices": devices}
+    )
+    assert [r.error for r in in_workers + in_servers] == [None] * 8
+    assert comparable(in_workers) == comparable(in_servers)
+    assert len({r.trajectory for r in in_workers}) == 4
+    assert all(r.seconds.policy > 0 for r in in_workers + in_servers)
+    assert all(r.seconds.waiting > 0 for r in in_servers)
+    # Executed steps are a setting of the outcome: another number is another evaluation.
+    with pytest.raises(UserError, match="executed_steps: None in the file, 4 now"):
+        evaluate(tmp_path / "b", **own, executed_steps=4)
+
+
+def test_slurm_runs_the_shards_and_joins_them(
+    tmp_path: Path,
+    slurm: Path,
+    plain: list[dict[str, Any]],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    out = tmp_path / "out"
+    monkeypatch.setenv("PYTHONPATH", TESTS)
+    command = ["eval", *arguments(out), "--executor", "slurm", "--slurm.partition", "cpu", "--slurm.time", "00:10:00"]
+    assert main([*command, "--shards", "2"]) == 0
+    assert comparable(read_results(out).trials) == plain
+    assert "array=0-1" in (slurm / "1.script").read_text()
+    assert main(command) == 2, "the number of shards is needed"
+
+
+# Ten in a hundred trials have a fault, in both attempts.
+FAULTS = {1: "crash", 5: "hang", 9: "sigkill", 14: "nan"}
+REASONS = {
+    "crash": ("crashed", "RuntimeError: the block fell off"),
+    "hang": ("hung", "no progress for 3 s"),
+    "sigkill": ("crashed", "ended by SIGKILL"),
+    "nan": ("diverged", "proprioception is not finite after step 2"),
+}
+
+
+def test_faulty_trials_cost_only_themselves(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    own: dict[str, Any] = {"policy": "zero", "env.tasks": "Slide", "trials": 40, "workers": 2, "stall_seconds": 3}
+    healthy = evaluate(tmp_path / "healthy", **own)
+    # Only trials that get to their second step can be faulty there.
+    chosen = dict(zip([r.trial for r in healthy if r.steps > 2], FAULTS.values(), strict=False))
+    faulty = {str(trial_seed(0, "Slide", trial)): kind for trial, kind in chosen.items()}
+    monkeypatch.setenv("SLIDE_FAULTY_SEEDS", json.dumps(faulty))
+    records = evaluate(tmp_path / "out", **own)
+    assert len(records) == 40
+    for record, well in zip(records, healthy, strict=True):
+        if record.trial not in chosen:
+            assert record.comparable() == well.comparable()
+            continue
+        outcome, words = REASONS[chosen[record.trial]]
+        assert (record.outcome, record.first_outcome, record.attempts) == (outcome, outcome, 2)
+        assert words in str(record.error)
+        assert words in str(record.first_error)
+        assert not record.success
