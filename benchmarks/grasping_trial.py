@@ -7,13 +7,15 @@ from dataclasses import dataclass
 import mujoco
 import numpy as np
 
+from robocasa_lerobot.demos.planning.grasps import GraspPose, grasp_poses_as_it_lies
 from robocasa_lerobot.envs.kitchens.materials import MaterialPalette, load_style, style_ids
 from robocasa_lerobot.envs.objects import catalogue
-from robocasa_lerobot.envs.objects.grasping import GraspPose, grasp_poses_as_it_lies
 from robocasa_lerobot.envs.objects.shapes import add_object
+from robocasa_lerobot.envs.physics.options import apply_simulation_options
 from robocasa_lerobot.envs.robots.panda_omron import names
 from robocasa_lerobot.envs.robots.panda_omron.bodies import BODIES
-from robocasa_lerobot.envs.robots.panda_omron.model import _add_meshes, apply_simulation_options
+from robocasa_lerobot.envs.robots.panda_omron.model import _add_meshes
+from robocasa_lerobot.envs.robots.panda_omron.robot import PANDA_OMRON
 from robocasa_lerobot.envs.robots.panda_omron.shapes import _HAND_MESH_QUAT, _MATERIALS, _fingers, _mesh
 
 SLIDES = ("slide_x", "slide_y", "slide_z")
@@ -112,7 +114,7 @@ class GripperTrial:
         mujoco.mju_quat2Mat(turn, self.rest[3:7])
         return [
             GraspPose(pose.position + self.rest[:3], pose.rotation, pose.width, pose.score)
-            for pose in grasp_poses_as_it_lies(self.item, turn.reshape(3, 3), POSES)
+            for pose in grasp_poses_as_it_lies(self.item, turn.reshape(3, 3), PANDA_OMRON.gripper, POSES)
         ]
 
     def run(self) -> Outcome:

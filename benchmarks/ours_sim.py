@@ -19,8 +19,8 @@ from peers import sim_loop
 import robocasa_lerobot
 from robocasa_lerobot import contract
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
-from robocasa_lerobot.envs.robots.panda_omron.control.controller import RobotController
-from robocasa_lerobot.envs.robots.panda_omron.control.step import control_step
+from robocasa_lerobot.envs.robots.control_step import control_step
+from robocasa_lerobot.envs.robots.panda_omron.control.controller import PandaOmronController
 
 TASK = "PickPlaceCounterToSink"
 SPLIT_PASSES = 3
@@ -109,7 +109,7 @@ class KitchenSimulator:
     def _controlled_physics(self, seed: int, actions: NDArray[np.float64]) -> tuple[float, float]:
         self.reset(seed, same_scene=True)
         model, data = self._env.model, self._env.data
-        controller = RobotController(model, data)
+        controller = PandaOmronController(model, data)
         controller.set_state(self._env.get_state().controller)
         held = copy.copy(data)
         controlled = physics = 0.0

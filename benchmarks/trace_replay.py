@@ -19,16 +19,12 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from robocasa_lerobot.envs.robots.panda_omron.control.controller import RobotController
-from robocasa_lerobot.envs.robots.panda_omron.control.step import control_step
-from robocasa_lerobot.envs.robots.panda_omron.model import (
-    SPAWN_POSITION,
-    add_robot,
-    apply_simulation_options,
-    place_base,
-    set_home,
-)
+from robocasa_lerobot.envs.physics.options import apply_simulation_options
+from robocasa_lerobot.envs.robots.control_step import control_step
+from robocasa_lerobot.envs.robots.panda_omron.control.controller import PandaOmronController
+from robocasa_lerobot.envs.robots.panda_omron.model import SPAWN_POSITION
 from robocasa_lerobot.envs.robots.panda_omron.proprioception import read_observations
+from robocasa_lerobot.envs.robots.panda_omron.robot import PANDA_OMRON
 from robocasa_lerobot.envs.scene.scene import SETTLE_STEPS
 from robocasa_lerobot.errors import UserError
 from robocasa_lerobot.progress import Bar
@@ -139,7 +135,7 @@ def empty_room(multiccd: bool) -> mujoco.MjModel:
     if not multiccd:
         spec.option.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_MULTICCD)
     spec.worldbody.add_geom(name="floor", type=mujoco.mjtGeom.mjGEOM_PLANE, size=(20, 20, 0.1))
-    add_robot(spec, "fast")
+    PANDA_OMRON.add_to(spec, "fast")
     return spec.compile()
 
 
@@ -149,10 +145,10 @@ def replay(model: mujoco.MjModel, actions: Array, perturbation: float = 0.0) -> 
     `perturbation` radians are added to the second arm joint before the first action.
     """
     data = mujoco.MjData(model)
-    set_home(model, data)
-    place_base(model, data, 0.0, 0.0, 0.0)
+    PANDA_OMRON.set_home(model, data)
+    PANDA_OMRON.place_base(model, data, 0.0, 0.0, 0.0)
     mujoco.mj_forward(model, data)
-    controller = RobotController(model, data)
+    controller = PandaOmronController(model, data)
     controller.reset()
     for _ in range(SETTLE_STEPS):
         control_step(model, data, controller, np.zeros(12))

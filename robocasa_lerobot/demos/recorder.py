@@ -12,7 +12,6 @@ from robocasa_lerobot import contract
 from robocasa_lerobot.demos.demonstrator import SkillError, demonstrate
 from robocasa_lerobot.demos.motion_style import PLAIN, Variety
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
-from robocasa_lerobot.envs.robots.panda_omron.proprioception import read_observations
 
 Array = NDArray[np.float64]
 
@@ -65,7 +64,7 @@ class _Buffer:
         self.states.append(np.concatenate([[data.time], data.qpos, data.qvel]))
         self.actions.append(contract.stored_to_hdf5(action))
         self.rewards.append(float(success))
-        for key, value in read_observations(env.model, data).items():
+        for key, value in env.robot.read_observations(env.model, data).items():
             self.observations.setdefault(key, []).append(np.array(value, dtype=np.float64))
         if images:
             for camera in env.cameras:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from robocasa_lerobot.demos.demonstrator import can_demonstrate
 from robocasa_lerobot.demos.recorder import record_episode
-from robocasa_lerobot.envs.check import CHECK_SEEDS, check_task
+from robocasa_lerobot.envs.checks.tasks import CHECK_SEEDS, check_task
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.tasks.registry import get_task
 from robocasa_lerobot.jobs.as_completed import as_they_end

@@ -1,4 +1,4 @@
-"""The kitchen as a Gymnasium env: a PandaOmron, one task, three cameras, 20 control steps per second."""
+"""The kitchen as a Gymnasium env: a robot, one task, three cameras, 20 control steps per second."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ from numpy.typing import NDArray
 
 from robocasa_lerobot import contract, gl
 from robocasa_lerobot.envs.kitchens.splits import scene_ids, without
+from robocasa_lerobot.envs.physics.whole_state import read_physics
 from robocasa_lerobot.envs.pictures import Pictures, picture_spaces, segmentation_names, take_pictures
 from robocasa_lerobot.envs.rendering import SceneRenderer
-from robocasa_lerobot.envs.robots.panda_omron.camera_noise import CameraNoise, choose_noise
-from robocasa_lerobot.envs.robots.panda_omron.cameras import check_camera_names
-from robocasa_lerobot.envs.robots.panda_omron.control.controller import RobotController
-from robocasa_lerobot.envs.robots.panda_omron.control.physics import read_physics
-from robocasa_lerobot.envs.robots.panda_omron.control.step import control_step
-from robocasa_lerobot.envs.robots.panda_omron.proprioception import read_state
+from robocasa_lerobot.envs.robots.camera_noise import CameraNoise, choose_noise
+from robocasa_lerobot.envs.robots.cameras import check_camera_names
+from robocasa_lerobot.envs.robots.control_step import control_step
+from robocasa_lerobot.envs.robots.panda_omron.robot import PANDA_OMRON
+from robocasa_lerobot.envs.robots.robot import Controller, Robot
 from robocasa_lerobot.envs.scene.build import RENDER_PRESETS, build_scene
 from robocasa_lerobot.envs.scene.reset_noise import InitialNoise, add_initial_noise
 from robocasa_lerobot.envs.scene.scene import Scene
@@ -54,7 +54,7 @@ class KitchenEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         split: "target" or "pretrain".
         render_preset: "fast" (no shadows) or "quality".
         image_size: height and width of the pictures, pixels.
-        cameras: names of the cameras that are observed, of `envs.cameras.CAMERA_SETS`.
+        cameras: names of the cameras that are observed, of the robot's `camera_sets`.
         horizon: control steps until truncation; the task's own if None.
         terminate_on_success: end the episode at the first success.
         render_mode: "rgb_array" or None.
@@ -67,8 +67,9 @@ class KitchenEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         initial_noise: on the robot's start, in place of RoboCasa's 0.02 rad on the arm's joints.
         depth: observe depth.
         segmentation: observe which geom each pixel shows.
-        layouts: ids of layouts, or of groups of them (negative, see `scene.kitchens`), instead of the split's own.
+        layouts: ids of layouts, or of groups of them (negative, see `kitchens.splits`), instead of the split's own.
         styles: the same for styles. States and seeds go with them: the same seed elsewhere is another scene.
+        robot: that acts in it.
 
     Raises:
         UnknownNameError: no such task, split, preset, render mode, camera, camera set, layout or style.
@@ -97,8 +98,9 @@ class KitchenEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         segmentation: bool = False,
         layouts: Sequence[int] | None = None,
         styles: Sequence[int] | None = None,
+        robot: Robot = PANDA_OMRON,
     ) -> None:
-        self.declaration = get_task(task)
+        self.declaration, self.robot = get_task(task), robot
         # Fails here, not at the first reset, for a split without kitchens.
         chosen = scene_ids(split, layouts=layouts, styles=styles)
         without(chosen, self.declaration.needs, self.declaration.exclude_styles)
@@ -116,13 +118,13 @@ class KitchenEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         self.split = split
         self.render_preset = render_preset
         self.image_size = image_size
-        self.cameras = check_camera_names(cameras, camera_set)
+        self.cameras = check_camera_names(cameras, robot.cameras(camera_set))
         self.camera_set = camera_set
         if novel_language and not self.declaration.paraphrases:
             raise UserError(f"novel_language: task {task} declares no paraphrases.")
         self.novel_language = novel_language
         self.initial_noise = initial_noise
-        self.camera_noise = choose_noise(camera_noise, camera_set)
+        self.camera_noise = choose_noise(camera_noise, robot.camera_noise.get(camera_set))
         self._kinds = {"depth": depth, "segmentation": segmentation}
         self.horizon = horizon if horizon is not None else self.declaration.horizon
         self._max_episode_steps = self.horizon  # where LeRobot looks
@@ -141,7 +143,7 @@ class KitchenEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         self.action_space = gymnasium.spaces.Box(-1.0, 1.0, (contract.ACTION_SIZE,), np.float32)
         self._scene: Scene | None = None
         self._data: mujoco.MjData | None = None
-        self._controller: RobotController | None = None
+        self._controller: Controller | None = None
         self._renderer: SceneRenderer | None = None
         self._pictures: Pictures = {}
         self._steps = 0
@@ -248,7 +250,7 @@ class KitchenEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         One entry for each geom and a last one, "background", for id -1: `np.array(names)[segmentation]`. Ids change
         with the scene, names do not.
         """
-        return segmentation_names(self.model)
+        return segmentation_names(self.model, self.robot.names.base)
 
     def close(self) -> None:
         """Free the OpenGL context."""
@@ -265,6 +267,7 @@ class KitchenEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
             self.camera_set,
             self.camera_noise,
             self._kitchens,
+            self.robot,
         )
         if self.novel_language:
             wordings = self._scene.paraphrases
@@ -306,7 +309,7 @@ class KitchenEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
                 self._pictures = take_pictures(self._open_renderer(), self.data, self.cameras, **self._kinds)
                 self.rendering_seconds += time.perf_counter() - started
             pictures = {key: dict(by_camera) for key, by_camera in self._pictures.items()}
-        return {**pictures, "agent_pos": read_state(self.model, self.data)}
+        return {**pictures, "agent_pos": self.robot.read_state(self.model, self.data)}
 
     def _info(self) -> dict[str, Any]:
         terms: dict[str, bool] = {}

@@ -11,7 +11,6 @@ import numpy as np
 
 from robocasa_lerobot.envs.kitchens.surroundings import SURROUNDINGS
 from robocasa_lerobot.envs.rendering import SceneRenderer
-from robocasa_lerobot.envs.robots.panda_omron.names import ROBOT_BASE
 
 BACKGROUND = "background"
 Pictures = dict[str, dict[str, Any]]
@@ -53,13 +52,13 @@ def take_pictures(
     return taken
 
 
-def segmentation_names(model: mujoco.MjModel) -> tuple[str, ...]:
+def segmentation_names(model: mujoco.MjModel, robot_base: str) -> tuple[str, ...]:
     """What each geom id of a segmentation belongs to (ngeom + 1,): a fixture, an object, a body of the robot,
     or what is around the room.
 
     The last entry is the background's, which id -1 finds: `numpy.array(names)[segmentation]` is right as it stands.
     """
-    robot = model.body(ROBOT_BASE).id
+    robot = model.body(robot_base).id
     owners = []
     for geom in range(model.ngeom):
         body = int(model.geom_bodyid[geom])

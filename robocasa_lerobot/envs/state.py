@@ -9,8 +9,8 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from robocasa_lerobot.envs.robots.panda_omron.control.controller import RobotController
-from robocasa_lerobot.envs.robots.panda_omron.control.physics import physics_size, write_physics
+from robocasa_lerobot.envs.physics.whole_state import physics_size, write_physics
+from robocasa_lerobot.envs.robots.robot import Controller
 from robocasa_lerobot.errors import UserError
 
 
@@ -62,7 +62,7 @@ class KitchenState:
         )
 
 
-def restore(model: mujoco.MjModel, data: mujoco.MjData, controller: RobotController, state: KitchenState) -> None:
+def restore(model: mujoco.MjModel, data: mujoco.MjData, controller: Controller, state: KitchenState) -> None:
     """Put `data` and `controller` into `state`, positions and velocities evaluated.
 
     Raises:

@@ -11,7 +11,7 @@ from PIL import Image
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.kitchens.footprints import Footprint
 from robocasa_lerobot.envs.rendering import SceneRenderer
-from robocasa_lerobot.envs.scene.roles import footprint
+from robocasa_lerobot.envs.scene.robot_poses import footprint
 from robocasa_lerobot.envs.scene.scene import Scene
 
 _NEAREST_M, _FARTHEST_M, _MARGIN_M, _EYE_M = 1.4, 3.0, 0.2, 1.5
@@ -53,15 +53,15 @@ def render_task(
 def visitor_camera(scene: Scene) -> mujoco.MjvCamera:
     """A free camera at eye height behind and beside the robot, as far away as the room and its furniture allow."""
     camera = mujoco.MjvCamera()
-    towards = np.array([np.cos(scene.robot.yaw), np.sin(scene.robot.yaw)])
-    camera.lookat = [scene.robot.x + 0.25 * towards[0], scene.robot.y + 0.25 * towards[1], 0.95]
+    towards = np.array([np.cos(scene.robot_pose.yaw), np.sin(scene.robot_pose.yaw)])
+    camera.lookat = [scene.robot_pose.x + 0.25 * towards[0], scene.robot_pose.y + 0.25 * towards[1], 0.95]
     camera.elevation = -14.0
     spots = [
-        (_clear_distance(scene, camera, scene.robot.yaw + np.radians(side)), -abs(side), side)
+        (_clear_distance(scene, camera, scene.robot_pose.yaw + np.radians(side)), -abs(side), side)
         for side in (28.0, -28.0, 55.0, -55.0, 80.0, -80.0)
     ]
     camera.distance, _, side = max(spots)
-    camera.azimuth = float(np.degrees(scene.robot.yaw)) + side
+    camera.azimuth = float(np.degrees(scene.robot_pose.yaw)) + side
     return camera
 
 

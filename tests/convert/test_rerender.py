@@ -230,8 +230,9 @@ def test_cameras_are_moved_and_added_in_the_scene() -> None:
 
 
 def test_cotraining_set_is_the_environments_own() -> None:
+    from robocasa_lerobot.envs.robots.cameras import apply_camera_configs
     from robocasa_lerobot.envs.robots.panda_omron import names
-    from robocasa_lerobot.envs.robots.panda_omron.cameras import apply_camera_configs, cameras_of_set
+    from robocasa_lerobot.envs.robots.panda_omron.robot import PANDA_OMRON
 
     bodies = ""
     for body, cameras in ((names.SUPPORT, contract.CAMERAS[:2]), (names.HAND, contract.CAMERAS[2:])):
@@ -241,7 +242,7 @@ def test_cotraining_set_is_the_environments_own() -> None:
     ours = mujoco.MjModel.from_xml_string(with_cameras(xml, camera_set("cotraining")))
     model = mujoco.MjModel.from_xml_string(xml)
     apply_camera_configs(model, camera_set("cotraining"))
-    for camera in cameras_of_set("cotraining"):
+    for camera in PANDA_OMRON.cameras("cotraining"):
         if camera.name not in contract.CAMERAS:
             continue
         index = model.camera(camera.name).id

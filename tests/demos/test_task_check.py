@@ -8,7 +8,7 @@ import pytest
 
 from robocasa_lerobot import cli
 from robocasa_lerobot.demos import task_check
-from robocasa_lerobot.envs.check import check_task
+from robocasa_lerobot.envs.checks.tasks import check_task
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.kitchens.splits import SPLITS
 from robocasa_lerobot.envs.tasks.registry import task_names

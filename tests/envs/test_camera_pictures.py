@@ -18,9 +18,10 @@ from robocasa_lerobot.envs.kitchens.surroundings import SURROUNDINGS
 from robocasa_lerobot.envs.pictures import BACKGROUND
 from robocasa_lerobot.envs.projection import back_project, camera_matrix, project
 from robocasa_lerobot.envs.rendering import canvas
+from robocasa_lerobot.envs.robots.camera_noise import CameraNoise
+from robocasa_lerobot.envs.robots.cameras import apply_camera_configs
 from robocasa_lerobot.envs.robots.panda_omron.bodies import BODIES
-from robocasa_lerobot.envs.robots.panda_omron.camera_noise import CameraNoise
-from robocasa_lerobot.envs.robots.panda_omron.cameras import CAMERA_SETS, apply_camera_configs
+from robocasa_lerobot.envs.robots.panda_omron.cameras import CAMERA_SETS
 from robocasa_lerobot.envs.scene.build import RENDER_PRESETS
 
 pytestmark = pytest.mark.render

@@ -12,17 +12,12 @@ from robot_arena import Arena, arena_spec
 
 from robocasa_lerobot import contract
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
+from robocasa_lerobot.envs.physics.options import apply_simulation_options
 from robocasa_lerobot.envs.projection import back_project, camera_matrix, project, raw_depth
-from robocasa_lerobot.envs.robots.panda_omron.camera_noise import CAMERA_NOISE, CameraNoise, add_camera_noise
-from robocasa_lerobot.envs.robots.panda_omron.cameras import (
-    CAMERA_SETS,
-    add_cameras,
-    apply_camera_configs,
-    camera_configs,
-    cameras_of_set,
-    check_camera_names,
-)
-from robocasa_lerobot.envs.robots.panda_omron.model import add_robot, apply_simulation_options
+from robocasa_lerobot.envs.robots.camera_noise import CameraNoise, add_camera_noise
+from robocasa_lerobot.envs.robots.cameras import add_cameras, apply_camera_configs, camera_configs, check_camera_names
+from robocasa_lerobot.envs.robots.panda_omron.cameras import CAMERA_NOISE, CAMERA_SETS
+from robocasa_lerobot.envs.robots.panda_omron.robot import PANDA_OMRON
 from robocasa_lerobot.envs.scene.build import build_scene
 from robocasa_lerobot.envs.scene.scene import Scene
 from robocasa_lerobot.envs.tasks.registry import get_task
@@ -109,7 +104,7 @@ def test_poses_in_the_world_follow_their_bodies(camera_set: str, name: str) -> N
     """At the noise-free initial pose with the base at the origin, and with the torso raised by 0.2 m."""
     spec = mujoco.MjSpec()
     apply_simulation_options(spec)
-    add_robot(spec, "fast", camera_set=camera_set)
+    PANDA_OMRON.add_to(spec, "fast", camera_set)
     arena = Arena.settled(spec.compile(), steps=0)
     pos, _, body, _ = GOLDEN[camera_set][name]
     low = arena.data.camera(name).xpos.copy()
@@ -156,13 +151,13 @@ def test_noise_has_the_distribution_of_the_facts(camera_set: str) -> None:
     spec = mujoco.MjSpec()
     for body in (SUPPORT, HAND):
         spec.worldbody.add_body(name=body)
-    add_cameras(spec, camera_set)
+    add_cameras(spec, PANDA_OMRON.cameras(camera_set))
     rng = np.random.default_rng(1)
     shifts: dict[str, list[np.ndarray]] = {name: [] for name in GOLDEN[camera_set]}
     angles: dict[str, list[np.ndarray]] = {name: [] for name in GOLDEN[camera_set]}
     for _ in range(4000):
-        add_camera_noise(spec, camera_set, CAMERA_NOISE[camera_set], rng)
-        for camera in cameras_of_set(camera_set):
+        add_camera_noise(spec, PANDA_OMRON.cameras(camera_set), CAMERA_NOISE[camera_set], rng)
+        for camera in PANDA_OMRON.cameras(camera_set):
             found = spec.camera(camera.name)
             shifts[camera.name].append(found.pos - camera.pos)
             quat = np.array(camera.quat) / np.linalg.norm(camera.quat)
@@ -213,7 +208,7 @@ def test_configs_apply_to_models_and_specs_bit_for_bit(camera_set: str, noisy: b
         # Of a lens it is only for information: MuJoCo computes it from lengths in single precision.
         np.testing.assert_allclose(found.cam_fovy, recorded.model.cam_fovy, rtol=1e-7)
         np.testing.assert_array_equal(found.cam_intrinsic[has_lens], recorded.model.cam_intrinsic[has_lens])
-        assert camera_configs(found) == camera_configs(recorded.model)
+        assert camera_configs(found, GOLDEN["default"]) == camera_configs(recorded.model, GOLDEN["default"])
 
 
 def test_configs_in_robocasas_own_words() -> None:
@@ -259,10 +254,10 @@ _POSE = {"pos": [0, 0, 1], "quat": [1, 0, 0, 0]}
 )
 def test_wrong_configs_change_nothing(name: str, config: dict, error: type[Exception], words: str) -> None:
     model = arena_spec().compile()
-    before = copy.deepcopy(camera_configs(model))
+    before = copy.deepcopy(camera_configs(model, GOLDEN["default"]))
     with pytest.raises(error, match=words):
         apply_camera_configs(model, {RIGHT: _POSE, name: config})
-    assert camera_configs(model) == before
+    assert camera_configs(model, GOLDEN["default"]) == before
 
 
 @pytest.mark.parametrize(
@@ -284,7 +279,7 @@ def test_mistakes_are_found_when_the_env_is_made(kwargs: dict, error: type[Excep
 def test_noise_below_zero_is_none() -> None:
     with pytest.raises(UserError, match="wrist_angle_deg"):
         CameraNoise(wrist_angle_deg=-1.0)
-    assert check_camera_names(list(GOLDEN["default"])) == tuple(GOLDEN["default"])
+    assert check_camera_names(list(GOLDEN["default"]), PANDA_OMRON.cameras("default")) == tuple(GOLDEN["default"])
 
 
 def test_projection_of_known_points() -> None:

@@ -14,7 +14,7 @@ from task_selection import every_task
 import robocasa_lerobot.envs  # noqa: F401  (makes the tasks known to Gymnasium)
 from robocasa_lerobot import contract
 from robocasa_lerobot.contract import ContractError
-from robocasa_lerobot.envs.check import check_task
+from robocasa_lerobot.envs.checks.tasks import check_task
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.kitchens.splits import scene_ids
 from robocasa_lerobot.envs.tasks.registry import get_task, task_names, task_set, task_sets
@@ -98,7 +98,7 @@ def test_different_seeds_give_different_scenes():
     scenes = []
     for seed in range(4):
         env.reset(seed=seed)
-        scenes.append((env.scene.robot.x, tuple(p.item.model for p in env.scene.objects.values())))
+        scenes.append((env.scene.robot_pose.x, tuple(p.item.model for p in env.scene.objects.values())))
     assert len(set(scenes)) == 4
     env.close()
 

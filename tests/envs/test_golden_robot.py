@@ -16,7 +16,7 @@ import pytest
 from robot_arena import Arena, arena_spec
 
 from robocasa_lerobot import contract
-from robocasa_lerobot.envs.robots.panda_omron.model import set_home
+from robocasa_lerobot.envs.robots.panda_omron.robot import PANDA_OMRON
 from robocasa_lerobot.envs.scene.build import build_scene
 from robocasa_lerobot.envs.scene.scene import SETTLE_STEPS, Scene
 from robocasa_lerobot.envs.tasks.registry import get_task
@@ -254,7 +254,7 @@ ARM_HOME = (-0.01612974, -1.03446714, -0.02397936, -2.27550888, 0.03932365, 1.51
 
 def test_initial_pose(model: mujoco.MjModel) -> None:
     data = mujoco.MjData(model)
-    set_home(model, data)
+    PANDA_OMRON.set_home(model, data)
     assert tuple(float(data.joint(name).qpos[0]) for name in ARM) == ARM_HOME
     assert data.joint(TORSO).qpos[0] == 0.0
     assert [float(data.joint(name).qpos[0]) for name in FINGERS] == [0.020833, -0.020833]
@@ -265,7 +265,7 @@ def test_initial_noise_is_gaussian_of_002_rad_on_the_arm_alone_and_unclipped(mod
     data, rng = mujoco.MjData(model), np.random.default_rng(0)
     drawn = np.empty((3000, model.nq))
     for row in drawn:
-        set_home(model, data, rng)
+        PANDA_OMRON.set_home(model, data, rng)
         row[:] = data.qpos
     arm = [int(model.joint(name).qposadr[0]) for name in ARM]
     noise = drawn[:, arm] - ARM_HOME
@@ -282,7 +282,7 @@ def test_initial_noise_is_gaussian_of_002_rad_on_the_arm_alone_and_unclipped(mod
 def test_the_robot_is_modelled_at_10_10_and_its_slides_carry_the_rest(kitchen: Scene) -> None:
     data, _ = kitchen.initial_data(np.random.default_rng(0))
     np.testing.assert_array_equal(kitchen.model.body("robot0_base").pos, SPAWN)
-    yaw, robot = float(data.joint(YAW).qpos[0]), kitchen.robot
+    yaw, robot = float(data.joint(YAW).qpos[0]), kitchen.robot_pose
     assert yaw == pytest.approx(robot.yaw, abs=1e-3)
     # The hinge turns the base about a point 0.21 m behind its centre.
     pivot = np.array([robot.x, robot.y]) - 0.21 * np.array([np.cos(yaw), np.sin(yaw)])

@@ -16,9 +16,10 @@ from robocasa_lerobot.envs.kitchens.fixtures.counters import Counter
 from robocasa_lerobot.envs.kitchens.footprints import PlacementError
 from robocasa_lerobot.envs.kitchens.layout import Layout, load_layout
 from robocasa_lerobot.envs.kitchens.splits import scene_ids
-from robocasa_lerobot.envs.scene import roles as selection
+from robocasa_lerobot.envs.robots.panda_omron.robot import PANDA_OMRON
 from robocasa_lerobot.envs.scene.build import build_scene
-from robocasa_lerobot.envs.scene.roles import Obstacles, RobotPose, candidates, counter_of, robot_pose
+from robocasa_lerobot.envs.scene.robot_poses import Obstacles, RobotPose, robot_pose
+from robocasa_lerobot.envs.scene.roles import candidates, counter_of
 from robocasa_lerobot.envs.scene.spec import RobotStart
 from robocasa_lerobot.envs.tasks.registry import get_task
 
@@ -42,7 +43,7 @@ def _sinks() -> list[tuple[Layout, Fixture]]:
 
 def test_the_standard_deviation_is_robocasas() -> None:
     assert RobotStart("sink").deviation == DEVIATION_M
-    assert selection.ROBOT_STANDOFF_M == STANDOFF_M
+    assert PANDA_OMRON.shape.standoff == STANDOFF_M
 
 
 def test_poses_spread_uniformly_about_the_place_in_front_of_the_fixture() -> None:
@@ -52,7 +53,7 @@ def test_poses_spread_uniformly_about_the_place_in_front_of_the_fixture() -> Non
     centre = _in_counter(counter, RobotPose(sink.pos[0], sink.pos[1], 0.0))[0]
     rows = []
     for _ in range(500):
-        pose = robot_pose(rng, layout, RobotStart("sink"), sink)
+        pose = robot_pose(rng, layout, RobotStart("sink"), sink, PANDA_OMRON.shape)
         assert pose.yaw == pytest.approx(counter.yaw + np.pi / 2)  # facing it, without noise
         along, away = _in_counter(counter, pose)
         rows.append((along - centre, away - STANDOFF_M))
@@ -74,7 +75,7 @@ def test_blocked_poses_are_drawn_again_and_the_deviation_widens(monkeypatch: pyt
         return np.arange(len(tried) - len(poses), len(tried)) >= 120
 
     monkeypatch.setattr(Obstacles, "leave_free", free)
-    found = robot_pose(np.random.default_rng(1), layout, RobotStart("sink"), sink)
+    found = robot_pose(np.random.default_rng(1), layout, RobotStart("sink"), sink, PANDA_OMRON.shape)
     assert _in_counter(counter, found) == tried[120]  # the first that is free
     centre = _in_counter(counter, RobotPose(sink.pos[0], sink.pos[1], 0.0))[0]
     off = np.abs(np.array(tried) - (centre, STANDOFF_M))
@@ -88,7 +89,7 @@ def test_a_layout_without_a_free_place_is_given_up(monkeypatch: pytest.MonkeyPat
     layout, sink = _sinks()[0]
     monkeypatch.setattr(Obstacles, "leave_free", lambda _, poses: np.zeros(len(poses), dtype=bool))
     with pytest.raises(PlacementError, match="no free place"):
-        robot_pose(np.random.default_rng(0), layout, RobotStart("sink"), sink)
+        robot_pose(np.random.default_rng(0), layout, RobotStart("sink"), sink, PANDA_OMRON.shape)
 
 
 @pytest.mark.parametrize("task", every_task())
@@ -113,11 +114,11 @@ def test_it_stands_free_even_at_the_nearest_pose() -> None:
     scene = build_scene(get_task("PickPlaceCounterToSink"), "target", 0)
     layout = load_layout(scene.layout_id)
     counter = counter_of(layout, layout.fixtures[scene.roles["sink"]])
-    robot, (_, away) = scene.robot, _in_counter(counter, scene.robot)
+    robot, (_, away) = scene.robot_pose, _in_counter(counter, scene.robot_pose)
     nearer = away - (STANDOFF_M - DEVIATION_M[1])
     assert nearer > 0.0
-    scene.robot = replace(robot, x=robot.x + nearer * np.cos(robot.yaw), y=robot.y + nearer * np.sin(robot.yaw))
-    assert _in_counter(counter, scene.robot)[1] == pytest.approx(0.15)
+    scene.robot_pose = replace(robot, x=robot.x + nearer * np.cos(robot.yaw), y=robot.y + nearer * np.sin(robot.yaw))
+    assert _in_counter(counter, scene.robot_pose)[1] == pytest.approx(0.15)
     data, _ = scene.initial_data(np.random.default_rng(0))
     _assert_free(scene.model, data)
 

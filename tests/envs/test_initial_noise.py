@@ -7,9 +7,9 @@ import pytest
 from task_selection import every_task
 
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
-from robocasa_lerobot.envs.robots.panda_omron.model import ARM_HOME_QPOS
+from robocasa_lerobot.envs.robots.panda_omron.robot import PANDA_OMRON
 from robocasa_lerobot.envs.scene.reset_noise import InitialNoise
-from robocasa_lerobot.envs.scene.roles import is_free
+from robocasa_lerobot.envs.scene.robot_poses import is_free
 from robocasa_lerobot.errors import UserError
 
 SEEDS = range(6)
@@ -21,8 +21,8 @@ def starts(**kwargs: object) -> list[tuple[np.ndarray, np.ndarray, str]]:
     out = []
     for seed in SEEDS:
         env.reset(seed=seed)
-        robot = env.scene.robot
-        assert is_free(env.scene.fixtures, robot)
+        robot = env.scene.robot_pose
+        assert is_free(env.scene.fixtures, robot, PANDA_OMRON.shape)
         arm = np.array([env.data.joint(f"robot0_joint{i}").qpos[0] for i in range(1, 8)])
         out.append((np.array([robot.x, robot.y, robot.yaw]), arm, env.scene.instruction))
     return out
@@ -38,7 +38,7 @@ def test_each_noise_moves_what_it_names() -> None:
         assert not np.array_equal(one[0], moved[0])
         assert one[2] == arm[2] == moved[2]
         # The same draw, five times as large; the controller has held the arm for half a second since.
-        scaled = (arm[1] - ARM_HOME_QPOS) / (one[1] - ARM_HOME_QPOS)
+        scaled = (arm[1] - np.array(PANDA_OMRON.home.arm)) / (one[1] - np.array(PANDA_OMRON.home.arm))
         assert np.median(scaled) == pytest.approx(5.0, rel=0.2)
     shifts = np.array([moved[0] - one[0] for one, moved in zip(plain, base, strict=True)])
     assert 0.02 < np.abs(shifts[:, :2]).mean() < 0.25

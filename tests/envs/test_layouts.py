@@ -7,6 +7,7 @@ from collections import Counter as Tally
 
 import pytest
 
+from robocasa_lerobot.envs.checks.soundness import blocked_walkways
 from robocasa_lerobot.envs.kitchens.appliances.catalogue import kinds, model_of
 from robocasa_lerobot.envs.kitchens.fixture_types import FILTERS, FixtureType
 from robocasa_lerobot.envs.kitchens.fixtures.accessories import Accessory
@@ -17,8 +18,9 @@ from robocasa_lerobot.envs.kitchens.fixtures.stools import DESIGNS as STOOLS
 from robocasa_lerobot.envs.kitchens.layout import Layout, layout_ids, layout_record, load_layout, split_of
 from robocasa_lerobot.envs.kitchens.materials import COMMON_SURFACES, load_style, style_ids
 from robocasa_lerobot.envs.kitchens.splits import EXCLUDED, GROUPS, expand, scene_ids, without
-from robocasa_lerobot.envs.scene.roles import candidates, footprint, standing_on
-from robocasa_lerobot.envs.scene.soundness import blocked_walkways
+from robocasa_lerobot.envs.scene.counter_areas import standing_on
+from robocasa_lerobot.envs.scene.robot_poses import footprint
+from robocasa_lerobot.envs.scene.roles import candidates
 from robocasa_lerobot.errors import UnknownNameError, UserError
 
 ALL = tuple(range(1, 61))

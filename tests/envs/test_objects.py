@@ -12,13 +12,14 @@ import numpy as np
 import pytest
 from grasping_trial import GripperTrial, try_instance
 
+from robocasa_lerobot.demos.planning.grasps import grasp_poses
 from robocasa_lerobot.envs.kitchens.materials import MaterialPalette, load_style, style_ids
 from robocasa_lerobot.envs.objects import catalogue
 from robocasa_lerobot.envs.objects.draft import FORMS
 from robocasa_lerobot.envs.objects.forms import find_form
-from robocasa_lerobot.envs.objects.grasping import grasp_poses
 from robocasa_lerobot.envs.objects.shapes import add_object
-from robocasa_lerobot.envs.robots.panda_omron.model import apply_simulation_options
+from robocasa_lerobot.envs.physics.options import apply_simulation_options
+from robocasa_lerobot.envs.robots.panda_omron.robot import PANDA_OMRON
 from robocasa_lerobot.envs.scene.build import LIQUIDS, build_scene
 from robocasa_lerobot.envs.tasks.registry import get_task
 from robocasa_lerobot.errors import UnknownNameError, UserError
@@ -296,7 +297,7 @@ def test_two_of_a_kind_share_their_meshes_and_a_model_is_a_pure_function():
 @pytest.mark.parametrize("name", ["apple", "mug", "pan", "wine", "sponge", "banana"])
 def test_grasp_poses_keep_the_fingers_off_the_table(name):
     item = item_of(name)
-    poses = grasp_poses(item)
+    poses = grasp_poses(item, PANDA_OMRON.gripper)
     assert 1 <= len(poses) <= 16
     for pose in poses:
         assert pose.width < 0.0785

@@ -11,7 +11,8 @@ from robocasa_lerobot import contract
 from robocasa_lerobot.envs.robots.panda_omron import names
 from robocasa_lerobot.envs.robots.panda_omron.bodies import BODIES
 from robocasa_lerobot.envs.robots.panda_omron.cameras import CAMERA_SETS
-from robocasa_lerobot.envs.robots.panda_omron.model import QUALITIES, add_robot, mesh_bytes, place_base, set_home
+from robocasa_lerobot.envs.robots.panda_omron.model import QUALITIES, mesh_bytes
+from robocasa_lerobot.envs.robots.panda_omron.robot import PANDA_OMRON
 from robocasa_lerobot.errors import UnknownNameError
 
 
@@ -30,7 +31,7 @@ def test_joint_ranges_are_radians_whatever_the_unit_of_the_spec() -> None:
     for degree in (False, True):
         spec = mujoco.MjSpec()
         spec.compiler.degree = degree
-        add_robot(spec, "fast")
+        PANDA_OMRON.add_to(spec, "fast")
         ranges.append(spec.compile().joint("robot0_joint4").range)
     np.testing.assert_allclose(ranges[0], [-3.0718, -0.0698])
     np.testing.assert_allclose(ranges[1], ranges[0])
@@ -39,7 +40,7 @@ def test_joint_ranges_are_radians_whatever_the_unit_of_the_spec() -> None:
 @pytest.mark.parametrize("camera_set", CAMERA_SETS)
 def test_every_camera_set_has_the_contract_cameras(camera_set: str) -> None:
     spec = mujoco.MjSpec()
-    add_robot(spec, "fast", camera_set=camera_set)
+    PANDA_OMRON.add_to(spec, "fast", camera_set)
     compiled = spec.compile()
     for camera in CAMERA_SETS[camera_set]:
         added = compiled.camera(camera.name)
@@ -90,7 +91,7 @@ def test_shapes_carry_no_mass_and_visual_ones_do_not_collide(model: mujoco.MjMod
 
 def test_finger_pads_grip_hard_and_meet_when_closed(model: mujoco.MjModel) -> None:
     data = mujoco.MjData(model)
-    set_home(model, data)
+    PANDA_OMRON.set_home(model, data)
     for name in names.FINGER_JOINTS:
         data.joint(name).qpos[0] = 0.0
     mujoco.mj_forward(model, data)
@@ -133,8 +134,8 @@ def test_state_is_the_contract_vector_and_not_a_view(model: mujoco.MjModel) -> N
 )
 def test_place_base(model: mujoco.MjModel, x: float, y: float, yaw: float) -> None:
     data = mujoco.MjData(model)
-    set_home(model, data)
-    place_base(model, data, x, y, yaw)
+    PANDA_OMRON.set_home(model, data)
+    PANDA_OMRON.place_base(model, data, x, y, yaw)
     mujoco.mj_forward(model, data)
     site = data.site(names.BASE_CENTER_SITE)
     np.testing.assert_allclose(site.xpos, [x, y, 0.7], atol=1e-12)
@@ -146,7 +147,7 @@ def test_home_noise_is_seeded_and_on_the_arm_only(model: mujoco.MjModel) -> None
     poses = []
     for seed in (0, 0, 1, None):
         data = mujoco.MjData(model)
-        set_home(model, data, None if seed is None else np.random.default_rng(seed))
+        PANDA_OMRON.set_home(model, data, None if seed is None else np.random.default_rng(seed))
         poses.append(data.qpos.copy())
     np.testing.assert_array_equal(poses[0], poses[1])
     assert not np.array_equal(poses[0], poses[2])
@@ -170,9 +171,9 @@ def test_written_xml_loads_with_portable_asset_names(quality: str) -> None:
 
 def test_misspelt_names_get_a_suggestion() -> None:
     with pytest.raises(UnknownNameError, match="Did you mean 'quality'"):
-        add_robot(mujoco.MjSpec(), "qualty")
+        PANDA_OMRON.add_to(mujoco.MjSpec(), "qualty")
     with pytest.raises(UnknownNameError, match="Did you mean 'cotraining'"):
-        add_robot(mujoco.MjSpec(), "fast", camera_set="cotrain")
+        PANDA_OMRON.cameras("cotrain")
 
 
 @pytest.mark.render

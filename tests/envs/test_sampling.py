@@ -9,9 +9,11 @@ import pytest
 
 from robocasa_lerobot.envs.kitchens.footprints import Footprint, Footprints, PlacementError
 from robocasa_lerobot.envs.kitchens.layout import load_layout
+from robocasa_lerobot.envs.robots.panda_omron.robot import PANDA_OMRON
 from robocasa_lerobot.envs.scene.placement import cast_roles, place_objects
 from robocasa_lerobot.envs.scene.regions import choose_parts, parts_of, rectangle_in
-from robocasa_lerobot.envs.scene.roles import candidates, faces, ground_fixture, is_free, robot_pose
+from robocasa_lerobot.envs.scene.robot_poses import faces, is_free, robot_pose
+from robocasa_lerobot.envs.scene.roles import candidates, ground_fixture
 from robocasa_lerobot.envs.scene.spec import FixtureWanted, ObjectWanted, Placement, RobotStart, SampleRegion
 from robocasa_lerobot.envs.tasks.registry import get_task
 
@@ -133,12 +135,12 @@ def test_robots_stand_before_stools_islands_fridges_and_towers(layout_id: int) -
         found = 0
         for fixture in candidates(layout, kind):
             try:
-                pose = robot_pose(rng, layout, RobotStart(kind), fixture)
+                pose = robot_pose(rng, layout, RobotStart(kind), fixture, PANDA_OMRON.shape)
             except PlacementError:
                 assert kind == "cabinet", fixture.name  # beside a corner there may be no room: the builder draws again
                 continue
             found += 1
-            assert is_free(layout.fixtures, pose)
+            assert is_free(layout.fixtures, pose, PANDA_OMRON.shape)
             ground = ground_fixture(layout, fixture)
             facing = np.array([np.cos(pose.yaw), np.sin(pose.yaw)])
             away = np.array([pose.x, pose.y]) - ground.pos[:2]

@@ -12,6 +12,7 @@ import pytest
 from PIL import Image
 from task_selection import every_task
 
+from robocasa_lerobot.envs.checks.soundness import overlaps
 from robocasa_lerobot.envs.kitchens.fixtures.cabinets import FULL_TRAVEL_OF_DEPTH, Drawer
 from robocasa_lerobot.envs.kitchens.footprints import Area, Footprint, PlacementError, place
 from robocasa_lerobot.envs.kitchens.layout import layout_ids, load_layout, split_of
@@ -19,7 +20,6 @@ from robocasa_lerobot.envs.kitchens.materials import style_ids
 from robocasa_lerobot.envs.kitchens.textures import GENERATORS, TextureRecord, texture_png
 from robocasa_lerobot.envs.scene.assembly import bare_kitchen
 from robocasa_lerobot.envs.scene.build import build_scene
-from robocasa_lerobot.envs.scene.soundness import overlaps
 from robocasa_lerobot.envs.tasks.registry import get_task, task_names
 
 

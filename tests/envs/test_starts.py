@@ -6,12 +6,12 @@ import mujoco
 import numpy as np
 import pytest
 
+from robocasa_lerobot.envs.checks.soundness import moved
 from robocasa_lerobot.envs.kitchens.footprints import Area, Footprint
 from robocasa_lerobot.envs.kitchens.layout import load_layout
 from robocasa_lerobot.envs.scene.build import build_scene
-from robocasa_lerobot.envs.scene.roles import standing_on
+from robocasa_lerobot.envs.scene.counter_areas import standing_on
 from robocasa_lerobot.envs.scene.scene import Scene
-from robocasa_lerobot.envs.scene.soundness import moved
 from robocasa_lerobot.envs.tasks.registry import get_task
 
 

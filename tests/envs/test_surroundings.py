@@ -6,11 +6,11 @@ import mujoco
 import numpy as np
 import pytest
 
+from robocasa_lerobot.envs.checks.views import views
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.kitchens.layout import layout_ids
 from robocasa_lerobot.envs.kitchens.plan.fixture_rows import WALL_THICKNESS
 from robocasa_lerobot.envs.kitchens.splits import without
-from robocasa_lerobot.envs.scene.views import views
 from robocasa_lerobot.envs.tasks.registry import get_task, task_names
 from robocasa_lerobot.envs.tasks.task import Task
 from robocasa_lerobot.errors import UserError

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from robocasa_lerobot.benchmark.tasks import published_task_sets
-from robocasa_lerobot.envs.robots.panda_omron.camera_noise import CameraNoise
+from robocasa_lerobot.envs.robots.camera_noise import CameraNoise
 from robocasa_lerobot.envs.scene.reset_noise import InitialNoise
 from robocasa_lerobot.envs.tasks.registry import task_names
 from robocasa_lerobot.errors import UserError

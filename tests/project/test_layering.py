@@ -47,11 +47,12 @@ MAY_IMPORT: dict[str, set[str]] = {
 # Of these parts, what each room (a folder, or a file beside the folders) may import of the other rooms.
 ROOMS: dict[str, dict[str, set[str]]] = {
     "envs": {
+        "physics": set(),
         "rendering": set(),
-        "robots": {"rendering"},
-        "kitchens": {"rendering", "robots"},
-        "objects": {"rendering", "kitchens"},
-        "scene": {"rendering", "robots", "kitchens", "objects"},
+        "robots": {"physics", "rendering"},
+        "kitchens": {"physics", "rendering"},
+        "objects": {"kitchens", "rendering"},
+        "scene": {"physics", "rendering", "robots", "kitchens", "objects"},
         "predicates": {"robots", "kitchens", "objects", "scene"},
         "tasks": {"kitchens", "objects", "scene", "predicates"},
     },

@@ -13,7 +13,7 @@ from robocasa_lerobot.contract import SUBSTEPS
 from robocasa_lerobot.envs.kitchens.appliances.base import update_all
 from robocasa_lerobot.envs.kitchens.appliances.catalogue import build_appliance
 from robocasa_lerobot.envs.kitchens.materials import MaterialPalette, load_style
-from robocasa_lerobot.envs.robots.panda_omron.model import apply_simulation_options
+from robocasa_lerobot.envs.physics.options import apply_simulation_options
 from robocasa_lerobot.envs.scene.bodies import subtree
 
 FINGER_M = 0.008  # radius

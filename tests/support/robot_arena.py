@@ -9,10 +9,11 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from robocasa_lerobot.envs.robots.panda_omron.control.controller import RobotController
-from robocasa_lerobot.envs.robots.panda_omron.control.step import control_step
-from robocasa_lerobot.envs.robots.panda_omron.model import add_robot, apply_simulation_options, place_base, set_home
+from robocasa_lerobot.envs.physics.options import apply_simulation_options
+from robocasa_lerobot.envs.robots.control_step import control_step
+from robocasa_lerobot.envs.robots.panda_omron.control.controller import PandaOmronController
 from robocasa_lerobot.envs.robots.panda_omron.proprioception import read_observations, read_state
+from robocasa_lerobot.envs.robots.panda_omron.robot import PANDA_OMRON
 
 SHARED = Path(__file__).parents[3] / "shared"
 SETTLE_STEPS = 10
@@ -22,7 +23,7 @@ def arena_spec(quality: str = "fast") -> mujoco.MjSpec:
     spec = mujoco.MjSpec()
     apply_simulation_options(spec)
     spec.worldbody.add_geom(name="floor", type=mujoco.mjtGeom.mjGEOM_PLANE, size=(20, 20, 0.1))
-    add_robot(spec, quality)
+    PANDA_OMRON.add_to(spec, quality)
     return spec
 
 
@@ -42,15 +43,15 @@ class Arena:
 
     model: mujoco.MjModel
     data: mujoco.MjData
-    controller: RobotController
+    controller: PandaOmronController
 
     @classmethod
     def settled(cls, model: mujoco.MjModel, yaw: float = 0.0, steps: int = SETTLE_STEPS) -> Arena:
         data = mujoco.MjData(model)
-        set_home(model, data)
-        place_base(model, data, 0.0, 0.0, yaw)
+        PANDA_OMRON.set_home(model, data)
+        PANDA_OMRON.place_base(model, data, 0.0, 0.0, yaw)
         mujoco.mj_forward(model, data)
-        controller = RobotController(model, data)
+        controller = PandaOmronController(model, data)
         controller.reset()
         arena = cls(model, data, controller)
         arena.run(action(), steps)

@@ -14,18 +14,18 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from robocasa_lerobot.demos.arm import Arm
 from robocasa_lerobot.demos.motion import Array, HandTarget, base_pose, floor_axes
+from robocasa_lerobot.demos.planning.kinematics import Arm
 from robocasa_lerobot.demos.skills.common import SkillError
 from robocasa_lerobot.demos.skills.hinged import Hinged
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
-from robocasa_lerobot.envs.robots.panda_omron.model import ARM_HOME_QPOS, place_base
 from robocasa_lerobot.envs.robots.panda_omron.names import ARM_CENTER_SITE, HAND, MOBILE_BASE, TORSO_JOINT
+from robocasa_lerobot.envs.robots.panda_omron.robot import PANDA_OMRON
 
 Shift = tuple[float, float]
 
 # Half extents of the closed finger tips along the hand's axes, metres, from the grip site.
-FINGER_HALF_M = np.array([0.011, 0.026, 0.011])
+CLOSED_FINGERS_HALF_M = np.array(PANDA_OMRON.gripper.closed_half)
 STANDOFF_M = 0.09  # of the hand before it grasps
 ARM_FOOT = "robot0_link0"
 HOPELESS, MOST_TESTED = 2.0, 80
@@ -165,7 +165,7 @@ class _Bench:
         cost = np.array([way.bias for way in ways])[which]
         cost = cost + (_DRIVE * np.hypot(*starts.T) + _ALONG * drive)[where]
         solved: list[Array] = []
-        joints = np.tile(np.array(ARM_HOME_QPOS), (len(which), 1))
+        joints = np.tile(np.array(PANDA_OMRON.home.arm), (len(which), 1))
         for index in range(vias):
             shift = starts[where] + progress[which, index, None] * (ends - starts)[where]
             position = (positions[which, index] - shift @ self._axes) @ turn
@@ -249,7 +249,7 @@ class _Bench:
         self._data.qpos[:] = self._env.data.qpos
         self._data.qpos[self._arm.addresses] = joints
         self._part.place(self._data, angle)
-        place_base(self._model, self._data, x + float(to[0]), y + float(to[1]), yaw)
+        PANDA_OMRON.place_base(self._model, self._data, x + float(to[0]), y + float(to[1]), yaw)
         mujoco.mj_kinematics(self._model, self._data)
 
     def _raise(self) -> None:
@@ -313,7 +313,7 @@ def face_way(
 
     def target_at(angle: float) -> HandTarget:
         rotation, out = rotation_at(angle), part.turned(angle) @ normal
-        support = float(FINGER_HALF_M @ np.abs(rotation.T @ out))
+        support = float(CLOSED_FINGERS_HALF_M @ np.abs(rotation.T @ out))
         return HandTarget(part.point(local, angle) + out * support, rotation)
 
     start = part.angle

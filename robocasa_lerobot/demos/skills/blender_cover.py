@@ -41,7 +41,7 @@ from robocasa_lerobot.demos.skills.pick import INSIST, entry
 from robocasa_lerobot.demos.skills.ways import Choice, Held, Way, approach, choose, lead
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.kitchens.appliances.kinds.blender import Blender
-from robocasa_lerobot.envs.scene.roles import RobotPose
+from robocasa_lerobot.envs.scene.robot_poses import RobotPose
 from robocasa_lerobot.envs.tasks.task import Stage
 
 LAYS = 2  # tries to bring a lid that is in the hand to the jug

@@ -26,7 +26,8 @@ from robocasa_lerobot.demos.skills.reach_many import plan_reach_of_many
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.kitchens.appliances.kinds.blender import Blender
 from robocasa_lerobot.envs.kitchens.footprints import Area, Footprint
-from robocasa_lerobot.envs.scene.roles import counter_areas, footprint
+from robocasa_lerobot.envs.scene.counter_areas import counter_areas
+from robocasa_lerobot.envs.scene.robot_poses import footprint
 from robocasa_lerobot.envs.scene.spec import OnCounter
 from robocasa_lerobot.envs.tasks.task import Stage
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from robocasa_lerobot.demos.motion import CLOSED, UP, Array, HandTarget, base_pose, frame, grip_position, hand_rotation
 from robocasa_lerobot.demos.skills.common import SkillError, hold_hand, move_hand
-from robocasa_lerobot.demos.skills.levers import FINGER_HALF_M, level_and_down, push_way
+from robocasa_lerobot.demos.skills.levers import CLOSED_FINGERS_HALF_M, level_and_down, push_way
 from robocasa_lerobot.demos.skills.reach import plan_reach, shift_base, untried
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.tasks.task import Stage
@@ -80,7 +80,7 @@ def retreat(env: KitchenEnv, outwards: Array) -> Iterator[Array]:
 
 
 def _way(face: Array, inwards: Array, rotation: Array) -> tuple[HandTarget, ...]:
-    touch = face - inwards * float(FINGER_HALF_M @ np.abs(rotation.T @ inwards))
+    touch = face - inwards * float(CLOSED_FINGERS_HALF_M @ np.abs(rotation.T @ inwards))
     return tuple(HandTarget(touch + inwards * deep, rotation) for deep in (-2 * STANDOFF_M, -STANDOFF_M, PRESS_M))
 
 

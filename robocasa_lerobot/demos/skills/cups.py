@@ -11,10 +11,10 @@ import dataclasses
 import numpy as np
 
 from robocasa_lerobot.demos.motion import UP, Array, frame
+from robocasa_lerobot.demos.planning.grasps import GraspPose
 from robocasa_lerobot.demos.skills.pick import Manner, ahead_of
 from robocasa_lerobot.demos.skills.things import UPRIGHT_COS, Thing, grasps
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
-from robocasa_lerobot.envs.objects.grasping import PALM_ABOVE_GRIP_M, GraspPose
 
 WIDEST_M = 0.081  # at the rim; a mug's body is a little narrower where the fingers are
 LEVEL_RAD = np.deg2rad(25.0)  # a hand that looks down more than this meets the rim with its palm
@@ -54,7 +54,7 @@ def _across(
         return []
     rotation = frame(approach, np.cross(UP, ahead))
     # As deep as the palm lets it.
-    short = max(radius - PALM_ABOVE_GRIP_M, 0.0)
+    short = max(radius - env.robot.gripper.palm_above_grip, 0.0)
     foot = body.xpos + turn @ middle - what.below(turn) * UP
     score = min(behind, 0.6) - ASKEW * max(float(np.arccos(np.clip(ahead @ ahead_of(env), -1, 1))) - SMALL_RAD, 0.0)
     return [

@@ -22,6 +22,7 @@ from robocasa_lerobot.demos.skills.common import SkillError, move_hand
 from robocasa_lerobot.demos.skills.hinged import Hinged
 from robocasa_lerobot.demos.skills.ways import lead
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
+from robocasa_lerobot.envs.robots.panda_omron.robot import PANDA_OMRON
 
 ATTEMPTS = 4
 GAP_M, ENOUGH_GAP_M = 0.20, 0.11  # between the case and the upper edge: wanted of a pull, and enough for a hand
@@ -33,8 +34,8 @@ GRASPS = ((15, 0, 0.3), (40, 0, 0.3), (40, 35, 0.3), (40, -35, 0.3), (65, 0, 0.3
 PUSHES = tuple(
     (share, lean, aside) for share in (0.97, 0.9, 0.65) for lean, aside in ((10, 0), (30, 0), (10, 30), (10, -30))
 )
-FINGER_M = 0.014
-BASE_HALF_M, BASE_FRONT_M = 0.25, 0.15
+FINGER_M = PANDA_OMRON.gripper.tips_below_grip
+BASE_HALF_M, BASE_FRONT_M = PANDA_OMRON.shape.base_y[1], PANDA_OMRON.shape.base_x[1]
 
 
 def fold_down(env: KitchenEnv, door: Hinged) -> Iterator[Array]:

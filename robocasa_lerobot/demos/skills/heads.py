@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from robocasa_lerobot.demos.motion import UP, Array, frame
-from robocasa_lerobot.demos.skills.arc_plan import FINGER_HALF_M, Shift, Way, face_way, grip_way, plan_arc
+from robocasa_lerobot.demos.skills.arc_plan import CLOSED_FINGERS_HALF_M, Shift, Way, face_way, grip_way, plan_arc
 from robocasa_lerobot.demos.skills.arcs import pull_arc, push_arc
 from robocasa_lerobot.demos.skills.common import SkillError
 from robocasa_lerobot.demos.skills.hinged import Hinged
@@ -83,7 +83,7 @@ def _drag_way(head: Hinged, drag: tuple[float, float, float], roll: float) -> Wa
     """Hold the cap on the nose and lead it down: a head that is up is too near a wall cabinet to reach over it."""
     pitch, aside, turn = drag
     skew = head.angle + np.deg2rad(pitch)  # of the fingers from the cap's axis
-    corner = FINGER_HALF_M[2] * np.cos(skew) + FINGER_HALF_M[0] * abs(np.sin(skew))
+    corner = CLOSED_FINGERS_HALF_M[2] * np.cos(skew) + CLOSED_FINGERS_HALF_M[0] * abs(np.sin(skew))
     local = np.array([0.0, head.outside + CAP_M - corner - OFF_NOSE_M, CAP_HEIGHT * head.high[2]])
     first = head.angle
 

@@ -5,12 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from robocasa_lerobot.demos.motion import UP, Array
+from robocasa_lerobot.demos.planning.grasps import GraspPose
 from robocasa_lerobot.demos.skills.things import DOWN, Thing, grasps
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
-from robocasa_lerobot.envs.objects.grasping import FINGER_BELOW_GRIP_M, PALM_ABOVE_GRIP_M, GraspPose
 
-FINGER_HALF_M = 0.0105  # along the hand's x
-PALM_HALF_M, PALM_BACK_M = (0.028, 0.10), PALM_ABOVE_GRIP_M + 0.004  # along the hand's x and y; food gives way a little
+PALM_HALF_M, GIVES_WAY_M = (0.028, 0.10), 0.004  # along the hand's x and y; food gives way a little
 GAP_M = 0.003  # between the fingers' lowest corners and what the thing lies on
 INWARDS = 0.5  # least cosine between the hand's heading and the approach's
 
@@ -26,7 +25,9 @@ def level_grasps(env: KitchenEnv, what: Thing, approach: Array) -> list[GraspPos
     flat = float(np.linalg.norm(ahead))
     body = env.data.body(what.name)
     turn = body.xmat.reshape(3, 3)
-    lowest = float(body.xpos[2]) - what.below(turn) + FINGER_BELOW_GRIP_M * steepness + FINGER_HALF_M * flat + GAP_M
+    gripper = env.robot.gripper
+    lowest = float(body.xpos[2]) - what.below(turn) + gripper.tips_below_grip * steepness
+    lowest = lowest + gripper.finger_half_width * flat + GAP_M
     points = body.xpos + np.concatenate([_filled(solid.cloud()) for solid in what.solids]) @ turn.T
     found = []
     for pose in grasps(env, what, DOWN):
@@ -40,7 +41,11 @@ def level_grasps(env: KitchenEnv, what: Thing, approach: Array) -> list[GraspPos
         position[2] = max(position[2], lowest)
         rotation = np.column_stack([np.cross(opening, z), opening, z])
         x, y, deep = ((points - position) @ rotation).T
-        if np.any((np.abs(x) < PALM_HALF_M[0]) & (np.abs(y) < PALM_HALF_M[1]) & (deep < -PALM_BACK_M)):
+        if np.any(
+            (np.abs(x) < PALM_HALF_M[0])
+            & (np.abs(y) < PALM_HALF_M[1])
+            & (deep < -(gripper.palm_above_grip + GIVES_WAY_M))
+        ):
             continue
         found.append(GraspPose(position, rotation, pose.width, pose.score))
     return found + grasps(env, what, approach)

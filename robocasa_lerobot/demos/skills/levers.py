@@ -24,13 +24,14 @@ from robocasa_lerobot.demos.motion import (
 from robocasa_lerobot.demos.skills.common import SkillError, hold_hand, move_hand
 from robocasa_lerobot.demos.skills.reach import plan_reach, shift_base, untried
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
+from robocasa_lerobot.envs.robots.panda_omron.robot import PANDA_OMRON
 from robocasa_lerobot.envs.tasks.task import Stage
 
 ATTEMPTS = 4
 GRASP_STEPS = 10
 STANDOFF_M = 0.08
 # Half extents of the closed finger tips along the hand's axes, metres, from the grip site.
-FINGER_HALF_M = np.array([0.011, 0.026, 0.011])
+CLOSED_FINGERS_HALF_M = np.array(PANDA_OMRON.gripper.closed_half)
 # From the side the grip site ends short of the middle of what is pushed, so that the tips end just beyond it.
 SHORT_M = 0.008
 PUSH_SPEED, LEAD_SPEED = 0.45, 0.35
@@ -212,7 +213,7 @@ def level_and_down(env: KitchenEnv) -> list[Array]:
 def push_way(point: Array, way: Array, rotation: Array, travel: float) -> tuple[HandTarget, ...]:
     """Away from, before, at the touch, and at the end of a push of a point."""
     approach = rotation[:, 2]
-    support = float(FINGER_HALF_M @ np.abs(rotation.T @ way))
+    support = float(CLOSED_FINGERS_HALF_M @ np.abs(rotation.T @ way))
     aside = 1.0 - abs(float(approach @ way))
     touch = point - way * (support + 0.004) - approach * SHORT_M * aside
     before = touch - way * 0.015 - approach * 0.05 * aside - way * 0.04 * (1 - aside)

@@ -11,7 +11,6 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from robocasa_lerobot.demos.arm import Arm
 from robocasa_lerobot.demos.motion import (
     CLOSED,
     UP,
@@ -24,7 +23,8 @@ from robocasa_lerobot.demos.motion import (
     hand_rotation,
     pose_error,
 )
-from robocasa_lerobot.demos.skills.arc_plan import FINGER_HALF_M, Shift, Via, Way, arc_vias, face_way, plan_arc
+from robocasa_lerobot.demos.planning.kinematics import Arm
+from robocasa_lerobot.demos.skills.arc_plan import CLOSED_FINGERS_HALF_M, Shift, Via, Way, arc_vias, face_way, plan_arc
 from robocasa_lerobot.demos.skills.arcs import spots, swing, take_stance, working_height
 from robocasa_lerobot.demos.skills.common import SkillError, move_hand
 from robocasa_lerobot.demos.skills.doors import SHUT_GOAL, doors
@@ -33,8 +33,8 @@ from robocasa_lerobot.demos.skills.fold_down import BASE_FRONT_M, BASE_HALF_M, s
 from robocasa_lerobot.demos.skills.hinged import Hinged
 from robocasa_lerobot.demos.skills.reach import shift_base
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
-from robocasa_lerobot.envs.robots.panda_omron.model import ARM_HOME_QPOS
 from robocasa_lerobot.envs.robots.panda_omron.names import ARM_CENTER_SITE
+from robocasa_lerobot.envs.robots.panda_omron.robot import PANDA_OMRON
 from robocasa_lerobot.envs.tasks.task import Stage
 
 ATTEMPTS = 6
@@ -69,7 +69,7 @@ def lift_low(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
             except SkillError:
                 if attempt == ATTEMPTS - 1:
                     raise
-                yield from _dash(env, np.array(ARM_HOME_QPOS))
+                yield from _dash(env, np.array(PANDA_OMRON.home.arm))
                 yield from shift_base(env, RETREAT, CLOSED)  # from elsewhere other places are reached
         if door.share > SHUT_GOAL:
             raise SkillError(f"{door.name} is still {door.share:.1%} open after {ATTEMPTS} attempts")
@@ -94,7 +94,7 @@ def _push(env: KitchenEnv, door: Hinged) -> Iterator[Array]:
     away = HandTarget(grip_position(data) - 0.16 * door.inwards, hand_rotation(data))
     yield from move_hand(data, away, CLOSED, tolerance=0.04, max_steps=20)
     if door.angle > ENOUGH_RAD:
-        yield from _dash(env, np.array(ARM_HOME_QPOS))
+        yield from _dash(env, np.array(PANDA_OMRON.home.arm))
 
 
 def _dash(env: KitchenEnv, joints: Array) -> Iterator[Array]:
@@ -158,7 +158,7 @@ def _lift_way(door: Hinged, lift: tuple[float, float], x: float, roll: float) ->
         side = roll * rotation[:, 0]
         corner = door.point(local, angle)
         corner[2] = min(corner[2], highest)
-        beyond = press * angle / start - FINGER_HALF_M[0]
+        beyond = press * angle / start - CLOSED_FINGERS_HALF_M[0]
         return HandTarget(corner + beyond * side + TIP_M * rotation[:, 2], rotation)
 
     at = target_at(start, 0.0)

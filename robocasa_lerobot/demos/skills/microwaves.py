@@ -10,8 +10,8 @@ from dataclasses import replace
 import mujoco
 import numpy as np
 
-from robocasa_lerobot.demos.arm import Arm
 from robocasa_lerobot.demos.motion import OPEN, Array, base_pose, floor_axes
+from robocasa_lerobot.demos.planning.kinematics import Arm
 from robocasa_lerobot.demos.skills.level_grasps import level_grasps
 from robocasa_lerobot.demos.skills.navigation import Room
 from robocasa_lerobot.demos.skills.pick import ANYHOW, Manner
@@ -22,8 +22,8 @@ from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.kitchens.appliances.base import Appliance
 from robocasa_lerobot.envs.kitchens.appliances.kinds.microwave import Microwave
 from robocasa_lerobot.envs.kitchens.appliances.kinds.toaster_oven import ToasterOven
-from robocasa_lerobot.envs.robots.panda_omron.model import ARM_HOME_QPOS, place_base
-from robocasa_lerobot.envs.scene.roles import RobotPose
+from robocasa_lerobot.envs.robots.panda_omron.robot import PANDA_OMRON
+from robocasa_lerobot.envs.scene.robot_poses import RobotPose
 
 ASIDES_M = (0.08, 0.02, -0.03, -0.06, -0.09, -0.12, -0.15)  # of a stand to the right of the cavity's middle
 OPEN_SHARE = 0.3
@@ -79,7 +79,7 @@ def _way_round(env: KitchenEnv, base: Array, yaw: float, beside: float) -> Seque
     ahead, left = floor_axes(yaw)
     room = Room(env.scene)
     data = copy.copy(env.data)
-    data.qpos[Arm(env.model, env.data).addresses] = ARM_HOME_QPOS
+    data.qpos[Arm(env.model, env.data).addresses] = PANDA_OMRON.home.arm
 
     def at(back: float, right: float) -> RobotPose:
         x, y, _ = (base - back * ahead - right * left).tolist()
@@ -89,7 +89,7 @@ def _way_round(env: KitchenEnv, base: Array, yaw: float, beside: float) -> Seque
         count = max(int(np.ceil(np.hypot(other.x - one.x, other.y - one.y) / STEP_M)), 1)
         for share in np.arange(1, count + 1) / count:
             x, y = one.x + share * (other.x - one.x), one.y + share * (other.y - one.y)
-            place_base(env.model, data, x, y, yaw)
+            PANDA_OMRON.place_base(env.model, data, x, y, yaw)
             mujoco.mj_kinematics(env.model, data)
             if not room.free(RobotPose(x, y, yaw)) or collisions(env.model, data, frozenset()):
                 return False

@@ -15,7 +15,7 @@ import numpy as np
 from robocasa_lerobot.demos.motion import FROM_DESIRED, OPEN, Array, action, base_pose, limit
 from robocasa_lerobot.demos.skills.common import SkillError
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
-from robocasa_lerobot.envs.scene.roles import RobotPose, is_free
+from robocasa_lerobot.envs.scene.robot_poses import RobotPose, is_free
 from robocasa_lerobot.envs.scene.scene import Scene
 from robocasa_lerobot.envs.tasks.task import Stage
 
@@ -90,7 +90,7 @@ class Room:
     """Answers whether the robot can stand at a pose, asking the fixtures near it only."""
 
     def __init__(self, scene: Scene) -> None:
-        self._bounds = scene.layout.room
+        self._bounds, self._shape = scene.layout.room, scene.robot.shape
         self._fixtures = [f for f in scene.fixtures.values() if f.name != "floor"]
         self._middle = np.array([f.pos[:2] for f in self._fixtures])
         self._half = np.array([[f.width / 2, f.depth / 2] for f in self._fixtures])
@@ -106,7 +106,7 @@ class Room:
         x = np.abs(self._cos * dx + self._sin * dy) - self._half[:, 0]
         y = np.abs(-self._sin * dx + self._cos * dy) - self._half[:, 1]
         near = np.flatnonzero(np.hypot(np.maximum(x, 0.0), np.maximum(y, 0.0)) < REACH_M)
-        return is_free({self._fixtures[index].name: self._fixtures[index] for index in near}, pose)
+        return is_free({self._fixtures[index].name: self._fixtures[index] for index in near}, pose, self._shape)
 
     def nearest(self, goal: RobotPose) -> RobotPose:
         """The goal, or the free pose of the same heading that is nearest to it, or the goal if there is none."""

@@ -23,12 +23,12 @@ from robocasa_lerobot.demos.motion import (
     pose_error,
     rotation_about,
 )
+from robocasa_lerobot.demos.planning.grasps import GraspPose
 from robocasa_lerobot.demos.skills.common import SkillError, close_fingers, hold_hand, move_hand
 from robocasa_lerobot.demos.skills.things import Thing, grasps
 from robocasa_lerobot.demos.skills.ways import GOOD_ENOUGH, Choice, Held, Way, approach, choose, lead
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
-from robocasa_lerobot.envs.objects.grasping import GraspPose
-from robocasa_lerobot.envs.scene.roles import RobotPose
+from robocasa_lerobot.envs.scene.robot_poses import RobotPose
 
 ATTEMPTS = 5
 INSIST = 0.12

@@ -26,7 +26,7 @@ from robocasa_lerobot.demos.skills.pick import FROM_ABOVE, INSIST, Manner, ahead
 from robocasa_lerobot.demos.skills.things import Thing
 from robocasa_lerobot.demos.skills.ways import Choice, Held, Way, approach, choose, lead
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
-from robocasa_lerobot.envs.scene.roles import RobotPose
+from robocasa_lerobot.envs.scene.robot_poses import RobotPose
 
 ATTEMPTS = 4
 RELEASE_STEPS, SETTLE_STEPS = 9, 15

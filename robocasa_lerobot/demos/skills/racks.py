@@ -19,7 +19,7 @@ from robocasa_lerobot.demos.motion import (
     hand_rotation,
 )
 from robocasa_lerobot.demos.skills.common import SkillError, hold_hand, move_hand
-from robocasa_lerobot.demos.skills.levers import FINGER_HALF_M
+from robocasa_lerobot.demos.skills.levers import CLOSED_FINGERS_HALF_M
 from robocasa_lerobot.demos.skills.reach import Plan, plan_reach, shift_base, untried
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.kitchens.appliances.base import Appliance
@@ -72,7 +72,7 @@ def push(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
         ways = []
         for spot in part.spots((0.0, 0.5)):
             for rotation in rotations(env, part.inwards):
-                support = float(FINGER_HALF_M @ np.abs(rotation.T @ part.inwards))
+                support = float(CLOSED_FINGERS_HALF_M @ np.abs(rotation.T @ part.inwards))
                 touch = spot - part.inwards * support
                 ways.append(_row(touch, rotation, -part.inwards, part.inwards * travel))
         plan = _plan(env, part, ways, tried)

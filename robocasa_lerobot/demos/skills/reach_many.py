@@ -12,13 +12,13 @@ from collections.abc import Iterable
 import mujoco
 import numpy as np
 
-from robocasa_lerobot.demos.arm import Arm
 from robocasa_lerobot.demos.motion import Array, HandTarget, base_pose
 from robocasa_lerobot.demos.motion_style import variety_of
+from robocasa_lerobot.demos.planning.kinematics import Arm
 from robocasa_lerobot.demos.skills.reach import GOOD_ENOUGH, Plan, collisions
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
-from robocasa_lerobot.envs.robots.panda_omron.model import place_base
 from robocasa_lerobot.envs.robots.panda_omron.names import ARM_CENTER_SITE
+from robocasa_lerobot.envs.robots.panda_omron.robot import PANDA_OMRON
 
 _WORSE = 0.6  # what ways worse than the best by this much meet is not tested
 _TESTED = 60  # ways from each stand for which it is tested
@@ -78,7 +78,7 @@ class _Bench:
             cost += np.maximum(0.0, _NEAR_LIMIT_RAD - solution.margin) * 2.0
             solved.append(joints)
         cost += 0.1 * np.abs(joints - self._home).max(axis=1)
-        place_base(self._model, self._data, x + float(move[0]), y + float(move[1]), yaw)
+        PANDA_OMRON.place_base(self._model, self._data, x + float(move[0]), y + float(move[1]), yaw)
         found: list[Plan] = []
         for number, row in enumerate(np.argsort(cost, kind="stable")):
             total = float(cost[row])

@@ -8,9 +8,9 @@ import mujoco
 import numpy as np
 
 from robocasa_lerobot.demos.motion import Array, rotation_about
+from robocasa_lerobot.demos.planning.grasps import GraspPose, grasp_poses, grasp_poses_of, pieces
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.objects.catalogue import Instance
-from robocasa_lerobot.envs.objects.grasping import GraspPose, grasp_poses, grasp_poses_of, pieces
 from robocasa_lerobot.envs.objects.solids import Solid, hull
 
 UPRIGHT_COS = 0.98  # tilts up to 11 degrees count as standing as it was put down
@@ -69,11 +69,11 @@ def grasps(env: KitchenEnv, what: Thing, approach: Array) -> list[GraspPose]:
         if what.item is not None and turn[2, 2] > UPRIGHT_COS and upright > 1e-6:
             yaw = np.array([[turn[0, 0], -turn[1, 0], 0], [turn[1, 0], turn[0, 0], 0], [0, 0, 1.0]])
             yaw[:2, :2] /= upright
-            return [pose.placed(body.xpos, yaw) for pose in grasp_poses(what.item)]
+            return [pose.placed(body.xpos, yaw) for pose in grasp_poses(what.item, env.robot.gripper)]
         tip = np.eye(3)
     else:
         tip = _to_down(approach)
-    poses = grasp_poses_of(list(what.solids), tip @ turn)
+    poses = grasp_poses_of(list(what.solids), tip @ turn, env.robot.gripper)
     back = tip.T
     return [GraspPose(body.xpos + back @ pose.position, back @ pose.rotation, pose.width, pose.score) for pose in poses]
 

@@ -15,7 +15,6 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from robocasa_lerobot.demos.arm import Arm
 from robocasa_lerobot.demos.motion import (
     Array,
     HandTarget,
@@ -26,12 +25,13 @@ from robocasa_lerobot.demos.motion import (
     pose_error,
 )
 from robocasa_lerobot.demos.motion_style import variety_of
+from robocasa_lerobot.demos.planning.kinematics import Arm
 from robocasa_lerobot.demos.skills.common import SkillError
 from robocasa_lerobot.demos.skills.navigation import Room, drive_to
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
-from robocasa_lerobot.envs.robots.panda_omron.model import ARM_HOME_QPOS, place_base
 from robocasa_lerobot.envs.robots.panda_omron.names import ARM_CENTER_SITE, MOBILE_BASE
-from robocasa_lerobot.envs.scene.roles import RobotPose
+from robocasa_lerobot.envs.robots.panda_omron.robot import PANDA_OMRON
+from robocasa_lerobot.envs.scene.robot_poses import RobotPose
 
 GOOD_ENOUGH = 0.8  # cost up to which no other place to stand is looked at
 _SHORTLIST, _TESTED = 160, 60
@@ -163,7 +163,7 @@ def lead(env: KitchenEnv, joints: Array, gripper: float) -> Iterator[Array]:
 
 def go_to(env: KitchenEnv, stand: RobotPose, gripper: float) -> Iterator[Array]:
     """Drive with the arm folded as at the start, as near as it gets."""
-    home, arm = np.array(ARM_HOME_QPOS), Arm(env.model, env.data)
+    home, arm = np.array(PANDA_OMRON.home.arm), Arm(env.model, env.data)
     if np.abs(env.data.qpos[arm.addresses] - home).max() > FOLDED_RAD:
         yield from lead(env, home, gripper)
     with contextlib.suppress(SkillError):
@@ -254,7 +254,7 @@ class _Planner:
 
     def _start(self, stand: RobotPose | None) -> Array:
         if stand is not None:
-            return np.array(ARM_HOME_QPOS)
+            return np.array(PANDA_OMRON.home.arm)
         return np.array(self._env.data.qpos[self._arm.addresses])
 
     def _drive(self, stand: RobotPose | None) -> float:
@@ -290,7 +290,7 @@ class _Planner:
         model, data = self._env.model, self._scratch
         data.qpos[:] = self._env.data.qpos
         cost = self._hits_on_drive(pose, joints[0])
-        place_base(model, data, *pose)
+        PANDA_OMRON.place_base(model, data, *pose)
         for index in range(1, len(joints)):
             for share in (0.2, 0.4, 0.6, 0.8, 1.0) if index == 1 else (0.5, 1.0):
                 data.qpos[self._arm.addresses] = (1 - share) * joints[index - 1] + share * joints[index]
@@ -312,7 +312,7 @@ class _Planner:
         data.qpos[self._arm.addresses] = joints
         cost = 0.0
         for share in (0.35, 0.7, 1.0):
-            place_base(model, data, *((1 - share) * a + share * b for a, b in zip(here, pose, strict=True)))
+            PANDA_OMRON.place_base(model, data, *((1 - share) * a + share * b for a, b in zip(here, pose, strict=True)))
             mujoco.mj_kinematics(model, data)
             cost += _HIT * min(self._met(model, data, self._robot), _MOST_HITS)
         return cost

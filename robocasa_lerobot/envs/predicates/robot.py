@@ -9,7 +9,6 @@ import mujoco
 import numpy as np
 
 from robocasa_lerobot.envs.predicates.logic import Term, plain
-from robocasa_lerobot.envs.robots.panda_omron.names import BASE_CENTER_SITE, GRIP_SITE
 
 if TYPE_CHECKING:
     from robocasa_lerobot.envs.scene.scene import Scene
@@ -33,9 +32,8 @@ class GripperFar(Term):
 
     def holds(self, scene: Scene, data: mujoco.MjData) -> bool:
         """Compare the distance with the threshold."""
-        return (
-            float(np.linalg.norm(data.site(GRIP_SITE).xpos - data.body(scene.fill(self.object)).xpos)) > self.distance
-        )
+        grip = data.site(scene.robot.names.grip_site).xpos
+        return float(np.linalg.norm(grip - data.body(scene.fill(self.object)).xpos)) > self.distance
 
 
 @dataclass(frozen=True)
@@ -54,7 +52,7 @@ class GripperFarFromPart(Term):
     def holds(self, scene: Scene, data: mujoco.MjData) -> bool:
         """Compare the distance with the threshold."""
         body = data.body(f"{scene.fixture(self.fixture).name}_{self.part}")
-        return float(np.linalg.norm(data.site(GRIP_SITE).xpos - body.xipos)) > self.distance
+        return float(np.linalg.norm(data.site(scene.robot.names.grip_site).xpos - body.xipos)) > self.distance
 
 
 @dataclass(frozen=True)
@@ -71,7 +69,7 @@ class StandsBefore(Term):
     def holds(self, scene: Scene, data: mujoco.MjData) -> bool:
         """Compare place and heading with the standing pose."""
         goal = scene.standing_pose(self.fixture)
-        site = data.site(BASE_CENTER_SITE)
+        site = data.site(scene.robot.names.base_center_site)
         apart = float(np.hypot(site.xpos[0] - goal.x, site.xpos[1] - goal.y))
         rotation = site.xmat.reshape(3, 3)
         heading = float(np.arctan2(rotation[1, 0], rotation[0, 0]))

@@ -7,7 +7,7 @@ import mujoco
 from robocasa_lerobot.envs.kitchens.layout import Layout
 from robocasa_lerobot.envs.kitchens.materials import MaterialPalette, load_style
 from robocasa_lerobot.envs.kitchens.surroundings import add_surroundings
-from robocasa_lerobot.envs.robots.panda_omron.model import apply_simulation_options
+from robocasa_lerobot.envs.physics.options import apply_simulation_options
 
 
 def bare_kitchen(layout: Layout, render_preset: str = "fast") -> tuple[mujoco.MjSpec, MaterialPalette]:

@@ -15,14 +15,16 @@ from robocasa_lerobot.envs.kitchens.footprints import PlacementError, place
 from robocasa_lerobot.envs.kitchens.layout import Layout, load_layout
 from robocasa_lerobot.envs.kitchens.splits import Pairs, scene_ids, without
 from robocasa_lerobot.envs.objects.shapes import add_object
-from robocasa_lerobot.envs.robots.panda_omron.camera_noise import CameraNoise, add_camera_noise
-from robocasa_lerobot.envs.robots.panda_omron.cameras import cameras_of_set
-from robocasa_lerobot.envs.robots.panda_omron.model import add_robot
+from robocasa_lerobot.envs.robots.camera_noise import CameraNoise, add_camera_noise
+from robocasa_lerobot.envs.robots.panda_omron.robot import PANDA_OMRON
+from robocasa_lerobot.envs.robots.robot import Robot
 from robocasa_lerobot.envs.scene.assembly import bare_kitchen
+from robocasa_lerobot.envs.scene.counter_areas import counter_areas
 from robocasa_lerobot.envs.scene.initial_states import Initial, LidAside, PartAt
 from robocasa_lerobot.envs.scene.placement import cast_roles, place_objects
 from robocasa_lerobot.envs.scene.regions import Shares
-from robocasa_lerobot.envs.scene.roles import RobotPose, counter_areas, counter_of, robot_pose
+from robocasa_lerobot.envs.scene.robot_poses import RobotPose, robot_pose
+from robocasa_lerobot.envs.scene.roles import counter_of
 from robocasa_lerobot.envs.scene.scene import PlacedObject, Scene
 from robocasa_lerobot.envs.scene.scene_spec import SceneSpec
 from robocasa_lerobot.envs.scene.spec import InitialOpenness, OnCounter
@@ -65,7 +67,7 @@ class Arrangement:
     initial: tuple[tuple[Initial, float], ...]
     lids: dict[str, bool]
     objects: dict[str, PlacedObject]
-    robot: RobotPose
+    robot_pose: RobotPose
 
 
 def build_scene(
@@ -76,6 +78,7 @@ def build_scene(
     camera_set: str = "default",
     camera_noise: CameraNoise | None = None,
     kitchens: Pairs | None = None,
+    robot: Robot = PANDA_OMRON,
 ) -> Scene:
     """The scene of an episode. Render preset, cameras and their noise change looks only: never physics or placement.
 
@@ -87,7 +90,7 @@ def build_scene(
     """
     if render_preset not in RENDER_PRESETS:
         raise UnknownNameError("render preset", render_preset, RENDER_PRESETS)
-    cameras_of_set(camera_set)
+    robot.cameras(camera_set)
     look = _Look(render_preset, camera_set, camera_noise)
     pairs = without(scene_ids(split) if kitchens is None else kitchens, task.needs, task.exclude_styles)
     rng = np.random.default_rng(seed)
@@ -95,7 +98,7 @@ def build_scene(
     for _ in range(MAX_ATTEMPTS):
         layout_id, style_id = pairs[int(rng.integers(len(pairs)))]
         try:
-            return _attempt(task, split, seed, layout_id, style_id, look, rng)
+            return _attempt(task, split, seed, layout_id, style_id, look, robot, rng)
         except PlacementError as error:
             failure = str(error)
     raise UserError(
@@ -111,18 +114,19 @@ def _attempt(
     layout_id: int,
     style_id: int,
     look: _Look,
+    robot: Robot,
     rng: np.random.Generator,
 ) -> Scene:
     layout = load_layout(layout_id, style_id)
-    arranged = arrange(rng, task, split, layout)
-    roles, choices, objects, robot = arranged.roles, arranged.choices, arranged.objects, arranged.robot
+    arranged = arrange(rng, task, split, layout, robot)
+    roles, choices, objects, pose = arranged.roles, arranged.choices, arranged.objects, arranged.robot_pose
     spots = {role: _lid_spot(rng, layout, roles[role], objects) for role, gone in arranged.lids.items() if not gone}
-    spec = _assemble(task, layout, look, objects)
+    spec = _assemble(task, layout, look, robot, objects)
     if look.camera_noise is not None:
         noise_rng = np.random.default_rng([seed, _CAMERA_NOISE_STREAM])
-        add_camera_noise(spec, look.camera_set, look.camera_noise, noise_rng)
+        add_camera_noise(spec, robot.cameras(look.camera_set), look.camera_noise, noise_rng)
     model = spec.compile()
-    words = _words(layout, roles, objects) | choices.words | {"side": robot.side}
+    words = _words(layout, roles, objects) | choices.words | {"side": pose.side}
     return Scene(
         split=split,
         seed=seed,
@@ -135,6 +139,7 @@ def _attempt(
         objects=objects,
         openness=arranged.openness,
         robot=robot,
+        robot_pose=pose,
         instruction=_said(task.instruction, words),
         paraphrases=tuple(_said(wording, words) for wording in task.paraphrases),
         choices=choices.values,
@@ -143,7 +148,9 @@ def _attempt(
     )
 
 
-def arrange(rng: np.random.Generator, task: SceneSpec, split: str, layout: Layout) -> Arrangement:
+def arrange(
+    rng: np.random.Generator, task: SceneSpec, split: str, layout: Layout, robot: Robot = PANDA_OMRON
+) -> Arrangement:
     """Draw what stands where in a layout at the start of a task.
 
     Raises:
@@ -151,12 +158,11 @@ def arrange(rng: np.random.Generator, task: SceneSpec, split: str, layout: Layou
     """
     roles = cast_roles(rng, task, layout)
     choices = draw_choices(rng, task, layout.fixtures, roles)
-    robot: RobotPose | None = None
+    pose: RobotPose | None = None
+    start, shape = task.robot_start, robot.shape
     opened = [layout.fixtures[roles[role]] for role in _opened(task)]
-    if not task.robot_start.at_object:
-        robot = robot_pose(
-            rng, layout, task.robot_start, layout.fixtures[roles[task.robot_start.fixture]], opened=opened
-        )
+    if not start.at_object:
+        pose = robot_pose(rng, layout, start, layout.fixtures[roles[start.fixture]], shape, opened=opened)
     openness = {
         roles[entry.fixture]: float(rng.uniform(entry.low, entry.high))
         for entry in task.initial
@@ -171,10 +177,10 @@ def arrange(rng: np.random.Generator, task: SceneSpec, split: str, layout: Layou
         blender.with_lid = not gone
     places: dict[str, float | Shares] = {**openness, **_shares(initial, roles, choices)}
     objects = place_objects(rng, task, split, layout, roles, places, choices.values)
-    if robot is None:
-        at = objects[task.robot_start.at_object].pos[:2]
-        robot = robot_pose(rng, layout, task.robot_start, layout.fixtures[roles[task.robot_start.fixture]], at, opened)
-    return Arrangement(roles, choices, openness, initial, lids, objects, robot)
+    if pose is None:
+        at = objects[start.at_object].pos[:2]
+        pose = robot_pose(rng, layout, start, layout.fixtures[roles[start.fixture]], shape, at, opened)
+    return Arrangement(roles, choices, openness, initial, lids, objects, pose)
 
 
 def _shares(initial: tuple[tuple[Initial, float], ...], roles: dict[str, str], choices: Choices) -> dict[str, Shares]:
@@ -235,9 +241,11 @@ def _said(wording: str, words: dict[str, str]) -> str:
     return " ".join(wording.format(**words).split())
 
 
-def _assemble(task: SceneSpec, layout: Layout, look: _Look, objects: dict[str, PlacedObject]) -> mujoco.MjSpec:
+def _assemble(
+    task: SceneSpec, layout: Layout, look: _Look, robot: Robot, objects: dict[str, PlacedObject]
+) -> mujoco.MjSpec:
     spec, palette = bare_kitchen(layout, look.render_preset)
-    add_robot(spec, look.render_preset, camera_set=look.camera_set)
+    robot.add_to(spec, look.render_preset, look.camera_set)
     liquids = {wanted.name: LIQUIDS[wanted.filled] for wanted in task.objects if wanted.filled}
     for placed in objects.values():
         add_object(spec, palette, placed.name, placed.item, liquid=liquids.get(placed.name))

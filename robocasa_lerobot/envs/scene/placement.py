@@ -13,8 +13,9 @@ from robocasa_lerobot.envs.kitchens.fixtures.base import Fixture
 from robocasa_lerobot.envs.kitchens.footprints import Area, Footprint, PlacementError, place
 from robocasa_lerobot.envs.kitchens.layout import Layout
 from robocasa_lerobot.envs.objects import catalogue
+from robocasa_lerobot.envs.scene.counter_areas import counter_areas, inside_area, standing_on
 from robocasa_lerobot.envs.scene.regions import Part, Shares, choose_parts, rectangle_in
-from robocasa_lerobot.envs.scene.roles import candidates, counter_areas, inside_area, standing_on
+from robocasa_lerobot.envs.scene.roles import candidates
 from robocasa_lerobot.envs.scene.scene import PlacedObject
 from robocasa_lerobot.envs.scene.scene_spec import SceneSpec
 from robocasa_lerobot.envs.scene.spec import FixtureWanted, ObjectWanted, OnCounter, Placement

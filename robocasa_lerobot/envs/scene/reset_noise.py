@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from robocasa_lerobot.envs.scene.roles import RobotPose, is_free
+from robocasa_lerobot.envs.scene.robot_poses import RobotPose, is_free
 from robocasa_lerobot.envs.scene.scene import Scene
 from robocasa_lerobot.errors import UserError
 
@@ -48,11 +48,11 @@ def add_initial_noise(scene: Scene, noise: InitialNoise) -> None:
     if noise.base_position_m == 0.0 and noise.base_yaw_deg == 0.0:
         return
     rng = np.random.default_rng([scene.seed, _BASE_NOISE_STREAM])
-    start = scene.robot
+    start = scene.robot_pose
     for _ in range(_TRIES):
         shift = rng.normal(0.0, noise.base_position_m, 2)
         turn = np.deg2rad(rng.normal(0.0, noise.base_yaw_deg))
         pose = RobotPose(start.x + float(shift[0]), start.y + float(shift[1]), start.yaw + float(turn), start.side)
-        if is_free(scene.fixtures, pose):
-            scene.robot = pose
+        if is_free(scene.fixtures, pose, scene.robot.shape):
+            scene.robot_pose = pose
             return

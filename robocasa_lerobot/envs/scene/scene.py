@@ -19,13 +19,11 @@ from robocasa_lerobot.envs.kitchens.fixtures.cabinets import Drawer, HingeCabine
 from robocasa_lerobot.envs.kitchens.footprints import Footprint
 from robocasa_lerobot.envs.kitchens.layout import Layout
 from robocasa_lerobot.envs.objects.catalogue import Instance
-from robocasa_lerobot.envs.robots.panda_omron.cameras import camera_configs
-from robocasa_lerobot.envs.robots.panda_omron.control.controller import RobotController
-from robocasa_lerobot.envs.robots.panda_omron.control.step import control_step
-from robocasa_lerobot.envs.robots.panda_omron.model import place_base, set_home
-from robocasa_lerobot.envs.robots.panda_omron.names import GRIPPER
+from robocasa_lerobot.envs.robots.cameras import camera_configs
+from robocasa_lerobot.envs.robots.control_step import control_step
+from robocasa_lerobot.envs.robots.robot import Controller, Robot
 from robocasa_lerobot.envs.scene.bodies import subtree
-from robocasa_lerobot.envs.scene.roles import RobotPose, standing_pose
+from robocasa_lerobot.envs.scene.robot_poses import RobotPose, standing_pose
 
 SETTLE_STEPS = 10  # control steps without a command after placing everything (docs/robocasa.md, section 1)
 
@@ -66,7 +64,8 @@ class Scene:
         roles: fixture name of each role of the task.
         objects: by name.
         openness: initial share of full travel by fixture name.
-        robot: start pose of the base.
+        robot: that is in it.
+        robot_pose: where its base starts.
         instruction: what the robot is told.
         paraphrases: the same in other words.
         choices: what was drawn for the task's choices, and the roles' fixtures, by name.
@@ -85,7 +84,8 @@ class Scene:
     roles: dict[str, str]
     objects: dict[str, PlacedObject]
     openness: dict[str, float]
-    robot: RobotPose
+    robot: Robot
+    robot_pose: RobotPose
     instruction: str
     paraphrases: tuple[str, ...] = ()
     choices: dict[str, str] = field(default_factory=dict)
@@ -139,7 +139,7 @@ class Scene:
 
     def standing_pose(self, role: str) -> RobotPose:
         """Where a robot stands that is to use the fixture of a role, without deviation."""
-        return standing_pose(self.layout, self.fixture(role))
+        return standing_pose(self.layout, self.fixture(role), self.robot.shape)
 
     def lay_lid(self, role: str, data: mujoco.MjData, turn: float, *, gone: bool) -> None:
         """Lay the lid of a blender on the counter, turned by a share of a full turn, or out of the way if `gone`."""
@@ -148,11 +148,12 @@ class Scene:
         if not gone:
             blender.set_lid(data, self.lid_spots[role], 2 * np.pi * turn)
 
-    def initial_data(self, rng: np.random.Generator) -> tuple[mujoco.MjData, RobotController]:
+    def initial_data(self, rng: np.random.Generator) -> tuple[mujoco.MjData, Controller]:
         """State at the start of an episode: everything placed, then settled without commands."""
         data = mujoco.MjData(self.model)
-        place_base(self.model, data, self.robot.x, self.robot.y, self.robot.yaw)
-        set_home(self.model, data, rng, self.arm_noise_rad)
+        pose = self.robot_pose
+        self.robot.place_base(self.model, data, pose.x, pose.y, pose.yaw)
+        self.robot.set_home(self.model, data, rng, self.arm_noise_rad)
         for name, openness in self.openness.items():
             fixture = self.fixtures[name]
             set_openness(fixture, data, openness)
@@ -161,7 +162,7 @@ class Scene:
         for placed in self.objects.values():
             data.joint(f"{placed.name}_joint0").qpos[:] = [*placed.pos, *yaw_quat(placed.yaw)]
         mujoco.mj_forward(self.model, data)
-        controller = RobotController(self.model, data)
+        controller = self.robot.controller(self.model, data)
         controller.reset()
         hold = np.zeros(ACTION_SIZE)
         for _ in range(SETTLE_STEPS):
@@ -174,7 +175,7 @@ class Scene:
         """Let appliances latch, time and light up, once after each control step."""
         appliances = [fixture for fixture in self.fixtures.values() if isinstance(fixture, Appliance)]
         if appliances:
-            update_all(appliances, self.model, data, self.subtree(GRIPPER))
+            update_all(appliances, self.model, data, self.subtree(self.robot.names.gripper))
 
     def ep_meta(self) -> dict[str, Any]:
         """Description of the episode in RoboCasa's keys (JSON-able)."""
@@ -203,9 +204,9 @@ class Scene:
                 for name, fixture in self.fixtures.items()
             },
             "fixture_refs": dict(self.roles),
-            "cam_configs": camera_configs(self.model),
-            "init_robot_base_pos": [self.robot.x, self.robot.y, 0.0],
-            "init_robot_base_ori": [0.0, 0.0, self.robot.yaw],
+            "cam_configs": camera_configs(self.model, (camera.name for camera in self.robot.cameras("default"))),
+            "init_robot_base_pos": [self.robot_pose.x, self.robot_pose.y, 0.0],
+            "init_robot_base_ori": [0.0, 0.0, self.robot_pose.yaw],
         }
 
 

@@ -175,7 +175,7 @@ def env_arguments(name: str, settings: PerturbationSettings) -> dict[str, Any]:
     if name == "language":
         return {"novel_language": True}
     if name == "camera":
-        from robocasa_lerobot.envs.robots.panda_omron.camera_noise import CameraNoise
+        from robocasa_lerobot.envs.robots.camera_noise import CameraNoise
 
         return {
             "camera_noise": CameraNoise(

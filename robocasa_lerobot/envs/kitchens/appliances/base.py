@@ -20,7 +20,7 @@ from robocasa_lerobot.envs.kitchens.appliances.parts import Parts
 from robocasa_lerobot.envs.kitchens.appliances.records import ModelRecord
 from robocasa_lerobot.envs.kitchens.fixtures.base import Fixture, Region
 from robocasa_lerobot.envs.kitchens.materials import MaterialPalette
-from robocasa_lerobot.envs.robots.panda_omron.control.physics import read_physics, write_physics
+from robocasa_lerobot.envs.physics.whole_state import read_physics, write_physics
 
 # A door counts as open, or as closed, by these shares of its range (docs/robocasa.md, section 7).
 OPEN_FROM, CLOSED_UP_TO = 0.90, 0.005

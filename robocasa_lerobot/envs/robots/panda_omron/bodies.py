@@ -9,10 +9,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+from robocasa_lerobot.envs.robots.cameras import Quat, Vec3
 from robocasa_lerobot.envs.robots.panda_omron import names
-
-Vec3 = tuple[float, float, float]
-Quat = tuple[float, float, float, float]
 
 IDENTITY: Quat = (1.0, 0.0, 0.0, 0.0)
 _QUARTER = 0.707107  # as the source writes it: sqrt(1/2) to six digits

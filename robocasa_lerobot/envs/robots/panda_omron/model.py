@@ -6,27 +6,22 @@ site-packages folder, so that a written MJCF is the same on every machine.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import cache
 from importlib.util import find_spec
 from pathlib import Path
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
-from robocasa_lerobot.contract import PHYSICS_TIMESTEP_S
+from robocasa_lerobot.envs.robots.cameras import CameraSpec, add_cameras
 from robocasa_lerobot.envs.robots.panda_omron import names
-from robocasa_lerobot.envs.robots.panda_omron.bodies import BASE_YAW_PIVOT, BODIES, BodySpec, JointSpec
-from robocasa_lerobot.envs.robots.panda_omron.cameras import add_cameras
+from robocasa_lerobot.envs.robots.panda_omron.bodies import BODIES, BodySpec, JointSpec
 from robocasa_lerobot.envs.robots.panda_omron.shapes import add_shapes
 from robocasa_lerobot.errors import UnknownNameError, UserError
 
 QUALITIES = ("fast", "quality")
 SPAWN_POSITION = (10.0, 10.0, 0.0)  # of the model; the base joints then carry it to its place, as in RoboCasa's files
-
-ARM_HOME_QPOS = (-0.01612974, -1.03446714, -0.02397936, -2.27550888, 0.03932365, 1.51639493, 0.69615947)
-GRIPPER_HOME_QPOS = (0.020833, -0.020833)
-TORSO_HOME_QPOS = 0.0
 
 _ARM_TORQUE_NM = (80.0, 80.0, 80.0, 80.0, 80.0, 12.0, 12.0)
 _BASE_KV = (1000.0, 1000.0, 1500.0)
@@ -44,8 +39,8 @@ _MESH_NAMES = (*(f"link{i}" for i in range(8)), "hand", "finger")
 def add_robot(
     spec: mujoco.MjSpec,
     quality: str,
+    cameras: Sequence[CameraSpec] = (),
     spawn_position: tuple[float, float, float] = SPAWN_POSITION,
-    camera_set: str = "default",
 ) -> None:
     """Add the PandaOmron to the world of `spec`, its zero configuration at `spawn_position` (metres), facing +x.
 
@@ -53,7 +48,7 @@ def add_robot(
     shapes are the same in both.
 
     Raises:
-        UnknownNameError: there is no such quality or camera set.
+        UnknownNameError: there is no such quality.
     """
     if quality not in QUALITIES:
         raise UnknownNameError("robot quality", quality, QUALITIES)
@@ -64,64 +59,8 @@ def add_robot(
     _add_sites(spec)
     _add_meshes(spec, quality)
     add_shapes(spec, quality)
-    add_cameras(spec, camera_set)
+    add_cameras(spec, cameras)
     _add_actuators(spec)
-
-
-def apply_simulation_options(spec: mujoco.MjSpec) -> None:
-    """Set time step, integrator, contact and solver options to RoboCasa's."""
-    option = spec.option
-    option.timestep = PHYSICS_TIMESTEP_S
-    option.integrator = mujoco.mjtIntegrator.mjINT_EULER
-    option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
-    option.solver = mujoco.mjtSolver.mjSOL_NEWTON
-    option.iterations = 100
-    option.impratio = 20.0
-    option.density = 1.2  # of air, kg/m^3
-    option.viscosity = 2.0e-5  # of air, Pa s
-    # Several contacts per pair of convex shapes: on where MuJoCo has a flag for it either way round.
-    if hasattr(mujoco.mjtEnableBit, "mjENBL_MULTICCD"):
-        option.enableflags |= int(mujoco.mjtEnableBit.mjENBL_MULTICCD)
-    if hasattr(mujoco.mjtDisableBit, "mjDSBL_MULTICCD"):
-        option.disableflags &= ~int(mujoco.mjtDisableBit.mjDSBL_MULTICCD)
-    # A simulation that is lost must be an error (`control_step` raises it), not a silent return to the zero state.
-    option.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
-    spec.visual.map.znear = 0.001
-
-
-def place_base(model: mujoco.MjModel, data: mujoco.MjData, x: float, y: float, yaw: float) -> None:
-    """Set the base joints so that the base centre stands at world (x, y) metres with heading `yaw` radians.
-
-    Writes `data.qpos` only (call `mj_forward` afterwards); the torso keeps its height.
-    """
-    spawn = model.body(names.ROBOT_BASE).pos
-    cos, sin = np.cos(yaw), np.sin(yaw)
-    pivot_x, pivot_y, _ = BASE_YAW_PIVOT
-    # The hinge turns the base about its pivot, which moves the base centre; the slides make up for that.
-    slide_x = x - spawn[0] - pivot_x + cos * pivot_x - sin * pivot_y
-    slide_y = y - spawn[1] - pivot_y + sin * pivot_x + cos * pivot_y
-    for joint, value in zip(names.BASE_JOINTS, (slide_x, slide_y, yaw), strict=True):
-        data.joint(joint).qpos[0] = value
-
-
-def set_home(
-    model: mujoco.MjModel, data: mujoco.MjData, rng: np.random.Generator | None = None, noise_std: float = 0.02
-) -> None:
-    """Set arm, gripper and torso to their initial pose, at rest; the base stays where it is.
-
-    With `rng`, Gaussian noise of `noise_std` radians is added to the arm joints, unclipped, as RoboCasa does.
-    Writes `data.qpos` and the robot's `data.qvel` only (call `mj_forward` afterwards).
-    """
-    arm: NDArray[np.float64] = np.array(ARM_HOME_QPOS)
-    if rng is not None:
-        arm += rng.normal(0.0, noise_std, size=arm.shape)
-    values = dict(zip(names.ARM_JOINTS, arm, strict=True))
-    values |= dict(zip(names.FINGER_JOINTS, GRIPPER_HOME_QPOS, strict=True))
-    values[names.TORSO_JOINT] = TORSO_HOME_QPOS
-    for joint, value in values.items():
-        data.joint(joint).qpos[0] = value
-    for joint in names.JOINTS:
-        data.joint(joint).qvel[0] = 0.0
 
 
 @cache

@@ -7,12 +7,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from robocasa_lerobot.contract import ACTION_SIZE, SUBSTEPS, ContractError
+from robocasa_lerobot.envs.physics import native
 from robocasa_lerobot.envs.robots.panda_omron import names
-from robocasa_lerobot.envs.robots.panda_omron.control import indices, kernel, native
+from robocasa_lerobot.envs.robots.panda_omron.control import indices, kernel
 from robocasa_lerobot.errors import UserError
 
 
-class RobotController:
+class PandaOmronController:
     """Arm, base, torso and gripper together; all four always execute what they are told.
 
     The control mode only chooses what an arm command is added to: its previous goal (> 0), so that the arm rides

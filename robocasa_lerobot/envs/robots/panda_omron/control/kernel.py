@@ -18,7 +18,7 @@ import numpy as np
 from numba import types
 from numpy.typing import NDArray
 
-from robocasa_lerobot.envs.robots.panda_omron.control.native import compiled
+from robocasa_lerobot.envs.physics.native import compiled
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -50,7 +50,6 @@ _SINGULAR = 1e-14  # relative pivot below which a direction counts as lost (a st
 # MuJoCo's own functions, by their names in its library; `native.load()` makes them known before the first call.
 _mj_step1 = types.ExternalFunction("mj_step1", types.void(types.intp, types.intp))
 _mj_step2 = types.ExternalFunction("mj_step2", types.void(types.intp, types.intp))
-_mj_updateSleep = types.ExternalFunction("mj_updateSleep", types.void(types.intp, types.intp))  # noqa: N816
 
 
 class Views(NamedTuple):
@@ -190,12 +189,6 @@ def run_uncontrolled(model: int, data: int, substeps: int) -> None:
     for _ in range(substeps):
         _mj_step2(model, data)
         _mj_step1(model, data)
-
-
-@compiled
-def update_sleep(model: int, data: int) -> None:
-    """Make MuJoCo's lists of what is awake follow `data.tree_asleep`; its Python package has no call for it."""
-    _mj_updateSleep(model, data)
 
 
 @compiled

@@ -11,8 +11,8 @@ import numpy as np
 from robocasa_lerobot.envs.kitchens.footprints import PlacementError
 from robocasa_lerobot.envs.kitchens.layout import load_layout, split_of
 from robocasa_lerobot.envs.rendering import SceneRenderer
-from robocasa_lerobot.envs.robots.panda_omron.cameras import cameras_of_set
-from robocasa_lerobot.envs.robots.panda_omron.model import add_robot, place_base, set_home
+from robocasa_lerobot.envs.robots.panda_omron.robot import PANDA_OMRON
+from robocasa_lerobot.envs.robots.robot import Robot
 from robocasa_lerobot.envs.scene.assembly import bare_kitchen
 from robocasa_lerobot.envs.scene.build import arrange
 from robocasa_lerobot.envs.scene.scene_spec import SceneSpec
@@ -48,6 +48,7 @@ def views(
     starts: int = 1,
     size: int = 48,
     camera_set: str = "default",
+    robot: Robot = PANDA_OMRON,
 ) -> Iterator[View]:
     """What every camera of a set sees in a bare kitchen, from `starts` starts of each task that the kitchen admits.
 
@@ -60,13 +61,14 @@ def views(
         starts: of each task.
         size: of the pictures, pixels.
         camera_set: name.
+        robot: that starts.
     """
     layout = load_layout(layout_id)
     spec, _ = bare_kitchen(layout)
-    add_robot(spec, "fast", camera_set=camera_set)
+    robot.add_to(spec, "fast", camera_set)
     model = spec.compile()
     data = mujoco.MjData(model)
-    set_home(model, data)
+    robot.set_home(model, data)
     room = layout.room
     low = np.array([room["x_min"], room["y_min"], 0.0])
     high = np.array([room["x_max"], 0.0, room["height"]])
@@ -75,14 +77,14 @@ def views(
         for task in tasks:
             rng = np.random.default_rng([seed, layout_id, *task.name.encode()])
             for _ in range(starts):
-                pose = _start(rng, task, layout_id)
+                pose = _start(rng, task, layout_id, robot)
                 if pose is None:
                     break
-                place_base(model, data, *pose)
+                robot.place_base(model, data, *pose)
                 mujoco.mj_kinematics(model, data)
                 mujoco.mj_comPos(model, data)
                 mujoco.mj_camlight(model, data)
-                for camera in cameras_of_set(camera_set):
+                for camera in robot.cameras(camera_set):
                     _, geoms = renderer.geometry(data, camera.name)
                     at = data.camera(camera.name).xpos
                     beyond = float(np.maximum(np.maximum(low - at, at - high), 0.0).max())
@@ -91,12 +93,14 @@ def views(
         renderer.close()
 
 
-def _start(rng: np.random.Generator, task: SceneSpec, layout_id: int) -> tuple[float, float, float] | None:
+def _start(
+    rng: np.random.Generator, task: SceneSpec, layout_id: int, robot: Robot
+) -> tuple[float, float, float] | None:
     """Where a start of the task puts the robot; None where the kitchen does not admit it."""
     for _ in range(TRIES):
         try:
-            robot = arrange(rng, task, split_of(layout_id), load_layout(layout_id)).robot
+            start = arrange(rng, task, split_of(layout_id), load_layout(layout_id), robot).robot_pose
         except PlacementError:
             continue
-        return robot.x, robot.y, robot.yaw
+        return start.x, start.y, start.yaw
     return None

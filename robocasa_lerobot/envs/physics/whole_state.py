@@ -6,7 +6,8 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from robocasa_lerobot.envs.robots.panda_omron.control import kernel, native
+from robocasa_lerobot.envs.physics import native
+from robocasa_lerobot.envs.physics.sleep import update_sleep
 
 _SIGNATURE = int(mujoco.mjtState.mjSTATE_INTEGRATION)
 
@@ -34,5 +35,5 @@ def write_physics(
     # which drawers at rest would creep by their solver's last digits.
     mujoco.mj_forward(model, data)
     data.tree_asleep[:] = asleep
-    kernel.update_sleep(model._address, data._address)
+    update_sleep(model._address, data._address)
     mujoco.mj_step1(model, data)

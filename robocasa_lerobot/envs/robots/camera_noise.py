@@ -14,12 +14,13 @@ Source of the distributions: RoboCasa 1.0.1 (`randomize_cameras`). Three of its 
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, fields
 
 import mujoco
 import numpy as np
 
-from robocasa_lerobot.envs.robots.panda_omron.cameras import cameras_of_set
+from robocasa_lerobot.envs.robots.cameras import CameraSpec
 from robocasa_lerobot.errors import UserError
 
 # The wrist camera must not be moved into the hand that carries it: RoboCasa's limits, metres in the hand's frame.
@@ -53,31 +54,24 @@ class CameraNoise:
                 raise UserError(f"camera_noise.{field.name}: found {value}, expected a finite number of at least 0.")
 
 
-# RoboCasa's noise for each camera set; the real robot's cameras are mounted more exactly.
-CAMERA_NOISE: dict[str, CameraNoise] = {
-    "default": CameraNoise(),
-    "cotraining": CameraNoise(scene_position_m=0.025, scene_angle_deg=0.75),
-}
-
-
-def choose_noise(noise: bool | CameraNoise, camera_set: str) -> CameraNoise | None:
-    """The noise that an env's setting stands for: True is RoboCasa's for the camera set.
+def choose_noise(noise: bool | CameraNoise, usual: CameraNoise | None) -> CameraNoise | None:
+    """The noise that an env's setting stands for: True is the `usual` one of the camera set.
 
     Raises:
-        UnknownNameError: there is no camera set of that name.
         UserError: the setting is neither a truth value nor a `CameraNoise`.
     """
-    cameras_of_set(camera_set)
     if isinstance(noise, CameraNoise):
         return noise
     if not isinstance(noise, bool):
         raise UserError(f"camera_noise: found {noise!r}, expected True, False or a CameraNoise(...).")
-    return CAMERA_NOISE[camera_set] if noise else None
+    return usual if noise else None
 
 
-def add_camera_noise(spec: mujoco.MjSpec, camera_set: str, noise: CameraNoise, rng: np.random.Generator) -> None:
-    """Move and turn the cameras of a set that is in `spec`, in the order of the set."""
-    for camera in cameras_of_set(camera_set):
+def add_camera_noise(
+    spec: mujoco.MjSpec, cameras: Iterable[CameraSpec], noise: CameraNoise, rng: np.random.Generator
+) -> None:
+    """Move and turn cameras that are in `spec`, in their order."""
+    for camera in cameras:
         if "agentview" in camera.name:
             shift = rng.normal(0.0, noise.scene_position_m, 3)
             angles = rng.normal(0.0, noise.scene_angle_deg, 3)

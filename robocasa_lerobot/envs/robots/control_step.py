@@ -6,8 +6,8 @@ import mujoco
 from numpy.typing import ArrayLike
 
 from robocasa_lerobot.contract import SUBSTEPS
-from robocasa_lerobot.envs.robots.panda_omron.control.controller import RobotController
-from robocasa_lerobot.envs.robots.panda_omron.control.physics import read_physics, write_physics
+from robocasa_lerobot.envs.physics.whole_state import read_physics, write_physics
+from robocasa_lerobot.envs.robots.robot import Controller
 
 _BAD = [
     int(mujoco.mjtWarning.mjWARN_BADQPOS),
@@ -21,7 +21,7 @@ class DivergedError(RuntimeError):
 
 
 def control_step(
-    model: mujoco.MjModel, data: mujoco.MjData, controller: RobotController, action: ArrayLike, substeps: int = SUBSTEPS
+    model: mujoco.MjModel, data: mujoco.MjData, controller: Controller, action: ArrayLike, substeps: int = SUBSTEPS
 ) -> None:
     """Advance the simulation by one policy step (50 ms) with `action` (12,) in HDF5 order.
 

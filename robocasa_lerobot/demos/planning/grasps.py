@@ -15,14 +15,8 @@ import numpy as np
 from robocasa_lerobot.envs.objects.catalogue import Instance, model_of
 from robocasa_lerobot.envs.objects.mesh import Array
 from robocasa_lerobot.envs.objects.solids import Solid, about, matrix
+from robocasa_lerobot.envs.robots.robot import GripperGeometry
 
-# Of the gripper (robot_bodies, robot_shapes), metres.
-OPENING_M = 0.076  # widest thing that it is sent to grasp
-FINGER_BELOW_GRIP_M = 0.014  # the finger tips reach this far below the grip site
-PALM_ABOVE_GRIP_M = 0.029  # nothing may be higher than this above the grip site
-_FINGER_INNER, _FINGER_OUTER = 0.0395, 0.056  # of an open finger, from the middle
-_FINGER_HALF_WIDTH = 0.0105
-_PALM_HALF = (0.10, 0.03)
 _TABLE_GAP = 0.0025  # between finger tips and what the object stands on
 _ANGLES = 8
 _LINE_STEP = 0.01
@@ -50,24 +44,28 @@ class GraspPose:
         return GraspPose(origin + turn @ self.position, turn @ self.rotation, self.width, self.score)
 
 
-def grasp_poses(item: Instance, count: int = 16) -> tuple[GraspPose, ...]:
+def grasp_poses(item: Instance, gripper: GripperGeometry, count: int = 16) -> tuple[GraspPose, ...]:
     """Up to `count` ways to hold an instance as it stands, best first, in the frame of its body."""
-    return _standing(item)[:count]
+    return _standing(item, gripper)[:count]
 
 
-def grasp_poses_as_it_lies(item: Instance, turn: Array, count: int = 16) -> tuple[GraspPose, ...]:
+def grasp_poses_as_it_lies(
+    item: Instance, turn: Array, gripper: GripperGeometry, count: int = 16
+) -> tuple[GraspPose, ...]:
     """The same for an object that was turned by the rotation matrix `turn`, about its origin, in axes of the room."""
-    return _plan(pieces(item), turn)[:count]
+    return _plan(pieces(item), turn, gripper)[:count]
 
 
-def grasp_poses_of(solids: list[Solid], turn: Array, count: int = 16) -> tuple[GraspPose, ...]:
+def grasp_poses_of(
+    solids: list[Solid], turn: Array, gripper: GripperGeometry, count: int = 16
+) -> tuple[GraspPose, ...]:
     """The same for any body made of convex pieces, in its own frame, that was turned by the rotation matrix `turn`."""
-    return _plan(solids, turn)[:count]
+    return _plan(solids, turn, gripper)[:count]
 
 
 @functools.lru_cache(maxsize=512)
-def _standing(item: Instance) -> tuple[GraspPose, ...]:
-    return _plan(pieces(item), np.eye(3))
+def _standing(item: Instance, gripper: GripperGeometry) -> tuple[GraspPose, ...]:
+    return _plan(pieces(item), np.eye(3), gripper)
 
 
 def pieces(item: Instance) -> list[Solid]:
@@ -142,7 +140,7 @@ class _Candidate:
         return np.asarray(self.middle * self.u + self.row * self.w + np.array([0.0, 0.0, self.z]))
 
 
-def _plan(solids: list[Solid], turn: Array) -> tuple[GraspPose, ...]:
+def _plan(solids: list[Solid], turn: Array, gripper: GripperGeometry) -> tuple[GraspPose, ...]:
     clouds = [s.cloud() @ turn.T for s in solids]
     faces = _faces(clouds)
     cloud = np.concatenate(clouds)
@@ -150,14 +148,14 @@ def _plan(solids: list[Solid], turn: Array) -> tuple[GraspPose, ...]:
     middles = np.array([(c.min(axis=0) + c.max(axis=0)) / 2 for c in clouds])
     center = volumes @ middles / volumes.sum()
     bottom, top = float(cloud[:, 2].min()), float(cloud[:, 2].max())
-    lowest = bottom + FINGER_BELOW_GRIP_M + _TABLE_GAP
+    lowest = bottom + gripper.tips_below_grip + _TABLE_GAP
     heights = {lowest, *np.linspace(bottom, top, 7)[1:-1], top - 0.028, top - 0.018, top - 0.010, top - 0.002}
     levels = sorted({round(max(h, lowest), 3) for h in heights} | {round(lowest, 4)})
     found: list[_Candidate] = []
     for k in range(_ANGLES):
         angle = np.pi * k / _ANGLES
         u, w = np.array([np.cos(angle), np.sin(angle), 0.0]), np.array([-np.sin(angle), np.cos(angle), 0.0])
-        found += _across(faces, cloud, center, u, w, levels)
+        found += _across(faces, cloud, center, u, w, levels, gripper.opening)
     found.sort(key=lambda candidate: -candidate.score)
     # Best first, but such that the first ones differ; whether there is room is asked of those that count only.
     chosen: list[_Candidate] = []
@@ -166,7 +164,7 @@ def _plan(solids: list[Solid], turn: Array) -> tuple[GraspPose, ...]:
             np.linalg.norm(candidate.position - other.position) < 0.012 and abs(float(candidate.u @ other.u)) > 0.95
             for other in chosen
         )
-        if not alike and _has_room(faces, candidate, top):
+        if not alike and _has_room(faces, candidate, top, gripper):
             chosen.append(candidate)
             if len(chosen) == _MOST_POSES:
                 break
@@ -179,7 +177,9 @@ def _pose(candidate: _Candidate) -> GraspPose:
     return GraspPose(candidate.position, rotation, candidate.high - candidate.low, candidate.score)
 
 
-def _across(faces: _Faces, cloud: Array, center: Array, u: Array, w: Array, levels: list[float]) -> list[_Candidate]:
+def _across(
+    faces: _Faces, cloud: Array, center: Array, u: Array, w: Array, levels: list[float], opening: float
+) -> list[_Candidate]:
     """Candidates that open along u, the fingers' width along w."""
     reach = cloud @ w
     middle = float(center @ w)
@@ -201,7 +201,7 @@ def _across(faces: _Faces, cloud: Array, center: Array, u: Array, w: Array, leve
             lines = parts[level, index]
             # What is lower than the pads' middle is held by their lower ends.
             for low, high in _merged(lines[4]) or _merged(lines[3]):
-                if not 0.002 < high - low < OPENING_M:
+                if not 0.002 < high - low < opening:
                     continue
                 ends = []
                 for line in lines:
@@ -236,23 +236,25 @@ def _merged(parts: Array) -> list[tuple[float, float]]:
     return out
 
 
-def _has_room(faces: _Faces, candidate: _Candidate, top: float) -> bool:
+def _has_room(faces: _Faces, candidate: _Candidate, top: float, gripper: GripperGeometry) -> bool:
     """Whether the open fingers and the palm meet nothing."""
     row, z, u, w = candidate.row, candidate.z, candidate.u, candidate.w
     up = np.array([0.0, 0.0, 1.0])
     # The fingers, from their tips to the palm, and nothing beside what is to be held.
-    side = np.array([-_FINGER_HALF_WIDTH, 0.0, _FINGER_HALF_WIDTH])
-    rise = np.array([-FINGER_BELOW_GRIP_M + 0.001, 0.0, 0.02])
+    side = np.array([-gripper.finger_half_width, 0.0, gripper.finger_half_width])
+    rise = np.array([-gripper.tips_below_grip + 0.001, 0.0, 0.02])
     starts = ((row + side)[:, None, None] * w + (z + rise)[None, :, None] * up).reshape(-1, 3)
     lines = faces.fill(starts, u) - candidate.middle
-    near = (lines[..., 1] > -_FINGER_OUTER) & (lines[..., 0] < _FINGER_OUTER)
-    if (near & ((lines[..., 0] < -_FINGER_INNER) | (lines[..., 1] > _FINGER_INNER))).any():
+    inner, outer = gripper.finger_inner, gripper.finger_outer
+    near = (lines[..., 1] > -outer) & (lines[..., 0] < outer)
+    if (near & ((lines[..., 0] < -inner) | (lines[..., 1] > inner))).any():
         return False
     # The palm: nothing crosses lines along it, from its height up to the top.
-    beside = np.array([-_PALM_HALF[1], -_PALM_HALF[1] / 2, 0.0, _PALM_HALF[1] / 2, _PALM_HALF[1]])
-    heights = np.arange(z + PALM_ABOVE_GRIP_M, top, 0.012)
+    along, across = gripper.palm_half
+    beside = np.array([-across, -across / 2, 0.0, across / 2, across])
+    heights = np.arange(z + gripper.palm_above_grip, top, 0.012)
     if not len(heights):
         return True
     starts = ((row + beside)[:, None, None] * w + heights[None, :, None] * up).reshape(-1, 3)
     lines = faces.fill(starts, u) - candidate.middle
-    return not ((lines[..., 1] > -_PALM_HALF[0]) & (lines[..., 0] < _PALM_HALF[0])).any()
+    return not ((lines[..., 1] > -along) & (lines[..., 0] < along)).any()

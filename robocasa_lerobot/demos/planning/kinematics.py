@@ -10,13 +10,11 @@ from numpy.typing import NDArray
 
 from robocasa_lerobot.demos.motion import Array
 from robocasa_lerobot.envs.robots.panda_omron.control.indices import joint_positions
-from robocasa_lerobot.envs.robots.panda_omron.model import ARM_HOME_QPOS
 from robocasa_lerobot.envs.robots.panda_omron.names import ARM_CENTER_SITE, ARM_JOINTS, GRIP_SITE, HAND
+from robocasa_lerobot.envs.robots.panda_omron.robot import PANDA_OMRON
 
 ITERATIONS, DAMPING = 40, 0.05
 HOPELESS_AFTER, HOPELESS_M = 10, 0.06  # what is as far as this after so many iterations is given up
-# The wrist's centre is this far behind the grip site, and never farther than this from the shoulder, metres.
-WRIST_M, SHOULDER_M, LONGEST_M = 0.204, 0.333, 0.81
 STEP_M, STEP_RAD, TOWARDS_HOME = 0.12, 0.5, 0.15
 
 
@@ -89,7 +87,7 @@ class Arm:
         What the six conditions leave over goes towards the arm's home, as its controller lets it.
         """
         joints = start.copy()
-        home = np.asarray(ARM_HOME_QPOS)
+        home = np.asarray(PANDA_OMRON.home.arm)
         eye6, eye7 = DAMPING**2 * np.eye(6), np.eye(7)
         busy = np.flatnonzero(self._within_reach(positions, rotations))
         for iteration in range(ITERATIONS):
@@ -120,8 +118,9 @@ class Arm:
 
     @staticmethod
     def _within_reach(positions: Array, rotations: Array) -> NDArray[np.bool_]:
-        wrist = positions - WRIST_M * rotations[:, :, 2] - np.array([0.0, 0.0, SHOULDER_M])
-        near: NDArray[np.bool_] = np.linalg.norm(wrist, axis=1) < LONGEST_M
+        reach = PANDA_OMRON.reach
+        wrist = positions - reach.wrist_behind_grip * rotations[:, :, 2] - np.array([0.0, 0.0, reach.shoulder])
+        near: NDArray[np.bool_] = np.linalg.norm(wrist, axis=1) < reach.longest
         return near
 
 

@@ -1,0 +1,1 @@
+"""What kitchens and tasks must pass."""

@@ -1,0 +1,76 @@
+"""Which parts of a counter, a drawer or a basin an object may start on, and what stands there already."""
+
+from __future__ import annotations
+
+from robocasa_lerobot.envs.kitchens.appliances.kinds.sink import Sink
+from robocasa_lerobot.envs.kitchens.fixtures.accessories import Accessory
+from robocasa_lerobot.envs.kitchens.fixtures.base import Fixture
+from robocasa_lerobot.envs.kitchens.fixtures.cabinets import Drawer
+from robocasa_lerobot.envs.kitchens.footprints import Area, Footprint, PlacementError
+from robocasa_lerobot.envs.kitchens.layout import Layout
+from robocasa_lerobot.envs.scene.robot_poses import footprint
+from robocasa_lerobot.envs.scene.roles import counter_of
+from robocasa_lerobot.envs.scene.spec import InsideOf, OnCounter
+
+MIN_REGION_WIDTH_M = 0.12
+# Fixture types that nothing on a counter meets: shells, counters themselves, what is flat on a wall. Boxes are parts of
+# cabinets, but for those that stand on a counter as accessories.
+NOT_IN_THE_WAY = ("counter", "floor", "wall", "window", "stool", "box", "panel_cabinet", "drawer")
+
+
+def counter_areas(layout: Layout, start: OnCounter, near: Fixture) -> tuple[list[Area], list[Footprint]]:
+    """The rectangles of the counter that a start allows, and what already stands on the counter."""
+    counter = counter_of(layout, near)
+    near_x = counter.to_local(near.pos)[0]
+    width, depth = start.size
+    shift_x, shift_y = start.offset
+    if start.at == "front":
+        y0 = -counter.depth / 2 + shift_y
+        y1 = min(y0 + depth, counter.depth / 2)
+    else:
+        y1 = counter.depth / 2 - shift_y
+        y0 = max(y1 - depth, -counter.depth / 2)
+    half = near.width / 2
+    spans = {
+        "above": [(near_x - width / 2, near_x + width / 2)],
+        "left_right": [(near_x - half - width, near_x - half), (near_x + half, near_x + half + width)],
+    }[start.loc]
+    areas = []
+    for low, high in spans:
+        x0, x1 = max(low + shift_x, -counter.width / 2), min(high + shift_x, counter.width / 2)
+        if x1 - x0 >= MIN_REGION_WIDTH_M:
+            areas.append(Area(x0, x1, y0, y1, counter.pos[:2], counter.yaw, counter.surface_z))
+    if not areas:
+        raise PlacementError(f"no room on {counter.name} near {near.name}")
+    return areas, standing_on(layout, counter, counter.surface_z)
+
+
+def standing_on(layout: Layout, fixture: Fixture, surface_z: float) -> list[Footprint]:
+    """Footprints of the fixtures that stand on a surface of a fixture, or reach near it from above."""
+    standing = [
+        f
+        for f in layout.fixtures.values()
+        if f is not fixture
+        and (isinstance(f, Accessory) or layout.types[f.name] not in NOT_IN_THE_WAY)
+        and f.pos[2] + f.height / 2 > surface_z - 0.005
+        and f.pos[2] - f.height / 2 < surface_z + 0.3
+    ]
+    return [footprint(f) for f in standing] + [_faucet(f) for f in standing if isinstance(f, Sink)]
+
+
+def _faucet(sink: Sink) -> Footprint:
+    """What the faucet covers of the counter; it stands out of the sink's box."""
+    (x, y), half = sink.faucet_spot
+    at = sink.to_world((x, y, 0.0))
+    return Footprint(float(at[0]), float(at[1]), sink.yaw, half)
+
+
+def inside_area(start: InsideOf, fixture: Fixture, openness: float) -> Area:
+    """The part of a drawer's or basin's floor that a start allows, in the room as the drawer stands open."""
+    assert isinstance(fixture, Drawer | Sink)
+    region = fixture.interior if isinstance(fixture, Drawer) else fixture.basin
+    half_w, half_d = min(start.size[0] / 2, region.half[0]), min(start.size[1] / 2, region.half[1])
+    centre_y = region.center[1] + start.at * (region.half[1] - half_d)
+    slide = -openness * fixture.full_travel if isinstance(fixture, Drawer) else 0.0
+    centre = fixture.to_world((region.center[0], centre_y + slide, region.center[2] - region.half[2]))
+    return Area(-half_w, half_w, -half_d, half_d, (float(centre[0]), float(centre[1])), fixture.yaw, float(centre[2]))

@@ -1,0 +1,266 @@
+"""Where a robot stands in a kitchen: before which side of a fixture, and whether there is room for it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from robocasa_lerobot.envs.kitchens.appliances.kinds.dishwasher import Dishwasher
+from robocasa_lerobot.envs.kitchens.appliances.kinds.microwave import Microwave
+from robocasa_lerobot.envs.kitchens.appliances.kinds.oven import Oven
+from robocasa_lerobot.envs.kitchens.fixtures.base import Fixture
+from robocasa_lerobot.envs.kitchens.fixtures.cabinets import Drawer, HingeCabinet
+from robocasa_lerobot.envs.kitchens.fixtures.counters import Counter
+from robocasa_lerobot.envs.kitchens.fixtures.stools import SEAT_M
+from robocasa_lerobot.envs.kitchens.footprints import Footprint, Footprints, PlacementError
+from robocasa_lerobot.envs.kitchens.layout import Layout
+from robocasa_lerobot.envs.kitchens.plan.islands import STOOL_OUT_M
+from robocasa_lerobot.envs.robots.robot import StandingShape
+from robocasa_lerobot.envs.scene.roles import ground_fixture
+from robocasa_lerobot.envs.scene.spec import RobotStart
+
+BESIDE_CLEARANCE_M = 0.20
+# Free poses are searched for with the start's deviation, then with wider ones (docs/robocasa.md, section 6); RoboCasa
+# widens without end, ours gives the layout up and takes another.
+SPAWN_TRIES, SPAWN_ROUNDS = 50, 4
+SPAWN_WIDENING_M = (0.10, 0.05)
+FEW_TRIES = 8  # of a round, one by one: nearly always enough; the others are looked at together, which is faster
+SPAWN_MARGIN_M = 0.02
+TALL_STANDOFF_M = 0.10  # more, before fridges and tall housings (docs/robocasa.md, section 6)
+HANDLE_OUT_M = 0.05
+DOOR_M = 0.04  # thickness of doors
+
+
+@dataclass(frozen=True)
+class RobotPose:
+    """Where the base centre stands (metres), its heading (radians), and on which side a fixture beside it is."""
+
+    x: float
+    y: float
+    yaw: float
+    side: str = ""
+
+
+@dataclass(frozen=True)
+class Face:
+    """A side of a fixture that a robot may stand at.
+
+    Attributes:
+        turn: of the side's frame from the fixture's, radians; 0 is the front.
+        width, depth: of the fixture seen from there, metres.
+        clearance: kept free for stools, metres.
+    """
+
+    turn: float
+    width: float
+    depth: float
+    clearance: float = 0.0
+
+
+def faces(layout: Layout, ground: Fixture, fixture: Fixture) -> list[Face]:
+    """Sides of a ground fixture, the best first: the front, or for islands and tables any, at their stools last."""
+    front = Face(0.0, ground.width, ground.depth)
+    if not (isinstance(ground, Counter) and ground.back_face):
+        return [front]
+    stools = [ground.to_local(f.pos)[1] for f in layout.of_type("stool") if _belongs(ground, f)]
+    room = STOOL_OUT_M + SEAT_M / 2
+    front = Face(0.0, ground.width, ground.depth, room if any(y < 0 for y in stools) else 0.0)
+    back = Face(np.pi, ground.width, ground.depth, room if any(y > 0 for y in stools) else 0.0)
+    if layout.types[fixture.name] == "stool":
+        return [back if ground.to_local(fixture.pos)[1] > 0 else front]
+    if fixture is not ground:
+        return [front]
+    sides = [Face(turn, ground.depth, ground.width) for turn in (-np.pi / 2, np.pi / 2)]
+    return sorted([front, back, *sides], key=lambda face: (face.clearance, abs(face.turn) == np.pi / 2, abs(face.turn)))
+
+
+def _belongs(counter: Counter, stool: Fixture) -> bool:
+    x, y = counter.to_local(stool.pos)
+    return abs(x) <= counter.width / 2 and abs(y) <= counter.depth / 2 + STOOL_OUT_M + 0.05
+
+
+def standing_pose(layout: Layout, fixture: Fixture, shape: StandingShape) -> RobotPose:
+    """Where a robot stands to use a fixture: in line with its middle, at the usual distance of its front."""
+    ground = ground_fixture(layout, fixture)
+    face = faces(layout, ground, fixture)[0]
+    return _pose_at(layout, ground, face, fixture.pos[:2], (0.0, 0.0), 0.0, "", shape)
+
+
+def _standoff(layout: Layout, ground: Fixture, shape: StandingShape) -> float:
+    tall = layout.types[ground.name] == "housing_cabinet" or layout.types[ground.name].startswith("fridge")
+    return shape.standoff + (TALL_STANDOFF_M if tall else 0.0)
+
+
+def _pose_at(
+    layout: Layout,
+    ground: Fixture,
+    face: Face,
+    at: tuple[float, float],
+    shift: tuple[float, float],
+    setback: float,
+    side: str,
+    shape: StandingShape,
+) -> RobotPose:
+    """The pose before a face of a ground fixture, in line with a point of the room, shifted right and inwards."""
+    x = _turned(ground.to_local(at), -face.turn)[0] + shift[0]
+    y = -face.depth / 2 - _standoff(layout, ground, shape) - setback - face.clearance - shift[1]
+    world = ground.to_world((*_turned((x, y), face.turn), 0.0))
+    heading = ground.yaw + face.turn + np.pi / 2
+    yaw = float(np.arctan2(np.sin(heading), np.cos(heading)))
+    return RobotPose(float(world[0]), float(world[1]), yaw, side)
+
+
+def robot_pose(
+    rng: np.random.Generator,
+    layout: Layout,
+    start: RobotStart,
+    fixture: Fixture,
+    shape: StandingShape,
+    at: tuple[float, float] | None = None,
+    opened: Iterable[Fixture] = (),
+) -> RobotPose:
+    """A free pose facing a fixture, by RoboCasa's rules, with the start's uniform deviation to all sides.
+
+    `shape` is what the robot takes up, `at` a point of the room to stand in line with, instead of the fixture's
+    middle. The robot does not stand in the open doors and drawers of those `opened`.
+
+    Raises:
+        PlacementError: no pose was free.
+    """
+    ground = ground_fixture(layout, fixture)
+    lateral = fixture.width / 2 + BESIDE_CLEARANCE_M
+    # Standing to the left of the fixture, it is at the robot's right, and the other way round.
+    options = [("right", -lateral), ("left", lateral)] if start.beside else [("", 0.0)]
+    if start.setback and layout.types[fixture.name] == "fridge_bottom_freezer":
+        options = [("", -start.setback)]  # out of the way of its doors (docs/robocasa.md, section 6)
+    obstacles = Obstacles(layout.fixtures, shape, opened)
+    for face in faces(layout, ground, fixture):
+        half_range = np.array(start.deviation)
+        for _ in range(SPAWN_ROUNDS):
+            for count in (*[1] * FEW_TRIES, SPAWN_TRIES - FEW_TRIES):
+                tried = []
+                for _ in range(count):
+                    order = rng.permutation(len(options))
+                    deviation = rng.uniform(-1, 1, size=2) * half_range
+                    for index in order:
+                        side, offset = options[int(index)]
+                        shift = (offset + float(deviation[0]), float(deviation[1]))
+                        place = at or fixture.pos[:2]
+                        pose = _pose_at(layout, ground, face, place, shift, start.setback, side, shape)
+                        tried.append(pose)
+                free = obstacles.leave_free(tried)
+                if free.any():
+                    return tried[int(np.argmax(free))]
+            half_range = half_range + SPAWN_WIDENING_M
+    raise PlacementError(f"no free place for the robot at {fixture.name}")
+
+
+def _turned(point: tuple[float, float], angle: float) -> tuple[float, float]:
+    c, s = float(np.cos(angle)), float(np.sin(angle))
+    return c * point[0] - s * point[1], s * point[0] + c * point[1]
+
+
+class Obstacles:
+    """What a robot may meet where it stands: at the height of its base, of the column above it, and of its hand."""
+
+    def __init__(self, fixtures: Mapping[str, Fixture], shape: StandingShape, opened: Iterable[Fixture] = ()) -> None:
+        self._shape = shape
+        doors = _opened(opened)
+        self._base, self._column = (_standing(fixtures, doors, top) for top in (shape.base_top, shape.column_top))
+        low, high = shape.hand_z
+        tall = [f for f in fixtures.values() if f.pos[2] - f.height / 2 < high and f.pos[2] + f.height / 2 > low]
+        above = [door.footprint for door in doors if door.low < high and door.high > low]
+        self._tall = Footprints([*(footprint(f) for f in tall), *above])
+
+    def leave_free(self, poses: Sequence[RobotPose]) -> NDArray[np.bool_]:
+        """Of n poses those at which the robot touches none, its arm as at the start of an episode; shape (n,)."""
+        at = np.array([(pose.x, pose.y, pose.yaw) for pose in poses])
+        shape = self._shape
+        return ~(
+            self._base.overlapping(_ahead(at, *shape.base_x), _half(shape.base_x, shape.base_y[1]), SPAWN_MARGIN_M)
+            | self._column.overlapping(at, (shape.column_half, shape.column_half), SPAWN_MARGIN_M)
+            | self._tall.overlapping(_ahead(at, *shape.hand_x), _half(shape.hand_x, shape.hand_half))
+        )
+
+
+def _ahead(at: NDArray[np.float64], near: float, far: float) -> NDArray[np.float64]:
+    """The middles of what reaches from `near` to `far` metres before poses, (n, 3)."""
+    along = (near + far) / 2
+    return at + along * np.stack([np.cos(at[:, 2]), np.sin(at[:, 2]), np.zeros(len(at))], axis=1)
+
+
+def _half(along: tuple[float, float], across: float) -> tuple[float, float]:
+    return (along[1] - along[0]) / 2, across
+
+
+@dataclass(frozen=True)
+class _Door:
+    """Where an open door or a pulled-out drawer is: on the floor plan, and from which height to which, metres."""
+
+    footprint: Footprint
+    low: float
+    high: float
+
+
+def _standing(fixtures: Mapping[str, Fixture], doors: list[_Door], top: float) -> Footprints:
+    """Fixtures but the floor, and doors, that begin below a height, metres; and handles that stand out of them."""
+    standing = [f for f in fixtures.values() if f.pos[2] - f.height / 2 < top and f.name != "floor"]
+    marks = [mark for f in standing for mark in (footprint(f), *_handles(f, top))]
+    return Footprints([*marks, *(door.footprint for door in doors if door.low < top)])
+
+
+def _opened(fixtures: Iterable[Fixture]) -> list[_Door]:
+    """The open doors of cabinets, microwaves, dishwashers and ovens, and the pulled-out drawers, of some fixtures."""
+    return [door for fixture in fixtures for door in (*_outwards(fixture), *_sideways(fixture))]
+
+
+def _outwards(fixture: Fixture) -> Iterator[_Door]:
+    """What folds down or slides out in front."""
+    if isinstance(fixture, Dishwasher | Oven):
+        low, high = fixture.door_span
+        out, thick = high - low, DOOR_M
+    elif isinstance(fixture, Drawer):
+        low, out, thick = -fixture.height / 2, fixture.full_travel + HANDLE_OUT_M, fixture.height
+    else:
+        return
+    x, y, z = fixture.to_world((0.0, -fixture.depth / 2 - out / 2, low)).tolist()
+    yield _Door(Footprint(x, y, fixture.yaw, (fixture.width / 2, out / 2)), z, z + thick)
+
+
+def _sideways(fixture: Fixture) -> Iterator[_Door]:
+    """Doors on a vertical hinge that stand open by 0.9 to 1 of a right angle, with their handles."""
+    if isinstance(fixture, Microwave):
+        hinges: tuple[str, ...] = ("left",)
+        wide = fixture.door_width
+    elif isinstance(fixture, HingeCabinet):
+        hinges, wide = fixture.hinges, fixture.width / max(len(fixture.hinges), 1)
+    else:
+        return
+    inwards, out = wide * float(np.sin(0.1 * np.pi / 2)) + DOOR_M, HANDLE_OUT_M
+    for hinge in hinges:
+        sign = -1.0 if hinge == "left" else 1.0
+        middle = sign * (fixture.width / 2 + (out - inwards) / 2)
+        x, y, z = fixture.to_world((middle, -(fixture.depth + wide) / 2, 0.0)).tolist()
+        mark = Footprint(x, y, fixture.yaw, ((inwards + out) / 2, wide / 2))
+        yield _Door(mark, z - fixture.height / 2, z + fixture.height / 2)
+
+
+def is_free(fixtures: Mapping[str, Fixture], pose: RobotPose, shape: StandingShape) -> bool:
+    """Whether a robot can stand at a pose without touching a fixture, its arm as at the start of an episode."""
+    return bool(Obstacles(fixtures, shape).leave_free([pose])[0])
+
+
+def _handles(fixture: Fixture, top: float) -> list[Footprint]:
+    """The handle of a drawer that is low enough to be met: it stands out of the fixture's box."""
+    if not isinstance(fixture, Drawer) or fixture.pos[2] > top:
+        return []
+    x, y, _ = fixture.to_world((0.0, -fixture.depth / 2 - HANDLE_OUT_M / 2, 0.0))
+    return [Footprint(float(x), float(y), fixture.yaw, (fixture.width / 4, HANDLE_OUT_M / 2))]
+
+
+def footprint(fixture: Fixture) -> Footprint:
+    """A fixture's box on the floor plan."""
+    return Footprint(fixture.pos[0], fixture.pos[1], fixture.yaw, (fixture.width / 2, fixture.depth / 2))
