@@ -132,7 +132,7 @@ def test_task_sets_of_a_registry_file(tmp_path: Path) -> None:
 
 def test_lifelong_policies_run_the_tasks_of_their_phases(monkeypatch: pytest.MonkeyPatch) -> None:
     sets = {"first": ("OpenDrawer", "CloseDrawer"), "second": ("PickPlaceCounterToSink",)}
-    monkeypatch.setattr("robocasa_lerobot.data.registry.published.published_task_sets", lambda: sets)
+    monkeypatch.setattr("robocasa_lerobot.benchmark.tasks.published_task_sets", lambda: sets)
     given = ["--env.task_sets=first,second", "--lifelong", "--policy=zero,random", "--trials=1"]
     evaluation = engine.prepare(load_config(EvaluationConfig, [*given, "--policy.lifelong_phase=1,2"]))
     assert [(s.label, s.task) for s in evaluation.plan] == [

@@ -223,11 +223,11 @@ def check_chunk(source: Any, actions: np.ndarray) -> None:
 def test_gr00t_is_asked_for_chunks_as_its_own_queue_gives_them(tmp_path: Path) -> None:
     """A tiny one with the published names in a cache of the hub, which a process looks for when it starts."""
     pytest.importorskip("tree", reason="GR00T needs dm-tree")
-    script = Path(__file__).with_name("groot_chunks.py")
+    script = Path(__file__).parents[1] / "support" / "groot_chunks.py"
     tests = str(script.parent)
     environment = {
         **os.environ, "HF_HOME": str(tmp_path), "HF_HUB_OFFLINE": "1", "OMP_NUM_THREADS": "1",
-        "PYTHONPATH": os.pathsep.join((f"{tests}/tiny_gemma", tests, str(script.parents[1]))),
+        "PYTHONPATH": os.pathsep.join((f"{tests}/tiny_gemma", tests, str(script.parents[2]))),
     }  # fmt: skip
     done = subprocess.run(
         [sys.executable, str(script), str(tmp_path)], env=environment, capture_output=True, text=True, check=False

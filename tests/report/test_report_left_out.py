@@ -7,8 +7,8 @@ from pathlib import Path
 
 from evaluation_records import header, record, write_results
 
-from robocasa_lerobot.cli import report as report_command
 from robocasa_lerobot.evaluation.records import results, trials_file
+from robocasa_lerobot.evaluation.report import output
 from robocasa_lerobot.evaluation.report.gather import gather
 from robocasa_lerobot.training.planning import skipped
 from robocasa_lerobot.training.planning.skipped import Skipped
@@ -29,7 +29,7 @@ def test_what_a_training_left_out_and_what_a_run_lacks_is_said(tmp_path: Path) -
     folder.mkdir(parents=True)
     for item in (one, *(record(run=one.id, trial=t, seed=t) for t in range(3))):
         trials_file.append(folder / results.TRIALS_FILE, item)
-    report_command.write_report([folder], out=folder / "report.html")
+    output.write_report([folder], out=folder / "report.html")
     text = (folder / "report.md").read_text()
     for said in (
         "lifelong: phase phase2 is left out: none of its 20 tasks is in this version yet.",
@@ -40,7 +40,7 @@ def test_what_a_training_left_out_and_what_a_run_lacks_is_said(tmp_path: Path) -
         assert said in text.replace("\\", "")
     assert "its run says so itself" not in text
     skipped.record(out, [])
-    report_command.write_report([folder], out=folder / "report.html")
+    output.write_report([folder], out=folder / "report.html")
     assert "What was left out" not in (folder / "report.md").read_text()
 
 

@@ -62,7 +62,7 @@ def test_no_phase_is_lost_to_an_evaluation(
     tmp_path: Path, data: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """One has no registered task, one lacks some, one fails when it runs: the next phase trains all the same."""
-    monkeypatch.setenv("PYTHONPATH", f"{ROOT / 'tests'}{os.pathsep}{ROOT}")
+    monkeypatch.setenv("PYTHONPATH", f"{ROOT / 'tests' / 'support'}{os.pathsep}{ROOT}")
     slide = tmp_path / "slide.yaml"
     slide.write_text(
         "env: {factory: 'evaluation_env:SlideEnv', tasks: [Slide], horizon: 4}\ntrials: 1\nvideos: 0\nworkers: 1\n"
@@ -121,13 +121,13 @@ def test_evaluations_mean_the_experiments_registry_where_they_name_none(tmp_path
 
 def test_nothing_of_a_killed_training_goes_on_evaluating(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The evaluation of a trainer that is killed ends, so that the next one may write to its folder."""
-    monkeypatch.setenv("PYTHONPATH", f"{ROOT / 'tests'}{os.pathsep}{ROOT}")
+    monkeypatch.setenv("PYTHONPATH", f"{ROOT / 'tests' / 'support'}{os.pathsep}{ROOT}")
     command = [
         sys.executable, "-m", "robocasa_lerobot.cli", "eval", "--end-with-input", "--policy=zero", "--trials=1",
         "--env.factory=evaluation_env:SlideEnv", "--env.tasks=Slide+slow", "--env.horizon=30000", "--workers=1",
         f"--out={tmp_path}",
     ]  # fmt: skip
-    trainer = f"from robocasa_lerobot.training import evaluations as e; e._run({command!r}, lambda: False)"
+    trainer = f"from robocasa_lerobot.training.planning import evaluations as e; e._run({command!r}, lambda: False)"
     with subprocess.Popen([sys.executable, "-c", trainer]) as process:
         while not (tmp_path / "trials.jsonl").exists():
             time.sleep(0.1)
