@@ -46,7 +46,7 @@ demo: $(STAMP)  ## demonstrations, dataset, two training phases, evaluation and 
 	PYTHON=$(BIN)/python sh scripts/demo.sh
 
 test: $(STAMP)  ## the fast tests
-	$(BIN)/python -m pytest $(PYTEST_ARGS)
+	PYTHON=$(BIN)/python sh scripts/test.sh $(PYTEST_ARGS)
 
 test-slow: $(STAMP)  ## the slow tests: every task and kitchen, long trainings
 	$(BIN)/python -m pytest -m slow $(PYTEST_ARGS)
