@@ -7,10 +7,11 @@ from collections.abc import Iterable, Iterator
 from robocasa_lerobot.demos.motion import Array, action
 from robocasa_lerobot.demos.motion_style import PLAIN, Variety, give_variety
 from robocasa_lerobot.demos.skills import SKILLS, SkillError
+from robocasa_lerobot.demos.stages import StageLog, carry_out
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.tasks.registry import get_task, task_names
 from robocasa_lerobot.envs.tasks.task import Task
-from robocasa_lerobot.errors import UnknownNameError, UserError
+from robocasa_lerobot.errors import UserError
 
 __all__ = ["SkillError", "can_demonstrate", "demonstrate"]
 
@@ -36,25 +37,21 @@ def check_demonstrable(names: Iterable[str]) -> None:
         )
 
 
-def demonstrate(env: KitchenEnv, variety: Variety = PLAIN) -> Iterator[Array]:
+def demonstrate(env: KitchenEnv, variety: Variety = PLAIN, log: StageLog | None = None) -> Iterator[Array]:
     """Actions (12,), stored order, for the episode that `env` has been reset to, one per control step.
 
     Each action is computed from the state that the env is in when it is asked for, so the caller must step the env
     with it before asking for the next. It ends after the last stage, with the arm held still from then on. `variety`
-    says how it is carried out.
+    says how it is carried out; `log` tells which stage each action belongs to, and what came of them.
 
     Raises:
         UnknownNameError: a stage needs a skill that does not exist.
-        SkillError: a skill gives up.
+        SkillError: a stage is not done after all its attempts.
     """
     gripper = -1.0
     give_variety(env, variety)
-    for stage in env.declaration.stages:
-        key = (stage.skill, stage.verb)
-        if key not in SKILLS:
-            raise UnknownNameError("skill", " ".join(key), (" ".join(k) for k in SKILLS))
-        for step in SKILLS[key](env, stage):
-            gripper = float(step[-1])
-            yield variety.carry_out(step)
+    for step in carry_out(env, StageLog() if log is None else log):
+        gripper = float(step[-1])
+        yield variety.carry_out(step)
     while True:
         yield action(gripper=gripper)

@@ -48,6 +48,9 @@ def write_part(path: Path, recording: Recording) -> None:
         demo.create_dataset("states", data=recording.states, compression="gzip")
         demo.create_dataset("actions", data=recording.actions, compression="gzip")
         demo.create_dataset("rewards", data=recording.rewards)
+        demo.create_dataset("stage", data=recording.stages)
+        terms = demo.create_dataset("success_terms", data=recording.success_terms, compression="gzip")
+        terms.attrs["names"] = json.dumps(recording.term_names)
         dones = np.zeros(len(recording.actions), dtype=np.int64)
         dones[-1] = 1
         demo.create_dataset("dones", data=dones)

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from robocasa_lerobot import contract
 from robocasa_lerobot.demos.demonstrator import SkillError, demonstrate
 from robocasa_lerobot.demos.motion_style import PLAIN, Variety
+from robocasa_lerobot.demos.stages import StageLog
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 
 Array = NDArray[np.float64]
@@ -34,6 +35,8 @@ class Recording:
         actions: (T, 12) in HDF5 order, as executed.
         observations: robosuite-named proprioception, each (T, k); pictures (T, S, S, 3) uint8 if asked for.
         rewards: (T,) 1 where the goal held in states[t].
+        stages: (T,) index of the stage that actions[t] belongs to.
+        success_terms: (T, n) whether each of the goal's terms held in states[t]; `term_names` are theirs.
         model_file: MJCF.
         assets: files of textures and objects that the MJCF names.
         ep_meta: description of the scene.
@@ -47,6 +50,9 @@ class Recording:
     actions: Array
     observations: dict[str, NDArray[Any]]
     rewards: Array
+    stages: NDArray[np.int32]
+    success_terms: NDArray[np.bool_]
+    term_names: tuple[str, ...]
     model_file: str
     assets: dict[str, bytes]
     ep_meta: dict[str, Any]
@@ -57,13 +63,17 @@ class _Buffer:
     states: list[Array] = field(default_factory=list)
     actions: list[Array] = field(default_factory=list)
     rewards: list[float] = field(default_factory=list)
+    stages: list[int] = field(default_factory=list)
+    terms: list[dict[str, bool]] = field(default_factory=list)
     observations: dict[str, list[NDArray[Any]]] = field(default_factory=dict)
 
-    def add(self, env: KitchenEnv, action: Array, success: bool, *, images: bool) -> None:
+    def add(self, env: KitchenEnv, action: Array, info: dict[str, Any], stage: int, *, images: bool) -> None:
         data = env.data
+        self.stages.append(stage)
+        self.terms.append(info["success_terms"])
         self.states.append(np.concatenate([[data.time], data.qpos, data.qvel]))
         self.actions.append(contract.stored_to_hdf5(action))
-        self.rewards.append(float(success))
+        self.rewards.append(float(info["success"]))
         for key, value in env.robot.read_observations(env.model, data).items():
             self.observations.setdefault(key, []).append(np.array(value, dtype=np.float64))
         if images:
@@ -91,12 +101,12 @@ def record_episode(
     _, info = env.reset(seed=seed)
     model_file = env.scene.spec.to_xml()
     buffer = _Buffer()
-    held, reason = 0, ""
+    held, reason, log = 0, "", StageLog()
     try:
-        for wanted in demonstrate(env, variety):
+        for wanted in demonstrate(env, variety, log):
             # Everything is carried out in single precision, as a policy's action is, and recorded as carried out.
             action = _with_noise(rng, wanted, action_noise).astype(np.float32).astype(np.float64)
-            buffer.add(env, contract.binarize(action), info["success"], images=images)
+            buffer.add(env, contract.binarize(action), info, log.current, images=images)
             _, _, _, truncated, info = env.step(action.astype(np.float32))
             held = held + 1 if info["success"] else 0
             if held >= SUCCESS_HOLD_STEPS:
@@ -107,6 +117,7 @@ def record_episode(
                 break
     except SkillError as error:
         reason = str(error)
+    log.close(env)
     return Recording(
         seed=seed,
         success=held >= SUCCESS_HOLD_STEPS,
@@ -116,11 +127,20 @@ def record_episode(
         actions=np.array(buffer.actions),
         observations={key: np.array(values) for key, values in buffer.observations.items()},
         rewards=np.array(buffer.rewards),
+        stages=np.array(buffer.stages, dtype=np.int32),
+        success_terms=np.array([list(terms.values()) for terms in buffer.terms], dtype=bool),
+        term_names=tuple(info["success_terms"]),
         model_file=model_file,
         assets={
             name: data for name, data in env.scene.spec.assets.items() if name.startswith(("textures/", "objects/"))
         },
-        ep_meta={**env.scene.ep_meta(), **_kitchens(env), "action_noise": action_noise, "variety": asdict(variety)},
+        ep_meta={
+            **env.scene.ep_meta(),
+            **_kitchens(env),
+            "action_noise": action_noise,
+            "variety": asdict(variety),
+            "stages": log.table(env.declaration.stages),
+        },
     )
 
 

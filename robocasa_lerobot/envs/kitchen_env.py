@@ -27,6 +27,7 @@ from robocasa_lerobot.envs.scene.reset_noise import InitialNoise, add_initial_no
 from robocasa_lerobot.envs.scene.scene import Scene
 from robocasa_lerobot.envs.state import KitchenState, restore
 from robocasa_lerobot.envs.tasks.registry import get_task
+from robocasa_lerobot.envs.tasks.task import Task
 from robocasa_lerobot.errors import UnknownNameError, UserError
 
 Observation = dict[str, Any]
@@ -50,7 +51,7 @@ class KitchenEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
     Info, at reset and every step: `success`, `is_success`, `success_terms`, `instruction`, `task`, `scene`, `seed`.
 
     Args:
-        task: name of a registered task.
+        task: name of a registered task, or a declaration that is in the making.
         split: "target" or "pretrain".
         render_preset: "fast" (no shadows) or "quality".
         image_size: height and width of the pictures, pixels.
@@ -81,7 +82,7 @@ class KitchenEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
 
     def __init__(
         self,
-        task: str,
+        task: str | Task,
         split: str = "target",
         render_preset: str = "fast",
         image_size: int = contract.IMAGE_SIZE,
@@ -100,7 +101,7 @@ class KitchenEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         styles: Sequence[int] | None = None,
         robot: Robot = PANDA_OMRON,
     ) -> None:
-        self.declaration, self.robot = get_task(task), robot
+        self.declaration, self.robot = task if isinstance(task, Task) else get_task(task), robot
         # Fails here, not at the first reset, for a split without kitchens.
         chosen = scene_ids(split, layouts=layouts, styles=styles)
         without(chosen, self.declaration.needs, self.declaration.exclude_styles)
@@ -114,7 +115,7 @@ class KitchenEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
             raise UserError(f"image_size ({image_size}) and horizon ({horizon}) must be at least 1.")
         if render_device is not None:
             gl.check_device(render_device)
-        self.task = task
+        self.task = self.declaration.name
         self.split = split
         self.render_preset = render_preset
         self.image_size = image_size

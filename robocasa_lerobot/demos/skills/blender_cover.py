@@ -36,7 +36,7 @@ from robocasa_lerobot.demos.skills.blender_lid import (
     grasps,
     the_blender,
 )
-from robocasa_lerobot.demos.skills.common import SkillError, hold_hand, move_hand
+from robocasa_lerobot.demos.skills.common import SkillError, hold_hand, move_hand, stage_done
 from robocasa_lerobot.demos.skills.pick import INSIST, entry
 from robocasa_lerobot.demos.skills.ways import Choice, Held, Way, approach, choose, lead
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
@@ -78,7 +78,7 @@ def cover(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
         yield from hold_hand(env.data, at, OPEN, RELEASE_STEPS)
         away = HandTarget(at.position - AWAY_M * at.rotation[:, 2], at.rotation)
         yield from move_hand(env.data, away, OPEN, tolerance=0.02, max_steps=50)
-        if env.declaration.goal.evaluate(env.scene, env.data, {}):
+        if stage_done(env, stage):
             return
     raise SkillError(f"the lid of {blender.name} is not on its jug after {ATTEMPTS} attempts")
 

@@ -20,7 +20,7 @@ from robocasa_lerobot.demos.motion import (
     grip_position,
     hand_rotation,
 )
-from robocasa_lerobot.demos.skills.common import SkillError, hold_hand, move_hand
+from robocasa_lerobot.demos.skills.common import SkillError, hold_hand, move_hand, stage_done
 from robocasa_lerobot.demos.skills.reach import shift_base, untried
 from robocasa_lerobot.demos.skills.reach_many import plan_reach_of_many
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
@@ -56,7 +56,7 @@ def uncover(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
     """
     blender = the_blender(env, stage)
     spots = [spot + UP * PLUG_M for spot in _free_spots(env, blender)]
-    yield from _carry(env, blender, spots)
+    yield from _carry(env, stage, blender, spots)
 
 
 def the_blender(env: KitchenEnv, stage: Stage) -> Blender:
@@ -66,7 +66,7 @@ def the_blender(env: KitchenEnv, stage: Stage) -> Blender:
     return blender
 
 
-def _carry(env: KitchenEnv, blender: Blender, spots: list[Array]) -> Iterator[Array]:
+def _carry(env: KitchenEnv, stage: Stage, blender: Blender, spots: list[Array]) -> Iterator[Array]:
     """Take the lid to one of the spots of its origin."""
     data = env.data
     if not spots:
@@ -102,7 +102,7 @@ def _carry(env: KitchenEnv, blender: Blender, spots: list[Array]) -> Iterator[Ar
         yield from hold_hand(data, rest, OPEN, RELEASE_STEPS)
         away = HandTarget(rest.position - AWAY_M * rest.rotation[:, 2], rest.rotation)
         yield from move_hand(data, away, OPEN, tolerance=0.02, max_steps=50)
-        if env.declaration.goal.evaluate(env.scene, data, {}):
+        if stage_done(env, stage):
             return
     raise SkillError(f"the lid of {blender.name} is not where it belongs after {ATTEMPTS} attempts")
 

@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator
 import numpy as np
 
 from robocasa_lerobot.demos.motion import CLOSED, UP, Array, HandTarget, base_pose, frame, grip_position, hand_rotation
-from robocasa_lerobot.demos.skills.common import SkillError, hold_hand, move_hand
+from robocasa_lerobot.demos.skills.common import SkillError, hold_hand, move_hand, stage_done
 from robocasa_lerobot.demos.skills.levers import CLOSED_FINGERS_HALF_M, level_and_down, push_way
 from robocasa_lerobot.demos.skills.reach import plan_reach, shift_base, untried
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
@@ -54,7 +54,7 @@ def press_button(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
         yield from move_hand(data, at, CLOSED, speed=PRESS_SPEED, tolerance=0.003, max_steps=50, until=pressed)
         yield from retreat(env, -inwards)
         for _ in range(40):
-            if env.declaration.goal.evaluate(env.scene, data, {}):
+            if stage_done(env, stage):
                 return
             yield from hold_hand(data, HandTarget(grip_position(data), hand_rotation(data)), CLOSED, 1)
     raise SkillError(f"{part} of {fixture.name}: nothing came of {ATTEMPTS} presses")

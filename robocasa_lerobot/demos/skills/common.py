@@ -17,7 +17,10 @@ from robocasa_lerobot.demos.motion import (
     limit,
     pose_error,
 )
+from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.robots.panda_omron.names import FINGER_JOINTS
+from robocasa_lerobot.envs.tasks.conditions import stage_condition
+from robocasa_lerobot.envs.tasks.task import Stage
 
 POSITION_TOLERANCE_M = 0.012
 ROTATION_TOLERANCE_RAD = 0.12
@@ -112,3 +115,8 @@ def require_near(data: mujoco.MjData, target: HandTarget, limit_m: float, what: 
     distance = pose_error(data, target).position
     if distance > limit_m:
         raise SkillError(f"{what}: the hand stayed {distance * 100:.0f} cm away")
+
+
+def stage_done(env: KitchenEnv, stage: Stage) -> bool:
+    """Whether a stage's own condition holds now."""
+    return stage_condition(env.declaration, stage).evaluate(env.scene, env.data, {})

@@ -17,7 +17,7 @@ from robocasa_lerobot.demos.motion import (
     hand_rotation,
     rotation_about,
 )
-from robocasa_lerobot.demos.skills.common import SkillError, hold_hand, move_hand
+from robocasa_lerobot.demos.skills.common import SkillError, hold_hand, move_hand, stage_done
 from robocasa_lerobot.demos.skills.reach import plan_reach, shift_base
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.scene.initial_states import initial_share
@@ -60,7 +60,7 @@ def raise_knob(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
 
 def turn_knob(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
     """Turn a knob up or down from where it was at reset, as the task's direction asks."""
-    way = ADJUST_SHARE if env.scene.choices["direction"] == "increase" else -ADJUST_SHARE
+    way = ADJUST_SHARE if env.scene.fill(stage.to) == "increase" else -ADJUST_SHARE
     share = initial_share(env.scene, stage.target, stage.part) + way
     yield from _turn_to(env, stage, float(np.clip(share, 0.0, 1.0)) * _range(env, stage))
 
@@ -100,9 +100,7 @@ def _turn_to(env: KitchenEnv, stage: Stage, goal: float) -> Iterator[Array]:
         yield from hold_hand(data, rest, OPEN, GRASP_STEPS)
         away = HandTarget(rest.position - rest.rotation[:, 2] * STANDOFF_M, rest.rotation)
         yield from move_hand(data, away, OPEN, max_steps=30, tolerance=0.03)
-        if abs(goal - fixture.position(data, part)) < 2 * DONE_RAD or env.declaration.goal.evaluate(
-            env.scene, data, {}
-        ):
+        if abs(goal - fixture.position(data, part)) < 2 * DONE_RAD or stage_done(env, stage):
             return
     raise SkillError(
         f"{part} of {fixture.name} is at {np.degrees(fixture.position(data, part)):.0f} degrees after {GRASPS} grasps, "

@@ -21,7 +21,7 @@ from robocasa_lerobot.demos.motion import (
     grip_position,
     rotation_about,
 )
-from robocasa_lerobot.demos.skills.common import SkillError, hold_hand, move_hand
+from robocasa_lerobot.demos.skills.common import SkillError, hold_hand, move_hand, stage_done
 from robocasa_lerobot.demos.skills.reach import plan_reach, shift_base, untried
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.robots.panda_omron.robot import PANDA_OMRON
@@ -84,7 +84,7 @@ def press_lever(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
         yield from hold_hand(data, HandTarget(grip_position(data) + way * 0.01, rotation), CLOSED, 4)
         back = HandTarget(before.position + (UP * 0.05) - rotation[:, 2] * 0.06, rotation)
         yield from move_hand(data, back, CLOSED, tolerance=0.03, max_steps=40)
-        if env.declaration.goal.evaluate(env.scene, data, {}):
+        if stage_done(env, stage):
             return
     raise SkillError(f"{part} of {fixture.name} is at {fixture.share(data, part):.0%} after {ATTEMPTS} attempts")
 
@@ -105,10 +105,10 @@ def turn_sideways(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
     """Grasp the spout, or the lever that sets the temperature, and lead it to the side that is asked for."""
     sink, part = env.scene.sink(stage.target), stage.part
     if part == "spout":
-        goal = SPOUT_RAD if env.scene.choices["direction"] == "right" else -SPOUT_RAD
+        goal = SPOUT_RAD if env.scene.fill(stage.to) == "right" else -SPOUT_RAD
     else:
         low, high = (float(v) for v in env.model.joint(sink.joint(part)).range)
-        goal = low + (HOT_SHARE if env.scene.choices["start"] == "cold" else COLD_SHARE) * (high - low)
+        goal = low + (HOT_SHARE if env.scene.fill(stage.to) == "other than cold" else COLD_SHARE) * (high - low)
     runs = sink.water_on(env.data)
     yield from _lead(env, stage, part, lambda: goal - sink.position(env.data, part))
     if runs and not sink.water_on(env.data):  # the hand has leaned on the lever
@@ -161,7 +161,7 @@ def _lead(env: KitchenEnv, stage: Stage, part: str, left_over: Callable[[], floa
         yield from hold_hand(data, rest, OPEN, GRASP_STEPS)
         away = HandTarget(rest.position - rest.rotation[:, 2] * 0.10, rest.rotation)
         yield from move_hand(data, away, OPEN, max_steps=30, tolerance=0.03)
-        if abs(left_over()) < DONE_RAD or env.declaration.goal.evaluate(env.scene, data, {}):
+        if abs(left_over()) < DONE_RAD or stage_done(env, stage):
             return
     raise SkillError(f"{part} of {sink.name}: {np.degrees(left_over()):.0f} degrees left after {ATTEMPTS} attempts")
 

@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterator
 import numpy as np
 
 from robocasa_lerobot.demos.motion import UP, Array
+from robocasa_lerobot.demos.skills.common import stage_done
 from robocasa_lerobot.demos.skills.microwaves import go_round_door, taking_out
 from robocasa_lerobot.demos.skills.pick import FROM_A_SLOT, FROM_ABOVE
 from robocasa_lerobot.demos.skills.put import Putting, Spot, move
@@ -31,7 +32,7 @@ def place_on(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
     Raises:
         SkillError: it is not there after all attempts.
     """
-    how = Putting(_on(env, stage), goal(env), leans=(0.0, np.deg2rad(25.0)), taking=FROM_ABOVE)
+    how = Putting(_on(env, stage), done_when(env, stage), leans=(0.0, np.deg2rad(25.0)), taking=FROM_ABOVE)
     yield from move(env, thing(env, stage.object), how)
 
 
@@ -45,7 +46,7 @@ def place_on_reaching_in(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
     yield from go_round_door(env)
     how = Putting(
         _on(env, stage),
-        goal(env),
+        done_when(env, stage),
         leans=(0.0, np.deg2rad(30.0), np.deg2rad(55.0)),
         entries=("up", "across", "out"),
         taking=FROM_A_SLOT if what.item is not None and what.item.upright_axis is not None else taking_out(env, what),
@@ -70,13 +71,13 @@ def place_into_basin(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
             for z, extra in BASIN_DROPS
         ]
 
-    how = Putting(spots, goal(env), leans=(0.0, np.deg2rad(25.0)), entries=("up", "across"))
+    how = Putting(spots, done_when(env, stage), leans=(0.0, np.deg2rad(25.0)), entries=("up", "across"))
     yield from move(env, thing(env, stage.object), how)
 
 
-def goal(env: KitchenEnv) -> Callable[[], bool]:
-    """Whether the task's goal holds."""
-    return lambda: env.declaration.goal.evaluate(env.scene, env.data, {})
+def done_when(env: KitchenEnv, stage: Stage) -> Callable[[], bool]:
+    """Whether the stage's condition holds."""
+    return lambda: stage_done(env, stage)
 
 
 def _on(env: KitchenEnv, stage: Stage) -> Callable[[], list[Spot]]:

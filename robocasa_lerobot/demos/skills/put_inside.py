@@ -16,7 +16,7 @@ from robocasa_lerobot.demos.skills.common import SkillError, hold_hand, move_han
 from robocasa_lerobot.demos.skills.cups import FROM_THE_SIDE
 from robocasa_lerobot.demos.skills.pick import ANYHOW, FROM_ABOVE, RELEASE_STEPS, Manner, best_way
 from robocasa_lerobot.demos.skills.put import Putting, Spot, move
-from robocasa_lerobot.demos.skills.put_down import goal
+from robocasa_lerobot.demos.skills.put_down import done_when
 from robocasa_lerobot.demos.skills.racks import pull
 from robocasa_lerobot.demos.skills.things import Thing, thing
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
@@ -26,6 +26,7 @@ from robocasa_lerobot.envs.kitchens.fixtures.cabinets import Drawer
 from robocasa_lerobot.envs.kitchens.fixtures.regions import regions_of
 from robocasa_lerobot.envs.predicates.logic import AllOf
 from robocasa_lerobot.envs.predicates.objects import ObjectInside
+from robocasa_lerobot.envs.tasks.conditions import stage_condition
 from robocasa_lerobot.envs.tasks.task import Stage
 
 EDGE_M = 0.015  # kept from a region's sides
@@ -56,19 +57,20 @@ def place_inside(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
     Raises:
         SkillError: it is not there after all attempts.
     """
+    done = done_when(env, stage)
     what = thing(env, stage.object)
     fixture, part = env.scene.fixture(stage.target), env.scene.fill(stage.part)
-    regions = [region for name, region in regions_of(fixture) if name.startswith(part) and _usable(env, region)]
+    regions = [region for name, region in regions_of(fixture) if name.startswith(part) and _usable(env, stage, region)]
     if isinstance(fixture, StandMixer):
-        how = Putting(_over(env, regions[0]), goal(env), leans=STEEP_LEANS, entries=("up", "across", "out"), in_m=0.2)
+        how = Putting(_over(env, regions[0]), done, leans=STEEP_LEANS, entries=("up", "across", "out"), in_m=0.2)
     elif isinstance(fixture, Drawer) or "drawer" in part:
         how = Putting(
-            _in(env, what, regions, DROPS_M), goal(env), leans=(0.0, np.deg2rad(30.0), np.deg2rad(50.0)),
+            _in(env, what, regions, DROPS_M), done, leans=(0.0, np.deg2rad(30.0), np.deg2rad(50.0)),
             entries=("up", "across"), taking=ANYHOW if "drawer" in part else FROM_ABOVE,
         )  # fmt: skip
     else:
         how = Putting(
-            _in(env, what, regions, (0.0,)), goal(env), leans=LEANS, entries=("up", "across", "out"), taking=ANYHOW,
+            _in(env, what, regions, (0.0,)), done, leans=LEANS, entries=("up", "across", "out"), taking=ANYHOW,
             in_m=0.28,
         )  # fmt: skip
     yield from move(env, what, how)
@@ -80,12 +82,13 @@ def place_inside_fridge(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
     Raises:
         SkillError: it is not there after all attempts.
     """
+    done = done_when(env, stage)
     what = thing(env, stage.object)
     fixture, part = env.scene.fixture(stage.target), env.scene.fill(stage.part)
-    regions = [region for name, region in regions_of(fixture) if name.startswith(part) and _usable(env, region)]
+    regions = [region for name, region in regions_of(fixture) if name.startswith(part) and _usable(env, stage, region)]
     into = "drawer" in part
     how = Putting(
-        _in(env, what, regions, DROPS_M if into else (0.0,)), goal(env), leans=LEANS, entries=("up", "across", "out"),
+        _in(env, what, regions, DROPS_M if into else (0.0,)), done, leans=LEANS, entries=("up", "across", "out"),
         taking=ANYHOW if into else FROM_CRISPER, in_m=0.28, narrow=not into,
     )  # fmt: skip
     if not into and best_way(env, what, FROM_CRISPER).cost > HARD:
@@ -110,12 +113,13 @@ def drop_into_jug(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
     Raises:
         SkillError: it is not there after all attempts.
     """
+    done = done_when(env, stage)
     region = regions_of(env.scene.fixture(stage.target))[0][1]
 
     def spots() -> list[Spot]:
         return [Spot(region.world(env.data, (0.0, 0.0, region.half[2] + rim)), DROP_COST * rim) for rim in OVER_RIM_M]
 
-    how = Putting(spots, goal(env), leans=LEVEL_LEANS, entries=("out", "across"), in_m=0.2, turns=TURNS, falls=True)
+    how = Putting(spots, done, leans=LEVEL_LEANS, entries=("out", "across"), in_m=0.2, turns=TURNS, falls=True)
     yield from move(env, thing(env, stage.object), how)
 
 
@@ -125,6 +129,7 @@ def place_at_site(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
     Raises:
         SkillError: it is not there after all attempts.
     """
+    done = done_when(env, stage)
     data, appliance = env.data, env.scene.appliance(stage.target)
     region = next(iter(appliance.regions.values()))
 
@@ -133,14 +138,14 @@ def place_at_site(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
         floor = region.world(data, (0.0, 0.0, -region.half[2]))[2]
         return [Spot(np.array([*site[:2], floor]))]
 
-    how = Putting(spots, goal(env), entries=("out", "level"), taking=FROM_THE_SIDE, in_m=0.17, gap_m=0.003)
+    how = Putting(spots, done, entries=("out", "level"), taking=FROM_THE_SIDE, in_m=0.17, gap_m=0.003)
     yield from move(env, thing(env, stage.object), how)
 
 
-def _usable(env: KitchenEnv, region: Region) -> bool:
-    """Whether things in a region count, where the task's goal bounds its height."""
+def _usable(env: KitchenEnv, stage: Stage, region: Region) -> bool:
+    """Whether things in a region count, where the stage's condition bounds its height."""
     floor = float(region.world(env.data, (0.0, 0.0, -region.half[2]))[2])
-    whole = env.declaration.goal
+    whole = stage_condition(env.declaration, stage)
     for term in whole.parts if isinstance(whole, AllOf) else (whole,):
         if isinstance(term, ObjectInside):
             low, high, least = term.height

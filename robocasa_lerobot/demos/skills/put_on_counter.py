@@ -19,7 +19,7 @@ from robocasa_lerobot.demos.skills.drawers import drag_open
 from robocasa_lerobot.demos.skills.level_grasps import level_grasps
 from robocasa_lerobot.demos.skills.pick import ANYHOW, FROM_ABOVE, Manner, best_way
 from robocasa_lerobot.demos.skills.put import Putting, Spot, move
-from robocasa_lerobot.demos.skills.put_down import goal
+from robocasa_lerobot.demos.skills.put_down import done_when
 from robocasa_lerobot.demos.skills.things import Thing, thing
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.kitchens.fixtures.counters import Counter
@@ -88,7 +88,7 @@ def _move(env: KitchenEnv, stage: Stage, taking: Manner, within_m: float = NEAR_
     what = thing(env, stage.object)
     how = Putting(
         free_spots(env, what, stage.target, within_m),
-        goal(env),
+        done_when(env, stage),
         leans=(0.0, np.deg2rad(30.0)),
         entries=("up", "across"),
         taking=taking,

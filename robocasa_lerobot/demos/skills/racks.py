@@ -56,7 +56,7 @@ def slide(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
     Raises:
         SkillError: it is not there after three attempts.
     """
-    yield from (push if env.scene.choices["direction"] == "in" else pull)(env, stage)
+    yield from (push if env.scene.fill(stage.to) == "in" else pull)(env, stage)
 
 
 def push(env: KitchenEnv, stage: Stage) -> Iterator[Array]:

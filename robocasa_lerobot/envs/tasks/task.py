@@ -22,6 +22,8 @@ class Stage:
         target: role of the fixture.
         object: name of the object that is handled, if any.
         part: of the fixture, if any; may name a choice in braces.
+        to: which way, for verbs that go several: "left", "out", "increase"; may name a choice in braces.
+        until: when it is done, where that is not what its verb always asks for (`tasks.conditions`).
     """
 
     skill: str
@@ -29,6 +31,8 @@ class Stage:
     target: str
     object: str = ""
     part: str = ""
+    to: str = ""
+    until: Goal | None = None
 
 
 @dataclass(frozen=True, kw_only=True)

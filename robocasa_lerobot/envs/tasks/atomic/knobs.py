@@ -165,7 +165,7 @@ OVENS = (
                 "decrease": PartTurned("toaster_oven", "knob_temp", -0.15, label="lowered"),
             },
         ),
-        stages=(Stage("knobs", "turn", "toaster_oven", part="knob_temp"),),
+        stages=(Stage("knobs", "turn", "toaster_oven", part="knob_temp", to="{direction}"),),
         instruction="{verb} the temperature of the toaster oven.",
         paraphrases=(
             "{verb} the heat at the toaster oven's temperature dial.",

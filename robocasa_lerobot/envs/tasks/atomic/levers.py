@@ -43,6 +43,7 @@ def _sink(
     paraphrases: tuple[str, ...],
     choices: tuple[Choice, ...] = (),
     cluttered: bool = True,
+    to: str = "",
 ) -> Task:
     return Task(
         name=name,
@@ -53,7 +54,7 @@ def _sink(
         objects=_SINK_OBJECTS if cluttered else (),
         initial=initial,
         goal=goal,
-        stages=(Stage("levers", verb, "sink", part=part),),
+        stages=(Stage("levers", verb, "sink", part=part, to=to),),
         instruction=instruction,
         paraphrases=paraphrases,
     )
@@ -98,6 +99,7 @@ SINK = (
         "turn",
         "spout",
         choices=(Choice("direction", {"left": {}, "right": {}}),),
+        to="{direction}",
         instruction="Turn the spout of the faucet to the {direction}.",
         paraphrases=(
             "The sink's spout should point {direction}.",
@@ -123,6 +125,7 @@ SINK = (
         "turn",
         "handle_temp",
         choices=(Choice("start", {"cold": {"target": "hot"}, "hot": {"target": "cold"}}),),
+        to="other than {start}",
         cluttered=False,
         instruction="Make the running water {target} with the sink's handle.",
         paraphrases=(

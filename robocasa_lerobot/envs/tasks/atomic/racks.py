@@ -88,7 +88,7 @@ def _rack(
                 "in": PartWithin(kind, part, high=_IN_UP_TO, label="in"),
             },
         ),
-        stages=(Stage("racks", "slide", kind, part=part),),
+        stages=(Stage("racks", "slide", kind, part=part, to="{direction}"),),
         instruction=instruction,
         paraphrases=paraphrases,
         needs=needs,

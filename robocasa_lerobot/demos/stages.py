@@ -1,0 +1,156 @@
+"""Carrying out the stages of a task: one after the other, again where one has failed or come undone."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from typing import Any
+
+from robocasa_lerobot.demos.motion import Array, action
+from robocasa_lerobot.demos.skills import SKILLS, SkillError
+from robocasa_lerobot.envs.kitchen_env import KitchenEnv
+from robocasa_lerobot.envs.tasks.conditions import stage_condition, without_gripper
+from robocasa_lerobot.envs.tasks.task import Stage
+from robocasa_lerobot.errors import UnknownNameError
+
+ATTEMPTS = 3  # of a stage; skills try several grasps in each
+PATIENCE_STEPS = 40  # after a skill, for things that fall, swing and settle
+
+
+@dataclass
+class StageOutcome:
+    """What came of a stage: how often it was tried, whether it was done when it was left, and why not.
+
+    `skipped` is a stage that was done before anybody touched it.
+    """
+
+    attempts: int = 0
+    done: bool = False
+    skipped: bool = False
+    reason: str = ""
+
+
+@dataclass
+class StageLog:
+    """How far an episode has come, for whoever records it.
+
+    Attributes:
+        current: index of the stage that the next action belongs to.
+        outcomes: of each stage.
+    """
+
+    current: int = 0
+    outcomes: list[StageOutcome] = field(default_factory=list)
+
+    def close(self, env: KitchenEnv) -> None:
+        """Note of the stage that was on when the episode ended whether it was done."""
+        if self.outcomes and _still_holds(env, self.current):
+            self.outcomes[self.current].done, self.outcomes[self.current].reason = True, ""
+
+    def table(self, stages: tuple[Stage, ...]) -> list[dict[str, Any]]:
+        """Stages and outcomes in plain values, for `ep_meta`."""
+        return [
+            {
+                "skill": stage.skill,
+                "verb": stage.verb,
+                "target": stage.target,
+                "object": stage.object,
+                "part": stage.part,
+                "to": stage.to,
+                "attempts": outcome.attempts,
+                "done": outcome.done,
+                "skipped": outcome.skipped,
+                "reason": outcome.reason,
+            }
+            for stage, outcome in zip(stages, self.outcomes, strict=True)
+        ]
+
+
+def carry_out(env: KitchenEnv, log: StageLog) -> Iterator[Array]:
+    """Actions (12,), stored order, that do all stages; it ends when the last is done.
+
+    A stage that is done already is left out. One that fails is tried again; if the one before it has come undone
+    meanwhile (an object has slipped off), that one comes first. Where the task's goal does not hold in the end, it goes
+    on with the first stage that has to do with what is lacking.
+
+    Raises:
+        UnknownNameError: a stage needs a skill that does not exist.
+        SkillError: a stage is not done after all its attempts.
+    """
+    stages = env.declaration.stages
+    log.outcomes = [StageOutcome() for _ in stages]
+    index = 0
+    while True:
+        if index == len(stages):
+            undone = _undone(env)
+            if undone is None:
+                return
+            index = undone
+            _check_attempts(env, index, log.outcomes[index])
+        log.current, outcome = index, log.outcomes[index]
+        if len(stages) > 1 and _holds(env, index):
+            outcome.skipped, outcome.done = outcome.attempts == 0, True
+            index += 1
+            continue
+        yield from _attempt(env, stages[index], outcome)
+        outcome.done = _holds(env, index)
+        if outcome.done:
+            outcome.reason = ""
+            index += 1
+        elif index > 0 and not _still_holds(env, index - 1):
+            index -= 1  # what it rests on has come undone
+            _check_attempts(env, index, log.outcomes[index])
+        else:
+            _check_attempts(env, index, outcome)
+
+
+def _attempt(env: KitchenEnv, stage: Stage, outcome: StageOutcome) -> Iterator[Array]:
+    """One go at a stage with its skill, and a while of standing still after it; a failure is noted."""
+    key = (stage.skill, stage.verb)
+    if key not in SKILLS:
+        raise UnknownNameError("skill", " ".join(key), (" ".join(k) for k in SKILLS))
+    outcome.attempts += 1
+    outcome.reason = "it is not done"
+    gripper = -1.0
+    try:
+        for step in SKILLS[key](env, stage):
+            gripper = float(step[-1])
+            yield step
+    except SkillError as error:
+        outcome.reason = str(error)
+    condition = stage_condition(env.declaration, stage)
+    for _ in range(PATIENCE_STEPS):
+        if condition.evaluate(env.scene, env.data, {}):
+            return
+        yield action(gripper=gripper)
+
+
+def _check_attempts(env: KitchenEnv, index: int, outcome: StageOutcome) -> None:
+    if outcome.attempts >= ATTEMPTS:
+        stages = env.declaration.stages
+        which = f"stage {index + 1} ({stages[index].skill} {stages[index].verb}): " if len(stages) > 1 else ""
+        raise SkillError(f"{which}{outcome.reason}")
+
+
+def _holds(env: KitchenEnv, index: int) -> bool:
+    condition = stage_condition(env.declaration, env.declaration.stages[index])
+    return condition.evaluate(env.scene, env.data, {})
+
+
+def _still_holds(env: KitchenEnv, index: int) -> bool:
+    condition = without_gripper(stage_condition(env.declaration, env.declaration.stages[index]))
+    return condition.evaluate(env.scene, env.data, {})
+
+
+def _undone(env: KitchenEnv) -> int | None:
+    """The first stage that what is lacking of the goal belongs to; None where the goal holds, or nobody knows."""
+    task = env.declaration
+    wanted: dict[str, bool] = {}
+    if len(task.stages) == 1 or task.goal.evaluate(env.scene, env.data, wanted):
+        return None
+    for index, stage in enumerate(task.stages):
+        terms: dict[str, bool] = {}
+        stage_condition(task, stage).evaluate(env.scene, env.data, terms)
+        if any(not held and wanted.get(name) is False for name, held in terms.items()):
+            return index
+    return None

@@ -1,0 +1,191 @@
+"""Tasks of several stages: each is done before the next, again where it failed or came undone, and recorded."""
+
+from __future__ import annotations
+
+import itertools
+import json
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import h5py
+import numpy as np
+import pytest
+
+from robocasa_lerobot.demos import stages as module
+from robocasa_lerobot.demos.hdf5 import write_part
+from robocasa_lerobot.demos.recorder import record_episode
+from robocasa_lerobot.demos.skills import SKILLS, SkillError
+from robocasa_lerobot.demos.stages import ATTEMPTS, PATIENCE_STEPS, StageLog, carry_out
+from robocasa_lerobot.envs.kitchen_env import KitchenEnv
+from robocasa_lerobot.envs.predicates import AllOf, Goal, GripperFar, ObjectInBasin, ObjectOn, StateIs
+from robocasa_lerobot.envs.predicates.logic import Term
+from robocasa_lerobot.envs.scene.initial_states import Water
+from robocasa_lerobot.envs.tasks.conditions import stage_condition, without_gripper
+from robocasa_lerobot.envs.tasks.registry import get_task, task_names
+from robocasa_lerobot.envs.tasks.task import Stage, Task
+from robocasa_lerobot.errors import UserError
+
+IN_BASIN, WATER = ObjectInBasin("obj", "sink"), StateIs("sink", "water_on")
+
+
+def thaw(runs: bool) -> Task:
+    """Two stages in the words of atomic tasks; its water may run from the beginning."""
+    sink = get_task("PickPlaceCounterToSink")
+    return Task(
+        name="ThawInSink",
+        summary="The object lies in the sink, and water runs.",
+        fixtures=sink.fixtures,
+        robot_start=sink.robot_start,
+        objects=sink.objects,
+        initial=(Water("sink", runs),),
+        goal=AllOf(IN_BASIN, WATER),
+        stages=(Stage("levers", "on", "sink", part="handle"), Stage("pick_place", "place", "sink", object="obj")),
+        instruction="Put the {obj} into the sink under running water.",
+    )
+
+
+def test_two_stages_are_solved_one_after_the_other_and_recorded(tmp_path: Path) -> None:
+    solved = 0
+    for split, seed in itertools.product(("target", "pretrain"), range(3)):
+        env = KitchenEnv(thaw(runs=False), split=split, cameras=(), terminate_on_success=False)
+        recording = record_episode(env, seed)
+        env.close()
+        if not recording.success:
+            continue
+        solved += 1
+        rows = recording.ep_meta["stages"]
+        assert [(row["verb"], row["done"], row["skipped"]) for row in rows] == [
+            ("on", True, False),
+            ("place", True, False),
+        ]
+        assert set(recording.stages) == {0, 1}
+        assert recording.stages[0] == 0
+        water, basin = (recording.success_terms[:, recording.term_names.index(t.name)] for t in (WATER, IN_BASIN))
+        first = int(np.flatnonzero(recording.stages == 1)[0])
+        assert not water[0]
+        assert water[first]
+        assert not basin[: first + 1].any()
+        write_part(tmp_path / "one.hdf5", recording)
+        with h5py.File(tmp_path / "one.hdf5") as file:
+            assert file["demo/stage"][:].tolist() == recording.stages.tolist()
+            assert file["demo/success_terms"][:].tolist() == recording.success_terms.tolist()
+            assert json.loads(file["demo/success_terms"].attrs["names"]) == [IN_BASIN.name, WATER.name]
+    assert solved >= 4
+
+
+def test_a_stage_that_is_done_already_is_left_out() -> None:
+    env = KitchenEnv(thaw(runs=True), cameras=(), terminate_on_success=False)
+    recordings = [record_episode(env, seed) for seed in range(3)]
+    env.close()
+    assert any(recording.success for recording in recordings)
+    for recording in recordings:
+        assert recording.stages[0] == 1
+        assert recording.ep_meta["stages"][0] == {
+            "skill": "levers", "verb": "on", "target": "sink", "object": "", "part": "handle", "to": "",
+            "attempts": 0, "done": True, "skipped": True, "reason": "",
+        }  # fmt: skip
+
+
+@dataclass
+class Made:
+    """An env of flags that skills set: what is done is known without physics."""
+
+    declaration: Any
+    flags: dict[str, bool] = field(default_factory=dict)
+    scene: Any = None
+
+    @property
+    def data(self) -> dict[str, bool]:
+        return self.flags
+
+
+class Flag(Term):
+    def __init__(self, key: str) -> None:
+        self.key = key
+
+    @property
+    def name(self) -> str:
+        return self.key
+
+    def holds(self, scene: Any, data: Any) -> bool:
+        return bool(data.get(self.key))
+
+
+Skill = Callable[[Made, Stage], Iterator[np.ndarray]]
+
+
+def made(monkeypatch: pytest.MonkeyPatch, skills: dict[str, Skill]) -> Made:
+    monkeypatch.setattr(module, "SKILLS", {("made", name): skill for name, skill in skills.items()})
+    stages = tuple(Stage("made", name, "", until=Flag(name)) for name in skills)
+    goal: Goal = AllOf(*(Flag(name) for name in skills))
+    return Made(SimpleNamespace(name="made", stages=stages, goal=goal))
+
+
+def does(*effects: dict[str, bool] | SkillError) -> Skill:
+    """A skill of one step, with an effect for each time that it is called."""
+    left = list(effects)
+
+    def skill(env: Made, stage: Stage) -> Iterator[np.ndarray]:
+        effect = left.pop(0)
+        yield np.zeros(12)
+        if isinstance(effect, SkillError):
+            raise effect
+        env.flags |= effect
+
+    return skill
+
+
+def test_a_stage_that_failed_is_tried_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    env = made(monkeypatch, {"a": does(SkillError("slipped"), {}, {"a": True}), "b": does({"b": True})})
+    log = StageLog()
+    steps = list(carry_out(env, log))
+    assert [(o.attempts, o.done, o.reason) for o in log.outcomes] == [(3, True, ""), (1, True, "")]
+    assert len(steps) == 4 + 2 * PATIENCE_STEPS
+
+
+def test_what_has_come_undone_comes_first(monkeypatch: pytest.MonkeyPatch) -> None:
+    env = made(monkeypatch, {"a": does({"a": True}, {"a": True}), "b": does({"a": False}, {"b": True})})
+    log, order = StageLog(), []
+    for _ in carry_out(env, log):
+        if not order or order[-1] != log.current:
+            order.append(log.current)
+    assert order == [0, 1, 0, 1]
+    assert [o.attempts for o in log.outcomes] == [2, 2]
+
+
+def test_it_gives_up_with_the_skills_own_words(monkeypatch: pytest.MonkeyPatch) -> None:
+    env = made(monkeypatch, {"a": does(*[SkillError("the lid is stuck")] * ATTEMPTS), "b": does({"b": True})})
+    log = StageLog()
+    with pytest.raises(SkillError, match=r"stage 1 \(made a\): the lid is stuck"):
+        list(carry_out(env, log))
+    assert [(o.attempts, o.done) for o in log.outcomes] == [(ATTEMPTS, False), (0, False)]
+
+
+@pytest.mark.parametrize("name", task_names())
+def test_every_stage_of_every_task_has_a_condition(name: str) -> None:
+    task = get_task(name)
+    for stage in task.stages:
+        assert isinstance(stage_condition(task, stage), Goal)
+    if len(task.stages) == 1:
+        assert stage_condition(task, task.stages[0]) is task.goal
+
+
+def test_conditions_of_verbs_are_those_of_goals() -> None:
+    open_, place = Stage("doors", "open", "fxtr"), Stage("pick_place", "place_on", "plate", object="obj")
+    task = SimpleNamespace(name="t", stages=(open_, place), goal=StateIs("fxtr", "on"))
+    assert stage_condition(task, open_).name == get_task("OpenFridge").goal.name  # type: ignore[arg-type]
+    on, away = stage_condition(task, place).parts  # type: ignore[arg-type]
+    assert (on, away) == (ObjectOn("obj", "plate"), GripperFar("obj"))
+    assert without_gripper(stage_condition(task, place)).parts == (on,)  # type: ignore[arg-type]
+    press = Stage("buttons", "press", "fxtr")
+    with pytest.raises(UserError, match="until"):
+        stage_condition(SimpleNamespace(name="t", stages=(open_, press)), press)  # type: ignore[arg-type]
+
+
+def test_verbs_with_a_condition_of_their_own_are_verbs_of_skills() -> None:
+    from robocasa_lerobot.envs.tasks import conditions
+
+    assert set(conditions._BY_VERB) <= set(SKILLS)
