@@ -69,7 +69,8 @@ def test_recipes_have_seeds_of_their_own() -> None:
     assert ranges[-1][1] < 2**32
 
 
-def test_what_is_missing_of_our_kitchens_is_made_by_a_command() -> None:
+def test_what_is_missing_of_our_kitchens_is_made_by_a_command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)  # where nothing has been made yet
     config = MixtureConfig(select=[SelectionConfig(KITCHENS, task_set="atomic_seen", split="target", source="human")])
     with pytest.raises(MissingDatasetsError, match="data EXPERIMENT_FILE --make") as caught:
         resolve_mixture(config)
