@@ -78,7 +78,7 @@ def run(args: argparse.Namespace) -> int:
         )
         needs, said = needs_of(experiment, episodes)
         asked = f" --episodes {args.episodes}" if args.episodes else ""
-        print(listing(experiment.name, str(args.experiment), needs, said, cores, asked), flush=True)
+        print(listing(experiment.name, args.experiment, needs, said, cores, asked), flush=True)
     elif args.convert is None:
         raise UserError(
             "no experiment: `robocasa-lerobot data configs/experiments/small/foundation.yaml` lists its data."

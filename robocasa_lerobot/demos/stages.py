@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from typing import Any
 
 from robocasa_lerobot.demos.motion import Array, action
 from robocasa_lerobot.demos.skills import SKILLS, SkillError
+from robocasa_lerobot.demos.skills.common import stage_done
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.tasks.conditions import stage_condition, without_gripper
 from robocasa_lerobot.envs.tasks.task import Stage
@@ -15,6 +16,7 @@ from robocasa_lerobot.errors import UnknownNameError
 
 ATTEMPTS = 3  # of a stage; skills try several grasps in each
 PATIENCE_STEPS = 40  # after a skill, for things that fall, swing and settle
+_TOLD = ("skill", "verb", "target", "object", "part", "to")  # of a stage, to whoever reads the file
 
 
 @dataclass
@@ -50,18 +52,7 @@ class StageLog:
     def table(self, stages: tuple[Stage, ...]) -> list[dict[str, Any]]:
         """Stages and outcomes in plain values, for `ep_meta`."""
         return [
-            {
-                "skill": stage.skill,
-                "verb": stage.verb,
-                "target": stage.target,
-                "object": stage.object,
-                "part": stage.part,
-                "to": stage.to,
-                "attempts": outcome.attempts,
-                "done": outcome.done,
-                "skipped": outcome.skipped,
-                "reason": outcome.reason,
-            }
+            {**{name: getattr(stage, name) for name in _TOLD}, **asdict(outcome)}
             for stage, outcome in zip(stages, self.outcomes, strict=True)
         ]
 
@@ -88,12 +79,12 @@ def carry_out(env: KitchenEnv, log: StageLog) -> Iterator[Array]:
             index = undone
             _check_attempts(env, index, log.outcomes[index])
         log.current, outcome = index, log.outcomes[index]
-        if len(stages) > 1 and _holds(env, index):
+        if len(stages) > 1 and stage_done(env, stages[index]):
             outcome.skipped, outcome.done = outcome.attempts == 0, True
             index += 1
             continue
         yield from _attempt(env, stages[index], outcome)
-        outcome.done = _holds(env, index)
+        outcome.done = stage_done(env, stages[index])
         if outcome.done:
             outcome.reason = ""
             index += 1
@@ -118,9 +109,8 @@ def _attempt(env: KitchenEnv, stage: Stage, outcome: StageOutcome) -> Iterator[A
             yield step
     except SkillError as error:
         outcome.reason = str(error)
-    condition = stage_condition(env.declaration, stage)
     for _ in range(PATIENCE_STEPS):
-        if condition.evaluate(env.scene, env.data, {}):
+        if stage_done(env, stage):
             return
         yield action(gripper=gripper)
 
@@ -130,11 +120,6 @@ def _check_attempts(env: KitchenEnv, index: int, outcome: StageOutcome) -> None:
         stages = env.declaration.stages
         which = f"stage {index + 1} ({stages[index].skill} {stages[index].verb}): " if len(stages) > 1 else ""
         raise SkillError(f"{which}{outcome.reason}")
-
-
-def _holds(env: KitchenEnv, index: int) -> bool:
-    condition = stage_condition(env.declaration, env.declaration.stages[index])
-    return condition.evaluate(env.scene, env.data, {})
 
 
 def _still_holds(env: KitchenEnv, index: int) -> bool:
@@ -150,7 +135,7 @@ def _undone(env: KitchenEnv) -> int | None:
         return None
     for index, stage in enumerate(task.stages):
         terms: dict[str, bool] = {}
-        stage_condition(task, stage).evaluate(env.scene, env.data, terms)
-        if any(not held and wanted.get(name) is False for name, held in terms.items()):
+        done = stage_condition(task, stage).evaluate(env.scene, env.data, terms)
+        if not done and any(not held and wanted.get(name) is False for name, held in terms.items()):
             return index
     return None

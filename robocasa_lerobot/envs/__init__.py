@@ -1,7 +1,7 @@
 """Kitchens, robot, tasks: the MuJoCo side. Knows no torch.
 
 Importing this package makes the tasks known to Gymnasium: `gymnasium.make("robocasa_lerobot/OpenDrawer")`, and
-`gymnasium.make_vec` with the arguments of `vector.make_vector_env`.
+`gymnasium.make_vec` with the arguments of `vector.kitchens.make_vector_env`.
 """
 
 import gymnasium

@@ -60,7 +60,7 @@ class KitchenEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         terminate_on_success: end the episode at the first success.
         render_mode: "rgb_array" or None.
         render_device: EGL device that this process draws on (see `gl`); EGL's choice if None. One process draws on
-            one device: for several, see `vector.make_vector_env`.
+            one device: for several, see `vector.kitchens.make_vector_env`.
         camera_set: "default", or "cotraining" for the real robot's poses and wrist lens.
         camera_noise: True for RoboCasa's noise on camera poses, or noise of one's own; it follows from the episode's
             seed and changes nothing but pictures.

@@ -20,7 +20,7 @@ from robocasa_lerobot.demos.recorder import record_episode
 from robocasa_lerobot.demos.skills import SKILLS, SkillError
 from robocasa_lerobot.demos.stages import ATTEMPTS, PATIENCE_STEPS, StageLog, carry_out
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
-from robocasa_lerobot.envs.predicates import AllOf, Goal, GripperFar, ObjectInBasin, ObjectOn, StateIs
+from robocasa_lerobot.envs.predicates import AllOf, Goal, GripperFar, Not, ObjectInBasin, ObjectOn, StateIs
 from robocasa_lerobot.envs.predicates.logic import Term
 from robocasa_lerobot.envs.scene.initial_states import Water
 from robocasa_lerobot.envs.tasks.conditions import stage_condition, without_gripper
@@ -154,6 +154,17 @@ def test_what_has_come_undone_comes_first(monkeypatch: pytest.MonkeyPatch) -> No
             order.append(log.current)
     assert order == [0, 1, 0, 1]
     assert [o.attempts for o in log.outcomes] == [2, 2]
+
+
+def test_a_stage_that_is_done_by_what_does_not_hold_is_not_the_one_that_is_lacking(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    env = made(monkeypatch, {"a": does({}), "b": does({"b": True})})
+    stages = (Stage("made", "a", "", until=Not(Flag("a"))), Stage("made", "b", "", until=Flag("b")))
+    env.declaration = SimpleNamespace(name="made", stages=stages, goal=AllOf(Not(Flag("a")), Flag("c")))
+    log = StageLog()
+    assert len(list(carry_out(env, log))) == 1
+    assert [(o.attempts, o.done) for o in log.outcomes] == [(0, True), (1, True)]
 
 
 def test_it_gives_up_with_the_skills_own_words(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -10,6 +10,7 @@ from robot_arena import Arena, action, arena_spec
 from robocasa_lerobot.contract import ContractError
 from robocasa_lerobot.envs.robots.panda_omron import names
 from robocasa_lerobot.envs.robots.panda_omron.control import indices
+from robocasa_lerobot.envs.robots.panda_omron.robot import PANDA_OMRON
 
 TORSO = names.TORSO_JOINT
 # RoboCasa's gains: stiffness per unit of mass, critically damped.
@@ -165,7 +166,7 @@ def test_each_action_component_drives_its_own_joints(
     arena, idle = Arena.settled(model), Arena.settled(model)
     arena.run(command, 4)
     idle.run(action(1.0), 4)
-    moved = {name: abs(arena.joint(name) - idle.joint(name)) for name in names.JOINTS}
+    moved = {name: abs(arena.joint(name) - idle.joint(name)) for name in PANDA_OMRON.names.joints}
     driven = max(moved[name] for name in joints)
     groups = (names.ARM_JOINTS, names.FINGER_JOINTS, (TORSO,), *((name,) for name in names.BASE_JOINTS))
     for group in groups:

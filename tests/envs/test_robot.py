@@ -165,7 +165,7 @@ def test_written_xml_loads_with_portable_asset_names(quality: str) -> None:
     # By MjSpec: a dictionary for `MjModel.from_xml_string` may not have the same file name in two folders.
     reloaded = mujoco.MjSpec.from_string(spec.to_xml(), assets=assets).compile()
     np.testing.assert_allclose(reloaded.body_mass, model.body_mass, rtol=1e-5)
-    assert tuple(reloaded.joint(i).name for i in range(reloaded.njnt)) == names.JOINTS
+    assert tuple(reloaded.joint(i).name for i in range(reloaded.njnt)) == PANDA_OMRON.names.joints
     np.testing.assert_allclose(reloaded.jnt_range, model.jnt_range, rtol=1e-5)
 
 

@@ -11,7 +11,14 @@ import pytest
 import torch
 from lerobot.configs import PreTrainedConfig
 from lerobot.policies.factory import make_pre_post_processors
-from policy_support import batch_for, build, check_trains_and_predicts, generators, tiny_config
+from policy_support import (
+    batch_for,
+    build,
+    check_trains_and_predicts,
+    check_wrong_features_and_batches_are_explained,
+    generators,
+    tiny_config,
+)
 from torch import nn
 
 from robocasa_lerobot import contract
@@ -302,19 +309,4 @@ def test_wrong_fields_are_explained(overrides: dict[str, Any], message: str) -> 
 
 
 def test_wrong_features_and_batches_are_explained() -> None:
-    config = tiny_config()
-    config.input_features = {k: v for k, v in config.input_features.items() if k == contract.STATE_KEY}
-    with pytest.raises(UserError, match="no camera"):
-        DiffusionTransformerPolicy(config)
-    with pytest.raises(UserError, match="needs 'observation\\.state'"):
-        DiffusionTransformerPolicy(DiffusionTransformerConfig(device="cpu"))
-    with pytest.raises(UserError, match="has 16 components"):
-        DiffusionTransformerPolicy(tiny_config(state_indices=[16]))
-    policy, preprocess, _ = build(tiny_config())
-    raw = batch_for(policy.config)
-    with pytest.raises(UserError, match="pass it through the policy's preprocessor"):
-        policy(raw)
-    with pytest.raises(UserError, match="action_delta_indices"):
-        policy(preprocess({**raw, "action": raw["action"][:, :4]}))
-    with pytest.raises(UserError, match="has no instructions"):
-        preprocess({k: v for k, v in raw.items() if k != "task"})
+    check_wrong_features_and_batches_are_explained(DiffusionTransformerPolicy, DiffusionTransformerConfig, tiny_config)

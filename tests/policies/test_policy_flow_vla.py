@@ -13,7 +13,13 @@ import torch
 import yaml
 from flow_vla_support import build, check_variant, chunk_noise, tiny_config, write_pretrained
 from lerobot.configs import PreTrainedConfig
-from policy_support import INSTRUCTIONS, batch_for, generators, with_features
+from policy_support import (
+    INSTRUCTIONS,
+    batch_for,
+    check_wrong_features_and_batches_are_explained,
+    generators,
+    with_features,
+)
 
 from robocasa_lerobot import contract
 from robocasa_lerobot.errors import UserError
@@ -285,19 +291,4 @@ def test_wrong_fields_are_explained(overrides: dict[str, Any], message: str) -> 
 
 
 def test_wrong_features_and_batches_are_explained() -> None:
-    config = tiny_config()
-    config.input_features = {k: v for k, v in config.input_features.items() if k == contract.STATE_KEY}
-    with pytest.raises(UserError, match="no camera"):
-        FlowVlaPolicy(config)
-    with pytest.raises(UserError, match="needs 'observation\\.state'"):
-        FlowVlaPolicy(FlowVlaConfig(device="cpu"))
-    with pytest.raises(UserError, match="has 16 components"):
-        FlowVlaPolicy(tiny_config(state_indices=[16]))
-    policy, preprocess, _ = build(tiny_config())
-    raw = batch_for(policy.config)
-    with pytest.raises(UserError, match="pass it through the policy's preprocessor"):
-        policy(raw)
-    with pytest.raises(UserError, match="action_delta_indices"):
-        policy(preprocess({**raw, "action": raw["action"][:, :4]}))
-    with pytest.raises(UserError, match="has no instructions"):
-        preprocess({k: v for k, v in raw.items() if k != "task"})
+    check_wrong_features_and_batches_are_explained(FlowVlaPolicy, FlowVlaConfig, tiny_config)

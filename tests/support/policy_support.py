@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
+import pytest
 import torch
 from lerobot.configs import FeatureType, PolicyFeature, PreTrainedConfig
 from lerobot.policies.factory import get_policy_class, make_pre_post_processors
 
 from robocasa_lerobot import contract
+from robocasa_lerobot.errors import UserError
 from robocasa_lerobot.policies.diffusion_transformer.configuration_diffusion_transformer import (
     DiffusionTransformerConfig,
 )
@@ -99,3 +102,25 @@ def check_trains_and_predicts(policy: Any, preprocess: Any, postprocess: Any, le
     assert policy.sample(batch).shape == (4, length, contract.ACTION_SIZE)
     assert torch.isfinite(postprocess(chunk)).all()
     assert len(config.action_delta_indices) == length
+
+
+def check_wrong_features_and_batches_are_explained(
+    policy_class: Callable[[Any], Any], config_class: Callable[..., Any], tiny_config: Callable[..., Any]
+) -> None:
+    """What a policy that takes a state and pictures says of features and batches that do not fit."""
+    config = tiny_config()
+    config.input_features = {k: v for k, v in config.input_features.items() if k == contract.STATE_KEY}
+    with pytest.raises(UserError, match="no camera"):
+        policy_class(config)
+    with pytest.raises(UserError, match="needs 'observation\\.state'"):
+        policy_class(config_class(device="cpu"))
+    with pytest.raises(UserError, match="has 16 components"):
+        policy_class(tiny_config(state_indices=[16]))
+    policy, preprocess, _ = build(tiny_config())
+    raw = batch_for(policy.config)
+    with pytest.raises(UserError, match="pass it through the policy's preprocessor"):
+        policy(raw)
+    with pytest.raises(UserError, match="action_delta_indices"):
+        policy(preprocess({**raw, "action": raw["action"][:, :4]}))
+    with pytest.raises(UserError, match="has no instructions"):
+        preprocess({k: v for k, v in raw.items() if k != "task"})

@@ -10,8 +10,9 @@ from collections.abc import Callable, Iterator
 import numpy as np
 
 from robocasa_lerobot.demos.motion import CLOSED, UP, Array, HandTarget, base_pose, frame, grip_position, hand_rotation
+from robocasa_lerobot.demos.skills.arc_plan import CLOSED_FINGERS_HALF_M
 from robocasa_lerobot.demos.skills.common import SkillError, hold_hand, move_hand, stage_done
-from robocasa_lerobot.demos.skills.levers import CLOSED_FINGERS_HALF_M, level_and_down, push_way
+from robocasa_lerobot.demos.skills.levers import level_and_down, push_way
 from robocasa_lerobot.demos.skills.reach import plan_reach, shift_base, untried
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.tasks.task import Stage

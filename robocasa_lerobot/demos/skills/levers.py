@@ -21,17 +21,16 @@ from robocasa_lerobot.demos.motion import (
     grip_position,
     rotation_about,
 )
+from robocasa_lerobot.demos.skills.arc_plan import CLOSED_FINGERS_HALF_M
 from robocasa_lerobot.demos.skills.common import SkillError, hold_hand, move_hand, stage_done
 from robocasa_lerobot.demos.skills.reach import plan_reach, shift_base, untried
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
-from robocasa_lerobot.envs.robots.panda_omron.robot import PANDA_OMRON
 from robocasa_lerobot.envs.tasks.task import Stage
 
 ATTEMPTS = 4
 GRASP_STEPS = 10
 STANDOFF_M = 0.08
 # Half extents of the closed finger tips along the hand's axes, metres, from the grip site.
-CLOSED_FINGERS_HALF_M = np.array(PANDA_OMRON.gripper.closed_half)
 # From the side the grip site ends short of the middle of what is pushed, so that the tips end just beyond it.
 SHORT_M = 0.008
 PUSH_SPEED, LEAD_SPEED = 0.45, 0.35

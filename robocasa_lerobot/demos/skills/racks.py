@@ -18,8 +18,8 @@ from robocasa_lerobot.demos.motion import (
     grip_position,
     hand_rotation,
 )
+from robocasa_lerobot.demos.skills.arc_plan import CLOSED_FINGERS_HALF_M
 from robocasa_lerobot.demos.skills.common import SkillError, hold_hand, move_hand
-from robocasa_lerobot.demos.skills.levers import CLOSED_FINGERS_HALF_M
 from robocasa_lerobot.demos.skills.reach import Plan, plan_reach, shift_base, untried
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.kitchens.appliances.base import Appliance

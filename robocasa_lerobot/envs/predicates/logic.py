@@ -74,7 +74,7 @@ class Not(Goal):
 
 
 class When(Goal):
-    """One of several goals, by a value that was drawn at reset (`envs.task.Choice`)."""
+    """One of several goals, by a value that was drawn at reset (`scene.spec.Choice`)."""
 
     def __init__(self, choice: str, goals: Mapping[str, Goal]) -> None:
         self.choice, self.goals = choice, dict(goals)

@@ -58,12 +58,14 @@ def choose_noise(noise: bool | CameraNoise, usual: CameraNoise | None) -> Camera
     """The noise that an env's setting stands for: True is the `usual` one of the camera set.
 
     Raises:
-        UserError: the setting is neither a truth value nor a `CameraNoise`.
+        UserError: the setting is neither a truth value nor a `CameraNoise`, or there is no usual one.
     """
     if isinstance(noise, CameraNoise):
         return noise
     if not isinstance(noise, bool):
         raise UserError(f"camera_noise: found {noise!r}, expected True, False or a CameraNoise(...).")
+    if noise and usual is None:
+        raise UserError("camera_noise: this robot has no usual noise for the camera set. Give a CameraNoise(...).")
     return usual if noise else None
 
 

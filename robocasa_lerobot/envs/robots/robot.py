@@ -66,7 +66,7 @@ class RobotNames:
 
     @property
     def joints(self) -> tuple[str, ...]:
-        """All joints, in the order of the model."""
+        """All joints in the order of the model, and so of its entries in qpos and qvel."""
         return (*self.base_joints, self.torso_joint, *self.arm_joints, *self.finger_joints)
 
 
@@ -145,7 +145,7 @@ class Robot:
         names: of its parts.
         home, shape, gripper, reach: see there.
         camera_sets: its cameras, by name of the set; camera_noise: what stands for noise on them if none is given.
-        parts: puts its bodies, joints, actuators, sites, cameras and shapes into a spec: (spec, quality, cameras).
+        build: puts its bodies, joints, actuators, sites, cameras and shapes into a spec: (spec, quality, cameras).
         controller: makes what drives it: (model, data).
         read_state: the contract's state (16,): (model, data), positions and velocities evaluated.
         read_observations: proprioception under robosuite's names, likewise.
@@ -159,7 +159,7 @@ class Robot:
     reach: ArmReach
     camera_sets: Mapping[str, tuple[CameraSpec, ...]]
     camera_noise: Mapping[str, CameraNoise]
-    parts: Callable[[mujoco.MjSpec, str, Sequence[CameraSpec]], None]
+    build: Callable[[mujoco.MjSpec, str, Sequence[CameraSpec]], None]
     controller: Callable[[mujoco.MjModel, mujoco.MjData], Controller]
     read_state: Callable[[mujoco.MjModel, mujoco.MjData], Array]
     read_observations: Callable[[mujoco.MjModel, mujoco.MjData], dict[str, Array]]
@@ -180,7 +180,7 @@ class Robot:
         Raises:
             UnknownNameError: there is no such quality or camera set.
         """
-        self.parts(spec, quality, self.cameras(camera_set))
+        self.build(spec, quality, self.cameras(camera_set))
 
     def place_base(self, model: mujoco.MjModel, data: mujoco.MjData, x: float, y: float, yaw: float) -> None:
         """Set the base joints so that the base centre stands at world (x, y) metres with heading `yaw` radians.

@@ -24,7 +24,7 @@ from robocasa_lerobot.envs.predicates import (
 from robocasa_lerobot.envs.tasks.task import Stage, Task
 from robocasa_lerobot.errors import UserError
 
-_OUT_FROM, _IN_UP_TO = 0.95, 0.05  # of a rack's or a drawer's range
+OUT_FROM, IN_UP_TO = 0.95, 0.05  # of a rack's or a drawer's range
 
 
 def _let_go(stage: Stage, goal: Goal) -> Goal:
@@ -56,10 +56,10 @@ _BY_VERB: dict[tuple[str, str], Callable[[Stage], Goal]] = {
     **dict.fromkeys(
         (("doors", "close"), ("doors", "close_large"), ("doors", "lift_shut"), ("doors", "lift_low")), _closed
     ),
-    ("drawers", "open"): lambda stage: DrawerOpen(stage.target, at_least=_OUT_FROM),
-    ("drawers", "close"): lambda stage: DrawerClosed(stage.target, at_most=_IN_UP_TO),
-    ("racks", "pull"): lambda stage: PartWithin(stage.target, stage.part, low=_OUT_FROM, label="out"),
-    ("racks", "push"): lambda stage: PartWithin(stage.target, stage.part, high=_IN_UP_TO, label="in"),
+    ("drawers", "open"): lambda stage: DrawerOpen(stage.target, at_least=OUT_FROM),
+    ("drawers", "close"): lambda stage: DrawerClosed(stage.target, at_most=IN_UP_TO),
+    ("racks", "pull"): lambda stage: PartWithin(stage.target, stage.part, low=OUT_FROM, label="out"),
+    ("racks", "push"): lambda stage: PartWithin(stage.target, stage.part, high=IN_UP_TO, label="in"),
     ("navigation", "drive"): lambda stage: StandsBefore(stage.target),
     ("levers", "on"): lambda stage: StateIs(stage.target, "water_on"),
     ("levers", "off"): lambda stage: StateIs(stage.target, "water_on", value=False),

@@ -12,8 +12,6 @@ BASE_JOINTS = ("mobilebase0_joint_mobile_forward", "mobilebase0_joint_mobile_sid
 TORSO_JOINT = "mobilebase0_joint_torso_height"
 ARM_JOINTS = tuple(f"robot0_joint{i}" for i in range(1, 8))
 FINGER_JOINTS = ("gripper0_right_finger_joint1", "gripper0_right_finger_joint2")
-# Order of the robot's joints in the model, and so of its entries in qpos and qvel.
-JOINTS = (*BASE_JOINTS, TORSO_JOINT, *ARM_JOINTS, *FINGER_JOINTS)
 
 BASE_ACTUATORS = (
     "mobilebase0_actuator_mobile_forward",

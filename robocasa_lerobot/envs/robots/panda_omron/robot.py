@@ -63,7 +63,7 @@ PANDA_OMRON = Robot(
     reach=ArmReach(wrist_behind_grip=0.204, shoulder=0.333, longest=0.81),
     camera_sets=CAMERA_SETS,
     camera_noise=CAMERA_NOISE,
-    parts=add_robot,
+    build=add_robot,
     controller=PandaOmronController,
     read_state=read_state,
     read_observations=read_observations,

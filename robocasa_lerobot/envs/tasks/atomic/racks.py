@@ -11,12 +11,12 @@ from robocasa_lerobot.envs.scene.spec import (
     RobotStart,
     SampleRegion,
 )
+from robocasa_lerobot.envs.tasks.conditions import IN_UP_TO, OUT_FROM
 from robocasa_lerobot.envs.tasks.task import Stage, Task
 
 # Which way a rack is to go, with the words for it; one that is to come out starts half out, one to go in all the way.
 DIRECTION = Choice("direction", {"out": {"verb": "Pull"}, "in": {"verb": "Push"}})
 STARTS = {"out": (0.5, 0.5), "in": (1.0, 1.0)}
-_OUT_FROM, _IN_UP_TO = 0.95, 0.05
 FRIDGE_DRAWER = "{drawer}"  # all are at one height
 DRAWER = Choice("drawer", of="fridge")
 
@@ -84,8 +84,8 @@ def _rack(
         goal=When(
             "direction",
             {
-                "out": PartWithin(kind, part, low=_OUT_FROM, label="out"),
-                "in": PartWithin(kind, part, high=_IN_UP_TO, label="in"),
+                "out": PartWithin(kind, part, low=OUT_FROM, label="out"),
+                "in": PartWithin(kind, part, high=IN_UP_TO, label="in"),
             },
         ),
         stages=(Stage("racks", "slide", kind, part=part, to="{direction}"),),
