@@ -20,7 +20,7 @@ from robocasa_lerobot.envs.predicates.objects import (
     ObjectTouchesAnyCounter,
     ObjectUpright,
 )
-from robocasa_lerobot.envs.predicates.robot import GripperFar, GripperFarFromPart, StandsBefore
+from robocasa_lerobot.envs.predicates.robot import Grasped, GripperFar, GripperFarFromPart, StandsBefore, StandsNear
 
 __all__ = [
     "AllOf",
@@ -31,6 +31,7 @@ __all__ = [
     "DrawerClosed",
     "DrawerOpen",
     "Goal",
+    "Grasped",
     "GripperFar",
     "GripperFarFromPart",
     "Not",
@@ -44,6 +45,7 @@ __all__ = [
     "PartTurned",
     "PartWithin",
     "StandsBefore",
+    "StandsNear",
     "StateIs",
     "Term",
     "When",

@@ -1,4 +1,4 @@
-"""Conditions on the robot: how far the gripper is, and where the base stands."""
+"""Conditions on the robot: how far the gripper is, what it holds, and where the base stands."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import mujoco
 import numpy as np
 
+from robocasa_lerobot.envs.predicates.contacts import touching
 from robocasa_lerobot.envs.predicates.logic import Term, plain
 
 if TYPE_CHECKING:
@@ -15,6 +16,7 @@ if TYPE_CHECKING:
 
 GRIPPER_FAR_M, BUTTON_FAR_M = 0.25, 0.15
 # Of the base from the pose in front of a fixture (docs/robocasa.md, section 8).
+NEAR_M, NEAR_COSINE = 1.1, 0.5  # of an object from the base's centre, and of the base's heading towards it
 STANDS_WITHIN_M, STANDS_COSINE = 0.20, 0.98
 
 
@@ -74,3 +76,40 @@ class StandsBefore(Term):
         rotation = site.xmat.reshape(3, 3)
         heading = float(np.arctan2(rotation[1, 0], rotation[0, 0]))
         return apart <= STANDS_WITHIN_M and float(np.cos(heading - goal.yaw)) >= STANDS_COSINE
+
+
+@dataclass(frozen=True)
+class Grasped(Term):
+    """An object is between the fingers: both touch it."""
+
+    object: str
+
+    @property
+    def name(self) -> str:
+        """E.g. `obj_grasped`."""
+        return f"{plain(self.object)}_grasped"
+
+    def holds(self, scene: Scene, data: mujoco.MjData) -> bool:
+        """Look at the contacts of each finger."""
+        model, held = scene.model, scene.subtree(scene.fill(self.object))
+        fingers = [model.body(model.jnt_bodyid[model.joint(name).id]).name for name in scene.robot.names.finger_joints]
+        return all(touching(model, data, scene.subtree(finger), held) for finger in fingers)
+
+
+@dataclass(frozen=True)
+class StandsNear(Term):
+    """An object is before the base, so that the arm reaches it after a small drive at most."""
+
+    object: str
+
+    @property
+    def name(self) -> str:
+        """E.g. `stands_near_bowl`."""
+        return f"stands_near_{plain(self.object)}"
+
+    def holds(self, scene: Scene, data: mujoco.MjData) -> bool:
+        """Compare where it is in the base's frame with the bounds."""
+        site = data.site(scene.robot.names.base_center_site)
+        ahead, left, _ = site.xmat.reshape(3, 3).T @ (data.body(scene.fill(self.object)).xpos - site.xpos)
+        far = float(np.hypot(ahead, left))
+        return far < NEAR_M and bool(ahead > NEAR_COSINE * far)
