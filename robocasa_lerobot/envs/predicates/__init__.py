@@ -10,7 +10,10 @@ from robocasa_lerobot.envs.predicates.fixtures import (
     PartWithin,
     StateIs,
 )
-from robocasa_lerobot.envs.predicates.logic import AllOf, AnyOf, Goal, Not, Term, When
+from robocasa_lerobot.envs.predicates.heat_and_water import OnBurner, UnderWater
+from robocasa_lerobot.envs.predicates.logic import AllOf, AnyOf, Exactly, Goal, Not, Term, When
+from robocasa_lerobot.envs.predicates.memory import Never, Once, StepsWhile, WithMemory
+from robocasa_lerobot.envs.predicates.near import Near, NearerThan
 from robocasa_lerobot.envs.predicates.objects import (
     ObjectAtSite,
     ObjectInBasin,
@@ -20,7 +23,14 @@ from robocasa_lerobot.envs.predicates.objects import (
     ObjectTouchesAnyCounter,
     ObjectUpright,
 )
-from robocasa_lerobot.envs.predicates.robot import GripperFar, GripperFarFromPart, StandsBefore
+from robocasa_lerobot.envs.predicates.robot import (
+    Grasped,
+    GripperFar,
+    GripperFarFromPart,
+    GripperTouches,
+    StandsBefore,
+)
+from robocasa_lerobot.envs.predicates.traces import MovedSince, Strokes
 
 __all__ = [
     "AllOf",
@@ -30,9 +40,16 @@ __all__ = [
     "DoorsOpen",
     "DrawerClosed",
     "DrawerOpen",
+    "Exactly",
     "Goal",
+    "Grasped",
     "GripperFar",
     "GripperFarFromPart",
+    "GripperTouches",
+    "MovedSince",
+    "Near",
+    "NearerThan",
+    "Never",
     "Not",
     "ObjectAtSite",
     "ObjectInBasin",
@@ -41,10 +58,16 @@ __all__ = [
     "ObjectTouches",
     "ObjectTouchesAnyCounter",
     "ObjectUpright",
+    "OnBurner",
+    "Once",
     "PartTurned",
     "PartWithin",
     "StandsBefore",
     "StateIs",
+    "StepsWhile",
+    "Strokes",
     "Term",
+    "UnderWater",
     "When",
+    "WithMemory",
 ]

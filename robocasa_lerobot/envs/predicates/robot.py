@@ -1,4 +1,4 @@
-"""Conditions on the robot: how far the gripper is, and where the base stands."""
+"""Conditions on the robot: what the gripper holds and touches, how far it is, and where the base stands."""
 
 from __future__ import annotations
 
@@ -8,12 +8,14 @@ from typing import TYPE_CHECKING
 import mujoco
 import numpy as np
 
+from robocasa_lerobot.envs.predicates.contacts import touching
 from robocasa_lerobot.envs.predicates.logic import Term, plain
 
 if TYPE_CHECKING:
     from robocasa_lerobot.envs.scene.scene import Scene
 
 GRIPPER_FAR_M, BUTTON_FAR_M = 0.25, 0.15
+WIDE_OPEN_M = 0.035  # of a finger (docs/robocasa.md, section 8)
 # Of the base from the pose in front of a fixture (docs/robocasa.md, section 8).
 STANDS_WITHIN_M, STANDS_COSINE = 0.20, 0.98
 
@@ -53,6 +55,44 @@ class GripperFarFromPart(Term):
         """Compare the distance with the threshold."""
         body = data.body(f"{scene.fixture(self.fixture).name}_{self.part}")
         return float(np.linalg.norm(data.site(scene.robot.names.grip_site).xpos - body.xipos)) > self.distance
+
+
+@dataclass(frozen=True)
+class GripperTouches(Term):
+    """The gripper touches an object."""
+
+    object: str
+
+    @property
+    def name(self) -> str:
+        """E.g. `gripper_touches_obj`."""
+        return f"gripper_touches_{plain(self.object)}"
+
+    def holds(self, scene: Scene, data: mujoco.MjData) -> bool:
+        """Look at the contacts."""
+        gripper = scene.subtree(scene.robot.names.gripper)
+        return touching(scene.model, data, gripper, scene.subtree(scene.fill(self.object)))
+
+
+@dataclass(frozen=True)
+class Grasped(Term):
+    """The gripper holds an object: every finger touches it, and none stands wide open."""
+
+    object: str
+
+    @property
+    def name(self) -> str:
+        """E.g. `obj_grasped`."""
+        return f"{plain(self.object)}_grasped"
+
+    def holds(self, scene: Scene, data: mujoco.MjData) -> bool:
+        """Look at the fingers' positions, then at their contacts."""
+        model, thing = scene.model, scene.subtree(scene.fill(self.object))
+        joints = [data.joint(name) for name in scene.robot.names.finger_joints]
+        if max(abs(float(joint.qpos[0])) for joint in joints) >= WIDE_OPEN_M:
+            return False
+        fingers = [model.body(model.jnt_bodyid[joint.id]).name for joint in joints]
+        return all(touching(model, data, scene.subtree(finger), thing) for finger in fingers)
 
 
 @dataclass(frozen=True)
