@@ -12,7 +12,7 @@ from robocasa_lerobot.envs.predicates.fixtures import (
 )
 from robocasa_lerobot.envs.predicates.heat_and_water import OnBurner, UnderWater
 from robocasa_lerobot.envs.predicates.logic import AllOf, AnyOf, Exactly, Goal, Not, Term, When
-from robocasa_lerobot.envs.predicates.memory import Never, Once, StepsWhile, WithMemory
+from robocasa_lerobot.envs.predicates.memory import Never, Once, StepsWhile, WithMemory, parts_with_memory
 from robocasa_lerobot.envs.predicates.near import Near, NearerThan
 from robocasa_lerobot.envs.predicates.objects import (
     ObjectAtSite,
@@ -70,4 +70,5 @@ __all__ = [
     "UnderWater",
     "When",
     "WithMemory",
+    "parts_with_memory",
 ]

@@ -13,6 +13,8 @@ from robocasa_lerobot.envs.predicates import (
     Goal,
     GripperFar,
     GripperFarFromPart,
+    MovedSince,
+    Never,
     ObjectInBasin,
     ObjectInside,
     ObjectOn,
@@ -90,7 +92,19 @@ def stage_condition(task: Task, stage: Stage) -> Goal:
 
 
 def without_gripper(goal: Goal) -> Goal:
-    """What of a stage's condition must still hold when the hand is busy with the next one."""
+    """What of a stage's condition must still hold when the hand is busy with the next one.
+
+    Left out are where the gripper has to be, and that something moved in the last step, which passes by itself. What is
+    remembered stays whole: steps that were counted remain.
+    """
     if isinstance(goal, AllOf):
-        return AllOf(*(part for part in goal.parts if not isinstance(part, GripperFar | GripperFarFromPart)))
-    return goal
+        return AllOf(*map(without_gripper, goal.parts))
+    passes = isinstance(goal, MovedSince) and goal.since == "step"
+    return AllOf() if passes or isinstance(goal, GripperFar | GripperFarFromPart) else goal
+
+
+def must_never(goal: Goal) -> tuple[Never, ...]:
+    """What a goal asks never to happen in any case: once it has, the goal cannot be reached any more."""
+    if isinstance(goal, AllOf):
+        return tuple(never for part in goal.parts for never in must_never(part))
+    return (goal,) if isinstance(goal, Never) else ()
