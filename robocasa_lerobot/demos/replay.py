@@ -20,6 +20,7 @@ from robocasa_lerobot import contract
 from robocasa_lerobot.demos.recorder import SUCCESS_HOLD_STEPS
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.predicates import parts_with_memory
+from robocasa_lerobot.envs.tasks.task import Task
 from robocasa_lerobot.errors import UserError
 from robocasa_lerobot.jobs.as_completed import as_they_end
 
@@ -137,15 +138,15 @@ def _last_terms(group: h5py.Group) -> dict[str, bool]:
     return dict(zip(json.loads(recorded.attrs["names"]), recorded[-1].astype(bool).tolist(), strict=True))
 
 
-def replay(path: Path, demo: str) -> Replayed:
-    """Replay one demonstration both ways.
+def replay(path: Path, demo: str, declaration: Task | None = None) -> Replayed:
+    """Replay one demonstration both ways; of a task that is in the making, its declaration is given.
 
     Raises:
         UserError: its kitchen cannot be made again.
     """
     recorded = read_demonstration(path, demo)
     task, states = recorded.task, recorded.states
-    env = kitchen_of(recorded)
+    env = kitchen_of(recorded, declaration)
     try:
         env.reset(seed=recorded.seed)
         start = _state(env)
@@ -160,10 +161,10 @@ def replay(path: Path, demo: str) -> Replayed:
     return Replayed(path, demo, task, done, final, same, deviation, note)
 
 
-def kitchen_of(recorded: Demonstration) -> KitchenEnv:
+def kitchen_of(recorded: Demonstration, declaration: Task | None = None) -> KitchenEnv:
     """An env that makes the kitchen of a demonstration when it is reset with its seed; without cameras."""
     return KitchenEnv(
-        recorded.task,
+        declaration or recorded.task,
         split=recorded.split,
         cameras=(),
         terminate_on_success=False,

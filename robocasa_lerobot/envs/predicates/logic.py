@@ -181,13 +181,13 @@ def terms_by_name(goal: Goal) -> dict[str, tuple[Term, ...]]:
     for part in goal.inner:
         for name, terms in terms_by_name(part).items():
             before = found.get(name, ())
-            new = tuple(term for term in terms if term not in before)
-            if before and new and not isinstance(goal, When):
+            clash = next(((a, b) for a in before for b in terms if a != b), None)
+            if clash is not None and not isinstance(goal, When):
                 raise UserError(
-                    f"two terms of a goal are called `{name}`: {before[0]} and {new[0]}. The value of one would hide "
+                    f"two terms of a goal are called `{name}`: {clash[0]} and {clash[1]}. The value of one would hide "
                     "the other's: expected a name of its own for each (some terms take a `label`), or equal terms."
                 )
-            found[name] = before + new
+            found[name] = before + tuple(term for term in terms if term not in before)
     return found
 
 
