@@ -55,6 +55,7 @@ from robocasa_lerobot.envs.predicates import (
 from robocasa_lerobot.envs.predicates.objects import middle_of
 from robocasa_lerobot.envs.scene.scene import Scene, set_openness
 
+AWAKE = -(1 + 10)  # of `tree_asleep`: and 10 quiet steps (mjMINAWAKE) away from sleep
 # What holds as long as nothing was done; and what moves objects or the robot to where they stay, which the
 # demonstrators' tests do.
 AT_START = (GripperFar, GripperFarFromPart, Never)
@@ -84,9 +85,15 @@ def can_be_written(kind: type[Goal]) -> bool:
     return write.dispatch(kind) is not write.dispatch(object)
 
 
+def evaluate(scene: Scene, data: mujoco.MjData) -> None:
+    """Evaluate a state that was written, with everything awake: sleeping things may have been put onto others."""
+    data.tree_asleep[:] = AWAKE
+    take_effect(scene.model, data)
+
+
 def hold(goal: Goal, scene: Scene, data: mujoco.MjData) -> dict[str, bool] | None:
     """Evaluate a state that was written; the terms where the goal does not hold, for messages."""
-    take_effect(scene.model, data)
+    evaluate(scene, data)
     terms: dict[str, bool] = {}
     return None if goal.evaluate(scene, data, terms) else terms
 
