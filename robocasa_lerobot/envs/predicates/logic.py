@@ -54,6 +54,9 @@ class Joined(Goal):
     def __hash__(self) -> int:
         return hash((type(self), self.inner))
 
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}({', '.join(map(repr, self.inner))})"
+
 
 class AllOf(Joined):
     """Every part holds. All parts are evaluated, so that a failure names all that is missing."""

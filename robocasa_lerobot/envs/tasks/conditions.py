@@ -98,9 +98,13 @@ def without_gripper(goal: Goal) -> Goal:
     remembered stays whole: steps that were counted remain.
     """
     if isinstance(goal, AllOf):
-        return AllOf(*map(without_gripper, goal.parts))
-    passes = isinstance(goal, MovedSince) and goal.since == "step"
-    return AllOf() if passes or isinstance(goal, GripperFar | GripperFarFromPart) else goal
+        return AllOf(*(without_gripper(part) for part in goal.parts if not _passes(part)))
+    return AllOf() if _passes(goal) else goal
+
+
+def _passes(goal: Goal) -> bool:
+    moves = isinstance(goal, MovedSince) and goal.since == "step"
+    return moves or isinstance(goal, GripperFar | GripperFarFromPart)
 
 
 def must_never(goal: Goal) -> tuple[Never, ...]:
