@@ -31,7 +31,6 @@ from robocasa_lerobot.envs.predicates import (
 )
 from robocasa_lerobot.envs.predicates.logic import every_goal_in, terms_by_name
 from robocasa_lerobot.envs.predicates.objects import middle_of, radius
-from robocasa_lerobot.envs.predicates.robot import WIDE_OPEN_M
 from robocasa_lerobot.envs.scene.build import build_scene
 from robocasa_lerobot.envs.scene.scene import Scene
 from robocasa_lerobot.envs.scene.scene_spec import SceneSpec
@@ -47,7 +46,10 @@ from robocasa_lerobot.envs.scene.spec import (
 from robocasa_lerobot.envs.tasks.registry import get_task, task_names
 from robocasa_lerobot.errors import UserError
 
-BURNER = Placement("stove", region=SampleRegion(name="any"), size=(0.02, 0.02), pos=(0.0, 0.0), ensure_inside=False)
+HOB_Z_M = (0.7, 1.2)  # not the oven
+BURNER = Placement(
+    "stove", region=SampleRegion(name="any", height=HOB_Z_M), size=(0.02, 0.02), pos=(0.0, 0.0), ensure_inside=False
+)
 STOVE = SceneSpec(
     name="TwoOnAStove",
     fixtures=(FixtureWanted("stove", "stove"),),
@@ -72,7 +74,7 @@ type Change = Callable[[Scene, mujoco.MjData], Any]
 @pytest.fixture(scope="module")
 def scenes() -> dict[str, Scene]:
     """By the role of the fixture that they are about."""
-    return {"stove": build_scene(STOVE, "target", 0), "sink": build_scene(SINK, "target", 0)}
+    return {"stove": build_scene(STOVE, "target", 4), "sink": build_scene(SINK, "target", 0)}
 
 
 def state(scene: Scene) -> mujoco.MjData:
@@ -123,6 +125,14 @@ def both_fingers(position_m: float) -> Change:
     return lambda scene, data: [finger(number, position_m)(scene, data) for number in (0, 1)]
 
 
+def fist(scene: Scene, data: mujoco.MjData) -> None:
+    """Push the object with closed fingers: both tips touch it, from the same side."""
+    both_fingers(0.0)(scene, data)
+    grip = data.site(scene.robot.names.grip_site)
+    ahead = scene.robot.gripper.tips_below_grip + scene.objects["obj"].item.size[2] / 2 - 0.006
+    data.joint("obj_joint0").qpos[:3] = grip.xpos + ahead * grip.xmat.reshape(3, 3)[:, 2]
+
+
 def beside(name: str, other: str, x: float, z: float = 0.0) -> Change:
     """Put an object's origin beside another's, metres."""
 
@@ -141,6 +151,16 @@ def onto(burner: int, name: str = "pan") -> Change:
     return change
 
 
+def into_oven(scene: Scene, data: mujoco.MjData) -> None:
+    """Below the burner, on the rack of the oven: it touches the stove too."""
+    hob = scene.hob("stove")
+    oven = hob.regions["interior"]
+    floor = oven.world(data, (0.0, 0.0, -oven.half[2]))
+    burner = data.site(f"{hob.name}_burner_on_{hob.nearest_burner(data, floor)[0]}").xpos
+    put_object(scene, data, "pan", np.array([*burner[:2], 0.0]))
+    data.joint("pan_joint0").qpos[2] = floor[2] - scene.objects["pan"].item.bottom_offset - 0.0005
+
+
 FIRST = "front_left"
 # Scene, predicate, what still counts, and what does not any more, each from a state in which it holds.
 CASES: dict[str, tuple[str, Goal, list[Change], list[Change]]] = {
@@ -150,7 +170,12 @@ CASES: dict[str, tuple[str, Goal, list[Change], list[Change]]] = {
         [away_from_stream(0.98), water(0.41)],
         [away_from_stream(1.02), water(0.39), shift("obj", z=0.16)],
     ),
-    "on any burner": ("stove", OnBurner("pan", "stove"), [knobs(0.0), knobs(1.0), onto(1)], [shift("pan", z=0.004)]),
+    "on any burner": (
+        "stove",
+        OnBurner("pan", "stove"),
+        [knobs(0.0), knobs(1.0), onto(1)],
+        [shift("pan", z=0.004), into_oven],
+    ),
     "on one burner": (
         "stove",
         OnBurner("pan", "stove", burner=FIRST, within=0.08),
@@ -173,13 +198,13 @@ CASES: dict[str, tuple[str, Goal, list[Change], list[Change]]] = {
     "grasped": (
         "sink",
         Grasped("obj"),
-        [],
-        [both_fingers(WIDE_OPEN_M + 0.001), finger(0, 0.04), finger(1, 0.04), shift("obj", z=-0.3)],
+        [both_fingers(0.030)],
+        [finger(0, 0.04), finger(1, 0.04), fist, shift("obj", z=-0.3)],
     ),
     "gripper touches": (
         "sink",
         GripperTouches("obj"),
-        [finger(0, 0.04), finger(1, 0.04)],
+        [finger(0, 0.04), finger(1, 0.04), fist],
         [shift("obj", z=-0.3)],
     ),
     "near, horizontally": (

@@ -42,14 +42,14 @@ class UnderWater(Term):
 
 @dataclass(frozen=True)
 class OnBurner(Term):
-    """An object stands on a burner: it touches the stove, and this burner is the nearest to its middle.
+    """An object stands on a burner: it touches the stove, is above the burners, and this one is the nearest.
 
     Attributes:
         object: name.
         fixture: role of the stove or stovetop.
         burner: its location; may name a choice in braces; any burner if empty.
         lit: whether its knob must be on, or must be off; None is either.
-        within: bound of the horizontal distance of the middles, metres.
+        within: bound of the horizontal distance from the object's middle, metres.
         other_than: name of an object whose burner it must not be.
     """
 
@@ -80,5 +80,8 @@ class OnBurner(Term):
         return touching(scene.model, data, scene.subtree(name), scene.subtree(hob.name))
 
     def _burner_of(self, scene: Scene, data: mujoco.MjData, name: str) -> str | None:
-        burner, apart = scene.hob(self.fixture).nearest_burner(data, middle_of(scene, data, name))
-        return burner if apart < self.within else None
+        hob = scene.hob(self.fixture)
+        burner, apart = hob.nearest_burner(data, middle_of(scene, data, name))
+        # Below it is the oven.
+        above = data.body(name).xpos[2] > data.site(f"{hob.name}_burner_on_{burner}").xpos[2]
+        return burner if above and apart < self.within else None
