@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Literal
 import mujoco
 import numpy as np
 
-from robocasa_lerobot.envs.predicates.logic import AllOf, Goal, plain
+from robocasa_lerobot.envs.predicates.logic import plain
 from robocasa_lerobot.envs.predicates.memory import Array, WithMemory
 from robocasa_lerobot.envs.predicates.objects import ObjectTouches, ObjectTouchesAnyCounter
 from robocasa_lerobot.envs.predicates.robot import Grasped
@@ -146,8 +146,10 @@ class Strokes(WithMemory):
         return bool(kept[0] >= self.n_places and np.linalg.norm(kept[3:5] - kept[1:3]) >= self.span_m)
 
     def _rubs(self, scene: Scene, data: mujoco.MjData) -> bool:
-        touches: Goal = ObjectTouches(self.tool, self.surface) if self.surface else ObjectTouchesAnyCounter(self.tool)
-        return AllOf(Grasped(self.tool), touches).evaluate(scene, data, {})
+        if not Grasped(self.tool).holds(scene, data):
+            return False
+        touches = ObjectTouches(self.tool, self.surface) if self.surface else ObjectTouchesAnyCounter(self.tool)
+        return touches.holds(scene, data)
 
     def _place(self, scene: Scene, data: mujoco.MjData) -> Array:
         """Where the tool is on the surface, (2,); in the world where it may be any counter."""
