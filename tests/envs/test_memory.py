@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import functools
+from contextlib import closing
 from dataclasses import replace
+from functools import partial
 
 import mujoco
 import numpy as np
@@ -34,6 +36,7 @@ from robocasa_lerobot.envs.scene.memory import PREFIX
 from robocasa_lerobot.envs.scene.scene import Scene
 from robocasa_lerobot.envs.state import KitchenState
 from robocasa_lerobot.envs.tasks.registry import get_task, task_names
+from robocasa_lerobot.envs.vector.kitchens import make_vector_env
 from robocasa_lerobot.errors import UserError
 
 IDLE = np.zeros(12, np.float32)
@@ -287,6 +290,17 @@ def test_a_joint_keeps_what_was_written_through_physics() -> None:
         mujoco.mj_step(env.model, env.data)
     for name, numbers in kept.items():
         assert np.array_equal(env.scene.memory.read(env.data, name), numbers)
+
+
+@pytest.mark.render
+def test_workers_of_a_vector_env_count_each_for_itself_and_anew_in_each_episode() -> None:
+    tasks = [by_the_sink(StepsWhile(RUNS, n), runs=True) for n in (3, 5)]
+    with closing(make_vector_env([partial(KitchenEnv, task, cameras=()) for task in tasks])) as envs:
+        envs.reset(seed=[0, 1])
+        ends = np.array([envs.step(np.zeros((2, 12), np.float32))[2] for _ in range(12)])
+    # The step after an end resets, and counts for nothing.
+    assert np.flatnonzero(ends[:, 0]).tolist() == [2, 6, 10]
+    assert np.flatnonzero(ends[:, 1]).tolist() == [4, 10]
 
 
 def hidden(scene: Scene) -> list[str]:
