@@ -229,7 +229,7 @@ class KitchenEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         assert controller is not None
         command = contract.stored_to_hdf5(contract.binarize(np.asarray(action, dtype=np.float64)))
         control_step(self.model, data, controller, command)
-        self.scene.update_appliances(data)
+        self.scene.after_control_step(data)
         self._steps += 1
         info = self._info()
         terminated = self.terminate_on_success and info["success"]

@@ -10,7 +10,8 @@ from typing import Any
 
 from robocasa_lerobot import contract
 from robocasa_lerobot.demos.demonstrator import can_demonstrate
-from robocasa_lerobot.envs.predicates import AllOf, AnyOf, Goal, Not, ObjectInside, Term, When
+from robocasa_lerobot.envs.predicates import AllOf, AnyOf, Exactly, Goal, Not, ObjectInside, Term, When
+from robocasa_lerobot.envs.predicates.logic import every_goal_in
 from robocasa_lerobot.envs.scene.initial_states import Initial
 from robocasa_lerobot.envs.scene.scene_spec import InitialState
 from robocasa_lerobot.envs.scene.spec import (
@@ -96,6 +97,10 @@ def goal_lines(goal: Goal, indent: str = "  ") -> Iterator[str]:
     elif isinstance(goal, Not):
         yield f"{indent}- not"
         yield from goal_lines(goal.part, indent + "  ")
+    elif isinstance(goal, Exactly):
+        yield f"{indent}- exactly {goal.n} of"
+        for part in goal.parts:
+            yield from goal_lines(part, indent + "  ")
     elif isinstance(goal, When):
         for value, part in goal.goals.items():
             yield f"{indent}- where {{{goal.choice}}} is {value}"
@@ -103,8 +108,10 @@ def goal_lines(goal: Goal, indent: str = "  ") -> Iterator[str]:
     else:
         assert isinstance(goal, Term), goal
         first = (inspect.getdoc(type(goal)) or "").splitlines()[0]
-        values = ", ".join(f"{name} {_value(value)}" for name, value in _fields(goal))
-        yield f"{indent}- `{goal.name}`: {first} ({values})"
+        fields = [f"{name} {_value(value)}" for name, value in _fields(goal) if not isinstance(value, Goal)]
+        yield f"{indent}- `{goal.name}`: {first}" + (f" ({', '.join(fields)})" if fields else "")
+        for part in goal.inner:
+            yield from goal_lines(part, indent + "  ")
 
 
 def _skill(task: Task) -> str:
@@ -112,13 +119,7 @@ def _skill(task: Task) -> str:
 
 
 def _asks_inside(goal: Goal) -> bool:
-    if isinstance(goal, AllOf | AnyOf):
-        return any(map(_asks_inside, goal.parts))
-    if isinstance(goal, Not):
-        return _asks_inside(goal.part)
-    if isinstance(goal, When):
-        return any(map(_asks_inside, goal.goals.values()))
-    return isinstance(goal, ObjectInside)
+    return any(isinstance(part, ObjectInside) for part in every_goal_in(goal))
 
 
 def _fixture(wanted: FixtureWanted) -> str:

@@ -10,7 +10,10 @@ from robocasa_lerobot.envs.predicates.fixtures import (
     PartWithin,
     StateIs,
 )
-from robocasa_lerobot.envs.predicates.logic import AllOf, AnyOf, Goal, Not, Term, When
+from robocasa_lerobot.envs.predicates.heat_and_water import OnBurner, UnderWater
+from robocasa_lerobot.envs.predicates.logic import AllOf, AnyOf, Exactly, Goal, Not, Term, When
+from robocasa_lerobot.envs.predicates.memory import Never, Once, StepsWhile, WithMemory, parts_with_memory
+from robocasa_lerobot.envs.predicates.near import Near, NearerThan
 from robocasa_lerobot.envs.predicates.objects import (
     ObjectAtSite,
     ObjectInBasin,
@@ -20,7 +23,15 @@ from robocasa_lerobot.envs.predicates.objects import (
     ObjectTouchesAnyCounter,
     ObjectUpright,
 )
-from robocasa_lerobot.envs.predicates.robot import Grasped, GripperFar, GripperFarFromPart, StandsBefore, StandsNear
+from robocasa_lerobot.envs.predicates.robot import (
+    Grasped,
+    GripperFar,
+    GripperFarFromPart,
+    GripperTouches,
+    StandsBefore,
+    StandsNear,
+)
+from robocasa_lerobot.envs.predicates.traces import MovedSince, Strokes
 
 __all__ = [
     "AllOf",
@@ -30,10 +41,16 @@ __all__ = [
     "DoorsOpen",
     "DrawerClosed",
     "DrawerOpen",
+    "Exactly",
     "Goal",
     "Grasped",
     "GripperFar",
     "GripperFarFromPart",
+    "GripperTouches",
+    "MovedSince",
+    "Near",
+    "NearerThan",
+    "Never",
     "Not",
     "ObjectAtSite",
     "ObjectInBasin",
@@ -42,11 +59,18 @@ __all__ = [
     "ObjectTouches",
     "ObjectTouchesAnyCounter",
     "ObjectUpright",
+    "OnBurner",
+    "Once",
     "PartTurned",
     "PartWithin",
     "StandsBefore",
     "StandsNear",
     "StateIs",
+    "StepsWhile",
+    "Strokes",
     "Term",
+    "UnderWater",
     "When",
+    "WithMemory",
+    "parts_with_memory",
 ]

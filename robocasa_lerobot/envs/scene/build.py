@@ -21,6 +21,7 @@ from robocasa_lerobot.envs.robots.robot import Robot
 from robocasa_lerobot.envs.scene.assembly import bare_kitchen
 from robocasa_lerobot.envs.scene.counter_areas import counter_areas
 from robocasa_lerobot.envs.scene.initial_states import Initial, LidAside, PartAt
+from robocasa_lerobot.envs.scene.memory import Memory, add_memory
 from robocasa_lerobot.envs.scene.placement import cast_roles, place_objects
 from robocasa_lerobot.envs.scene.regions import Shares
 from robocasa_lerobot.envs.scene.robot_poses import RobotPose, robot_pose
@@ -122,6 +123,8 @@ def _attempt(
     roles, choices, objects, pose = arranged.roles, arranged.choices, arranged.objects, arranged.robot_pose
     spots = {role: _lid_spot(rng, layout, roles[role], objects) for role, gone in arranged.lids.items() if not gone}
     spec = _assemble(task, layout, look, robot, objects)
+    kept = {part.name: part.numbers for part in task.remembering}
+    add_memory(spec, kept)
     if look.camera_noise is not None:
         noise_rng = np.random.default_rng([seed, _CAMERA_NOISE_STREAM])
         add_camera_noise(spec, robot.cameras(look.camera_set), look.camera_noise, noise_rng)
@@ -145,6 +148,8 @@ def _attempt(
         choices=choices.values,
         initial=arranged.initial,
         lid_spots=spots,
+        remembering=task.remembering,
+        memory=Memory.of(model, kept),
     )
 
 

@@ -23,6 +23,7 @@ from robocasa_lerobot.envs.robots.cameras import camera_configs
 from robocasa_lerobot.envs.robots.control_step import control_step
 from robocasa_lerobot.envs.robots.robot import Controller, Robot
 from robocasa_lerobot.envs.scene.bodies import subtree
+from robocasa_lerobot.envs.scene.memory import Memory
 from robocasa_lerobot.envs.scene.robot_poses import RobotPose, standing_pose
 
 SETTLE_STEPS = 10  # control steps without a command after placing everything (docs/robocasa.md, section 1)
@@ -51,6 +52,24 @@ class FirstState(Protocol):
         """Write it, with the number drawn for it."""
 
 
+class Remembering(Protocol):
+    """Part of a goal that depends on earlier states; `envs/predicates/memory.py` has them all."""
+
+    @property
+    def name(self) -> str:
+        """Of what is kept."""
+
+    @property
+    def numbers(self) -> tuple[str, ...]:
+        """Names of the numbers that it keeps."""
+
+    def begin(self, scene: Scene, data: mujoco.MjData) -> NDArray[np.float64]:
+        """Its numbers at the start of an episode."""
+
+    def after_step(self, scene: Scene, data: mujoco.MjData) -> NDArray[np.float64]:
+        """Its numbers after a control step; those before it are in `scene.memory`."""
+
+
 @dataclass
 class Scene:
     """A kitchen made for an episode.
@@ -72,6 +91,8 @@ class Scene:
         initial: what the task has written into the first state, each with the number drawn for it, in that order.
         lid_spots: where the lid of a blender may lie, by role.
         arm_noise_rad: standard deviation of the noise on the initial arm pose.
+        remembering: the parts of the task's goal and of its stages' conditions that have memory, the inner first.
+        memory: where their numbers are.
     """
 
     split: str
@@ -92,6 +113,8 @@ class Scene:
     initial: tuple[tuple[FirstState, float], ...] = ()
     lid_spots: dict[str, NDArray[np.float64]] = field(default_factory=dict)
     arm_noise_rad: float = 0.02
+    remembering: tuple[Remembering, ...] = ()
+    memory: Memory = field(default_factory=Memory)
     _subtrees: dict[tuple[str, ...], NDArray[np.bool_]] = field(default_factory=dict, init=False, repr=False)
 
     @property
@@ -168,11 +191,19 @@ class Scene:
         for _ in range(SETTLE_STEPS):
             control_step(self.model, data, controller, hold)
             self.update_appliances(data)
+        for part in self.remembering:
+            self.memory.write(data, part.name, part.begin(self, data))
         data.time = 0.0
         return data, controller
 
+    def after_control_step(self, data: mujoco.MjData) -> None:
+        """What happens by itself, once after each control step of an episode: appliances act, then goals remember."""
+        self.update_appliances(data)
+        for part in self.remembering:
+            self.memory.write(data, part.name, part.after_step(self, data))
+
     def update_appliances(self, data: mujoco.MjData) -> None:
-        """Let appliances latch, time and light up, once after each control step."""
+        """Let appliances latch, time and light up."""
         appliances = [fixture for fixture in self.fixtures.values() if isinstance(fixture, Appliance)]
         if appliances:
             update_all(appliances, self.model, data, self.subtree(self.robot.names.gripper))

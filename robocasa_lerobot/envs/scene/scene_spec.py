@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from robocasa_lerobot.envs.scene.initial_states import Initial
+from robocasa_lerobot.envs.scene.scene import Remembering
 from robocasa_lerobot.envs.scene.spec import Choice, FixtureWanted, InitialOpenness, ObjectWanted, RobotStart
 
 type InitialState = InitialOpenness | Initial
@@ -34,3 +35,8 @@ class SceneSpec:
     paraphrases: tuple[str, ...] = ()
     needs: tuple[str, ...] = ()
     exclude_styles: tuple[int, ...] = ()
+
+    @property
+    def remembering(self) -> tuple[Remembering, ...]:
+        """What has memory, and so needs hidden joints in the scene, the inner first."""
+        return ()

@@ -14,6 +14,8 @@ from robocasa_lerobot.envs.predicates import (
     Grasped,
     GripperFar,
     GripperFarFromPart,
+    MovedSince,
+    Never,
     ObjectInBasin,
     ObjectInside,
     ObjectOn,
@@ -95,7 +97,23 @@ def stage_condition(task: Task, stage: Stage) -> Goal:
 
 
 def without_gripper(goal: Goal) -> Goal:
-    """What of a stage's condition must still hold when the hand is busy with the next one."""
+    """What of a stage's condition must still hold when the hand is busy with the next one.
+
+    Left out are where the gripper has to be, and that something moved in the last step, which passes by itself. What is
+    remembered stays whole: steps that were counted remain.
+    """
     if isinstance(goal, AllOf):
-        return AllOf(*(part for part in goal.parts if not isinstance(part, GripperFar | GripperFarFromPart)))
-    return goal
+        return AllOf(*(without_gripper(part) for part in goal.parts if not _passes(part)))
+    return AllOf() if _passes(goal) else goal
+
+
+def _passes(goal: Goal) -> bool:
+    moves = isinstance(goal, MovedSince) and goal.since == "step"
+    return moves or isinstance(goal, GripperFar | GripperFarFromPart)
+
+
+def must_never(goal: Goal) -> tuple[Never, ...]:
+    """What a goal asks never to happen in any case: once it has, the goal cannot be reached any more."""
+    if isinstance(goal, AllOf):
+        return tuple(never for part in goal.parts for never in must_never(part))
+    return (goal,) if isinstance(goal, Never) else ()

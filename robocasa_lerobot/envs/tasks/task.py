@@ -8,8 +8,10 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from robocasa_lerobot.benchmark.tasks import TaskFacts, facts_of
-from robocasa_lerobot.envs.predicates.logic import Goal
+from robocasa_lerobot.envs.predicates.logic import Goal, terms_by_name
+from robocasa_lerobot.envs.predicates.memory import WithMemory, parts_with_memory
 from robocasa_lerobot.envs.scene.scene_spec import SceneSpec
+from robocasa_lerobot.errors import UserError
 
 
 @dataclass(frozen=True)
@@ -43,11 +45,31 @@ class Task(SceneSpec):
         summary: when it counts as solved, in a sentence.
         goal: what must hold; its terms are reported one by one.
         stages: the plan.
+
+    Raises:
+        UserError: two terms of the goal, or of a stage's condition, have one name.
     """
 
     summary: str = field(compare=False)
     goal: Goal
     stages: tuple[Stage, ...]
+
+    def __post_init__(self) -> None:
+        try:
+            for goal in self._goals:
+                terms_by_name(goal)
+            parts_with_memory(self._goals)
+        except UserError as error:
+            raise UserError(f"task {self.name}: {error}") from error
+
+    @property
+    def remembering(self) -> tuple[WithMemory, ...]:
+        """What of the goal and of the stages' conditions has memory, the inner first."""
+        return parts_with_memory(self._goals)
+
+    @property
+    def _goals(self) -> tuple[Goal, ...]:
+        return (self.goal, *(stage.until for stage in self.stages if stage.until is not None))
 
     @property
     def facts(self) -> TaskFacts:
