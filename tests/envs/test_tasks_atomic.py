@@ -39,7 +39,7 @@ from robocasa_lerobot.envs.predicates import (
 from robocasa_lerobot.envs.predicates.contacts import touching
 from robocasa_lerobot.envs.scene.build import build_scene
 from robocasa_lerobot.envs.scene.initial_states import PartAt
-from robocasa_lerobot.envs.scene.scene import Scene, set_openness
+from robocasa_lerobot.envs.scene.scene import Scene
 from robocasa_lerobot.envs.tasks.registry import get_task, task_names
 from robocasa_lerobot.envs.tasks.task import Task
 
@@ -122,7 +122,8 @@ def write(goal: Goal, scene: Scene, data: mujoco.MjData) -> None:
     elif isinstance(goal, When):
         write(goal.goals[scene.choices[goal.choice]], scene, data)
     elif isinstance(goal, DoorsOpen | DoorsClosed | DrawerOpen | DrawerClosed):
-        set_openness(scene.fixture(goal.fixture), data, float(isinstance(goal, DoorsOpen | DrawerOpen)))
+        part = getattr(goal, "part", "")
+        scene.fixture(goal.fixture).set_openness(data, float(isinstance(goal, DoorsOpen | DrawerOpen)), part)
     elif isinstance(goal, PartWithin):
         low, high = max(goal.low, 0.0), min(goal.high, 1.0)
         scene.appliance(goal.fixture).set_share(data, scene.fill(goal.part), (low + high) / 2)

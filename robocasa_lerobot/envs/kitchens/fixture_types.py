@@ -132,6 +132,11 @@ FIXTURE_KINDS: dict[str, Filter] = {kind.name.lower(): FILTERS[kind] for kind in
 FIXTURE_KINDS["drawer_top"] = FILTERS[FixtureType.TOP_DRAWER]
 
 
+def _with_freezer(_: Layout, fixture: Fixture) -> bool:
+    """A fridge whose freezer has a door, and shelves that the arm reaches: not below, not in a drawer."""
+    return "freezer" in fixture.compartments and bool(fixture.usable_shelves("freezer"))
+
+
 def _with_drawer(layout: Layout, fixture: Fixture) -> bool:
     return isinstance(fixture, Fridge) and bool(fixture.drawers)
 
@@ -150,4 +155,9 @@ def _once(layout: Layout, fixture: Fixture) -> bool:
     return kind in _LANDMARKS and list(layout.types.values()).count(kind) == 1
 
 
-FIXTURE_KINDS |= {"fridge_with_drawer": _with_drawer, "landmark": _types(*_SOURCES), "landmark_once": _once}
+FIXTURE_KINDS |= {
+    "fridge_with_drawer": _with_drawer,
+    "fridge_with_freezer": _with_freezer,
+    "landmark": _types(*_SOURCES),
+    "landmark_once": _once,
+}

@@ -8,9 +8,7 @@ from typing import TYPE_CHECKING
 import mujoco
 import numpy as np
 
-from robocasa_lerobot.envs.kitchens.appliances.base import CLOSED_UP_TO, OPEN_FROM, Appliance
-from robocasa_lerobot.envs.kitchens.fixtures.base import Fixture
-from robocasa_lerobot.envs.kitchens.fixtures.cabinets import HingeCabinet
+from robocasa_lerobot.envs.kitchens.appliances.base import CLOSED_UP_TO, OPEN_FROM
 from robocasa_lerobot.envs.predicates.logic import Term, plain
 from robocasa_lerobot.envs.scene.initial_states import initial_share
 
@@ -54,36 +52,52 @@ class DrawerClosed(Term):
 
 @dataclass(frozen=True)
 class DoorsOpen(Term):
-    """Every door of a fixture is open by at least a share of its range."""
+    """Every door of a fixture is open by at least a share of its range; so is what has no doors.
+
+    Attributes:
+        fixture: role.
+        at_least: share.
+        part: start of the doors' names, such as the compartment "freezer"; all if empty. May name a choice in braces.
+    """
 
     fixture: str
     at_least: float = OPEN_FROM
+    part: str = ""
 
     @property
     def name(self) -> str:
-        """E.g. `fridge_open`."""
-        return f"{self.fixture}_open"
+        """E.g. `fridge_open`, `fridge_freezer_open`."""
+        return f"{self.fixture}_{plain(self.part)}_open" if self.part else f"{self.fixture}_open"
 
     def holds(self, scene: Scene, data: mujoco.MjData) -> bool:
         """Compare each door with the threshold."""
-        return min(door_shares(scene.fixture(self.fixture), data)) >= self.at_least
+        shares = scene.fixture(self.fixture).door_shares(data, scene.fill(self.part))
+        return all(share >= self.at_least for share in shares)
 
 
 @dataclass(frozen=True)
 class DoorsClosed(Term):
-    """Every door of a fixture is open by at most a share of its range."""
+    """Every door of a fixture is open by at most a share of its range; so is what has no doors.
+
+    Attributes:
+        fixture: role.
+        at_most: share.
+        part: start of the doors' names, such as the compartment "freezer"; all if empty. May name a choice in braces.
+    """
 
     fixture: str
     at_most: float = CLOSED_UP_TO
+    part: str = ""
 
     @property
     def name(self) -> str:
-        """E.g. `fridge_closed`."""
-        return f"{self.fixture}_closed"
+        """E.g. `fridge_closed`, `fridge_freezer_closed`."""
+        return f"{self.fixture}_{plain(self.part)}_closed" if self.part else f"{self.fixture}_closed"
 
     def holds(self, scene: Scene, data: mujoco.MjData) -> bool:
         """Compare each door with the threshold."""
-        return max(door_shares(scene.fixture(self.fixture), data)) <= self.at_most
+        shares = scene.fixture(self.fixture).door_shares(data, scene.fill(self.part))
+        return all(share <= self.at_most for share in shares)
 
 
 @dataclass(frozen=True)
@@ -175,11 +189,3 @@ class BurnerLevel(Term):
     def holds(self, scene: Scene, data: mujoco.MjData) -> bool:
         """Read the knob."""
         return scene.hob(self.fixture).burner_level(data, scene.fill(self.location)) == self.level
-
-
-def door_shares(fixture: Fixture, data: mujoco.MjData) -> tuple[float, ...]:
-    """Openness of each door of a cabinet or an appliance, as shares of their ranges."""
-    if isinstance(fixture, HingeCabinet):
-        return tuple(fixture.openness(data))
-    assert isinstance(fixture, Appliance), f"{fixture.name} has no doors"
-    return tuple(fixture.share(data, part) for part in fixture.doors)

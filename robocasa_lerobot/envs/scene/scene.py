@@ -15,7 +15,7 @@ from robocasa_lerobot.envs.kitchens.appliances.kinds.blender import Blender
 from robocasa_lerobot.envs.kitchens.appliances.kinds.sink import Sink
 from robocasa_lerobot.envs.kitchens.appliances.kinds.stove import Hob
 from robocasa_lerobot.envs.kitchens.fixtures.base import Fixture, yaw_quat
-from robocasa_lerobot.envs.kitchens.fixtures.cabinets import Drawer, HingeCabinet
+from robocasa_lerobot.envs.kitchens.fixtures.cabinets import Drawer
 from robocasa_lerobot.envs.kitchens.footprints import Footprint
 from robocasa_lerobot.envs.kitchens.layout import Layout
 from robocasa_lerobot.envs.objects.catalogue import Instance
@@ -63,7 +63,7 @@ class Scene:
         layout: where its fixtures stand.
         roles: fixture name of each role of the task.
         objects: by name.
-        openness: initial share of full travel by fixture name.
+        openness: initial share of full travel by fixture name and part, an empty one for all of it.
         robot: that is in it.
         robot_pose: where its base starts.
         instruction: what the robot is told.
@@ -83,7 +83,7 @@ class Scene:
     layout: Layout
     roles: dict[str, str]
     objects: dict[str, PlacedObject]
-    openness: dict[str, float]
+    openness: dict[tuple[str, str], float]
     robot: Robot
     robot_pose: RobotPose
     instruction: str
@@ -154,9 +154,8 @@ class Scene:
         pose = self.robot_pose
         self.robot.place_base(self.model, data, pose.x, pose.y, pose.yaw)
         self.robot.set_home(self.model, data, rng, self.arm_noise_rad)
-        for name, openness in self.openness.items():
-            fixture = self.fixtures[name]
-            set_openness(fixture, data, openness)
+        for (name, part), openness in self.openness.items():
+            self.fixtures[name].set_openness(data, openness, part)
         for entry, drawn in self.initial:
             entry.apply(self, data, drawn)
         for placed in self.objects.values():
@@ -208,13 +207,3 @@ class Scene:
             "init_robot_base_pos": [self.robot_pose.x, self.robot_pose.y, 0.0],
             "init_robot_base_ori": [0.0, 0.0, self.robot_pose.yaw],
         }
-
-
-def set_openness(fixture: Fixture, data: mujoco.MjData, openness: float) -> None:
-    """Open a drawer or the doors of a cabinet or appliance by a share of their full travel; for initial states."""
-    if isinstance(fixture, Drawer | HingeCabinet):
-        fixture.set_openness(data, openness)
-    elif isinstance(fixture, Appliance):
-        fixture.set_door(data, openness)
-    else:
-        raise AssertionError(f"{fixture.name} cannot be opened")

@@ -194,8 +194,15 @@ class RobotStart:
 
 @dataclass(frozen=True)
 class InitialOpenness:
-    """Initial openness of a drawer or door, uniform between two shares of its full travel."""
+    """Initial openness of a drawer or of doors, uniform between two shares of full travel.
+
+    Attributes:
+        fixture: role.
+        low, high: bounds, as shares of full travel.
+        part: start of the doors' names, such as the compartment "freezer"; all if empty. The others stay shut.
+    """
 
     fixture: str
     low: float
     high: float
+    part: str = ""

@@ -44,11 +44,11 @@ def _on_counter(stage: Stage) -> Goal:
 
 
 def _opened(stage: Stage) -> Goal:
-    return DoorsOpen(stage.target)
+    return DoorsOpen(stage.target, part=stage.part)
 
 
 def _closed(stage: Stage) -> Goal:
-    return DoorsClosed(stage.target)
+    return DoorsClosed(stage.target, part=stage.part)
 
 
 _BY_VERB: dict[tuple[str, str], Callable[[Stage], Goal]] = {

@@ -87,6 +87,15 @@ class Appliance(Fixture):
         return ()
 
     @property
+    def door_names(self) -> tuple[str, ...]:
+        """Parts that are doors."""
+        return self.doors
+
+    def door_share(self, data: mujoco.MjData, door: str) -> float:
+        """How far a door is open, as a share of its range."""
+        return self.share(data, door)
+
+    @property
     def regions(self) -> dict[str, Region]:
         """Where things can be put, by name; the first is the usual place."""
         return {}
@@ -103,10 +112,10 @@ class Appliance(Fixture):
         """Whether every door is open by at most 0.005 of its range."""
         return all(self.share(data, part) <= CLOSED_UP_TO for part in self.doors)
 
-    def set_door(self, data: mujoco.MjData, share: float, part: str | None = None) -> None:
-        """Open one door, or all, by a share of its range; for initial states."""
-        for door in self.doors if part is None else (part,):
-            self.set_share(data, door, share)
+    def set_openness(self, data: mujoco.MjData, openness: float, part: str = "") -> None:
+        """Open the doors of a part, or all, by a share of their ranges; for initial states."""
+        for door in self.doors_of(part):
+            self.set_share(data, door, openness)
 
     def set_rack(self, data: mujoco.MjData, share: float, rack: str) -> None:
         """Slide a rack or drawer out by a share of its range; doors in its way are opened. For initial states."""

@@ -35,6 +35,11 @@ class Fridge(Appliance):
         return tuple(self._doors())
 
     @property
+    def compartments(self) -> tuple[str, ...]:
+        """`fridge`, and `freezer` where that has a door; that of a French door fridge is a drawer."""
+        return tuple(dict.fromkeys(door.split("_")[0] for door in self.doors))
+
+    @property
     def drawers(self) -> tuple[str, ...]:
         """Crisper drawers, all in one row, low in the fridge; left to right."""
         return tuple(f"fridge_drawer{i}" for i in range(self.record["drawers"]))
@@ -65,19 +70,18 @@ class Fridge(Appliance):
             found[part] = Region.between(self.name, *self._room(part))
         return found
 
-    def shelf(self, rack_index: int, compartment: str = "fridge") -> Region:
-        """A usable shelf: -1 the highest, -2 the one below it, and so on.
+    def usable_shelves(self, compartment: str) -> tuple[str, ...]:
+        """Names of the regions over the shelves of "fridge" or "freezer" that goals may name, from below.
 
-        Raises:
-            IndexError: there are fewer usable shelves.
+        A higher shelf is out of the arm's reach, a lower one too, and nothing stands in a lower room.
         """
-        usable = []
+        found = []
         for name, region in self.regions.items():
             bottom = self.pos[2] + region.center[2] - region.half[2]
             fits = USABLE_Z[0] <= bottom <= USABLE_Z[1] and 2 * region.half[2] >= USABLE_ROOM_M - 1e-9
             if name.startswith(f"{compartment}_shelf") and fits:
-                usable.append(region)
-        return usable[rack_index]
+                found.append(name)
+        return tuple(found)
 
     def state(self, data: mujoco.MjData) -> dict[str, float | bool]:
         """Shares of the ranges of doors and drawers."""
