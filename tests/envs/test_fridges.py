@@ -1,4 +1,4 @@
-"""One compartment of a fridge: opened and shut alone, with objects on its shelves."""
+"""One compartment of a fridge: opened and shut alone, with objects on its shelves, which have levels."""
 
 from __future__ import annotations
 
@@ -14,10 +14,15 @@ from robocasa_lerobot.demos.skills.doors import doors
 from robocasa_lerobot.demos.stages import StageLog, carry_out
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.kitchens.appliances.base import take_effect
+from robocasa_lerobot.envs.kitchens.appliances.catalogue import build_appliance, kinds, models_of
+from robocasa_lerobot.envs.kitchens.appliances.kinds.fridge import Fridge
+from robocasa_lerobot.envs.kitchens.fixtures.base import Fixture, yaw_quat
 from robocasa_lerobot.envs.kitchens.fixtures.cabinets import HingeCabinet
+from robocasa_lerobot.envs.kitchens.fixtures.regions import ANY_LEVEL, LEVELS, USABLE_SHELF, region_names
+from robocasa_lerobot.envs.kitchens.footprints import PlacementError
 from robocasa_lerobot.envs.kitchens.layout import Layout, layout_ids, load_layout
 from robocasa_lerobot.envs.kitchens.splits import EXCLUDED
-from robocasa_lerobot.envs.predicates import DoorsClosed, DoorsOpen
+from robocasa_lerobot.envs.predicates import AllOf, DoorsClosed, DoorsOpen, GripperFar, OnShelf
 from robocasa_lerobot.envs.scene.build import build_scene
 from robocasa_lerobot.envs.scene.roles import candidates
 from robocasa_lerobot.envs.scene.scene import Scene
@@ -188,6 +193,112 @@ def test_a_cabinet_without_doors_is_shut(layouts: dict[int, Layout]) -> None:
     scene = SimpleNamespace(fixture=lambda role: found[0], fill=lambda text: text)
     data = cast(mujoco.MjData, None)
     assert DoorsClosed("cabinet").holds(cast(Scene, scene), data)
+
+
+# Shelves by level -----------------------------------------------------------------------------------------------
+
+
+def on_level(level: str, compartment: str) -> Task:
+    """Food that starts on the shelf of a level."""
+    task = food_in(compartment)
+    region = SampleRegion(name=f"{compartment}_shelf:{level}")
+    start = Placement("fridge", region=region, size=(0.3, 0.2), pos=(0.0, -1.0))
+    wanted = dataclasses.replace(task.objects[0], start=start, max_height=0.12)
+    return dataclasses.replace(task, objects=(wanted,), goal=OnShelf("obj", "fridge", level, compartment))
+
+
+def lay(scene: Scene, data: mujoco.MjData, at: np.ndarray) -> None:
+    """Put the object's middle to a place in the room, level, along the fridge's sides."""
+    data.joint("obj_joint0").qpos[:] = [*at, *yaw_quat(scene.fixture("fridge").yaw)]
+    mujoco.mj_forward(scene.model, data)
+
+
+@pytest.mark.parametrize("compartment", PARTS)
+@pytest.mark.parametrize("level", [*LEVELS, ANY_LEVEL])
+def test_placement_predicate_and_skill_mean_the_same_shelf(level: str, compartment: str) -> None:
+    for split in ("target", "pretrain"):
+        for seed in range(3):
+            task = on_level(level, compartment)
+            scene, data = settled(task, split, seed)
+            assert holds(task.goal, scene, data), (split, seed)
+            fridge = cast(Fridge, scene.fixture("fridge"))
+            skill = scene.part("fridge", f"{compartment}_shelf:{level}")
+            at = data.body("obj").xpos
+            meant = [name for name, region in fridge.regions.items() if name.startswith(skill)]
+            assert any(fridge.regions[name].contains(data, at) for name in meant)
+            if level != ANY_LEVEL:
+                assert meant == [fridge.usable_shelves(compartment)[-LEVELS[level]]]
+
+
+def test_levels_of_shelves_exclude_each_other_and_near_misses() -> None:
+    scene, data = settled(on_level("highest", "fridge"))
+    fridge = cast(Fridge, scene.fixture("fridge"))
+    half = np.asarray(scene.objects["obj"].item.size) / 2
+    goals = {level: OnShelf("obj", "fridge", level) for level in (*LEVELS, ANY_LEVEL)}
+    usable = fridge.usable_shelves("fridge")
+    for index, shelf in enumerate(reversed(usable), start=1):
+        region = fridge.regions[shelf]
+        floor = -region.half[2] + half[2]
+        lay(scene, data, region.world(data, (0.0, 0.0, floor)))
+        held = {level for level, goal in goals.items() if holds(goal, scene, data)}
+        assert held == {ANY_LEVEL} | {level for level, number in LEVELS.items() if number == index}
+        # A corner may stand out by 0.05 m, and not farther, and the middle not at all.
+        front = -region.half[1] + half[1] - min(0.05, half[1])
+        lay(scene, data, region.world(data, (0.0, front + 0.004, floor)))
+        assert holds(goals[ANY_LEVEL], scene, data)
+        lay(scene, data, region.world(data, (0.0, front - 0.004, floor)))
+        assert not holds(goals[ANY_LEVEL], scene, data)
+        # Its middle is in the lower nine tenths of the room.
+        if half[2] < 0.05:
+            lay(scene, data, region.world(data, (0.0, 0.0, 0.79 * region.half[2])))
+            assert holds(goals[ANY_LEVEL], scene, data)
+            lay(scene, data, region.world(data, (0.0, 0.0, 0.81 * region.half[2])))
+            assert not holds(goals[ANY_LEVEL], scene, data)
+    # The freezer's shelf at the same height is none of the fridge's.
+    freezer = fridge.regions[fridge.usable_shelves("freezer")[-1]]
+    lay(scene, data, freezer.world(data, (0.0, 0.0, -freezer.half[2] + half[2])))
+    assert not holds(goals[ANY_LEVEL], scene, data)
+    assert holds(OnShelf("obj", "fridge", ANY_LEVEL, "freezer"), scene, data)
+
+
+@pytest.mark.parametrize("kind", [k for k in kinds() if k.startswith("fridge")])
+def test_usable_shelves_are_within_reach_and_have_room(kind: str) -> None:
+    low, high, room = USABLE_SHELF
+    for record in models_of(kind):
+        fridge = cast(Fridge, build_appliance(record.model_id, "it", (0.0, 0.0, record.size[2] / 2)))
+        for compartment in PARTS:
+            shelves = [name for name in fridge.regions if name.startswith(f"{compartment}_shelf")]
+            usable = fridge.usable_shelves(compartment)
+            for name in shelves:
+                region = fridge.regions[name]
+                floor = region.center[2] - region.half[2] + fridge.pos[2]
+                fits = low <= floor <= high and 2 * region.half[2] >= room - 1e-9
+                assert fits == (name in usable)
+            heights = [fridge.regions[name].center[2] for name in usable]
+            assert heights == sorted(heights)
+        # The second highest is one of its own in every model, so that two levels can be told apart.
+        assert len(fridge.usable_shelves("fridge")) >= 2
+        assert (len(fridge.usable_shelves("freezer")) >= 2) == (kind == "fridge_side_by_side")
+
+
+def test_a_level_falls_back_to_the_highest_and_mistakes_are_named() -> None:
+    one = cast(Fixture, SimpleNamespace(name="fridge", usable_shelves=lambda compartment: ("fridge_shelf2",)))
+    none = cast(Fixture, SimpleNamespace(name="fridge", usable_shelves=lambda compartment: ()))
+    assert region_names(one, "fridge_shelf:second_highest") == ("fridge_shelf2",)
+    assert region_names(one, "fridge_shelf") == ("fridge_shelf",)
+    with pytest.raises(PlacementError, match="fridge_with_freezer"):
+        region_names(none, "freezer_shelf:highest")
+    with pytest.raises(UnknownNameError, match="second_highest"):
+        region_names(one, "fridge_shelf:second")
+
+
+def test_a_stage_that_names_a_level_is_done_on_that_shelf() -> None:
+    stage = Stage("pick_place", "place_inside", "fridge", object="obj", part="freezer_shelf:{rack}")
+    task = dataclasses.replace(food_in("freezer"), stages=(stage, stage))
+    condition = stage_condition(task, stage)
+    assert isinstance(condition, AllOf)
+    assert condition.parts == (OnShelf("obj", "fridge", "{rack}", "freezer"), GripperFar("obj"))
+    assert OnShelf("obj", "fridge", "highest", "freezer").name == "obj_on_highest_freezer_shelf"
 
 
 @pytest.fixture(scope="module")

@@ -59,7 +59,7 @@ def place_inside(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
     """
     done = done_when(env, stage)
     what = thing(env, stage.object)
-    fixture, part = env.scene.fixture(stage.target), env.scene.fill(stage.part)
+    fixture, part = env.scene.fixture(stage.target), env.scene.part(stage.target, stage.part)
     regions = [region for name, region in regions_of(fixture) if name.startswith(part) and _usable(env, stage, region)]
     if isinstance(fixture, StandMixer):
         how = Putting(_over(env, regions[0]), done, leans=STEEP_LEANS, entries=("up", "across", "out"), in_m=0.2)
@@ -84,7 +84,7 @@ def place_inside_fridge(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
     """
     done = done_when(env, stage)
     what = thing(env, stage.object)
-    fixture, part = env.scene.fixture(stage.target), env.scene.fill(stage.part)
+    fixture, part = env.scene.fixture(stage.target), env.scene.part(stage.target, stage.part)
     regions = [region for name, region in regions_of(fixture) if name.startswith(part) and _usable(env, stage, region)]
     into = "drawer" in part
     how = Putting(

@@ -21,6 +21,7 @@ from robocasa_lerobot.envs.predicates.objects import (
     ObjectUpright,
 )
 from robocasa_lerobot.envs.predicates.robot import GripperFar, GripperFarFromPart, StandsBefore
+from robocasa_lerobot.envs.predicates.shelves import OnShelf
 
 __all__ = [
     "AllOf",
@@ -41,6 +42,7 @@ __all__ = [
     "ObjectTouches",
     "ObjectTouchesAnyCounter",
     "ObjectUpright",
+    "OnShelf",
     "PartTurned",
     "PartWithin",
     "StandsBefore",

@@ -11,7 +11,7 @@ import numpy as np
 from robocasa_lerobot.envs.kitchens.appliances.base import Appliance
 from robocasa_lerobot.envs.kitchens.fixtures.base import Fixture, Region
 from robocasa_lerobot.envs.kitchens.fixtures.counters import Counter
-from robocasa_lerobot.envs.kitchens.fixtures.regions import regions_of
+from robocasa_lerobot.envs.kitchens.fixtures.regions import region_names, regions_of
 from robocasa_lerobot.envs.kitchens.footprints import Area, PlacementError
 from robocasa_lerobot.envs.kitchens.layout import Layout
 from robocasa_lerobot.envs.kitchens.materials import MaterialPalette, load_style
@@ -101,10 +101,11 @@ def choose_parts(
     """
     region = placement.region
     low, high = region.height
+    names = region_names(fixture, region.name)
     parts = [
         part
         for part in parts_of(layout, fixture, openness)
-        if part.name.startswith(region.name)
+        if part.name.startswith(names)
         and low <= part.area.z <= high
         and (placement.slot or _sides(part.area) >= (MIN_SIDE_M, MIN_SIDE_M))
     ]

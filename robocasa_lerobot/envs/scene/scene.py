@@ -16,6 +16,7 @@ from robocasa_lerobot.envs.kitchens.appliances.kinds.sink import Sink
 from robocasa_lerobot.envs.kitchens.appliances.kinds.stove import Hob
 from robocasa_lerobot.envs.kitchens.fixtures.base import Fixture, yaw_quat
 from robocasa_lerobot.envs.kitchens.fixtures.cabinets import Drawer
+from robocasa_lerobot.envs.kitchens.fixtures.regions import region_names
 from robocasa_lerobot.envs.kitchens.footprints import Footprint
 from robocasa_lerobot.envs.kitchens.layout import Layout
 from robocasa_lerobot.envs.objects.catalogue import Instance
@@ -130,6 +131,12 @@ class Scene:
     def fill(self, text: str) -> str:
         """A name of a declaration with its choices and roles filled in, e.g. "knob_{knob}"."""
         return text.format(**self.choices) if "{" in text else text
+
+    def part(self, role: str, text: str) -> str:
+        """A part that a declaration names at a fixture, choices filled in, a shelf by its level as its own name."""
+        text = self.fill(text)
+        names = region_names(self.fixture(role), text)
+        return names[0] if len(names) == 1 else text.partition(":")[0]
 
     def subtree(self, *bodies: str) -> NDArray[np.bool_]:
         """For each body of the model whether it is one of the named ones or hangs on one, (nbody,); kept."""

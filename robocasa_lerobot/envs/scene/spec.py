@@ -92,7 +92,8 @@ class SampleRegion:
         top_size: least width and depth of the part, metres.
         height: bounds of the height in the room of the part's floor, metres.
         level: number of the part from below; -1 is the highest. May name a choice in braces.
-        name: start of the part's name, such as "shelf" or "rack0"; may name a choice in braces.
+        name: start of the part's name, such as "shelf" or "rack0", or a usable shelf of a fridge by its level, as
+            "freezer_shelf:highest" (`kitchens.fixtures.regions.region_names`); may name a choice in braces.
     """
 
     ref: str = ""

@@ -17,6 +17,7 @@ from robocasa_lerobot.envs.predicates import (
     ObjectInside,
     ObjectOn,
     ObjectTouches,
+    OnShelf,
     PartWithin,
     StandsBefore,
     StateIs,
@@ -36,6 +37,9 @@ def _on(stage: Stage) -> Goal:
 
 
 def _inside(stage: Stage) -> Goal:
+    start, _, level = stage.part.partition(":")
+    if level:
+        return _let_go(stage, OnShelf(stage.object, stage.target, level, start.removesuffix("_shelf")))
     return _let_go(stage, ObjectInside(stage.object, stage.target, region=stage.part))
 
 

@@ -11,6 +11,7 @@ import numpy as np
 from robocasa_lerobot.envs.kitchens.appliances.base import Appliance
 from robocasa_lerobot.envs.kitchens.appliances.parts import Parts
 from robocasa_lerobot.envs.kitchens.fixtures.base import Region
+from robocasa_lerobot.envs.kitchens.fixtures.regions import USABLE_SHELF
 
 DOOR_M, _FOOT_M = 0.060, 0.035
 _WALL_M, _BACK_M = 0.035, 0.06
@@ -19,8 +20,6 @@ _SHELF_M = 0.010
 # Of the crisper drawers above the floor of a fridge that reaches down to its feet: the arm, whose shoulder is a metre
 # high, does not reach farther down than 0.4 m. Below them is an open room for bottles.
 _BOTTLES_M = 0.42
-# A shelf that a goal may name (docs/robocasa.md, section 7): its bottom this high in the room, and room above it.
-USABLE_Z, USABLE_ROOM_M = (0.5, 1.5), 0.20
 
 Box = tuple[np.ndarray, np.ndarray]  # low and high corner
 
@@ -75,10 +74,11 @@ class Fridge(Appliance):
 
         A higher shelf is out of the arm's reach, a lower one too, and nothing stands in a lower room.
         """
+        lowest, highest, room = USABLE_SHELF
         found = []
         for name, region in self.regions.items():
             bottom = self.pos[2] + region.center[2] - region.half[2]
-            fits = USABLE_Z[0] <= bottom <= USABLE_Z[1] and 2 * region.half[2] >= USABLE_ROOM_M - 1e-9
+            fits = lowest <= bottom <= highest and 2 * region.half[2] >= room - 1e-9
             if name.startswith(f"{compartment}_shelf") and fits:
                 found.append(name)
         return tuple(found)
@@ -119,7 +119,7 @@ class Fridge(Appliance):
         first = self._crisper_floor() + _CRISPER_M + 0.02
         count = int(self.record["shelves"])
         # Rooms of the height that counts as usable at least.
-        count = min(count, int((high[2] - first) / (USABLE_ROOM_M + _SHELF_M + 0.012)))
+        count = min(count, int((high[2] - first) / (USABLE_SHELF[2] + _SHELF_M + 0.012)))
         return [float(z) for z in np.linspace(first, high[2], count + 1)[:-1]]
 
     def _crisper_floor(self) -> float:
