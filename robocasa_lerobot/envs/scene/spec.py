@@ -152,7 +152,7 @@ class ObjectWanted:
         properties: further properties asked for, such as "cookable".
         exclude: groups or categories that are not wanted.
         max_size: bounds of its size along x, y, z, metres; None leaves an axis free.
-        scale: factor of its size.
+        scale: factor of its size, or one for each of x, y, z; before it is turned upright.
         upright: turned so that its longest axis points up.
         repeats: may be of a category that the scene already has.
         filled: what is seen in it, one of `LIQUIDS` in `envs/scene/build.py`; it is there for the eye only.
@@ -168,7 +168,7 @@ class ObjectWanted:
     properties: tuple[str, ...] = ()
     exclude: tuple[str, ...] = ()
     max_size: tuple[float | None, float | None, float | None] | None = None
-    scale: float = 1.0
+    scale: float | tuple[float, float, float] = 1.0
     upright: bool = False
     repeats: bool = False
     filled: str = ""
