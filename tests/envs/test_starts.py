@@ -9,6 +9,8 @@ import numpy as np
 import pytest
 
 from robocasa_lerobot.envs.checks.soundness import moved
+from robocasa_lerobot.envs.kitchens.appliances.kinds.stove import Hob
+from robocasa_lerobot.envs.kitchens.fixtures.cabinets import Drawer
 from robocasa_lerobot.envs.kitchens.footprints import Area, Footprint
 from robocasa_lerobot.envs.kitchens.layout import load_layout
 from robocasa_lerobot.envs.predicates import ObjectOn
@@ -35,7 +37,7 @@ def touches(scene: Scene, data: mujoco.MjData, one: str, other: str) -> bool:
 def test_no_robot_starts_in_a_drawer_that_stands_open() -> None:
     scene = scene_in("PickPlaceDrawerToCounter", 40, 21)
     data, _ = scene.initial_data(np.random.default_rng(0))
-    drawer = scene.drawer("drawer")
+    drawer = scene.fixture("drawer", Drawer)
     assert drawer.openness(data) == pytest.approx(1.0, abs=0.01)
     assert not touches(scene, data, "robot0_base", drawer.name)
 
@@ -43,7 +45,7 @@ def test_no_robot_starts_in_a_drawer_that_stands_open() -> None:
 def test_a_door_that_moves_by_itself_is_found() -> None:
     scene = scene_in("PickPlaceDrawerToCounter", 40, 21)
     data, _ = scene.initial_data(np.random.default_rng(0))
-    drawer = scene.drawer("drawer")
+    drawer = scene.fixture("drawer", Drawer)
     assert max(moved(scene, data).values()) < 0.01
     data.joint(drawer.joint).qvel[:] = 0.5
     assert moved(scene, data)[f"{drawer.name}_box"] > 0.01
@@ -55,7 +57,7 @@ def test_a_pan_stands_with_its_round_part_on_the_burner() -> None:
     assert pan.item.interior is not None
     footprint = pan.footprint
     middle = np.array(pan.pos[:2]) + np.array(pan.item.interior.center[:2]) @ footprint.axes()
-    regions = scene.hob("stove").regions
+    regions = scene.fixture("stove", Hob).regions
     burners = [scene.fixture("stove").to_world(r.center)[:2] for name, r in regions.items() if name != "interior"]
     assert min(np.hypot(*(middle - at)) for at in burners) < 0.02
     assert min(np.hypot(*(np.array(pan.pos[:2]) - at)) for at in burners) > 0.02

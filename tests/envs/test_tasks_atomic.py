@@ -9,8 +9,10 @@ import numpy as np
 import pytest
 from task_selection import every_task
 
-from robocasa_lerobot.envs.kitchens.appliances.base import take_effect
+from robocasa_lerobot.envs.kitchens.appliances.base import Appliance, take_effect
 from robocasa_lerobot.envs.kitchens.appliances.kinds.blender import Blender
+from robocasa_lerobot.envs.kitchens.appliances.kinds.sink import Sink
+from robocasa_lerobot.envs.kitchens.appliances.kinds.stove import Hob
 from robocasa_lerobot.envs.predicates import (
     AllOf,
     AnyOf,
@@ -72,7 +74,7 @@ def test_it_can_be_made_and_is_not_done_at_reset(name: str, split: str) -> None:
             if isinstance(entry, PartAt):
                 part = scene.fill(entry.part)
                 # A timer or a snapping door may have moved while the scene settled.
-                assert scene.appliance(entry.fixture).share(data, part) == pytest.approx(
+                assert scene.fixture(entry.fixture, Appliance).share(data, part) == pytest.approx(
                     scene.initial_share(entry.fixture, entry.part), abs=0.06
                 )
 
@@ -126,12 +128,12 @@ def write(goal: Goal, scene: Scene, data: mujoco.MjData) -> None:
         scene.fixture(goal.fixture).set_openness(data, float(isinstance(goal, DoorsOpen | DrawerOpen)), part)
     elif isinstance(goal, PartWithin):
         low, high = max(goal.low, 0.0), min(goal.high, 1.0)
-        scene.appliance(goal.fixture).set_share(data, scene.fill(goal.part), (low + high) / 2)
+        scene.fixture(goal.fixture, Appliance).set_share(data, scene.fill(goal.part), (low + high) / 2)
     elif isinstance(goal, PartTurned):
         share = scene.initial_share(goal.fixture, goal.part) + 1.2 * goal.by
-        scene.appliance(goal.fixture).set_share(data, goal.part, share)
+        scene.fixture(goal.fixture, Appliance).set_share(data, goal.part, share)
     elif isinstance(goal, BurnerLevel):
-        scene.hob(goal.fixture).set_burner(data, scene.fill(goal.location), goal.level)
+        scene.fixture(goal.fixture, Hob).set_burner(data, scene.fill(goal.location), goal.level)
     elif isinstance(goal, StateIs):
         write_state(goal, scene, data)
 
@@ -139,18 +141,18 @@ def write(goal: Goal, scene: Scene, data: mujoco.MjData) -> None:
 def write_state(goal: StateIs, scene: Scene, data: mujoco.MjData) -> None:
     fixture, key = scene.fixture(goal.fixture), scene.fill(goal.key)
     if key == "water_on":
-        scene.sink(goal.fixture).set_water(data, goal.value)
+        scene.fixture(goal.fixture, Sink).set_water(data, goal.value)
     elif key.endswith("_on"):
-        scene.hob(goal.fixture).set_burner(data, key.removesuffix("_on"), "on" if goal.value else "off")
+        scene.fixture(goal.fixture, Hob).set_burner(data, key.removesuffix("_on"), "on" if goal.value else "off")
     elif key in ("left", "right"):
-        scene.appliance(goal.fixture).set_position(data, "spout", 1.0 if key == "right" else -1.0)
+        scene.fixture(goal.fixture, Appliance).set_position(data, "spout", 1.0 if key == "right" else -1.0)
     elif key == "lid":
         assert isinstance(fixture, Blender)
         assert goal.value
         fixture.set_lid(data)
     else:
         assert key == "on", (fixture.name, key)
-        scene.appliance(goal.fixture).set_share(data, "power", float(goal.value))
+        scene.fixture(goal.fixture, Appliance).set_share(data, "power", float(goal.value))
 
 
 @pytest.mark.parametrize("name", every_task(can_be_written))

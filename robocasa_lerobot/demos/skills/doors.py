@@ -18,6 +18,7 @@ from robocasa_lerobot.demos.motion import (
 from robocasa_lerobot.demos.skills.common import SkillError, draw_back, move_hand
 from robocasa_lerobot.demos.skills.hinged import Hinged, push_round
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
+from robocasa_lerobot.envs.kitchens.appliances.base import Appliance
 from robocasa_lerobot.envs.tasks.task import Stage
 
 ATTEMPTS = 3
@@ -40,7 +41,7 @@ def push_lid(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
         SkillError: it is not shut after three attempts.
     """
     data = env.data
-    appliance = env.scene.appliance(stage.target)
+    appliance = env.scene.fixture(stage.target, Appliance)
     lid = Hinged(data, appliance, appliance.joint(stage.part))
     far = lid.high[1] if abs(lid.high[1]) > abs(lid.low[1]) else lid.low[1]
 

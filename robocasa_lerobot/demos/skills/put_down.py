@@ -16,6 +16,7 @@ from robocasa_lerobot.demos.skills.pick import FROM_A_SLOT, FROM_ABOVE
 from robocasa_lerobot.demos.skills.put import Putting, Spot, move
 from robocasa_lerobot.demos.skills.things import thing
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
+from robocasa_lerobot.envs.kitchens.appliances.kinds.sink import Sink
 from robocasa_lerobot.envs.tasks.task import Stage
 
 # Shares of the depth of what it goes into at which an object may be let go, with their costs.
@@ -61,7 +62,7 @@ def place_into_basin(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
     Raises:
         SkillError: it is not there after all attempts.
     """
-    data, basin = env.data, env.scene.sink(stage.target).basin
+    data, basin = env.data, env.scene.fixture(stage.target, Sink).basin
 
     def spots() -> list[Spot]:
         ahead = min(BASIN_AHEAD_M, basin.half[1] - 0.07)

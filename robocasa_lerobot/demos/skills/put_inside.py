@@ -20,6 +20,7 @@ from robocasa_lerobot.demos.skills.put_down import done_when
 from robocasa_lerobot.demos.skills.racks import pull
 from robocasa_lerobot.demos.skills.things import Thing, thing
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
+from robocasa_lerobot.envs.kitchens.appliances.base import Appliance
 from robocasa_lerobot.envs.kitchens.appliances.kinds.stand_mixer import StandMixer
 from robocasa_lerobot.envs.kitchens.fixtures.base import Region
 from robocasa_lerobot.envs.kitchens.fixtures.cabinets import Drawer
@@ -130,7 +131,7 @@ def place_at_site(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
         SkillError: it is not there after all attempts.
     """
     done = done_when(env, stage)
-    data, appliance = env.data, env.scene.appliance(stage.target)
+    data, appliance = env.data, env.scene.fixture(stage.target, Appliance)
     region = next(iter(appliance.regions.values()))
 
     def spots() -> list[Spot]:

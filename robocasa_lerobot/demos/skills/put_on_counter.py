@@ -22,6 +22,7 @@ from robocasa_lerobot.demos.skills.put import Putting, Spot, move
 from robocasa_lerobot.demos.skills.put_down import done_when
 from robocasa_lerobot.demos.skills.things import Thing, thing
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
+from robocasa_lerobot.envs.kitchens.fixtures.cabinets import Drawer
 from robocasa_lerobot.envs.kitchens.fixtures.counters import Counter
 from robocasa_lerobot.envs.tasks.task import Stage
 
@@ -76,7 +77,7 @@ def _clear_of_counter(what: Thing) -> Callable[[KitchenEnv], Iterator[Array]]:
 
     def first(env: KitchenEnv) -> Iterator[Array]:
         nonlocal again
-        drawer = env.scene.drawer("drawer")
+        drawer = env.scene.fixture("drawer", Drawer)
         if again or best_way(env, what, OUT_OF_DRAWER).cost > HARD:
             yield from drag_open(env, drawer, 1.0 + FARTHER_OUT_M / drawer.full_travel)
         again = True
@@ -98,8 +99,7 @@ def _move(env: KitchenEnv, stage: Stage, taking: Manner, within_m: float = NEAR_
 
 def free_spots(env: KitchenEnv, what: Thing, role: str, within_m: float = NEAR_M) -> Callable[[], list[Spot]]:
     """Points on a counter's top, near the robot, where a thing as it is turned now meets nothing."""
-    counter = env.scene.fixture(role)
-    assert isinstance(counter, Counter)
+    counter = env.scene.fixture(role, Counter)
 
     def spots() -> list[Spot]:
         body = env.data.body(what.name)

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from enum import IntEnum
 
-from robocasa_lerobot.envs.kitchens.appliances.kinds.fridge import Fridge
 from robocasa_lerobot.envs.kitchens.fixtures.base import Fixture
 from robocasa_lerobot.envs.kitchens.fixtures.counters import Counter
 from robocasa_lerobot.envs.kitchens.layout import Layout
@@ -138,7 +137,7 @@ def _with_freezer(_: Layout, fixture: Fixture) -> bool:
 
 
 def _with_drawer(layout: Layout, fixture: Fixture) -> bool:
-    return isinstance(fixture, Fridge) and bool(fixture.drawers)
+    return FILTERS[FixtureType.FRIDGE](layout, fixture) and bool(fixture.parts_to_choose("drawer"))
 
 
 # What a robot is sent from and to (docs/robocasa.md, section 8).

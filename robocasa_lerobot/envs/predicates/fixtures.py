@@ -8,7 +8,9 @@ from typing import TYPE_CHECKING
 import mujoco
 import numpy as np
 
-from robocasa_lerobot.envs.kitchens.appliances.base import CLOSED_UP_TO, OPEN_FROM
+from robocasa_lerobot.envs.kitchens.appliances.base import CLOSED_UP_TO, OPEN_FROM, Appliance
+from robocasa_lerobot.envs.kitchens.appliances.kinds.stove import Hob
+from robocasa_lerobot.envs.kitchens.fixtures.cabinets import Drawer
 from robocasa_lerobot.envs.predicates.logic import Term, plain
 from robocasa_lerobot.envs.scene.initial_states import initial_share
 
@@ -30,7 +32,7 @@ class DrawerOpen(Term):
 
     def holds(self, scene: Scene, data: mujoco.MjData) -> bool:
         """Compare the openness with the threshold."""
-        return scene.drawer(self.fixture).openness(data) >= self.at_least
+        return scene.fixture(self.fixture, Drawer).openness(data) >= self.at_least
 
 
 @dataclass(frozen=True)
@@ -47,7 +49,7 @@ class DrawerClosed(Term):
 
     def holds(self, scene: Scene, data: mujoco.MjData) -> bool:
         """Compare the openness with the threshold."""
-        return scene.drawer(self.fixture).openness(data) <= self.at_most
+        return scene.fixture(self.fixture, Drawer).openness(data) <= self.at_most
 
 
 @dataclass(frozen=True)
@@ -124,7 +126,7 @@ class PartWithin(Term):
 
     def holds(self, scene: Scene, data: mujoco.MjData) -> bool:
         """Compare the share with the bounds."""
-        share = scene.appliance(self.fixture).share(data, scene.fill(self.part))
+        share = scene.fixture(self.fixture, Appliance).share(data, scene.fill(self.part))
         return self.low <= share <= self.high
 
 
@@ -144,7 +146,9 @@ class PartTurned(Term):
 
     def holds(self, scene: Scene, data: mujoco.MjData) -> bool:
         """Compare the change with what is wanted."""
-        change = scene.appliance(self.fixture).share(data, self.part) - initial_share(scene, self.fixture, self.part)
+        change = scene.fixture(self.fixture, Appliance).share(data, self.part) - initial_share(
+            scene, self.fixture, self.part
+        )
         return change >= self.by if self.by > 0 else change <= self.by
 
 
@@ -170,7 +174,7 @@ class StateIs(Term):
 
     def holds(self, scene: Scene, data: mujoco.MjData) -> bool:
         """Read the state."""
-        return bool(scene.appliance(self.fixture).state(data)[scene.fill(self.key)]) == self.value
+        return bool(scene.fixture(self.fixture, Appliance).state(data)[scene.fill(self.key)]) == self.value
 
 
 @dataclass(frozen=True)
@@ -188,4 +192,4 @@ class BurnerLevel(Term):
 
     def holds(self, scene: Scene, data: mujoco.MjData) -> bool:
         """Read the knob."""
-        return scene.hob(self.fixture).burner_level(data, scene.fill(self.location)) == self.level
+        return scene.fixture(self.fixture, Hob).burner_level(data, scene.fill(self.location)) == self.level

@@ -9,6 +9,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from robocasa_lerobot.envs.kitchens.appliances.kinds.sink import Sink
 from robocasa_lerobot.envs.kitchens.fixtures.base import Region
 from robocasa_lerobot.envs.kitchens.fixtures.counters import Counter
 from robocasa_lerobot.envs.kitchens.fixtures.regions import region_names, regions_of
@@ -39,7 +40,7 @@ class ObjectInBasin(Term):
 
     def holds(self, scene: Scene, data: mujoco.MjData) -> bool:
         """Test the body's origin against the basin's region."""
-        return scene.sink(self.fixture).basin.contains(data, data.body(scene.fill(self.object)).xpos)
+        return scene.fixture(self.fixture, Sink).basin.contains(data, data.body(scene.fill(self.object)).xpos)
 
 
 @dataclass(frozen=True)

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robocasa_lerobot.envs.kitchens.appliances.kinds.blender import Blender
+from robocasa_lerobot.envs.kitchens.fixtures.base import of_kind
 from robocasa_lerobot.envs.kitchens.footprints import PlacementError, place
 from robocasa_lerobot.envs.kitchens.layout import Layout, load_layout
 from robocasa_lerobot.envs.kitchens.splits import Pairs, scene_ids, without
@@ -170,9 +171,7 @@ def arrange(
     initial = tuple((entry, entry.draw(rng, choices.values)) for entry in further)
     lids = _lids(task, roles)
     for role, gone in lids.items():
-        blender = layout.fixtures[roles[role]]
-        assert isinstance(blender, Blender)
-        blender.with_lid = not gone
+        of_kind(layout.fixtures[roles[role]], Blender).with_lid = not gone
     places: dict[str, float | Shares] = {name: share for (name, part), share in openness.items() if not part}
     places |= _shares(initial, roles, choices)
     objects = place_objects(rng, task, split, layout, roles, places, choices.values)
@@ -221,8 +220,7 @@ def _lid_spot(
     Raises:
         PlacementError: there is no room for it.
     """
-    blender = layout.fixtures[name]
-    assert isinstance(blender, Blender)
+    blender = of_kind(layout.fixtures[name], Blender)
     counter = counter_of(layout, blender)
     areas, standing = counter_areas(layout, OnCounter("", "left_right", size=(0.35, 0.35)), blender)
     taken = [placed.footprint for placed in objects.values()]

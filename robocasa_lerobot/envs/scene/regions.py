@@ -9,7 +9,7 @@ import mujoco
 import numpy as np
 
 from robocasa_lerobot.envs.kitchens.appliances.base import Appliance
-from robocasa_lerobot.envs.kitchens.fixtures.base import Fixture, Region
+from robocasa_lerobot.envs.kitchens.fixtures.base import Fixture, Region, of_kind
 from robocasa_lerobot.envs.kitchens.fixtures.counters import Counter
 from robocasa_lerobot.envs.kitchens.fixtures.regions import region_names, regions_of
 from robocasa_lerobot.envs.kitchens.footprints import Area, PlacementError
@@ -82,10 +82,9 @@ def _part_offset(style_id: int, fixture: Fixture, body: str, openness: float | S
     model = spec.compile()
     data = mujoco.MjData(model)
     if isinstance(openness, Mapping):
-        assert isinstance(alone, Appliance)
         for part, share in openness.items():
-            alone.set_share(data, part, share)
-    elif openness and hasattr(alone, "set_openness"):
+            of_kind(alone, Appliance).set_share(data, part, share)
+    elif openness:
         alone.set_openness(data, openness)
     mujoco.mj_kinematics(model, data)
     return np.asarray(data.body(body).xpos.copy())

@@ -3,19 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Any, Protocol
+from typing import Any, Protocol, overload
 
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
 from robocasa_lerobot.contract import ACTION_SIZE
-from robocasa_lerobot.envs.kitchens.appliances.base import Appliance, update_all
+from robocasa_lerobot.envs.kitchens.appliances.base import update_all
 from robocasa_lerobot.envs.kitchens.appliances.kinds.blender import Blender
-from robocasa_lerobot.envs.kitchens.appliances.kinds.sink import Sink
-from robocasa_lerobot.envs.kitchens.appliances.kinds.stove import Hob
-from robocasa_lerobot.envs.kitchens.fixtures.base import Fixture, yaw_quat
-from robocasa_lerobot.envs.kitchens.fixtures.cabinets import Drawer
+from robocasa_lerobot.envs.kitchens.fixtures.base import Fixture, of_kind, yaw_quat
 from robocasa_lerobot.envs.kitchens.fixtures.regions import region_names
 from robocasa_lerobot.envs.kitchens.footprints import Footprint
 from robocasa_lerobot.envs.kitchens.layout import Layout
@@ -100,33 +97,19 @@ class Scene:
         """Fixtures by name."""
         return self.layout.fixtures
 
-    def fixture(self, role: str) -> Fixture:
-        """The fixture of a role."""
-        return self.fixtures[self.roles[role]]
+    @overload
+    def fixture(self, role: str) -> Fixture: ...
 
-    def drawer(self, role: str) -> Drawer:
-        """The drawer of a role."""
-        fixture = self.fixture(role)
-        assert isinstance(fixture, Drawer), f"{role} is no drawer"
-        return fixture
+    @overload
+    def fixture[F: Fixture](self, role: str, kind: type[F]) -> F: ...
 
-    def sink(self, role: str) -> Sink:
-        """The sink of a role."""
-        fixture = self.fixture(role)
-        assert isinstance(fixture, Sink), f"{role} is no sink"
-        return fixture
+    def fixture(self, role: str, kind: type[Fixture] = Fixture) -> Fixture:
+        """The fixture of a role, as what it must be: `scene.fixture("sink", Sink)`.
 
-    def appliance(self, role: str) -> Appliance:
-        """The appliance of a role."""
-        fixture = self.fixture(role)
-        assert isinstance(fixture, Appliance), f"{role} is no appliance"
-        return fixture
-
-    def hob(self, role: str) -> Hob:
-        """The stove or stovetop of a role."""
-        fixture = self.fixture(role)
-        assert isinstance(fixture, Hob), f"{role} is no hob"
-        return fixture
+        Raises:
+            UserError: it is something else.
+        """
+        return of_kind(self.fixtures[self.roles[role]], kind)
 
     def fill(self, text: str) -> str:
         """A name of a declaration with its choices and roles filled in, e.g. "knob_{knob}"."""
@@ -150,8 +133,7 @@ class Scene:
 
     def lay_lid(self, role: str, data: mujoco.MjData, turn: float, *, gone: bool) -> None:
         """Lay the lid of a blender on the counter, turned by a share of a full turn, or out of the way if `gone`."""
-        blender = self.fixture(role)
-        assert isinstance(blender, Blender)
+        blender = self.fixture(role, Blender)
         if not gone:
             blender.set_lid(data, self.lid_spots[role], 2 * np.pi * turn)
 
@@ -179,9 +161,7 @@ class Scene:
 
     def update_appliances(self, data: mujoco.MjData) -> None:
         """Let appliances latch, time and light up, once after each control step."""
-        appliances = [fixture for fixture in self.fixtures.values() if isinstance(fixture, Appliance)]
-        if appliances:
-            update_all(appliances, self.model, data, self.subtree(self.robot.names.gripper))
+        update_all(self.fixtures.values(), self.model, data, self.subtree(self.robot.names.gripper))
 
     def ep_meta(self) -> dict[str, Any]:
         """Description of the episode in RoboCasa's keys (JSON-able)."""

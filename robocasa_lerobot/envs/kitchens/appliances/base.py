@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from robocasa_lerobot.envs.kitchens.appliances.parts import Parts
 from robocasa_lerobot.envs.kitchens.appliances.records import ModelRecord
-from robocasa_lerobot.envs.kitchens.fixtures.base import Fixture, Region
+from robocasa_lerobot.envs.kitchens.fixtures.base import Fixture
 from robocasa_lerobot.envs.kitchens.materials import MaterialPalette
 from robocasa_lerobot.envs.physics.whole_state import read_physics, write_physics
 
@@ -95,11 +95,6 @@ class Appliance(Fixture):
         """How far a door is open, as a share of its range."""
         return self.share(data, door)
 
-    @property
-    def regions(self) -> dict[str, Region]:
-        """Where things can be put, by name; the first is the usual place."""
-        return {}
-
     def state(self, data: mujoco.MjData) -> dict[str, float | bool]:
         """Shares of ranges of doors, racks, knobs and levers, and whether things are on."""
         return {part: self.share(data, part) for part in self.doors}
@@ -116,6 +111,10 @@ class Appliance(Fixture):
         """Open the doors of a part, or all, by a share of their ranges; for initial states."""
         for door in self.doors_of(part):
             self.set_share(data, door, openness)
+
+    def set_on(self, data: mujoco.MjData, on: bool) -> None:
+        """Switch it on or off; for initial states."""
+        raise AssertionError(f"{self.name} has nothing to switch it on with")
 
     def set_rack(self, data: mujoco.MjData, share: float, rack: str) -> None:
         """Slide a rack or drawer out by a share of its range; doors in its way are opened. For initial states."""
@@ -214,12 +213,15 @@ class Appliance(Fixture):
 
 
 def update_all(
-    appliances: Iterable[Appliance], model: mujoco.MjModel, data: mujoco.MjData, gripper: NDArray[np.bool_]
+    fixtures: Iterable[Fixture], model: mujoco.MjModel, data: mujoco.MjData, gripper: NDArray[np.bool_]
 ) -> None:
-    """Let appliances do what they do by themselves; `gripper` are the bodies that press buttons, (nbody,).
+    """Let the appliances among fixtures do what they do by themselves.
 
-    Before and after: positions and contacts are evaluated.
+    Before and after: positions and contacts are evaluated. `gripper` are the bodies that press buttons, (nbody,).
     """
+    appliances = [fixture for fixture in fixtures if isinstance(fixture, Appliance)]
+    if not appliances:
+        return
     contacts = Touches(model, data, gripper)
     changed = [appliance.update(model, data, contacts) for appliance in appliances]
     if any(changed):

@@ -12,6 +12,7 @@ from robocasa_lerobot.envs.kitchens.appliances.base import Appliance
 from robocasa_lerobot.envs.kitchens.appliances.parts import Parts
 from robocasa_lerobot.envs.kitchens.fixtures.base import Region
 from robocasa_lerobot.envs.kitchens.fixtures.regions import USABLE_SHELF
+from robocasa_lerobot.envs.kitchens.fixtures.swept import TALL_STANDOFF_M
 
 DOOR_M, _FOOT_M = 0.060, 0.035
 _WALL_M, _BACK_M = 0.035, 0.06
@@ -28,6 +29,8 @@ Box = tuple[np.ndarray, np.ndarray]  # low and high corner
 class Fridge(Appliance):
     """Doors are named `fridge_...` and `freezer_...`, drawers `fridge_drawer<i>` and `freezer_drawer`."""
 
+    stand_offset_m: ClassVar[float] = TALL_STANDOFF_M
+
     @property
     def doors(self) -> tuple[str, ...]:
         """Doors; the freezer's drawer of a French door fridge is none."""
@@ -42,6 +45,10 @@ class Fridge(Appliance):
     def drawers(self) -> tuple[str, ...]:
         """Crisper drawers, all in one row, low in the fridge; left to right."""
         return tuple(f"fridge_drawer{i}" for i in range(self.record["drawers"]))
+
+    def parts_to_choose(self, name: str) -> dict[str, dict[str, str]]:
+        """Its crisper drawers, which need no words."""
+        return {drawer: {} for drawer in self.drawers}
 
     @property
     def sliding(self) -> tuple[str, ...]:

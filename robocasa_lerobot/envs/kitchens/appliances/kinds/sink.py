@@ -35,6 +35,7 @@ class Sink(Appliance):
     Parts `handle` (water), `handle_temp` (0 cold, 1 hot) and `spout` (positive to the right).
     """
 
+    holds_all_of_it: ClassVar[bool] = True
     looks: ClassVar = {
         "off": {},
         "on": {"handle": 0.45, "handle_temp": 0.2, "water_cold_low": 1.0},
@@ -57,6 +58,10 @@ class Sink(Appliance):
             )
             for i, (x0, x1) in enumerate(self._basins())
         }
+
+    def covers_beside(self) -> tuple[tuple[tuple[float, float], tuple[float, float]], ...]:
+        """The faucet, behind the basin."""
+        return (self.faucet_spot,)
 
     @property
     def faucet_spot(self) -> tuple[tuple[float, float], tuple[float, float]]:

@@ -51,6 +51,10 @@ class Hob(Appliance):
         """Middle of each burner by location, as shares of width and depth."""
         return FOUR
 
+    def parts_to_choose(self, name: str) -> dict[str, dict[str, str]]:
+        """Its burners."""
+        return {location: {name: location.replace("_", " ")} for location in self.burners}
+
     @property
     def regions(self) -> dict[str, Region]:
         """Above each burner, by its location: where the bottom of a pan stands."""
