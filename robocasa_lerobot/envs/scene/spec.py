@@ -15,7 +15,7 @@ class FixtureWanted:
 
     Attributes:
         role: name by which the rest of the declaration calls it.
-        kind: a key of `kitchens.fixture_types.FIXTURE_KINDS`, e.g. "drawer_top" or "sink".
+        kind: a word of `kitchens.fixture_types.fixture_filter`, e.g. "drawer_top", "sink", or any appliance.
         near: role of an earlier fixture that it is the nearest to.
         other_than: roles of earlier fixtures that it is none of.
         size: least width and depth of its top, metres; of counters.

@@ -50,17 +50,37 @@ class Touches:
         return number in self._bodies
 
 
+@dataclass(frozen=True)
+class Standing:
+    """Where an appliance stands in the rows of layouts.
+
+    Attributes:
+        where: "counter", on it; "floor", between counters; "under_counter", flush with the cabinets; or "built_in",
+            where rows have a place of their own for it.
+        back_m: on the floor, of its back from the wall, metres.
+        name: of the fixture; its kind if empty.
+        tiled: on the floor, whether the tiles of the wall go on behind it.
+    """
+
+    where: str = "counter"
+    back_m: float = 0.0
+    name: str = ""
+    tiled: bool = False
+
+
 @dataclass
 class Appliance(Fixture):
     """A fixture made from a model record.
 
     Attributes:
         record: the model.
+        standing: where it stands in a row.
         memory_slots: numbers that it keeps in user data.
         looks: states worth a picture: shares of range by part.
     """
 
     record: ModelRecord = field(kw_only=True)
+    standing: ClassVar[Standing] = Standing()
     memory_slots: ClassVar[int] = 0
     looks: ClassVar[dict[str, dict[str, float]]] = {"": {}}
     _memory_at: int = field(default=-1, init=False, repr=False)
@@ -85,6 +105,11 @@ class Appliance(Fixture):
     def doors(self) -> tuple[str, ...]:
         """Parts that are doors."""
         return ()
+
+    @property
+    def is_ground(self) -> bool:
+        """Whether it stands on the floor."""
+        return self.standing.where == "floor"
 
     @property
     def door_names(self) -> tuple[str, ...]:

@@ -8,6 +8,7 @@ from typing import ClassVar
 import mujoco
 import numpy as np
 
+from robocasa_lerobot.envs.kitchens.appliances.base import Standing
 from robocasa_lerobot.envs.kitchens.appliances.kinds.racked import Racked, fold_door
 from robocasa_lerobot.envs.kitchens.appliances.parts import Parts
 from robocasa_lerobot.envs.kitchens.fixtures.base import Region, SweptBox
@@ -22,6 +23,7 @@ _RIM_M = {"rack0": 0.12, "rack1": 0.07}
 class Dishwasher(Racked):
     """Racks `rack0` (lower) and `rack1` (upper)."""
 
+    standing: ClassVar[Standing] = Standing("under_counter")
     looks: ClassVar = {"closed": {}, "open": {"door": 1.0, "rack0": 0.8, "rack1": 0.4}}
 
     def swept_areas(self) -> tuple[SweptBox, ...]:

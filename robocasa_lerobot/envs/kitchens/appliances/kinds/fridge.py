@@ -8,7 +8,7 @@ from typing import ClassVar
 import mujoco
 import numpy as np
 
-from robocasa_lerobot.envs.kitchens.appliances.base import Appliance
+from robocasa_lerobot.envs.kitchens.appliances.base import Appliance, Standing
 from robocasa_lerobot.envs.kitchens.appliances.parts import Parts
 from robocasa_lerobot.envs.kitchens.fixtures.base import Region
 from robocasa_lerobot.envs.kitchens.fixtures.regions import USABLE_SHELF
@@ -29,6 +29,7 @@ Box = tuple[np.ndarray, np.ndarray]  # low and high corner
 class Fridge(Appliance):
     """Doors are named `fridge_...` and `freezer_...`, drawers `fridge_drawer<i>` and `freezer_drawer`."""
 
+    standing: ClassVar[Standing] = Standing("floor", back_m=0.03, name="fridge")
     stand_offset_m: ClassVar[float] = TALL_STANDOFF_M
 
     @property

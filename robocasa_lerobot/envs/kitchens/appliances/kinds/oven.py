@@ -8,7 +8,7 @@ from typing import ClassVar
 import mujoco
 import numpy as np
 
-from robocasa_lerobot.envs.kitchens.appliances.base import Touches
+from robocasa_lerobot.envs.kitchens.appliances.base import Standing, Touches
 from robocasa_lerobot.envs.kitchens.appliances.kinds.racked import Racked, fold_door, rack_words
 from robocasa_lerobot.envs.kitchens.appliances.parts import Parts
 from robocasa_lerobot.envs.kitchens.fixtures.base import SweptBox
@@ -23,6 +23,7 @@ LIT_FROM = 0.05  # share of the temperature knob
 class Oven(Racked):
     """Knobs `knob_time` and `knob_temp`; racks `rack0`, and above it `rack1`."""
 
+    standing: ClassVar[Standing] = Standing("built_in")
     looks: ClassVar = {"closed": {}, "open": {"door": 1.0, "rack0": 0.7}, "on": {"knob_temp": 0.6, "power": 1.0}}
 
     def parts_to_choose(self, name: str) -> dict[str, dict[str, str]]:

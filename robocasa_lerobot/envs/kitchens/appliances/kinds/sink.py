@@ -9,7 +9,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from robocasa_lerobot.envs.kitchens.appliances.base import Appliance, Touches
+from robocasa_lerobot.envs.kitchens.appliances.base import Appliance, Standing, Touches
 from robocasa_lerobot.envs.kitchens.appliances.parts import HIDDEN_M, Parts
 from robocasa_lerobot.envs.kitchens.fixtures.base import Region
 
@@ -35,6 +35,7 @@ class Sink(Appliance):
     Parts `handle` (water), `handle_temp` (0 cold, 1 hot) and `spout` (positive to the right).
     """
 
+    standing: ClassVar[Standing] = Standing("built_in")
     holds_all_of_it: ClassVar[bool] = True
     looks: ClassVar = {
         "off": {},
