@@ -21,7 +21,7 @@ from robocasa_lerobot.envs.predicates.objects import (
     ObjectUpright,
 )
 from robocasa_lerobot.envs.predicates.robot import GripperFar, GripperFarFromPart, StandsBefore
-from robocasa_lerobot.envs.predicates.shelves import OnShelf
+from robocasa_lerobot.envs.predicates.shelves import OnShelf, inside
 
 __all__ = [
     "AllOf",
@@ -49,4 +49,5 @@ __all__ = [
     "StateIs",
     "Term",
     "When",
+    "inside",
 ]

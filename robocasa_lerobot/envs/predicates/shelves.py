@@ -37,3 +37,11 @@ class OnShelf(ObjectInside):
         """E.g. `obj_on_highest_freezer_shelf`, `obj_on_any_fridge_shelf`."""
         shelf, _, level = self.region.partition(":")
         return f"{plain(self.object)}_on_{plain(level)}_{shelf}"
+
+
+def inside(object: str, fixture: str, region: str = "") -> ObjectInside:
+    """An object is in a region of a fixture: on the shelf of a level, if it is named so, as "fridge_shelf:highest"."""
+    start, _, level = region.partition(":")
+    if level:
+        return OnShelf(object, fixture, level, start.removesuffix("_shelf"))
+    return ObjectInside(object, fixture, region=region)

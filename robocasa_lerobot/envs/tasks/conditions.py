@@ -14,13 +14,12 @@ from robocasa_lerobot.envs.predicates import (
     GripperFar,
     GripperFarFromPart,
     ObjectInBasin,
-    ObjectInside,
     ObjectOn,
     ObjectTouches,
-    OnShelf,
     PartWithin,
     StandsBefore,
     StateIs,
+    inside,
 )
 from robocasa_lerobot.envs.tasks.task import Stage, Task
 from robocasa_lerobot.errors import UserError
@@ -37,10 +36,7 @@ def _on(stage: Stage) -> Goal:
 
 
 def _inside(stage: Stage) -> Goal:
-    start, _, level = stage.part.partition(":")
-    if level:
-        return _let_go(stage, OnShelf(stage.object, stage.target, level, start.removesuffix("_shelf")))
-    return _let_go(stage, ObjectInside(stage.object, stage.target, region=stage.part))
+    return _let_go(stage, inside(stage.object, stage.target, stage.part))
 
 
 def _on_counter(stage: Stage) -> Goal:
