@@ -54,7 +54,9 @@ class DrawerClosed(Term):
 
 @dataclass(frozen=True)
 class DoorsOpen(Term):
-    """Every door of a fixture is open by at least a share of its range; so is what has no doors.
+    """Every door of a fixture is open by at least a share of its range.
+
+    It holds for a fixture without doors, such as an open cabinet.
 
     Attributes:
         fixture: role.
@@ -79,7 +81,9 @@ class DoorsOpen(Term):
 
 @dataclass(frozen=True)
 class DoorsClosed(Term):
-    """Every door of a fixture is open by at most a share of its range; so is what has no doors.
+    """Every door of a fixture is open by at most a share of its range.
+
+    It holds for a fixture without doors, such as an open cabinet.
 
     Attributes:
         fixture: role.
