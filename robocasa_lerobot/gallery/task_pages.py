@@ -148,7 +148,8 @@ def _start(start: RobotStart) -> str:
 
 def _initial(state: InitialState) -> str:
     if isinstance(state, InitialOpenness):
-        return f"`{state.fixture}` open by {_bounds((state.low, state.high))}"
+        part = f", {state.part}," if state.part else ""
+        return f"`{state.fixture}`{part} open by {_bounds((state.low, state.high))}"
     assert isinstance(state, Initial)
     first = (inspect.getdoc(type(state)) or "").splitlines()[0].rstrip(".")
     values = ", ".join(f"{name} {_value(value)}" for name, value in _fields(state))

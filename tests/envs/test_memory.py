@@ -15,6 +15,8 @@ from memory_tasks import WASHED, by_the_sink
 from numpy.typing import NDArray
 
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
+from robocasa_lerobot.envs.kitchens.appliances.base import Appliance
+from robocasa_lerobot.envs.kitchens.appliances.kinds.sink import Sink
 from robocasa_lerobot.envs.predicates import (
     AllOf,
     Goal,
@@ -65,7 +67,7 @@ def make(goal: Goal, seed: int = 0, *, runs: bool = False) -> KitchenEnv:
 
 
 def water(env: KitchenEnv, on: bool) -> None:
-    env.scene.sink("sink").set_water(env.data, on)
+    env.scene.fixture("sink", Sink).set_water(env.data, on)
 
 
 def steps(env: KitchenEnv, count: int, on: bool | None = None) -> list[bool]:
@@ -123,9 +125,9 @@ def test_once_and_never() -> None:
     assert info["success_terms"] == {"once_sink_water_on": False, "never_sink_left": True}
     assert steps(env, 2, on=True) == [True, True]
     assert all(steps(env, 2, on=False)), "it has been on"
-    env.scene.appliance("sink").set_position(env.data, "spout", -1.0)
+    env.scene.fixture("sink", Appliance).set_position(env.data, "spout", -1.0)
     assert steps(env, 1) == [False]
-    env.scene.appliance("sink").set_position(env.data, "spout", 0.0)
+    env.scene.fixture("sink", Appliance).set_position(env.data, "spout", 0.0)
     assert not any(steps(env, 3)), "what has happened cannot be made good"
     env.reset(seed=0)
     assert steps(env, 1, on=True) == [True]

@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 from goal_states import hold, put_object, write
 
-from robocasa_lerobot.envs.kitchens.appliances.kinds.stove import ON_FROM
+from robocasa_lerobot.envs.kitchens.appliances.kinds.sink import Sink
+from robocasa_lerobot.envs.kitchens.appliances.kinds.stove import ON_FROM, Hob
 from robocasa_lerobot.envs.predicates import (
     AllOf,
     AnyOf,
@@ -101,12 +102,12 @@ def away_from_stream(share: float) -> Change:
 
 
 def water(angle: float) -> Change:
-    return lambda scene, data: scene.sink("sink").set_position(data, "handle", angle)
+    return lambda scene, data: scene.fixture("sink", Sink).set_position(data, "handle", angle)
 
 
 def knobs(angle: float) -> Change:
     def change(scene: Scene, data: mujoco.MjData) -> None:
-        hob = scene.hob("stove")
+        hob = scene.fixture("stove", Hob)
         for location in hob.burners:
             hob.set_position(data, f"knob_{location}", angle)
 
@@ -146,14 +147,14 @@ def onto(burner: int, name: str = "pan") -> Change:
     """Put an object onto another burner."""
 
     def change(scene: Scene, data: mujoco.MjData) -> None:
-        write(OnBurner(name, "stove", burner=list(scene.hob("stove").burners)[burner]), scene, data)
+        write(OnBurner(name, "stove", burner=list(scene.fixture("stove", Hob).burners)[burner]), scene, data)
 
     return change
 
 
 def into_oven(scene: Scene, data: mujoco.MjData) -> None:
     """Below the burner, on the rack of the oven: it touches the stove too."""
-    hob = scene.hob("stove")
+    hob = scene.fixture("stove", Hob)
     oven = hob.regions["interior"]
     floor = oven.world(data, (0.0, 0.0, -oven.half[2]))
     burner = data.site(f"{hob.name}_burner_on_{hob.nearest_burner(data, floor)[0]}").xpos

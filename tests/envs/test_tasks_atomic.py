@@ -11,6 +11,7 @@ from goal_states import AT_START, MOVED, can_be_written, hold, leaves, write
 from task_selection import every_task
 
 from robocasa_lerobot.envs import predicates
+from robocasa_lerobot.envs.kitchens.appliances.base import Appliance
 from robocasa_lerobot.envs.predicates import Goal
 from robocasa_lerobot.envs.predicates.contacts import touching
 from robocasa_lerobot.envs.scene.build import build_scene
@@ -47,7 +48,7 @@ def test_it_can_be_made_and_is_not_done_at_reset(name: str, split: str) -> None:
             if isinstance(entry, PartAt):
                 part = scene.fill(entry.part)
                 # A timer or a snapping door may have moved while the scene settled.
-                assert scene.appliance(entry.fixture).share(data, part) == pytest.approx(
+                assert scene.fixture(entry.fixture, Appliance).share(data, part) == pytest.approx(
                     scene.initial_share(entry.fixture, entry.part), abs=0.06
                 )
 

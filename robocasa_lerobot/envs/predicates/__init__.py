@@ -31,6 +31,7 @@ from robocasa_lerobot.envs.predicates.robot import (
     StandsBefore,
     StandsNear,
 )
+from robocasa_lerobot.envs.predicates.shelves import OnShelf, inside
 from robocasa_lerobot.envs.predicates.traces import MovedSince, Strokes
 
 __all__ = [
@@ -60,6 +61,7 @@ __all__ = [
     "ObjectTouchesAnyCounter",
     "ObjectUpright",
     "OnBurner",
+    "OnShelf",
     "Once",
     "PartTurned",
     "PartWithin",
@@ -72,5 +74,6 @@ __all__ = [
     "UnderWater",
     "When",
     "WithMemory",
+    "inside",
     "parts_with_memory",
 ]

@@ -8,9 +8,8 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from robocasa_lerobot.envs.kitchens.appliances.base import Appliance
 from robocasa_lerobot.envs.kitchens.appliances.kinds.blender import Blender
-from robocasa_lerobot.envs.kitchens.fixtures.cabinets import HingeCabinet
+from robocasa_lerobot.envs.kitchens.fixtures.base import of_kind
 from robocasa_lerobot.envs.kitchens.footprints import PlacementError, place
 from robocasa_lerobot.envs.kitchens.layout import Layout, load_layout
 from robocasa_lerobot.envs.kitchens.splits import Pairs, scene_ids, without
@@ -55,7 +54,7 @@ class Arrangement:
     Attributes:
         roles: fixtures by role.
         choices: what was chosen among equals.
-        openness: of doors and drawers, by fixture.
+        openness: of doors and drawers, by fixture and part.
         initial: the task's further initial state, each entry with the number drawn for it.
         lids: roles of the blenders whose lid is not on, and whether it is gone altogether.
         objects: by name.
@@ -64,7 +63,7 @@ class Arrangement:
 
     roles: dict[str, str]
     choices: Choices
-    openness: dict[str, float]
+    openness: dict[tuple[str, str], float]
     initial: tuple[tuple[Initial, float], ...]
     lids: dict[str, bool]
     objects: dict[str, PlacedObject]
@@ -169,7 +168,7 @@ def arrange(
     if not start.at_object:
         pose = robot_pose(rng, layout, start, layout.fixtures[roles[start.fixture]], shape, opened=opened)
     openness = {
-        roles[entry.fixture]: float(rng.uniform(entry.low, entry.high))
+        (roles[entry.fixture], _part(layout, roles, entry)): float(rng.uniform(entry.low, entry.high))
         for entry in task.initial
         if isinstance(entry, InitialOpenness)
     }
@@ -177,15 +176,26 @@ def arrange(
     initial = tuple((entry, entry.draw(rng, choices.values)) for entry in further)
     lids = _lids(task, roles)
     for role, gone in lids.items():
-        blender = layout.fixtures[roles[role]]
-        assert isinstance(blender, Blender)
-        blender.with_lid = not gone
-    places: dict[str, float | Shares] = {**openness, **_shares(initial, roles, choices)}
+        of_kind(layout.fixtures[roles[role]], Blender).with_lid = not gone
+    places: dict[str, float | Shares] = {name: share for (name, part), share in openness.items() if not part}
+    places |= _shares(initial, roles, choices)
     objects = place_objects(rng, task, split, layout, roles, places, choices.values)
     if pose is None:
         at = objects[start.at_object].pos[:2]
         pose = robot_pose(rng, layout, start, layout.fixtures[roles[start.fixture]], shape, at, opened)
     return Arrangement(roles, choices, openness, initial, lids, objects, pose)
+
+
+def _part(layout: Layout, roles: dict[str, str], entry: InitialOpenness) -> str:
+    """The part of a fixture that starts open.
+
+    Raises:
+        PlacementError: the fixture has no door there.
+    """
+    fixture = layout.fixtures[roles[entry.fixture]]
+    if entry.part and not any(door.startswith(entry.part) for door in fixture.door_names):
+        raise PlacementError(f"{fixture.name} has no door of its {entry.part}. Ask for another kind of fixture.")
+    return entry.part
 
 
 def _shares(initial: tuple[tuple[Initial, float], ...], roles: dict[str, str], choices: Choices) -> dict[str, Shares]:
@@ -215,8 +225,7 @@ def _lid_spot(
     Raises:
         PlacementError: there is no room for it.
     """
-    blender = layout.fixtures[name]
-    assert isinstance(blender, Blender)
+    blender = of_kind(layout.fixtures[name], Blender)
     counter = counter_of(layout, blender)
     areas, standing = counter_areas(layout, OnCounter("", "left_right", size=(0.35, 0.35)), blender)
     taken = [placed.footprint for placed in objects.values()]
@@ -230,11 +239,15 @@ def _words(layout: Layout, roles: dict[str, str], objects: dict[str, PlacedObjec
     names = {role: _fixture_word(layout.types[name]) for role, name in roles.items()}
     for name in roles.values():
         fixture = layout.fixtures[name]
-        doors = fixture.doors if isinstance(fixture, HingeCabinet | Appliance) else ()
-        if doors:
-            number = doors if isinstance(doors, int) else len(doors)
-            names.setdefault("doors", "door" if number == 1 else "doors")
+        if fixture.door_names:
+            names.setdefault("doors", _doors_word(fixture.door_names))
+        for part in fixture.compartments:
+            names.setdefault(f"{part}_doors", _doors_word(fixture.doors_of(part)))
     return names | {name: placed.item.category.name.replace("_", " ") for name, placed in objects.items()}
+
+
+def _doors_word(doors: tuple[str, ...]) -> str:
+    return "door" if len(doors) == 1 else "doors"
 
 
 def _fixture_word(kind: str) -> str:

@@ -8,7 +8,6 @@ from types import MappingProxyType
 
 import numpy as np
 
-from robocasa_lerobot.envs.kitchens.appliances.kinds.sink import Sink
 from robocasa_lerobot.envs.kitchens.fixtures.base import Fixture
 from robocasa_lerobot.envs.kitchens.footprints import Area, Footprint, PlacementError, place
 from robocasa_lerobot.envs.kitchens.layout import Layout
@@ -171,7 +170,7 @@ def _put(
             # What may stick out is the container: a thing across its rim would tip over.
             _put_on(rng, table, name, item, table.placed[holder], replace(start, ensure_inside=True))
             return
-        if isinstance(fixture, Sink) and start.ensure_inside:
+        if fixture.holds_all_of_it and start.ensure_inside:
             # Of other compartments a thing may stick out, as the handle of a mug does under a spout.
             rooms = [part.area for part in table.parts[name]]
     _put_down(rng, table, name, item, areas, standing, rooms)

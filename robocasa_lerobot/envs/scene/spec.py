@@ -15,7 +15,7 @@ class FixtureWanted:
 
     Attributes:
         role: name by which the rest of the declaration calls it.
-        kind: a key of `kitchens.fixture_types.FIXTURE_KINDS`, e.g. "drawer_top" or "sink".
+        kind: a word of `kitchens.fixture_types.fixture_filter`, e.g. "drawer_top", "sink", or any appliance.
         near: role of an earlier fixture that it is the nearest to.
         other_than: roles of earlier fixtures that it is none of.
         size: least width and depth of its top, metres; of counters.
@@ -92,7 +92,8 @@ class SampleRegion:
         top_size: least width and depth of the part, metres.
         height: bounds of the height in the room of the part's floor, metres.
         level: number of the part from below; -1 is the highest. May name a choice in braces.
-        name: start of the part's name, such as "shelf" or "rack0"; may name a choice in braces.
+        name: start of the part's name, such as "shelf" or "rack0", or a usable shelf of a fridge by its level, as
+            "freezer_shelf:highest" (`kitchens.fixtures.regions.region_names`); may name a choice in braces.
     """
 
     ref: str = ""
@@ -151,7 +152,7 @@ class ObjectWanted:
         properties: further properties asked for, such as "cookable".
         exclude: groups or categories that are not wanted.
         max_size: bounds of its size along x, y, z, metres; None leaves an axis free.
-        scale: factor of its size.
+        scale: factor of its size, or one for each of x, y, z; before it is turned upright.
         upright: turned so that its longest axis points up.
         repeats: may be of a category that the scene already has.
         filled: what is seen in it, one of `LIQUIDS` in `envs/scene/build.py`; it is there for the eye only.
@@ -167,7 +168,7 @@ class ObjectWanted:
     properties: tuple[str, ...] = ()
     exclude: tuple[str, ...] = ()
     max_size: tuple[float | None, float | None, float | None] | None = None
-    scale: float = 1.0
+    scale: float | tuple[float, float, float] = 1.0
     upright: bool = False
     repeats: bool = False
     filled: str = ""
@@ -194,8 +195,15 @@ class RobotStart:
 
 @dataclass(frozen=True)
 class InitialOpenness:
-    """Initial openness of a drawer or door, uniform between two shares of its full travel."""
+    """Initial openness of a drawer or of doors, uniform between two shares of full travel.
+
+    Attributes:
+        fixture: role.
+        low, high: bounds, as shares of full travel.
+        part: start of the doors' names, such as the compartment "freezer"; all if empty. The others stay shut.
+    """
 
     fixture: str
     low: float
     high: float
+    part: str = ""

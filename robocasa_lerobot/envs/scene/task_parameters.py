@@ -2,22 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
 
-from robocasa_lerobot.envs.kitchens.appliances.kinds.fridge import Fridge
-from robocasa_lerobot.envs.kitchens.appliances.kinds.oven import Oven
-from robocasa_lerobot.envs.kitchens.appliances.kinds.stove import Hob
-from robocasa_lerobot.envs.kitchens.appliances.kinds.toaster import Toaster
-from robocasa_lerobot.envs.kitchens.appliances.kinds.toaster_oven import ToasterOven
 from robocasa_lerobot.envs.kitchens.fixtures.base import Fixture
 from robocasa_lerobot.envs.kitchens.footprints import PlacementError
 from robocasa_lerobot.envs.scene.scene_spec import SceneSpec
-from robocasa_lerobot.envs.scene.spec import Choice
-
-type Options = dict[str, dict[str, str]]
 
 
 @dataclass(frozen=True)
@@ -38,7 +30,7 @@ def draw_choices(
     """
     drawn = Choices(dict(roles))
     for choice in task.choices:
-        options = _options(choice, fixtures[roles[choice.of]]) if choice.of else choice.options
+        options = fixtures[roles[choice.of]].parts_to_choose(choice.name) if choice.of else choice.options
         if not options:
             raise PlacementError(f"{roles[choice.of]} has no {choice.name} to choose")
         value = list(options)[int(rng.integers(len(options)))]
@@ -47,50 +39,3 @@ def draw_choices(
         drawn.words[choice.name] = value
         drawn.words.update({k: v for k, v in options[value].items() if not k.startswith("_")})
     return drawn
-
-
-def _options(choice: Choice, fixture: Fixture) -> Options:
-    for kind, options in _BY_KIND:
-        if isinstance(fixture, kind):
-            return options(choice.name, fixture)
-    raise AssertionError(f"{fixture.name} has nothing to choose from")
-
-
-def _burners(name: str, hob: Fixture) -> Options:
-    assert isinstance(hob, Hob)
-    return {location: {name: location.replace("_", " ")} for location in hob.burners}
-
-
-def _oven_racks(name: str, oven: Fixture) -> Options:
-    assert isinstance(oven, Oven)
-    return {rack: {name: word} for rack, word in zip(oven.racks, _levels(len(oven.racks)), strict=True)}
-
-
-def _toaster_oven_racks(name: str, oven: Fixture) -> Options:
-    assert isinstance(oven, ToasterOven)
-    words = _levels(len(oven.racks))
-    return {rack: {name: f"{word} rack".strip()} for rack, word in zip(oven.racks, words, strict=True)}
-
-
-def _slots(name: str, toaster: Fixture) -> Options:
-    assert isinstance(toaster, Toaster)
-    return {str(slot): {"_side": str(slot // 2)} for slot in range(2 * toaster.sides)}
-
-
-def _drawers(name: str, fridge: Fixture) -> Options:
-    assert isinstance(fridge, Fridge)
-    return {drawer: {} for drawer in fridge.drawers}
-
-
-def _levels(count: int) -> tuple[str, ...]:
-    """Words for racks from below; a single one needs none."""
-    return ("",) if count == 1 else ("bottom", "top") if count == 2 else ("bottom", "middle", "top")
-
-
-_BY_KIND: tuple[tuple[type[Fixture], Callable[[str, Fixture], Options]], ...] = (
-    (Hob, _burners),
-    (Oven, _oven_racks),
-    (ToasterOven, _toaster_oven_racks),
-    (Toaster, _slots),
-    (Fridge, _drawers),
-)

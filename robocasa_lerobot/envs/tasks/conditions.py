@@ -17,13 +17,13 @@ from robocasa_lerobot.envs.predicates import (
     MovedSince,
     Never,
     ObjectInBasin,
-    ObjectInside,
     ObjectOn,
     ObjectTouches,
     PartWithin,
     StandsBefore,
     StandsNear,
     StateIs,
+    inside,
 )
 from robocasa_lerobot.envs.tasks.task import Stage, Task
 from robocasa_lerobot.errors import UserError
@@ -41,7 +41,7 @@ def _placed(task: Task, stage: Stage) -> Goal:
     elif kind.startswith("sink"):
         where = ObjectInBasin(stage.object, stage.target)
     else:
-        where = ObjectInside(stage.object, stage.target, region=stage.part)
+        where = inside(stage.object, stage.target, stage.part)
     return AllOf(where, GripperFar(stage.object))
 
 
@@ -53,11 +53,11 @@ def _driven(task: Task, stage: Stage) -> Goal:
 
 
 def _opened(task: Task, stage: Stage) -> Goal:
-    return DoorsOpen(stage.target)
+    return DoorsOpen(stage.target, part=stage.part)
 
 
 def _closed(task: Task, stage: Stage) -> Goal:
-    return DoorsClosed(stage.target)
+    return DoorsClosed(stage.target, part=stage.part)
 
 
 _BY_VERB: dict[tuple[str, str], Callable[[Task, Stage], Goal]] = {

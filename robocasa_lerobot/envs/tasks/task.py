@@ -23,7 +23,8 @@ class Stage:
         verb: what is done, e.g. "open".
         target: role of the fixture.
         object: name of the object that is handled, if any.
-        part: of the fixture, if any; may name a choice in braces.
+        part: of the fixture, if any: a knob, a rack, the doors of its "freezer", a shelf by its level, as
+            "fridge_shelf:highest"; may name a choice in braces.
         to: which way, for verbs that go several: "left", "out", "increase"; may name a choice in braces.
         until: when it is done, where that is not what its verb always asks for (`tasks.conditions`).
     """

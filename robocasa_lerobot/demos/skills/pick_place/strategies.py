@@ -141,7 +141,7 @@ def _by_target(env: KitchenEnv, stage: Stage, obj: Graspable) -> PlaceStrategy:
         if in_the_open(locate(env, holder)) and not _looks_ahead(env) and in_the_open(locate(env, obj.name)):
             return PlaceStrategy(poses, leans=_OPEN_LEANS)
         return PlaceStrategy(poses, leans=_CLOSED_LEANS, entries=("up", "across", "out"), grasp=ANY_APPROACH, in_m=0.25)
-    fixture, part = env.scene.fixture(stage.target), env.scene.fill(stage.part)
+    fixture, part = env.scene.fixture(stage.target), env.scene.part(stage.target, stage.part)
     match fixture:
         case Counter():
             within = FARTHER_M if isinstance(locate(env, obj.name).fixture, Drawer) else NEAR_M

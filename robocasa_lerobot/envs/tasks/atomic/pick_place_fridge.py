@@ -1,5 +1,6 @@
 """Pick and place inside the fridge: between its shelves and its drawers."""
 
+from robocasa_lerobot.envs.kitchens.fixtures.regions import USABLE_SHELF
 from robocasa_lerobot.envs.predicates import (
     AllOf,
     GripperFar,
@@ -20,8 +21,6 @@ from robocasa_lerobot.envs.tasks.atomic.racks import DRAWER
 from robocasa_lerobot.envs.tasks.task import Task
 
 _FRIDGE_FAR_M = 0.15
-# A fridge shelf that counts: its floor between these heights, and at least so high, metres.
-USABLE_SHELF = (0.5, 1.5, 0.20)
 
 
 FRIDGE = (
