@@ -84,7 +84,8 @@ def test_a_stage_that_is_done_already_is_left_out() -> None:
     for recording in recordings:
         assert recording.stages[0] == 1
         assert recording.ep_meta["stages"][0] == {
-            "skill": "levers", "verb": "on", "target": "sink", "object": "", "part": "handle", "to": "",
+            "text": "turn on the faucet of the sink", "skill": "levers", "verb": "on", "target": "sink", "object": "",
+            "part": "handle", "to": "",
             "attempts": 0, "done": True, "skipped": True, "reason": "",
         }  # fmt: skip
 

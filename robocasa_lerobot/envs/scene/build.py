@@ -143,6 +143,7 @@ def _attempt(
         instruction=_said(task.instruction, words),
         paraphrases=tuple(_said(wording, words) for wording in task.paraphrases),
         choices=choices.values,
+        words=words,
         initial=arranged.initial,
         lid_spots=spots,
     )

@@ -69,6 +69,7 @@ class Scene:
         instruction: what the robot is told.
         paraphrases: the same in other words.
         choices: what was drawn for the task's choices, and the roles' fixtures, by name.
+        words: what is said of fixtures (by role), objects, and choices.
         initial: what the task has written into the first state, each with the number drawn for it, in that order.
         lid_spots: where the lid of a blender may lie, by role.
         arm_noise_rad: standard deviation of the noise on the initial arm pose.
@@ -89,6 +90,7 @@ class Scene:
     instruction: str
     paraphrases: tuple[str, ...] = ()
     choices: dict[str, str] = field(default_factory=dict)
+    words: dict[str, str] = field(default_factory=dict)
     initial: tuple[tuple[FirstState, float], ...] = ()
     lid_spots: dict[str, NDArray[np.float64]] = field(default_factory=dict)
     arm_noise_rad: float = 0.02

@@ -24,6 +24,7 @@ class Stage:
         part: of the fixture, if any; may name a choice in braces.
         to: which way, for verbs that go several: "left", "out", "increase"; may name a choice in braces.
         until: when it is done, where that is not what its verb always asks for (`tasks.conditions`).
+        text: what it is called, where not as its verb always is (`tasks.stage_text`); fields as in instructions.
     """
 
     skill: str
@@ -33,6 +34,7 @@ class Stage:
     part: str = ""
     to: str = ""
     until: Goal | None = None
+    text: str = ""
 
 
 @dataclass(frozen=True, kw_only=True)
