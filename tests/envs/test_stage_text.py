@@ -29,7 +29,7 @@ def test_every_stage_of_every_task_can_be_said(name: str) -> None:
     task = get_task(name)
     for split in ("target", "pretrain"):
         scene = build_scene(task, split, 0)
-        for stage in task.stages:
+        for stage in task.bound(scene).stages:
             text = stage_text(stage, scene)
             check(text, scene)
             if stage.object in scene.objects:

@@ -19,6 +19,7 @@ from robocasa_lerobot.envs.predicates import (
     DoorsOpen,
     DrawerClosed,
     DrawerOpen,
+    ForEach,
     Goal,
     GripperFar,
     GripperFarFromPart,
@@ -42,6 +43,7 @@ from robocasa_lerobot.envs.scene.initial_states import PartAt
 from robocasa_lerobot.envs.scene.scene import Scene, set_openness
 from robocasa_lerobot.envs.tasks.registry import get_task, task_names
 from robocasa_lerobot.envs.tasks.task import Task
+from robocasa_lerobot.envs.tasks.typical import goal_of
 
 
 def test_there_are_sixty_five() -> None:
@@ -62,7 +64,7 @@ def test_it_can_be_made_and_is_not_done_at_reset(name: str, split: str) -> None:
         scene = build_scene(task, split, seed)
         data, _ = scene.initial_data(np.random.default_rng(seed))
         terms: dict[str, bool] = {}
-        assert not task.goal.evaluate(scene, data, terms)
+        assert not task.bound(scene).goal.evaluate(scene, data, terms)
         assert terms
         for said in (scene.instruction, *scene.paraphrases):
             assert "{" not in said
@@ -101,6 +103,8 @@ def leaves(goal: Goal) -> Iterator[Goal]:
         parts = goal.goals.values()
     elif isinstance(goal, Not):
         parts = (goal.part,)
+    elif isinstance(goal, ForEach):
+        parts = (goal.pattern,)
     else:
         yield goal
         return
@@ -109,7 +113,7 @@ def leaves(goal: Goal) -> Iterator[Goal]:
 
 
 def can_be_written(task: Task) -> bool:
-    return all(isinstance(leaf, WRITTEN + AT_START) for leaf in leaves(task.goal))
+    return all(isinstance(leaf, WRITTEN + AT_START) for leaf in leaves(goal_of(task)))
 
 
 def write(goal: Goal, scene: Scene, data: mujoco.MjData) -> None:
@@ -157,15 +161,16 @@ def test_the_state_that_the_goal_asks_for_is_success(name: str) -> None:
     task = get_task(name)
     scene = build_scene(task, "target", 1)
     data, _ = scene.initial_data(np.random.default_rng(1))
-    write(task.goal, scene, data)
+    goal = task.bound(scene).goal
+    write(goal, scene, data)
     take_effect(scene.model, data)
     terms: dict[str, bool] = {}
-    assert task.goal.evaluate(scene, data, terms), terms
+    assert goal.evaluate(scene, data, terms), terms
 
 
 def test_every_condition_is_written_or_moved() -> None:
     for name in task_names():
-        assert all(isinstance(leaf, WRITTEN + AT_START + MOVED) for leaf in leaves(get_task(name).goal)), name
+        assert all(isinstance(leaf, WRITTEN + AT_START + MOVED) for leaf in leaves(goal_of(get_task(name)))), name
 
 
 def test_sleeping_things_that_lie_on_each_other_touch() -> None:

@@ -10,7 +10,7 @@ from robocasa_lerobot.envs.predicates.fixtures import (
     PartWithin,
     StateIs,
 )
-from robocasa_lerobot.envs.predicates.logic import AllOf, AnyOf, Goal, Not, Term, When
+from robocasa_lerobot.envs.predicates.logic import AllOf, AnyOf, ForEach, Goal, Not, Term, When
 from robocasa_lerobot.envs.predicates.objects import (
     ObjectAtSite,
     ObjectInBasin,
@@ -30,6 +30,7 @@ __all__ = [
     "DoorsOpen",
     "DrawerClosed",
     "DrawerOpen",
+    "ForEach",
     "Goal",
     "GripperFar",
     "GripperFarFromPart",

@@ -8,9 +8,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from robocasa_lerobot.envs.kitchens.appliances.base import Appliance
 from robocasa_lerobot.envs.kitchens.appliances.kinds.blender import Blender
-from robocasa_lerobot.envs.kitchens.fixtures.cabinets import HingeCabinet
 from robocasa_lerobot.envs.kitchens.footprints import PlacementError, place
 from robocasa_lerobot.envs.kitchens.layout import Layout, load_layout
 from robocasa_lerobot.envs.kitchens.splits import Pairs, scene_ids, without
@@ -29,6 +27,7 @@ from robocasa_lerobot.envs.scene.scene import PlacedObject, Scene
 from robocasa_lerobot.envs.scene.scene_spec import SceneSpec
 from robocasa_lerobot.envs.scene.spec import InitialOpenness, OnCounter
 from robocasa_lerobot.envs.scene.task_parameters import Choices, draw_choices
+from robocasa_lerobot.envs.scene.words import numbered, said, words_of
 from robocasa_lerobot.errors import UnknownNameError, UserError
 
 RENDER_PRESETS = ("fast", "quality")
@@ -126,7 +125,9 @@ def _attempt(
         noise_rng = np.random.default_rng([seed, _CAMERA_NOISE_STREAM])
         add_camera_noise(spec, robot.cameras(look.camera_set), look.camera_noise, noise_rng)
     model = spec.compile()
-    words = _words(layout, roles, objects) | choices.words | {"side": pose.side}
+    categories = {name: placed.item.category.name for name, placed in objects.items()}
+    words = words_of(layout, roles, categories, [wanted.name for wanted in task.objects if wanted.count != (1, 1)])
+    words.update({"side": pose.side} | choices.words)
     return Scene(
         split=split,
         seed=seed,
@@ -140,8 +141,8 @@ def _attempt(
         openness=arranged.openness,
         robot=robot,
         robot_pose=pose,
-        instruction=_said(task.instruction, words),
-        paraphrases=tuple(_said(wording, words) for wording in task.paraphrases),
+        instruction=said(task.instruction, words),
+        paraphrases=tuple(said(wording, words) for wording in task.paraphrases),
         choices=choices.values,
         words=words,
         initial=arranged.initial,
@@ -221,33 +222,17 @@ def _lid_spot(
     return np.array([spot.x, spot.y, counter.surface_z + 0.002])
 
 
-def _words(layout: Layout, roles: dict[str, str], objects: dict[str, PlacedObject]) -> dict[str, str]:
-    """What instructions call fixtures and objects, by role and name."""
-    names = {role: _fixture_word(layout.types[name]) for role, name in roles.items()}
-    for name in roles.values():
-        fixture = layout.fixtures[name]
-        doors = fixture.doors if isinstance(fixture, HingeCabinet | Appliance) else ()
-        if doors:
-            number = doors if isinstance(doors, int) else len(doors)
-            names.setdefault("doors", "door" if number == 1 else "doors")
-    return names | {name: placed.item.category.name.replace("_", " ") for name, placed in objects.items()}
-
-
-def _fixture_word(kind: str) -> str:
-    return "fridge" if kind.startswith("fridge") else "stove" if kind.startswith("stove") else kind.replace("_", " ")
-
-
-def _said(wording: str, words: dict[str, str]) -> str:
-    """A wording with its words; a missing one (a rack that needs no name) leaves no double space."""
-    return " ".join(wording.format(**words).split())
-
-
 def _assemble(
     task: SceneSpec, layout: Layout, look: _Look, robot: Robot, objects: dict[str, PlacedObject]
 ) -> mujoco.MjSpec:
     spec, palette = bare_kitchen(layout, look.render_preset)
     robot.add_to(spec, look.render_preset, look.camera_set)
-    liquids = {wanted.name: LIQUIDS[wanted.filled] for wanted in task.objects if wanted.filled}
+    liquids = {
+        name: LIQUIDS[wanted.filled]
+        for wanted in task.objects
+        if wanted.filled
+        for name in numbered(wanted.name, objects)
+    }
     for placed in objects.values():
         add_object(spec, palette, placed.name, placed.item, liquid=liquids.get(placed.name))
     return spec

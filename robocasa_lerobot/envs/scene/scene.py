@@ -24,6 +24,7 @@ from robocasa_lerobot.envs.robots.control_step import control_step
 from robocasa_lerobot.envs.robots.robot import Controller, Robot
 from robocasa_lerobot.envs.scene.bodies import subtree
 from robocasa_lerobot.envs.scene.robot_poses import RobotPose, standing_pose
+from robocasa_lerobot.envs.scene.words import Words, numbered
 
 SETTLE_STEPS = 10  # control steps without a command after placing everything (docs/robocasa.md, section 1)
 
@@ -69,7 +70,7 @@ class Scene:
         instruction: what the robot is told.
         paraphrases: the same in other words.
         choices: what was drawn for the task's choices, and the roles' fixtures, by name.
-        words: what is said of fixtures (by role), objects, and choices.
+        words: what is said of fixtures (by role), objects, choices, and lists of objects.
         initial: what the task has written into the first state, each with the number drawn for it, in that order.
         lid_spots: where the lid of a blender may lie, by role.
         arm_noise_rad: standard deviation of the noise on the initial arm pose.
@@ -90,7 +91,7 @@ class Scene:
     instruction: str
     paraphrases: tuple[str, ...] = ()
     choices: dict[str, str] = field(default_factory=dict)
-    words: dict[str, str] = field(default_factory=dict)
+    words: Words = field(default_factory=Words)
     initial: tuple[tuple[FirstState, float], ...] = ()
     lid_spots: dict[str, NDArray[np.float64]] = field(default_factory=dict)
     arm_noise_rad: float = 0.02
@@ -103,7 +104,11 @@ class Scene:
 
     def fixture(self, role: str) -> Fixture:
         """The fixture of a role."""
-        return self.fixtures[self.roles[role]]
+        return self.fixtures[self.roles[self.fill(role)]]
+
+    def named(self, name: str) -> tuple[str, ...]:
+        """The objects of a declaration's name: one, or as many as were drawn, `<name>_0` first."""
+        return numbered(self.fill(name), self.objects)
 
     def drawer(self, role: str) -> Drawer:
         """The drawer of a role."""
@@ -206,6 +211,7 @@ class Scene:
                 for name, fixture in self.fixtures.items()
             },
             "fixture_refs": dict(self.roles),
+            "choices": {name: value for name, value in self.choices.items() if name not in self.roles},
             "cam_configs": camera_configs(self.model, (camera.name for camera in self.robot.cameras("default"))),
             "init_robot_base_pos": [self.robot_pose.x, self.robot_pose.y, 0.0],
             "init_robot_base_ori": [0.0, 0.0, self.robot_pose.yaw],

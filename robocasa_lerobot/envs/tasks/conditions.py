@@ -21,7 +21,7 @@ from robocasa_lerobot.envs.predicates import (
     StandsBefore,
     StateIs,
 )
-from robocasa_lerobot.envs.tasks.task import Stage, Task
+from robocasa_lerobot.envs.tasks.task import BoundTask, Stage
 from robocasa_lerobot.errors import UserError
 
 OUT_FROM, IN_UP_TO = 0.95, 0.05  # of a rack's or a drawer's range
@@ -70,7 +70,7 @@ _BY_VERB: dict[tuple[str, str], Callable[[Stage], Goal]] = {
 }
 
 
-def stage_condition(task: Task, stage: Stage) -> Goal:
+def stage_condition(task: BoundTask, stage: Stage) -> Goal:
     """What holds when a stage is done: its `until`; the goal of a task of one stage; else its verb's own condition.
 
     Raises:

@@ -7,6 +7,7 @@ from collections.abc import Callable
 from robocasa_lerobot.envs.kitchens.appliances.base import Appliance
 from robocasa_lerobot.envs.kitchens.fixtures.cabinets import HingeCabinet
 from robocasa_lerobot.envs.scene.scene import Scene
+from robocasa_lerobot.envs.scene.words import said
 from robocasa_lerobot.envs.tasks.task import Stage
 
 _DEEP_M = 0.04  # what is deeper is put into, not on
@@ -26,11 +27,8 @@ def stage_text(stage: Stage, scene: Scene) -> str:
 
     Words are those of `Scene.words`: kinds of fixtures and objects, and of what was drawn; never ids.
     """
-    if stage.text:
-        said = stage.text.format(**scene.words)
-    else:
-        said = _BY_VERB.get((stage.skill, stage.verb), _plainly)(stage, scene)
-    return " ".join(said.split())
+    wording = stage.text or _BY_VERB.get((stage.skill, stage.verb), _plainly)(stage, scene)
+    return said(wording, scene.words)
 
 
 def _target(stage: Stage, scene: Scene) -> str:
