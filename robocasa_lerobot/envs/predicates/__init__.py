@@ -11,7 +11,7 @@ from robocasa_lerobot.envs.predicates.fixtures import (
     StateIs,
 )
 from robocasa_lerobot.envs.predicates.heat_and_water import OnBurner, UnderWater
-from robocasa_lerobot.envs.predicates.logic import AllOf, AnyOf, Exactly, Goal, Not, Term, When
+from robocasa_lerobot.envs.predicates.logic import AllOf, AnyOf, Exactly, ForEach, Goal, Not, Term, When
 from robocasa_lerobot.envs.predicates.memory import Never, Once, StepsWhile, WithMemory, parts_with_memory
 from robocasa_lerobot.envs.predicates.near import Near, NearerThan
 from robocasa_lerobot.envs.predicates.objects import (
@@ -43,6 +43,7 @@ __all__ = [
     "DrawerClosed",
     "DrawerOpen",
     "Exactly",
+    "ForEach",
     "Goal",
     "Grasped",
     "GripperFar",

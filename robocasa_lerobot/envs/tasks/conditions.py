@@ -25,13 +25,13 @@ from robocasa_lerobot.envs.predicates import (
     StateIs,
     inside,
 )
-from robocasa_lerobot.envs.tasks.task import Stage, Task
+from robocasa_lerobot.envs.tasks.task import BoundTask, Stage
 from robocasa_lerobot.errors import UserError
 
 OUT_FROM, IN_UP_TO = 0.95, 0.05  # of a rack's or a drawer's range
 
 
-def _placed(task: Task, stage: Stage) -> Goal:
+def _placed(task: BoundTask, stage: Stage) -> Goal:
     """Where the object belongs, by what the target is, and let go."""
     kind = next((fixture.kind for fixture in task.fixtures if fixture.role == stage.target), None)
     if kind is None:
@@ -45,22 +45,22 @@ def _placed(task: Task, stage: Stage) -> Goal:
     return AllOf(where, GripperFar(stage.object))
 
 
-def _driven(task: Task, stage: Stage) -> Goal:
+def _driven(task: BoundTask, stage: Stage) -> Goal:
     """Before a fixture or an object, and with what is carried, if anything, in the hand."""
     roles = {fixture.role for fixture in task.fixtures}
     there = StandsBefore(stage.target) if stage.target in roles else StandsNear(stage.target)
     return AllOf(there, Grasped(stage.object)) if stage.object else there
 
 
-def _opened(task: Task, stage: Stage) -> Goal:
+def _opened(task: BoundTask, stage: Stage) -> Goal:
     return DoorsOpen(stage.target, part=stage.part)
 
 
-def _closed(task: Task, stage: Stage) -> Goal:
+def _closed(task: BoundTask, stage: Stage) -> Goal:
     return DoorsClosed(stage.target, part=stage.part)
 
 
-_BY_VERB: dict[tuple[str, str], Callable[[Task, Stage], Goal]] = {
+_BY_VERB: dict[tuple[str, str], Callable[[BoundTask, Stage], Goal]] = {
     ("doors", "open"): _opened,
     **dict.fromkeys(
         (("doors", "close"), ("doors", "close_large"), ("doors", "lift_shut"), ("doors", "lift_low")), _closed
@@ -77,7 +77,7 @@ _BY_VERB: dict[tuple[str, str], Callable[[Task, Stage], Goal]] = {
 }
 
 
-def stage_condition(task: Task, stage: Stage) -> Goal:
+def stage_condition(task: BoundTask, stage: Stage) -> Goal:
     """What holds when a stage is done: its `until`; the goal of a task of one stage; else its verb's own condition.
 
     Raises:
