@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import heapq
 import itertools
-import zlib
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import Protocol
@@ -18,20 +17,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robocasa_lerobot.demos.motion import Array, HandTarget, floor_axes
+from robocasa_lerobot.demos.planning.approach import Approach
 from robocasa_lerobot.demos.planning.collision import CollisionChecker, MovingPart, Touched
-from robocasa_lerobot.demos.planning.connect import connect
 from robocasa_lerobot.demos.planning.costs import IN_CONTACT
 from robocasa_lerobot.demos.planning.errors import NoPlanError
-from robocasa_lerobot.demos.planning.follow import CLOSELY, joint_line
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.robots.panda_omron.names import ARM_CENTER_SITE
 from robocasa_lerobot.envs.robots.panda_omron.robot import PANDA_OMRON
 
 Shift = tuple[float, float]
 
-MOST_TESTED, MOST_DETOURS = 80, 3
-# Shares of the line to the first pose, and from one pose to the next, that are tested, in stretches that count once.
-BEFORE = ((0.15, 0.3), (0.45, 0.6), (0.7, 0.8, 0.9))
+MOST_TESTED, MOST_DETOURS = 80, 2
+# Shares of the line from one pose to the next that are tested, in stretches that count once.
 BETWEEN = ((0.2, 0.35), (0.5, 0.7, 0.85))
 OFF_M = 0.12  # after which the base no longer leans on what it leant on
 BACKS_M = (0.25, 0.5, 0.75)  # that the base goes back before it goes to the side, where it cannot go straight
@@ -103,7 +100,12 @@ class ArticulatedPlan:
 
 
 def plan_contact(
-    env: KitchenEnv, part: ArticulatedPart, paths: Iterable[ContactPath], stances: Iterable[tuple[Shift, Shift]]
+    env: KitchenEnv,
+    part: ArticulatedPart,
+    paths: Iterable[ContactPath],
+    stances: Iterable[tuple[Shift, Shift]],
+    *,
+    detours: int = MOST_DETOURS,
 ) -> ArticulatedPlan:
     """The path that costs least of those that can be reached without touching what is not meant.
 
@@ -112,6 +114,7 @@ def plan_contact(
         part: what is moved.
         paths: alternatives, all with the same number of poses.
         stances: moves of the base to try: before, and by the end.
+        detours: how often a path to the first pose is searched for, at most.
 
     Raises:
         NoPlanError: there is none.
@@ -123,7 +126,7 @@ def plan_contact(
     queue = [(candidate.cost, _POSES, number) for number, candidate in enumerate(found)]
     heapq.heapify(queue)
     best: tuple[float, int, Array] | None = None
-    tested = detours = 0
+    tested = 0
     while queue and tested < MOST_TESTED:
         cost, stage, number = heapq.heappop(queue)
         if best is not None and cost >= best[0]:
@@ -136,16 +139,17 @@ def plan_contact(
             heapq.heappush(queue, (cost + search.poses(candidate), _LINES, number))
         elif stage == _LINES:
             rest = cost + search.between(candidate)
-            before = search.before(candidate)
+            before = search.straight(candidate)
             if best is None or rest + before < best[0]:
                 best = (rest + before, number, candidate.joints[:1])
-            if before > IN_CONTACT.detour:
+            if before > 2 * IN_CONTACT.detour:
                 heapq.heappush(queue, (rest + IN_CONTACT.detour, _DETOUR, number))
-        elif detours < MOST_DETOURS:
-            detours += 1
-            joints = search.detour(candidate)
-            if joints is not None and (best is None or cost < best[0]):
-                best = (cost, number, joints)
+        elif detours > 0:
+            detours -= 1
+            detour = search.detour(candidate)
+            whole = np.inf if detour is None else cost - IN_CONTACT.detour + detour[1]
+            if detour is not None and (best is None or whole < best[0]):
+                best = (whole, number, detour[0])
     if best is None:
         raise NoPlanError(f"{part.name}: the arm reaches nowhere along its arc")
     candidate = found[best[1]]
@@ -186,11 +190,10 @@ class _Search:
 
     def _angles(self, path: ContactPath) -> list[float]:
         """Every angle at which something is tested."""
-        before, found = self._part.angle, [self._part.angle]
-        for number, waypoint in enumerate(path.waypoints):
-            shares = [share for group in (BEFORE if number == 0 else BETWEEN) for share in group]
-            found += [before + share * (waypoint.angle - before) for share in (*shares, 1.0)]
-            before = waypoint.angle
+        found = [self._part.angle, *(waypoint.angle for waypoint in path.waypoints)]
+        shares = [share for group in BETWEEN for share in group]
+        for last, waypoint in itertools.pairwise(path.waypoints):
+            found += [last.angle + share * (waypoint.angle - last.angle) for share in shares]
         return found
 
     def candidates(self) -> list[_Candidate]:
@@ -279,31 +282,18 @@ class _Search:
         near = self._touched(angles, shifts, candidate.joints, may, most=1, raised_m=costs.clearance_m).counts.sum()
         return costs.hit_at_pose * float(hits) + costs.clearance * float(near)
 
-    def before(self, candidate: _Candidate) -> float:
-        """Cost of what is touched on the line to the first pose."""
-        return self._lines(candidate, first=True)
-
     def between(self, candidate: _Candidate) -> float:
         """Cost of what is touched between the poses."""
-        return self._lines(candidate, first=False)
-
-    def _lines(self, candidate: _Candidate, *, first: bool) -> float:
         path, (start, end) = self._paths[candidate.path], candidate.stance
         angles, shifts, joints, may, groups = [], [], [], [], []
-        for number, waypoint in enumerate(path.waypoints):
-            if (number == 0) is not first:
-                continue
-            if first:
-                angle, shift, one = self._part.angle, start, self._present
-            else:
-                last = path.waypoints[number - 1]
-                angle, shift, one = last.angle, _between(start, end, last.progress), candidate.joints[number - 1]
-            there = _between(start, end, waypoint.progress)
-            for group, shares in enumerate(BEFORE if first else BETWEEN):
+        for number, (last, waypoint) in enumerate(itertools.pairwise(path.waypoints), start=1):
+            shift, there = (_between(start, end, at.progress) for at in (last, waypoint))
+            one, other = candidate.joints[number - 1 : number + 1]
+            for group, shares in enumerate(BETWEEN):
                 for share in shares:
-                    angles.append(angle + share * (waypoint.angle - angle))
+                    angles.append(last.angle + share * (waypoint.angle - last.angle))
                     shifts.append(_between(shift, there, share))
-                    joints.append(one + share * (candidate.joints[number] - one))
+                    joints.append(one + share * (other - one))
                     may.append(number >= path.contact)
                     groups.append((number, group))
         if not groups:
@@ -314,23 +304,24 @@ class _Search:
             worst[where] = max(worst.get(where, 0), int(count))
         return IN_CONTACT.hit * sum(worst.values())
 
-    def detour(self, candidate: _Candidate) -> Array | None:
-        """A joint path (k, 7) to the first pose round what the straight line meets, as the controller goes along it."""
-        goal, arm, may = candidate.joints[0], self._arm, self._paths[candidate.path].contact == 0
-        key = np.concatenate([self._present, goal, np.ravel(candidate.stance)]).round(9)
-        generator = np.random.default_rng(zlib.crc32(key.tobytes()))
+    def straight(self, candidate: _Candidate) -> float:
+        """Cost of the straight line to the first pose."""
+        return self._approach(candidate).straight(self._present, candidate.joints[0])
 
-        def free(joints: Array) -> NDArray[np.bool_]:
+    def detour(self, candidate: _Candidate) -> tuple[Array, float] | None:
+        """A joint path (k, 7) to the first pose round what the straight line meets, and its cost."""
+        key = np.ravel(np.asarray(candidate.stance))
+        return self._approach(candidate).detour(self._present, candidate.joints[0], key)
+
+    def _approach(self, candidate: _Candidate) -> Approach:
+        may = self._paths[candidate.path].contact == 0
+
+        def counts(joints: Array, margin_m: float) -> NDArray[np.int64]:
             many = len(joints)
             angles, shifts = [self._part.angle] * many, [candidate.stance[0]] * many
-            return self._touched(angles, shifts, joints, [may] * many, most=1).counts == 0
+            return self._touched(angles, shifts, joints, [may] * many, margin_m=margin_m).counts
 
-        path = connect(self._present, goal, free, arm.ranges[:, 0], arm.ranges[:, 1], generator)
-        if path is None:
-            return None
-        ends = [self._present, *path]
-        line = np.concatenate([joint_line(arm, a, b, CLOSELY) for a, b in itertools.pairwise(ends)])
-        return path if bool(free(arm.along(self._present, line)).all()) else None
+        return Approach(self._arm, counts, IN_CONTACT)
 
     def _touched(
         self,
@@ -341,6 +332,7 @@ class _Search:
         *,
         most: int = IN_CONTACT.most_hits,
         raised_m: float = 0.0,
+        margin_m: float = 0.0,
         links: tuple[int, ...] | None = None,
     ) -> Touched:
         moves = np.asarray(shifts) @ self._axes[:, :2]
@@ -352,6 +344,7 @@ class _Search:
             states=np.array([self._states[round(angle, 6)] for angle in angles]),
             hand_may=np.array(may),
             raised_m=raised_m,
+            margin_m=margin_m,
             most=most,
             links=links,
         )

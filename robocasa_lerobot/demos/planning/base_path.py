@@ -29,7 +29,8 @@ TURN_COST_M = 0.30  # of one heading to the next
 SHIFT_M, SHIFT_STEP_M = 0.18, 0.03
 STEP_M, STEP_RAD = 0.05, 0.1  # between tested poses of a straight move
 MARGINS_M = (0.02, 0.0)  # kept from what stands around, or, where there is no path then, the next
-LEAVING_M = 0.15  # from the start, within which what is touched there already may still be touched
+# From the start, within which what is touched there already may still be touched; and from the goal.
+LEAVING_M, COMING_M = 0.15, 0.20
 MOST_CELLS = 20_000  # that are looked at
 _NEIGHBOURS = [(x, y) for x in (-1, 0, 1) for y in (-1, 0, 1) if x or y]
 
@@ -61,7 +62,7 @@ def find_path(
     """
     footprints, path = Room(scene), None
     for margin in MARGINS_M if data is not None else ():
-        path = path or _search(Space(footprints, data, start, held, joints, margin), start, goal)
+        path = path or _search(Space(footprints, data, start, goal, held, joints, margin), start, goal)
     if path is None:  # without a state, or where the arm already touches something wherever it goes
         path = _search(footprints, start, goal)
     if path is None:
@@ -121,6 +122,7 @@ class Space(Room):
         room: footprints.
         data: present state.
         start: where the base stands; what is touched there is no obstacle near it.
+        goal: where it is to stand.
         held: what is in the gripper.
         joints: (7,) of the arm on the way, radians; None takes those it has.
         margin_m: kept from what stands around.
@@ -131,6 +133,7 @@ class Space(Room):
         room: Room,
         data: mujoco.MjData,
         start: RobotPose,
+        goal: RobotPose,
         held: Held | None,
         joints: Array | None,
         margin_m: float,
@@ -139,26 +142,35 @@ class Space(Room):
         self._checker = CollisionChecker(room.scene.model, data)
         self._held, self._margin = held, margin_m
         self._joints = self._checker.present_joints if joints is None else joints
-        self._start = start
-        self._leaning = self._touched([start], 8).all()
+        self._start, self._goal = start, goal
+        self._leaning = self._touched([start], 8, 0.0).all()
 
     def all_free(self, poses: Sequence[RobotPose]) -> NDArray[np.bool_]:
-        """Whether nothing is touched, inside of the walls; poses near the start may touch what the start does."""
+        """Whether nothing is touched, inside of the walls; poses near the start may touch what the start does.
+
+        Near the start and the goal no margin is kept: robots stand close to what they work on.
+        """
         free = super().all_free(poses)
-        open_places = np.flatnonzero(free)
-        if not len(open_places):
+        places = np.flatnonzero(free)
+        if not len(places):
             return free
-        found = self._touched([poses[index] for index in open_places], 8 if self._leaning else 1)
-        for index, count, bodies in zip(open_places, found.counts, found.bodies, strict=True):
-            pose = poses[index]
-            leaving = np.hypot(pose.x - self._start.x, pose.y - self._start.y) < LEAVING_M
-            touched = frozenset(bodies[:count].tolist())
-            free[index] = not (touched - self._leaning if leaving else touched)
+        at = np.array([(poses[index].x, poses[index].y) for index in places])
+        leaving = np.hypot(*(at - [self._start.x, self._start.y]).T) < LEAVING_M
+        coming = np.hypot(*(at - [self._goal.x, self._goal.y]).T) < COMING_M
+        for close in (False, True):
+            mine = places[(leaving | coming) == close]
+            if not len(mine):
+                continue
+            found = self._touched([poses[index] for index in mine], 8 if close else 1, 0.0 if close else self._margin)
+            for index, count, bodies in zip(mine, found.counts, found.bodies, strict=True):
+                touched = frozenset(bodies[:count].tolist())
+                left = np.hypot(poses[index].x - self._start.x, poses[index].y - self._start.y) < LEAVING_M
+                free[index] = not (touched - self._leaning if left else touched)
         return free
 
-    def _touched(self, poses: Sequence[RobotPose], most: int) -> Touched:
+    def _touched(self, poses: Sequence[RobotPose], most: int, margin_m: float) -> Touched:
         bases = np.array([(pose.x, pose.y, pose.yaw) for pose in poses])
-        return self._checker.touched(bases, self._joints, held=self._held, margin_m=self._margin, most=most)
+        return self._checker.touched(bases, self._joints, held=self._held, margin_m=margin_m, most=most)
 
 
 def carried(scene: Scene, data: mujoco.MjData) -> Held | None:
@@ -201,10 +213,10 @@ class _Grid:
     goal: RobotPose
 
     def __post_init__(self) -> None:
-        self._known: dict[tuple[int, int, float], bool] = {}
+        self._known: dict[tuple[float, float, float], bool] = {}
 
-    def pose(self, cell: tuple[int, int, float]) -> RobotPose:
-        """The middle of a cell, or between two headings."""
+    def pose(self, cell: tuple[float, float, float]) -> RobotPose:
+        """The middle of a cell, or between two."""
         i, j, k = cell
         return RobotPose(
             self.goal.x + i * CELL_M, self.goal.y + j * CELL_M, wrap(self.goal.yaw + k * 2 * np.pi / HEADINGS)
@@ -257,23 +269,24 @@ class _Grid:
             yield (i, j, (k + turn) % HEADINGS), TURN_COST_M
 
     def _look(self, before: _Cell, cells: Sequence[_Cell]) -> None:
-        """Test cells, and what lies between two headings, all at once."""
-        wanted: list[tuple[int, int, float]] = [*cells, *(_turning(before, cell) for cell in cells)]
+        """Test cells, and the way there where it leads across a corner or turns, all at once."""
+        wanted: list[tuple[float, float, float]] = [*cells, *(_middle(before, cell) for cell in cells)]
         new = [cell for cell in dict.fromkeys(wanted) if cell not in self._known]
         free = self.room.all_free([self.pose(cell) for cell in new])
         self._known.update(zip(new, free.tolist(), strict=True))
         self._known[0, 0, 0] = True
 
     def _is_free(self, before: _Cell, cell: _Cell) -> bool:
-        return self._known[cell] and self._known[_turning(before, cell)]
+        return self._known[cell] and self._known[_middle(before, cell)]
 
 
-def _turning(before: _Cell, cell: _Cell) -> tuple[int, int, float]:
-    """Between the headings of two cells that lie beside each other; the second one where they have the same."""
-    if before[2] == cell[2]:
-        return cell
-    low, high = sorted((before[2], cell[2]))
-    return (*cell[:2], high + 0.5 if (low, high) == (0, HEADINGS - 1) else low + 0.5)
+def _middle(before: _Cell, cell: _Cell) -> tuple[float, float, float]:
+    """Between two cells that lie across a corner or have other headings; the second one where they lie side by side."""
+    (i, j, k), (x, y, turned) = before, cell
+    if k == turned:
+        return ((i + x) / 2, (j + y) / 2, k) if i != x and j != y else cell
+    low, high = sorted((k, turned))
+    return (x, y, high + 0.5 if (low, high) == (0, HEADINGS - 1) else low + 0.5)
 
 
 def base_now(data: mujoco.MjData) -> RobotPose:

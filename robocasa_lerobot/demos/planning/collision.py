@@ -22,7 +22,7 @@ from robocasa_lerobot.envs.robots.panda_omron.names import ARM_CENTER_SITE, HAND
 from robocasa_lerobot.envs.scene.bodies import subtree
 
 MOST_TOUCHED = 3  # bodies that are told apart
-_PARTS = 8  # numbers of links and the base
+FLOOR = "floor"
 
 _scratch: WeakKeyDictionary[mujoco.MjModel, mujoco.MjData] = WeakKeyDictionary()
 
@@ -121,6 +121,9 @@ class CollisionChecker:
         self._yaw_offset = float(np.arctan2(frame.xmat[3], frame.xmat[0])) - yaw
         self._grip_from_last = (self.arm.chain.grip, self.arm.chain.hand)
         self._pardons = np.zeros(model.nbody, dtype=np.int64)
+        floor = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, FLOOR)
+        if floor >= 0:
+            self._pardons[floor] = 3  # wheels stand on it, the hand may not
         self._pardons[list(allowed)] = 1
         self._movers: dict[tuple[int, tuple[int, ...] | None], kernel.Shapes] = {}
         self._robots: dict[tuple[int, ...] | None, kernel.Shapes] = {}

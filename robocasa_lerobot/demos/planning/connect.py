@@ -16,7 +16,7 @@ from robocasa_lerobot.demos.motion import Array
 
 STEP_RAD = 0.35  # by which a tree grows at once, of the joint that turns most
 TEST_RAD = 0.06  # between tested configurations
-ITERATIONS, SHORTCUTS = 150, 40
+ITERATIONS, SHORTCUTS = 80, 30
 GOAL_BIAS_RAD = 1.2  # samples lie about the line from start to goal, as far as this from it
 EVERYWHERE = 0.25  # share of the samples that lie anywhere
 

@@ -21,6 +21,8 @@ class PlanCosts:
         hit: of a body that is touched in a part of the path; most_hits: bodies that are counted.
         hit_at_pose: the same at the poses of a path in contact.
         clearance, clearance_m: of a robot that would touch something if it stood that much higher.
+        near, near_m: of a body that the arm comes as near as this to on its path to the first pose.
+        astray, astray_rad: of an arm that ends so far from the planned joint angles when its hand is led along a path.
         detour: of a path that was planned round something, and detour_per_rad of its length beyond the straight line.
         good_enough: cost up to which no other place to stand is looked at.
         hopeless: cost from which on a candidate is dropped.
@@ -43,6 +45,10 @@ class PlanCosts:
     hit_at_pose: float = 0.5
     clearance: float = 0.0
     clearance_m: float = 0.0
+    near: float = 0.1
+    near_m: float = 0.02
+    astray: float = 1.0
+    astray_rad: float = 0.6
     detour: float = 0.15
     detour_per_rad: float = 0.03
     good_enough: float = 0.8

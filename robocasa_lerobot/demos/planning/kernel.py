@@ -188,15 +188,20 @@ def _step(
 
 
 @compiled
-def solve(chain: Any, positions: Array, rotations: Array, hopeful: Flags, joints: Array, errors: Array) -> None:
+def solve(
+    chain: Any, positions: Array, rotations: Array, hopeful: Flags, joints: Array, errors: Array, chained: bool
+) -> None:
     """Turn joint angles (N, 7) towards grip positions (N, 3) and hand rotations (N, 3, 3); write the errors (N, 2).
 
-    Rows that are not `hopeful` stay as they are. Errors are metres and radians.
+    Rows that are not `hopeful` stay as they are; where `chained`, each begins as the one before it ended. Errors are
+    metres and radians.
     """
     position, rotation = np.empty((8, 3)), np.empty((8, 3, 3))
     grip, hand, turn, error = np.empty(3), np.empty((3, 3)), np.empty(3), np.empty(6)
     jacobian, a = np.empty((6, ARM_DOFS)), np.empty((6, 6))
     for n in range(len(joints)):
+        if chained and n > 0:
+            joints[n] = joints[n - 1]
         for iteration in range(ITERATIONS + 1):
             link_frames(chain, joints[n], position, rotation)
             _grip(chain, position, rotation, grip, hand)
@@ -323,7 +328,7 @@ def _meet(
     """Note the bodies of the first `count` geoms of `near` that geoms which move touch, by MuJoCo's own distance."""
     most, within = bodies.shape[1], max(margin, 1e-3)
     mine, its, owners, links = moving.geoms, others.geoms, others.bodies, others.links
-    is_hand, contype, conaffinity = moving.is_hand, moving.contype, moving.conaffinity
+    is_hand, own_links, contype, conaffinity = moving.is_hand, moving.links, moving.contype, moving.conaffinity
     other_contype, other_conaffinity = others.contype, others.conaffinity
     for k in range(count):
         e = near[k]
@@ -337,6 +342,8 @@ def _meet(
             return
         for g in range(len(mine)):
             if (is_hand[g] and pardon == 2 and hand_may) or (on_own_base and not is_hand[g]):
+                continue
+            if pardon == 3 and own_links[g] == 0:
                 continue
             if (
                 low[g, 0] > other_high[e, 0] + margin
@@ -388,7 +395,7 @@ def touched(
         part: geoms of a part that moves.
         part_positions: (S, p, 3) of the part's geoms in each of its states.
         part_rotations: (S, p, 3, 3) of them.
-        pardons: (nbody,) 1 for bodies that may be touched, 2 for those that the hand alone may touch.
+        pardons: (nbody,) 1 for bodies that may be touched, 2 for those that the hand alone, 3 that the base alone may.
         bases: (N, 4) x, y, z in metres and heading in radians of the arm's frame.
         joints: (N, 7) radians.
         states: (N,) of the part.

@@ -83,7 +83,7 @@ class Arm:
         joints, errors = np.array(start, dtype=np.float64), np.empty((len(start), 2))
         hopeful = self._within_reach(positions, rotations)
         kernel.solve(
-            self.chain, np.ascontiguousarray(positions), np.ascontiguousarray(rotations), hopeful, joints, errors
+            self.chain, np.ascontiguousarray(positions), np.ascontiguousarray(rotations), hopeful, joints, errors, False
         )
         margin = np.minimum(joints - self.ranges[:, 0], self.ranges[:, 1] - joints).min(axis=1)
         return Solution(joints, errors[:, 0], errors[:, 1], margin)
@@ -94,11 +94,10 @@ class Arm:
         Each pose is solved from the one before, so that the elbow goes as it will rather than as it was planned.
         """
         positions, rotations = self.forward(joints)
-        now, found = np.array(start, dtype=np.float64)[None], []
-        for index in range(len(joints)):
-            now = self.solve(positions[index : index + 1], rotations[index : index + 1], now).joints
-            found.append(now[0])
-        return np.array(found).reshape(len(joints), 7)
+        found, errors = np.empty((len(joints), 7)), np.empty((len(joints), 2))
+        found[:1] = start
+        kernel.solve(self.chain, positions, rotations, np.ones(len(joints), dtype=np.bool_), found, errors, True)
+        return found
 
     @staticmethod
     def _within_reach(positions: Array, rotations: Array) -> NDArray[np.bool_]:

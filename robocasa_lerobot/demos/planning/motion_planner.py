@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import heapq
 import itertools
-import zlib
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
@@ -18,17 +17,15 @@ from numpy.typing import NDArray
 
 from robocasa_lerobot.demos.motion import Array, HandTarget, base_pose, floor_axes
 from robocasa_lerobot.demos.motion_style import variety_of
+from robocasa_lerobot.demos.planning.approach import Approach
 from robocasa_lerobot.demos.planning.collision import CollisionChecker, Held
-from robocasa_lerobot.demos.planning.connect import connect
 from robocasa_lerobot.demos.planning.costs import NEARBY, REACHING, PlanCosts
-from robocasa_lerobot.demos.planning.follow import CLOSELY, joint_line
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.robots.panda_omron.robot import PANDA_OMRON
 from robocasa_lerobot.envs.scene.robot_poses import RobotPose
 
-SHORTLIST, MOST_TESTED, MOST_DETOURS = 200, 60, 3
-FIRST_BINS, OTHER_BINS = 4, 1  # stretches of a line in which what is touched counts once
-SAMPLE_RAD, MOST_SAMPLES = 0.10, 5  # between tested configurations of a stretch, and how many at most
+SHORTLIST, MOST_TESTED, MOST_DETOURS = 200, 60, 2
+SAMPLE_RAD, MOST_SAMPLES = 0.10, 5  # between tested configurations of a line, and how many at most
 NEAR_M, DRIVE_STEP_M = 0.08, 0.07  # a drive as short is not tested; between tested places of a longer one
 _POSES, _LINES, _DETOUR = range(3)
 
@@ -156,12 +153,15 @@ class MotionPlanner:
         self._same = np.unique(keys.round(4), axis=0, return_inverse=True)[1].reshape(-1)
         self._drives: dict[tuple[float, float, float], float] = {}
 
-    def best(self, bases: Sequence[RobotPose | None], *, folded: bool = True) -> list[MotionPlan]:
+    def best(
+        self, bases: Sequence[RobotPose | None], *, folded: bool = True, detours: int = MOST_DETOURS
+    ) -> list[MotionPlan]:
         """Plans among all paths from all places, the best first; the first one's cost is complete.
 
         Args:
             bases: None is where the robot stands.
             folded: whether the arm is folded while the base drives, or carried as it is.
+            detours: how often a path to the first pose is searched for, at most.
         """
         if not bases or not self._paths:
             return []
@@ -169,7 +169,7 @@ class MotionPlanner:
         queue = [(float(found.cost[row]), _POSES, row) for row in range(len(found.cost))]
         heapq.heapify(queue)
         plans: list[MotionPlan] = []
-        number, detours = itertools.count(), 0
+        number = itertools.count()
         least = np.inf
         while queue:
             cost, stage, row = heapq.heappop(queue)
@@ -180,17 +180,16 @@ class MotionPlanner:
             if stage == _POSES:
                 heapq.heappush(queue, (cost + found.poses(row), _LINES, row))
             elif stage == _LINES:
-                rest = cost + found.lines(row, first=False) + found.drive(row)
-                first = found.lines(row, first=True)
+                rest = cost + found.lines(row) + found.drive(row)
+                first = found.straight(row)
                 plans.append(found.plan(row, rest + first, found.goal(row)[None]))
-                if first > self._costs.detour:
+                if first > 2 * self._costs.detour:
                     heapq.heappush(queue, (rest + self._costs.detour, _DETOUR, row))
-            elif detours < MOST_DETOURS:
-                detours += 1
-                path = found.detour(row)
-                if path is not None:
-                    longer = found.length(row, path) * self._costs.detour_per_rad
-                    plans.append(found.plan(row, cost + longer, path))
+            elif detours > 0:
+                detours -= 1
+                detour = found.detour(row)
+                if detour is not None:
+                    plans.append(found.plan(row, cost - self._costs.detour + detour[1], detour[0]))
             least = min([least, *(plan.cost for plan in plans[-1:])])
         return sorted(plans, key=lambda plan: plan.cost)
 
@@ -273,26 +272,20 @@ class _Candidates:
         counts = self._counts(row, [(line, self._joints[row, line : line + 1]) for line in range(1, self._lines + 1)])
         return self._p._costs.hit_at_pose * float(counts.sum())
 
-    def lines(self, row: int, *, first: bool) -> float:
-        """Cost of what is touched on the line to the first pose, or on those between the others."""
-        joints, costs = self._joints[row], self._p._costs
-        worst = 0
+    def lines(self, row: int) -> float:
+        """Cost of what is touched on the lines between the poses."""
+        joints, worst, at = self._joints[row], 0, 0
         pieces: list[tuple[int, Array]] = []
-        sizes: list[int] = []
-        for line in range(1, 2) if first else range(2, len(joints)):
-            parts = FIRST_BINS if line == 1 else OTHER_BINS
+        for line in range(2, len(joints)):
             away = joints[line] - joints[line - 1]
-            count = parts * int(np.clip(np.ceil(np.abs(away).max() / (parts * SAMPLE_RAD)), 1, MOST_SAMPLES))
-            # The last stretch ends short of the pose, which has been tested.
-            shares = (np.arange(count) + 0.7) / count
-            pieces.append((line, joints[line - 1] + shares[:, None] * away))
-            sizes += [count // parts] * parts
+            count = int(np.clip(np.ceil(np.abs(away).max() / SAMPLE_RAD), 1, MOST_SAMPLES))
+            # It ends short of the pose, which has been tested.
+            pieces.append((line, joints[line - 1] + ((np.arange(count) + 0.7) / count)[:, None] * away))
         counts = self._counts(row, pieces)
-        at = 0
-        for size in sizes:
-            worst += int(counts[at : at + size].max())
-            at += size
-        return costs.hit * worst
+        for _, piece in pieces:
+            worst += int(counts[at : at + len(piece)].max())
+            at += len(piece)
+        return self._p._costs.hit * worst
 
     def drive(self, row: int) -> float:
         """Cost of what is met on the drive."""
@@ -303,29 +296,23 @@ class _Candidates:
         joints: Array = self._joints[row, 1]
         return joints
 
-    def detour(self, row: int) -> Array | None:
-        """A joint path (k, 7) to the first pose round what the straight line meets, as the controller goes along it."""
+    def straight(self, row: int) -> float:
+        """Cost of the straight line to the first pose."""
+        return self._approach(row).straight(self._joints[row, 0], self._joints[row, 1])
+
+    def detour(self, row: int) -> tuple[Array, float] | None:
+        """A joint path (k, 7) to the first pose round what the straight line meets, and its cost."""
+        place = self._places[self._where[row]]
+        return self._approach(row).detour(self._joints[row, 0], self._joints[row, 1], place)
+
+    def _approach(self, row: int) -> Approach:
         planner, place = self._p, self._places[self._where[row]]
-        arm, checker = planner._arm, planner._checker
-        held = planner.held_on(planner._paths[self._which[row]], 1)
-        start, goal = self._joints[row, 0], self._joints[row, 1]
-        generator = np.random.default_rng(zlib.crc32(np.concatenate([start, goal, place]).round(9).tobytes()))
+        held, most = planner.held_on(planner._paths[self._which[row]], 1), planner._costs.most_hits
 
-        def free(joints: Array) -> NDArray[np.bool_]:
-            return checker.free(place, joints, held=held)
+        def counts(joints: Array, margin_m: float) -> NDArray[np.int64]:
+            return planner._checker.touched(place, joints, held=held, margin_m=margin_m, most=most).counts
 
-        path = connect(start, goal, free, arm.ranges[:, 0], arm.ranges[:, 1], generator)
-        if path is None:
-            return None
-        ends = [start, *path]
-        line = np.concatenate([joint_line(arm, a, b, CLOSELY) for a, b in itertools.pairwise(ends)])
-        return path if bool(free(arm.along(start, line)).all()) else None
-
-    def length(self, row: int, path: Array) -> float:
-        """How much longer a path is than the straight line, radians of the joint that turns most."""
-        ends = np.vstack([self._joints[row, 0], path])
-        whole = float(np.abs(np.diff(ends, axis=0)).max(axis=1).sum())
-        return max(whole - float(np.abs(ends[-1] - ends[0]).max()), 0.0)
+        return Approach(planner._arm, counts, planner._costs)
 
     def plan(self, row: int, cost: float, joints: Array) -> MotionPlan:
         """The plan of a row."""
