@@ -22,12 +22,13 @@ from robocasa_lerobot.demos.motion import (
     hand_rotation,
     nearer_turn,
 )
-from robocasa_lerobot.demos.skills.arc_plan import STANDOFF_M, ArcPlan, Shift, Way, plan_arc
+from robocasa_lerobot.demos.planning.articulated import ArticulatedPlan, ContactPath, Shift, plan_contact
+from robocasa_lerobot.demos.planning.contact_paths import STANDOFF_M
+from robocasa_lerobot.demos.planning.follow import follow_joint_path
 from robocasa_lerobot.demos.skills.common import SkillError, draw_back, hold_hand, move_hand
 from robocasa_lerobot.demos.skills.firm import FirmServo
 from robocasa_lerobot.demos.skills.hinged import Headway, Hinged
 from robocasa_lerobot.demos.skills.reach import shift_base
-from robocasa_lerobot.demos.skills.ways import lead
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 
 SETTLE_STEPS, GRASP_STEPS, RELEASE_STEPS = 6, 10, 6
@@ -43,7 +44,7 @@ FIRMER_STEPS = 12  # without movement, after which a firm push has twice its lea
 def swing(
     env: KitchenEnv,
     part: Hinged,
-    plan: ArcPlan,
+    plan: ArticulatedPlan,
     goal: float,
     *,
     gripper: float,
@@ -80,25 +81,25 @@ def swing(
         if headway.ends():
             return
         if firm:
-            here, near = (plan.way.target_at(part.angle + turn).position for turn in (0.0, 0.01))
+            here, near = (plan.path.target_at(part.angle + turn).position for turn in (0.0, 0.01))
             lead = FIRM_LEAD_M / (float(np.linalg.norm(near - here)) / 0.01) * (1.0 + headway.since / FIRMER_STEPS)
-            step = servo.action(plan.way.target_at(part.angle + way * lead), gripper)
+            step = servo.action(plan.path.target_at(part.angle + way * lead), gripper)
         else:
-            step = arm_action(data, plan.way.target_at(part.angle + way * lead_rad), gripper, speed=speed)
+            step = arm_action(data, plan.path.target_at(part.angle + way * lead_rad), gripper, speed=speed)
         progress = float(np.clip((part.angle - first) / (goal - first) + 0.15, 0.0, 1.0))
         step[contract.ACTION_SLICES["base_motion"]][:2] = _base_command(data, spot[0] + progress * (spot[1] - spot[0]))
         yield step
 
 
 def pull_arc(
-    env: KitchenEnv, part: Hinged, plan: ArcPlan, goal: float, *, lead_rad: float = 0.15, speed: float = 0.9
+    env: KitchenEnv, part: Hinged, plan: ArticulatedPlan, goal: float, *, lead_rad: float = 0.15, speed: float = 0.9
 ) -> Iterator[Array]:
     """Grasp a part as planned, lead it to an angle, let it go and draw the hand back."""
     data = env.data
     spot = spots(env, plan)
     yield from take_stance(env, plan, OPEN)
-    yield from lead(env, plan.joints, OPEN)
-    before, at = plan.way.vias[0].target, plan.way.vias[1].target
+    yield from follow_joint_path(env, plan.joints, OPEN)
+    before, at = plan.path.waypoints[0].target, plan.path.waypoints[1].target
     yield from move_hand(data, before, OPEN, speed=0.7, tolerance=0.010, insist=INSIST)
     yield from hold_hand(data, before, OPEN, SETTLE_STEPS)  # it comes with speed, and there may be little room
     yield from move_hand(data, at, OPEN, speed=0.6, tolerance=0.006, max_steps=40, insist=INSIST)
@@ -113,7 +114,7 @@ def pull_arc(
 def push_arc(
     env: KitchenEnv,
     part: Hinged,
-    ways: Iterable[Way],
+    ways: Iterable[ContactPath],
     stances: Iterable[tuple[Shift, Shift]],
     goal: float,
     *,
@@ -128,13 +129,13 @@ def push_arc(
         SkillError: none of them is to be had, or none for `most_cost`.
     """
     data = env.data
-    plan = plan_arc(env, part, ways, stances)
+    plan = plan_contact(env, part, ways, stances)
     if plan.cost > most_cost:
         raise SkillError(f"{part.name}: the arm hardly reaches along its arc")
     spot = spots(env, plan)
     yield from take_stance(env, plan, CLOSED)
-    yield from lead(env, plan.joints, CLOSED)
-    for via in plan.way.vias[: plan.way.contact]:
+    yield from follow_joint_path(env, plan.joints, CLOSED)
+    for via in plan.path.waypoints[: plan.path.contact]:
         yield from move_hand(data, via.target, CLOSED, tolerance=0.03)
     yield from swing(env, part, plan, goal, gripper=CLOSED, spot=spot, lead_rad=lead_rad, speed=speed, firm=firm)
     yield from draw_back(data, CLOSED, 0.10)
@@ -181,13 +182,13 @@ def working_height(env: KitchenEnv, door: Hinged, low: float, high: float) -> fl
     return float(np.clip(height, low, high))
 
 
-def take_stance(env: KitchenEnv, plan: ArcPlan, gripper: float) -> Iterator[Array]:
+def take_stance(env: KitchenEnv, plan: ArticulatedPlan, gripper: float) -> Iterator[Array]:
     """Drive to where a plan begins."""
     for leg in plan.legs:
         yield from shift_base(env, leg, gripper)
 
 
-def spots(env: KitchenEnv, plan: ArcPlan) -> tuple[Array, Array]:
+def spots(env: KitchenEnv, plan: ArticulatedPlan) -> tuple[Array, Array]:
     """World positions (3,) of the base that a plan begins and ends at, from where it stands now."""
     base, yaw = base_pose(env.data)
     axes = floor_axes(yaw)

@@ -20,9 +20,10 @@ from robocasa_lerobot.demos.motion import (
     grip_position,
     hand_rotation,
 )
+from robocasa_lerobot.demos.planning.follow import follow_joint_path
+from robocasa_lerobot.demos.planning.motion_planner import plan_near
 from robocasa_lerobot.demos.skills.common import SkillError, hold_hand, move_hand, stage_done
-from robocasa_lerobot.demos.skills.reach import shift_base, untried
-from robocasa_lerobot.demos.skills.reach_many import plan_reach_of_many
+from robocasa_lerobot.demos.skills.reach import shift_base
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.kitchens.appliances.kinds.blender import Blender
 from robocasa_lerobot.envs.kitchens.footprints import Area, Footprint
@@ -77,15 +78,13 @@ def _carry(env: KitchenEnv, stage: Stage, blender: Blender, spots: list[Array]) 
             _way(at, spot + UP * (HOLD_M + DROP_M), rotation, blender) for spot in spots for rotation in grasps(env)
         ]
         allowed = frozenset({int(env.model.body(blender.lid).id)})
-        plans = plan_reach_of_many(env, ways, SHIFTS, allowed=allowed)
-        plan = untried([other for other in plans if other.cost < plans[0].cost + NEARLY_AS_GOOD], tried)
+        plan = plan_near(env, ways, SHIFTS, allowed=allowed)
+        another = plan_near(env, ways, SHIFTS, allowed=allowed, tried=tried) if tried else plan
+        plan = another if another.cost < plan.cost + NEARLY_AS_GOOD else plan
+        tried.append(plan.targets[-1].rotation)
         yield from shift_base(env, plan.shift, OPEN)
+        yield from follow_joint_path(env, plan.joints, OPEN)
         hover, grasp, lifted, over, put = plan.targets
-        # On the jug there is a wall cabinet above, and room before it; on the counter it is the other way round.
-        on_jug = data.body(blender.lid).xpos[2] > blender.lid_pose[0][2] - LOST_M
-        back = -hover.rotation[:, 2] * BEFORE_M if on_jug else UP * ABOVE_M
-        above = HandTarget(hover.position + back, hover.rotation)
-        yield from move_hand(data, above, OPEN, tolerance=0.05)
         yield from move_hand(data, hover, OPEN, tolerance=0.015)
         yield from move_hand(data, grasp, OPEN, speed=0.6, tolerance=0.006, max_steps=50)
         yield from hold_hand(data, grasp, CLOSED, GRASP_STEPS)

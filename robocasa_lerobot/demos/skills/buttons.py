@@ -10,10 +10,12 @@ from collections.abc import Callable, Iterator
 import numpy as np
 
 from robocasa_lerobot.demos.motion import CLOSED, UP, Array, HandTarget, base_pose, frame, grip_position, hand_rotation
-from robocasa_lerobot.demos.skills.arc_plan import CLOSED_FINGERS_HALF_M
+from robocasa_lerobot.demos.planning.contact_paths import CLOSED_FINGERS_HALF_M
+from robocasa_lerobot.demos.planning.follow import follow_joint_path
+from robocasa_lerobot.demos.planning.motion_planner import plan_near
 from robocasa_lerobot.demos.skills.common import SkillError, hold_hand, move_hand, stage_done
 from robocasa_lerobot.demos.skills.levers import level_and_down, push_way
-from robocasa_lerobot.demos.skills.reach import plan_reach, shift_base, untried
+from robocasa_lerobot.demos.skills.reach import shift_base
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.kitchens.appliances.base import Appliance
 from robocasa_lerobot.envs.tasks.task import Stage
@@ -46,8 +48,10 @@ def press_button(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
             ways = [push_way(face, inwards, rotation, PRESS_M) for rotation in level_and_down(env)]
         else:
             ways = [_way(face, inwards, rotation) for rotation in rotations(env, inwards)]
-        plan = untried(plan_reach(env, ways, SHIFTS, allowed=allowed), tried)
+        plan = plan_near(env, ways, SHIFTS, allowed=allowed, tried=tried)
+        tried.append(plan.targets[-1].rotation)
         yield from shift_base(env, plan.shift, CLOSED)
+        yield from follow_joint_path(env, plan.joints, CLOSED)
         *before, at = plan.targets
         yield from move_hand(data, before[0], CLOSED, tolerance=0.04)
         for target in before[1:]:

@@ -17,10 +17,21 @@ from robocasa_lerobot.demos.motion import (
     limit,
     pose_error,
 )
+from robocasa_lerobot.demos.planning.errors import SkillError
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.robots.panda_omron.names import FINGER_JOINTS
 from robocasa_lerobot.envs.tasks.conditions import stage_condition
 from robocasa_lerobot.envs.tasks.task import Stage
+
+__all__ = [
+    "SkillError",
+    "close_fingers",
+    "draw_back",
+    "hold_hand",
+    "move_hand",
+    "require_near",
+    "stage_done",
+]
 
 POSITION_TOLERANCE_M = 0.012
 ROTATION_TOLERANCE_RAD = 0.12
@@ -29,10 +40,6 @@ STALL_M, STALL_STEPS = 0.002, 12
 INSIST_NEAR_M, INSIST_MOST_M = 0.03, 0.03
 AHEAD_ON_LINE_M = 0.03  # commands this far ahead are full ones
 MORE_CLOSING_STEPS, STILL_M = 10, 0.0004  # of a finger in a step: it has met something
-
-
-class SkillError(RuntimeError):
-    """The skill cannot go on: what it tried and how far it came."""
 
 
 def move_hand(

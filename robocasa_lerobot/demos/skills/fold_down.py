@@ -16,11 +16,12 @@ from robocasa_lerobot.demos.motion import (
     grip_position,
     hand_rotation,
 )
-from robocasa_lerobot.demos.skills.arc_plan import Shift, Via, Way, arc_vias, grip_way, plan_arc
+from robocasa_lerobot.demos.planning.articulated import ContactPath, Shift, Waypoint, plan_contact
+from robocasa_lerobot.demos.planning.contact_paths import arc_waypoints, grip_path
+from robocasa_lerobot.demos.planning.follow import follow_joint_path
 from robocasa_lerobot.demos.skills.arcs import pull_arc, spots, swing, take_stance
 from robocasa_lerobot.demos.skills.common import SkillError, move_hand
 from robocasa_lerobot.demos.skills.hinged import Hinged
-from robocasa_lerobot.demos.skills.ways import lead
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.robots.panda_omron.robot import PANDA_OMRON
 
@@ -76,7 +77,7 @@ def _pull(env: KitchenEnv, door: Hinged, wanted: float) -> Iterator[Array]:
     """Grasp the handle and pull the door ajar."""
     data = env.data
     ways = [_pull_way(env, door, grasp, flip, wanted) for grasp in GRASPS for flip in (1.0, -1.0)]
-    plan = plan_arc(env, door, ways, stances_beside(env, door))
+    plan = plan_contact(env, door, ways, stances_beside(env, door))
     yield from pull_arc(env, door, plan, wanted + 0.02)
     rest = HandTarget(grip_position(data), hand_rotation(data))
     edge = door.point(np.array([0.0, 0.0, door.high[2]]), door.angle)
@@ -90,7 +91,9 @@ def _along(env: KitchenEnv, door: Hinged, low: float, high: float) -> float:
     return float(np.clip((base - door.point(np.zeros(3), 0.0)) @ door.rightwards, low, high))
 
 
-def _pull_way(env: KitchenEnv, door: Hinged, grasp: tuple[float, float, float], flip: float, wanted: float) -> Way:
+def _pull_way(
+    env: KitchenEnv, door: Hinged, grasp: tuple[float, float, float], flip: float, wanted: float
+) -> ContactPath:
     low, high = door.handle()
     room = 0.5 * (high[0] - low[0]) - 0.07
     middle = (low[0] + high[0]) / 2
@@ -103,18 +106,18 @@ def _pull_way(env: KitchenEnv, door: Hinged, grasp: tuple[float, float, float], 
         turn = door.turned(grasp[2] * angle)
         return frame(turn @ local, flip * turn[:, 2])
 
-    return grip_way(door, grip, rotation_at, wanted)
+    return grip_path(door, grip, rotation_at, wanted)
 
 
 def _push(env: KitchenEnv, door: Hinged) -> Iterator[Array]:
     """Push the door down, from inside."""
     data = env.data
     ways = [_push_way(env, door, push, roll) for push in PUSHES for roll in range(4)]
-    plan = plan_arc(env, door, ways, stances_beside(env, door))
+    plan = plan_contact(env, door, ways, stances_beside(env, door))
     spot = spots(env, plan)
     yield from take_stance(env, plan, CLOSED)
-    yield from lead(env, plan.joints, CLOSED)
-    for via in plan.way.vias[: plan.way.contact]:
+    yield from follow_joint_path(env, plan.joints, CLOSED)
+    for via in plan.path.waypoints[: plan.path.contact]:
         yield from move_hand(data, via.target, CLOSED, tolerance=0.04)
     yield from swing(
         env,
@@ -130,7 +133,7 @@ def _push(env: KitchenEnv, door: Hinged) -> Iterator[Array]:
     yield from move_hand(data, away, CLOSED, max_steps=20)
 
 
-def _push_way(env: KitchenEnv, door: Hinged, push: tuple[float, float, float], roll: int) -> Way:
+def _push_way(env: KitchenEnv, door: Hinged, push: tuple[float, float, float], roll: int) -> ContactPath:
     share, lean, aside = push
     x = _along(env, door, 0.75 * door.low[0], 0.75 * door.high[0])
     local = np.array([x, door.inside, share * door.high[2]])
@@ -150,5 +153,5 @@ def _push_way(env: KitchenEnv, door: Hinged, push: tuple[float, float, float], r
     edge = door.point(np.array([x, door.inside, door.high[2]]), start)
     over = np.array([*beside.position[:2], edge[2] + 0.08])
     end = OPEN_SHARE * door.full
-    arc = arc_vias(start, end, target_at, (0.0, 0.5, 1.0))
-    return Way((Via(start, HandTarget(over, rotation)), Via(start, beside), *arc), 2, target_at)
+    arc = arc_waypoints(start, end, target_at, (0.0, 0.5, 1.0))
+    return ContactPath((Waypoint(start, HandTarget(over, rotation)), Waypoint(start, beside), *arc), 2, target_at)

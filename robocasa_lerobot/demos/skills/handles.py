@@ -19,7 +19,8 @@ from robocasa_lerobot.demos.motion import (
     grip_position,
     hand_rotation,
 )
-from robocasa_lerobot.demos.skills.arc_plan import Shift, Via, Way, arc_vias, grip_way, plan_arc
+from robocasa_lerobot.demos.planning.articulated import ContactPath, Shift, Waypoint, plan_contact
+from robocasa_lerobot.demos.planning.contact_paths import arc_waypoints, grip_path
 from robocasa_lerobot.demos.skills.arcs import pull_arc, push_arc, stances_round, tuck, working_height
 from robocasa_lerobot.demos.skills.common import SkillError, move_hand
 from robocasa_lerobot.demos.skills.doors import doors
@@ -137,7 +138,7 @@ def _pull(env: KitchenEnv, door: Hinged, slipped: list[tuple[float, float]]) -> 
         options = [(tilt, roll) for tilt in GRASP_TILTS for roll in rolls]
         ways = [_pull_way(env, door, *option, goal, bias=SLIPPED * (option[0] in slipped)) for option in options]
         try:
-            plan = plan_arc(env, door, ways, stances)
+            plan = plan_contact(env, door, ways, stances)
         except SkillError:
             if goal <= least:
                 raise
@@ -146,7 +147,7 @@ def _pull(env: KitchenEnv, door: Hinged, slipped: list[tuple[float, float]]) -> 
             first = door.angle
             yield from pull_arc(env, door, plan, goal + 0.02)
             if door.angle < first + 0.5 * (goal - first):
-                slipped.append(options[ways.index(plan.way)][0])
+                slipped.append(options[ways.index(plan.path)][0])
             yield from _come_round(env, door)
             return
 
@@ -163,7 +164,9 @@ def _come_round(env: KitchenEnv, door: Hinged) -> Iterator[Array]:
         yield from move_hand(data, HandTarget(beyond, hand_rotation(data)), OPEN, tolerance=0.05, max_steps=30)
 
 
-def _pull_way(env: KitchenEnv, door: Hinged, tilt: tuple[float, float], roll: int, goal: float, *, bias: float) -> Way:
+def _pull_way(
+    env: KitchenEnv, door: Hinged, tilt: tuple[float, float], roll: int, goal: float, *, bias: float
+) -> ContactPath:
     low, high = door.handle()
     middle, room = (low[2] + high[2]) / 2, 0.2 * (high[2] - low[2])
     z = working_height(env, door, middle - room, middle + room)
@@ -176,7 +179,7 @@ def _pull_way(env: KitchenEnv, door: Hinged, tilt: tuple[float, float], roll: in
         approach = turn @ np.array([-way * np.sin(aside) * np.cos(up), np.cos(aside) * np.cos(up), np.sin(up)])
         return frame(approach, (turn[:, 0], UP, -turn[:, 0], -UP)[roll])
 
-    return grip_way(door, grip, rotation_at, goal, bias=bias + 0.1 * (roll % 2))
+    return grip_path(door, grip, rotation_at, goal, bias=bias + 0.1 * (roll % 2))
 
 
 def _push(env: KitchenEnv, door: Hinged) -> Iterator[Array]:
@@ -186,7 +189,9 @@ def _push(env: KitchenEnv, door: Hinged) -> Iterator[Array]:
     yield from push_arc(env, door, ways, stances, (OPEN_SHARE + 0.01) * door.full, firm=True, most_cost=MOST_COST)
 
 
-def _push_way(env: KitchenEnv, door: Hinged, push: tuple[float, float, float, float, float], flip: float) -> Way:
+def _push_way(
+    env: KitchenEnv, door: Hinged, push: tuple[float, float, float, float, float], flip: float
+) -> ContactPath:
     share, past, degrees, pitch, bias = push
     way = door.side
     z = working_height(env, door, door.low[2] + 0.06, door.high[2] - (0.06 if pitch > -50.0 else 0.02))
@@ -207,5 +212,7 @@ def _push_way(env: KitchenEnv, door: Hinged, push: tuple[float, float, float, fl
     # Round the free edge, not through the door.
     beyond = door.point(np.array([way * (door.width + ROUND_M), -0.06, z]), start)
     end = OPEN_SHARE * door.full
-    arc = arc_vias(start, end, target_at, (0.0, 0.5, 1.0))
-    return Way((Via(start, HandTarget(beyond, rotation)), Via(start, beside), *arc), 2, target_at, bias)
+    arc = arc_waypoints(start, end, target_at, (0.0, 0.5, 1.0))
+    return ContactPath(
+        (Waypoint(start, HandTarget(beyond, rotation)), Waypoint(start, beside), *arc), 2, target_at, bias
+    )

@@ -7,7 +7,8 @@ from collections.abc import Iterator
 import numpy as np
 
 from robocasa_lerobot.demos.motion import UP, Array, frame
-from robocasa_lerobot.demos.skills.arc_plan import CLOSED_FINGERS_HALF_M, Shift, Way, face_way, grip_way, plan_arc
+from robocasa_lerobot.demos.planning.articulated import ContactPath, Shift, plan_contact
+from robocasa_lerobot.demos.planning.contact_paths import CLOSED_FINGERS_HALF_M, grip_path, push_path
 from robocasa_lerobot.demos.skills.arcs import pull_arc, push_arc
 from robocasa_lerobot.demos.skills.common import SkillError
 from robocasa_lerobot.demos.skills.hinged import Hinged
@@ -56,7 +57,7 @@ def lower_head(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
     for _ in range(ATTEMPTS):
         if head.share > HALF_SHARE + 0.1:
             ways = [_drag_way(head, drag, roll) for drag in DRAGS for roll in (1.0, -1.0)]
-            yield from pull_arc(env, head, plan_arc(env, head, ways, STANCES), DOWN_SHARE * head.full)
+            yield from pull_arc(env, head, plan_contact(env, head, ways, STANCES), DOWN_SHARE * head.full)
             if head.share <= DOWN_SHARE:
                 return
             if head.share > HALF_SHARE + 0.2:
@@ -73,14 +74,14 @@ def _head(env: KitchenEnv, stage: Stage) -> Hinged:
     return Hinged(env.data, mixer, mixer.joint("head"))
 
 
-def _lift_way(head: Hinged, tilt: tuple[float, float], roll: float) -> Way:
+def _lift_way(head: Hinged, tilt: tuple[float, float], roll: float) -> ContactPath:
     """Push the head up near its nose, the fingers flat under it."""
     local = np.array([0.0, 0.9 * head.low[1], head.low[2]])
     rotation = _rotation(head, tilt, roll)
-    return face_way(head, local, -UP, lambda _: rotation, UP_SHARE * head.full, off_m=0.015, back_m=0.12)
+    return push_path(head, local, -UP, lambda _: rotation, UP_SHARE * head.full, off_m=0.015, back_m=0.12)
 
 
-def _drag_way(head: Hinged, drag: tuple[float, float, float], roll: float) -> Way:
+def _drag_way(head: Hinged, drag: tuple[float, float, float], roll: float) -> ContactPath:
     """Hold the cap on the nose and lead it down: a head that is up is too near a wall cabinet to reach over it."""
     pitch, aside, turn = drag
     skew = head.angle + np.deg2rad(pitch)  # of the fingers from the cap's axis
@@ -93,14 +94,14 @@ def _drag_way(head: Hinged, drag: tuple[float, float, float], roll: float) -> Wa
 
     # From below, for there is a wall cabinet close above; straight, for then the fingers pass beside the cap.
     bias = 0.005 * abs(pitch - 35.0) + 0.005 * abs(aside)
-    return grip_way(head, local, rotation_at, DOWN_SHARE * head.full, bias=bias)
+    return grip_path(head, local, rotation_at, DOWN_SHARE * head.full, bias=bias)
 
 
-def _press_way(head: Hinged, tilt: tuple[float, float], roll: float) -> Way:
+def _press_way(head: Hinged, tilt: tuple[float, float], roll: float) -> ContactPath:
     """Push the head down near its nose, the fingers flat on it."""
     local = np.array([0.0, 0.85 * head.low[1], head.high[2]])
     rotation = _rotation(head, tilt, roll)
-    return face_way(head, local, UP, lambda _: rotation, DOWN_SHARE * head.full, off_m=0.04, back_m=0.06)
+    return push_path(head, local, UP, lambda _: rotation, DOWN_SHARE * head.full, off_m=0.04, back_m=0.06)
 
 
 def _rotation(head: Hinged, tilt: tuple[float, float], roll: float) -> Array:

@@ -78,9 +78,9 @@ class Hinged:
         """Number of its body."""
         return self._body
 
-    def place(self, data: mujoco.MjData, angle: float) -> None:
-        """Turn it to an angle in a copy of the state: for planning only."""
-        data.qpos[self._address] = self.opening * angle
+    def joint_value(self, angle: float) -> float:
+        """The position of its hinge at an angle from shut, radians."""
+        return self.opening * angle
 
     def handle(self) -> tuple[Array, Array]:
         """Opposite corners of the bar of its handle, (3,) each."""

@@ -17,8 +17,10 @@ from robocasa_lerobot.demos.motion import (
     hand_rotation,
     rotation_about,
 )
+from robocasa_lerobot.demos.planning.follow import follow_joint_path
+from robocasa_lerobot.demos.planning.motion_planner import plan_near
 from robocasa_lerobot.demos.skills.common import SkillError, hold_hand, move_hand, stage_done
-from robocasa_lerobot.demos.skills.reach import plan_reach, shift_base
+from robocasa_lerobot.demos.skills.reach import shift_base
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.kitchens.appliances.base import Appliance
 from robocasa_lerobot.envs.scene.initial_states import initial_share
@@ -88,11 +90,10 @@ def _turn_to(env: KitchenEnv, stage: Stage, goal: float) -> Iterator[Array]:
         face = body.xpos - inwards * _length(env, int(body.id), inwards)
         grip = face + inwards * DEPTH_M
         ways = [_way(grip, rotation, inwards, turn) for rotation in _rotations(body.xmat.reshape(3, 3), inwards)]
-        plan = plan_reach(env, ways, SHIFTS, allowed=allowed)[0]
+        plan = plan_near(env, ways, SHIFTS, allowed=allowed)
         yield from shift_base(env, plan.shift, OPEN)
+        yield from follow_joint_path(env, plan.joints, OPEN)
         before, at, _ = plan.targets
-        over = HandTarget(before.position - inwards * 0.06 + UP * 0.04, at.rotation)
-        yield from move_hand(data, over, OPEN, tolerance=0.03)
         yield from move_hand(data, before, OPEN, tolerance=0.008, max_steps=60)
         yield from move_hand(data, at, OPEN, speed=0.6, tolerance=0.005, max_steps=40)
         yield from hold_hand(data, at, CLOSED, GRASP_STEPS)

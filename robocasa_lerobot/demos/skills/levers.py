@@ -21,9 +21,11 @@ from robocasa_lerobot.demos.motion import (
     grip_position,
     rotation_about,
 )
-from robocasa_lerobot.demos.skills.arc_plan import CLOSED_FINGERS_HALF_M
+from robocasa_lerobot.demos.planning.contact_paths import CLOSED_FINGERS_HALF_M
+from robocasa_lerobot.demos.planning.follow import follow_joint_path
+from robocasa_lerobot.demos.planning.motion_planner import plan_near
 from robocasa_lerobot.demos.skills.common import SkillError, hold_hand, move_hand, stage_done
-from robocasa_lerobot.demos.skills.reach import plan_reach, shift_base, untried
+from robocasa_lerobot.demos.skills.reach import shift_base
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.kitchens.appliances.base import Appliance
 from robocasa_lerobot.envs.kitchens.appliances.kinds.sink import Sink
@@ -71,8 +73,10 @@ def press_lever(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
         left_over = travel - fixture.position(data, part)
         point = _upper_face(env, int(body.id), way)
         ways = [push_way(point, way, rotation, left_over) for rotation in level_and_down(env)]
-        plan = untried(plan_reach(env, ways, SHIFTS, allowed=allowed), tried)
+        plan = plan_near(env, ways, SHIFTS, allowed=allowed, tried=tried)
+        tried.append(plan.targets[-1].rotation)
         yield from shift_base(env, plan.shift, CLOSED)
+        yield from follow_joint_path(env, plan.joints, CLOSED)
         over, before, touch, end = plan.targets
         rotation = before.rotation
         yield from move_hand(data, over, CLOSED, tolerance=0.03)
@@ -138,11 +142,11 @@ def _lead(env: KitchenEnv, stage: Stage, part: str, left_over: Callable[[], floa
             before = HandTarget(grip - rotation[:, 2] * STANDOFF_M, rotation)
             row = (before, HandTarget(grip, rotation))
             ways.append((*row, _turned(row[1], anchor, axis, angle, turns_hand=turning)))
-        plan = untried(plan_reach(env, ways, SHIFTS, allowed=allowed), tried)
+        plan = plan_near(env, ways, SHIFTS, allowed=allowed, tried=tried)
+        tried.append(plan.targets[-1].rotation)
         yield from shift_base(env, plan.shift, OPEN)
+        yield from follow_joint_path(env, plan.joints, OPEN)
         before, at, _ = plan.targets
-        over = HandTarget(before.position - at.rotation[:, 2] * 0.05 + UP * 0.05, at.rotation)
-        yield from move_hand(data, over, OPEN, tolerance=0.03)
         yield from move_hand(data, before, OPEN, tolerance=0.015)
         yield from move_hand(data, at, OPEN, speed=0.6, tolerance=0.008, max_steps=40)
         yield from hold_hand(data, at, CLOSED, GRASP_STEPS)

@@ -23,8 +23,9 @@ from robocasa_lerobot.demos.motion import (
     hand_rotation,
     pose_error,
 )
+from robocasa_lerobot.demos.planning.articulated import ContactPath, Shift, Waypoint, plan_contact
+from robocasa_lerobot.demos.planning.contact_paths import CLOSED_FINGERS_HALF_M, arc_waypoints, push_path
 from robocasa_lerobot.demos.planning.kinematics import Arm
-from robocasa_lerobot.demos.skills.arc_plan import CLOSED_FINGERS_HALF_M, Shift, Via, Way, arc_vias, face_way, plan_arc
 from robocasa_lerobot.demos.skills.arcs import spots, swing, take_stance, working_height
 from robocasa_lerobot.demos.skills.common import SkillError, move_hand
 from robocasa_lerobot.demos.skills.doors import SHUT_GOAL, doors
@@ -80,14 +81,14 @@ def _push(env: KitchenEnv, door: Hinged) -> Iterator[Array]:
     data = env.data
     if door.angle > ENOUGH_RAD:
         ways = [_lift_way(door, lift, x, roll) for lift in LIFTS for x in XS for roll in (1, -1)]
-        plan = plan_arc(env, door, ways, _stances(env, door))
+        plan = plan_contact(env, door, ways, _stances(env, door))
     else:
         ways = [_push_way(env, door, push, roll) for push in PUSHES for roll in (1, -1)]
-        plan = plan_arc(env, door, ways, stances_beside(env, door))
+        plan = plan_contact(env, door, ways, stances_beside(env, door))
     spot = spots(env, plan)
     yield from take_stance(env, plan, CLOSED)
     yield from _dash(env, plan.joints)
-    back, off = plan.way.vias[0].target, plan.way.vias[1].target
+    back, off = plan.path.waypoints[0].target, plan.path.waypoints[1].target
     yield from move_hand(data, back, CLOSED, tolerance=0.02, max_steps=30)
     yield from move_hand(data, off, CLOSED, tolerance=0.004, max_steps=40, insist=0.12)
     yield from swing(env, door, plan, SHUT_GOAL * door.full, gripper=CLOSED, spot=spot, lead_rad=0.0, firm=True)
@@ -105,7 +106,7 @@ def _dash(env: KitchenEnv, joints: Array) -> Iterator[Array]:
     axes, origin = site.xmat.reshape(3, 3).copy(), site.xpos.copy()
     count = max(int(np.ceil(float(np.abs(joints - start).max()) / DASH_RAD)), 1)
     shares = np.arange(1, count + 1)[:, None] / count
-    positions, turns, _ = arm.forward(start + shares * (joints - start))
+    positions, turns = arm.forward(start + shares * (joints - start))
     servo = FirmServo(data)
     for position, turn in zip(positions, turns, strict=True):
         via = HandTarget(origin + axes @ position, axes @ turn)
@@ -141,7 +142,7 @@ def _stances(env: KitchenEnv, door: Hinged) -> tuple[tuple[Shift, Shift], ...]:
     return tuple(found)
 
 
-def _lift_way(door: Hinged, lift: tuple[float, float], x: float, roll: float) -> Way:
+def _lift_way(door: Hinged, lift: tuple[float, float], x: float, roll: float) -> ContactPath:
     """At the free edge, at a share of half its width from the middle.
 
     The inward side of the fingers bears on the edge's outer corner, their tips just below it.
@@ -164,11 +165,11 @@ def _lift_way(door: Hinged, lift: tuple[float, float], x: float, roll: float) ->
     at = target_at(start, 0.0)
     off = HandTarget(at.position - OFF_M * door.inwards, at.rotation)
     back = HandTarget(off.position - BACK_M * at.rotation[:, 2], at.rotation)
-    arc = arc_vias(start, SHUT_GOAL * door.full, lambda angle: target_at(angle, 0.0), (0.0, 0.5, 1.0))
-    return Way((Via(start, back), Via(start, off), *arc), 2, target_at)
+    arc = arc_waypoints(start, SHUT_GOAL * door.full, lambda angle: target_at(angle, 0.0), (0.0, 0.5, 1.0))
+    return ContactPath((Waypoint(start, back), Waypoint(start, off), *arc), 2, target_at)
 
 
-def _push_way(env: KitchenEnv, door: Hinged, push: tuple[float, float], roll: float) -> Way:
+def _push_way(env: KitchenEnv, door: Hinged, push: tuple[float, float], roll: float) -> ContactPath:
     """On the face, below the handle."""
     turn, pitch = np.deg2rad(push)
     low, _ = door.handle()
@@ -178,4 +179,4 @@ def _push_way(env: KitchenEnv, door: Hinged, push: tuple[float, float], roll: fl
     level = np.cos(turn) * door.inwards + np.sin(turn) * door.rightwards
     rotation = frame(np.cos(pitch) * level - np.sin(pitch) * UP, roll * np.cross(level, UP))
     local = np.array([x, door.low[1], z])
-    return face_way(door, local, FORWARDS, lambda _: rotation, SHUT_GOAL * door.full, off_m=0.03, back_m=0.05)
+    return push_path(door, local, FORWARDS, lambda _: rotation, SHUT_GOAL * door.full, off_m=0.03, back_m=0.05)

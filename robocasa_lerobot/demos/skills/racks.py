@@ -18,9 +18,11 @@ from robocasa_lerobot.demos.motion import (
     grip_position,
     hand_rotation,
 )
-from robocasa_lerobot.demos.skills.arc_plan import CLOSED_FINGERS_HALF_M
+from robocasa_lerobot.demos.planning.contact_paths import CLOSED_FINGERS_HALF_M
+from robocasa_lerobot.demos.planning.follow import follow_joint_path
+from robocasa_lerobot.demos.planning.motion_planner import MotionPlan, plan_near
 from robocasa_lerobot.demos.skills.common import SkillError, hold_hand, move_hand
-from robocasa_lerobot.demos.skills.reach import Plan, plan_reach, shift_base, untried
+from robocasa_lerobot.demos.skills.reach import shift_base
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.kitchens.appliances.base import Appliance
 from robocasa_lerobot.envs.tasks.task import Stage
@@ -77,6 +79,7 @@ def push(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
                 ways.append(_row(touch, rotation, -part.inwards, part.inwards * travel))
         plan = _plan(env, part, ways, tried)
         yield from shift_base(env, plan.shift, CLOSED)
+        yield from follow_joint_path(env, plan.joints, CLOSED)
         yield from _approach(env, plan, CLOSED)
         end = plan.targets[-1]
         goal = HandTarget(end.position + part.inwards * BEYOND_M, end.rotation)
@@ -107,6 +110,7 @@ def pull(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
                 ways.append(_row(at, rotation, -rotation[:, 2], -part.inwards * travel))
         plan = _plan(env, part, ways, tried)
         yield from shift_base(env, plan.shift, OPEN)
+        yield from follow_joint_path(env, plan.joints, OPEN)
         yield from _approach(env, plan, OPEN)
         _, _, held, end = plan.targets
         yield from hold_hand(data, held, CLOSED, GRASP_STEPS)
@@ -206,11 +210,13 @@ def _row(at: Array, rotation: Array, back: Array, slide: Array) -> tuple[HandTar
     return tuple(HandTarget(p, rotation) for p in (before + UP * OVER_M, before, at, at + slide))
 
 
-def _plan(env: KitchenEnv, part: _Part, ways: list[tuple[HandTarget, ...]], tried: list[Array]) -> Plan:
-    return untried(plan_reach(env, ways, SHIFTS, allowed=frozenset({part.body})), tried)
+def _plan(env: KitchenEnv, part: _Part, ways: list[tuple[HandTarget, ...]], tried: list[Array]) -> MotionPlan:
+    plan = plan_near(env, ways, SHIFTS, allowed=frozenset({part.body}), tried=tried)
+    tried.append(plan.targets[-1].rotation)
+    return plan
 
 
-def _approach(env: KitchenEnv, plan: Plan, gripper: float) -> Iterator[Array]:
+def _approach(env: KitchenEnv, plan: MotionPlan, gripper: float) -> Iterator[Array]:
     over, before, at, _ = plan.targets
     yield from move_hand(env.data, over, gripper, tolerance=0.03)
     yield from move_hand(env.data, before, gripper, tolerance=0.015)

@@ -10,7 +10,8 @@ from collections.abc import Iterator
 import numpy as np
 
 from robocasa_lerobot.demos.motion import CLOSED, UP, Array, frame
-from robocasa_lerobot.demos.skills.arc_plan import Shift, Way, face_way
+from robocasa_lerobot.demos.planning.articulated import ContactPath, Shift
+from robocasa_lerobot.demos.planning.contact_paths import push_path
 from robocasa_lerobot.demos.skills.arcs import push_arc, stances_round, tuck, working_height
 from robocasa_lerobot.demos.skills.common import SkillError
 from robocasa_lerobot.demos.skills.doors import SHUT_GOAL, doors
@@ -71,7 +72,7 @@ def lift_shut(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
             raise SkillError(f"{door.name} is still {door.share:.1%} open after {ATTEMPTS} attempts")
 
 
-def _push_way(env: KitchenEnv, door: Hinged, push: tuple[float, float, float], roll: float) -> Way:
+def _push_way(env: KitchenEnv, door: Hinged, push: tuple[float, float, float], roll: float) -> ContactPath:
     share, turn, pitch = push
     side = door.side
     z = working_height(env, door, door.low[2] + 0.06, door.high[2] - 0.06)
@@ -80,10 +81,10 @@ def _push_way(env: KitchenEnv, door: Hinged, push: tuple[float, float, float], r
     level = np.cos(aside) * door.inwards + side * np.sin(aside) * door.rightwards
     rotation = frame(np.cos(up) * level + np.sin(up) * UP, roll * UP)
     bias = ROUND_BIAS if share > 0.9 else 0.0
-    return face_way(door, local, FORWARDS, lambda _: rotation, SHUT_GOAL * door.full, bias=bias)
+    return push_path(door, local, FORWARDS, lambda _: rotation, SHUT_GOAL * door.full, bias=bias)
 
 
-def _lift_way(door: Hinged, lift: tuple[float, float, float], side: float, roll: float) -> Way:
+def _lift_way(door: Hinged, lift: tuple[float, float, float], side: float, roll: float) -> ContactPath:
     """From the right (side 1) or the left."""
     share, turn, pitch = lift
     reach = door.high[0] if side > 0 else -door.low[0]
@@ -96,4 +97,4 @@ def _lift_way(door: Hinged, lift: tuple[float, float, float], side: float, roll:
         # The wide side of the hand keeps along the door.
         return frame(approach, roll * door.turned(angle)[:, 2])
 
-    return face_way(door, local, FORWARDS, rotation_at, SHUT_GOAL * door.full, off_m=0.02, back_m=0.14)
+    return push_path(door, local, FORWARDS, rotation_at, SHUT_GOAL * door.full, off_m=0.02, back_m=0.14)

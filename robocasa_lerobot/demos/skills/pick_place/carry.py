@@ -6,6 +6,7 @@ import contextlib
 from collections.abc import Iterator, Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from robocasa_lerobot.demos.motion import (
     CLOSED,
@@ -19,12 +20,14 @@ from robocasa_lerobot.demos.motion import (
     hand_rotation,
     rotation_about,
 )
+from robocasa_lerobot.demos.planning.base_path import Room, wrap
+from robocasa_lerobot.demos.planning.collision import CollisionChecker, Held
 from robocasa_lerobot.demos.planning.kinematics import Arm
 from robocasa_lerobot.demos.skills.common import SkillError, move_hand
-from robocasa_lerobot.demos.skills.navigation import Room, drive_to
+from robocasa_lerobot.demos.skills.navigation import drive_to
 from robocasa_lerobot.demos.skills.pick_place.graspable import Graspable
 from robocasa_lerobot.demos.skills.pick_place.location import locate
-from robocasa_lerobot.demos.skills.ways import MOST_DRIVES, Held, Way, choose, lead
+from robocasa_lerobot.demos.skills.ways import MOST_DRIVES, Way, choose, lead
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.kitchens.fixtures.base import Fixture
 from robocasa_lerobot.envs.robots.panda_omron.robot import PANDA_OMRON
@@ -66,23 +69,32 @@ def standing_pose_for(
     Raises:
         SkillError: no place is free from where the arm reaches the point.
     """
-    room = Room(env.scene)
     base, _ = base_pose(env.data)
-    best, least = None, np.inf
+    found: list[tuple[float, RobotPose]] = []
     for turn in range(DIRECTIONS):
-        yaw = float(np.remainder(fixture.yaw + 2 * np.pi * turn / DIRECTIONS + np.pi, 2 * np.pi) - np.pi)
+        yaw = wrap(fixture.yaw + 2 * np.pi * turn / DIRECTIONS)
         askew = abs(np.sin(2 * (yaw - fixture.yaw)))
         for far in STAND_FAR_M:
             x, y, _ = (point - far * floor_axes(yaw)[0]).tolist()
             cost = FAR_COST * abs(far - STAND_FAR_M[0]) + ASKEW_COST * askew + float(np.hypot(x - base[0], y - base[1]))
-            pose = RobotPose(x, y, yaw)
-            if any(np.hypot(x - other.x, y - other.y) < OTHER_M for other in other_than):
-                continue
-            if cost < least and room.free(pose):
-                best, least = pose, cost
-    if best is None:
+            if all(np.hypot(x - other.x, y - other.y) > OTHER_M for other in other_than):
+                found.append((cost, RobotPose(x, y, yaw)))
+    found.sort(key=lambda pair: pair[0])
+    poses = [pose for _, pose in found]
+    free = _free(env, poses)
+    if not free.any():
         raise SkillError(f"there is no room to stand before {fixture.name}")
-    return best
+    return poses[int(np.argmax(free))]
+
+
+def _free(env: KitchenEnv, poses: Sequence[RobotPose]) -> NDArray[np.bool_]:
+    """Where the robot, its arm folded, meets neither a fixture nor a door or drawer as it stands now, (n,)."""
+    free = Room(env.scene).all_free(poses)
+    bases = np.array([(pose.x, pose.y, pose.yaw) for pose in poses])[free]
+    if len(bases):
+        home = np.tile(np.array(PANDA_OMRON.home.arm), (len(bases), 1))
+        free[free] = CollisionChecker(env.model, env.data).free(bases, home)
+    return free
 
 
 def go_to_object(env: KitchenEnv, name: str, other_than: Sequence[RobotPose] = ()) -> Iterator[Array]:
@@ -102,7 +114,8 @@ def carry_to(env: KitchenEnv, obj: Graspable, stand: RobotPose) -> Iterator[Arra
         SkillError: there is no path, or the base got stuck.
     """
     yield from fold_with(env, obj)
-    yield from drive_to(env, stand.x, stand.y, stand.yaw, gripper=CLOSED)
+    held = Held.now(env.data, obj.name, obj.contents)
+    yield from drive_to(env, stand.x, stand.y, stand.yaw, gripper=CLOSED, held=held)
 
 
 def fold_with(env: KitchenEnv, obj: Graspable) -> Iterator[Array]:
@@ -138,7 +151,7 @@ def _folded(env: KitchenEnv, base: Array, yaw: float) -> list[Way]:
 def _home_height(env: KitchenEnv) -> float:
     """Height of the grip site with the arm as at the start of an episode, metres."""
     arm = Arm(env.model, env.data)
-    position, _, _ = arm.forward(np.array([PANDA_OMRON.home.arm]))
+    position, _ = arm.forward(np.array([PANDA_OMRON.home.arm]))
     frame = env.data.site(PANDA_OMRON.names.arm_center_site)
     return float((frame.xpos + frame.xmat.reshape(3, 3) @ position[0])[2])
 

@@ -1,0 +1,11 @@
+"""What planning raises."""
+
+from __future__ import annotations
+
+
+class SkillError(RuntimeError):
+    """The skill cannot go on: what it tried and how far it came."""
+
+
+class NoPlanError(SkillError):
+    """There is no plan: what was asked for and what stands against it."""
