@@ -20,7 +20,7 @@ from robocasa_lerobot.envs.predicates import (
 )
 from robocasa_lerobot.envs.scene.build import build_scene
 from robocasa_lerobot.envs.scene.scene import Scene
-from robocasa_lerobot.envs.scene.spec import Choice, FixtureWanted, ObjectWanted, Placement, SampleRegion
+from robocasa_lerobot.envs.scene.spec import Choice, FixtureWanted, ObjectWanted, Placement, RobotStart, SampleRegion
 from robocasa_lerobot.envs.tasks.stage_text import stage_text
 from robocasa_lerobot.envs.tasks.task import BoundTask, Stage, StagesWhen, Task
 from robocasa_lerobot.envs.tasks.typical import goal_of, stages_of
@@ -114,6 +114,19 @@ def test_the_other_stands_on_the_other_side() -> None:
         assert scene.instruction == f"It is on the {side}, the other on the {other}."
         sides.add(side)
     assert sides == {"left", "right"}
+
+
+def test_the_robot_starts_where_a_choice_says() -> None:
+    choice = Choice("at", {"cab": {}, "other": {}})
+    others = (*PANTRY.fixtures, FixtureWanted("other", "sink"))
+    task = replace(PANTRY, choices=(*PANTRY.choices, choice), fixtures=others, robot_start=RobotStart("{at}"))
+    starts = set()
+    for seed in range(6):
+        scene, _ = in_scene(task, seed)
+        wanted, pose = scene.standing_pose(scene.choices["at"]), scene.robot_pose
+        assert np.hypot(wanted.x - pose.x, wanted.y - pose.y) < 0.3
+        starts.add(scene.choices["at"])
+    assert starts == {"cab", "other"}
 
 
 def test_categories_goals_and_stages_by_a_choice() -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import mujoco
 import numpy as np
@@ -29,7 +29,7 @@ from robocasa_lerobot.envs.scene.roles import counter_of
 from robocasa_lerobot.envs.scene.scene import Scene
 from robocasa_lerobot.envs.scene.scene_spec import SceneSpec
 from robocasa_lerobot.envs.scene.spec import InitialOpenness, OnCounter
-from robocasa_lerobot.envs.scene.task_parameters import Choices, draw_choices
+from robocasa_lerobot.envs.scene.task_parameters import Choices, draw_choices, filled
 from robocasa_lerobot.envs.scene.words import numbered, said, words_of
 from robocasa_lerobot.errors import UnknownNameError, UserError
 
@@ -170,6 +170,8 @@ def arrange(
     choices = draw_choices(rng, task, layout.fixtures, roles)
     pose: RobotPose | None = None
     start, shape = task.robot_start, robot.shape
+    at_object = filled(start.at_object, choices.values)
+    start = replace(start, fixture=filled(start.fixture, choices.values), at_object=at_object)
     opened = [layout.fixtures[roles[role]] for role in _opened(task)]
     if not start.at_object:
         pose = robot_pose(rng, layout, start, layout.fixtures[roles[start.fixture]], shape, opened=opened)

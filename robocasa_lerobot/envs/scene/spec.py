@@ -187,7 +187,7 @@ class RobotStart:
     """Where the robot stands: facing a fixture, in front of it or beside it.
 
     Attributes:
-        fixture: role.
+        fixture: role; this and `at_object` may name a choice in braces.
         beside: stand half the fixture's width plus 0.2 m to its left or right, whichever is free.
         deviation: half ranges of the uniform noise along and towards the counter, metres.
         setback: farther from it than usual, metres.

@@ -92,7 +92,7 @@ def item_of(
     if like is not None and wanted.same_model:
         item = catalogue.scaled(catalogue.instance(like.category, like.index), factors)
         return replace(item, upright=True) if wanted.upright else item
-    groups = tuple(_filled(group, choices) for group in wanted.groups) if like is None else (like.category.name,)
+    groups = tuple(filled(group, choices) for group in wanted.groups) if like is None else (like.category.name,)
     # An instruction names one object of the scene.
     used = frozenset(() if wanted.repeats or like is not None else (item.category.name for item in items.values()))
     return catalogue.sample(
@@ -120,16 +120,16 @@ def start_of(
     region = start.region
     if region.name or isinstance(region.level, str):
         names = region.name.split("|")
-        name = _filled(names[int(rng.integers(len(names)))], choices)
-        level = _filled(region.level, choices) if isinstance(region.level, str) else region.level
+        name = filled(names[int(rng.integers(len(names)))], choices)
+        level = filled(region.level, choices) if isinstance(region.level, str) else region.level
         region = replace(region, name="" if name == "any" else name, level=level)
-    region = replace(region, ref=_filled(region.ref, choices), loc=_filled(region.loc, choices))
+    region = replace(region, ref=filled(region.ref, choices), loc=filled(region.loc, choices))
     across, along = start.pos
     return replace(
         start,
         region=region,
-        fixture=_filled(start.fixture, choices),
-        object=_filled(start.object, choices),
+        fixture=filled(start.fixture, choices),
+        object=filled(start.object, choices),
         pos=(_position(across, wanted, choices), _position(along, wanted, choices)),
     )
 
@@ -164,17 +164,18 @@ def _position(where: _Position, wanted: ObjectWanted, choices: Mapping[str, str]
     if not isinstance(where, str) or "{" not in where:
         return where
     sign = -1.0 if where.startswith("-") else 1.0
-    word = _filled(where.removeprefix("-"), choices)
+    word = filled(where.removeprefix("-"), choices)
     return sign * (_SIDES[word] if word in _SIDES else _number(word, choices, f"position of {wanted.name}"))
 
 
 def _number(text: str, choices: Mapping[str, str], what: str) -> float:
-    value = _filled(text, choices)
+    value = filled(text, choices)
     try:
         return float(value)
     except ValueError:
         raise UserError(f"the {what} is {text!r}, which was drawn as {value!r}: a number is needed.") from None
 
 
-def _filled(text: str, choices: Mapping[str, str]) -> str:
+def filled(text: str, choices: Mapping[str, str]) -> str:
+    """A name of a declaration with what was drawn for its choices."""
     return text.format_map(choices) if "{" in text else text
