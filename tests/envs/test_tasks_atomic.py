@@ -14,7 +14,7 @@ from robocasa_lerobot.envs import predicates
 from robocasa_lerobot.envs.predicates import Goal
 from robocasa_lerobot.envs.predicates.contacts import touching
 from robocasa_lerobot.envs.scene.build import build_scene
-from robocasa_lerobot.envs.scene.initial_states import PartAt
+from robocasa_lerobot.envs.scene.initial_states import PartAt, initial_share
 from robocasa_lerobot.envs.tasks.registry import get_task, task_names
 from robocasa_lerobot.envs.tasks.task import Task
 
@@ -48,7 +48,7 @@ def test_it_can_be_made_and_is_not_done_at_reset(name: str, split: str) -> None:
                 part = scene.fill(entry.part)
                 # A timer or a snapping door may have moved while the scene settled.
                 assert scene.appliance(entry.fixture).share(data, part) == pytest.approx(
-                    scene.initial_share(entry.fixture, entry.part), abs=0.06
+                    initial_share(scene, entry.fixture, entry.part), abs=0.06
                 )
 
 

@@ -53,6 +53,7 @@ from robocasa_lerobot.envs.predicates import (
     WithMemory,
 )
 from robocasa_lerobot.envs.predicates.objects import middle_of
+from robocasa_lerobot.envs.scene.initial_states import initial_share
 from robocasa_lerobot.envs.scene.scene import Scene, set_openness
 
 AWAKE = -(1 + 10)  # of `tree_asleep`: and 10 quiet steps (mjMINAWAKE) away from sleep
@@ -158,7 +159,7 @@ def _part_within(goal: PartWithin, scene: Scene, data: mujoco.MjData) -> None:
 
 @write.register
 def _part_turned(goal: PartTurned, scene: Scene, data: mujoco.MjData) -> None:
-    share = scene.initial_share(goal.fixture, goal.part) + 1.2 * goal.by
+    share = initial_share(scene, goal.fixture, goal.part) + 1.2 * goal.by
     scene.appliance(goal.fixture).set_share(data, goal.part, share)
 
 
