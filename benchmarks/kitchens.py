@@ -27,7 +27,7 @@ import mujoco
 import numpy as np
 
 from robocasa_lerobot.envs.checks.soundness import MOVED_M, blocked_walkways, fell, moved, overlaps
-from robocasa_lerobot.envs.kitchens.layout import split_of
+from robocasa_lerobot.envs.kitchens.materials import split_of
 from robocasa_lerobot.envs.kitchens.splits import scene_ids, without
 from robocasa_lerobot.envs.scene.build import build_scene
 from robocasa_lerobot.envs.tasks.registry import get_task, task_names

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from PIL import Image, ImageDraw
 
 from robocasa_lerobot.envs.kitchens.appliances.catalogue import kinds, models_of
-from robocasa_lerobot.envs.kitchens.layout import layout_ids, layout_record, split_of
-from robocasa_lerobot.envs.kitchens.materials import load_style, style_ids
+from robocasa_lerobot.envs.kitchens.layout import layout_ids, layout_record
+from robocasa_lerobot.envs.kitchens.materials import load_style, split_of, style_ids
 from robocasa_lerobot.envs.objects.catalogue import CATEGORIES, instance, split_indices
 from robocasa_lerobot.errors import UnknownNameError
 from robocasa_lerobot.gallery.appliance_pictures import appliance_pictures

@@ -163,7 +163,7 @@ def test_initial_states_can_be_set(kind):
     fixture, model = compiled(models_of(kind)[0].model_id)
     data = mujoco.MjData(model)
     for share in (0.0, 0.5, 1.0):
-        fixture.set_door(data, share)
+        fixture.set_openness(data, share)
         for door in fixture.doors:
             assert fixture.share(data, door) == pytest.approx(share)
         assert fixture.is_open(data) == (share >= OPEN_FROM or not fixture.doors)
@@ -195,8 +195,8 @@ def test_burners_take_every_level(model_id):
 def test_fridges_have_usable_shelves_and_a_drawer(kind):
     for record in models_of(kind):
         fixture = build_appliance(record.model_id, "it", (0.0, 0.0, record.size[2] / 2))
-        highest, second = fixture.shelf(-1), fixture.shelf(-2)
-        assert highest.center[2] > second.center[2], record.model_id
+        *_, second, highest = fixture.usable_shelves("fridge")
+        assert fixture.regions[highest].center[2] > fixture.regions[second].center[2], record.model_id
         assert fixture.drawers
 
 

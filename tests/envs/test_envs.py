@@ -16,6 +16,8 @@ from robocasa_lerobot import contract
 from robocasa_lerobot.contract import ContractError
 from robocasa_lerobot.envs.checks.tasks import check_task
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
+from robocasa_lerobot.envs.kitchens.appliances.kinds.sink import Sink
+from robocasa_lerobot.envs.kitchens.fixtures.cabinets import Drawer
 from robocasa_lerobot.envs.kitchens.splits import scene_ids
 from robocasa_lerobot.envs.tasks.registry import get_task, task_names, task_set, task_sets
 from robocasa_lerobot.errors import UnknownNameError, UserError
@@ -122,7 +124,7 @@ def test_goal_terms_follow_the_drawer():
     for task, low, high in (("OpenDrawer", 0.94, 0.96), ("CloseDrawer", 0.06, 0.04)):
         env = make(task)
         env.reset(seed=0)
-        drawer = env.scene.drawer("drawer")
+        drawer = env.scene.fixture("drawer", Drawer)
         for openness, expected in ((low, False), (high, True)):
             drawer.set_openness(env.data, openness)
             info = env._info()
@@ -136,7 +138,7 @@ def test_success_needs_every_term():
 
     env = make("PickPlaceCounterToSink")
     env.reset(seed=0)
-    basin = env.scene.sink("sink").basin
+    basin = env.scene.fixture("sink", Sink).basin
     env.data.joint("obj_joint0").qpos[:3] = basin.world(env.data)
     mujoco.mj_forward(env.model, env.data)
     assert env._info()["success_terms"] == {"obj_in_sink": True, "gripper_far_from_obj": True}

@@ -8,15 +8,15 @@ from collections import Counter as Tally
 import pytest
 
 from robocasa_lerobot.envs.checks.soundness import blocked_walkways
-from robocasa_lerobot.envs.kitchens.appliances.catalogue import kinds, model_of
+from robocasa_lerobot.envs.kitchens.appliances.catalogue import kinds, model_for, model_of
 from robocasa_lerobot.envs.kitchens.fixture_types import FILTERS, FixtureType
 from robocasa_lerobot.envs.kitchens.fixtures.accessories import Accessory
 from robocasa_lerobot.envs.kitchens.fixtures.counters import Counter
 from robocasa_lerobot.envs.kitchens.fixtures.fronts import HANDLES, PANELS
 from robocasa_lerobot.envs.kitchens.fixtures.hoods import DESIGNS as HOODS
 from robocasa_lerobot.envs.kitchens.fixtures.stools import DESIGNS as STOOLS
-from robocasa_lerobot.envs.kitchens.layout import Layout, layout_ids, layout_record, load_layout, split_of
-from robocasa_lerobot.envs.kitchens.materials import COMMON_SURFACES, load_style, style_ids
+from robocasa_lerobot.envs.kitchens.layout import Layout, layout_ids, layout_record, load_layout
+from robocasa_lerobot.envs.kitchens.materials import COMMON_SURFACES, load_style, split_of, style_ids
 from robocasa_lerobot.envs.kitchens.splits import EXCLUDED, GROUPS, expand, scene_ids, without
 from robocasa_lerobot.envs.scene.counter_areas import standing_on
 from robocasa_lerobot.envs.scene.robot_poses import footprint
@@ -155,7 +155,7 @@ def test_a_style_says_everything(style_id: int) -> None:
     assert style.handle in HANDLES
     assert style.hood in HOODS
     assert style.stool in STOOLS
-    assert set(style.appliances) == set(kinds())
+    assert {kind: model_for(style, kind).model_id for kind in kinds()} == style.appliances
     for kind, model_id in style.appliances.items():
         assert model_of(model_id).kind == kind
         assert model_of(model_id).split == split_of(style_id)

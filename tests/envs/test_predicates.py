@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 from goal_states import hold, put_object, write
 
-from robocasa_lerobot.envs.kitchens.appliances.kinds.stove import ON_FROM
+from robocasa_lerobot.envs.kitchens.appliances.kinds.sink import Sink
+from robocasa_lerobot.envs.kitchens.appliances.kinds.stove import ON_FROM, Hob
 from robocasa_lerobot.envs.predicates import (
     AllOf,
     AnyOf,
@@ -28,6 +29,7 @@ from robocasa_lerobot.envs.predicates import (
     StateIs,
     UnderWater,
     When,
+    parts_with_memory,
 )
 from robocasa_lerobot.envs.predicates.logic import every_goal_in, terms_by_name
 from robocasa_lerobot.envs.predicates.objects import middle_of, radius
@@ -101,12 +103,12 @@ def away_from_stream(share: float) -> Change:
 
 
 def water(angle: float) -> Change:
-    return lambda scene, data: scene.sink("sink").set_position(data, "handle", angle)
+    return lambda scene, data: scene.fixture("sink", Sink).set_position(data, "handle", angle)
 
 
 def knobs(angle: float) -> Change:
     def change(scene: Scene, data: mujoco.MjData) -> None:
-        hob = scene.hob("stove")
+        hob = scene.fixture("stove", Hob)
         for location in hob.burners:
             hob.set_position(data, f"knob_{location}", angle)
 
@@ -146,14 +148,14 @@ def onto(burner: int, name: str = "pan") -> Change:
     """Put an object onto another burner."""
 
     def change(scene: Scene, data: mujoco.MjData) -> None:
-        write(OnBurner(name, "stove", burner=list(scene.hob("stove").burners)[burner]), scene, data)
+        write(OnBurner(name, "stove", burner=list(scene.fixture("stove", Hob).burners)[burner]), scene, data)
 
     return change
 
 
 def into_oven(scene: Scene, data: mujoco.MjData) -> None:
     """Below the burner, on the rack of the oven: it touches the stove too."""
-    hob = scene.hob("stove")
+    hob = scene.fixture("stove", Hob)
     oven = hob.regions["interior"]
     floor = oven.world(data, (0.0, 0.0, -oven.half[2]))
     burner = data.site(f"{hob.name}_burner_on_{hob.nearest_burner(data, floor)[0]}").xpos
@@ -318,4 +320,4 @@ def test_goals_are_equal_where_they_ask_for_the_same() -> None:
 def test_no_registered_task_hides_a_term(name: str) -> None:
     task = get_task(name)
     assert terms_by_name(task.goal)
-    assert (task.facts.kind == "atomic") <= (task.remembering == ())
+    assert (task.facts.kind == "atomic") <= (parts_with_memory([task.goal]) == ())

@@ -15,8 +15,8 @@ from task_selection import every_task
 from robocasa_lerobot.envs.checks.soundness import overlaps
 from robocasa_lerobot.envs.kitchens.fixtures.cabinets import FULL_TRAVEL_OF_DEPTH, Drawer
 from robocasa_lerobot.envs.kitchens.footprints import Area, Footprint, PlacementError, place
-from robocasa_lerobot.envs.kitchens.layout import layout_ids, load_layout, split_of
-from robocasa_lerobot.envs.kitchens.materials import style_ids
+from robocasa_lerobot.envs.kitchens.layout import layout_ids, load_layout
+from robocasa_lerobot.envs.kitchens.materials import split_of, style_ids
 from robocasa_lerobot.envs.kitchens.textures import GENERATORS, TextureRecord, texture_png
 from robocasa_lerobot.envs.scene.assembly import bare_kitchen
 from robocasa_lerobot.envs.scene.build import build_scene

@@ -2,17 +2,26 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import mujoco
 import numpy as np
 import pytest
 
 from robocasa_lerobot.envs.checks.soundness import moved
+from robocasa_lerobot.envs.kitchens.appliances.kinds.stove import Hob
+from robocasa_lerobot.envs.kitchens.fixtures.cabinets import Drawer
 from robocasa_lerobot.envs.kitchens.footprints import Area, Footprint
 from robocasa_lerobot.envs.kitchens.layout import load_layout
+from robocasa_lerobot.envs.predicates import ObjectOn
 from robocasa_lerobot.envs.scene.build import build_scene
 from robocasa_lerobot.envs.scene.counter_areas import standing_on
 from robocasa_lerobot.envs.scene.scene import Scene
+from robocasa_lerobot.envs.scene.spec import ObjectWanted, OnCounter, Placement
 from robocasa_lerobot.envs.tasks.registry import get_task
+from robocasa_lerobot.errors import UserError
+
+type Scale = float | tuple[float, float, float]
 
 
 def scene_in(task: str, layout: int, style: int) -> Scene:
@@ -28,7 +37,7 @@ def touches(scene: Scene, data: mujoco.MjData, one: str, other: str) -> bool:
 def test_no_robot_starts_in_a_drawer_that_stands_open() -> None:
     scene = scene_in("PickPlaceDrawerToCounter", 40, 21)
     data, _ = scene.initial_data(np.random.default_rng(0))
-    drawer = scene.drawer("drawer")
+    drawer = scene.fixture("drawer", Drawer)
     assert drawer.openness(data) == pytest.approx(1.0, abs=0.01)
     assert not touches(scene, data, "robot0_base", drawer.name)
 
@@ -36,7 +45,7 @@ def test_no_robot_starts_in_a_drawer_that_stands_open() -> None:
 def test_a_door_that_moves_by_itself_is_found() -> None:
     scene = scene_in("PickPlaceDrawerToCounter", 40, 21)
     data, _ = scene.initial_data(np.random.default_rng(0))
-    drawer = scene.drawer("drawer")
+    drawer = scene.fixture("drawer", Drawer)
     assert max(moved(scene, data).values()) < 0.01
     data.joint(drawer.joint).qvel[:] = 0.5
     assert moved(scene, data)[f"{drawer.name}_box"] > 0.01
@@ -48,7 +57,7 @@ def test_a_pan_stands_with_its_round_part_on_the_burner() -> None:
     assert pan.item.interior is not None
     footprint = pan.footprint
     middle = np.array(pan.pos[:2]) + np.array(pan.item.interior.center[:2]) @ footprint.axes()
-    regions = scene.hob("stove").regions
+    regions = scene.fixture("stove", Hob).regions
     burners = [scene.fixture("stove").to_world(r.center)[:2] for name, r in regions.items() if name != "interior"]
     assert min(np.hypot(*(middle - at)) for at in burners) < 0.02
     assert min(np.hypot(*(np.array(pan.pos[:2]) - at)) for at in burners) > 0.02
@@ -82,3 +91,33 @@ def test_faucets_are_in_the_way_behind_the_basin() -> None:
     spot = Footprint(float(behind[0]), float(behind[1]), 0.0, (0.01, 0.01))
     marks = standing_on(layout, counter, sink.pos[2] + sink.height / 2)
     assert any(mark.overlaps(spot) for mark in marks)
+
+
+# As composite tasks ask for them: a wider and lower box, and cutlery made high enough to be held.
+@pytest.mark.parametrize(
+    ("group", "scale"), [("tupperware", (1.5, 1.5, 1.0)), ("fork", (1.0, 1.0, 2.0)), ("bowl", 1.25)]
+)
+def test_objects_start_scaled_by_axis_with_what_is_in_them(group: str, scale: Scale) -> None:
+    base = dataclasses.replace(get_task("PickPlaceCounterToCabinet"), instruction="Look.", paraphrases=())
+    start = OnCounter("cab", size=(0.6, 0.4))
+    found = {}
+    for factors in (1.0, scale):
+        item = ObjectWanted("item", (group,), start, scale=factors)
+        inside = ObjectWanted("food", ("lime",), Placement(object="item"))
+        objects = (item, inside) if group != "fork" else (item,)
+        scene = build_scene(dataclasses.replace(base, objects=objects), "target", 3)
+        found[factors] = scene.objects["item"].item
+        data, _ = scene.initial_data(np.random.default_rng(0))
+        assert abs(data.body("item").xpos[2] - scene.objects["item"].pos[2]) < 0.02  # it has not fallen
+        if len(objects) == 2:
+            assert ObjectOn("food", "item").holds(scene, data)
+    assert found[scale].model == found[1.0].model
+    ratio = np.asarray(found[scale].size) / np.asarray(found[1.0].size)
+    assert ratio == pytest.approx(np.broadcast_to(scale, 3), rel=1e-3)
+
+
+def test_a_scale_of_two_factors_is_refused() -> None:
+    base = get_task("PickPlaceCounterToCabinet")
+    item = ObjectWanted("item", ("bowl",), OnCounter("cab"), scale=(1.5, 1.5))  # type: ignore[arg-type]
+    with pytest.raises(UserError, match="three of them"):
+        build_scene(dataclasses.replace(base, objects=(item,)), "target", 0)

@@ -11,12 +11,14 @@ from goal_states import AT_START, MOVED, can_be_written, hold, leaves, write
 from task_selection import every_task
 
 from robocasa_lerobot.envs import predicates
+from robocasa_lerobot.envs.kitchens.appliances.base import Appliance
 from robocasa_lerobot.envs.predicates import Goal
 from robocasa_lerobot.envs.predicates.contacts import touching
 from robocasa_lerobot.envs.scene.build import build_scene
 from robocasa_lerobot.envs.scene.initial_states import PartAt, initial_share
 from robocasa_lerobot.envs.tasks.registry import get_task, task_names
 from robocasa_lerobot.envs.tasks.task import Task
+from robocasa_lerobot.envs.tasks.typical import goal_of
 
 
 def test_there_are_sixty_five() -> None:
@@ -37,7 +39,7 @@ def test_it_can_be_made_and_is_not_done_at_reset(name: str, split: str) -> None:
         scene = build_scene(task, split, seed)
         data, _ = scene.initial_data(np.random.default_rng(seed))
         terms: dict[str, bool] = {}
-        assert not task.goal.evaluate(scene, data, terms)
+        assert not task.bound(scene).goal.evaluate(scene, data, terms)
         assert terms
         for said in (scene.instruction, *scene.paraphrases):
             assert "{" not in said
@@ -47,13 +49,13 @@ def test_it_can_be_made_and_is_not_done_at_reset(name: str, split: str) -> None:
             if isinstance(entry, PartAt):
                 part = scene.fill(entry.part)
                 # A timer or a snapping door may have moved while the scene settled.
-                assert scene.appliance(entry.fixture).share(data, part) == pytest.approx(
+                assert scene.fixture(entry.fixture, Appliance).share(data, part) == pytest.approx(
                     initial_share(scene, entry.fixture, entry.part), abs=0.06
                 )
 
 
 def reachable(task: Task) -> bool:
-    return all(can_be_written(type(leaf)) or isinstance(leaf, AT_START) for leaf in leaves(task.goal))
+    return all(can_be_written(type(leaf)) or isinstance(leaf, AT_START) for leaf in leaves(goal_of(task)))
 
 
 @pytest.mark.parametrize("name", every_task(reachable))
@@ -61,8 +63,9 @@ def test_the_state_that_the_goal_asks_for_is_success(name: str) -> None:
     task = get_task(name)
     scene = build_scene(task, "target", 1)
     data, _ = scene.initial_data(np.random.default_rng(1))
-    write(task.goal, scene, data)
-    assert hold(task.goal, scene, data) is None
+    goal = task.bound(scene).goal
+    write(goal, scene, data)
+    assert hold(goal, scene, data) is None
 
 
 def test_every_predicate_is_written_or_holds_at_the_start_or_is_moved() -> None:

@@ -12,8 +12,10 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from robocasa_lerobot.envs.kitchens.appliances.base import take_effect
+from robocasa_lerobot.envs.kitchens.appliances.base import Appliance, take_effect
 from robocasa_lerobot.envs.kitchens.appliances.kinds.blender import Blender
+from robocasa_lerobot.envs.kitchens.appliances.kinds.sink import Sink
+from robocasa_lerobot.envs.kitchens.appliances.kinds.stove import Hob
 from robocasa_lerobot.envs.predicates import (
     AllOf,
     AnyOf,
@@ -23,6 +25,7 @@ from robocasa_lerobot.envs.predicates import (
     DrawerClosed,
     DrawerOpen,
     Exactly,
+    ForEach,
     Goal,
     Grasped,
     GripperFar,
@@ -45,6 +48,7 @@ from robocasa_lerobot.envs.predicates import (
     PartTurned,
     PartWithin,
     StandsBefore,
+    StandsNear,
     StateIs,
     StepsWhile,
     Strokes,
@@ -54,7 +58,7 @@ from robocasa_lerobot.envs.predicates import (
 )
 from robocasa_lerobot.envs.predicates.objects import middle_of
 from robocasa_lerobot.envs.scene.initial_states import initial_share
-from robocasa_lerobot.envs.scene.scene import Scene, set_openness
+from robocasa_lerobot.envs.scene.scene import Scene
 
 AWAKE = -(1 + 10)  # of `tree_asleep`: and 10 quiet steps (mjMINAWAKE) away from sleep
 # What holds as long as nothing was done; and what moves objects or the robot to where they stay, which the
@@ -69,6 +73,7 @@ MOVED = (
     ObjectTouchesAnyCounter,
     ObjectUpright,
     StandsBefore,
+    StandsNear,
 )
 
 
@@ -130,6 +135,11 @@ def _exactly(goal: Exactly, scene: Scene, data: mujoco.MjData) -> None:
 
 
 @write.register
+def _each(goal: ForEach, scene: Scene, data: mujoco.MjData) -> None:
+    write(goal.bound(scene), scene, data)
+
+
+@write.register
 def _not(goal: Not, scene: Scene, data: mujoco.MjData) -> None:
     """What is not wanted does not hold by itself."""
 
@@ -142,60 +152,60 @@ def _when(goal: When, scene: Scene, data: mujoco.MjData) -> None:
 @write.register(DoorsOpen)
 @write.register(DrawerOpen)
 def _open(goal: DoorsOpen | DrawerOpen, scene: Scene, data: mujoco.MjData) -> None:
-    set_openness(scene.fixture(goal.fixture), data, 1.0)
+    scene.fixture(goal.fixture).set_openness(data, 1.0, getattr(goal, "part", ""))
 
 
 @write.register(DoorsClosed)
 @write.register(DrawerClosed)
 def _closed(goal: DoorsClosed | DrawerClosed, scene: Scene, data: mujoco.MjData) -> None:
-    set_openness(scene.fixture(goal.fixture), data, 0.0)
+    scene.fixture(goal.fixture).set_openness(data, 0.0, getattr(goal, "part", ""))
 
 
 @write.register
 def _part_within(goal: PartWithin, scene: Scene, data: mujoco.MjData) -> None:
     low, high = max(goal.low, 0.0), min(goal.high, 1.0)
-    scene.appliance(goal.fixture).set_share(data, scene.fill(goal.part), (low + high) / 2)
+    scene.fixture(goal.fixture, Appliance).set_share(data, scene.fill(goal.part), (low + high) / 2)
 
 
 @write.register
 def _part_turned(goal: PartTurned, scene: Scene, data: mujoco.MjData) -> None:
     share = initial_share(scene, goal.fixture, goal.part) + 1.2 * goal.by
-    scene.appliance(goal.fixture).set_share(data, goal.part, share)
+    scene.fixture(goal.fixture, Appliance).set_share(data, goal.part, share)
 
 
 @write.register
 def _burner_level(goal: BurnerLevel, scene: Scene, data: mujoco.MjData) -> None:
-    scene.hob(goal.fixture).set_burner(data, scene.fill(goal.location), goal.level)
+    scene.fixture(goal.fixture, Hob).set_burner(data, scene.fill(goal.location), goal.level)
 
 
 @write.register
 def _state_is(goal: StateIs, scene: Scene, data: mujoco.MjData) -> None:
     fixture, key = scene.fixture(goal.fixture), scene.fill(goal.key)
     if key == "water_on":
-        scene.sink(goal.fixture).set_water(data, goal.value)
+        scene.fixture(goal.fixture, Sink).set_water(data, goal.value)
     elif key.endswith("_on"):
-        scene.hob(goal.fixture).set_burner(data, key.removesuffix("_on"), "on" if goal.value else "off")
+        scene.fixture(goal.fixture, Hob).set_burner(data, key.removesuffix("_on"), "on" if goal.value else "off")
     elif key in ("left", "right"):
-        scene.appliance(goal.fixture).set_position(data, "spout", 1.0 if key == "right" else -1.0)
+        scene.fixture(goal.fixture, Appliance).set_position(data, "spout", 1.0 if key == "right" else -1.0)
     elif key == "lid":
         assert isinstance(fixture, Blender)
         assert goal.value
         fixture.set_lid(data)
     else:
         assert key == "on", (fixture.name, key)
-        scene.appliance(goal.fixture).set_share(data, "power", float(goal.value))
+        scene.fixture(goal.fixture, Appliance).set_share(data, "power", float(goal.value))
 
 
 @write.register
 def _under_water(goal: UnderWater, scene: Scene, data: mujoco.MjData) -> None:
-    sink = scene.sink(goal.fixture)
+    sink = scene.fixture(goal.fixture, Sink)
     sink.set_water(data, True)
     put_object(scene, data, scene.fill(goal.object), data.site(f"{sink.name}_water").xpos - [0.0, 0.0, 0.15])
 
 
 @write.register
 def _on_burner(goal: OnBurner, scene: Scene, data: mujoco.MjData) -> None:
-    hob, name = scene.hob(goal.fixture), scene.fill(goal.object)
+    hob, name = scene.fixture(goal.fixture, Hob), scene.fill(goal.object)
     others = [location for location in hob.burners if hob.burner_level(data, location) == "off"]
     burner = scene.fill(goal.burner) or others[0]
     top = data.site(f"{hob.name}_burner_on_{burner}").xpos

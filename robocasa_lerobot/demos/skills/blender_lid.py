@@ -61,9 +61,7 @@ def uncover(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
 
 def the_blender(env: KitchenEnv, stage: Stage) -> Blender:
     """The blender that a stage is about."""
-    blender = env.scene.fixture(stage.target)
-    assert isinstance(blender, Blender)
-    return blender
+    return env.scene.fixture(stage.target, Blender)
 
 
 def _carry(env: KitchenEnv, stage: Stage, blender: Blender, spots: list[Array]) -> Iterator[Array]:

@@ -15,6 +15,7 @@ from robocasa_lerobot.demos.skills.common import SkillError, hold_hand, move_han
 from robocasa_lerobot.demos.skills.levers import level_and_down, push_way
 from robocasa_lerobot.demos.skills.reach import plan_reach, shift_base, untried
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
+from robocasa_lerobot.envs.kitchens.appliances.base import Appliance
 from robocasa_lerobot.envs.tasks.task import Stage
 
 ATTEMPTS = 4
@@ -32,7 +33,7 @@ def press_button(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
     Raises:
         SkillError: the goal does not hold after four attempts.
     """
-    data, fixture = env.data, env.scene.appliance(stage.target)
+    data, fixture = env.data, env.scene.fixture(stage.target, Appliance)
     part = env.scene.fill(stage.part)
     body = data.body(f"{fixture.name}_{part}")
     joint = data.joint(fixture.joint(part))
@@ -87,5 +88,5 @@ def _way(face: Array, inwards: Array, rotation: Array) -> tuple[HandTarget, ...]
 
 def _pressed(env: KitchenEnv, stage: Stage, part: str) -> Callable[[], bool]:
     """Whether the button is in by most of its way."""
-    fixture = env.scene.appliance(stage.target)
+    fixture = env.scene.fixture(stage.target, Appliance)
     return lambda: fixture.share(env.data, part) > 0.7

@@ -19,7 +19,6 @@ from robocasa_lerobot.demos.skills.common import SkillError, draw_back, move_han
 from robocasa_lerobot.demos.skills.hinged import Hinged, push_round
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.kitchens.appliances.base import Appliance
-from robocasa_lerobot.envs.kitchens.fixtures.cabinets import HingeCabinet
 from robocasa_lerobot.envs.tasks.task import Stage
 
 ATTEMPTS = 3
@@ -29,14 +28,10 @@ SHUT_GOAL = 0.002  # below the 0.005 that tasks ask for
 
 
 def doors(env: KitchenEnv, stage: Stage) -> list[Hinged]:
-    """Doors of the stage's fixture."""
+    """Doors of the stage's fixture, or of the stage's part of it, such as its "freezer"."""
     fixture = env.scene.fixture(stage.target)
-    if isinstance(fixture, HingeCabinet):
-        joints = fixture.door_joints
-    else:
-        assert isinstance(fixture, Appliance)
-        joints = tuple(fixture.joint(part) for part in fixture.doors)
-    return [Hinged(env.data, fixture, joint) for joint in joints]
+    names = fixture.doors_of(env.scene.fill(stage.part))
+    return [Hinged(env.data, fixture, fixture.door_joint(name)) for name in names]
 
 
 def push_lid(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
@@ -46,7 +41,7 @@ def push_lid(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
         SkillError: it is not shut after three attempts.
     """
     data = env.data
-    appliance = env.scene.appliance(stage.target)
+    appliance = env.scene.fixture(stage.target, Appliance)
     lid = Hinged(data, appliance, appliance.joint(stage.part))
     far = lid.high[1] if abs(lid.high[1]) > abs(lid.low[1]) else lid.low[1]
 

@@ -47,7 +47,7 @@ def open_drawer(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
     Raises:
         SkillError: the drawer is not open after three attempts.
     """
-    data, drawer = env.data, env.scene.drawer(stage.target)
+    data, drawer = env.data, env.scene.fixture(stage.target, Drawer)
     inwards = _inwards(drawer)
     rotation = _facing(env, drawer, inwards)
     approach = rotation[:, 2]
@@ -114,7 +114,7 @@ def close_drawer(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
     Raises:
         SkillError: the drawer is not shut after three attempts.
     """
-    data, drawer = env.data, env.scene.drawer(stage.target)
+    data, drawer = env.data, env.scene.fixture(stage.target, Drawer)
     inwards = _inwards(drawer)
     rotation = _facing(env, drawer, inwards)
     sideways = np.cross(inwards, UP)

@@ -76,7 +76,7 @@ PUSH_NEAR: list[Shift] = [
 
 
 def open_doors(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
-    """Open every door of the stage's fixture.
+    """Open every door of the stage's fixture, or of its part.
 
     Raises:
         SkillError: a door is not open after four attempts.

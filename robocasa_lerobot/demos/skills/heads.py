@@ -12,6 +12,7 @@ from robocasa_lerobot.demos.skills.arcs import pull_arc, push_arc
 from robocasa_lerobot.demos.skills.common import SkillError
 from robocasa_lerobot.demos.skills.hinged import Hinged
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
+from robocasa_lerobot.envs.kitchens.appliances.base import Appliance
 from robocasa_lerobot.envs.tasks.task import Stage
 
 ATTEMPTS = 5
@@ -68,7 +69,7 @@ def lower_head(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
 
 
 def _head(env: KitchenEnv, stage: Stage) -> Hinged:
-    mixer = env.scene.appliance(stage.target)
+    mixer = env.scene.fixture(stage.target, Appliance)
     return Hinged(env.data, mixer, mixer.joint("head"))
 
 

@@ -20,6 +20,7 @@ from robocasa_lerobot.demos.motion import (
 from robocasa_lerobot.demos.skills.common import SkillError, hold_hand, move_hand, stage_done
 from robocasa_lerobot.demos.skills.reach import plan_reach, shift_base
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
+from robocasa_lerobot.envs.kitchens.appliances.base import Appliance
 from robocasa_lerobot.envs.scene.initial_states import initial_share
 from robocasa_lerobot.envs.tasks.task import Stage
 
@@ -66,7 +67,7 @@ def turn_knob(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
 
 
 def _range(env: KitchenEnv, stage: Stage) -> float:
-    fixture = env.scene.appliance(stage.target)
+    fixture = env.scene.fixture(stage.target, Appliance)
     return float(env.model.joint(fixture.joint(env.scene.fill(stage.part))).range[1])
 
 
@@ -76,7 +77,7 @@ def _turn_to(env: KitchenEnv, stage: Stage, goal: float) -> Iterator[Array]:
     Raises:
         SkillError: it does not after six grasps.
     """
-    data, fixture = env.data, env.scene.appliance(stage.target)
+    data, fixture = env.data, env.scene.fixture(stage.target, Appliance)
     part = env.scene.fill(stage.part)
     body = data.body(f"{fixture.name}_{part}")
     allowed = frozenset({int(body.id)})

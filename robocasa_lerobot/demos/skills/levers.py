@@ -25,6 +25,8 @@ from robocasa_lerobot.demos.skills.arc_plan import CLOSED_FINGERS_HALF_M
 from robocasa_lerobot.demos.skills.common import SkillError, hold_hand, move_hand, stage_done
 from robocasa_lerobot.demos.skills.reach import plan_reach, shift_base, untried
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
+from robocasa_lerobot.envs.kitchens.appliances.base import Appliance
+from robocasa_lerobot.envs.kitchens.appliances.kinds.sink import Sink
 from robocasa_lerobot.envs.tasks.task import Stage
 
 ATTEMPTS = 4
@@ -58,7 +60,7 @@ def press_lever(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
     Raises:
         SkillError: it is not there after four attempts.
     """
-    data, fixture = env.data, env.scene.appliance(stage.target)
+    data, fixture = env.data, env.scene.fixture(stage.target, Appliance)
     part = env.scene.fill(stage.part)
     body = data.body(f"{fixture.name}_{part}")
     allowed = frozenset({int(body.id)})
@@ -90,19 +92,19 @@ def press_lever(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
 
 def turn_on_water(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
     """Grasp the faucet's lever and lift it."""
-    sink = env.scene.sink(stage.target)
+    sink = env.scene.fixture(stage.target, Sink)
     yield from _lead(env, stage, "handle", lambda: WATER_ON_RAD - sink.position(env.data, "handle"))
 
 
 def turn_off_water(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
     """Grasp the faucet's lever and lower it."""
-    sink = env.scene.sink(stage.target)
+    sink = env.scene.fixture(stage.target, Sink)
     yield from _lead(env, stage, "handle", lambda: WATER_OFF_RAD - sink.position(env.data, "handle"))
 
 
 def turn_sideways(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
     """Grasp the spout, or the lever that sets the temperature, and lead it to the side that is asked for."""
-    sink, part = env.scene.sink(stage.target), stage.part
+    sink, part = env.scene.fixture(stage.target, Sink), stage.part
     if part == "spout":
         goal = SPOUT_RAD if env.scene.fill(stage.to) == "right" else -SPOUT_RAD
     else:
@@ -120,7 +122,7 @@ def _lead(env: KitchenEnv, stage: Stage, part: str, left_over: Callable[[], floa
     Raises:
         SkillError: neither is it there after four attempts, nor does the task's goal hold.
     """
-    data, sink = env.data, env.scene.sink(stage.target)
+    data, sink = env.data, env.scene.fixture(stage.target, Sink)
     tree = env.scene.subtree(f"{sink.name}_{part}")
     allowed = frozenset(int(i) for i in np.flatnonzero(tree))
     tried: list[Array] = []

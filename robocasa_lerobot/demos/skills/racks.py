@@ -149,7 +149,7 @@ class _Part:
 
     @classmethod
     def of(cls, env: KitchenEnv, stage: Stage) -> _Part:
-        appliance, name = env.scene.appliance(stage.target), env.scene.fill(stage.part)
+        appliance, name = env.scene.fixture(stage.target, Appliance), env.scene.fill(stage.part)
         model, body = env.model, env.model.body(f"{appliance.name}_{name}")
         first = int(body.geomadr[0])
         solid = [

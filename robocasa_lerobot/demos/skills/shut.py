@@ -37,7 +37,7 @@ NEAR: list[Shift] = [(0.0, 0.0), (-0.2, 0.0), (-0.2, 0.25), (-0.2, -0.25), (-0.4
 
 
 def close_doors(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
-    """Push each door shut from outside, the base going along.
+    """Push each door of the stage's fixture, or of its part, shut from outside, the base going along.
 
     Raises:
         SkillError: a door is not shut after four attempts.

@@ -8,6 +8,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from robocasa_lerobot.envs.kitchens.appliances.catalogue import kinds_standing
 from robocasa_lerobot.envs.kitchens.fixtures.base import Fixture
 from robocasa_lerobot.envs.kitchens.footprints import Footprint
 from robocasa_lerobot.envs.kitchens.layout import Layout
@@ -18,8 +19,7 @@ PENETRATION_M = 0.002  # that fixtures may have
 WALKWAY_M = 1.0  # free before everything that opens
 SETTLE_S, MOVED_M = 1.0, 0.01
 _PROBE_M = 0.05  # thickness of the slices that walkways are looked through in
-_OPENING = ("drawer", "hinge_cabinet", "single_cabinet", "dishwasher", "oven", "stove", "stove_wide", "stovetop")
-_FRIDGES = ("fridge_french_door", "fridge_side_by_side", "fridge_bottom_freezer")
+_OPENING = ("drawer", "hinge_cabinet", "single_cabinet", "oven", "stovetop")  # besides what stands on the floor
 _BELOW_M = 0.9  # what begins above it is in no robot's way
 
 
@@ -82,7 +82,7 @@ def blocked_walkways(layout: Layout) -> list[str]:
     ]
     marks = [(f, footprint(f), float(np.hypot(f.width, f.depth)) / 2) for f in standing]
     found = []
-    for fixture in layout.of_type(*_OPENING, *_FRIDGES):
+    for fixture in layout.of_type(*_OPENING, *kinds_standing("under_counter"), *kinds_standing("floor")):
         if fixture.pos[2] - fixture.height / 2 > _BELOW_M:
             continue
         away = WALKWAY_M / 2 + 0.08  # the first centimetres are handles and the counter's edge

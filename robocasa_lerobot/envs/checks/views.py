@@ -9,7 +9,8 @@ import mujoco
 import numpy as np
 
 from robocasa_lerobot.envs.kitchens.footprints import PlacementError
-from robocasa_lerobot.envs.kitchens.layout import load_layout, split_of
+from robocasa_lerobot.envs.kitchens.layout import load_layout
+from robocasa_lerobot.envs.kitchens.materials import split_of
 from robocasa_lerobot.envs.rendering import SceneRenderer
 from robocasa_lerobot.envs.robots.panda_omron.robot import PANDA_OMRON
 from robocasa_lerobot.envs.robots.robot import Robot

@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable
 from enum import IntEnum
 
-from robocasa_lerobot.envs.kitchens.appliances.kinds.fridge import Fridge
+from robocasa_lerobot.envs.kitchens.appliances.catalogue import kinds, kinds_in
 from robocasa_lerobot.envs.kitchens.fixtures.base import Fixture
 from robocasa_lerobot.envs.kitchens.fixtures.counters import Counter
 from robocasa_lerobot.envs.kitchens.layout import Layout
+from robocasa_lerobot.errors import UnknownNameError
 
 Filter = Callable[[Layout, Fixture], bool]
 
@@ -98,19 +99,13 @@ def _dining_counter(_: Layout, fixture: Fixture) -> bool:
     )
 
 
+def _appliance(name: str) -> Filter:
+    """An appliance of a category, e.g. "fridge", or of a kind of one, e.g. "fridge_french_door"."""
+    return lambda layout, fixture: layout.types[fixture.name] in kinds_in(name)
+
+
 FILTERS: dict[FixtureType, Filter] = {
-    FixtureType.MICROWAVE: _types("microwave"),
-    FixtureType.STOVE: _types("stove", "stove_wide", "stovetop"),
-    FixtureType.OVEN: _types("oven"),
-    FixtureType.SINK: _types("sink"),
-    FixtureType.COFFEE_MACHINE: _types("coffee_machine"),
-    FixtureType.TOASTER: _types("toaster"),
-    FixtureType.TOASTER_OVEN: _types("toaster_oven"),
-    FixtureType.FRIDGE: _types("fridge_french_door", "fridge_side_by_side", "fridge_bottom_freezer"),
-    FixtureType.DISHWASHER: _types("dishwasher"),
-    FixtureType.BLENDER: _types("blender"),
-    FixtureType.STAND_MIXER: _types("stand_mixer"),
-    FixtureType.ELECTRIC_KETTLE: _types("electric_kettle"),
+    **{kind: _appliance(kind.name.lower()) for kind in FixtureType if kinds_in(kind.name.lower())},
     FixtureType.STOOL: _types("stool"),
     FixtureType.COUNTER: _counter,
     FixtureType.ISLAND: _island,
@@ -132,8 +127,13 @@ FIXTURE_KINDS: dict[str, Filter] = {kind.name.lower(): FILTERS[kind] for kind in
 FIXTURE_KINDS["drawer_top"] = FILTERS[FixtureType.TOP_DRAWER]
 
 
+def _with_freezer(_: Layout, fixture: Fixture) -> bool:
+    """A fridge whose freezer has a door, and shelves that the arm reaches: not below, not in a drawer."""
+    return "freezer" in fixture.compartments and bool(fixture.usable_shelves("freezer"))
+
+
 def _with_drawer(layout: Layout, fixture: Fixture) -> bool:
-    return isinstance(fixture, Fridge) and bool(fixture.drawers)
+    return FILTERS[FixtureType.FRIDGE](layout, fixture) and bool(fixture.parts_to_choose("drawer"))
 
 
 # What a robot is sent from and to (docs/robocasa.md, section 8).
@@ -150,4 +150,22 @@ def _once(layout: Layout, fixture: Fixture) -> bool:
     return kind in _LANDMARKS and list(layout.types.values()).count(kind) == 1
 
 
-FIXTURE_KINDS |= {"fridge_with_drawer": _with_drawer, "landmark": _types(*_SOURCES), "landmark_once": _once}
+FIXTURE_KINDS |= {
+    "fridge_with_drawer": _with_drawer,
+    "fridge_with_freezer": _with_freezer,
+    "landmark": _types(*_SOURCES),
+    "landmark_once": _once,
+}
+
+
+def fixture_filter(kind: str) -> Filter:
+    """What counts as a fixture of a kind: by the words of `FIXTURE_KINDS`, else by a category or kind of appliances.
+
+    Raises:
+        UnknownNameError: no such kind.
+    """
+    if kind in FIXTURE_KINDS:
+        return FIXTURE_KINDS[kind]
+    if not kinds_in(kind):
+        raise UnknownNameError("fixture kind", kind, (*FIXTURE_KINDS, *kinds()))
+    return _appliance(kind)

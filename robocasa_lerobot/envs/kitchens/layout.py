@@ -22,7 +22,6 @@ from robocasa_lerobot.envs.kitchens.plan.room import add_room
 from robocasa_lerobot.errors import UnknownNameError
 
 WALLS = ("back", "left", "right", "front")
-LAST_TARGET_ID = 10  # ids 1..10 are target, 11..60 pretraining (docs/robocasa.md, section 6)
 
 
 @dataclass(frozen=True)
@@ -49,11 +48,6 @@ class Layout:
     def of_type(self, *types: str) -> list[Fixture]:
         """Fixtures of any of some fixture types, in the layout's order."""
         return [fixture for name, fixture in self.fixtures.items() if self.types[name] in types]
-
-
-def split_of(number: int) -> str:
-    """Split of a layout or style id: 1..10 target, above that pretraining."""
-    return "target" if number <= LAST_TARGET_ID else "pretrain"
 
 
 def layout_ids() -> tuple[int, ...]:

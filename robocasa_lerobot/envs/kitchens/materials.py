@@ -51,6 +51,9 @@ COMMON_SURFACES: dict[str, Surface] = {
 }
 
 
+LAST_TARGET_ID = 10  # ids 1..10 are target, 11..60 pretraining (docs/robocasa.md, section 6)
+
+
 @dataclass(frozen=True)
 class Style:
     """The surfaces and parts of a kitchen.
@@ -62,7 +65,7 @@ class Style:
         panel, upper_panel: designs of fronts, keys of `fixtures.fronts.PANELS`; of wall cabinets apart.
         handle: one of `fixtures.fronts.HANDLES`.
         hood, stool: one of `fixtures.hoods.DESIGNS` and of `fixtures.stools.DESIGNS`.
-        appliances: model of the catalogue by appliance kind.
+        appliances: models of the catalogue that it names, by appliance kind; of others one is drawn by its number.
     """
 
     style_id: int
@@ -85,15 +88,15 @@ class Style:
             raise UnknownNameError(f"surface role of style {self.style_id}", role, self.surfaces)
         return self.surfaces[role]
 
-    def appliance(self, kind: str) -> str:
-        """Model of an appliance kind, e.g. "fridge_french_door".
+    @property
+    def split(self) -> str:
+        """Split that it belongs to."""
+        return split_of(self.style_id)
 
-        Raises:
-            UnknownNameError: the style file has no such kind.
-        """
-        if kind not in self.appliances:
-            raise UnknownNameError(f"appliance kind of style {self.style_id}", kind, self.appliances)
-        return self.appliances[kind]
+
+def split_of(number: int) -> str:
+    """Split of a layout or style id: 1..10 target, above that pretraining."""
+    return "target" if number <= LAST_TARGET_ID else "pretrain"
 
 
 def _surface(record: dict[str, Any]) -> Surface:
@@ -144,7 +147,7 @@ def load_style(style_id: int) -> Style:
         record["handle"],
         record["hood"],
         record["stool"],
-        record["appliances"],
+        record.get("appliances", {}),
     )
 
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
-from robocasa_lerobot.envs.kitchens.layout import LAST_TARGET_ID, layout_ids
-from robocasa_lerobot.envs.kitchens.materials import style_ids
+from robocasa_lerobot.envs.kitchens.layout import layout_ids
+from robocasa_lerobot.envs.kitchens.materials import LAST_TARGET_ID, style_ids
 from robocasa_lerobot.errors import UnknownNameError, UserError
 
 SPLITS = ("pretrain", "target")

@@ -278,11 +278,20 @@ def scaled(item: Instance, factors: float | Iterable[float]) -> Instance:
     Raises:
         UserError: not one or three positive factors.
     """
+    x, y, z = (a * b for a, b in zip(item.scale, _three(factors), strict=True))
+    return replace(item, scale=(x, y, z))
+
+
+def _three(factors: float | Iterable[float]) -> list[float]:
+    """Factors of x, y and z.
+
+    Raises:
+        UserError: not one or three positive factors.
+    """
     values = [float(factors)] * 3 if isinstance(factors, int | float) else [float(f) for f in factors]
     if len(values) != 3 or min(values) <= 0:
         raise UserError(f"object scale {values}: expected one positive factor, or three of them for x, y and z.")
-    x, y, z = (a * b for a, b in zip(item.scale, values, strict=True))
-    return replace(item, scale=(x, y, z))
+    return values
 
 
 def pool(
@@ -304,11 +313,12 @@ def pool(
 
     Raises:
         UnknownNameError: no such group or property.
+        UserError: not one or three positive factors.
     """
     for name in properties:
         if name not in PROPERTIES:
             raise UnknownNameError("object property", name, PROPERTIES)
-    factors = [scale] * 3 if isinstance(scale, int | float) else list(scale)
+    factors = _three(scale)
     unwanted = {c.name for group in exclude for c in categories_of(group)}
     found = {c.name: c for group in groups for c in categories_of(group) if c.name not in unwanted}
     wanted = set(properties)

@@ -11,7 +11,7 @@ from robocasa_lerobot.envs.predicates.fixtures import (
     StateIs,
 )
 from robocasa_lerobot.envs.predicates.heat_and_water import OnBurner, UnderWater
-from robocasa_lerobot.envs.predicates.logic import AllOf, AnyOf, Exactly, Goal, Not, Term, When
+from robocasa_lerobot.envs.predicates.logic import AllOf, AnyOf, Exactly, ForEach, Goal, Not, Term, When
 from robocasa_lerobot.envs.predicates.memory import Never, Once, StepsWhile, WithMemory, parts_with_memory
 from robocasa_lerobot.envs.predicates.near import Near, NearerThan
 from robocasa_lerobot.envs.predicates.objects import (
@@ -29,7 +29,9 @@ from robocasa_lerobot.envs.predicates.robot import (
     GripperFarFromPart,
     GripperTouches,
     StandsBefore,
+    StandsNear,
 )
+from robocasa_lerobot.envs.predicates.shelves import OnShelf, inside
 from robocasa_lerobot.envs.predicates.traces import MovedSince, Strokes
 
 __all__ = [
@@ -41,6 +43,7 @@ __all__ = [
     "DrawerClosed",
     "DrawerOpen",
     "Exactly",
+    "ForEach",
     "Goal",
     "Grasped",
     "GripperFar",
@@ -59,10 +62,12 @@ __all__ = [
     "ObjectTouchesAnyCounter",
     "ObjectUpright",
     "OnBurner",
+    "OnShelf",
     "Once",
     "PartTurned",
     "PartWithin",
     "StandsBefore",
+    "StandsNear",
     "StateIs",
     "StepsWhile",
     "Strokes",
@@ -70,5 +75,6 @@ __all__ = [
     "UnderWater",
     "When",
     "WithMemory",
+    "inside",
     "parts_with_memory",
 ]

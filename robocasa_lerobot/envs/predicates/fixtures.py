@@ -9,8 +9,8 @@ import mujoco
 import numpy as np
 
 from robocasa_lerobot.envs.kitchens.appliances.base import CLOSED_UP_TO, OPEN_FROM, Appliance
-from robocasa_lerobot.envs.kitchens.fixtures.base import Fixture
-from robocasa_lerobot.envs.kitchens.fixtures.cabinets import HingeCabinet
+from robocasa_lerobot.envs.kitchens.appliances.kinds.stove import Hob
+from robocasa_lerobot.envs.kitchens.fixtures.cabinets import Drawer
 from robocasa_lerobot.envs.predicates.logic import Term, plain
 from robocasa_lerobot.envs.scene.initial_states import initial_share
 
@@ -32,7 +32,7 @@ class DrawerOpen(Term):
 
     def holds(self, scene: Scene, data: mujoco.MjData) -> bool:
         """Compare the openness with the threshold."""
-        return scene.drawer(self.fixture).openness(data) >= self.at_least
+        return scene.fixture(self.fixture, Drawer).openness(data) >= self.at_least
 
 
 @dataclass(frozen=True)
@@ -49,41 +49,61 @@ class DrawerClosed(Term):
 
     def holds(self, scene: Scene, data: mujoco.MjData) -> bool:
         """Compare the openness with the threshold."""
-        return scene.drawer(self.fixture).openness(data) <= self.at_most
+        return scene.fixture(self.fixture, Drawer).openness(data) <= self.at_most
 
 
 @dataclass(frozen=True)
 class DoorsOpen(Term):
-    """Every door of a fixture is open by at least a share of its range."""
+    """Every door of a fixture is open by at least a share of its range.
+
+    It holds for a fixture without doors, such as an open cabinet.
+
+    Attributes:
+        fixture: role.
+        at_least: share.
+        part: start of the doors' names, such as the compartment "freezer"; all if empty. May name a choice in braces.
+    """
 
     fixture: str
     at_least: float = OPEN_FROM
+    part: str = ""
 
     @property
     def name(self) -> str:
-        """E.g. `fridge_open`."""
-        return f"{self.fixture}_open"
+        """E.g. `fridge_open`, `fridge_freezer_open`."""
+        return f"{self.fixture}_{plain(self.part)}_open" if self.part else f"{self.fixture}_open"
 
     def holds(self, scene: Scene, data: mujoco.MjData) -> bool:
         """Compare each door with the threshold."""
-        return min(door_shares(scene.fixture(self.fixture), data)) >= self.at_least
+        shares = scene.fixture(self.fixture).door_shares(data, scene.fill(self.part))
+        return all(share >= self.at_least for share in shares)
 
 
 @dataclass(frozen=True)
 class DoorsClosed(Term):
-    """Every door of a fixture is open by at most a share of its range."""
+    """Every door of a fixture is open by at most a share of its range.
+
+    It holds for a fixture without doors, such as an open cabinet.
+
+    Attributes:
+        fixture: role.
+        at_most: share.
+        part: start of the doors' names, such as the compartment "freezer"; all if empty. May name a choice in braces.
+    """
 
     fixture: str
     at_most: float = CLOSED_UP_TO
+    part: str = ""
 
     @property
     def name(self) -> str:
-        """E.g. `fridge_closed`."""
-        return f"{self.fixture}_closed"
+        """E.g. `fridge_closed`, `fridge_freezer_closed`."""
+        return f"{self.fixture}_{plain(self.part)}_closed" if self.part else f"{self.fixture}_closed"
 
     def holds(self, scene: Scene, data: mujoco.MjData) -> bool:
         """Compare each door with the threshold."""
-        return max(door_shares(scene.fixture(self.fixture), data)) <= self.at_most
+        shares = scene.fixture(self.fixture).door_shares(data, scene.fill(self.part))
+        return all(share <= self.at_most for share in shares)
 
 
 @dataclass(frozen=True)
@@ -110,7 +130,7 @@ class PartWithin(Term):
 
     def holds(self, scene: Scene, data: mujoco.MjData) -> bool:
         """Compare the share with the bounds."""
-        share = scene.appliance(self.fixture).share(data, scene.fill(self.part))
+        share = scene.fixture(self.fixture, Appliance).share(data, scene.fill(self.part))
         return self.low <= share <= self.high
 
 
@@ -130,7 +150,9 @@ class PartTurned(Term):
 
     def holds(self, scene: Scene, data: mujoco.MjData) -> bool:
         """Compare the change with what is wanted."""
-        change = scene.appliance(self.fixture).share(data, self.part) - initial_share(scene, self.fixture, self.part)
+        change = scene.fixture(self.fixture, Appliance).share(data, self.part) - initial_share(
+            scene, self.fixture, self.part
+        )
         return change >= self.by if self.by > 0 else change <= self.by
 
 
@@ -156,7 +178,7 @@ class StateIs(Term):
 
     def holds(self, scene: Scene, data: mujoco.MjData) -> bool:
         """Read the state."""
-        return bool(scene.appliance(self.fixture).state(data)[scene.fill(self.key)]) == self.value
+        return bool(scene.fixture(self.fixture, Appliance).state(data)[scene.fill(self.key)]) == self.value
 
 
 @dataclass(frozen=True)
@@ -174,12 +196,4 @@ class BurnerLevel(Term):
 
     def holds(self, scene: Scene, data: mujoco.MjData) -> bool:
         """Read the knob."""
-        return scene.hob(self.fixture).burner_level(data, scene.fill(self.location)) == self.level
-
-
-def door_shares(fixture: Fixture, data: mujoco.MjData) -> tuple[float, ...]:
-    """Openness of each door of a cabinet or an appliance, as shares of their ranges."""
-    if isinstance(fixture, HingeCabinet):
-        return tuple(fixture.openness(data))
-    assert isinstance(fixture, Appliance), f"{fixture.name} has no doors"
-    return tuple(fixture.share(data, part) for part in fixture.doors)
+        return scene.fixture(self.fixture, Hob).burner_level(data, scene.fill(self.location)) == self.level

@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING
 
 import mujoco
 
+from robocasa_lerobot.envs.kitchens.appliances.kinds.sink import Sink
+from robocasa_lerobot.envs.kitchens.appliances.kinds.stove import Hob
 from robocasa_lerobot.envs.predicates.contacts import touching
 from robocasa_lerobot.envs.predicates.logic import Term, plain
 from robocasa_lerobot.envs.predicates.objects import middle_of, radius
@@ -37,7 +39,7 @@ class UnderWater(Term):
     def holds(self, scene: Scene, data: mujoco.MjData) -> bool:
         """Look where the stream falls."""
         name = scene.fill(self.object)
-        return scene.sink(self.fixture).under_water(data, middle_of(scene, data, name), radius(scene, name))
+        return scene.fixture(self.fixture, Sink).under_water(data, middle_of(scene, data, name), radius(scene, name))
 
 
 @dataclass(frozen=True)
@@ -69,7 +71,7 @@ class OnBurner(Term):
 
     def holds(self, scene: Scene, data: mujoco.MjData) -> bool:
         """Find the burner, then look at its knob, at contacts and at the other object's burner."""
-        name, hob = scene.fill(self.object), scene.hob(self.fixture)
+        name, hob = scene.fill(self.object), scene.fixture(self.fixture, Hob)
         burner = self._burner_of(scene, data, name)
         if burner is None or (self.burner and burner != scene.fill(self.burner)):
             return False
@@ -80,7 +82,7 @@ class OnBurner(Term):
         return touching(scene.model, data, scene.subtree(name), scene.subtree(hob.name))
 
     def _burner_of(self, scene: Scene, data: mujoco.MjData, name: str) -> str | None:
-        hob = scene.hob(self.fixture)
+        hob = scene.fixture(self.fixture, Hob)
         burner, apart = hob.nearest_burner(data, middle_of(scene, data, name))
         # Below it is the oven.
         above = data.body(name).xpos[2] > data.site(f"{hob.name}_burner_on_{burner}").xpos[2]

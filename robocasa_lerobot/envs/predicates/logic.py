@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from typing import TYPE_CHECKING
 
 import mujoco
@@ -11,6 +11,7 @@ import mujoco
 from robocasa_lerobot.errors import UserError
 
 if TYPE_CHECKING:
+    from robocasa_lerobot.envs.scene.drawn import Drawn
     from robocasa_lerobot.envs.scene.scene import Scene
 
 
@@ -30,6 +31,10 @@ class Goal(ABC):
     @abstractmethod
     def evaluate(self, scene: Scene, data: mujoco.MjData, terms: dict[str, bool]) -> bool:
         """Whether it holds; every named term that it is made of is written to `terms`."""
+
+    def bound(self, scene: Drawn) -> Goal:
+        """The same in a scene, without what depends on what was drawn."""
+        return self
 
 
 class Term(Goal):
@@ -79,6 +84,10 @@ class AllOf(Joined):
         held = [part.evaluate(scene, data, terms) for part in self.parts]
         return all(held)
 
+    def bound(self, scene: Drawn) -> Goal:
+        """Bind every part."""
+        return AllOf(*(part.bound(scene) for part in self.parts))
+
 
 class AnyOf(Joined):
     """At least one part holds."""
@@ -101,6 +110,10 @@ class AnyOf(Joined):
         held = [part.evaluate(scene, data, terms) for part in self.parts]
         return any(held)
 
+    def bound(self, scene: Drawn) -> Goal:
+        """Bind every part."""
+        return AnyOf(*(part.bound(scene) for part in self.parts))
+
 
 class Not(Joined):
     """The part does not hold; its own terms are reported as they are."""
@@ -121,6 +134,10 @@ class Not(Joined):
     def evaluate(self, scene: Scene, data: mujoco.MjData, terms: dict[str, bool]) -> bool:
         """Evaluate the part."""
         return not self.part.evaluate(scene, data, terms)
+
+    def bound(self, scene: Drawn) -> Goal:
+        """Bind the part."""
+        return Not(self.part.bound(scene))
 
 
 class Exactly(Joined):
@@ -143,6 +160,10 @@ class Exactly(Joined):
         """Evaluate and count every part."""
         return sum([part.evaluate(scene, data, terms) for part in self.parts]) == self.n
 
+    def bound(self, scene: Drawn) -> Goal:
+        """Bind every part."""
+        return Exactly(self.n, *(part.bound(scene) for part in self.parts))
+
 
 class When(Joined):
     """One of several goals, by a value that was drawn at reset (`scene.spec.Choice`)."""
@@ -162,7 +183,47 @@ class When(Joined):
 
     def evaluate(self, scene: Scene, data: mujoco.MjData, terms: dict[str, bool]) -> bool:
         """Evaluate the goal of the value that was drawn."""
-        return self.goals[scene.choices[self.choice]].evaluate(scene, data, terms)
+        return self.bound(scene).evaluate(scene, data, terms)
+
+    def bound(self, scene: Drawn) -> Goal:
+        """The goal of the value that was drawn."""
+        return self.goals[scene.choices[self.choice]].bound(scene)
+
+
+class ForEach(Goal):
+    """A goal for every one of the objects of a name, as many as were drawn; each has terms of its own.
+
+    Args:
+        object: name in the declaration; where several were drawn, their names are `<object>_0`, `<object>_1`, ...
+        make: the goal of the object of a name, which it should use in the names of its terms.
+    """
+
+    def __init__(self, object: str, make: Callable[[str], Goal]) -> None:
+        self.object, self.make = object, make
+
+    @property
+    def name(self) -> str:
+        """E.g. `each_ice_i_on_cup`."""
+        return f"each_{self.pattern.name}"
+
+    @property
+    def pattern(self) -> Goal:
+        """The goal of any of them, `<object>_i`; for readers without a scene."""
+        return self.make(f"{self.object}_i")
+
+    @property
+    def inner(self) -> tuple[Goal, ...]:
+        """The goal of any of them."""
+        return (self.pattern,)
+
+    def evaluate(self, scene: Scene, data: mujoco.MjData, terms: dict[str, bool]) -> bool:
+        """Evaluate the goal of every one."""
+        return self.bound(scene).evaluate(scene, data, terms)
+
+    def bound(self, scene: Drawn) -> Goal:
+        """All of the goals of those that the scene has."""
+        goals = [self.make(name).bound(scene) for name in scene.named(self.object)]
+        return goals[0] if len(goals) == 1 else AllOf(*goals)
 
 
 def every_goal_in(goal: Goal) -> Iterator[Goal]:

@@ -9,9 +9,10 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from robocasa_lerobot.envs.kitchens.appliances.kinds.sink import Sink
 from robocasa_lerobot.envs.kitchens.fixtures.base import Region
 from robocasa_lerobot.envs.kitchens.fixtures.counters import Counter
-from robocasa_lerobot.envs.kitchens.fixtures.regions import regions_of
+from robocasa_lerobot.envs.kitchens.fixtures.regions import region_names, regions_of
 from robocasa_lerobot.envs.predicates.contacts import touching
 from robocasa_lerobot.envs.predicates.logic import Term, plain
 
@@ -39,7 +40,7 @@ class ObjectInBasin(Term):
 
     def holds(self, scene: Scene, data: mujoco.MjData) -> bool:
         """Test the body's origin against the basin's region."""
-        return scene.sink(self.fixture).basin.contains(data, data.body(scene.fill(self.object)).xpos)
+        return scene.fixture(self.fixture, Sink).basin.contains(data, data.body(scene.fill(self.object)).xpos)
 
 
 @dataclass(frozen=True)
@@ -49,7 +50,8 @@ class ObjectInside(Term):
     Attributes:
         object: name.
         fixture: role.
-        region: start of the region's name; all of the fixture's regions if empty. May name a choice in braces.
+        region: start of the region's name, or a shelf by its level, as "fridge_shelf:highest"; all of the fixture's
+            regions if empty. May name a choice in braces.
         margin: by which corners may stand out.
         lower: share of the region's height, from its floor, that the object's origin must be in.
         height: bounds of the height of the region's floor in the room, and its least height.
@@ -69,11 +71,12 @@ class ObjectInside(Term):
 
     def holds(self, scene: Scene, data: mujoco.MjData) -> bool:
         """Test the corners against each region."""
-        wanted = scene.fill(self.region)
+        fixture = scene.fixture(self.fixture)
+        wanted = region_names(fixture, scene.fill(self.region))
         corners, origin = object_corners(scene, data, self.object), data.body(scene.fill(self.object)).xpos
         return any(
             self._usable(data, region) and self._inside(data, region, corners, origin)
-            for name, region in regions_of(scene.fixture(self.fixture))
+            for name, region in regions_of(fixture)
             if name.startswith(wanted)
         )
 

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 GRIPPER_FAR_M, BUTTON_FAR_M = 0.25, 0.15
 OPPOSITE_COSINE = -0.5  # of the angle between two fingers' pushes
 # Of the base from the pose in front of a fixture (docs/robocasa.md, section 8).
+NEAR_M, NEAR_COSINE = 1.1, 0.5  # of an object from the base's centre, and of the base's heading towards it
 STANDS_WITHIN_M, STANDS_COSINE = 0.20, 0.98
 
 
@@ -117,3 +118,22 @@ class StandsBefore(Term):
         rotation = site.xmat.reshape(3, 3)
         heading = float(np.arctan2(rotation[1, 0], rotation[0, 0]))
         return apart <= STANDS_WITHIN_M and float(np.cos(heading - goal.yaw)) >= STANDS_COSINE
+
+
+@dataclass(frozen=True)
+class StandsNear(Term):
+    """An object is before the base, so that the arm reaches it after a small drive at most."""
+
+    object: str
+
+    @property
+    def name(self) -> str:
+        """E.g. `stands_near_bowl`."""
+        return f"stands_near_{plain(self.object)}"
+
+    def holds(self, scene: Scene, data: mujoco.MjData) -> bool:
+        """Compare where it is in the base's frame with the bounds."""
+        site = data.site(scene.robot.names.base_center_site)
+        ahead, left, _ = site.xmat.reshape(3, 3).T @ (data.body(scene.fill(self.object)).xpos - site.xpos)
+        far = float(np.hypot(ahead, left))
+        return far < NEAR_M and bool(ahead > NEAR_COSINE * far)

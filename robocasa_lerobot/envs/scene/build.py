@@ -8,9 +8,8 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from robocasa_lerobot.envs.kitchens.appliances.base import Appliance
 from robocasa_lerobot.envs.kitchens.appliances.kinds.blender import Blender
-from robocasa_lerobot.envs.kitchens.fixtures.cabinets import HingeCabinet
+from robocasa_lerobot.envs.kitchens.fixtures.base import of_kind
 from robocasa_lerobot.envs.kitchens.footprints import PlacementError, place
 from robocasa_lerobot.envs.kitchens.layout import Layout, load_layout
 from robocasa_lerobot.envs.kitchens.splits import Pairs, scene_ids, without
@@ -20,16 +19,18 @@ from robocasa_lerobot.envs.robots.panda_omron.robot import PANDA_OMRON
 from robocasa_lerobot.envs.robots.robot import Robot
 from robocasa_lerobot.envs.scene.assembly import bare_kitchen
 from robocasa_lerobot.envs.scene.counter_areas import counter_areas
+from robocasa_lerobot.envs.scene.drawn import Drawn, PlacedObject
 from robocasa_lerobot.envs.scene.initial_states import Initial, LidAside, PartAt
 from robocasa_lerobot.envs.scene.memory import Memory, add_memory
 from robocasa_lerobot.envs.scene.placement import cast_roles, place_objects
 from robocasa_lerobot.envs.scene.regions import Shares
 from robocasa_lerobot.envs.scene.robot_poses import RobotPose, robot_pose
 from robocasa_lerobot.envs.scene.roles import counter_of
-from robocasa_lerobot.envs.scene.scene import PlacedObject, Scene
+from robocasa_lerobot.envs.scene.scene import Scene
 from robocasa_lerobot.envs.scene.scene_spec import SceneSpec
 from robocasa_lerobot.envs.scene.spec import InitialOpenness, OnCounter
 from robocasa_lerobot.envs.scene.task_parameters import Choices, draw_choices
+from robocasa_lerobot.envs.scene.words import numbered, said, words_of
 from robocasa_lerobot.errors import UnknownNameError, UserError
 
 RENDER_PRESETS = ("fast", "quality")
@@ -55,7 +56,7 @@ class Arrangement:
     Attributes:
         roles: fixtures by role.
         choices: what was chosen among equals.
-        openness: of doors and drawers, by fixture.
+        openness: of doors and drawers, by fixture and part.
         initial: the task's further initial state, each entry with the number drawn for it.
         lids: roles of the blenders whose lid is not on, and whether it is gone altogether.
         objects: by name.
@@ -64,7 +65,7 @@ class Arrangement:
 
     roles: dict[str, str]
     choices: Choices
-    openness: dict[str, float]
+    openness: dict[tuple[str, str], float]
     initial: tuple[tuple[Initial, float], ...]
     lids: dict[str, bool]
     objects: dict[str, PlacedObject]
@@ -123,13 +124,16 @@ def _attempt(
     roles, choices, objects, pose = arranged.roles, arranged.choices, arranged.objects, arranged.robot_pose
     spots = {role: _lid_spot(rng, layout, roles[role], objects) for role, gone in arranged.lids.items() if not gone}
     spec = _assemble(task, layout, look, robot, objects)
-    kept = {part.name: part.numbers for part in task.remembering}
+    remembering = task.remembering(Drawn(roles=roles, objects=objects, choices=choices.values))
+    kept = {part.name: part.numbers for part in remembering}
     add_memory(spec, kept)
     if look.camera_noise is not None:
         noise_rng = np.random.default_rng([seed, _CAMERA_NOISE_STREAM])
         add_camera_noise(spec, robot.cameras(look.camera_set), look.camera_noise, noise_rng)
     model = spec.compile()
-    words = _words(layout, roles, objects) | choices.words | {"side": pose.side}
+    categories = {name: placed.item.category.name for name, placed in objects.items()}
+    words = words_of(layout, roles, categories, [wanted.name for wanted in task.objects if wanted.count != (1, 1)])
+    words.update({"side": pose.side} | choices.words)
     return Scene(
         split=split,
         seed=seed,
@@ -143,12 +147,13 @@ def _attempt(
         openness=arranged.openness,
         robot=robot,
         robot_pose=pose,
-        instruction=_said(task.instruction, words),
-        paraphrases=tuple(_said(wording, words) for wording in task.paraphrases),
+        instruction=said(task.instruction, words),
+        paraphrases=tuple(said(wording, words) for wording in task.paraphrases),
         choices=choices.values,
+        words=words,
         initial=arranged.initial,
         lid_spots=spots,
-        remembering=task.remembering,
+        remembering=remembering,
         memory=Memory.of(model, kept),
     )
 
@@ -169,7 +174,7 @@ def arrange(
     if not start.at_object:
         pose = robot_pose(rng, layout, start, layout.fixtures[roles[start.fixture]], shape, opened=opened)
     openness = {
-        roles[entry.fixture]: float(rng.uniform(entry.low, entry.high))
+        (roles[entry.fixture], _part(layout, roles, entry)): float(rng.uniform(entry.low, entry.high))
         for entry in task.initial
         if isinstance(entry, InitialOpenness)
     }
@@ -177,15 +182,26 @@ def arrange(
     initial = tuple((entry, entry.draw(rng, choices.values)) for entry in further)
     lids = _lids(task, roles)
     for role, gone in lids.items():
-        blender = layout.fixtures[roles[role]]
-        assert isinstance(blender, Blender)
-        blender.with_lid = not gone
-    places: dict[str, float | Shares] = {**openness, **_shares(initial, roles, choices)}
+        of_kind(layout.fixtures[roles[role]], Blender).with_lid = not gone
+    places: dict[str, float | Shares] = {name: share for (name, part), share in openness.items() if not part}
+    places |= _shares(initial, roles, choices)
     objects = place_objects(rng, task, split, layout, roles, places, choices.values)
     if pose is None:
         at = objects[start.at_object].pos[:2]
         pose = robot_pose(rng, layout, start, layout.fixtures[roles[start.fixture]], shape, at, opened)
     return Arrangement(roles, choices, openness, initial, lids, objects, pose)
+
+
+def _part(layout: Layout, roles: dict[str, str], entry: InitialOpenness) -> str:
+    """The part of a fixture that starts open.
+
+    Raises:
+        PlacementError: the fixture has no door there.
+    """
+    fixture = layout.fixtures[roles[entry.fixture]]
+    if entry.part and not any(door.startswith(entry.part) for door in fixture.door_names):
+        raise PlacementError(f"{fixture.name} has no door of its {entry.part}. Ask for another kind of fixture.")
+    return entry.part
 
 
 def _shares(initial: tuple[tuple[Initial, float], ...], roles: dict[str, str], choices: Choices) -> dict[str, Shares]:
@@ -215,8 +231,7 @@ def _lid_spot(
     Raises:
         PlacementError: there is no room for it.
     """
-    blender = layout.fixtures[name]
-    assert isinstance(blender, Blender)
+    blender = of_kind(layout.fixtures[name], Blender)
     counter = counter_of(layout, blender)
     areas, standing = counter_areas(layout, OnCounter("", "left_right", size=(0.35, 0.35)), blender)
     taken = [placed.footprint for placed in objects.values()]
@@ -225,33 +240,17 @@ def _lid_spot(
     return np.array([spot.x, spot.y, counter.surface_z + 0.002])
 
 
-def _words(layout: Layout, roles: dict[str, str], objects: dict[str, PlacedObject]) -> dict[str, str]:
-    """What instructions call fixtures and objects, by role and name."""
-    names = {role: _fixture_word(layout.types[name]) for role, name in roles.items()}
-    for name in roles.values():
-        fixture = layout.fixtures[name]
-        doors = fixture.doors if isinstance(fixture, HingeCabinet | Appliance) else ()
-        if doors:
-            number = doors if isinstance(doors, int) else len(doors)
-            names.setdefault("doors", "door" if number == 1 else "doors")
-    return names | {name: placed.item.category.name.replace("_", " ") for name, placed in objects.items()}
-
-
-def _fixture_word(kind: str) -> str:
-    return "fridge" if kind.startswith("fridge") else "stove" if kind.startswith("stove") else kind.replace("_", " ")
-
-
-def _said(wording: str, words: dict[str, str]) -> str:
-    """A wording with its words; a missing one (a rack that needs no name) leaves no double space."""
-    return " ".join(wording.format(**words).split())
-
-
 def _assemble(
     task: SceneSpec, layout: Layout, look: _Look, robot: Robot, objects: dict[str, PlacedObject]
 ) -> mujoco.MjSpec:
     spec, palette = bare_kitchen(layout, look.render_preset)
     robot.add_to(spec, look.render_preset, look.camera_set)
-    liquids = {wanted.name: LIQUIDS[wanted.filled] for wanted in task.objects if wanted.filled}
+    liquids = {
+        name: LIQUIDS[wanted.filled]
+        for wanted in task.objects
+        if wanted.filled
+        for name in numbered(wanted.name, objects)
+    }
     for placed in objects.values():
         add_object(spec, palette, placed.name, placed.item, liquid=liquids.get(placed.name))
     return spec

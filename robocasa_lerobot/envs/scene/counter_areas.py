@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-from robocasa_lerobot.envs.kitchens.appliances.kinds.sink import Sink
-from robocasa_lerobot.envs.kitchens.fixtures.accessories import Accessory
 from robocasa_lerobot.envs.kitchens.fixtures.base import Fixture
-from robocasa_lerobot.envs.kitchens.fixtures.cabinets import Drawer
+from robocasa_lerobot.envs.kitchens.fixtures.regions import regions_of
 from robocasa_lerobot.envs.kitchens.footprints import Area, Footprint, PlacementError
 from robocasa_lerobot.envs.kitchens.layout import Layout
 from robocasa_lerobot.envs.scene.robot_poses import footprint
@@ -51,26 +49,27 @@ def standing_on(layout: Layout, fixture: Fixture, surface_z: float) -> list[Foot
         f
         for f in layout.fixtures.values()
         if f is not fixture
-        and (isinstance(f, Accessory) or layout.types[f.name] not in NOT_IN_THE_WAY)
+        and (f.stands_on_surface or layout.types[f.name] not in NOT_IN_THE_WAY)
         and f.pos[2] + f.height / 2 > surface_z - 0.005
         and f.pos[2] - f.height / 2 < surface_z + 0.3
     ]
-    return [footprint(f) for f in standing] + [_faucet(f) for f in standing if isinstance(f, Sink)]
+    return [footprint(f) for f in standing] + [mark for f in standing for mark in _beside(f)]
 
 
-def _faucet(sink: Sink) -> Footprint:
-    """What the faucet covers of the counter; it stands out of the sink's box."""
-    (x, y), half = sink.faucet_spot
-    at = sink.to_world((x, y, 0.0))
-    return Footprint(float(at[0]), float(at[1]), sink.yaw, half)
+def _beside(fixture: Fixture) -> list[Footprint]:
+    """What a fixture covers of the counter outside its box, as the faucet of a sink does."""
+    found = []
+    for (x, y), half in fixture.covers_beside():
+        at = fixture.to_world((x, y, 0.0))
+        found.append(Footprint(float(at[0]), float(at[1]), fixture.yaw, half))
+    return found
 
 
 def inside_area(start: InsideOf, fixture: Fixture, openness: float) -> Area:
     """The part of a drawer's or basin's floor that a start allows, in the room as the drawer stands open."""
-    assert isinstance(fixture, Drawer | Sink)
-    region = fixture.interior if isinstance(fixture, Drawer) else fixture.basin
+    region = regions_of(fixture)[0][1]
     half_w, half_d = min(start.size[0] / 2, region.half[0]), min(start.size[1] / 2, region.half[1])
     centre_y = region.center[1] + start.at * (region.half[1] - half_d)
-    slide = -openness * fixture.full_travel if isinstance(fixture, Drawer) else 0.0
-    centre = fixture.to_world((region.center[0], centre_y + slide, region.center[2] - region.half[2]))
+    centre_y += fixture.slide_m(openness)
+    centre = fixture.to_world((region.center[0], centre_y, region.center[2] - region.half[2]))
     return Area(-half_w, half_w, -half_d, half_d, (float(centre[0]), float(centre[1])), fixture.yaw, float(centre[2]))

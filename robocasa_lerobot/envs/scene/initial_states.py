@@ -14,6 +14,10 @@ from typing import TYPE_CHECKING
 import mujoco
 import numpy as np
 
+from robocasa_lerobot.envs.kitchens.appliances.base import Appliance
+from robocasa_lerobot.envs.kitchens.appliances.kinds.sink import Sink
+from robocasa_lerobot.envs.kitchens.appliances.kinds.stove import Hob
+
 if TYPE_CHECKING:
     from robocasa_lerobot.envs.scene.scene import Scene
 
@@ -61,7 +65,7 @@ class PartAt(Initial):
 
     def apply(self, scene: Scene, data: mujoco.MjData, drawn: float) -> None:
         """Write the share."""
-        scene.appliance(self.fixture).set_share(data, scene.fill(self.part), drawn)
+        scene.fixture(self.fixture, Appliance).set_share(data, scene.fill(self.part), drawn)
 
 
 @dataclass(frozen=True)
@@ -74,7 +78,7 @@ class BurnerAt(Initial):
 
     def apply(self, scene: Scene, data: mujoco.MjData, drawn: float) -> None:
         """Turn the knob to a share of that level's range."""
-        scene.hob(self.fixture).set_burner(data, scene.fill(self.location), self.level, drawn)
+        scene.fixture(self.fixture, Hob).set_burner(data, scene.fill(self.location), self.level, drawn)
 
 
 @dataclass(frozen=True)
@@ -87,7 +91,7 @@ class Water(Initial):
     def apply(self, scene: Scene, data: mujoco.MjData, drawn: float) -> None:
         """Turn the handle."""
         on, draw = (drawn < 0.5, (2 * drawn) % 1.0) if self.on is None else (self.on, drawn)
-        scene.sink(self.fixture).set_water(data, on, draw)
+        scene.fixture(self.fixture, Sink).set_water(data, on, draw)
 
 
 @dataclass(frozen=True)
@@ -98,7 +102,7 @@ class SwitchedOn(Initial):
 
     def apply(self, scene: Scene, data: mujoco.MjData, drawn: float) -> None:
         """Switch it on."""
-        scene.appliance(self.fixture).set_on(data, True)  # type: ignore[attr-defined]
+        scene.fixture(self.fixture, Appliance).set_on(data, True)
 
 
 @dataclass(frozen=True)

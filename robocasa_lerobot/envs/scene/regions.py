@@ -9,9 +9,9 @@ import mujoco
 import numpy as np
 
 from robocasa_lerobot.envs.kitchens.appliances.base import Appliance
-from robocasa_lerobot.envs.kitchens.fixtures.base import Fixture, Region
+from robocasa_lerobot.envs.kitchens.fixtures.base import Fixture, Region, of_kind
 from robocasa_lerobot.envs.kitchens.fixtures.counters import Counter
-from robocasa_lerobot.envs.kitchens.fixtures.regions import regions_of
+from robocasa_lerobot.envs.kitchens.fixtures.regions import region_names, regions_of
 from robocasa_lerobot.envs.kitchens.footprints import Area, PlacementError
 from robocasa_lerobot.envs.kitchens.layout import Layout
 from robocasa_lerobot.envs.kitchens.materials import MaterialPalette, load_style
@@ -82,10 +82,9 @@ def _part_offset(style_id: int, fixture: Fixture, body: str, openness: float | S
     model = spec.compile()
     data = mujoco.MjData(model)
     if isinstance(openness, Mapping):
-        assert isinstance(alone, Appliance)
         for part, share in openness.items():
-            alone.set_share(data, part, share)
-    elif openness and hasattr(alone, "set_openness"):
+            of_kind(alone, Appliance).set_share(data, part, share)
+    elif openness:
         alone.set_openness(data, openness)
     mujoco.mj_kinematics(model, data)
     return np.asarray(data.body(body).xpos.copy())
@@ -101,10 +100,11 @@ def choose_parts(
     """
     region = placement.region
     low, high = region.height
+    names = region_names(fixture, region.name)
     parts = [
         part
         for part in parts_of(layout, fixture, openness)
-        if part.name.startswith(region.name)
+        if part.name.startswith(names)
         and low <= part.area.z <= high
         and (placement.slot or _sides(part.area) >= (MIN_SIDE_M, MIN_SIDE_M))
     ]

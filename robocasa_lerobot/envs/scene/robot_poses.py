@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from robocasa_lerobot.envs.kitchens.appliances.kinds.dishwasher import Dishwasher
-from robocasa_lerobot.envs.kitchens.appliances.kinds.microwave import Microwave
-from robocasa_lerobot.envs.kitchens.appliances.kinds.oven import Oven
-from robocasa_lerobot.envs.kitchens.fixtures.base import Fixture
-from robocasa_lerobot.envs.kitchens.fixtures.cabinets import Drawer, HingeCabinet
+from robocasa_lerobot.envs.kitchens.fixtures.base import Fixture, SweptBox
 from robocasa_lerobot.envs.kitchens.fixtures.counters import Counter
 from robocasa_lerobot.envs.kitchens.fixtures.stools import SEAT_M
 from robocasa_lerobot.envs.kitchens.footprints import Footprint, Footprints, PlacementError
@@ -29,9 +25,6 @@ SPAWN_TRIES, SPAWN_ROUNDS = 50, 4
 SPAWN_WIDENING_M = (0.10, 0.05)
 FEW_TRIES = 8  # of a round, one by one: nearly always enough; the others are looked at together, which is faster
 SPAWN_MARGIN_M = 0.02
-TALL_STANDOFF_M = 0.10  # more, before fridges and tall housings (docs/robocasa.md, section 6)
-HANDLE_OUT_M = 0.05
-DOOR_M = 0.04  # thickness of doors
 
 
 @dataclass(frozen=True)
@@ -89,9 +82,8 @@ def standing_pose(layout: Layout, fixture: Fixture, shape: StandingShape) -> Rob
     return _pose_at(layout, ground, face, fixture.pos[:2], (0.0, 0.0), 0.0, "", shape)
 
 
-def _standoff(layout: Layout, ground: Fixture, shape: StandingShape) -> float:
-    tall = layout.types[ground.name] == "housing_cabinet" or layout.types[ground.name].startswith("fridge")
-    return shape.standoff + (TALL_STANDOFF_M if tall else 0.0)
+def _standoff(ground: Fixture, shape: StandingShape) -> float:
+    return shape.standoff + ground.stand_offset_m
 
 
 def _pose_at(
@@ -106,7 +98,7 @@ def _pose_at(
 ) -> RobotPose:
     """The pose before a face of a ground fixture, in line with a point of the room, shifted right and inwards."""
     x = _turned(ground.to_local(at), -face.turn)[0] + shift[0]
-    y = -face.depth / 2 - _standoff(layout, ground, shape) - setback - face.clearance - shift[1]
+    y = -face.depth / 2 - _standoff(ground, shape) - setback - face.clearance - shift[1]
     world = ground.to_world((*_turned((x, y), face.turn), 0.0))
     heading = ground.yaw + face.turn + np.pi / 2
     yaw = float(np.arctan2(np.sin(heading), np.cos(heading)))
@@ -213,39 +205,18 @@ def _standing(fixtures: Mapping[str, Fixture], doors: list[_Door], top: float) -
 
 
 def _opened(fixtures: Iterable[Fixture]) -> list[_Door]:
-    """The open doors of cabinets, microwaves, dishwashers and ovens, and the pulled-out drawers, of some fixtures."""
-    return [door for fixture in fixtures for door in (*_outwards(fixture), *_sideways(fixture))]
+    """The open doors and the pulled-out drawers of some fixtures."""
+    found = []
+    for fixture in fixtures:
+        for box in fixture.swept_areas():
+            low = float(fixture.to_world((0.0, 0.0, box.low))[2])
+            found.append(_Door(_footprint_of(fixture, box), low, low + box.height))
+    return found
 
 
-def _outwards(fixture: Fixture) -> Iterator[_Door]:
-    """What folds down or slides out in front."""
-    if isinstance(fixture, Dishwasher | Oven):
-        low, high = fixture.door_span
-        out, thick = high - low, DOOR_M
-    elif isinstance(fixture, Drawer):
-        low, out, thick = -fixture.height / 2, fixture.full_travel + HANDLE_OUT_M, fixture.height
-    else:
-        return
-    x, y, z = fixture.to_world((0.0, -fixture.depth / 2 - out / 2, low)).tolist()
-    yield _Door(Footprint(x, y, fixture.yaw, (fixture.width / 2, out / 2)), z, z + thick)
-
-
-def _sideways(fixture: Fixture) -> Iterator[_Door]:
-    """Doors on a vertical hinge that stand open by 0.9 to 1 of a right angle, with their handles."""
-    if isinstance(fixture, Microwave):
-        hinges: tuple[str, ...] = ("left",)
-        wide = fixture.door_width
-    elif isinstance(fixture, HingeCabinet):
-        hinges, wide = fixture.hinges, fixture.width / max(len(fixture.hinges), 1)
-    else:
-        return
-    inwards, out = wide * float(np.sin(0.1 * np.pi / 2)) + DOOR_M, HANDLE_OUT_M
-    for hinge in hinges:
-        sign = -1.0 if hinge == "left" else 1.0
-        middle = sign * (fixture.width / 2 + (out - inwards) / 2)
-        x, y, z = fixture.to_world((middle, -(fixture.depth + wide) / 2, 0.0)).tolist()
-        mark = Footprint(x, y, fixture.yaw, ((inwards + out) / 2, wide / 2))
-        yield _Door(mark, z - fixture.height / 2, z + fixture.height / 2)
+def _footprint_of(fixture: Fixture, box: SweptBox) -> Footprint:
+    x, y, _ = fixture.to_world((*box.middle, 0.0)).tolist()
+    return Footprint(x, y, fixture.yaw, box.half)
 
 
 def is_free(fixtures: Mapping[str, Fixture], pose: RobotPose, shape: StandingShape) -> bool:
@@ -254,11 +225,8 @@ def is_free(fixtures: Mapping[str, Fixture], pose: RobotPose, shape: StandingSha
 
 
 def _handles(fixture: Fixture, top: float) -> list[Footprint]:
-    """The handle of a drawer that is low enough to be met: it stands out of the fixture's box."""
-    if not isinstance(fixture, Drawer) or fixture.pos[2] > top:
-        return []
-    x, y, _ = fixture.to_world((0.0, -fixture.depth / 2 - HANDLE_OUT_M / 2, 0.0))
-    return [Footprint(float(x), float(y), fixture.yaw, (fixture.width / 4, HANDLE_OUT_M / 2))]
+    """The handles of a fixture that are low enough to be met: they stand out of its box."""
+    return [] if fixture.pos[2] > top else [_footprint_of(fixture, box) for box in fixture.handles_out()]
 
 
 def footprint(fixture: Fixture) -> Footprint:

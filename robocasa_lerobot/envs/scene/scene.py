@@ -3,46 +3,28 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Any, Protocol
+from typing import Any, Protocol, overload
 
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
 from robocasa_lerobot.contract import ACTION_SIZE
-from robocasa_lerobot.envs.kitchens.appliances.base import Appliance, update_all
+from robocasa_lerobot.envs.kitchens.appliances.base import update_all
 from robocasa_lerobot.envs.kitchens.appliances.kinds.blender import Blender
-from robocasa_lerobot.envs.kitchens.appliances.kinds.sink import Sink
-from robocasa_lerobot.envs.kitchens.appliances.kinds.stove import Hob
-from robocasa_lerobot.envs.kitchens.fixtures.base import Fixture, yaw_quat
-from robocasa_lerobot.envs.kitchens.fixtures.cabinets import Drawer, HingeCabinet
-from robocasa_lerobot.envs.kitchens.footprints import Footprint
+from robocasa_lerobot.envs.kitchens.fixtures.base import Fixture, of_kind, yaw_quat
+from robocasa_lerobot.envs.kitchens.fixtures.regions import region_names
 from robocasa_lerobot.envs.kitchens.layout import Layout
-from robocasa_lerobot.envs.objects.catalogue import Instance
 from robocasa_lerobot.envs.robots.cameras import camera_configs
 from robocasa_lerobot.envs.robots.control_step import control_step
 from robocasa_lerobot.envs.robots.robot import Controller, Robot
 from robocasa_lerobot.envs.scene.bodies import subtree
+from robocasa_lerobot.envs.scene.drawn import Drawn
 from robocasa_lerobot.envs.scene.memory import Memory
 from robocasa_lerobot.envs.scene.robot_poses import RobotPose, standing_pose
+from robocasa_lerobot.envs.scene.words import Words
 
 SETTLE_STEPS = 10  # control steps without a command after placing everything (docs/robocasa.md, section 1)
-
-
-@dataclass(frozen=True)
-class PlacedObject:
-    """An object of a scene: its model, and where it starts (centre in metres, yaw in radians)."""
-
-    name: str
-    item: Instance
-    pos: tuple[float, float, float]
-    yaw: float
-
-    @property
-    def footprint(self) -> Footprint:
-        """Its bounding box on the floor plan."""
-        width, depth, _ = self.item.size
-        return Footprint(self.pos[0], self.pos[1], self.yaw, (width / 2, depth / 2))
 
 
 class FirstState(Protocol):
@@ -70,8 +52,8 @@ class Remembering(Protocol):
         """Its numbers after a control step; those before it are in `scene.memory`."""
 
 
-@dataclass
-class Scene:
+@dataclass(kw_only=True)
+class Scene(Drawn):
     """A kitchen made for an episode.
 
     Attributes:
@@ -80,14 +62,12 @@ class Scene:
         spec: the MjSpec; its XML names assets by portable paths.
         model: compiled.
         layout: where its fixtures stand.
-        roles: fixture name of each role of the task.
-        objects: by name.
-        openness: initial share of full travel by fixture name.
+        openness: initial share of full travel by fixture name and part, an empty one for all of it.
         robot: that is in it.
         robot_pose: where its base starts.
         instruction: what the robot is told.
         paraphrases: the same in other words.
-        choices: what was drawn for the task's choices, and the roles' fixtures, by name.
+        words: what is said of fixtures (by role), objects, choices, and lists of objects.
         initial: what the task has written into the first state, each with the number drawn for it, in that order.
         lid_spots: where the lid of a blender may lie, by role.
         arm_noise_rad: standard deviation of the noise on the initial arm pose.
@@ -102,14 +82,12 @@ class Scene:
     spec: mujoco.MjSpec
     model: mujoco.MjModel
     layout: Layout
-    roles: dict[str, str]
-    objects: dict[str, PlacedObject]
-    openness: dict[str, float]
+    openness: dict[tuple[str, str], float]
     robot: Robot
     robot_pose: RobotPose
     instruction: str
     paraphrases: tuple[str, ...] = ()
-    choices: dict[str, str] = field(default_factory=dict)
+    words: Words = field(default_factory=Words)
     initial: tuple[tuple[FirstState, float], ...] = ()
     lid_spots: dict[str, NDArray[np.float64]] = field(default_factory=dict)
     arm_noise_rad: float = 0.02
@@ -122,37 +100,25 @@ class Scene:
         """Fixtures by name."""
         return self.layout.fixtures
 
-    def fixture(self, role: str) -> Fixture:
-        """The fixture of a role."""
-        return self.fixtures[self.roles[role]]
+    @overload
+    def fixture(self, role: str) -> Fixture: ...
 
-    def drawer(self, role: str) -> Drawer:
-        """The drawer of a role."""
-        fixture = self.fixture(role)
-        assert isinstance(fixture, Drawer), f"{role} is no drawer"
-        return fixture
+    @overload
+    def fixture[F: Fixture](self, role: str, kind: type[F]) -> F: ...
 
-    def sink(self, role: str) -> Sink:
-        """The sink of a role."""
-        fixture = self.fixture(role)
-        assert isinstance(fixture, Sink), f"{role} is no sink"
-        return fixture
+    def fixture(self, role: str, kind: type[Fixture] = Fixture) -> Fixture:
+        """The fixture of a role, as what it must be: `scene.fixture("sink", Sink)`.
 
-    def appliance(self, role: str) -> Appliance:
-        """The appliance of a role."""
-        fixture = self.fixture(role)
-        assert isinstance(fixture, Appliance), f"{role} is no appliance"
-        return fixture
+        Raises:
+            UserError: it is something else.
+        """
+        return of_kind(self.fixtures[self.roles[self.fill(role)]], kind)
 
-    def hob(self, role: str) -> Hob:
-        """The stove or stovetop of a role."""
-        fixture = self.fixture(role)
-        assert isinstance(fixture, Hob), f"{role} is no hob"
-        return fixture
-
-    def fill(self, text: str) -> str:
-        """A name of a declaration with its choices and roles filled in, e.g. "knob_{knob}"."""
-        return text.format(**self.choices) if "{" in text else text
+    def part(self, role: str, text: str) -> str:
+        """A part that a declaration names at a fixture, choices filled in, a shelf by its level as its own name."""
+        text = self.fill(text)
+        names = region_names(self.fixture(role), text)
+        return names[0] if len(names) == 1 else text.partition(":")[0]
 
     def subtree(self, *bodies: str) -> NDArray[np.bool_]:
         """For each body of the model whether it is one of the named ones or hangs on one, (nbody,); kept."""
@@ -166,8 +132,7 @@ class Scene:
 
     def lay_lid(self, role: str, data: mujoco.MjData, turn: float, *, gone: bool) -> None:
         """Lay the lid of a blender on the counter, turned by a share of a full turn, or out of the way if `gone`."""
-        blender = self.fixture(role)
-        assert isinstance(blender, Blender)
+        blender = self.fixture(role, Blender)
         if not gone:
             blender.set_lid(data, self.lid_spots[role], 2 * np.pi * turn)
 
@@ -177,9 +142,8 @@ class Scene:
         pose = self.robot_pose
         self.robot.place_base(self.model, data, pose.x, pose.y, pose.yaw)
         self.robot.set_home(self.model, data, rng, self.arm_noise_rad)
-        for name, openness in self.openness.items():
-            fixture = self.fixtures[name]
-            set_openness(fixture, data, openness)
+        for (name, part), openness in self.openness.items():
+            self.fixtures[name].set_openness(data, openness, part)
         for entry, drawn in self.initial:
             entry.apply(self, data, drawn)
         for placed in self.objects.values():
@@ -191,8 +155,8 @@ class Scene:
         for _ in range(SETTLE_STEPS):
             control_step(self.model, data, controller, hold)
             self.update_appliances(data)
-        for part in self.remembering:
-            self.memory.write(data, part.name, part.begin(self, data))
+        for remembered in self.remembering:
+            self.memory.write(data, remembered.name, remembered.begin(self, data))
         data.time = 0.0
         return data, controller
 
@@ -203,10 +167,8 @@ class Scene:
             self.memory.write(data, part.name, part.after_step(self, data))
 
     def update_appliances(self, data: mujoco.MjData) -> None:
-        """Let appliances latch, time and light up."""
-        appliances = [fixture for fixture in self.fixtures.values() if isinstance(fixture, Appliance)]
-        if appliances:
-            update_all(appliances, self.model, data, self.subtree(self.robot.names.gripper))
+        """Let appliances latch, time and light up, once after each control step."""
+        update_all(self.fixtures.values(), self.model, data, self.subtree(self.robot.names.gripper))
 
     def ep_meta(self) -> dict[str, Any]:
         """Description of the episode in RoboCasa's keys (JSON-able)."""
@@ -235,17 +197,8 @@ class Scene:
                 for name, fixture in self.fixtures.items()
             },
             "fixture_refs": dict(self.roles),
+            "choices": {name: value for name, value in self.choices.items() if name not in self.roles},
             "cam_configs": camera_configs(self.model, (camera.name for camera in self.robot.cameras("default"))),
             "init_robot_base_pos": [self.robot_pose.x, self.robot_pose.y, 0.0],
             "init_robot_base_ori": [0.0, 0.0, self.robot_pose.yaw],
         }
-
-
-def set_openness(fixture: Fixture, data: mujoco.MjData, openness: float) -> None:
-    """Open a drawer or the doors of a cabinet or appliance by a share of their full travel; for initial states."""
-    if isinstance(fixture, Drawer | HingeCabinet):
-        fixture.set_openness(data, openness)
-    elif isinstance(fixture, Appliance):
-        fixture.set_door(data, openness)
-    else:
-        raise AssertionError(f"{fixture.name} cannot be opened")

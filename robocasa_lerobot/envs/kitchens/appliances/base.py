@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from robocasa_lerobot.envs.kitchens.appliances.parts import Parts
 from robocasa_lerobot.envs.kitchens.appliances.records import ModelRecord
-from robocasa_lerobot.envs.kitchens.fixtures.base import Fixture, Region
+from robocasa_lerobot.envs.kitchens.fixtures.base import Fixture
 from robocasa_lerobot.envs.kitchens.materials import MaterialPalette
 from robocasa_lerobot.envs.physics.whole_state import read_physics, write_physics
 
@@ -50,17 +50,37 @@ class Touches:
         return number in self._bodies
 
 
+@dataclass(frozen=True)
+class Standing:
+    """Where an appliance stands in the rows of layouts.
+
+    Attributes:
+        where: "counter", on it; "floor", between counters; "under_counter", flush with the cabinets; or "built_in",
+            where rows have a place of their own for it.
+        back_m: on the floor, of its back from the wall, metres.
+        name: of the fixture; its kind if empty.
+        tiled: on the floor, whether the tiles of the wall go on behind it.
+    """
+
+    where: str = "counter"
+    back_m: float = 0.0
+    name: str = ""
+    tiled: bool = False
+
+
 @dataclass
 class Appliance(Fixture):
     """A fixture made from a model record.
 
     Attributes:
         record: the model.
+        standing: where it stands in a row.
         memory_slots: numbers that it keeps in user data.
         looks: states worth a picture: shares of range by part.
     """
 
     record: ModelRecord = field(kw_only=True)
+    standing: ClassVar[Standing] = Standing()
     memory_slots: ClassVar[int] = 0
     looks: ClassVar[dict[str, dict[str, float]]] = {"": {}}
     _memory_at: int = field(default=-1, init=False, repr=False)
@@ -87,9 +107,18 @@ class Appliance(Fixture):
         return ()
 
     @property
-    def regions(self) -> dict[str, Region]:
-        """Where things can be put, by name; the first is the usual place."""
-        return {}
+    def is_ground(self) -> bool:
+        """Whether it stands on the floor."""
+        return self.standing.where == "floor"
+
+    @property
+    def door_names(self) -> tuple[str, ...]:
+        """Parts that are doors."""
+        return self.doors
+
+    def door_share(self, data: mujoco.MjData, door: str) -> float:
+        """How far a door is open, as a share of its range."""
+        return self.share(data, door)
 
     def state(self, data: mujoco.MjData) -> dict[str, float | bool]:
         """Shares of ranges of doors, racks, knobs and levers, and whether things are on."""
@@ -103,10 +132,14 @@ class Appliance(Fixture):
         """Whether every door is open by at most 0.005 of its range."""
         return all(self.share(data, part) <= CLOSED_UP_TO for part in self.doors)
 
-    def set_door(self, data: mujoco.MjData, share: float, part: str | None = None) -> None:
-        """Open one door, or all, by a share of its range; for initial states."""
-        for door in self.doors if part is None else (part,):
-            self.set_share(data, door, share)
+    def set_openness(self, data: mujoco.MjData, openness: float, part: str = "") -> None:
+        """Open the doors of a part, or all, by a share of their ranges; for initial states."""
+        for door in self.doors_of(part):
+            self.set_share(data, door, openness)
+
+    def set_on(self, data: mujoco.MjData, on: bool) -> None:
+        """Switch it on or off; for initial states."""
+        raise AssertionError(f"{self.name} has nothing to switch it on with")
 
     def set_rack(self, data: mujoco.MjData, share: float, rack: str) -> None:
         """Slide a rack or drawer out by a share of its range; doors in its way are opened. For initial states."""
@@ -205,12 +238,15 @@ class Appliance(Fixture):
 
 
 def update_all(
-    appliances: Iterable[Appliance], model: mujoco.MjModel, data: mujoco.MjData, gripper: NDArray[np.bool_]
+    fixtures: Iterable[Fixture], model: mujoco.MjModel, data: mujoco.MjData, gripper: NDArray[np.bool_]
 ) -> None:
-    """Let appliances do what they do by themselves; `gripper` are the bodies that press buttons, (nbody,).
+    """Let the appliances among fixtures do what they do by themselves.
 
-    Before and after: positions and contacts are evaluated.
+    Before and after: positions and contacts are evaluated. `gripper` are the bodies that press buttons, (nbody,).
     """
+    appliances = [fixture for fixture in fixtures if isinstance(fixture, Appliance)]
+    if not appliances:
+        return
     contacts = Touches(model, data, gripper)
     changed = [appliance.update(model, data, contacts) for appliance in appliances]
     if any(changed):

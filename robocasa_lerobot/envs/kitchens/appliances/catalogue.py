@@ -3,61 +3,61 @@
 from __future__ import annotations
 
 import functools
+import zlib
 
-from robocasa_lerobot.envs.kitchens.appliances.base import Appliance
+from robocasa_lerobot.envs.kitchens.appliances.base import Appliance, Standing
 from robocasa_lerobot.envs.kitchens.appliances.families import KINDS
-from robocasa_lerobot.envs.kitchens.appliances.kinds.blender import Blender
-from robocasa_lerobot.envs.kitchens.appliances.kinds.coffee_machine import CoffeeMachine
-from robocasa_lerobot.envs.kitchens.appliances.kinds.dishwasher import Dishwasher
-from robocasa_lerobot.envs.kitchens.appliances.kinds.electric_kettle import ElectricKettle
-from robocasa_lerobot.envs.kitchens.appliances.kinds.fridge import (
-    BottomFreezerFridge,
-    FrenchDoorFridge,
-    SideBySideFridge,
-)
-from robocasa_lerobot.envs.kitchens.appliances.kinds.microwave import Microwave
-from robocasa_lerobot.envs.kitchens.appliances.kinds.oven import Oven
-from robocasa_lerobot.envs.kitchens.appliances.kinds.sink import Sink
-from robocasa_lerobot.envs.kitchens.appliances.kinds.stand_mixer import StandMixer
-from robocasa_lerobot.envs.kitchens.appliances.kinds.stove import Stove, Stovetop
-from robocasa_lerobot.envs.kitchens.appliances.kinds.toaster import Toaster
-from robocasa_lerobot.envs.kitchens.appliances.kinds.toaster_oven import ToasterOven
-from robocasa_lerobot.envs.kitchens.appliances.records import SPLITS, ModelRecord, Size, generate
-from robocasa_lerobot.errors import UnknownNameError
+from robocasa_lerobot.envs.kitchens.appliances.kind_record import Kind, generate
+from robocasa_lerobot.envs.kitchens.appliances.records import SPLITS, ModelRecord, Size
+from robocasa_lerobot.envs.kitchens.materials import Style
+from robocasa_lerobot.errors import UnknownNameError, UserError
 
-# By kind, else by category: the class that builds its models.
-CLASSES: dict[str, type[Appliance]] = {
-    "blender": Blender,
-    "coffee_machine": CoffeeMachine,
-    "dishwasher": Dishwasher,
-    "electric_kettle": ElectricKettle,
-    "fridge_bottom_freezer": BottomFreezerFridge,
-    "fridge_french_door": FrenchDoorFridge,
-    "fridge_side_by_side": SideBySideFridge,
-    "sink": Sink,
-    "microwave": Microwave,
-    "oven": Oven,
-    "stand_mixer": StandMixer,
-    "stove": Stove,
-    "stovetop": Stovetop,
-    "toaster": Toaster,
-    "toaster_oven": ToasterOven,
-}
+_KINDS: dict[str, Kind] = {kind.name: kind for kind in KINDS}
+
+
+def register(kind: Kind) -> None:
+    """Add a kind of appliance: from then on its models can be built, and layouts and tasks may name it.
+
+    Raises:
+        UserError: there is a kind of that name.
+    """
+    if kind.name in _KINDS:
+        raise UserError(f"there is an appliance kind {kind.name!r} already: give yours another name.")
+    _KINDS[kind.name] = kind
+
+
+def _models() -> dict[str, ModelRecord]:
+    return _models_of(tuple(_KINDS))
 
 
 @functools.cache
-def _models() -> dict[str, ModelRecord]:
-    return {record.model_id: record for kind in KINDS for record in generate(kind)}
+def _models_of(names: tuple[str, ...]) -> dict[str, ModelRecord]:
+    return {record.model_id: record for name in names for record in generate(_KINDS[name])}
 
 
 def categories() -> tuple[str, ...]:
     """The 12 categories, e.g. "fridge"."""
-    return tuple(dict.fromkeys(kind.category for kind in KINDS))
+    return tuple(dict.fromkeys(kind.category for kind in _KINDS.values()))
 
 
 def kinds() -> tuple[str, ...]:
     """The fixture types, e.g. "fridge_french_door"; most categories have one of their own name."""
-    return tuple(kind.name for kind in KINDS)
+    return tuple(_KINDS)
+
+
+def kinds_in(name: str) -> tuple[str, ...]:
+    """The fixture types of a category, or the one of that name; none if there is neither."""
+    return tuple(kind.name for kind in _KINDS.values() if kind.category == name) or ((name,) if name in _KINDS else ())
+
+
+def kinds_standing(where: str) -> tuple[str, ...]:
+    """The fixture types that stand in a place, e.g. on the "counter" (`Standing.where`)."""
+    return tuple(kind.name for kind in _KINDS.values() if kind.made_by.standing.where == where)
+
+
+def standing_of(kind: str) -> Standing:
+    """Where appliances of a fixture type stand."""
+    return _KINDS[kind].made_by.standing
 
 
 def models_of(kind: str, split: str | None = None) -> tuple[ModelRecord, ...]:
@@ -101,6 +101,21 @@ def model_of(model_id: str) -> ModelRecord:
     return _models()[model_id]
 
 
+def model_for(style: Style, kind: str) -> ModelRecord:
+    """The model that a style has of a fixture type: the one that it names, else one drawn by its number.
+
+    Raises:
+        UnknownNameError: no such kind.
+        UserError: the style's split has no model of it.
+    """
+    if kind in style.appliances:
+        return model_of(style.appliances[kind])
+    models = models_of(kind, style.split)
+    if not models:
+        raise UserError(f"no {kind} belongs to the {style.split} split: give its record models of both (`target`).")
+    return models[zlib.crc32(f"{kind} {style.style_id}".encode()) % len(models)]
+
+
 def build_appliance(
     model_id: str, name: str, pos: tuple[float, float, float], yaw: float = 0.0, size: Size | None = None
 ) -> Appliance:
@@ -117,5 +132,4 @@ def build_appliance(
         UnknownNameError: no such model.
     """
     record = model_of(model_id)
-    made = CLASSES[record.kind if record.kind in CLASSES else record.category]
-    return made(name, record.size if size is None else size, pos, yaw, record=record)
+    return _KINDS[record.kind].made_by(name, record.size if size is None else size, pos, yaw, record=record)

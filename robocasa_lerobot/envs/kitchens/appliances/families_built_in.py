@@ -2,7 +2,17 @@
 
 from __future__ import annotations
 
-from robocasa_lerobot.envs.kitchens.appliances.records import Family, Kind
+from robocasa_lerobot.envs.kitchens.appliances.kind_record import Kind
+from robocasa_lerobot.envs.kitchens.appliances.kinds.dishwasher import Dishwasher
+from robocasa_lerobot.envs.kitchens.appliances.kinds.fridge import (
+    BottomFreezerFridge,
+    FrenchDoorFridge,
+    SideBySideFridge,
+)
+from robocasa_lerobot.envs.kitchens.appliances.kinds.oven import Oven
+from robocasa_lerobot.envs.kitchens.appliances.kinds.sink import Sink
+from robocasa_lerobot.envs.kitchens.appliances.kinds.stove import Stove, Stovetop
+from robocasa_lerobot.envs.kitchens.appliances.records import Family
 
 STEELS = ("steel", "warm_steel", "black_steel")
 
@@ -28,6 +38,7 @@ BUILT_IN: tuple[Kind, ...] = (
                 {"handle": ("bar", "slim"), "panel": ("none",), "tines": (3, 4, 5)},
             ),
         ),
+        made_by=Dishwasher,
     ),
     Kind(
         "fridge_french_door",
@@ -62,6 +73,7 @@ BUILT_IN: tuple[Kind, ...] = (
                 },
             ),
         ),
+        made_by=FrenchDoorFridge,
     ),
     Kind(
         "fridge_side_by_side",
@@ -83,6 +95,7 @@ BUILT_IN: tuple[Kind, ...] = (
                 },
             ),
         ),
+        made_by=SideBySideFridge,
     ),
     Kind(
         "fridge_bottom_freezer",
@@ -117,6 +130,7 @@ BUILT_IN: tuple[Kind, ...] = (
                 },
             ),
         ),
+        made_by=BottomFreezerFridge,
     ),
     Kind(
         "oven",
@@ -146,6 +160,7 @@ BUILT_IN: tuple[Kind, ...] = (
                 {"handle": ("bar", "slim"), "racks": (1,), "panel": ("display",)},
             ),
         ),
+        made_by=Oven,
     ),
     Kind(
         "sink",
@@ -187,6 +202,7 @@ BUILT_IN: tuple[Kind, ...] = (
                 },
             ),
         ),
+        made_by=Sink,
     ),
     Kind(
         "stove",
@@ -216,6 +232,7 @@ BUILT_IN: tuple[Kind, ...] = (
                 {"handle": ("bow", "bar"), "knob": ("round", "bar"), "back": (0.06, 0.10), "hob": ("gas",)},
             ),
         ),
+        made_by=Stove,
     ),
     Kind(
         "stove_wide",
@@ -238,6 +255,7 @@ BUILT_IN: tuple[Kind, ...] = (
                 {"handle": ("bow", "bar"), "knob": ("round",), "back": (0.06, 0.10), "hob": ("gas", "coil")},
             ),
         ),
+        made_by=Stove,
     ),
     Kind(
         "stovetop",
@@ -260,5 +278,6 @@ BUILT_IN: tuple[Kind, ...] = (
                 {"knob": ("round",), "hob": ("glass",), "burners": (4,)},
             ),
         ),
+        made_by=Stovetop,
     ),
 )

@@ -3,7 +3,15 @@
 from __future__ import annotations
 
 from robocasa_lerobot.envs.kitchens.appliances.families_built_in import STEELS
-from robocasa_lerobot.envs.kitchens.appliances.records import Family, Kind
+from robocasa_lerobot.envs.kitchens.appliances.kind_record import Kind
+from robocasa_lerobot.envs.kitchens.appliances.kinds.blender import Blender
+from robocasa_lerobot.envs.kitchens.appliances.kinds.coffee_machine import CoffeeMachine
+from robocasa_lerobot.envs.kitchens.appliances.kinds.electric_kettle import ElectricKettle
+from robocasa_lerobot.envs.kitchens.appliances.kinds.microwave import Microwave
+from robocasa_lerobot.envs.kitchens.appliances.kinds.stand_mixer import StandMixer
+from robocasa_lerobot.envs.kitchens.appliances.kinds.toaster import Toaster
+from robocasa_lerobot.envs.kitchens.appliances.kinds.toaster_oven import ToasterOven
+from robocasa_lerobot.envs.kitchens.appliances.records import Family
 
 RETRO = ("cream", "mint", "red", "sky", "pink", "sage", "navy", "mustard")
 
@@ -36,6 +44,7 @@ COUNTER_TOP: tuple[Kind, ...] = (
                 {"jug": ("square", "round"), "handle": ("straight",), "panel": ("wide",)},
             ),
         ),
+        made_by=Blender,
     ),
     Kind(
         "coffee_machine",
@@ -72,6 +81,7 @@ COUNTER_TOP: tuple[Kind, ...] = (
                 {"tray": ("round", "slots"), "top": ("lever", "flat"), "accent": ("chrome", "graphite")},
             ),
         ),
+        made_by=CoffeeMachine,
     ),
     Kind(
         "electric_kettle",
@@ -101,6 +111,7 @@ COUNTER_TOP: tuple[Kind, ...] = (
                 {"window": (True,), "accent": ("black", "chrome")},
             ),
         ),
+        made_by=ElectricKettle,
     ),
     Kind(
         "microwave",
@@ -130,6 +141,7 @@ COUNTER_TOP: tuple[Kind, ...] = (
                 {"handle": ("bow", "bar"), "controls": ("dials",), "window": ("tall", "wide")},
             ),
         ),
+        made_by=Microwave,
     ),
     Kind(
         "stand_mixer",
@@ -152,6 +164,7 @@ COUNTER_TOP: tuple[Kind, ...] = (
                 {"bowl": ("steel_plain", "white"), "trim": ("band", "cap"), "tool": ("whisk", "paddle", "hook")},
             ),
         ),
+        made_by=StandMixer,
     ),
     Kind(
         "toaster",
@@ -181,6 +194,7 @@ COUNTER_TOP: tuple[Kind, ...] = (
                 {"slots": (4,), "corner": (0.02, 0.04), "base": ("black", "silver"), "dial": (True, False)},
             ),
         ),
+        made_by=Toaster,
     ),
     Kind(
         "toaster_oven",
@@ -210,5 +224,6 @@ COUNTER_TOP: tuple[Kind, ...] = (
                 {"handle": ("bar",), "racks": (2,), "feet": ("round", "square")},
             ),
         ),
+        made_by=ToasterOven,
     ),
 )

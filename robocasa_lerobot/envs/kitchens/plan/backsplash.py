@@ -7,21 +7,21 @@ from typing import Any
 
 import mujoco
 
+from robocasa_lerobot.envs.kitchens.appliances.catalogue import kinds, standing_of
 from robocasa_lerobot.envs.kitchens.fixtures.base import Fixture, add_box
 from robocasa_lerobot.envs.kitchens.materials import MaterialPalette
 from robocasa_lerobot.envs.kitchens.plan.fixture_rows import (
-    BASE_TYPES,
-    CARRIES_COUNTER,
     COUNTER_HEIGHT,
     HOOD_BOTTOM,
     MICROWAVE_SHELF,
     SPLASH_M,
-    STOVES,
     UPPER_BOTTOM,
     UPPER_TOP,
     UPPER_TYPES,
     WINDOW_BOTTOM,
     Row,
+    base_types,
+    carries_counter,
     entry_kind,
 )
 
@@ -63,8 +63,8 @@ def _runs(plan: dict[str, Any]) -> list[tuple[float, float]]:
     found: list[tuple[float, float]] = []
     along, begun = float(plan.get("start", 0.0)), None
     for entry in [*plan.get("base", []), {"gap": 0.0}]:
-        kind, width = entry_kind(entry, BASE_TYPES)
-        tiled = kind in (*CARRIES_COUNTER, *STOVES, "corner")
+        kind, width = entry_kind(entry, base_types())
+        tiled = kind in (*carries_counter(), "corner") or (kind in kinds() and standing_of(kind).tiled)
         if tiled and begun is None:
             begun = along
         if not tiled and begun is not None:

@@ -7,7 +7,12 @@ from typing import Any
 
 import numpy as np
 
-from robocasa_lerobot.envs.kitchens.appliances.catalogue import build_appliance, model_of
+from robocasa_lerobot.envs.kitchens.appliances.catalogue import (
+    build_appliance,
+    kinds_standing,
+    model_for,
+    standing_of,
+)
 from robocasa_lerobot.envs.kitchens.fixtures.accessories import SIZES, WALL_KINDS, make_accessory
 from robocasa_lerobot.envs.kitchens.fixtures.base import Fixture
 from robocasa_lerobot.envs.kitchens.fixtures.cabinets import (
@@ -43,12 +48,18 @@ WALL_THICKNESS = 0.12
 BASIN_FRONT_MARGIN = 0.075  # counter left in front of the basin
 FRONT_HEIGHTS = {1: (0.78,), 2: (0.34, 0.44), 3: (0.18, 0.30, 0.30), 4: (0.18, 0.20, 0.20, 0.20)}
 
-FRIDGES = ("fridge_french_door", "fridge_side_by_side", "fridge_bottom_freezer")
-STOVES = ("stove", "stove_wide")
-CARRIES_COUNTER = ("cabinet", "open_cabinet", "drawers", "dishwasher", "sink", "stovetop", "filler", "panel")
-BASE_TYPES = (*CARRIES_COUNTER, *FRIDGES, *STOVES, "tower", "corner", "gap")
+_CARRIES_COUNTER = ("cabinet", "open_cabinet", "drawers", "sink", "stovetop", "filler", "panel")
 UPPER_TYPES = ("cabinet", "open_cabinet", "shelf", "bridge", "hood", "window", "microwave", "corner", "filler", "gap")
-APPLIANCES = (*("blender", "coffee_machine", "electric_kettle", "microwave", "stand_mixer", "toaster", "toaster_oven"),)
+
+
+def carries_counter() -> tuple[str, ...]:
+    """What of a row along the floor stands below a counter."""
+    return (*_CARRIES_COUNTER, *kinds_standing("under_counter"))
+
+
+def base_types() -> tuple[str, ...]:
+    """What may stand in a row along the floor."""
+    return (*carries_counter(), *kinds_standing("floor"), "tower", "corner", "gap")
 
 
 @dataclass(frozen=True)
@@ -115,10 +126,9 @@ class Row:
 
     def appliance(self, kind: str, along: float, back: float, bottom: float, name: str | None = None) -> Fixture:
         """Add the style's model of an appliance, its back `back` metres from the wall and standing at `bottom`."""
-        model_id = self.style.appliance(kind)
-        size = model_of(model_id).size
-        pos = self.line.at(along, back + size[1] / 2, bottom + size[2] / 2)
-        return self.add(kind, build_appliance(model_id, name or self.name(kind, single=True), pos, self.line.yaw))
+        model = model_for(self.style, kind)
+        pos = self.line.at(along, back + model.size[1] / 2, bottom + model.size[2] / 2)
+        return self.add(kind, build_appliance(model.model_id, name or self.name(kind, single=True), pos, self.line.yaw))
 
 
 def entry_kind(entry: dict[str, Any], known: tuple[str, ...]) -> tuple[str, float]:
@@ -145,8 +155,8 @@ def base_row(row: Row, entries: list[dict[str, Any]], start: float, depth: float
     run_start: float | None = None
     basin: Fixture | None = None
     for entry in [*entries, {"gap": 0.0}]:
-        kind, width = entry_kind(entry, BASE_TYPES)
-        carries = kind in CARRIES_COUNTER
+        kind, width = entry_kind(entry, base_types())
+        carries = kind in carries_counter()
         if not carries and run_start is not None:
             counters.append(_counter(row, row.name("counter"), run_start, along, depth, basin))
             run_start, basin = None, None
@@ -167,14 +177,12 @@ def _base_fixture(row: Row, kind: str, entry: dict[str, Any], middle: float, wid
     line, yaw, surface = row.line, row.line.yaw, row.surfaces[0]
     if kind in ("gap", "corner"):
         return
-    if kind in FRIDGES:
-        row.appliance(kind, middle, 0.03, 0.0, row.prefix + "fridge")
+    if kind in kinds_standing("floor"):
+        standing = standing_of(kind)
+        row.appliance(kind, middle, standing.back_m, 0.0, row.prefix + (standing.name or kind))
         return
-    if kind in STOVES:
-        row.appliance(kind, middle, 0.0, 0.0, row.prefix + "stove")
-        return
-    if kind == "dishwasher":
-        row.appliance(kind, middle, BASE_DEPTH - model_of(row.style.appliance(kind)).size[1], 0.0)
+    if kind in kinds_standing("under_counter"):
+        row.appliance(kind, middle, BASE_DEPTH - model_for(row.style, kind).size[1], 0.0)
         return
     if kind == "tower":
         _tower(row, entry, middle, width)
@@ -193,7 +201,7 @@ def _base_fixture(row: Row, kind: str, entry: dict[str, Any], middle: float, wid
     elif kind == "drawers":
         _drawers(row, row.name("stack"), entry.get("rows", 3), middle, width)
     elif kind == "stovetop":
-        size = model_of(row.style.appliance(kind)).size
+        size = model_for(row.style, kind).size
         row.appliance(kind, middle, (COUNTER_DEPTH - size[1]) / 2 + 0.02, COUNTER_HEIGHT, row.prefix + "stove")
         _drawers(row, row.name("stack"), entry.get("rows", 2), middle, width)
     else:
@@ -232,8 +240,7 @@ def _corner(row: Row, along: float, width: float) -> None:
 
 
 def _sink(row: Row, middle: float) -> Fixture:
-    model_id = row.style.appliance("sink")
-    size = model_of(model_id).size
+    model_id, size = model_for(row.style, "sink").model_id, model_for(row.style, "sink").size
     pos = row.line.at(middle, COUNTER_DEPTH - BASIN_FRONT_MARGIN - size[1] / 2, COUNTER_HEIGHT - size[2] / 2)
     return row.add("sink", build_appliance(model_id, row.prefix + "sink", pos, row.line.yaw))
 
@@ -265,7 +272,7 @@ def _tower(row: Row, entry: dict[str, Any], middle: float, width: float) -> None
     z, boards = TOWER_DRAWER_TOP + BOARD_M, []
     inner = width - 2 * BOARD_M
     for kind in stack:
-        size = model_of(row.style.appliance(kind)).size
+        size = model_for(row.style, kind).size
         row.appliance(kind, middle, TOWER_DEPTH - 0.012 - size[1], z + 0.001)
         slot = MICROWAVE_SLOT if kind == "microwave" else size[2] + 0.006
         if kind == "oven" and inner - size[0] > 0.004:
@@ -354,7 +361,7 @@ def _microwave_housing(row: Row, middle: float, width: float) -> None:
     row.add(
         "housing_cabinet", Housing(name, size, line.at(middle, MICROWAVE_DEPTH / 2, MICROWAVE_SHELF + height / 2), yaw)
     )
-    deep = model_of(row.style.appliance("microwave")).size[1]
+    deep = model_for(row.style, "microwave").size[1]
     row.appliance("microwave", middle, MICROWAVE_DEPTH - 0.012 - deep, z + 0.001)
     bottom = MICROWAVE_SHELF + height
     rest = UPPER_TOP - bottom
@@ -372,13 +379,12 @@ def counter_things(row: Row, things: list[dict[str, Any]]) -> None:
     `turn` its turn in degrees, `z` the height of a thing that hangs.
     """
     for entry in things:
-        kind, along = entry_kind(entry, (*APPLIANCES, *SIZES))
+        kind, along = entry_kind(entry, (*kinds_standing("counter"), *SIZES))
         out, turn = float(entry.get("out", 0.05)), float(np.radians(entry.get("turn", 0.0)))
-        if kind in APPLIANCES:
-            model_id = row.style.appliance(kind)
-            size = model_of(model_id).size
-            pos = row.line.at(along, out + size[1] / 2, COUNTER_HEIGHT + size[2] / 2)
-            row.add(kind, build_appliance(model_id, row.prefix + kind, pos, row.line.yaw + turn))
+        if kind in kinds_standing("counter"):
+            model = model_for(row.style, kind)
+            pos = row.line.at(along, out + model.size[1] / 2, COUNTER_HEIGHT + model.size[2] / 2)
+            row.add(kind, build_appliance(model.model_id, row.prefix + kind, pos, row.line.yaw + turn))
             continue
         depth = SIZES[kind][1]
         single = kind in ("dish_rack", "paper_towel")

@@ -7,11 +7,11 @@ from typing import Any
 from robocasa_lerobot.envs.kitchens.fixtures.accessories import SIZES, WALL_KINDS, make_accessory
 from robocasa_lerobot.envs.kitchens.fixtures.room import CeilingLamp, Doorway, Slab, Wall, Window
 from robocasa_lerobot.envs.kitchens.plan.fixture_rows import (
-    BASE_TYPES,
     WALL_THICKNESS,
     WINDOW_BOTTOM,
     WINDOW_TOP,
     Row,
+    base_types,
     entry_kind,
 )
 
@@ -71,7 +71,7 @@ def _free(plan: dict[str, Any], length: float) -> list[tuple[float, float]]:
     taken: list[tuple[float, float]] = []
     along = float(plan.get("start", 0.0))
     for entry in plan.get("base", []):
-        kind, width = entry_kind(entry, BASE_TYPES)
+        kind, width = entry_kind(entry, base_types())
         if kind != "gap":
             taken.append((along, along + width))
         along += width

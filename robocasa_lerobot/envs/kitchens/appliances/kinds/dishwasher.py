@@ -8,9 +8,11 @@ from typing import ClassVar
 import mujoco
 import numpy as np
 
+from robocasa_lerobot.envs.kitchens.appliances.base import Standing
 from robocasa_lerobot.envs.kitchens.appliances.kinds.racked import Racked, fold_door
 from robocasa_lerobot.envs.kitchens.appliances.parts import Parts
-from robocasa_lerobot.envs.kitchens.fixtures.base import Region
+from robocasa_lerobot.envs.kitchens.fixtures.base import Region, SweptBox
+from robocasa_lerobot.envs.kitchens.fixtures.swept import folded_down
 
 DOOR_M, _KICK_M, _WALL_M = 0.050, 0.15, 0.022
 OPEN_RAD = 1.30  # how far the door folds down: lower than 0.30 m the gripper hardly comes, and the edge lies at 0.34 m
@@ -21,7 +23,12 @@ _RIM_M = {"rack0": 0.12, "rack1": 0.07}
 class Dishwasher(Racked):
     """Racks `rack0` (lower) and `rack1` (upper)."""
 
+    standing: ClassVar[Standing] = Standing("under_counter")
     looks: ClassVar = {"closed": {}, "open": {"door": 1.0, "rack0": 0.8, "rack1": 0.4}}
+
+    def swept_areas(self) -> tuple[SweptBox, ...]:
+        """Its open door."""
+        return folded_down(self, self.door_span)
 
     @property
     def door_span(self) -> tuple[float, float]:

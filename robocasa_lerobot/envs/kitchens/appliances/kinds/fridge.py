@@ -8,9 +8,11 @@ from typing import ClassVar
 import mujoco
 import numpy as np
 
-from robocasa_lerobot.envs.kitchens.appliances.base import Appliance
+from robocasa_lerobot.envs.kitchens.appliances.base import Appliance, Standing
 from robocasa_lerobot.envs.kitchens.appliances.parts import Parts
 from robocasa_lerobot.envs.kitchens.fixtures.base import Region
+from robocasa_lerobot.envs.kitchens.fixtures.regions import USABLE_SHELF
+from robocasa_lerobot.envs.kitchens.fixtures.swept import TALL_STANDOFF_M
 
 DOOR_M, _FOOT_M = 0.060, 0.035
 _WALL_M, _BACK_M = 0.035, 0.06
@@ -19,8 +21,6 @@ _SHELF_M = 0.010
 # Of the crisper drawers above the floor of a fridge that reaches down to its feet: the arm, whose shoulder is a metre
 # high, does not reach farther down than 0.4 m. Below them is an open room for bottles.
 _BOTTLES_M = 0.42
-# A shelf that a goal may name (docs/robocasa.md, section 7): its bottom this high in the room, and room above it.
-USABLE_Z, USABLE_ROOM_M = (0.5, 1.5), 0.20
 
 Box = tuple[np.ndarray, np.ndarray]  # low and high corner
 
@@ -29,15 +29,27 @@ Box = tuple[np.ndarray, np.ndarray]  # low and high corner
 class Fridge(Appliance):
     """Doors are named `fridge_...` and `freezer_...`, drawers `fridge_drawer<i>` and `freezer_drawer`."""
 
+    standing: ClassVar[Standing] = Standing("floor", back_m=0.03, name="fridge")
+    stand_offset_m: ClassVar[float] = TALL_STANDOFF_M
+
     @property
     def doors(self) -> tuple[str, ...]:
         """Doors; the freezer's drawer of a French door fridge is none."""
         return tuple(self._doors())
 
     @property
+    def compartments(self) -> tuple[str, ...]:
+        """`fridge`, and `freezer` where that has a door; that of a French door fridge is a drawer."""
+        return tuple(dict.fromkeys(door.split("_")[0] for door in self.doors))
+
+    @property
     def drawers(self) -> tuple[str, ...]:
         """Crisper drawers, all in one row, low in the fridge; left to right."""
         return tuple(f"fridge_drawer{i}" for i in range(self.record["drawers"]))
+
+    def parts_to_choose(self, name: str) -> dict[str, dict[str, str]]:
+        """Its crisper drawers, which need no words."""
+        return {drawer: {} for drawer in self.drawers}
 
     @property
     def sliding(self) -> tuple[str, ...]:
@@ -65,19 +77,19 @@ class Fridge(Appliance):
             found[part] = Region.between(self.name, *self._room(part))
         return found
 
-    def shelf(self, rack_index: int, compartment: str = "fridge") -> Region:
-        """A usable shelf: -1 the highest, -2 the one below it, and so on.
+    def usable_shelves(self, compartment: str) -> tuple[str, ...]:
+        """Names of the regions over the shelves of "fridge" or "freezer" that goals may name, from below.
 
-        Raises:
-            IndexError: there are fewer usable shelves.
+        A higher shelf is out of the arm's reach, a lower one too, and nothing stands in a lower room.
         """
-        usable = []
+        lowest, highest, room = USABLE_SHELF
+        found = []
         for name, region in self.regions.items():
             bottom = self.pos[2] + region.center[2] - region.half[2]
-            fits = USABLE_Z[0] <= bottom <= USABLE_Z[1] and 2 * region.half[2] >= USABLE_ROOM_M - 1e-9
+            fits = lowest <= bottom <= highest and 2 * region.half[2] >= room - 1e-9
             if name.startswith(f"{compartment}_shelf") and fits:
-                usable.append(region)
-        return usable[rack_index]
+                found.append(name)
+        return tuple(found)
 
     def state(self, data: mujoco.MjData) -> dict[str, float | bool]:
         """Shares of the ranges of doors and drawers."""
@@ -115,7 +127,7 @@ class Fridge(Appliance):
         first = self._crisper_floor() + _CRISPER_M + 0.02
         count = int(self.record["shelves"])
         # Rooms of the height that counts as usable at least.
-        count = min(count, int((high[2] - first) / (USABLE_ROOM_M + _SHELF_M + 0.012)))
+        count = min(count, int((high[2] - first) / (USABLE_SHELF[2] + _SHELF_M + 0.012)))
         return [float(z) for z in np.linspace(first, high[2], count + 1)[:-1]]
 
     def _crisper_floor(self) -> float:

@@ -10,7 +10,8 @@ import numpy as np
 
 from robocasa_lerobot.envs.kitchens.appliances.base import OPEN_FROM, Appliance, Touches
 from robocasa_lerobot.envs.kitchens.appliances.parts import Parts
-from robocasa_lerobot.envs.kitchens.fixtures.base import Region
+from robocasa_lerobot.envs.kitchens.fixtures.base import Region, SweptBox
+from robocasa_lerobot.envs.kitchens.fixtures.swept import open_doors
 
 DOOR_M, PANEL_M = 0.030, 0.105
 _WALLS = {"left": 0.018, "right": PANEL_M, "bottom": 0.022, "top": 0.018, "back": 0.035, "front": 0.0}
@@ -37,6 +38,10 @@ class Microwave(Appliance):
         low, high = self._cavity()
         low[2] += _TURNTABLE_M
         return {"interior": Region.between(self.name, low, high)}
+
+    def swept_areas(self) -> tuple[SweptBox, ...]:
+        """Its open door."""
+        return open_doors(self, ("left",), self.door_width)
 
     @property
     def door_width(self) -> float:

@@ -8,9 +8,11 @@ from typing import ClassVar
 import mujoco
 import numpy as np
 
-from robocasa_lerobot.envs.kitchens.appliances.base import Touches
-from robocasa_lerobot.envs.kitchens.appliances.kinds.racked import Racked, fold_door
+from robocasa_lerobot.envs.kitchens.appliances.base import Standing, Touches
+from robocasa_lerobot.envs.kitchens.appliances.kinds.racked import Racked, fold_door, rack_words
 from robocasa_lerobot.envs.kitchens.appliances.parts import Parts
+from robocasa_lerobot.envs.kitchens.fixtures.base import SweptBox
+from robocasa_lerobot.envs.kitchens.fixtures.swept import folded_down
 
 DOOR_M, PANEL_M = 0.045, 0.105
 _WALL_M = 0.035
@@ -21,7 +23,16 @@ LIT_FROM = 0.05  # share of the temperature knob
 class Oven(Racked):
     """Knobs `knob_time` and `knob_temp`; racks `rack0`, and above it `rack1`."""
 
+    standing: ClassVar[Standing] = Standing("built_in")
     looks: ClassVar = {"closed": {}, "open": {"door": 1.0, "rack0": 0.7}, "on": {"knob_temp": 0.6, "power": 1.0}}
+
+    def parts_to_choose(self, name: str) -> dict[str, dict[str, str]]:
+        """Its racks."""
+        return {rack: {name: word} for rack, word in zip(self.racks, rack_words(len(self.racks)), strict=True)}
+
+    def swept_areas(self) -> tuple[SweptBox, ...]:
+        """Its open door."""
+        return folded_down(self, self.door_span)
 
     @property
     def door_span(self) -> tuple[float, float]:

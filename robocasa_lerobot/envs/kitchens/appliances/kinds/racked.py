@@ -104,6 +104,11 @@ class Racked(Appliance):
         return body
 
 
+def rack_words(count: int) -> tuple[str, ...]:
+    """Words for racks from below; a single one needs none."""
+    return ("",) if count == 1 else ("bottom", "top") if count == 2 else ("bottom", "middle", "top")
+
+
 def fold_door(
     parts: Parts,
     root: mujoco.MjsBody,

@@ -9,7 +9,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from robocasa_lerobot.envs.kitchens.appliances.base import Appliance, Touches
+from robocasa_lerobot.envs.kitchens.appliances.base import Appliance, Standing, Touches
 from robocasa_lerobot.envs.kitchens.appliances.parts import HIDDEN_M, Parts
 from robocasa_lerobot.envs.kitchens.fixtures.base import Region
 
@@ -35,6 +35,8 @@ class Sink(Appliance):
     Parts `handle` (water), `handle_temp` (0 cold, 1 hot) and `spout` (positive to the right).
     """
 
+    standing: ClassVar[Standing] = Standing("built_in")
+    holds_all_of_it: ClassVar[bool] = True
     looks: ClassVar = {
         "off": {},
         "on": {"handle": 0.45, "handle_temp": 0.2, "water_cold_low": 1.0},
@@ -57,6 +59,10 @@ class Sink(Appliance):
             )
             for i, (x0, x1) in enumerate(self._basins())
         }
+
+    def covers_beside(self) -> tuple[tuple[tuple[float, float], tuple[float, float]], ...]:
+        """The faucet, behind the basin."""
+        return (self.faucet_spot,)
 
     @property
     def faucet_spot(self) -> tuple[tuple[float, float], tuple[float, float]]:

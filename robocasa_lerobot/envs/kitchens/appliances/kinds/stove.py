@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robocasa_lerobot.envs.kitchens.appliances import meshes
-from robocasa_lerobot.envs.kitchens.appliances.base import Appliance, Touches
+from robocasa_lerobot.envs.kitchens.appliances.base import Appliance, Standing, Touches
 from robocasa_lerobot.envs.kitchens.appliances.kinds.oven import DOOR_M, add_oven_door
 from robocasa_lerobot.envs.kitchens.appliances.parts import Parts
 from robocasa_lerobot.envs.kitchens.fixtures.base import Region
@@ -50,6 +50,10 @@ class Hob(Appliance):
     def burners(self) -> dict[str, tuple[float, float]]:
         """Middle of each burner by location, as shares of width and depth."""
         return FOUR
+
+    def parts_to_choose(self, name: str) -> dict[str, dict[str, str]]:
+        """Its burners."""
+        return {location: {name: location.replace("_", " ")} for location in self.burners}
 
     @property
     def regions(self) -> dict[str, Region]:
@@ -159,6 +163,7 @@ class Hob(Appliance):
 class Stove(Hob):
     """A range: a hob, knobs on the front, an oven with a door and a rack below."""
 
+    standing: ClassVar[Standing] = Standing("floor", name="stove", tiled=True)
     looks: ClassVar = {
         "off": {},
         "on": {"knob_front_left": 0.6, "burner_front_left": 1.0, "knob_rear_right": 0.2, "burner_rear_right": 0.62},
@@ -249,6 +254,7 @@ class Stove(Hob):
 class Stovetop(Hob):
     """A hob with knobs on top; its box is the plate that stands out of the counter."""
 
+    standing: ClassVar[Standing] = Standing("built_in")
     looks: ClassVar = {
         "off": {},
         "on": {"knob_front_left": 0.6, "burner_front_left": 1.0, "knob_rear_right": 0.2, "burner_rear_right": 0.62},

@@ -32,6 +32,10 @@ class Toaster(Appliance):
 
     looks: ClassVar = {"up": {}, "on": {"lever0": 1.0, "heat0": 1.0}}
 
+    def parts_to_choose(self, name: str) -> dict[str, dict[str, str]]:
+        """Its slots, with the side of each, `_side`."""
+        return {str(slot): {"_side": str(slot // 2)} for slot in range(2 * self.sides)}
+
     @property
     def sides(self) -> int:
         """Number of levers."""

@@ -9,7 +9,7 @@ import mujoco
 import numpy as np
 
 from robocasa_lerobot.envs.kitchens.appliances.base import Touches
-from robocasa_lerobot.envs.kitchens.appliances.kinds.racked import Racked, fold_door
+from robocasa_lerobot.envs.kitchens.appliances.kinds.racked import Racked, fold_door, rack_words
 from robocasa_lerobot.envs.kitchens.appliances.parts import Parts
 
 # docs/robocasa.md, section 7; the timer runs down over its whole range in 3000 control steps.
@@ -36,6 +36,11 @@ class ToasterOven(Racked):
         "open": {"door": 1.0, "rack0": 0.6},
         "on": {"knob_time": 0.6, "knob_temp": 0.5, "power": 1.0},
     }
+
+    def parts_to_choose(self, name: str) -> dict[str, dict[str, str]]:
+        """Its racks."""
+        words = rack_words(len(self.racks))
+        return {rack: {name: f"{word} rack".strip()} for rack, word in zip(self.racks, words, strict=True)}
 
     def state(self, data: mujoco.MjData) -> dict[str, float | bool]:
         """Shares of the door, racks and knobs (`temperature`, `time`, ...), and whether it heats (`on`)."""
