@@ -29,6 +29,7 @@ from robocasa_lerobot.envs.predicates import (
     StateIs,
     UnderWater,
     When,
+    parts_with_memory,
 )
 from robocasa_lerobot.envs.predicates.logic import every_goal_in, terms_by_name
 from robocasa_lerobot.envs.predicates.objects import middle_of, radius
@@ -319,4 +320,4 @@ def test_goals_are_equal_where_they_ask_for_the_same() -> None:
 def test_no_registered_task_hides_a_term(name: str) -> None:
     task = get_task(name)
     assert terms_by_name(task.goal)
-    assert (task.facts.kind == "atomic") <= (task.remembering == ())
+    assert (task.facts.kind == "atomic") <= (parts_with_memory([task.goal]) == ())

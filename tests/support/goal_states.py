@@ -25,6 +25,7 @@ from robocasa_lerobot.envs.predicates import (
     DrawerClosed,
     DrawerOpen,
     Exactly,
+    ForEach,
     Goal,
     Grasped,
     GripperFar,
@@ -47,6 +48,7 @@ from robocasa_lerobot.envs.predicates import (
     PartTurned,
     PartWithin,
     StandsBefore,
+    StandsNear,
     StateIs,
     StepsWhile,
     Strokes,
@@ -55,6 +57,7 @@ from robocasa_lerobot.envs.predicates import (
     WithMemory,
 )
 from robocasa_lerobot.envs.predicates.objects import middle_of
+from robocasa_lerobot.envs.scene.initial_states import initial_share
 from robocasa_lerobot.envs.scene.scene import Scene
 
 AWAKE = -(1 + 10)  # of `tree_asleep`: and 10 quiet steps (mjMINAWAKE) away from sleep
@@ -70,6 +73,7 @@ MOVED = (
     ObjectTouchesAnyCounter,
     ObjectUpright,
     StandsBefore,
+    StandsNear,
 )
 
 
@@ -131,6 +135,11 @@ def _exactly(goal: Exactly, scene: Scene, data: mujoco.MjData) -> None:
 
 
 @write.register
+def _each(goal: ForEach, scene: Scene, data: mujoco.MjData) -> None:
+    write(goal.bound(scene), scene, data)
+
+
+@write.register
 def _not(goal: Not, scene: Scene, data: mujoco.MjData) -> None:
     """What is not wanted does not hold by itself."""
 
@@ -160,7 +169,7 @@ def _part_within(goal: PartWithin, scene: Scene, data: mujoco.MjData) -> None:
 
 @write.register
 def _part_turned(goal: PartTurned, scene: Scene, data: mujoco.MjData) -> None:
-    share = scene.initial_share(goal.fixture, goal.part) + 1.2 * goal.by
+    share = initial_share(scene, goal.fixture, goal.part) + 1.2 * goal.by
     scene.fixture(goal.fixture, Appliance).set_share(data, goal.part, share)
 
 
