@@ -27,6 +27,7 @@ from robocasa_lerobot.envs.scene.build import build_scene
 from robocasa_lerobot.envs.scene.roles import candidates
 from robocasa_lerobot.envs.scene.scene import Scene
 from robocasa_lerobot.envs.scene.spec import (
+    Choice,
     FixtureWanted,
     InitialOpenness,
     ObjectWanted,
@@ -228,6 +229,28 @@ def test_placement_predicate_and_skill_mean_the_same_shelf(level: str, compartme
             assert any(fridge.regions[name].contains(data, at) for name in meant)
             if level != ANY_LEVEL:
                 assert meant == [fridge.usable_shelves(compartment)[-LEVELS[level]]]
+
+
+def test_levels_may_be_drawn_and_both_compartments_start_open() -> None:
+    base = on_level("{_source}", "freezer")
+    levels = {"up": ("second_highest", "highest"), "down": ("highest", "second_highest")}
+    options = {name: {"_source": source, "_target": target} for name, (source, target) in levels.items()}
+    task = dataclasses.replace(
+        base,
+        choices=(Choice("direction", options),),
+        initial=tuple(InitialOpenness("fridge", 0.9, 1.0, part=part) for part in PARTS),
+        goal=OnShelf("obj", "fridge", "{_target}", "freezer"),
+    )
+    drawn = set()
+    for seed in range(6):
+        scene, data = settled(task, "target", seed)
+        drawn.add(scene.choices["direction"])
+        assert OnShelf("obj", "fridge", "{_source}", "freezer").holds(scene, data)
+        assert not holds(task.goal, scene, data)
+        shelf = scene.part("fridge", "freezer_shelf:{_target}")
+        assert shelf in scene.fixture("fridge").usable_shelves("freezer")[-2:]
+        assert all(holds(DoorsOpen("fridge", 0.85, part=part), scene, data) for part in PARTS)
+    assert drawn == set(levels)
 
 
 def test_levels_of_shelves_exclude_each_other_and_near_misses() -> None:
