@@ -48,6 +48,11 @@ STATE_KEY = "observation.state"
 ACTION_KEY = "action"
 TASK_KEY = "task"
 IMAGE_PREFIX = "observation.images."
+# Which stage a frame belongs to: its number in the episode, its row in the table of texts, and LeRobot's own column.
+STAGE_KEY = "stage_index"
+SUBTASK_KEY = "subtask_index"
+LANGUAGE_KEY = "language_persistent"
+STAGE_KEYS: tuple[str, ...] = (STAGE_KEY, SUBTASK_KEY, LANGUAGE_KEY)
 
 
 def image_key(camera: str) -> str:

@@ -81,6 +81,7 @@ def _chosen(args: argparse.Namespace) -> list[Task]:
     from robocasa_lerobot.demos.choose import expand_names
     from robocasa_lerobot.demos.demonstrator import can_demonstrate
     from robocasa_lerobot.envs.tasks.registry import get_task, task_names, task_set
+    from robocasa_lerobot.envs.tasks.typical import stages_of
     from robocasa_lerobot.errors import UnknownNameError, UserError
 
     tasks = [get_task(name) for name in (expand_names(",".join(args.names)) if args.names else task_names())]
@@ -88,10 +89,10 @@ def _chosen(args: argparse.Namespace) -> list[Task]:
         members = task_set(args.task_set)
         tasks = [task for task in tasks if task.name in members]
     if args.skill:
-        known = {stage.skill for name in task_names() for stage in get_task(name).stages}
+        known = {stage.skill for name in task_names() for stage in stages_of(get_task(name))}
         if args.skill not in known:
             raise UnknownNameError("skill", args.skill, known)
-        tasks = [task for task in tasks if args.skill in {stage.skill for stage in task.stages}]
+        tasks = [task for task in tasks if args.skill in {stage.skill for stage in stages_of(task)}]
     if args.fixture:
         kinds = {fixture.kind for name in task_names() for fixture in get_task(name).fixtures}
         if not any(args.fixture in kind for kind in kinds):
@@ -121,6 +122,7 @@ def _check(tasks: list[Task], workers: int) -> int:
 
 def _facts(task: Task) -> dict[str, object]:
     from robocasa_lerobot.demos.demonstrator import can_demonstrate
+    from robocasa_lerobot.envs.tasks.typical import stages_of
 
     return {
         "name": task.name,
@@ -128,7 +130,7 @@ def _facts(task: Task) -> dict[str, object]:
         "horizon": task.horizon,
         "human_seconds": task.facts.human_seconds,
         "demonstrator": can_demonstrate(task),
-        "skills": sorted({stage.skill for stage in task.stages}),
+        "skills": sorted({stage.skill for stage in stages_of(task)}),
         "fixtures": {fixture.role: fixture.kind for fixture in task.fixtures},
         "sets": sorted(task.facts.sets),
         "instruction": task.instruction,
@@ -138,9 +140,10 @@ def _facts(task: Task) -> dict[str, object]:
 
 def _table(tasks: list[Task]) -> None:
     from robocasa_lerobot.demos.demonstrator import can_demonstrate
+    from robocasa_lerobot.envs.tasks.typical import stages_of
 
     width = max(len(task.name) for task in tasks)
-    skills = {task.name: ", ".join(sorted({stage.skill for stage in task.stages})) for task in tasks}
+    skills = {task.name: ", ".join(sorted({stage.skill for stage in stages_of(task)})) for task in tasks}
     wide = max(len("skill"), *map(len, skills.values()))
     print(f"{'task':<{width}}  {'kind':<9}  {'skill':<{wide}}  horizon  demonstrator  instruction")
     for task in tasks:

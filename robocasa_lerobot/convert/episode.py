@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from robocasa_lerobot.convert.mapping.instruction import instruction_of
 from robocasa_lerobot.convert.reading.demo import RejectedEpisodeError
 from robocasa_lerobot.convert.reading.demo_file import DemoFile
+from robocasa_lerobot.convert.reading.stages import stages_of
 from robocasa_lerobot.convert.scenes.ahead import ScenesAhead
 from robocasa_lerobot.convert.scenes.demo_scene import DemoScene
 from robocasa_lerobot.convert.settings import Camera, Plan, needs_scene
@@ -28,7 +29,8 @@ class Episode:
     Its scene is taken from `ahead`, if that has it.
 
     Attributes: `actions` (T, A) and `states` (T, S) float64 in stored order, `extras` (feature name -> (T, k) float64),
-    `instruction`, `provenance` (MimicGen's), `state_source`, and `simulator_states` (T, 1 + nq + nv) or None.
+    `instruction`, `stages` (where the dataset has them), `provenance` (MimicGen's), `state_source`, and
+    `simulator_states` (T, 1 + nq + nv) or None.
 
     Raises:
         RejectedEpisodeError: anything about this demo that keeps it from being converted.
@@ -45,6 +47,7 @@ class Episode:
             raise RejectedEpisodeError(str(error)) from None
         self.extras = plan.mapping.extras(self.demo)
         self.provenance = self.demo.provenance
+        self.stages = stages_of(self.demo, self.instruction.text) if plan.stages else None
         self.cameras = plan.cameras
         self._scene: Scene | None = None
         self._stack = ExitStack()

@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 from robocasa_lerobot import __version__, contract
 from robocasa_lerobot.convert.lerobot_v3 import EXTRA_PREFIX, ExportedDataset, ExportedEpisode
 from robocasa_lerobot.convert.reading.demo_file import ASSETS_GROUP, IMAGE_SUFFIX
+from robocasa_lerobot.convert.reading.stages import STAGE_DATASET
 from robocasa_lerobot.errors import UnknownNameError, UserError
 from robocasa_lerobot.files import written_aside
 from robocasa_lerobot.progress import Bar
@@ -63,7 +64,7 @@ def export(root: Path, out: Path, settings: ExportSettings | None = None, overwr
     """Write the episodes of a dataset to the HDF5 file `out`.
 
     Groups are `demo_0`, `demo_1`, ... in the order of the dataset. `states` and `model_file` are there where the
-    dataset keeps them under `extras`, `rewards` where it has `next.reward`.
+    dataset keeps them under `extras`, `rewards` where it has `next.reward`, `stage` where it has `stage_index`.
 
     Raises:
         UserError: no readable dataset, an unknown camera or task, episodes of several tasks, `out` exists, or writing
@@ -150,6 +151,8 @@ def _write_vectors(
     for key, values in columns.items():
         if key.startswith(EXTRA_PREFIX):
             group.create_dataset(key.removeprefix(EXTRA_PREFIX).replace(".", "/"), data=values, **compression)
+    if contract.STAGE_KEY in columns:
+        group.create_dataset(STAGE_DATASET, data=columns[contract.STAGE_KEY].astype(np.int32))
     lacking = []
     if "next.reward" in columns:
         group.create_dataset("rewards", data=columns["next.reward"].reshape(-1).astype(np.float64))

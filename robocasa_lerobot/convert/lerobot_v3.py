@@ -96,7 +96,7 @@ class ExportedDataset:
         numeric = [
             key
             for key, feature in self.features.items()
-            if feature["dtype"] not in ("video", "image", "string")
+            if feature["dtype"] not in ("video", "image", "string", "language")
             and key not in _INDICES
             and len(feature["shape"]) == 1
         ]

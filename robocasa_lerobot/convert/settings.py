@@ -7,7 +7,7 @@ import json
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -21,11 +21,14 @@ from robocasa_lerobot.convert.reading.demo_file import DemoFile
 from robocasa_lerobot.convert.reading.layout import ACTION_KEYS, Layout
 from robocasa_lerobot.convert.reading.mjcf import AssetFinder, loadable, scene_names
 from robocasa_lerobot.convert.reading.selection import check_selection, select
+from robocasa_lerobot.convert.reading.stages import has_stages
 from robocasa_lerobot.convert.reading.survey import survey
+from robocasa_lerobot.convert.writing.stages import stage_features
 from robocasa_lerobot.errors import UnknownNameError, UserError
 
 # Raised when the written bytes change for the same input, so that shards of an older version are not taken up again.
 FORMAT_VERSION = 4
+_STAGES_VERSION = 1  # the same for datasets with stages
 # A shard is what a kill can lose and what a worker takes at a time: some seconds of work, but never so many shards
 # that joining them costs more than making them.
 SHARD_FRAMES = 1000
@@ -137,16 +140,19 @@ class Plan:
     fps: int
     shards: tuple[Shard, ...]
     num_frames: int  # an upper bound: rejected episodes are counted
+    stages: bool = field(default=False, kw_only=True)  # whether any source says which stage its steps belong to
 
     @property
     def features(self) -> dict[str, dict[str, Any]]:
         """LeRobotDataset features."""
-        return self.mapping.features({camera.name: (camera.height, camera.width) for camera in self.cameras})
+        features = self.mapping.features({camera.name: (camera.height, camera.width) for camera in self.cameras})
+        return features | (stage_features() if self.stages else {})
 
     @property
     def fingerprint(self) -> str:
         """The same for the same settings and the same source bytes."""
-        text = json.dumps([FORMAT_VERSION, asdict(self.settings), [asdict(s) for s in self.sources]], sort_keys=True)
+        content = [FORMAT_VERSION, asdict(self.settings), [asdict(s) for s in self.sources]]
+        text = json.dumps([*content, _STAGES_VERSION] if self.stages else content, sort_keys=True)
         return hashlib.sha256(text.encode()).hexdigest()[:12]
 
 
@@ -190,7 +196,16 @@ def make_plan(files: Sequence[Path], settings: ConversionSettings) -> Plan:
     num_frames = sum(length for look in looks for _, length in look.demos)
     target = shard_frames(num_frames, SHARD_FRAMES)
     shards = [shard for look in looks for shard in _cut(look, target, copies)]
-    return Plan(settings, sources, first.mapping, first.cameras, first.fps, tuple(shards), num_frames)
+    return Plan(
+        settings,
+        sources,
+        first.mapping,
+        first.cameras,
+        first.fps,
+        tuple(shards),
+        num_frames,
+        stages=any(look.stages for look in looks),
+    )
 
 
 def shard_frames(num_frames: int, most: int) -> int:
@@ -221,6 +236,7 @@ class _Look:
     all_demos: bool
     traps: dict[str, str]  # demos that end the process that reads them, and how
     digests: dict[str, str]  # of whole demos
+    stages: bool  # whether a demo says which stage its steps belong to
 
 
 def _look(path: Path, settings: ConversionSettings, roots: Sequence[Path]) -> _Look:
@@ -251,7 +267,8 @@ def _look(path: Path, settings: ConversionSettings, roots: Sequence[Path]) -> _L
         all_demos = len(selected) == len(file.demo_names)
         # Who names demos has not asked for others.
         strays = file.strays() if settings.filter_key is None and settings.demos is None else {}
-        return _Look(path, mapping, cameras, file.control_hz, tuple(demos), strays, all_demos, traps, digests)
+        stages = any(has_stages(file.demo(name)) for name in widths)
+        return _Look(path, mapping, cameras, file.control_hz, tuple(demos), strays, all_demos, traps, digests, stages)
 
 
 def _robot_and_cameras(

@@ -121,7 +121,7 @@ class _ShardWriter:
             {contract.image_key(name): picture for name, picture in step.items()} for step in episode.pictures()
         )
         rendered = bool(episode.rendered_cameras)
-        self._dataset.add(columns, task, episode.length, pictures, report.advance, rendered)
+        self._dataset.add(columns, task, episode.length, pictures, report.advance, rendered, episode.stages)
         index = len(self.episodes)
         _write_extras(episode, self._folder / EXTRAS / episode_folder(index))
         self.episodes.append(

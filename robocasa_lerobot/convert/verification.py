@@ -17,9 +17,11 @@ from robocasa_lerobot.convert.episode import Episode
 from robocasa_lerobot.convert.mapping.robot_mapping import EXTRA_PREFIX, RobotMapping
 from robocasa_lerobot.convert.mapping.robots import choose_mapping
 from robocasa_lerobot.convert.reading.demo_file import DemoFile, RejectedEpisodeError
+from robocasa_lerobot.convert.reading.stages import StageTrack
 from robocasa_lerobot.convert.record_files import META_FOLDER, REJECTED_FILE
 from robocasa_lerobot.convert.report import CameraQuality, Check, Report
 from robocasa_lerobot.convert.settings import Camera, ConversionSettings, Plan, file_sha256
+from robocasa_lerobot.convert.writing.stages import active_texts, read_subtasks
 from robocasa_lerobot.convert.writing.statistics import column_of
 from robocasa_lerobot.errors import UserError
 from robocasa_lerobot.jsonl import read_jsonl
@@ -46,7 +48,7 @@ _COLUMNS = (
     "index",
     "task_index",
 )
-_EXTRAS = "extra columns"  # a check of datasets that have such
+_EXTRAS, _STAGES = "extra columns", "stages"  # checks of datasets that have such
 _PEAK = 255.0
 # A picture counts as misplaced where another step's true picture fits it better by this factor in squared error.
 _MISPLACED_FACTOR = 1.5
@@ -81,7 +83,12 @@ class Verification:
         extras = [key for key in dataset.meta.features if key.startswith(EXTRA_PREFIX)]
         if extras:
             self._checks[_EXTRAS] = Check(_EXTRAS)
-        keys = [*_COLUMNS, *extras]
+        self._has_stages = all(key in dataset.meta.features for key in contract.STAGE_KEYS)
+        if self._has_stages:
+            self._checks[_STAGES] = Check(_STAGES)
+        stages = [contract.STAGE_KEY, contract.SUBTASK_KEY] if self._has_stages else []
+        self._subtasks = read_subtasks(root) if self._has_stages else []
+        keys = [*_COLUMNS, *extras, *stages]
         table = dataset.hf_dataset.select_columns(keys).with_format("arrow")[:]
         self._columns: dict[str, NDArray[Any]] = {key: column_of(table, key) for key in keys}
         self._tasks = {int(row.task_index): str(task) for task, row in dataset.meta.tasks.iterrows()}
@@ -153,7 +160,7 @@ class Verification:
         if not mine:
             return
         with DemoFile(source.path, settings.layout) as file:
-            plan = _plan(file, mine, settings, self._record)
+            plan = _plan(file, mine, settings, self._record, self._has_stages)
             for line in mine:
                 try:
                     with Episode(file, line["source_demo"], plan) as episode:
@@ -190,8 +197,22 @@ class Verification:
             tasks == {episode.instruction.text} and line["instruction"] == episode.instruction.text,
             f"{label}: {sorted(map(str, tasks))}, the source has {episode.instruction.text!r}",
         )
+        if episode.stages is not None and len(rows) == length:
+            self._check_stages(label, episode.stages, rows)
         if len(rows) == length:
             self.check_pictures(label, int(rows[0]), length, episode.pictures_at)
+
+    def _check_stages(self, label: str, stages: StageTrack, rows: NDArray[np.intp]) -> None:
+        """The stage of each step, and its text by the table of subtasks and in LeRobot's language column."""
+        check = self._checks[_STAGES]
+        compare_bits(check, label, self._columns[contract.STAGE_KEY][rows], stages.index)
+        true = [stages.texts[stage] for stage in stages.index]
+        known = dict(enumerate(self._subtasks))
+        listed = [known.get(int(row)) for row in self._columns[contract.SUBTASK_KEY][rows]]
+        check.expect(listed == true, f"{label}: its rows of the table of subtasks are not its stages")
+        column = self._dataset.hf_dataset.with_format(None)[int(rows[0]) : int(rows[-1]) + 1][contract.LANGUAGE_KEY]
+        said = active_texts(column, self._columns["timestamp"][rows])
+        check.expect(said == true, f"{label}: {contract.LANGUAGE_KEY} does not have its stages")
 
     def check_pictures(
         self, label: str, first_row: int, length: int, pictures_at: Callable[[int], dict[str, NDArray[np.uint8]]]
@@ -264,7 +285,9 @@ def num_video_frames(file: Path) -> int:
         return sum(1 for packet in container.demux(video=0) if packet.size)
 
 
-def _plan(file: DemoFile, lines: list[dict[str, Any]], settings: ConversionSettings, record: dict[str, Any]) -> Plan:
+def _plan(
+    file: DemoFile, lines: list[dict[str, Any]], settings: ConversionSettings, record: dict[str, Any], stages: bool
+) -> Plan:
     return Plan(
         settings=settings,
         sources=(),
@@ -273,6 +296,7 @@ def _plan(file: DemoFile, lines: list[dict[str, Any]], settings: ConversionSetti
         fps=record["fps"],
         shards=(),
         num_frames=0,
+        stages=stages,
     )
 
 

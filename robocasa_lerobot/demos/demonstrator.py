@@ -11,6 +11,7 @@ from robocasa_lerobot.demos.stages import StageLog, carry_out
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.tasks.registry import get_task, task_names
 from robocasa_lerobot.envs.tasks.task import Task
+from robocasa_lerobot.envs.tasks.typical import stages_of
 from robocasa_lerobot.errors import UserError
 
 __all__ = ["SkillError", "can_demonstrate", "demonstrate"]
@@ -18,7 +19,7 @@ __all__ = ["SkillError", "can_demonstrate", "demonstrate"]
 
 def can_demonstrate(task: Task) -> bool:
     """Whether every stage of a task has a skill."""
-    return all((stage.skill, stage.verb) in SKILLS for stage in task.stages)
+    return all((stage.skill, stage.verb) in SKILLS for stage in stages_of(task))
 
 
 def check_demonstrable(names: Iterable[str]) -> None:

@@ -13,6 +13,7 @@ from robocasa_lerobot.demos.demonstrator import SkillError, demonstrate
 from robocasa_lerobot.demos.motion_style import PLAIN, Variety
 from robocasa_lerobot.demos.stages import StageLog
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
+from robocasa_lerobot.envs.tasks.stage_text import stage_text
 
 Array = NDArray[np.float64]
 
@@ -118,6 +119,7 @@ def record_episode(
     except SkillError as error:
         reason = str(error)
     log.close(env)
+    stages = env.declaration.stages
     return Recording(
         seed=seed,
         success=held >= SUCCESS_HOLD_STEPS,
@@ -139,7 +141,10 @@ def record_episode(
             **_kitchens(env),
             "action_noise": action_noise,
             "variety": asdict(variety),
-            "stages": log.table(env.declaration.stages),
+            "stages": [
+                {"text": stage_text(stage, env.scene), **row}
+                for stage, row in zip(stages, log.table(stages), strict=True)
+            ],
         },
     )
 

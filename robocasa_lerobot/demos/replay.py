@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +19,8 @@ from numpy.typing import NDArray
 from robocasa_lerobot import contract
 from robocasa_lerobot.demos.recorder import SUCCESS_HOLD_STEPS
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
+from robocasa_lerobot.envs.predicates import parts_with_memory
+from robocasa_lerobot.envs.tasks.task import Task
 from robocasa_lerobot.errors import UserError
 from robocasa_lerobot.jobs.as_completed import as_they_end
 
@@ -34,7 +36,7 @@ class Replayed:
         demo: its name in the file.
         task: name.
         actions: whether the goal held for as long as a recording asks for, when the actions were carried out.
-        states: whether the goal holds in the last recorded state.
+        states: whether the goal holds in the last recorded state; where it has memory, as the recorded terms say too.
         same_start: whether the kitchen's own first state is the recorded one, bit for bit.
         deviation: largest difference of a joint position between the recorded states and those passed through.
         note: what went wrong, or "".
@@ -59,12 +61,14 @@ class Demonstration:
         meta: its `ep_meta`.
         states: (T, 1 + nq + nv) time, positions, velocities.
         actions: (T, 12) in stored order.
+        last_terms: whether each of the goal's terms held in the last state, by name; empty where that is not recorded.
     """
 
     task: str
     meta: dict[str, Any]
     states: Array
     actions: Array
+    last_terms: dict[str, bool] = field(default_factory=dict)
 
     @property
     def seed(self) -> int:
@@ -121,20 +125,28 @@ def read_demonstration(path: Path, demo: str) -> Demonstration:
         task = str(file["data"].attrs["env"])
         meta = json.loads(group.attrs["ep_meta"])
         states, actions = group["states"][()], contract.hdf5_to_stored(group["actions"][()])
+        terms = _last_terms(group)
     if "seed" not in meta or "split" not in meta:
         raise UserError(f"{path}, {demo}: its ep_meta has no scene seed and split; it was recorded by other software.")
-    return Demonstration(task, meta, states, actions)
+    return Demonstration(task, meta, states, actions, terms)
 
 
-def replay(path: Path, demo: str) -> Replayed:
-    """Replay one demonstration both ways.
+def _last_terms(group: h5py.Group) -> dict[str, bool]:
+    recorded = group.get("success_terms")
+    if recorded is None or "names" not in recorded.attrs:
+        return {}
+    return dict(zip(json.loads(recorded.attrs["names"]), recorded[-1].astype(bool).tolist(), strict=True))
+
+
+def replay(path: Path, demo: str, declaration: Task | None = None) -> Replayed:
+    """Replay one demonstration both ways; of a task that is in the making, its declaration is given.
 
     Raises:
         UserError: its kitchen cannot be made again.
     """
     recorded = read_demonstration(path, demo)
     task, states = recorded.task, recorded.states
-    env = kitchen_of(recorded)
+    env = kitchen_of(recorded, declaration)
     try:
         env.reset(seed=recorded.seed)
         start = _state(env)
@@ -142,17 +154,17 @@ def replay(path: Path, demo: str) -> Replayed:
             note = f"{states[0].size} numbers in a state, {start.size} in the kitchen as it is made now"
             return Replayed(path, demo, task, False, False, False, np.inf, note)
         same = bool(np.array_equal(start, states[0]))
-        final = _goal_holds_in(env, states[-1])
+        final, note = _goal_held_at_the_end(env, recorded)
         done, deviation = _carry_out(env, states, recorded.actions)
     finally:
         env.close()
-    return Replayed(path, demo, task, done, final, same, deviation)
+    return Replayed(path, demo, task, done, final, same, deviation, note)
 
 
-def kitchen_of(recorded: Demonstration) -> KitchenEnv:
+def kitchen_of(recorded: Demonstration, declaration: Task | None = None) -> KitchenEnv:
     """An env that makes the kitchen of a demonstration when it is reset with its seed; without cameras."""
     return KitchenEnv(
-        recorded.task,
+        declaration or recorded.task,
         split=recorded.split,
         cameras=(),
         terminate_on_success=False,
@@ -172,11 +184,21 @@ def _carry_out(env: KitchenEnv, states: Array, actions: Array) -> tuple[bool, fl
     return held >= SUCCESS_HOLD_STEPS, deviation
 
 
-def _goal_holds_in(env: KitchenEnv, state: Array) -> bool:
-    """Whether the goal holds in a recorded state, set into a simulation of its own; nothing sleeps in it."""
+def _goal_held_at_the_end(env: KitchenEnv, recorded: Demonstration) -> tuple[bool, str]:
+    """Whether the goal holds in the last recorded state, set into a simulation of its own; nothing sleeps in it.
+
+    What a goal remembers is in the state, as positions of joints that only the recording vouches for: nothing in the
+    state itself shows how it came about. The terms that were recorded at the time must say the same.
+    """
     data = mujoco.MjData(env.model)
-    _put(env, data, state)
-    return bool(env.declaration.goal.evaluate(env.scene, data, {}))
+    _put(env, data, recorded.states[-1])
+    holds = bool(env.declaration.goal.evaluate(env.scene, data, {}))
+    for part in parts_with_memory([env.declaration.goal]):
+        then, now = recorded.last_terms.get(part.name), part.holds(env.scene, data)
+        if recorded.last_terms and then != now:
+            said = "was not recorded" if then is None else f"was recorded as {then}"
+            return False, f"`{part.name}` is {now} in the last state, but {said}"
+    return holds, ""
 
 
 def _put(env: KitchenEnv, data: mujoco.MjData, state: Array) -> None:

@@ -10,12 +10,13 @@ from robocasa_lerobot.demos.motion import Array, action
 from robocasa_lerobot.demos.skills import SKILLS, SkillError
 from robocasa_lerobot.demos.skills.common import stage_done
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
-from robocasa_lerobot.envs.tasks.conditions import stage_condition, without_gripper
+from robocasa_lerobot.envs.predicates import parts_with_memory
+from robocasa_lerobot.envs.tasks.conditions import must_never, stage_condition, without_gripper
 from robocasa_lerobot.envs.tasks.task import Stage
 from robocasa_lerobot.errors import UnknownNameError
 
 ATTEMPTS = 3  # of a stage; skills try several grasps in each
-PATIENCE_STEPS = 40  # after a skill, for things that fall, swing and settle
+PATIENCE_STEPS = 40  # after a skill, for things that fall, swing and settle; as long again after each step that counted
 _TOLD = ("skill", "verb", "target", "object", "part", "to")  # of a stage, to whoever reads the file
 
 
@@ -66,7 +67,7 @@ def carry_out(env: KitchenEnv, log: StageLog) -> Iterator[Array]:
 
     Raises:
         UnknownNameError: a stage needs a skill that does not exist.
-        SkillError: a stage is not done after all its attempts.
+        SkillError: a stage is not done after all its attempts, or something has happened that never must.
     """
     stages = env.declaration.stages
     log.outcomes = [StageOutcome() for _ in stages]
@@ -84,6 +85,7 @@ def carry_out(env: KitchenEnv, log: StageLog) -> Iterator[Array]:
             index += 1
             continue
         yield from _attempt(env, stages[index], outcome)
+        _check_never(env, outcome)
         outcome.done = stage_done(env, stages[index])
         if outcome.done:
             outcome.reason = ""
@@ -109,10 +111,25 @@ def _attempt(env: KitchenEnv, stage: Stage, outcome: StageOutcome) -> Iterator[A
             yield step
     except SkillError as error:
         outcome.reason = str(error)
-    for _ in range(PATIENCE_STEPS):
-        if stage_done(env, stage):
-            return
+    left, best = PATIENCE_STEPS, _progress(env, stage)
+    while left and not stage_done(env, stage):
         yield action(gripper=gripper)
+        now = _progress(env, stage)
+        left, best = (PATIENCE_STEPS, now) if now > best else (left - 1, best)
+
+
+def _progress(env: KitchenEnv, stage: Stage) -> float:
+    """How much of what the stage's condition remembers is there: 1 for each memory that is full."""
+    remembered = parts_with_memory([stage_condition(env.declaration, stage)])
+    return sum(part.progress(env.scene, env.data) for part in remembered)
+
+
+def _check_never(env: KitchenEnv, outcome: StageOutcome) -> None:
+    """Give up where the goal cannot be reached any more: what is remembered cannot be made good."""
+    for never in must_never(env.declaration.goal):
+        if not never.holds(env.scene, env.data):
+            outcome.reason = f"the goal is out of reach: `{never.name}` does not hold any more"
+            raise SkillError(outcome.reason)
 
 
 def _check_attempts(env: KitchenEnv, index: int, outcome: StageOutcome) -> None:

@@ -27,7 +27,7 @@ from robocasa_lerobot.envs.scene.reset_noise import InitialNoise, add_initial_no
 from robocasa_lerobot.envs.scene.scene import Scene
 from robocasa_lerobot.envs.state import KitchenState, restore
 from robocasa_lerobot.envs.tasks.registry import get_task
-from robocasa_lerobot.envs.tasks.task import Task
+from robocasa_lerobot.envs.tasks.task import BoundTask, Task
 from robocasa_lerobot.errors import UnknownNameError, UserError
 
 Observation = dict[str, Any]
@@ -101,10 +101,10 @@ class KitchenEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         styles: Sequence[int] | None = None,
         robot: Robot = PANDA_OMRON,
     ) -> None:
-        self.declaration, self.robot = task if isinstance(task, Task) else get_task(task), robot
+        self._declared, self.robot = task if isinstance(task, Task) else get_task(task), robot
         # Fails here, not at the first reset, for a split without kitchens.
         chosen = scene_ids(split, layouts=layouts, styles=styles)
-        without(chosen, self.declaration.needs, self.declaration.exclude_styles)
+        without(chosen, self._declared.needs, self._declared.exclude_styles)
         self.layouts, self.styles = layouts, styles
         self._kitchens = None if layouts is None and styles is None else chosen
         if render_preset not in RENDER_PRESETS:
@@ -115,19 +115,19 @@ class KitchenEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
             raise UserError(f"image_size ({image_size}) and horizon ({horizon}) must be at least 1.")
         if render_device is not None:
             gl.check_device(render_device)
-        self.task = self.declaration.name
+        self.task = self._declared.name
         self.split = split
         self.render_preset = render_preset
         self.image_size = image_size
         self.cameras = check_camera_names(cameras, robot.cameras(camera_set))
         self.camera_set = camera_set
-        if novel_language and not self.declaration.paraphrases:
+        if novel_language and not self._declared.paraphrases:
             raise UserError(f"novel_language: task {task} declares no paraphrases.")
         self.novel_language = novel_language
         self.initial_noise = initial_noise
         self.camera_noise = choose_noise(camera_noise, robot.camera_noise.get(camera_set))
         self._kinds = {"depth": depth, "segmentation": segmentation}
-        self.horizon = horizon if horizon is not None else self.declaration.horizon
+        self.horizon = horizon if horizon is not None else self._declared.horizon
         self._max_episode_steps = self.horizon  # where LeRobot looks
         self.terminate_on_success = terminate_on_success
         self.render_mode = render_mode
@@ -143,12 +143,20 @@ class KitchenEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         )
         self.action_space = gymnasium.spaces.Box(-1.0, 1.0, (contract.ACTION_SIZE,), np.float32)
         self._scene: Scene | None = None
+        self._bound: BoundTask | None = None
         self._data: mujoco.MjData | None = None
         self._controller: Controller | None = None
         self._renderer: SceneRenderer | None = None
         self._pictures: Pictures = {}
         self._steps = 0
         self._initial: KitchenState | None = None  # of the running scene, right after its reset
+
+    @property
+    def declaration(self) -> BoundTask:
+        """The task of the running episode, with goal and stages of what was drawn."""
+        if self._bound is None:
+            raise UserError("the env has no scene yet, and so no task in it: call reset() first.")
+        return self._bound
 
     @property
     def scene(self) -> Scene:
@@ -229,7 +237,7 @@ class KitchenEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         assert controller is not None
         command = contract.stored_to_hdf5(contract.binarize(np.asarray(action, dtype=np.float64)))
         control_step(self.model, data, controller, command)
-        self.scene.update_appliances(data)
+        self.scene.after_control_step(data)
         self._steps += 1
         info = self._info()
         terminated = self.terminate_on_success and info["success"]
@@ -261,7 +269,7 @@ class KitchenEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         self._close_renderer()
         self._initial = None
         self._scene = build_scene(
-            self.declaration,
+            self._declared,
             self.split,
             seed,
             self.render_preset,
@@ -270,6 +278,7 @@ class KitchenEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
             self._kitchens,
             self.robot,
         )
+        self._bound = self._declared.bound(self._scene)
         if self.novel_language:
             wordings = self._scene.paraphrases
             choice = np.random.default_rng([seed, _WORDING_STREAM]).integers(len(wordings))

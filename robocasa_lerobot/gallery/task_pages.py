@@ -10,7 +10,8 @@ from typing import Any
 
 from robocasa_lerobot import contract
 from robocasa_lerobot.demos.demonstrator import can_demonstrate
-from robocasa_lerobot.envs.predicates import AllOf, AnyOf, Goal, Not, ObjectInside, Term, When
+from robocasa_lerobot.envs.predicates import AllOf, AnyOf, Exactly, ForEach, Goal, Not, ObjectInside, Term, When
+from robocasa_lerobot.envs.predicates.logic import every_goal_in
 from robocasa_lerobot.envs.scene.initial_states import Initial
 from robocasa_lerobot.envs.scene.scene_spec import InitialState
 from robocasa_lerobot.envs.scene.spec import (
@@ -24,6 +25,7 @@ from robocasa_lerobot.envs.scene.spec import (
     RobotStart,
 )
 from robocasa_lerobot.envs.tasks.task import Task
+from robocasa_lerobot.envs.tasks.typical import goal_of, stages_of
 
 DEMONSTRATOR = "Demonstrator: "  # start of the line that says whether there is one
 _HEAD = """# Tasks
@@ -66,7 +68,7 @@ def page(task: Task) -> Iterator[str]:
         f"; human median {human:g} s" if human else ""
     )
     yield f"- {DEMONSTRATOR}{able}; stages: " + ", ".join(
-        " ".join(filter(None, (s.skill, s.verb, s.object, s.target, s.part))) for s in task.stages
+        " ".join(filter(None, (s.skill, s.verb, s.object, s.target, s.part))) for s in stages_of(task)
     )
     yield f"- Sets: {', '.join(sorted(task.facts.sets))}"
     yield f"- Fixtures: {'; '.join(map(_fixture, task.fixtures))}"
@@ -82,8 +84,8 @@ def page(task: Task) -> Iterator[str]:
         without = f"; not styles {', '.join(map(str, task.exclude_styles))}" if task.exclude_styles else ""
         yield f"- Kitchens: those with {', '.join(task.needs) or 'anything'}{without}"
     yield "- Goal:"
-    yield from goal_lines(task.goal)
-    notes = [note for note in (task.facts.note, _INSIDE_NOTE if _asks_inside(task.goal) else None) if note]
+    yield from goal_lines(goal_of(task))
+    notes = [note for note in (task.facts.note, _INSIDE_NOTE if _asks_inside(goal_of(task)) else None) if note]
     yield from (f"- Other than the original: {note}" for note in notes)
 
 
@@ -96,29 +98,32 @@ def goal_lines(goal: Goal, indent: str = "  ") -> Iterator[str]:
     elif isinstance(goal, Not):
         yield f"{indent}- not"
         yield from goal_lines(goal.part, indent + "  ")
+    elif isinstance(goal, Exactly):
+        yield f"{indent}- exactly {goal.n} of"
+        for part in goal.parts:
+            yield from goal_lines(part, indent + "  ")
     elif isinstance(goal, When):
         for value, part in goal.goals.items():
             yield f"{indent}- where {{{goal.choice}}} is {value}"
             yield from goal_lines(part, indent + "  ")
+    elif isinstance(goal, ForEach):
+        yield f"{indent}- for each of `{goal.object}`"
+        yield from goal_lines(goal.pattern, indent + "  ")
     else:
         assert isinstance(goal, Term), goal
         first = (inspect.getdoc(type(goal)) or "").splitlines()[0]
-        values = ", ".join(f"{name} {_value(value)}" for name, value in _fields(goal))
-        yield f"{indent}- `{goal.name}`: {first} ({values})"
+        fields = [f"{name} {_value(value)}" for name, value in _fields(goal) if not isinstance(value, Goal)]
+        yield f"{indent}- `{goal.name}`: {first}" + (f" ({', '.join(fields)})" if fields else "")
+        for part in goal.inner:
+            yield from goal_lines(part, indent + "  ")
 
 
 def _skill(task: Task) -> str:
-    return task.stages[0].skill.replace("_", " ")
+    return stages_of(task)[0].skill.replace("_", " ")
 
 
 def _asks_inside(goal: Goal) -> bool:
-    if isinstance(goal, AllOf | AnyOf):
-        return any(map(_asks_inside, goal.parts))
-    if isinstance(goal, Not):
-        return _asks_inside(goal.part)
-    if isinstance(goal, When):
-        return any(map(_asks_inside, goal.goals.values()))
-    return isinstance(goal, ObjectInside)
+    return any(isinstance(part, ObjectInside) for part in every_goal_in(goal))
 
 
 def _fixture(wanted: FixtureWanted) -> str:
@@ -156,14 +161,23 @@ def _initial(state: InitialState) -> str:
 
 
 def _object(wanted: ObjectWanted) -> str:
-    low, high = wanted.count
-    number = "" if (low, high) == (1, 1) else f"{low} to {high} x " if low != high else f"{low} x "
-    said = f"`{wanted.name}`: {number}{' or '.join(group.replace('_', ' ') for group in wanted.groups)}"
+    said = f"`{wanted.name}`: {_number(wanted.count)}{' or '.join(group.replace('_', ' ') for group in wanted.groups)}"
+    if wanted.same_category_as:
+        kind = "model" if wanted.same_model else "category"
+        own = wanted.same_category_as == wanted.name
+        said += f", all of one {kind}" if own else f", of the {kind} of `{wanted.same_category_as}`"
     asked = [*(["graspable"] if wanted.graspable else []), *(["washable"] if wanted.washable else [])]
     asked += [word.replace("_", " ") for word in wanted.properties]
     if asked:
         said += f" ({', '.join(asked)})"
     return f"{said}, {_where(wanted.start)}"
+
+
+def _number(count: tuple[int, int] | str) -> str:
+    if isinstance(count, str):
+        return f"{count} x "
+    low, high = count
+    return "" if (low, high) == (1, 1) else f"{low} to {high} x " if low != high else f"{low} x "
 
 
 def _where(start: OnCounter | InsideOf | Placement) -> str:

@@ -11,6 +11,7 @@ from PIL import Image
 from robocasa_lerobot import cli
 from robocasa_lerobot.demos.demonstrator import can_demonstrate
 from robocasa_lerobot.envs.tasks.registry import get_task, task_names
+from robocasa_lerobot.envs.tasks.typical import stages_of
 from robocasa_lerobot.gallery.task_pages import DEMONSTRATOR, page, pages
 
 DOCS = Path(__file__).parents[2] / "docs" / "tasks.md"
@@ -53,7 +54,7 @@ def test_filters(capsys: pytest.CaptureFixture[str]) -> None:
     assert _listed(capsys) == list(task_names())
     drawers = _listed(capsys, "--skill", "drawers")
     assert {"OpenDrawer", "CloseDrawer"} <= set(drawers)
-    assert all("drawers" in {stage.skill for stage in get_task(name).stages} for name in drawers)
+    assert all("drawers" in {stage.skill for stage in stages_of(get_task(name))} for name in drawers)
     assert _listed(capsys, "--set", "atomic_seen", "--fixture", "drawer_top", "--skill", "drawers") == ["OpenDrawer"]
     able, unable = _listed(capsys, "--demonstrated"), [t.name for t in TASKS if not can_demonstrate(t)]
     assert sorted((*able, *unable)) == list(task_names())

@@ -28,6 +28,7 @@ from robocasa_lerobot.data.registry.registry_file import load_registry
 from robocasa_lerobot.demos.attempts import MAX_ATTEMPTS_PER_EPISODE
 from robocasa_lerobot.demos.demonstrator import can_demonstrate
 from robocasa_lerobot.envs.tasks.registry import get_task, task_names
+from robocasa_lerobot.envs.tasks.typical import stages_of
 from robocasa_lerobot.errors import UnknownNameError, UserError
 from robocasa_lerobot.training.config.experiment import load_experiment
 from robocasa_lerobot.training.planning.skipped import PARTIAL, PHASE
@@ -128,7 +129,7 @@ def test_atomic_lifelong_phases_share_all_atomic_tasks_among_them() -> None:
     config = load_registry(EXPERIMENTS / "parts/lifelong_atomic.yaml")
     phases = [config.task_sets[f"lifelong_phase{number}"] for number in (1, 2, 3, 4)]
     assert sorted(task for tasks in phases for task in tasks) == sorted(published_task_sets()["lifelong_phase1"])
-    skills = [{stage.skill for task in tasks for stage in get_task(task).stages} for tasks in phases]
+    skills = [{stage.skill for task in tasks for stage in stages_of(get_task(task))} for tasks in phases]
     assert skills[:2] == [{"doors", "drawers", "racks"}, {"buttons", "knobs", "levers"}]
     assert skills[2:] == [{"pick_place", "navigation"}, {"pick_place"}]
 

@@ -105,7 +105,7 @@ class Demo:
     def image_cameras(self) -> tuple[str, ...]:
         """Cameras whose pictures the file holds."""
         if self.layout.pictures is not None:
-            return tuple(camera for camera, picture in self.layout.pictures if self._has(picture.key))
+            return tuple(camera for camera, picture in self.layout.pictures if self.has(picture.key))
         return tuple(key.removesuffix(IMAGE_SUFFIX) for key in self.observation_keys if key.endswith(IMAGE_SUFFIX))
 
     def image_shape(self, camera: str) -> tuple[int, int]:
@@ -222,7 +222,8 @@ class Demo:
             self._group.visititems(note)
         return found
 
-    def _has(self, key: str) -> bool:
+    def has(self, key: str) -> bool:
+        """Whether there is anything of that path below the episode."""
         return member(self._group, key) is not None
 
     def _picture(self, camera: str) -> Picture:

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from robocasa_lerobot.convert.reading.stages import StageTrack
 from robocasa_lerobot.convert.writing.encoder import EncodingError, Histogram, VideoSettings
 from robocasa_lerobot.convert.writing.encoding_process import EncodingProcess
 from robocasa_lerobot.convert.writing.files import DatasetFiles
@@ -28,6 +29,7 @@ class _Pending:
     task: str
     length: int
     scratch: Path
+    stages: StageTrack | None
 
 
 class DatasetWriter:
@@ -64,6 +66,7 @@ class DatasetWriter:
         pictures: Iterable[Mapping[str, NDArray[np.uint8]]],
         progress: Callable[[int], None] = lambda _: None,
         rendered: bool = False,
+        stages: StageTrack | None = None,
     ) -> None:
         """Append an episode of `length` steps.
 
@@ -74,6 +77,7 @@ class DatasetWriter:
             pictures: for each step, the picture (H, W, 3) of each video feature.
             progress: called with 1 after each step.
             rendered: pictures are being rendered, which takes longer than encoding them.
+            stages: which stage each step belongs to, where the dataset has them.
 
         Raises:
             EncodingError: there are not T pictures; or the videos of the episode before could not be encoded, which
@@ -99,7 +103,7 @@ class DatasetWriter:
             raise
         self._encoder.end_episode()
         # While this episode's last pictures are encoded, the one before is written.
-        before, self._pending = self._pending, _Pending(columns, task, length, scratch)
+        before, self._pending = self._pending, _Pending(columns, task, length, scratch, stages)
         self._complete(before)
 
     def finalize(self) -> None:
@@ -111,5 +115,6 @@ class DatasetWriter:
 
     def _complete(self, pending: _Pending | None) -> None:
         if pending is not None:
-            self._files.append(pending.columns, [pending.task], pending.length, self._encoder.finished())
+            videos = self._encoder.finished()
+            self._files.append(pending.columns, [pending.task], pending.length, videos, stages=pending.stages)
             shutil.rmtree(pending.scratch)

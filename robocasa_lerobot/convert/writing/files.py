@@ -15,7 +15,10 @@ from lerobot.datasets.feature_utils import get_hf_features_from_features
 from lerobot.datasets.io_utils import write_info
 from numpy.typing import NDArray
 
+from robocasa_lerobot import contract
+from robocasa_lerobot.convert.reading.stages import StageTrack
 from robocasa_lerobot.convert.writing.encoder import CODECS, EncodedVideo, Histogram
+from robocasa_lerobot.convert.writing.stages import SubtaskTable, language_column
 from robocasa_lerobot.convert.writing.statistics import vector_statistics
 from robocasa_lerobot.convert.writing.video import VideoFiles, VideoForm, probe
 
@@ -43,6 +46,7 @@ class DatasetFiles:
     ) -> None:
         self.num_episodes = self.num_frames = 0
         self.histograms: dict[str, Histogram] = {}
+        self._subtasks = SubtaskTable()
         self._root, self._fps = root, fps
         self._meta = LeRobotDatasetMetadata.create(
             repo_id="local/shard",
@@ -67,6 +71,7 @@ class DatasetFiles:
         length: int,
         videos: Mapping[str, EncodedVideo],
         forms: Mapping[str, VideoForm] | None = None,
+        stages: StageTrack | None = None,
     ) -> None:
         """Append an episode of `length` steps.
 
@@ -77,6 +82,7 @@ class DatasetFiles:
             length: number of steps T.
             videos: with T frames each, by video feature.
             forms: of the videos, where they are known already.
+            stages: which stage each step belongs to, where the features have them.
         """
         index, first = self.num_episodes, self.num_frames
         self._meta.save_episode_tasks(list(tasks))
@@ -88,7 +94,15 @@ class DatasetFiles:
             "episode_index": np.full(length, index),
             "index": np.arange(first, first + length),
         }
-        self._tables.write_table(arrow_table(everything, self._schema))
+        language: dict[str, pa.Array] = {}
+        if stages is not None:
+            everything |= {
+                contract.STAGE_KEY: stages.index,
+                contract.SUBTASK_KEY: self._subtasks.rows(stages.texts)[stages.index],
+            }
+            kind = self._schema.field(contract.LANGUAGE_KEY).type
+            language[contract.LANGUAGE_KEY] = language_column(stages, everything["timestamp"], kind)
+        self._tables.write_table(arrow_table(everything, self._schema, language))
         entries: dict[str, Any] = {
             "data/chunk_index": 0,
             "data/file_index": 0,
@@ -116,6 +130,7 @@ class DatasetFiles:
         for videos in self._videos.values():
             videos.close()
         self._meta.finalize()
+        self._subtasks.write(self._root)
         if self.num_episodes:
             for key in self._videos:
                 codec = codecs[key]
@@ -124,10 +139,15 @@ class DatasetFiles:
             write_info(self._meta.info, self._root)
 
 
-def arrow_table(columns: Mapping[str, NDArray[Any]], schema: pa.Schema) -> pa.Table:
-    """Columns (T,) or (T, k) as an Arrow table with the fields of `schema`, bit for bit."""
+def arrow_table(
+    columns: Mapping[str, NDArray[Any]], schema: pa.Schema, made: Mapping[str, pa.Array] | None = None
+) -> pa.Table:
+    """Columns (T,) or (T, k) as an Arrow table with the fields of `schema`, bit for bit; `made` are Arrow already."""
     arrays = []
     for field in schema:
+        if made and field.name in made:
+            arrays.append(made[field.name])
+            continue
         values = columns[field.name]
         if not pa.types.is_nested(field.type):
             arrays.append(pa.array(values.reshape(-1), type=field.type))

@@ -21,7 +21,9 @@ import pyarrow.parquet as pq
 from lerobot.datasets.io_utils import write_tasks
 from numpy.typing import NDArray
 
+from robocasa_lerobot import contract
 from robocasa_lerobot.convert.writing.files import VIDEO_FILE_MB
+from robocasa_lerobot.convert.writing.stages import SubtaskTable, read_subtasks
 from robocasa_lerobot.convert.writing.statistics import column_of, vector_statistics
 from robocasa_lerobot.convert.writing.video import VideoFiles, probe
 
@@ -48,6 +50,7 @@ def join_datasets(parts: Sequence[Path], target: Path) -> None:
     data = _Files(target, "data", first["chunks_size"], DATA_FILE_MB)
     entries = _Files(target, "meta/episodes", first["chunks_size"], DATA_FILE_MB)
     tasks: dict[str, int] = {}
+    subtasks = SubtaskTable()
     num_episodes = num_frames = 0
     for part, info in zip(parts, infos, strict=True):
         rows = _task_rows(part)
@@ -57,19 +60,21 @@ def join_datasets(parts: Sequence[Path], target: Path) -> None:
         table = pq.ParquetFile(_only(part, "data")).read()
         table = _set(table, "episode_index", column_of(table, "episode_index") + num_episodes)
         table = _set(table, "index", column_of(table, "index") + num_frames)
-        task_index = renumbered[column_of(table, "task_index")]
-        table = _set(table, "task_index", task_index)
+        rows_of = {"task_index": renumbered[column_of(table, "task_index")]}
+        if contract.SUBTASK_KEY in first["features"] and (texts := read_subtasks(part)):
+            subtask_rows = subtasks.rows(texts)
+            rows_of[contract.SUBTASK_KEY] = subtask_rows[column_of(table, contract.SUBTASK_KEY)]
+        for name, values in rows_of.items():
+            table = _set(table, name, values)
         chunk, file = data.write(table)
         episodes = pq.ParquetFile(_only(part, "meta/episodes")).read()
         starts = column_of(episodes, "dataset_from_index")
         ends = column_of(episodes, "dataset_to_index")
         episodes = _shift(episodes, "episode_index", num_episodes)
         episodes = _shift(episodes, "index", num_frames)
-        each = [vector_statistics(task_index[start:end]) for start, end in zip(starts, ends, strict=True)]
-        for name in each[0]:
-            column = f"stats/task_index/{name}"
-            values = pa.array([stats[name].tolist() for stats in each], episodes.schema.field(column).type)
-            episodes = episodes.set_column(episodes.schema.get_field_index(column), column, values)
+        for feature, numbers in rows_of.items():
+            each = [vector_statistics(numbers[start:end]) for start, end in zip(starts, ends, strict=True)]
+            episodes = _set_statistics(episodes, feature, each)
         for name, values in (
             ("episode_index", column_of(episodes, "episode_index") + num_episodes),
             ("dataset_from_index", starts + num_frames),
@@ -88,6 +93,7 @@ def join_datasets(parts: Sequence[Path], target: Path) -> None:
     for files in videos.values():
         files.close()
     write_tasks(pd.DataFrame({"task_index": list(tasks.values())}, index=pd.Index(list(tasks), name="task")), target)
+    subtasks.write(target)
     info = first | {
         "features": features,
         "total_episodes": num_episodes,
@@ -175,6 +181,15 @@ def _shift(episodes: pa.Table, feature: str, offset: int) -> pa.Table:
         values = column_of(episodes, column) + offset
         array = pa.array(values.tolist(), episodes.schema.field(column).type)
         episodes = episodes.set_column(episodes.schema.get_field_index(column), column, array)
+    return episodes
+
+
+def _set_statistics(episodes: pa.Table, feature: str, each: Sequence[Mapping[str, NDArray[Any]]]) -> pa.Table:
+    """The entries of episodes with other statistics of a feature, those of each episode."""
+    for name in each[0]:
+        column = f"stats/{feature}/{name}"
+        values = pa.array([stats[name].tolist() for stats in each], episodes.schema.field(column).type)
+        episodes = episodes.set_column(episodes.schema.get_field_index(column), column, values)
     return episodes
 
 

@@ -46,7 +46,7 @@ def dataset_statistics(
     for key, feature in features.items():
         if feature["dtype"] in ("video", "image"):
             stats[key] = picture_statistics(histograms[key], feature["shape"])
-        elif feature["dtype"] != "string":
+        elif feature["dtype"] not in ("string", "language"):
             stats[key] = _column_statistics(root, key)
     return stats
 

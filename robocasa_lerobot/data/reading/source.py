@@ -45,7 +45,11 @@ class DatasetSource:
         self.column_cache: Path | None = None
         self.fps = int(self._info.fps)
         self.robot_type: str | None = self._info.robot_type
-        self.features: dict[str, dict[str, Any]] = self._info.features
+        # Not the stages of episodes: datasets without them go together with those that have them, and a row of one
+        # dataset's table of subtasks means nothing in another.
+        self.features: dict[str, dict[str, Any]] = {
+            key: feature for key, feature in self._info.features.items() if key not in contract.STAGE_KEYS
+        }
         tasks = load_tasks(self.root).sort_values("task_index")
         self.instructions = [str(text) for text in tasks.index]  # text of each `task_index`
 

@@ -19,10 +19,7 @@ from robocasa_lerobot.demos.skills.heads import lower_head, raise_head
 from robocasa_lerobot.demos.skills.knobs import raise_knob, turn_burner_low, turn_knob, turn_off_burner, turn_on_burner
 from robocasa_lerobot.demos.skills.levers import press_lever, turn_off_water, turn_on_water, turn_sideways
 from robocasa_lerobot.demos.skills.lift_low import lift_low
-from robocasa_lerobot.demos.skills.navigation import drive
-from robocasa_lerobot.demos.skills.put_down import place_into_basin, place_on, place_on_reaching_in
-from robocasa_lerobot.demos.skills.put_inside import drop_into_jug, place_at_site, place_inside, place_inside_fridge
-from robocasa_lerobot.demos.skills.put_on_counter import place_on_counter, take_from_spout, take_out_of_drawer
+from robocasa_lerobot.demos.skills.pick_place.verbs import drive, pick_object, place_object
 from robocasa_lerobot.demos.skills.racks import pull, push, slide
 from robocasa_lerobot.demos.skills.shut import close_doors, lift_shut
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
@@ -55,20 +52,10 @@ SKILLS: dict[tuple[str, str], Skill] = {
     ("levers", "on"): turn_on_water,
     ("levers", "off"): turn_off_water,
     ("levers", "turn"): turn_sideways,
-    ("pick_place", "place"): place_into_basin,
+    ("pick_place", "pick"): pick_object,
+    ("pick_place", "place"): place_object,
     ("pick_place", "uncover"): uncover,
-    ("pick_place", "place_on"): place_on,
-    ("pick_place", "place_on_from_pan"): place_on,
-    ("pick_place", "drop_into"): place_on,
-    ("pick_place", "place_inside"): place_inside,
-    ("pick_place", "place_inside_fridge"): place_inside_fridge,
-    ("pick_place", "place_at_site"): place_at_site,
-    ("pick_place", "place_on_counter"): place_on_counter,
-    ("pick_place", "take_out_of_drawer"): take_out_of_drawer,
-    ("pick_place", "take_from_spout"): take_from_spout,
-    ("pick_place", "drop_into_jug"): drop_into_jug,
     ("pick_place", "cover"): cover,
-    ("pick_place", "place_on_reaching_in"): place_on_reaching_in,
 }
 
 __all__ = ["SKILLS", "Skill", "SkillError"]

@@ -37,7 +37,8 @@ from robocasa_lerobot.demos.skills.blender_lid import (
     the_blender,
 )
 from robocasa_lerobot.demos.skills.common import SkillError, hold_hand, move_hand, stage_done
-from robocasa_lerobot.demos.skills.pick import INSIST, entry
+from robocasa_lerobot.demos.skills.pick_place.grasp_strategy import entry
+from robocasa_lerobot.demos.skills.pick_place.pick import INSIST
 from robocasa_lerobot.demos.skills.ways import Choice, Held, Way, approach, choose, lead
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.kitchens.appliances.kinds.blender import Blender

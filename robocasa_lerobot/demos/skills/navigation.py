@@ -17,7 +17,6 @@ from robocasa_lerobot.demos.skills.common import SkillError
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.scene.robot_poses import RobotPose, is_free
 from robocasa_lerobot.envs.scene.scene import Scene
-from robocasa_lerobot.envs.tasks.task import Stage
 
 CELL_M = 0.10
 HEADINGS = 8
@@ -33,16 +32,6 @@ WAYPOINT_M, WAYPOINT_RAD = 0.12, 0.25
 ARRIVED_M, ARRIVED_RAD = 0.02, 0.03
 STALL_STEPS, STALL_M = 30, 0.01
 _NEIGHBOURS = [(x, y) for x in (-1, 0, 1) for y in (-1, 0, 1) if x or y]
-
-
-def drive(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
-    """Drive to where a robot stands that is to use the stage's fixture.
-
-    Raises:
-        SkillError: there is no way, or the base got stuck.
-    """
-    goal = env.scene.standing_pose(stage.target)
-    yield from drive_to(env, goal.x, goal.y, goal.yaw)
 
 
 def drive_to(

@@ -54,17 +54,25 @@ class Held:
         name: of the body.
         position: of its origin from the grip site, in the hand's axes, metres.
         rotation: in the hand's axes.
+        contents: what lies in it, and goes along.
     """
 
     name: str
     position: Array
     rotation: Array
+    contents: tuple[Held, ...] = ()
 
     @classmethod
-    def now(cls, data: mujoco.MjData, name: str) -> Held:
-        """As it lies in the hand at present."""
+    def now(cls, data: mujoco.MjData, name: str, contents: tuple[str, ...] = ()) -> Held:
+        """As it lies in the hand at present, with the bodies that lie in it."""
         hand, body = hand_rotation(data), data.body(name)
-        return cls(name, hand.T @ (body.xpos - grip_position(data)), hand.T @ body.xmat.reshape(3, 3))
+        position, rotation = hand.T @ (body.xpos - grip_position(data)), hand.T @ body.xmat.reshape(3, 3)
+        return cls(name, position, rotation, tuple(cls.now(data, other) for other in contents))
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Of all bodies that go along."""
+        return (self.name, *(other.name for other in self.contents))
 
 
 @dataclass(frozen=True)
@@ -299,7 +307,7 @@ class _Planner:
                 held = self._held if index <= self._loaded else way.takes if index > self._key + 1 else None
                 if held is not None:
                     self._bring(data, held)
-                    mine = self._robot | self._env.scene.subtree(held.name)
+                    mine = self._robot | self._env.scene.subtree(*held.names)
                 cost += _HIT * min(self._met(model, data, mine), _MOST_HITS)
         return cost
 
@@ -319,9 +327,10 @@ class _Planner:
 
     def _bring(self, data: mujoco.MjData, held: Held) -> None:
         hand, grip = hand_rotation(data), grip_position(data)
-        quat = np.empty(4)
-        mujoco.mju_mat2Quat(quat, np.ascontiguousarray(hand @ held.rotation).reshape(9))
-        data.joint(f"{held.name}_joint0").qpos[:] = [*(grip + hand @ held.position), *quat]
+        for body in (held, *held.contents):
+            quat = np.empty(4)
+            mujoco.mju_mat2Quat(quat, np.ascontiguousarray(hand @ body.rotation).reshape(9))
+            data.joint(f"{body.name}_joint0").qpos[:] = [*(grip + hand @ body.position), *quat]
         mujoco.mj_kinematics(self._env.model, data)
 
     def _met(self, model: mujoco.MjModel, data: mujoco.MjData, mine: NDArray[np.bool_]) -> int:

@@ -10,7 +10,10 @@ from robocasa_lerobot.envs.predicates.fixtures import (
     PartWithin,
     StateIs,
 )
-from robocasa_lerobot.envs.predicates.logic import AllOf, AnyOf, Goal, Not, Term, When
+from robocasa_lerobot.envs.predicates.heat_and_water import OnBurner, UnderWater
+from robocasa_lerobot.envs.predicates.logic import AllOf, AnyOf, Exactly, ForEach, Goal, Not, Term, When
+from robocasa_lerobot.envs.predicates.memory import Never, Once, StepsWhile, WithMemory, parts_with_memory
+from robocasa_lerobot.envs.predicates.near import Near, NearerThan
 from robocasa_lerobot.envs.predicates.objects import (
     ObjectAtSite,
     ObjectInBasin,
@@ -20,8 +23,16 @@ from robocasa_lerobot.envs.predicates.objects import (
     ObjectTouchesAnyCounter,
     ObjectUpright,
 )
-from robocasa_lerobot.envs.predicates.robot import GripperFar, GripperFarFromPart, StandsBefore
+from robocasa_lerobot.envs.predicates.robot import (
+    Grasped,
+    GripperFar,
+    GripperFarFromPart,
+    GripperTouches,
+    StandsBefore,
+    StandsNear,
+)
 from robocasa_lerobot.envs.predicates.shelves import OnShelf, inside
+from robocasa_lerobot.envs.predicates.traces import MovedSince, Strokes
 
 __all__ = [
     "AllOf",
@@ -31,9 +42,17 @@ __all__ = [
     "DoorsOpen",
     "DrawerClosed",
     "DrawerOpen",
+    "Exactly",
+    "ForEach",
     "Goal",
+    "Grasped",
     "GripperFar",
     "GripperFarFromPart",
+    "GripperTouches",
+    "MovedSince",
+    "Near",
+    "NearerThan",
+    "Never",
     "Not",
     "ObjectAtSite",
     "ObjectInBasin",
@@ -42,12 +61,20 @@ __all__ = [
     "ObjectTouches",
     "ObjectTouchesAnyCounter",
     "ObjectUpright",
+    "OnBurner",
     "OnShelf",
+    "Once",
     "PartTurned",
     "PartWithin",
     "StandsBefore",
+    "StandsNear",
     "StateIs",
+    "StepsWhile",
+    "Strokes",
     "Term",
+    "UnderWater",
     "When",
+    "WithMemory",
     "inside",
+    "parts_with_memory",
 ]

@@ -25,6 +25,23 @@ def touching(model: mujoco.MjModel, data: mujoco.MjData, first: NDArray[np.bool_
     return _touching_asleep(model, data, first, second)
 
 
+def pushes(
+    model: mujoco.MjModel, data: mujoco.MjData, first: NDArray[np.bool_], second: NDArray[np.bool_]
+) -> NDArray[np.float64]:
+    """Directions in which bodies of one set push bodies of the other, unit vectors (n, 3), one for each contact.
+
+    Before: contacts are evaluated. Where both sides sleep none are listed.
+    """
+    bodies = model.geom_bodyid[data.contact.geom[: data.ncon]].reshape(-1, 2)
+    met = data.contact.dist[: data.ncon] <= 0.0
+    normals = data.contact.frame[: data.ncon, :3]  # from the first geom to the second
+    along, against = first[bodies] & met[:, None], second[bodies]
+    pushing: NDArray[np.float64] = np.concatenate(
+        [normals[along[:, 0] & against[:, 1]], -normals[along[:, 1] & against[:, 0]]]
+    )
+    return pushing
+
+
 def _touching_asleep(
     model: mujoco.MjModel, data: mujoco.MjData, first: NDArray[np.bool_], second: NDArray[np.bool_]
 ) -> bool:

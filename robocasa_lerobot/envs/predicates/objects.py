@@ -159,20 +159,11 @@ class ObjectOn(Term):
 
     def holds(self, scene: Scene, data: mujoco.MjData) -> bool:
         """Look at distance, then contacts."""
-        apart = data.body(scene.fill(self.object)).xpos[:2] - self._middle(scene, data)
-        limit = self.within
-        if limit is None:
-            limit = RECEPTACLE_SHARE * max(scene.objects[self.receptacle].item.size[:2]) / 2
+        apart = data.body(scene.fill(self.object)).xpos[:2] - middle_of(scene, data, self.receptacle)[:2]
+        limit = RECEPTACLE_SHARE * radius(scene, self.receptacle) if self.within is None else self.within
         return float(np.linalg.norm(apart)) < limit and touching(
             scene.model, data, scene.subtree(scene.fill(self.object)), scene.subtree(self.receptacle)
         )
-
-    def _middle(self, scene: Scene, data: mujoco.MjData) -> NDArray[np.float64]:
-        """Middle of where the receptacle holds things, (2,): a pan's origin is off it, towards the handle."""
-        body, inside = data.body(self.receptacle), scene.objects[self.receptacle].item.interior
-        middle = body.xpos if inside is None else body.xpos + body.xmat.reshape(3, 3) @ np.asarray(inside.center)
-        across: NDArray[np.float64] = middle[:2]
-        return across
 
 
 @dataclass(frozen=True)
@@ -218,6 +209,18 @@ class ObjectUpright(Term):
     def holds(self, scene: Scene, data: mujoco.MjData) -> bool:
         """Compare the tilt with the bound."""
         return bool(data.body(scene.fill(self.object)).xmat.reshape(3, 3)[2, 2] > np.cos(UPRIGHT_RAD))
+
+
+def radius(scene: Scene, name: str) -> float:
+    """Horizontal radius of an object: half of the longer edge of its bounding box, metres."""
+    return max(scene.objects[name].item.size[:2]) / 2
+
+
+def middle_of(scene: Scene, data: mujoco.MjData, name: str) -> NDArray[np.float64]:
+    """Middle of where an object holds things, else its origin, (3,): a pan's origin is off, towards the handle."""
+    body, inside = data.body(name), scene.objects[name].item.interior
+    middle: NDArray[np.float64] = body.xpos
+    return middle if inside is None else middle + body.xmat.reshape(3, 3) @ np.asarray(inside.center)
 
 
 def object_corners(scene: Scene, data: mujoco.MjData, name: str) -> NDArray[np.float64]:

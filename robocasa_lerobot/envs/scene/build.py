@@ -19,15 +19,18 @@ from robocasa_lerobot.envs.robots.panda_omron.robot import PANDA_OMRON
 from robocasa_lerobot.envs.robots.robot import Robot
 from robocasa_lerobot.envs.scene.assembly import bare_kitchen
 from robocasa_lerobot.envs.scene.counter_areas import counter_areas
+from robocasa_lerobot.envs.scene.drawn import Drawn, PlacedObject
 from robocasa_lerobot.envs.scene.initial_states import Initial, LidAside, PartAt
+from robocasa_lerobot.envs.scene.memory import Memory, add_memory
 from robocasa_lerobot.envs.scene.placement import cast_roles, place_objects
 from robocasa_lerobot.envs.scene.regions import Shares
 from robocasa_lerobot.envs.scene.robot_poses import RobotPose, robot_pose
 from robocasa_lerobot.envs.scene.roles import counter_of
-from robocasa_lerobot.envs.scene.scene import PlacedObject, Scene
+from robocasa_lerobot.envs.scene.scene import Scene
 from robocasa_lerobot.envs.scene.scene_spec import SceneSpec
 from robocasa_lerobot.envs.scene.spec import InitialOpenness, OnCounter
 from robocasa_lerobot.envs.scene.task_parameters import Choices, draw_choices
+from robocasa_lerobot.envs.scene.words import numbered, said, words_of
 from robocasa_lerobot.errors import UnknownNameError, UserError
 
 RENDER_PRESETS = ("fast", "quality")
@@ -121,11 +124,16 @@ def _attempt(
     roles, choices, objects, pose = arranged.roles, arranged.choices, arranged.objects, arranged.robot_pose
     spots = {role: _lid_spot(rng, layout, roles[role], objects) for role, gone in arranged.lids.items() if not gone}
     spec = _assemble(task, layout, look, robot, objects)
+    remembering = task.remembering(Drawn(roles=roles, objects=objects, choices=choices.values))
+    kept = {part.name: part.numbers for part in remembering}
+    add_memory(spec, kept)
     if look.camera_noise is not None:
         noise_rng = np.random.default_rng([seed, _CAMERA_NOISE_STREAM])
         add_camera_noise(spec, robot.cameras(look.camera_set), look.camera_noise, noise_rng)
     model = spec.compile()
-    words = _words(layout, roles, objects) | choices.words | {"side": pose.side}
+    categories = {name: placed.item.category.name for name, placed in objects.items()}
+    words = words_of(layout, roles, categories, [wanted.name for wanted in task.objects if wanted.count != (1, 1)])
+    words.update({"side": pose.side} | choices.words)
     return Scene(
         split=split,
         seed=seed,
@@ -139,11 +147,14 @@ def _attempt(
         openness=arranged.openness,
         robot=robot,
         robot_pose=pose,
-        instruction=_said(task.instruction, words),
-        paraphrases=tuple(_said(wording, words) for wording in task.paraphrases),
+        instruction=said(task.instruction, words),
+        paraphrases=tuple(said(wording, words) for wording in task.paraphrases),
         choices=choices.values,
+        words=words,
         initial=arranged.initial,
         lid_spots=spots,
+        remembering=remembering,
+        memory=Memory.of(model, kept),
     )
 
 
@@ -229,37 +240,17 @@ def _lid_spot(
     return np.array([spot.x, spot.y, counter.surface_z + 0.002])
 
 
-def _words(layout: Layout, roles: dict[str, str], objects: dict[str, PlacedObject]) -> dict[str, str]:
-    """What instructions call fixtures and objects, by role and name."""
-    names = {role: _fixture_word(layout.types[name]) for role, name in roles.items()}
-    for name in roles.values():
-        fixture = layout.fixtures[name]
-        if fixture.door_names:
-            names.setdefault("doors", _doors_word(fixture.door_names))
-        for part in fixture.compartments:
-            names.setdefault(f"{part}_doors", _doors_word(fixture.doors_of(part)))
-    return names | {name: placed.item.category.name.replace("_", " ") for name, placed in objects.items()}
-
-
-def _doors_word(doors: tuple[str, ...]) -> str:
-    return "door" if len(doors) == 1 else "doors"
-
-
-def _fixture_word(kind: str) -> str:
-    return "fridge" if kind.startswith("fridge") else "stove" if kind.startswith("stove") else kind.replace("_", " ")
-
-
-def _said(wording: str, words: dict[str, str]) -> str:
-    """A wording with its words; a missing one (a rack that needs no name) leaves no double space."""
-    return " ".join(wording.format(**words).split())
-
-
 def _assemble(
     task: SceneSpec, layout: Layout, look: _Look, robot: Robot, objects: dict[str, PlacedObject]
 ) -> mujoco.MjSpec:
     spec, palette = bare_kitchen(layout, look.render_preset)
     robot.add_to(spec, look.render_preset, look.camera_set)
-    liquids = {wanted.name: LIQUIDS[wanted.filled] for wanted in task.objects if wanted.filled}
+    liquids = {
+        name: LIQUIDS[wanted.filled]
+        for wanted in task.objects
+        if wanted.filled
+        for name in numbered(wanted.name, objects)
+    }
     for placed in objects.values():
         add_object(spec, palette, placed.name, placed.item, liquid=liquids.get(placed.name))
     return spec

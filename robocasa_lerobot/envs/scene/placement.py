@@ -13,11 +13,13 @@ from robocasa_lerobot.envs.kitchens.footprints import Area, Footprint, Placement
 from robocasa_lerobot.envs.kitchens.layout import Layout
 from robocasa_lerobot.envs.objects import catalogue
 from robocasa_lerobot.envs.scene.counter_areas import counter_areas, inside_area, standing_on
+from robocasa_lerobot.envs.scene.drawn import PlacedObject
 from robocasa_lerobot.envs.scene.regions import Part, Shares, choose_parts, rectangle_in
 from robocasa_lerobot.envs.scene.roles import candidates
-from robocasa_lerobot.envs.scene.scene import PlacedObject
 from robocasa_lerobot.envs.scene.scene_spec import SceneSpec
 from robocasa_lerobot.envs.scene.spec import FixtureWanted, ObjectWanted, OnCounter, Placement
+from robocasa_lerobot.envs.scene.task_parameters import item_of, name_of, number_of, start_of
+from robocasa_lerobot.envs.scene.words import numbered
 
 PLACEMENT_GAP_M = 0.004  # objects start this far above their surface and settle
 _TURNS = 20  # how often a place is drawn for what hardly fits into a compartment
@@ -67,13 +69,13 @@ class _Table:
         placed: objects by name.
         taken: their footprints.
         parts: which part of a fixture each object stands on.
-        used: categories.
+        holders: names of the containers that were put under objects.
     """
 
     placed: dict[str, PlacedObject] = field(default_factory=dict)
     taken: list[tuple[Footprint, float]] = field(default_factory=list)
     parts: dict[str, list[Part]] = field(default_factory=dict)
-    used: set[str] = field(default_factory=set)
+    holders: set[str] = field(default_factory=set)
 
     def near(self, z: float) -> list[Footprint]:
         """Footprints of what stands at about a height (metres), or on something there."""
@@ -96,39 +98,12 @@ def place_objects(
     """
     table = _Table()
     for wanted in task.objects:
-        count = int(rng.integers(wanted.count[0], wanted.count[1] + 1))
-        for index in range(count):
-            name = wanted.name if wanted.count == (1, 1) else f"{wanted.name}_{index}"
-            item = catalogue.sample(
-                rng,
-                wanted.groups,
-                split,
-                graspable=wanted.graspable,
-                washable=wanted.washable,
-                max_height=wanted.max_height,
-                # An instruction names one object of the scene.
-                exclude=frozenset(() if wanted.repeats else table.used) | frozenset(wanted.exclude),
-                properties=wanted.properties,
-                max_size=wanted.max_size,
-                object_scale=wanted.scale,
-                rotate_upright=wanted.upright,
-            )
-            table.used.add(item.category.name)
-            _put(rng, table, _filled(rng, wanted, choices), name, item, split, layout, roles, openness)
+        for index in range(number_of(rng, wanted, choices)):
+            items = {name: placed.item for name, placed in table.placed.items() if name not in table.holders}
+            item = item_of(rng, wanted, index, split, items, choices)
+            start = start_of(rng, wanted, choices)
+            _put(rng, table, replace(wanted, start=start), name_of(wanted, index), item, split, layout, roles, openness)
     return table.placed
-
-
-def _filled(rng: np.random.Generator, wanted: ObjectWanted, choices: Mapping[str, str]) -> ObjectWanted:
-    """With the choices filled into the names of its place, and one taken of several ("{knob}|any")."""
-    start = wanted.start
-    if not isinstance(start, Placement) or not (start.region.name or isinstance(start.region.level, str)):
-        return wanted
-    region = start.region
-    names = region.name.split("|")
-    name = names[int(rng.integers(len(names)))].format(**choices)
-    level = region.level.format(**choices) if isinstance(region.level, str) else region.level
-    region = replace(region, name="" if name == "any" else name, level=level)
-    return replace(wanted, start=replace(start, region=region))
 
 
 def _put(
@@ -166,6 +141,7 @@ def _put(
         if start.try_to_place_in and IN_CONTAINER in _groups_of(item):
             container = catalogue.sample(rng, (start.try_to_place_in,), split)
             holder = f"{name}_container"
+            table.holders.add(holder)
             _put_down(rng, table, holder, container, areas, standing)
             # What may stick out is the container: a thing across its rim would tip over.
             _put_on(rng, table, name, item, table.placed[holder], replace(start, ensure_inside=True))
@@ -204,7 +180,7 @@ def _areas(
     region = start.region
     ref = layout.fixtures[roles[region.ref]] if region.ref else None
     if start.reuse_region_from:
-        parts = table.parts[start.reuse_region_from]
+        parts = table.parts[numbered(start.reuse_region_from, table.parts)[0]]
     else:
         parts = choose_parts(layout, start, fixture, ref, openness.get(fixture.name, 0.0))
     table.parts[name] = parts

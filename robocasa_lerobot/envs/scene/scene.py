@@ -14,32 +14,17 @@ from robocasa_lerobot.envs.kitchens.appliances.base import update_all
 from robocasa_lerobot.envs.kitchens.appliances.kinds.blender import Blender
 from robocasa_lerobot.envs.kitchens.fixtures.base import Fixture, of_kind, yaw_quat
 from robocasa_lerobot.envs.kitchens.fixtures.regions import region_names
-from robocasa_lerobot.envs.kitchens.footprints import Footprint
 from robocasa_lerobot.envs.kitchens.layout import Layout
-from robocasa_lerobot.envs.objects.catalogue import Instance
 from robocasa_lerobot.envs.robots.cameras import camera_configs
 from robocasa_lerobot.envs.robots.control_step import control_step
 from robocasa_lerobot.envs.robots.robot import Controller, Robot
 from robocasa_lerobot.envs.scene.bodies import subtree
+from robocasa_lerobot.envs.scene.drawn import Drawn
+from robocasa_lerobot.envs.scene.memory import Memory
 from robocasa_lerobot.envs.scene.robot_poses import RobotPose, standing_pose
+from robocasa_lerobot.envs.scene.words import Words
 
 SETTLE_STEPS = 10  # control steps without a command after placing everything (docs/robocasa.md, section 1)
-
-
-@dataclass(frozen=True)
-class PlacedObject:
-    """An object of a scene: its model, and where it starts (centre in metres, yaw in radians)."""
-
-    name: str
-    item: Instance
-    pos: tuple[float, float, float]
-    yaw: float
-
-    @property
-    def footprint(self) -> Footprint:
-        """Its bounding box on the floor plan."""
-        width, depth, _ = self.item.size
-        return Footprint(self.pos[0], self.pos[1], self.yaw, (width / 2, depth / 2))
 
 
 class FirstState(Protocol):
@@ -49,8 +34,26 @@ class FirstState(Protocol):
         """Write it, with the number drawn for it."""
 
 
-@dataclass
-class Scene:
+class Remembering(Protocol):
+    """Part of a goal that depends on earlier states; `envs/predicates/memory.py` has them all."""
+
+    @property
+    def name(self) -> str:
+        """Of what is kept."""
+
+    @property
+    def numbers(self) -> tuple[str, ...]:
+        """Names of the numbers that it keeps."""
+
+    def begin(self, scene: Scene, data: mujoco.MjData) -> NDArray[np.float64]:
+        """Its numbers at the start of an episode."""
+
+    def after_step(self, scene: Scene, data: mujoco.MjData) -> NDArray[np.float64]:
+        """Its numbers after a control step; those before it are in `scene.memory`."""
+
+
+@dataclass(kw_only=True)
+class Scene(Drawn):
     """A kitchen made for an episode.
 
     Attributes:
@@ -59,17 +62,17 @@ class Scene:
         spec: the MjSpec; its XML names assets by portable paths.
         model: compiled.
         layout: where its fixtures stand.
-        roles: fixture name of each role of the task.
-        objects: by name.
         openness: initial share of full travel by fixture name and part, an empty one for all of it.
         robot: that is in it.
         robot_pose: where its base starts.
         instruction: what the robot is told.
         paraphrases: the same in other words.
-        choices: what was drawn for the task's choices, and the roles' fixtures, by name.
+        words: what is said of fixtures (by role), objects, choices, and lists of objects.
         initial: what the task has written into the first state, each with the number drawn for it, in that order.
         lid_spots: where the lid of a blender may lie, by role.
         arm_noise_rad: standard deviation of the noise on the initial arm pose.
+        remembering: the parts of the task's goal and of its stages' conditions that have memory, the inner first.
+        memory: where their numbers are.
     """
 
     split: str
@@ -79,17 +82,17 @@ class Scene:
     spec: mujoco.MjSpec
     model: mujoco.MjModel
     layout: Layout
-    roles: dict[str, str]
-    objects: dict[str, PlacedObject]
     openness: dict[tuple[str, str], float]
     robot: Robot
     robot_pose: RobotPose
     instruction: str
     paraphrases: tuple[str, ...] = ()
-    choices: dict[str, str] = field(default_factory=dict)
+    words: Words = field(default_factory=Words)
     initial: tuple[tuple[FirstState, float], ...] = ()
     lid_spots: dict[str, NDArray[np.float64]] = field(default_factory=dict)
     arm_noise_rad: float = 0.02
+    remembering: tuple[Remembering, ...] = ()
+    memory: Memory = field(default_factory=Memory)
     _subtrees: dict[tuple[str, ...], NDArray[np.bool_]] = field(default_factory=dict, init=False, repr=False)
 
     @property
@@ -109,11 +112,7 @@ class Scene:
         Raises:
             UserError: it is something else.
         """
-        return of_kind(self.fixtures[self.roles[role]], kind)
-
-    def fill(self, text: str) -> str:
-        """A name of a declaration with its choices and roles filled in, e.g. "knob_{knob}"."""
-        return text.format(**self.choices) if "{" in text else text
+        return of_kind(self.fixtures[self.roles[self.fill(role)]], kind)
 
     def part(self, role: str, text: str) -> str:
         """A part that a declaration names at a fixture, choices filled in, a shelf by its level as its own name."""
@@ -156,8 +155,16 @@ class Scene:
         for _ in range(SETTLE_STEPS):
             control_step(self.model, data, controller, hold)
             self.update_appliances(data)
+        for remembered in self.remembering:
+            self.memory.write(data, remembered.name, remembered.begin(self, data))
         data.time = 0.0
         return data, controller
+
+    def after_control_step(self, data: mujoco.MjData) -> None:
+        """What happens by itself, once after each control step of an episode: appliances act, then goals remember."""
+        self.update_appliances(data)
+        for part in self.remembering:
+            self.memory.write(data, part.name, part.after_step(self, data))
 
     def update_appliances(self, data: mujoco.MjData) -> None:
         """Let appliances latch, time and light up, once after each control step."""
@@ -190,6 +197,7 @@ class Scene:
                 for name, fixture in self.fixtures.items()
             },
             "fixture_refs": dict(self.roles),
+            "choices": {name: value for name, value in self.choices.items() if name not in self.roles},
             "cam_configs": camera_configs(self.model, (camera.name for camera in self.robot.cameras("default"))),
             "init_robot_base_pos": [self.robot_pose.x, self.robot_pose.y, 0.0],
             "init_robot_base_ori": [0.0, 0.0, self.robot_pose.yaw],

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from robocasa_lerobot.envs.scene.drawn import Drawn
 from robocasa_lerobot.envs.scene.initial_states import Initial
+from robocasa_lerobot.envs.scene.scene import Remembering
 from robocasa_lerobot.envs.scene.spec import Choice, FixtureWanted, InitialOpenness, ObjectWanted, RobotStart
 
 type InitialState = InitialOpenness | Initial
@@ -18,7 +20,9 @@ class SceneSpec:
         name: id, as in RoboCasa365.
         fixtures, objects, robot_start, initial: the scene.
         choices: what is drawn at reset.
-        instruction: template; fields are "{side}" and names of objects.
+        instruction: template; fields are "{side}" (where the robot stands), roles, choices and names of objects.
+            "{a+b}" lists objects ("the apple and the pear", "both apples"); of counted ones "{a}" is such a list,
+            "{a_count}" their number, and "{a_all}" "both" or "all three".
         paraphrases: other wordings, kept apart as novel language.
         needs: names of `kitchens.splits.EXCLUDED`, of what a layout must have: the others are left out, always.
         exclude_styles: ids of styles that do not suit it.
@@ -34,3 +38,7 @@ class SceneSpec:
     paraphrases: tuple[str, ...] = ()
     needs: tuple[str, ...] = ()
     exclude_styles: tuple[int, ...] = ()
+
+    def remembering(self, scene: Drawn) -> tuple[Remembering, ...]:
+        """What has memory, and so needs hidden joints in the scene, the inner first."""
+        return ()

@@ -86,7 +86,7 @@ class SampleRegion:
     """Which part of a fixture's tops or insides is used.
 
     Attributes:
-        ref: role of a reference fixture; none uses the whole fixture.
+        ref: role of a reference fixture; none uses the whole fixture. This and `loc` may name a choice in braces.
         loc: "nn" takes the part nearest to the reference, "left" or "right" those on one side of it, "left_right" those
             on either, "any" all.
         top_size: least width and depth of the part, metres.
@@ -109,12 +109,13 @@ class Placement:
     """Start on or in a fixture, or on an object that was placed before, as RoboCasa's placement records say it.
 
     Attributes:
-        fixture: role.
-        object: name of an object of the scene, instead of a fixture.
+        fixture: role; may name a choice in braces.
+        object: name of an object of the scene, instead of a fixture; may name a choice in braces.
         region: which part of the fixture.
         size: width and depth of the rectangle that is used, metres; the whole part if None.
         pos: where the rectangle lies, -1 left or front, 1 right or back; "ref" is in line with the reference, None
-            anywhere. Of an object on an object it is not used.
+            anywhere. "{side}" is where the choice `side` (left, right, front, back, middle, or a number) says, and
+            "-{side}" opposite to it. Of an object on an object it is not used.
         offset: shift to the right and to the back, metres.
         margin: kept from the rectangle's edges, metres.
         rotation: bounds of the turn, radians.
@@ -143,34 +144,41 @@ class ObjectWanted:
     """An object, or several alike, and where it starts.
 
     Attributes:
-        name: in the scene; several get `<name>_<i>`.
-        groups: object groups to draw from.
+        name: in the scene; several get `<name>_<i>`, from 0 on.
+        groups: object groups to draw from; may name a choice in braces.
         start: where.
-        count: least and greatest number, both possible.
+        count: least and greatest number, both possible; or in braces a choice that is a number, 0 included.
         graspable, washable: properties asked for.
         max_height: bound of its size along z, metres.
         properties: further properties asked for, such as "cookable".
         exclude: groups or categories that are not wanted.
         max_size: bounds of its size along x, y, z, metres; None leaves an axis free.
-        scale: factor of its size, or one for each of x, y, z; before it is turned upright.
+        scale: factor of its size, or one for each of x, y, z, before it is turned upright; or in braces a choice that
+            is a number.
+        scale_step: of several, how much larger each is than the one before.
         upright: turned so that its longest axis points up.
         repeats: may be of a category that the scene already has.
+        same_category_as: name of an earlier object whose category it has; of several, their own name makes them alike.
+        same_model: with it, the very same model, at its own scale.
         filled: what is seen in it, one of `LIQUIDS` in `envs/scene/build.py`; it is there for the eye only.
     """
 
     name: str
     groups: tuple[str, ...]
     start: OnCounter | InsideOf | Placement
-    count: tuple[int, int] = (1, 1)
+    count: tuple[int, int] | str = (1, 1)
     graspable: bool = False
     washable: bool = False
     max_height: float | None = None
     properties: tuple[str, ...] = ()
     exclude: tuple[str, ...] = ()
     max_size: tuple[float | None, float | None, float | None] | None = None
-    scale: float | tuple[float, float, float] = 1.0
+    scale: float | tuple[float, float, float] | str = 1.0
+    scale_step: float = 1.0
     upright: bool = False
     repeats: bool = False
+    same_category_as: str = ""
+    same_model: bool = False
     filled: str = ""
 
 

@@ -1,15 +1,24 @@
-"""Draws what a task leaves open: which knob, rack, slot or drawer, which way; and the words for it."""
+"""Draws what a task leaves open: which knob, rack, slot or drawer, which way, and the words for it; how many of an
+object there are, which model each of them is, and where it starts, by what was drawn before.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from robocasa_lerobot.envs.kitchens.fixtures.base import Fixture
 from robocasa_lerobot.envs.kitchens.footprints import PlacementError
+from robocasa_lerobot.envs.objects import catalogue
 from robocasa_lerobot.envs.scene.scene_spec import SceneSpec
+from robocasa_lerobot.envs.scene.spec import InsideOf, ObjectWanted, OnCounter, Placement
+from robocasa_lerobot.envs.scene.words import numbered
+from robocasa_lerobot.errors import UserError
+
+_SIDES = {"left": -1.0, "front": -1.0, "middle": 0.0, "right": 1.0, "back": 1.0}
+type _Position = float | str | None
 
 
 @dataclass(frozen=True)
@@ -39,3 +48,133 @@ def draw_choices(
         drawn.words[choice.name] = value
         drawn.words.update({k: v for k, v in options[value].items() if not k.startswith("_")})
     return drawn
+
+
+def number_of(rng: np.random.Generator, wanted: ObjectWanted, choices: Mapping[str, str]) -> int:
+    """How many there are; drawn, unless a choice says it.
+
+    Raises:
+        UserError: what a choice says is no number.
+    """
+    if isinstance(wanted.count, str):
+        return int(_number(wanted.count, choices, f"count of {wanted.name}"))
+    return int(rng.integers(wanted.count[0], wanted.count[1] + 1))
+
+
+def name_of(wanted: ObjectWanted, index: int) -> str:
+    """Its own name, or with its index where it may be one of several."""
+    return wanted.name if wanted.count == (1, 1) else f"{wanted.name}_{index}"
+
+
+def item_of(
+    rng: np.random.Generator,
+    wanted: ObjectWanted,
+    index: int,
+    split: str,
+    items: Mapping[str, catalogue.Instance],
+    choices: Mapping[str, str],
+) -> catalogue.Instance:
+    """Draw the model of one of the wanted objects.
+
+    Args:
+        rng: generator that is advanced.
+        wanted: the object.
+        index: which of several.
+        split: of object models.
+        items: of the objects that the scene has already, by name.
+        choices: what was drawn for the task's choices.
+
+    Raises:
+        UserError: no category is left, or it is to be like an object that is not there.
+    """
+    factors = _factors(wanted, index, choices)
+    like = _like(wanted, index, items)
+    if like is not None and wanted.same_model:
+        item = catalogue.scaled(catalogue.instance(like.category, like.index), factors)
+        return replace(item, upright=True) if wanted.upright else item
+    groups = tuple(_filled(group, choices) for group in wanted.groups) if like is None else (like.category.name,)
+    # An instruction names one object of the scene.
+    used = frozenset(() if wanted.repeats or like is not None else (item.category.name for item in items.values()))
+    return catalogue.sample(
+        rng,
+        groups,
+        split,
+        graspable=wanted.graspable,
+        washable=wanted.washable,
+        max_height=wanted.max_height,
+        exclude=used | frozenset(wanted.exclude),
+        properties=wanted.properties,
+        max_size=wanted.max_size,
+        object_scale=factors,
+        rotate_upright=wanted.upright,
+    )
+
+
+def start_of(
+    rng: np.random.Generator, wanted: ObjectWanted, choices: Mapping[str, str]
+) -> OnCounter | InsideOf | Placement:
+    """Where it starts, with the choices filled in, and one taken of several names of regions ("{knob}|any")."""
+    start = wanted.start
+    if not isinstance(start, Placement):
+        return start
+    region = start.region
+    if region.name or isinstance(region.level, str):
+        names = region.name.split("|")
+        name = _filled(names[int(rng.integers(len(names)))], choices)
+        level = _filled(region.level, choices) if isinstance(region.level, str) else region.level
+        region = replace(region, name="" if name == "any" else name, level=level)
+    region = replace(region, ref=_filled(region.ref, choices), loc=_filled(region.loc, choices))
+    across, along = start.pos
+    return replace(
+        start,
+        region=region,
+        fixture=_filled(start.fixture, choices),
+        object=_filled(start.object, choices),
+        pos=(_position(across, wanted, choices), _position(along, wanted, choices)),
+    )
+
+
+def _like(wanted: ObjectWanted, index: int, items: Mapping[str, catalogue.Instance]) -> catalogue.Instance | None:
+    """The object whose category is taken again; the first of several alike has none."""
+    if not wanted.same_category_as:
+        return None
+    known = numbered(wanted.same_category_as, items)
+    if known:
+        return items[known[0]]
+    if wanted.same_category_as == wanted.name and index == 0:
+        return None
+    raise UserError(
+        f"{wanted.name} is to be like {wanted.same_category_as!r}, which is not there before it "
+        f"({', '.join(items) or 'nothing is'}). Declare that first."
+    )
+
+
+def _factors(wanted: ObjectWanted, index: int, choices: Mapping[str, str]) -> float | tuple[float, float, float]:
+    scale = wanted.scale
+    factors = _number(scale, choices, f"scale of {wanted.name}") if isinstance(scale, str) else scale
+    if wanted.scale_step == 1.0 or index == 0:
+        return factors
+    step = wanted.scale_step**index
+    x, y, z = (factors,) * 3 if isinstance(factors, int | float) else factors
+    return x * step, y * step, z * step
+
+
+def _position(where: _Position, wanted: ObjectWanted, choices: Mapping[str, str]) -> _Position:
+    """A position along one axis; "{side}" is that of the word that was drawn, "-{side}" the opposite one."""
+    if not isinstance(where, str) or "{" not in where:
+        return where
+    sign = -1.0 if where.startswith("-") else 1.0
+    word = _filled(where.removeprefix("-"), choices)
+    return sign * (_SIDES[word] if word in _SIDES else _number(word, choices, f"position of {wanted.name}"))
+
+
+def _number(text: str, choices: Mapping[str, str], what: str) -> float:
+    value = _filled(text, choices)
+    try:
+        return float(value)
+    except ValueError:
+        raise UserError(f"the {what} is {text!r}, which was drawn as {value!r}: a number is needed.") from None
+
+
+def _filled(text: str, choices: Mapping[str, str]) -> str:
+    return text.format_map(choices) if "{" in text else text

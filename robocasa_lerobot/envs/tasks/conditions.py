@@ -11,66 +11,73 @@ from robocasa_lerobot.envs.predicates import (
     DrawerClosed,
     DrawerOpen,
     Goal,
+    Grasped,
     GripperFar,
     GripperFarFromPart,
+    MovedSince,
+    Never,
     ObjectInBasin,
     ObjectOn,
     ObjectTouches,
     PartWithin,
     StandsBefore,
+    StandsNear,
     StateIs,
     inside,
 )
-from robocasa_lerobot.envs.tasks.task import Stage, Task
+from robocasa_lerobot.envs.tasks.task import BoundTask, Stage
 from robocasa_lerobot.errors import UserError
 
 OUT_FROM, IN_UP_TO = 0.95, 0.05  # of a rack's or a drawer's range
 
 
-def _let_go(stage: Stage, goal: Goal) -> Goal:
-    return AllOf(goal, GripperFar(stage.object))
+def _placed(task: BoundTask, stage: Stage) -> Goal:
+    """Where the object belongs, by what the target is, and let go."""
+    kind = next((fixture.kind for fixture in task.fixtures if fixture.role == stage.target), None)
+    if kind is None:
+        where: Goal = ObjectOn(stage.object, stage.target)
+    elif "counter" in kind or kind in ("island",):
+        where = ObjectTouches(stage.object, stage.target)
+    elif kind.startswith("sink"):
+        where = ObjectInBasin(stage.object, stage.target)
+    else:
+        where = inside(stage.object, stage.target, stage.part)
+    return AllOf(where, GripperFar(stage.object))
 
 
-def _on(stage: Stage) -> Goal:
-    return _let_go(stage, ObjectOn(stage.object, stage.target))
+def _driven(task: BoundTask, stage: Stage) -> Goal:
+    """Before a fixture or an object, and with what is carried, if anything, in the hand."""
+    roles = {fixture.role for fixture in task.fixtures}
+    there = StandsBefore(stage.target) if stage.target in roles else StandsNear(stage.target)
+    return AllOf(there, Grasped(stage.object)) if stage.object else there
 
 
-def _inside(stage: Stage) -> Goal:
-    return _let_go(stage, inside(stage.object, stage.target, stage.part))
-
-
-def _on_counter(stage: Stage) -> Goal:
-    return _let_go(stage, ObjectTouches(stage.object, stage.target))
-
-
-def _opened(stage: Stage) -> Goal:
+def _opened(task: BoundTask, stage: Stage) -> Goal:
     return DoorsOpen(stage.target, part=stage.part)
 
 
-def _closed(stage: Stage) -> Goal:
+def _closed(task: BoundTask, stage: Stage) -> Goal:
     return DoorsClosed(stage.target, part=stage.part)
 
 
-_BY_VERB: dict[tuple[str, str], Callable[[Stage], Goal]] = {
+_BY_VERB: dict[tuple[str, str], Callable[[BoundTask, Stage], Goal]] = {
     ("doors", "open"): _opened,
     **dict.fromkeys(
         (("doors", "close"), ("doors", "close_large"), ("doors", "lift_shut"), ("doors", "lift_low")), _closed
     ),
-    ("drawers", "open"): lambda stage: DrawerOpen(stage.target, at_least=OUT_FROM),
-    ("drawers", "close"): lambda stage: DrawerClosed(stage.target, at_most=IN_UP_TO),
-    ("racks", "pull"): lambda stage: PartWithin(stage.target, stage.part, low=OUT_FROM, label="out"),
-    ("racks", "push"): lambda stage: PartWithin(stage.target, stage.part, high=IN_UP_TO, label="in"),
-    ("navigation", "drive"): lambda stage: StandsBefore(stage.target),
-    ("levers", "on"): lambda stage: StateIs(stage.target, "water_on"),
-    ("levers", "off"): lambda stage: StateIs(stage.target, "water_on", value=False),
-    ("pick_place", "place"): lambda stage: _let_go(stage, ObjectInBasin(stage.object, stage.target)),
-    **{("pick_place", verb): _on for verb in ("place_on", "place_on_from_pan", "place_on_reaching_in", "drop_into")},
-    **{("pick_place", verb): _inside for verb in ("place_inside", "place_inside_fridge", "drop_into_jug")},
-    **{("pick_place", verb): _on_counter for verb in ("place_on_counter", "take_out_of_drawer", "take_from_spout")},
+    ("drawers", "open"): lambda task, stage: DrawerOpen(stage.target, at_least=OUT_FROM),
+    ("drawers", "close"): lambda task, stage: DrawerClosed(stage.target, at_most=IN_UP_TO),
+    ("racks", "pull"): lambda task, stage: PartWithin(stage.target, stage.part, low=OUT_FROM, label="out"),
+    ("racks", "push"): lambda task, stage: PartWithin(stage.target, stage.part, high=IN_UP_TO, label="in"),
+    ("navigation", "drive"): _driven,
+    ("levers", "on"): lambda task, stage: StateIs(stage.target, "water_on"),
+    ("levers", "off"): lambda task, stage: StateIs(stage.target, "water_on", value=False),
+    ("pick_place", "pick"): lambda task, stage: Grasped(stage.object),
+    ("pick_place", "place"): _placed,
 }
 
 
-def stage_condition(task: Task, stage: Stage) -> Goal:
+def stage_condition(task: BoundTask, stage: Stage) -> Goal:
     """What holds when a stage is done: its `until`; the goal of a task of one stage; else its verb's own condition.
 
     Raises:
@@ -86,11 +93,27 @@ def stage_condition(task: Task, stage: Stage) -> Goal:
             f"{task.name}: the stage `{' '.join(key)}` needs a condition of its own: what a {stage.verb} of "
             f"{stage.skill} comes to is not the same everywhere. Give the stage `until=...`."
         )
-    return _BY_VERB[key](stage)
+    return _BY_VERB[key](task, stage)
 
 
 def without_gripper(goal: Goal) -> Goal:
-    """What of a stage's condition must still hold when the hand is busy with the next one."""
+    """What of a stage's condition must still hold when the hand is busy with the next one.
+
+    Left out are where the gripper has to be, and that something moved in the last step, which passes by itself. What is
+    remembered stays whole: steps that were counted remain.
+    """
     if isinstance(goal, AllOf):
-        return AllOf(*(part for part in goal.parts if not isinstance(part, GripperFar | GripperFarFromPart)))
-    return goal
+        return AllOf(*(without_gripper(part) for part in goal.parts if not _passes(part)))
+    return AllOf() if _passes(goal) else goal
+
+
+def _passes(goal: Goal) -> bool:
+    moves = isinstance(goal, MovedSince) and goal.since == "step"
+    return moves or isinstance(goal, GripperFar | GripperFarFromPart)
+
+
+def must_never(goal: Goal) -> tuple[Never, ...]:
+    """What a goal asks never to happen in any case: once it has, the goal cannot be reached any more."""
+    if isinstance(goal, AllOf):
+        return tuple(never for part in goal.parts for never in must_never(part))
+    return (goal,) if isinstance(goal, Never) else ()

@@ -19,7 +19,7 @@ TASKS = (
             ),
         ),
         goal=AllOf(ObjectAtSite("obj", "coffee_machine", "receptacle", across=0.04, high=0.10), GripperFar("obj")),
-        stages=(Stage("pick_place", "place_at_site", "coffee_machine", object="obj", part="receptacle"),),
+        stages=(Stage("pick_place", "place", "coffee_machine", object="obj", part="receptacle"),),
         instruction="Put the {obj} under the coffee machine's dispenser.",
         paraphrases=(
             "The {obj} should stand where the coffee comes out.",
@@ -42,7 +42,7 @@ TASKS = (
             ),
         ),
         goal=AllOf(ObjectTouches("obj", "counter"), GripperFar("obj")),
-        stages=(Stage("pick_place", "take_from_spout", "counter", object="obj"),),
+        stages=(Stage("pick_place", "place", "counter", object="obj"),),
         instruction="Take the {obj} from under the coffee machine's dispenser and put it on the counter.",
         paraphrases=(
             "The coffee is ready: set the {obj} on the worktop.",

@@ -44,6 +44,7 @@ def _sink(
     choices: tuple[Choice, ...] = (),
     cluttered: bool = True,
     to: str = "",
+    text: str = "",
 ) -> Task:
     return Task(
         name=name,
@@ -54,7 +55,7 @@ def _sink(
         objects=_SINK_OBJECTS if cluttered else (),
         initial=initial,
         goal=goal,
-        stages=(Stage("levers", verb, "sink", part=part, to=to),),
+        stages=(Stage("levers", verb, "sink", part=part, to=to, text=text),),
         instruction=instruction,
         paraphrases=paraphrases,
     )
@@ -126,6 +127,7 @@ SINK = (
         "handle_temp",
         choices=(Choice("start", {"cold": {"target": "hot"}, "hot": {"target": "cold"}}),),
         to="other than {start}",
+        text="make the running water {target}",
         cluttered=False,
         instruction="Make the running water {target} with the sink's handle.",
         paraphrases=(

@@ -51,7 +51,7 @@ CABINET = (
         ),
         initial=(InitialOpenness("cab", *_DOOR_OPEN),),
         goal=AllOf(ObjectInside("obj", "cab"), GripperFar("obj")),
-        stages=place(target="cab", verb="place_inside"),
+        stages=place(target="cab"),
         instruction="Take the {obj} off the counter and put it into the cabinet.",
         paraphrases=(
             "The {obj} belongs in the cabinet.",
@@ -77,7 +77,7 @@ CABINET = (
         ),
         initial=(InitialOpenness("cab", *_DOOR_OPEN),),
         goal=AllOf(ObjectTouches("obj", "counter"), GripperFar("obj")),
-        stages=place(verb="place_on_counter"),
+        stages=place(),
         instruction="Take the {obj} out of the cabinet and put it on the counter.",
         paraphrases=(
             "Bring the {obj} from the cabinet to the worktop.",
@@ -100,7 +100,7 @@ TOP_DRAWER = (
         ),
         initial=(InitialOpenness("drawer", *_DOOR_OPEN),),
         goal=AllOf(ObjectInside("obj", "drawer"), Not(ObjectTouchesAnyCounter("obj")), GripperFar("obj")),
-        stages=place(target="drawer", verb="place_inside"),
+        stages=place(target="drawer"),
         instruction="Take the {obj} off the counter and put it into the drawer.",
         paraphrases=(
             "The {obj} belongs in the open drawer.",
@@ -126,7 +126,7 @@ TOP_DRAWER = (
         ),
         initial=(InitialOpenness("drawer", 1.0, 1.0),),
         goal=AllOf(ObjectTouchesAnyCounter("obj"), GripperFar("obj")),
-        stages=place(verb="take_out_of_drawer"),
+        stages=place(),
         instruction="Take the {obj} out of the drawer and put it on the counter.",
         paraphrases=(
             "Bring the {obj} from the drawer to the worktop.",
@@ -153,7 +153,7 @@ SINK = (
             ),
         ),
         goal=AllOf(ObjectOn("obj", "container"), ObjectTouches("container", "counter"), GripperFar("obj")),
-        stages=place(target="container", verb="place_on"),
+        stages=place(target="container"),
         instruction="Take the {obj} out of the sink and put it on the {container} on the counter.",
         paraphrases=(
             "The washed {obj} goes onto the {container} beside the sink.",
@@ -181,7 +181,7 @@ STOVE = (
             ),
         ),
         goal=AllOf(ObjectOn("obj", "container", within=_IN_PAN_M), GripperFar("obj")),
-        stages=place(target="container", verb="place_on"),
+        stages=place(target="container"),
         instruction="Take the {obj} off the plate and put it into the {container} on the stove.",
         paraphrases=(
             "The {obj} should be cooked: move it into the {container}.",
@@ -208,7 +208,7 @@ STOVE = (
             ObjectWanted("container", ("plate", "bowl"), on_counter("stove", (0.3, 0.3))),
         ),
         goal=AllOf(ObjectOn("obj", "container", within=_IN_PAN_M), GripperFar("obj")),
-        stages=place(target="container", verb="place_on_from_pan"),
+        stages=place(target="container"),
         instruction="Take the {obj} out of the {obj_container} and put it on the {container} on the counter.",
         paraphrases=(
             "Serve the {obj} from the stove on the {container}.",
@@ -240,7 +240,7 @@ MICROWAVE = (
         ),
         initial=(InitialOpenness("microwave", *_DOOR_OPEN),),
         goal=AllOf(ObjectTouches("obj", "container"), ObjectTouches("container", "microwave"), GripperFar("obj")),
-        stages=place(target="container", verb="place_on_reaching_in"),
+        stages=place(target="container"),
         instruction="Take the {obj} off its plate and put it on the plate in the microwave.",
         paraphrases=(
             "The {obj} should be warmed: move it into the microwave.",
@@ -267,7 +267,7 @@ MICROWAVE = (
         ),
         initial=(InitialOpenness("microwave", *_DOOR_OPEN),),
         goal=AllOf(ObjectOn("obj", "container"), GripperFar("obj")),
-        stages=place(target="container", verb="place_on_reaching_in"),
+        stages=place(target="container"),
         instruction="Take the {obj} out of the microwave and put it on the {container} on the counter.",
         paraphrases=(
             "The {obj} is warm; it goes onto the {container}.",

@@ -43,7 +43,7 @@ OVENS = (
         ),
         initial=(InitialOpenness("oven", 1.0, 1.0), PartAt("oven", "{rack}", (1.0, 1.0))),
         goal=AllOf(ObjectTouches("oven_tray", "oven", part="{rack}"), ObjectOn("obj", "oven_tray"), GripperFar("obj")),
-        stages=place(target="oven_tray", verb="place_on_reaching_in"),
+        stages=place(target="oven_tray"),
         instruction="Take the {obj} off the plate and put it on the tray on the {rack} rack of the oven.",
         paraphrases=(
             "The {obj} should be baked: it goes onto the oven's tray.",
@@ -70,7 +70,7 @@ OVENS = (
         ),
         initial=(InitialOpenness("toaster_oven", 1.0, 1.0), PartAt("toaster_oven", "{rack}", (1.0, 1.0))),
         goal=AllOf(ObjectTouches("obj", "toaster_oven", part="{rack}"), GripperFar("obj")),
-        stages=place(target="toaster_oven", verb="place_inside", part="{rack}"),
+        stages=place(target="toaster_oven", part="{rack}"),
         instruction="Take the {obj} off the plate and put it on the {rack} of the toaster oven.",
         paraphrases=(
             "The {obj} should be toasted: it goes onto the toaster oven's {rack}.",
@@ -97,7 +97,7 @@ OVENS = (
         ),
         initial=(InitialOpenness("toaster_oven", 1.0, 1.0), PartAt("toaster_oven", "{rack}", (1.0, 1.0))),
         goal=AllOf(ObjectOn("obj", "container"), ObjectTouches("container", "counter"), GripperFar("obj")),
-        stages=place(target="container", verb="place_on_reaching_in"),
+        stages=place(target="container"),
         instruction="Take the {obj} off the {rack} of the toaster oven and put it on the plate.",
         paraphrases=(
             "The {obj} is toasted; it goes onto the plate.",
@@ -125,7 +125,7 @@ OVENS = (
             ObjectWanted("plate", ("plate",), on_counter("toaster", (0.8, 0.3))),
         ),
         goal=AllOf(ObjectOn("obj", "plate"), GripperFar("obj")),
-        stages=place(target="plate", verb="place_on_reaching_in"),
+        stages=place(target="plate"),
         instruction="Take the bread out of the toaster and put it on the plate.",
         paraphrases=(
             "The toast goes onto the plate.",
@@ -160,7 +160,7 @@ BLENDER_AND_MIXER = (
         ),
         initial=(LidAside("blender", gone=True),),
         goal=AllOf(ObjectInside("obj", "blender"), GripperFar("obj")),
-        stages=place(target="blender", verb="drop_into_jug"),
+        stages=place(target="blender"),
         instruction="Take the {obj} off the counter and put it into the blender.",
         paraphrases=(
             "The {obj} should go into the blender jar.",
@@ -184,7 +184,7 @@ BLENDER_AND_MIXER = (
         ),
         initial=(PartAt("stand_mixer", "head", (1.0, 1.0)),),
         goal=AllOf(ObjectInside("obj", "stand_mixer", lower=0.5), GripperFar("obj")),
-        stages=place(target="stand_mixer", verb="place_inside"),
+        stages=place(target="stand_mixer"),
         instruction="Take the {obj} off the counter and put it into the bowl of the stand mixer.",
         paraphrases=(
             "The {obj} should go into the mixer's bowl.",

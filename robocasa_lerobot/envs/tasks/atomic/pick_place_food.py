@@ -33,7 +33,7 @@ COUNTER = (
             ),
         ),
         goal=AllOf(ObjectOn("bread", "bread_container"), ObjectTouches("cheese", "bread"), GripperFar("cheese")),
-        stages=place("cheese", "bread", verb="place_on"),
+        stages=place("cheese", "bread"),
         instruction="Put the cheese on the bread on the cutting board.",
         paraphrases=(
             "Make cheese bread: the cheese goes on top of the bread.",
@@ -66,7 +66,7 @@ COUNTER = (
             GripperFar("ice_cube1", 0.15),
             GripperFar("ice_cube2", 0.15),
         ),
-        stages=place("ice_cube1", "cup", verb="drop_into"),
+        stages=place("ice_cube1", "cup"),
         instruction="Put an ice cube from the bowl into the glass of coffee.",
         paraphrases=(
             "The coffee should be cold: add one ice cube.",
@@ -101,7 +101,7 @@ COUNTER = (
             ObjectOn("dessert", "cooked_food_container"),
             GripperFar("dessert"),
         ),
-        stages=place("dessert", "cooked_food_container", verb="place_on"),
+        stages=place("dessert", "cooked_food_container"),
         instruction="Put the {dessert} into the tupperware with the {cooked_food}.",
         paraphrases=(
             "The {dessert} goes into the box next to the {cooked_food}.",

@@ -53,7 +53,7 @@ FRIDGE = (
         ),
         initial=(InitialOpenness("fridge", 1.0, 1.0), PartAt("fridge", "{drawer}", (0.8, 1.0))),
         goal=AllOf(ObjectInside("obj", "fridge", region="{drawer}"), GripperFar("obj", _FRIDGE_FAR_M)),
-        stages=place(target="fridge", verb="place_inside_fridge", part="{drawer}"),
+        stages=place(target="fridge", part="{drawer}"),
         instruction="Take the {obj} off the fridge shelf and put it into the fridge drawer.",
         paraphrases=(
             "The {obj} belongs in the drawer of the fridge.",
@@ -89,7 +89,7 @@ FRIDGE = (
             ObjectInside("obj", "fridge", region="fridge_shelf", lower=0.9, height=USABLE_SHELF),
             GripperFar("obj", _FRIDGE_FAR_M),
         ),
-        stages=place(target="fridge", verb="place_inside_fridge", part="fridge_shelf"),
+        stages=place(target="fridge", part="fridge_shelf"),
         instruction="Take the {obj} out of the fridge drawer and put it on a shelf of the fridge.",
         paraphrases=(
             "The {obj} belongs on a shelf of the fridge.",

@@ -1,4 +1,4 @@
-"""Put what the hand holds to a spot: from above or through a front, then leave the way it came."""
+"""Put down what the hand holds at one of several place poses: from above or through a front, then leave as it came."""
 
 from __future__ import annotations
 
@@ -18,33 +18,35 @@ from robocasa_lerobot.demos.motion import (
     base_pose,
     grip_position,
     hand_rotation,
+    pose_error,
     rotation_about,
 )
 from robocasa_lerobot.demos.skills.common import SkillError, hold_hand, move_hand
 from robocasa_lerobot.demos.skills.navigation import drive_to
-from robocasa_lerobot.demos.skills.pick import FROM_ABOVE, INSIST, Manner, ahead_of, entry, pick, steep
-from robocasa_lerobot.demos.skills.things import Thing
+from robocasa_lerobot.demos.skills.pick_place.grasp_strategy import FROM_ABOVE, GraspStrategy, ahead_of, entry, steep
+from robocasa_lerobot.demos.skills.pick_place.graspable import Graspable
+from robocasa_lerobot.demos.skills.pick_place.pick import INSIST
 from robocasa_lerobot.demos.skills.ways import Choice, Held, Way, approach, choose, lead
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.scene.robot_poses import RobotPose
 
-ATTEMPTS = 4
-RELEASE_STEPS, SETTLE_STEPS = 9, 15
-GAP_M = 0.012  # of the underside above the spot when the hand opens
+RELEASE_STEPS = 9
+GAP_M = 0.012  # of the underside above the place pose when the hand opens
+BLOCKED_M = 0.08  # a hand as far as this from where it is to let go is blocked, and keeps what it holds
 CLEAR_M = 0.06  # along the hand, out of what it held, before it leaves
 AWAY_M = 0.26
-GONE_M = 0.27  # of the grip site from the thing's origin: tasks ask for 25 cm
+GONE_M = 0.27  # of the grip site from the object's origin: tasks ask for 25 cm
 YAWS = 12
-UP_RISE_M, RISES_M, LOW_COST = 0.06, (0.035, 0.010), 0.05  # over where it is let go, on the way in
+UP_RISE_M, RISES_M, LOW_COST = 0.06, (0.035, 0.010), 0.05  # over where it is let go, on the path in
 LEVEL_RISE_M, LEVEL_COST = 0.004, 0.1
 AGAIN, AGAIN_M = 0.5, 0.02  # cost of a hand that goes where it went in vain, as near as this
-LEANING = 0.35  # cost of a radian that the thing is tilted
+LEANING = 0.35  # cost of a radian that the object is tilted
 LEVEL_FINGERS = 0.35  # sine of the slope of the line between the fingers
 
 
 @dataclass(frozen=True)
-class Spot:
-    """Where the middle of a thing's underside may come.
+class PlacePose:
+    """Where the middle of an object's underside may come.
 
     Attributes:
         point: world, metres.
@@ -56,27 +58,25 @@ class Spot:
 
 
 @dataclass(frozen=True)
-class Putting:
-    """How a thing is put down.
+class PlaceStrategy:
+    """How an object is put down.
 
     Attributes:
-        spots: where, asked anew at each attempt, with the thing in the hand.
-        done: whether it lies where it belongs.
-        leans: tilts of thing and hand towards straight ahead that are allowed, radians.
-        entries: ways in and out, as of `Manner`.
-        taking: how it is picked before.
-        in_m: length of the way in, metres.
-        gap_m: of the underside above the spot when the hand opens.
+        poses: where, asked anew at each attempt, with the object in the hand.
+        leans: tilts of object and hand towards straight ahead that are allowed, radians.
+        entries: paths in and out, as of `GraspStrategy`.
+        grasp: how it is grasped before, where it stands free.
+        in_m: length of the path in, metres.
+        gap_m: of the underside above the place pose when the hand opens.
         turns: of a leaning hand to the left, radians.
-        falls: the fingers are to open side by side, so that the thing falls from between them.
+        falls: the fingers are to open side by side, so that the object falls from between them.
         narrow: whether the hand keeps to a straight line in and out also where that is steep.
     """
 
-    spots: Callable[[], Sequence[Spot]]
-    done: Callable[[], bool]
+    poses: Callable[[], Sequence[PlacePose]]
     leans: tuple[float, ...] = (0.0,)
     entries: tuple[str, ...] = ("up",)
-    taking: Manner = FROM_ABOVE
+    grasp: GraspStrategy = FROM_ABOVE
     in_m: float = 0.15
     gap_m: float = GAP_M
     turns: tuple[float, ...] = (0.0,)
@@ -84,46 +84,32 @@ class Putting:
     narrow: bool = False
 
 
-def move(env: KitchenEnv, what: Thing, how: Putting) -> Iterator[Array]:
-    """Pick a thing, put it to one of the spots, and leave; again if it is not there then.
+def put(env: KitchenEnv, obj: Graspable, strategy: PlaceStrategy, failed: list[Array]) -> Iterator[Array]:
+    """Bring what is in the hand to one of the place poses, let go, and leave; the hand's place is noted in `failed`.
 
-    Raises:
-        SkillError: it is not there after four attempts.
-    """
-    failed: list[Array] = []
-    for _ in range(ATTEMPTS):
-        yield from pick(env, what, how.taking)
-        yield from put(env, what, how, failed)
-        for _ in range(SETTLE_STEPS):
-            if how.done():
-                return
-            yield from hold_hand(env.data, HandTarget(grip_position(env.data), hand_rotation(env.data)), OPEN, 1)
-    raise SkillError(f"{what.title} is not where it belongs after {ATTEMPTS} attempts")
-
-
-def put(env: KitchenEnv, what: Thing, how: Putting, failed: list[Array]) -> Iterator[Array]:
-    """Bring what is in the hand to one of the spots, let go, and leave; the hand's place is noted in `failed`.
+    Where the hand is blocked on its way, it keeps what it holds.
 
     Raises:
         SkillError: there is nowhere to put it.
     """
     data = env.data
-    held = Held.now(data, what.name)
-    spots = list(how.spots())
-    ways = [way for spot in spots for way in _ways(env, what, held, spot, how, failed)]
-    if not ways:
-        raise SkillError(f"{what.title}: nowhere to put it")
-    middle = np.mean([spot.point for spot in spots], axis=0)
+    held = Held.now(data, obj.name, obj.contents)
+    poses = list(strategy.poses())
+    paths = [path for pose in poses for path in _paths(env, obj, held, pose, strategy, failed)]
+    if not paths:
+        raise SkillError(f"{obj.title}: nowhere to put it")
+    mine = obj.bodies | obj.carried
+    middle = np.mean([pose.point for pose in poses], axis=0)
 
     def plan(blocked: Sequence[RobotPose]) -> Choice:
-        return choose(env, ways, middle, key=2, held=held, loaded=3, allowed=what.bodies, blocked=blocked)[0]
+        return choose(env, paths, middle, key=2, held=held, loaded=3, allowed=mine, blocked=blocked)[0]
 
     choice = yield from approach(env, plan, CLOSED)
     failed.append(choice.way.targets[2].position)
     yield from lead(env, choice.joints, CLOSED)
     far, above, low, clear, away = choice.way.targets
-    # A way in through a front is kept from its beginning on.
-    inwards = how.narrow or not steep(far, above)
+    # A path in through a front is kept from its beginning on.
+    inwards = strategy.narrow or not steep(far, above)
     line = far.position if inwards else None
     yield from move_hand(
         data, far, CLOSED, tolerance=0.01 if inwards else 0.04, max_steps=110, insist=INSIST if inwards else 0.0
@@ -133,27 +119,30 @@ def put(env: KitchenEnv, what: Thing, how: Putting, failed: list[Array]) -> Iter
     yield from move_hand(data, above, CLOSED, speed=0.7 if inwards else 1.0, max_steps=90, start=line)
     if not _holds(env, held):
         return
-    # What has slipped in the hand goes to the spot, not the hand.
-    slipped = (_origin(low, held) - _origin_now(env, what, low)) * [1.0, 1.0, 0.0]
+    # What has slipped in the hand goes to the place pose, not the hand.
+    slipped = (_origin(low, held) - _origin_now(env, obj, low)) * [1.0, 1.0, 0.0]
     low = HandTarget(low.position + np.clip(slipped, -0.03, 0.03), low.rotation)
     yield from move_hand(data, low, CLOSED, speed=0.5, tolerance=0.008, max_steps=60, insist=INSIST)
+    if pose_error(data, low).position > BLOCKED_M:
+        yield from move_hand(data, above, CLOSED, speed=0.6, tolerance=0.03, max_steps=30)
+        return
     at = HandTarget(grip_position(data), hand_rotation(data))
     yield from hold_hand(data, at, OPEN, RELEASE_STEPS)
     yield from move_hand(data, clear, OPEN, speed=0.6, tolerance=0.02, max_steps=30)
     line = clear.position if inwards else None
     yield from move_hand(data, away, OPEN, tolerance=0.03, max_steps=60, start=line)
-    yield from leave(env, what)
+    yield from leave(env, obj)
 
 
-def leave(env: KitchenEnv, what: Thing) -> Iterator[Array]:
+def leave(env: KitchenEnv, obj: Graspable) -> Iterator[Array]:
     """Go farther off where the hand is still near what it has put down: up and back, then with the base."""
     data = env.data
     for _ in range(2):
-        if np.linalg.norm(grip_position(data) - data.body(what.name).xpos) > GONE_M:
+        if np.linalg.norm(grip_position(data) - data.body(obj.name).xpos) > GONE_M:
             return
         away = grip_position(data) - 0.12 * ahead_of(env) + 0.06 * UP
         yield from move_hand(data, HandTarget(away, hand_rotation(data)), OPEN, tolerance=0.03, max_steps=30)
-    if np.linalg.norm(grip_position(data) - data.body(what.name).xpos) > GONE_M:
+    if np.linalg.norm(grip_position(data) - data.body(obj.name).xpos) > GONE_M:
         return
     base, yaw = base_pose(data)
     back = base - 0.2 * ahead_of(env)
@@ -161,7 +150,9 @@ def leave(env: KitchenEnv, what: Thing) -> Iterator[Array]:
         yield from drive_to(env, float(back[0]), float(back[1]), yaw, gripper=OPEN, tolerance_m=0.04)
 
 
-def _ways(env: KitchenEnv, what: Thing, held: Held, spot: Spot, how: Putting, failed: list[Array]) -> list[Way]:
+def _paths(
+    env: KitchenEnv, obj: Graspable, held: Held, pose: PlacePose, strategy: PlaceStrategy, failed: list[Array]
+) -> list[Way]:
     ahead = ahead_of(env)
     left = np.cross(UP, ahead)
     present = hand_rotation(env.data)
@@ -172,23 +163,23 @@ def _ways(env: KitchenEnv, what: Thing, held: Held, spot: Spot, how: Putting, fa
         turned = rotation_about(UP, yaw) @ present
         if level and float(turned[:, 2] @ ahead) < 0.35:
             continue
-        for lean, turn in itertools.product(how.leans, how.turns):
+        for lean, turn in itertools.product(strategy.leans, strategy.turns):
             rotation = rotation_about(UP, turn) @ rotation_about(left, -lean) @ turned
-            if how.falls and abs(float(rotation[2, 1])) > LEVEL_FINGERS:
+            if strategy.falls and abs(float(rotation[2, 1])) > LEVEL_FINGERS:
                 continue
-            thing_turn = rotation @ held.rotation
-            origin = spot.point + (what.below(thing_turn) + how.gap_m) * UP
+            object_turn = rotation @ held.rotation
+            origin = pose.point + (obj.below(object_turn) + strategy.gap_m) * UP
             low = origin - rotation @ held.position
             again = sum(np.linalg.norm(low - other) < AGAIN_M for other in failed)
-            cost = spot.extra + AGAIN * float(again) + LEANING * lean + 0.08 * min(yaw, 2 * np.pi - yaw)
-            for name in how.entries:
+            cost = pose.extra + AGAIN * float(again) + LEANING * lean + 0.08 * min(yaw, 2 * np.pi - yaw)
+            for name in strategy.entries:
                 for rise in {"up": (UP_RISE_M,), "level": (LEVEL_RISE_M,)}.get(name, RISES_M):
                     extra = cost + (LEVEL_COST if name == "level" else LOW_COST if rise == min(RISES_M) else 0.0)
-                    found.append(_way(low, rotation, entry(env, name), name, how.in_m, rise, extra))
+                    found.append(_path(low, rotation, entry(env, name), name, strategy.in_m, rise, extra))
     return found
 
 
-def _way(low: Array, rotation: Array, out: Array, name: str, in_m: float, rise: float, cost: float) -> Way:
+def _path(low: Array, rotation: Array, out: Array, name: str, in_m: float, rise: float, cost: float) -> Way:
     clear = low - CLEAR_M * rotation[:, 2]
     if name == "up":
         above, far, away = low + rise * UP, low + in_m * UP, clear + AWAY_M * UP
@@ -208,6 +199,6 @@ def _origin(hand: HandTarget, held: Held) -> Array:
     return origin
 
 
-def _origin_now(env: KitchenEnv, what: Thing, hand: HandTarget) -> Array:
-    """Where a thing's origin comes with the hand at a target, as it lies in the hand now."""
-    return _origin(hand, Held.now(env.data, what.name))
+def _origin_now(env: KitchenEnv, obj: Graspable, hand: HandTarget) -> Array:
+    """Where an object's origin comes with the hand at a target, as it lies in the hand now."""
+    return _origin(hand, Held.now(env.data, obj.name))

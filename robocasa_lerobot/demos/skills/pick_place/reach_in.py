@@ -12,16 +12,13 @@ import numpy as np
 
 from robocasa_lerobot.demos.motion import OPEN, Array, base_pose, floor_axes
 from robocasa_lerobot.demos.planning.kinematics import Arm
-from robocasa_lerobot.demos.skills.level_grasps import level_grasps
 from robocasa_lerobot.demos.skills.navigation import Room
-from robocasa_lerobot.demos.skills.pick import ANYHOW, Manner
+from robocasa_lerobot.demos.skills.pick_place.grasp_strategy import GraspStrategy
+from robocasa_lerobot.demos.skills.pick_place.level_grasps import level_grasps
 from robocasa_lerobot.demos.skills.reach import collisions
-from robocasa_lerobot.demos.skills.things import Thing
 from robocasa_lerobot.demos.skills.ways import go_to
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
-from robocasa_lerobot.envs.kitchens.appliances.base import Appliance
 from robocasa_lerobot.envs.kitchens.appliances.kinds.microwave import Microwave
-from robocasa_lerobot.envs.kitchens.appliances.kinds.toaster_oven import ToasterOven
 from robocasa_lerobot.envs.robots.panda_omron.robot import PANDA_OMRON
 from robocasa_lerobot.envs.scene.robot_poses import RobotPose
 
@@ -31,7 +28,7 @@ BACKS_M, MORE_BACK_M = (0.10, 0.20, 0.30, 0.40, 0.50, 0.60), (0.0, 0.05, 0.10, 0
 STEP_M = 0.06  # between places that are tested
 
 
-OUT_OF_A_MICROWAVE = Manner(
+OUT_OF_A_MICROWAVE = GraspStrategy(
     tuple(
         (float(np.deg2rad(tilt)), extra) for tilt, extra in ((60, 0.0), (72, 0.05), (48, 0.05), (35, 0.1), (86, 0.2))
     ),
@@ -43,26 +40,9 @@ OUT_OF_A_MICROWAVE = Manner(
 OUT_OF_A_TOASTER_OVEN = replace(OUT_OF_A_MICROWAVE, narrow=True)  # between two racks
 
 
-def taking_out(env: KitchenEnv, what: Thing) -> Manner:
-    """How a thing is taken that may be in a microwave or in a toaster oven."""
-    point = env.data.body(what.name).xpos
-    for kind, manner in ((Microwave, OUT_OF_A_MICROWAVE), (ToasterOven, OUT_OF_A_TOASTER_OVEN)):
-        oven = _one_of(env, kind)
-        if oven is not None and any(region.contains(env.data, point) for region in oven.regions.values()):
-            return manner
-    return ANYHOW
-
-
-def _one_of[A: Appliance](env: KitchenEnv, kind: type[A]) -> A | None:
-    """The first of a kind among the fixtures of the task's roles, if there is one."""
-    found = (env.scene.fixture(role) for role in env.scene.roles)
-    return next((fixture for fixture in found if isinstance(fixture, kind)), None)
-
-
-def go_round_door(env: KitchenEnv, gripper: float = OPEN) -> Iterator[Array]:
+def drive_around_open_door(env: KitchenEnv, oven: Microwave, gripper: float = OPEN) -> Iterator[Array]:
     """Where the open door stands between the robot and the cavity: drive back, past it, and up to the cavity."""
-    oven = _one_of(env, Microwave)
-    if oven is None or oven.share(env.data, "door") < OPEN_SHARE:
+    if oven.share(env.data, "door") < OPEN_SHARE:
         return
     base, yaw = base_pose(env.data)
     left = floor_axes(yaw)[1]
@@ -70,12 +50,12 @@ def go_round_door(env: KitchenEnv, gripper: float = OPEN) -> Iterator[Array]:
     beside = float((base - cavity.world(env.data)) @ left)
     if beside < cavity.half[0]:
         return
-    for place in _way_round(env, base, yaw, beside):
+    for place in _path_around(env, base, yaw, beside):
         yield from go_to(env, place, gripper)
 
 
-def _way_round(env: KitchenEnv, base: Array, yaw: float, beside: float) -> Sequence[RobotPose]:
-    """Places of the shortest way on which the folded robot meets nothing; none where there is no such way."""
+def _path_around(env: KitchenEnv, base: Array, yaw: float, beside: float) -> Sequence[RobotPose]:
+    """Places of the shortest path on which the folded robot meets nothing; none where there is no such path."""
     ahead, left = floor_axes(yaw)
     room = Room(env.scene)
     data = copy.copy(env.data)

@@ -12,13 +12,13 @@ import numpy as np
 
 from robocasa_lerobot.demos.motion import UP, Array, frame
 from robocasa_lerobot.demos.planning.grasps import GraspPose
-from robocasa_lerobot.demos.skills.pick import Manner, ahead_of
-from robocasa_lerobot.demos.skills.things import UPRIGHT_COS, Thing, grasps
+from robocasa_lerobot.demos.skills.pick_place.grasp_strategy import GraspStrategy, ahead_of
+from robocasa_lerobot.demos.skills.pick_place.graspable import UPRIGHT_COS, Graspable, grasps
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 
 WIDEST_M = 0.081  # at the rim; a mug's body is a little narrower where the fingers are
 LEVEL_RAD = np.deg2rad(25.0)  # a hand that looks down more than this meets the rim with its palm
-# Of the grip above what the thing stands on: low, so that the hand passes below spouts and the handles of portafilters.
+# Of the grip above what the object stands on: so low that the hand passes below spouts and handles of portafilters.
 HEIGHTS_M = (0.035, 0.045)
 HANDLE_BEHIND = 0.35  # of the handle's direction along the approach: less is in the way of a finger
 HANDLE_M = 0.008  # what stands out farther than this from the body is the handle
@@ -26,22 +26,22 @@ UPPER, ASKEW = 0.3, 4.0  # what a score loses by a higher grip, and by a radian 
 SMALL_RAD = np.deg2rad(21.0)
 
 
-def from_the_side(env: KitchenEnv, what: Thing, approach: Array) -> list[GraspPose]:
-    """Grasps across the body where the hand comes level and the thing stands; else of whatever kind there is."""
-    turn = env.data.body(what.name).xmat.reshape(3, 3).copy()
+def from_the_side(env: KitchenEnv, obj: Graspable, approach: Array) -> list[GraspPose]:
+    """Grasps across the body where the hand comes level and the object stands; else of whatever kind there is."""
+    turn = env.data.body(obj.name).xmat.reshape(3, 3).copy()
     level = np.hypot(approach[0], approach[1]) > np.cos(LEVEL_RAD)
-    if level and what.item is not None and what.item.interior is not None and turn[2, 2] > UPRIGHT_COS:
-        return _across(env, what, approach, float(min(what.item.size[:2])) / 2, what.item.interior.center)
-    return grasps(env, what, approach)
+    if level and obj.item is not None and obj.item.interior is not None and turn[2, 2] > UPRIGHT_COS:
+        return _across(env, obj, approach, float(min(obj.item.size[:2])) / 2, obj.item.interior.center)
+    return grasps(env, obj, approach)
 
 
 def _across(
-    env: KitchenEnv, what: Thing, approach: Array, radius: float, center: tuple[float, float, float]
+    env: KitchenEnv, obj: Graspable, approach: Array, radius: float, center: tuple[float, float, float]
 ) -> list[GraspPose]:
-    body = env.data.body(what.name)
+    body = env.data.body(obj.name)
     turn = body.xmat.reshape(3, 3)
     middle = np.array([*center[:2], 0.0])
-    away = what.cloud - middle
+    away = obj.cloud - middle
     if 2 * radius > WIDEST_M:
         return []
     out = np.linalg.norm(away[:, :2], axis=1)
@@ -55,7 +55,7 @@ def _across(
     rotation = frame(approach, np.cross(UP, ahead))
     # As deep as the palm lets it.
     short = max(radius - env.robot.gripper.palm_above_grip, 0.0)
-    foot = body.xpos + turn @ middle - what.below(turn) * UP
+    foot = body.xpos + turn @ middle - obj.below(turn) * UP
     score = min(behind, 0.6) - ASKEW * max(float(np.arccos(np.clip(ahead @ ahead_of(env), -1, 1))) - SMALL_RAD, 0.0)
     return [
         GraspPose(foot + height * UP - short * approach, rotation, 2 * radius, score - UPPER * index)
@@ -63,7 +63,7 @@ def _across(
     ]
 
 
-FROM_THE_SIDE = Manner(
+FROM_THE_SIDE = GraspStrategy(
     tuple((float(np.deg2rad(tilt)), extra) for tilt, extra in ((78.0, 0.0), (84.0, 0.05), (60.0, 0.5))),
     ("up", "across", "out"),
     turns=tuple(float(np.deg2rad(turn)) for turn in (20.0, -20.0, 0.0, 45.0, -45.0)),

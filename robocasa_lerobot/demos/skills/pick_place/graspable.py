@@ -1,4 +1,4 @@
-"""What can be carried: objects of a scene, and loose parts of fixtures such as a blender's lid."""
+"""What can be grasped: objects of a scene, and loose parts of fixtures such as a blender's lid."""
 
 from __future__ import annotations
 
@@ -14,11 +14,12 @@ from robocasa_lerobot.envs.objects.catalogue import Instance
 from robocasa_lerobot.envs.objects.solids import Solid, hull
 
 UPRIGHT_COS = 0.98  # tilts up to 11 degrees count as standing as it was put down
+LOAD_M = 0.10  # an object's origin is less than this over the inside of what it lies in, or over its top
 DOWN = np.array([0.0, 0.0, -1.0])
 
 
 @dataclass(frozen=True)
-class Thing:
+class Graspable:
     """A loose body.
 
     Attributes:
@@ -28,6 +29,8 @@ class Thing:
         cloud: points (n, 3) whose hull it fills.
         item: the object model, if it is one.
         bodies: ids of what belongs to it.
+        contents: names of the objects in or on it, which go where it goes.
+        carried: ids of the bodies of these.
     """
 
     name: str
@@ -36,6 +39,8 @@ class Thing:
     cloud: Array
     item: Instance | None
     bodies: frozenset[int]
+    contents: tuple[str, ...] = ()
+    carried: frozenset[int] = frozenset()
 
     def below(self, rotation: Array) -> float:
         """How far its underside is below its origin when it is turned so, metres."""
@@ -47,33 +52,59 @@ class Thing:
         return reach
 
 
-def thing(env: KitchenEnv, name: str) -> Thing:
+def graspable(env: KitchenEnv, name: str) -> Graspable:
     """The loose body of a name, which may name a role in braces."""
     name = env.scene.fill(name)
     bodies = frozenset(np.flatnonzero(env.scene.subtree(name)).tolist())
     placed = env.scene.objects.get(name)
     if placed is None:
         solids = _solids(env.model, env.model.body(name).id)
-        return Thing(name, name, solids, np.concatenate([s.cloud() for s in solids]), None, bodies)
+        return Graspable(name, name, solids, np.concatenate([s.cloud() for s in solids]), None, bodies)
     found = tuple(pieces(placed.item))
     cloud = np.concatenate([s.cloud() for s in found])
-    return Thing(name, f"{name} ({placed.item.model})", found, cloud, placed.item, bodies)
+    contents = contents_of(env, name)
+    carried = frozenset(np.flatnonzero(env.scene.subtree(*contents)).tolist()) if contents else frozenset()
+    return Graspable(name, f"{name} ({placed.item.model})", found, cloud, placed.item, bodies, contents, carried)
 
 
-def grasps(env: KitchenEnv, what: Thing, approach: Array) -> list[GraspPose]:
-    """Grasp poses in the room for a thing as it lies now, by a hand that comes along `approach` (unit vector)."""
-    body = env.data.body(what.name)
+def contents_of(env: KitchenEnv, name: str) -> tuple[str, ...]:
+    """Names of the objects whose origins are in or over an object's inside, or over its top, as all lie now."""
+    holder, body = env.scene.objects[name].item, env.data.body(name)
+    if holder.interior is not None:
+        center, half = np.array(holder.interior.center), np.array(holder.interior.half)
+    else:
+        center, half = np.array([0.0, 0.0, holder.size[2] / 2]), np.array(holder.size) / 2
+    floor = center[2] - (half[2] if holder.interior is not None else 0.0)
+    found = []
+    for other in env.scene.objects:
+        if other != name:
+            x, y, z = body.xmat.reshape(3, 3).T @ (env.data.body(other).xpos - body.xpos)
+            over = abs(x - center[0]) < half[0] and abs(y - center[1]) < half[1]
+            if over and floor < z < center[2] + half[2] + LOAD_M:
+                found.append(other)
+    return tuple(found)
+
+
+def holder_of(env: KitchenEnv, name: str) -> str:
+    """Name of the object that an object is in or on; empty where there is none."""
+    holders = (other for other in env.scene.objects if other != name and name in contents_of(env, other))
+    return min(holders, key=lambda other: float(np.prod(env.scene.objects[other].item.size)), default="")
+
+
+def grasps(env: KitchenEnv, obj: Graspable, approach: Array) -> list[GraspPose]:
+    """Grasp poses in the room for an object as it lies now, by a hand that comes along `approach` (unit vector)."""
+    body = env.data.body(obj.name)
     turn = body.xmat.reshape(3, 3).copy()
     if approach @ DOWN > 0.999:
         upright = np.hypot(turn[0, 0], turn[1, 0])
-        if what.item is not None and turn[2, 2] > UPRIGHT_COS and upright > 1e-6:
+        if obj.item is not None and turn[2, 2] > UPRIGHT_COS and upright > 1e-6:
             yaw = np.array([[turn[0, 0], -turn[1, 0], 0], [turn[1, 0], turn[0, 0], 0], [0, 0, 1.0]])
             yaw[:2, :2] /= upright
-            return [pose.placed(body.xpos, yaw) for pose in grasp_poses(what.item, env.robot.gripper)]
+            return [pose.placed(body.xpos, yaw) for pose in grasp_poses(obj.item, env.robot.gripper)]
         tip = np.eye(3)
     else:
         tip = _to_down(approach)
-    poses = grasp_poses_of(list(what.solids), tip @ turn, env.robot.gripper)
+    poses = grasp_poses_of(list(obj.solids), tip @ turn, env.robot.gripper)
     back = tip.T
     return [GraspPose(body.xpos + back @ pose.position, back @ pose.rotation, pose.width, pose.score) for pose in poses]
 

@@ -1,4 +1,4 @@
-"""Grasps of flat things under a roof: the hand comes along a slope, its fingers stay level."""
+"""Grasps of flat objects under a roof: the hand comes along a slope, its fingers stay level."""
 
 from __future__ import annotations
 
@@ -6,31 +6,31 @@ import numpy as np
 
 from robocasa_lerobot.demos.motion import UP, Array
 from robocasa_lerobot.demos.planning.grasps import GraspPose
-from robocasa_lerobot.demos.skills.things import DOWN, Thing, grasps
+from robocasa_lerobot.demos.skills.pick_place.graspable import DOWN, Graspable, grasps
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 
 PALM_HALF_M, GIVES_WAY_M = (0.028, 0.10), 0.004  # along the hand's x and y; food gives way a little
-GAP_M = 0.003  # between the fingers' lowest corners and what the thing lies on
+GAP_M = 0.003  # between the fingers' lowest corners and what the object lies on
 INWARDS = 0.5  # least cosine between the hand's heading and the approach's
 
 
-def level_grasps(env: KitchenEnv, what: Thing, approach: Array) -> list[GraspPose]:
+def level_grasps(env: KitchenEnv, obj: Graspable, approach: Array) -> list[GraspPose]:
     """Grasps from above, tipped over the line between the fingers until the hand looks along an approach's slope.
 
-    The fingers stay level and close on the same sides of the thing; the hand is as high as its lower corners ask for.
+    The fingers stay level and close on the same sides of the object; the hand is as high as its lower corners ask for.
     Grasps that keep the approach as it is come after them.
     """
     ahead = approach - (approach @ UP) * UP
     steepness = float(-approach @ UP)
     flat = float(np.linalg.norm(ahead))
-    body = env.data.body(what.name)
+    body = env.data.body(obj.name)
     turn = body.xmat.reshape(3, 3)
     gripper = env.robot.gripper
-    lowest = float(body.xpos[2]) - what.below(turn) + gripper.tips_below_grip * steepness
+    lowest = float(body.xpos[2]) - obj.below(turn) + gripper.tips_below_grip * steepness
     lowest = lowest + gripper.finger_half_width * flat + GAP_M
-    points = body.xpos + np.concatenate([_filled(solid.cloud()) for solid in what.solids]) @ turn.T
+    points = body.xpos + np.concatenate([_filled(solid.cloud()) for solid in obj.solids]) @ turn.T
     found = []
-    for pose in grasps(env, what, DOWN):
+    for pose in grasps(env, obj, DOWN):
         opening = pose.rotation[:, 1]
         heading = np.cross(UP, opening)
         heading *= np.sign(heading @ ahead)
@@ -48,7 +48,7 @@ def level_grasps(env: KitchenEnv, what: Thing, approach: Array) -> list[GraspPos
         ):
             continue
         found.append(GraspPose(position, rotation, pose.width, pose.score))
-    return found + grasps(env, what, approach)
+    return found + grasps(env, obj, approach)
 
 
 def _filled(cloud: Array) -> Array:

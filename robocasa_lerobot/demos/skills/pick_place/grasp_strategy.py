@@ -1,0 +1,96 @@
+"""How the hand may come to an object, grasp it and leave with it: which tilts, which entries, which grasps."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from robocasa_lerobot.demos.motion import UP, Array, HandTarget, base_pose
+from robocasa_lerobot.demos.planning.grasps import GraspPose
+from robocasa_lerobot.demos.skills.pick_place.graspable import Graspable, grasps
+from robocasa_lerobot.envs.kitchen_env import KitchenEnv
+
+OUT_M = 0.25
+LIFT_M, HOVER_M = 0.12, 0.12
+LIFTS_M = (0.035, 0.010)  # before it is drawn out of a front
+STEEP = 0.5  # sine of a slope
+
+
+@dataclass(frozen=True)
+class GraspStrategy:
+    """How an object is grasped.
+
+    Attributes:
+        tilts: of the hand's approach from straight down to straight ahead, radians, with their costs.
+        entries: whether the hand may come from above ("up"), or out of the front ("out" rises a little, "level" does
+            not), or between ("across"), or along its fingers ("along").
+        out_m: how far it goes on its way out, metres.
+        hover_m, lift_m: how far over the grasp the hand comes from, and lifts to, where it comes from above, metres.
+        lifts: before it is drawn out of a front, metres.
+        turns: of a tilted approach from the base's heading to the left, radians.
+        narrow: whether the hand keeps to straight lines also where these are steep, does not press down, and goes
+            after an object that it moves by its coming: in a drawer, which gives way.
+        poses: grasps of an object by a hand that comes along an approach.
+        first: done before each attempt.
+    """
+
+    tilts: tuple[tuple[float, float], ...] = ((0.0, 0.0),)
+    entries: tuple[str, ...] = ("up",)
+    out_m: float = OUT_M
+    hover_m: float = HOVER_M
+    lift_m: float = LIFT_M
+    lifts: tuple[float, ...] = LIFTS_M
+    turns: tuple[float, ...] = (0.0,)
+    narrow: bool = False
+    poses: Callable[[KitchenEnv, Graspable, Array], list[GraspPose]] = grasps
+    first: Callable[[KitchenEnv], Iterator[Array]] | None = None
+
+
+FROM_ABOVE = GraspStrategy(((0.0, 0.0), (np.deg2rad(30.0), 0.25)))
+ANY_APPROACH = GraspStrategy(
+    ((0.0, 0.0), (np.deg2rad(35.0), 0.1), (np.deg2rad(65.0), 0.2), (np.deg2rad(88.0), 0.3)), ("up", "across", "out")
+)
+# Out of a slot in whose plane the hand may lean, below a wall cabinet.
+FROM_A_SLOT = GraspStrategy(
+    ((0.0, 0.0), (np.deg2rad(35.0), 0.1), (np.deg2rad(50.0), 0.2), (np.deg2rad(65.0), 0.3)),
+    ("across", "out"),
+    lifts=(0.06,),
+    turns=(0.0, np.pi / 2, -np.pi / 2),
+)
+# Out of a drawer below a shelf, whose hind part the shelf covers.
+FROM_CRISPER = GraspStrategy(
+    tuple((float(np.deg2rad(tilt)), extra) for tilt, extra in ((35, 0.0), (50, 0.1), (20, 0.1), (65, 0.2), (5, 0.2))),
+    ("along",),
+    narrow=True,
+)
+# Out of a drawer, whose hind part is below the counter: straight up to over its top.
+OUT_OF_DRAWER = GraspStrategy(
+    ((0.0, 0.0), (np.deg2rad(20.0), 0.1), (np.deg2rad(30.0), 0.2), (np.deg2rad(45.0), 0.3)),
+    ("up", "across"),
+    out_m=0.30,
+    narrow=True,
+    hover_m=0.26,
+    lift_m=0.30,
+)
+
+
+def steep(one: HandTarget, other: HandTarget) -> bool:
+    """Whether the line between two poses goes up or down rather than through a front."""
+    away = other.position - one.position
+    return abs(float(away @ UP)) > STEEP * float(np.linalg.norm(away))
+
+
+def ahead_of(env: KitchenEnv) -> Array:
+    """Unit vector (3,) along the base's heading."""
+    _, yaw = base_pose(env.data)
+    return np.array([np.cos(yaw), np.sin(yaw), 0.0])
+
+
+def entry(env: KitchenEnv, name: str) -> Array:
+    """Unit vector out of where an object is: "up", "out" or "level" to the robot, or "across" between the two."""
+    ahead = ahead_of(env)
+    out = {"up": UP, "out": 0.1 * UP - ahead, "across": UP - ahead, "level": -ahead}[name]
+    unit: Array = out / np.linalg.norm(out)
+    return unit

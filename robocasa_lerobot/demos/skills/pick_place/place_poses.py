@@ -1,0 +1,160 @@
+"""Where an object may be put down: on or in another one, over a basin, a jug or a burner, in a region, at a site."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from robocasa_lerobot.demos.motion import UP, Array, base_pose
+from robocasa_lerobot.demos.skills.pick_place.graspable import Graspable
+from robocasa_lerobot.demos.skills.pick_place.place import PlacePose
+from robocasa_lerobot.envs.kitchen_env import KitchenEnv
+from robocasa_lerobot.envs.kitchens.fixtures.base import Region
+
+type PlacePoses = Callable[[], Sequence[PlacePose]]
+
+# Shares of the depth of what it goes into at which an object may be let go, with their costs.
+DROPS = ((0.0, 0.0), (0.5, 0.4), (1.1, 0.7))
+EDGE_M, OFF_SHARE, BESIDE_COST = 0.005, 0.5, 3.0  # beside the middle, with a cost for each metre
+BASIN_AHEAD_M, BASIN_ASIDE_M = 0.09, 0.08  # from the basin's middle: before the faucet, whose spout reaches over it
+# Heights of the underside over the basin's rim at which an object is let go, metres, with their costs.
+BASIN_DROPS = ((-0.07, 0.0), (-0.03, 0.2), (0.02, 0.5))
+REGION_EDGE_M = 0.015  # kept from a region's sides
+INWARDS = (0.0, 0.05, 0.10)  # from the front of a region, metres
+DROPS_M = (0.0, 0.04, 0.08, 0.12)  # over the floor of what is open above
+DROP_COST, DEEP_COST, ASIDE_COST = 2.0, 2.0, 0.5  # for each metre
+HIGH_COST = 0.5  # for each metre that a shelf is above the lowest one
+OVER_RIM_M = (0.0, 0.015, 0.03, 0.045)  # of the underside
+RIMS_M = (0.012, 0.045, 0.08)  # of the underside above a bowl's rim: a level hand needs room below it
+FAR_COST, BURNER_ROOM_M = 0.8, 0.10  # for each metre from the robot; half of what a vessel takes on a burner
+
+
+def on_object(env: KitchenEnv, obj: Graspable, holder: str) -> PlacePoses:
+    """In or on another object: its middle, or beside what lies there already."""
+    data, placed = env.data, env.scene.objects[holder]
+
+    def poses() -> list[PlacePose]:
+        body = data.body(placed.name)
+        turn, inside = body.xmat.reshape(3, 3), placed.item.interior
+        if inside is None:
+            return [PlacePose(body.xpos + UP * placed.item.size[2] / 2)]
+        middle, half = np.array(inside.center), np.array(inside.half)
+        deep = 2 * half[2]
+        room = np.maximum(half[:2] - obj.half_extents(np.eye(3))[:2].max() - EDGE_M, 0.0)
+        room = np.minimum(room, OFF_SHARE * half[:2])
+        floors = [
+            (np.array([x * room[0], y * room[1], -half[2]]), BESIDE_COST * float(np.hypot(x * room[0], y * room[1])))
+            for x in (0, -1, 1)
+            for y in (0, -1, 1)
+            if (x, y) == (0, 0) or room.max() > 0.01
+        ]
+        return [
+            PlacePose(body.xpos + turn @ (middle + floor) + UP * deep * share, aside + (extra if deep > 0.02 else 0.0))
+            for floor, aside in floors
+            for share, extra in DROPS
+        ]
+
+    return poses
+
+
+def in_basin(env: KitchenEnv, basin: Region) -> PlacePoses:
+    """Low over the front half of a basin."""
+
+    def poses() -> list[PlacePose]:
+        ahead = min(BASIN_AHEAD_M, basin.half[1] - 0.07)
+        return [
+            PlacePose(basin.world(env.data, (aside, -ahead, basin.half[2])) + z * UP, extra + abs(aside))
+            for aside in (0.0, -BASIN_ASIDE_M, BASIN_ASIDE_M)
+            for z, extra in BASIN_DROPS
+        ]
+
+    return poses
+
+
+def in_regions(env: KitchenEnv, obj: Graspable, regions: list[Region], drops: tuple[float, ...]) -> PlacePoses:
+    """On the floors of regions, near their fronts, or let fall from heights `drops` above, metres."""
+    data = env.data
+
+    def poses() -> list[PlacePose]:
+        half = obj.half_extents(data.body(obj.name).xmat.reshape(3, 3))
+        across = float(max(half[:2]))
+        base, _ = base_pose(data)
+        lowest = min(float(region.world(data, (0, 0, -region.half[2]))[2]) for region in regions)
+        found = []
+        for region in regions:
+            wide, deep, tall = region.half
+            room_x, room_y = max(wide - across - REGION_EDGE_M, 0.0), max(deep - across - REGION_EDGE_M, 0.0)
+            own = float(np.clip(region.local(data, base)[0], -room_x, room_x))
+            columns = sorted({round(x, 3) for x in (own, *np.linspace(-room_x, room_x, 5))}, key=lambda x: abs(x - own))
+            rise = float(region.world(data, (0, 0, -tall))[2]) - lowest
+            for x in columns[:5]:
+                for inwards in INWARDS:
+                    y = min(-room_y + inwards, room_y)
+                    for drop in drops:
+                        point = region.world(data, (x, y, -tall + drop))
+                        cost = DROP_COST * drop + DEEP_COST * inwards + ASIDE_COST * abs(x - own) + HIGH_COST * rise
+                        found.append(PlacePose(point, cost))
+        return found
+
+    return poses
+
+
+def over_jug(env: KitchenEnv, jug: Region) -> PlacePoses:
+    """Over the rim of a jug, from where the object falls into it."""
+
+    def poses() -> list[PlacePose]:
+        return [PlacePose(jug.world(env.data, (0.0, 0.0, jug.half[2] + rim)), DROP_COST * rim) for rim in OVER_RIM_M]
+
+    return poses
+
+
+def over_bowl(env: KitchenEnv, bowl: Region) -> PlacePoses:
+    """In the middle of a bowl, from deep in it to above its rim."""
+
+    def poses() -> list[PlacePose]:
+        tall = 2 * bowl.half[2]
+        return [
+            PlacePose(bowl.world(env.data, (0.0, 0.0, z - bowl.half[2])), DROP_COST * z)
+            for z in (tall * 0.3, tall * 0.6, tall * 0.85, *(tall + rim for rim in RIMS_M))
+        ]
+
+    return poses
+
+
+def at_site(env: KitchenEnv, site: str, floor: Region) -> PlacePoses:
+    """Below or at a site, on the floor of a region: under a spout."""
+
+    def poses() -> list[PlacePose]:
+        point: Array = env.data.site(site).xpos
+        return [PlacePose(np.array([*point[:2], floor.world(env.data, (0.0, 0.0, -floor.half[2]))[2]]))]
+
+    return poses
+
+
+def over_burners(env: KitchenEnv, obj: Graspable, burners: list[Region]) -> PlacePoses:
+    """On the middle of a burner that carries nothing, the front ones first."""
+
+    def poses() -> list[PlacePose]:
+        base, _ = base_pose(env.data)
+        found = []
+        for burner in burners:
+            floor = burner.world(env.data, (0.0, 0.0, -burner.half[2]))
+            if not _taken(env, obj, floor):
+                found.append(PlacePose(floor, FAR_COST * float(np.linalg.norm((floor - base)[:2]))))
+        return found
+
+    return poses
+
+
+def _taken(env: KitchenEnv, obj: Graspable, point: Array) -> bool:
+    """Whether another object reaches over a point from less than its own size away."""
+    own = float(obj.half_extents(np.eye(3))[:2].max())
+    for name, placed in env.scene.objects.items():
+        if name == obj.name or name in obj.contents:
+            continue
+        apart = np.linalg.norm((env.data.body(name).xpos - point)[:2])
+        near = abs(env.data.body(name).xpos[2] - point[2]) < BURNER_ROOM_M
+        if near and apart < min(own, BURNER_ROOM_M) + max(placed.item.size[:2]) / 2:
+            return True
+    return False

@@ -1,0 +1,240 @@
+"""How to grasp an object where it is, and how to put it down where it goes: by the place alone, not by the task."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from robocasa_lerobot.demos.motion import OPEN, UP, Array, HandTarget, grip_position, hand_rotation
+from robocasa_lerobot.demos.skills.common import SkillError, hold_hand, move_hand
+from robocasa_lerobot.demos.skills.drawers import drag_open
+from robocasa_lerobot.demos.skills.pick_place.counter_poses import NEAR_M, on_counter
+from robocasa_lerobot.demos.skills.pick_place.grasp_strategy import (
+    ANY_APPROACH,
+    FROM_A_SLOT,
+    FROM_CRISPER,
+    OUT_OF_DRAWER,
+    GraspStrategy,
+)
+from robocasa_lerobot.demos.skills.pick_place.graspable import Graspable
+from robocasa_lerobot.demos.skills.pick_place.level_grasps import level_grasps
+from robocasa_lerobot.demos.skills.pick_place.location import Location, locate
+from robocasa_lerobot.demos.skills.pick_place.mugs import FROM_THE_SIDE, UNDER_A_SPOUT
+from robocasa_lerobot.demos.skills.pick_place.pick import RELEASE_STEPS, best_grasp
+from robocasa_lerobot.demos.skills.pick_place.place import PlaceStrategy
+from robocasa_lerobot.demos.skills.pick_place.place_poses import (
+    DROPS_M,
+    at_site,
+    in_basin,
+    in_regions,
+    on_object,
+    over_bowl,
+    over_burners,
+    over_jug,
+)
+from robocasa_lerobot.demos.skills.pick_place.reach_in import OUT_OF_A_MICROWAVE, OUT_OF_A_TOASTER_OVEN
+from robocasa_lerobot.demos.skills.racks import pull
+from robocasa_lerobot.envs.kitchen_env import KitchenEnv
+from robocasa_lerobot.envs.kitchens.appliances.kinds.blender import Blender
+from robocasa_lerobot.envs.kitchens.appliances.kinds.coffee_machine import CoffeeMachine
+from robocasa_lerobot.envs.kitchens.appliances.kinds.microwave import Microwave
+from robocasa_lerobot.envs.kitchens.appliances.kinds.sink import Sink
+from robocasa_lerobot.envs.kitchens.appliances.kinds.stand_mixer import StandMixer
+from robocasa_lerobot.envs.kitchens.appliances.kinds.stove import Hob
+from robocasa_lerobot.envs.kitchens.appliances.kinds.toaster import Toaster
+from robocasa_lerobot.envs.kitchens.appliances.kinds.toaster_oven import ToasterOven
+from robocasa_lerobot.envs.kitchens.fixtures.base import Fixture, Region
+from robocasa_lerobot.envs.kitchens.fixtures.cabinets import Drawer, HingeCabinet
+from robocasa_lerobot.envs.kitchens.fixtures.counters import Counter
+from robocasa_lerobot.envs.kitchens.fixtures.regions import regions_of
+from robocasa_lerobot.envs.predicates.logic import AllOf
+from robocasa_lerobot.envs.predicates.objects import ObjectInside
+from robocasa_lerobot.envs.tasks.conditions import stage_condition
+from robocasa_lerobot.envs.tasks.task import Stage
+
+OUT_OF_CABINET = replace(ANY_APPROACH, narrow=True, poses=level_grasps)
+HARD = 1.0  # cost of taking something out of a drawer, from which on it is pulled out first
+FARTHER_OUT_M = 0.12  # how far
+FARTHER_M = 1.1  # of a free place on a counter from the base, where an open drawer keeps the robot off
+OFF_M = 0.10  # of the hand from what it has let go
+OVENS = ("interior", "cavity")  # regions of ranges that are below their burners
+# A vessel as deep as this keeps what it holds when it is tilted by this much on its way in, metres, radians.
+DEEP_M, DEEP_LEAN = 0.035, float(np.deg2rad(30.0))
+# Of a vessel at its rim, that is to go through a front: the hand is tilted so that it fits under what is above.
+LEANING_GRASP = replace(
+    ANY_APPROACH,
+    tilts=tuple(
+        (float(np.deg2rad(tilt)), extra) for tilt, extra in ((40, 0.0), (55, 0.1), (25, 0.15), (70, 0.2), (0, 0.5))
+    ),
+)
+LEVEL_HAND = -0.85  # of the hand's approach along the vertical: above it, the hand looks ahead rather than down
+_SMALL, _STEEP, _STEEPEST = np.deg2rad(25.0), np.deg2rad(30.0), np.deg2rad(55.0)
+_OPEN_LEANS, _CLOSED_LEANS = (0.0, _SMALL), (0.0, _STEEP, _STEEPEST)
+_DRAWER_LEANS, _BOWL_LEANS = (0.0, _STEEP, np.deg2rad(50.0)), (*_CLOSED_LEANS, np.deg2rad(80.0))
+# A jug stands below a wall cabinet: the hand comes level, from any side, and lets go over the rim.
+_JUG_LEANS = (np.deg2rad(72.0), np.deg2rad(85.0))
+_JUG_TURNS = tuple(float(np.deg2rad(turn)) for turn in (0.0, 30.0, -30.0, 60.0, -60.0))
+
+
+def grasp_strategy(env: KitchenEnv, obj: Graspable, free: GraspStrategy) -> GraspStrategy:
+    """How an object is grasped where it is; `free` where it stands in the open."""
+    place = locate(env, obj.name)
+    match place.fixture:
+        case Microwave():
+            return OUT_OF_A_MICROWAVE
+        case ToasterOven():
+            return OUT_OF_A_TOASTER_OVEN
+        case Toaster() if obj.item is not None and obj.item.upright_axis is not None:
+            return FROM_A_SLOT
+        case CoffeeMachine():
+            return UNDER_A_SPOUT
+        case Drawer() as drawer:
+            return replace(OUT_OF_DRAWER, first=_clear_of_counter(obj, drawer))
+        case HingeCabinet():
+            return OUT_OF_CABINET
+        case _ if "drawer" in place.region:
+            return replace(FROM_CRISPER, first=_pull_out_first(obj, place))
+        case _ if in_the_open(place):
+            return free
+        case _:
+            return ANY_APPROACH
+
+
+def in_the_open(place: Location) -> bool:
+    """Whether a hand from above meets no roof there; racks that are pulled out of an oven count as under one."""
+    if isinstance(place.fixture, Hob):
+        return place.region not in OVENS
+    return isinstance(place.fixture, Counter | Sink | StandMixer)
+
+
+def place_strategy(env: KitchenEnv, stage: Stage, obj: Graspable) -> PlaceStrategy:
+    """How the stage's object is put down at the stage's target: an object, or a part of the fixture of a role.
+
+    An object that holds others is kept level, or nearly so where it is deep.
+    """
+    strategy = _by_target(env, stage, obj)
+    if not obj.contents:
+        return strategy
+    steepest = DEEP_LEAN if _is_deep(obj) else 0.0
+    leans = tuple(lean for lean in (0.0, DEEP_LEAN / 2, DEEP_LEAN) if lean <= max(steepest, 0.0))
+    grasp = LEANING_GRASP if strategy.grasp is ANY_APPROACH and "out" in strategy.entries else strategy.grasp
+    return replace(strategy, leans=leans, grasp=grasp)
+
+
+def _is_deep(obj: Graspable) -> bool:
+    return obj.item is not None and obj.item.interior is not None and 2 * obj.item.interior.half[2] > DEEP_M
+
+
+def target_object(env: KitchenEnv, stage: Stage) -> str:
+    """Name of the object that a stage's target is; empty where it is a fixture."""
+    name = env.scene.fill(stage.target)
+    return name if name in env.scene.objects else ""
+
+
+def _by_target(env: KitchenEnv, stage: Stage, obj: Graspable) -> PlaceStrategy:
+    holder = target_object(env, stage)
+    if holder:
+        poses = on_object(env, obj, holder)
+        if in_the_open(locate(env, holder)) and not _looks_ahead(env) and in_the_open(locate(env, obj.name)):
+            return PlaceStrategy(poses, leans=_OPEN_LEANS)
+        return PlaceStrategy(poses, leans=_CLOSED_LEANS, entries=("up", "across", "out"), grasp=ANY_APPROACH, in_m=0.25)
+    fixture, part = env.scene.fixture(stage.target), env.scene.part(stage.target, stage.part)
+    match fixture:
+        case Counter():
+            within = FARTHER_M if isinstance(locate(env, obj.name).fixture, Drawer) else NEAR_M
+            return PlaceStrategy(
+                on_counter(env, obj, fixture, within), leans=(0.0, _STEEP), entries=("up", "across"), grasp=ANY_APPROACH
+            )
+        case Sink():
+            return PlaceStrategy(in_basin(env, fixture.basin), leans=_OPEN_LEANS, entries=("up", "across"))
+        case CoffeeMachine():
+            poses = at_site(env, f"{fixture.name}_{part}", next(iter(fixture.regions.values())))
+            return PlaceStrategy(poses, entries=("out", "level"), grasp=FROM_THE_SIDE, in_m=0.17, gap_m=0.003)
+    named = [(name, region) for name, region in regions_of(fixture) if name.startswith(part)]
+    if isinstance(fixture, Hob) and not part:
+        named = [(name, region) for name, region in named if name in fixture.burners]
+    regions = [region for _, region in named if _counts(env, stage, region)]
+    return _into_regions(env, obj, fixture, part, regions)
+
+
+def _into_regions(env: KitchenEnv, obj: Graspable, fixture: Fixture, part: str, regions: list[Region]) -> PlaceStrategy:
+    match fixture:
+        case Blender():
+            return PlaceStrategy(
+                over_jug(env, regions[0]), leans=_JUG_LEANS, entries=("out", "across"), in_m=0.2, turns=_JUG_TURNS,
+                falls=True,
+            )  # fmt: skip
+        case StandMixer():
+            return PlaceStrategy(
+                over_bowl(env, regions[0]), leans=_BOWL_LEANS, entries=("up", "across", "out"), in_m=0.2
+            )
+        case Drawer():
+            return PlaceStrategy(in_regions(env, obj, regions, DROPS_M), leans=_DRAWER_LEANS, entries=("up", "across"))
+        case Hob() if part not in OVENS:
+            return PlaceStrategy(over_burners(env, obj, regions), entries=("up", "across"))
+        case _ if "drawer" in part:
+            return PlaceStrategy(
+                in_regions(env, obj, regions, DROPS_M), leans=_CLOSED_LEANS, entries=("up", "across", "out"),
+                grasp=ANY_APPROACH, in_m=0.28,
+            )  # fmt: skip
+        case _:
+            # Past the edge of what it came from, a shelf's or a drawer's, in a straight line.
+            narrow = "drawer" in locate(env, obj.name).region
+            return PlaceStrategy(
+                in_regions(env, obj, regions, (0.0,)), leans=_CLOSED_LEANS, entries=("up", "across", "out"),
+                grasp=ANY_APPROACH, in_m=0.28, narrow=narrow,
+            )  # fmt: skip
+
+
+def _looks_ahead(env: KitchenEnv) -> bool:
+    return float(hand_rotation(env.data)[:, 2] @ UP) > LEVEL_HAND
+
+
+def _counts(env: KitchenEnv, stage: Stage, region: Region) -> bool:
+    """Whether objects in a region count, where the stage's condition bounds its height."""
+    floor = float(region.world(env.data, (0.0, 0.0, -region.half[2]))[2])
+    whole = stage_condition(env.declaration, stage)
+    for term in whole.parts if isinstance(whole, AllOf) else (whole,):
+        if isinstance(term, ObjectInside):
+            low, high, least = term.height
+            return low <= floor <= high and 2 * region.half[2] >= least
+    return True
+
+
+def _clear_of_counter(obj: Graspable, drawer: Drawer) -> Callable[[KitchenEnv], Iterator[Array]]:
+    """Before a grasp: pull the drawer farther out where the counter over it is in the way, or where a grasp failed."""
+    again = False
+
+    def first(env: KitchenEnv) -> Iterator[Array]:
+        nonlocal again
+        if again or best_grasp(env, obj, OUT_OF_DRAWER).cost > HARD:
+            yield from drag_open(env, drawer, 1.0 + FARTHER_OUT_M / drawer.full_travel)
+        again = True
+
+    return first
+
+
+def _pull_out_first(obj: Graspable, place: Location) -> Callable[[KitchenEnv], Iterator[Array]]:
+    """Before the first grasp in a drawer of an appliance: pull it all the way out where the object is hard to reach."""
+    done = False
+
+    def first(env: KitchenEnv) -> Iterator[Array]:
+        nonlocal done
+        fixture = place.fixture
+        roles = [role for role, name in env.scene.roles.items() if fixture is not None and name == fixture.name]
+        if done or not roles or best_grasp(env, obj, FROM_CRISPER).cost <= HARD:
+            done = True
+            return
+        done = True
+        with contextlib.suppress(SkillError):
+            yield from pull(env, Stage("racks", "pull", roles[0], part=place.region))
+        data = env.data
+        at = HandTarget(grip_position(data), hand_rotation(data))
+        yield from hold_hand(data, at, OPEN, RELEASE_STEPS)
+        off = HandTarget(at.position - OFF_M * at.rotation[:, 2], at.rotation)
+        yield from move_hand(data, off, OPEN, tolerance=0.03, max_steps=20)
+
+    return first

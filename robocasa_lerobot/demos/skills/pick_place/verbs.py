@@ -1,0 +1,141 @@
+"""The verbs of picking and placing: pick an object and keep it; place what is held, after picking it up if need be."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from robocasa_lerobot.demos.motion import OPEN, Array, HandTarget, base_pose, grip_position, hand_rotation
+from robocasa_lerobot.demos.skills.common import SkillError, hold_hand, stage_done
+from robocasa_lerobot.demos.skills.navigation import drive_to
+from robocasa_lerobot.demos.skills.pick_place.carry import carry_to, go_to_object, in_reach, standing_pose_for
+from robocasa_lerobot.demos.skills.pick_place.grasp_strategy import ANY_APPROACH, GraspStrategy
+from robocasa_lerobot.demos.skills.pick_place.graspable import Graspable, graspable
+from robocasa_lerobot.demos.skills.pick_place.location import locate
+from robocasa_lerobot.demos.skills.pick_place.pick import pick
+from robocasa_lerobot.demos.skills.pick_place.place import PlaceStrategy, put
+from robocasa_lerobot.demos.skills.pick_place.reach_in import drive_around_open_door
+from robocasa_lerobot.demos.skills.pick_place.strategies import grasp_strategy, place_strategy, target_object
+from robocasa_lerobot.envs.kitchen_env import KitchenEnv
+from robocasa_lerobot.envs.kitchens.appliances.kinds.microwave import Microwave
+from robocasa_lerobot.envs.kitchens.fixtures.base import Fixture
+from robocasa_lerobot.envs.predicates.robot import Grasped
+from robocasa_lerobot.envs.scene.robot_poses import RobotPose
+from robocasa_lerobot.envs.tasks.task import Stage
+
+ATTEMPTS = 4
+SETTLE_STEPS = 15
+MOST_PLACES = 2  # that an object is reached for from
+
+
+def pick_object(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
+    """Take hold of the stage's object where it is, after a drive if need be, and keep it.
+
+    Raises:
+        SkillError: it is not in the gripper after all attempts.
+    """
+    yield from take(env, graspable(env, stage.object), _free_grasp(env, stage))
+
+
+def place_object(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
+    """Put the stage's object down at its target; where it is not in the hand, it is picked up first.
+
+    Raises:
+        SkillError: it is not there after all attempts.
+    """
+    failed: list[Array] = []
+    for attempt in range(ATTEMPTS):
+        obj = graspable(env, stage.object)
+        strategy = place_strategy(env, stage, obj)
+        if not is_held(env, obj.name):
+            if attempt == 0:
+                yield from _around_door(env, _target_fixture(env, stage))
+            yield from take(env, obj, strategy.grasp)
+        yield from _bring(env, stage, obj, strategy)
+        yield from put(env, obj, strategy, failed)
+        for _ in range(SETTLE_STEPS):
+            if stage_done(env, stage):
+                return
+            yield from hold_hand(env.data, HandTarget(grip_position(env.data), hand_rotation(env.data)), OPEN, 1)
+    raise SkillError(f"{graspable(env, stage.object).title} is not where it belongs after {ATTEMPTS} attempts")
+
+
+def drive(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
+    """Drive to where a robot stands to use the stage's target, a fixture's role or an object's name.
+
+    What is in the hand goes along; the stage's object, if any, is picked up where it is not in the hand.
+
+    Raises:
+        SkillError: there is no path, the base got stuck, or the object cannot be picked up.
+    """
+    holder = target_object(env, stage)
+    obj = graspable(env, stage.object) if stage.object else None
+    if obj is not None and not is_held(env, obj.name):
+        yield from take(env, obj, _free_grasp(env, stage))
+    if holder:
+        fixture = locate(env, holder).fixture
+        if fixture is None:
+            raise SkillError(f"{holder} stands nowhere that a robot can drive to")
+        stand = standing_pose_for(env, fixture, env.data.body(holder).xpos)
+    else:
+        stand = env.scene.standing_pose(stage.target)
+    if obj is not None:
+        yield from carry_to(env, obj, stand)
+    else:
+        yield from drive_to(env, stand.x, stand.y, stand.yaw)
+
+
+def take(env: KitchenEnv, obj: Graspable, free: GraspStrategy) -> Iterator[Array]:
+    """Drive to an object where it is out of reach, and pick it in the manner of its place.
+
+    Raises:
+        SkillError: it is not in the gripper after all attempts.
+    """
+    been: list[RobotPose] = []
+    while True:
+        yield from go_to_object(env, obj.name, been)
+        yield from _around_door(env, locate(env, obj.name).fixture)
+        try:
+            yield from pick(env, obj, grasp_strategy(env, obj, free))
+            return
+        except SkillError:
+            if len(been) == MOST_PLACES - 1:
+                raise
+        base, yaw = base_pose(env.data)
+        been.append(RobotPose(float(base[0]), float(base[1]), yaw))
+
+
+def is_held(env: KitchenEnv, name: str) -> bool:
+    """Whether an object is between the fingers."""
+    return Grasped(name).holds(env.scene, env.data)
+
+
+def _bring(env: KitchenEnv, stage: Stage, obj: Graspable, strategy: PlaceStrategy) -> Iterator[Array]:
+    """Carry what is held to before the stage's target, where that is out of reach."""
+    poses = [pose.point for pose in strategy.poses()]
+    fixture = _target_fixture(env, stage)
+    if fixture is None or (poses and in_reach(env, np.mean(poses, axis=0))):
+        return
+    middle = np.mean(poses, axis=0) if poses else np.asarray(fixture.pos)
+    yield from carry_to(env, obj, standing_pose_for(env, fixture, middle))
+
+
+def _target_fixture(env: KitchenEnv, stage: Stage) -> Fixture | None:
+    holder = target_object(env, stage)
+    return locate(env, holder).fixture if holder else env.scene.fixture(stage.target)
+
+
+def _around_door(env: KitchenEnv, fixture: Fixture | None) -> Iterator[Array]:
+    if isinstance(fixture, Microwave):
+        yield from drive_around_open_door(env, fixture)
+
+
+def _free_grasp(env: KitchenEnv, stage: Stage) -> GraspStrategy:
+    """How an object that stands free is grasped best for where it goes next."""
+    stages = env.declaration.stages
+    later = stages[stages.index(stage) + 1 :] if stage in stages else ()
+    for following in later:
+        if (following.skill, following.verb, following.object) == ("pick_place", "place", stage.object):
+            return place_strategy(env, following, graspable(env, stage.object)).grasp
+    return ANY_APPROACH

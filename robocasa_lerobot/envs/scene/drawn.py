@@ -1,0 +1,48 @@
+"""What was drawn for an episode before its model is made: fixtures of roles, objects, choices."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from robocasa_lerobot.envs.kitchens.footprints import Footprint
+from robocasa_lerobot.envs.objects.catalogue import Instance
+from robocasa_lerobot.envs.scene.words import numbered
+
+
+@dataclass(frozen=True)
+class PlacedObject:
+    """An object of a scene: its model, and where it starts (centre in metres, yaw in radians)."""
+
+    name: str
+    item: Instance
+    pos: tuple[float, float, float]
+    yaw: float
+
+    @property
+    def footprint(self) -> Footprint:
+        """Its bounding box on the floor plan."""
+        width, depth, _ = self.item.size
+        return Footprint(self.pos[0], self.pos[1], self.yaw, (width / 2, depth / 2))
+
+
+@dataclass(kw_only=True)
+class Drawn:
+    """What goals and stages may depend on.
+
+    Attributes:
+        roles: fixture name of each role of the task.
+        objects: by name.
+        choices: what was drawn for the task's choices, and the roles' fixtures, by name.
+    """
+
+    roles: dict[str, str]
+    objects: dict[str, PlacedObject]
+    choices: dict[str, str]
+
+    def fill(self, text: str) -> str:
+        """A name of a declaration with its choices and roles filled in, e.g. "knob_{knob}"."""
+        return text.format(**self.choices) if "{" in text else text
+
+    def named(self, name: str) -> tuple[str, ...]:
+        """The objects of a declaration's name: one, or as many as were drawn, `<name>_0` first."""
+        return numbered(self.fill(name), self.objects)
