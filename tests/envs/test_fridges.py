@@ -316,7 +316,7 @@ def test_a_level_falls_back_to_the_highest_and_mistakes_are_named() -> None:
 
 
 def test_a_stage_that_names_a_level_is_done_on_that_shelf() -> None:
-    stage = Stage("pick_place", "place_inside", "fridge", object="obj", part="freezer_shelf:{rack}")
+    stage = Stage("pick_place", "place", "fridge", object="obj", part="freezer_shelf:{rack}")
     task = dataclasses.replace(food_in("freezer"), stages=(stage, stage))
     condition = stage_condition(task, stage)
     assert isinstance(condition, AllOf)
