@@ -27,6 +27,7 @@ from robocasa_lerobot.envs.scene.build import build_scene
 from robocasa_lerobot.envs.scene.roles import candidates
 from robocasa_lerobot.envs.scene.scene import Scene
 from robocasa_lerobot.envs.scene.spec import (
+    Choice,
     FixtureWanted,
     InitialOpenness,
     ObjectWanted,
@@ -230,6 +231,28 @@ def test_placement_predicate_and_skill_mean_the_same_shelf(level: str, compartme
                 assert meant == [fridge.usable_shelves(compartment)[-LEVELS[level]]]
 
 
+def test_levels_may_be_drawn_and_both_compartments_start_open() -> None:
+    base = on_level("{_source}", "freezer")
+    levels = {"up": ("second_highest", "highest"), "down": ("highest", "second_highest")}
+    options = {name: {"_source": source, "_target": target} for name, (source, target) in levels.items()}
+    task = dataclasses.replace(
+        base,
+        choices=(Choice("direction", options),),
+        initial=tuple(InitialOpenness("fridge", 0.9, 1.0, part=part) for part in PARTS),
+        goal=OnShelf("obj", "fridge", "{_target}", "freezer"),
+    )
+    drawn = set()
+    for seed in range(6):
+        scene, data = settled(task, "target", seed)
+        drawn.add(scene.choices["direction"])
+        assert OnShelf("obj", "fridge", "{_source}", "freezer").holds(scene, data)
+        assert not holds(task.goal, scene, data)
+        shelf = scene.part("fridge", "freezer_shelf:{_target}")
+        assert shelf in scene.fixture("fridge").usable_shelves("freezer")[-2:]
+        assert all(holds(DoorsOpen("fridge", 0.85, part=part), scene, data) for part in PARTS)
+    assert drawn == set(levels)
+
+
 def test_levels_of_shelves_exclude_each_other_and_near_misses() -> None:
     scene, data = settled(on_level("highest", "fridge"))
     fridge = cast(Fridge, scene.fixture("fridge"))
@@ -293,7 +316,7 @@ def test_a_level_falls_back_to_the_highest_and_mistakes_are_named() -> None:
 
 
 def test_a_stage_that_names_a_level_is_done_on_that_shelf() -> None:
-    stage = Stage("pick_place", "place_inside", "fridge", object="obj", part="freezer_shelf:{rack}")
+    stage = Stage("pick_place", "place", "fridge", object="obj", part="freezer_shelf:{rack}")
     task = dataclasses.replace(food_in("freezer"), stages=(stage, stage))
     condition = stage_condition(task, stage)
     assert isinstance(condition, AllOf)

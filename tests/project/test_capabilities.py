@@ -21,10 +21,16 @@ ALLOWED: dict[tuple[str, str], int] = {
     ("envs/scene/regions.py", "Counter"): 1,
     ("envs/scene/robot_poses.py", "Counter"): 1,
     ("envs/scene/roles.py", "Counter"): 3,
-    # Which way of putting down is taken: from above into a bowl or a drawer, else from the front.
-    ("demos/skills/put_inside.py", "StandMixer"): 1,
-    ("demos/skills/put_inside.py", "Drawer"): 1,
+    ("demos/skills/pick_place/location.py", "Counter"): 1,
+    ("envs/tasks/stage_text.py", "Counter"): 1,
+    # What a place at a fixture is called: under a spout, on a burner.
+    ("envs/tasks/stage_text.py", "CoffeeMachine"): 1,
+    ("envs/tasks/stage_text.py", "Hob"): 1,
+    # Its door opens between the robot and the cavity, and is driven around.
+    ("demos/skills/pick_place/verbs.py", "Microwave"): 1,
 }
+# Tables by class: how an object is grasped and put down is a choice of the skill for each kind of place, tuned for it.
+TABLES = {"demos/skills/pick_place/strategies.py"}
 
 
 def fixture_classes() -> set[str]:
@@ -80,7 +86,8 @@ def test_nobody_asks_a_fixture_for_its_class() -> None:
     found: Counter[tuple[str, str]] = Counter()
     for path in sorted(PACKAGE.rglob("*.py")):
         source = path.relative_to(PACKAGE).as_posix()
-        if not source.startswith("envs/kitchens/appliances/"):
+        if not source.startswith("envs/kitchens/appliances/") and source not in TABLES:
             names = asked_for(ast.parse(path.read_text()))
             found.update((source, name) for name in names if name in classes)
     assert dict(found) == ALLOWED
+    assert all((PACKAGE / table).is_file() for table in TABLES)
