@@ -27,7 +27,7 @@ from robocasa_lerobot.envs.robots.panda_omron.robot import PANDA_OMRON
 
 Shift = tuple[float, float]
 
-MOST_TESTED, MOST_DETOURS = 80, 2
+MOST_TESTED, MOST_DETOURS = 200, 2
 # Shares of the line from one pose to the next that are tested, in stretches that count once.
 BETWEEN = ((0.2, 0.35), (0.5, 0.7, 0.85))
 OFF_M = 0.12  # after which the base no longer leans on what it leant on
@@ -127,13 +127,13 @@ def plan_contact(
     heapq.heapify(queue)
     best: tuple[float, int, Array] | None = None
     tested = 0
-    while queue and tested < MOST_TESTED:
+    while queue:
         cost, stage, number = heapq.heappop(queue)
         if best is not None and cost >= best[0]:
             break
         candidate = found[number]
         if stage == _POSES:
-            if search.legs(candidate) is None:
+            if tested >= MOST_TESTED or search.legs(candidate) is None:
                 continue
             tested += 1
             heapq.heappush(queue, (cost + search.poses(candidate), _LINES, number))
