@@ -49,7 +49,7 @@ XS = (0.0, 0.5, -0.5, 0.8, -0.8)  # shares of half of the door's width, from its
 TIP_M = 0.008  # of the grip site past the corner that is lifted
 OFF_M, BACK_M = 0.02, 0.10
 PRESS_M = 0.06  # that the hand is led beyond the corner at the beginning: the edge must not slip off the fingers
-DASH = Following(spacing_m=0.25, per_rad_m=1.0, near_m=0.08, near_rad=0.4, most_steps=8)
+DASH = Following(spacing_m=0.2, per_m=0.0, per_rad_m=1.0, near_m=0.08, near_rad=0.4, most_steps=8)
 RETREAT: Shift = (-0.15, 0.0)
 
 
