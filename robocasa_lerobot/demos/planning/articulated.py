@@ -27,7 +27,7 @@ from robocasa_lerobot.envs.robots.panda_omron.robot import PANDA_OMRON
 
 Shift = tuple[float, float]
 
-MOST_TESTED, MOST_DETOURS = 200, 2
+MOST_TESTED, MOST_DETOURS = 80, 2
 # Shares of the line from one pose to the next that are tested, in stretches that count once.
 BETWEEN = ((0.2, 0.35), (0.5, 0.7, 0.85))
 OFF_M = 0.12  # after which the base no longer leans on what it leant on
@@ -136,7 +136,7 @@ def plan_contact(
             if tested >= MOST_TESTED or search.legs(candidate) is None:
                 continue
             tested += 1
-            heapq.heappush(queue, (cost + search.poses(candidate), _LINES, number))
+            heapq.heappush(queue, (cost + search.drive(candidate) + search.poses(candidate), _LINES, number))
         elif stage == _LINES:
             rest = cost + search.between(candidate)
             before = search.straight(candidate)
@@ -239,6 +239,12 @@ class _Search:
             clear = self._clears(self._paths[candidate.path].waypoints[-1].angle, end)
             self._known[candidate.stance] = self._route(start) if clear else None
         return self._known[candidate.stance]
+
+    def drive(self, candidate: _Candidate) -> float:
+        """Cost of the drive to a stance beyond that of its straight line."""
+        legs = self.legs(candidate) or ()
+        longer = sum(float(np.hypot(*leg)) for leg in legs) - float(np.hypot(*candidate.stance[0]))
+        return IN_CONTACT.drive_per_m * max(longer, 0.0) + IN_CONTACT.leg * max(len(legs) - 1, 0)
 
     def _route(self, shift: Shift) -> tuple[Shift, ...] | None:
         ahead, left = shift
