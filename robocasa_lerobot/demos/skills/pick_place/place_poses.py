@@ -10,6 +10,7 @@ from robocasa_lerobot.demos.motion import UP, Array, base_pose
 from robocasa_lerobot.demos.skills.pick_place.graspable import Graspable
 from robocasa_lerobot.demos.skills.pick_place.place import PlacePose
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
+from robocasa_lerobot.envs.kitchens.appliances.kinds.stove import Hob
 from robocasa_lerobot.envs.kitchens.fixtures.base import Region
 
 type PlacePoses = Callable[[], Sequence[PlacePose]]
@@ -28,6 +29,8 @@ HIGH_COST = 0.5  # for each metre that a shelf is above the lowest one
 OVER_RIM_M = (0.0, 0.015, 0.03, 0.045)  # of the underside
 RIMS_M = (0.012, 0.045, 0.08)  # of the underside above a bowl's rim: a level hand needs room below it
 FAR_COST, BURNER_ROOM_M = 0.8, 0.10  # for each metre from the robot; half of what a vessel takes on a burner
+# Of a knob from the vessel's middle, that a hand fits between; a knob less than this below the burners is on top.
+KNOB_ROOM_M, TIGHT_COST, ON_TOP_M = 0.30, 2.0, 0.05
 
 
 def on_object(env: KitchenEnv, obj: Graspable, holder: str) -> PlacePoses:
@@ -132,19 +135,28 @@ def at_site(env: KitchenEnv, site: str, floor: Region) -> PlacePoses:
     return poses
 
 
-def over_burners(env: KitchenEnv, obj: Graspable, burners: list[Region]) -> PlacePoses:
-    """On the middle of a burner that carries nothing, the front ones first."""
+def over_burners(env: KitchenEnv, obj: Graspable, hob: Hob, burners: Sequence[str]) -> PlacePoses:
+    """On the middle of a burner that carries nothing: the front ones first, and those that leave room at the knob."""
 
     def poses() -> list[PlacePose]:
         base, _ = base_pose(env.data)
         found = []
         for burner in burners:
-            floor = burner.world(env.data, (0.0, 0.0, -burner.half[2]))
+            region = hob.regions[burner]
+            floor = region.world(env.data, (0.0, 0.0, -region.half[2]))
             if not _taken(env, obj, floor):
-                found.append(PlacePose(floor, FAR_COST * float(np.linalg.norm((floor - base)[:2]))))
+                tight = KNOB_ROOM_M - _apart_from_knob(env, hob, burner, floor)
+                cost = FAR_COST * float(np.linalg.norm((floor - base)[:2])) + TIGHT_COST * max(tight, 0.0)
+                found.append(PlacePose(floor, cost))
         return found
 
     return poses
+
+
+def _apart_from_knob(env: KitchenEnv, hob: Hob, burner: str, floor: Array) -> float:
+    """How far a burner's own knob is from its middle where both are on top; a knob on the front is in nobody's way."""
+    away = env.data.body(f"{hob.name}_knob_{burner}").xpos - floor
+    return float(np.linalg.norm(away[:2])) if away[2] > -ON_TOP_M else np.inf
 
 
 def _taken(env: KitchenEnv, obj: Graspable, point: Array) -> bool:
