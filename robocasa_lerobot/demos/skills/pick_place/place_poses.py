@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from robocasa_lerobot.demos.motion import UP, Array, base_pose
-from robocasa_lerobot.demos.skills.pick_place.graspable import Graspable
+from robocasa_lerobot.demos.skills.pick_place.graspable import Graspable, filled, graspable
 from robocasa_lerobot.demos.skills.pick_place.place import PlacePose
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.kitchens.appliances.kinds.stove import Hob
@@ -29,6 +29,7 @@ HIGH_COST = 0.5  # for each metre that a shelf is above the lowest one
 OVER_RIM_M = (0.0, 0.015, 0.03, 0.045)  # of the underside
 RIMS_M = (0.012, 0.045, 0.08)  # of the underside above a bowl's rim: a level hand needs room below it
 FAR_COST, BURNER_ROOM_M = 0.8, 0.10  # for each metre from the robot; half of what a vessel takes on a burner
+ELSEWHERE_M = 0.6  # an object's origin as far as this is nowhere near
 # Of a knob from the vessel's middle, that a hand fits between; a knob less than this below the burners is on top.
 KNOB_ROOM_M, TIGHT_COST, ON_TOP_M = 0.30, 2.0, 0.05
 
@@ -160,13 +161,16 @@ def _apart_from_knob(env: KitchenEnv, hob: Hob, burner: str, floor: Array) -> fl
 
 
 def _taken(env: KitchenEnv, obj: Graspable, point: Array) -> bool:
-    """Whether another object reaches over a point from less than its own size away."""
-    own = float(obj.half_extents(np.eye(3))[:2].max())
-    for name, placed in env.scene.objects.items():
+    """Whether another object reaches to where an object would stand, however it is turned."""
+    reach = min(float(np.linalg.norm(obj.cloud[:, :2], axis=1).max()), BURNER_ROOM_M) + EDGE_M
+    for name in env.scene.objects:
         if name == obj.name or name in obj.contents:
             continue
-        apart = np.linalg.norm((env.data.body(name).xpos - point)[:2])
-        near = abs(env.data.body(name).xpos[2] - point[2]) < BURNER_ROOM_M
-        if near and apart < min(own, BURNER_ROOM_M) + max(placed.item.size[:2]) / 2:
-            return True
+        body, turn = env.data.body(name), env.data.body(name).xmat.reshape(3, 3)
+        if np.linalg.norm(body.xpos - point) > ELSEWHERE_M:
+            continue
+        for solid in graspable(env, name).solids:
+            away = filled(solid.cloud()) @ turn.T + body.xpos - point
+            if float(np.linalg.norm(away[:, :2], axis=1).min()) < reach:
+                return True
     return False
