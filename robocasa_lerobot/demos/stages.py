@@ -8,9 +8,8 @@ from typing import Any
 
 from robocasa_lerobot.demos.motion import Array, action
 from robocasa_lerobot.demos.skills import SKILLS, SkillError
-from robocasa_lerobot.demos.skills.common import stage_done
+from robocasa_lerobot.demos.skills.common import stage_done, stage_progress
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
-from robocasa_lerobot.envs.predicates import parts_with_memory
 from robocasa_lerobot.envs.tasks.conditions import must_never, stage_condition, without_gripper
 from robocasa_lerobot.envs.tasks.task import Stage
 from robocasa_lerobot.errors import UnknownNameError
@@ -111,17 +110,11 @@ def _attempt(env: KitchenEnv, stage: Stage, outcome: StageOutcome) -> Iterator[A
             yield step
     except SkillError as error:
         outcome.reason = str(error)
-    left, best = PATIENCE_STEPS, _progress(env, stage)
+    left, best = PATIENCE_STEPS, stage_progress(env, stage)
     while left and not stage_done(env, stage):
         yield action(gripper=gripper)
-        now = _progress(env, stage)
+        now = stage_progress(env, stage)
         left, best = (PATIENCE_STEPS, now) if now > best else (left - 1, best)
-
-
-def _progress(env: KitchenEnv, stage: Stage) -> float:
-    """How much of what the stage's condition remembers is there: 1 for each memory that is full."""
-    remembered = parts_with_memory([stage_condition(env.declaration, stage)])
-    return sum(part.progress(env.scene, env.data) for part in remembered)
 
 
 def _check_never(env: KitchenEnv, outcome: StageOutcome) -> None:

@@ -19,6 +19,7 @@ from robocasa_lerobot.demos.skills.heads import lower_head, raise_head
 from robocasa_lerobot.demos.skills.knobs import raise_knob, turn_burner_low, turn_knob, turn_off_burner, turn_on_burner
 from robocasa_lerobot.demos.skills.levers import press_lever, turn_off_water, turn_on_water, turn_sideways
 from robocasa_lerobot.demos.skills.lift_low import lift_low
+from robocasa_lerobot.demos.skills.pick_place.hold import hold_object
 from robocasa_lerobot.demos.skills.pick_place.verbs import drive, pick_object, place_object
 from robocasa_lerobot.demos.skills.racks import pull, push, slide
 from robocasa_lerobot.demos.skills.shut import close_doors, lift_shut
@@ -54,6 +55,7 @@ SKILLS: dict[tuple[str, str], Skill] = {
     ("levers", "turn"): turn_sideways,
     ("pick_place", "pick"): pick_object,
     ("pick_place", "place"): place_object,
+    ("pick_place", "hold"): hold_object,
     ("pick_place", "uncover"): uncover,
     ("pick_place", "cover"): cover,
 }

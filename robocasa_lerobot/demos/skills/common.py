@@ -19,6 +19,7 @@ from robocasa_lerobot.demos.motion import (
 )
 from robocasa_lerobot.demos.planning.errors import SkillError
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
+from robocasa_lerobot.envs.predicates import parts_with_memory
 from robocasa_lerobot.envs.robots.panda_omron.names import FINGER_JOINTS
 from robocasa_lerobot.envs.tasks.conditions import stage_condition
 from robocasa_lerobot.envs.tasks.task import Stage
@@ -31,6 +32,7 @@ __all__ = [
     "move_hand",
     "require_near",
     "stage_done",
+    "stage_progress",
 ]
 
 POSITION_TOLERANCE_M = 0.012
@@ -127,3 +129,9 @@ def require_near(data: mujoco.MjData, target: HandTarget, limit_m: float, what: 
 def stage_done(env: KitchenEnv, stage: Stage) -> bool:
     """Whether a stage's own condition holds now."""
     return stage_condition(env.declaration, stage).evaluate(env.scene, env.data, {})
+
+
+def stage_progress(env: KitchenEnv, stage: Stage) -> float:
+    """How much of what the stage's condition remembers is there: 1 for each memory that is full."""
+    remembered = parts_with_memory([stage_condition(env.declaration, stage)])
+    return sum(part.progress(env.scene, env.data) for part in remembered)

@@ -20,10 +20,15 @@ from robocasa_lerobot.demos.motion import (
 from robocasa_lerobot.demos.planning.follow import follow_joint_path
 from robocasa_lerobot.demos.planning.motion_planner import plan_near
 from robocasa_lerobot.demos.skills.common import SkillError, hold_hand, move_hand, stage_done
+from robocasa_lerobot.demos.skills.pick_place.graspable import graspable
+from robocasa_lerobot.demos.skills.pick_place.place import leave
 from robocasa_lerobot.demos.skills.reach import shift_base
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.kitchens.appliances.base import Appliance
+from robocasa_lerobot.envs.kitchens.appliances.kinds.stove import Hob
+from robocasa_lerobot.envs.predicates.objects import middle_of
 from robocasa_lerobot.envs.scene.initial_states import initial_share
+from robocasa_lerobot.envs.tasks.conditions import KNOB
 from robocasa_lerobot.envs.tasks.task import Stage
 
 GRASPS = 6  # at most; a turn that the wrist cannot make in one goes on with another grasp
@@ -32,6 +37,7 @@ STANDOFF_M = 0.09
 DEPTH_M = 0.012  # of the grip site below the knob's face: pads that reach over it, tips short of the panel
 TURN_STEPS = 45
 TURN_AT_ONCE_RAD = 1.7
+LEAST_TURN_RAD = 0.15  # by which a grasp turns the knob, or the next one is another
 LEAD_RAD = 0.35  # that the hand's goal is ahead of the hand
 TILTS = tuple(np.deg2rad((0.0, 15.0)))
 SHIFTS = ((0.0, 0.0), (-0.15, 0.0), (-0.15, -0.25), (-0.15, 0.25), (-0.3, 0.0), (-0.3, -0.3), (-0.3, 0.3), (-0.45, 0.0))
@@ -73,6 +79,15 @@ def _range(env: KitchenEnv, stage: Stage) -> float:
     return float(env.model.joint(fixture.joint(env.scene.fill(stage.part))).range[1])
 
 
+def _part_of(env: KitchenEnv, stage: Stage) -> str:
+    """The stage's knob; where it names an object, that of the burner which the object stands on."""
+    if not stage.object:
+        return env.scene.fill(stage.part)
+    hob, name = env.scene.fixture(stage.target, Hob), env.scene.fill(stage.object)
+    burner, _ = hob.nearest_burner(env.data, middle_of(env.scene, env.data, name))
+    return f"{KNOB}{burner}"
+
+
 def _turn_to(env: KitchenEnv, stage: Stage, goal: float) -> Iterator[Array]:
     """Grasp and turn until the knob stands at an angle, radians.
 
@@ -80,17 +95,18 @@ def _turn_to(env: KitchenEnv, stage: Stage, goal: float) -> Iterator[Array]:
         SkillError: it does not after six grasps.
     """
     data, fixture = env.data, env.scene.fixture(stage.target, Appliance)
-    part = env.scene.fill(stage.part)
+    part = _part_of(env, stage)
     body = data.body(f"{fixture.name}_{part}")
     allowed = frozenset({int(body.id)})
     inwards = data.joint(fixture.joint(part)).xaxis.copy()
+    tried: list[Array] = []
     for _ in range(GRASPS):
         left_over = goal - fixture.position(data, part)
         turn = float(np.clip(left_over, -TURN_AT_ONCE_RAD, TURN_AT_ONCE_RAD))
         face = body.xpos - inwards * _length(env, int(body.id), inwards)
         grip = face + inwards * DEPTH_M
         ways = [_way(grip, rotation, inwards, turn) for rotation in _rotations(body.xmat.reshape(3, 3), inwards)]
-        plan = plan_near(env, ways, SHIFTS, allowed=allowed)
+        plan = plan_near(env, ways, SHIFTS, allowed=allowed, tried=tried)
         yield from shift_base(env, plan.shift, OPEN)
         yield from follow_joint_path(env, plan.joints, OPEN)
         before, at, _ = plan.targets
@@ -102,7 +118,12 @@ def _turn_to(env: KitchenEnv, stage: Stage, goal: float) -> Iterator[Array]:
         yield from hold_hand(data, rest, OPEN, GRASP_STEPS)
         away = HandTarget(rest.position - rest.rotation[:, 2] * STANDOFF_M, rest.rotation)
         yield from move_hand(data, away, OPEN, max_steps=30, tolerance=0.03)
-        if abs(goal - fixture.position(data, part)) < 2 * DONE_RAD or stage_done(env, stage):
+        now_left = abs(goal - fixture.position(data, part))
+        if now_left > abs(left_over) - LEAST_TURN_RAD:  # something is in the hand's way
+            tried.append(plan.targets[-1].rotation)
+        if now_left < 2 * DONE_RAD or stage_done(env, stage):
+            if stage.object:
+                yield from leave(env, graspable(env, stage.object))
             return
     raise SkillError(
         f"{part} of {fixture.name} is at {np.degrees(fixture.position(data, part)):.0f} degrees after {GRASPS} grasps, "

@@ -19,6 +19,7 @@ from robocasa_lerobot.envs.predicates import (
     ObjectInBasin,
     ObjectOn,
     ObjectTouches,
+    OnBurner,
     PartWithin,
     StandsBefore,
     StandsNear,
@@ -29,6 +30,8 @@ from robocasa_lerobot.envs.tasks.task import BoundTask, Stage
 from robocasa_lerobot.errors import UserError
 
 OUT_FROM, IN_UP_TO = 0.95, 0.05  # of a rack's or a drawer's range
+IN_RANGE = ("interior", "cavity")  # regions of stoves that are below their burners
+KNOB = "knob_"
 
 
 def _placed(task: BoundTask, stage: Stage) -> Goal:
@@ -40,6 +43,8 @@ def _placed(task: BoundTask, stage: Stage) -> Goal:
         where = ObjectTouches(stage.object, stage.target)
     elif kind.startswith("sink"):
         where = ObjectInBasin(stage.object, stage.target)
+    elif kind.startswith("stove") and stage.part not in IN_RANGE:
+        where = OnBurner(stage.object, stage.target, burner=stage.part)
     else:
         where = inside(stage.object, stage.target, stage.part)
     return AllOf(where, GripperFar(stage.object))
@@ -50,6 +55,19 @@ def _driven(task: BoundTask, stage: Stage) -> Goal:
     roles = {fixture.role for fixture in task.fixtures}
     there = StandsBefore(stage.target) if stage.target in roles else StandsNear(stage.target)
     return AllOf(there, Grasped(stage.object)) if stage.object else there
+
+
+def _burner(on: bool) -> Callable[[BoundTask, Stage], Goal]:
+    """The burner of a knob, or that of the object that a stage names, is on or off; the object let go."""
+
+    def condition(task: BoundTask, stage: Stage) -> Goal:
+        if stage.object:
+            return AllOf(OnBurner(stage.object, stage.target, lit=on), GripperFar(stage.object))
+        if not stage.part.startswith(KNOB):
+            raise _needs_own(task, stage)
+        return StateIs(stage.target, f"{stage.part.removeprefix(KNOB)}_on", value=on)
+
+    return condition
 
 
 def _opened(task: BoundTask, stage: Stage) -> Goal:
@@ -69,6 +87,8 @@ _BY_VERB: dict[tuple[str, str], Callable[[BoundTask, Stage], Goal]] = {
     ("drawers", "close"): lambda task, stage: DrawerClosed(stage.target, at_most=IN_UP_TO),
     ("racks", "pull"): lambda task, stage: PartWithin(stage.target, stage.part, low=OUT_FROM, label="out"),
     ("racks", "push"): lambda task, stage: PartWithin(stage.target, stage.part, high=IN_UP_TO, label="in"),
+    ("knobs", "on"): _burner(on=True),
+    ("knobs", "off"): _burner(on=False),
     ("navigation", "drive"): _driven,
     ("levers", "on"): lambda task, stage: StateIs(stage.target, "water_on"),
     ("levers", "off"): lambda task, stage: StateIs(stage.target, "water_on", value=False),
@@ -89,11 +109,15 @@ def stage_condition(task: BoundTask, stage: Stage) -> Goal:
         return task.goal
     key = (stage.skill, stage.verb)
     if key not in _BY_VERB:
-        raise UserError(
-            f"{task.name}: the stage `{' '.join(key)}` needs a condition of its own: what a {stage.verb} of "
-            f"{stage.skill} comes to is not the same everywhere. Give the stage `until=...`."
-        )
+        raise _needs_own(task, stage)
     return _BY_VERB[key](task, stage)
+
+
+def _needs_own(task: BoundTask, stage: Stage) -> UserError:
+    return UserError(
+        f"{task.name}: the stage `{stage.skill} {stage.verb}` needs a condition of its own: what a {stage.verb} of "
+        f"{stage.skill} comes to is not the same everywhere. Give the stage `until=...`."
+    )
 
 
 def without_gripper(goal: Goal) -> Goal:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from robocasa_lerobot.envs.kitchens.appliances.kinds.coffee_machine import CoffeeMachine
+from robocasa_lerobot.envs.kitchens.appliances.kinds.sink import Sink
 from robocasa_lerobot.envs.kitchens.appliances.kinds.stove import Hob
 from robocasa_lerobot.envs.kitchens.fixtures.counters import Counter
 from robocasa_lerobot.envs.kitchens.fixtures.regions import ANY_LEVEL
@@ -130,6 +131,20 @@ def _placed(stage: Stage, scene: Scene) -> str:
             return _inside(stage, scene)
 
 
+def _knob(stage: Stage, scene: Scene) -> str:
+    """A knob, or the burner under the object that a stage names."""
+    if stage.object:
+        return f"burner under the {_object(stage, scene)}"
+    return f"{_part(stage, scene)} of the {_target(stage, scene)}"
+
+
+def _held(stage: Stage, scene: Scene) -> str:
+    """Where an object is held."""
+    target = _target(stage, scene)
+    sink = stage.target in scene.roles and isinstance(scene.fixture(stage.target), Sink)
+    return f"hold the {_object(stage, scene)} {'under the faucet of' if sink else 'at'} the {target}"
+
+
 def _driven(stage: Stage, scene: Scene) -> str:
     target = _target(stage, scene)
     return f"carry the {_object(stage, scene)} to the {target}" if stage.object else f"go to the {target}"
@@ -148,10 +163,10 @@ type _Wording = Callable[[Stage, Scene], str]
 
 
 def _parted(pattern: str) -> _Wording:
-    """With {part}, {target}, {object}, {to}, {doors} and {placed}, each made where it is named."""
+    """With {part}, {target}, {object}, {to}, {doors}, {placed} and {knob}, each made where it is named."""
     makers = {
         "part": _part, "target": _target, "object": _object, "to": _to, "doors": _doors,
-        "placed": _placed,
+        "placed": _placed, "knob": _knob,
     }  # fmt: skip
     used = {name: make for name, make in makers.items() if f"{{{name}}}" in pattern}
     return lambda stage, scene: pattern.format(**{name: make(stage, scene) for name, make in used.items()})
@@ -179,8 +194,8 @@ _BY_VERB: dict[tuple[str, str], _Wording] = {
     ("navigation", "drive"): _driven,
     ("buttons", "press"): _parted("press the {part} of the {target}"),
     ("levers", "press"): _parted("press the {part} of the {target}"),
-    ("knobs", "on"): _parted("turn on the {part} of the {target}"),
-    ("knobs", "off"): _parted("turn off the {part} of the {target}"),
+    ("knobs", "on"): _parted("turn on the {knob}"),
+    ("knobs", "off"): _parted("turn off the {knob}"),
     ("knobs", "low"): _parted("turn the {part} of the {target} down to low"),
     ("knobs", "raise"): _parted("turn up the {part} of the {target}"),
     ("knobs", "turn"): _parted("turn the {part} of the {target} {to}"),
@@ -189,6 +204,7 @@ _BY_VERB: dict[tuple[str, str], _Wording] = {
     ("levers", "turn"): _turned,
     ("pick_place", "pick"): _parted("pick up the {object}"),
     ("pick_place", "place"): _parted("put the {object} {placed}"),
+    ("pick_place", "hold"): _held,
     ("pick_place", "cover"): _parted("put the lid on the {target}"),
     ("pick_place", "uncover"): _parted("take the lid off the {target}"),
 }

@@ -6,7 +6,7 @@ import numpy as np
 
 from robocasa_lerobot.demos.motion import UP, Array
 from robocasa_lerobot.demos.planning.grasps import GraspPose
-from robocasa_lerobot.demos.skills.pick_place.graspable import DOWN, Graspable, grasps
+from robocasa_lerobot.demos.skills.pick_place.graspable import DOWN, Graspable, filled, grasps
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 
 PALM_HALF_M, GIVES_WAY_M = (0.028, 0.10), 0.004  # along the hand's x and y; food gives way a little
@@ -28,7 +28,7 @@ def level_grasps(env: KitchenEnv, obj: Graspable, approach: Array) -> list[Grasp
     gripper = env.robot.gripper
     lowest = float(body.xpos[2]) - obj.below(turn) + gripper.tips_below_grip * steepness
     lowest = lowest + gripper.finger_half_width * flat + GAP_M
-    points = body.xpos + np.concatenate([_filled(solid.cloud()) for solid in obj.solids]) @ turn.T
+    points = body.xpos + np.concatenate([filled(solid.cloud()) for solid in obj.solids]) @ turn.T
     found = []
     for pose in grasps(env, obj, DOWN):
         opening = pose.rotation[:, 1]
@@ -49,11 +49,3 @@ def level_grasps(env: KitchenEnv, obj: Graspable, approach: Array) -> list[Grasp
             continue
         found.append(GraspPose(position, rotation, pose.width, pose.score))
     return found + grasps(env, obj, approach)
-
-
-def _filled(cloud: Array) -> Array:
-    """Points on the lines between the points of a convex piece."""
-    first, second = np.triu_indices(len(cloud))
-    shares = np.array([0.0, 0.25, 0.5, 0.75])[:, None, None]
-    filled: Array = ((1 - shares) * cloud[first] + shares * cloud[second]).reshape(-1, 3)
-    return filled

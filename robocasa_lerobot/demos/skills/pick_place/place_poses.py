@@ -8,9 +8,10 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from robocasa_lerobot.demos.motion import UP, Array, base_pose
-from robocasa_lerobot.demos.skills.pick_place.graspable import Graspable, contents_of
+from robocasa_lerobot.demos.skills.pick_place.graspable import Graspable, contents_of, filled, graspable
 from robocasa_lerobot.demos.skills.pick_place.place import PlacePose
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
+from robocasa_lerobot.envs.kitchens.appliances.kinds.stove import Hob
 from robocasa_lerobot.envs.kitchens.fixtures.base import Region
 
 type PlacePoses = Callable[[], Sequence[PlacePose]]
@@ -31,6 +32,9 @@ HIGH_COST = 0.5  # for each metre that a shelf is above the lowest one
 OVER_RIM_M = (0.0, 0.015, 0.03, 0.045)  # of the underside
 RIMS_M = (0.012, 0.045, 0.08)  # of the underside above a bowl's rim: a level hand needs room below it
 FAR_COST, BURNER_ROOM_M = 0.8, 0.10  # for each metre from the robot; half of what a vessel takes on a burner
+ELSEWHERE_M = 0.6  # an object's origin as far as this is nowhere near
+# Of a knob from the vessel's middle, that a hand fits between; a knob less than this below the burners is on top.
+KNOB_ROOM_M, TIGHT_COST, ON_TOP_M = 0.30, 2.0, 0.05
 
 
 def on_object(env: KitchenEnv, obj: Graspable, holder: str) -> PlacePoses:
@@ -139,29 +143,41 @@ def at_site(env: KitchenEnv, site: str, floor: Region) -> PlacePoses:
     return poses
 
 
-def over_burners(env: KitchenEnv, obj: Graspable, burners: list[Region]) -> PlacePoses:
-    """On the middle of a burner that carries nothing, the front ones first."""
+def over_burners(env: KitchenEnv, obj: Graspable, hob: Hob, burners: Sequence[str]) -> PlacePoses:
+    """On the middle of a burner that carries nothing: the front ones first, and those that leave room at the knob."""
 
     def poses() -> list[PlacePose]:
         base, _ = base_pose(env.data)
         found = []
         for burner in burners:
-            floor = burner.world(env.data, (0.0, 0.0, -burner.half[2]))
+            region = hob.regions[burner]
+            floor = region.world(env.data, (0.0, 0.0, -region.half[2]))
             if not _taken(env, obj, floor):
-                found.append(PlacePose(floor, FAR_COST * float(np.linalg.norm((floor - base)[:2]))))
+                tight = KNOB_ROOM_M - _apart_from_knob(env, hob, burner, floor)
+                cost = FAR_COST * float(np.linalg.norm((floor - base)[:2])) + TIGHT_COST * max(tight, 0.0)
+                found.append(PlacePose(floor, cost))
         return found
 
     return poses
 
 
+def _apart_from_knob(env: KitchenEnv, hob: Hob, burner: str, floor: Array) -> float:
+    """How far a burner's own knob is from its middle where both are on top; a knob on the front is in nobody's way."""
+    away = env.data.body(f"{hob.name}_knob_{burner}").xpos - floor
+    return float(np.linalg.norm(away[:2])) if away[2] > -ON_TOP_M else np.inf
+
+
 def _taken(env: KitchenEnv, obj: Graspable, point: Array) -> bool:
-    """Whether another object reaches over a point from less than its own size away."""
-    own = float(obj.half_extents(np.eye(3))[:2].max())
-    for name, placed in env.scene.objects.items():
+    """Whether another object reaches to where an object would stand, however it is turned."""
+    reach = min(float(np.linalg.norm(obj.cloud[:, :2], axis=1).max()), BURNER_ROOM_M) + EDGE_M
+    for name in env.scene.objects:
         if name == obj.name or name in obj.contents:
             continue
-        apart = np.linalg.norm((env.data.body(name).xpos - point)[:2])
-        near = abs(env.data.body(name).xpos[2] - point[2]) < BURNER_ROOM_M
-        if near and apart < min(own, BURNER_ROOM_M) + max(placed.item.size[:2]) / 2:
-            return True
+        body, turn = env.data.body(name), env.data.body(name).xmat.reshape(3, 3)
+        if np.linalg.norm(body.xpos - point) > ELSEWHERE_M:
+            continue
+        for solid in graspable(env, name).solids:
+            away = filled(solid.cloud()) @ turn.T + body.xpos - point
+            if float(np.linalg.norm(away[:, :2], axis=1).min()) < reach:
+                return True
     return False

@@ -52,7 +52,7 @@ from robocasa_lerobot.envs.kitchens.fixtures.counters import Counter
 from robocasa_lerobot.envs.kitchens.fixtures.regions import regions_of
 from robocasa_lerobot.envs.predicates.logic import AllOf
 from robocasa_lerobot.envs.predicates.objects import ObjectInside
-from robocasa_lerobot.envs.tasks.conditions import stage_condition
+from robocasa_lerobot.envs.tasks.conditions import IN_RANGE, stage_condition
 from robocasa_lerobot.envs.tasks.task import Stage
 
 OUT_OF_CABINET = replace(ANY_APPROACH, narrow=True, poses=level_grasps)
@@ -60,7 +60,6 @@ HARD = 1.0  # cost of taking something out of a drawer, from which on it is pull
 FARTHER_OUT_M = 0.12  # how far
 FARTHER_M = 1.1  # of a free place on a counter from the base, where an open drawer keeps the robot off
 OFF_M = 0.10  # of the hand from what it has let go
-OVENS = ("interior", "cavity")  # regions of ranges that are below their burners
 # A vessel as deep as this keeps what it holds when it is tilted by this much on its way in, metres, radians.
 DEEP_M, DEEP_LEAN = 0.035, float(np.deg2rad(30.0))
 # Of a vessel at its rim, that is to go through a front: the hand is tilted so that it fits under what is above.
@@ -107,7 +106,7 @@ def grasp_strategy(env: KitchenEnv, obj: Graspable, free: GraspStrategy) -> Gras
 def in_the_open(place: Location) -> bool:
     """Whether a hand from above meets no roof there; racks that are pulled out of an oven count as under one."""
     if isinstance(place.fixture, Hob):
-        return place.region not in OVENS
+        return place.region not in IN_RANGE
     return isinstance(place.fixture, Counter | Sink | StandMixer)
 
 
@@ -154,9 +153,10 @@ def _by_target(env: KitchenEnv, stage: Stage, obj: Graspable) -> PlaceStrategy:
         case CoffeeMachine():
             poses = at_site(env, f"{fixture.name}_{part}", next(iter(fixture.regions.values())))
             return PlaceStrategy(poses, entries=("out", "level"), grasp=FROM_THE_SIDE, in_m=0.17, gap_m=0.003)
+    if isinstance(fixture, Hob) and part not in IN_RANGE:
+        burners = [burner for burner in fixture.burners if part in ("", burner)]
+        return PlaceStrategy(over_burners(env, obj, fixture, burners), entries=("up", "across"))
     named = [(name, region) for name, region in regions_of(fixture) if name.startswith(part)]
-    if isinstance(fixture, Hob) and not part:
-        named = [(name, region) for name, region in named if name in fixture.burners]
     regions = [region for _, region in named if _counts(env, stage, region)]
     return _into_regions(env, obj, fixture, part, regions)
 
@@ -174,8 +174,6 @@ def _into_regions(env: KitchenEnv, obj: Graspable, fixture: Fixture, part: str, 
             )
         case Drawer():
             return PlaceStrategy(in_regions(env, obj, regions, DROPS_M), leans=_DRAWER_LEANS, entries=("up", "across"))
-        case Hob() if part not in OVENS:
-            return PlaceStrategy(over_burners(env, obj, regions), entries=("up", "across"))
         case _ if "drawer" in part:
             return PlaceStrategy(
                 in_regions(env, obj, regions, DROPS_M), leans=_CLOSED_LEANS, entries=("up", "across", "out"),
