@@ -79,7 +79,7 @@ def test_finished_trials_are_kept_replaced_and_forgotten(
     options = ["--seeds", "2", "--trials", str(file), "--out", str(out)]
     assert bench.main(["--tasks", "OpenDrawer,CloseDrawer", *options]) == 0
     assert len(made) == 8
-    assert {seed for _, _, seed, _, _ in made} == {100_000, 100_001}
+    assert {seed for _, _, seed, _, _ in made} == {bench.FIRST_SEED, bench.FIRST_SEED + 1}
     file.write_text(file.read_text()[:-9])  # killed while it wrote the last line
     made.clear()
     bench._mend(file)
@@ -87,7 +87,7 @@ def test_finished_trials_are_kept_replaced_and_forgotten(
     assert len(made) == 1
     made.clear()
     bench.main(["--tasks", "OpenDrawer", "--fresh", *options])
-    assert sorted(made) == sorted(("OpenDrawer", s, n, 0.0, True) for s in bench.SPLITS for n in (100_000, 100_001))
+    assert sorted(made) == sorted(("OpenDrawer", s, n, 0.0, True) for s in bench.SPLITS for n in (bench.FIRST_SEED, bench.FIRST_SEED + 1))
     result = json.loads(out.read_text())
     assert result["trials"] == 8
     assert set(result["tasks"]) == set(task_names())
