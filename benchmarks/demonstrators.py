@@ -1,7 +1,8 @@
 """The demonstrators: how often each solves its task in kitchens it was not made on, and how long it takes.
 
-Seeds from 300,000 on in both splits: nobody has looked at them. Every trial is a line of `outputs/demonstrators.jsonl`, so that a run can be
-stopped and continued; the result holds all trials that are there. After a skill was changed, run its tasks again:
+Seeds from 300,000 on in both splits: nobody has looked at them. Every trial is a line of
+`outputs/demonstrators.jsonl`, so that a run can be stopped and continued; the result holds all trials that are there.
+After a skill was changed, run its tasks again:
 
     python benchmarks/demonstrators.py --tasks OpenDrawer,CloseDrawer --fresh
 """

@@ -87,7 +87,8 @@ def test_finished_trials_are_kept_replaced_and_forgotten(
     assert len(made) == 1
     made.clear()
     bench.main(["--tasks", "OpenDrawer", "--fresh", *options])
-    assert sorted(made) == sorted(("OpenDrawer", s, n, 0.0, True) for s in bench.SPLITS for n in (bench.FIRST_SEED, bench.FIRST_SEED + 1))
+    seeds = (bench.FIRST_SEED, bench.FIRST_SEED + 1)
+    assert sorted(made) == sorted(("OpenDrawer", s, n, 0.0, True) for s in bench.SPLITS for n in seeds)
     result = json.loads(out.read_text())
     assert result["trials"] == 8
     assert set(result["tasks"]) == set(task_names())
