@@ -13,6 +13,7 @@ from pathlib import Path
 
 import pytest
 import torch
+from atomic_version import atomic_tasks_only
 from training_support import ROOT, experiment_file
 
 from robocasa_lerobot.cli import main
@@ -63,6 +64,7 @@ def test_no_phase_is_lost_to_an_evaluation(
 ) -> None:
     """One has no registered task, one lacks some, one fails when it runs: the next phase trains all the same."""
     monkeypatch.setenv("PYTHONPATH", f"{ROOT / 'tests' / 'support'}{os.pathsep}{ROOT}")
+    atomic_tasks_only(monkeypatch)
     slide = tmp_path / "slide.yaml"
     slide.write_text(
         "env: {factory: 'evaluation_env:SlideEnv', tasks: [Slide], horizon: 4}\ntrials: 1\nvideos: 0\nworkers: 1\n"
@@ -105,7 +107,10 @@ def test_a_command_about_one_phase_keeps_what_is_known_of_the_others(tmp_path: P
     assert skipped.read(tmp_path) == [second]
 
 
-def test_evaluations_mean_the_experiments_registry_where_they_name_none(tmp_path: Path, data: Path) -> None:
+def test_evaluations_mean_the_experiments_registry_where_they_name_none(
+    tmp_path: Path, data: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    atomic_tasks_only(monkeypatch)
     registry = tmp_path / "own.yaml"
     registry.write_text("task_sets: {lifelong_phase1: [OpenDrawer], lifelong_phase2: [TurnOnStove]}\n")
     path = experiment_file(tmp_path, data, registry=str(registry))
