@@ -27,6 +27,7 @@ from robocasa_lerobot.envs.tasks.registry import get_task, task_names
 from robocasa_lerobot.envs.tasks.task import Stage
 from robocasa_lerobot.envs.tasks.typical import stages_of
 
+CARRIED_M = 0.12  # from where it stood
 REACH_M = 0.9  # on the floor, from the base's centre to a point that the arm is to reach
 OBSTRUCTED = {"Microwave"}  # its open door stands where the robot would: `reach_in` drives around that
 ENTRIES = ("up", "out", "across", "level", "along")
@@ -208,26 +209,27 @@ def drop(env: KitchenEnv, name: str, qpos: Array) -> None:
 
 
 def test_what_is_lost_on_the_way_is_picked_up_again() -> None:
-    """In most of some kitchens, since grasps fail now and then; in each it is held twice."""
+    """It is taken away as far from its place as a skill that picks alone never brings it."""
     env = KitchenEnv("PickPlaceCounterToSink", split="target", cameras=(), terminate_on_success=False)
     stage = Stage("pick_place", "place", "sink", object="obj")
     again = solved = 0
     for seed in range(3):
         env.reset(seed=seed)
-        start, height = env.data.qpos.copy(), float(env.data.body("obj").xpos[2])
-        lifts, up = 0, False
+        start, origin = env.data.qpos.copy(), env.data.body("obj").xpos.copy()
+        times = 0  # that it was carried
         try:
             for action in place_object(env, stage):
                 env.step(action)
-                was, up = up, is_held(env, "obj") and env.data.body("obj").xpos[2] > height + 0.05
-                if up and not was:
-                    lifts += 1
-                    if lifts == 1:
-                        drop(env, "obj", start)
-                        up = False
+                away = float(np.linalg.norm((env.data.body("obj").xpos - origin)[:2]))
+                carried = is_held(env, "obj") and away > CARRIED_M
+                if carried and not times:
+                    drop(env, "obj", start)
+                    times = 1
+                elif carried:
+                    times = 2
         except SkillError:
             continue
-        again += lifts >= 2
+        again += times == 2
         solved += stage_done(env, stage)
     env.close()
     assert again >= 2

@@ -15,8 +15,10 @@ import pytest
 import torch
 from training_support import ROOT, experiment_file
 
+from robocasa_lerobot.benchmark.tasks import published_task_sets, published_tasks
 from robocasa_lerobot.cli import main
 from robocasa_lerobot.data.fake import write_fake_dataset
+from robocasa_lerobot.envs.tasks.registry import task_names
 from robocasa_lerobot.evaluation.records.results import read_results
 from robocasa_lerobot.training.config.experiment import load_experiment
 from robocasa_lerobot.training.planning import evaluations, skipped
@@ -63,6 +65,12 @@ def test_no_phase_is_lost_to_an_evaluation(
 ) -> None:
     """One has no registered task, one lacks some, one fails when it runs: the next phase trains all the same."""
     monkeypatch.setenv("PYTHONPATH", f"{ROOT / 'tests' / 'support'}{os.pathsep}{ROOT}")
+    later = sorted(set(published_tasks()) - set(task_names()))[:2]
+    if not later:
+        pytest.skip("every task of the benchmark is registered: nothing lacks")
+    registry = tmp_path / "later.yaml"
+    registry.write_text(f"task_sets: {{later: [{', '.join(later)}]}}\n")
+    nothing = f"robustness --env.registry={registry} --env.task_sets=later"
     slide = tmp_path / "slide.yaml"
     slide.write_text(
         "env: {factory: 'evaluation_env:SlideEnv', tasks: [Slide], horizon: 4}\ntrials: 1\nvideos: 0\nworkers: 1\n"
@@ -71,8 +79,8 @@ def test_no_phase_is_lost_to_an_evaluation(
     # A device that this machine does not have shows when the evaluation runs.
     broken = f"{slide.with_name('broken.yaml')} --env.render_devices=977"
     slide.with_name("broken.yaml").write_text(slide.read_text())
-    partial = "paper --env.tasks=OpenDrawer,WashLettuce --env.render_devices=977"
-    settings = evaluations_of(path, pretrain=["robustness", broken, partial], finetune=[str(slide)])
+    partial = f"paper --env.tasks=OpenDrawer,{later[0]} --env.render_devices=977"
+    settings = evaluations_of(path, pretrain=[nothing, broken, partial], finetune=[str(slide)])
     assert train(path, "--evaluate", *settings) == 2
     assert "2 evaluation(s) failed" in capsys.readouterr().err
     last = last_checkpoint(out / "finetune")
@@ -82,7 +90,7 @@ def test_no_phase_is_lost_to_an_evaluation(
     assert trial.label == "test/finetune-000004"
     left_out = {(item.kind, item.phase, item.evaluation): item.reason for item in skipped.read(out)}
     assert {key: words in left_out[key] for key, words in {
-        ("evaluation", "pretrain", "robustness"): "has none of the tasks of composite_seen",
+        ("evaluation", "pretrain", "robustness"): "has none of the tasks of later",
         ("partial", "pretrain", "paper"): "without 17 of 18 tasks of atomic_seen",
         ("evaluation", "pretrain", "paper"): "ended with status 2",
         ("evaluation", "pretrain", "broken"): "ended with status 2",
@@ -90,7 +98,7 @@ def test_no_phase_is_lost_to_an_evaluation(
 
     # What failed is run again, what was finished is not; and what is possible now has no line any more.
     before = (out / "finetune/evaluations/slide/finished").stat().st_mtime_ns
-    assert train(path, "--evaluate", *evaluations_of(path, pretrain=["robustness"], finetune=[str(slide)])) == 0
+    assert train(path, "--evaluate", *evaluations_of(path, pretrain=[nothing], finetune=[str(slide)])) == 0
     assert (out / "finetune/evaluations/slide/finished").stat().st_mtime_ns == before
     assert [(item.kind, item.evaluation) for item in skipped.read(out)] == [("evaluation", "robustness")]
 
@@ -115,7 +123,7 @@ def test_evaluations_mean_the_experiments_registry_where_they_name_none(tmp_path
     own, benchmark = evaluations.plan_evaluations(experiment, experiment.phases)
     assert own.tasks == 2
     assert f"--env.registry={registry}" in own.arguments
-    assert benchmark.tasks == 18
+    assert benchmark.tasks == len(set(published_task_sets()["target50"]) & set(task_names()))
     assert load_experiment(path).registry == str(registry)
 
 

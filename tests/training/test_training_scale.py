@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 import yaml
+from atomic_version import atomic_tasks_only
 
 from robocasa_lerobot.cli import main
 from robocasa_lerobot.config_files import configs_folder
@@ -65,7 +66,8 @@ def test_evaluations_of_a_scaled_experiment_are_small_and_say_so() -> None:
     assert "scale" not in outcome_settings(load_config(EvaluationConfig, arguments[:3]), 32)
 
 
-def test_two_tasks_of_each_set_are_those_that_can_be_simulated() -> None:
+def test_two_tasks_of_each_set_are_those_that_can_be_simulated(monkeypatch: pytest.MonkeyPatch) -> None:
+    atomic_tasks_only(monkeypatch)
     planned = plan_tasks(EnvSettings(task_sets=["atomic_seen", "lifelong_phase1"], tasks_per_set=2))
     assert [len(tasks) for tasks in planned.sets.values()] == [2, 2]
     assert planned.missing == []
