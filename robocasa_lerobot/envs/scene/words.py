@@ -52,7 +52,7 @@ def words_of(layout: Layout, roles: Mapping[str, str], categories: Mapping[str, 
             words.setdefault("doors", _doors_word(fixture.door_names))
         for part in fixture.compartments:
             words.setdefault(f"{part}_doors", _doors_word(fixture.doors_of(part)))
-    said = {name: category.replace("_", " ") for name, category in categories.items()}
+    said = {name: object_word(category) for name, category in categories.items()}
     words |= said
     members: dict[str, Sequence[str]] = {name: (word,) for name, word in said.items()}
     for name in several:
@@ -86,6 +86,11 @@ def numbered(name: str, names: Iterable[str]) -> tuple[str, ...]:
 def fixture_word(kind: str) -> str:
     """What a type of fixture is called."""
     return "fridge" if kind.startswith("fridge") else "stove" if kind.startswith("stove") else kind.replace("_", " ")
+
+
+def object_word(category: str) -> str:
+    """What a kind of object is called: a kettle is one that is not electric, as nobody says."""
+    return category.removesuffix("_non_electric").replace("_", " ")
 
 
 def listed(words: Sequence[str]) -> str:
