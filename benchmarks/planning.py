@@ -24,6 +24,7 @@ from typing import Any
 
 import common
 import planning_side
+from planning_poses import poses
 from planning_queries import record, write
 
 from robocasa_lerobot.demos.choose import expand_names
@@ -192,6 +193,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         "settings": {"will_do": WILL_DO, "split": options.split},
         "ratios": ratios,
         "kinds": result,
+        "single_poses": poses(),
     }
     common.write_result(options.out, "planning", body)
     print(options.out)

@@ -79,6 +79,7 @@ def test_what_is_missing_of_our_kitchens_is_made_by_a_command(tmp_path: Path, mo
     assert len(str(caught.value).splitlines()) == 2  # the same remedy for all
 
 
+@pytest.mark.usefixtures("atomic_only")
 def test_sets_of_which_nothing_is_there_have_no_stand_ins() -> None:
     nothing = SelectionConfig(KITCHENS, task_set="composite_seen", split="target", source="human")
     with pytest.raises(NothingRegisteredError, match="none of the 16 tasks of composite_seen"):
@@ -134,6 +135,7 @@ def test_atomic_lifelong_phases_share_all_atomic_tasks_among_them() -> None:
     assert skills[2:] == [{"pick_place", "navigation"}, {"pick_place"}]
 
 
+@pytest.mark.usefixtures("atomic_only")
 def test_phases_without_tasks_are_left_out() -> None:
     experiment, said = runnable(load_experiment(EXPERIMENTS / "small/foundation.yaml"))
     assert [phase.name for phase in experiment.phases] == ["pretrain", "atomic_10", "atomic_30", "atomic_100"]
@@ -146,6 +148,18 @@ def test_phases_without_tasks_are_left_out() -> None:
     assert "65 of the 300 tasks of pretrain300" in partial[0].reason
     published = load_experiment(EXPERIMENTS / "robocasa365/foundation.yaml")
     assert runnable(published) == (published, [])
+
+
+def test_phases_of_which_some_tasks_are_there_run() -> None:
+    able, sets = demonstrated_tasks(), published_task_sets()
+    experiment = load_experiment(EXPERIMENTS / "small/lifelong.yaml")
+    lacking = {phase.name: set(sets[f"lifelong_{phase.name}"]) - able for phase in experiment.phases}
+    none = [name for name, tasks in lacking.items() if len(tasks) == len(sets[f"lifelong_{name}"])]
+    kept, said = runnable(experiment)
+    assert [phase.name for phase in kept.phases] == [name for name in lacking if name not in none]
+    assert [item.phase for item in said if item.kind == PHASE] == none
+    partial = {item.phase for item in said if item.kind == PARTIAL and "are in this version" in item.reason}
+    assert partial == {name for name, tasks in lacking.items() if tasks and name not in none}
 
 
 def _chain(tmp_path: Path, sets: list[str], **settings: dict[str, object]) -> Path:
@@ -181,6 +195,7 @@ def _chain(tmp_path: Path, sets: list[str], **settings: dict[str, object]) -> Pa
     return tmp_path / "chain.yaml"
 
 
+@pytest.mark.usefixtures("atomic_only")
 def test_what_builds_on_a_left_out_phase_starts_from_the_last_one_that_runs(tmp_path: Path) -> None:
     gone = "composite_seen"
     replay = {
@@ -203,6 +218,7 @@ def test_what_builds_on_a_left_out_phase_starts_from_the_last_one_that_runs(tmp_
         runnable(load_experiment(_chain(tmp_path, [gone, gone])))
 
 
+@pytest.mark.usefixtures("atomic_only")
 def test_training_says_what_it_leaves_out_and_records_it(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -280,5 +296,5 @@ def test_sim_and_real_is_the_papers_protocol(folder: str) -> None:
     assert real == sets["real4"]
     entries = {entry.task for entry in select_datasets(same)}
     assert entries == set(real) - {"PlaceOnDishRack"}
-    expected = 150 if folder == "robocasa365" else 65
-    assert len(select_datasets(middle)) == expected
+    expected = best if folder == "robocasa365" else best & demonstrated_tasks()
+    assert {entry.task for entry in select_datasets(middle)} == expected

@@ -62,9 +62,12 @@ def test_all_that_a_small_experiment_needs_can_be_made_here(path: Path) -> None:
     assert len({need.root for need in needs}) == len(needs)
     hours = estimate.estimate(needs, cores=2)
     assert hours.recording_hours + hours.converting_hours < 5  # a night of a laptop with two cores, at the most
-    assert all("is in this version" in item.reason or "are in this version" in item.reason for item in said)
+    # Phases wait for tasks, or have some of theirs, or start earlier because the one before them waits.
+    expected = ("is in this version yet", "are in this version", "is left out")
+    assert all(any(text in item.reason for text in expected) for item in said)
 
 
+@pytest.mark.usefixtures("atomic_only")
 def test_hours_and_disk_come_first_and_check_says_it_with_its_status(capsys: pytest.CaptureFixture[str]) -> None:
     file = str(EXPERIMENTS / "small/foundation.yaml")
     assert cli.main(["data", file, "--workers", "2", "--episodes", "human=100,mg=10000,target=500"]) == 0

@@ -10,7 +10,6 @@ import h5py
 import pytest
 from drawn_tasks import FRUITS
 
-from robocasa_lerobot.demos import replay as replay_module
 from robocasa_lerobot.demos.hdf5 import merge_parts, write_part
 from robocasa_lerobot.demos.recorder import record_episode
 from robocasa_lerobot.demos.replay import replay
@@ -53,17 +52,11 @@ def test_recordings_have_the_stages_of_their_own_scene(fruits: tuple[Path, list[
                 assert set(demo["stage"][:].tolist()) == set(range(len(rows)))
 
 
-def test_replay_makes_the_same_scene_and_the_same_goal(
-    fruits: tuple[Path, list[Any]], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    def kitchen_of(demonstration: Any) -> KitchenEnv:
-        return KitchenEnv(FRUITS, split=demonstration.split, cameras=(), terminate_on_success=False)
-
-    monkeypatch.setattr(replay_module, "kitchen_of", kitchen_of)
+def test_replay_makes_the_same_scene_and_the_same_goal(fruits: tuple[Path, list[Any]]) -> None:
     path, recordings = fruits
     for number, recording in enumerate(recordings):
         if recording.success:
-            found = replay(path, f"demo_{number}")
+            found = replay(path, f"demo_{number}", FRUITS)
             assert (found.note, found.deviation) == ("", 0.0)
             assert found.actions
             assert found.states

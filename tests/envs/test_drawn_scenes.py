@@ -146,7 +146,7 @@ def test_categories_goals_and_stages_by_a_choice() -> None:
 
 def test_the_object_of_a_stage_by_a_choice() -> None:
     drawn, kept = (
-        Stage("pick_place", "place_on", "food", object="{_tool}"),
+        Stage("pick_place", "place", "food", object="{_tool}"),
         Stage("x", "y", "sink", object="{sink}_lid"),
     )
     for seed in range(4):
@@ -228,7 +228,7 @@ def test_goal_and_stages_may_be_functions_of_the_scene() -> None:
         return AllOf(*(ObjectOn(above, below) for below, above in pairs(scene)))
 
     def stages(scene: Scene) -> tuple[Stage, ...]:
-        return tuple(Stage("pick_place", "place_on", below, object=above) for below, above in pairs(scene))
+        return tuple(Stage("pick_place", "place", below, object=above) for below, above in pairs(scene))
 
     def pairs(scene: Scene) -> list[tuple[str, str]]:
         names = scene.named("nest")
@@ -248,7 +248,7 @@ def test_goal_and_stages_may_be_functions_of_the_scene() -> None:
         seen.add(count)
     env.close()
     assert seen == {2, 3}
-    assert {(stage.skill, stage.verb) for stage in stages_of(task)} == {("pick_place", "place_on")}
+    assert {(stage.skill, stage.verb) for stage in stages_of(task)} == {("pick_place", "place")}
     assert isinstance(goal_of(task), AllOf)
     assert can_demonstrate(task)
 

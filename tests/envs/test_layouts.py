@@ -18,7 +18,7 @@ from robocasa_lerobot.envs.kitchens.fixtures.stools import DESIGNS as STOOLS
 from robocasa_lerobot.envs.kitchens.layout import Layout, layout_ids, layout_record, load_layout
 from robocasa_lerobot.envs.kitchens.materials import COMMON_SURFACES, load_style, split_of, style_ids
 from robocasa_lerobot.envs.kitchens.splits import EXCLUDED, GROUPS, expand, scene_ids, without
-from robocasa_lerobot.envs.scene.counter_areas import standing_on
+from robocasa_lerobot.envs.scene.placement.counter_areas import standing_on
 from robocasa_lerobot.envs.scene.robot_poses import footprint
 from robocasa_lerobot.envs.scene.roles import candidates
 from robocasa_lerobot.errors import UnknownNameError, UserError

@@ -10,10 +10,10 @@ import pytest
 from robocasa_lerobot.envs.kitchens.footprints import Footprint, Footprints, PlacementError
 from robocasa_lerobot.envs.kitchens.layout import load_layout
 from robocasa_lerobot.envs.robots.panda_omron.robot import PANDA_OMRON
-from robocasa_lerobot.envs.scene.placement import cast_roles, place_objects
-from robocasa_lerobot.envs.scene.regions import choose_parts, parts_of, rectangle_in
+from robocasa_lerobot.envs.scene.placement.objects import place_objects
+from robocasa_lerobot.envs.scene.placement.regions import choose_parts, parts_of, rectangle_in
 from robocasa_lerobot.envs.scene.robot_poses import faces, is_free, robot_pose
-from robocasa_lerobot.envs.scene.roles import candidates, ground_fixture
+from robocasa_lerobot.envs.scene.roles import candidates, cast_roles, ground_fixture
 from robocasa_lerobot.envs.scene.spec import FixtureWanted, ObjectWanted, Placement, RobotStart, SampleRegion
 from robocasa_lerobot.envs.tasks.registry import get_task
 
@@ -76,7 +76,7 @@ def test_food_stands_in_its_container_and_regions_are_taken_again() -> None:
     task = _task(ObjectWanted("obj", ("fruit",), start), ObjectWanted("other", ("can",), again))
     for seed in range(5):
         rng = np.random.default_rng(seed)
-        roles = cast_roles(rng, task, LAYOUT)
+        roles = cast_roles(rng, task.fixtures, LAYOUT)
         assert roles["counter"] == COUNTER.name
         placed = place_objects(rng, task, "target", LAYOUT, roles, {})
         assert set(placed) == {"obj", "obj_container", "other"}
@@ -119,7 +119,7 @@ def test_what_does_not_fit_is_said_with_free_area_and_three_remedies() -> None:
     names = ("plate", "tray", "pan", "pot", "cutting_board")
     task = _task(*(ObjectWanted(f"wide_{name}", (name,), start) for name in names))
     rng = np.random.default_rng(0)
-    roles = cast_roles(rng, task, LAYOUT)
+    roles = cast_roles(rng, task.fixtures, LAYOUT)
     with pytest.raises(PlacementError, match="wide_") as failure:
         place_objects(rng, task, "target", LAYOUT, roles, {})
     assert "m2 are free" in str(failure.value)

@@ -15,7 +15,7 @@ from robocasa_lerobot.envs.kitchens.footprints import Area, Footprint
 from robocasa_lerobot.envs.kitchens.layout import load_layout
 from robocasa_lerobot.envs.predicates import ObjectOn
 from robocasa_lerobot.envs.scene.build import build_scene
-from robocasa_lerobot.envs.scene.counter_areas import standing_on
+from robocasa_lerobot.envs.scene.placement.counter_areas import standing_on
 from robocasa_lerobot.envs.scene.scene import Scene
 from robocasa_lerobot.envs.scene.spec import ObjectWanted, OnCounter, Placement
 from robocasa_lerobot.envs.tasks.registry import get_task

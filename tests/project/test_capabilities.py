@@ -18,7 +18,7 @@ ALLOWED: dict[tuple[str, str], int] = {
     ("envs/kitchens/fixture_types.py", "Counter"): 4,
     ("envs/kitchens/plan/islands.py", "Counter"): 1,
     ("envs/predicates/objects.py", "Counter"): 1,
-    ("envs/scene/regions.py", "Counter"): 1,
+    ("envs/scene/placement/regions.py", "Counter"): 1,
     ("envs/scene/robot_poses.py", "Counter"): 1,
     ("envs/scene/roles.py", "Counter"): 3,
     ("demos/skills/pick_place/location.py", "Counter"): 1,

@@ -85,8 +85,8 @@ TOOLS = Task(
     ),
     goal=When("_tool", {tool: ObjectOn(tool, "food") for tool in ("knife", "peeler")}),
     stages=(StagesWhen("_tool", {
-        "knife": (Stage("pick_place", "place_on", "food", object="knife"),),
-        "peeler": (Stage("pick_place", "place_on", "food", object="peeler"), Stage("navigation", "drive", "sink")),
+        "knife": (Stage("pick_place", "place", "food", object="knife"),),
+        "peeler": (Stage("pick_place", "place", "food", object="peeler"), Stage("navigation", "drive", "sink")),
     }),),
     instruction="Lay the tool for the {food} on it.",
 )  # fmt: skip

@@ -127,16 +127,16 @@ def plan_contact(
     heapq.heapify(queue)
     best: tuple[float, int, Array] | None = None
     tested = 0
-    while queue and tested < MOST_TESTED:
+    while queue:
         cost, stage, number = heapq.heappop(queue)
         if best is not None and cost >= best[0]:
             break
         candidate = found[number]
         if stage == _POSES:
-            if search.legs(candidate) is None:
+            if tested >= MOST_TESTED or search.legs(candidate) is None:
                 continue
             tested += 1
-            heapq.heappush(queue, (cost + search.poses(candidate), _LINES, number))
+            heapq.heappush(queue, (cost + search.drive(candidate) + search.poses(candidate), _LINES, number))
         elif stage == _LINES:
             rest = cost + search.between(candidate)
             before = search.straight(candidate)
@@ -239,6 +239,12 @@ class _Search:
             clear = self._clears(self._paths[candidate.path].waypoints[-1].angle, end)
             self._known[candidate.stance] = self._route(start) if clear else None
         return self._known[candidate.stance]
+
+    def drive(self, candidate: _Candidate) -> float:
+        """Cost of the drive to a stance beyond that of its straight line."""
+        legs = self.legs(candidate) or ()
+        longer = sum(float(np.hypot(*leg)) for leg in legs) - float(np.hypot(*candidate.stance[0]))
+        return IN_CONTACT.drive_per_m * max(longer, 0.0) + IN_CONTACT.leg * max(len(legs) - 1, 0)
 
     def _route(self, shift: Shift) -> tuple[Shift, ...] | None:
         ahead, left = shift

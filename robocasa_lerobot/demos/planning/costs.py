@@ -17,6 +17,7 @@ class PlanCosts:
         other_poses: factor of misses at poses other than the first solved one.
         turn: of a radian of the joint that turns most to get there.
         drive, drive_per_m: of driving at all, and of a metre of it.
+        leg: of each straight move of a drive after the first.
         along_per_m: of a metre that the base goes while the hand is in contact.
         hit: of a body that is touched in a part of the path; most_hits: bodies that are counted.
         hit_at_pose: the same at the poses of a path in contact.
@@ -39,6 +40,7 @@ class PlanCosts:
     turn: float = 0.1
     drive: float = 0.25
     drive_per_m: float = 0.4
+    leg: float = 0.15
     along_per_m: float = 0.0
     hit: float = 0.5
     most_hits: int = 3

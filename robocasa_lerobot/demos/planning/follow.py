@@ -19,12 +19,14 @@ class Following:
     """How closely the hand keeps to the poses of a path.
 
     Attributes:
-        spacing_m: between the poses that it is led along; a radian of the joint that turns most counts `per_rad_m`.
+        spacing_m: between the poses that it is led along.
+        per_m, per_rad_m: what a metre of the hand, and a radian of the joint that turns most, count in that.
         near_m, near_rad: from where on it goes for the next pose.
         most_steps: control steps that a pose is waited for.
     """
 
     spacing_m: float = 0.06
+    per_m: float = 1.0
     per_rad_m: float = 0.15
     near_m: float = 0.06
     near_rad: float = 0.5
@@ -65,7 +67,7 @@ def follow_joint_path(
 def joint_line(arm: Arm, start: Array, end: Array, how: Following) -> Array:
     """Joint angles (n, 7) of the poses between two configurations (7,), the last one included."""
     ends, _ = arm.forward(np.stack([start, end]))
-    far = float(np.linalg.norm(ends[1] - ends[0])) + how.per_rad_m * float(np.abs(end - start).max())
+    far = how.per_m * float(np.linalg.norm(ends[1] - ends[0])) + how.per_rad_m * float(np.abs(end - start).max())
     count = max(int(np.ceil(far / how.spacing_m)), 1)
     shares = np.arange(1, count + 1)[:, None] / count
     line: Array = start + shares * (end - start)

@@ -24,7 +24,7 @@ from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.robots.panda_omron.robot import PANDA_OMRON
 from robocasa_lerobot.envs.scene.robot_poses import RobotPose
 
-SHORTLIST, MOST_TESTED, MOST_DETOURS = 200, 60, 2
+SHORTLIST, MOST_TESTED, MOST_DETOURS = 240, 120, 2
 SAMPLE_RAD, MOST_SAMPLES = 0.10, 5  # between tested configurations of a line, and how many at most
 NEAR_M, DRIVE_STEP_M = 0.08, 0.07  # a drive as short is not tested; between tested places of a longer one
 _POSES, _LINES, _DETOUR = range(3)

@@ -21,11 +21,10 @@ from robocasa_lerobot.demos.motion import (
     frame,
     grip_position,
     hand_rotation,
-    pose_error,
 )
 from robocasa_lerobot.demos.planning.articulated import ContactPath, Shift, Waypoint, plan_contact
 from robocasa_lerobot.demos.planning.contact_paths import CLOSED_FINGERS_HALF_M, arc_waypoints, push_path
-from robocasa_lerobot.demos.planning.kinematics import Arm
+from robocasa_lerobot.demos.planning.follow import Following, follow_joint_path
 from robocasa_lerobot.demos.skills.arcs import spots, swing, take_stance, working_height
 from robocasa_lerobot.demos.skills.common import SkillError, move_hand
 from robocasa_lerobot.demos.skills.doors import SHUT_GOAL, doors
@@ -34,7 +33,6 @@ from robocasa_lerobot.demos.skills.fold_down import BASE_FRONT_M, BASE_HALF_M, s
 from robocasa_lerobot.demos.skills.hinged import Hinged
 from robocasa_lerobot.demos.skills.reach import shift_base
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
-from robocasa_lerobot.envs.robots.panda_omron.names import ARM_CENTER_SITE
 from robocasa_lerobot.envs.robots.panda_omron.robot import PANDA_OMRON
 from robocasa_lerobot.envs.tasks.task import Stage
 
@@ -51,7 +49,7 @@ XS = (0.0, 0.5, -0.5, 0.8, -0.8)  # shares of half of the door's width, from its
 TIP_M = 0.008  # of the grip site past the corner that is lifted
 OFF_M, BACK_M = 0.02, 0.10
 PRESS_M = 0.06  # that the hand is led beyond the corner at the beginning: the edge must not slip off the fingers
-DASH_RAD, DASH_STEPS, DASH_NEAR_M, DASH_NEAR_RAD = 0.2, 8, 0.08, 0.4  # of the poses that the hand is led along
+DASH = Following(spacing_m=0.2, per_m=0.0, per_rad_m=1.0, near_m=0.08, near_rad=0.4, most_steps=8)
 RETREAT: Shift = (-0.15, 0.0)
 
 
@@ -100,21 +98,7 @@ def _push(env: KitchenEnv, door: Hinged) -> Iterator[Array]:
 
 def _dash(env: KitchenEnv, joints: Array) -> Iterator[Array]:
     """Move the hand fast as it goes when all joints turn evenly to some angles: straight ways end in joint limits."""
-    data, arm = env.data, Arm(env.model, env.data)
-    start = np.array(data.qpos[arm.addresses])
-    site = data.site(ARM_CENTER_SITE)
-    axes, origin = site.xmat.reshape(3, 3).copy(), site.xpos.copy()
-    count = max(int(np.ceil(float(np.abs(joints - start).max()) / DASH_RAD)), 1)
-    shares = np.arange(1, count + 1)[:, None] / count
-    positions, turns = arm.forward(start + shares * (joints - start))
-    servo = FirmServo(data)
-    for position, turn in zip(positions, turns, strict=True):
-        via = HandTarget(origin + axes @ position, axes @ turn)
-        for _ in range(DASH_STEPS):
-            error = pose_error(data, via)
-            if error.position < DASH_NEAR_M and error.rotation < DASH_NEAR_RAD:
-                break
-            yield servo.action(via, CLOSED)
+    yield from follow_joint_path(env, joints, CLOSED, DASH, FirmServo(env.data).action)
 
 
 def _stances(env: KitchenEnv, door: Hinged) -> tuple[tuple[Shift, Shift], ...]:

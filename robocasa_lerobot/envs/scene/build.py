@@ -18,14 +18,14 @@ from robocasa_lerobot.envs.robots.camera_noise import CameraNoise, add_camera_no
 from robocasa_lerobot.envs.robots.panda_omron.robot import PANDA_OMRON
 from robocasa_lerobot.envs.robots.robot import Robot
 from robocasa_lerobot.envs.scene.assembly import bare_kitchen
-from robocasa_lerobot.envs.scene.counter_areas import counter_areas
 from robocasa_lerobot.envs.scene.drawn import Drawn, PlacedObject
 from robocasa_lerobot.envs.scene.initial_states import Initial, LidAside, PartAt
 from robocasa_lerobot.envs.scene.memory import Memory, add_memory
-from robocasa_lerobot.envs.scene.placement import cast_roles, place_objects
-from robocasa_lerobot.envs.scene.regions import Shares
+from robocasa_lerobot.envs.scene.placement.counter_areas import counter_areas
+from robocasa_lerobot.envs.scene.placement.objects import place_objects
+from robocasa_lerobot.envs.scene.placement.regions import Shares
 from robocasa_lerobot.envs.scene.robot_poses import RobotPose, robot_pose
-from robocasa_lerobot.envs.scene.roles import counter_of
+from robocasa_lerobot.envs.scene.roles import cast_roles, counter_of
 from robocasa_lerobot.envs.scene.scene import Scene
 from robocasa_lerobot.envs.scene.scene_spec import SceneSpec
 from robocasa_lerobot.envs.scene.spec import InitialOpenness, OnCounter
@@ -166,7 +166,7 @@ def arrange(
     Raises:
         PlacementError: the layout has not what the task needs, or not the room for it.
     """
-    roles = cast_roles(rng, task, layout)
+    roles = cast_roles(rng, task.fixtures, layout)
     choices = draw_choices(rng, task, layout.fixtures, roles)
     pose: RobotPose | None = None
     start, shape = task.robot_start, robot.shape

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from robocasa_lerobot.envs.kitchens.fixture_types import fixture_filter
@@ -9,8 +11,44 @@ from robocasa_lerobot.envs.kitchens.fixtures.base import Fixture
 from robocasa_lerobot.envs.kitchens.fixtures.counters import Counter
 from robocasa_lerobot.envs.kitchens.footprints import PlacementError
 from robocasa_lerobot.envs.kitchens.layout import Layout
+from robocasa_lerobot.envs.scene.spec import FixtureWanted
 
 HOUSING_BELOW_M = 0.6  # a housing whose underside is lower stands on the floor
+
+
+def cast_roles(rng: np.random.Generator, fixtures: Sequence[FixtureWanted], layout: Layout) -> dict[str, str]:
+    """Fixture name of each role of a task.
+
+    Raises:
+        PlacementError: the layout has nothing for a role.
+    """
+    roles: dict[str, str] = {}
+    for wanted in fixtures:
+        pool = [f for f in candidates(layout, wanted.kind) if _suits(f, wanted, layout, roles)]
+        if not pool:
+            raise PlacementError(
+                f"layout {layout.layout_id} has no {wanted.kind} for {wanted.role!r}. Name another kind, a smaller "
+                "size, or in `needs` what layouts must have."
+            )
+        if wanted.near:
+            ref = layout.fixtures[roles[wanted.near]]
+            roles[wanted.role] = min(pool, key=lambda f: _distance(f, ref)).name
+        else:
+            roles[wanted.role] = pool[int(rng.integers(len(pool)))].name
+    return roles
+
+
+def _suits(fixture: Fixture, wanted: FixtureWanted, layout: Layout, roles: dict[str, str]) -> bool:
+    others = {roles[role] for role in wanted.other_than}
+    large = fixture.width >= wanted.size[0] and fixture.depth >= wanted.size[1]
+    apart = all(_distance(layout.fixtures[name], fixture) >= wanted.apart_m for name in others)
+    return fixture.name not in others and large and apart
+
+
+def _distance(fixture: Fixture, ref: Fixture) -> float:
+    """Metres on the floor plan from a point to the rectangle of a fixture."""
+    x, y = fixture.to_local(ref.pos)
+    return float(np.hypot(max(abs(x) - fixture.width / 2, 0.0), max(abs(y) - fixture.depth / 2, 0.0)))
 
 
 def candidates(layout: Layout, kind: str) -> list[Fixture]:

@@ -33,6 +33,7 @@ ATTEMPTS = 5
 INSIST = 0.12
 GRASP_STEPS, RELEASE_STEPS = 11, 8
 STANDOFF_M = 0.06
+HOPELESS = 3.5  # cost of a path from which on it is not tried
 LOW_COST = 0.05
 BLOCKED_M, BACK_M = 0.05, 0.08  # a hand as far as this from where the grasp begins is blocked: another grasp is next
 HELD_UP_M, LOWER_M = 0.08, 0.03
@@ -58,6 +59,8 @@ def pick(env: KitchenEnv, obj: Graspable, strategy: GraspStrategy) -> Iterator[A
         body = data.body(obj.name)
         start = body.xpos.copy()
         choice = yield from approach(env, lambda blocked: _best(env, obj, strategy, tried, blocked), OPEN)
+        if choice.cost > HOPELESS:
+            raise SkillError(f"{obj.title} is out of reach from here, or too near to other things")
         yield from lead(env, choice.joints, OPEN)
         far, before, at, lifted, out = choice.way.targets
         # All poses move with the object, should it have been touched meanwhile.

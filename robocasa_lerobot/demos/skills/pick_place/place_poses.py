@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable, Sequence
 
 import numpy as np
 
 from robocasa_lerobot.demos.motion import UP, Array, base_pose
-from robocasa_lerobot.demos.skills.pick_place.graspable import Graspable
+from robocasa_lerobot.demos.skills.pick_place.graspable import Graspable, contents_of
 from robocasa_lerobot.demos.skills.pick_place.place import PlacePose
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.kitchens.fixtures.base import Region
@@ -17,6 +18,8 @@ type PlacePoses = Callable[[], Sequence[PlacePose]]
 # Shares of the depth of what it goes into at which an object may be let go, with their costs.
 DROPS = ((0.0, 0.0), (0.5, 0.4), (1.1, 0.7))
 EDGE_M, OFF_SHARE, BESIDE_COST = 0.005, 0.5, 3.0  # beside the middle, with a cost for each metre
+ASIDE_SHARE, ON_OTHERS_COST = 0.4, 8.0  # beside what lies there, with a gain for each metre from it
+LEAST_ROOM_M, SHALLOW_M = 0.01, 0.02
 BASIN_AHEAD_M, BASIN_ASIDE_M = 0.09, 0.08  # from the basin's middle: before the faucet, whose spout reaches over it
 # Heights of the underside over the basin's rim at which an object is let go, metres, with their costs.
 BASIN_DROPS = ((-0.07, 0.0), (-0.03, 0.2), (0.02, 0.5))
@@ -41,19 +44,23 @@ def on_object(env: KitchenEnv, obj: Graspable, holder: str) -> PlacePoses:
             return [PlacePose(body.xpos + UP * placed.item.size[2] / 2)]
         middle, half = np.array(inside.center), np.array(inside.half)
         deep = 2 * half[2]
+        others = [data.body(name).xpos[:2].copy() for name in contents_of(env, placed.name) if name != obj.name]
         room = np.maximum(half[:2] - obj.half_extents(np.eye(3))[:2].max() - EDGE_M, 0.0)
         room = np.minimum(room, OFF_SHARE * half[:2])
-        floors = [
-            (np.array([x * room[0], y * room[1], -half[2]]), BESIDE_COST * float(np.hypot(x * room[0], y * room[1])))
-            for x in (0, -1, 1)
-            for y in (0, -1, 1)
-            if (x, y) == (0, 0) or room.max() > 0.01
-        ]
-        return [
-            PlacePose(body.xpos + turn @ (middle + floor) + UP * deep * share, aside + (extra if deep > 0.02 else 0.0))
-            for floor, aside in floors
-            for share, extra in DROPS
-        ]
+        if others:  # beside them, though it may then lean on the wall
+            room = np.maximum(room, ASIDE_SHARE * half[:2])
+        found = []
+        for x, y in itertools.product((0, -1, 1), (0, -1, 1)):
+            if (x, y) != (0, 0) and room.max() <= LEAST_ROOM_M:
+                continue
+            floor = body.xpos + turn @ (middle + np.array([x * room[0], y * room[1], -half[2]]))
+            cost = BESIDE_COST * float(np.hypot(x * room[0], y * room[1]))
+            cost -= ON_OTHERS_COST * min((float(np.linalg.norm(floor[:2] - other)) for other in others), default=0.0)
+            found += [
+                PlacePose(floor + UP * deep * share, cost + (extra if deep > SHALLOW_M else 0.0))
+                for share, extra in DROPS
+            ]
+        return found
 
     return poses
 

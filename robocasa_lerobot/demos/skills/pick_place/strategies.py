@@ -67,7 +67,8 @@ DEEP_M, DEEP_LEAN = 0.035, float(np.deg2rad(30.0))
 LEANING_GRASP = replace(
     ANY_APPROACH,
     tilts=tuple(
-        (float(np.deg2rad(tilt)), extra) for tilt, extra in ((40, 0.0), (55, 0.1), (25, 0.15), (70, 0.2), (0, 0.5))
+        (float(np.deg2rad(tilt)), extra)
+        for tilt, extra in ((62, 0.0), (72, 0.1), (52, 0.1), (40, 0.4), (20, 0.7), (0, 0.9))
     ),
 )
 LEVEL_HAND = -0.85  # of the hand's approach along the vertical: above it, the hand looks ahead rather than down

@@ -1,4 +1,4 @@
-"""Casts a layout's fixtures in the roles of a task, and puts the task's objects where they start."""
+"""Puts the objects of a task where they start."""
 
 from __future__ import annotations
 
@@ -12,53 +12,17 @@ from robocasa_lerobot.envs.kitchens.fixtures.base import Fixture
 from robocasa_lerobot.envs.kitchens.footprints import Area, Footprint, PlacementError, place
 from robocasa_lerobot.envs.kitchens.layout import Layout
 from robocasa_lerobot.envs.objects import catalogue
-from robocasa_lerobot.envs.scene.counter_areas import counter_areas, inside_area, standing_on
 from robocasa_lerobot.envs.scene.drawn import PlacedObject
-from robocasa_lerobot.envs.scene.regions import Part, Shares, choose_parts, rectangle_in
-from robocasa_lerobot.envs.scene.roles import candidates
+from robocasa_lerobot.envs.scene.placement.counter_areas import counter_areas, inside_area, standing_on
+from robocasa_lerobot.envs.scene.placement.regions import Part, Shares, choose_parts, rectangle_in
 from robocasa_lerobot.envs.scene.scene_spec import SceneSpec
-from robocasa_lerobot.envs.scene.spec import FixtureWanted, ObjectWanted, OnCounter, Placement
+from robocasa_lerobot.envs.scene.spec import ObjectWanted, OnCounter, Placement
 from robocasa_lerobot.envs.scene.task_parameters import item_of, name_of, number_of, start_of
 from robocasa_lerobot.envs.scene.words import numbered
 
 PLACEMENT_GAP_M = 0.004  # objects start this far above their surface and settle
 _TURNS = 20  # how often a place is drawn for what hardly fits into a compartment
 IN_CONTAINER = "in_container"  # object group of what may stand in a container
-
-
-def cast_roles(rng: np.random.Generator, task: SceneSpec, layout: Layout) -> dict[str, str]:
-    """Fixture name of each role of a task.
-
-    Raises:
-        PlacementError: the layout has nothing for a role.
-    """
-    roles: dict[str, str] = {}
-    for wanted in task.fixtures:
-        pool = [f for f in candidates(layout, wanted.kind) if _suits(f, wanted, layout, roles)]
-        if not pool:
-            raise PlacementError(
-                f"layout {layout.layout_id} has no {wanted.kind} for {wanted.role!r}. Name another kind, a smaller "
-                "size, or in `needs` what layouts must have."
-            )
-        if wanted.near:
-            ref = layout.fixtures[roles[wanted.near]]
-            roles[wanted.role] = min(pool, key=lambda f: _distance(f, ref)).name
-        else:
-            roles[wanted.role] = pool[int(rng.integers(len(pool)))].name
-    return roles
-
-
-def _suits(fixture: Fixture, wanted: FixtureWanted, layout: Layout, roles: dict[str, str]) -> bool:
-    others = {roles[role] for role in wanted.other_than}
-    large = fixture.width >= wanted.size[0] and fixture.depth >= wanted.size[1]
-    apart = all(_distance(layout.fixtures[name], fixture) >= wanted.apart_m for name in others)
-    return fixture.name not in others and large and apart
-
-
-def _distance(fixture: Fixture, ref: Fixture) -> float:
-    """Metres on the floor plan from a point to the rectangle of a fixture."""
-    x, y = fixture.to_local(ref.pos)
-    return float(np.hypot(max(abs(x) - fixture.width / 2, 0.0), max(abs(y) - fixture.depth / 2, 0.0)))
 
 
 @dataclass
