@@ -9,6 +9,7 @@ from typing import Any
 from robocasa_lerobot.demos.motion import Array, action
 from robocasa_lerobot.demos.skills import SKILLS, SkillError
 from robocasa_lerobot.demos.skills.common import stage_done, stage_progress
+from robocasa_lerobot.demos.skills.fold import fold_arm
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.tasks.conditions import must_never, stage_condition, without_gripper
 from robocasa_lerobot.envs.tasks.task import Stage
@@ -16,6 +17,7 @@ from robocasa_lerobot.errors import UnknownNameError
 
 ATTEMPTS = 3  # of a stage; skills try several grasps in each
 PATIENCE_STEPS = 40  # after a skill, for things that fall, swing and settle; as long again after each step that counted
+_AS_IT_IS = ("navigation", "pick_place")  # skills that begin with the arm as the stage before has left it
 _TOLD = ("skill", "verb", "target", "object", "part", "to")  # of a stage, to whoever reads the file
 
 
@@ -83,6 +85,8 @@ def carry_out(env: KitchenEnv, log: StageLog) -> Iterator[Array]:
             outcome.skipped, outcome.done = outcome.attempts == 0, True
             index += 1
             continue
+        if len(stages) > 1 and stages[index].skill not in _AS_IT_IS:
+            yield from fold_arm(env)
         yield from _attempt(env, stages[index], outcome)
         _check_never(env, outcome)
         outcome.done = stage_done(env, stages[index])

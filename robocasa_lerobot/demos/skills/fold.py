@@ -1,0 +1,43 @@
+"""Fold the empty arm as at the start of an episode, round what stands in its way: where most skills begin from."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from robocasa_lerobot.demos.motion import OPEN, Array
+from robocasa_lerobot.demos.planning.approach import Approach
+from robocasa_lerobot.demos.planning.base_path import carried
+from robocasa_lerobot.demos.planning.collision import CollisionChecker
+from robocasa_lerobot.demos.planning.costs import REACHING
+from robocasa_lerobot.demos.planning.follow import follow_joint_path
+from robocasa_lerobot.envs.kitchen_env import KitchenEnv
+from robocasa_lerobot.envs.robots.panda_omron.robot import PANDA_OMRON
+
+FOLDED_RAD = 0.35  # of each joint from its angle at the start
+
+
+def fold_arm(env: KitchenEnv) -> Iterator[Array]:
+    """Lead the arm home unless it is there, something is in the hand, or no free path is found."""
+    if carried(env.scene, env.data) is not None:
+        return
+    checker = CollisionChecker(env.model, env.data)
+    base, present = checker.present_base, checker.present_joints
+    home = np.array(PANDA_OMRON.home.arm)
+    if np.abs(present - home).max() < FOLDED_RAD:
+        return
+    # What it leans on already is no reason to stay there.
+    checker.allow(checker.touched(base[None], present[None]).all())
+
+    def counts(joints: Array, margin_m: float) -> NDArray[np.int64]:
+        return checker.touched(np.tile(base, (len(joints), 1)), joints, margin_m=margin_m).counts
+
+    paths = Approach(checker.arm, counts, REACHING)
+    if paths.straight(present, home) < REACHING.hit:
+        yield from follow_joint_path(env, home, OPEN)
+        return
+    detour = paths.detour(present, home, base)
+    if detour is not None:
+        yield from follow_joint_path(env, detour[0], OPEN)

@@ -1,0 +1,79 @@
+"""Keep order in the freezer."""
+
+import numpy as np
+
+from robocasa_lerobot.envs.predicates import AllOf, GripperFar, ObjectOn, OnShelf
+from robocasa_lerobot.envs.scene.spec import (
+    FixtureWanted,
+    InitialOpenness,
+    ObjectWanted,
+    Placement,
+    RobotStart,
+    SampleRegion,
+)
+from robocasa_lerobot.envs.tasks.task import Stage, Task
+
+_ACROSS = (np.pi / 2, np.pi / 2)  # radians
+
+
+def _box(name: str, x: float, *, repeats: bool = False) -> ObjectWanted:
+    start = Placement("counter", region=SampleRegion(ref="fridge"), size=(1.0, 0.4), pos=(x, -1.0), rotation=_ACROSS)
+    return ObjectWanted(name, ("tupperware",), start, graspable=True, scale=(1.5, 1.5, 1.0), repeats=repeats)
+
+
+def _in_box(name: str, group: str, box: str) -> ObjectWanted:
+    return ObjectWanted(name, (group,), Placement(object=box, size=(0.8, 0.8)), graspable=True)
+
+
+def _store(box: str, level: str) -> tuple[Stage, ...]:
+    return (
+        Stage("pick_place", "pick", "counter", object=box),
+        Stage("navigation", "drive", "fridge", object=box),
+        Stage("pick_place", "place", "fridge", object=box, part=f"freezer_shelf:{level}"),
+    )
+
+
+SEPARATE_FREEZER_RACK = Task(
+    name="SeparateFreezerRack",
+    summary=(
+        "The box with the meat is on the second highest shelf of the freezer, the one with both vegetables on the "
+        "highest, the gripper away from both."
+    ),
+    fixtures=(FixtureWanted("fridge", "fridge_with_freezer"), FixtureWanted("counter", "counter", near="fridge")),
+    needs=("freezer",),
+    robot_start=RobotStart("counter", at_object="meat_tupperware"),
+    objects=(
+        _box("meat_tupperware", 0.25),
+        _in_box("meat", "meat", "meat_tupperware"),
+        _box("veg_tupperware", -0.25, repeats=True),
+        _in_box("vegetable1", "vegetable", "veg_tupperware"),
+        _in_box("vegetable2", "vegetable", "veg_tupperware"),
+    ),
+    initial=(InitialOpenness("fridge", 0.9, 1.0, part="freezer"),),
+    goal=AllOf(
+        ObjectOn("meat", "meat_tupperware"),
+        ObjectOn("vegetable1", "veg_tupperware"),
+        ObjectOn("vegetable2", "veg_tupperware"),
+        OnShelf("meat_tupperware", "fridge", "second_highest", compartment="freezer"),
+        OnShelf("veg_tupperware", "fridge", "highest", compartment="freezer"),
+        GripperFar("meat_tupperware"),
+        GripperFar("veg_tupperware"),
+    ),
+    stages=(
+        *_store("meat_tupperware", "second_highest"),
+        Stage("navigation", "drive", "veg_tupperware"),
+        *_store("veg_tupperware", "highest"),
+    ),
+    instruction=(
+        "Store the box of {meat} on the freezer rack one below the top and the box of {vegetable1} and {vegetable2} on "
+        "the top rack."
+    ),
+    paraphrases=(
+        "The box with the {vegetable1} and the {vegetable2} goes on top in the freezer, the {meat} box just below.",
+        "Freeze the {meat} on the second shelf from the top and the {vegetable1} and {vegetable2} on the first.",
+        "Keep {meat} and vegetables apart: its box on the freezer's second highest shelf, theirs on the highest.",
+        "Put both boxes into the freezer, vegetables on the uppermost shelf, {meat} one shelf lower.",
+    ),
+)
+
+TASKS = (SEPARATE_FREEZER_RACK,)
