@@ -11,18 +11,18 @@ from robocasa_lerobot.demos.motion import Array
 from robocasa_lerobot.demos.skills.blender_cover import cover
 from robocasa_lerobot.demos.skills.blender_lid import uncover
 from robocasa_lerobot.demos.skills.buttons import press_button
+from robocasa_lerobot.demos.skills.close_dishwasher import lift_low
+from robocasa_lerobot.demos.skills.close_doors import close_doors, lift_shut
 from robocasa_lerobot.demos.skills.common import SkillError
 from robocasa_lerobot.demos.skills.doors import push_lid
 from robocasa_lerobot.demos.skills.drawers import close_drawer, open_drawer
 from robocasa_lerobot.demos.skills.handles import open_doors
-from robocasa_lerobot.demos.skills.heads import lower_head, raise_head
 from robocasa_lerobot.demos.skills.knobs import raise_knob, turn_burner_low, turn_knob, turn_off_burner, turn_on_burner
 from robocasa_lerobot.demos.skills.levers import press_lever, turn_off_water, turn_on_water, turn_sideways
-from robocasa_lerobot.demos.skills.lift_low import lift_low
+from robocasa_lerobot.demos.skills.mixer_head import lower_head, raise_head
 from robocasa_lerobot.demos.skills.pick_place.hold import hold_object
 from robocasa_lerobot.demos.skills.pick_place.verbs import drive, pick_object, place_object
 from robocasa_lerobot.demos.skills.racks import pull, push, slide
-from robocasa_lerobot.demos.skills.shut import close_doors, lift_shut
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.tasks.task import Stage
 

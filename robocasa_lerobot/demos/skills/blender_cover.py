@@ -38,8 +38,8 @@ from robocasa_lerobot.demos.skills.blender_lid import (
 )
 from robocasa_lerobot.demos.skills.common import SkillError, hold_hand, move_hand, stage_done
 from robocasa_lerobot.demos.skills.pick_place.grasp_strategy import entry
-from robocasa_lerobot.demos.skills.pick_place.pick import INSIST
-from robocasa_lerobot.demos.skills.ways import Choice, Held, Way, approach, choose, lead
+from robocasa_lerobot.demos.skills.pick_place.pick import INTEGRAL_GAIN
+from robocasa_lerobot.demos.skills.reaching import Held, ReachPlan, WaypointPath, approach, lead, plan_reach
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.kitchens.appliances.kinds.blender import Blender
 from robocasa_lerobot.envs.scene.robot_poses import RobotPose
@@ -90,10 +90,10 @@ def _take(env: KitchenEnv, blender: Blender, tried: list[Array]) -> Iterator[Arr
     body = data.body(blender.lid)
     choice = yield from approach(env, lambda blocked: _best_take(env, blender, tried, blocked), OPEN)
     yield from lead(env, choice.joints, OPEN)
-    above, before, at, lifted = choice.way.targets[:4]
+    above, before, at, lifted = choice.path.targets[:4]
     tried.append(at.rotation)
     yield from move_hand(data, above, OPEN, tolerance=0.04)
-    yield from move_hand(data, before, OPEN, tolerance=0.01, insist=INSIST)
+    yield from move_hand(data, before, OPEN, tolerance=0.01, integral_gain=INTEGRAL_GAIN)
     yield from move_hand(data, at, OPEN, speed=0.6, tolerance=0.006, max_steps=50)
     start = float(body.xpos[2])
     yield from hold_hand(data, at, CLOSED, GRASP_STEPS)
@@ -108,19 +108,19 @@ def _lay(env: KitchenEnv, blender: Blender, place: Array, tries: int) -> Iterato
     failed: list[Array] = []
     for _ in range(tries):
 
-        def plan(blocked: Sequence[RobotPose]) -> Choice:
+        def plan(blocked: Sequence[RobotPose]) -> ReachPlan:
             held, lid = Held.now(data, blender.lid), _lid(env, blender)
             ways = _lays(env, blender, held, hand_rotation(data) @ held.rotation, place, failed)
-            return choose(env, ways, place, key=2, held=held, loaded=3, allowed=lid, blocked=blocked)[0]
+            return plan_reach(env, ways, place, key=2, held=held, loaded=3, allowed=lid, blocked=blocked)[0]
 
         choice = yield from approach(env, plan, CLOSED)
         if not _holds(env, blender):
             return
-        far, over, low, _ = choice.way.targets
+        far, over, low, _ = choice.path.targets
         failed.append(low.rotation)
         turn = low.rotation @ Held.now(data, blender.lid).rotation  # of the lid
         yield from lead(env, choice.joints, CLOSED)
-        yield from move_hand(data, far, CLOSED, tolerance=0.02, insist=INSIST)
+        yield from move_hand(data, far, CLOSED, tolerance=0.02, integral_gain=INTEGRAL_GAIN)
         height = float(over.position[2] - low.position[2]) + LOW_M
         line: Array | None = far.position
         for _ in range(SINKS):
@@ -129,7 +129,14 @@ def _lay(env: KitchenEnv, blender: Blender, place: Array, tries: int) -> Iterato
                     return
                 goal = _hand_for(Held.now(data, blender.lid), place, turn, above)
                 yield from move_hand(
-                    data, goal, CLOSED, speed=speed, tolerance=tolerance, max_steps=60, insist=INSIST, start=line
+                    data,
+                    goal,
+                    CLOSED,
+                    speed=speed,
+                    tolerance=tolerance,
+                    max_steps=60,
+                    integral_gain=INTEGRAL_GAIN,
+                    start=line,
                 )
                 line = None
                 if above == LOW_M and _aside(env, blender, place) > NOT_OVER_M:
@@ -140,7 +147,7 @@ def _lay(env: KitchenEnv, blender: Blender, place: Array, tries: int) -> Iterato
                 break
 
 
-def _best_take(env: KitchenEnv, blender: Blender, tried: list[Array], blocked: Sequence[RobotPose]) -> Choice:
+def _best_take(env: KitchenEnv, blender: Blender, tried: list[Array], blocked: Sequence[RobotPose]) -> ReachPlan:
     """A grasp with which the lid gets to the jug from the same place, else after a drive."""
     body, lid, place = env.data.body(blender.lid), _lid(env, blender), blender.lid_pose[0]
     at, turn = body.xpos + UP * HOLD_M, body.xmat.reshape(3, 3).copy()
@@ -150,24 +157,24 @@ def _best_take(env: KitchenEnv, blender: Blender, tried: list[Array], blocked: S
         cost = TRIED * sum(float(np.trace(rotation.T @ other)) > ALIKE for other in tried)
         before = at - HOVER_M * rotation[:, 2]
         poses = (before + ABOVE_M * UP, before, at, at + TAKEN_M * UP)
-        take = Way(tuple(HandTarget(point, rotation) for point in poses), cost, held)
+        take = WaypointPath(tuple(HandTarget(point, rotation) for point in poses), cost, held)
         taking.append(take)
         for way in _lays(env, blender, held, turn, place, []):
             laying.append(dataclasses.replace(way, takes=held))
-            together.append(Way(take.targets + way.targets[:3], cost + way.extra, held))
-    found = choose(env, together, at, key=2, allowed=lid, blocked=blocked)[0]
+            together.append(WaypointPath(take.targets + way.targets[:3], cost + way.extra, held))
+    found = plan_reach(env, together, at, key=2, allowed=lid, blocked=blocked)[0]
     if found.cost < TOGETHER:
         return found
     later: dict[tuple[float, ...], float] = {}
-    for choice in choose(env, laying, place, key=0, allowed=lid):
-        grasp = _grasp(choice.way.takes)
+    for choice in plan_reach(env, laying, place, key=0, allowed=lid):
+        grasp = _grasp(choice.path.takes)
         later[grasp] = min(choice.cost, later.get(grasp, np.inf))
     able = [
         dataclasses.replace(way, extra=way.extra + later[grasp])
         for way in taking
         if (grasp := _grasp(way.takes)) in later
     ]
-    apart = choose(env, able, at, key=2, allowed=lid, blocked=blocked)[0]
+    apart = plan_reach(env, able, at, key=2, allowed=lid, blocked=blocked)[0]
     return min((found, apart), key=lambda choice: choice.cost)
 
 
@@ -177,7 +184,9 @@ def _grasp(held: Held | None) -> tuple[float, ...]:
     return tuple(held.rotation.ravel().round(4).tolist())
 
 
-def _lays(env: KitchenEnv, blender: Blender, held: Held, turn: Array, place: Array, failed: list[Array]) -> list[Way]:
+def _lays(
+    env: KitchenEnv, blender: Blender, held: Held, turn: Array, place: Array, failed: list[Array]
+) -> list[WaypointPath]:
     """Before a place of the lid, over it, just above it, and away from it; `turn` is the lid's now."""
     found = []
     for lid_turn, extra in _lid_turns(env, blender, turn):
@@ -189,7 +198,7 @@ def _lays(env: KitchenEnv, blender: Blender, held: Held, turn: Array, place: Arr
                 far = over + IN_M * entry(env, name)
                 away = low.position - AWAY_M * low.rotation[:, 2]
                 poses = (far, over, low.position, away)
-                found.append(Way(tuple(HandTarget(point, low.rotation) for point in poses), cost))
+                found.append(WaypointPath(tuple(HandTarget(point, low.rotation) for point in poses), cost))
     return found
 
 

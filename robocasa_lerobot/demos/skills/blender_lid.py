@@ -22,8 +22,8 @@ from robocasa_lerobot.demos.motion import (
 )
 from robocasa_lerobot.demos.planning.follow import follow_joint_path
 from robocasa_lerobot.demos.planning.motion_planner import plan_near
+from robocasa_lerobot.demos.skills.base_shift import shift_base
 from robocasa_lerobot.demos.skills.common import SkillError, hold_hand, move_hand, stage_done
-from robocasa_lerobot.demos.skills.reach import shift_base
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.kitchens.appliances.kinds.blender import Blender
 from robocasa_lerobot.envs.kitchens.footprints import Area, Footprint

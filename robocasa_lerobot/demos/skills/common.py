@@ -39,7 +39,7 @@ POSITION_TOLERANCE_M = 0.012
 ROTATION_TOLERANCE_RAD = 0.12
 # A move that makes less headway than this over `STALL_STEPS` is blocked, or as near as the arm gets.
 STALL_M, STALL_STEPS = 0.002, 12
-INSIST_NEAR_M, INSIST_MOST_M = 0.03, 0.03
+INTEGRAL_GAIN_NEAR_M, INTEGRAL_GAIN_MOST_M = 0.03, 0.03
 AHEAD_ON_LINE_M = 0.03  # commands this far ahead are full ones
 MORE_CLOSING_STEPS, STILL_M = 10, 0.0004  # of a finger in a step: it has met something
 
@@ -53,13 +53,13 @@ def move_hand(
     tolerance: float = POSITION_TOLERANCE_M,
     max_steps: int = 90,
     until: Callable[[], bool] = lambda: False,
-    insist: float = 0.0,
+    integral_gain: float = 0.0,
     start: Array | None = None,
 ) -> Iterator[Array]:
     """Servo the hand to a target; ends when it is there, when `until` holds, when it stalls, or after `max_steps`.
 
-    With `insist` that share of the error that is left near the target is added to the command at every step: a far
-    reach otherwise ends a centimetre short. With a `start` the hand keeps to the straight line from there.
+    With `integral_gain` that share of the error that is left near the target is added to the command at every step: a
+    far reach otherwise ends a centimetre short. With a `start` the hand keeps to the straight line from there.
     """
     best, since = np.inf, 0
     more: Array = np.zeros(3)
@@ -75,8 +75,8 @@ def move_hand(
         if since >= STALL_STEPS:
             return
         left_over = target.position - grip_position(data)
-        if insist > 0.0 and error.position < INSIST_NEAR_M:
-            more = limit(more + insist * left_over, INSIST_MOST_M)
+        if integral_gain > 0.0 and error.position < INTEGRAL_GAIN_NEAR_M:
+            more = limit(more + integral_gain * left_over, INTEGRAL_GAIN_MOST_M)
         position = target.position if start is None else _ahead(start, target.position, grip_position(data))
         yield arm_action(data, HandTarget(position + more, target.rotation), gripper, speed=speed)
 

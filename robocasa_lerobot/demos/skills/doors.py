@@ -15,8 +15,8 @@ from robocasa_lerobot.demos.motion import (
     hand_rotation,
     nearer_turn,
 )
+from robocasa_lerobot.demos.skills.articulated_part import ArticulatedPart, push_around
 from robocasa_lerobot.demos.skills.common import SkillError, draw_back, move_hand
-from robocasa_lerobot.demos.skills.hinged import Hinged, push_round
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.kitchens.appliances.base import Appliance
 from robocasa_lerobot.envs.tasks.task import Stage
@@ -27,11 +27,11 @@ LEAN = 0.5  # inwards, for each metre down
 SHUT_GOAL = 0.002  # below the 0.005 that tasks ask for
 
 
-def doors(env: KitchenEnv, stage: Stage) -> list[Hinged]:
+def doors(env: KitchenEnv, stage: Stage) -> list[ArticulatedPart]:
     """Doors of the stage's fixture, or of the stage's part of it, such as its "freezer"."""
     fixture = env.scene.fixture(stage.target)
     names = fixture.doors_of(env.scene.fill(stage.part))
-    return [Hinged(env.data, fixture, fixture.door_joint(name)) for name in names]
+    return [ArticulatedPart(env.data, fixture, fixture.door_joint(name)) for name in names]
 
 
 def push_lid(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
@@ -42,7 +42,7 @@ def push_lid(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
     """
     data = env.data
     appliance = env.scene.fixture(stage.target, Appliance)
-    lid = Hinged(data, appliance, appliance.joint(stage.part))
+    lid = ArticulatedPart(data, appliance, appliance.joint(stage.part))
     far = lid.high[1] if abs(lid.high[1]) > abs(lid.low[1]) else lid.low[1]
 
     def rotation(angle: float) -> Array:
@@ -55,7 +55,7 @@ def push_lid(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
         start = lid.angle
         over = HandTarget(lid.point(local + HOVER_M * UP, start), rotation(start))
         yield from move_hand(data, over, CLOSED, tolerance=0.03)
-        yield from push_round(lid, data, local, SHUT_GOAL, rotation)
+        yield from push_around(lid, data, local, SHUT_GOAL, rotation)
         if lid.share <= SHUT_GOAL:
             return
         yield from draw_back(data, CLOSED, 0.12)

@@ -21,12 +21,12 @@ from robocasa_lerobot.demos.motion import (
 )
 from robocasa_lerobot.demos.planning.articulated import ContactPath, Shift, Waypoint, plan_contact
 from robocasa_lerobot.demos.planning.contact_paths import arc_waypoints, grip_path
-from robocasa_lerobot.demos.skills.arcs import pull_arc, push_arc, stances_round, tuck, working_height
+from robocasa_lerobot.demos.skills.arc_motion import pull_arc, push_arc, retract, stances_around, working_height
+from robocasa_lerobot.demos.skills.articulated_part import ArticulatedPart
+from robocasa_lerobot.demos.skills.base_shift import shift_base
 from robocasa_lerobot.demos.skills.common import SkillError, move_hand
 from robocasa_lerobot.demos.skills.doors import doors
-from robocasa_lerobot.demos.skills.fold_down import fold_down
-from robocasa_lerobot.demos.skills.hinged import Hinged
-from robocasa_lerobot.demos.skills.reach import shift_base
+from robocasa_lerobot.demos.skills.drop_down_doors import fold_down
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.tasks.task import Stage
 
@@ -94,7 +94,7 @@ def open_doors(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
             if door.share >= ENOUGH_SHARE:
                 break
             if moved:
-                yield from tuck(env, OPEN)
+                yield from retract(env, OPEN)
             moved = True
             try:
                 yield from _attempt(env, door, slipped)
@@ -106,7 +106,7 @@ def open_doors(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
             raise SkillError(f"{door.name} is {door.share:.0%} open after {ATTEMPTS} attempts")
 
 
-def _attempt(env: KitchenEnv, door: Hinged, slipped: list[tuple[float, float]]) -> Iterator[Array]:
+def _attempt(env: KitchenEnv, door: ArticulatedPart, slipped: list[tuple[float, float]]) -> Iterator[Array]:
     """Pull the door ajar if it is not, and push it open, or pull it farther where the hand does not get behind it."""
     if door.angle < ENOUGH_RAD:
         yield from _pull(env, door, slipped)
@@ -117,7 +117,7 @@ def _attempt(env: KitchenEnv, door: Hinged, slipped: list[tuple[float, float]]) 
             yield from _pull(env, door, slipped)
 
 
-def _pull(env: KitchenEnv, door: Hinged, slipped: list[tuple[float, float]]) -> Iterator[Array]:
+def _pull(env: KitchenEnv, door: ArticulatedPart, slipped: list[tuple[float, float]]) -> Iterator[Array]:
     """Grasp the handle and pull the door open, as far as the arm gets with ease.
 
     A tilt of the hand in which the handle slips out of it is noted in `slipped`, and is the last choice from then on.
@@ -127,7 +127,7 @@ def _pull(env: KitchenEnv, door: Hinged, slipped: list[tuple[float, float]]) -> 
     """
     stances = [
         (start, (start[0] + ahead, start[1] + door.side * aside))
-        for start, _ in stances_round(env, door, PULL_NEAR)
+        for start, _ in stances_around(env, door, PULL_NEAR)
         for ahead, aside in PULL_ALONG
     ]
     low, high = door.handle()
@@ -136,7 +136,7 @@ def _pull(env: KitchenEnv, door: Hinged, slipped: list[tuple[float, float]]) -> 
     goals = sorted({goal for goal in (OPEN_SHARE * door.full, FAR_RAD) if goal > least}, reverse=True)
     for goal in (*goals, min(least, OPEN_SHARE * door.full)):
         options = [(tilt, roll) for tilt in GRASP_TILTS for roll in rolls]
-        ways = [_pull_way(env, door, *option, goal, bias=SLIPPED * (option[0] in slipped)) for option in options]
+        ways = [_pull_path(env, door, *option, goal, bias=SLIPPED * (option[0] in slipped)) for option in options]
         try:
             plan = plan_contact(env, door, ways, stances)
         except SkillError:
@@ -152,7 +152,7 @@ def _pull(env: KitchenEnv, door: Hinged, slipped: list[tuple[float, float]]) -> 
             return
 
 
-def _come_round(env: KitchenEnv, door: Hinged) -> Iterator[Array]:
+def _come_round(env: KitchenEnv, door: ArticulatedPart) -> Iterator[Array]:
     """Bring the hand that has pulled a door wide open back round its free edge, not against it."""
     data = env.data
     if door.angle < WIDE_RAD:
@@ -164,8 +164,8 @@ def _come_round(env: KitchenEnv, door: Hinged) -> Iterator[Array]:
         yield from move_hand(data, HandTarget(beyond, hand_rotation(data)), OPEN, tolerance=0.05, max_steps=30)
 
 
-def _pull_way(
-    env: KitchenEnv, door: Hinged, tilt: tuple[float, float], roll: int, goal: float, *, bias: float
+def _pull_path(
+    env: KitchenEnv, door: ArticulatedPart, tilt: tuple[float, float], roll: int, goal: float, *, bias: float
 ) -> ContactPath:
     low, high = door.handle()
     middle, room = (low[2] + high[2]) / 2, 0.2 * (high[2] - low[2])
@@ -182,15 +182,15 @@ def _pull_way(
     return grip_path(door, grip, rotation_at, goal, bias=bias + 0.1 * (roll % 2))
 
 
-def _push(env: KitchenEnv, door: Hinged) -> Iterator[Array]:
+def _push(env: KitchenEnv, door: ArticulatedPart) -> Iterator[Array]:
     """Push the door open, from inside."""
-    ways = [_push_way(env, door, push, flip) for push in PUSHES for flip in (1.0, -1.0)]
-    stances = stances_round(env, door, PUSH_NEAR)
+    ways = [_push_path(env, door, push, flip) for push in PUSHES for flip in (1.0, -1.0)]
+    stances = stances_around(env, door, PUSH_NEAR)
     yield from push_arc(env, door, ways, stances, (OPEN_SHARE + 0.01) * door.full, firm=True, most_cost=MOST_COST)
 
 
-def _push_way(
-    env: KitchenEnv, door: Hinged, push: tuple[float, float, float, float, float], flip: float
+def _push_path(
+    env: KitchenEnv, door: ArticulatedPart, push: tuple[float, float, float, float, float], flip: float
 ) -> ContactPath:
     share, past, degrees, pitch, bias = push
     way = door.side

@@ -19,10 +19,10 @@ from robocasa_lerobot.demos.motion import (
 )
 from robocasa_lerobot.demos.planning.follow import follow_joint_path
 from robocasa_lerobot.demos.planning.motion_planner import plan_near
+from robocasa_lerobot.demos.skills.base_shift import shift_base
 from robocasa_lerobot.demos.skills.common import SkillError, hold_hand, move_hand, stage_done
 from robocasa_lerobot.demos.skills.pick_place.graspable import graspable
 from robocasa_lerobot.demos.skills.pick_place.place import leave
-from robocasa_lerobot.demos.skills.reach import shift_base
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.kitchens.appliances.base import Appliance
 from robocasa_lerobot.envs.kitchens.appliances.kinds.stove import Hob

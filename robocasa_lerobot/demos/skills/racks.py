@@ -21,8 +21,8 @@ from robocasa_lerobot.demos.motion import (
 from robocasa_lerobot.demos.planning.contact_paths import CLOSED_FINGERS_HALF_M
 from robocasa_lerobot.demos.planning.follow import follow_joint_path
 from robocasa_lerobot.demos.planning.motion_planner import MotionPlan, plan_near
+from robocasa_lerobot.demos.skills.base_shift import shift_base
 from robocasa_lerobot.demos.skills.common import SkillError, hold_hand, move_hand
-from robocasa_lerobot.demos.skills.reach import shift_base
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.kitchens.appliances.base import Appliance
 from robocasa_lerobot.envs.tasks.task import Stage

@@ -27,7 +27,7 @@ from robocasa_lerobot.demos.skills.common import SkillError, move_hand
 from robocasa_lerobot.demos.skills.navigation import drive_to
 from robocasa_lerobot.demos.skills.pick_place.graspable import Graspable
 from robocasa_lerobot.demos.skills.pick_place.location import locate
-from robocasa_lerobot.demos.skills.ways import MOST_DRIVES, Way, choose, lead
+from robocasa_lerobot.demos.skills.reaching import MOST_DRIVES, WaypointPath, lead, plan_reach
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.kitchens.fixtures.base import Fixture
 from robocasa_lerobot.envs.robots.panda_omron.robot import PANDA_OMRON
@@ -123,16 +123,16 @@ def fold_with(env: KitchenEnv, obj: Graspable) -> Iterator[Array]:
     base, yaw = base_pose(env.data)
     held = Held.now(env.data, obj.name, obj.contents)
     here = RobotPose(float(base[0]), float(base[1]), yaw)
-    found = choose(
+    found = plan_reach(
         env, _folded(env, base, yaw), grip_position(env.data), key=1, held=held, loaded=1,
         allowed=obj.bodies | obj.carried, blocked=[here] * MOST_DRIVES,
     )  # fmt: skip
     if found:
         yield from lead(env, found[0].joints, CLOSED)
-        yield from move_hand(env.data, found[0].way.targets[1], CLOSED, tolerance=0.03, max_steps=60)
+        yield from move_hand(env.data, found[0].path.targets[1], CLOSED, tolerance=0.03, max_steps=60)
 
 
-def _folded(env: KitchenEnv, base: Array, yaw: float) -> list[Way]:
+def _folded(env: KitchenEnv, base: Array, yaw: float) -> list[WaypointPath]:
     ahead = floor_axes(yaw)[0]
     present, grip = hand_rotation(env.data), grip_position(env.data)
     home = _home_height(env)
@@ -144,7 +144,7 @@ def _folded(env: KitchenEnv, base: Array, yaw: float) -> list[Way]:
                 point = np.array([*(base + out * ahead)[:2], home + rise])
                 above = np.array([*grip[:2], max(grip[2], home)])
                 targets = (HandTarget(above, present), HandTarget(point, rotation))
-                found.append(Way(targets, 0.1 * abs(turn) + rise + abs(out - FOLDED_M[0])))
+                found.append(WaypointPath(targets, 0.1 * abs(turn) + rise + abs(out - FOLDED_M[0])))
     return found
 
 

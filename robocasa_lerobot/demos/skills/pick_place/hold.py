@@ -21,9 +21,9 @@ from robocasa_lerobot.demos.skills.common import SkillError, hold_hand, move_han
 from robocasa_lerobot.demos.skills.pick_place.carry import carry_to, in_reach, standing_pose_for
 from robocasa_lerobot.demos.skills.pick_place.grasp_strategy import ANY_APPROACH, entry, steep
 from robocasa_lerobot.demos.skills.pick_place.graspable import Graspable, graspable
-from robocasa_lerobot.demos.skills.pick_place.pick import INSIST
+from robocasa_lerobot.demos.skills.pick_place.pick import INTEGRAL_GAIN
 from robocasa_lerobot.demos.skills.pick_place.verbs import is_held, take
-from robocasa_lerobot.demos.skills.ways import MOST_DRIVES, Choice, Held, Way, choose, lead
+from robocasa_lerobot.demos.skills.reaching import MOST_DRIVES, Held, ReachPlan, WaypointPath, lead, plan_reach
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.kitchens.appliances.kinds.sink import Sink
 from robocasa_lerobot.envs.predicates import UnderWater
@@ -79,9 +79,9 @@ def hold_object(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
         if choice.stand is not None:
             yield from carry_to(env, obj, choice.stand)
             choice = _choose(env, stage, obj, failed, [_here(env)] * MOST_DRIVES)
-        failed.append(choice.way.targets[1].position)
+        failed.append(choice.path.targets[1].position)
         yield from lead(env, choice.joints, CLOSED)
-        yield from _stay(env, stage, obj, *choice.way.targets)
+        yield from _stay(env, stage, obj, *choice.path.targets)
         if stage_done(env, stage):
             return
     raise SkillError(f"{graspable(env, stage.object).title} was held in vain {ATTEMPTS} times")
@@ -97,7 +97,7 @@ def _stay(env: KitchenEnv, stage: Stage, obj: Graspable, far: HandTarget, at: Ha
     line = None if steep(far, at) else far.position
     yield from move_hand(data, far, CLOSED, tolerance=0.03, max_steps=60, until=done)
     yield from move_hand(
-        data, at, CLOSED, speed=0.7, tolerance=0.01, max_steps=80, insist=INSIST, start=line, until=done
+        data, at, CLOSED, speed=0.7, tolerance=0.01, max_steps=80, integral_gain=INTEGRAL_GAIN, start=line, until=done
     )
     # What has slipped in the hand goes to where it was meant to be, not the hand.
     slipped = at.rotation @ (held.position - Held.now(data, obj.name).position)
@@ -176,7 +176,7 @@ def _levelled(turn: Array) -> Array:
 
 def _choose(
     env: KitchenEnv, stage: Stage, obj: Graspable, failed: list[Array], blocked: list[RobotPose] | tuple[()]
-) -> Choice:
+) -> ReachPlan:
     """The path in that the arm takes best, in all directions that the object may be turned to.
 
     Raises:
@@ -196,9 +196,9 @@ def _choose(
         cost = pose.extra + AGAIN * float(again) + 0.08 * min(yaw, 2 * np.pi - yaw)
         for name in ENTRIES:
             far = at + IN_M * entry(env, name)
-            paths.append(Way((HandTarget(far, rotation), HandTarget(at, rotation)), cost))
+            paths.append(WaypointPath((HandTarget(far, rotation), HandTarget(at, rotation)), cost))
     middle = np.mean([pose.point for pose in poses], axis=0)
-    found = choose(
+    found = plan_reach(
         env, paths, middle, key=1, held=held, loaded=2, allowed=obj.bodies | obj.carried, blocked=blocked
     )  # fmt: skip
     if not found:

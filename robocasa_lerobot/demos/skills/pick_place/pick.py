@@ -25,12 +25,20 @@ from robocasa_lerobot.demos.motion import (
 from robocasa_lerobot.demos.skills.common import SkillError, close_fingers, draw_back, hold_hand, move_hand
 from robocasa_lerobot.demos.skills.pick_place.grasp_strategy import LIFT_M, GraspStrategy, ahead_of, entry, steep
 from robocasa_lerobot.demos.skills.pick_place.graspable import Graspable
-from robocasa_lerobot.demos.skills.ways import GOOD_ENOUGH, Choice, Held, Way, approach, choose, lead
+from robocasa_lerobot.demos.skills.reaching import (
+    GOOD_ENOUGH,
+    Held,
+    ReachPlan,
+    WaypointPath,
+    approach,
+    lead,
+    plan_reach,
+)
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.scene.robot_poses import RobotPose
 
 ATTEMPTS = 5
-INSIST = 0.12
+INTEGRAL_GAIN = 0.12
 GRASP_STEPS, RELEASE_STEPS = 11, 8
 STANDOFF_M = 0.06
 HOPELESS = 3.5  # cost of a path from which on it is not tried
@@ -62,29 +70,37 @@ def pick(env: KitchenEnv, obj: Graspable, strategy: GraspStrategy) -> Iterator[A
         if choice.cost > HOPELESS:
             raise SkillError(f"{obj.title} is out of reach from here, or too near to other things")
         yield from lead(env, choice.joints, OPEN)
-        far, before, at, lifted, out = choice.way.targets
+        far, before, at, lifted, out = choice.path.targets
         # All poses move with the object, should it have been touched meanwhile.
         moved = data.body(obj.name).xpos - start
         yield from move_hand(data, _shifted(far, moved), OPEN, tolerance=0.03)
         line = far.position + moved if strategy.narrow or not steep(far, before) else None
-        yield from move_hand(data, _shifted(before, moved), OPEN, tolerance=0.008, insist=INSIST, start=line)
+        yield from move_hand(
+            data, _shifted(before, moved), OPEN, tolerance=0.008, integral_gain=INTEGRAL_GAIN, start=line
+        )
         moved = data.body(obj.name).xpos - start
         if pose_error(data, _shifted(before, moved)).position > BLOCKED_M:
             tried.append(_in_object(env, obj, HandTarget(at.position + moved, at.rotation)))
             yield from draw_back(data, OPEN, BACK_M)
             continue
         at = _shifted(at, moved)
-        insist = 0.0 if strategy.narrow else INSIST
-        yield from move_hand(data, at, OPEN, speed=0.6, tolerance=0.005, max_steps=45, insist=insist)
+        integral_gain = 0.0 if strategy.narrow else INTEGRAL_GAIN
+        yield from move_hand(data, at, OPEN, speed=0.6, tolerance=0.005, max_steps=45, integral_gain=integral_gain)
         if strategy.narrow:
             more = (data.body(obj.name).xpos - start - moved) * [1.0, 1.0, 0.0]
             at = HandTarget(np.array([*(at.position + more)[:2], grip_position(data)[2]]), at.rotation)
             yield from move_hand(data, at, OPEN, speed=0.4, tolerance=0.004, max_steps=15)
         yield from close_fingers(data, at, GRASP_STEPS)
         inside = _inside(env, obj)
-        lift = float(lifted.position[2] - choice.way.targets[2].position[2])
+        lift = float(lifted.position[2] - choice.path.targets[2].position[2])
         yield from move_hand(
-            data, _shifted(lifted, moved), CLOSED, speed=0.7, tolerance=0.4 * lift, max_steps=50, insist=INSIST
+            data,
+            _shifted(lifted, moved),
+            CLOSED,
+            speed=0.7,
+            tolerance=0.4 * lift,
+            max_steps=50,
+            integral_gain=INTEGRAL_GAIN,
         )
         rise = data.body(obj.name).xpos[2] - start[2] - moved[2]
         if rise > ROSE_SHARE * lift and np.linalg.norm(_inside(env, obj) - inside) < HELD_M:
@@ -109,7 +125,7 @@ def _draw_out(env: KitchenEnv, lifted: HandTarget, out: HandTarget, narrow: bool
         yield from move_hand(env.data, _shifted(out, -LOWER_M * UP), CLOSED, speed=0.8, tolerance=0.03)
 
 
-def best_grasp(env: KitchenEnv, obj: Graspable, strategy: GraspStrategy) -> Choice:
+def best_grasp(env: KitchenEnv, obj: Graspable, strategy: GraspStrategy) -> ReachPlan:
     """How an object would be grasped now; above a cost of about 2 it cannot be.
 
     Raises:
@@ -124,17 +140,17 @@ def _best(
     strategy: GraspStrategy,
     tried: list[HandTarget],
     blocked: Sequence[RobotPose],
-) -> Choice:
+) -> ReachPlan:
     """The first tilt's best path if that is good, else the best of all tilts.
 
     Raises:
         SkillError: no pose fits.
     """
-    found: list[Choice] = []
+    found: list[ReachPlan] = []
     point = env.data.body(obj.name).xpos.copy()
     for tilt, extra in strategy.tilts:
         paths = _paths(env, obj, strategy, tried, tilt, extra)
-        found += choose(env, paths, point, key=2, allowed=obj.bodies, blocked=blocked)[:1]
+        found += plan_reach(env, paths, point, key=2, allowed=obj.bodies, blocked=blocked)[:1]
         if found and found[-1].cost <= GOOD_ENOUGH + extra:
             break
     if not found:
@@ -144,7 +160,7 @@ def _best(
 
 def _paths(
     env: KitchenEnv, obj: Graspable, strategy: GraspStrategy, tried: list[HandTarget], tilt: float, extra: float
-) -> list[Way]:
+) -> list[WaypointPath]:
     body = env.data.body(obj.name)
     found = []
     level = [rotation_about(UP, turn) @ ahead_of(env) for turn in (strategy.turns if tilt > 0.0 else (0.0,))]
@@ -160,7 +176,9 @@ def _paths(
                 for lift in {"up": (strategy.lift_m,), "level": (LEVEL_LIFT_M,)}.get(name, strategy.lifts):
                     out = -turn[:, 2] if name == "along" else entry(env, name)
                     low = LEVEL_COST if name == "level" else LOW_COST if lift < LIFT_M else 0.0
-                    found.append(Way(_poses(pose.position, turn, out, name, strategy, lift), cost + low, takes))
+                    found.append(
+                        WaypointPath(_poses(pose.position, turn, out, name, strategy, lift), cost + low, takes)
+                    )
     return found
 
 

@@ -25,8 +25,8 @@ from robocasa_lerobot.demos.skills.common import SkillError, hold_hand, move_han
 from robocasa_lerobot.demos.skills.navigation import drive_to
 from robocasa_lerobot.demos.skills.pick_place.grasp_strategy import FROM_ABOVE, GraspStrategy, ahead_of, entry, steep
 from robocasa_lerobot.demos.skills.pick_place.graspable import Graspable
-from robocasa_lerobot.demos.skills.pick_place.pick import INSIST
-from robocasa_lerobot.demos.skills.ways import Choice, Held, Way, approach, choose, lead
+from robocasa_lerobot.demos.skills.pick_place.pick import INTEGRAL_GAIN
+from robocasa_lerobot.demos.skills.reaching import Held, ReachPlan, WaypointPath, approach, lead, plan_reach
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.scene.robot_poses import RobotPose
 
@@ -101,18 +101,23 @@ def put(env: KitchenEnv, obj: Graspable, strategy: PlaceStrategy, failed: list[A
     mine = obj.bodies | obj.carried
     middle = np.mean([pose.point for pose in poses], axis=0)
 
-    def plan(blocked: Sequence[RobotPose]) -> Choice:
-        return choose(env, paths, middle, key=2, held=held, loaded=3, allowed=mine, blocked=blocked)[0]
+    def plan(blocked: Sequence[RobotPose]) -> ReachPlan:
+        return plan_reach(env, paths, middle, key=2, held=held, loaded=3, allowed=mine, blocked=blocked)[0]
 
     choice = yield from approach(env, plan, CLOSED)
-    failed.append(choice.way.targets[2].position)
+    failed.append(choice.path.targets[2].position)
     yield from lead(env, choice.joints, CLOSED)
-    far, above, low, clear, away = choice.way.targets
+    far, above, low, clear, away = choice.path.targets
     # A path in through a front is kept from its beginning on.
     inwards = strategy.narrow or not steep(far, above)
     line = far.position if inwards else None
     yield from move_hand(
-        data, far, CLOSED, tolerance=0.01 if inwards else 0.04, max_steps=110, insist=INSIST if inwards else 0.0
+        data,
+        far,
+        CLOSED,
+        tolerance=0.01 if inwards else 0.04,
+        max_steps=110,
+        integral_gain=INTEGRAL_GAIN if inwards else 0.0,
     )
     if not _holds(env, held):
         return
@@ -122,7 +127,7 @@ def put(env: KitchenEnv, obj: Graspable, strategy: PlaceStrategy, failed: list[A
     # What has slipped in the hand goes to the place pose, not the hand.
     slipped = (_origin(low, held) - _origin_now(env, obj, low)) * [1.0, 1.0, 0.0]
     low = HandTarget(low.position + np.clip(slipped, -0.03, 0.03), low.rotation)
-    yield from move_hand(data, low, CLOSED, speed=0.5, tolerance=0.008, max_steps=60, insist=INSIST)
+    yield from move_hand(data, low, CLOSED, speed=0.5, tolerance=0.008, max_steps=60, integral_gain=INTEGRAL_GAIN)
     if pose_error(data, low).position > BLOCKED_M:
         yield from move_hand(data, above, CLOSED, speed=0.6, tolerance=0.03, max_steps=30)
         return
@@ -152,7 +157,7 @@ def leave(env: KitchenEnv, obj: Graspable) -> Iterator[Array]:
 
 def _paths(
     env: KitchenEnv, obj: Graspable, held: Held, pose: PlacePose, strategy: PlaceStrategy, failed: list[Array]
-) -> list[Way]:
+) -> list[WaypointPath]:
     ahead = ahead_of(env)
     left = np.cross(UP, ahead)
     present = hand_rotation(env.data)
@@ -179,14 +184,14 @@ def _paths(
     return found
 
 
-def _path(low: Array, rotation: Array, out: Array, name: str, in_m: float, rise: float, cost: float) -> Way:
+def _path(low: Array, rotation: Array, out: Array, name: str, in_m: float, rise: float, cost: float) -> WaypointPath:
     clear = low - CLEAR_M * rotation[:, 2]
     if name == "up":
         above, far, away = low + rise * UP, low + in_m * UP, clear + AWAY_M * UP
     else:
         above = low + rise * UP
         far, away = above + in_m * out, clear + max(AWAY_M, in_m) * out
-    return Way(tuple(HandTarget(p, rotation) for p in (far, above, low, clear, away)), cost)
+    return WaypointPath(tuple(HandTarget(p, rotation) for p in (far, above, low, clear, away)), cost)
 
 
 def _holds(env: KitchenEnv, held: Held) -> bool:

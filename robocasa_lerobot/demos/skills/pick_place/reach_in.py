@@ -12,11 +12,11 @@ import numpy as np
 
 from robocasa_lerobot.demos.motion import OPEN, Array, base_pose, floor_axes
 from robocasa_lerobot.demos.planning.kinematics import Arm
+from robocasa_lerobot.demos.skills.base_shift import collisions
 from robocasa_lerobot.demos.skills.navigation import Room
 from robocasa_lerobot.demos.skills.pick_place.grasp_strategy import GraspStrategy
 from robocasa_lerobot.demos.skills.pick_place.level_grasps import level_grasps
-from robocasa_lerobot.demos.skills.reach import collisions
-from robocasa_lerobot.demos.skills.ways import go_to
+from robocasa_lerobot.demos.skills.reaching import go_to
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.kitchens.appliances.kinds.microwave import Microwave
 from robocasa_lerobot.envs.robots.panda_omron.robot import PANDA_OMRON

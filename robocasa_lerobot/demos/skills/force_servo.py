@@ -30,7 +30,7 @@ ANEW_STEPS = 40
 STEP_M, STEP_RAD = 0.025, 0.12  # that the goal moves in a control step at most
 
 
-class FirmServo:
+class ForceServo:
     """Actions that draw the hand to targets with a force that grows with their distance.
 
     Args:

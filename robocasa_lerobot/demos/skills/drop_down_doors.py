@@ -19,9 +19,9 @@ from robocasa_lerobot.demos.motion import (
 from robocasa_lerobot.demos.planning.articulated import ContactPath, Shift, Waypoint, plan_contact
 from robocasa_lerobot.demos.planning.contact_paths import arc_waypoints, grip_path
 from robocasa_lerobot.demos.planning.follow import follow_joint_path
-from robocasa_lerobot.demos.skills.arcs import pull_arc, spots, swing, take_stance
+from robocasa_lerobot.demos.skills.arc_motion import follow_arc, pull_arc, spots, take_stance
+from robocasa_lerobot.demos.skills.articulated_part import ArticulatedPart
 from robocasa_lerobot.demos.skills.common import SkillError, move_hand
-from robocasa_lerobot.demos.skills.hinged import Hinged
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.robots.panda_omron.robot import PANDA_OMRON
 
@@ -39,7 +39,7 @@ FINGER_M = PANDA_OMRON.gripper.tips_below_grip
 BASE_HALF_M, BASE_FRONT_M = PANDA_OMRON.shape.base_y[1], PANDA_OMRON.shape.base_x[1]
 
 
-def fold_down(env: KitchenEnv, door: Hinged) -> Iterator[Array]:
+def fold_down(env: KitchenEnv, door: ArticulatedPart) -> Iterator[Array]:
     """Open a door that folds down.
 
     Raises:
@@ -59,7 +59,7 @@ def fold_down(env: KitchenEnv, door: Hinged) -> Iterator[Array]:
         raise SkillError(f"{door.name} is {door.share:.0%} open after {ATTEMPTS} attempts")
 
 
-def stances_beside(env: KitchenEnv, door: Hinged) -> list[tuple[Shift, Shift]]:
+def stances_beside(env: KitchenEnv, door: ArticulatedPart) -> list[tuple[Shift, Shift]]:
     """Moves of the base to try: about where it stands, beside the door's way, and before it."""
     base, _ = base_pose(env.data)
     offset = base - door.point(np.zeros(3), 0.0)
@@ -73,10 +73,10 @@ def stances_beside(env: KitchenEnv, door: Hinged) -> list[tuple[Shift, Shift]]:
     return [(shift, shift) for shift in near]
 
 
-def _pull(env: KitchenEnv, door: Hinged, wanted: float) -> Iterator[Array]:
+def _pull(env: KitchenEnv, door: ArticulatedPart, wanted: float) -> Iterator[Array]:
     """Grasp the handle and pull the door ajar."""
     data = env.data
-    ways = [_pull_way(env, door, grasp, flip, wanted) for grasp in GRASPS for flip in (1.0, -1.0)]
+    ways = [_pull_path(env, door, grasp, flip, wanted) for grasp in GRASPS for flip in (1.0, -1.0)]
     plan = plan_contact(env, door, ways, stances_beside(env, door))
     yield from pull_arc(env, door, plan, wanted + 0.02)
     rest = HandTarget(grip_position(data), hand_rotation(data))
@@ -85,14 +85,14 @@ def _pull(env: KitchenEnv, door: Hinged, wanted: float) -> Iterator[Array]:
     yield from move_hand(data, HandTarget(over, rest.rotation), CLOSED, tolerance=0.05, max_steps=30)
 
 
-def _along(env: KitchenEnv, door: Hinged, low: float, high: float) -> float:
+def _along(env: KitchenEnv, door: ArticulatedPart, low: float, high: float) -> float:
     """The place along the hinge, between bounds, that is nearest to the robot."""
     base, _ = base_pose(env.data)
     return float(np.clip((base - door.point(np.zeros(3), 0.0)) @ door.rightwards, low, high))
 
 
-def _pull_way(
-    env: KitchenEnv, door: Hinged, grasp: tuple[float, float, float], flip: float, wanted: float
+def _pull_path(
+    env: KitchenEnv, door: ArticulatedPart, grasp: tuple[float, float, float], flip: float, wanted: float
 ) -> ContactPath:
     low, high = door.handle()
     room = 0.5 * (high[0] - low[0]) - 0.07
@@ -109,17 +109,17 @@ def _pull_way(
     return grip_path(door, grip, rotation_at, wanted)
 
 
-def _push(env: KitchenEnv, door: Hinged) -> Iterator[Array]:
+def _push(env: KitchenEnv, door: ArticulatedPart) -> Iterator[Array]:
     """Push the door down, from inside."""
     data = env.data
-    ways = [_push_way(env, door, push, roll) for push in PUSHES for roll in range(4)]
+    ways = [_push_path(env, door, push, roll) for push in PUSHES for roll in range(4)]
     plan = plan_contact(env, door, ways, stances_beside(env, door))
     spot = spots(env, plan)
     yield from take_stance(env, plan, CLOSED)
     yield from follow_joint_path(env, plan.joints, CLOSED)
     for via in plan.path.waypoints[: plan.path.contact]:
         yield from move_hand(data, via.target, CLOSED, tolerance=0.04)
-    yield from swing(
+    yield from follow_arc(
         env,
         door,
         plan,
@@ -133,7 +133,7 @@ def _push(env: KitchenEnv, door: Hinged) -> Iterator[Array]:
     yield from move_hand(data, away, CLOSED, max_steps=20)
 
 
-def _push_way(env: KitchenEnv, door: Hinged, push: tuple[float, float, float], roll: int) -> ContactPath:
+def _push_path(env: KitchenEnv, door: ArticulatedPart, push: tuple[float, float, float], roll: int) -> ContactPath:
     share, lean, aside = push
     x = _along(env, door, 0.75 * door.low[0], 0.75 * door.high[0])
     local = np.array([x, door.inside, share * door.high[2]])

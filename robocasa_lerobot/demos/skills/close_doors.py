@@ -12,11 +12,11 @@ import numpy as np
 from robocasa_lerobot.demos.motion import CLOSED, UP, Array, frame
 from robocasa_lerobot.demos.planning.articulated import ContactPath, Shift
 from robocasa_lerobot.demos.planning.contact_paths import push_path
-from robocasa_lerobot.demos.skills.arcs import push_arc, stances_round, tuck, working_height
+from robocasa_lerobot.demos.skills.arc_motion import push_arc, retract, stances_around, working_height
+from robocasa_lerobot.demos.skills.articulated_part import ArticulatedPart
 from robocasa_lerobot.demos.skills.common import SkillError
 from robocasa_lerobot.demos.skills.doors import SHUT_GOAL, doors
-from robocasa_lerobot.demos.skills.fold_down import stances_beside
-from robocasa_lerobot.demos.skills.hinged import Hinged
+from robocasa_lerobot.demos.skills.drop_down_doors import stances_beside
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.tasks.task import Stage
 
@@ -48,9 +48,9 @@ def close_doors(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
             if door.share <= SHUT_GOAL:
                 break
             if attempt > 0 or number > 0:
-                yield from tuck(env, CLOSED)
-            ways = [_push_way(env, door, push, roll) for push in PUSHES for roll in (1.0, -1.0)]
-            stances = stances_round(env, door, NEAR, follow=0.25)
+                yield from retract(env, CLOSED)
+            ways = [_push_path(env, door, push, roll) for push in PUSHES for roll in (1.0, -1.0)]
+            stances = stances_around(env, door, NEAR, follow=0.25)
             yield from push_arc(env, door, ways, stances, SHUT_GOAL * door.full, firm=True)
         if door.share > SHUT_GOAL:
             raise SkillError(f"{door.name} is still {door.share:.1%} open after {ATTEMPTS} attempts")
@@ -66,13 +66,15 @@ def lift_shut(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
         for _ in range(ATTEMPTS):
             if door.share <= SHUT_GOAL:
                 break
-            ways = [_lift_way(door, lift, side, roll) for lift in LIFTS for side in (1.0, -1.0) for roll in (1.0, -1.0)]
+            ways = [
+                _lift_path(door, lift, side, roll) for lift in LIFTS for side in (1.0, -1.0) for roll in (1.0, -1.0)
+            ]
             yield from push_arc(env, door, ways, stances_beside(env, door), SHUT_GOAL * door.full, firm=True)
         if door.share > SHUT_GOAL:
             raise SkillError(f"{door.name} is still {door.share:.1%} open after {ATTEMPTS} attempts")
 
 
-def _push_way(env: KitchenEnv, door: Hinged, push: tuple[float, float, float], roll: float) -> ContactPath:
+def _push_path(env: KitchenEnv, door: ArticulatedPart, push: tuple[float, float, float], roll: float) -> ContactPath:
     share, turn, pitch = push
     side = door.side
     z = working_height(env, door, door.low[2] + 0.06, door.high[2] - 0.06)
@@ -84,7 +86,7 @@ def _push_way(env: KitchenEnv, door: Hinged, push: tuple[float, float, float], r
     return push_path(door, local, FORWARDS, lambda _: rotation, SHUT_GOAL * door.full, bias=bias)
 
 
-def _lift_way(door: Hinged, lift: tuple[float, float, float], side: float, roll: float) -> ContactPath:
+def _lift_path(door: ArticulatedPart, lift: tuple[float, float, float], side: float, roll: float) -> ContactPath:
     """From the right (side 1) or the left."""
     share, turn, pitch = lift
     reach = door.high[0] if side > 0 else -door.low[0]

@@ -25,13 +25,13 @@ from robocasa_lerobot.demos.motion import (
 from robocasa_lerobot.demos.planning.articulated import ContactPath, Shift, Waypoint, plan_contact
 from robocasa_lerobot.demos.planning.contact_paths import CLOSED_FINGERS_HALF_M, arc_waypoints, push_path
 from robocasa_lerobot.demos.planning.follow import Following, follow_joint_path
-from robocasa_lerobot.demos.skills.arcs import spots, swing, take_stance, working_height
+from robocasa_lerobot.demos.skills.arc_motion import follow_arc, spots, take_stance, working_height
+from robocasa_lerobot.demos.skills.articulated_part import ArticulatedPart
+from robocasa_lerobot.demos.skills.base_shift import shift_base
 from robocasa_lerobot.demos.skills.common import SkillError, move_hand
 from robocasa_lerobot.demos.skills.doors import SHUT_GOAL, doors
-from robocasa_lerobot.demos.skills.firm import FirmServo
-from robocasa_lerobot.demos.skills.fold_down import BASE_FRONT_M, BASE_HALF_M, stances_beside
-from robocasa_lerobot.demos.skills.hinged import Hinged
-from robocasa_lerobot.demos.skills.reach import shift_base
+from robocasa_lerobot.demos.skills.drop_down_doors import BASE_FRONT_M, BASE_HALF_M, stances_beside
+from robocasa_lerobot.demos.skills.force_servo import ForceServo
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.robots.panda_omron.robot import PANDA_OMRON
 from robocasa_lerobot.envs.tasks.task import Stage
@@ -74,22 +74,22 @@ def lift_low(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
             raise SkillError(f"{door.name} is still {door.share:.1%} open after {ATTEMPTS} attempts")
 
 
-def _push(env: KitchenEnv, door: Hinged) -> Iterator[Array]:
+def _push(env: KitchenEnv, door: ArticulatedPart) -> Iterator[Array]:
     """Push the door shut: at its edge while it lies low, else at its face."""
     data = env.data
     if door.angle > ENOUGH_RAD:
-        ways = [_lift_way(door, lift, x, roll) for lift in LIFTS for x in XS for roll in (1, -1)]
+        ways = [_lift_path(door, lift, x, roll) for lift in LIFTS for x in XS for roll in (1, -1)]
         plan = plan_contact(env, door, ways, _stances(env, door))
     else:
-        ways = [_push_way(env, door, push, roll) for push in PUSHES for roll in (1, -1)]
+        ways = [_push_path(env, door, push, roll) for push in PUSHES for roll in (1, -1)]
         plan = plan_contact(env, door, ways, stances_beside(env, door))
     spot = spots(env, plan)
     yield from take_stance(env, plan, CLOSED)
     yield from _dash(env, plan.joints)
     back, off = plan.path.waypoints[0].target, plan.path.waypoints[1].target
     yield from move_hand(data, back, CLOSED, tolerance=0.02, max_steps=30)
-    yield from move_hand(data, off, CLOSED, tolerance=0.004, max_steps=40, insist=0.12)
-    yield from swing(env, door, plan, SHUT_GOAL * door.full, gripper=CLOSED, spot=spot, lead_rad=0.0, firm=True)
+    yield from move_hand(data, off, CLOSED, tolerance=0.004, max_steps=40, integral_gain=0.12)
+    yield from follow_arc(env, door, plan, SHUT_GOAL * door.full, gripper=CLOSED, spot=spot, lead_rad=0.0, firm=True)
     away = HandTarget(grip_position(data) - 0.16 * door.inwards, hand_rotation(data))
     yield from move_hand(data, away, CLOSED, tolerance=0.04, max_steps=20)
     if door.angle > ENOUGH_RAD:
@@ -98,10 +98,10 @@ def _push(env: KitchenEnv, door: Hinged) -> Iterator[Array]:
 
 def _dash(env: KitchenEnv, joints: Array) -> Iterator[Array]:
     """Move the hand fast as it goes when all joints turn evenly to some angles: straight ways end in joint limits."""
-    yield from follow_joint_path(env, joints, CLOSED, DASH, FirmServo(env.data).action)
+    yield from follow_joint_path(env, joints, CLOSED, DASH, ForceServo(env.data).action)
 
 
-def _stances(env: KitchenEnv, door: Hinged) -> tuple[tuple[Shift, Shift], ...]:
+def _stances(env: KitchenEnv, door: ArticulatedPart) -> tuple[tuple[Shift, Shift], ...]:
     """Moves of the base, before and by the end: before the free edge, then beside it; the base goes along inwards."""
     base, yaw = base_pose(env.data)
     axes = floor_axes(yaw)
@@ -126,7 +126,7 @@ def _stances(env: KitchenEnv, door: Hinged) -> tuple[tuple[Shift, Shift], ...]:
     return tuple(found)
 
 
-def _lift_way(door: Hinged, lift: tuple[float, float], x: float, roll: float) -> ContactPath:
+def _lift_path(door: ArticulatedPart, lift: tuple[float, float], x: float, roll: float) -> ContactPath:
     """At the free edge, at a share of half its width from the middle.
 
     The inward side of the fingers bears on the edge's outer corner, their tips just below it.
@@ -153,7 +153,7 @@ def _lift_way(door: Hinged, lift: tuple[float, float], x: float, roll: float) ->
     return ContactPath((Waypoint(start, back), Waypoint(start, off), *arc), 2, target_at)
 
 
-def _push_way(env: KitchenEnv, door: Hinged, push: tuple[float, float], roll: float) -> ContactPath:
+def _push_path(env: KitchenEnv, door: ArticulatedPart, push: tuple[float, float], roll: float) -> ContactPath:
     """On the face, below the handle."""
     turn, pitch = np.deg2rad(push)
     low, _ = door.handle()

@@ -9,9 +9,9 @@ import numpy as np
 from robocasa_lerobot.demos.motion import UP, Array, frame
 from robocasa_lerobot.demos.planning.articulated import ContactPath, Shift, plan_contact
 from robocasa_lerobot.demos.planning.contact_paths import CLOSED_FINGERS_HALF_M, grip_path, push_path
-from robocasa_lerobot.demos.skills.arcs import pull_arc, push_arc
+from robocasa_lerobot.demos.skills.arc_motion import pull_arc, push_arc
+from robocasa_lerobot.demos.skills.articulated_part import ArticulatedPart
 from robocasa_lerobot.demos.skills.common import SkillError
-from robocasa_lerobot.demos.skills.hinged import Hinged
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.kitchens.appliances.base import Appliance
 from robocasa_lerobot.envs.tasks.task import Stage
@@ -40,7 +40,7 @@ def raise_head(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
     """
     head = _head(env, stage)
     for _ in range(ATTEMPTS):
-        ways = [_lift_way(head, lift, roll) for lift in LIFTS for roll in (1.0, -1.0)]
+        ways = [_lift_path(head, lift, roll) for lift in LIFTS for roll in (1.0, -1.0)]
         yield from push_arc(env, head, ways, STANCES, UP_SHARE * head.full)
         if head.share >= UP_SHARE:
             return
@@ -56,32 +56,32 @@ def lower_head(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
     head = _head(env, stage)
     for _ in range(ATTEMPTS):
         if head.share > HALF_SHARE + 0.1:
-            ways = [_drag_way(head, drag, roll) for drag in DRAGS for roll in (1.0, -1.0)]
+            ways = [_drag_path(head, drag, roll) for drag in DRAGS for roll in (1.0, -1.0)]
             yield from pull_arc(env, head, plan_contact(env, head, ways, STANCES), DOWN_SHARE * head.full)
             if head.share <= DOWN_SHARE:
                 return
             if head.share > HALF_SHARE + 0.2:
                 continue  # the cap has slipped out of the fingers
-        ways = [_press_way(head, press, roll) for press in PRESSES for roll in (1.0, -1.0)]
+        ways = [_press_path(head, press, roll) for press in PRESSES for roll in (1.0, -1.0)]
         yield from push_arc(env, head, ways, STANCES, DOWN_SHARE * head.full)
         if head.share <= DOWN_SHARE:
             return
     raise SkillError(f"{head.name} is still {head.share:.1%} up after {ATTEMPTS} attempts")
 
 
-def _head(env: KitchenEnv, stage: Stage) -> Hinged:
+def _head(env: KitchenEnv, stage: Stage) -> ArticulatedPart:
     mixer = env.scene.fixture(stage.target, Appliance)
-    return Hinged(env.data, mixer, mixer.joint("head"))
+    return ArticulatedPart(env.data, mixer, mixer.joint("head"))
 
 
-def _lift_way(head: Hinged, tilt: tuple[float, float], roll: float) -> ContactPath:
+def _lift_path(head: ArticulatedPart, tilt: tuple[float, float], roll: float) -> ContactPath:
     """Push the head up near its nose, the fingers flat under it."""
     local = np.array([0.0, 0.9 * head.low[1], head.low[2]])
     rotation = _rotation(head, tilt, roll)
     return push_path(head, local, -UP, lambda _: rotation, UP_SHARE * head.full, off_m=0.015, back_m=0.12)
 
 
-def _drag_way(head: Hinged, drag: tuple[float, float, float], roll: float) -> ContactPath:
+def _drag_path(head: ArticulatedPart, drag: tuple[float, float, float], roll: float) -> ContactPath:
     """Hold the cap on the nose and lead it down: a head that is up is too near a wall cabinet to reach over it."""
     pitch, aside, turn = drag
     skew = head.angle + np.deg2rad(pitch)  # of the fingers from the cap's axis
@@ -97,14 +97,14 @@ def _drag_way(head: Hinged, drag: tuple[float, float, float], roll: float) -> Co
     return grip_path(head, local, rotation_at, DOWN_SHARE * head.full, bias=bias)
 
 
-def _press_way(head: Hinged, tilt: tuple[float, float], roll: float) -> ContactPath:
+def _press_path(head: ArticulatedPart, tilt: tuple[float, float], roll: float) -> ContactPath:
     """Push the head down near its nose, the fingers flat on it."""
     local = np.array([0.0, 0.85 * head.low[1], head.high[2]])
     rotation = _rotation(head, tilt, roll)
     return push_path(head, local, UP, lambda _: rotation, DOWN_SHARE * head.full, off_m=0.04, back_m=0.06)
 
 
-def _rotation(head: Hinged, tilt: tuple[float, float], roll: float) -> Array:
+def _rotation(head: ArticulatedPart, tilt: tuple[float, float], roll: float) -> Array:
     pitch, aside = np.deg2rad(tilt)
     level = np.cos(aside) * head.inwards + np.sin(aside) * head.rightwards
     return frame(np.cos(pitch) * level + np.sin(pitch) * UP, roll * head.rightwards)

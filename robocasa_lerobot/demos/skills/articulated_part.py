@@ -20,7 +20,7 @@ LEAD_M = 0.07  # of the commanded point before the one that is pushed: with the 
 STALL_STEPS, STALL_RAD = 25, 0.004
 
 
-class Hinged:
+class ArticulatedPart:
     """A door, head or lid of a fixture.
 
     Points are given in the fixture's axes (x to the right, y inwards, z up) from the hinge, as they lie when it is
@@ -140,7 +140,7 @@ class Hinged:
         return low, high
 
 
-class Headway:
+class StallDetector:
     """Tells when a part that is led one way turns no more.
 
     Args:
@@ -151,7 +151,7 @@ class Headway:
         since: control steps without movement.
     """
 
-    def __init__(self, part: Hinged, way: float) -> None:
+    def __init__(self, part: ArticulatedPart, way: float) -> None:
         self._part, self._way, self._last, self.since = part, way, part.angle, 0
 
     def ends(self) -> bool:
@@ -163,8 +163,8 @@ class Headway:
         return self.since >= STALL_STEPS
 
 
-def push_round(
-    part: Hinged,
+def push_around(
+    part: ArticulatedPart,
     data: mujoco.MjData,
     local: Array,
     goal: float,
@@ -190,7 +190,7 @@ def push_round(
     """
     way = 1.0 if goal > part.share else -1.0
     lead = lead_m / part.radius(local)
-    headway = Headway(part, way)
+    headway = StallDetector(part, way)
     for _ in range(max_steps):
         if way * (part.share - goal) >= 0.0:
             return

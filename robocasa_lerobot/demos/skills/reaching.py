@@ -17,15 +17,14 @@ from robocasa_lerobot.demos.planning.collision import Held
 from robocasa_lerobot.demos.planning.costs import REACHING
 from robocasa_lerobot.demos.planning.follow import follow_joint_path
 from robocasa_lerobot.demos.planning.kinematics import Arm
-from robocasa_lerobot.demos.planning.motion_planner import MotionPlanner
-from robocasa_lerobot.demos.planning.motion_planner import WaypointPath as Way
+from robocasa_lerobot.demos.planning.motion_planner import MotionPlanner, WaypointPath
 from robocasa_lerobot.demos.skills.common import SkillError
 from robocasa_lerobot.demos.skills.navigation import drive_to
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.robots.panda_omron.robot import PANDA_OMRON
 from robocasa_lerobot.envs.scene.robot_poses import RobotPose
 
-__all__ = ["GOOD_ENOUGH", "Choice", "Held", "Way", "approach", "choose", "go_to", "lead"]
+__all__ = ["GOOD_ENOUGH", "Held", "ReachPlan", "WaypointPath", "approach", "go_to", "lead", "plan_reach"]
 
 GOOD_ENOUGH = REACHING.good_enough  # cost up to which no other place to stand is looked at
 AHEAD_M, LEFT_M = (0.45, 0.55, 0.65, 0.75), (0.0, -0.15, 0.15, -0.3, 0.3)
@@ -34,22 +33,22 @@ ARRIVED_M, BLOCKED_M, MOST_DRIVES = 0.05, 0.10, 3
 
 
 @dataclass(frozen=True)
-class Choice:
+class ReachPlan:
     """A path, where to stand, the cost (from about 2 on it will not do), and the joint path to its first pose.
 
     Attributes:
         joints: (7,) radians at the first pose, or (k, 7) where the arm goes round something.
     """
 
-    way: Way
+    path: WaypointPath
     stand: RobotPose | None
     cost: float
     joints: Array
 
 
-def choose(
+def plan_reach(
     env: KitchenEnv,
-    ways: Sequence[Way],
+    ways: Sequence[WaypointPath],
     point: Array,
     *,
     key: int,
@@ -57,7 +56,7 @@ def choose(
     loaded: int = 0,
     allowed: frozenset[int] = frozenset(),
     blocked: Sequence[RobotPose] = (),
-) -> list[Choice]:
+) -> list[ReachPlan]:
     """The paths that cost least, best first, from where the robot stands or from where it could.
 
     Args:
@@ -77,12 +76,12 @@ def choose(
     if not ((found and found[0].cost <= GOOD_ENOUGH) or len(blocked) >= MOST_DRIVES):
         stands = [s for s in _stands(env, point) if all(np.hypot(s.x - b.x, s.y - b.y) > BLOCKED_M for b in blocked)]
         found = sorted(found + planner.best(stands), key=lambda plan: plan.cost)
-    return [Choice(p.path, p.base, p.cost, p.joints if len(p.joints) > 1 else p.joints[0]) for p in found]
+    return [ReachPlan(p.path, p.base, p.cost, p.joints if len(p.joints) > 1 else p.joints[0]) for p in found]
 
 
 def approach(
-    env: KitchenEnv, plan: Callable[[Sequence[RobotPose]], Choice], gripper: float
-) -> Generator[Array, None, Choice]:
+    env: KitchenEnv, plan: Callable[[Sequence[RobotPose]], ReachPlan], gripper: float
+) -> Generator[Array, None, ReachPlan]:
     """Choose a path and drive to where it begins; choose another one where the base does not get there."""
     blocked: list[RobotPose] = []
     while True:

@@ -25,14 +25,14 @@ from robocasa_lerobot.demos.motion import (
 from robocasa_lerobot.demos.planning.articulated import ArticulatedPlan, ContactPath, Shift, plan_contact
 from robocasa_lerobot.demos.planning.contact_paths import STANDOFF_M
 from robocasa_lerobot.demos.planning.follow import follow_joint_path
+from robocasa_lerobot.demos.skills.articulated_part import ArticulatedPart, StallDetector
+from robocasa_lerobot.demos.skills.base_shift import shift_base
 from robocasa_lerobot.demos.skills.common import SkillError, draw_back, hold_hand, move_hand
-from robocasa_lerobot.demos.skills.firm import FirmServo
-from robocasa_lerobot.demos.skills.hinged import Headway, Hinged
-from robocasa_lerobot.demos.skills.reach import shift_base
+from robocasa_lerobot.demos.skills.force_servo import ForceServo
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 
 SETTLE_STEPS, GRASP_STEPS, RELEASE_STEPS = 6, 10, 6
-INSIST = 0.12
+INTEGRAL_GAIN = 0.12
 _BASE_SPEED = 0.22  # metres a second while the arm moves too: the arm keeps up with about 0.26
 _DEAD_ZONE = 0.25  # of base commands (docs/robocasa.md, section 2)
 TUCKED_AHEAD_M, TUCKED_UP_M = 0.28, 0.58  # of the grip site from the arm's foot
@@ -41,9 +41,9 @@ FIRM_LEAD_M = 0.09  # of the hand's goal in a firm push
 FIRMER_STEPS = 12  # without movement, after which a firm push has twice its lead
 
 
-def swing(
+def follow_arc(
     env: KitchenEnv,
-    part: Hinged,
+    part: ArticulatedPart,
     plan: ArticulatedPlan,
     goal: float,
     *,
@@ -71,10 +71,10 @@ def swing(
         firm: push harder, the harder the longer nothing moves; then neither `lead_rad` nor `speed` has an effect.
     """
     data = env.data
-    servo = FirmServo(data)
+    servo = ForceServo(data)
     first = part.angle
     way = 1.0 if goal > first else -1.0
-    headway = Headway(part, way)
+    headway = StallDetector(part, way)
     for _ in range(max_steps):
         if way * (part.angle - goal) >= 0.0 or until():
             return
@@ -92,7 +92,13 @@ def swing(
 
 
 def pull_arc(
-    env: KitchenEnv, part: Hinged, plan: ArticulatedPlan, goal: float, *, lead_rad: float = 0.15, speed: float = 0.9
+    env: KitchenEnv,
+    part: ArticulatedPart,
+    plan: ArticulatedPlan,
+    goal: float,
+    *,
+    lead_rad: float = 0.15,
+    speed: float = 0.9,
 ) -> Iterator[Array]:
     """Grasp a part as planned, lead it to an angle, let it go and draw the hand back."""
     data = env.data
@@ -100,11 +106,13 @@ def pull_arc(
     yield from take_stance(env, plan, OPEN)
     yield from follow_joint_path(env, plan.joints, OPEN)
     before, at = plan.path.waypoints[0].target, plan.path.waypoints[1].target
-    yield from move_hand(data, before, OPEN, speed=0.7, tolerance=0.010, insist=INSIST)
+    yield from move_hand(data, before, OPEN, speed=0.7, tolerance=0.010, integral_gain=INTEGRAL_GAIN)
     yield from hold_hand(data, before, OPEN, SETTLE_STEPS)  # it comes with speed, and there may be little room
-    yield from move_hand(data, at, OPEN, speed=0.6, tolerance=0.006, max_steps=40, insist=INSIST)
+    yield from move_hand(data, at, OPEN, speed=0.6, tolerance=0.006, max_steps=40, integral_gain=INTEGRAL_GAIN)
     yield from hold_hand(data, at, CLOSED, GRASP_STEPS)
-    yield from swing(env, part, plan, goal, gripper=CLOSED, spot=spot, lead_rad=lead_rad, speed=speed, max_steps=160)
+    yield from follow_arc(
+        env, part, plan, goal, gripper=CLOSED, spot=spot, lead_rad=lead_rad, speed=speed, max_steps=160
+    )
     rest = HandTarget(grip_position(data), hand_rotation(data))
     yield from hold_hand(data, rest, OPEN, RELEASE_STEPS)
     away = HandTarget(rest.position - rest.rotation[:, 2] * (STANDOFF_M + 0.02), rest.rotation)
@@ -113,7 +121,7 @@ def pull_arc(
 
 def push_arc(
     env: KitchenEnv,
-    part: Hinged,
+    part: ArticulatedPart,
     ways: Iterable[ContactPath],
     stances: Iterable[tuple[Shift, Shift]],
     goal: float,
@@ -137,11 +145,11 @@ def push_arc(
     yield from follow_joint_path(env, plan.joints, CLOSED)
     for via in plan.path.waypoints[: plan.path.contact]:
         yield from move_hand(data, via.target, CLOSED, tolerance=0.03)
-    yield from swing(env, part, plan, goal, gripper=CLOSED, spot=spot, lead_rad=lead_rad, speed=speed, firm=firm)
+    yield from follow_arc(env, part, plan, goal, gripper=CLOSED, spot=spot, lead_rad=lead_rad, speed=speed, firm=firm)
     yield from draw_back(data, CLOSED, 0.10)
 
 
-def tuck(env: KitchenEnv, gripper: float) -> Iterator[Array]:
+def retract(env: KitchenEnv, gripper: float) -> Iterator[Array]:
     """Draw the hand back to about where it is at the beginning of an episode, before the base's middle."""
     data = env.data
     base, yaw = base_pose(data)
@@ -151,8 +159,8 @@ def tuck(env: KitchenEnv, gripper: float) -> Iterator[Array]:
     yield from move_hand(data, target, gripper, tolerance=0.10, max_steps=40)
 
 
-def stances_round(
-    env: KitchenEnv, door: Hinged, near: list[Shift], *, follow: float = 0.0
+def stances_around(
+    env: KitchenEnv, door: ArticulatedPart, near: list[Shift], *, follow: float = 0.0
 ) -> list[tuple[Shift, Shift]]:
     """Moves of the base to try for a door on a vertical hinge: about where it stands, and about the door.
 
@@ -176,7 +184,7 @@ def stances_round(
     return [((x, y), (x + more, y)) for x, y in starts for more in ends]
 
 
-def working_height(env: KitchenEnv, door: Hinged, low: float, high: float) -> float:
+def working_height(env: KitchenEnv, door: ArticulatedPart, low: float, high: float) -> float:
     """The height over the door's hinge, between two bounds, that is nearest to where the hand works best, metres."""
     height = base_pose(env.data)[0][2] + REST_M - door.point(np.zeros(3), 0.0)[2]
     return float(np.clip(height, low, high))
