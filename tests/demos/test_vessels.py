@@ -43,6 +43,7 @@ def kettle(request: pytest.FixtureRequest) -> Iterator[KitchenEnv]:
 def test_at_every_hold_pose_the_contents_are_under_water(lettuce: KitchenEnv) -> None:
     env = lettuce
     stage, obj = env.declaration.stages[1], graspable(env, "lettuce_container")
+    assert stage_text(stage, env.scene) == "hold the colander under the faucet of the sink"
     assert obj.contents == ("lettuce",)
     poses = hold_poses(env, stage, obj)
     assert len(poses) > 8

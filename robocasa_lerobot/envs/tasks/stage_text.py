@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from robocasa_lerobot.envs.kitchens.appliances.kinds.coffee_machine import CoffeeMachine
-from robocasa_lerobot.envs.kitchens.appliances.kinds.sink import Sink
 from robocasa_lerobot.envs.kitchens.appliances.kinds.stove import Hob
 from robocasa_lerobot.envs.kitchens.fixtures.counters import Counter
 from robocasa_lerobot.envs.kitchens.fixtures.regions import ANY_LEVEL
+from robocasa_lerobot.envs.predicates.heat_and_water import UnderWater
+from robocasa_lerobot.envs.predicates.logic import every_goal_in
 from robocasa_lerobot.envs.scene.scene import Scene
 from robocasa_lerobot.envs.scene.words import said
 from robocasa_lerobot.envs.tasks.task import Stage
@@ -139,10 +140,9 @@ def _knob(stage: Stage, scene: Scene) -> str:
 
 
 def _held(stage: Stage, scene: Scene) -> str:
-    """Where an object is held."""
-    target = _target(stage, scene)
-    sink = stage.target in scene.roles and isinstance(scene.fixture(stage.target), Sink)
-    return f"hold the {_object(stage, scene)} {'under the faucet of' if sink else 'at'} the {target}"
+    """Where an object is held: what is to be under water, under the faucet."""
+    wet = stage.until is not None and any(isinstance(goal, UnderWater) for goal in every_goal_in(stage.until))
+    return f"hold the {_object(stage, scene)} {'under the faucet of' if wet else 'at'} the {_target(stage, scene)}"
 
 
 def _driven(stage: Stage, scene: Scene) -> str:
