@@ -10,14 +10,15 @@ import numpy as np
 import pytest
 from drawn_tasks import CUBES, DRAWN, FOOD, FRUIT, FRUITS, ICE, PANTRY, SINK, TOOLS, in_sink
 
-from robocasa_lerobot.envs.kitchens.appliances.kinds.sink import Sink
 from robocasa_lerobot.demos.demonstrator import can_demonstrate
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
+from robocasa_lerobot.envs.kitchens.appliances.kinds.sink import Sink
 from robocasa_lerobot.envs.kitchens.fixtures.cabinets import HingeCabinet
-from robocasa_lerobot.envs.predicates import StateIs, (
+from robocasa_lerobot.envs.predicates import (
     AllOf,
     ForEach,
     ObjectOn,
+    StateIs,
 )
 from robocasa_lerobot.envs.scene.build import build_scene
 from robocasa_lerobot.envs.scene.scene import Scene
