@@ -263,7 +263,7 @@ def test_readers_without_a_scene_see_all_that_may_come() -> None:
     assert [stage.object for stage in stages_of(TOOLS)] == ["knife", "peeler", ""]
     assert all(map(can_demonstrate, DRAWN.values()))
     text = "\n".join(page(replace(ICE, paraphrases=("a",))))
-    for said in ("for each of `ice_cube`", "`ice_cube_i_inside_blender`", "{n} x ice cube", "drop_into_jug ice_cube_i"):
+    for said in ("for each of `ice_cube`", "`ice_cube_i_inside_blender`", "{n} x ice cube", "place ice_cube_i"):
         assert said in text
     assert "all of one model" in "\n".join(page(alike(same_model=True)))
 

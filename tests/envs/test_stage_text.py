@@ -61,7 +61,7 @@ def test_a_text_of_its_own_comes_first(kitchen: Any) -> None:
 
 
 def test_words_of_what_was_drawn() -> None:
-    fixture = SimpleNamespace()
+    fixture = SimpleNamespace(compartments=())
     interior = SimpleNamespace(half=np.array([0.1, 0.1, 0.04]))
     bowl = SimpleNamespace(item=SimpleNamespace(interior=interior))
     plate = SimpleNamespace(item=SimpleNamespace(interior=None))
@@ -83,7 +83,7 @@ def test_words_of_what_was_drawn() -> None:
         (Stage("racks", "slide", "fxtr", part="{rack}", to="{direction}"), "slide the top rack of the oven out"),
         (Stage("pick_place", "place", "bowl", object="obj"), "put the ice cube into the bowl"),
         (Stage("pick_place", "place", "plate", object="obj"), "put the ice cube on the plate"),
-        (Stage("pick_place", "place_inside", "fxtr", object="obj", part="{rack}"),
+        (Stage("pick_place", "place", "fxtr", object="obj", part="{rack}"),
          "put the ice cube on the top rack of the oven"),
         (Stage("made", "hold", "fxtr", object="{fxtr}_lid"), "hold the lid"),
         (Stage("doors", "open", "fxtr", part="left_door"), "open the left door of the oven"),

@@ -53,7 +53,7 @@ ICE = Task(
         ObjectWanted("ice_cube", ("ice_cube",), Placement(object="bowl"), count="{n}", scale=0.8, repeats=True),
     ),
     goal=ForEach("ice_cube", lambda name: AllOf(ObjectInside(name, "blender"), GripperFar(name))),
-    stages=(EachStage("ice_cube", lambda name: (Stage("pick_place", "drop_into_jug", "blender", object=name),)),),
+    stages=(EachStage("ice_cube", lambda name: (Stage("pick_place", "place", "blender", object=name),)),),
     instruction="Move {how_many} ice cubes from the bowl into the blender.",
 )  # fmt: skip
 IN_CABINET = Placement("cab", size=(0.2, 0.3), pos=("{side}", -0.3), margin=0.0)
