@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Generator, Iterable, Iterator
 
 import mujoco
 import numpy as np
@@ -122,8 +122,8 @@ def push_arc(
     speed: float = 0.8,
     firm: bool = False,
     most_cost: float = np.inf,
-) -> Iterator[Array]:
-    """Push a part to an angle in the best of some ways, and draw the hand back.
+) -> Generator[Array, None, ContactPath]:
+    """Push a part to an angle in the best of some ways, which is returned, and draw the hand back.
 
     Raises:
         SkillError: none of them is to be had, or none for `most_cost`.
@@ -139,6 +139,7 @@ def push_arc(
         yield from move_hand(data, via.target, CLOSED, tolerance=0.03)
     yield from swing(env, part, plan, goal, gripper=CLOSED, spot=spot, lead_rad=lead_rad, speed=speed, firm=firm)
     yield from draw_back(data, CLOSED, 0.10)
+    return plan.path
 
 
 def tuck(env: KitchenEnv, gripper: float) -> Iterator[Array]:

@@ -17,8 +17,11 @@ from robocasa_lerobot.demos.skills.common import SkillError
 from robocasa_lerobot.demos.skills.doors import SHUT_GOAL, doors
 from robocasa_lerobot.demos.skills.fold_down import stances_beside
 from robocasa_lerobot.demos.skills.hinged import Hinged
+from robocasa_lerobot.demos.skills.reach import shift_base
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.tasks.task import Stage
+
+Push = tuple[float, float, float]
 
 ATTEMPTS = 4
 FORWARDS = np.array([0.0, -1.0, 0.0])  # to the room, in the fixture's axes: outwards for a door that is shut
@@ -33,6 +36,9 @@ PUSHES = (
     *((0.75, turn, pitch) for pitch in (-50, -75) for turn in (0, 45)),
     *((0.93, turn, 0) for turn in (0, -30, -60)),
 )
+SLIPPED, MOVED_RAD = 0.6, 0.1  # cost of a push under which the door has turned by less than that
+RETREAT: Shift = (-0.2, 0.0)  # from a door that was not shut
+RETREAT_STEPS = 25
 ROUND_BIAS = 0.4  # against reaching round the free edge: the hand may meet it
 NEAR: list[Shift] = [(0.0, 0.0), (-0.2, 0.0), (-0.2, 0.25), (-0.2, -0.25), (-0.4, 0.0)]
 
@@ -44,16 +50,31 @@ def close_doors(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
         SkillError: a door is not shut after four attempts.
     """
     for number, door in enumerate(doors(env, stage)):
+        slipped: list[Push] = []
         for attempt in range(ATTEMPTS):
             if door.share <= SHUT_GOAL:
                 break
             if attempt > 0 or number > 0:
                 yield from tuck(env, CLOSED)
-            ways = [_push_way(env, door, push, roll) for push in PUSHES for roll in (1.0, -1.0)]
-            stances = stances_round(env, door, NEAR, follow=0.25)
-            yield from push_arc(env, door, ways, stances, SHUT_GOAL * door.full, firm=True)
+            yield from _close(env, door, slipped)
         if door.share > SHUT_GOAL:
             raise SkillError(f"{door.name} is still {door.share:.1%} open after {ATTEMPTS} attempts")
+
+
+def _close(env: KitchenEnv, door: Hinged, slipped: list[Push]) -> Iterator[Array]:
+    """Push a door as far as it goes; a push under which it hardly turns is noted in `slipped`, and tried last.
+
+    Raises:
+        SkillError: the arm reaches it nowhere.
+    """
+    pushes = [(push, roll) for push in PUSHES for roll in (1.0, -1.0)]
+    ways = [_push_way(env, door, push, roll, SLIPPED * (push in slipped)) for push, roll in pushes]
+    stances, before = stances_round(env, door, NEAR, follow=0.25), door.angle
+    goal = SHUT_GOAL * door.full
+    path = yield from push_arc(env, door, ways, stances, goal, firm=True)
+    if before - door.angle < MOVED_RAD:
+        slipped.append(pushes[ways.index(path)][0])
+        yield from shift_base(env, RETREAT, CLOSED, RETREAT_STEPS)
 
 
 def lift_shut(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
@@ -72,7 +93,7 @@ def lift_shut(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
             raise SkillError(f"{door.name} is still {door.share:.1%} open after {ATTEMPTS} attempts")
 
 
-def _push_way(env: KitchenEnv, door: Hinged, push: tuple[float, float, float], roll: float) -> ContactPath:
+def _push_way(env: KitchenEnv, door: Hinged, push: Push, roll: float, more: float) -> ContactPath:
     share, turn, pitch = push
     side = door.side
     z = working_height(env, door, door.low[2] + 0.06, door.high[2] - 0.06)
@@ -80,7 +101,7 @@ def _push_way(env: KitchenEnv, door: Hinged, push: tuple[float, float, float], r
     aside, up = np.deg2rad(turn), np.deg2rad(pitch)
     level = np.cos(aside) * door.inwards + side * np.sin(aside) * door.rightwards
     rotation = frame(np.cos(up) * level + np.sin(up) * UP, roll * UP)
-    bias = ROUND_BIAS if share > 0.9 else 0.0
+    bias = more + (ROUND_BIAS if share > 0.9 else 0.0)
     return push_path(door, local, FORWARDS, lambda _: rotation, SHUT_GOAL * door.full, bias=bias)
 
 
