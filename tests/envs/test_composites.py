@@ -11,10 +11,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from robocasa_lerobot.envs.predicates import Goal, GripperFar, OnBurner, StepsWhile, UnderWater
 from robocasa_lerobot.envs.predicates.logic import AllOf
+from robocasa_lerobot.envs.scene.build import build_scene
 from robocasa_lerobot.envs.scene.initial_states import Water
 from robocasa_lerobot.envs.scene.scene_spec import InitialState
 from robocasa_lerobot.envs.scene.spec import ObjectWanted, Placement
@@ -139,3 +141,11 @@ def test_goal_and_initial_states(name: str, blueprints: dict[str, Any]) -> None:
     states = {state for state in ours.initial.values() if state is not None and not isinstance(state, str)}
     assert set(task.initial) == states
     assert {state for state in ours.initial.values() if isinstance(state, str)} <= {o.name for o in task.objects}
+
+
+@pytest.mark.parametrize("seed", [300_000, 300_006, 300_008])
+def test_objects_on_several_shelves_do_not_lie_in_each_other(seed: int) -> None:
+    scene = build_scene(get_task("BuildAppetizerPlate"), "target", seed)
+    data, _ = scene.initial_data(np.random.default_rng(seed))
+    moved = {name: np.linalg.norm(data.body(name).xpos - placed.pos) for name, placed in scene.objects.items()}
+    assert max(moved.values()) < 0.05, moved

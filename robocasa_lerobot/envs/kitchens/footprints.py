@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -185,18 +185,22 @@ def place(
     rng: np.random.Generator,
     areas: list[Area],
     half: tuple[float, float],
-    occupied: list[Footprint],
+    occupied: list[Footprint] | Callable[[Area], list[Footprint]],
     margin: float = 0.01,
     what: str = "a footprint",
     middle: tuple[float, float] = (0.0, 0.0),
 ) -> tuple[Footprint, Area]:
     """Find a footprint in one of the areas that keeps `margin` metres from those occupied; `middle` as in `sample`.
 
+    What is occupied may be another matter for each area: shelves lie over each other.
+
     Raises:
         PlacementError: none found in 5000 draws; it names `what`, the region, its free area and three remedies.
     """
     aside = float(np.hypot(*middle))
-    near = [Footprints(_neighbours(area, half, occupied, margin + aside)) for area in areas]
+    taken = [occupied(area) if callable(occupied) else occupied for area in areas]
+    pairs = list(zip(areas, taken, strict=True))
+    near = [Footprints(_neighbours(area, half, marks, margin + aside)) for area, marks in pairs]
     for count in (*[1] * FEW_SAMPLES, MAX_SAMPLES - FEW_SAMPLES):
         which = rng.integers(len(areas), size=count)
         places, free = np.empty((count, 3)), np.empty(count, dtype=bool)
@@ -208,7 +212,7 @@ def place(
             first = int(np.argmax(free))
             x, y, yaw = places[first].tolist()
             return Footprint(x, y, yaw, half), areas[int(which[first])]
-    left = sum(area.free_extent(occupied) for area in areas)
+    left = sum(area.free_extent(marks) for area, marks in pairs)
     names = ", ".join(dict.fromkeys(area.name for area in areas))
     raise PlacementError(
         f"no free place for {what} of {half[0] * 2:.2f} x {half[1] * 2:.2f} m on {names}: {left:.3f} of "

@@ -169,7 +169,14 @@ def _put_down(
             f"{what} is {height:.2f} m high, and {areas[0].name} has {max(a.height for a in areas):.2f} m. Ask for a "
             "lower object, for a higher part, or for another fixture."
         )
-    half, occupied = (width / 2, depth / 2), [*table.near(high[0].z), *standing]
+    half = (width / 2, depth / 2)
+
+    def occupied(area: Area) -> list[Footprint]:
+        """What stands at the area's own height; and, as ever, at that of the first, though it may lie elsewhere."""
+        heights = {high[0].z, area.z}
+        marks = dict.fromkeys(mark for z in sorted(heights) for mark in table.near(z))
+        return [*marks, *standing]
+
     middle = (0.0, 0.0) if item.interior is None else item.interior.center[:2]
     for _ in range(_TURNS):
         footprint, area = place(rng, high, half, occupied, what=what, middle=middle)
