@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from robocasa_lerobot.envs.scene.scene import Scene
 
 GRIPPER_FAR_M, BUTTON_FAR_M = 0.25, 0.15
-OPPOSITE_COSINE = -0.5  # of the angle between two fingers' pushes
+OPPOSITE_COSINE = -0.2  # of the angle between two fingers' pushes: wedges, as of cheese, are held askew
 # Of the base from the pose in front of a fixture (docs/robocasa.md, section 8).
 NEAR_M, NEAR_COSINE = 1.1, 0.5  # of an object from the base's centre, and of the base's heading towards it
 STANDS_WITHIN_M, STANDS_COSINE = 0.20, 0.98
