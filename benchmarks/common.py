@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import importlib.metadata
+import io
 import json
 import os
 import platform
 import statistics
+import subprocess
+import tarfile
 import time
 from collections.abc import Iterable, Sequence
 from pathlib import Path
@@ -58,6 +61,15 @@ def busy_share(seconds: float = 0.3) -> float | None:
     assert after is not None
     total, idle = after[0] - before[0], after[1] - before[1]
     return 0.0 if total <= 0 else 1.0 - idle / total
+
+
+def unpack(commit: str, folder: Path, *paths: str) -> Path:
+    """Lay the files of a commit of ours into a folder, all or those below some paths."""
+    command = ["git", "archive", commit, *paths]
+    archive = subprocess.run(command, cwd=REPOSITORY, check=True, capture_output=True).stdout
+    with tarfile.open(fileobj=io.BytesIO(archive)) as files:
+        files.extractall(folder, filter="data")
+    return folder
 
 
 def table(header: Sequence[str], rows: Iterable[Sequence[str]]) -> str:

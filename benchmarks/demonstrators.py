@@ -5,6 +5,11 @@ Seeds from 300,000 on in both splits: nobody has looked at them. Every trial is 
 After a skill was changed, run its tasks again:
 
     python benchmarks/demonstrators.py --tasks OpenDrawer,CloseDrawer --fresh
+
+Rates may be measured beside other work, demonstrations an hour not: these are taken alone, of a few trials.
+
+    python benchmarks/demonstrators.py --seeds 2 --first-seed 100200 \\
+        --trials outputs/demonstrators_alone.jsonl --out benchmarks/results/demonstrators_alone.json
 """
 
 from __future__ import annotations
@@ -166,6 +171,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
         "commits": {c: sum(t.commit == c for t in trials) for c in sorted({t.commit for t in trials})},
         "ratios": ratios(tasks),
         "demonstrations_per_hour": per_hour(trials),
+        "demonstrations_per_hour_of_kind": {
+            kind: per_hour([trial for trial in trials if tasks[trial.task]["kind"] == kind])
+            for kind in ("atomic", "composite")
+        },
         "tasks": tasks,
     }
     print(text(body))

@@ -10,13 +10,11 @@ the chosen path from the chosen place. The planners of before knew no path round
 from __future__ import annotations
 
 import argparse
-import io
 import json
 import os
 import statistics
 import subprocess
 import sys
-import tarfile
 import tempfile
 from collections.abc import Sequence
 from pathlib import Path
@@ -70,15 +68,6 @@ def answers(side: str, file: Path, checkout: Path) -> dict[int, dict[str, Any]]:
         command = [sys.executable, str(script), side, str(file.resolve()), str(out)]
         subprocess.run(command, check=True, env=environment, cwd=checkout)
         return {int(number): answer for number, answer in json.loads(out.read_text(encoding="utf-8")).items()}
-
-
-def unpack(commit: str, folder: Path) -> None:
-    """Lay a commit's files into a folder."""
-    archive = subprocess.run(
-        ["git", "archive", commit, "robocasa_lerobot"], cwd=common.REPOSITORY, check=True, capture_output=True
-    ).stdout
-    with tarfile.open(fileobj=io.BytesIO(archive)) as files:
-        files.extractall(folder, filter="data")
 
 
 def judged(query: dict[str, Any], env: Any, answer: dict[str, Any], *, detours: int) -> float | None:
@@ -137,7 +126,7 @@ def summary(milliseconds: list[float], costs: list[float | None]) -> dict[str, A
 def compare(file: Path) -> dict[str, Any]:
     """Ask both planners, and judge what they say."""
     with tempfile.TemporaryDirectory() as folder:
-        unpack(BEFORE, Path(folder))
+        common.unpack(BEFORE, Path(folder), "robocasa_lerobot")
         sides = {"before": answers("before", file, Path(folder)), "now": answers("now", file, common.REPOSITORY)}
     queries = planning_side.read(file)
     costs: dict[str, dict[int, float | None]] = {"before": {}, "now": {}}

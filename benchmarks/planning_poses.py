@@ -28,7 +28,7 @@ def poses() -> dict[str, Any] | None:
     data = mujoco.MjData(model)
     PANDA_OMRON.set_home(model, data)
     mujoco.mj_forward(model, data)
-    arm, home = Arm(model, data), np.array(PANDA_OMRON.home.arm)
+    arm, home = Arm(model, data, PANDA_OMRON), np.array(PANDA_OMRON.home.arm)
     rng = np.random.default_rng(0)
     goals = np.clip(home + rng.normal(size=(POSES, 7)) * 0.5, *arm.ranges.T)
     positions, rotations = arm.forward(goals)

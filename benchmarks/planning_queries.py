@@ -17,7 +17,7 @@ from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.progress import Bar
 
 # Kinds of questions, and the functions that skills ask them by.
-ASKED = {"choose": "paths", "plan_near": "near", "plan_contact": "contact"}
+ASKED = {"plan_reach": "paths", "plan_near": "near", "plan_contact": "contact"}
 FIRST_SEED = 100_000
 MOST_OF_ONE = 6  # questions of one demonstration: a failing one asks the same again and again
 
@@ -95,15 +95,15 @@ class _Listening:
         rotations = np.array([[target.rotation for target in row] for row in rows], dtype=np.float32)
         return Query(kind, *self._where, self._env.data.qpos.copy(), positions, rotations, more)
 
-    def _paths(self, ways: Any, point: Any, **options: Any) -> Query | None:
-        if not ways:
+    def _paths(self, paths: Any, point: Any, **options: Any) -> Query | None:
+        if not paths:
             return None
-        taken = [way.takes and (way.takes.name, way.takes.position, way.takes.rotation) for way in ways]
+        taken = [path.takes and (path.takes.name, path.takes.position, path.takes.rotation) for path in paths]
         held = options.get("held")
         return self._query(
             "paths",
-            [list(way.targets) for way in ways],
-            extra=np.array([way.extra for way in ways]),
+            [list(path.targets) for path in paths],
+            extra=np.array([path.extra for path in paths]),
             takes=taken if any(taken) else None,
             point=np.array(point),
             key=options["key"],
@@ -117,7 +117,7 @@ class _Listening:
             return None
         return self._query("near", list(rows), shifts=list(shifts), allowed=sorted(options.get("allowed", ())))
 
-    def _contact(self, part: Any, paths: Any, stances: Any) -> Query:
+    def _contact(self, part: Any, paths: Any, stances: Any, **options: Any) -> Query:
         return self._query(
             "contact",
             [[waypoint.target for waypoint in path.waypoints] for path in paths],
@@ -128,6 +128,7 @@ class _Listening:
             joint=part.name,
             opening=float(part.joint_value(1.0)),
             stances=list(stances),
+            bends=options.get("bends"),
         )
 
 

@@ -63,21 +63,26 @@ class Now:
     """The planner of this checkout."""
 
     def __init__(self) -> None:
-        self._ways, self._near = module("skills.ways"), module("planning.motion_planner")
+        reaching, self._near = module("skills.reaching"), module("planning.motion_planner")
+        self._held, self._path, self._plan_paths = reaching.Held, reaching.WaypointPath, reaching.plan_reach
         self._contact = module("planning.articulated")
 
     def paths(self, env: Any, query: dict[str, Any], options: list[Any]) -> tuple[int, Any, Any] | None:
         """Of paths from where the robot could stand: the number, the place, the joint path."""
         more = query["more"]
-        held = self._ways.Held(*more["held"]) if more["held"] else None
+        held = self._held(*more["held"]) if more["held"] else None
         allowed = frozenset(more["allowed"])
-        found = self._ways.choose(
+        found = self._plan_paths(
             env, options, more["point"], key=more["key"], held=held, loaded=more["loaded"], allowed=allowed
         )
         if not found:
             return None
-        stand = found[0].stand
-        return index_of(options, found[0].way), stand and (stand.x, stand.y, stand.yaw), found[0].joints
+        path, stand = self.chosen(found[0])
+        return index_of(options, path), stand and (stand.x, stand.y, stand.yaw), found[0].joints
+
+    def chosen(self, plan: Any) -> tuple[Any, Any]:
+        """The path of a plan, and where the robot is to stand."""
+        return plan.path, plan.base
 
     def near(self, env: Any, query: dict[str, Any], options: list[Any]) -> tuple[int, Any, Any]:
         """Of rows near where the robot stands."""
@@ -88,7 +93,9 @@ class Now:
     def contact(self, env: Any, query: dict[str, Any], options: list[Any]) -> tuple[int, Any, Any]:
         """Of paths along a part."""
         more = query["more"]
-        plan = self._contact.plan_contact(env, Part(env, more["joint"], more["opening"]), options, more["stances"])
+        bends = {} if more["bends"] is None else {"bends": more["bends"]}
+        part = Part(env, more["joint"], more["opening"])
+        plan = self._contact.plan_contact(env, part, options, more["stances"], **bends)
         return index_of(options, plan.path), (plan.start, plan.end), plan.joints
 
     def options(self, query: dict[str, Any]) -> list[Any]:
@@ -98,8 +105,8 @@ class Now:
             return found
         if query["kind"] == "paths":
             takes = more["takes"] or [None] * len(found)
-            held = [what and self._ways.Held(*what) for what in takes]
-            return [self._ways.Way(*of) for of in zip(found, more["extra"].tolist(), held, strict=True)]
+            held = [what and self._held(*what) for what in takes]
+            return [self._path(*of) for of in zip(found, more["extra"].tolist(), held, strict=True)]
         return [self.contact_path(query, number, row) for number, row in enumerate(found)]
 
     def contact_path(self, query: dict[str, Any], number: int, row: tuple[Any, ...]) -> Any:
@@ -116,11 +123,14 @@ class Before(Now):
     """The four planners of commit 5b97785."""
 
     def __init__(self) -> None:
-        self._ways, self._contact = module("skills.ways"), module("skills.arc_plan")
-        self._contact = SimpleNamespace(
-            ContactPath=self._contact.Way, Waypoint=self._contact.Via, plan_arc=self._contact.plan_arc
-        )
+        ways, arc_plan = module("skills.ways"), module("skills.arc_plan")
+        self._held, self._path, self._plan_paths = ways.Held, ways.Way, ways.choose
+        self._contact = SimpleNamespace(ContactPath=arc_plan.Way, Waypoint=arc_plan.Via, plan_arc=arc_plan.plan_arc)
         self._few, self._many = module("skills.reach"), module("skills.reach_many")
+
+    def chosen(self, plan: Any) -> tuple[Any, Any]:
+        """The path of a plan, and where the robot is to stand."""
+        return plan.way, plan.stand
 
     def near(self, env: Any, query: dict[str, Any], options: list[Any]) -> tuple[int, Any, Any]:
         """Hundreds of rows were asked of another planner."""

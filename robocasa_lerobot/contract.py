@@ -2,7 +2,7 @@
 
 Everything else imports them from here; a part that is missing is an error and never filled with zeros.
 The conventions are RoboCasa365's (robocasa 1.0.1) and those of LeRobot's own RoboCasa environment, so that
-a policy trained on their data runs here and the other way round. All quaternions of observations and
+a policy trained on their data runs here and vice versa. All quaternions of observations and
 datasets are xyzw with w >= 0; lengths are metres, angles radians, and image arrays are upright HWC uint8 RGB.
 """
 

@@ -61,10 +61,10 @@ class Bar(_Tqdm):
 
 
 class Rows:
-    """Progress of several named things at once: a bar for each on a terminal; elsewhere one line at a time.
+    """Progress of several named jobs at once: a bar for each on a terminal; elsewhere one line at a time.
 
     Args:
-        names: of all things that will be shown; they line up.
+        names: of all jobs that will be shown; they line up.
         show: nothing is shown if False.
         clock: seconds, for tests.
     """
@@ -76,7 +76,7 @@ class Rows:
         self._width = max((len(name) for name in names), default=0)
         self._show = show and bool(names)
         self._clock, self._printed = clock, clock()
-        self._waiting: dict[str, str] = {}  # lines not yet written, the longest waiting thing first
+        self._waiting: dict[str, str] = {}  # lines not yet written, the longest waiting job first
         self._tasks: dict[str, TaskID] = {}
         console = Console(file=sys.stderr)
         self._bars = Progress(
@@ -89,7 +89,7 @@ class Rows:
         )
 
     def update(self, name: str, done: int, total: int, text: str) -> None:
-        """Show how far a thing is, in numbers and words."""
+        """Show how far a job is, in numbers and words."""
         if not self._bars.disable:
             if name not in self._tasks:
                 self._tasks[name] = self._bars.add_task(f"{name:<{self._width}}", total=total, text="")
@@ -102,7 +102,7 @@ class Rows:
             self._print(f"{first:<{self._width}}  {self._waiting.pop(first)}")
 
     def finish(self, name: str, text: str) -> None:
-        """Take a thing's bar away and leave a line."""
+        """Take a job's bar away and leave a line."""
         self._waiting.pop(name, None)
         if name in self._tasks:
             self._bars.remove_task(self._tasks.pop(name))

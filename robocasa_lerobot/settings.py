@@ -73,15 +73,15 @@ def parse_overrides(arguments: Sequence[str], *, flags: bool = False) -> list[tu
 
 
 def set_dotted(data: Data, dotted: str, value: Any) -> None:
-    """Set `phases.pretrain.steps` or `phases.0.steps` in place; mappings on the way are made if missing.
+    """Set `phases.pretrain.steps` or `phases.0.steps` in place; mappings above it are made if missing.
 
     Raises:
-        ConfigError: the way leads through something that has nothing inside.
-        UnknownNameError: a list on the way has no entry of that name.
+        ConfigError: the path leads through a value that has nothing inside.
+        UnknownNameError: a list on that path has no entry of that name.
     """
     here: Any = data
-    *way, last = dotted.split(".")
-    for step in way:
+    *path, last = dotted.split(".")
+    for step in path:
         if isinstance(here, list):
             here = here[_list_index(here, step, dotted)]
         else:

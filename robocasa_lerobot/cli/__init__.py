@@ -37,7 +37,7 @@ SUBCOMMANDS: dict[str, Subcommand] = {
     "verify": Subcommand("robocasa_lerobot.cli.verify", "compare a converted dataset with its source"),
     "export": Subcommand("robocasa_lerobot.cli.export", "write a LeRobotDataset v3.0 back to HDF5"),
     "render": Subcommand("robocasa_lerobot.cli.render", "render a dataset again with other cameras, sizes or presets"),
-    "data": Subcommand("robocasa_lerobot.cli.data", "list the data that an experiment needs, and make what is missing"),
+    "data": Subcommand("robocasa_lerobot.cli.data", "list the data that an experiment needs, and make missing ones"),
     "train": Subcommand("robocasa_lerobot.cli.train", "run the training phases of an experiment file"),
     "eval": Subcommand("robocasa_lerobot.cli.eval", "run seeded trials of a policy and report"),
     "report": Subcommand("robocasa_lerobot.cli.report", "compare runs: report.html, .md, .tex and .csv"),

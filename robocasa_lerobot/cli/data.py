@@ -1,4 +1,4 @@
-"""`robocasa-lerobot data`: which datasets an experiment needs, what is missing, and making it."""
+"""`robocasa-lerobot data`: which datasets an experiment needs, which are missing, and making them."""
 
 from __future__ import annotations
 

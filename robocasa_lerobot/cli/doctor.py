@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Literal
 
 from robocasa_lerobot import gl
+from robocasa_lerobot.policies.registry import POLICY_TYPES
 
 EXAMPLE = "robocasa-lerobot doctor --json"
 
@@ -96,7 +97,7 @@ def check_torchcodec(import_torchcodec: Callable[[], None] | None = None) -> Fin
     """Torchcodec finds the system's ffmpeg libraries; without them videos are read with PyAV, only more slowly."""
     try:
         (import_torchcodec or _import_torchcodec)()
-    except Exception:  # it raises RuntimeError, OSError or ImportError, depending on what is missing
+    except Exception:  # it raises RuntimeError, OSError or ImportError, depending on the missing part
         remedy = "apt-get install --yes ffmpeg"
         return Finding(
             "ffmpeg", "warning", "no system libraries: videos are read with PyAV instead of torchcodec", remedy
@@ -176,7 +177,7 @@ from lerobot.configs.policies import PreTrainedConfig
 from lerobot.envs.configs import EnvConfig
 print("types:", *EnvConfig.get_known_choices(), *PreTrainedConfig.get_known_choices())
 """
-OUR_TYPES = ("robocasa_kitchen", "diffusion_transformer")
+OUR_TYPES = ("robocasa_kitchen", *POLICY_TYPES)
 
 
 def check_plugins(run: Callable[[], subprocess.CompletedProcess[str]] | None = None) -> Finding:

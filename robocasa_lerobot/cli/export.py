@@ -30,7 +30,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Export, and say what was written and what is lacking."""
+    """Export, and list the written and the missing data."""
     from robocasa_lerobot.convert.export import ExportSettings, export
 
     settings = ExportSettings(args.cameras, not args.no_images, args.task, args.compression)

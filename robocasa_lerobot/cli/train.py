@@ -45,7 +45,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Run the experiment; 0 when finished, 3 when it stopped as asked, 75 when a signal ended it (run it again)."""
-    from robocasa_lerobot.training.spinning import limit_spinning
+    from robocasa_lerobot.training.cpu_tuning import limit_spinning
 
     limit_spinning()
     from robocasa_lerobot.config_files import find_config

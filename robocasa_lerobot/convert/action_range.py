@@ -11,7 +11,7 @@ from robocasa_lerobot import contract
 from robocasa_lerobot.contract import Part
 from robocasa_lerobot.convert.mapping.robot_mapping import RobotMapping
 
-# A full command is 1; controllers clip what is beyond it. A little beyond is rounding and noise, more is another unit.
+# A full command is 1; controllers clip greater values. A little beyond is rounding and noise, more is another unit.
 FULL_COMMAND = 1.0
 FAR = 1.05
 

@@ -14,8 +14,8 @@ from robocasa_lerobot.convert.mapping.instruction import instruction_of
 from robocasa_lerobot.convert.reading.demo import RejectedEpisodeError
 from robocasa_lerobot.convert.reading.demo_file import DemoFile
 from robocasa_lerobot.convert.reading.stages import stages_of
-from robocasa_lerobot.convert.scenes.ahead import ScenesAhead
 from robocasa_lerobot.convert.scenes.demo_scene import DemoScene
+from robocasa_lerobot.convert.scenes.prefetch import ScenesAhead
 from robocasa_lerobot.convert.settings import Camera, Plan, needs_scene
 from robocasa_lerobot.errors import UserError
 
@@ -51,7 +51,7 @@ class Episode:
         self.cameras = plan.cameras
         self._scene: Scene | None = None
         self._stack = ExitStack()
-        # Everything that is written is read or looked at here, so that nothing is found wrong half-way.
+        # Everything that is written is read or looked at here, so that no mistake is found after half of the writing.
         self.simulator_states = self.demo.states
         names = [camera.name for camera in plan.cameras]
         for camera in names:

@@ -38,7 +38,7 @@ _ARM_ENDINGS = {"position": "eef_pos", "rotation": "eef_quat", "fingers": "gripp
 
 @dataclass(frozen=True)
 class ExportSettings:
-    """What is exported; None takes all cameras, or the only task."""
+    """What to export; None takes all cameras, or the only task."""
 
     cameras: tuple[str, ...] | None = None
     images: bool = True
@@ -82,7 +82,7 @@ def export(root: Path, out: Path, settings: ExportSettings | None = None, overwr
         with written_aside(out) as aside, h5py.File(aside, "w") as file:
             num_frames = _write(file, dataset, episodes, cameras, settings, notes)
     except OSError as error:
-        raise UserError(f"writing {out} failed: {error}. Nothing is there; free what is lacking and repeat.") from error
+        raise UserError(f"writing {out} failed: {error}. Nothing is there; free disk space and repeat.") from error
     return ExportResult(out, len(episodes), num_frames, tuple(notes))
 
 

@@ -38,7 +38,7 @@ from robocasa_lerobot.convert.record_files import (
     episode_folder,
     kept_assets,
 )
-from robocasa_lerobot.convert.scenes.ahead import scenes_ahead
+from robocasa_lerobot.convert.scenes.prefetch import scenes_ahead
 from robocasa_lerobot.convert.settings import ConversionSettings, Plan, Shard, SourceRecord, make_plan
 from robocasa_lerobot.convert.shard import convert_shard
 from robocasa_lerobot.convert.writing.card import write_dataset_card

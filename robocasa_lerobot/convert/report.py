@@ -12,7 +12,7 @@ _MAX_DIFFERENCES = 20  # kept for each check
 
 @dataclass
 class Check:
-    """One thing that was compared: how many values, and what differed."""
+    """One comparison: of how many values, and what differed."""
 
     name: str
     compared: int = 0
@@ -31,7 +31,7 @@ class Check:
             self.differences.append(difference)
 
     def add(self, other: Check) -> None:
-        """Take what another process found of the same thing."""
+        """Add what another process found in the same comparison."""
         self.compared += other.compared
         self.num_differences += other.num_differences
         self.differences += other.differences[: _MAX_DIFFERENCES - len(self.differences)]

@@ -20,9 +20,9 @@ from robocasa_lerobot.convert.reading.demo import Demo, RejectedEpisodeError, So
 from robocasa_lerobot.convert.reading.demo_file import DemoFile
 from robocasa_lerobot.convert.reading.layout import ACTION_KEYS, Layout
 from robocasa_lerobot.convert.reading.mjcf import AssetFinder, loadable, scene_names
+from robocasa_lerobot.convert.reading.safe_scan import survey
 from robocasa_lerobot.convert.reading.selection import check_selection, select
 from robocasa_lerobot.convert.reading.stages import has_stages
-from robocasa_lerobot.convert.reading.survey import survey
 from robocasa_lerobot.convert.writing.stages import stage_features
 from robocasa_lerobot.errors import UnknownNameError, UserError
 
@@ -241,7 +241,7 @@ class _Look:
 
 def _look(path: Path, settings: ConversionSettings, roots: Sequence[Path]) -> _Look:
     if not path.is_file():
-        DemoFile(path)  # says what is wrong
+        DemoFile(path)  # names the mistake
     layout = settings.layout
     found = survey(path, layout.episodes)
     with DemoFile(path, layout) as file:

@@ -26,8 +26,8 @@ from robocasa_lerobot.convert.record_files import (
     REJECTED_FILE,
     episode_folder,
 )
-from robocasa_lerobot.convert.scenes.ahead import scenes_ahead
 from robocasa_lerobot.convert.scenes.demo_scene import DemoScene
+from robocasa_lerobot.convert.scenes.prefetch import scenes_ahead
 from robocasa_lerobot.convert.settings import Plan, Shard
 from robocasa_lerobot.convert.writing.dataset import DatasetWriter
 from robocasa_lerobot.convert.writing.encoding_process import EncodingProcess, shared_encoder
@@ -113,7 +113,7 @@ class _ShardWriter:
                 plan.features,
                 plan.settings.video_codec,
             )
-        # Read now what is written last: an episode that has been added cannot be rejected any more.
+        # Read the columns written last now: an episode that has been added cannot be rejected any more.
         meta, _ = episode.demo.ep_meta, episode.demo.model_xml
         task = episode.instruction.text
         columns = {contract.STATE_KEY: episode.states, contract.ACTION_KEY: episode.actions, **episode.extras}

@@ -116,7 +116,7 @@ def cached_statistics(parts: Sequence[Part], folder: Path, images: bool = True) 
 
 
 class _Column:
-    """What is known so far of one numeric feature of `size` components."""
+    """Running statistics of one numeric feature of `size` components."""
 
     def __init__(self, size: int, dtype: str) -> None:
         self.size = size

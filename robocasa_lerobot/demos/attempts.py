@@ -41,7 +41,7 @@ class RecordingSettings:
         image_size: of those pictures, pixels.
         layouts: ids of layouts or of groups of them; None takes the split's own.
         styles: the same for styles.
-        varied: whether each demonstration is carried out in its own way (`demos.variety`).
+        varied: whether each demonstration has a style of its own (`demos.motion_style`).
     """
 
     task: str
@@ -106,7 +106,7 @@ class Parts:
     Args:
         out: the folder that the file of demonstrations comes to.
         settings: of the recording.
-        films: folder for what is kept of failures; None keeps nothing.
+        films: folder for the films of failures; None keeps nothing.
     """
 
     def __init__(self, out: Path, settings: RecordingSettings, films: Path | None = None) -> None:
@@ -173,7 +173,7 @@ class Parts:
     def attempt(self, number: int, env: KitchenEnv) -> None:
         """Make one attempt, and leave its file.
 
-        A skill that goes wrong in a way that nobody foresaw must not end a recording of thousands: it failed.
+        An unforeseen error of a skill must not end a recording of thousands: that attempt failed.
         """
         exit_if_orphaned()
         settings = self.settings

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 
 from robocasa_lerobot.demos.motion import Array, action
-from robocasa_lerobot.demos.motion_style import PLAIN, Variety, give_variety
+from robocasa_lerobot.demos.motion_style import PLAIN, MotionStyle, give_motion_style
 from robocasa_lerobot.demos.skills import SKILLS, SkillError
 from robocasa_lerobot.demos.stages import StageLog, carry_out
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
@@ -38,11 +38,11 @@ def check_demonstrable(names: Iterable[str]) -> None:
         )
 
 
-def demonstrate(env: KitchenEnv, variety: Variety = PLAIN, log: StageLog | None = None) -> Iterator[Array]:
+def demonstrate(env: KitchenEnv, style: MotionStyle = PLAIN, log: StageLog | None = None) -> Iterator[Array]:
     """Actions (12,), stored order, for the episode that `env` has been reset to, one per control step.
 
     Each action is computed from the state that the env is in when it is asked for, so the caller must step the env
-    with it before asking for the next. It ends after the last stage, with the arm held still from then on. `variety`
+    with it before asking for the next. It ends after the last stage, with the arm held still from then on. `style`
     says how it is carried out; `log` tells which stage each action belongs to, and what came of them.
 
     Raises:
@@ -50,9 +50,9 @@ def demonstrate(env: KitchenEnv, variety: Variety = PLAIN, log: StageLog | None 
         SkillError: a stage is not done after all its attempts.
     """
     gripper = -1.0
-    give_variety(env, variety)
+    give_motion_style(env, style)
     for step in carry_out(env, StageLog() if log is None else log):
         gripper = float(step[-1])
-        yield variety.carry_out(step)
+        yield style.carry_out(step)
     while True:
         yield action(gripper=gripper)

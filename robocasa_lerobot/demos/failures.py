@@ -51,7 +51,7 @@ def keep_failure(folder: Path, env: KitchenEnv, failure: Failure, recording: Rec
 
 
 def remove_others(folder: Path, failures: list[Failure]) -> None:
-    """Remove what is kept of attempts that turned out not to be needed."""
+    """Remove the files of attempts that turned out not to be needed."""
     kept = {film_of(folder, failure.seed).stem for failure in failures}
     for file in folder.glob("seed_*"):
         if file.stem not in kept:

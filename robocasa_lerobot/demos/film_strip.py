@@ -20,7 +20,7 @@ from robocasa_lerobot.files import written_aside
 STRIP_PICTURES, STRIP_SIZE = 10, 224  # along the strip; pixels of each
 # Of a camera that follows the hand: over a shoulder, or where nothing stands between.
 _CLOSE_M, _SIDES_DEG, _DOWN_DEG = 0.9, (40.0, -40.0, 75.0, -75.0, 10.0), (-28.0, -50.0, -8.0)
-_NEAR_HAND_M = 0.25  # what is nearer to the hand than this belongs to it
+_NEAR_HAND_M = 0.25  # geoms nearer to the hand than this belong to it
 
 
 def film_strip(path: Path, demo: str, out: Path) -> None:

@@ -13,7 +13,14 @@ from numpy.typing import NDArray
 
 from robocasa_lerobot import contract
 from robocasa_lerobot.envs.robots.panda_omron.control.kernel import POSITION_SCALE_M, ROTATION_SCALE_RAD
-from robocasa_lerobot.envs.robots.panda_omron.names import ARM_CENTER_SITE, BASE_CENTER_SITE, GRIP_SITE, HAND
+from robocasa_lerobot.envs.robots.panda_omron.names import (
+    ARM_CENTER_SITE,
+    ARM_JOINTS,
+    BASE_CENTER_SITE,
+    GRIP_SITE,
+    HAND,
+)
+from robocasa_lerobot.envs.robots.panda_omron.robot import PANDA_OMRON
 
 Array = NDArray[np.float64]
 
@@ -25,6 +32,11 @@ FROM_ACHIEVED, FROM_DESIRED = -1.0, 1.0
 # In mode FROM_ACHIEVED the arm covers about a quarter of a commanded step (docs/robocasa.md, section 2), so errors are
 # commanded more than once over; above about 3 the arm overshoots.
 ARM_GAIN = 2.0
+# A base at rest answers to commands above these only (docs/robocasa.md, section 2), forward and left, and turn: metres
+# and radians a second are |command| - 0.25 and 1.5 |command| - 0.167.
+DEAD_ZONE, TURN_DEAD_ZONE = 0.25, 0.11
+DEAD_ZONES = np.array([DEAD_ZONE, DEAD_ZONE, TURN_DEAD_ZONE, 0.0])  # of base_motion
+ELBOW = ARM_JOINTS[3]
 
 
 @dataclass(frozen=True)
@@ -81,6 +93,10 @@ def arm_action(
 ) -> Array:
     """Action (12,), stored order, that moves the hand towards a target with the base at rest.
 
+    An elbow that has gone past the stretched arm, as it can where the hand presses down far out, stays there: whatever
+    draws the hand back from then on pushes the elbow against its limit. Then the hand is tipped over, about the elbow's
+    axis, until that bends again.
+
     Args:
         data: present state.
         target: wanted pose.
@@ -90,7 +106,11 @@ def arm_action(
     """
     base = data.site(ARM_CENTER_SITE).xmat.reshape(3, 3)
     move = base.T @ (target.position - grip_position(data)) * gain / POSITION_SCALE_M
-    turn = base.T @ axis_angle(target.rotation @ hand_rotation(data).T) * gain / ROTATION_SCALE_RAD
+    elbow = data.joint(ELBOW)
+    if elbow.qpos[0] > PANDA_OMRON.reach.stretched:
+        turn = -base.T @ elbow.xaxis
+    else:
+        turn = base.T @ axis_angle(target.rotation @ hand_rotation(data).T) * gain / ROTATION_SCALE_RAD
     return action(position=limit(move, speed), rotation=limit(turn, 1.0), gripper=gripper, mode=FROM_ACHIEVED)
 
 
@@ -102,7 +122,7 @@ def action(
     base: Array | None = None,
     mode: float = FROM_ACHIEVED,
 ) -> Array:
-    """Action (12,), stored order, from its parts; what is left out is zero."""
+    """Action (12,), stored order, from its parts; missing parts are zero."""
     return contract.join_action(
         {
             "base_motion": np.zeros(4) if base is None else base,
@@ -134,6 +154,14 @@ def rotation_about(axis: Array, angle: float) -> Array:
     mujoco.mju_axisAngle2Quat(quat, axis, angle)
     mujoco.mju_quat2Mat(matrix, quat)
     return matrix.reshape(3, 3)
+
+
+def turned_up(rotation: Array, direction: Array) -> Array:
+    """The rotation (3, 3) nearest to another that brings a direction (3,) of its own axes up."""
+    now = rotation @ direction
+    axis = np.cross(now, UP)
+    sine = float(np.linalg.norm(axis))
+    return rotation if sine < 1e-6 else rotation_about(axis / sine, float(np.arctan2(sine, now @ UP))) @ rotation
 
 
 def nearer_turn(rotation: Array, present: Array) -> Array:

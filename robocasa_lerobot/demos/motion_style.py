@@ -1,10 +1,10 @@
-"""Variety: what differs between two demonstrations of one task beyond the kitchen, drawn once for each.
+"""Motion style: what differs between two demonstrations of one task beyond the kitchen, drawn once for each.
 
-A demonstration has a speed, a side to which its free ways bow, and a preference among ways to hold the hand that are
+A demonstration has a speed, a side to which its free paths bow, and a preference among poses of the hand that are
 about equally good: grasps, rolls and approaches. Where a hand waits before it goes straight to a handle is drawn too:
 a policy that is trained on it has seen how a hand comes back from beside its goal, which one that always waits at the
-same place has not. speed and bow change the free ways of any skill; the preference is asked for by skills that choose
-among candidates (`variety_of(env).bonus(rotation)`), and so is the place (`variety_of(env).beside(rotation)`).
+same place has not. speed and bow change the free paths of any skill; the preference is asked for by skills that choose
+among candidates (`motion_style_of(env).bonus`), and so is the place (`motion_style_of(env).beside`).
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ import mujoco
 import numpy as np
 
 from robocasa_lerobot import contract
-from robocasa_lerobot.demos.motion import FROM_ACHIEVED, Array, limit
+from robocasa_lerobot.demos.motion import DEAD_ZONES, FROM_ACHIEVED, Array, limit
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 
 _SLOWEST = 0.85
@@ -26,11 +26,8 @@ _WEIGHT = 0.12
 # Half sizes in metres of the box in which a hand waits, along the world's horizontal across the approach, upwards (the
 # counter's edge is near) and along the approach (backwards).
 _ACROSS_M, _DOWN_M, _UP_M, _BACK_M = 0.05, 0.04, 0.015, 0.03
-# Ways with greater commands than this are free ones: skills come near to things, push and pull with smaller ones.
+# Motions with greater commands than this are free ones: skills approach objects, push and pull with smaller ones.
 _FAST = 0.9
-
-# Of forward, left, turn and torso (docs/robocasa.md, section 2).
-_DEAD_ZONES = np.array([0.25, 0.25, 0.11, 0.0])
 
 _POSITION = contract.ACTION_SLICES["end_effector_position"]
 _BASE = contract.ACTION_SLICES["base_motion"]
@@ -39,12 +36,12 @@ _MODE = contract.ACTION_SLICES["control_mode"]
 
 
 @dataclass(frozen=True)
-class Variety:
+class MotionStyle:
     """How a demonstration is carried out. The defaults change nothing.
 
     Attributes:
         speed: bound of the arm's commands, and factor of the driving base's speed, in (0, 1].
-        bow_rad: angle about the vertical by which free horizontal ways of the open hand start beside their goal.
+        bow_rad: angle about the vertical by which free horizontal paths of the open hand start beside their goal.
         hand: quaternion (w, x, y, z) in the world of the hand that is preferred.
         weight: what the preference is worth, in the cost of candidates.
         wait_m: where a hand waits before it goes straight to its goal, beside the skill's own place: across the
@@ -58,7 +55,7 @@ class Variety:
     wait_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
     @classmethod
-    def draw(cls, rng: np.random.Generator) -> Variety:
+    def draw(cls, rng: np.random.Generator) -> MotionStyle:
         """A random one."""
         quaternion = rng.normal(size=4)
         w, x, y, z = (float(v) for v in quaternion / np.linalg.norm(quaternion))
@@ -95,21 +92,21 @@ class Variety:
         out[_POSITION] = limit(out[_POSITION], self.speed)
         if largest > 0:  # arm and base together keep step with each other
             return out
-        # A base at rest answers to what is beyond its dead zones: that is the speed.
-        beyond = np.maximum(np.abs(out[_BASE]) - _DEAD_ZONES, 0.0)
+        # A base at rest answers to commands beyond its dead zones: these are the speed.
+        beyond = np.maximum(np.abs(out[_BASE]) - DEAD_ZONES, 0.0)
         out[_BASE] -= np.sign(out[_BASE]) * (1.0 - self.speed) * beyond
         return out
 
 
-PLAIN = Variety()
-_given: WeakKeyDictionary[KitchenEnv, Variety] = WeakKeyDictionary()
+PLAIN = MotionStyle()
+_given: WeakKeyDictionary[KitchenEnv, MotionStyle] = WeakKeyDictionary()
 
 
-def give_variety(env: KitchenEnv, variety: Variety) -> None:
+def give_motion_style(env: KitchenEnv, style: MotionStyle) -> None:
     """Let the demonstrations in an env be carried out so, from now on."""
-    _given[env] = variety
+    _given[env] = style
 
 
-def variety_of(env: KitchenEnv) -> Variety:
+def motion_style_of(env: KitchenEnv) -> MotionStyle:
     """How the demonstration that runs in an env is carried out."""
     return _given.get(env, PLAIN)

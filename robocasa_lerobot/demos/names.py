@@ -1,6 +1,6 @@
 """`python -m robocasa_lerobot.demos.names`: names of the tasks that a demonstrator can solve, as one line of JSON.
 
-What knows nothing of simulators, such as the registry of datasets, asks in this way, in a process of its own.
+What knows nothing of simulators, such as the registry of datasets, asks by this command, in a process of its own.
 """
 
 from __future__ import annotations

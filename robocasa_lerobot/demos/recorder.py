@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from robocasa_lerobot import contract
 from robocasa_lerobot.demos.demonstrator import SkillError, demonstrate
-from robocasa_lerobot.demos.motion_style import PLAIN, Variety
+from robocasa_lerobot.demos.motion_style import PLAIN, MotionStyle
 from robocasa_lerobot.demos.stages import StageLog
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.tasks.stage_text import stage_text
@@ -19,8 +19,8 @@ Array = NDArray[np.float64]
 
 # An episode ends after this many consecutive steps in which the goal holds (docs/robocasa.md, section 4).
 SUCCESS_HOLD_STEPS = 15
-# Keys of the generators of action noise and of variety, apart from those of the scene and the arm.
-_NOISE_STREAM, _VARIETY_STREAM = 2, 6
+# Keys of the generators of action noise and of the motion style, apart from those of the scene and the arm.
+_NOISE_STREAM, _STYLE_STREAM = 2, 6
 
 
 @dataclass
@@ -93,18 +93,18 @@ def record_episode(
         action_noise: standard deviation of Gaussian noise on the six commanded arm components (unit: full command);
             it is part of the action that is executed and recorded.
         images: also keep the camera pictures.
-        varied: draw how the demonstration is carried out (`Variety`) from the seed; else as the skills have it.
+        varied: draw how the demonstration is carried out (`MotionStyle`) from the seed; else as the skills have it.
     """
     assert not env.terminate_on_success, "the recorder decides when an episode ends"
     env.render_observations = False
     rng = np.random.default_rng([seed, _NOISE_STREAM])
-    variety = Variety.draw(np.random.default_rng([seed, _VARIETY_STREAM])) if varied else PLAIN
+    style = MotionStyle.draw(np.random.default_rng([seed, _STYLE_STREAM])) if varied else PLAIN
     _, info = env.reset(seed=seed)
     model_file = env.scene.spec.to_xml()
     buffer = _Buffer()
     held, reason, log = 0, "", StageLog()
     try:
-        for wanted in demonstrate(env, variety, log):
+        for wanted in demonstrate(env, style, log):
             # Everything is carried out in single precision, as a policy's action is, and recorded as carried out.
             action = _with_noise(rng, wanted, action_noise).astype(np.float32).astype(np.float64)
             buffer.add(env, contract.binarize(action), info, log.current, images=images)
@@ -140,7 +140,7 @@ def record_episode(
             **env.scene.ep_meta(),
             **_kitchens(env),
             "action_noise": action_noise,
-            "variety": asdict(variety),
+            "motion_style": asdict(style),
             "stages": [
                 {"text": stage_text(stage, env.scene), **row}
                 for stage, row in zip(stages, log.table(stages), strict=True)

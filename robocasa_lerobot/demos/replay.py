@@ -139,7 +139,7 @@ def _last_terms(group: h5py.Group) -> dict[str, bool]:
 
 
 def replay(path: Path, demo: str, declaration: Task | None = None) -> Replayed:
-    """Replay one demonstration both ways; of a task that is in the making, its declaration is given.
+    """Replay one demonstration, its states and its actions; of a task that is in the making, its declaration is given.
 
     Raises:
         UserError: its kitchen cannot be made again.
@@ -202,7 +202,7 @@ def _goal_held_at_the_end(env: KitchenEnv, recorded: Demonstration) -> tuple[boo
 
 
 def _put(env: KitchenEnv, data: mujoco.MjData, state: Array) -> None:
-    """Write a recorded state, unless it is there already: what is not in it (latches, sleep) then stays."""
+    """Write a recorded state, unless it is there already: variables that are not in it (latches, sleep) then stay."""
     model = env.model
     wanted = state[1 : 1 + model.nq], state[1 + model.nq :]
     if np.array_equal(data.qpos, wanted[0]) and np.array_equal(data.qvel, wanted[1]):

@@ -8,7 +8,7 @@ from typing import Any
 
 from robocasa_lerobot.demos.motion import Array, action
 from robocasa_lerobot.demos.skills import SKILLS, SkillError
-from robocasa_lerobot.demos.skills.common import stage_done, stage_progress
+from robocasa_lerobot.demos.skills.common import stage_done, wait_for_stage
 from robocasa_lerobot.demos.skills.fold import fold_arm
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.tasks.conditions import must_never, stage_condition, without_gripper
@@ -16,7 +16,7 @@ from robocasa_lerobot.envs.tasks.task import Stage
 from robocasa_lerobot.errors import UnknownNameError
 
 ATTEMPTS = 3  # of a stage; skills try several grasps in each
-PATIENCE_STEPS = 40  # after a skill, for things that fall, swing and settle; as long again after each step that counted
+PATIENCE_STEPS = 40  # after a skill, for what falls, swings and settles; as long again after each step that counted
 _AS_IT_IS = ("navigation", "pick_place")  # skills that begin with the arm as the stage before has left it
 _TOLD = ("skill", "verb", "target", "object", "part", "to")  # of a stage, to whoever reads the file
 
@@ -64,7 +64,7 @@ def carry_out(env: KitchenEnv, log: StageLog) -> Iterator[Array]:
 
     A stage that is done already is left out. One that fails is tried again; if the one before it has come undone
     meanwhile (an object has slipped off), that one comes first. Where the task's goal does not hold in the end, it goes
-    on with the first stage that has to do with what is lacking.
+    on with the first stage that has to do with the terms that fail.
 
     Raises:
         UnknownNameError: a stage needs a skill that does not exist.
@@ -94,8 +94,8 @@ def carry_out(env: KitchenEnv, log: StageLog) -> Iterator[Array]:
             outcome.reason = ""
             index += 1
         elif index > 0 and not _still_holds(env, index - 1):
-            index -= 1  # what it rests on has come undone
-            _check_attempts(env, index, log.outcomes[index])
+            index -= 1  # the stage that it rests on has come undone
+            _check_attempts(env, index, log.outcomes[index], cause=outcome.reason)
         else:
             _check_attempts(env, index, outcome)
 
@@ -114,26 +114,24 @@ def _attempt(env: KitchenEnv, stage: Stage, outcome: StageOutcome) -> Iterator[A
             yield step
     except SkillError as error:
         outcome.reason = str(error)
-    left, best = PATIENCE_STEPS, stage_progress(env, stage)
-    while left and not stage_done(env, stage):
-        yield action(gripper=gripper)
-        now = stage_progress(env, stage)
-        left, best = (PATIENCE_STEPS, now) if now > best else (left - 1, best)
+    yield from wait_for_stage(env, stage, lambda: action(gripper=gripper), PATIENCE_STEPS)
 
 
 def _check_never(env: KitchenEnv, outcome: StageOutcome) -> None:
-    """Give up where the goal cannot be reached any more: what is remembered cannot be made good."""
+    """Give up where the goal cannot be reached any more: remembered failures cannot be undone."""
     for never in must_never(env.declaration.goal):
         if not never.holds(env.scene, env.data):
             outcome.reason = f"the goal is out of reach: `{never.name}` does not hold any more"
             raise SkillError(outcome.reason)
 
 
-def _check_attempts(env: KitchenEnv, index: int, outcome: StageOutcome) -> None:
+def _check_attempts(env: KitchenEnv, index: int, outcome: StageOutcome, cause: str = "") -> None:
+    """Give up on a stage that has had all its attempts; `cause` is why it is to be done again, where it was done."""
     if outcome.attempts >= ATTEMPTS:
         stages = env.declaration.stages
         which = f"stage {index + 1} ({stages[index].skill} {stages[index].verb}): " if len(stages) > 1 else ""
-        raise SkillError(f"{which}{outcome.reason}")
+        again = f"it came undone after {outcome.attempts} attempts" + (f", when {cause}" if cause else "")
+        raise SkillError(f"{which}{outcome.reason or again}")
 
 
 def _still_holds(env: KitchenEnv, index: int) -> bool:
@@ -142,7 +140,7 @@ def _still_holds(env: KitchenEnv, index: int) -> bool:
 
 
 def _undone(env: KitchenEnv) -> int | None:
-    """The first stage that what is lacking of the goal belongs to; None where the goal holds, or nobody knows."""
+    """The first stage that the goal's failing terms belong to; None where the goal holds, or nobody knows."""
     task = env.declaration
     wanted: dict[str, bool] = {}
     if len(task.stages) == 1 or task.goal.evaluate(env.scene, env.data, wanted):

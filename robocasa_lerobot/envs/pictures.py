@@ -1,4 +1,4 @@
-"""What an env shows of its cameras: pictures, and on request depth and which thing each pixel belongs to."""
+"""What an env shows of its cameras: pictures, and on request depth and the object or fixture of each pixel."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ def take_pictures(
 
 def segmentation_names(model: mujoco.MjModel, robot_base: str) -> tuple[str, ...]:
     """What each geom id of a segmentation belongs to (ngeom + 1,): a fixture, an object, a body of the robot,
-    or what is around the room.
+    or the surroundings of the room.
 
     The last entry is the background's, which id -1 finds: `numpy.array(names)[segmentation]` is right as it stands.
     """
@@ -65,6 +65,6 @@ def segmentation_names(model: mujoco.MjModel, robot_base: str) -> tuple[str, ...
         root = body
         while root != robot and int(model.body_parentid[root]) != 0:
             root = int(model.body_parentid[root])
-        # The world's own geoms are what is around the room.
+        # The world's own geoms are the surroundings of the room.
         owners.append(SURROUNDINGS if root == 0 else model.body(body if root == robot else root).name)
     return (*owners, BACKGROUND)

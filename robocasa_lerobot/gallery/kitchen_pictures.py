@@ -15,7 +15,7 @@ _EYE_M = 1.60
 _WIDE_DEG = 62.0  # vertical field of view of the photographer's lens
 _CROWDED_M = 1.9
 _HIDDEN_GROUP = 5  # drawn by no camera
-_CUT_M = 2.25  # what is above is left out of views from above
+_CUT_M = 2.25  # geoms above it are left out of views from above
 
 
 def kitchen_photo(
@@ -86,8 +86,8 @@ def _photographer(layout: Layout, corner: str) -> mujoco.MjvCamera:
             corner = "left" if fridge.pos[0] > width / 2 else "right"
         # Not close behind a fridge or a tall housing.
         tall = [f for f in layout.fixtures.values() if f.height > _EYE_M and layout.types[f.name] != "wall"]
-        ways = {side: (0.22 if side == "left" else width - 0.22, 0.22 - depth) for side in sides}
-        near = {side: min(np.hypot(f.pos[0] - x, f.pos[1] - y) for f in tall) for side, (x, y) in ways.items()}
+        eyes = {side: (0.22 if side == "left" else width - 0.22, 0.22 - depth) for side in sides}
+        near = {side: min(np.hypot(f.pos[0] - x, f.pos[1] - y) for f in tall) for side, (x, y) in eyes.items()}
         if near[corner] < _CROWDED_M < max(near.values()):
             corner = "left" if corner == "right" else "right"
     x = 0.22 if corner == "left" else width - 0.22
@@ -100,9 +100,9 @@ def _photographer(layout: Layout, corner: str) -> mujoco.MjvCamera:
 
 def _look(eye: NDArray[np.float64], target: NDArray[np.float64]) -> mujoco.MjvCamera:
     camera = mujoco.MjvCamera()
-    way = target - eye
+    view = target - eye
     camera.lookat = target
-    camera.distance = float(np.linalg.norm(way))
-    camera.azimuth = float(np.degrees(np.arctan2(way[1], way[0])))
-    camera.elevation = float(np.degrees(np.arcsin(way[2] / camera.distance)))
+    camera.distance = float(np.linalg.norm(view))
+    camera.azimuth = float(np.degrees(np.arctan2(view[1], view[0])))
+    camera.elevation = float(np.degrees(np.arcsin(view[2] / camera.distance)))
     return camera

@@ -66,7 +66,7 @@ def visitor_camera(scene: Scene) -> mujoco.MjvCamera:
 
 
 def _clear_distance(scene: Scene, camera: mujoco.MjvCamera, azimuth: float) -> float:
-    """How far back a camera can stand in a direction, up to 3 m, before a wall or something tall is in the way."""
+    """How far back a camera can stand in a direction, up to 3 m, before a wall or a tall fixture blocks the view."""
     room = scene.layout.room
     low, high = np.array([0.0, room["y_min"]]) + _MARGIN_M, np.array([room["x_max"], 0.0]) - _MARGIN_M
     back = -np.array([np.cos(azimuth), np.sin(azimuth)]) * np.cos(np.radians(camera.elevation))

@@ -16,10 +16,10 @@ from robocasa_lerobot.envs.scene.initial_states import Initial
 from robocasa_lerobot.envs.scene.scene_spec import InitialState
 from robocasa_lerobot.envs.scene.spec import (
     Choice,
-    FixtureWanted,
+    FixtureSpec,
     InitialOpenness,
     InsideOf,
-    ObjectWanted,
+    ObjectSpec,
     OnCounter,
     Placement,
     RobotStart,
@@ -126,7 +126,7 @@ def _asks_inside(goal: Goal) -> bool:
     return any(isinstance(part, ObjectInside) for part in every_goal_in(goal))
 
 
-def _fixture(wanted: FixtureWanted) -> str:
+def _fixture(wanted: FixtureSpec) -> str:
     said = f"`{wanted.role}` ({wanted.kind.replace('_', ' ')}"
     if wanted.near:
         said += f" near {wanted.near}"
@@ -160,7 +160,7 @@ def _initial(state: InitialState) -> str:
     return f"{first[0].lower()}{first[1:]} ({values})"
 
 
-def _object(wanted: ObjectWanted) -> str:
+def _object(wanted: ObjectSpec) -> str:
     said = f"`{wanted.name}`: {_number(wanted.count)}{' or '.join(group.replace('_', ' ') for group in wanted.groups)}"
     if wanted.same_category_as:
         kind = "model" if wanted.same_model else "category"

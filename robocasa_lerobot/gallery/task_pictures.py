@@ -1,4 +1,4 @@
-"""A picture of a task: its first state, and the state that its demonstrator leaves, each seen in four ways."""
+"""A picture of a task: its first state, and the state that its demonstrator leaves, each seen from four sides."""
 
 from __future__ import annotations
 

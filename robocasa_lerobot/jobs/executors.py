@@ -1,7 +1,7 @@
 """Where the pieces of a conversion run: processes of this machine, a Slurm cluster, or Ray; all are datatrove's.
 
 On this machine and with Ray the command waits and then joins the pieces. With Slurm it submits an array of jobs, one
-for each piece, and one job more that joins them when all have succeeded, and returns. Either way a piece that is
+for each piece, and one job more that joins them when all have succeeded, and returns. In both cases a piece that is
 complete stays complete: the same command goes on with the others.
 """
 

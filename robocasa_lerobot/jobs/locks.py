@@ -1,4 +1,4 @@
-"""Locks on files, which the system frees when their holder ends in whatever way."""
+"""Locks on files, which the system frees when their holder ends, however it does."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from filelock import FileLock, Timeout
 
 
 class LockHeldError(Exception):
-    """Somebody else holds the lock."""
+    """Another process holds the lock."""
 
 
 @contextmanager
@@ -22,7 +22,7 @@ def locked(path: Path, *, wait: bool) -> Iterator[None]:
         wait: for another holder to let go, however long that takes.
 
     Raises:
-        LockHeldError: somebody else holds it, and `wait` is false.
+        LockHeldError: another process holds it, and `wait` is false.
         OSError: the file cannot be made.
     """
     lock = FileLock(path)

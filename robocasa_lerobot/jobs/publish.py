@@ -54,13 +54,13 @@ def held_folder(partial: Path) -> Iterator[None]:
 
 @contextlib.contextmanager
 def failures_explained(out: Path, partial: Path) -> Iterator[None]:
-    """Turn errors of the file system, such as a full disk, into ones that say what is kept and what to do."""
+    """Turn errors of the file system, such as a full disk, into ones that name the kept files and a remedy."""
     try:
         yield
     except OSError as error:
         raise UserError(
-            f"writing failed: {error}. Nothing is at {out}; finished parts are kept in {partial}: free what is "
-            "lacking and give the same command to go on."
+            f"writing failed: {error}. Nothing is at {out}; finished parts are kept in {partial}: free disk "
+            "space and give the same command to go on."
         ) from error
 
 

@@ -1,6 +1,6 @@
 """Jobs of a Slurm cluster: an array of pieces by datatrove, and the one that comes after them.
 
-`python -m robocasa_lerobot.jobs.slurm FILE` is that last job: it calls what is pickled in the file.
+`python -m robocasa_lerobot.jobs.slurm FILE` is that last job: it calls the function pickled in the file.
 """
 
 from __future__ import annotations

@@ -24,7 +24,7 @@ class Download:
 
     source: Path
     out: Path
-    folder: Path  # of the whole conversion, for what is on the way
+    folder: Path  # of the whole conversion, for unfinished files
 
     @property
     def name(self) -> str:

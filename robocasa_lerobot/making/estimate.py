@@ -1,22 +1,23 @@
 """How long our demonstrators and the conversion take, and what comes of it on disk: measured means, no promises.
 
-On two cores of an AMD EPYC without a GPU: demonstrations by `make bench-demonstrators` (65 tasks, 2,600 trials:
-`benchmarks/results/demonstrators.json`), drawing and encoding by `make bench-convert` (states of 256 pixels in two
-processes: `benchmarks/results/convert_speed.json`; smaller pictures are not slower), sizes of three tasks' datasets at
-128 pixels that `robocasa-lerobot data --make` made.
+On two cores of an AMD EPYC without a GPU: demonstrations of 72 tasks by `benchmarks/demonstrators.py`, kind by kind
+(`benchmarks/results/demonstrators_alone.json`), drawing and encoding by `make bench-convert` (states of 256
+pixels in two processes: `benchmarks/results/convert_speed.json`; smaller pictures are not slower), sizes of three
+tasks' datasets at 128 pixels that `robocasa-lerobot data --make` made.
 """
 
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 from robocasa_lerobot.benchmark.tasks import task_facts
 from robocasa_lerobot.making.needs import Need
 
-SECONDS_PER_DEMONSTRATION = 4.3  # of one core, failed attempts included: 844.5 an hour
-STEPS_PER_DEMONSTRATION = 160  # mean of the tasks' medians: 8.0 s
+# Of one core, failed attempts included; and the mean of the tasks' medians of steps, of 50 ms each.
+SECONDS_PER_DEMONSTRATION: Mapping[str, float] = {"atomic": 1.8, "composite": 32.0}
+STEPS_PER_DEMONSTRATION: Mapping[str, int] = {"atomic": 165, "composite": 950}
 STEPS_PER_SECOND = 53.0  # of one core, with three cameras
 BYTES_PER_STEP = 6_000
 BYTES_PER_EPISODE = 500_000  # scene, textures and states, kept so that it can be drawn again
@@ -48,16 +49,19 @@ def cores_here() -> int:
 
 def estimate(needs: Iterable[Need], cores: int) -> Estimate:
     """What making the datasets takes; those that are drawn again are not recorded."""
-    recorded = demonstrations = 0
+    facts = task_facts()
+    demonstrations = frames = 0
+    recording_seconds = 0.0
     for need in needs:
         count = need.demonstrations or 0
+        kind = facts[need.task].kind if need.task in facts else "atomic"  # of somebody's own tasks nothing is known
         demonstrations += count
-        recorded += count if need.redrawn is None else 0
-    frames = demonstrations * STEPS_PER_DEMONSTRATION
+        frames += count * STEPS_PER_DEMONSTRATION[kind]
+        recording_seconds += count * SECONDS_PER_DEMONSTRATION[kind] if need.redrawn is None else 0.0
     return Estimate(
         demonstrations,
         frames,
-        recorded * SECONDS_PER_DEMONSTRATION / cores / 3600,
+        recording_seconds / cores / 3600,
         frames / STEPS_PER_SECOND / cores / 3600,
         frames * BYTES_PER_STEP + demonstrations * BYTES_PER_EPISODE,
         cores,

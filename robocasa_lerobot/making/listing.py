@@ -18,10 +18,10 @@ def listing(name: str, file: str, needs: Sequence[Need], said: Sequence[Skipped]
 
     Args:
         name: of the experiment.
-        file: its file, for the command that makes what is missing.
+        file: its file, for the command that makes the missing datasets.
         needs: the datasets.
         said: phases that are left out or partial.
-        cores: that would make what is missing.
+        cores: that would make the missing datasets.
         asked: further options of the command.
     """
     contents = {need.root: need.content() for need in needs}

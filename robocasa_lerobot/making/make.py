@@ -63,10 +63,10 @@ class MadeDataset:
         return _HALF * min(recorded, settings.episodes)
 
     def make(self, workers: int) -> None:
-        """Record, convert, and draw again; what is there is left alone.
+        """Record, convert, and draw again; files that are there are left alone.
 
         Raises:
-            UserError: too many attempts failed, or a dataset of other making is in the way.
+            UserError: too many attempts failed, or a dataset of other making is already there.
         """
         if self._lacks(self.need):
             self._record_and_convert(workers)
@@ -122,7 +122,7 @@ def recording_settings(need: Need) -> RecordingSettings:
 
 
 def pieces_of(needs: Sequence[Need], replace: bool = False, keep: bool = False) -> list[MadeDataset]:
-    """The pieces that make what is missing, or has too few demonstrations, of what recipes can make."""
+    """The pieces for datasets that are missing, or have too few demonstrations, as far as recipes can make them."""
     made = [need for need in needs if need.made is not None]
     pieces = [
         MadeDataset(need, tuple(other for other in made if other.redrawn == need.root), replace, keep)

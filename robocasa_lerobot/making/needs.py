@@ -35,7 +35,7 @@ class Need:
 
     Attributes:
         group: what it is listed under: the `path` of a registry, or split and source of published data.
-        task, split, source: what is in it.
+        task, split, source: its contents.
         root: its folder.
         missing: what to do if it is not there; None where it is.
         demonstrations: how many there should be; None where nobody says.
@@ -57,11 +57,11 @@ class Need:
 
     @property
     def work(self) -> Path:
-        """Folder for what is recorded of it, and for the log."""
+        """Folder for its recordings, and for the log."""
         return self.registry_root / WORK / self.root.relative_to(self.registry_root)
 
     def content(self) -> Content | None:
-        """What is there, if it is."""
+        """The dataset, if it is there."""
         if dataset_version(self.root) != "v3.0":
             return None
         info = json.loads((self.root / "meta/info.json").read_text(encoding="utf-8"))
@@ -72,17 +72,17 @@ class Need:
 def needs_of(
     experiment: ExperimentConfig, episodes: Mapping[str, int] | None = None
 ) -> tuple[list[Need], list[Skipped]]:
-    """The datasets of all phases that can run, each once, and what is left out or partial.
+    """The datasets of all phases that can run, each once, and the ones left out or partial.
 
     Args:
-        experiment: what is to be trained.
+        experiment: the one to train.
         episodes: demonstrations of each kind of dataset, over those that the registries say.
 
     Raises:
         UserError: a selection does not fit its registry, or `episodes` has a kind that none of them has.
     """
     part, said = runnable(experiment)
-    found: dict[tuple[Path, str, str, str], Need] = {}  # what is missing of published data has no folders yet
+    found: dict[tuple[Path, str, str, str], Need] = {}  # missing published data has no folders yet
     kinds: set[str] = set()
     for mixture in [phase.mixture for phase in part.phases]:
         for selection in mixture.select:

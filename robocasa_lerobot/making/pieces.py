@@ -1,7 +1,7 @@
 """Datasets made one after the other by several processes: on this machine, on a Slurm cluster, or with Ray.
 
-A piece is one dataset, or one and what is drawn again from it. What a piece cannot make it says in a file, and the
-others go on. Nothing but the datasets themselves says what is done, so the same command takes up the rest.
+A piece is one dataset, or one and the datasets drawn again from it. What a piece cannot make it says in a file, and the
+others go on. Nothing but the datasets themselves says how far it is, so the same command takes up the rest.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ class Piece(Protocol):
 
     @property
     def work(self) -> Path:
-        """Folder of its own for what is on the way."""
+        """Folder of its own for unfinished files."""
         ...
 
     @property
@@ -48,7 +48,7 @@ class Piece(Protocol):
         ...
 
     def make(self, workers: int) -> None:
-        """Do it, or what is lacking of it."""
+        """Do it, or the missing part of it."""
         ...
 
 
@@ -87,7 +87,7 @@ def run_pieces(
     """Run the pieces, each in a process of its own; with fewer pieces than cores one after the other on all of them.
 
     Args:
-        pieces: what is to be made.
+        pieces: the ones to make.
         folder: for logs and completion markers; it goes when all is done.
         execution: local, Ray (both wait), or Slurm (submits, and the last job sums up).
         cores: processes of this machine.

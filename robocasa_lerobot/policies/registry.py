@@ -1,4 +1,4 @@
-"""The policies of this project, and the one way to make them known to LeRobot."""
+"""The policies of this project, and the one function that makes them known to LeRobot."""
 
 from __future__ import annotations
 

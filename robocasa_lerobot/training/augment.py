@@ -22,7 +22,7 @@ def augment(
 ) -> dict[str, Tensor]:
     """The batch with changed pictures, float (B, ..., 3, H, W) in [0, 1].
 
-    What is drawn for a sample depends on the seed and its place in the batch of all processes only.
+    The augmentation of a sample depends on the seed and its place in the batch of all processes only.
     """
     out = dict(batch)
     for number, key in enumerate(cameras):

@@ -31,7 +31,7 @@ class Interrupts:
 
         try:
             before = {number: signal.signal(number, on_signal) for number in SIGNALS}
-        except ValueError:  # not in the main thread: signals are somebody else's
+        except ValueError:  # not in the main thread: signals are not ours to handle
             yield
             return
         try:

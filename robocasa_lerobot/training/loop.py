@@ -22,9 +22,9 @@ from robocasa_lerobot.data.mixture import StepBatches
 from robocasa_lerobot.errors import UserError
 from robocasa_lerobot.files import written_aside
 from robocasa_lerobot.progress import Bar
-from robocasa_lerobot.training.allocator import keep_freed_memory
 from robocasa_lerobot.training.augment import augment
 from robocasa_lerobot.training.config.phase import PhaseConfig
+from robocasa_lerobot.training.cpu_tuning import keep_freed_memory
 from robocasa_lerobot.training.held_out import HeldOut
 from robocasa_lerobot.training.metrics import HELD_OUT, METRICS, append_line, draw_curve, track
 from robocasa_lerobot.training.shared_noise import SharedNoise

@@ -1,4 +1,4 @@
-"""Runs the phases of an experiment: what is finished is skipped, what was begun goes on."""
+"""Runs the phases of an experiment: finished ones are skipped, begun ones go on."""
 
 from __future__ import annotations
 

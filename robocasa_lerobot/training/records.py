@@ -20,7 +20,7 @@ from robocasa_lerobot.training.weights.checkpoint import last_checkpoint
 
 EXPERIMENT_FILE, PHASE_FILE, CONFIG_FILE = "experiment.yaml", "phase.json", "config.yaml"
 PACKAGES = ("lerobot", "torch", "accelerate", "transformers", "diffusers", "numpy")
-# Settings that may change while a phase is under way, because the losses do not depend on them.
+# Settings that may change while a phase is running, because the losses do not depend on them.
 FREE_SETTINGS = (
     *("loader.workers", "loader.cache", "device", "trackers", "save_every", "keep_last", "keep_every", "log_every"),
     *("held_out.every", "held_out.samples", "evaluations", "scale"),
@@ -30,7 +30,7 @@ FREE_SETTINGS = (
 def write_experiment(output: Path, experiment: ExperimentConfig) -> None:
     """Write the experiment; phases of another one in the same folder stay in the file, after its own.
 
-    So experiments of which one is a part of the other can take turns in a folder, and share what is trained.
+    So experiments of which one is a part of the other can take turns in a folder, and share the trained phases.
     """
     path, own = output / EXPERIMENT_FILE, dataclasses.asdict(experiment)
     before = yaml.safe_load(path.read_text(encoding="utf-8"))["phases"] if path.is_file() else []

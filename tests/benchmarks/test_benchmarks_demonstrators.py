@@ -46,11 +46,18 @@ def test_rates_times_and_reasons_are_counted(bench: ModuleType, tmp_path: Path) 
     assert drawer["failures"] == {"the hand stayed # cm away": 3}
     assert drawer["failed_seeds"] == [["pretrain", 0], ["pretrain", 1], ["target", 1]]
     assert tasks["OpenFridge"] == {
-        "demonstrator": False, "success_rate": None, "successes": 0, "trials": 0,
+        "demonstrator": False, "kind": "atomic", "success_rate": None, "successes": 0, "trials": 0,
         "human_seconds": facts_of("OpenFridge").human_seconds,
     }  # fmt: skip
     found = report.ratios(tasks)
-    assert found["mean_success"] == found["worst_task"] == 0.5
+    assert (
+        found["mean_success"]
+        == found["worst_task"]
+        == found["mean_success_atomic"]
+        == found["worst_task_atomic"]
+        == 0.5
+    )
+    assert found["mean_success_composite"] is found["worst_task_composite"] is None
     assert found["mean_success_counting_missing_as_0"] == pytest.approx(0.5 / 3)
     assert found["tasks_with_demonstrator"] == pytest.approx(2 / 3)
     assert bench.per_hour(trials) == {"one_process": 900.0, "all_processes": 1800.0}

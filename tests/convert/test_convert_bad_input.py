@@ -23,7 +23,7 @@ from lerobot.datasets.lerobot_dataset import LeRobotDataset
 
 from robocasa_lerobot.convert.pipeline import convert
 from robocasa_lerobot.convert.reading import hdf5
-from robocasa_lerobot.convert.reading.survey import CPU_SECONDS
+from robocasa_lerobot.convert.reading.safe_scan import CPU_SECONDS
 from robocasa_lerobot.convert.record_files import ACTIONS_OUT_OF_RANGE, CONVERSION_FILE, META_FOLDER
 from robocasa_lerobot.convert.settings import ConversionSettings, make_plan
 from robocasa_lerobot.convert.verify import verify

@@ -18,9 +18,9 @@ from robocasa_lerobot.convert import settings
 from robocasa_lerobot.convert.reading.demo_file import DemoFile
 from robocasa_lerobot.convert.reading.layout import ROBOMIMIC
 from robocasa_lerobot.convert.render import Scene
-from robocasa_lerobot.convert.scenes.ahead import ScenesAhead, SceneSource
 from robocasa_lerobot.convert.scenes.compiled import CompiledScene
 from robocasa_lerobot.convert.scenes.demo_scene import DemoScene
+from robocasa_lerobot.convert.scenes.prefetch import ScenesAhead, SceneSource
 from robocasa_lerobot.convert.settings import Camera, ConversionSettings
 
 pytest.importorskip("lerobot.datasets")
@@ -96,7 +96,7 @@ def _here(file: Path, number: int, preset: str) -> CompiledScene:
 @pytest.mark.parametrize("preset", ["fast", "quality"])
 def test_a_scene_is_that_compiled_here(preset: str, source: Path, scenes: ScenesAhead) -> None:
     _requested(scenes, _scene(source, 0), preset)
-    there, here = scenes.take(_scene(source, 0)), _here(source, 0, preset).with_look_alike()
+    there, here = scenes.take(_scene(source, 0)), _here(source, 0, preset).with_merged_model()
     assert there is not None
     assert _bytes(there.model) == _bytes(here.model)
     assert (there.alike is None) == (here.alike is None) == (preset == "quality")
@@ -116,7 +116,7 @@ def test_a_scene_is_that_compiled_here(preset: str, source: Path, scenes: Scenes
         np.testing.assert_array_equal(picture, drawn[1][name])
 
 
-def test_without_pictures_no_look_alike_is_made(source: Path, scenes: ScenesAhead) -> None:
+def test_without_pictures_no_merged_model_is_made(source: Path, scenes: ScenesAhead) -> None:
     _requested(scenes, _scene(source, 0), pictures=False)
     taken = scenes.take(_scene(source, 0))
     assert taken is not None

@@ -12,17 +12,18 @@ from robocasa_lerobot.demos.motion import Array, base_pose, floor_axes
 from robocasa_lerobot.demos.planning.base_path import Room
 from robocasa_lerobot.demos.planning.collision import CollisionChecker
 from robocasa_lerobot.demos.skills.common import SkillError, stage_done
-from robocasa_lerobot.demos.skills.pick_place.carry import OTHER_M, in_reach, standing_pose_for
+from robocasa_lerobot.demos.skills.pick_place.carrying.carry import OTHER_M, in_reach, standing_pose_for
 from robocasa_lerobot.demos.skills.pick_place.grasp_strategy import GraspStrategy, entry
 from robocasa_lerobot.demos.skills.pick_place.graspable import contents_of, graspable, holder_of
 from robocasa_lerobot.demos.skills.pick_place.location import locate
+from robocasa_lerobot.demos.skills.pick_place.pick import is_held
 from robocasa_lerobot.demos.skills.pick_place.strategies import grasp_strategy, in_the_open, place_strategy
-from robocasa_lerobot.demos.skills.pick_place.verbs import is_held, pick_object, place_object
+from robocasa_lerobot.demos.skills.pick_place.verbs import pick_object, place_object
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.kitchens.fixtures.counters import Counter
 from robocasa_lerobot.envs.robots.panda_omron.robot import PANDA_OMRON
 from robocasa_lerobot.envs.scene.robot_poses import RobotPose
-from robocasa_lerobot.envs.scene.spec import InsideOf, ObjectWanted, Placement
+from robocasa_lerobot.envs.scene.spec import InsideOf, ObjectSpec, Placement
 from robocasa_lerobot.envs.tasks.registry import get_task, task_names
 from robocasa_lerobot.envs.tasks.task import Stage
 from robocasa_lerobot.envs.tasks.typical import stages_of
@@ -54,7 +55,7 @@ def env(request: pytest.FixtureRequest) -> Iterator[KitchenEnv]:
     kitchen.close()
 
 
-def declared(env: KitchenEnv) -> Iterator[tuple[str, ObjectWanted]]:
+def declared(env: KitchenEnv) -> Iterator[tuple[str, ObjectSpec]]:
     """Names of the scene's objects, with their declarations; those that several share, and containers, are left out."""
     for wanted in get_task(env.declaration.name).objects:
         if wanted.name in env.scene.objects:
@@ -161,7 +162,7 @@ def test_a_standing_pose_is_free_and_near(env: KitchenEnv) -> None:
             assert np.hypot(stand.x - x, stand.y - y) < REACH_M
             assert Room(env.scene).free(stand)
             at = np.array([[stand.x, stand.y, stand.yaw]])
-            assert CollisionChecker(env.model, env.data).free(at, np.array([PANDA_OMRON.home.arm])).all()
+            assert CollisionChecker(env.scene, env.data).free(at, np.array([PANDA_OMRON.home.arm])).all()
 
 
 def reached(env: KitchenEnv, stand: RobotPose, point: Array) -> bool:

@@ -1,10 +1,11 @@
-"""The planner: what it takes for touching is what MuJoCo does, it goes round things, and it repeats itself."""
+"""The planner: what it takes for touching is what MuJoCo does, it goes round obstacles, and it repeats itself."""
 
 from __future__ import annotations
 
 import copy
 import itertools
 from collections.abc import Iterator
+from types import SimpleNamespace
 
 import mujoco
 import numpy as np
@@ -12,10 +13,12 @@ import pytest
 from numpy.typing import NDArray
 
 from robocasa_lerobot.demos.motion import UP, Array, HandTarget, grip_position, hand_rotation, rotation_about
-from robocasa_lerobot.demos.planning.base_path import Room, Space, base_now, find_path
+from robocasa_lerobot.demos.planning.articulated import ContactPath, Waypoint, plan_contact
+from robocasa_lerobot.demos.planning.base_path import Space, base_now, find_path
 from robocasa_lerobot.demos.planning.collision import CollisionChecker, Held, MovingPart
 from robocasa_lerobot.demos.planning.connect import connect
 from robocasa_lerobot.demos.planning.errors import NoPlanError
+from robocasa_lerobot.demos.planning.follow import CLOSELY, hand_poses
 from robocasa_lerobot.demos.planning.kinematics import Arm
 from robocasa_lerobot.demos.planning.motion_planner import MotionPlanner, WaypointPath, plan_near
 from robocasa_lerobot.demos.skills.common import SkillError
@@ -68,7 +71,7 @@ def test_what_is_touched_is_what_mujoco_finds_in_contact(cabinet: KitchenEnv, ca
     model, data = cabinet.model, copy.copy(cabinet.data)
     name = next(iter(cabinet.scene.objects))
     held = Held(name, np.array([0.01, 0.0, 0.03]), rotation_about(np.array([0.0, 1.0, 0.0]), 0.4)) if carries else None
-    checker = CollisionChecker(model, cabinet.data)
+    checker = CollisionChecker(cabinet.scene, cabinet.data)
     bases, joints = random_configurations(checker, 150)
     found = checker.touched(bases, joints, held=held, most=60)
     mine = cabinet.scene.subtree(MOBILE_BASE) | (cabinet.scene.subtree(name) if carries else False)
@@ -105,14 +108,14 @@ def test_a_part_that_moves_is_where_its_joint_takes_it(dishwasher: KitchenEnv) -
 
 
 def test_allowed_bodies_and_margins_and_links(dishwasher: KitchenEnv) -> None:
-    checker = CollisionChecker(dishwasher.model, dishwasher.data)
+    checker = CollisionChecker(dishwasher.scene, dishwasher.data)
     bases, joints = random_configurations(checker, 100)
     plain = checker.touched(bases, joints, most=12)
     assert plain.all()
     assert (checker.touched(bases, joints, most=12, margin_m=0.05).counts >= plain.counts).all()
     assert checker.touched(bases, joints, margin_m=0.05).counts.sum() > checker.touched(bases, joints).counts.sum()
     assert (checker.touched(bases, joints, most=12, links=(0,)).counts <= plain.counts).all()
-    excused = CollisionChecker(dishwasher.model, dishwasher.data, allowed=plain.all())
+    excused = CollisionChecker(dishwasher.scene, dishwasher.data, allowed=plain.all())
     assert not excused.touched(bases, joints, most=12).all()
     for body in plain.all():
         checker.allow_hand(body)
@@ -182,10 +185,10 @@ def before_the_dishwasher(env: KitchenEnv) -> tuple[RobotPose, RobotPose]:
 def test_the_base_goes_round_an_open_door(dishwasher: KitchenEnv) -> None:
     env = dishwasher
     one, other = before_the_dishwasher(env)
-    assert len(find_path(env.scene, None, one, other)) == 1  # straight, as with all doors shut
-    path = find_path(env.scene, env.data, one, other)
+    assert len(find_path(env.scene, None, one, other).poses) == 1  # straight, as with all doors shut
+    path = find_path(env.scene, env.data, one, other).poses
     assert len(path) > 1
-    checker = CollisionChecker(env.model, env.data)
+    checker = CollisionChecker(env.scene, env.data)
     for before, after in zip([one, *path[:-1]], path, strict=True):
         for share in np.linspace(0.0, 1.0, 6):
             base = np.array(
@@ -202,27 +205,27 @@ def test_the_base_goes_round_more_with_something_long_in_the_hand(cabinet: Kitch
     ahead = np.array([np.cos(goal.yaw), np.sin(goal.yaw), 0.0])
     start = RobotPose(float(goal.x - 0.4 * ahead[0]), float(goal.y - 0.4 * ahead[1]), goal.yaw)
     held = Held(name, hand.T @ (0.3 * ahead - 0.25 * UP), hand.T)
-    room = Room(env.scene)
-    alone, loaded = (Space(room, env.data, start, goal, what, None, 0.0) for what in (None, held))
+    checker = CollisionChecker(env.scene, env.data)
+    alone, loaded = (Space(env.scene, checker, start, goal, what, None, 0.0) for what in (None, held))
     assert alone.free(start)
     assert loaded.free(start)
     assert alone.free(goal)
     assert not loaded.free(goal)
-    assert find_path(env.scene, env.data, start, goal) == [goal]
-    path = find_path(env.scene, env.data, start, goal, held)
+    assert find_path(env.scene, env.data, start, goal).poses == [goal]
+    path = find_path(env.scene, env.data, start, goal, held).poses
     assert path[-1] != goal
     assert loaded.free(path[-1])
 
 
 def test_where_the_base_cannot_go_there_is_no_path(dishwasher: KitchenEnv) -> None:
     start = base_now(dishwasher.data)
-    with pytest.raises(NoPlanError, match="no way for the base"):
+    with pytest.raises(NoPlanError, match="no path for the base"):
         find_path(dishwasher.scene, dishwasher.data, start, RobotPose(start.x + 30.0, start.y, start.yaw))
     assert issubclass(NoPlanError, SkillError)
 
 
 def test_angles_that_are_solved_for_give_the_pose_and_the_hand_is_led_there(cabinet: KitchenEnv) -> None:
-    arm = Arm(cabinet.model, cabinet.data)
+    arm = Arm(cabinet.model, cabinet.data, cabinet.scene.robot)
     rng = np.random.default_rng(2)
     start = np.array(PANDA_OMRON.home.arm)
     goals = np.clip(start + rng.normal(size=(60, 7)) * 0.3, *arm.ranges.T)
@@ -233,9 +236,26 @@ def test_angles_that_are_solved_for_give_the_pose_and_the_hand_is_led_there(cabi
     reached, _ = arm.forward(found.joints)
     assert np.allclose(np.linalg.norm(positions - reached, axis=1), found.position_error)
     goal = found.joints[solved][0]
-    went = arm.along(start, start + np.linspace(0.1, 1.0, 10)[:, None] * (goal - start))
+    went = arm.along(start, *arm.forward(start + np.linspace(0.1, 1.0, 10)[:, None] * (goal - start)))
     end, _ = arm.forward(went[-1:])
     assert np.linalg.norm(end[0] - reached[solved][0]) < 0.01
+
+
+def test_what_is_upright_at_both_ends_of_a_level_path_is_upright_between(cabinet: KitchenEnv) -> None:
+    arm = Arm(cabinet.model, cabinet.data, cabinet.scene.robot)
+    start = arm.home
+    (position,), (turn,) = arm.forward(start[None])
+    aside = position[None] + np.array([[0.1, -0.25, 0.1]])
+    end = arm.solve(aside, (rotation_about(UP, -1.0) @ turn)[None], start[None]).joints[0]
+    upright = turn.T @ UP  # of something in the hand
+    tilts = []
+    for level in (False, True):
+        positions, turns = hand_poses(arm, start, end[None], CLOSELY, level=level)
+        assert np.allclose(positions[-1], arm.forward(end[None])[0][0])
+        assert np.allclose(turns[-1], arm.forward(end[None])[1][0])
+        tilts.append(float(np.arccos(np.clip((turns @ upright)[:, 2], -1.0, 1.0)).max()))
+    assert tilts[1] < 0.03
+    assert tilts[1] < tilts[0]
 
 
 def paths_down(env: KitchenEnv) -> list[WaypointPath]:
@@ -273,3 +293,19 @@ def test_what_was_tried_is_not_tried_again(cabinet: KitchenEnv) -> None:
     assert np.trace(first.targets[-1].rotation.T @ second.targets[-1].rotation) < 2.5
     every = [row[-1].rotation for row in rows]
     assert plan_near(cabinet, rows, [(0.0, 0.0)], tried=every).cost == first.cost  # there are no others
+
+
+def test_a_path_that_begins_where_the_hand_is_already_is_planned(cabinet: KitchenEnv) -> None:
+    """There is no line to its first pose on which anything could be tested."""
+    data, model = cabinet.data, cabinet.model
+    joint = next(name for i in range(model.njnt) if (name := model.joint(i).name).endswith("door_joint"))
+    here = HandTarget(grip_position(data), hand_rotation(data))
+    there = HandTarget(here.position - 0.05 * here.rotation[:, 2], here.rotation)
+    path = ContactPath((Waypoint(0.0, here), Waypoint(0.0, there, 1.0)), 1, lambda _: here)
+    part = SimpleNamespace(
+        name=joint, body=int(model.joint(joint).bodyid[0]), angle=0.0, joint_value=lambda angle: float(angle)
+    )
+    plan = plan_contact(cabinet, part, [path], [((0.0, 0.0), (0.0, 0.0))])
+    assert plan.path is path
+    present = data.qpos[Arm(model, data, cabinet.scene.robot).addresses]
+    assert np.abs(plan.joints[-1] - present).max() < 0.05

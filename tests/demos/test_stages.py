@@ -178,6 +178,19 @@ def test_it_gives_up_with_the_skills_own_words(monkeypatch: pytest.MonkeyPatch) 
     assert [(o.attempts, o.done) for o in log.outcomes] == [(ATTEMPTS, False), (0, False)]
 
 
+def test_it_says_why_a_stage_that_was_done_is_to_be_done_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    def undoes(env: Made, stage: Stage) -> Iterator[np.ndarray]:
+        env.flags["a"] = False
+        yield np.zeros(12)
+        raise SkillError("it fell")
+
+    env = made(monkeypatch, {"a": does(*[{"a": True}] * ATTEMPTS), "b": undoes})
+    with pytest.raises(
+        SkillError, match=rf"stage 1 \(made a\): it came undone after {ATTEMPTS} attempts, when it fell"
+    ):
+        list(carry_out(env, StageLog()))
+
+
 @pytest.mark.parametrize("name", task_names())
 def test_every_stage_of_every_task_has_a_condition(name: str) -> None:
     task = get_task(name)

@@ -9,10 +9,13 @@ import numpy as np
 import pytest
 from goal_states import put_object
 
+from robocasa_lerobot.demos.motion import DEAD_ZONE, UP, rotation_about
 from robocasa_lerobot.demos.skills import SkillError
+from robocasa_lerobot.demos.skills.navigation import LOADED_CHANGE, Pace
+from robocasa_lerobot.demos.skills.pick_place.carrying.level import levelled
 from robocasa_lerobot.demos.skills.pick_place.graspable import graspable
 from robocasa_lerobot.demos.skills.pick_place.hold import hold_poses
-from robocasa_lerobot.demos.skills.pick_place.place_poses import over_burners
+from robocasa_lerobot.demos.skills.pick_place.place_poses import on_object, over_burners
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.kitchens.appliances.kinds.sink import Sink
 from robocasa_lerobot.envs.kitchens.appliances.kinds.stove import Hob
@@ -38,6 +41,54 @@ def lettuce(request: pytest.FixtureRequest) -> Iterator[KitchenEnv]:
 @pytest.fixture(params=["target", "pretrain"])
 def kettle(request: pytest.FixtureRequest) -> Iterator[KitchenEnv]:
     yield from made("KettleBoiling", request.param)
+
+
+@pytest.fixture(params=["target", "pretrain"])
+def leftovers(request: pytest.FixtureRequest) -> Iterator[KitchenEnv]:
+    yield from made("StoreLeftoversInBowl", request.param)
+
+
+def test_what_goes_into_a_vessel_goes_beside_what_lies_across_it(leftovers: KitchenEnv) -> None:
+    env, data = leftovers, leftovers.data
+    bowl = data.body("bowl").xpos.copy()
+    poses = on_object(env, graspable(env, "vegetable"), "bowl")
+    alone = min(poses(), key=lambda pose: pose.extra)
+    assert np.linalg.norm((alone.point - bowl)[:2]) < 0.005
+    for yaw in (0.4, 1.9):
+        turn = np.empty(4)
+        mujoco.mju_axisAngle2Quat(turn, UP, yaw)
+        put_object(env.scene, data, "chicken_drumstick", bowl + 0.02 * UP)
+        data.joint("chicken_drumstick_joint0").qpos[3:] = turn
+        mujoco.mj_forward(env.model, data)
+        assert graspable(env, "bowl").contents == ("chicken_drumstick",)
+        best = min(poses(), key=lambda pose: pose.extra)
+        along, across = np.abs(rotation_about(UP, -yaw) @ (best.point - data.body("chicken_drumstick").xpos))[:2]
+        assert across > 0.012  # it is longer along its x axis
+        assert np.linalg.norm((best.point - bowl)[:2]) < 0.06, along
+
+
+def test_a_tilted_vessel_is_turned_upright_by_the_least_turn_and_one_that_lies_is_left() -> None:
+    for tilt in (0.0, 0.2, 0.6):
+        turn = rotation_about(np.array([0.6, 0.8, 0.0]), tilt) @ rotation_about(UP, 1.0)
+        upright = levelled(turn)
+        assert np.allclose(upright[:, 2], UP)
+        assert np.allclose(upright, rotation_about(UP, 1.0))
+    lying = rotation_about(np.array([1.0, 0.0, 0.0]), 1.2)
+    assert np.array_equal(levelled(lying), lying)
+
+
+def test_a_base_with_a_loaded_vessel_changes_its_speed_by_and_by() -> None:
+    pace, free = Pace(smooth=True), Pace()
+    wanted, before = np.array([1.0, -0.4, 0.3, 0.0]), np.zeros(4)
+    assert np.array_equal(free.next(wanted), wanted)
+    for step in range(20):
+        now = pace.next(wanted)
+        assert np.abs(now - before).max() <= LOADED_CHANGE + (DEAD_ZONE if step == 0 else 0.0) + 1e-9
+        before = now
+    assert np.allclose(now, wanted)
+    for _ in range(30):
+        now = pace.next(-wanted)
+    assert np.allclose(now, -wanted)
 
 
 def test_at_every_hold_pose_the_contents_are_under_water(lettuce: KitchenEnv) -> None:

@@ -17,7 +17,7 @@ from robocasa_lerobot.envs.kitchens.fixtures.cabinets import HingeCabinet
 from robocasa_lerobot.envs.predicates import AllOf, ForEach, ObjectOn, StateIs
 from robocasa_lerobot.envs.scene.build import build_scene
 from robocasa_lerobot.envs.scene.scene import Scene
-from robocasa_lerobot.envs.scene.spec import Choice, FixtureWanted, ObjectWanted, Placement, RobotStart, SampleRegion
+from robocasa_lerobot.envs.scene.spec import Choice, FixtureSpec, ObjectSpec, Placement, RobotStart, SampleRegion
 from robocasa_lerobot.envs.tasks.stage_text import stage_text
 from robocasa_lerobot.envs.tasks.task import BoundTask, Stage, StagesWhen, Task
 from robocasa_lerobot.envs.tasks.typical import goal_of, stages_of
@@ -115,7 +115,7 @@ def test_the_other_stands_on_the_other_side() -> None:
 
 def test_the_robot_starts_where_a_choice_says() -> None:
     choice = Choice("at", {"cab": {}, "other": {}})
-    others = (*PANTRY.fixtures, FixtureWanted("other", "sink"))
+    others = (*PANTRY.fixtures, FixtureSpec("other", "sink"))
     task = replace(PANTRY, choices=(*PANTRY.choices, choice), fixtures=others, robot_start=RobotStart("{at}"))
     starts = set()
     for seed in range(6):
@@ -155,8 +155,8 @@ def test_the_object_of_a_stage_by_a_choice() -> None:
 
 def alike(**fields: Any) -> Task:
     start = Placement("counter", region=SampleRegion("sink", "any"), size=(0.9, 0.5))
-    counter = FixtureWanted("counter", "counter", near="sink")
-    wanted = ObjectWanted("nest", ("cup", "bowl"), start, count=(2, 3), same_category_as="nest", **fields)
+    counter = FixtureSpec("counter", "counter", near="sink")
+    wanted = ObjectSpec("nest", ("cup", "bowl"), start, count=(2, 3), same_category_as="nest", **fields)
     return replace(
         FRUITS,
         fixtures=(*SINK.fixtures, counter),
@@ -183,7 +183,7 @@ def test_several_alike_and_smaller_and_smaller() -> None:
 def test_of_the_category_of_another() -> None:
     start = SINK.objects[0].start
     for seed in range(4):
-        first = ObjectWanted("a", ("vegetable",), start, graspable=True)
+        first = ObjectSpec("a", ("vegetable",), start, graspable=True)
         second = replace(first, name="b", same_category_as="a", scale=(1.0, 1.0, 0.9))
         task = replace(
             FRUITS,
@@ -208,10 +208,19 @@ def test_of_the_category_of_another() -> None:
         (replace(FRUIT, same_category_as="nobody"), "is not there before it"),
     ],
 )
-def test_wrong_declarations_say_what_is_wrong(wanted: ObjectWanted, message: str) -> None:
+def test_wrong_declarations_say_what_is_wrong(wanted: ObjectSpec, message: str) -> None:
     task = replace(FRUITS, objects=(wanted,), choices=(Choice("side_count", {"many": {}}),))
     with pytest.raises(UserError, match=message):
         build_scene(task, "target", 0)
+
+
+@pytest.mark.parametrize(
+    "declared", [{"of": "stove"}, {"options": {"left": {"_knob": "left one"}}}, {"options": {"left": {}}}]
+)
+def test_the_value_of_a_choice_cannot_be_replaced_by_its_word(declared: dict[str, Any]) -> None:
+    with pytest.raises(ValueError, match=r"'_knob'.*would replace the value.*Call it 'knob'"):
+        Choice("_knob", **declared)
+    assert Choice("knob", **declared).name == "knob"
 
 
 def test_a_scene_with_nothing_to_do_is_a_mistake_of_the_declaration() -> None:

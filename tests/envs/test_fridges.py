@@ -28,9 +28,9 @@ from robocasa_lerobot.envs.scene.roles import candidates
 from robocasa_lerobot.envs.scene.scene import Scene
 from robocasa_lerobot.envs.scene.spec import (
     Choice,
-    FixtureWanted,
+    FixtureSpec,
     InitialOpenness,
-    ObjectWanted,
+    ObjectSpec,
     Placement,
     RobotStart,
     SampleRegion,
@@ -47,10 +47,10 @@ def food_in(compartment: str, *, kind: str = "fridge_with_freezer", opened: str 
     return Task(
         name=f"FoodIn{compartment.title()}",
         summary="The compartment is shut.",
-        fixtures=(FixtureWanted("fridge", kind),),
+        fixtures=(FixtureSpec("fridge", kind),),
         robot_start=RobotStart("fridge", setback=0.3),
         objects=(
-            ObjectWanted(
+            ObjectSpec(
                 "obj",
                 ("vegetable", "fruit"),
                 Placement(

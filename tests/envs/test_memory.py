@@ -6,6 +6,8 @@ import functools
 from contextlib import closing
 from dataclasses import replace
 from functools import partial
+from types import SimpleNamespace
+from typing import cast
 
 import mujoco
 import numpy as np
@@ -19,6 +21,7 @@ from robocasa_lerobot.envs.kitchens.appliances.base import Appliance
 from robocasa_lerobot.envs.kitchens.appliances.kinds.sink import Sink
 from robocasa_lerobot.envs.predicates import (
     AllOf,
+    ForEach,
     Goal,
     Grasped,
     GripperTouches,
@@ -31,6 +34,7 @@ from robocasa_lerobot.envs.predicates import (
     StepsWhile,
     Strokes,
     UnderWater,
+    When,
     parts_with_memory,
 )
 from robocasa_lerobot.envs.scene.build import build_scene
@@ -333,3 +337,16 @@ def test_mistakes_are_named() -> None:
         StepsWhile(RUNS, 0)
     with pytest.raises(UserError, match="expected a bound"):
         MovedSince("obj", "step")
+
+
+def test_what_is_remembered_is_bound_with_its_goal_and_keeps_its_name() -> None:
+    drawn = cast(Scene, SimpleNamespace(named=lambda name: (f"{name}_0", f"{name}_1"), choices={"side": "left"}))
+    each = ForEach("ice", lambda name: UnderWater(name, "sink"))
+    by_side = When("side", {"left": StateIs("sink", "left"), "right": StateIs("sink", "right")})
+    for make in (partial(StepsWhile, n_steps=3), Once, Never):
+        term = make(goal=AllOf(each, by_side))
+        bound = term.bound(drawn)
+        both = AllOf(UnderWater("ice_0", "sink"), UnderWater("ice_1", "sink"))
+        assert bound.inner == (AllOf(both, StateIs("sink", "left")),)
+        assert (type(bound), bound.name) == (type(term), term.name)
+        assert bound.bound(drawn) == bound

@@ -28,9 +28,9 @@ from robocasa_lerobot.envs.scene.roles import candidates, ground_fixture
 from robocasa_lerobot.envs.scene.scene import Scene
 from robocasa_lerobot.envs.scene.spec import (
     Choice,
-    FixtureWanted,
+    FixtureSpec,
     InitialOpenness,
-    ObjectWanted,
+    ObjectSpec,
     Placement,
     RobotStart,
 )
@@ -107,10 +107,10 @@ def scene_with(kind: str, style_id: int) -> Scene:
     task = Task(
         name="CloseTheNewOne",
         summary="It is shut.",
-        fixtures=(FixtureWanted("new", kind),),
+        fixtures=(FixtureSpec("new", kind),),
         robot_start=RobotStart("new"),
         choices=(Choice("programme", of="new"),),
-        objects=(ObjectWanted("obj", ("lime",), Placement("new", size=(0.2, 0.2))),),
+        objects=(ObjectSpec("obj", ("lime",), Placement("new", size=(0.2, 0.2))),),
         initial=(InitialOpenness("new", 0.9, 1.0),),
         goal=DoorsClosed("new"),
         stages=(Stage("doors", "close", "new"),),

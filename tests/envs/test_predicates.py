@@ -37,9 +37,9 @@ from robocasa_lerobot.envs.scene.build import build_scene
 from robocasa_lerobot.envs.scene.scene import Scene
 from robocasa_lerobot.envs.scene.scene_spec import SceneSpec
 from robocasa_lerobot.envs.scene.spec import (
-    FixtureWanted,
+    FixtureSpec,
     InsideOf,
-    ObjectWanted,
+    ObjectSpec,
     OnCounter,
     Placement,
     RobotStart,
@@ -54,19 +54,19 @@ BURNER = Placement(
 )
 STOVE = SceneSpec(
     name="TwoOnAStove",
-    fixtures=(FixtureWanted("stove", "stove"),),
+    fixtures=(FixtureSpec("stove", "stove"),),
     robot_start=RobotStart("stove"),
-    objects=(ObjectWanted("pan", ("pan",), BURNER), ObjectWanted("pot", ("pot",), BURNER)),
+    objects=(ObjectSpec("pan", ("pan",), BURNER), ObjectSpec("pot", ("pot",), BURNER)),
     instruction="Cook.",
 )
 SINK = SceneSpec(
     name="OneInASink",
-    fixtures=(FixtureWanted("sink", "sink"),),
+    fixtures=(FixtureSpec("sink", "sink"),),
     robot_start=RobotStart("sink"),
     objects=(
-        ObjectWanted("obj", ("sponge",), OnCounter("sink", loc="left_right", size=(0.30, 0.30))),
-        ObjectWanted("distr_counter", ("apple",), OnCounter("sink", loc="left_right", size=(0.30, 0.40))),
-        ObjectWanted("distr_sink", ("bowl",), InsideOf("sink", size=(0.25, 0.25), at=1.0)),
+        ObjectSpec("obj", ("sponge",), OnCounter("sink", loc="left_right", size=(0.30, 0.30))),
+        ObjectSpec("distr_counter", ("apple",), OnCounter("sink", loc="left_right", size=(0.30, 0.40))),
+        ObjectSpec("distr_sink", ("bowl",), InsideOf("sink", size=(0.25, 0.25), at=1.0)),
     ),
     instruction="Wash.",
 )

@@ -13,7 +13,7 @@ from task_selection import every_task
 from robocasa_lerobot import contract
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.rendering import SceneRenderer
-from robocasa_lerobot.envs.rendering.look_alike import look_alike
+from robocasa_lerobot.envs.rendering.merged_model import merged_model
 from robocasa_lerobot.envs.rendering.tessellation import Surface, boxes, capsule, cylinder
 
 GROUPS = (1, 2)
@@ -66,7 +66,7 @@ def volume_of(surface: Surface) -> float:
 
 @pytest.mark.render
 @pytest.mark.parametrize("task", every_task())
-def test_the_look_alike_looks_alike(task: str) -> None:
+def test_the_merged_model_looks_alike(task: str) -> None:
     env = KitchenEnv(task, image_size=128)
     env.reset(seed=2)
     merged = SceneRenderer(env.model, 128, 128)
@@ -164,4 +164,4 @@ def test_a_state_that_is_shown_by_colour_is_seen() -> None:
 
 def test_a_small_model_is_drawn_as_it_is() -> None:
     model = mujoco.MjModel.from_xml_string("<mujoco><worldbody><geom size='1' group='1'/></worldbody></mujoco>")
-    assert look_alike(model, GROUPS) is None
+    assert merged_model(model, GROUPS) is None

@@ -14,7 +14,7 @@ from robocasa_lerobot.envs.scene.placement.objects import place_objects
 from robocasa_lerobot.envs.scene.placement.regions import choose_parts, parts_of, rectangle_in
 from robocasa_lerobot.envs.scene.robot_poses import faces, is_free, robot_pose
 from robocasa_lerobot.envs.scene.roles import candidates, cast_roles, ground_fixture
-from robocasa_lerobot.envs.scene.spec import FixtureWanted, ObjectWanted, Placement, RobotStart, SampleRegion
+from robocasa_lerobot.envs.scene.spec import FixtureSpec, ObjectSpec, Placement, RobotStart, SampleRegion
 from robocasa_lerobot.envs.tasks.registry import get_task
 
 LAYOUT = load_layout(2)
@@ -65,15 +65,15 @@ def test_levels_of_a_cabinet() -> None:
     assert {part.area.z for part in low} == {z for z in heights if z <= 1.5}
 
 
-def _task(*objects: ObjectWanted):
-    fixtures = (FixtureWanted("sink", "sink"), FixtureWanted("counter", "counter", near="sink"))
+def _task(*objects: ObjectSpec):
+    fixtures = (FixtureSpec("sink", "sink"), FixtureSpec("counter", "counter", near="sink"))
     return replace(get_task("PickPlaceCounterToSink"), fixtures=fixtures, objects=objects)
 
 
 def test_food_stands_in_its_container_and_regions_are_taken_again() -> None:
     start = Placement("counter", region=SampleRegion("sink", "left_right"), try_to_place_in="plate")
     again = Placement("counter", region=SampleRegion("sink", "any"), reuse_region_from="obj")
-    task = _task(ObjectWanted("obj", ("fruit",), start), ObjectWanted("other", ("can",), again))
+    task = _task(ObjectSpec("obj", ("fruit",), start), ObjectSpec("other", ("can",), again))
     for seed in range(5):
         rng = np.random.default_rng(seed)
         roles = cast_roles(rng, task.fixtures, LAYOUT)
@@ -117,7 +117,7 @@ def test_several_footprints_answer_as_each_of_them_does() -> None:
 def test_what_does_not_fit_is_said_with_free_area_and_three_remedies() -> None:
     start = Placement("counter", size=(0.3, 0.3), pos=(-1.0, -1.0))
     names = ("plate", "tray", "pan", "pot", "cutting_board")
-    task = _task(*(ObjectWanted(f"wide_{name}", (name,), start) for name in names))
+    task = _task(*(ObjectSpec(f"wide_{name}", (name,), start) for name in names))
     rng = np.random.default_rng(0)
     roles = cast_roles(rng, task.fixtures, LAYOUT)
     with pytest.raises(PlacementError, match="wide_") as failure:

@@ -17,7 +17,7 @@ from robocasa_lerobot.envs.predicates import ObjectOn
 from robocasa_lerobot.envs.scene.build import build_scene
 from robocasa_lerobot.envs.scene.placement.counter_areas import standing_on
 from robocasa_lerobot.envs.scene.scene import Scene
-from robocasa_lerobot.envs.scene.spec import ObjectWanted, OnCounter, Placement
+from robocasa_lerobot.envs.scene.spec import ObjectSpec, OnCounter, Placement
 from robocasa_lerobot.envs.tasks.registry import get_task
 from robocasa_lerobot.errors import UserError
 
@@ -102,8 +102,8 @@ def test_objects_start_scaled_by_axis_with_what_is_in_them(group: str, scale: Sc
     start = OnCounter("cab", size=(0.6, 0.4))
     found = {}
     for factors in (1.0, scale):
-        item = ObjectWanted("item", (group,), start, scale=factors)
-        inside = ObjectWanted("food", ("lime",), Placement(object="item"))
+        item = ObjectSpec("item", (group,), start, scale=factors)
+        inside = ObjectSpec("food", ("lime",), Placement(object="item"))
         objects = (item, inside) if group != "fork" else (item,)
         scene = build_scene(dataclasses.replace(base, objects=objects), "target", 3)
         found[factors] = scene.objects["item"].item
@@ -118,6 +118,6 @@ def test_objects_start_scaled_by_axis_with_what_is_in_them(group: str, scale: Sc
 
 def test_a_scale_of_two_factors_is_refused() -> None:
     base = get_task("PickPlaceCounterToCabinet")
-    item = ObjectWanted("item", ("bowl",), OnCounter("cab"), scale=(1.5, 1.5))  # type: ignore[arg-type]
+    item = ObjectSpec("item", ("bowl",), OnCounter("cab"), scale=(1.5, 1.5))  # type: ignore[arg-type]
     with pytest.raises(UserError, match="three of them"):
         build_scene(dataclasses.replace(base, objects=(item,)), "target", 0)

@@ -14,7 +14,7 @@ from robocasa_lerobot.envs.predicates import (
     ObjectOn,
     When,
 )
-from robocasa_lerobot.envs.scene.spec import Choice, FixtureWanted, ObjectWanted, Placement, RobotStart, SampleRegion
+from robocasa_lerobot.envs.scene.spec import Choice, FixtureSpec, ObjectSpec, Placement, RobotStart, SampleRegion
 from robocasa_lerobot.envs.tasks.registry import get_task
 from robocasa_lerobot.envs.tasks.task import EachStage, Stage, StagesWhen, Task
 
@@ -47,10 +47,10 @@ ICE = Task(
     initial=BLENDER.initial,
     choices=(CUBES,),
     objects=(
-        ObjectWanted(
+        ObjectSpec(
             "bowl", ("bowl",), Placement("counter", region=SampleRegion("blender", "left_right"), size=(0.5, 0.35))
         ),
-        ObjectWanted("ice_cube", ("ice_cube",), Placement(object="bowl"), count="{n}", scale=0.8, repeats=True),
+        ObjectSpec("ice_cube", ("ice_cube",), Placement(object="bowl"), count="{n}", scale=0.8, repeats=True),
     ),
     goal=ForEach("ice_cube", lambda name: AllOf(ObjectInside(name, "blender"), GripperFar(name))),
     stages=(EachStage("ice_cube", lambda name: (Stage("pick_place", "place", "blender", object=name),)),),
@@ -60,12 +60,12 @@ IN_CABINET = Placement("cab", size=(0.2, 0.3), pos=("{side}", -0.3), margin=0.0)
 PANTRY = Task(
     name="RestockPantry",
     summary="It stays as it is.",
-    fixtures=(FixtureWanted("cab", "cabinet_double_door"), FixtureWanted("counter", "counter", near="cab")),
+    fixtures=(FixtureSpec("cab", "cabinet_double_door"), FixtureSpec("counter", "counter", near="cab")),
     robot_start=RobotStart("cab"),
     choices=(Choice("side", {"left": {"other": "right"}, "right": {"other": "left"}}),),
     objects=(
-        ObjectWanted("here", ("canned_food",), IN_CABINET),
-        ObjectWanted("there", ("can",), replace(IN_CABINET, pos=("-{side}", 0.3))),
+        ObjectSpec("here", ("canned_food",), IN_CABINET),
+        ObjectSpec("there", ("can",), replace(IN_CABINET, pos=("-{side}", 0.3))),
     ),
     goal=Not(ObjectInBasin("here", "cab")),
     stages=(Stage("doors", "open", "cab"),),
@@ -79,9 +79,9 @@ TOOLS = Task(
     robot_start=SINK.robot_start,
     choices=(Choice("food_kind", {food: {"_tool": tool} for food, tool in FOOD.items()}),),
     objects=(
-        ObjectWanted("food", ("{food_kind}",), SINK.objects[0].start, graspable=True),
-        ObjectWanted("knife", ("knife",), SINK.objects[0].start),
-        ObjectWanted("peeler", ("peeler",), SINK.objects[0].start),
+        ObjectSpec("food", ("{food_kind}",), SINK.objects[0].start, graspable=True),
+        ObjectSpec("knife", ("knife",), SINK.objects[0].start),
+        ObjectSpec("peeler", ("peeler",), SINK.objects[0].start),
     ),
     goal=When("_tool", {tool: ObjectOn(tool, "food") for tool in ("knife", "peeler")}),
     stages=(StagesWhen("_tool", {

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from robocasa_lerobot.envs.predicates import Goal, StepsWhile, UnderWater
 from robocasa_lerobot.envs.scene.initial_states import Water
-from robocasa_lerobot.envs.scene.spec import FixtureWanted, ObjectWanted, OnCounter, Placement, RobotStart
+from robocasa_lerobot.envs.scene.spec import FixtureSpec, ObjectSpec, OnCounter, Placement, RobotStart
 from robocasa_lerobot.envs.tasks.task import Stage, Task
 
 UNDER_SPOUT = Placement("sink", size=(0.02, 0.02), pos=(0.0, 0.0), ensure_inside=False)
@@ -16,11 +16,11 @@ def by_the_sink(goal: Goal, *stages: Stage, runs: bool = False) -> Task:
     return Task(
         name="WashLettuce",
         summary="What the goal says.",
-        fixtures=(FixtureWanted("sink", "sink"),),
+        fixtures=(FixtureSpec("sink", "sink"),),
         robot_start=RobotStart("sink"),
         objects=(
-            ObjectWanted("obj", ("lettuce",), UNDER_SPOUT),
-            ObjectWanted("sponge", ("sponge",), OnCounter("sink", loc="left_right", size=(0.30, 0.30))),
+            ObjectSpec("obj", ("lettuce",), UNDER_SPOUT),
+            ObjectSpec("sponge", ("sponge",), OnCounter("sink", loc="left_right", size=(0.30, 0.30))),
         ),
         initial=(Water("sink", runs),),
         goal=goal,

@@ -1,4 +1,4 @@
-"""A draft of a mapping file for an inspected HDF5 file: what is known filled in, what is not left as comments."""
+"""A draft of a mapping file for an inspected HDF5 file: known entries filled in, unknown ones left as comments."""
 
 from __future__ import annotations
 

@@ -18,7 +18,7 @@ from robocasa_lerobot.convert.reading.demo_file import WHOLE_FILE, DemoFile
 from robocasa_lerobot.convert.reading.hdf5 import RejectedEpisodeError
 from robocasa_lerobot.convert.reading.layout import DEFAULT_EPISODES, Layout
 from robocasa_lerobot.convert.reading.mjcf import scene_names
-from robocasa_lerobot.convert.reading.survey import Survey, survey
+from robocasa_lerobot.convert.reading.safe_scan import Survey, survey
 from robocasa_lerobot.errors import UserError
 from robocasa_lerobot.progress import Bar
 

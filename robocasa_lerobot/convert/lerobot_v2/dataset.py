@@ -21,7 +21,7 @@ from robocasa_lerobot.errors import suggest
 INFO = "meta/info.json"
 VERSIONS = ("v2.0", "v2.1")
 EXTRAS = "extras"
-# The only things that a path template may hold, with at most two digits of width: a template is input like any other.
+# The only fields that a path template may hold, with at most two digits of width: a template is input like any other.
 _FIELD = re.compile(r"\{(?:episode_chunk|episode_index|video_key)(?::0?\d{1,2}d)?\}")
 # Written anew for the dataset that is made; LeRobot adds them to every dataset.
 INDEX_COLUMNS = ("timestamp", "frame_index", "episode_index", "index", "task_index")

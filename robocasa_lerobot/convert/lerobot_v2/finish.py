@@ -1,4 +1,4 @@
-"""What is written into a dataset made from LeRobot v2 after its shards were joined: GR00T's and RoboCasa's files."""
+"""Files that are added to a dataset made from LeRobot v2 after its shards were joined: GR00T's and RoboCasa's files."""
 
 from __future__ import annotations
 

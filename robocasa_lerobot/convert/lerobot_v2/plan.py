@@ -109,7 +109,7 @@ def make_v2_plan(folders: Sequence[Path], settings: ConversionSettings) -> V2Pla
                 )
         if look.columns != first.columns or look.camera_keys != first.camera_keys:
             raise UserError(
-                f"{look.dataset.root} and {first.dataset.root} order or name the same things differently. Convert "
+                f"{look.dataset.root} and {first.dataset.root} order or name the same columns differently. Convert "
                 "them into datasets of their own and join those with LeRobot."
             )
     num_frames = sum(max(0, line.length) for look in looks for line in look.episodes)

@@ -1,7 +1,7 @@
 """Reading HDF5 files that may be damaged or hostile: every failure is one of this project's errors, never zeros.
 
 HDF5 itself follows links into other files, takes raw data from any file that a dataset names, and gives fill values
-where chunks are missing. None of that is a demonstration: nothing outside the file is opened, and what is not in the
+where chunks are missing. None of that is a demonstration: nothing outside the file is opened, and data missing in the
 file is an error. Sizes are looked at before anything is read, since a few bytes can declare any size.
 """
 
@@ -17,7 +17,7 @@ import numpy as np
 
 from robocasa_lerobot.errors import UserError
 
-# Larger things than these are no demonstration: values of one column, bytes of one text, of one chunk, of one file
+# Larger sizes than these are no demonstration's: values of one column, bytes of one text, of one chunk, of one file
 # that a scene names, and of one attribute that is only kept as a record; height and width of pictures.
 MAX_COLUMN_VALUES = 50_000_000
 MAX_MAGNITUDE = 1e30  # of numbers: beyond it squares, and so statistics, soon overflow

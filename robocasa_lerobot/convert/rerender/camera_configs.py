@@ -1,7 +1,7 @@
 """Cameras of recorded scenes, moved or added by a description in RoboCasa's `cam_configs` form.
 
 For each camera: `pos` (metres) and `quat` (wxyz) in the frame of the body `parent_body`, and `camera_attribs` as MJCF
-has them: `fovy` in degrees, or `focal`/`focalpixel`, `sensorsize` and `resolution`. What is not given stays as it is.
+has them: `fovy` in degrees, or `focal`/`focalpixel`, `sensorsize` and `resolution`. Missing keys stay as they are.
 """
 
 from __future__ import annotations

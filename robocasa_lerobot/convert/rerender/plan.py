@@ -25,7 +25,7 @@ from robocasa_lerobot.convert.reading.demo_file import RejectedEpisodeError
 from robocasa_lerobot.convert.reading.mjcf import AssetFinder, loadable, scene_names
 from robocasa_lerobot.convert.record_files import EXTRAS, kept_assets
 from robocasa_lerobot.convert.rerender.camera_configs import check_camera_configs, with_cameras
-from robocasa_lerobot.convert.scenes.ahead import ScenesAhead
+from robocasa_lerobot.convert.scenes.prefetch import ScenesAhead
 from robocasa_lerobot.convert.settings import SHARD_FRAMES, Camera, shard_frames
 from robocasa_lerobot.convert.writing.encoder import CODECS
 from robocasa_lerobot.errors import UnknownNameError, UserError

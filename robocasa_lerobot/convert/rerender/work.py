@@ -30,7 +30,7 @@ from robocasa_lerobot.convert.rerender.plan import (
     RenderSettings,
     make_render_plan,
 )
-from robocasa_lerobot.convert.scenes.ahead import scenes_ahead
+from robocasa_lerobot.convert.scenes.prefetch import scenes_ahead
 from robocasa_lerobot.convert.writing.card import renew_dataset_card
 from robocasa_lerobot.convert.writing.encoder import (
     CODECS,

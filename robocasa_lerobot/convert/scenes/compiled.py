@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robocasa_lerobot.convert.reading.hdf5 import RejectedEpisodeError
-from robocasa_lerobot.envs.rendering.look_alike import VISIBLE_GROUPS, LookAlike, look_alike
+from robocasa_lerobot.envs.rendering.merged_model import VISIBLE_GROUPS, MergedModel, merged_model
 
 PRESETS = ("fast", "quality")
 _QUALITY_SAMPLES = 4  # multisampling of the `quality` preset
@@ -32,7 +32,7 @@ class CompiledScene:
 
     model: mujoco.MjModel
     preset: str
-    alike: LookAlike | None = None
+    alike: MergedModel | None = None
 
     @classmethod
     def of(cls, xml: str, assets: Mapping[str, bytes], preset: str = "fast") -> Self:
@@ -55,14 +55,14 @@ class CompiledScene:
             model.mat_reflectance[:] = 0
         return cls(model, preset)
 
-    def with_look_alike(self) -> Self:
+    def with_merged_model(self) -> Self:
         """The same with the look-alike that pictures will be drawn from, if the preset has one."""
-        return self if self.preset != "fast" else replace(self, alike=look_alike(self.model, VISIBLE_GROUPS))
+        return self if self.preset != "fast" else replace(self, alike=merged_model(self.model, VISIBLE_GROUPS))
 
 
 @dataclass(frozen=True)
 class KeptScene:
-    """What is kept of a scene beside its models: where the geoms of its look-alike come from, if it has one."""
+    """The record of a scene, kept beside its models: where the geoms of its look-alike come from, if it has one."""
 
     preset: str
     bodies: NDArray[np.intp] | None = None
@@ -92,7 +92,7 @@ def kept(scene: KeptScene, files: Files) -> CompiledScene:
     model = _read(files[0])
     if scene.bodies is None or scene.geoms is None:
         return CompiledScene(model, scene.preset)
-    alike = LookAlike(model, _read(files[1]), scene.bodies, scene.geoms, frozenset())
+    alike = MergedModel(model, _read(files[1]), scene.bodies, scene.geoms, frozenset())
     return CompiledScene(model, scene.preset, alike)
 
 

@@ -23,7 +23,7 @@ from robocasa_lerobot.convert.writing.files import DatasetFiles
 
 @dataclass(frozen=True)
 class _Pending:
-    """An episode whose pictures are on their way through the encoder."""
+    """An episode whose pictures are being encoded."""
 
     columns: Mapping[str, NDArray[Any]]
     task: str

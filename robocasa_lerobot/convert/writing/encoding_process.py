@@ -276,7 +276,7 @@ def serve(down: int, up: int, *frames: int) -> None:
 
 
 class _Episode:
-    """What is being encoded; after a failure the rest of an episode is let pass."""
+    """The episode being encoded; after a failure the rest of an episode is let pass."""
 
     def __init__(self) -> None:
         self._encoder: EpisodeEncoder | None = None

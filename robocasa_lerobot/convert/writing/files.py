@@ -22,7 +22,7 @@ from robocasa_lerobot.convert.writing.stages import SubtaskTable, language_colum
 from robocasa_lerobot.convert.writing.statistics import vector_statistics
 from robocasa_lerobot.convert.writing.video import VideoFiles, VideoForm, probe
 
-# Also the time to open one file, and what is lost with it.
+# Also the time to open one file, and the frames that are lost with it.
 VIDEO_FILE_MB = 100
 _DATA_FILE = "data/chunk-000/file-000.parquet"
 

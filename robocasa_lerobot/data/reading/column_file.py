@@ -1,6 +1,6 @@
 """The numbers of a dataset as one memory-mapped file, for mixtures whose states and actions do not fit in memory.
 
-Rows are frames and hold all columns, so that what a sample needs lies together. The system keeps what is used often
+Rows are frames and hold all columns, so that the values of a sample lie together. The system keeps pages used often
 in its own cache, and takes that memory back when something else needs it.
 """
 

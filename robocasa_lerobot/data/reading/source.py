@@ -38,7 +38,7 @@ class DatasetSource:
         self._info = load_info(self.root)
         if not self._info.total_episodes:
             raise UserError(f"{self.root}: the dataset has no episodes; convert some demonstrations first.")
-        # LeRobot's own metadata object takes seconds for this table and has what is not needed here too.
+        # LeRobot's own metadata object takes seconds for this table and has columns that are not needed here.
         self._episodes = _read_episodes(self.root, self._info.total_episodes)
         self.starts: NDArray[np.int64] = self._episodes.column("dataset_from_index").to_numpy().astype(np.int64)
         self.ends: NDArray[np.int64] = self._episodes.column("dataset_to_index").to_numpy().astype(np.int64)

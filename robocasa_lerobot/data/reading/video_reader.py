@@ -1,4 +1,4 @@
-"""Pictures out of videos, with a bounded number of files open: what is opened once is not opened for each sample."""
+"""Pictures out of videos, with a bounded number of files open: a file opened once is not opened for each sample."""
 
 from __future__ import annotations
 

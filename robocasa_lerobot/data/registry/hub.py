@@ -11,7 +11,7 @@ from robocasa_lerobot.errors import UserError
 
 
 def fetch_missing(mixtures: Iterable[MixtureConfig]) -> list[Path]:
-    """Fetch what is not there of the members with a `repo_id`; gives the new folders.
+    """Fetch the missing members with a `repo_id`; gives the new folders.
 
     A folder appears complete or not at all; what a kill left is taken up.
 

@@ -71,7 +71,7 @@ class PublishedDatasets:
         self._base = root / VERSION_FOLDER if (root / VERSION_FOLDER).is_dir() else root
 
     def find(self, tasks: Sequence[str], split: str | None, source: str | None, views: str) -> list[DatasetEntry]:
-        """What is published of the tasks, in the order of the tasks, there or not."""
+        """The published datasets of the tasks, in the order of the tasks, there or not."""
         wanted = [key for key in PUBLISHED if split in (None, key[0]) and source in (None, key[1])]
         found = []
         for task in tasks:

@@ -26,7 +26,7 @@ class RecipeConfig:
         layouts: kitchens by layout; null is the split's own.
         styles: likewise by style.
         action_noise: standard deviation of noise on arm commands, as `demos --action-noise`.
-        varied: each demonstration in its own way, as `demos` without `--plain`.
+        varied: each demonstration in a style of its own, as `demos` without `--plain`.
         image_size: height and width of the pictures, pixels.
         redraw: instead of recording: `path` of the registry's dataset whose episodes are drawn again.
         camera_set: of the cameras that `redraw` draws with, as `render --camera-set`.

@@ -1,4 +1,4 @@
-"""Where datasets are: RoboCasa365's published folders, a user's own registry file, and what is missing of them."""
+"""Where datasets are: RoboCasa365's published folders, a user's own registry file, and which of them are missing."""
 
 from __future__ import annotations
 
@@ -197,7 +197,7 @@ def missing_datasets(config: MixtureConfig) -> list[DatasetEntry]:
 
 
 def registered_part(config: MixtureConfig) -> tuple[MixtureConfig | None, list[str]]:
-    """The mixture without selections of which no task is in this version, and what is lacking of the others.
+    """The mixture without selections of which no task is in this version, and the missing tasks of the others.
 
     The mixture is None where nothing is left. The sentences are the same whether or not datasets are there.
 

@@ -61,7 +61,7 @@ class RegisteredDataset:
             raise UserError(f"dataset {self.path!r}: a path with {TASK} needs `tasks` or a `task_set`.")
         if self.make is not None and TASK not in self.path:
             raise UserError(
-                f"dataset {self.path!r}: what is made has a folder for each task; put {TASK} into the path."
+                f"dataset {self.path!r}: recorded data has a folder for each task; put {TASK} into the path."
             )
 
 

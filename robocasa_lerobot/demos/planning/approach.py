@@ -6,7 +6,6 @@ not by those that were planned.
 
 from __future__ import annotations
 
-import itertools
 import zlib
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -14,15 +13,16 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from robocasa_lerobot.demos.motion import Array
+from robocasa_lerobot.demos.motion import UP, Array, turned_up
 from robocasa_lerobot.demos.planning.connect import Free, connect
 from robocasa_lerobot.demos.planning.costs import PlanCosts
-from robocasa_lerobot.demos.planning.follow import Following, joint_line
+from robocasa_lerobot.demos.planning.follow import Following, hand_poses
 from robocasa_lerobot.demos.planning.kinematics import Arm
 
-STRETCHES = 4  # of the line, in each of which what is touched counts once
+STRETCHES = 4  # of the line, in each of which a touched body counts once
 TESTED = Following(spacing_m=0.03)  # between tested configurations
 MOST_TESTED = 40
+MOST_TILT_RAD, LEVEL_ITERATIONS = 0.45, 400  # of what is to stay level; samples, most of which are of no use then
 
 Counts = Callable[[Array, float], NDArray[np.int64]]
 
@@ -35,11 +35,13 @@ class Approach:
         arm: its kinematics.
         counts: bodies that it touches at configurations (N, 7), with a margin in metres, (N,).
         costs: weights.
+        level: whether what is held stays upright: led so as of `follow.hand_poses`, and not much tilted on a detour.
     """
 
     arm: Arm
     counts: Counts
     costs: PlanCosts
+    level: bool = False
 
     def straight(self, start: Array, goal: Array) -> float:
         """Cost of the straight line between joint angles (7,) without its end, as the controller goes along it."""
@@ -62,7 +64,10 @@ class Approach:
         generator = np.random.default_rng(zlib.crc32(np.concatenate([start, goal, key]).round(9).tobytes()))
         low, high = self.arm.ranges.T
         margin = 0.0 if self.counts(goal[None], self.costs.near_m).any() else self.costs.near_m
-        path = connect(start, goal, self._free(margin), low, high, generator)
+        if self.level:
+            path = self._level_path(start, goal, self._free(margin), generator)
+        else:
+            path = connect(start, goal, self._free(margin), low, high, generator)
         if path is None:
             return None
         went = self._went(start, path)
@@ -73,16 +78,34 @@ class Approach:
         close = 0.0 if margin else self.costs.near * STRETCHES
         return path, self.costs.detour + self.costs.detour_per_rad * max(longer, 0.0) + close
 
+    def _level_path(self, start: Array, goal: Array, free: Free, generator: np.random.Generator) -> Array | None:
+        """A joint path (k, 7) on which what is up in the hand at the start stays up, more or less."""
+        _, hands = self.arm.forward(np.stack([start, goal]))
+        up = hands[0].T @ UP
+        least = min(float(np.cos(MOST_TILT_RAD)), float(UP @ hands[1] @ up) - 1e-3)
+
+        def upright(joints: Array) -> NDArray[np.bool_]:
+            _, turns = self.arm.forward(joints)
+            return free(joints) & (UP @ turns @ up >= least)
+
+        def levelled(joints: Array) -> Array:
+            positions, turns = self.arm.forward(joints[None])
+            solved = self.arm.solve(positions, turned_up(turns[0], up)[None], joints[None])
+            return solved.joints[0]
+
+        low, high = self.arm.ranges.T
+        return connect(start, goal, upright, low, high, generator, iterations=LEVEL_ITERATIONS, project=levelled)
+
     def _free(self, margin_m: float) -> Free:
         return lambda joints: self.counts(joints, margin_m) == 0
 
     def _went(self, start: Array, path: Array) -> Array:
         """Joint angles (N, 7) as the hand is led along a path (k, 7)."""
-        lines = [joint_line(self.arm, a, b, TESTED) for a, b in itertools.pairwise([start, *path])]
-        line = np.concatenate(lines)
-        if len(line) > MOST_TESTED:
-            line = line[np.linspace(0, len(line) - 1, MOST_TESTED).round().astype(int)]
-        return self.arm.along(start, line)
+        positions, turns = hand_poses(self.arm, start, path, TESTED, level=self.level)
+        if len(positions) > MOST_TESTED:
+            chosen = np.linspace(0, len(positions) - 1, MOST_TESTED).round().astype(int)
+            positions, turns = positions[chosen], turns[chosen]
+        return self.arm.along(start, positions, turns)
 
     def _astray(self, went: Array, goal: Array) -> float:
         return self.costs.astray * float(np.abs(went[-1] - goal).max() > self.costs.astray_rad)

@@ -2,7 +2,7 @@
 
 A plan says where the base stands when the hand first touches the part and where it stands at the end: long doors are
 followed with the base as well as with the arm. All candidates are solved at once and tested best first, as far as they
-must be, so planning takes a bounded time, also for what is out of reach.
+must be, so planning takes a bounded time, also for parts out of reach.
 """
 
 from __future__ import annotations
@@ -22,8 +22,6 @@ from robocasa_lerobot.demos.planning.collision import CollisionChecker, MovingPa
 from robocasa_lerobot.demos.planning.costs import IN_CONTACT
 from robocasa_lerobot.demos.planning.errors import NoPlanError
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
-from robocasa_lerobot.envs.robots.panda_omron.names import ARM_CENTER_SITE
-from robocasa_lerobot.envs.robots.panda_omron.robot import PANDA_OMRON
 
 Shift = tuple[float, float]
 
@@ -34,6 +32,9 @@ OFF_M = 0.12  # after which the base no longer leans on what it leant on
 BACKS_M = (0.25, 0.5, 0.75)  # that the base goes back before it goes to the side, where it cannot go straight
 LEG_STEP_M = 0.08  # between tested places of the base
 _POSES, _LINES, _DETOUR = range(3)
+# Bends of the home pose, from which first poses are solved, radians: none; let down ahead and to both sides.
+AT_HOME = np.zeros((1, 7))
+LET_DOWN = np.array([[0, 0, 0, 0, 0, 0, 0], [0, 1, 0, 0, 0, 0, 0], [1.2, 1, 0, 0, 0, 0, 0], [-1.2, 1, 0, 0, 0, 0, 0]])
 
 
 class ArticulatedPart(Protocol):
@@ -70,7 +71,7 @@ class ContactPath:
         waypoints: in their order, those off the part first.
         contact: number of the first pose in which the hand may touch the part.
         target_at: wanted pose of the hand with the part at an angle.
-        bias: added to the cost of what is known to hold worse.
+        bias: added to the cost of a grasp that is known to hold worse.
     """
 
     waypoints: tuple[Waypoint, ...]
@@ -86,7 +87,7 @@ class ArticulatedPlan:
     Attributes:
         path: of the hand.
         start, end: moves of the base from where it stands now, metres forward and to the left: before, and by the end.
-        cost: how bad it is; above 1 it is not to be had without a collision or a miss.
+        cost: how bad it is; above 1 it is not possible without a collision or a miss.
         legs: straight moves that make up the first one.
         joints: (k, 7) radians: the joint path to the first pose.
     """
@@ -105,15 +106,18 @@ def plan_contact(
     paths: Iterable[ContactPath],
     stances: Iterable[tuple[Shift, Shift]],
     *,
+    bends: Array = AT_HOME,
     detours: int = MOST_DETOURS,
 ) -> ArticulatedPlan:
-    """The path that costs least of those that can be reached without touching what is not meant.
+    """The path that costs least of those that can be reached without touching other bodies.
 
     Args:
         env: its state is read, not touched.
-        part: what is moved.
+        part: the one to move.
         paths: alternatives, all with the same number of poses.
         stances: moves of the base to try: before, and by the end.
+        bends: (n, 7) radians: joint angles, from those of the home pose, from which first poses are solved; from the
+            home pose alone the arm misses much of what is low and to the side.
         detours: how often a path to the first pose is searched for, at most.
 
     Raises:
@@ -122,7 +126,7 @@ def plan_contact(
     options = list(paths)
     assert options, "no path to plan"
     search = _Search(env, part, options, list(stances))
-    found = search.candidates()
+    found = search.candidates(bends)
     queue = [(candidate.cost, _POSES, number) for number, candidate in enumerate(found)]
     heapq.heapify(queue)
     best: tuple[float, int, Array] | None = None
@@ -175,7 +179,7 @@ class _Search:
         self, env: KitchenEnv, part: ArticulatedPart, paths: list[ContactPath], stances: list[tuple[Shift, Shift]]
     ) -> None:
         self._env, self._part, self._paths, self._stances = env, part, paths, stances
-        self._checker = CollisionChecker(env.model, env.data)
+        self._checker = CollisionChecker(env.scene, env.data)
         self._checker.allow_hand(part.body)
         self._arm, self._present = self._checker.arm, self._checker.present_joints
         self._base = self._checker.present_base
@@ -196,22 +200,22 @@ class _Search:
             found += [last.angle + share * (waypoint.angle - last.angle) for share in shares]
         return found
 
-    def candidates(self) -> list[_Candidate]:
-        """What the arm reaches, the cheapest first."""
-        costs, frame = IN_CONTACT, self._env.data.site(ARM_CENTER_SITE)
+    def candidates(self, bends: Array) -> list[_Candidate]:
+        """What the arm reaches from bends of its home pose (n, 7), the cheapest first."""
+        costs, frame = IN_CONTACT, self._env.data.site(self._env.scene.robot.names.arm_center_site)
         turn = frame.xmat.reshape(3, 3)
         paths, count = self._paths, len(self._paths)
         positions = np.array([[w.target.position for w in path.waypoints] for path in paths]) - frame.xpos
         rotations = turn.T @ np.array([[w.target.rotation for w in path.waypoints] for path in paths])
         progress = np.array([[w.progress for w in path.waypoints] for path in paths])
         starts, ends = (np.array([stance[index] for stance in self._stances]) for index in (0, 1))
-        which = np.tile(np.arange(count), len(self._stances))
-        where = np.repeat(np.arange(len(self._stances)), count)
+        which = np.tile(np.arange(count), len(bends) * len(self._stances))
+        where = np.tile(np.repeat(np.arange(len(self._stances)), count), len(bends))
         cost = np.array([path.bias for path in paths])[which]
         drive = costs.drive_per_m * np.hypot(*starts.T) + costs.along_per_m * np.hypot(*(ends - starts).T)
         cost = cost + drive[where]
         solved: list[Array] = []
-        joints = np.tile(np.array(PANDA_OMRON.home.arm), (len(which), 1))
+        joints = np.repeat(self._arm.home + bends, count * len(self._stances), axis=0)
         for index in range(positions.shape[1]):
             shift = starts[where] + progress[which, index, None] * (ends - starts)[where]
             position = (positions[which, index] - shift @ self._axes) @ turn
@@ -233,7 +237,7 @@ class _Search:
         ]
 
     def legs(self, candidate: _Candidate) -> tuple[Shift, ...] | None:
-        """Straight moves that end at a stance, with the arm as it is, if the base is out of the part's way there."""
+        """Straight moves that end at a stance, with the arm as it is, if the base is clear of the part there."""
         start, end = candidate.stance
         if candidate.stance not in self._known:
             clear = self._clears(self._paths[candidate.path].waypoints[-1].angle, end)
@@ -274,12 +278,12 @@ class _Search:
         return True
 
     def _clears(self, angle: float, shift: Shift) -> bool:
-        """Whether the base is out of the part's way at an angle; the arm may still be."""
+        """Whether the base is clear of the part at an angle; the arm need not be."""
         found = self._touched([angle], [shift], self._present[None], [False], most=1, links=(0,))
         return not found.counts[0]
 
     def poses(self, candidate: _Candidate) -> float:
-        """Cost of what is touched at the poses, and of what would be if the robot stood a bit higher."""
+        """Cost of the bodies touched at the poses, and of those that would be if the robot stood a bit higher."""
         costs, path = IN_CONTACT, self._paths[candidate.path]
         angles = [waypoint.angle for waypoint in path.waypoints]
         shifts = [_between(*candidate.stance, waypoint.progress) for waypoint in path.waypoints]
@@ -289,7 +293,7 @@ class _Search:
         return costs.hit_at_pose * float(hits) + costs.clearance * float(near)
 
     def between(self, candidate: _Candidate) -> float:
-        """Cost of what is touched between the poses."""
+        """Cost of the bodies touched between the poses."""
         path, (start, end) = self._paths[candidate.path], candidate.stance
         angles, shifts, joints, may, groups = [], [], [], [], []
         for number, (last, waypoint) in enumerate(itertools.pairwise(path.waypoints), start=1):
@@ -341,7 +345,7 @@ class _Search:
         margin_m: float = 0.0,
         links: tuple[int, ...] | None = None,
     ) -> Touched:
-        moves = np.asarray(shifts) @ self._axes[:, :2]
+        moves = np.asarray(shifts, dtype=np.float64).reshape(-1, 2) @ self._axes[:, :2]
         bases = np.column_stack([self._base[:2] + moves, np.full(len(moves), self._base[2])])
         return self._checker.touched(
             bases,

@@ -1,42 +1,57 @@
 """Paths of the base: A* on a grid of poses, round the fixtures, and round doors and drawers as they stand now.
 
-The base can move to all sides, so a path keeps one heading where it can: it turns at the start, on the way, or at the
+The base can move to all sides, so a path keeps one heading where it can: it turns at the start, in between, or at the
 end, whichever has room. Every grid pose is tested twice: with the fixtures' footprints, as start poses are, and with
 the shapes of the robot, its arm as it is and what it holds, against the kitchen's in their present state.
 """
 
 from __future__ import annotations
 
+import contextlib
 import heapq
+import itertools
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from weakref import WeakKeyDictionary
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
 from robocasa_lerobot.demos.motion import Array, base_pose
-from robocasa_lerobot.demos.planning.collision import CollisionChecker, Held, Touched
-from robocasa_lerobot.demos.planning.errors import NoPlanError
-from robocasa_lerobot.envs.scene.robot_poses import Obstacles, RobotPose
+from robocasa_lerobot.demos.planning.base_room import Room, Space, wrap
+from robocasa_lerobot.demos.planning.collision import CollisionChecker, Held, is_full
+from robocasa_lerobot.demos.planning.errors import NoPlanError, ShutInError
+from robocasa_lerobot.envs.scene.robot_poses import RobotPose
 from robocasa_lerobot.envs.scene.scene import Scene
+
+__all__ = ["Room", "Space", "base_now", "carried", "find_free_path", "find_path", "search_path", "wrap"]
 
 CELL_M = 0.10
 HEADINGS = 8
 TURN_COST_M = 0.30  # of one heading to the next
-# A goal that touches something is exchanged for the nearest free pose up to this far away.
-SHIFT_M, SHIFT_STEP_M = 0.18, 0.03
-STEP_M, STEP_RAD = 0.05, 0.1  # between tested poses of a straight move
-MARGINS_M = (0.02, 0.0)  # kept from what stands around, or, where there is no path then, the next
-# From the start, within which what is touched there already may still be touched; and from the goal.
-LEAVING_M, COMING_M = 0.15, 0.20
+# Kept from what stands around, and near the start and the goal; or, where there is no path then, the next. An arm that
+# carries a full vessel swings by some centimetres on the way.
+type Margins = tuple[float, float]
+MARGINS_M: tuple[Margins, ...] = ((0.02, 0.0), (0.0, 0.0))
+LOADED_MARGINS_M: tuple[Margins, ...] = ((0.05, 0.03), (0.03, 0.015), *MARGINS_M)
 MOST_CELLS = 20_000  # that are looked at
+# A goal from which fewer cells than these can be reached is shut in; poses near it count as others from this distance.
+POCKET, APART_M = 1_500, 0.05
 _NEIGHBOURS = [(x, y) for x in (-1, 0, 1) for y in (-1, 0, 1) if x or y]
 
 type _Cell = tuple[int, int, int]
 
-_obstacles: WeakKeyDictionary[mujoco.MjModel, Obstacles] = WeakKeyDictionary()
+
+@dataclass(frozen=True)
+class BasePath:
+    """Where the base goes.
+
+    Attributes:
+        poses: from after the start to the goal.
+        margin_m: kept from what stands around; less than nothing where the arm, or what it holds, may touch something.
+    """
+
+    poses: list[RobotPose]
+    margin_m: float
 
 
 def find_path(
@@ -46,141 +61,76 @@ def find_path(
     goal: RobotPose,
     held: Held | None = None,
     joints: Array | None = None,
-) -> list[RobotPose]:
+) -> BasePath:
     """Poses from a start to a goal, both left out but the goal, all of them free: the shortest path by A*.
+
+    Where there is none for the arm and what it holds, the footprint's path is better than nothing.
 
     Args:
         scene: of the kitchen.
         data: its present state; None asks the fixtures' footprints alone, with all doors shut.
         start: where the base centre stands.
         goal: where it is to stand; a pose that touches something is exchanged for a free one near it.
-        held: what is in the gripper.
-        joints: (7,) of the arm on the way, radians; None takes those it has.
+        held: the object in the gripper.
+        joints: (7,) of the arm during the drive, radians; None takes those it has.
 
     Raises:
         NoPlanError: there is none.
     """
-    footprints, path = Room(scene), None
-    for margin in MARGINS_M if data is not None else ():
-        path = path or _search(Space(footprints, data, start, goal, held, joints, margin), start, goal)
-    if path is None:  # without a state, or where the arm already touches something wherever it goes
-        path = _search(footprints, start, goal)
-    if path is None:
-        raise NoPlanError(f"no way for the base from ({start.x:.2f}, {start.y:.2f}) to ({goal.x:.2f}, {goal.y:.2f})")
-    return path
+    if data is not None:
+        margins = LOADED_MARGINS_M if is_full(held) else MARGINS_M
+        with contextlib.suppress(NoPlanError):
+            return find_free_path(scene, data, start, goal, held, joints, margins_m=margins)
+    return BasePath(search_path(Room(scene), start, goal), -1.0)
 
 
-class Room:
-    """Answers whether the robot can stand at poses, asking the fixtures' footprints."""
-
-    def __init__(self, scene: Scene) -> None:
-        self.scene = scene
-        if scene.model not in _obstacles:
-            fixtures = {name: fixture for name, fixture in scene.fixtures.items() if name != "floor"}
-            _obstacles[scene.model] = Obstacles(fixtures, scene.robot.shape)
-        self._obstacles = _obstacles[scene.model]
-
-    def free(self, pose: RobotPose) -> bool:
-        """Whether nothing is touched, inside of the walls."""
-        return bool(self.all_free([pose])[0])
-
-    def all_free(self, poses: Sequence[RobotPose]) -> NDArray[np.bool_]:
-        """The same of N poses, (N,)."""
-        if not poses:
-            return np.zeros(0, dtype=np.bool_)
-        x, y = np.array([(pose.x, pose.y) for pose in poses]).T
-        bounds = self.scene.layout.room
-        inside = (bounds["x_min"] < x) & (x < bounds["x_max"]) & (bounds["y_min"] < y) & (y < 0.0)
-        return inside & self._obstacles.leave_free(poses)
-
-    def nearest(self, goal: RobotPose) -> RobotPose:
-        """The goal, or the free pose of the same heading that is nearest to it, or the goal if there is none."""
-        if self.free(goal):
-            return goal
-        reach = np.arange(-SHIFT_M, SHIFT_M + 1e-9, SHIFT_STEP_M)
-        shifts = sorted(((float(x), float(y)) for x in reach for y in reach), key=lambda shift: np.hypot(*shift))
-        near = [RobotPose(goal.x + x, goal.y + y, goal.yaw) for x, y in shifts if np.hypot(x, y) <= SHIFT_M]
-        found = np.flatnonzero(self.all_free(near))
-        return near[int(found[0])] if len(found) else goal
-
-    def straight(self, start: RobotPose, goal: RobotPose) -> bool:
-        """Whether the robot can move and turn at once from one pose to another."""
-        turn = wrap(goal.yaw - start.yaw)
-        length = float(np.hypot(goal.x - start.x, goal.y - start.y))
-        steps = int(np.ceil(max(length / STEP_M, abs(turn) / STEP_RAD, 1.0)))
-        between = [
-            RobotPose(start.x + (goal.x - start.x) * t, start.y + (goal.y - start.y) * t, start.yaw + turn * t)
-            for t in (np.arange(1, steps) / steps).tolist()
-        ]
-        return bool(self.all_free(between).all())
-
-
-class Space(Room):
-    """The same, and the robot's shapes against those of the kitchen as it is now.
+def find_free_path(
+    scene: Scene,
+    data: mujoco.MjData,
+    start: RobotPose,
+    goal: RobotPose,
+    held: Held | None = None,
+    joints: Array | None = None,
+    *,
+    margins_m: Sequence[Margins] = MARGINS_M,
+    checker: CollisionChecker | None = None,
+) -> BasePath:
+    """The same, but only a path on which neither the arm nor what it holds meets anything.
 
     Args:
-        room: footprints.
+        scene: as of `find_path`, like the rest.
         data: present state.
-        start: where the base stands; what is touched there is no obstacle near it.
+        start: where the base centre stands.
         goal: where it is to stand.
         held: what is in the gripper.
-        joints: (7,) of the arm on the way, radians; None takes those it has.
-        margin_m: kept from what stands around.
+        joints: (7,) of the arm on the way, radians.
+        margins_m: to keep from what stands around, or, where there is no path then, the next.
+        checker: of this state, for whoever asks more than once; None makes one.
+
+    Raises:
+        NoPlanError: there is none; of the last margins, why.
     """
+    checker = checker or CollisionChecker(scene, data)
+    failure: NoPlanError | None = None
+    for margin, close in margins_m:
+        try:
+            space = Space(scene, checker, start, goal, held, joints, margin, close)
+            return BasePath(search_path(space, start, goal), margin)
+        except NoPlanError as error:
+            failure = error
+    assert failure is not None, "no margins"
+    raise failure
 
-    def __init__(
-        self,
-        room: Room,
-        data: mujoco.MjData,
-        start: RobotPose,
-        goal: RobotPose,
-        held: Held | None,
-        joints: Array | None,
-        margin_m: float,
-    ) -> None:
-        super().__init__(room.scene)
-        self._checker = CollisionChecker(room.scene.model, data)
-        self._held, self._margin = held, margin_m
-        self._joints = self._checker.present_joints if joints is None else joints
-        self._start, self._goal = start, goal
-        self._leaning = self._touched([start], 8, 0.0).all()
 
-    def all_free(self, poses: Sequence[RobotPose]) -> NDArray[np.bool_]:
-        """Whether nothing is touched, inside of the walls; poses near the start may touch what the start does.
-
-        Near the start and the goal no margin is kept: robots stand close to what they work on.
-        """
-        free = super().all_free(poses)
-        places = np.flatnonzero(free)
-        if not len(places):
-            return free
-        at = np.array([(poses[index].x, poses[index].y) for index in places])
-        leaving = np.hypot(*(at - [self._start.x, self._start.y]).T) < LEAVING_M
-        coming = np.hypot(*(at - [self._goal.x, self._goal.y]).T) < COMING_M
-        for close in (False, True):
-            mine = places[(leaving | coming) == close]
-            if not len(mine):
-                continue
-            found = self._touched([poses[index] for index in mine], 8 if close else 1, 0.0 if close else self._margin)
-            for index, count, bodies in zip(mine, found.counts, found.bodies, strict=True):
-                touched = frozenset(bodies[:count].tolist())
-                left = np.hypot(poses[index].x - self._start.x, poses[index].y - self._start.y) < LEAVING_M
-                free[index] = not (touched - self._leaning if left else touched)
-        return free
-
-    def _touched(self, poses: Sequence[RobotPose], most: int, margin_m: float) -> Touched:
-        bases = np.array([(pose.x, pose.y, pose.yaw) for pose in poses])
-        return self._checker.touched(bases, self._joints, held=self._held, margin_m=margin_m, most=most)
+def _no_path(start: RobotPose, goal: RobotPose) -> str:
+    return f"no path for the base from ({start.x:.2f}, {start.y:.2f}) to ({goal.x:.2f}, {goal.y:.2f})"
 
 
 def carried(scene: Scene, data: mujoco.MjData) -> Held | None:
     """The task's object that both fingers touch, if there is one."""
     model = scene.model
-    fingers = [model.body(name).id for name in ("gripper0_right_leftfinger", "gripper0_right_rightfinger")]
     pairs = model.geom_bodyid[data.contact.geom] if data.ncon else np.zeros((0, 2), dtype=int)
-    sides = [
-        np.array([_below(model, int(body), finger) for body in pairs.reshape(-1)], dtype=bool) for finger in fingers
-    ]
+    sides = [finger[pairs.reshape(-1)] for finger in scene.fingers()]
     for name in scene.objects:
         body = model.body(name).id
         mine = (pairs == body).reshape(-1, 2)[:, ::-1].reshape(-1) if len(pairs) else np.zeros(0, dtype=bool)
@@ -189,19 +139,34 @@ def carried(scene: Scene, data: mujoco.MjData) -> Held | None:
     return None
 
 
-def _below(model: mujoco.MjModel, body: int, root: int) -> bool:
-    while body > root:
-        body = int(model.body_parentid[body])
-    return body == root
+def search_path(room: Room, start: RobotPose, goal: RobotPose) -> list[RobotPose]:
+    """The shortest path to the first of the goal and the free poses near it that is not shut in.
+
+    Raises:
+        ShutInError: all of them are.
+        NoPlanError: there is no path to that one.
+    """
+    for end in _ends(room, goal):
+        if room.straight(start, end):
+            return [end]
+        grid = _Grid(room, start, end)
+        if grid.is_shut_in():
+            continue
+        cells = grid.search()
+        if cells is None:
+            raise NoPlanError(_no_path(start, goal))
+        return [*(grid.pose(cell) for cell in cells[1:]), end]
+    raise ShutInError(_no_path(start, goal))
 
 
-def _search(room: Room, start: RobotPose, goal: RobotPose) -> list[RobotPose] | None:
-    goal = room.nearest(goal)
-    if room.straight(start, goal):
-        return [goal]
-    grid = _Grid(room, start, goal)
-    cells = grid.search()
-    return None if cells is None else [*(grid.pose(cell) for cell in cells[1:]), goal]
+def _ends(room: Room, goal: RobotPose) -> Iterator[RobotPose]:
+    """The goal, or the free pose nearest to it, and others that lie apart from it and from each other."""
+    found = [room.nearest(goal)]
+    yield found[0]
+    for pose in room.near(goal):
+        if all(np.hypot(pose.x - other.x, pose.y - other.y) > APART_M for other in found):
+            found.append(pose)
+            yield pose
 
 
 @dataclass
@@ -232,30 +197,53 @@ class _Grid:
         )
 
     def search(self) -> list[_Cell] | None:
-        """Cells from the start's to the goal's, or None; the start's own surroundings count as free."""
-        first = self.first()
-        cost: dict[_Cell, float] = {first: 0.0}
+        """Cells from the start's to the goal's, or None; the start's own surroundings count as free.
+
+        A move between cells is tested closely when it would come next, which few of them do.
+        """
+        first, number = self.first(), itertools.count()
+        queue = [(self._ahead(first), first, next(number), 0.0, first)]
         came: dict[_Cell, _Cell] = {}
-        queue = [(self._ahead(first), first)]
-        done: set[_Cell] = set()
-        while queue and len(done) < MOST_CELLS:
-            _, cell = heapq.heappop(queue)
+        while queue and len(came) < MOST_CELLS:
+            _, cell, _, cost, before = heapq.heappop(queue)
+            if cell in came or not self._is_clear(before, cell):
+                continue
+            came[cell] = before
             if cell == (0, 0, 0):
                 path = [cell]
-                while path[-1] in came:
+                while path[-1] != first:
                     path.append(came[path[-1]])
                 return path[::-1]
-            if cell in done:
-                continue
-            done.add(cell)
             around = list(self._neighbours(cell))
             self._look(cell, [other for other, _ in around])
             for other, length in around:
-                new = cost[cell] + length
-                if new < cost.get(other, np.inf) and self._is_free(cell, other):
-                    cost[other], came[other] = new, cell
-                    heapq.heappush(queue, (new + self._ahead(other), other))
+                if other not in came and self._is_free(cell, other):
+                    new = cost + length
+                    heapq.heappush(queue, (new + self._ahead(other), other, next(number), new, cell))
         return None
+
+    def _is_clear(self, before: _Cell, cell: _Cell) -> bool:
+        """Whether a move is free in between, where a margin is to be kept; the first one begins where the base is."""
+        if before == cell or self.room.margin_m <= 0.0:
+            return True
+        if before == self.first():
+            return not self.room.free(self.start) or self.room.closely(self.start, self.pose(cell))
+        return self.room.closely(self.pose(before), self.pose(cell))
+
+    def is_shut_in(self) -> bool:
+        """Whether all that can be reached from the goal is a pocket of less than `POCKET` cells without the start."""
+        first, goal = self.first(), (0, 0, 0)
+        found, queue = {goal}, [goal]
+        while queue and len(found) < POCKET:
+            cell = queue.pop()
+            if cell == first:
+                return False
+            around = [other for other, _ in self._neighbours(cell)]
+            self._look(cell, around)
+            new = [other for other in around if other not in found and self._is_free(cell, other)]
+            found.update(new)
+            queue += new
+        return not queue
 
     def _ahead(self, cell: _Cell) -> float:
         i, j, k = cell
@@ -269,7 +257,7 @@ class _Grid:
             yield (i, j, (k + turn) % HEADINGS), TURN_COST_M
 
     def _look(self, before: _Cell, cells: Sequence[_Cell]) -> None:
-        """Test cells, and the way there where it leads across a corner or turns, all at once."""
+        """Test cells, and the move there where it leads across a corner or turns, all at once."""
         wanted: list[tuple[float, float, float]] = [*cells, *(_middle(before, cell) for cell in cells)]
         new = [cell for cell in dict.fromkeys(wanted) if cell not in self._known]
         free = self.room.all_free([self.pose(cell) for cell in new])
@@ -293,8 +281,3 @@ def base_now(data: mujoco.MjData) -> RobotPose:
     """Where the base centre stands."""
     position, yaw = base_pose(data)
     return RobotPose(float(position[0]), float(position[1]), yaw)
-
-
-def wrap(angle: float) -> float:
-    """The same angle between -pi and pi, radians."""
-    return float(np.arctan2(np.sin(angle), np.cos(angle)))

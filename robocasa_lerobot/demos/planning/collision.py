@@ -15,11 +15,11 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from robocasa_lerobot.demos.motion import Array, base_pose, grip_position, hand_rotation
+from robocasa_lerobot.demos.motion import Array, base_pose, grip_position, hand_rotation, rotation_about
 from robocasa_lerobot.demos.planning import kernel
 from robocasa_lerobot.demos.planning.kinematics import Arm
-from robocasa_lerobot.envs.robots.panda_omron.names import ARM_CENTER_SITE, HAND, MOBILE_BASE
 from robocasa_lerobot.envs.scene.bodies import subtree
+from robocasa_lerobot.envs.scene.scene import Scene
 
 MOST_TOUCHED = 3  # bodies that are told apart
 FLOOR = "floor"
@@ -54,6 +54,11 @@ class Held:
     def names(self) -> tuple[str, ...]:
         """Of all bodies that go along."""
         return (self.name, *(other.name for other in self.contents))
+
+
+def is_full(held: Held | None) -> bool:
+    """Whether the object in the gripper is a vessel with others in it."""
+    return held is not None and bool(held.contents)
 
 
 @dataclass(frozen=True)
@@ -95,7 +100,7 @@ class MovingPart:
         slides = model.jnt_type[hinge.id] == mujoco.mjtJoint.mjJNT_SLIDE
         positions, rotations = [], []
         for value in values:
-            turn = np.eye(3) if slides else _rotation(axis, float(value) - present)
+            turn = np.eye(3) if slides else rotation_about(axis, float(value) - present)
             move = axis * (float(value) - present) if slides else np.zeros(3)
             positions.append((self.shapes.positions - anchor) @ turn.T + anchor + move)
             rotations.append(turn @ self.shapes.rotations)
@@ -108,21 +113,22 @@ class CollisionChecker:
     """Tells what the robot, and what it holds, would touch.
 
     Args:
-        model: of the kitchen.
+        scene: of the kitchen.
         data: its state, with positions evaluated; it is read now, and stays as it is.
         allowed: bodies that may be touched.
     """
 
-    def __init__(self, model: mujoco.MjModel, data: mujoco.MjData, *, allowed: Iterable[int] = ()) -> None:
-        self._model, self.arm = model, Arm(model, data)
+    def __init__(self, scene: Scene, data: mujoco.MjData, *, allowed: Iterable[int] = ()) -> None:
+        model, names = scene.model, scene.robot.names
+        self._model, self.arm = model, Arm(model, data, scene.robot)
         self._data = _scratch_data(model)
-        self._robot = subtree(model, MOBILE_BASE)
-        self._hand = subtree(model, HAND)
+        self._robot = scene.subtree(names.mobile_base)
+        self._hand = scene.subtree(names.hand)
         self._all = _shapes(model, data, np.ones(model.nbody, dtype=np.bool_))
         kernel.boxes(self._all)
         self._none = _take(self._all, np.zeros(len(self._all.geoms), dtype=np.bool_))
-        frame = data.site(ARM_CENTER_SITE)
-        self._links = _link_poses(self.arm, data)
+        frame = data.site(names.arm_center_site)
+        self._links = _LinkPoses(frame, self.arm, data)
         base, yaw = base_pose(data)
         self._arm_from_base = _turn(-yaw) @ (frame.xpos - base)
         self._height = float(frame.xpos[2])
@@ -179,7 +185,7 @@ class CollisionChecker:
         Args:
             bases: (N, 3) or (3,) of the base centre: x, y in metres, heading in radians.
             joints: (N, 7) or (7,) radians.
-            held: what is in the gripper; nothing else of that name is there then.
+            held: the object in the gripper; nothing else of that name is there then.
             part: that moves.
             states: (N,) numbers of its positions.
             hand_may: (N,) whether the hand may touch what it alone may touch.
@@ -278,8 +284,7 @@ class CollisionChecker:
 class _LinkPoses:
     """Where the base and the seven links are, and every body."""
 
-    def __init__(self, arm: Arm, data: mujoco.MjData) -> None:
-        frame = data.site(ARM_CENTER_SITE)
+    def __init__(self, frame: Any, arm: Arm, data: mujoco.MjData) -> None:
         self.positions = np.vstack([frame.xpos[None], data.xpos[arm.bodies]])
         self.rotations = np.concatenate([frame.xmat.reshape(1, 3, 3), data.xmat[arm.bodies].reshape(-1, 3, 3)])
         self._numbers = {body: number + 1 for number, body in enumerate(arm.bodies)}
@@ -291,10 +296,6 @@ class _LinkPoses:
         while body and body not in self._numbers:
             body = int(model.body_parentid[body])
         return self._numbers.get(body, 0)
-
-
-def _link_poses(arm: Arm, data: mujoco.MjData) -> _LinkPoses:
-    return _LinkPoses(arm, data)
 
 
 def _scratch_data(model: mujoco.MjModel) -> mujoco.MjData:
@@ -338,10 +339,3 @@ def _joined(one: kernel.Shapes, other: kernel.Shapes) -> kernel.Shapes:
 def _turn(yaw: float) -> Array:
     cos, sin = np.cos(yaw), np.sin(yaw)
     return np.array([[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]])
-
-
-def _rotation(axis: Array, angle: float) -> Array:
-    quat, matrix = np.empty(4), np.empty(9)
-    mujoco.mju_axisAngle2Quat(quat, axis, angle)
-    mujoco.mju_quat2Mat(matrix, quat)
-    return matrix.reshape(3, 3)

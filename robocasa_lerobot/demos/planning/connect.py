@@ -21,6 +21,7 @@ GOAL_BIAS_RAD = 1.2  # samples lie about the line from start to goal, as far as 
 EVERYWHERE = 0.25  # share of the samples that lie anywhere
 
 Free = Callable[[Array], NDArray[np.bool_]]
+Project = Callable[[Array], Array]
 
 
 @dataclass
@@ -55,6 +56,7 @@ def connect(
     *,
     iterations: int = ITERATIONS,
     shortcuts: int = SHORTCUTS,
+    project: Project | None = None,
 ) -> Array | None:
     """A joint path (k, n) from after the start to the goal itself, both (n,) radians, or None.
 
@@ -67,6 +69,7 @@ def connect(
         generator: the path is a function of it and of the rest.
         iterations: samples after which it gives up.
         shortcuts: attempts to leave out a part of what was found.
+        project: brings a sample (n,) to where a condition holds that few configurations meet by chance.
     """
     if not free(goal[None])[0]:
         return None
@@ -75,6 +78,8 @@ def connect(
     here, there = _Tree([start]), _Tree([goal])
     for _ in range(iterations):
         sample = _sample(start, goal, low, high, generator)
+        if project is not None:
+            sample = project(sample)
         new = _extend(here, sample, free, once=True)
         if new is not None:
             other = _extend(there, here.nodes[new], free, once=False)

@@ -5,14 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Protocol
 
-import numpy as np
-
 from robocasa_lerobot.demos.motion import Array, HandTarget
 from robocasa_lerobot.demos.planning.articulated import ContactPath, Waypoint
-from robocasa_lerobot.envs.robots.panda_omron.robot import PANDA_OMRON
+from robocasa_lerobot.envs.robots.robot import GripperGeometry
 
-# Half extents of the closed finger tips along the hand's axes, metres, from the grip site.
-CLOSED_FINGERS_HALF_M = np.array(PANDA_OMRON.gripper.closed_half)
 STANDOFF_M = 0.09  # of the hand before it grasps
 
 
@@ -33,12 +29,13 @@ class TurningPart(Protocol):
 def arc_waypoints(
     start: float, end: float, target_at: Callable[[float], HandTarget], shares: tuple[float, ...]
 ) -> list[Waypoint]:
-    """Poses at some shares of the way from one angle to another, radians."""
+    """Poses at some shares of the turn from one angle to another, radians."""
     angles = [start + (end - start) * share for share in shares]
     return [Waypoint(angle, target_at(angle), share) for angle, share in zip(angles, shares, strict=True)]
 
 
 def push_path(
+    gripper: GripperGeometry,
     part: TurningPart,
     local: Array,
     normal: Array,
@@ -52,7 +49,8 @@ def push_path(
     """A path that pushes on a face with the closed finger tips.
 
     Args:
-        part: what is pushed, from where it stands now.
+        gripper: that pushes.
+        part: the one to push, from where it stands now.
         local: the point of the face, in the fixture's axes from the hinge as it lies when shut, metres, (3,).
         normal: of the face towards the hand, same axes, (3,).
         rotation_at: hand rotation (3, 3) wanted at an angle.
@@ -64,8 +62,8 @@ def push_path(
 
     def target_at(angle: float) -> HandTarget:
         rotation, out = rotation_at(angle), part.turned(angle) @ normal
-        support = float(CLOSED_FINGERS_HALF_M @ np.abs(rotation.T @ out))
-        return HandTarget(part.point(local, angle) + out * support, rotation)
+        reach = gripper.closed_reach(rotation, out)
+        return HandTarget(part.point(local, angle) + out * reach, rotation)
 
     start = part.angle
     at = target_at(start)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class PlanCosts:
-    """Weights of what is wrong with a plan; costs have no unit, and from about 2 on a plan will not do.
+    """Weights of a plan's defects; costs have no unit, and from about 2 on a plan will not do.
 
     Attributes:
         miss_per_m, miss_per_rad: of what a pose is missed by, beyond the free part.

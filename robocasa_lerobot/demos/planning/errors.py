@@ -9,3 +9,7 @@ class SkillError(RuntimeError):
 
 class NoPlanError(SkillError):
     """There is no plan: what was asked for and what stands against it."""
+
+
+class ShutInError(NoPlanError):
+    """There is no plan, and little had to be looked at to know: all around the goal is taken."""

@@ -1,17 +1,16 @@
-"""Following a joint path: the hand is led along the poses that it has on the way."""
+"""Following a joint path: the hand is led along the poses that it has there."""
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
-import mujoco
 import numpy as np
 
-from robocasa_lerobot.demos.motion import Array, HandTarget, arm_action, pose_error
+from robocasa_lerobot.demos.motion import Array, HandTarget, arm_action, axis_angle, pose_error, rotation_about
 from robocasa_lerobot.demos.planning.kinematics import Arm
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
-from robocasa_lerobot.envs.robots.panda_omron.names import ARM_CENTER_SITE
 
 
 @dataclass(frozen=True)
@@ -34,11 +33,18 @@ class Following:
 
 
 CLOSELY = Following()
+GENTLY = Following(most_steps=20)  # more slowly
 Command = Callable[[HandTarget, float], Array]
 
 
 def follow_joint_path(
-    env: KitchenEnv, joints: Array, gripper: float, how: Following = CLOSELY, command: Command | None = None
+    env: KitchenEnv,
+    joints: Array,
+    gripper: float,
+    how: Following = CLOSELY,
+    command: Command | None = None,
+    *,
+    level: bool = False,
 ) -> Iterator[Array]:
     """Lead the hand as it goes when all joints turn evenly from where they are to each row of a path in turn.
 
@@ -48,20 +54,20 @@ def follow_joint_path(
         gripper: OPEN or CLOSED.
         how: how closely.
         command: the action for a wanted pose; None takes the plain servo.
+        level: whether what is held stays upright, as of `hand_poses`.
     """
     data = env.data
-    arm = Arm(env.model, data)
+    arm = Arm(env.model, data, env.scene.robot)
     plain: Command = lambda target, fingers: arm_action(data, target, fingers)  # noqa: E731
     act = command or plain
-    start: Array = np.array(data.qpos[arm.addresses])
-    for end in np.atleast_2d(joints):
-        for target in _between(arm, data, start, end, how):
-            for _ in range(how.most_steps):
-                error = pose_error(data, target())
-                if error.position < how.near_m and error.rotation < how.near_rad:
-                    break
-                yield act(target(), gripper)
-        start = end
+    poses = hand_poses(arm, np.array(data.qpos[arm.addresses]), np.atleast_2d(joints), how, level=level)
+    for position, turn in zip(*poses, strict=True):
+        for _ in range(how.most_steps):
+            target = in_room(env, position, turn)
+            error = pose_error(data, target)
+            if error.position < how.near_m and error.rotation < how.near_rad:
+                break
+            yield act(target, gripper)
 
 
 def joint_line(arm: Arm, start: Array, end: Array, how: Following) -> Array:
@@ -74,16 +80,27 @@ def joint_line(arm: Arm, start: Array, end: Array, how: Following) -> Array:
     return line
 
 
-def _between(
-    arm: Arm, data: mujoco.MjData, start: Array, end: Array, how: Following
-) -> Iterator[Callable[[], HandTarget]]:
-    """Poses along a line, each in the world as the base stands when it is asked for."""
-    positions, turns = arm.forward(joint_line(arm, start, end, how))
-    for position, turn in zip(positions, turns, strict=True):
+def hand_poses(arm: Arm, start: Array, path: Array, how: Following, *, level: bool = False) -> tuple[Array, Array]:
+    """Grip positions (n, 3) and hand rotations (n, 3, 3), in the arm's frame, along a joint path (k, 7) from `start`.
 
-        def target(position: Array = position, turn: Array = turn) -> HandTarget:
-            frame = data.site(ARM_CENTER_SITE)
-            axes = frame.xmat.reshape(3, 3)
-            return HandTarget(frame.xpos + axes @ position, axes @ turn)
+    Joints that turn evenly tilt the hand on the way, also where it is upright at both ends. With `level` it turns
+    evenly instead from its first rotation to its last one: what both hold upright, all between them do.
+    """
+    positions, turns = arm.forward(
+        np.concatenate([joint_line(arm, one, other, how) for one, other in itertools.pairwise([start, *path])])
+    )
+    if level:
+        first = arm.forward(start[None])[1][0]
+        turn = axis_angle(turns[-1] @ first.T)
+        angle = float(np.linalg.norm(turn))
+        axis = turn / max(angle, 1e-9)
+        count = len(turns)
+        turns = np.array([rotation_about(axis, angle * step / count) @ first for step in range(1, count + 1)])
+    return positions, turns
 
-        yield target
+
+def in_room(env: KitchenEnv, position: Array, turn: Array) -> HandTarget:
+    """A pose of the arm's frame in the world, as the base stands now."""
+    frame = env.data.site(env.scene.robot.names.arm_center_site)
+    axes = frame.xmat.reshape(3, 3)
+    return HandTarget(frame.xpos + axes @ position, axes @ turn)

@@ -25,12 +25,12 @@ _MOST_JUDGED, _MOST_POSES = 1200, 24
 
 @dataclass(frozen=True)
 class GraspPose:
-    """A way to hold an object.
+    """A grasp of an object: a pose of the hand.
 
     Attributes:
         position: of the grip site, metres, shape (3,).
         rotation: of the hand, shape (3, 3): z is the approach direction, the fingers open along y.
-        width: of what is between the fingers, metres.
+        width: of the object between the fingers, metres.
         score: higher is better.
     """
 
@@ -45,7 +45,7 @@ class GraspPose:
 
 
 def grasp_poses(item: Instance, gripper: GripperGeometry, count: int = 16) -> tuple[GraspPose, ...]:
-    """Up to `count` ways to hold an instance as it stands, best first, in the frame of its body."""
+    """Up to `count` grasps of an instance as it stands, best first, in the frame of its body."""
     return _standing(item, gripper)[:count]
 
 
@@ -199,7 +199,7 @@ def _across(
     for level, z in enumerate(levels):
         for index, row in enumerate(rows):
             lines = parts[level, index]
-            # What is lower than the pads' middle is held by their lower ends.
+            # A surface lower than the pads' middle is held by their lower ends.
             for low, high in _merged(lines[4]) or _merged(lines[3]):
                 if not 0.002 < high - low < opening:
                     continue
@@ -240,7 +240,7 @@ def _has_room(faces: _Faces, candidate: _Candidate, top: float, gripper: Gripper
     """Whether the open fingers and the palm meet nothing."""
     row, z, u, w = candidate.row, candidate.z, candidate.u, candidate.w
     up = np.array([0.0, 0.0, 1.0])
-    # The fingers, from their tips to the palm, and nothing beside what is to be held.
+    # The fingers, from their tips to the palm, and nothing beside the object to be held.
     side = np.array([-gripper.finger_half_width, 0.0, gripper.finger_half_width])
     rise = np.array([-gripper.tips_below_grip + 0.001, 0.0, 0.02])
     starts = ((row + side)[:, None, None] * w + (z + rise)[None, :, None] * up).reshape(-1, 3)

@@ -146,7 +146,7 @@ def _axis_angle(wanted: Array, present: Array, out: Array) -> None:
 def _step(
     chain: Any, joints: Array, position: Array, rotation: Array, grip: Array, error: Array, jacobian: Array, a: Array
 ) -> None:
-    """Turn the joints (7,) by one damped least-squares step along an error (6,), with what is left over home.
+    """Turn the joints (7,) by one damped least-squares step along an error (6,), its null space towards home.
 
     The Jacobian (6, 7) and a matrix (6, 6) are memory to work in.
     """

@@ -12,8 +12,7 @@ from robocasa_lerobot.demos.motion import Array
 from robocasa_lerobot.demos.planning import kernel
 from robocasa_lerobot.envs.physics import native
 from robocasa_lerobot.envs.robots.panda_omron.control.indices import joint_positions
-from robocasa_lerobot.envs.robots.panda_omron.names import ARM_CENTER_SITE, ARM_JOINTS, GRIP_SITE, HAND
-from robocasa_lerobot.envs.robots.panda_omron.robot import PANDA_OMRON
+from robocasa_lerobot.envs.robots.robot import Robot
 
 
 @dataclass(frozen=True)
@@ -39,35 +38,40 @@ class Arm:
     Args:
         model: of the kitchen; its constants are read once.
         data: a state with positions evaluated.
+        robot: whose arm it is.
 
     Attributes:
         addresses: (7,) of the joints in qpos.
         bodies: (7,) numbers of the links' bodies.
         ranges: (7, 2) limits, radians.
+        home: (7,) at the start of an episode, radians.
         chain: what the compiled functions take.
     """
 
-    def __init__(self, model: mujoco.MjModel, data: mujoco.MjData) -> None:
+    def __init__(self, model: mujoco.MjModel, data: mujoco.MjData, robot: Robot) -> None:
         native.load()
-        self.bodies = [int(model.jnt_bodyid[model.joint(name).id]) for name in ARM_JOINTS]
-        self.ranges = np.array([model.joint(name).range for name in ARM_JOINTS])
-        self.addresses = joint_positions(model, ARM_JOINTS)
+        names = robot.names
+        self.bodies = [int(model.jnt_bodyid[model.joint(name).id]) for name in names.arm_joints]
+        self.ranges = np.array([model.joint(name).range for name in names.arm_joints])
+        self.home = np.array(robot.home.arm)
+        self.addresses = joint_positions(model, names.arm_joints)
         first = model.body_parentid[self.bodies[0]]
-        frame = data.site(ARM_CENTER_SITE)
+        frame = data.site(names.arm_center_site)
         base = frame.xmat.reshape(3, 3)
-        last, hand = data.body(self.bodies[-1]), data.body(HAND)
+        last, hand = data.body(self.bodies[-1]), data.body(names.hand)
         turn = last.xmat.reshape(3, 3)
         self.chain = kernel.Chain(
             first_position=base.T @ (data.xpos[first] - frame.xpos),
             first_rotation=base.T @ data.xmat[first].reshape(3, 3),
             positions=model.body_pos[self.bodies].copy(),
             rotations=np.array([_matrix(model.body_quat[body]) for body in self.bodies]),
-            grip=turn.T @ (data.site(GRIP_SITE).xpos - last.xpos),
+            grip=turn.T @ (data.site(names.grip_site).xpos - last.xpos),
             hand=turn.T @ hand.xmat.reshape(3, 3),
             low=self.ranges[:, 0].copy(),
             high=self.ranges[:, 1].copy(),
-            home=np.array(PANDA_OMRON.home.arm),
+            home=self.home,
         )
+        self._reach = robot.reach
 
     def forward(self, joints: Array) -> tuple[Array, Array]:
         """Grip positions (N, 3) and hand rotations (N, 3, 3) at joint angles (N, 7)."""
@@ -88,20 +92,27 @@ class Arm:
         margin = np.minimum(joints - self.ranges[:, 0], self.ranges[:, 1] - joints).min(axis=1)
         return Solution(joints, errors[:, 0], errors[:, 1], margin)
 
-    def along(self, start: Array, joints: Array) -> Array:
-        """Joint angles (N, 7) as the controller reaches them, which is told the hand's poses at `joints` (N, 7) alone.
+    def along(self, start: Array, positions: Array, rotations: Array) -> Array:
+        """Joint angles (N, 7) as the controller reaches them, which is told the hand's poses alone.
 
         Each pose is solved from the one before, so that the elbow goes as it will rather than as it was planned.
         """
-        positions, rotations = self.forward(joints)
-        found, errors = np.empty((len(joints), 7)), np.empty((len(joints), 2))
+        count = len(positions)
+        found, errors = np.empty((count, 7)), np.empty((count, 2))
         found[:1] = start
-        kernel.solve(self.chain, positions, rotations, np.ones(len(joints), dtype=np.bool_), found, errors, True)
+        kernel.solve(
+            self.chain,
+            np.ascontiguousarray(positions),
+            np.ascontiguousarray(rotations),
+            np.ones(count, dtype=np.bool_),
+            found,
+            errors,
+            True,
+        )
         return found
 
-    @staticmethod
-    def _within_reach(positions: Array, rotations: Array) -> NDArray[np.bool_]:
-        reach = PANDA_OMRON.reach
+    def _within_reach(self, positions: Array, rotations: Array) -> NDArray[np.bool_]:
+        reach = self._reach
         wrist = positions - reach.wrist_behind_grip * rotations[:, :, 2] - np.array([0.0, 0.0, reach.shoulder])
         near: NDArray[np.bool_] = np.linalg.norm(wrist, axis=1) < reach.longest
         return near

@@ -16,15 +16,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robocasa_lerobot.demos.motion import Array, HandTarget, base_pose, floor_axes
-from robocasa_lerobot.demos.motion_style import variety_of
+from robocasa_lerobot.demos.motion_style import motion_style_of
 from robocasa_lerobot.demos.planning.approach import Approach
-from robocasa_lerobot.demos.planning.collision import CollisionChecker, Held
+from robocasa_lerobot.demos.planning.collision import CollisionChecker, Held, is_full
 from robocasa_lerobot.demos.planning.costs import NEARBY, REACHING, PlanCosts
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
-from robocasa_lerobot.envs.robots.panda_omron.robot import PANDA_OMRON
 from robocasa_lerobot.envs.scene.robot_poses import RobotPose
 
 SHORTLIST, MOST_TESTED, MOST_DETOURS = 240, 120, 2
+LOADED_MORE = 4  # times as many of all of them with a full vessel in the hand, which is wide: most come to nothing
 SAMPLE_RAD, MOST_SAMPLES = 0.10, 5  # between tested configurations of a line, and how many at most
 NEAR_M, DRIVE_STEP_M = 0.08, 0.07  # a drive as short is not tested; between tested places of a longer one
 _POSES, _LINES, _DETOUR = range(3)
@@ -37,7 +37,7 @@ class WaypointPath:
     Attributes:
         targets: all paths that are compared have the same number.
         extra: cost that it has in any case.
-        takes: what is in the gripper after the pose that is solved first, as it will be.
+        takes: the object in the gripper after the pose that is solved first, as it will be.
     """
 
     targets: tuple[HandTarget, ...]
@@ -77,7 +77,7 @@ def plan_near(
     allowed: frozenset[int] = frozenset(),
     tried: Sequence[Array] = (),
 ) -> MotionPlan:
-    """The best way to reach a row of hand poses from about where the robot stands, the arm carried as it is.
+    """The best path to one of some rows of hand poses from about where the robot stands, the arm carried as it is.
 
     Args:
         env: its state is read, not touched.
@@ -119,7 +119,7 @@ class MotionPlanner:
         env: its state is read, not touched.
         paths: alternatives, all with the same number of poses.
         key: number of the pose that is solved first.
-        held: what is in the gripper.
+        held: the object in the gripper.
         loaded: number of poses, from the first on, at which it still is.
         allowed: bodies that the robot may touch.
         costs: weights.
@@ -140,14 +140,15 @@ class MotionPlanner:
     ) -> None:
         self._env, self._paths, self._key, self._costs = env, list(paths), key, costs
         self._held, self._loaded = held, loaded
-        self._checker = CollisionChecker(env.model, env.data, allowed=allowed)
+        self._more = LOADED_MORE if loaded and is_full(held) else 1
+        self._checker = CollisionChecker(env.scene, env.data, allowed=allowed)
         self._arm, self._here = self._checker.arm, self._checker.present_base
         # What it leans on already is no reason not to go: an open drawer before the base, for one.
         self._checker.allow(self._checker.touched(self._here, self._checker.present_joints, most=8).all())
         # (paths, poses, 3) and (paths, poses, 3, 3)
         self._positions = np.array([[t.position for t in path.targets] for path in paths])
         self._rotations = np.array([[t.rotation for t in path.targets] for path in paths])
-        style, which = variety_of(env), key if preferred is None else preferred
+        style, which = motion_style_of(env), key if preferred is None else preferred
         self._extra = np.array([path.extra - style.bonus(path.targets[which].rotation) for path in paths])
         keys = np.column_stack([self._positions[:, key], self._rotations[:, key].reshape(len(paths), 9)])
         self._same = np.unique(keys.round(4), axis=0, return_inverse=True)[1].reshape(-1)
@@ -170,12 +171,13 @@ class MotionPlanner:
         heapq.heapify(queue)
         plans: list[MotionPlan] = []
         number = itertools.count()
+        detours *= self._more
         least = np.inf
         while queue:
             cost, stage, row = heapq.heappop(queue)
             if cost > least:
                 break
-            if stage == _POSES and next(number) >= MOST_TESTED:
+            if stage == _POSES and next(number) >= MOST_TESTED * self._more:
                 continue
             if stage == _POSES:
                 heapq.heappush(queue, (cost + found.poses(row), _LINES, row))
@@ -210,7 +212,7 @@ class MotionPlanner:
         return solution.joints, np.minimum(miss, costs.most_miss) + costs.near_limit * margin
 
     def held_on(self, path: WaypointPath, line: int) -> Held | None:
-        """What is in the gripper on the line that ends in a pose, counted from 1."""
+        """The object in the gripper on the line that ends in a pose, counted from 1."""
         if line <= self._loaded:
             return self._held
         return path.takes if line > self._key + 1 else None
@@ -240,7 +242,7 @@ class _Candidates:
         costs, here = planner._costs, planner._here
         places = np.array([here if base is None else (base.x, base.y, base.yaw) for base in bases])
         present = planner._checker.present_joints
-        home = np.array(PANDA_OMRON.home.arm) if folded else present
+        home = planner._arm.home if folded else present
         starts = np.array([present if base is None else home for base in bases])
         far = np.hypot(*(places - here)[:, :2].T)
         drives = np.where([base is None for base in bases], 0.0, costs.drive + costs.drive_per_m * far)
@@ -255,7 +257,7 @@ class _Candidates:
         joints, missed = planner.solve(which[first], frames[where[first]], key, start[first])
         joints, missed = joints[back.reshape(-1)], missed[back.reshape(-1)]
         cost = cost + missed + costs.turn * np.abs(joints - start).max(axis=1)
-        short = np.argsort(cost, kind="stable")[:SHORTLIST]
+        short = np.argsort(cost, kind="stable")[: SHORTLIST * planner._more]
         which, where, cost, start = which[short], where[short], cost[short], start[short]
         solved = [start]
         for index in range(planner._positions.shape[1]):
@@ -268,12 +270,12 @@ class _Candidates:
         self._lines = len(solved) - 1
 
     def poses(self, row: int) -> float:
-        """Cost of what is touched at the poses."""
+        """Cost of the bodies touched at the poses."""
         counts = self._counts(row, [(line, self._joints[row, line : line + 1]) for line in range(1, self._lines + 1)])
         return self._p._costs.hit_at_pose * float(counts.sum())
 
     def lines(self, row: int) -> float:
-        """Cost of what is touched on the lines between the poses."""
+        """Cost of the bodies touched on the lines between the poses."""
         joints, worst, at = self._joints[row], 0, 0
         pieces: list[tuple[int, Array]] = []
         for line in range(2, len(joints)):
@@ -288,7 +290,7 @@ class _Candidates:
         return self._p._costs.hit * worst
 
     def drive(self, row: int) -> float:
-        """Cost of what is met on the drive."""
+        """Cost of the obstacles met on the drive."""
         return self._p.drive_cost(self._bases[self._where[row]], self._joints[row, 0])
 
     def goal(self, row: int) -> Array:
@@ -312,14 +314,14 @@ class _Candidates:
         def counts(joints: Array, margin_m: float) -> NDArray[np.int64]:
             return planner._checker.touched(place, joints, held=held, margin_m=margin_m, most=most).counts
 
-        return Approach(planner._arm, counts, planner._costs)
+        return Approach(planner._arm, counts, planner._costs, level=held is not None and bool(held.contents))
 
     def plan(self, row: int, cost: float, joints: Array) -> MotionPlan:
         """The plan of a row."""
         return MotionPlan(self._p._paths[self._which[row]], self._bases[self._where[row]], cost, joints)
 
     def _counts(self, row: int, pieces: list[tuple[int, Array]]) -> NDArray[np.int64]:
-        """Bodies touched at configurations (n, 7) of lines in their order, with what is held on each, one row."""
+        """Bodies touched at configurations (n, 7) of lines in their order, with the object held on each, one row."""
         path, place = self._p._paths[self._which[row]], self._places[self._where[row]]
         found: list[NDArray[np.int64]] = [np.zeros(0, dtype=np.int64)]
         for held, group in itertools.groupby(pieces, key=lambda piece: self._p.held_on(path, piece[0])):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Generator, Iterable, Iterator
 
 import mujoco
 import numpy as np
@@ -10,6 +10,7 @@ import numpy as np
 from robocasa_lerobot import contract
 from robocasa_lerobot.demos.motion import (
     CLOSED,
+    DEAD_ZONE,
     OPEN,
     UP,
     Array,
@@ -22,10 +23,17 @@ from robocasa_lerobot.demos.motion import (
     hand_rotation,
     nearer_turn,
 )
-from robocasa_lerobot.demos.planning.articulated import ArticulatedPlan, ContactPath, Shift, plan_contact
+from robocasa_lerobot.demos.planning.articulated import (
+    AT_HOME,
+    LET_DOWN,
+    ArticulatedPlan,
+    ContactPath,
+    Shift,
+    plan_contact,
+)
 from robocasa_lerobot.demos.planning.contact_paths import STANDOFF_M
 from robocasa_lerobot.demos.planning.follow import follow_joint_path
-from robocasa_lerobot.demos.skills.articulated_part import ArticulatedPart, StallDetector
+from robocasa_lerobot.demos.skills.articulated_part import STALL_RAD, ArticulatedPart, StallDetector
 from robocasa_lerobot.demos.skills.base_shift import shift_base
 from robocasa_lerobot.demos.skills.common import SkillError, draw_back, hold_hand, move_hand
 from robocasa_lerobot.demos.skills.force_servo import ForceServo
@@ -34,9 +42,11 @@ from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 SETTLE_STEPS, GRASP_STEPS, RELEASE_STEPS = 6, 10, 6
 INTEGRAL_GAIN = 0.12
 _BASE_SPEED = 0.22  # metres a second while the arm moves too: the arm keeps up with about 0.26
-_DEAD_ZONE = 0.25  # of base commands (docs/robocasa.md, section 2)
 TUCKED_AHEAD_M, TUCKED_UP_M = 0.28, 0.58  # of the grip site from the arm's foot
 REST_M = 0.40  # height over the arm's foot at which the hand works best
+KNOCKED_RAD = 0.08
+FRUITLESS_RAD = 0.1  # a push that turns the part by less has come to nothing
+LOW_TOP_M = 0.35  # of a low part's upper edge over the arm's foot
 FIRM_LEAD_M = 0.09  # of the hand's goal in a firm push
 FIRMER_STEPS = 12  # without movement, after which a firm push has twice its lead
 
@@ -54,13 +64,14 @@ def follow_arc(
     max_steps: int = 200,
     until: Callable[[], bool] = lambda: False,
     firm: bool = False,
+    stall_rad: float = STALL_RAD,
 ) -> Iterator[Array]:
     """Go along with a part until it stands at `goal`, `until` holds, or it turns no more.
 
     Args:
         env: the kitchen.
         part: what turns.
-        plan: whose way is gone.
+        plan: whose path is followed.
         goal: angle, radians.
         gripper: OPEN or CLOSED.
         spot: where the base stands at the beginning and at the goal, world, metres, (3,) each.
@@ -69,23 +80,24 @@ def follow_arc(
         max_steps: control steps at most.
         until: ends it too.
         firm: push harder, the harder the longer nothing moves; then neither `lead_rad` nor `speed` has an effect.
+        stall_rad: what it must turn by not to have stalled, radians.
     """
     data = env.data
     servo = ForceServo(data)
     first = part.angle
-    way = 1.0 if goal > first else -1.0
-    headway = StallDetector(part, way)
+    sign = 1.0 if goal > first else -1.0
+    headway = StallDetector(part, sign, stall_rad)
     for _ in range(max_steps):
-        if way * (part.angle - goal) >= 0.0 or until():
+        if sign * (part.angle - goal) >= 0.0 or until():
             return
         if headway.ends():
             return
         if firm:
             here, near = (plan.path.target_at(part.angle + turn).position for turn in (0.0, 0.01))
             lead = FIRM_LEAD_M / (float(np.linalg.norm(near - here)) / 0.01) * (1.0 + headway.since / FIRMER_STEPS)
-            step = servo.action(plan.path.target_at(part.angle + way * lead), gripper)
+            step = servo.action(plan.path.target_at(part.angle + sign * lead), gripper)
         else:
-            step = arm_action(data, plan.path.target_at(part.angle + way * lead_rad), gripper, speed=speed)
+            step = arm_action(data, plan.path.target_at(part.angle + sign * lead_rad), gripper, speed=speed)
         progress = float(np.clip((part.angle - first) / (goal - first) + 0.15, 0.0, 1.0))
         step[contract.ACTION_SLICES["base_motion"]][:2] = _base_command(data, spot[0] + progress * (spot[1] - spot[0]))
         yield step
@@ -122,7 +134,7 @@ def pull_arc(
 def push_arc(
     env: KitchenEnv,
     part: ArticulatedPart,
-    ways: Iterable[ContactPath],
+    paths: Iterable[ContactPath],
     stances: Iterable[tuple[Shift, Shift]],
     goal: float,
     *,
@@ -130,23 +142,44 @@ def push_arc(
     speed: float = 0.8,
     firm: bool = False,
     most_cost: float = np.inf,
-) -> Iterator[Array]:
-    """Push a part to an angle in the best of some ways, and draw the hand back.
+    stall_rad: float = STALL_RAD,
+) -> Generator[Array, None, ContactPath | None]:
+    """Push a part to an angle along the best of some paths, and draw the hand back; returns one that came to nothing.
+
+    A hand that knocks the part back before it gets to its place goes no farther: it would push on the wrong side.
 
     Raises:
-        SkillError: none of them is to be had, or none for `most_cost`.
+        SkillError: none of them is possible, or none for `most_cost`.
     """
     data = env.data
-    plan = plan_contact(env, part, ways, stances)
+    plan = plan_contact(env, part, paths, stances, bends=arm_bends(env, part))
     if plan.cost > most_cost:
         raise SkillError(f"{part.name}: the arm hardly reaches along its arc")
     spot = spots(env, plan)
+    first, way = part.angle, 1.0 if goal > part.angle else -1.0
+
+    def knocked() -> bool:
+        return way * (part.angle - first) < -KNOCKED_RAD
+
     yield from take_stance(env, plan, CLOSED)
     yield from follow_joint_path(env, plan.joints, CLOSED)
     for via in plan.path.waypoints[: plan.path.contact]:
-        yield from move_hand(data, via.target, CLOSED, tolerance=0.03)
-    yield from follow_arc(env, part, plan, goal, gripper=CLOSED, spot=spot, lead_rad=lead_rad, speed=speed, firm=firm)
+        yield from move_hand(data, via.target, CLOSED, tolerance=0.03, until=knocked)
+    if not knocked():
+        yield from follow_arc(
+            env,
+            part,
+            plan,
+            goal,
+            gripper=CLOSED,
+            spot=spot,
+            lead_rad=lead_rad,
+            speed=speed,
+            firm=firm,
+            stall_rad=stall_rad,
+        )
     yield from draw_back(data, CLOSED, 0.10)
+    return plan.path if way * (part.angle - first) < FRUITLESS_RAD else None
 
 
 def retract(env: KitchenEnv, gripper: float) -> Iterator[Array]:
@@ -166,7 +199,7 @@ def stances_around(
 
     Args:
         env: the kitchen.
-        door: what is opened or closed.
+        door: the one to open or close.
         near: moves from where the robot stands now, metres forward and to the left.
         follow: how far the base may go along forwards as the door turns, metres.
     """
@@ -190,6 +223,12 @@ def working_height(env: KitchenEnv, door: ArticulatedPart, low: float, high: flo
     return float(np.clip(height, low, high))
 
 
+def arm_bends(env: KitchenEnv, part: ArticulatedPart) -> Array:
+    """Bends (n, 7) of the home pose from which the arm is solved for a part: let down, too, for one that is low."""
+    top = float(part.point(np.zeros(3), 0.0)[2] + part.high[2])
+    return LET_DOWN if top < base_pose(env.data)[0][2] + LOW_TOP_M else AT_HOME
+
+
 def take_stance(env: KitchenEnv, plan: ArticulatedPlan, gripper: float) -> Iterator[Array]:
     """Drive to where a plan begins."""
     for leg in plan.legs:
@@ -211,5 +250,5 @@ def _base_command(data: mujoco.MjData, spot: Array) -> Array:
     distance = float(np.linalg.norm(error))
     if distance < 0.02:
         return np.zeros(2)
-    command: Array = error / distance * (_DEAD_ZONE + min(2.0 * distance, _BASE_SPEED))
+    command: Array = error / distance * (DEAD_ZONE + min(2.0 * distance, _BASE_SPEED))
     return command

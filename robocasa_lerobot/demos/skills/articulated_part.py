@@ -141,22 +141,23 @@ class ArticulatedPart:
 
 
 class StallDetector:
-    """Tells when a part that is led one way turns no more.
+    """Tells when a part that is led in one direction turns no more.
 
     Args:
         part: what turns.
-        way: 1 if its angle is to grow, -1 if it is to shrink.
+        sign: 1 if its angle is to grow, -1 if it is to shrink.
+        least_rad: what it must turn by, or it turns no more.
 
     Attributes:
         since: control steps without movement.
     """
 
-    def __init__(self, part: ArticulatedPart, way: float) -> None:
-        self._part, self._way, self._last, self.since = part, way, part.angle, 0
+    def __init__(self, part: ArticulatedPart, sign: float, least_rad: float = STALL_RAD) -> None:
+        self._part, self._sign, self._least, self._last, self.since = part, sign, least_rad, part.angle, 0
 
     def ends(self) -> bool:
         """Whether it has stalled; asked once at every control step."""
-        if self._way * (self._part.angle - self._last) > STALL_RAD:
+        if self._sign * (self._part.angle - self._last) > self._least:
             self._last, self.since = self._part.angle, 0
         else:
             self.since += 1
@@ -188,14 +189,14 @@ def push_around(
         lead_m: how far before the pushed point the commanded one is, metres.
         max_steps: control steps at most.
     """
-    way = 1.0 if goal > part.share else -1.0
+    sign = 1.0 if goal > part.share else -1.0
     lead = lead_m / part.radius(local)
-    headway = StallDetector(part, way)
+    headway = StallDetector(part, sign)
     for _ in range(max_steps):
-        if way * (part.share - goal) >= 0.0:
+        if sign * (part.share - goal) >= 0.0:
             return
         if headway.ends():
             return
-        angle = part.angle + way * lead
+        angle = part.angle + sign * lead
         target = HandTarget(part.point(local, angle), rotation(angle))
         yield arm_action(data, target, gripper, speed=speed)

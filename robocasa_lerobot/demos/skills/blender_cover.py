@@ -1,6 +1,6 @@
 """The lid of a blender put on its jug: taken by its knob, brought level over the rim, and let down.
 
-The jug stands below a wall cabinet, so the way there is planned anew with the lid in the hand, from where the robot
+The jug stands below a wall cabinet, so the path there is planned anew with the lid in the hand, from where the robot
 stands or from a better place. The lid has its place, not the hand: how it lies in the hand is looked at before each
 move, and it is let go only over the jug.
 
@@ -24,6 +24,7 @@ from robocasa_lerobot.demos.motion import (
     hand_rotation,
     rotation_about,
 )
+from robocasa_lerobot.demos.planning.follow import follow_joint_path
 from robocasa_lerobot.demos.skills.blender_lid import (
     ATTEMPTS,
     AWAY_M,
@@ -39,7 +40,7 @@ from robocasa_lerobot.demos.skills.blender_lid import (
 from robocasa_lerobot.demos.skills.common import SkillError, hold_hand, move_hand, stage_done
 from robocasa_lerobot.demos.skills.pick_place.grasp_strategy import entry
 from robocasa_lerobot.demos.skills.pick_place.pick import INTEGRAL_GAIN
-from robocasa_lerobot.demos.skills.reaching import Held, ReachPlan, WaypointPath, approach, lead, plan_reach
+from robocasa_lerobot.demos.skills.reaching import Held, MotionPlan, WaypointPath, approach, plan_reach
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.kitchens.appliances.kinds.blender import Blender
 from robocasa_lerobot.envs.scene.robot_poses import RobotPose
@@ -47,11 +48,11 @@ from robocasa_lerobot.envs.tasks.task import Stage
 
 LAYS = 2  # tries to bring a lid that is in the hand to the jug
 TAKEN_M = 0.08  # that it is lifted at once
-# Of the lid above its place: on its way, over the rim, when it is let go.
+# Of the lid above its place: while it is carried, over the rim, when it is let go.
 OVER_M, LOW_M, DROP_M = (0.045, 0.028), 0.020, 0.002
 ABOVE_M = 0.10  # over a lid on the counter, where the hand comes from
-IN_M = 0.15  # length of the way in
-SINKS, SINK = 3, ((0.010, 0.3, 0.003), (DROP_M, 0.3, 0.003))  # heights, speeds and tolerances of the way down
+IN_M = 0.15  # length of the path in
+SINKS, SINK = 3, ((0.010, 0.3, 0.003), (DROP_M, 0.3, 0.003))  # heights, speeds and tolerances of the path down
 NOT_OVER_M = 0.03  # of a lid that is aside of its place
 SEATED_M, LEVEL_COS = 0.007, float(np.cos(np.deg2rad(4.0)))  # of a lid that is let go at once
 TOGETHER = 1.0  # cost up to which the lid is taken from where it can be brought to the jug, too
@@ -89,7 +90,7 @@ def _take(env: KitchenEnv, blender: Blender, tried: list[Array]) -> Iterator[Arr
     data = env.data
     body = data.body(blender.lid)
     choice = yield from approach(env, lambda blocked: _best_take(env, blender, tried, blocked), OPEN)
-    yield from lead(env, choice.joints, OPEN)
+    yield from follow_joint_path(env, choice.joints, OPEN)
     above, before, at, lifted = choice.path.targets[:4]
     tried.append(at.rotation)
     yield from move_hand(data, above, OPEN, tolerance=0.04)
@@ -108,10 +109,10 @@ def _lay(env: KitchenEnv, blender: Blender, place: Array, tries: int) -> Iterato
     failed: list[Array] = []
     for _ in range(tries):
 
-        def plan(blocked: Sequence[RobotPose]) -> ReachPlan:
+        def plan(blocked: Sequence[RobotPose]) -> MotionPlan:
             held, lid = Held.now(data, blender.lid), _lid(env, blender)
-            ways = _lays(env, blender, held, hand_rotation(data) @ held.rotation, place, failed)
-            return plan_reach(env, ways, place, key=2, held=held, loaded=3, allowed=lid, blocked=blocked)[0]
+            paths = _lays(env, blender, held, hand_rotation(data) @ held.rotation, place, failed)
+            return plan_reach(env, paths, place, key=2, held=held, loaded=3, allowed=lid, blocked=blocked)[0]
 
         choice = yield from approach(env, plan, CLOSED)
         if not _holds(env, blender):
@@ -119,7 +120,7 @@ def _lay(env: KitchenEnv, blender: Blender, place: Array, tries: int) -> Iterato
         far, over, low, _ = choice.path.targets
         failed.append(low.rotation)
         turn = low.rotation @ Held.now(data, blender.lid).rotation  # of the lid
-        yield from lead(env, choice.joints, CLOSED)
+        yield from follow_joint_path(env, choice.joints, CLOSED)
         yield from move_hand(data, far, CLOSED, tolerance=0.02, integral_gain=INTEGRAL_GAIN)
         height = float(over.position[2] - low.position[2]) + LOW_M
         line: Array | None = far.position
@@ -147,7 +148,7 @@ def _lay(env: KitchenEnv, blender: Blender, place: Array, tries: int) -> Iterato
                 break
 
 
-def _best_take(env: KitchenEnv, blender: Blender, tried: list[Array], blocked: Sequence[RobotPose]) -> ReachPlan:
+def _best_take(env: KitchenEnv, blender: Blender, tried: list[Array], blocked: Sequence[RobotPose]) -> MotionPlan:
     """A grasp with which the lid gets to the jug from the same place, else after a drive."""
     body, lid, place = env.data.body(blender.lid), _lid(env, blender), blender.lid_pose[0]
     at, turn = body.xpos + UP * HOLD_M, body.xmat.reshape(3, 3).copy()
@@ -159,9 +160,9 @@ def _best_take(env: KitchenEnv, blender: Blender, tried: list[Array], blocked: S
         poses = (before + ABOVE_M * UP, before, at, at + TAKEN_M * UP)
         take = WaypointPath(tuple(HandTarget(point, rotation) for point in poses), cost, held)
         taking.append(take)
-        for way in _lays(env, blender, held, turn, place, []):
-            laying.append(dataclasses.replace(way, takes=held))
-            together.append(WaypointPath(take.targets + way.targets[:3], cost + way.extra, held))
+        for path in _lays(env, blender, held, turn, place, []):
+            laying.append(dataclasses.replace(path, takes=held))
+            together.append(WaypointPath(take.targets + path.targets[:3], cost + path.extra, held))
     found = plan_reach(env, together, at, key=2, allowed=lid, blocked=blocked)[0]
     if found.cost < TOGETHER:
         return found
@@ -170,16 +171,16 @@ def _best_take(env: KitchenEnv, blender: Blender, tried: list[Array], blocked: S
         grasp = _grasp(choice.path.takes)
         later[grasp] = min(choice.cost, later.get(grasp, np.inf))
     able = [
-        dataclasses.replace(way, extra=way.extra + later[grasp])
-        for way in taking
-        if (grasp := _grasp(way.takes)) in later
+        dataclasses.replace(path, extra=path.extra + later[grasp])
+        for path in taking
+        if (grasp := _grasp(path.takes)) in later
     ]
     apart = plan_reach(env, able, at, key=2, allowed=lid, blocked=blocked)[0]
     return min((found, apart), key=lambda choice: choice.cost)
 
 
 def _grasp(held: Held | None) -> tuple[float, ...]:
-    """What is the same of a grasp wherever the hand is."""
+    """A key of a grasp that does not depend on where the hand is."""
     assert held is not None
     return tuple(held.rotation.ravel().round(4).tolist())
 

@@ -43,7 +43,7 @@ PLUG_M = 0.016  # of the lid's lowest point below its origin
 TILTS = tuple(np.deg2rad((8.0, 20.0, 35.0, 55.0, 85.0)))
 TURNS = tuple(np.deg2rad((0.0, 25.0, -25.0, 50.0, -50.0)))
 SHIFTS = ((0.0, 0.0), (-0.12, 0.0), (0.0, 0.2), (0.0, -0.2), (-0.25, 0.0), (-0.15, 0.25), (-0.15, -0.25))
-NEARLY_AS_GOOD = 0.6  # cost by which another way may be worse than the best
+NEARLY_AS_GOOD = 0.6  # cost by which another grasp may be worse than the best
 ROSE_M = 0.01  # of a lid that is held
 LOST_M = 0.05  # a lid farther than this from the hand is no longer held
 SPOTS, SPOT_STEP_M, SPOT_MARGIN_M = 6, 0.06, 0.02
@@ -74,12 +74,12 @@ def _carry(env: KitchenEnv, stage: Stage, blender: Blender, spots: list[Array]) 
     for _ in range(ATTEMPTS):
         at = data.body(blender.lid).xpos + UP * HOLD_M
         start = float(data.body(blender.lid).xpos[2])
-        ways = [
-            _way(at, spot + UP * (HOLD_M + DROP_M), rotation, blender) for spot in spots for rotation in grasps(env)
+        rows = [
+            _row(at, spot + UP * (HOLD_M + DROP_M), rotation, blender) for spot in spots for rotation in grasps(env)
         ]
         allowed = frozenset({int(env.model.body(blender.lid).id)})
-        plan = plan_near(env, ways, SHIFTS, allowed=allowed)
-        another = plan_near(env, ways, SHIFTS, allowed=allowed, tried=tried) if tried else plan
+        plan = plan_near(env, rows, SHIFTS, allowed=allowed)
+        another = plan_near(env, rows, SHIFTS, allowed=allowed, tried=tried) if tried else plan
         plan = another if another.cost < plan.cost + NEARLY_AS_GOOD else plan
         tried.append(plan.targets[-1].rotation)
         yield from shift_base(env, plan.shift, OPEN)
@@ -110,7 +110,7 @@ def _held_off(env: KitchenEnv, blender: Blender) -> Array:
     return off
 
 
-def _way(at: Array, put: Array, rotation: Array, blender: Blender) -> tuple[HandTarget, ...]:
+def _row(at: Array, put: Array, rotation: Array, blender: Blender) -> tuple[HandTarget, ...]:
     """Over the knob, at it, above the jug's rim with the lid, over where it goes, and there."""
     height = blender.lid_pose[0][2] + HOLD_M + LIFT_M
     return (
@@ -136,7 +136,7 @@ def grasps(env: KitchenEnv) -> list[Array]:
 
 
 def _free_spots(env: KitchenEnv, blender: Blender) -> list[Array]:
-    """Points of the counter beside the blender with room for the lid, those nearest to the robot's way first."""
+    """Points of the counter beside the blender with room for the lid, those nearest to the robot's path first."""
     layout = env.scene.layout
     areas, standing = counter_areas(layout, OnCounter("", "left_right", size=(0.45, 0.40)), blender)
     width, depth, _ = blender.lid_size

@@ -1,6 +1,7 @@
 """Buttons: pressed with the closed finger tips, then left alone.
 
-What fails most is a microwave's stop button: it is low over the counter, where tilted hands meet the case.
+A microwave's stop button is low over the counter and beside the door's handle: there the hand has to come from above
+and from the other side.
 """
 
 from __future__ import annotations
@@ -9,23 +10,34 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 
-from robocasa_lerobot.demos.motion import CLOSED, UP, Array, HandTarget, base_pose, frame, grip_position, hand_rotation
-from robocasa_lerobot.demos.planning.contact_paths import CLOSED_FINGERS_HALF_M
+from robocasa_lerobot.demos.motion import (
+    CLOSED,
+    UP,
+    Array,
+    HandTarget,
+    frame,
+    grip_position,
+    hand_rotation,
+    rotation_about,
+)
 from robocasa_lerobot.demos.planning.follow import follow_joint_path
 from robocasa_lerobot.demos.planning.motion_planner import plan_near
 from robocasa_lerobot.demos.skills.base_shift import shift_base
 from robocasa_lerobot.demos.skills.common import SkillError, hold_hand, move_hand, stage_done
-from robocasa_lerobot.demos.skills.levers import level_and_down, push_way
+from robocasa_lerobot.demos.skills.levers import level_and_down, push_row
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.kitchens.appliances.base import Appliance
+from robocasa_lerobot.envs.robots.robot import GripperGeometry
 from robocasa_lerobot.envs.tasks.task import Stage
 
 ATTEMPTS = 4
 STANDOFF_M, RETREAT_M = 0.07, 0.20
 PRESS_M = 0.012  # deeper than the button goes: the servo's goal, not where the finger ends
 PRESS_SPEED = 0.4
-# Tilts of the hand from a front's normal downwards, radians.
+# Of the hand from a front's normal: tilts downwards and turns to both sides, radians. Level hands meet what stands out
+# beside a button: a door's handle, for one.
 TILTS = tuple(np.deg2rad((0.0, 20.0, 40.0, 55.0, 70.0)))
+TURNS = tuple(np.deg2rad((0.0, 25.0, -25.0, 50.0, -50.0)))
 SHIFTS = ((0.0, 0.0), (-0.12, 0.0), (-0.25, 0.0), (-0.12, -0.2), (-0.12, 0.2), (-0.4, 0.0), (-0.3, -0.25), (-0.3, 0.25))
 
 
@@ -45,10 +57,10 @@ def press_button(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
         inwards = joint.xaxis.copy()
         face = body.xpos.copy() - inwards * fixture.position(data, part)
         if abs(inwards[2]) > 0.7:  # on top
-            ways = [push_way(face, inwards, rotation, PRESS_M) for rotation in level_and_down(env)]
+            rows = [push_row(env.robot.gripper, face, inwards, rotation, PRESS_M) for rotation in level_and_down(env)]
         else:
-            ways = [_way(face, inwards, rotation) for rotation in rotations(env, inwards)]
-        plan = plan_near(env, ways, SHIFTS, allowed=allowed, tried=tried)
+            rows = [_row(env.robot.gripper, face, inwards, rotation) for rotation in rotations(inwards)]
+        plan = plan_near(env, rows, SHIFTS, allowed=allowed, tried=tried)
         tried.append(plan.targets[-1].rotation)
         yield from shift_base(env, plan.shift, CLOSED)
         yield from follow_joint_path(env, plan.joints, CLOSED)
@@ -66,15 +78,16 @@ def press_button(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
     raise SkillError(f"{part} of {fixture.name}: nothing came of {ATTEMPTS} presses")
 
 
-def rotations(env: KitchenEnv, inwards: Array) -> list[Array]:
-    """Rotations of the hand that press along `inwards`: tilts, each with four rolls."""
-    _, yaw = base_pose(env.data)
-    left = np.array([-np.sin(yaw), np.cos(yaw), 0.0])
+def rotations(inwards: Array) -> list[Array]:
+    """Rotations of the hand that press along `inwards`: tilts and turns, each with four rolls."""
     out = []
-    for tilt in TILTS:
-        approach = np.cos(tilt) * inwards - np.sin(tilt) * UP
-        other = np.cross(approach, left)
-        out += [frame(approach, opening) for opening in (left, -left, other, -other)]
+    for turn in TURNS:
+        level = rotation_about(UP, turn) @ inwards
+        left = np.cross(UP, level)
+        for tilt in TILTS:
+            approach = np.cos(tilt) * level - np.sin(tilt) * UP
+            other = np.cross(approach, left)
+            out += [frame(approach, opening) for opening in (left, -left, other, -other)]
     return out
 
 
@@ -85,12 +98,12 @@ def retreat(env: KitchenEnv, outwards: Array) -> Iterator[Array]:
     yield from move_hand(data, away, CLOSED, tolerance=0.02, max_steps=50)
 
 
-def _way(face: Array, inwards: Array, rotation: Array) -> tuple[HandTarget, ...]:
-    touch = face - inwards * float(CLOSED_FINGERS_HALF_M @ np.abs(rotation.T @ inwards))
+def _row(gripper: GripperGeometry, face: Array, inwards: Array, rotation: Array) -> tuple[HandTarget, ...]:
+    touch = face - inwards * gripper.closed_reach(rotation, inwards)
     return tuple(HandTarget(touch + inwards * deep, rotation) for deep in (-2 * STANDOFF_M, -STANDOFF_M, PRESS_M))
 
 
 def _pressed(env: KitchenEnv, stage: Stage, part: str) -> Callable[[], bool]:
-    """Whether the button is in by most of its way."""
+    """Whether the button is in by most of its travel."""
     fixture = env.scene.fixture(stage.target, Appliance)
     return lambda: fixture.share(env.data, part) > 0.7

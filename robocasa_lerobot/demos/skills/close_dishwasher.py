@@ -1,8 +1,7 @@
 """Doors that fold down nearly to the floor, shut: lifted at their free edge by the finger tips, then pushed.
 
 The hand points down before the edge and presses its finger tips inwards against the outer corner while it goes up: the
-arm does not get below the door. What fails is a kitchen in which the robot can stand only beside the
-door, on its left.
+arm does not get below the door. Where there is no room before the door, the robot stands beside it and reaches over.
 """
 
 from __future__ import annotations
@@ -22,18 +21,18 @@ from robocasa_lerobot.demos.motion import (
     grip_position,
     hand_rotation,
 )
-from robocasa_lerobot.demos.planning.articulated import ContactPath, Shift, Waypoint, plan_contact
-from robocasa_lerobot.demos.planning.contact_paths import CLOSED_FINGERS_HALF_M, arc_waypoints, push_path
+from robocasa_lerobot.demos.planning.articulated import LET_DOWN, ContactPath, Shift, Waypoint, plan_contact
+from robocasa_lerobot.demos.planning.contact_paths import arc_waypoints, push_path
 from robocasa_lerobot.demos.planning.follow import Following, follow_joint_path
 from robocasa_lerobot.demos.skills.arc_motion import follow_arc, spots, take_stance, working_height
-from robocasa_lerobot.demos.skills.articulated_part import ArticulatedPart
+from robocasa_lerobot.demos.skills.articulated_part import ArticulatedPart, StallDetector
 from robocasa_lerobot.demos.skills.base_shift import shift_base
 from robocasa_lerobot.demos.skills.common import SkillError, move_hand
 from robocasa_lerobot.demos.skills.doors import SHUT_GOAL, doors
-from robocasa_lerobot.demos.skills.drop_down_doors import BASE_FRONT_M, BASE_HALF_M, stances_beside
+from robocasa_lerobot.demos.skills.drop_down_doors import stances_beside
 from robocasa_lerobot.demos.skills.force_servo import ForceServo
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
-from robocasa_lerobot.envs.robots.panda_omron.robot import PANDA_OMRON
+from robocasa_lerobot.envs.robots.robot import GripperGeometry
 from robocasa_lerobot.envs.tasks.task import Stage
 
 ATTEMPTS = 6
@@ -51,6 +50,10 @@ OFF_M, BACK_M = 0.02, 0.10
 PRESS_M = 0.06  # that the hand is led beyond the corner at the beginning: the edge must not slip off the fingers
 DASH = Following(spacing_m=0.2, per_m=0.0, per_rad_m=1.0, near_m=0.08, near_rad=0.4, most_steps=8)
 RETREAT: Shift = (-0.15, 0.0)
+WEDGED_STEPS = 10  # without movement
+SLIPPED = 0.5  # cost of a lift from which the edge has slipped off
+# Lean of the hand, share of half the door's width, and which of its flat sides is to the right.
+Lift = tuple[tuple[float, float], float, float]
 
 
 def lift_low(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
@@ -60,49 +63,64 @@ def lift_low(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
         SkillError: it is not shut after six attempts.
     """
     for door in doors(env, stage):
+        slipped: list[Lift] = []
         for attempt in range(ATTEMPTS):
             if door.share <= SHUT_GOAL:
                 break
             try:
-                yield from _push(env, door)
+                yield from _push(env, door, slipped)
             except SkillError:
                 if attempt == ATTEMPTS - 1:
                     raise
-                yield from _dash(env, np.array(PANDA_OMRON.home.arm))
+                yield from _dash(env, np.array(env.robot.home.arm))
                 yield from shift_base(env, RETREAT, CLOSED)  # from elsewhere other places are reached
         if door.share > SHUT_GOAL:
             raise SkillError(f"{door.name} is still {door.share:.1%} open after {ATTEMPTS} attempts")
 
 
-def _push(env: KitchenEnv, door: ArticulatedPart) -> Iterator[Array]:
-    """Push the door shut: at its edge while it lies low, else at its face."""
+def _push(env: KitchenEnv, door: ArticulatedPart, slipped: list[Lift]) -> Iterator[Array]:
+    """Push the door shut: at its edge while it lies low, else at its face.
+
+    A lift from which the edge slips off is noted in `slipped`, and is the last choice from then on.
+    """
     data = env.data
-    if door.angle > ENOUGH_RAD:
-        ways = [_lift_path(door, lift, x, roll) for lift in LIFTS for x in XS for roll in (1, -1)]
-        plan = plan_contact(env, door, ways, _stances(env, door))
+    lifts = [(lift, x, roll) for lift in LIFTS for x in XS for roll in (1, -1)]
+    low = door.angle > ENOUGH_RAD
+    if low:
+        paths = [_lift_path(env.robot.gripper, door, lift, bias=SLIPPED * (lift in slipped)) for lift in lifts]
+        plan = plan_contact(env, door, paths, _stances(env, door), bends=LET_DOWN)
     else:
-        ways = [_push_path(env, door, push, roll) for push in PUSHES for roll in (1, -1)]
-        plan = plan_contact(env, door, ways, stances_beside(env, door))
+        paths = [_push_path(env, door, push, roll) for push in PUSHES for roll in (1, -1)]
+        plan = plan_contact(env, door, paths, stances_beside(env, door))
     spot = spots(env, plan)
     yield from take_stance(env, plan, CLOSED)
     yield from _dash(env, plan.joints)
     back, off = plan.path.waypoints[0].target, plan.path.waypoints[1].target
     yield from move_hand(data, back, CLOSED, tolerance=0.02, max_steps=30)
-    yield from move_hand(data, off, CLOSED, tolerance=0.004, max_steps=40, integral_gain=0.12)
-    yield from follow_arc(env, door, plan, SHUT_GOAL * door.full, gripper=CLOSED, spot=spot, lead_rad=0.0, firm=True)
+    exact = 0.004 if low else 0.015  # a face is met anywhere
+    yield from move_hand(data, off, CLOSED, tolerance=exact, max_steps=40, integral_gain=0.12)
+    goal, headway = SHUT_GOAL * door.full, StallDetector(door, -1.0)
+
+    def wedged() -> bool:
+        # Between the edge and the counter: the face is pushed instead.
+        headway.ends()
+        return low and door.angle < ENOUGH_RAD and headway.since >= WEDGED_STEPS
+
+    yield from follow_arc(env, door, plan, goal, gripper=CLOSED, spot=spot, lead_rad=0.0, firm=True, until=wedged)
     away = HandTarget(grip_position(data) - 0.16 * door.inwards, hand_rotation(data))
     yield from move_hand(data, away, CLOSED, tolerance=0.04, max_steps=20)
-    if door.angle > ENOUGH_RAD:
-        yield from _dash(env, np.array(PANDA_OMRON.home.arm))
+    if low and door.angle > ENOUGH_RAD:
+        slipped.append(lifts[paths.index(plan.path)])
 
 
 def _dash(env: KitchenEnv, joints: Array) -> Iterator[Array]:
-    """Move the hand fast as it goes when all joints turn evenly to some angles: straight ways end in joint limits."""
+    """Move the hand fast as it goes when all joints turn evenly to some angles: straight paths end in joint limits."""
     yield from follow_joint_path(env, joints, CLOSED, DASH, ForceServo(env.data).action)
 
 
 def _stances(env: KitchenEnv, door: ArticulatedPart) -> tuple[tuple[Shift, Shift], ...]:
     """Moves of the base, before and by the end: before the free edge, then beside it; the base goes along inwards."""
+    shape = env.robot.shape
     base, yaw = base_pose(env.data)
     axes = floor_axes(yaw)
     hinge = door.point(np.zeros(3), 0.0)
@@ -116,41 +134,42 @@ def _stances(env: KitchenEnv, door: ArticulatedPart) -> tuple[tuple[Shift, Shift
     found = []
     for before in (0.20, 0.26, 0.14):
         for aside in (0.15, 0.0, 0.3, 0.45, -0.15):
-            y = -out - BASE_FRONT_M - before
+            y = -out - shape.base_x[1] - before
             found.append((shift(near * aside, y), shift(near * aside, max(y, -0.60))))
     for side in (near, -near):
         for gap in (0.04, 0.10):
-            for y in (-out, -out - 0.2, -out + 0.2):
-                x = side * (door.high[0] + BASE_HALF_M + gap)
+            for y in (-out, -out - 0.2, -out + 0.1, -out + 0.2):
+                x = side * (door.high[0] + shape.base_y[1] + gap)
                 found.append((shift(x, y), shift(x, max(y, -0.35))))
     return tuple(found)
 
 
-def _lift_path(door: ArticulatedPart, lift: tuple[float, float], x: float, roll: float) -> ContactPath:
-    """At the free edge, at a share of half its width from the middle.
+def _lift_path(gripper: GripperGeometry, door: ArticulatedPart, lift: Lift, *, bias: float = 0.0) -> ContactPath:
+    """At the free edge.
 
     The inward side of the fingers bears on the edge's outer corner, their tips just below it.
     """
+    (inwards, rightwards), x, roll = lift
     start = door.angle
     local = np.array([x * door.high[0], door.low[1], door.high[2]])
     highest = door.point(local, LIFTED_RAD)[2]
-    aside = np.tan(np.deg2rad(lift[1])) * door.rightwards
+    aside = np.tan(np.deg2rad(rightwards)) * door.rightwards
 
     def target_at(angle: float, press: float = PRESS_M) -> HandTarget:
         share = float(np.clip(angle / LIFTED_RAD, 0.0, 1.0))
-        lean = np.deg2rad(share * lift[0] + (1.0 - share) * LAST_LEAN)
+        lean = np.deg2rad(share * inwards + (1.0 - share) * LAST_LEAN)
         rotation = frame(np.tan(lean) * door.inwards + aside - UP, roll * door.rightwards)
         side = roll * rotation[:, 0]
         corner = door.point(local, angle)
         corner[2] = min(corner[2], highest)
-        beyond = press * angle / start - CLOSED_FINGERS_HALF_M[0]
+        beyond = press * angle / start - gripper.closed_half[0]
         return HandTarget(corner + beyond * side + TIP_M * rotation[:, 2], rotation)
 
     at = target_at(start, 0.0)
     off = HandTarget(at.position - OFF_M * door.inwards, at.rotation)
     back = HandTarget(off.position - BACK_M * at.rotation[:, 2], at.rotation)
     arc = arc_waypoints(start, SHUT_GOAL * door.full, lambda angle: target_at(angle, 0.0), (0.0, 0.5, 1.0))
-    return ContactPath((Waypoint(start, back), Waypoint(start, off), *arc), 2, target_at)
+    return ContactPath((Waypoint(start, back), Waypoint(start, off), *arc), 2, target_at, bias)
 
 
 def _push_path(env: KitchenEnv, door: ArticulatedPart, push: tuple[float, float], roll: float) -> ContactPath:
@@ -163,4 +182,6 @@ def _push_path(env: KitchenEnv, door: ArticulatedPart, push: tuple[float, float]
     level = np.cos(turn) * door.inwards + np.sin(turn) * door.rightwards
     rotation = frame(np.cos(pitch) * level - np.sin(pitch) * UP, roll * np.cross(level, UP))
     local = np.array([x, door.low[1], z])
-    return push_path(door, local, FORWARDS, lambda _: rotation, SHUT_GOAL * door.full, off_m=0.03, back_m=0.05)
+    return push_path(
+        env.robot.gripper, door, local, FORWARDS, lambda _: rotation, SHUT_GOAL * door.full, off_m=0.03, back_m=0.05
+    )

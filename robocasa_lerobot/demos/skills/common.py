@@ -25,6 +25,7 @@ from robocasa_lerobot.envs.tasks.conditions import stage_condition
 from robocasa_lerobot.envs.tasks.task import Stage
 
 __all__ = [
+    "HOLD_SPEED",
     "SkillError",
     "close_fingers",
     "draw_back",
@@ -33,6 +34,7 @@ __all__ = [
     "require_near",
     "stage_done",
     "stage_progress",
+    "wait_for_stage",
 ]
 
 POSITION_TOLERANCE_M = 0.012
@@ -41,6 +43,7 @@ ROTATION_TOLERANCE_RAD = 0.12
 STALL_M, STALL_STEPS = 0.002, 12
 INTEGRAL_GAIN_NEAR_M, INTEGRAL_GAIN_MOST_M = 0.03, 0.03
 AHEAD_ON_LINE_M = 0.03  # commands this far ahead are full ones
+HOLD_SPEED = 0.4  # of a hand that stays where it is
 MORE_CLOSING_STEPS, STILL_M = 10, 0.0004  # of a finger in a step: it has met something
 
 
@@ -93,7 +96,7 @@ def _ahead(start: Array, end: Array, now: Array) -> Array:
 def hold_hand(data: mujoco.MjData, target: HandTarget, gripper: float, steps: int) -> Iterator[Array]:
     """Keep the hand at a target while the gripper moves."""
     for _ in range(steps):
-        yield arm_action(data, target, gripper, speed=0.4)
+        yield arm_action(data, target, gripper, speed=HOLD_SPEED)
 
 
 def close_fingers(data: mujoco.MjData, target: HandTarget, steps: int) -> Iterator[Array]:
@@ -105,7 +108,7 @@ def close_fingers(data: mujoco.MjData, target: HandTarget, steps: int) -> Iterat
         if step >= steps and float(np.abs(now - before).max()) < STILL_M:
             return
         before = now
-        yield arm_action(data, target, CLOSED, speed=0.4)
+        yield arm_action(data, target, CLOSED, speed=HOLD_SPEED)
 
 
 def draw_back(data: mujoco.MjData, gripper: float, distance_m: float) -> Iterator[Array]:
@@ -135,3 +138,12 @@ def stage_progress(env: KitchenEnv, stage: Stage) -> float:
     """How much of what the stage's condition remembers is there: 1 for each memory that is full."""
     remembered = parts_with_memory([stage_condition(env.declaration, stage)])
     return sum(part.progress(env.scene, env.data) for part in remembered)
+
+
+def wait_for_stage(env: KitchenEnv, stage: Stage, act: Callable[[], Array], patience_steps: int) -> Iterator[Array]:
+    """Repeat an action until a stage's condition holds, or until nothing has come nearer to it for some steps."""
+    left, best = patience_steps, stage_progress(env, stage)
+    while left and not stage_done(env, stage):
+        yield act()
+        now = stage_progress(env, stage)
+        left, best = (patience_steps, now) if now > best else (left - 1, best)

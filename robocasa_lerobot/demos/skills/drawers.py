@@ -17,19 +17,19 @@ from robocasa_lerobot.demos.motion import (
     grip_position,
     hand_rotation,
 )
-from robocasa_lerobot.demos.motion_style import variety_of
+from robocasa_lerobot.demos.motion_style import motion_style_of
 from robocasa_lerobot.demos.skills.common import SkillError, hold_hand, move_hand, require_near
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.kitchens.fixtures.cabinets import Drawer
 from robocasa_lerobot.envs.tasks.task import Stage
 
 ATTEMPTS = 3
-GRASP_STEPS = 10  # the gripper needs ten control steps for its whole way
+GRASP_STEPS = 10  # the gripper needs ten control steps for its whole stroke
 # A pull that begins just when the fingers arrive teaches to pull a little too early, and the bar slips out.
 FIRM_STEPS = 6
 APPROACH_PITCH_RAD = np.deg2rad(15.0)  # downwards: keeps the forearm above the handle
-# A hand that waits beside its goal (`Variety.wait_m`) first goes in front of it: a slant all the way to the handle is a
-# small share of each command, which a policy does not learn.
+# A hand that waits beside its goal (`MotionStyle.wait_m`) first goes in front of it: a slant up to the handle
+# is a small share of each command, which a policy does not learn.
 STANDOFF_M, ALIGNED_M = 0.15, 0.08
 ALIGN_SPEED, APPROACH_SPEED = 0.7, 0.45
 PULL_SPEED = 0.55
@@ -53,7 +53,7 @@ def open_drawer(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
     approach = rotation[:, 2]
     for _ in range(ATTEMPTS):
         handle = data.geom(drawer.handle_geom).xpos.copy()
-        before = HandTarget(handle - approach * STANDOFF_M + variety_of(env).beside(approach), rotation)
+        before = HandTarget(handle - approach * STANDOFF_M + motion_style_of(env).beside(approach), rotation)
         aligned = HandTarget(handle - approach * ALIGNED_M, rotation)
         at = HandTarget(handle, rotation)
         yield from move_hand(data, before, OPEN, tolerance=0.02)
@@ -62,7 +62,7 @@ def open_drawer(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
         yield from hold_hand(data, at, CLOSED, GRASP_STEPS + FIRM_STEPS)
         reach = drawer.full_travel * (OPEN_GOAL + 0.1 - drawer.openness(data))
         start = grip_position(data)
-        # The hand keeps the turn that the grasp left it with: a stiff bar turns the wrist, not the other way round.
+        # The hand keeps the turn that the grasp left it with: a stiff bar turns the wrist, not the wrist the bar.
         goal = HandTarget(start - inwards * reach, rotation)
         yield from move_hand(
             data, goal, CLOSED, speed=PULL_SPEED, max_steps=130, until=lambda: drawer.openness(data) >= OPEN_GOAL
@@ -147,7 +147,7 @@ def _inwards(drawer: Drawer) -> Array:
 def _facing(env: KitchenEnv, drawer: Drawer, inwards: Array) -> Array:
     """Hand rotation that looks into the drawer, the fingers one above the other.
 
-    Of the two ways to roll the hand, the one that turns the wrist back over the robot's own middle: the other runs
+    Of the two rolls of the hand, the one that turns the wrist back over the robot's own middle: the other runs
     the wrist into its limit.
     """
     base, _ = base_pose(env.data)

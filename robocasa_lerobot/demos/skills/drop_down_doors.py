@@ -23,7 +23,6 @@ from robocasa_lerobot.demos.skills.arc_motion import follow_arc, pull_arc, spots
 from robocasa_lerobot.demos.skills.articulated_part import ArticulatedPart
 from robocasa_lerobot.demos.skills.common import SkillError, move_hand
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
-from robocasa_lerobot.envs.robots.panda_omron.robot import PANDA_OMRON
 
 ATTEMPTS = 4
 GAP_M, ENOUGH_GAP_M = 0.20, 0.11  # between the case and the upper edge: wanted of a pull, and enough for a hand
@@ -35,8 +34,6 @@ GRASPS = ((15, 0, 0.3), (40, 0, 0.3), (40, 35, 0.3), (40, -35, 0.3), (65, 0, 0.3
 PUSHES = tuple(
     (share, lean, aside) for share in (0.97, 0.9, 0.65) for lean, aside in ((10, 0), (30, 0), (10, 30), (10, -30))
 )
-FINGER_M = PANDA_OMRON.gripper.tips_below_grip
-BASE_HALF_M, BASE_FRONT_M = PANDA_OMRON.shape.base_y[1], PANDA_OMRON.shape.base_x[1]
 
 
 def fold_down(env: KitchenEnv, door: ArticulatedPart) -> Iterator[Array]:
@@ -60,14 +57,15 @@ def fold_down(env: KitchenEnv, door: ArticulatedPart) -> Iterator[Array]:
 
 
 def stances_beside(env: KitchenEnv, door: ArticulatedPart) -> list[tuple[Shift, Shift]]:
-    """Moves of the base to try: about where it stands, beside the door's way, and before it."""
+    """Moves of the base to try: about where it stands, beside the area that the door sweeps, and before it."""
+    shape = env.robot.shape
     base, _ = base_pose(env.data)
     offset = base - door.point(np.zeros(3), 0.0)
     x, y = float(offset @ door.rightwards), float(offset @ door.inwards)
     near = [(0.0, 0.0), (-0.15, 0.0), (0.0, 0.15), (0.0, -0.15), (-0.3, 0.0), (-0.2, 0.25), (-0.2, -0.25)]
     side = 1.0 if x > 0 else -1.0
-    beside = [x - side * (door.high[0] + BASE_HALF_M + more) for more in (0.03, 0.10)]
-    before = -(door.high[2] + BASE_FRONT_M + 0.05) - y
+    beside = [x - side * (door.high[0] + shape.base_y[1] + more) for more in (0.03, 0.10)]
+    before = -(door.high[2] + shape.base_x[1] + 0.05) - y
     near += [(back, aside) for aside in beside for back in (0.0, -0.2, -0.4)]
     near += [(before, x - side * aside) for aside in (0.3, 0.15, 0.0)]
     return [(shift, shift) for shift in near]
@@ -76,8 +74,8 @@ def stances_beside(env: KitchenEnv, door: ArticulatedPart) -> list[tuple[Shift, 
 def _pull(env: KitchenEnv, door: ArticulatedPart, wanted: float) -> Iterator[Array]:
     """Grasp the handle and pull the door ajar."""
     data = env.data
-    ways = [_pull_path(env, door, grasp, flip, wanted) for grasp in GRASPS for flip in (1.0, -1.0)]
-    plan = plan_contact(env, door, ways, stances_beside(env, door))
+    paths = [_pull_path(env, door, grasp, flip, wanted) for grasp in GRASPS for flip in (1.0, -1.0)]
+    plan = plan_contact(env, door, paths, stances_beside(env, door))
     yield from pull_arc(env, door, plan, wanted + 0.02)
     rest = HandTarget(grip_position(data), hand_rotation(data))
     edge = door.point(np.array([0.0, 0.0, door.high[2]]), door.angle)
@@ -112,8 +110,8 @@ def _pull_path(
 def _push(env: KitchenEnv, door: ArticulatedPart) -> Iterator[Array]:
     """Push the door down, from inside."""
     data = env.data
-    ways = [_push_path(env, door, push, roll) for push in PUSHES for roll in range(4)]
-    plan = plan_contact(env, door, ways, stances_beside(env, door))
+    paths = [_push_path(env, door, push, roll) for push in PUSHES for roll in range(4)]
+    plan = plan_contact(env, door, paths, stances_beside(env, door))
     spot = spots(env, plan)
     yield from take_stance(env, plan, CLOSED)
     yield from follow_joint_path(env, plan.joints, CLOSED)
@@ -143,9 +141,10 @@ def _push_path(env: KitchenEnv, door: ArticulatedPart, push: tuple[float, float,
     )
     opening = (door.rightwards, door.inwards, -door.rightwards, -door.inwards)[roll]
     rotation = frame(approach, opening)
+    fingers = env.robot.gripper.tips_below_grip
 
     def target_at(angle: float) -> HandTarget:
-        return HandTarget(door.point(local, angle) + door.turned(angle)[:, 1] * FINGER_M, rotation)
+        return HandTarget(door.point(local, angle) + door.turned(angle)[:, 1] * fingers, rotation)
 
     start = door.angle
     at = target_at(start)

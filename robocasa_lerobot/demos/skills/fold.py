@@ -1,4 +1,4 @@
-"""Fold the empty arm as at the start of an episode, round what stands in its way: where most skills begin from."""
+"""Fold the empty arm as at the start of an episode, round obstacles: where most skills begin from."""
 
 from __future__ import annotations
 
@@ -14,7 +14,6 @@ from robocasa_lerobot.demos.planning.collision import CollisionChecker
 from robocasa_lerobot.demos.planning.costs import REACHING
 from robocasa_lerobot.demos.planning.follow import follow_joint_path
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
-from robocasa_lerobot.envs.robots.panda_omron.robot import PANDA_OMRON
 
 FOLDED_RAD = 0.35  # of each joint from its angle at the start
 
@@ -23,9 +22,9 @@ def fold_arm(env: KitchenEnv) -> Iterator[Array]:
     """Lead the arm home unless it is there, something is in the hand, or no free path is found."""
     if carried(env.scene, env.data) is not None:
         return
-    checker = CollisionChecker(env.model, env.data)
+    checker = CollisionChecker(env.scene, env.data)
     base, present = checker.present_base, checker.present_joints
-    home = np.array(PANDA_OMRON.home.arm)
+    home = checker.arm.home
     if np.abs(present - home).max() < FOLDED_RAD:
         return
     # What it leans on already is no reason to stay there.

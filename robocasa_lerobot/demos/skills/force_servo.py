@@ -1,4 +1,4 @@
-"""A firmer servo of the hand, for what is heavy to move.
+"""A firmer servo of the hand, for parts that are heavy to move.
 
 In mode FROM_ACHIEVED the arm's goal is never farther ahead of the hand than one command (5 cm), which bounds its force.
 In mode FROM_DESIRED commands add up, so that the goal may lie farther ahead. The servo keeps account of where the goal

@@ -1,7 +1,6 @@
 """Doors on a vertical hinge, opened: pulled by their handle, and pushed on from inside at their free edge.
 
-What fails are fridges with a freezer below, before
-an island or a wall, where the base gets to no place from which the arm reaches low.
+What takes long are fridges with a freezer below, before an island or a wall: two doors, and little room for the base.
 """
 
 from __future__ import annotations
@@ -21,7 +20,14 @@ from robocasa_lerobot.demos.motion import (
 )
 from robocasa_lerobot.demos.planning.articulated import ContactPath, Shift, Waypoint, plan_contact
 from robocasa_lerobot.demos.planning.contact_paths import arc_waypoints, grip_path
-from robocasa_lerobot.demos.skills.arc_motion import pull_arc, push_arc, retract, stances_around, working_height
+from robocasa_lerobot.demos.skills.arc_motion import (
+    arm_bends,
+    pull_arc,
+    push_arc,
+    retract,
+    stances_around,
+    working_height,
+)
 from robocasa_lerobot.demos.skills.articulated_part import ArticulatedPart
 from robocasa_lerobot.demos.skills.base_shift import shift_base
 from robocasa_lerobot.demos.skills.common import SkillError, move_hand
@@ -34,7 +40,7 @@ ATTEMPTS = 4
 # Wanted of a pull, with ease or at least; enough to get behind the edge.
 FAR_RAD, AJAR_RAD, ENOUGH_RAD = np.deg2rad(65.0), np.deg2rad(40.0), np.deg2rad(22.0)
 KNOB_M = 0.06  # a handle as low as this may be held from above and below, too
-SLIPPED = 0.5  # cost of a tilt of the hand in which it has lost the handle
+SLIPPED = 0.5  # cost of a tilt of the hand in which it has lost the handle, and of a push that has come to nothing
 EASY = 0.6  # cost of a pull
 # How the base may go along with a pull: ahead, and to the side of the hinge, metres.
 PULL_ALONG = ((0.0, 0.0), (-0.25, 0.0), (-0.3, 0.25))
@@ -89,7 +95,7 @@ def open_doors(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
         if not door.upright:
             yield from fold_down(env, door)
             continue
-        slipped: list[tuple[float, float]] = []
+        slipped: list[tuple[float, ...]] = []
         for attempt in range(ATTEMPTS):
             if door.share >= ENOUGH_SHARE:
                 break
@@ -106,18 +112,18 @@ def open_doors(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
             raise SkillError(f"{door.name} is {door.share:.0%} open after {ATTEMPTS} attempts")
 
 
-def _attempt(env: KitchenEnv, door: ArticulatedPart, slipped: list[tuple[float, float]]) -> Iterator[Array]:
+def _attempt(env: KitchenEnv, door: ArticulatedPart, slipped: list[tuple[float, ...]]) -> Iterator[Array]:
     """Pull the door ajar if it is not, and push it open, or pull it farther where the hand does not get behind it."""
     if door.angle < ENOUGH_RAD:
         yield from _pull(env, door, slipped)
     if ENOUGH_RAD <= door.angle < OPEN_SHARE * door.full:
         try:
-            yield from _push(env, door)
+            yield from _push(env, door, slipped)
         except SkillError:
             yield from _pull(env, door, slipped)
 
 
-def _pull(env: KitchenEnv, door: ArticulatedPart, slipped: list[tuple[float, float]]) -> Iterator[Array]:
+def _pull(env: KitchenEnv, door: ArticulatedPart, slipped: list[tuple[float, ...]]) -> Iterator[Array]:
     """Grasp the handle and pull the door open, as far as the arm gets with ease.
 
     A tilt of the hand in which the handle slips out of it is noted in `slipped`, and is the last choice from then on.
@@ -130,15 +136,16 @@ def _pull(env: KitchenEnv, door: ArticulatedPart, slipped: list[tuple[float, flo
         for start, _ in stances_around(env, door, PULL_NEAR)
         for ahead, aside in PULL_ALONG
     ]
+    bends = arm_bends(env, door)
     low, high = door.handle()
     rolls = (0, 2, 1, 3) if high[2] - low[2] < KNOB_M else (0, 2)
     least = max(AJAR_RAD, door.angle + FARTHER_RAD)
     goals = sorted({goal for goal in (OPEN_SHARE * door.full, FAR_RAD) if goal > least}, reverse=True)
     for goal in (*goals, min(least, OPEN_SHARE * door.full)):
         options = [(tilt, roll) for tilt in GRASP_TILTS for roll in rolls]
-        ways = [_pull_path(env, door, *option, goal, bias=SLIPPED * (option[0] in slipped)) for option in options]
+        paths = [_pull_path(env, door, *option, goal, bias=SLIPPED * (option[0] in slipped)) for option in options]
         try:
-            plan = plan_contact(env, door, ways, stances)
+            plan = plan_contact(env, door, paths, stances, bends=bends)
         except SkillError:
             if goal <= least:
                 raise
@@ -147,7 +154,7 @@ def _pull(env: KitchenEnv, door: ArticulatedPart, slipped: list[tuple[float, flo
             first = door.angle
             yield from pull_arc(env, door, plan, goal + 0.02)
             if door.angle < first + 0.5 * (goal - first):
-                slipped.append(options[ways.index(plan.path)][0])
+                slipped.append(options[paths.index(plan.path)][0])
             yield from _come_round(env, door)
             return
 
@@ -172,35 +179,38 @@ def _pull_path(
     z = working_height(env, door, middle - room, middle + room)
     grip = np.array([(low[0] + high[0]) / 2, low[1] + min((high[1] - low[1]) / 2, 0.012), z])
     aside, up = tilt
-    way = door.side
+    side = door.side
 
     def rotation_at(angle: float) -> Array:
         turn = door.turned(TURN * angle)
-        approach = turn @ np.array([-way * np.sin(aside) * np.cos(up), np.cos(aside) * np.cos(up), np.sin(up)])
+        approach = turn @ np.array([-side * np.sin(aside) * np.cos(up), np.cos(aside) * np.cos(up), np.sin(up)])
         return frame(approach, (turn[:, 0], UP, -turn[:, 0], -UP)[roll])
 
     return grip_path(door, grip, rotation_at, goal, bias=bias + 0.1 * (roll % 2))
 
 
-def _push(env: KitchenEnv, door: ArticulatedPart) -> Iterator[Array]:
-    """Push the door open, from inside."""
-    ways = [_push_path(env, door, push, flip) for push in PUSHES for flip in (1.0, -1.0)]
-    stances = stances_around(env, door, PUSH_NEAR)
-    yield from push_arc(env, door, ways, stances, (OPEN_SHARE + 0.01) * door.full, firm=True, most_cost=MOST_COST)
+def _push(env: KitchenEnv, door: ArticulatedPart, slipped: list[tuple[float, ...]]) -> Iterator[Array]:
+    """Push the door open, from inside; a push that comes to nothing is noted in `slipped`."""
+    options = [(push, flip) for push in PUSHES for flip in (1.0, -1.0)]
+    paths = [_push_path(env, door, *option, more=SLIPPED * (option[0] in slipped)) for option in options]
+    stances, goal = stances_around(env, door, PUSH_NEAR), (OPEN_SHARE + 0.01) * door.full
+    fruitless = yield from push_arc(env, door, paths, stances, goal, firm=True, most_cost=MOST_COST)
+    if fruitless is not None:
+        slipped.append(options[paths.index(fruitless)][0])
 
 
 def _push_path(
-    env: KitchenEnv, door: ArticulatedPart, push: tuple[float, float, float, float, float], flip: float
+    env: KitchenEnv, door: ArticulatedPart, push: tuple[float, float, float, float, float], flip: float, *, more: float
 ) -> ContactPath:
     share, past, degrees, pitch, bias = push
-    way = door.side
+    side = door.side
     z = working_height(env, door, door.low[2] + 0.06, door.high[2] - (0.06 if pitch > -50.0 else 0.02))
     # Bins stand out of the inside of fridges' doors, but not at the edge.
-    local = np.array([way * share * door.width, 0.0 if share > 0.95 else door.inside, z])
+    local = np.array([side * share * door.width, 0.0 if share > 0.95 else door.inside, z])
     turn, up = np.deg2rad(degrees), np.deg2rad(pitch)
-    level = np.cos(turn) * door.inwards - way * np.sin(turn) * door.rightwards
+    level = np.cos(turn) * door.inwards - side * np.sin(turn) * door.rightwards
     approach = np.cos(up) * level + np.sin(up) * UP
-    aside = way * np.cos(turn) * door.rightwards + np.sin(turn) * door.inwards  # away from the hinge
+    aside = side * np.cos(turn) * door.rightwards + np.sin(turn) * door.inwards  # away from the hinge
     rotation = frame(approach, flip * UP)
 
     def target_at(angle: float) -> HandTarget:
@@ -210,9 +220,9 @@ def _push_path(
     at = target_at(start)
     beside = HandTarget(at.position + aside * 0.07, rotation)
     # Round the free edge, not through the door.
-    beyond = door.point(np.array([way * (door.width + ROUND_M), -0.06, z]), start)
+    beyond = door.point(np.array([side * (door.width + ROUND_M), -0.06, z]), start)
     end = OPEN_SHARE * door.full
     arc = arc_waypoints(start, end, target_at, (0.0, 0.5, 1.0))
     return ContactPath(
-        (Waypoint(start, HandTarget(beyond, rotation)), Waypoint(start, beside), *arc), 2, target_at, bias
+        (Waypoint(start, HandTarget(beyond, rotation)), Waypoint(start, beside), *arc), 2, target_at, bias + more
     )

@@ -69,8 +69,8 @@ def raise_knob(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
 
 def turn_knob(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
     """Turn a knob up or down from where it was at reset, as the task's direction asks."""
-    way = ADJUST_SHARE if env.scene.fill(stage.to) == "increase" else -ADJUST_SHARE
-    share = initial_share(env.scene, stage.target, stage.part) + way
+    change = ADJUST_SHARE if env.scene.fill(stage.to) == "increase" else -ADJUST_SHARE
+    share = initial_share(env.scene, stage.target, stage.part) + change
     yield from _turn_to(env, stage, float(np.clip(share, 0.0, 1.0)) * _range(env, stage))
 
 
@@ -105,8 +105,8 @@ def _turn_to(env: KitchenEnv, stage: Stage, goal: float) -> Iterator[Array]:
         turn = float(np.clip(left_over, -TURN_AT_ONCE_RAD, TURN_AT_ONCE_RAD))
         face = body.xpos - inwards * _length(env, int(body.id), inwards)
         grip = face + inwards * DEPTH_M
-        ways = [_way(grip, rotation, inwards, turn) for rotation in _rotations(body.xmat.reshape(3, 3), inwards)]
-        plan = plan_near(env, ways, SHIFTS, allowed=allowed, tried=tried)
+        rows = [_row(grip, rotation, inwards, turn) for rotation in _rotations(body.xmat.reshape(3, 3), inwards)]
+        plan = plan_near(env, rows, SHIFTS, allowed=allowed, tried=tried)
         yield from shift_base(env, plan.shift, OPEN)
         yield from follow_joint_path(env, plan.joints, OPEN)
         before, at, _ = plan.targets
@@ -119,7 +119,7 @@ def _turn_to(env: KitchenEnv, stage: Stage, goal: float) -> Iterator[Array]:
         away = HandTarget(rest.position - rest.rotation[:, 2] * STANDOFF_M, rest.rotation)
         yield from move_hand(data, away, OPEN, max_steps=30, tolerance=0.03)
         now_left = abs(goal - fixture.position(data, part))
-        if now_left > abs(left_over) - LEAST_TURN_RAD:  # something is in the hand's way
+        if now_left > abs(left_over) - LEAST_TURN_RAD:  # something blocks the hand
             tried.append(plan.targets[-1].rotation)
         if now_left < 2 * DONE_RAD or stage_done(env, stage):
             if stage.object:
@@ -149,7 +149,7 @@ def _twist(env: KitchenEnv, at: HandTarget, axis: Array, goal: float, angle: Cal
         yield from hold_hand(env.data, HandTarget(at.position, rotation), CLOSED, 1)
 
 
-def _way(grip: Array, rotation: Array, axis: Array, turn: float) -> tuple[HandTarget, HandTarget, HandTarget]:
+def _row(grip: Array, rotation: Array, axis: Array, turn: float) -> tuple[HandTarget, HandTarget, HandTarget]:
     return (
         HandTarget(grip - rotation[:, 2] * STANDOFF_M, rotation),
         HandTarget(grip, rotation),
@@ -158,7 +158,7 @@ def _way(grip: Array, rotation: Array, axis: Array, turn: float) -> tuple[HandTa
 
 
 def _rotations(knob: Array, inwards: Array) -> list[Array]:
-    """Rotations of the hand along the knob's axis with the fingers across its grip, if it is a bar; both ways round.
+    """Rotations of the hand along the knob's axis with the fingers across its grip, if it is a bar; both rolls.
 
     The bar runs upwards in the knob's frame (or away, for a knob on top), so that fingers close along its x.
     """

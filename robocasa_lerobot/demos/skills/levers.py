@@ -21,7 +21,6 @@ from robocasa_lerobot.demos.motion import (
     grip_position,
     rotation_about,
 )
-from robocasa_lerobot.demos.planning.contact_paths import CLOSED_FINGERS_HALF_M
 from robocasa_lerobot.demos.planning.follow import follow_joint_path
 from robocasa_lerobot.demos.planning.motion_planner import plan_near
 from robocasa_lerobot.demos.skills.base_shift import shift_base
@@ -29,14 +28,18 @@ from robocasa_lerobot.demos.skills.common import SkillError, hold_hand, move_han
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.kitchens.appliances.base import Appliance
 from robocasa_lerobot.envs.kitchens.appliances.kinds.sink import Sink
+from robocasa_lerobot.envs.robots.robot import GripperGeometry
 from robocasa_lerobot.envs.tasks.task import Stage
 
 ATTEMPTS = 4
 GRASP_STEPS = 10
 STANDOFF_M = 0.08
-# Half extents of the closed finger tips along the hand's axes, metres, from the grip site.
-# From the side the grip site ends short of the middle of what is pushed, so that the tips end just beyond it.
+# From the side the grip site ends short of the middle of the pushed part, so that the tips end just beyond it.
 SHORT_M = 0.008
+# Where the palm, which is wide, would meet the case that a lever stands out from (a plan of more than this cost), the
+# lever is pushed just within its outer edge, by a hand rolled about its approach: the palm then stands along the case.
+IN_THE_WAY, EDGE_M = 0.7, 0.003
+ROLLS_RAD = tuple(np.deg2rad((0.0, 45.0, -45.0, 90.0)).tolist())
 PUSH_SPEED, LEAD_SPEED = 0.45, 0.35
 # How far from its middle towards the tip a faucet's lever is grasped, as a share of its length; angles in radians.
 WATER_ON_RAD, WATER_OFF_RAD = 0.70, 0.0
@@ -57,7 +60,7 @@ SHIFTS = (
 
 
 def press_lever(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
-    """Push a sliding lever to the end of its way.
+    """Push a sliding lever to the end of its travel.
 
     Raises:
         SkillError: it is not there after four attempts.
@@ -68,12 +71,18 @@ def press_lever(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
     allowed = frozenset({int(body.id)})
     tried: list[Array] = []
     for _ in range(ATTEMPTS):
-        way = data.joint(fixture.joint(part)).xaxis.copy()
+        direction = data.joint(fixture.joint(part)).xaxis.copy()
         travel = float(env.model.joint(fixture.joint(part)).range[1])
         left_over = travel - fixture.position(data, part)
-        point = _upper_face(env, int(body.id), way)
-        ways = [push_way(point, way, rotation, left_over) for rotation in level_and_down(env)]
-        plan = plan_near(env, ways, SHIFTS, allowed=allowed, tried=tried)
+        middle, edge = _upper_face(env, int(body.id), direction, data.body(fixture.name).xpos)
+        rotations = level_and_down(env)
+        rows = [push_row(env.robot.gripper, middle, direction, rotation, left_over) for rotation in rotations]
+        plan = plan_near(env, rows, SHIFTS, allowed=allowed, tried=tried)
+        if plan.cost > IN_THE_WAY:
+            rolled = [rotation_about(turn[:, 2], roll) @ turn for roll in ROLLS_RAD for turn in rotations]
+            rows = [push_row(env.robot.gripper, edge, direction, rotation, left_over) for rotation in rolled]
+            beside = plan_near(env, rows, SHIFTS, allowed=allowed, tried=tried)
+            plan = min(plan, beside, key=lambda one: one.cost)
         tried.append(plan.targets[-1].rotation)
         yield from shift_base(env, plan.shift, CLOSED)
         yield from follow_joint_path(env, plan.joints, CLOSED)
@@ -82,11 +91,11 @@ def press_lever(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
         yield from move_hand(data, over, CLOSED, tolerance=0.03)
         yield from move_hand(data, before, CLOSED, tolerance=0.012)
         yield from move_hand(data, touch, CLOSED, speed=0.6, tolerance=0.006, max_steps=40)
-        beyond = HandTarget(end.position + way * 0.02, rotation)
+        beyond = HandTarget(end.position + direction * 0.02, rotation)
         yield from move_hand(
             data, beyond, CLOSED, speed=PUSH_SPEED, max_steps=70, until=lambda: fixture.share(data, part) >= 0.985
         )
-        yield from hold_hand(data, HandTarget(grip_position(data) + way * 0.01, rotation), CLOSED, 4)
+        yield from hold_hand(data, HandTarget(grip_position(data) + direction * 0.01, rotation), CLOSED, 4)
         back = HandTarget(before.position + (UP * 0.05) - rotation[:, 2] * 0.06, rotation)
         yield from move_hand(data, back, CLOSED, tolerance=0.03, max_steps=40)
         if stage_done(env, stage):
@@ -121,7 +130,7 @@ def turn_sideways(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
 
 
 def _lead(env: KitchenEnv, stage: Stage, part: str, left_over: Callable[[], float]) -> Iterator[Array]:
-    """Grasp a part on a hinge and lead it until nothing is left over of its way, radians.
+    """Grasp a part on a hinge and lead it until nothing is left over of its turn, radians.
 
     Raises:
         SkillError: neither is it there after four attempts, nor does the task's goal hold.
@@ -136,13 +145,13 @@ def _lead(env: KitchenEnv, stage: Stage, part: str, left_over: Callable[[], floa
         grip, along = _hold_of(env, sink.name, part)
         angle = left_over()
         turning = abs(axis[2]) > 0.7  # about a plumb line: the hand turns with it
-        way = np.cross(axis, grip - anchor) * np.sign(angle)
-        ways = []
-        for rotation in _grasps(env, along, way):
+        direction = np.cross(axis, grip - anchor) * np.sign(angle)
+        rows = []
+        for rotation in _grasps(env, along, direction):
             before = HandTarget(grip - rotation[:, 2] * STANDOFF_M, rotation)
             row = (before, HandTarget(grip, rotation))
-            ways.append((*row, _turned(row[1], anchor, axis, angle, turns_hand=turning)))
-        plan = plan_near(env, ways, SHIFTS, allowed=allowed, tried=tried)
+            rows.append((*row, _turned(row[1], anchor, axis, angle, turns_hand=turning)))
+        plan = plan_near(env, rows, SHIFTS, allowed=allowed, tried=tried)
         tried.append(plan.targets[-1].rotation)
         yield from shift_base(env, plan.shift, OPEN)
         yield from follow_joint_path(env, plan.joints, OPEN)
@@ -184,8 +193,8 @@ def _hold_of(env: KitchenEnv, sink: str, part: str) -> tuple[Array, Array]:
     return lever.xpos + along * 0.022, along
 
 
-def _grasps(env: KitchenEnv, along: Array, way: Array) -> list[Array]:
-    """Rotations of the hand with the fingers on either side of a bar that runs `along` and is to move `way`."""
+def _grasps(env: KitchenEnv, along: Array, direction: Array) -> list[Array]:
+    """Rotations of the hand with the fingers on either side of a bar that runs `along` and is to move `direction`."""
     out = []
     for approach in _approaches(env):
         across: Array = np.cross(approach, along).astype(np.float64)
@@ -205,7 +214,7 @@ def _approaches(env: KitchenEnv) -> list[Array]:
 
 
 def level_and_down(env: KitchenEnv) -> list[Array]:
-    """Rotations of the hand that may push from above: from level to straight down, both ways round."""
+    """Rotations of the hand that may push from above: from level to straight down, with both rolls."""
     out = []
     for approach in _approaches(env):
         side = np.cross(approach, UP)
@@ -215,24 +224,25 @@ def level_and_down(env: KitchenEnv) -> list[Array]:
     return out
 
 
-def push_way(point: Array, way: Array, rotation: Array, travel: float) -> tuple[HandTarget, ...]:
+def push_row(
+    gripper: GripperGeometry, point: Array, direction: Array, rotation: Array, travel: float
+) -> tuple[HandTarget, ...]:
     """Away from, before, at the touch, and at the end of a push of a point."""
     approach = rotation[:, 2]
-    support = float(CLOSED_FINGERS_HALF_M @ np.abs(rotation.T @ way))
-    aside = 1.0 - abs(float(approach @ way))
-    touch = point - way * (support + 0.004) - approach * SHORT_M * aside
-    before = touch - way * 0.015 - approach * 0.05 * aside - way * 0.04 * (1 - aside)
+    aside = 1.0 - abs(float(approach @ direction))
+    touch = point - direction * (gripper.closed_reach(rotation, direction) + 0.004) - approach * SHORT_M * aside
+    before = touch - direction * 0.015 - approach * 0.05 * aside - direction * 0.04 * (1 - aside)
     level = approach * np.array([1.0, 1.0, 0.0])
     return (
         HandTarget(before - level * 0.07, rotation),
         HandTarget(before, rotation),
         HandTarget(touch, rotation),
-        HandTarget(touch + way * (travel + 0.006), rotation),
+        HandTarget(touch + direction * (travel + 0.006), rotation),
     )
 
 
-def _upper_face(env: KitchenEnv, body: int, way: Array) -> Array:
-    """Middle of the face that a part is pushed on: of its largest geom that can be touched from outside."""
+def _upper_face(env: KitchenEnv, body: int, direction: Array, case: Array) -> tuple[Array, Array]:
+    """Middle of the face that a part is pushed on, of its largest geom that can be touched, and its edge off a case."""
     model, data = env.model, env.data
     first, count = int(model.body_geomadr[body]), int(model.body_geomnum[body])
     solid = [
@@ -241,8 +251,13 @@ def _upper_face(env: KitchenEnv, body: int, way: Array) -> Array:
         if model.geom_contype[g] and model.geom_type[g] == mujoco.mjtGeom.mjGEOM_BOX
     ]
     knob = max(solid, key=lambda g: float(model.geom_size[g].min()))
-    half = float(model.geom_size[knob] @ np.abs(data.geom_xmat[knob].reshape(3, 3).T @ way))
-    return np.asarray(data.geom_xpos[knob] - way * half)
+    axes = data.geom_xmat[knob].reshape(3, 3).T
+    half = float(model.geom_size[knob] @ np.abs(axes @ direction))
+    away = axes @ (data.geom_xpos[knob] - case) * (np.abs(axes @ direction) < 0.5)
+    side = int(np.argmax(np.abs(away)))
+    outwards = axes[side] * np.sign(away[side])
+    middle = np.asarray(data.geom_xpos[knob] - direction * half)
+    return middle, middle + outwards * (model.geom_size[knob][side] - EDGE_M)
 
 
 def _turned(target: HandTarget, anchor: Array, axis: Array, angle: float, *, turns_hand: bool) -> HandTarget:

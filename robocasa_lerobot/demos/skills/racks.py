@@ -18,7 +18,6 @@ from robocasa_lerobot.demos.motion import (
     grip_position,
     hand_rotation,
 )
-from robocasa_lerobot.demos.planning.contact_paths import CLOSED_FINGERS_HALF_M
 from robocasa_lerobot.demos.planning.follow import follow_joint_path
 from robocasa_lerobot.demos.planning.motion_planner import MotionPlan, plan_near
 from robocasa_lerobot.demos.skills.base_shift import shift_base
@@ -71,13 +70,12 @@ def push(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
     tried: list[Array] = []
     for _ in range(ATTEMPTS):
         travel = part.position
-        ways = []
+        rows = []
         for spot in part.spots((0.0, 0.5)):
-            for rotation in rotations(env, part.inwards):
-                support = float(CLOSED_FINGERS_HALF_M @ np.abs(rotation.T @ part.inwards))
-                touch = spot - part.inwards * support
-                ways.append(_row(touch, rotation, -part.inwards, part.inwards * travel))
-        plan = _plan(env, part, ways, tried)
+            for rotation in rotations(part.inwards):
+                touch = spot - part.inwards * env.robot.gripper.closed_reach(rotation, part.inwards)
+                rows.append(_row(touch, rotation, -part.inwards, part.inwards * travel))
+        plan = _plan(env, part, rows, tried)
         yield from shift_base(env, plan.shift, CLOSED)
         yield from follow_joint_path(env, plan.joints, CLOSED)
         yield from _approach(env, plan, CLOSED)
@@ -100,15 +98,15 @@ def pull(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
     tried: list[Array] = []
     for _ in range(ATTEMPTS):
         travel = part.full - part.position
-        ways = []
+        rows = []
         for spot in part.spots((0.0, 0.5)):
-            for rotation in rotations(env, part.inwards):
+            for rotation in rotations(part.inwards):
                 # The fingers close round the edge: they open across it, not along it.
                 if abs(float(rotation[:, 1] @ part.rightwards)) > 0.3:
                     continue
                 at = spot + part.inwards * part.thick / 2
-                ways.append(_row(at, rotation, -rotation[:, 2], -part.inwards * travel))
-        plan = _plan(env, part, ways, tried)
+                rows.append(_row(at, rotation, -rotation[:, 2], -part.inwards * travel))
+        plan = _plan(env, part, rows, tried)
         yield from shift_base(env, plan.shift, OPEN)
         yield from follow_joint_path(env, plan.joints, OPEN)
         yield from _approach(env, plan, OPEN)
@@ -123,7 +121,7 @@ def pull(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
     raise SkillError(f"{part.name} is only {part.share:.0%} out after {ATTEMPTS} attempts")
 
 
-def rotations(env: KitchenEnv, inwards: Array) -> list[Array]:
+def rotations(inwards: Array) -> list[Array]:
     """Rotations of the hand that look inwards and down: tilts and turns, each with four rolls."""
     out = []
     across = np.cross(inwards, UP)
@@ -210,8 +208,8 @@ def _row(at: Array, rotation: Array, back: Array, slide: Array) -> tuple[HandTar
     return tuple(HandTarget(p, rotation) for p in (before + UP * OVER_M, before, at, at + slide))
 
 
-def _plan(env: KitchenEnv, part: _Part, ways: list[tuple[HandTarget, ...]], tried: list[Array]) -> MotionPlan:
-    plan = plan_near(env, ways, SHIFTS, allowed=frozenset({part.body}), tried=tried)
+def _plan(env: KitchenEnv, part: _Part, rows: list[tuple[HandTarget, ...]], tried: list[Array]) -> MotionPlan:
+    plan = plan_near(env, rows, SHIFTS, allowed=frozenset({part.body}), tried=tried)
     tried.append(plan.targets[-1].rotation)
     return plan
 
@@ -223,6 +221,6 @@ def _approach(env: KitchenEnv, plan: MotionPlan, gripper: float) -> Iterator[Arr
     yield from move_hand(env.data, at, gripper, speed=SPEED, tolerance=0.006, max_steps=40)
 
 
-def _off(env: KitchenEnv, way: Array) -> HandTarget:
+def _off(env: KitchenEnv, direction: Array) -> HandTarget:
     data = env.data
-    return HandTarget(grip_position(data) + way * 0.10 + UP * 0.02, hand_rotation(data))
+    return HandTarget(grip_position(data) + direction * 0.10 + UP * 0.02, hand_rotation(data))

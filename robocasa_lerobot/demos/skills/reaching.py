@@ -7,48 +7,43 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import Callable, Generator, Iterator, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
-from robocasa_lerobot.demos.motion import Array, base_pose
+from robocasa_lerobot.demos.motion import CLOSED, OPEN, Array, HandTarget, arm_action, base_pose, floor_axes
 from robocasa_lerobot.demos.planning.base_path import Room
-from robocasa_lerobot.demos.planning.collision import Held
+from robocasa_lerobot.demos.planning.collision import Held, is_full
 from robocasa_lerobot.demos.planning.costs import REACHING
-from robocasa_lerobot.demos.planning.follow import follow_joint_path
+from robocasa_lerobot.demos.planning.follow import GENTLY, follow_joint_path
 from robocasa_lerobot.demos.planning.kinematics import Arm
-from robocasa_lerobot.demos.planning.motion_planner import MotionPlanner, WaypointPath
+from robocasa_lerobot.demos.planning.motion_planner import MotionPlan, MotionPlanner, WaypointPath
 from robocasa_lerobot.demos.skills.common import SkillError
+from robocasa_lerobot.demos.skills.fold import FOLDED_RAD, fold_arm
 from robocasa_lerobot.demos.skills.navigation import drive_to
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
-from robocasa_lerobot.envs.robots.panda_omron.robot import PANDA_OMRON
 from robocasa_lerobot.envs.scene.robot_poses import RobotPose
 
-__all__ = ["GOOD_ENOUGH", "Held", "ReachPlan", "WaypointPath", "approach", "go_to", "lead", "plan_reach"]
+__all__ = [
+    "GOOD_ENOUGH",
+    "Held",
+    "MotionPlan",
+    "WaypointPath",
+    "approach",
+    "follow_with",
+    "free_stands",
+    "go_to",
+    "plan_reach",
+]
 
 GOOD_ENOUGH = REACHING.good_enough  # cost up to which no other place to stand is looked at
-AHEAD_M, LEFT_M = (0.45, 0.55, 0.65, 0.75), (0.0, -0.15, 0.15, -0.3, 0.3)
-FOLDED_RAD = 0.35
+STAND_AHEAD_M, STAND_ASIDE_M = (0.45, 0.55, 0.65, 0.75), (0.0, -0.15, 0.15, -0.3, 0.3)  # of a point to reach
+GENTLE = 0.7  # bound of the arm's commands with a vessel in the hand from which something may fall
 ARRIVED_M, BLOCKED_M, MOST_DRIVES = 0.05, 0.10, 3
-
-
-@dataclass(frozen=True)
-class ReachPlan:
-    """A path, where to stand, the cost (from about 2 on it will not do), and the joint path to its first pose.
-
-    Attributes:
-        joints: (7,) radians at the first pose, or (k, 7) where the arm goes round something.
-    """
-
-    path: WaypointPath
-    stand: RobotPose | None
-    cost: float
-    joints: Array
 
 
 def plan_reach(
     env: KitchenEnv,
-    ways: Sequence[WaypointPath],
+    paths: Sequence[WaypointPath],
     point: Array,
     *,
     key: int,
@@ -56,67 +51,86 @@ def plan_reach(
     loaded: int = 0,
     allowed: frozenset[int] = frozenset(),
     blocked: Sequence[RobotPose] = (),
-) -> list[ReachPlan]:
+    may_drive: bool = True,
+) -> list[MotionPlan]:
     """The paths that cost least, best first, from where the robot stands or from where it could.
 
     Args:
         env: its state is read, not touched.
-        ways: alternatives.
+        paths: alternatives.
         point: what the robot stands before, world, metres.
         key: index of the pose that is solved first.
         held: what is in the gripper.
         loaded: number of poses, from the first on, at which it still is.
         allowed: bodies that the robot may touch.
-        blocked: places that the base did not get to.
+        blocked: places that the base did not get to; after `MOST_DRIVES` of them it stays where it is.
+        may_drive: whether the base may go elsewhere at all.
     """
-    if not ways:
+    if not paths:
         return []
-    planner = MotionPlanner(env, ways, key, held=held, loaded=loaded, allowed=allowed)
+    planner = MotionPlanner(env, paths, key, held=held, loaded=loaded, allowed=allowed)
     found = planner.best([None])
-    if not ((found and found[0].cost <= GOOD_ENOUGH) or len(blocked) >= MOST_DRIVES):
-        stands = [s for s in _stands(env, point) if all(np.hypot(s.x - b.x, s.y - b.y) > BLOCKED_M for b in blocked)]
-        found = sorted(found + planner.best(stands), key=lambda plan: plan.cost)
-    return [ReachPlan(p.path, p.base, p.cost, p.joints if len(p.joints) > 1 else p.joints[0]) for p in found]
+    good = bool(found) and found[0].cost <= GOOD_ENOUGH
+    if may_drive and not good and len(blocked) < MOST_DRIVES:
+        others = free_stands(env, point)
+        stands = [s for s in others if all(np.hypot(s.x - b.x, s.y - b.y) > BLOCKED_M for b in blocked)]
+        found = sorted(found + planner.best(stands, folded=not is_full(held)), key=lambda plan: plan.cost)
+    return found
 
 
 def approach(
-    env: KitchenEnv, plan: Callable[[Sequence[RobotPose]], ReachPlan], gripper: float
-) -> Generator[Array, None, ReachPlan]:
-    """Choose a path and drive to where it begins; choose another one where the base does not get there."""
+    env: KitchenEnv, plan: Callable[[Sequence[RobotPose]], MotionPlan], gripper: float, held: Held | None = None
+) -> Generator[Array, None, MotionPlan]:
+    """Choose a path and drive to where it begins; choose another one where the base does not get there.
+
+    With a full vessel in the hand the arm stays as it is on the drive.
+    """
     blocked: list[RobotPose] = []
     while True:
         choice = plan(blocked)
-        if choice.stand is None:
+        if choice.base is None:
             return choice
-        yield from go_to(env, choice.stand, gripper)
+        yield from go_to(env, choice.base, gripper, held)
         base, _ = base_pose(env.data)
-        if np.hypot(choice.stand.x - base[0], choice.stand.y - base[1]) < ARRIVED_M:
+        if np.hypot(choice.base.x - base[0], choice.base.y - base[1]) < ARRIVED_M:
             return choice
-        blocked.append(choice.stand)
+        blocked.append(choice.base)
 
 
-def lead(env: KitchenEnv, joints: Array, gripper: float) -> Iterator[Array]:
-    """Lead the hand along a joint path, (7,) or (k, 7) radians: the one that has been tested."""
-    yield from follow_joint_path(env, joints, gripper)
+def follow_with(env: KitchenEnv, joints: Array, held: Held) -> Iterator[Array]:
+    """Lead the hand along a joint path (k, 7) radians with an object in it; a full vessel slowly, and upright."""
+    if not is_full(held):
+        yield from follow_joint_path(env, joints, CLOSED)
+        return
+
+    def gently(target: HandTarget, gripper: float) -> Array:
+        return arm_action(env.data, target, gripper, speed=GENTLE)
+
+    yield from follow_joint_path(env, joints, CLOSED, GENTLY, gently, level=True)
 
 
-def go_to(env: KitchenEnv, stand: RobotPose, gripper: float) -> Iterator[Array]:
-    """Drive with the arm folded as at the start, as near as it gets."""
-    home, arm = np.array(PANDA_OMRON.home.arm), Arm(env.model, env.data)
-    if np.abs(env.data.qpos[arm.addresses] - home).max() > FOLDED_RAD:
-        yield from lead(env, home, gripper)
+def go_to(env: KitchenEnv, stand: RobotPose, gripper: float, held: Held | None = None) -> Iterator[Array]:
+    """Drive as near as it gets, the arm folded as at the start, unless it holds a vessel with something in it."""
+    if gripper == OPEN:
+        yield from fold_arm(env)
+    arm = Arm(env.model, env.data, env.scene.robot)
+    full = is_full(held)
+    if not full and np.abs(env.data.qpos[arm.addresses] - arm.home).max() > FOLDED_RAD:
+        yield from follow_joint_path(env, arm.home, gripper)
     with contextlib.suppress(SkillError):
-        yield from drive_to(env, stand.x, stand.y, stand.yaw, gripper=gripper, tolerance_m=0.025)
+        yield from drive_to(
+            env, stand.x, stand.y, stand.yaw, gripper=gripper, held=held if full else None, tolerance_m=0.025
+        )
 
 
-def _stands(env: KitchenEnv, point: Array) -> Iterator[RobotPose]:
-    """Free places from where a point is ahead, the heading kept."""
+def free_stands(env: KitchenEnv, point: Array) -> Iterator[RobotPose]:
+    """Free places from where a point (3,) is ahead, the heading kept; the fixtures' footprints are asked."""
     _, yaw = base_pose(env.data)
-    ahead, left = np.array([np.cos(yaw), np.sin(yaw)]), np.array([-np.sin(yaw), np.cos(yaw)])
+    ahead, left = floor_axes(yaw)
     room = Room(env.scene)
-    for far in AHEAD_M:
-        for aside in LEFT_M:
-            x, y = (point[:2] - far * ahead - aside * left).tolist()
+    for far in STAND_AHEAD_M:
+        for aside in STAND_ASIDE_M:
+            x, y, _ = (point - far * ahead - aside * left).tolist()
             pose = RobotPose(x, y, yaw)
             if room.free(pose):
                 yield pose

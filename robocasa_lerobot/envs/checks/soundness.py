@@ -20,7 +20,7 @@ WALKWAY_M = 1.0  # free before everything that opens
 SETTLE_S, MOVED_M = 1.0, 0.01
 _PROBE_M = 0.05  # thickness of the slices that walkways are looked through in
 _OPENING = ("drawer", "hinge_cabinet", "single_cabinet", "oven", "stovetop")  # besides what stands on the floor
-_BELOW_M = 0.9  # what begins above it is in no robot's way
+_BELOW_M = 0.9  # what begins above it obstructs no robot
 
 
 @dataclass(frozen=True)
@@ -73,7 +73,7 @@ def _boxes(
 
 
 def blocked_walkways(layout: Layout) -> list[str]:
-    """What opens at the floor and has less than a metre free before it, with what is in the way."""
+    """What opens at the floor and has less than a metre free before it, with the obstacles there."""
     room = layout.room
     standing = [
         f
@@ -88,8 +88,8 @@ def blocked_walkways(layout: Layout) -> list[str]:
         away = WALKWAY_M / 2 + 0.08  # the first centimetres are handles and the counter's edge
         half = (fixture.width / 2 - 0.03, (WALKWAY_M - 0.16) / 2)
         x, y, _ = fixture.to_world((0.0, -fixture.depth / 2 - away, 0.0))
-        way = Footprint(float(x), float(y), fixture.yaw, half)
-        corners = way.corners()
+        free = Footprint(float(x), float(y), fixture.yaw, half)
+        corners = free.corners()
         low, high = corners.min(axis=0), corners.max(axis=0)
         if low[0] < room["x_min"] or high[0] > room["x_max"] or low[1] < room["y_min"] or high[1] > 0:
             found.append(f"{fixture.name}: a wall")
@@ -97,7 +97,7 @@ def blocked_walkways(layout: Layout) -> list[str]:
         found += [
             f"{fixture.name}: {other.name}"
             for other, mark, radius in marks
-            if other is not fixture and np.hypot(mark.x - x, mark.y - y) < radius + reach and way.overlaps(mark)
+            if other is not fixture and np.hypot(mark.x - x, mark.y - y) < radius + reach and free.overlaps(mark)
         ]
     return found
 
@@ -115,7 +115,7 @@ def moved(scene: Scene, data: mujoco.MjData) -> dict[str, float]:
         mujoco.mj_step(model, data)
     found = {name: float(np.linalg.norm(data.body(name).xpos - start)) for name, start in objects.items()}
     travel = np.linalg.norm(data.xipos[parts] - before, axis=1)
-    return found | {model.body(part).name: float(way) for part, way in zip(parts, travel, strict=True)}
+    return found | {model.body(part).name: float(distance) for part, distance in zip(parts, travel, strict=True)}
 
 
 def _moving_parts(model: mujoco.MjModel, scene: Scene) -> NDArray[np.intp]:

@@ -57,7 +57,7 @@ def _check_seed(first: KitchenEnv, second: KitchenEnv, seed: int) -> Iterator[st
 
 
 def _differences(first: KitchenEnv, second: KitchenEnv, observation: dict, again: dict) -> Iterator[str]:
-    """What is not the same in two envs that were reset with the same seed."""
+    """Differences between two envs that were reset with the same seed."""
     ours, theirs = (np.concatenate([env.data.qpos, env.data.qvel]) for env in (first, second))
     if not np.array_equal(ours, theirs):
         yield "the same seed gave another state"

@@ -53,7 +53,7 @@ def views(
 ) -> Iterator[View]:
     """What every camera of a set sees in a bare kitchen, from `starts` starts of each task that the kitchen admits.
 
-    Objects are left out: they can only hide what is behind them. Doors are closed.
+    Objects are left out: they can only hide what lies behind them. Doors are closed.
 
     Args:
         layout_id: of the kitchen; its style is that of the same number.

@@ -8,6 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from robocasa_lerobot.envs.kitchens.footprint_kernel import overlapping
+
 MAX_SAMPLES = 5000  # draws for an object before the scene is given up (docs/robocasa.md, section 6)
 FEW_SAMPLES = 32  # of these, one by one: nearly always enough; the others are drawn together, much faster
 MAX_YAW_RAD = np.pi / 4  # of the default rotation range, to either side
@@ -63,27 +65,7 @@ class Footprints:
 
         `places` are their middles (metres) and yaws, shape (n, 3); `half` are the half sizes of all of them.
         """
-        cos, sin = np.cos(places[:, 2]), np.sin(places[:, 2])
-        axes = np.stack([cos, sin, -sin, cos], axis=-1).reshape(-1, 2, 2)
-        corners = places[:, None, :2] + (_CORNERS * half) @ axes
-        turned = axes.transpose(0, 2, 1)
-        ours, theirs = self._corners @ turned[:, None], corners @ turned  # (n, marks, 4, 2) and (n, 4, 2)
-        low, high = theirs.min(axis=1)[:, None], theirs.max(axis=1)[:, None]
-        apart = _apart(ours.min(axis=2), ours.max(axis=2), low, high, margin)
-        theirs = corners[:, None] @ self._axes.transpose(0, 2, 1)
-        apart |= _apart(self._low, self._high, theirs.min(axis=2), theirs.max(axis=2), margin)
-        return np.asarray((~apart).any(axis=1))
-
-
-def _apart(
-    low: NDArray[np.float64],
-    high: NDArray[np.float64],
-    other_low: NDArray[np.float64],
-    other_high: NDArray[np.float64],
-    margin: float,
-) -> NDArray[np.bool_]:
-    """Whether one of the two axes, the last dimension, separates footprints that cover these spans of them."""
-    return np.asarray(((high + margin < other_low) | (other_high + margin < low)).any(axis=-1))
+        return overlapping(places, half, self._corners, self._axes, self._low, self._high, margin)
 
 
 @dataclass(frozen=True)
@@ -97,7 +79,7 @@ class Area:
         z: height of the surface in the room, metres.
         name: of the surface, for messages.
         height: free above it, metres.
-        rotation: bounds of the turn of what is placed, radians.
+        rotation: bounds of the turn of the placed object, radians.
         inside: whole footprints must lie in it, not their middles alone.
     """
 
@@ -192,7 +174,7 @@ def place(
 ) -> tuple[Footprint, Area]:
     """Find a footprint in one of the areas that keeps `margin` metres from those occupied; `middle` as in `sample`.
 
-    What is occupied may be another matter for each area: shelves lie over each other.
+    Obstacles may differ from area to area: shelves lie over each other.
 
     Raises:
         PlacementError: none found in 5000 draws; it names `what`, the region, its free area and three remedies.

@@ -16,7 +16,7 @@ import yaml
 from robocasa_lerobot.envs.kitchens.fixtures.base import Fixture
 from robocasa_lerobot.envs.kitchens.materials import Style, load_style
 from robocasa_lerobot.envs.kitchens.plan.backsplash import add_splash
-from robocasa_lerobot.envs.kitchens.plan.fixture_rows import Line, Names, Row, base_row, counter_things, upper_row
+from robocasa_lerobot.envs.kitchens.plan.fixture_rows import Line, Names, Row, base_row, counter_items, upper_row
 from robocasa_lerobot.envs.kitchens.plan.islands import add_island, add_table
 from robocasa_lerobot.envs.kitchens.plan.room import add_room
 from robocasa_lerobot.errors import UnknownNameError
@@ -98,7 +98,7 @@ def furnish(layout_id: int, record: dict[str, Any], style: Style) -> Layout:
         if "upper" in plan:
             upper_row(row, plan["upper"], plan.get("upper_start", plan.get("start", 0.0)), room["height"])
         add_splash(row, plan)
-        counter_things(row, plan.get("counter", []))
+        counter_items(row, plan.get("counter", []))
     made = list(rows.values())
     for kind, add in (("island", add_island), ("peninsula", add_island), ("table", add_table)):
         if kind in record:
@@ -115,7 +115,7 @@ def furnish(layout_id: int, record: dict[str, Any], style: Style) -> Layout:
 
 
 def wall_line(wall: str, width: float, depth: float) -> Line:
-    """Where the row along a wall runs: from left to right for somebody who faces the wall."""
+    """Where the row along a wall runs: from left to right for someone who faces the wall."""
     quarter = float(np.pi / 2)
     return {
         "back": Line(0.0, 0.0, 0.0),

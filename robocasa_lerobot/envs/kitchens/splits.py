@@ -106,6 +106,6 @@ def without(pairs: Pairs, exclude: Sequence[str], exclude_styles: Sequence[int] 
     left = [(i, j) for i, j in pairs if i not in barred and j not in exclude_styles]
     if not left:
         raise UserError(
-            f"none of {len(pairs)} kitchens has what is asked for ({', '.join(exclude) or 'styles'}): name others."
+            f"none of {len(pairs)} kitchens meets the needs ({', '.join(exclude) or 'styles'}): name others."
         )
     return left

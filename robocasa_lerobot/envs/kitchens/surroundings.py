@@ -1,7 +1,7 @@
-"""What is around a room: a closed shell, only to look at.
+"""The surroundings of a room: a closed shell, only to look at.
 
 A robot may stand so near to a wall that a camera beside or behind it is in the wall or beyond it. MuJoCo draws those
-faces of a box that look at the camera: from there the wall is not seen, but what is in the room, and beside it nothing.
+faces of a box that look at the camera: from there the wall is not seen, but the room, and beside it nothing.
 The shell closes that view with more of the same walls, floor and ceiling; from within the room nothing of it is seen.
 """
 

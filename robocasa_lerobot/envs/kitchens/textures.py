@@ -277,7 +277,7 @@ def _cloth(record: TextureRecord, rng: np.random.Generator) -> NDArray[np.float6
 
 
 def _view(record: TextureRecord, rng: np.random.Generator) -> NDArray[np.float64]:
-    """What is seen out of a window: sky of the main colour, clouds, hills and trees over ground of the second."""
+    """The view out of a window: sky of the main colour, clouds, hills and trees over ground of the second."""
     up = np.linspace(1.0, 0.0, TEXTURE_SIZE)[:, None]
     across = np.linspace(0.0, 1.0, TEXTURE_SIZE)[None, :]
     sky = _mix((0.93, 0.95, 0.97), record.rgb, np.broadcast_to(np.clip(1.6 * up - 0.5, 0, 1), (TEXTURE_SIZE,) * 2))

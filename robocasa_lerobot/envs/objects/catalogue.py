@@ -165,7 +165,7 @@ class Instance:
 
     @property
     def interior(self) -> Interior | None:
-        """Where it holds things, in the frame of its body; None if it holds nothing, or was turned upright."""
+        """Its interior in the frame of its body; None if it holds no other objects, or was turned upright."""
         inside = model_of(self).interior
         if inside is None or self.upright_axis is not None:
             return None

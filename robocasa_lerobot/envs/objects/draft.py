@@ -27,7 +27,7 @@ _LIFT = 0.0015  # walls end above the floor's underside, so that only the floor 
 
 @dataclass(frozen=True)
 class Interior:
-    """A box that things can be put into or onto, in the object's frame: centre and half extents, metres."""
+    """A box that objects can be put into or onto, in the object's frame: centre and half extents, metres."""
 
     center: tuple[float, float, float]
     half: tuple[float, float, float]
@@ -41,7 +41,7 @@ class Model:
         meshes: OBJ files by finish.
         png: the texture that they share.
         solids: collision pieces.
-        interior: where it holds things, if it does.
+        interior: where it holds other objects, if it does.
         rolls: whether it needs rolling friction to stay where it is put.
         density: of the collision pieces, kg / m^3.
         triangles: of the meshes.
@@ -126,7 +126,7 @@ class Draft:
         )
 
     def holds(self, center: Sequence[float], half: Sequence[float]) -> None:
-        """Say where things can be put."""
+        """Say where objects can be put."""
         self.inside = (np.asarray(center, float), np.asarray(half, float))
 
     def half_turn(self) -> None:

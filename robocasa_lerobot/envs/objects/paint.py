@@ -129,7 +129,7 @@ def write(image: Image.Image, text: str, rgb: Rgb, box: tuple[float, float, floa
 
 
 def label(ground: Rgb, ink: Rgb, text: str, seed: int, *, around: int = 1, accent: Rgb = (0.95, 0.93, 0.86)) -> Pattern:
-    """A printed label: bands, a patch with the words; repeated `around` times for round things."""
+    """A printed label: bands, a patch with the words; repeated `around` times for round objects."""
     rng = np.random.default_rng(seed)
     image, draw = canvas(ground, 64 if around == 1 else 48, 48)
     w, h = image.size
@@ -142,7 +142,7 @@ def label(ground: Rgb, ink: Rgb, text: str, seed: int, *, around: int = 1, accen
     else:
         draw.rectangle((w * 0.07, h * 0.18, w * 0.93, h * 0.82), fill=light)
         draw.rectangle((0, h * 0.92, w, h), fill=light)
-    # Around something round, what is seen at once is little more than a third.
+    # Of a round object little more than a third is seen at once.
     write(image, text, ink, (0.1, 0.3, 0.9, 0.7) if around == 1 else (0.22, 0.3, 0.78, 0.7))
     out = pixels(image)
     return out if around == 1 else np.tile(out, (1, around, 1))

@@ -121,7 +121,7 @@ def hull(shape: Mesh | Array) -> Solid:
 
 
 def wall(bottom: float, top: float, z0: float, z1: float, thickness: float, count: int) -> list[Solid]:
-    """A ring of leaning boxes: outer radii at z0 and z1, metres; what is inside them is hollow."""
+    """A ring of leaning boxes: outer radii at z0 and z1, metres; the space inside them is hollow."""
     lean = float(np.arctan2(top - bottom, z1 - z0))
     middle = (top + bottom) / 2 - thickness / 2
     half_length = (z1 - z0) / 2 / float(np.cos(lean))

@@ -18,7 +18,7 @@ def apply_simulation_options(spec: mujoco.MjSpec) -> None:
     option.impratio = 20.0
     option.density = 1.2  # of air, kg/m^3
     option.viscosity = 2.0e-5  # of air, Pa s
-    # Several contacts per pair of convex shapes: on where MuJoCo has a flag for it either way round.
+    # Several contacts per pair of convex shapes: on, whether MuJoCo's flag enables or disables it.
     if hasattr(mujoco.mjtEnableBit, "mjENBL_MULTICCD"):
         option.enableflags |= int(mujoco.mjtEnableBit.mjENBL_MULTICCD)
     if hasattr(mujoco.mjtDisableBit, "mjDSBL_MULTICCD"):

@@ -12,5 +12,5 @@ _mj_updateSleep = types.ExternalFunction("mj_updateSleep", types.void(types.intp
 
 @compiled
 def update_sleep(model: int, data: int) -> None:
-    """Make MuJoCo's lists of what is awake follow `data.tree_asleep`; its Python package has no call for it."""
+    """Make MuJoCo's lists of awake bodies follow `data.tree_asleep`; its Python package has no call for it."""
     _mj_updateSleep(model, data)

@@ -1,4 +1,4 @@
-"""Conditions on fixtures: doors, drawers, racks, knobs, levers, and what is on."""
+"""Conditions on fixtures: doors, drawers, racks, knobs, levers, and states such as "on"."""
 
 from __future__ import annotations
 
@@ -149,7 +149,7 @@ class PartTurned(Term):
         return f"{self.part}_{self.label}"
 
     def holds(self, scene: Scene, data: mujoco.MjData) -> bool:
-        """Compare the change with what is wanted."""
+        """Compare the change with the wanted one."""
         change = scene.fixture(self.fixture, Appliance).share(data, self.part) - initial_share(
             scene, self.fixture, self.part
         )

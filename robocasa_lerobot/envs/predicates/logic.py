@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import mujoco
@@ -51,7 +51,7 @@ class Term(Goal):
 
 
 class Joined(Goal):
-    """What joins other goals; equal to another one that joins equal goals in the same way."""
+    """What joins other goals; equal to another one that joins equal goals by the same rule."""
 
     def __eq__(self, other: object) -> bool:
         return type(other) is type(self) and vars(other) == vars(self)
@@ -63,56 +63,79 @@ class Joined(Goal):
         return f"{type(self).__name__}({', '.join(map(repr, self.inner))})"
 
 
-class AllOf(Joined):
-    """Every part holds. All parts are evaluated, so that a failure names all that is missing."""
+class Several(Joined):
+    """What joins any number of goals. All parts are evaluated, so that a failure names all that is missing."""
 
     def __init__(self, *parts: Goal) -> None:
         self.parts = parts
-
-    @property
-    def name(self) -> str:
-        """E.g. `sink_water_on_and_sink_left`."""
-        return "_and_".join(part.name for part in self.parts)
 
     @property
     def inner(self) -> tuple[Goal, ...]:
         """The parts."""
         return self.parts
-
-    def evaluate(self, scene: Scene, data: mujoco.MjData, terms: dict[str, bool]) -> bool:
-        """Evaluate every part."""
-        held = [part.evaluate(scene, data, terms) for part in self.parts]
-        return all(held)
-
-    def bound(self, scene: Drawn) -> Goal:
-        """Bind every part."""
-        return AllOf(*(part.bound(scene) for part in self.parts))
-
-
-class AnyOf(Joined):
-    """At least one part holds."""
-
-    def __init__(self, *parts: Goal) -> None:
-        self.parts = parts
 
     @property
     def name(self) -> str:
         """E.g. `obj_on_plate_or_obj_on_bowl`."""
         return "_or_".join(part.name for part in self.parts)
 
-    @property
-    def inner(self) -> tuple[Goal, ...]:
-        """The parts."""
-        return self.parts
-
     def evaluate(self, scene: Scene, data: mujoco.MjData, terms: dict[str, bool]) -> bool:
         """Evaluate every part."""
-        held = [part.evaluate(scene, data, terms) for part in self.parts]
-        return any(held)
+        return self.judge([part.evaluate(scene, data, terms) for part in self.parts])
+
+    @abstractmethod
+    def judge(self, held: Sequence[bool]) -> bool:
+        """Whether it holds, by which parts do."""
 
     def bound(self, scene: Drawn) -> Goal:
         """Bind every part."""
-        return AnyOf(*(part.bound(scene) for part in self.parts))
+        return self.of(*(part.bound(scene) for part in self.parts))
+
+    def of(self, *parts: Goal) -> Goal:
+        """The same of other parts."""
+        return type(self)(*parts)
+
+
+class AllOf(Several):
+    """Every part holds."""
+
+    @property
+    def name(self) -> str:
+        """E.g. `sink_water_on_and_sink_left`."""
+        return "_and_".join(part.name for part in self.parts)
+
+    def judge(self, held: Sequence[bool]) -> bool:
+        """All of them."""
+        return all(held)
+
+
+class AnyOf(Several):
+    """At least one part holds."""
+
+    def judge(self, held: Sequence[bool]) -> bool:
+        """Any of them."""
+        return any(held)
+
+
+class Exactly(Several):
+    """As many of several goals hold as are wanted, and no more; their terms are reported as they are."""
+
+    def __init__(self, n: int, *parts: Goal) -> None:
+        super().__init__(*parts)
+        self.n = n
+
+    @property
+    def name(self) -> str:
+        """E.g. `exactly_1_of_bun1_on_plate_or_bun2_on_plate`."""
+        return f"exactly_{self.n}_of_{super().name}"
+
+    def judge(self, held: Sequence[bool]) -> bool:
+        """Count them."""
+        return sum(held) == self.n
+
+    def of(self, *parts: Goal) -> Goal:
+        """As many of other parts."""
+        return Exactly(self.n, *parts)
 
 
 class Not(Joined):
@@ -138,31 +161,6 @@ class Not(Joined):
     def bound(self, scene: Drawn) -> Goal:
         """Bind the part."""
         return Not(self.part.bound(scene))
-
-
-class Exactly(Joined):
-    """As many of several goals hold as are wanted, and no more; their terms are reported as they are."""
-
-    def __init__(self, n: int, *parts: Goal) -> None:
-        self.n, self.parts = n, parts
-
-    @property
-    def name(self) -> str:
-        """E.g. `exactly_1_of_bun1_on_plate_or_bun2_on_plate`."""
-        return f"exactly_{self.n}_of_" + "_or_".join(part.name for part in self.parts)
-
-    @property
-    def inner(self) -> tuple[Goal, ...]:
-        """The parts."""
-        return self.parts
-
-    def evaluate(self, scene: Scene, data: mujoco.MjData, terms: dict[str, bool]) -> bool:
-        """Evaluate and count every part."""
-        return sum([part.evaluate(scene, data, terms) for part in self.parts]) == self.n
-
-    def bound(self, scene: Drawn) -> Goal:
-        """Bind every part."""
-        return Exactly(self.n, *(part.bound(scene) for part in self.parts))
 
 
 class When(Joined):

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import mujoco
@@ -20,6 +20,7 @@ from robocasa_lerobot.envs.predicates.logic import Goal, Term, every_goal_in, pl
 from robocasa_lerobot.errors import UserError
 
 if TYPE_CHECKING:
+    from robocasa_lerobot.envs.scene.drawn import Drawn
     from robocasa_lerobot.envs.scene.scene import Scene
 
 Array = NDArray[np.float64]
@@ -51,20 +52,39 @@ class WithMemory(Term):
 
 
 @dataclass(frozen=True)
-class StepsWhile(WithMemory):
-    """Another goal has held after a number of control steps (20 a second); from then on this holds for good.
+class OfGoal(WithMemory):
+    """What is remembered of another goal.
 
     Attributes:
-        goal: what must hold.
-        n_steps: how often.
-        consecutive: without a break; else in total.
+        goal: the other goal.
         label: name of the term, if not what the goal is called.
     """
 
     goal: Goal
+    label: str = field(default="", kw_only=True)
+
+    @property
+    def inner(self) -> tuple[Goal, ...]:
+        """The other goal."""
+        return (self.goal,)
+
+    def bound(self, scene: Drawn) -> Goal:
+        """Bind the other goal; the name stays, because the memory is kept under it."""
+        goal = self.goal.bound(scene)
+        return self if goal == self.goal else replace(self, goal=goal, label=self.name)
+
+
+@dataclass(frozen=True)
+class StepsWhile(OfGoal):
+    """Another goal has held after a number of control steps (20 a second); from then on this holds for good.
+
+    Attributes:
+        n_steps: how often.
+        consecutive: without a break; else in total.
+    """
+
     n_steps: int
     consecutive: bool = False
-    label: str = ""
 
     def __post_init__(self) -> None:
         if self.n_steps < 1:
@@ -74,11 +94,6 @@ class StepsWhile(WithMemory):
     def name(self) -> str:
         """E.g. `obj_under_water_for_25_steps`."""
         return self.label or f"{plain(self.goal.name)}_for_{self.n_steps}_steps{'_on_end' * self.consecutive}"
-
-    @property
-    def inner(self) -> tuple[Goal, ...]:
-        """What is counted."""
-        return (self.goal,)
 
     @property
     def numbers(self) -> tuple[str, ...]:
@@ -103,77 +118,48 @@ class StepsWhile(WithMemory):
 
 
 @dataclass(frozen=True)
-class Once(WithMemory):
-    """Another goal has held after some control step.
+class Seen(OfGoal):
+    """Remembers whether another goal has held after some control step."""
 
-    Attributes:
-        goal: what must have held.
-        label: name of the term, if not what the goal is called.
-    """
+    @property
+    def numbers(self) -> tuple[str, ...]:
+        """Whether it has held: 0 or 1."""
+        return ("seen",)
 
-    goal: Goal
-    label: str = ""
+    def after_step(self, scene: Scene, data: mujoco.MjData) -> Array:
+        """Look, unless it has held already."""
+        (seen,) = self.kept(scene, data)
+        return np.array([float(seen > 0.5 or self.goal.evaluate(scene, data, {}))])
+
+    def seen(self, scene: Scene, data: mujoco.MjData) -> bool:
+        """Whether it has held."""
+        return bool(self.kept(scene, data)[0] > 0.5)
+
+
+class Once(Seen):
+    """Another goal has held after some control step."""
 
     @property
     def name(self) -> str:
         """E.g. `once_sink_water_on_and_sink_left`."""
         return self.label or f"once_{plain(self.goal.name)}"
 
-    @property
-    def inner(self) -> tuple[Goal, ...]:
-        """What is looked for."""
-        return (self.goal,)
-
-    @property
-    def numbers(self) -> tuple[str, ...]:
-        """Whether it has been: 0 or 1."""
-        return ("seen",)
-
-    def after_step(self, scene: Scene, data: mujoco.MjData) -> Array:
-        """Look, unless it has been."""
-        (seen,) = self.kept(scene, data)
-        return np.array([float(seen > 0.5 or self.goal.evaluate(scene, data, {}))])
-
     def holds(self, scene: Scene, data: mujoco.MjData) -> bool:
-        """Whether it has been."""
-        return bool(self.kept(scene, data)[0] > 0.5)
+        """Whether it has held."""
+        return self.seen(scene, data)
 
 
-@dataclass(frozen=True)
-class Never(WithMemory):
-    """Another goal has held after no control step; what has happened cannot be made good in the episode.
-
-    Attributes:
-        goal: what must not have held.
-        label: name of the term, if not what the goal is called.
-    """
-
-    goal: Goal
-    label: str = ""
+class Never(Seen):
+    """Another goal has held after no control step; what has happened cannot be made good in the episode."""
 
     @property
     def name(self) -> str:
         """E.g. `never_gripper_touches_obj`."""
         return self.label or f"never_{plain(self.goal.name)}"
 
-    @property
-    def inner(self) -> tuple[Goal, ...]:
-        """What is looked for."""
-        return (self.goal,)
-
-    @property
-    def numbers(self) -> tuple[str, ...]:
-        """Whether it has been: 0 or 1."""
-        return ("seen",)
-
-    def after_step(self, scene: Scene, data: mujoco.MjData) -> Array:
-        """Look, unless it has been."""
-        (seen,) = self.kept(scene, data)
-        return np.array([float(seen > 0.5 or self.goal.evaluate(scene, data, {}))])
-
     def holds(self, scene: Scene, data: mujoco.MjData) -> bool:
-        """Whether it has not been."""
-        return bool(self.kept(scene, data)[0] < 0.5)
+        """Whether it has not held."""
+        return not self.seen(scene, data)
 
 
 def parts_with_memory(goals: Iterable[Goal]) -> tuple[WithMemory, ...]:

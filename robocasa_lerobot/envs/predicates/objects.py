@@ -217,7 +217,7 @@ def radius(scene: Scene, name: str) -> float:
 
 
 def middle_of(scene: Scene, data: mujoco.MjData, name: str) -> NDArray[np.float64]:
-    """Middle of where an object holds things, else its origin, (3,): a pan's origin is off, towards the handle."""
+    """Middle of an object's interior, else its origin, (3,): a pan's origin is off, towards the handle."""
     body, inside = data.body(name), scene.objects[name].item.interior
     middle: NDArray[np.float64] = body.xpos
     return middle if inside is None else middle + body.xmat.reshape(3, 3) @ np.asarray(inside.center)

@@ -81,7 +81,7 @@ class Grasped(Term):
     """The gripper holds an object between its fingers: two of them push it against each other.
 
     RoboCasa asks for any contact, with fingers that are not wide open (docs/robocasa.md, section 8): a fist that pushes
-    passes then, and what is 7 cm wide does not.
+    passes then, and an object 7 cm wide does not.
     """
 
     object: str
@@ -93,9 +93,8 @@ class Grasped(Term):
 
     def holds(self, scene: Scene, data: mujoco.MjData) -> bool:
         """Look for opposite pushes."""
-        model, thing = scene.model, scene.subtree(scene.fill(self.object))
-        fingers = [model.body(model.joint(joint).bodyid[0]).name for joint in scene.robot.names.finger_joints]
-        each = [pushes(model, data, scene.subtree(finger), thing) for finger in fingers]
+        held = scene.subtree(scene.fill(self.object))
+        each = [pushes(scene.model, data, finger, held) for finger in scene.fingers()]
         return any(bool((a @ b.T < OPPOSITE_COSINE).any()) for a, b in combinations(each, 2))
 
 

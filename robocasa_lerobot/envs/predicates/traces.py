@@ -133,7 +133,7 @@ class Strokes(WithMemory):
         return kept
 
     def holds(self, scene: Scene, data: mujoco.MjData) -> bool:
-        """Compare number and span with what is wanted."""
+        """Compare number and span with the wanted ones."""
         return self._enough(self.kept(scene, data))
 
     def progress(self, scene: Scene, data: mujoco.MjData) -> float:

@@ -23,11 +23,11 @@ from robocasa_lerobot.gl import ensure_gl, note_renderer
 
 # robosuite's and RoboCasa's convention: group 0 holds collision shapes, group 1 what cameras see.
 COLLISION_GROUP = 0
-# Of what is behind everything else, however near its box is: drawn last, it costs next to nothing where it is hidden.
+# Of geoms behind all others, however near their boxes: drawn last, they cost next to nothing where they are hidden.
 BACKDROP_GROUP = 2
 _HIDDEN_GROUP = 5  # MuJoCo's last geom group, which no camera draws
 _SPARE_GEOMS = 200  # of a scene, beyond the model's own: lights, skins and the like
-# Distances in metres between the parts of what is seen that are drawn one after the other, the nearest first. Near
+# Distances in metres between the parts of a view that are drawn one after the other, the nearest first. Near
 # ones hide the rest before its pixels are computed; more than a dozen parts cost more than they save.
 _LAYER_EDGES_M = (0.15, 0.3, 0.45, 0.6, 0.8, 1.0, 1.3, 1.7, 2.2, 3.0, 4.5)
 # What `MjrContext` knows of the framebuffer that pictures are drawn into.
@@ -168,7 +168,7 @@ class Canvas:
 
 
 def _geom_ids(scene: mujoco.MjvScene, colours: NDArray[np.uint8]) -> NDArray[np.int32]:
-    """Geom ids (height, width) of a picture in which each drawn thing has the colour of its number, from 1 on."""
+    """Geom ids (height, width) of a picture in which each drawn geom has the colour of its number, from 1 on."""
     channels = colours.astype(np.int32)
     numbers = channels[..., 0] + (channels[..., 1] << 8) + (channels[..., 2] << 16)
     present, places = np.unique(numbers, return_inverse=True)

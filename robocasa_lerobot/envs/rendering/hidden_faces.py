@@ -1,4 +1,4 @@
-"""Faces of boxes that nobody sees: those that lie against another box, and the edges of what is thin as a line.
+"""Faces of boxes that nobody sees: those that lie against another box, and the edges of boxes as thin as a line.
 
 A third of a kitchen's triangles are backs against walls, undersides on floors and ends of boards that meet.
 """

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robocasa_lerobot.envs.rendering.canvas import Canvas
-from robocasa_lerobot.envs.rendering.look_alike import VISIBLE_GROUPS, LookAlike, look_alike
+from robocasa_lerobot.envs.rendering.merged_model import VISIBLE_GROUPS, MergedModel, merged_model
 from robocasa_lerobot.errors import UnknownNameError
 
 
@@ -33,7 +33,7 @@ class SceneRenderer:
     """
 
     def __init__(
-        self, model: mujoco.MjModel, height: int, width: int, *, shadows: bool = False, alike: LookAlike | None = None
+        self, model: mujoco.MjModel, height: int, width: int, *, shadows: bool = False, alike: MergedModel | None = None
     ) -> None:
         self._model = model
         self._size = (height, width)
@@ -41,7 +41,7 @@ class SceneRenderer:
         self._cameras = {model.camera(i).name: i for i in range(model.ncam)}
         self._exact: Canvas | None = None
         self._merged: Canvas | None = None
-        self._alike = None if shadows else alike or look_alike(model, VISIBLE_GROUPS)
+        self._alike = None if shadows else alike or merged_model(model, VISIBLE_GROUPS)
         if self._alike is None:
             self._open_exact()  # so that a machine without OpenGL fails here
         else:
@@ -54,7 +54,7 @@ class SceneRenderer:
             UnknownNameError: the model has no camera of that name.
         """
         which = self._camera(camera)
-        alike = self._look_alike()
+        alike = self._merged_model()
         if alike is None or not isinstance(which, int):
             canvas = self._open_exact()
             canvas.see(data, which, cull=not self._shadows)  # shadows and reflections come from out of view, too
@@ -70,7 +70,7 @@ class SceneRenderer:
         Raises:
             UnknownNameError: the model has no camera of that name.
         """
-        alike = self._look_alike()
+        alike = self._merged_model()
         if alike is None:
             return [self.render(data, camera) for camera in cameras]
         numbers = [self._camera(camera) for camera in cameras]
@@ -117,11 +117,11 @@ class SceneRenderer:
             self._exact = Canvas(self._model, *self._size, shadows=self._shadows)
         return self._exact
 
-    def _look_alike(self) -> LookAlike | None:
-        """The look-alike, made anew when shapes have changed their looks in a way that it cannot follow."""
+    def _merged_model(self) -> MergedModel | None:
+        """The look-alike, made anew when shapes have changed their looks beyond what it can follow."""
         if self._alike is not None and (changed := self._alike.changed()):
             assert self._merged is not None
             self._merged.close()
-            self._alike = look_alike(self._model, VISIBLE_GROUPS, self._alike.loose | changed)
+            self._alike = merged_model(self._model, VISIBLE_GROUPS, self._alike.loose | changed)
             self._merged = None if self._alike is None else Canvas(self._alike.model, *self._size)
         return self._alike

@@ -86,7 +86,7 @@ class StandingShape:
     Attributes:
         standoff: of the base centre from the front edge of the counter that it faces.
         base_x, base_y, base_top: bounds of the mobile base, and its height.
-        column_half, column_top: half size of the column above it, and the height that counts as its way.
+        column_half, column_top: half size of the column above it, and the height below which obstacles count for it.
         hand_x, hand_half, hand_z: forearm and hand in the home pose: bounds before the base, half width, heights.
         yaw_pivot: where the joint turns the base.
     """
@@ -126,14 +126,22 @@ class GripperGeometry:
     palm_half: tuple[float, float]
     closed_half: tuple[float, float, float]
 
+    def closed_reach(self, rotation: Array, direction: Array) -> float:
+        """How far the closed fingers reach from the grip site in a direction (3,), turned so (3, 3), metres."""
+        return float(np.array(self.closed_half) @ np.abs(rotation.T @ direction))
+
 
 @dataclass(frozen=True)
 class ArmReach:
-    """How far an arm reaches, metres: the wrist behind the grip site, the shoulder's height, wrist to shoulder."""
+    """How far an arm reaches, metres: the wrist behind the grip site, the shoulder's height, wrist to shoulder.
+
+    `stretched` is the elbow's angle at which wrist and shoulder are farthest apart, radians; it bends to angles below.
+    """
 
     wrist_behind_grip: float
     shoulder: float
     longest: float
+    stretched: float
 
 
 @dataclass(frozen=True)

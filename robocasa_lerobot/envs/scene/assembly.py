@@ -17,7 +17,7 @@ def bare_kitchen(layout: Layout, render_preset: str = "fast") -> tuple[mujoco.Mj
     spec.compiler.degree = False
     spec.compiler.autolimits = True
     apply_simulation_options(spec)
-    # What is at rest sleeps: a kitchen of a hundred joints then costs little more than its robot.
+    # Bodies at rest sleep: a kitchen of a hundred joints then costs little more than its robot.
     spec.option.enableflags |= int(mujoco.mjtEnableBit.mjENBL_SLEEP)
     _light(spec, layout, render_preset)
     palette = MaterialPalette(spec, load_style(layout.style_id))

@@ -38,7 +38,7 @@ MAX_ATTEMPTS = 50
 # Key of the generator of camera noise: a stream of its own, so that noise changes nothing else of the scene.
 _CAMERA_NOISE_STREAM = 2
 
-# What is seen in a vessel: colour and opacity.
+# Liquids in a vessel: colour and opacity.
 LIQUIDS = {"coffee": (0.25, 0.13, 0.06, 1.0)}
 
 

@@ -1,4 +1,4 @@
-"""How fixtures start: doors, knobs, water, what is on. Drawn from the scene's seed, written into the first state.
+"""How fixtures start: doors, knobs, water, switches. Drawn from the scene's seed, written into the first state.
 
 Each is a record of a task declaration. `draw` takes the random numbers while the scene is made, so that placement can
 ask where a pulled-out rack is; `apply` writes positions before the scene settles.

@@ -124,10 +124,10 @@ def robot_pose(
     """
     ground = ground_fixture(layout, fixture)
     lateral = fixture.width / 2 + BESIDE_CLEARANCE_M
-    # Standing to the left of the fixture, it is at the robot's right, and the other way round.
+    # Standing to the left of the fixture, it is at the robot's right, and vice versa.
     options = [("right", -lateral), ("left", lateral)] if start.beside else [("", 0.0)]
     if start.setback and layout.types[fixture.name] == "fridge_bottom_freezer":
-        options = [("", -start.setback)]  # out of the way of its doors (docs/robocasa.md, section 6)
+        options = [("", -start.setback)]  # clear of its doors (docs/robocasa.md, section 6)
     obstacles = Obstacles(layout.fixtures, shape, opened)
     for face in faces(layout, ground, fixture):
         half_range = np.array(start.deviation)

@@ -11,12 +11,12 @@ from robocasa_lerobot.envs.kitchens.fixtures.base import Fixture
 from robocasa_lerobot.envs.kitchens.fixtures.counters import Counter
 from robocasa_lerobot.envs.kitchens.footprints import PlacementError
 from robocasa_lerobot.envs.kitchens.layout import Layout
-from robocasa_lerobot.envs.scene.spec import FixtureWanted
+from robocasa_lerobot.envs.scene.spec import FixtureSpec
 
 HOUSING_BELOW_M = 0.6  # a housing whose underside is lower stands on the floor
 
 
-def cast_roles(rng: np.random.Generator, fixtures: Sequence[FixtureWanted], layout: Layout) -> dict[str, str]:
+def cast_roles(rng: np.random.Generator, fixtures: Sequence[FixtureSpec], layout: Layout) -> dict[str, str]:
     """Fixture name of each role of a task.
 
     Raises:
@@ -38,7 +38,7 @@ def cast_roles(rng: np.random.Generator, fixtures: Sequence[FixtureWanted], layo
     return roles
 
 
-def _suits(fixture: Fixture, wanted: FixtureWanted, layout: Layout, roles: dict[str, str]) -> bool:
+def _suits(fixture: Fixture, wanted: FixtureSpec, layout: Layout, roles: dict[str, str]) -> bool:
     others = {roles[role] for role in wanted.other_than}
     large = fixture.width >= wanted.size[0] and fixture.depth >= wanted.size[1]
     apart = all(_distance(layout.fixtures[name], fixture) >= wanted.apart_m for name in others)

@@ -39,7 +39,7 @@ class Remembering(Protocol):
 
     @property
     def name(self) -> str:
-        """Of what is kept."""
+        """Name of the memory."""
 
     @property
     def numbers(self) -> tuple[str, ...]:
@@ -67,7 +67,7 @@ class Scene(Drawn):
         robot_pose: where its base starts.
         instruction: what the robot is told.
         paraphrases: the same in other words.
-        words: what is said of fixtures (by role), objects, choices, and lists of objects.
+        words: for fixtures (by role), objects, choices, and lists of objects.
         initial: what the task has written into the first state, each with the number drawn for it, in that order.
         lid_spots: where the lid of a blender may lie, by role.
         arm_noise_rad: standard deviation of the noise on the initial arm pose.
@@ -126,12 +126,17 @@ class Scene(Drawn):
             self._subtrees[bodies] = subtree(self.model, *bodies)
         return self._subtrees[bodies]
 
+    def fingers(self) -> tuple[NDArray[np.bool_], ...]:
+        """For each finger of the gripper, which bodies of the model belong to it, (nbody,) each."""
+        names = (self.model.body(self.model.joint(joint).bodyid[0]).name for joint in self.robot.names.finger_joints)
+        return tuple(self.subtree(name) for name in names)
+
     def standing_pose(self, role: str) -> RobotPose:
         """Where a robot stands that is to use the fixture of a role, without deviation."""
         return standing_pose(self.layout, self.fixture(role), self.robot.shape)
 
     def lay_lid(self, role: str, data: mujoco.MjData, turn: float, *, gone: bool) -> None:
-        """Lay the lid of a blender on the counter, turned by a share of a full turn, or out of the way if `gone`."""
+        """Lay the lid of a blender on the counter, turned by a share of a full turn; not if it is `gone`."""
         blender = self.fixture(role, Blender)
         if not gone:
             blender.set_lid(data, self.lid_spots[role], 2 * np.pi * turn)

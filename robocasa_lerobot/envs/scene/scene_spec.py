@@ -7,19 +7,19 @@ from dataclasses import dataclass
 from robocasa_lerobot.envs.scene.drawn import Drawn
 from robocasa_lerobot.envs.scene.initial_states import Initial
 from robocasa_lerobot.envs.scene.scene import Remembering
-from robocasa_lerobot.envs.scene.spec import Choice, FixtureWanted, InitialOpenness, ObjectWanted, RobotStart
+from robocasa_lerobot.envs.scene.spec import Choice, FixtureSpec, InitialOpenness, ObjectSpec, RobotStart
 
 type InitialState = InitialOpenness | Initial
 
 
 @dataclass(frozen=True, kw_only=True)
 class SceneSpec:
-    """Fixtures, objects, where the robot starts, what is drawn at reset, and what the robot is told.
+    """Fixtures, objects, where the robot starts, the choices drawn at reset, and the instruction.
 
     Attributes:
         name: id, as in RoboCasa365.
         fixtures, objects, robot_start, initial: the scene.
-        choices: what is drawn at reset.
+        choices: drawn at reset.
         instruction: template; fields are "{side}" (where the robot stands), roles, choices and names of objects.
             "{a+b}" lists objects ("the apple and the pear", "both apples"); of counted ones "{a}" is such a list,
             "{a_count}" their number, and "{a_all}" "both" or "all three".
@@ -29,10 +29,10 @@ class SceneSpec:
     """
 
     name: str
-    fixtures: tuple[FixtureWanted, ...]
+    fixtures: tuple[FixtureSpec, ...]
     robot_start: RobotStart
     instruction: str
-    objects: tuple[ObjectWanted, ...] = ()
+    objects: tuple[ObjectSpec, ...] = ()
     initial: tuple[InitialState, ...] = ()
     choices: tuple[Choice, ...] = ()
     paraphrases: tuple[str, ...] = ()

@@ -8,9 +8,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
+from robocasa_lerobot.errors import UserError
+
 
 @dataclass(frozen=True)
-class FixtureWanted:
+class FixtureSpec:
     """A fixture that plays a role in a task.
 
     Attributes:
@@ -32,19 +34,32 @@ class FixtureWanted:
 
 @dataclass(frozen=True)
 class Choice:
-    """A value that is drawn at reset: which knob, which rack, which way.
+    """A value that is drawn at reset: which knob, which rack, which direction.
 
     Declarations name it in braces, as in `part="knob_{knob}"`; instructions too.
 
     Attributes:
-        name: of the choice.
-        options: by value, the words that instructions may use besides the value itself.
+        name: of the choice; without an underscore at its start.
+        options: by value, the words that instructions may use besides the value itself; of these, those whose name
+            begins with an underscore are values for the declaration instead.
         of: role of a fixture whose parts are the options instead: burners, racks, or slots.
+
+    Raises:
+        UserError: the name begins with an underscore.
     """
 
     name: str
     options: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
     of: str = ""
+
+    def __post_init__(self) -> None:
+        # An option's word for the choice itself would be such a value too, and replace the one that was drawn.
+        if self.name.startswith("_"):
+            raise UserError(
+                f"choice {self.name!r}: found a name that begins with an underscore, as only further values of a "
+                f"choice's options do: its word would replace the value that was drawn. Call it "
+                f"{self.name.lstrip('_') or 'part'!r}; instructions need not name it."
+            )
 
 
 @dataclass(frozen=True)
@@ -140,7 +155,7 @@ class Placement:
 
 
 @dataclass(frozen=True)
-class ObjectWanted:
+class ObjectSpec:
     """An object, or several alike, and where it starts.
 
     Attributes:
@@ -160,7 +175,7 @@ class ObjectWanted:
         repeats: may be of a category that the scene already has.
         same_category_as: name of an earlier object whose category it has; of several, their own name makes them alike.
         same_model: with it, the very same model, at its own scale.
-        filled: what is seen in it, one of `LIQUIDS` in `envs/scene/build.py`; it is there for the eye only.
+        filled: the liquid in it, one of `LIQUIDS` in `envs/scene/build.py`; it is there for the eye only.
     """
 
     name: str

@@ -1,4 +1,4 @@
-"""Draws what a task leaves open: which knob, rack, slot or drawer, which way, and the words for it; how many of an
+"""Draws what a task leaves open: knob, rack, slot, drawer or direction, and the words for it; how many of an
 object there are, which model each of them is, and where it starts, by what was drawn before.
 """
 
@@ -13,7 +13,7 @@ from robocasa_lerobot.envs.kitchens.fixtures.base import Fixture
 from robocasa_lerobot.envs.kitchens.footprints import PlacementError
 from robocasa_lerobot.envs.objects import catalogue
 from robocasa_lerobot.envs.scene.scene_spec import SceneSpec
-from robocasa_lerobot.envs.scene.spec import InsideOf, ObjectWanted, OnCounter, Placement
+from robocasa_lerobot.envs.scene.spec import InsideOf, ObjectSpec, OnCounter, Placement
 from robocasa_lerobot.envs.scene.words import numbered
 from robocasa_lerobot.errors import UserError
 
@@ -50,7 +50,7 @@ def draw_choices(
     return drawn
 
 
-def number_of(rng: np.random.Generator, wanted: ObjectWanted, choices: Mapping[str, str]) -> int:
+def number_of(rng: np.random.Generator, wanted: ObjectSpec, choices: Mapping[str, str]) -> int:
     """How many there are; drawn, unless a choice says it.
 
     Raises:
@@ -61,14 +61,14 @@ def number_of(rng: np.random.Generator, wanted: ObjectWanted, choices: Mapping[s
     return int(rng.integers(wanted.count[0], wanted.count[1] + 1))
 
 
-def name_of(wanted: ObjectWanted, index: int) -> str:
+def name_of(wanted: ObjectSpec, index: int) -> str:
     """Its own name, or with its index where it may be one of several."""
     return wanted.name if wanted.count == (1, 1) else f"{wanted.name}_{index}"
 
 
 def item_of(
     rng: np.random.Generator,
-    wanted: ObjectWanted,
+    wanted: ObjectSpec,
     index: int,
     split: str,
     items: Mapping[str, catalogue.Instance],
@@ -111,7 +111,7 @@ def item_of(
 
 
 def start_of(
-    rng: np.random.Generator, wanted: ObjectWanted, choices: Mapping[str, str]
+    rng: np.random.Generator, wanted: ObjectSpec, choices: Mapping[str, str]
 ) -> OnCounter | InsideOf | Placement:
     """Where it starts, with the choices filled in, and one taken of several names of regions ("{knob}|any")."""
     start = wanted.start
@@ -134,7 +134,7 @@ def start_of(
     )
 
 
-def _like(wanted: ObjectWanted, index: int, items: Mapping[str, catalogue.Instance]) -> catalogue.Instance | None:
+def _like(wanted: ObjectSpec, index: int, items: Mapping[str, catalogue.Instance]) -> catalogue.Instance | None:
     """The object whose category is taken again; the first of several alike has none."""
     if not wanted.same_category_as:
         return None
@@ -149,7 +149,7 @@ def _like(wanted: ObjectWanted, index: int, items: Mapping[str, catalogue.Instan
     )
 
 
-def _factors(wanted: ObjectWanted, index: int, choices: Mapping[str, str]) -> float | tuple[float, float, float]:
+def _factors(wanted: ObjectSpec, index: int, choices: Mapping[str, str]) -> float | tuple[float, float, float]:
     scale = wanted.scale
     factors = _number(scale, choices, f"scale of {wanted.name}") if isinstance(scale, str) else scale
     if wanted.scale_step == 1.0 or index == 0:
@@ -159,7 +159,7 @@ def _factors(wanted: ObjectWanted, index: int, choices: Mapping[str, str]) -> fl
     return x * step, y * step, z * step
 
 
-def _position(where: _Position, wanted: ObjectWanted, choices: Mapping[str, str]) -> _Position:
+def _position(where: _Position, wanted: ObjectSpec, choices: Mapping[str, str]) -> _Position:
     """A position along one axis; "{side}" is that of the word that was drawn, "-{side}" the opposite one."""
     if not isinstance(where, str) or "{" not in where:
         return where

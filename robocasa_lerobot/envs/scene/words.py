@@ -94,7 +94,7 @@ def object_word(category: str) -> str:
 
 
 def listed(words: Sequence[str]) -> str:
-    """Things in a list, those of one kind together: "the apple, the two pears and the lime"."""
+    """Objects in a list, those of one kind together: "the apple, the two pears and the lime"."""
     counts: dict[str, int] = {}
     for word in words:
         counts[word] = counts.get(word, 0) + 1

@@ -51,7 +51,7 @@ def _placed(task: BoundTask, stage: Stage) -> Goal:
 
 
 def _driven(task: BoundTask, stage: Stage) -> Goal:
-    """Before a fixture or an object, and with what is carried, if anything, in the hand."""
+    """Before a fixture or an object, and with the carried object, if any, in the hand."""
     roles = {fixture.role for fixture in task.fixtures}
     there = StandsBefore(stage.target) if stage.target in roles else StandsNear(stage.target)
     return AllOf(there, Grasped(stage.object)) if stage.object else there
@@ -123,8 +123,8 @@ def _needs_own(task: BoundTask, stage: Stage) -> UserError:
 def without_gripper(goal: Goal) -> Goal:
     """What of a stage's condition must still hold when the hand is busy with the next one.
 
-    Left out are where the gripper has to be, and that something moved in the last step, which passes by itself. What is
-    remembered stays whole: steps that were counted remain.
+    Left out are where the gripper has to be, and that something moved in the last step, which passes by itself. Memory
+    stays whole: steps that were counted remain.
     """
     if isinstance(goal, AllOf):
         return AllOf(*(without_gripper(part) for part in goal.parts if not _passes(part)))

@@ -14,7 +14,7 @@ from robocasa_lerobot.envs.scene.scene import Scene
 from robocasa_lerobot.envs.scene.words import said
 from robocasa_lerobot.envs.tasks.task import Stage
 
-_DEEP_M = 0.04  # what is deeper is put into, not on
+_DEEP_M = 0.04  # an object is put into deeper receptacles, not on them
 # Parts of appliances that have another name in speech; others are called by their name without underscores.
 _PARTS = {
     "knob_temp": "temperature knob",
@@ -23,7 +23,7 @@ _PARTS = {
     "rack": "rack",
     "receptacle": "dispenser",
 }
-_WAYS = {"increase": "up", "decrease": "down"}
+_DIRECTIONS = {"increase": "up", "decrease": "down"}
 
 
 def stage_text(stage: Stage, scene: Scene) -> str:
@@ -76,11 +76,11 @@ def _spaced(name: str) -> str:
 
 
 def _to(stage: Stage, scene: Scene) -> str:
-    """Which way; a drawn one by the word of its choice."""
-    way = stage.to
+    """The direction; a drawn one by the word of its choice."""
+    direction = stage.to
     for name, word in scene.words.items():
-        way = way.replace(f"{{{name}}}", word)
-    return _WAYS.get(scene.fill(way), scene.fill(way))
+        direction = direction.replace(f"{{{name}}}", word)
+    return _DIRECTIONS.get(scene.fill(direction), scene.fill(direction))
 
 
 def _doors(stage: Stage, scene: Scene) -> str:
@@ -96,7 +96,7 @@ def _doors(stage: Stage, scene: Scene) -> str:
 
 
 def _holding(stage: Stage, scene: Scene) -> str:
-    """Into or onto the target: by the depth of what it holds things in."""
+    """Into or onto the target: by the depth of its interior."""
     placed = scene.objects.get(stage.target)
     interior = None if placed is None else placed.item.interior
     deep = interior is not None and 2 * interior.half[2] > _DEEP_M
@@ -140,7 +140,7 @@ def _knob(stage: Stage, scene: Scene) -> str:
 
 
 def _held(stage: Stage, scene: Scene) -> str:
-    """Where an object is held: what is to be under water, under the faucet."""
+    """Where an object is held: under the faucet, if it is to be under water."""
     wet = stage.until is not None and any(isinstance(goal, UnderWater) for goal in every_goal_in(stage.until))
     return f"hold the {_object(stage, scene)} {'under the faucet of' if wet else 'at'} the {_target(stage, scene)}"
 

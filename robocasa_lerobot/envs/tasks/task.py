@@ -1,6 +1,6 @@
 """The words that a task is declared in: its scene, goal and stages.
 
-A task is data. The scene builder reads what is wanted, the env reads the goal, the demonstrator reads the stages.
+A task is data. The scene builder reads the scene, the env reads the goal, the demonstrator reads the stages.
 """
 
 from __future__ import annotations
@@ -22,12 +22,12 @@ class Stage:
 
     Attributes:
         skill: one of the eight: "drawers", "pick_place", ...
-        verb: what is done, e.g. "open".
+        verb: e.g. "open".
         target: role of the fixture.
         object: name of the object that is handled, if any; it and the target may name a choice in braces.
         part: of the fixture, if any: a knob, a rack, the doors of its "freezer", a shelf by its level, as
             "fridge_shelf:highest"; may name a choice in braces.
-        to: which way, for verbs that go several: "left", "out", "increase"; may name a choice in braces.
+        to: direction, for verbs that have several: "left", "out", "increase"; may name a choice in braces.
         until: when it is done, where that is not what its verb always asks for (`tasks.conditions`).
         text: what it is called, where not as its verb always is (`tasks.stage_text`); fields as in instructions.
     """
@@ -139,13 +139,17 @@ class BoundTask(Task):
 
 
 def _named(stage: Stage, scene: Drawn) -> Stage:
-    """With the object and target that a choice names, as in `object="{tool}"`; names of fixtures' parts stay."""
+    """With the object and target that a choice names, as in `object="{tool}"`, and its condition bound.
+
+    Names of fixtures' parts stay.
+    """
     choices = scene.choices.keys() - scene.roles
 
     def drawn(name: str) -> str:
         return scene.fill(name) if any(f"{{{choice}}}" in name for choice in choices) else name
 
-    return replace(stage, object=drawn(stage.object), target=drawn(stage.target))
+    until = None if stage.until is None else stage.until.bound(scene)
+    return replace(stage, object=drawn(stage.object), target=drawn(stage.target), until=until)
 
 
 def _resolved(plan: StagePlan, scene: Drawn) -> tuple[Stage, ...]:

@@ -197,7 +197,7 @@ class KitchenVectorEnv(AsyncVectorEnv):
         self._state = AsyncState.DEFAULT
 
     def _check_spaces(self) -> None:
-        # The last thing Gymnasium's constructor does, and the first that talks to the workers.
+        # Gymnasium's constructor calls it last, and nothing before it talks to the workers.
         pipes: list[Connection] = self.parent_pipes  # type: ignore[has-type]
         self._links = [_Link(self, index, pipe) for index, pipe in enumerate(pipes)]
         self.parent_pipes = self._links

@@ -1,6 +1,6 @@
 """A LeRobot checkpoint as a function from requests to action chunks, computed in batches of one fixed width.
 
-Sums of floats come out differently with the size of the batch, so that a trial would go another way when other trials
+Sums of floats depend on the size of the batch, so that a trial would turn out differently if others
 share its batch. Here every batch has the same width, the last one filled up with copies, and the noise of each sample
 comes from a generator of its own. On a CPU even the place within a batch matters (vector instructions take another path
 at the ends of an array), so that the width is 1 there; with a greater one, the first batches are computed twice, with

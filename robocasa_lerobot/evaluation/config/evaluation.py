@@ -102,7 +102,7 @@ class SuccessSettings:
 
 @dataclass
 class PerturbationSettings:
-    """What is different from the plain env. Standard deviations are of Gaussian noise, drawn anew for each trial.
+    """Differences from the plain env. Standard deviations are of Gaussian noise, drawn anew for each trial.
 
     names: none, language (a wording that no demonstration has), camera, joint, base; trials run under each of them.
     camera_position_m: of both agentview cameras, metres per axis.

@@ -34,7 +34,7 @@ class SubmissionFacts:
     batch_size: the global batch; default: from the checkpoint's train_config.json.
     num_training_steps: default: from the checkpoint's folder or its train_config.json.
     commit_hash: of the code that trained and evaluated; default: the run's.
-    notes: added to what is always said: which simulator, trials, intervals.
+    notes: added to the fixed ones: which simulator, trials, intervals.
     """
 
     model_name: str | None = None

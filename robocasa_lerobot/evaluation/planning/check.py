@@ -31,16 +31,16 @@ from robocasa_lerobot.evaluation.planning.run_header import (
 
 @dataclass(frozen=True)
 class Checked:
-    """What is known of an evaluation beforehand.
+    """Facts of an evaluation that are known beforehand.
 
     Attributes:
-        mistake: what is wrong with its settings; None if nothing is.
+        mistake: in its settings; None if there is none.
         nothing: why there is nothing to run: this version has none of its tasks. None if there is.
         partial: what it leaves out, as a sentence; None if nothing.
         tasks: that it runs.
         trials: of all policies, tasks and perturbations together.
         steps: control steps of all trials, if none is solved before its horizon; 0 where the env decides.
-        plan: a name of what is run, the same as long as that is.
+        plan: a name of the planned run, the same as long as that is.
     """
 
     mistake: str | None = None
@@ -53,7 +53,7 @@ class Checked:
 
 
 def check(arguments: Sequence[str]) -> Checked:
-    """What is known of the evaluation with these arguments of `robocasa-lerobot eval`."""
+    """Facts of the evaluation with these arguments of `robocasa-lerobot eval`."""
     try:
         config = load_config(EvaluationConfig, arguments)
         return describe(config, planned(config))

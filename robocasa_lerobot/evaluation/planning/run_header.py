@@ -1,4 +1,4 @@
-"""From settings to what is planned: tasks, horizons, what a trial's outcome depends on, and the run's header."""
+"""From settings to the plan: tasks, horizons, what a trial's outcome depends on, and the run's header."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class NothingRegisteredError(UserError):
 
 @dataclass(frozen=True)
 class PlannedTasks:
-    """What is run: `horizons` of tasks (control steps), and `sets` with those of their tasks that are run.
+    """The run's plan: `horizons` of tasks (control steps), and `sets` with those of their tasks that are run.
 
     `missing` are tasks that were named, or that belong to a named set, and are not run; `missing_by_set` has them by
     set, for those sets that are not run as a whole.
@@ -157,7 +157,7 @@ def partial_sentence(
     ]
     in_sets = {task for tasks in missing_by_set.values() for task in tasks}
     parts += [task for task in missing if task not in in_sets]
-    return f"partial: without {', '.join(parts)}; no average is given over what is not whole."
+    return f"partial: without {', '.join(parts)}; no average is given over incomplete sets."
 
 
 def perturbation_parameters(settings: PerturbationSettings) -> dict[str, dict[str, Any]]:

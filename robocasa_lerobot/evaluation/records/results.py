@@ -190,7 +190,7 @@ class TrialRecord:
         attempts: 1, or 2 if it was tried again.
         first_outcome, first_error: those of the first attempt, where there was a second one.
         warnings: MuJoCo's warnings during the trial, with their counts.
-        trajectory: SHA-256 over all actions and proprioception; equal for trials that went the same way.
+        trajectory: SHA-256 over all actions and proprioception; equal for trials that took the same course.
         video: path relative to the results folder.
         seconds: wall time.
         finished: UTC, ISO 8601.

@@ -9,7 +9,7 @@ from typing import Any
 
 from robocasa_lerobot.evaluation.records.results import ResultsError, RunHeader, TrialRecord
 
-# Other versions of these may let the same trial go another way.
+# Other versions of these may let the same trial take another course.
 _DECIDING_VERSIONS = ("robocasa_lerobot", "mujoco")
 
 

@@ -24,7 +24,7 @@ class Bar:
 
 @dataclass(frozen=True)
 class Cell:
-    """A cell: its text, the number that it is sorted by, and what is drawn beside or beneath.
+    """A cell: its text, the number that it is sorted by, and the drawing beside or beneath.
 
     `interval` is small print under the text; `heat` in [0, 1] shades the cell; `tag` is a word beside the text, such as
     "published"; `series` puts a policy's colour before it; `marks` are squares for single trials: s(olved), f(ailed),

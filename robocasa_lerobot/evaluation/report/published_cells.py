@@ -19,7 +19,7 @@ AVERAGE = "average"
 class OurCell:
     """What a policy did in a cell of a published table.
 
-    `row` and `column` are the published keys; `percent` is what is published there, None for an empty cell. `tasks`
+    `row` and `column` are the published keys; `percent` is the number published there, None for an empty cell. `tasks`
     are those of the cell's tasks that the policy was evaluated on, `of` how many the published number is over.
     """
 

@@ -1,4 +1,4 @@
-"""Runs an evaluation: the plan, minus what is recorded, through the workers, into `trials.jsonl`."""
+"""Runs an evaluation: the plan, minus recorded trials, through the workers, into `trials.jsonl`."""
 
 from __future__ import annotations
 
@@ -186,8 +186,8 @@ def evaluate(evaluation: Evaluation) -> list[TrialRecord]:
 def showcase(plan: Sequence[TrialSpec], records: Mapping[TrialKey, TrialRecord]) -> list[TrialSpec]:
     """Trials to run once more for their films: the first success and the first failure that no film shows yet.
 
-    Which trials succeed is not known when the filmed ones are fixed; a trial can be run again, because it goes the
-    same way. Only policies that are filmed at all are looked at.
+    Which trials succeed is not known when the filmed ones are fixed; a trial can be run again, because it takes the
+    same course. Only policies that are filmed at all are looked at.
     """
     chosen = []
     groups: dict[tuple[str, str], list[TrialSpec]] = {}
@@ -268,11 +268,11 @@ def _run(
 
 
 def _with_film(earlier: TrialRecord, again: TrialRecord, out: Path) -> TrialRecord:
-    """The record of a trial that was run again for its film, with the film if it went the same way."""
+    """The record of a trial that was run again for its film, with the film if it took the same course."""
     if again.video is not None and again.trajectory == earlier.trajectory:
         return dataclasses.replace(earlier, video=again.video)
     print(
-        f"{earlier.label} {earlier.task} trial {earlier.trial} went another way when it was run again for its film: "
+        f"{earlier.label} {earlier.task} trial {earlier.trial} took another course when it was run again for its film: "
         "policy or env is not deterministic. The first run counts, without a film.",
         file=sys.stderr,
     )

@@ -55,7 +55,7 @@ class DivergedError(RolloutError):
 class Outcome:
     """What a trial gave; `steps` are control steps at 20 Hz, the first step is number 1.
 
-    `trajectory` is a SHA-256 over all actions and proprioception: two trials with the same one went the same way.
+    `trajectory` is a SHA-256 over all actions and proprioception: two trials with the same one took the same course.
     """
 
     success: bool = False

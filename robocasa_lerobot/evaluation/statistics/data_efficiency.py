@@ -41,7 +41,7 @@ def demos_for_success(demos: Array, success: Array, wanted: Array) -> Array:
     """Demonstrations at which a curve reaches `wanted` success; 0 below its first point, infinity above its last.
 
     Linear between points in the logarithm of demonstrations. Noise may make a curve fall; it is made monotone first
-    (isotonic regression), since more demonstrations are not worse in what is asked here.
+    (isotonic regression), since more demonstrations are not worse for the question asked here.
 
     Args:
         demos: (n,) demonstrations per task, ascending and above 0.

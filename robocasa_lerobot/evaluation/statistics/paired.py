@@ -45,7 +45,7 @@ class Comparison:
 def exact_mcnemar(only_a: int, only_b: int) -> float:
     """Two-sided p-value of the exact McNemar test: a binomial test of the trials on which two policies differ.
 
-    Within every task each of those trials goes either way with probability 1/2 if the policies are equally good, so
+    Within every task each of those trials has either outcome with probability 1/2 if the policies are equally good, so
     counts of several tasks may be added. Without such trials it is 1.
     Source: Q. McNemar, Psychometrika 12 (1947); computed by `statsmodels.stats.contingency_tables.mcnemar`.
     """

@@ -123,7 +123,7 @@ class ClipTextEncoder(nn.Module):
         """The CLIP model itself."""
         return self.model if hasattr(self, "model") else self._held[0]
 
-    # What is remembered must be the same under automatic mixed precision and usable for training although first
+    # Cached embeddings must be the same under automatic mixed precision and usable for training although first
     # seen in inference mode.
     @torch.inference_mode(False)
     @torch.no_grad()

@@ -1,4 +1,4 @@
-"""The robot's state on its way into a network."""
+"""The robot's state as a network takes it in."""
 
 from __future__ import annotations
 

@@ -49,7 +49,7 @@ class SpatialSoftmax(nn.Module):
 
 
 class FeatureGrid(nn.Module):
-    """What is in each cell of a coarse grid over the picture; tells small things apart where few pictures train it."""
+    """Features of the cells of a coarse grid over a picture; tells small objects apart where few pictures train it."""
 
     def __init__(self, channels: int, cells: int) -> None:
         super().__init__()

@@ -44,7 +44,7 @@ class DiffusionTransformerConfig(ActionChunkConfig):
     vision_shared: bool = False  # one encoder for all cameras (told apart by an embedding) instead of one each
     vision_stem: int = 2  # stride of a convnet's first convolution; the others have 2
     vision_keypoints: int = 32
-    vision_grid: int | None = None  # instead of keypoints, what is in each cell of a grid of so many rows and columns
+    vision_grid: int | None = None  # instead of keypoints, features of each cell of a grid of so many rows and columns
     vision_features: int = 64  # per camera
 
     # Language. `token`: hashed words and character trigrams, trained with the policy, no download.

@@ -131,7 +131,7 @@ class Prefix(nn.Module, ABC):
         self.train(self.training)
 
     def train(self, mode: bool = True) -> Prefix:
-        """As always, but what is frozen stays in eval mode (GR00T's rule): no dropout in what cannot adapt to it."""
+        """As always, but frozen modules stay in eval mode (GR00T's rule): no dropout where nothing can adapt to it."""
         super().train(mode)
         for part, frozen in (("vision", self.config.freeze_vision), ("language", self.config.freeze_language)):
             for module in self.parts()[part] if frozen else ():

@@ -17,7 +17,7 @@ from robocasa_lerobot.settings import Data, load_yaml, set_dotted
 
 FILE_KEYS = ("policy", "mixture")  # their value may be the name of a YAML file, or hold one under `file`
 BASE, WITHOUT, REGISTRY = "base", "without_phases", "registry"
-# Settings that say what the thing is, and with each the settings of the base that it puts an end to; None is all.
+# Settings that identify a policy or mixture, and with each the settings of the base that it replaces; None is all.
 IDENTITY: dict[str, dict[str, tuple[str, ...] | None]] = {
     "policy": {"file": None, "type": None, "path": None},
     "mixture": {"file": None, **dict.fromkeys(("members", "select"), ("file", "members", "select", "shares"))},

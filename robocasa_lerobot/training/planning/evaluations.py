@@ -57,7 +57,7 @@ class PlannedEvaluation:
         partial: what it leaves out; None if nothing.
         tasks: that it runs.
         trials: on all of them.
-        plan: a name of what is run, the same as long as that is.
+        plan: a name of the planned run, the same as long as that is.
     """
 
     phase: str
@@ -71,7 +71,7 @@ class PlannedEvaluation:
 
     @property
     def skipped(self) -> Skipped | None:
-        """The line of what is left out of it; None where it runs as a whole."""
+        """The line about its left-out part; None where it runs as a whole."""
         if self.nothing is not None:
             return Skipped(EVALUATION, self.phase, self.evaluation.name, self.nothing)
         return None if self.partial is None else Skipped(PARTIAL, self.phase, self.evaluation.name, self.partial)
@@ -191,7 +191,7 @@ def run_evaluations(
 class Evaluations:
     """The evaluations of a run's phases: planned at once, run after each phase, both by the first process alone.
 
-    `left_out` is what is known beforehand not to run, or not as a whole.
+    `left_out` has those known beforehand not to run, or not as a whole.
 
     Raises:
         UserError: as `plan_evaluations`.
@@ -221,7 +221,7 @@ class Evaluations:
 def _run(command: list[str], stop: Callable[[], bool]) -> int | None:
     """The exit status of a command; None where it was ended because of `stop`.
 
-    Its standard input closes when this process ends in whatever way: nothing of a killed run may go on writing.
+    Its standard input closes when this process ends, however it does: nothing of a killed run may go on writing.
     """
     process = subprocess.Popen(command, env=_environment(), stdin=subprocess.PIPE)
     try:

@@ -1,4 +1,4 @@
-"""What an experiment would do: its graph with steps and samples, what is missing, disk, and hours on this device."""
+"""What an experiment would do: its graph with steps and samples, missing data, disk, and hours on this device."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ class PhasePlan:
         checkpoint_bytes: size of a checkpoint, and `kept` how many stay.
         cache_bytes: decoded frames on disk.
         seconds: per optimiser step on this device, without waiting for data; None where not measured.
-        notes: what stands in the way, or was left out.
+        notes: what keeps it from running, or was left out.
         left_out: why the phase will not run at all, or "".
     """
 

@@ -1,4 +1,4 @@
-"""A plan as text: the graph first, then what is missing, then the sums."""
+"""A plan as text: the graph first, then the missing data, then the sums."""
 
 from __future__ import annotations
 

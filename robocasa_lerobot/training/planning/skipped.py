@@ -1,7 +1,7 @@
 """What a run could not do, written beside its phases, so that a report repeats what a log said once.
 
 `<output_dir>/skipped.jsonl` has a line for each phase or evaluation that was left out, that failed, or that ran on a
-part of its tasks. Every run writes the file anew: what is possible now has no line any more.
+part of its tasks. Every run writes the file anew: phases that are possible now have no line any more.
 """
 
 from __future__ import annotations
@@ -60,7 +60,7 @@ def decide(output_dir: Path, skipped: Iterable[Skipped], phases: Collection[str]
 
     Args:
         output_dir: the experiment's.
-        skipped: what is left out.
+        skipped: phases and evaluations left out.
         phases: names of the phases that the command runs.
         evaluations: whether it runs their evaluations.
     """

@@ -16,7 +16,7 @@ from robocasa_lerobot.training.planning.skipped import PARTIAL, PHASE, Skipped
 
 
 def runnable(experiment: ExperimentConfig) -> tuple[ExperimentConfig, list[Skipped]]:
-    """The experiment without the phases that cannot run, and what is left out or trained on a part of its tasks.
+    """The experiment without the phases that cannot run, and those left out or trained on a part of its tasks.
 
     Raises:
         UserError: no phase can run, or a selection of datasets does not fit its registry.
@@ -48,7 +48,7 @@ def runnable(experiment: ExperimentConfig) -> tuple[ExperimentConfig, list[Skipp
 
 
 def _replay(phase: PhaseConfig, kept: list[PhaseConfig], start: str | None) -> ReplayConfig | None:
-    """What is left of the phase's replay: the phases that run, or nothing where it builds on none."""
+    """The rest of the phase's replay: the phases that run, or nothing where it builds on none."""
     if phase.replay is None or phase.replay.phases is None:
         return phase.replay if start is not None else None
     names = [name for name in phase.replay.phases if name in {other.name for other in kept}]

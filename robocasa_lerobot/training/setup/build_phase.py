@@ -86,7 +86,7 @@ def prepare_phase(
         records.check_same_data(folder, about)
         restore(last, state)
         accelerator.print(f"phase {phase.name}: going on from step {state.step}")
-    accelerator.wait_for_everyone()  # all have read what is replaced now
+    accelerator.wait_for_everyone()  # all have read the files that are replaced now
     if accelerator.is_main_process:
         records.write_records(folder, about, experiment, phase)
         tidy(folder)

@@ -209,7 +209,7 @@ def make_optimizer(
 
 
 def _changed(registry: Any, preset: Any, changes: Mapping[str, Any], what: str) -> Any:
-    """The policy's own settings with changes, or another type's with what is given for it."""
+    """The policy's own settings with changes, or another type's with the given fields."""
     kind = changes.get("type", preset.type if preset is not None else None)
     fields = {key: value for key, value in changes.items() if key != "type"}
     if kind not in registry.get_known_choices():
@@ -229,7 +229,7 @@ def _changed(registry: Any, preset: Any, changes: Mapping[str, Any], what: str) 
 
 
 def _trained_groups(policy: PreTrainedPolicy, phase: PhaseConfig) -> Any:
-    """The policy's parameter groups without what is frozen; one group where low-rank changes are trained."""
+    """The policy's parameter groups without frozen parameters; one group where low-rank changes are trained."""
     trained = [p for p in policy.parameters() if p.requires_grad]
     if not trained:
         raise UserError(f"phase {phase.name!r}: `freeze` leaves nothing of the policy to train.")
@@ -248,7 +248,7 @@ def hub_checkpoint(name: str) -> Path:
     """Folder of a policy on the hub, downloaded or from the local cache.
 
     Raises:
-        UserError: there is none of that name, or no way to get it.
+        UserError: there is none of that name, or it cannot be downloaded.
     """
     with _from_hub(name):
         return Path(snapshot_download(name))
@@ -258,7 +258,7 @@ def hub_config(name: str) -> Path:
     """Folder with the config.json of a policy on the hub, and perhaps nothing else: to check without its weights.
 
     Raises:
-        UserError: there is none of that name, or no way to get it.
+        UserError: there is none of that name, or it cannot be downloaded.
     """
     with _from_hub(name):
         return Path(hf_hub_download(name, "config.json")).parent

@@ -1,7 +1,7 @@
-"""What a checkpoint's policy takes in and gives out, and the features of the data: names, sizes, and what is left out.
+"""What a checkpoint's policy takes in and gives out, and the features of the data: names, sizes, and the ones left out.
 
 The features of a checkpoint are slots: their names mean nothing to its weights, their order and sizes do. `rename` of a
-policy's settings therefore gives the slots the data's names, and what is trained from there, evaluated or run with
+policy's settings therefore gives the slots the data's names, and a policy trained from there, evaluated or run with
 `lerobot-eval` has these names and no other.
 """
 

@@ -15,6 +15,7 @@ from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 OUT_M = 0.25
 LIFT_M, HOVER_M = 0.12, 0.12
 LIFTS_M = (0.035, 0.010)  # before it is drawn out of a front
+WORSE_GRASP = 0.45
 STEEP = 0.5  # sine of a slope
 
 
@@ -26,12 +27,14 @@ class GraspStrategy:
         tilts: of the hand's approach from straight down to straight ahead, radians, with their costs.
         entries: whether the hand may come from above ("up"), or out of the front ("out" rises a little, "level" does
             not), or between ("across"), or along its fingers ("along").
-        out_m: how far it goes on its way out, metres.
+        out_m: how far it goes along its path out, metres.
         hover_m, lift_m: how far over the grasp the hand comes from, and lifts to, where it comes from above, metres.
         lifts: before it is drawn out of a front, metres.
         turns: of a tilted approach from the base's heading to the left, radians.
+        worse_grasp: cost of a grasp's score below the best one's.
+        among_tilts: whether that is the best of all tilts, not of its own.
         narrow: whether the hand keeps to straight lines also where these are steep, does not press down, and goes
-            after an object that it moves by its coming: in a drawer, which gives way.
+            after an object that it moves by its coming: in a drawer, which yields.
         poses: grasps of an object by a hand that comes along an approach.
         first: done before each attempt.
     """
@@ -43,6 +46,8 @@ class GraspStrategy:
     lift_m: float = LIFT_M
     lifts: tuple[float, ...] = LIFTS_M
     turns: tuple[float, ...] = (0.0,)
+    worse_grasp: float = WORSE_GRASP
+    among_tilts: bool = False
     narrow: bool = False
     poses: Callable[[KitchenEnv, Graspable, Array], list[GraspPose]] = grasps
     first: Callable[[KitchenEnv], Iterator[Array]] | None = None

@@ -13,23 +13,24 @@ from robocasa_lerobot.demos.motion import (
     UP,
     Array,
     HandTarget,
+    arm_action,
     base_pose,
     floor_axes,
     rotation_about,
 )
-from robocasa_lerobot.demos.skills.common import SkillError, hold_hand, move_hand, stage_done, stage_progress
-from robocasa_lerobot.demos.skills.pick_place.carry import carry_to, in_reach, standing_pose_for
+from robocasa_lerobot.demos.skills.common import HOLD_SPEED, SkillError, move_hand, stage_done, wait_for_stage
+from robocasa_lerobot.demos.skills.pick_place.carrying.carry import carry_to, in_reach, standing_pose_for
+from robocasa_lerobot.demos.skills.pick_place.carrying.level import levelled
 from robocasa_lerobot.demos.skills.pick_place.grasp_strategy import ANY_APPROACH, entry, steep
 from robocasa_lerobot.demos.skills.pick_place.graspable import Graspable, graspable
-from robocasa_lerobot.demos.skills.pick_place.pick import INTEGRAL_GAIN
-from robocasa_lerobot.demos.skills.pick_place.verbs import is_held, take
-from robocasa_lerobot.demos.skills.reaching import MOST_DRIVES, Held, ReachPlan, WaypointPath, lead, plan_reach
+from robocasa_lerobot.demos.skills.pick_place.pick import INTEGRAL_GAIN, is_held
+from robocasa_lerobot.demos.skills.pick_place.verbs import take
+from robocasa_lerobot.demos.skills.reaching import Held, MotionPlan, WaypointPath, follow_with, plan_reach
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.kitchens.appliances.kinds.sink import Sink
 from robocasa_lerobot.envs.predicates import UnderWater
 from robocasa_lerobot.envs.predicates.logic import every_goal_in
 from robocasa_lerobot.envs.predicates.objects import middle_of, radius
-from robocasa_lerobot.envs.scene.robot_poses import RobotPose
 from robocasa_lerobot.envs.tasks.conditions import stage_condition
 from robocasa_lerobot.envs.tasks.task import Stage
 
@@ -37,17 +38,16 @@ ATTEMPTS = 4
 PATIENCE_STEPS = 30  # without headway, before the object is held elsewhere
 YAWS = 12
 ENTRIES, IN_M = ("up", "across", "out"), 0.22
-STEEPEST_COS = 0.7  # what leans more than 45 degrees is carried as it lies in the hand
-# Under a stream: of what is highest below the spout's tip, with costs; shares of the radius beside the stream.
+# Under a stream: of the highest object below the spout's tip, with costs; shares of the radius beside the stream.
 BELOW_M = ((0.03, 0.0), (0.06, 0.02), (0.10, 0.05), (0.15, 0.1))
 ASIDE_SHARES, ASIDE_COST = (0.0, 0.5), 0.3
-AGAIN, AGAIN_M = 0.5, 0.03  # cost of a hand that goes where it went in vain, as near as this
+AGAIN, AGAIN_M = 0.5, 0.03  # cost of a hand that goes where it went without success, as near as this
 MOST_SLIP_M = 0.04
 
 
 @dataclass(frozen=True)
 class HoldPose:
-    """Where a point of what is held is to be.
+    """Where a point of the held object is to be.
 
     Attributes:
         point: world, metres.
@@ -75,12 +75,12 @@ def hold_object(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
             yield from take(env, obj, ANY_APPROACH)
             obj = graspable(env, stage.object)
         yield from _bring(env, stage, obj)
-        choice = _choose(env, stage, obj, failed, ())
-        if choice.stand is not None:
-            yield from carry_to(env, obj, choice.stand)
-            choice = _choose(env, stage, obj, failed, [_here(env)] * MOST_DRIVES)
+        choice = _choose(env, stage, obj, failed)
+        if choice.base is not None:
+            yield from carry_to(env, obj, choice.base)
+            choice = _choose(env, stage, obj, failed, may_drive=False)
         failed.append(choice.path.targets[1].position)
-        yield from lead(env, choice.joints, CLOSED)
+        yield from follow_with(env, choice.joints, Held.now(env.data, obj.name, obj.contents))
         yield from _stay(env, stage, obj, *choice.path.targets)
         if stage_done(env, stage):
             return
@@ -102,15 +102,11 @@ def _stay(env: KitchenEnv, stage: Stage, obj: Graspable, far: HandTarget, at: Ha
     # What has slipped in the hand goes to where it was meant to be, not the hand.
     slipped = at.rotation @ (held.position - Held.now(data, obj.name).position)
     at = HandTarget(at.position + np.clip(slipped, -MOST_SLIP_M, MOST_SLIP_M), at.rotation)
-    left, best = PATIENCE_STEPS, stage_progress(env, stage)
-    while left and not done():
-        yield from hold_hand(data, at, CLOSED, 1)
-        now = stage_progress(env, stage)
-        left, best = (PATIENCE_STEPS, now) if now > best else (left - 1, best)
+    yield from wait_for_stage(env, stage, lambda: arm_action(data, at, CLOSED, speed=HOLD_SPEED), PATIENCE_STEPS)
 
 
 def _bring(env: KitchenEnv, stage: Stage, obj: Graspable) -> Iterator[Array]:
-    """Carry what is held to before where it is to be held, where that is out of reach."""
+    """Carry the held object to before where it is to be held, where that is out of reach."""
     middle = np.mean([pose.point for pose in hold_poses(env, stage, obj)], axis=0)
     if not in_reach(env, middle):
         yield from carry_to(env, obj, standing_pose_for(env, env.scene.fixture(stage.target), middle))
@@ -133,12 +129,12 @@ def hold_poses(env: KitchenEnv, stage: Stage, obj: Graspable) -> list[HoldPose]:
 
 
 def _under_stream(env: KitchenEnv, obj: Graspable, sink: Sink, washed: str) -> list[HoldPose]:
-    """Under the spout, all of what is held below its tip; the stream falls onto the middle, or near it."""
+    """Under the spout, all of the held object below its tip; the stream falls onto the middle, or near it."""
     data = env.data
     body = data.body(obj.name)
     turn = body.xmat.reshape(3, 3)
     local = turn.T @ (middle_of(env.scene, data, washed) - body.xpos)
-    upright = _levelled(turn)
+    upright = levelled(turn)
     above = _top(env, obj) - float((upright @ local)[2])  # from the point to the highest of it
     tip, reach = data.site(f"{sink.name}_water").xpos, radius(env.scene, washed)
     _, yaw = base_pose(data)
@@ -156,27 +152,17 @@ def _top(env: KitchenEnv, obj: Graspable) -> float:
     """Height of the highest point of an object and its contents over its origin when it is level, metres."""
     body = env.data.body(obj.name)
     turn = body.xmat.reshape(3, 3)
-    points = [obj.cloud @ _levelled(turn).T]
+    points = [obj.cloud @ levelled(turn).T]
     for name in obj.contents:
         other, cloud = env.data.body(name), graspable(env, name).cloud
         inside = (cloud @ other.xmat.reshape(3, 3).T + other.xpos - body.xpos) @ turn
-        points.append(inside @ _levelled(turn).T)
+        points.append(inside @ levelled(turn).T)
     return float(np.concatenate(points)[:, 2].max())
 
 
-def _levelled(turn: Array) -> Array:
-    """A rotation that stands upright with the least turn from the present one; what lies, stays as it is."""
-    axis = np.cross(turn[:, 2], UP)
-    sine, cosine = float(np.linalg.norm(axis)), float(turn[:, 2] @ UP)
-    if cosine < STEEPEST_COS or sine < 1e-6:
-        return turn
-    level: Array = rotation_about(axis / sine, float(np.arctan2(sine, cosine))) @ turn
-    return level
-
-
 def _choose(
-    env: KitchenEnv, stage: Stage, obj: Graspable, failed: list[Array], blocked: list[RobotPose] | tuple[()]
-) -> ReachPlan:
+    env: KitchenEnv, stage: Stage, obj: Graspable, failed: list[Array], *, may_drive: bool = True
+) -> MotionPlan:
     """The path in that the arm takes best, in all directions that the object may be turned to.
 
     Raises:
@@ -184,7 +170,7 @@ def _choose(
     """
     data = env.data
     held = Held.now(data, obj.name, obj.contents)
-    level = _levelled(data.body(obj.name).xmat.reshape(3, 3))
+    level = levelled(data.body(obj.name).xmat.reshape(3, 3))
     poses = hold_poses(env, stage, obj)
     paths = []
     for pose, index in itertools.product(poses, range(YAWS)):
@@ -199,13 +185,8 @@ def _choose(
             paths.append(WaypointPath((HandTarget(far, rotation), HandTarget(at, rotation)), cost))
     middle = np.mean([pose.point for pose in poses], axis=0)
     found = plan_reach(
-        env, paths, middle, key=1, held=held, loaded=2, allowed=obj.bodies | obj.carried, blocked=blocked
+        env, paths, middle, key=1, held=held, loaded=2, allowed=obj.bodies | obj.carried, may_drive=may_drive
     )  # fmt: skip
     if not found:
         raise SkillError(f"{obj.title}: there is no path to where it is to be held")
     return found[0]
-
-
-def _here(env: KitchenEnv) -> RobotPose:
-    base, yaw = base_pose(env.data)
-    return RobotPose(float(base[0]), float(base[1]), yaw)

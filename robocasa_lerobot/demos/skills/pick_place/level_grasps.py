@@ -9,7 +9,7 @@ from robocasa_lerobot.demos.planning.grasps import GraspPose
 from robocasa_lerobot.demos.skills.pick_place.graspable import DOWN, Graspable, filled, grasps
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 
-PALM_HALF_M, GIVES_WAY_M = (0.028, 0.10), 0.004  # along the hand's x and y; food gives way a little
+PALM_HALF_M, GIVES_WAY_M = (0.028, 0.10), 0.004  # along the hand's x and y; food yields a little
 GAP_M = 0.003  # between the fingers' lowest corners and what the object lies on
 INWARDS = 0.5  # least cosine between the hand's heading and the approach's
 

@@ -1,7 +1,7 @@
 """Hold mugs by their bodies: a nearly level hand from the side, a finger at each end of a diameter.
 
 So the hand fits under a spout and below the handle of a portafilter, and what the fingers press does not turn in them.
-What fails: the mug is grasped beside its middle, and slips on its way.
+What fails: the mug is grasped beside its middle, and slips while it is carried.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ WIDEST_M = 0.081  # at the rim; a mug's body is a little narrower where the fing
 LEVEL_RAD = np.deg2rad(25.0)  # a hand that looks down more than this meets the rim with its palm
 # Of the grip above what the object stands on: so low that the hand passes below spouts and handles of portafilters.
 HEIGHTS_M = (0.035, 0.045)
-HANDLE_BEHIND = 0.35  # of the handle's direction along the approach: less is in the way of a finger
+HANDLE_BEHIND = 0.35  # of the handle's direction along the approach: less would block a finger
 HANDLE_M = 0.008  # what stands out farther than this from the body is the handle
 UPPER, ASKEW = 0.3, 4.0  # what a score loses by a higher grip, and by a radian beyond a small angle to the heading
 SMALL_RAD = np.deg2rad(21.0)

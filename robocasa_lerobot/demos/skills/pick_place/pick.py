@@ -7,7 +7,8 @@ drive where the arm falls short. A grasp that fails is followed by another one.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from functools import cache, partial
 
 import numpy as np
 
@@ -22,19 +23,27 @@ from robocasa_lerobot.demos.motion import (
     pose_error,
     rotation_about,
 )
+from robocasa_lerobot.demos.planning.follow import follow_joint_path
+from robocasa_lerobot.demos.planning.grasps import GraspPose
 from robocasa_lerobot.demos.skills.common import SkillError, close_fingers, draw_back, hold_hand, move_hand
-from robocasa_lerobot.demos.skills.pick_place.grasp_strategy import LIFT_M, GraspStrategy, ahead_of, entry, steep
+from robocasa_lerobot.demos.skills.pick_place.grasp_strategy import (
+    LIFT_M,
+    GraspStrategy,
+    ahead_of,
+    entry,
+    steep,
+)
 from robocasa_lerobot.demos.skills.pick_place.graspable import Graspable
 from robocasa_lerobot.demos.skills.reaching import (
     GOOD_ENOUGH,
     Held,
-    ReachPlan,
+    MotionPlan,
     WaypointPath,
     approach,
-    lead,
     plan_reach,
 )
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
+from robocasa_lerobot.envs.predicates.robot import Grasped
 from robocasa_lerobot.envs.scene.robot_poses import RobotPose
 
 ATTEMPTS = 5
@@ -46,11 +55,13 @@ LOW_COST = 0.05
 BLOCKED_M, BACK_M = 0.05, 0.08  # a hand as far as this from where the grasp begins is blocked: another grasp is next
 HELD_UP_M, LOWER_M = 0.08, 0.03
 LEVEL_LIFT_M, LEVEL_COST = 0.004, 0.1  # before it is drawn out level
-WORSE_GRASP = 0.45  # cost of a grasp's score below the best one's
 TRIED, ALIKE_M = 1.2, 0.015  # cost of a grasp like one that has failed: its place in the object is as near as this
 # An object that is held is nearer than this to where it was in the hand when that closed, and has risen by this share
 # of the lift.
 HELD_M, ROSE_SHARE = 0.05, 0.25
+# Fingers that close askew to the wall of a vessel with others in it turn it as much, or stay apart by as much more than
+# what is between them: it would go on turning on its way.
+ASKEW_RAD, ASKEW_M, ASKEW_ATTEMPTS = float(np.deg2rad(8.0)), 0.010, 2
 
 
 def pick(env: KitchenEnv, obj: Graspable, strategy: GraspStrategy) -> Iterator[Array]:
@@ -61,7 +72,7 @@ def pick(env: KitchenEnv, obj: Graspable, strategy: GraspStrategy) -> Iterator[A
     """
     data = env.data
     tried: list[HandTarget] = []
-    for _ in range(ATTEMPTS):
+    for attempt in range(ATTEMPTS):
         if strategy.first is not None:
             yield from strategy.first(env)
         body = data.body(obj.name)
@@ -69,8 +80,9 @@ def pick(env: KitchenEnv, obj: Graspable, strategy: GraspStrategy) -> Iterator[A
         choice = yield from approach(env, lambda blocked: _best(env, obj, strategy, tried, blocked), OPEN)
         if choice.cost > HOPELESS:
             raise SkillError(f"{obj.title} is out of reach from here, or too near to other things")
-        yield from lead(env, choice.joints, OPEN)
         far, before, at, lifted, out = choice.path.targets
+        planned = _in_object(env, obj, at)  # which grasp this was, wherever the hand gets to
+        yield from follow_joint_path(env, choice.joints, OPEN)
         # All poses move with the object, should it have been touched meanwhile.
         moved = data.body(obj.name).xpos - start
         yield from move_hand(data, _shifted(far, moved), OPEN, tolerance=0.03)
@@ -80,8 +92,8 @@ def pick(env: KitchenEnv, obj: Graspable, strategy: GraspStrategy) -> Iterator[A
         )
         moved = data.body(obj.name).xpos - start
         if pose_error(data, _shifted(before, moved)).position > BLOCKED_M:
-            tried.append(_in_object(env, obj, HandTarget(at.position + moved, at.rotation)))
-            yield from draw_back(data, OPEN, BACK_M)
+            tried.append(planned)
+            yield from _leave_as_it_came(env, far, before)
             continue
         at = _shifted(at, moved)
         integral_gain = 0.0 if strategy.narrow else INTEGRAL_GAIN
@@ -90,7 +102,12 @@ def pick(env: KitchenEnv, obj: Graspable, strategy: GraspStrategy) -> Iterator[A
             more = (data.body(obj.name).xpos - start - moved) * [1.0, 1.0, 0.0]
             at = HandTarget(np.array([*(at.position + more)[:2], grip_position(data)[2]]), at.rotation)
             yield from move_hand(data, at, OPEN, speed=0.4, tolerance=0.004, max_steps=15)
+        upright = _uprightness(env, obj)
         yield from close_fingers(data, at, GRASP_STEPS)
+        turned, wide = abs(_uprightness(env, obj) - upright), _gap(env) - _width(choice)
+        if obj.contents and attempt < ASKEW_ATTEMPTS and (turned > ASKEW_RAD or wide > ASKEW_M):
+            yield from _let_go(env, tried, planned)
+            continue
         inside = _inside(env, obj)
         lift = float(lifted.position[2] - choice.path.targets[2].position[2])
         yield from move_hand(
@@ -103,18 +120,50 @@ def pick(env: KitchenEnv, obj: Graspable, strategy: GraspStrategy) -> Iterator[A
             integral_gain=INTEGRAL_GAIN,
         )
         rise = data.body(obj.name).xpos[2] - start[2] - moved[2]
-        if rise > ROSE_SHARE * lift and np.linalg.norm(_inside(env, obj) - inside) < HELD_M:
+        if (rise > ROSE_SHARE * lift and _stays(env, obj, inside)) or is_held(env, obj.name):
             yield from _draw_out(env, _shifted(lifted, moved), _shifted(out, moved), strategy.narrow)
-            if np.linalg.norm(_inside(env, obj) - inside) < HELD_M:
+            if _stays(env, obj, inside) or is_held(env, obj.name):
                 return
-        tried.append(HandTarget(data.body(obj.name).xmat.reshape(3, 3).T @ (at.position - start), at.rotation))
-        yield from hold_hand(data, HandTarget(grip_position(data), hand_rotation(data)), OPEN, RELEASE_STEPS)
-        yield from draw_back(data, OPEN, BACK_M)
+        yield from _let_go(env, tried, planned)
     raise SkillError(f"{obj.title} was not lifted in {ATTEMPTS} attempts")
 
 
+def is_held(env: KitchenEnv, name: str) -> bool:
+    """Whether an object is between the fingers."""
+    return Grasped(name).holds(env.scene, env.data)
+
+
+def _stays(env: KitchenEnv, obj: Graspable, inside: Array) -> bool:
+    """Whether an object is about where it was in the hand; one that hangs from a thin part of it swings farther."""
+    return bool(np.linalg.norm(_inside(env, obj) - inside) < HELD_M)
+
+
+def _leave_as_it_came(env: KitchenEnv, far: HandTarget, before: HandTarget) -> Iterator[Array]:
+    """Out of where the hand is blocked, against the direction that it came along: it may be caught there."""
+    at = HandTarget(grip_position(env.data) + far.position - before.position, hand_rotation(env.data))
+    yield from move_hand(env.data, at, OPEN, tolerance=0.03, max_steps=40)
+
+
+def _let_go(env: KitchenEnv, tried: list[HandTarget], planned: HandTarget) -> Iterator[Array]:
+    """Open the fingers and draw back from a grasp that has failed; it is noted."""
+    data = env.data
+    tried.append(planned)
+    yield from hold_hand(data, HandTarget(grip_position(data), hand_rotation(data)), OPEN, RELEASE_STEPS)
+    yield from draw_back(data, OPEN, BACK_M)
+
+
+def _uprightness(env: KitchenEnv, obj: Graspable) -> float:
+    """How far an object's z axis is from the vertical, radians."""
+    return float(np.arccos(np.clip(env.data.body(obj.name).xmat[8], -1.0, 1.0)))
+
+
+def _gap(env: KitchenEnv) -> float:
+    """How far apart the fingers are, metres."""
+    return float(sum(abs(env.data.joint(name).qpos[0]) for name in env.scene.robot.names.finger_joints))
+
+
 def _draw_out(env: KitchenEnv, lifted: HandTarget, out: HandTarget, narrow: bool) -> Iterator[Array]:
-    """Move to where the path out ends; where the arm is held up by what is above it, a little lower."""
+    """Move to where the path out ends; where the arm is held up by an obstacle above it, a little lower."""
     if steep(lifted, out) and not narrow:
         yield from move_hand(env.data, out, CLOSED, speed=0.8, tolerance=0.03)
         return
@@ -125,7 +174,18 @@ def _draw_out(env: KitchenEnv, lifted: HandTarget, out: HandTarget, narrow: bool
         yield from move_hand(env.data, _shifted(out, -LOWER_M * UP), CLOSED, speed=0.8, tolerance=0.03)
 
 
-def best_grasp(env: KitchenEnv, obj: Graspable, strategy: GraspStrategy) -> ReachPlan:
+@dataclass(frozen=True)
+class _GraspPath(WaypointPath):
+    """The poses of a grasp, and how wide the object is between the fingers, metres."""
+
+    width: float = 0.0
+
+
+def _width(choice: MotionPlan) -> float:
+    return choice.path.width if isinstance(choice.path, _GraspPath) else 0.0
+
+
+def best_grasp(env: KitchenEnv, obj: Graspable, strategy: GraspStrategy) -> MotionPlan:
     """How an object would be grasped now; above a cost of about 2 it cannot be.
 
     Raises:
@@ -140,16 +200,19 @@ def _best(
     strategy: GraspStrategy,
     tried: list[HandTarget],
     blocked: Sequence[RobotPose],
-) -> ReachPlan:
+) -> MotionPlan:
     """The first tilt's best path if that is good, else the best of all tilts.
 
     Raises:
         SkillError: no pose fits.
     """
-    found: list[ReachPlan] = []
+    found: list[MotionPlan] = []
     point = env.data.body(obj.name).xpos.copy()
+    grasps = cache(partial(_grasps, env, obj, strategy))
+    compared = [pose.score for tilt, _ in strategy.tilts for pose in grasps(tilt)] if strategy.among_tilts else []
     for tilt, extra in strategy.tilts:
-        paths = _paths(env, obj, strategy, tried, tilt, extra)
+        best = max([*compared, *(pose.score for pose in grasps(tilt))], default=0.0)
+        paths = _paths(env, obj, strategy, tried, grasps(tilt), extra, best)
         found += plan_reach(env, paths, point, key=2, allowed=obj.bodies, blocked=blocked)[:1]
         if found and found[-1].cost <= GOOD_ENOUGH + extra:
             break
@@ -159,27 +222,36 @@ def _best(
 
 
 def _paths(
-    env: KitchenEnv, obj: Graspable, strategy: GraspStrategy, tried: list[HandTarget], tilt: float, extra: float
+    env: KitchenEnv,
+    obj: Graspable,
+    strategy: GraspStrategy,
+    tried: list[HandTarget],
+    poses: list[GraspPose],
+    extra: float,
+    best: float,
 ) -> list[WaypointPath]:
+    """Paths to grasps and away; what a grasp's score is below the best one's costs."""
     body = env.data.body(obj.name)
-    found = []
-    level = [rotation_about(UP, turn) @ ahead_of(env) for turn in (strategy.turns if tilt > 0.0 else (0.0,))]
-    poses = [pose for ahead in level for pose in strategy.poses(env, obj, np.cos(tilt) * -UP + np.sin(tilt) * ahead)]
-    best = max((pose.score for pose in poses), default=0.0)
+    found: list[WaypointPath] = []
     for pose in poses:
         local = body.xmat.reshape(3, 3).T @ (pose.position - body.xpos)
         alike = sum(np.linalg.norm(local - other.position) < ALIKE_M for other in tried)
-        cost = extra + WORSE_GRASP * (best - pose.score) + TRIED * float(alike)
+        cost = extra + strategy.worse_grasp * (best - pose.score) + TRIED * float(alike)
         for turn in (pose.rotation, pose.rotation @ np.diag([-1.0, -1.0, 1.0])):
             takes = _taken(env, obj, HandTarget(pose.position, turn))
             for name in strategy.entries:
                 for lift in {"up": (strategy.lift_m,), "level": (LEVEL_LIFT_M,)}.get(name, strategy.lifts):
                     out = -turn[:, 2] if name == "along" else entry(env, name)
                     low = LEVEL_COST if name == "level" else LOW_COST if lift < LIFT_M else 0.0
-                    found.append(
-                        WaypointPath(_poses(pose.position, turn, out, name, strategy, lift), cost + low, takes)
-                    )
+                    poses_on_it = _poses(pose.position, turn, out, name, strategy, lift)
+                    found.append(_GraspPath(poses_on_it, cost + low, takes, pose.width))
     return found
+
+
+def _grasps(env: KitchenEnv, obj: Graspable, strategy: GraspStrategy, tilt: float) -> list[GraspPose]:
+    """Grasps by a hand that is tilted so, in all its turns."""
+    level = [rotation_about(UP, turn) @ ahead_of(env) for turn in (strategy.turns if tilt > 0.0 else (0.0,))]
+    return [pose for ahead in level for pose in strategy.poses(env, obj, np.cos(tilt) * -UP + np.sin(tilt) * ahead)]
 
 
 def _taken(env: KitchenEnv, obj: Graspable, hand: HandTarget) -> Held:

@@ -23,10 +23,18 @@ from robocasa_lerobot.demos.motion import (
 )
 from robocasa_lerobot.demos.skills.common import SkillError, hold_hand, move_hand
 from robocasa_lerobot.demos.skills.navigation import drive_to
+from robocasa_lerobot.demos.skills.pick_place.carrying.level import level_hand, level_out
 from robocasa_lerobot.demos.skills.pick_place.grasp_strategy import FROM_ABOVE, GraspStrategy, ahead_of, entry, steep
 from robocasa_lerobot.demos.skills.pick_place.graspable import Graspable
 from robocasa_lerobot.demos.skills.pick_place.pick import INTEGRAL_GAIN
-from robocasa_lerobot.demos.skills.reaching import Held, ReachPlan, WaypointPath, approach, lead, plan_reach
+from robocasa_lerobot.demos.skills.reaching import (
+    Held,
+    MotionPlan,
+    WaypointPath,
+    approach,
+    follow_with,
+    plan_reach,
+)
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.scene.robot_poses import RobotPose
 
@@ -35,13 +43,14 @@ GAP_M = 0.012  # of the underside above the place pose when the hand opens
 BLOCKED_M = 0.08  # a hand as far as this from where it is to let go is blocked, and keeps what it holds
 CLEAR_M = 0.06  # along the hand, out of what it held, before it leaves
 AWAY_M = 0.26
+MOST_SLIP_M = 0.03  # in the hand that is made up for
 GONE_M = 0.27  # of the grip site from the object's origin: tasks ask for 25 cm
 YAWS = 12
 UP_RISE_M, RISES_M, LOW_COST = 0.06, (0.035, 0.010), 0.05  # over where it is let go, on the path in
 LEVEL_RISE_M, LEVEL_COST = 0.004, 0.1
-AGAIN, AGAIN_M = 0.5, 0.02  # cost of a hand that goes where it went in vain, as near as this
-LEANING = 0.35  # cost of a radian that the object is tilted
-LEVEL_FINGERS = 0.35  # sine of the slope of the line between the fingers
+AGAIN, AGAIN_M = 0.5, 0.02  # cost of a hand that goes where it went without success, as near as this
+LEANING, LOADED_LEANING = 0.35, 1.0  # cost of a radian that the object is tilted, and of one with others in it
+LEVEL_FINGERS, SLOPE = 0.35, 0.5  # sine of the slope of the line between the fingers, and what that costs
 
 
 @dataclass(frozen=True)
@@ -85,28 +94,27 @@ class PlaceStrategy:
 
 
 def put(env: KitchenEnv, obj: Graspable, strategy: PlaceStrategy, failed: list[Array]) -> Iterator[Array]:
-    """Bring what is in the hand to one of the place poses, let go, and leave; the hand's place is noted in `failed`.
+    """Bring the object in the hand to one of the place poses, let go, and leave; the hand's place is noted in `failed`.
 
-    Where the hand is blocked on its way, it keeps what it holds.
+    Where the hand is blocked before it is there, it keeps what it holds.
 
     Raises:
         SkillError: there is nowhere to put it.
     """
     data = env.data
     held = Held.now(data, obj.name, obj.contents)
-    poses = list(strategy.poses())
-    paths = [path for pose in poses for path in _paths(env, obj, held, pose, strategy, failed)]
-    if not paths:
-        raise SkillError(f"{obj.title}: nowhere to put it")
-    mine = obj.bodies | obj.carried
-    middle = np.mean([pose.point for pose in poses], axis=0)
-
-    def plan(blocked: Sequence[RobotPose]) -> ReachPlan:
-        return plan_reach(env, paths, middle, key=2, held=held, loaded=3, allowed=mine, blocked=blocked)[0]
-
-    choice = yield from approach(env, plan, CLOSED)
+    yield from level_out(env, obj)
+    choice = yield from approach(env, _planner(env, obj, strategy, failed), CLOSED, held)
+    if not _holds(env, held):
+        return
+    if obj.contents:  # which have moved it in the hand
+        yield from level_out(env, obj)
+        choice = _planner(env, obj, strategy, failed, may_drive=False)(())
+    held = Held.now(data, obj.name, obj.contents)
     failed.append(choice.path.targets[2].position)
-    yield from lead(env, choice.joints, CLOSED)
+    yield from follow_with(env, choice.joints, held)
+    if not _holds(env, held):
+        return
     far, above, low, clear, away = choice.path.targets
     # A path in through a front is kept from its beginning on.
     inwards = strategy.narrow or not steep(far, above)
@@ -121,12 +129,15 @@ def put(env: KitchenEnv, obj: Graspable, strategy: PlaceStrategy, failed: list[A
     )
     if not _holds(env, held):
         return
+    if obj.contents:  # it goes in as was planned, however it has turned and slipped in the hand until now
+        above, low = (_as_it_lies(env, pose, held) for pose in (above, low))
+        held = Held.now(data, obj.name, obj.contents)
     yield from move_hand(data, above, CLOSED, speed=0.7 if inwards else 1.0, max_steps=90, start=line)
     if not _holds(env, held):
         return
     # What has slipped in the hand goes to the place pose, not the hand.
     slipped = (_origin(low, held) - _origin_now(env, obj, low)) * [1.0, 1.0, 0.0]
-    low = HandTarget(low.position + np.clip(slipped, -0.03, 0.03), low.rotation)
+    low = HandTarget(low.position + np.clip(slipped, -MOST_SLIP_M, MOST_SLIP_M), low.rotation)
     yield from move_hand(data, low, CLOSED, speed=0.5, tolerance=0.008, max_steps=60, integral_gain=INTEGRAL_GAIN)
     if pose_error(data, low).position > BLOCKED_M:
         yield from move_hand(data, above, CLOSED, speed=0.6, tolerance=0.03, max_steps=30)
@@ -137,6 +148,30 @@ def put(env: KitchenEnv, obj: Graspable, strategy: PlaceStrategy, failed: list[A
     line = clear.position if inwards else None
     yield from move_hand(data, away, OPEN, tolerance=0.03, max_steps=60, start=line)
     yield from leave(env, obj)
+
+
+def _planner(
+    env: KitchenEnv, obj: Graspable, strategy: PlaceStrategy, failed: list[Array], *, may_drive: bool = True
+) -> Callable[[Sequence[RobotPose]], MotionPlan]:
+    """What plans the path to the place poses with the object as it lies in the hand now.
+
+    Raises:
+        SkillError: there is nowhere to put it.
+    """
+    held = Held.now(env.data, obj.name, obj.contents)
+    poses = list(strategy.poses())
+    paths = [path for pose in poses for path in _paths(env, obj, held, pose, strategy, failed)]
+    if not paths:
+        raise SkillError(f"{obj.title}: nowhere to put it")
+    mine = obj.bodies | obj.carried
+    middle = np.mean([pose.point for pose in poses], axis=0)
+
+    def plan(blocked: Sequence[RobotPose]) -> MotionPlan:
+        return plan_reach(
+            env, paths, middle, key=2, held=held, loaded=3, allowed=mine, blocked=blocked, may_drive=may_drive
+        )[0]
+
+    return plan
 
 
 def leave(env: KitchenEnv, obj: Graspable) -> Iterator[Array]:
@@ -160,7 +195,8 @@ def _paths(
 ) -> list[WaypointPath]:
     ahead = ahead_of(env)
     left = np.cross(UP, ahead)
-    present = hand_rotation(env.data)
+    present = level_hand(env, obj)
+    leaning = LOADED_LEANING if obj.contents else LEANING
     level = float(present[:, 2] @ UP) > -0.85  # a hand that looks ahead keeps doing so
     found = []
     for index in range(YAWS):
@@ -170,13 +206,14 @@ def _paths(
             continue
         for lean, turn in itertools.product(strategy.leans, strategy.turns):
             rotation = rotation_about(UP, turn) @ rotation_about(left, -lean) @ turned
-            if strategy.falls and abs(float(rotation[2, 1])) > LEVEL_FINGERS:
+            slope = abs(float(rotation[2, 1])) if strategy.falls else 0.0
+            if slope > LEVEL_FINGERS:
                 continue
             object_turn = rotation @ held.rotation
             origin = pose.point + (obj.below(object_turn) + strategy.gap_m) * UP
             low = origin - rotation @ held.position
             again = sum(np.linalg.norm(low - other) < AGAIN_M for other in failed)
-            cost = pose.extra + AGAIN * float(again) + LEANING * lean + 0.08 * min(yaw, 2 * np.pi - yaw)
+            cost = pose.extra + AGAIN * float(again) + leaning * lean + SLOPE * slope + 0.08 * min(yaw, 2 * np.pi - yaw)
             for name in strategy.entries:
                 for rise in {"up": (UP_RISE_M,), "level": (LEVEL_RISE_M,)}.get(name, RISES_M):
                     extra = cost + (LEVEL_COST if name == "level" else LOW_COST if rise == min(RISES_M) else 0.0)
@@ -197,6 +234,13 @@ def _path(low: Array, rotation: Array, out: Array, name: str, in_m: float, rise:
 def _holds(env: KitchenEnv, held: Held) -> bool:
     now = Held.now(env.data, held.name)
     return bool(np.linalg.norm(now.position - held.position) < 0.06)
+
+
+def _as_it_lies(env: KitchenEnv, hand: HandTarget, held: Held) -> HandTarget:
+    """The hand's pose that brings an object, as it lies in the hand now, to where `hand` did as it was held before."""
+    now = Held.now(env.data, held.name)
+    rotation = hand.rotation @ held.rotation @ now.rotation.T
+    return HandTarget(_origin(hand, held) - rotation @ now.position, rotation)
 
 
 def _origin(hand: HandTarget, held: Held) -> Array:

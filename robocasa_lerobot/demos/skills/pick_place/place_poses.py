@@ -13,6 +13,7 @@ from robocasa_lerobot.demos.skills.pick_place.place import PlacePose
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.kitchens.appliances.kinds.stove import Hob
 from robocasa_lerobot.envs.kitchens.fixtures.base import Region
+from robocasa_lerobot.envs.predicates.objects import RECEPTACLE_SHARE, radius
 
 type PlacePoses = Callable[[], Sequence[PlacePose]]
 
@@ -21,12 +22,16 @@ DROPS = ((0.0, 0.0), (0.5, 0.4), (1.1, 0.7))
 EDGE_M, OFF_SHARE, BESIDE_COST = 0.005, 0.5, 3.0  # beside the middle, with a cost for each metre
 ASIDE_SHARE, ON_OTHERS_COST = 0.4, 8.0  # beside what lies there, with a gain for each metre from it
 LEAST_ROOM_M, SHALLOW_M = 0.01, 0.02
+COUNTS_SHARE = 0.85  # of the distance from the middle at which goals count an object as in or on another one
+# In a vessel an object goes to where others heap up least, so that it comes to touch the vessel: cost for each metre,
+# and factors of how far it is from the middle.
+HEAP_COST, BESIDE_SHARES = 8.0, (1.0, 1.4)
 BASIN_AHEAD_M, BASIN_ASIDE_M = 0.09, 0.08  # from the basin's middle: before the faucet, whose spout reaches over it
 # Heights of the underside over the basin's rim at which an object is let go, metres, with their costs.
 BASIN_DROPS = ((-0.07, 0.0), (-0.03, 0.2), (0.02, 0.5))
 REGION_EDGE_M = 0.015  # kept from a region's sides
 INWARDS = (0.0, 0.05, 0.10)  # from the front of a region, metres
-DROPS_M = (0.0, 0.04, 0.08, 0.12)  # over the floor of what is open above
+DROPS_M = (0.0, 0.04, 0.08, 0.12)  # over the floor of receptacles that are open above
 DROP_COST, DEEP_COST, ASIDE_COST = 2.0, 2.0, 0.5  # for each metre
 HIGH_COST = 0.5  # for each metre that a shelf is above the lowest one
 OVER_RIM_M = (0.0, 0.015, 0.03, 0.045)  # of the underside
@@ -48,25 +53,50 @@ def on_object(env: KitchenEnv, obj: Graspable, holder: str) -> PlacePoses:
             return [PlacePose(body.xpos + UP * placed.item.size[2] / 2)]
         middle, half = np.array(inside.center), np.array(inside.half)
         deep = 2 * half[2]
-        others = [data.body(name).xpos[:2].copy() for name in contents_of(env, placed.name) if name != obj.name]
+        most = COUNTS_SHARE * RECEPTACLE_SHARE * radius(env.scene, placed.name)
+        names = [name for name in contents_of(env, placed.name) if name != obj.name]
+        others = [data.body(name).xpos[:2].copy() for name in names]
+        tops = _points_of(env, names)
+        width = float(np.sort(obj.half_extents(data.body(obj.name).xmat.reshape(3, 3))[:2])[0])
         room = np.maximum(half[:2] - obj.half_extents(np.eye(3))[:2].max() - EDGE_M, 0.0)
         room = np.minimum(room, OFF_SHARE * half[:2])
         if others:  # beside them, though it may then lean on the wall
             room = np.maximum(room, ASIDE_SHARE * half[:2])
         found = []
-        for x, y in itertools.product((0, -1, 1), (0, -1, 1)):
-            if (x, y) != (0, 0) and room.max() <= LEAST_ROOM_M:
+        sides, heaped = (0.0, -1.0, 1.0), bool(others) and deep > SHALLOW_M
+        for i, j, share in itertools.product(sides, sides, BESIDE_SHARES if heaped else BESIDE_SHARES[:1]):
+            if (i, j) != (0.0, 0.0) and room.max() <= LEAST_ROOM_M:
                 continue
-            floor = body.xpos + turn @ (middle + np.array([x * room[0], y * room[1], -half[2]]))
-            cost = BESIDE_COST * float(np.hypot(x * room[0], y * room[1]))
+            beside = np.array([i, j]) * share * room
+            beside *= most / max(float(np.linalg.norm(beside)), most)
+            floor = body.xpos + turn @ (middle + np.array([*beside, -half[2]]))
+            cost = BESIDE_COST * float(np.linalg.norm(beside))
+            if heaped:
+                cost += HEAP_COST * _height_at(tops, floor, width)
             cost -= ON_OTHERS_COST * min((float(np.linalg.norm(floor[:2] - other)) for other in others), default=0.0)
             found += [
-                PlacePose(floor + UP * deep * share, cost + (extra if deep > SHALLOW_M else 0.0))
-                for share, extra in DROPS
+                PlacePose(floor + UP * deep * drop, cost + (extra if deep > SHALLOW_M else 0.0))
+                for drop, extra in DROPS
             ]
         return found
 
     return poses
+
+
+def _points_of(env: KitchenEnv, names: Sequence[str]) -> Array:
+    """Points (n, 3) in the room that fill objects."""
+    found: list[Array] = [np.zeros((0, 3))]
+    for name in names:
+        body = env.data.body(name)
+        turn = body.xmat.reshape(3, 3)
+        found += [filled(solid.cloud()) @ turn.T + body.xpos for solid in graspable(env, name).solids]
+    return np.concatenate(found)
+
+
+def _height_at(points: Array, floor: Array, within: float) -> float:
+    """How high points reach over a floor, no farther than `within` from a place on it, metres."""
+    near = points[np.linalg.norm(points[:, :2] - floor[:2], axis=1) < within]
+    return float(max(near[:, 2].max() - floor[2], 0.0)) if len(near) else 0.0
 
 
 def in_basin(env: KitchenEnv, basin: Region) -> PlacePoses:
@@ -162,7 +192,7 @@ def over_burners(env: KitchenEnv, obj: Graspable, hob: Hob, burners: Sequence[st
 
 
 def _apart_from_knob(env: KitchenEnv, hob: Hob, burner: str, floor: Array) -> float:
-    """How far a burner's own knob is from its middle where both are on top; a knob on the front is in nobody's way."""
+    """How far a burner's own knob is from its middle where both are on top; a knob on the front blocks no hand."""
     away = env.data.body(f"{hob.name}_knob_{burner}").xpos - floor
     return float(np.linalg.norm(away[:2])) if away[2] > -ON_TOP_M else np.inf
 

@@ -2,24 +2,20 @@
 
 from __future__ import annotations
 
-import copy
 import itertools
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
-import mujoco
 import numpy as np
 
 from robocasa_lerobot.demos.motion import OPEN, Array, base_pose, floor_axes
-from robocasa_lerobot.demos.planning.kinematics import Arm
-from robocasa_lerobot.demos.skills.base_shift import collisions
+from robocasa_lerobot.demos.planning.collision import CollisionChecker
 from robocasa_lerobot.demos.skills.navigation import Room
 from robocasa_lerobot.demos.skills.pick_place.grasp_strategy import GraspStrategy
 from robocasa_lerobot.demos.skills.pick_place.level_grasps import level_grasps
 from robocasa_lerobot.demos.skills.reaching import go_to
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.kitchens.appliances.kinds.microwave import Microwave
-from robocasa_lerobot.envs.robots.panda_omron.robot import PANDA_OMRON
 from robocasa_lerobot.envs.scene.robot_poses import RobotPose
 
 ASIDES_M = (0.08, 0.02, -0.03, -0.06, -0.09, -0.12, -0.15)  # of a stand to the right of the cavity's middle
@@ -58,8 +54,7 @@ def _path_around(env: KitchenEnv, base: Array, yaw: float, beside: float) -> Seq
     """Places of the shortest path on which the folded robot meets nothing; none where there is no such path."""
     ahead, left = floor_axes(yaw)
     room = Room(env.scene)
-    data = copy.copy(env.data)
-    data.qpos[Arm(env.model, env.data).addresses] = PANDA_OMRON.home.arm
+    checker = CollisionChecker(env.scene, env.data)
 
     def at(back: float, right: float) -> RobotPose:
         x, y, _ = (base - back * ahead - right * left).tolist()
@@ -67,13 +62,10 @@ def _path_around(env: KitchenEnv, base: Array, yaw: float, beside: float) -> Seq
 
     def clear(one: RobotPose, other: RobotPose) -> bool:
         count = max(int(np.ceil(np.hypot(other.x - one.x, other.y - one.y) / STEP_M)), 1)
-        for share in np.arange(1, count + 1) / count:
-            x, y = one.x + share * (other.x - one.x), one.y + share * (other.y - one.y)
-            PANDA_OMRON.place_base(env.model, data, x, y, yaw)
-            mujoco.mj_kinematics(env.model, data)
-            if not room.free(RobotPose(x, y, yaw)) or collisions(env.model, data, frozenset()):
-                return False
-        return True
+        shares = (np.arange(1, count + 1) / count).tolist()
+        between = [RobotPose(one.x + t * (other.x - one.x), one.y + t * (other.y - one.y), yaw) for t in shares]
+        bases = np.array([(pose.x, pose.y, yaw) for pose in between])
+        return bool(room.all_free(between).all() and checker.free(bases, checker.arm.home).all())
 
     for more, aside, back in itertools.product(MORE_BACK_M, ASIDES_M, BACKS_M):
         places = [at(0.0, 0.0), at(back, 0.0), at(back, beside + aside), at(more, beside + aside)]

@@ -23,7 +23,7 @@ from robocasa_lerobot.demos.skills.pick_place.graspable import Graspable
 from robocasa_lerobot.demos.skills.pick_place.level_grasps import level_grasps
 from robocasa_lerobot.demos.skills.pick_place.location import Location, locate
 from robocasa_lerobot.demos.skills.pick_place.mugs import FROM_THE_SIDE, UNDER_A_SPOUT
-from robocasa_lerobot.demos.skills.pick_place.pick import RELEASE_STEPS, best_grasp
+from robocasa_lerobot.demos.skills.pick_place.pick import HOPELESS, RELEASE_STEPS, best_grasp
 from robocasa_lerobot.demos.skills.pick_place.place import PlaceStrategy
 from robocasa_lerobot.demos.skills.pick_place.place_poses import (
     DROPS_M,
@@ -36,6 +36,7 @@ from robocasa_lerobot.demos.skills.pick_place.place_poses import (
     over_jug,
 )
 from robocasa_lerobot.demos.skills.pick_place.reach_in import OUT_OF_A_MICROWAVE, OUT_OF_A_TOASTER_OVEN
+from robocasa_lerobot.demos.skills.pick_place.turn_across import lies_across, turn_across
 from robocasa_lerobot.demos.skills.racks import pull
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.kitchens.appliances.kinds.blender import Blender
@@ -50,25 +51,27 @@ from robocasa_lerobot.envs.kitchens.fixtures.base import Fixture, Region
 from robocasa_lerobot.envs.kitchens.fixtures.cabinets import Drawer, HingeCabinet
 from robocasa_lerobot.envs.kitchens.fixtures.counters import Counter
 from robocasa_lerobot.envs.kitchens.fixtures.regions import regions_of
-from robocasa_lerobot.envs.predicates.logic import AllOf
+from robocasa_lerobot.envs.predicates.logic import every_goal_in
 from robocasa_lerobot.envs.predicates.objects import ObjectInside
 from robocasa_lerobot.envs.tasks.conditions import IN_RANGE, stage_condition
 from robocasa_lerobot.envs.tasks.task import Stage
 
 OUT_OF_CABINET = replace(ANY_APPROACH, narrow=True, poses=level_grasps)
 HARD = 1.0  # cost of taking something out of a drawer, from which on it is pulled out first
+MOST_TURNS = 2  # of what lies across behind a front
 FARTHER_OUT_M = 0.12  # how far
 FARTHER_M = 1.1  # of a free place on a counter from the base, where an open drawer keeps the robot off
 OFF_M = 0.10  # of the hand from what it has let go
-# A vessel as deep as this keeps what it holds when it is tilted by this much on its way in, metres, radians.
+# A vessel as deep as this keeps what it holds when it is tilted by this much as it goes in, metres, radians.
 DEEP_M, DEEP_LEAN = 0.035, float(np.deg2rad(30.0))
-# Of a vessel at its rim, that is to go through a front: the hand is tilted so that it fits under what is above.
+# Of a vessel at its rim, that is to go through a front: the hand is tilted so that it fits under the edge above, yet
+# about as walls of bowls lean. Fingers that are askew to a wall turn the vessel: the grasp counts for more.
+_RIM_TILTS = ((46, 0.0), (40, 0.0), (52, 0.0), (34, 0.05), (58, 0.1), (64, 0.2), (24, 0.3), (0, 0.7))
 LEANING_GRASP = replace(
     ANY_APPROACH,
-    tilts=tuple(
-        (float(np.deg2rad(tilt)), extra)
-        for tilt, extra in ((62, 0.0), (72, 0.1), (52, 0.1), (40, 0.4), (20, 0.7), (0, 0.9))
-    ),
+    tilts=tuple((float(np.deg2rad(tilt)), extra) for tilt, extra in _RIM_TILTS),
+    worse_grasp=1.0,
+    among_tilts=True,
 )
 LEVEL_HAND = -0.85  # of the hand's approach along the vertical: above it, the hand looks ahead rather than down
 _SMALL, _STEEP, _STEEPEST = np.deg2rad(25.0), np.deg2rad(30.0), np.deg2rad(55.0)
@@ -84,9 +87,9 @@ def grasp_strategy(env: KitchenEnv, obj: Graspable, free: GraspStrategy) -> Gras
     place = locate(env, obj.name)
     match place.fixture:
         case Microwave():
-            return OUT_OF_A_MICROWAVE
+            return replace(OUT_OF_A_MICROWAVE, first=_turn_first(obj, OUT_OF_A_MICROWAVE))
         case ToasterOven():
-            return OUT_OF_A_TOASTER_OVEN
+            return replace(OUT_OF_A_TOASTER_OVEN, first=_turn_first(obj, OUT_OF_A_TOASTER_OVEN))
         case Toaster() if obj.item is not None and obj.item.upright_axis is not None:
             return FROM_A_SLOT
         case CoffeeMachine():
@@ -94,7 +97,7 @@ def grasp_strategy(env: KitchenEnv, obj: Graspable, free: GraspStrategy) -> Gras
         case Drawer() as drawer:
             return replace(OUT_OF_DRAWER, first=_clear_of_counter(obj, drawer))
         case HingeCabinet():
-            return OUT_OF_CABINET
+            return replace(OUT_OF_CABINET, first=_turn_first(obj, OUT_OF_CABINET))
         case _ if "drawer" in place.region:
             return replace(FROM_CRISPER, first=_pull_out_first(obj, place))
         case _ if in_the_open(place):
@@ -170,7 +173,7 @@ def _into_regions(env: KitchenEnv, obj: Graspable, fixture: Fixture, part: str, 
             )  # fmt: skip
         case StandMixer():
             return PlaceStrategy(
-                over_bowl(env, regions[0]), leans=_BOWL_LEANS, entries=("up", "across", "out"), in_m=0.2
+                over_bowl(env, regions[0]), leans=_BOWL_LEANS, entries=("up", "across", "out"), in_m=0.2, falls=True
             )
         case Drawer():
             return PlaceStrategy(in_regions(env, obj, regions, DROPS_M), leans=_DRAWER_LEANS, entries=("up", "across"))
@@ -195,8 +198,7 @@ def _looks_ahead(env: KitchenEnv) -> bool:
 def _counts(env: KitchenEnv, stage: Stage, region: Region) -> bool:
     """Whether objects in a region count, where the stage's condition bounds its height."""
     floor = float(region.world(env.data, (0.0, 0.0, -region.half[2]))[2])
-    whole = stage_condition(env.declaration, stage)
-    for term in whole.parts if isinstance(whole, AllOf) else (whole,):
+    for term in every_goal_in(stage_condition(env.declaration, stage)):
         if isinstance(term, ObjectInside):
             low, high, least = term.height
             return low <= floor <= high and 2 * region.half[2] >= least
@@ -204,7 +206,7 @@ def _counts(env: KitchenEnv, stage: Stage, region: Region) -> bool:
 
 
 def _clear_of_counter(obj: Graspable, drawer: Drawer) -> Callable[[KitchenEnv], Iterator[Array]]:
-    """Before a grasp: pull the drawer farther out where the counter over it is in the way, or where a grasp failed."""
+    """Before a grasp: pull the drawer farther out where the counter over it blocks the hand, or a grasp failed."""
     again = False
 
     def first(env: KitchenEnv) -> Iterator[Array]:
@@ -216,8 +218,23 @@ def _clear_of_counter(obj: Graspable, drawer: Drawer) -> Callable[[KitchenEnv], 
     return first
 
 
+def _turn_first(obj: Graspable, strategy: GraspStrategy) -> Callable[[KitchenEnv], Iterator[Array]]:
+    """Before a grasp through a front: turn what lies across where no grasp is worth a try, or where one failed."""
+    left, again = MOST_TURNS, False
+
+    def first(env: KitchenEnv) -> Iterator[Array]:
+        nonlocal left, again
+        while left and lies_across(env, obj) and (again or best_grasp(env, obj, strategy).cost > HOPELESS):
+            left, again = left - 1, False
+            if not (yield from turn_across(env, obj)):
+                break
+        again = True
+
+    return first
+
+
 def _pull_out_first(obj: Graspable, place: Location) -> Callable[[KitchenEnv], Iterator[Array]]:
-    """Before the first grasp in a drawer of an appliance: pull it all the way out where the object is hard to reach."""
+    """Before the first grasp in a drawer of an appliance: pull it fully out where the object is hard to reach."""
     done = False
 
     def first(env: KitchenEnv) -> Iterator[Array]:

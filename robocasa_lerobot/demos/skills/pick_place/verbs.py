@@ -1,4 +1,4 @@
-"""The verbs of picking and placing: pick an object and keep it; place what is held, after picking it up if need be."""
+"""The verbs of picking and placing: pick an object and keep it; place the held one, after picking it up if need be."""
 
 from __future__ import annotations
 
@@ -6,21 +6,22 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from robocasa_lerobot.demos.motion import OPEN, Array, HandTarget, base_pose, grip_position, hand_rotation
+from robocasa_lerobot.demos.motion import CLOSED, OPEN, Array, HandTarget, grip_position, hand_rotation
+from robocasa_lerobot.demos.planning.base_path import base_now
 from robocasa_lerobot.demos.skills.common import SkillError, hold_hand, stage_done
+from robocasa_lerobot.demos.skills.fold import fold_arm
 from robocasa_lerobot.demos.skills.navigation import drive_to
-from robocasa_lerobot.demos.skills.pick_place.carry import carry_to, go_to_object, in_reach, standing_pose_for
+from robocasa_lerobot.demos.skills.pick_place.carrying.carry import carry_to, go_to_object, in_reach, standing_pose_for
 from robocasa_lerobot.demos.skills.pick_place.grasp_strategy import ANY_APPROACH, GraspStrategy
 from robocasa_lerobot.demos.skills.pick_place.graspable import Graspable, graspable
 from robocasa_lerobot.demos.skills.pick_place.location import locate
-from robocasa_lerobot.demos.skills.pick_place.pick import pick
+from robocasa_lerobot.demos.skills.pick_place.pick import is_held, pick
 from robocasa_lerobot.demos.skills.pick_place.place import PlaceStrategy, put
 from robocasa_lerobot.demos.skills.pick_place.reach_in import drive_around_open_door
 from robocasa_lerobot.demos.skills.pick_place.strategies import grasp_strategy, place_strategy, target_object
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.kitchens.appliances.kinds.microwave import Microwave
 from robocasa_lerobot.envs.kitchens.fixtures.base import Fixture
-from robocasa_lerobot.envs.predicates.robot import Grasped
 from robocasa_lerobot.envs.scene.robot_poses import RobotPose
 from robocasa_lerobot.envs.tasks.task import Stage
 
@@ -57,14 +58,15 @@ def place_object(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
         for _ in range(SETTLE_STEPS):
             if stage_done(env, stage):
                 return
-            yield from hold_hand(env.data, HandTarget(grip_position(env.data), hand_rotation(env.data)), OPEN, 1)
+            fingers = CLOSED if is_held(env, obj.name) else OPEN  # what was blocked on its way is kept
+            yield from hold_hand(env.data, HandTarget(grip_position(env.data), hand_rotation(env.data)), fingers, 1)
     raise SkillError(f"{graspable(env, stage.object).title} is not where it belongs after {ATTEMPTS} attempts")
 
 
 def drive(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
     """Drive to where a robot stands to use the stage's target, a fixture's role or an object's name.
 
-    What is in the hand goes along; the stage's object, if any, is picked up where it is not in the hand.
+    An object in the hand goes along; the stage's object, if any, is picked up where it is not in the hand.
 
     Raises:
         SkillError: there is no path, the base got stuck, or the object cannot be picked up.
@@ -81,8 +83,9 @@ def drive(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
     else:
         stand = env.scene.standing_pose(stage.target)
     if obj is not None:
-        yield from carry_to(env, obj, stand)
+        yield from carry_to(env, obj, stand, _next_place(env, stage, obj))
     else:
+        yield from fold_arm(env)  # it may still reach into what it has put something into
         yield from drive_to(env, stand.x, stand.y, stand.yaw)
 
 
@@ -102,23 +105,17 @@ def take(env: KitchenEnv, obj: Graspable, free: GraspStrategy) -> Iterator[Array
         except SkillError:
             if len(been) == MOST_PLACES - 1:
                 raise
-        base, yaw = base_pose(env.data)
-        been.append(RobotPose(float(base[0]), float(base[1]), yaw))
-
-
-def is_held(env: KitchenEnv, name: str) -> bool:
-    """Whether an object is between the fingers."""
-    return Grasped(name).holds(env.scene, env.data)
+        been.append(base_now(env.data))
 
 
 def _bring(env: KitchenEnv, stage: Stage, obj: Graspable, strategy: PlaceStrategy) -> Iterator[Array]:
-    """Carry what is held to before the stage's target, where that is out of reach."""
+    """Carry the held object to before the stage's target, where that is out of reach."""
     poses = [pose.point for pose in strategy.poses()]
     fixture = _target_fixture(env, stage)
     if fixture is None or (poses and in_reach(env, np.mean(poses, axis=0))):
         return
     middle = np.mean(poses, axis=0) if poses else np.asarray(fixture.pos)
-    yield from carry_to(env, obj, standing_pose_for(env, fixture, middle))
+    yield from carry_to(env, obj, standing_pose_for(env, fixture, middle), middle)
 
 
 def _target_fixture(env: KitchenEnv, stage: Stage) -> Fixture | None:
@@ -133,9 +130,20 @@ def _around_door(env: KitchenEnv, fixture: Fixture | None) -> Iterator[Array]:
 
 def _free_grasp(env: KitchenEnv, stage: Stage) -> GraspStrategy:
     """How an object that stands free is grasped best for where it goes next."""
+    following = _placing(env, stage)
+    return ANY_APPROACH if following is None else place_strategy(env, following, graspable(env, stage.object)).grasp
+
+
+def _next_place(env: KitchenEnv, stage: Stage, obj: Graspable) -> Array | None:
+    """The middle of where a later stage puts a stage's object down, world, metres."""
+    following = _placing(env, stage)
+    poses = [] if following is None else place_strategy(env, following, obj).poses()
+    return np.mean([pose.point for pose in poses], axis=0) if poses else None
+
+
+def _placing(env: KitchenEnv, stage: Stage) -> Stage | None:
+    """The next stage that puts a stage's object down."""
     stages = env.declaration.stages
     later = stages[stages.index(stage) + 1 :] if stage in stages else ()
-    for following in later:
-        if (following.skill, following.verb, following.object) == ("pick_place", "place", stage.object):
-            return place_strategy(env, following, graspable(env, stage.object)).grasp
-    return ANY_APPROACH
+    wanted = ("pick_place", "place", stage.object)
+    return next((each for each in later if (each.skill, each.verb, each.object) == wanted), None)

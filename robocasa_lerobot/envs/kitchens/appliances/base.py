@@ -121,7 +121,7 @@ class Appliance(Fixture):
         return self.share(data, door)
 
     def state(self, data: mujoco.MjData) -> dict[str, float | bool]:
-        """Shares of ranges of doors, racks, knobs and levers, and whether things are on."""
+        """Shares of ranges of doors, racks, knobs and levers, and whether it, or a part of it, is on."""
         return {part: self.share(data, part) for part in self.doors}
 
     def is_open(self, data: mujoco.MjData) -> bool:
@@ -142,7 +142,7 @@ class Appliance(Fixture):
         raise AssertionError(f"{self.name} has nothing to switch it on with")
 
     def set_rack(self, data: mujoco.MjData, share: float, rack: str) -> None:
-        """Slide a rack or drawer out by a share of its range; doors in its way are opened. For initial states."""
+        """Slide a rack or drawer out by a share of its range; doors that block it are opened. For initial states."""
         if share > 0.0:
             for door in self.doors:
                 if self.share(data, door) < RACK_DOOR_FROM:

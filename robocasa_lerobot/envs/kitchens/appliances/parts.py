@@ -13,10 +13,10 @@ from robocasa_lerobot.envs.kitchens.fixtures.base import Vector
 # Clearance behind a handle for a finger of the gripper, metres.
 HANDLE_STANDOFF_M = 0.045
 HANDLE_RADIUS_M = 0.008
-# What is too long to hide in its appliance, such as running water, waits this far below the floor, metres.
+# A part too long to hide in its appliance, such as running water, waits this far below the floor, metres.
 HIDDEN_M = 3.0
 
-# Of what faces a side: outwards, upwards as somebody there sees it, and the axis name of its round parts.
+# Of what faces a side: outwards, upwards as an observer there sees it, and the axis name of its round parts.
 _FACINGS: dict[str, tuple[NDArray[np.float64], NDArray[np.float64], str]] = {
     "front": (np.array([0.0, -1.0, 0.0]), np.array([0.0, 0.0, 1.0]), "y"),
     "top": (np.array([0.0, 0.0, 1.0]), np.array([0.0, 1.0, 0.0]), "z"),
@@ -117,7 +117,7 @@ class Parts(Shapes):
         facing: str = "front",
         style: str = "round",
     ) -> mujoco.MjsBody:
-        """A knob that turns clockwise for somebody it faces ("front", "top" or "right"); friction holds it.
+        """A knob that turns clockwise for an observer whom it faces ("front", "top" or "right"); friction holds it.
 
         `style` is "round" or "bar", a disc with a grip across it. A pointer shows where it stands.
         """
@@ -199,13 +199,13 @@ class Parts(Shapes):
         That something is on is thus part of the joint positions, which recordings keep. Geoms are added by the
         caller; the joint is `<appliance>_<part>_joint`. Nothing but the appliance's update moves it.
         """
-        start, way = np.asarray(hidden, dtype=np.float64), np.asarray(shown) - np.asarray(hidden)
-        length = float(np.linalg.norm(way))
+        start, travel = np.asarray(hidden, dtype=np.float64), np.asarray(shown) - np.asarray(hidden)
+        length = float(np.linalg.norm(travel))
         return self.slide(
             parent,
             part,
             start,
-            way / length,
+            travel / length,
             (0.0, length),
             mass=0.001,
             size=(0.01, 0.01, 0.01),

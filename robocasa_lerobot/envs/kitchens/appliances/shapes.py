@@ -1,4 +1,4 @@
-"""What is seen and touched of an appliance: boxes, blocks, tubes, pipes, shells.
+"""Visual and collision shapes of an appliance: boxes, blocks, tubes, pipes, shells.
 
 Round shapes are seen as generated meshes and touched as simple shapes that cameras do not show.
 """

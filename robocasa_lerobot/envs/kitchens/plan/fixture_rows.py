@@ -67,7 +67,7 @@ class Line:
     """Where a row runs: a point and a direction on the floor plan.
 
     Attributes:
-        x, y: its left end at the wall, seen by somebody who faces it; metres.
+        x, y: its left end at the wall, seen by someone who faces it; metres.
         yaw: of its fixtures, radians.
     """
 
@@ -372,13 +372,13 @@ def _microwave_housing(row: Row, middle: float, width: float) -> None:
     row.add(_cabinet_type(cabinet.doors), cabinet)
 
 
-def counter_things(row: Row, things: list[dict[str, Any]]) -> None:
+def counter_items(row: Row, items: list[dict[str, Any]]) -> None:
     """Add what stands on the row's counter: small appliances of the style, and accessories.
 
     An entry is a type and where its middle is along the row; `out` is the distance of its back from the wall (0.05),
-    `turn` its turn in degrees, `z` the height of a thing that hangs.
+    `turn` its turn in degrees, `z` the height of one that hangs.
     """
-    for entry in things:
+    for entry in items:
         kind, along = entry_kind(entry, (*kinds_standing("counter"), *SIZES))
         out, turn = float(entry.get("out", 0.05)), float(np.radians(entry.get("turn", 0.0)))
         if kind in kinds_standing("counter"):

@@ -20,11 +20,11 @@ from robocasa_lerobot.envs.kitchens.plan.fixture_rows import (
     Names,
     Row,
     base_row,
-    counter_things,
+    counter_items,
     total_width,
 )
 
-# Which way the doors of an island look, and the yaw of its fixtures.
+# In which direction the doors of an island face, and the yaw of its fixtures.
 FACING = {"front": 0.0, "right": np.pi / 2, "back": np.pi, "left": -np.pi / 2}
 STOOL_OUT_M = 0.12  # of a stool's middle from the counter's edge
 PENDANT_Z_M = 1.95
@@ -71,7 +71,7 @@ def add_island(record: dict[str, Any], kind: str, style: Style, names: Names, ce
     row.add("panel_cabinet", Panel(f"{prefix}back", back, pos, turned, surface="island", plain=False))
     _stools(row, names, record.get("stools", 0), length, -overhang - STOOL_OUT_M, turned)
     _pendants(row, names, record.get("pendants", 0), length, (COUNTER_DEPTH - overhang) / 2, ceiling)
-    counter_things(row, record.get("counter", []))
+    counter_items(row, record.get("counter", []))
     return row
 
 
@@ -92,7 +92,7 @@ def add_table(record: dict[str, Any], kind: str, style: Style, names: Names, cei
     _stools(row, names, record.get("stools", 0), width, -STOOL_OUT_M, yaw + np.pi, _LEGS_M)
     _stools(row, names, record.get("front_stools", 0), width, depth + STOOL_OUT_M, yaw, _LEGS_M)
     _pendants(row, names, record.get("pendants", 0), width, depth / 2, ceiling)
-    counter_things(row, record.get("counter", []))
+    counter_items(row, record.get("counter", []))
     return row
 
 

@@ -214,10 +214,10 @@ def ginger(d: Draft) -> None:
     )
     root = d.body(lumpy(d.rng, main, 0.15).flattened(0.2), rings)
     floor = float(root.vertices[:, 2].min())
-    for k, (where, way, up) in enumerate(((-0.22, 1, 0.05), (0.05, -1, 0.05), (0.25, 1, 0.15))):
-        end = (where * x + 0.12 * x, way * 0.4 * y, (0.42 + up) * z)
+    for k, (where, side, up) in enumerate(((-0.22, 1, 0.05), (0.05, -1, 0.05), (0.25, 1, 0.15))):
+        end = (where * x + 0.12 * x, side * 0.4 * y, (0.42 + up) * z)
         knob = tube(
-            [(where * x, 0, 0.42 * z), (where * x + 0.04 * x, way * 0.25 * y, 0.45 * z), end],
+            [(where * x, 0, 0.42 * z), (where * x + 0.04 * x, side * 0.25 * y, 0.45 * z), end],
             [0.3 * z, 0.32 * z, 0.2 * z],
             7,
         )

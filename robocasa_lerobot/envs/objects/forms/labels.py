@@ -123,7 +123,7 @@ BOTTLES: dict[str, list[tuple[float, float]]] = {
 
 
 def around(radius: float, z0: float, z1: float, n: int = 14) -> Mesh:
-    """A band around a round thing, open above and below."""
+    """A band around a round object, open above and below."""
     return lathe([(radius, z0), (radius, z1)], n)
 
 

@@ -117,7 +117,7 @@ def lying(
     if abs(bend) < 0.5:
         return d.body(mesh, paint, finish)
     low, high = mesh.vertices[:, 0].min(), mesh.vertices[:, 0].max()
-    for k in range(3):  # a bent thing is three convex pieces
+    for k in range(3):  # a bent object is three convex pieces
         a, b = low + (high - low) * (k / 3 - 0.03), low + (high - low) * ((k + 1) / 3 + 0.03)
         d.hull(mesh.vertices[(mesh.vertices[:, 0] >= a) & (mesh.vertices[:, 0] <= b)])
     return d.add(mesh, paint, finish)

@@ -1,4 +1,4 @@
-"""Small kitchen tools and cleaning things."""
+"""Small kitchen tools and cleaning utensils."""
 
 from __future__ import annotations
 

@@ -48,7 +48,7 @@ class BodySpec:
 BASE_YAW_PIVOT: Vec3 = (-0.21, 0.0, 0.0)  # in the mobile base's frame: midway between its driven wheels
 
 _BASE_JOINTS = (
-    # The axes are those of robosuite >= 1.5.2 (forward is x); 1.5.1 has the two the other way round.
+    # The axes are those of robosuite >= 1.5.2 (forward is x); 1.5.1 has the two exchanged.
     JointSpec(names.BASE_JOINTS[0], "slide", (1.0, 0.0, 0.0), None, frictionloss=250.0),
     JointSpec(names.BASE_JOINTS[1], "slide", (0.0, 1.0, 0.0), None, frictionloss=250.0),
     JointSpec(names.BASE_JOINTS[2], "hinge", (0.0, 0.0, 1.0), None, frictionloss=250.0, anchor=BASE_YAW_PIVOT),

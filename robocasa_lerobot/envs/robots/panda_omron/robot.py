@@ -60,7 +60,7 @@ PANDA_OMRON = Robot(
         palm_half=(0.10, 0.03),
         closed_half=(0.011, 0.026, 0.011),
     ),
-    reach=ArmReach(wrist_behind_grip=0.204, shoulder=0.333, longest=0.81),
+    reach=ArmReach(wrist_behind_grip=0.204, shoulder=0.333, longest=0.81, stretched=-0.467),
     camera_sets=CAMERA_SETS,
     camera_noise=CAMERA_NOISE,
     build=add_robot,

@@ -1,4 +1,4 @@
-"""Shapes of the PandaOmron: what collides (geom group 0, the same in every look) and what is seen (group 1).
+"""Shapes of the PandaOmron: collision geoms (group 0, the same in every look) and visual geoms (group 1).
 
 The arm's shapes are the Franka meshes, drawn in their own link frames; base, column and finger pads are primitives.
 The shapes carry no mass: every body has its explicit inertia.
@@ -26,7 +26,7 @@ _HALF_TURN_Z: Quat = (0.0, 0.0, 0.0, 1.0)
 _WHEEL_QUAT: Quat = (0.707107, 0.707107, 0.0, 0.0)  # cylinder axis along y
 
 # Half sizes and centre (tip frame, metres) of the rubber pads. They stand 0.3 mm proud of the finger's mesh so that
-# what is grasped touches the pad with its high friction first, and end 1 mm below the finger tip.
+# a grasped object touches the pad with its high friction first, and end 1 mm below the finger tip.
 _PAD_SIZE: Vec3 = (0.0085, 0.0040, 0.0105)
 _PAD_CENTER: Vec3 = (0.0, -0.0048, -0.0114)
 _PAD_FRICTION: Vec3 = (2.0, 0.05, 0.0001)

@@ -11,9 +11,9 @@ from robocasa_lerobot.envs.scene.roles import counter_of
 from robocasa_lerobot.envs.scene.spec import InsideOf, OnCounter
 
 MIN_REGION_WIDTH_M = 0.12
-# Fixture types that nothing on a counter meets: shells, counters themselves, what is flat on a wall. Boxes are parts of
+# Fixture types that no object on a counter meets: shells, counters, flat fixtures on a wall. Boxes are parts of
 # cabinets, but for those that stand on a counter as accessories.
-NOT_IN_THE_WAY = ("counter", "floor", "wall", "window", "stool", "box", "panel_cabinet", "drawer")
+NOT_OBSTACLES = ("counter", "floor", "wall", "window", "stool", "box", "panel_cabinet", "drawer")
 
 
 def counter_areas(layout: Layout, start: OnCounter, near: Fixture) -> tuple[list[Area], list[Footprint]]:
@@ -49,7 +49,7 @@ def standing_on(layout: Layout, fixture: Fixture, surface_z: float) -> list[Foot
         f
         for f in layout.fixtures.values()
         if f is not fixture
-        and (f.stands_on_surface or layout.types[f.name] not in NOT_IN_THE_WAY)
+        and (f.stands_on_surface or layout.types[f.name] not in NOT_OBSTACLES)
         and f.pos[2] + f.height / 2 > surface_z - 0.005
         and f.pos[2] - f.height / 2 < surface_z + 0.3
     ]

@@ -16,7 +16,7 @@ from robocasa_lerobot.envs.scene.drawn import PlacedObject
 from robocasa_lerobot.envs.scene.placement.counter_areas import counter_areas, inside_area, standing_on
 from robocasa_lerobot.envs.scene.placement.regions import Part, Shares, choose_parts, rectangle_in
 from robocasa_lerobot.envs.scene.scene_spec import SceneSpec
-from robocasa_lerobot.envs.scene.spec import ObjectWanted, OnCounter, Placement
+from robocasa_lerobot.envs.scene.spec import ObjectSpec, OnCounter, Placement
 from robocasa_lerobot.envs.scene.task_parameters import item_of, name_of, number_of, start_of
 from robocasa_lerobot.envs.scene.words import numbered
 
@@ -27,7 +27,7 @@ IN_CONTAINER = "in_container"  # object group of what may stand in a container
 
 @dataclass
 class _Table:
-    """Where things have been put so far.
+    """Where objects have been put so far.
 
     Attributes:
         placed: objects by name.
@@ -73,7 +73,7 @@ def place_objects(
 def _put(
     rng: np.random.Generator,
     table: _Table,
-    wanted: ObjectWanted,
+    wanted: ObjectSpec,
     name: str,
     item: catalogue.Instance,
     split: str,
@@ -107,11 +107,11 @@ def _put(
             holder = f"{name}_container"
             table.holders.add(holder)
             _put_down(rng, table, holder, container, areas, standing)
-            # What may stick out is the container: a thing across its rim would tip over.
+            # What may stick out is the container: an object across its rim would tip over.
             _put_on(rng, table, name, item, table.placed[holder], replace(start, ensure_inside=True))
             return
         if fixture.holds_all_of_it and start.ensure_inside:
-            # Of other compartments a thing may stick out, as the handle of a mug does under a spout.
+            # Of other compartments an object may stick out, as the handle of a mug does under a spout.
             rooms = [part.area for part in table.parts[name]]
     _put_down(rng, table, name, item, areas, standing, rooms)
 

@@ -25,7 +25,7 @@ MIN_SIDE_M = 0.06  # parts narrower than this are no use
 
 @dataclass(frozen=True)
 class Part:
-    """A part of a fixture that things can stand on: a rectangle in the frame of the fixture.
+    """A part of a fixture that objects can stand on: a rectangle in the frame of the fixture.
 
     Attributes:
         area: its bounds, height and free height.
@@ -39,7 +39,7 @@ class Part:
 
 
 def parts_of(layout: Layout, fixture: Fixture, openness: float | Shares = 0.0) -> list[Part]:
-    """The parts of a fixture that things can stand on or in, in its own order, drawers and racks as they stand open.
+    """The parts of a fixture that objects can stand on or in, in its own order, drawers and racks as they stand open.
 
     Counters have a rectangle on each side of an opening and the strips before and behind it.
     """

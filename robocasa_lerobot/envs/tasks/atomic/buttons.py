@@ -7,9 +7,9 @@ from robocasa_lerobot.envs.predicates import (
 )
 from robocasa_lerobot.envs.scene.initial_states import SwitchedOn
 from robocasa_lerobot.envs.scene.spec import (
-    FixtureWanted,
+    FixtureSpec,
     InitialOpenness,
-    ObjectWanted,
+    ObjectSpec,
     Placement,
     RobotStart,
     SampleRegion,
@@ -18,7 +18,7 @@ from robocasa_lerobot.envs.tasks.atomic.common import counter_near
 from robocasa_lerobot.envs.tasks.task import Stage, Task
 
 _HEATED = (
-    ObjectWanted(
+    ObjectSpec(
         "obj",
         ("any",),
         Placement("microwave", size=(0.05, 0.05), pos=(0.0, 0.0), ensure_inside=False, try_to_place_in="plate"),
@@ -26,7 +26,7 @@ _HEATED = (
     ),
 )
 
-_MUG_UNDER_SPOUT = ObjectWanted(
+_MUG_UNDER_SPOUT = ObjectSpec(
     "obj", ("mug",), Placement("coffee_machine", region=SampleRegion(name="cup"), rotation=(0.39, 0.79))
 )
 
@@ -40,14 +40,14 @@ def _button(
     *,
     instruction: str,
     paraphrases: tuple[str, ...],
-    objects: tuple[ObjectWanted, ...] = (),
+    objects: tuple[ObjectSpec, ...] = (),
     initial: tuple[SwitchedOn | InitialOpenness, ...] = (),
     counter: bool = False,
 ) -> Task:
     return Task(
         name=name,
         summary=summary,
-        fixtures=(FixtureWanted(kind, kind), *([counter_near(kind)] if counter else [])),
+        fixtures=(FixtureSpec(kind, kind), *([counter_near(kind)] if counter else [])),
         robot_start=RobotStart(kind),
         objects=objects,
         initial=initial,
@@ -112,7 +112,7 @@ BUTTONS = (
         "The blender runs, with its lid on.",
         "button",
         StateIs("blender", "on"),
-        objects=(ObjectWanted("obj", ("fruit",), Placement("blender", size=(0.4, 0.4), margin=0.0), scale=0.8),),
+        objects=(ObjectSpec("obj", ("fruit",), Placement("blender", size=(0.4, 0.4), margin=0.0), scale=0.8),),
         instruction="Press the power button of the blender.",
         paraphrases=(
             "Blend what is in the jar.",

@@ -1,11 +1,11 @@
 """A mug at the coffee machine: put under its spout, and taken away."""
 
 from robocasa_lerobot.envs.predicates import AllOf, GripperFar, ObjectAtSite, ObjectTouches
-from robocasa_lerobot.envs.scene.spec import FixtureWanted, ObjectWanted, Placement, RobotStart, SampleRegion
+from robocasa_lerobot.envs.scene.spec import FixtureSpec, ObjectSpec, Placement, RobotStart, SampleRegion
 from robocasa_lerobot.envs.tasks.atomic.common import counter_near, on_counter
 from robocasa_lerobot.envs.tasks.task import Stage, Task
 
-_FIXTURES = (FixtureWanted("coffee_machine", "coffee_machine"), counter_near("coffee_machine"))
+_FIXTURES = (FixtureSpec("coffee_machine", "coffee_machine"), counter_near("coffee_machine"))
 
 TASKS = (
     Task(
@@ -14,7 +14,7 @@ TASKS = (
         fixtures=_FIXTURES,
         robot_start=RobotStart("coffee_machine"),
         objects=(
-            ObjectWanted(
+            ObjectSpec(
                 "obj", ("mug",), on_counter("coffee_machine", (0.3, 0.4), rotation=(0.79, 1.57)), graspable=True
             ),
         ),
@@ -34,7 +34,7 @@ TASKS = (
         fixtures=_FIXTURES,
         robot_start=RobotStart("coffee_machine"),
         objects=(
-            ObjectWanted(
+            ObjectSpec(
                 "obj",
                 ("mug",),
                 Placement("coffee_machine", region=SampleRegion(name="cup"), rotation=(0.39, 0.79)),

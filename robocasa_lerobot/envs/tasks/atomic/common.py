@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from robocasa_lerobot.envs.scene.spec import FixtureWanted, ObjectWanted, Placement, SampleRegion
+from robocasa_lerobot.envs.scene.spec import FixtureSpec, ObjectSpec, Placement, SampleRegion
 from robocasa_lerobot.envs.tasks.task import Stage, Task
 
 # Handles of cookware point away from the knobs by this much to either side, radians.
@@ -10,9 +10,9 @@ HANDLE_TURN = (0.785, 1.178)
 TASKS: tuple[Task, ...] = ()
 
 
-def counter_near(role: str, *, size: tuple[float, float] = (0.0, 0.0), name: str = "counter") -> FixtureWanted:
+def counter_near(role: str, *, size: tuple[float, float] = (0.0, 0.0), name: str = "counter") -> FixtureSpec:
     """The counter nearest to the fixture of a role."""
-    return FixtureWanted(name, "counter", near=role, size=size)
+    return FixtureSpec(name, "counter", near=role, size=size)
 
 
 def on_counter(
@@ -29,9 +29,9 @@ def on_counter(
     return Placement(counter, region=SampleRegion(ref=ref, loc=loc), size=size, pos=pos, offset=offset, **more)  # type: ignore[arg-type]
 
 
-def distractors(ref: str) -> ObjectWanted:
-    """One to three things on the counter near a fixture."""
-    return ObjectWanted("distr_counter", ("any",), on_counter(ref, (1.0, 0.5), offset=(0.0, 0.1)), count=(1, 3))
+def distractors(ref: str) -> ObjectSpec:
+    """One to three objects on the counter near a fixture."""
+    return ObjectSpec("distr_counter", ("any",), on_counter(ref, (1.0, 0.5), offset=(0.0, 0.1)), count=(1, 3))
 
 
 def place(object_: str = "obj", target: str = "counter", verb: str = "place", part: str = "") -> tuple[Stage, ...]:

@@ -2,7 +2,7 @@
 
 from robocasa_lerobot.envs.predicates import DoorsClosed, DoorsOpen, PartWithin
 from robocasa_lerobot.envs.scene.initial_states import PartAt
-from robocasa_lerobot.envs.scene.spec import FixtureWanted, InitialOpenness, ObjectWanted, Placement, RobotStart
+from robocasa_lerobot.envs.scene.spec import FixtureSpec, InitialOpenness, ObjectSpec, Placement, RobotStart
 from robocasa_lerobot.envs.tasks.atomic.common import counter_near, distractors
 from robocasa_lerobot.envs.tasks.task import Stage, Task
 
@@ -12,8 +12,8 @@ _CLOSING = dict.fromkeys(("oven", "toaster_oven"), "lift_shut") | {"fridge": "cl
 AJAR_AT_MOST, OPEN = (0.0, 0.0), (0.90, 1.0)
 
 
-def _inside(size: tuple[float, float] = (0.3, 0.3), **more: object) -> ObjectWanted:
-    return ObjectWanted("door_obj", ("any",), Placement("fxtr", size=size, pos=(None, -1.0)), graspable=True, **more)  # type: ignore[arg-type]
+def _inside(size: tuple[float, float] = (0.3, 0.3), **more: object) -> ObjectSpec:
+    return ObjectSpec("door_obj", ("any",), Placement("fxtr", size=size, pos=(None, -1.0)), graspable=True, **more)  # type: ignore[arg-type]
 
 
 def _door(
@@ -22,7 +22,7 @@ def _door(
     *,
     instruction: str,
     paraphrases: tuple[str, ...],
-    inside: ObjectWanted | None = None,
+    inside: ObjectSpec | None = None,
     clutter: bool = True,
     beside: bool = False,
     setback: float = 0.0,
@@ -35,7 +35,7 @@ def _door(
         summary="Every door is open by at least 90 % of its range."
         if opens
         else "Every door is within 0.5 % of its range of being shut.",
-        fixtures=(FixtureWanted("fxtr", kind), *([counter_near("fxtr")] if clutter else [])),
+        fixtures=(FixtureSpec("fxtr", kind), *([counter_near("fxtr")] if clutter else [])),
         robot_start=RobotStart("fxtr", beside=beside, setback=setback),
         objects=(*([inside] if inside else []), *([distractors("fxtr")] if clutter else [])),
         initial=(InitialOpenness("fxtr", *((0.0, 0.0) if opens else opened)),),
@@ -47,7 +47,7 @@ def _door(
     )
 
 
-_OVEN_DISH = ObjectWanted(
+_OVEN_DISH = ObjectSpec(
     "door_obj",
     ("oven_ready",),
     Placement("fxtr", size=(1.0, 0.45), pos=(None, -1.0), try_to_place_in="oven_tray"),
@@ -210,7 +210,7 @@ TASKS = (
     Task(
         name="OpenStandMixerHead",
         summary="The head is up by more than 99 % of its range.",
-        fixtures=(FixtureWanted("stand_mixer", "stand_mixer"),),
+        fixtures=(FixtureSpec("stand_mixer", "stand_mixer"),),
         robot_start=RobotStart("stand_mixer"),
         initial=(PartAt("stand_mixer", "head", (0.0, 0.0)),),
         goal=PartWithin("stand_mixer", "head", low=0.99, label="up"),
@@ -226,7 +226,7 @@ TASKS = (
     Task(
         name="CloseStandMixerHead",
         summary="The head is down to less than 1 % of its range.",
-        fixtures=(FixtureWanted("stand_mixer", "stand_mixer"),),
+        fixtures=(FixtureSpec("stand_mixer", "stand_mixer"),),
         robot_start=RobotStart("stand_mixer"),
         initial=(PartAt("stand_mixer", "head", (1.0, 1.0)),),
         goal=PartWithin("stand_mixer", "head", high=0.01, label="down"),
@@ -242,7 +242,7 @@ TASKS = (
     Task(
         name="OpenElectricKettleLid",
         summary="The lid is open by at least 95 % of its range; its button makes it spring open.",
-        fixtures=(FixtureWanted("electric_kettle", "electric_kettle"),),
+        fixtures=(FixtureSpec("electric_kettle", "electric_kettle"),),
         robot_start=RobotStart("electric_kettle"),
         initial=(PartAt("electric_kettle", "lid", (0.0, 0.0)),),
         goal=PartWithin("electric_kettle", "lid", low=0.95, label="open"),
@@ -258,7 +258,7 @@ TASKS = (
     Task(
         name="CloseElectricKettleLid",
         summary="The lid is shut to at most 1 % of its range.",
-        fixtures=(FixtureWanted("electric_kettle", "electric_kettle"),),
+        fixtures=(FixtureSpec("electric_kettle", "electric_kettle"),),
         robot_start=RobotStart("electric_kettle"),
         initial=(PartAt("electric_kettle", "lid", (1.0, 1.0)),),
         goal=PartWithin("electric_kettle", "lid", high=0.01, label="closed"),

@@ -2,21 +2,21 @@
 
 from robocasa_lerobot.envs.predicates import DrawerClosed, DrawerOpen
 from robocasa_lerobot.envs.scene.spec import (
-    FixtureWanted,
+    FixtureSpec,
     InitialOpenness,
     InsideOf,
-    ObjectWanted,
+    ObjectSpec,
     OnCounter,
     RobotStart,
 )
 from robocasa_lerobot.envs.tasks.task import Stage, Task
 
-_FIXTURES = (FixtureWanted("drawer", "drawer_top"),)
+_FIXTURES = (FixtureSpec("drawer", "drawer_top"),)
 # The base is placed as exactly as the original does for tasks beside a fixture.
 _START = RobotStart("drawer", beside=True, deviation=(0.05, 0.05))
 _OBJECTS = (
-    ObjectWanted("drawer_obj", ("tool", "utensil"), InsideOf("drawer", size=(0.30, 0.30), at=-0.75), max_height=0.10),
-    ObjectWanted(
+    ObjectSpec("drawer_obj", ("tool", "utensil"), InsideOf("drawer", size=(0.30, 0.30), at=-0.75), max_height=0.10),
+    ObjectSpec(
         "distr_counter", ("any",), OnCounter("drawer", size=(1.0, 0.5), at="front", offset=(0.0, 0.1)), count=(1, 3)
     ),
 )

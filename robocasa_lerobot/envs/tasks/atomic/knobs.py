@@ -10,8 +10,8 @@ from robocasa_lerobot.envs.predicates import (
 from robocasa_lerobot.envs.scene.initial_states import BurnerAt, PartAt
 from robocasa_lerobot.envs.scene.spec import (
     Choice,
-    FixtureWanted,
-    ObjectWanted,
+    FixtureSpec,
+    ObjectSpec,
     Placement,
     RobotStart,
     SampleRegion,
@@ -39,11 +39,11 @@ def _stove(
     return Task(
         name=name,
         summary=summary,
-        fixtures=(FixtureWanted("stove", "stove"),),
+        fixtures=(FixtureSpec("stove", "stove"),),
         robot_start=RobotStart("stove"),
         choices=(KNOB,),
         objects=(
-            ObjectWanted(
+            ObjectSpec(
                 cookware,
                 groups,
                 Placement(
@@ -113,7 +113,7 @@ OVENS = (
     Task(
         name="PreheatOven",
         summary="The temperature knob is at 25 % of its range or more.",
-        fixtures=(FixtureWanted("oven", "oven"),),
+        fixtures=(FixtureSpec("oven", "oven"),),
         robot_start=RobotStart("oven"),
         initial=(PartAt("oven", "knob_temp", (0.0, 0.0)),),
         goal=PartWithin("oven", "knob_temp", low=0.25, label="raised"),
@@ -130,7 +130,7 @@ OVENS = (
     Task(
         name="TurnOnToasterOven",
         summary="The timer knob is at 10 % of its range or more; it runs down with time.",
-        fixtures=(FixtureWanted("toaster_oven", "toaster_oven"),),
+        fixtures=(FixtureSpec("toaster_oven", "toaster_oven"),),
         robot_start=RobotStart("toaster_oven"),
         initial=(PartAt("toaster_oven", "knob_time", (0.0, 0.0)),),
         goal=PartWithin("toaster_oven", "knob_time", low=0.10, label="set"),
@@ -146,14 +146,14 @@ OVENS = (
     Task(
         name="AdjustToasterOvenTemperature",
         summary="The temperature knob has gone by 15 % of its range from where it was, up or down as asked for.",
-        fixtures=(FixtureWanted("toaster_oven", "toaster_oven"),),
+        fixtures=(FixtureSpec("toaster_oven", "toaster_oven"),),
         robot_start=RobotStart("toaster_oven"),
         choices=(
             Choice(
                 "direction",
                 {
-                    "increase": {"verb": "Raise", "comparative": "hotter", "way": "up"},
-                    "decrease": {"verb": "Lower", "comparative": "cooler", "way": "down"},
+                    "increase": {"verb": "Raise", "comparative": "hotter", "sense": "up"},
+                    "decrease": {"verb": "Lower", "comparative": "cooler", "sense": "down"},
                 },
             ),
         ),
@@ -171,7 +171,7 @@ OVENS = (
             "{verb} the heat at the toaster oven's temperature dial.",
             "The toaster oven should be {comparative}.",
             "Make the toaster oven {comparative} with its temperature knob.",
-            "The temperature set on the toaster oven must go {way}.",
+            "The temperature set on the toaster oven must go {sense}.",
         ),
     ),
 )

@@ -9,8 +9,8 @@ from robocasa_lerobot.envs.predicates import (
 from robocasa_lerobot.envs.scene.initial_states import PartAt, Water
 from robocasa_lerobot.envs.scene.spec import (
     Choice,
-    FixtureWanted,
-    ObjectWanted,
+    FixtureSpec,
+    ObjectSpec,
     Placement,
     RobotStart,
     SampleRegion,
@@ -18,16 +18,16 @@ from robocasa_lerobot.envs.scene.spec import (
 from robocasa_lerobot.envs.tasks.atomic.common import counter_near, on_counter
 from robocasa_lerobot.envs.tasks.task import Stage, Task
 
-_SINK = (FixtureWanted("sink", "sink"), counter_near("sink"))
+_SINK = (FixtureSpec("sink", "sink"), counter_near("sink"))
 
 _SINK_OBJECTS = (
-    ObjectWanted(
+    ObjectSpec(
         "distr_counter",
         ("any",),
         on_counter("sink", (0.3, 0.3), loc="left_right", offset=(0.0, 0.1)),
         count=(1, 3),
     ),
-    ObjectWanted("distr_sink", ("any",), Placement("sink", size=(0.3, 0.4), pos=(0.0, -1.0)), washable=True),
+    ObjectSpec("distr_sink", ("any",), Placement("sink", size=(0.3, 0.4), pos=(0.0, -1.0)), washable=True),
 )
 
 
@@ -143,7 +143,7 @@ LEVERS = (
     Task(
         name="TurnOnElectricKettle",
         summary="The kettle's switch is down, and it heats.",
-        fixtures=(FixtureWanted("electric_kettle", "electric_kettle"),),
+        fixtures=(FixtureSpec("electric_kettle", "electric_kettle"),),
         robot_start=RobotStart("electric_kettle"),
         initial=(PartAt("electric_kettle", "lid", (0.0, 0.0)),),
         goal=PartWithin("electric_kettle", "switch", low=0.95, label="down"),
@@ -159,11 +159,11 @@ LEVERS = (
     Task(
         name="TurnOnToaster",
         summary="The lever of the slots that hold the bread is down.",
-        fixtures=(FixtureWanted("toaster", "toaster"),),
+        fixtures=(FixtureSpec("toaster", "toaster"),),
         robot_start=RobotStart("toaster"),
         choices=(Choice("slot", of="toaster"),),
         objects=(
-            ObjectWanted(
+            ObjectSpec(
                 "obj",
                 ("sandwich_bread",),
                 Placement(

@@ -1,7 +1,7 @@
 """NavigateKitchen: drive from one fixture to another."""
 
 from robocasa_lerobot.envs.predicates import StandsBefore
-from robocasa_lerobot.envs.scene.spec import FixtureWanted, RobotStart
+from robocasa_lerobot.envs.scene.spec import FixtureSpec, RobotStart
 from robocasa_lerobot.envs.tasks.task import Stage, Task
 
 TASKS = (
@@ -9,8 +9,8 @@ TASKS = (
         name="NavigateKitchen",
         summary="The base stands within 20 cm of the place in front of the fixture, and faces it.",
         fixtures=(
-            FixtureWanted("source", "landmark"),
-            FixtureWanted("target", "landmark_once", other_than=("source",), apart_m=1.0),
+            FixtureSpec("source", "landmark"),
+            FixtureSpec("target", "landmark_once", other_than=("source",), apart_m=1.0),
         ),
         robot_start=RobotStart("source"),
         goal=StandsBefore("target"),

@@ -10,9 +10,9 @@ from robocasa_lerobot.envs.predicates import (
     ObjectTouchesAnyCounter,
 )
 from robocasa_lerobot.envs.scene.spec import (
-    FixtureWanted,
+    FixtureSpec,
     InitialOpenness,
-    ObjectWanted,
+    ObjectSpec,
     Placement,
     RobotStart,
     SampleRegion,
@@ -34,20 +34,20 @@ _WITHIN_REACH_M = (0.5, 1.65)  # heights of shelves that the arm reaches
 _DOOR_OPEN = (0.90, 1.0)
 
 
-def _back(ref: str, size: tuple[float, float], offset: tuple[float, float] = (0.0, 0.0)) -> ObjectWanted:
-    return ObjectWanted("distr_counter", ("any",), on_counter(ref, size, pos=("ref", 1.0), offset=offset))
+def _back(ref: str, size: tuple[float, float], offset: tuple[float, float] = (0.0, 0.0)) -> ObjectSpec:
+    return ObjectSpec("distr_counter", ("any",), on_counter(ref, size, pos=("ref", 1.0), offset=offset))
 
 
 CABINET = (
     Task(
         name="PickPlaceCounterToCabinet",
         summary="The object is inside the cabinet, the gripper away.",
-        fixtures=(FixtureWanted("cab", "cabinet"), counter_near("cab")),
+        fixtures=(FixtureSpec("cab", "cabinet"), counter_near("cab")),
         robot_start=RobotStart("cab"),
         objects=(
-            ObjectWanted("obj", ("any",), on_counter("cab", (0.6, 0.3), offset=(0.0, 0.1)), graspable=True),
-            ObjectWanted("distr_counter", ("any",), on_counter("cab", (1.0, 0.3), offset=(0.0, 0.3))),
-            ObjectWanted("distr_cab", ("any",), Placement("cab", size=(1.0, 0.2), pos=(0.0, 1.0))),
+            ObjectSpec("obj", ("any",), on_counter("cab", (0.6, 0.3), offset=(0.0, 0.1)), graspable=True),
+            ObjectSpec("distr_counter", ("any",), on_counter("cab", (1.0, 0.3), offset=(0.0, 0.3))),
+            ObjectSpec("distr_cab", ("any",), Placement("cab", size=(1.0, 0.2), pos=(0.0, 1.0))),
         ),
         initial=(InitialOpenness("cab", *_DOOR_OPEN),),
         goal=AllOf(ObjectInside("obj", "cab"), GripperFar("obj")),
@@ -63,17 +63,17 @@ CABINET = (
     Task(
         name="PickPlaceCabinetToCounter",
         summary="The object is on the counter below the cabinet, the gripper away.",
-        fixtures=(FixtureWanted("cab", "cabinet"), counter_near("cab")),
+        fixtures=(FixtureSpec("cab", "cabinet"), counter_near("cab")),
         robot_start=RobotStart("cab"),
         objects=(
-            ObjectWanted(
+            ObjectSpec(
                 "obj",
                 ("any",),
                 Placement("cab", region=SampleRegion(height=_WITHIN_REACH_M), size=(0.5, 0.2), pos=(0.0, -1.0)),
                 graspable=True,
             ),
             _back("cab", (1.0, 0.3), (0.0, -0.05)),
-            ObjectWanted("distr_cab", ("any",), Placement("cab", size=(1.0, 0.2), pos=(0.0, 1.0))),
+            ObjectSpec("distr_cab", ("any",), Placement("cab", size=(1.0, 0.2), pos=(0.0, 1.0))),
         ),
         initial=(InitialOpenness("cab", *_DOOR_OPEN),),
         goal=AllOf(ObjectTouches("obj", "counter"), GripperFar("obj")),
@@ -92,11 +92,11 @@ TOP_DRAWER = (
     Task(
         name="PickPlaceCounterToDrawer",
         summary="The object is inside the drawer and touches no counter, the gripper away.",
-        fixtures=(FixtureWanted("drawer", "drawer_top"), counter_near("drawer")),
+        fixtures=(FixtureSpec("drawer", "drawer_top"), counter_near("drawer")),
         robot_start=RobotStart("drawer"),
         objects=(
-            ObjectWanted("obj", _NOT_TOOLS, on_counter("drawer", (0.6, 0.3)), graspable=True, exclude=_TOOLS),
-            ObjectWanted("distr", ("any",), on_counter("drawer", (0.6, 0.3), pos=("ref", -0.5)), exclude=_NOT_TOOLS),
+            ObjectSpec("obj", _NOT_TOOLS, on_counter("drawer", (0.6, 0.3)), graspable=True, exclude=_TOOLS),
+            ObjectSpec("distr", ("any",), on_counter("drawer", (0.6, 0.3), pos=("ref", -0.5)), exclude=_NOT_TOOLS),
         ),
         initial=(InitialOpenness("drawer", *_DOOR_OPEN),),
         goal=AllOf(ObjectInside("obj", "drawer"), Not(ObjectTouchesAnyCounter("obj")), GripperFar("obj")),
@@ -112,17 +112,17 @@ TOP_DRAWER = (
     Task(
         name="PickPlaceDrawerToCounter",
         summary="The object is on a counter, the gripper away.",
-        fixtures=(FixtureWanted("drawer", "drawer_top"), counter_near("drawer")),
+        fixtures=(FixtureSpec("drawer", "drawer_top"), counter_near("drawer")),
         robot_start=RobotStart("drawer", setback=0.3),
         objects=(
-            ObjectWanted(
+            ObjectSpec(
                 "obj",
                 _NOT_TOOLS,
                 Placement("drawer", size=(0.3, 0.25), pos=(0.0, -0.25)),
                 graspable=True,
                 exclude=_TOOLS,
             ),
-            ObjectWanted("distr", ("any",), on_counter("drawer", (0.5, 0.3), pos=("ref", -0.5)), exclude=_NOT_TOOLS),
+            ObjectSpec("distr", ("any",), on_counter("drawer", (0.5, 0.3), pos=("ref", -0.5)), exclude=_NOT_TOOLS),
         ),
         initial=(InitialOpenness("drawer", 1.0, 1.0),),
         goal=AllOf(ObjectTouchesAnyCounter("obj"), GripperFar("obj")),
@@ -141,16 +141,14 @@ SINK = (
     Task(
         name="PickPlaceSinkToCounter",
         summary="The object is on the plate, the plate on the counter, the gripper away.",
-        fixtures=(FixtureWanted("sink", "sink"), counter_near("sink")),
+        fixtures=(FixtureSpec("sink", "sink"), counter_near("sink")),
         robot_start=RobotStart("sink"),
         objects=(
-            ObjectWanted(
+            ObjectSpec(
                 "obj", ("food",), Placement("sink", size=(0.25, 0.25), pos=(0.0, 1.0)), graspable=True, washable=True
             ),
-            ObjectWanted("container", ("plate",), on_counter("sink", (0.35, 0.4), loc="left_right")),
-            ObjectWanted(
-                "distr_counter", ("any",), on_counter("sink", (0.3, 0.3), loc="left_right", offset=(0.0, 0.3))
-            ),
+            ObjectSpec("container", ("plate",), on_counter("sink", (0.35, 0.4), loc="left_right")),
+            ObjectSpec("distr_counter", ("any",), on_counter("sink", (0.3, 0.3), loc="left_right", offset=(0.0, 0.3))),
         ),
         goal=AllOf(ObjectOn("obj", "container"), ObjectTouches("container", "counter"), GripperFar("obj")),
         stages=place(target="container"),
@@ -168,11 +166,11 @@ STOVE = (
     Task(
         name="PickPlaceCounterToStove",
         summary="The object is in the pan, the gripper away.",
-        fixtures=(FixtureWanted("stove", "stove"), counter_near("stove", size=(0.3, 0.4))),
+        fixtures=(FixtureSpec("stove", "stove"), counter_near("stove", size=(0.3, 0.4))),
         robot_start=RobotStart("stove"),
         objects=(
-            ObjectWanted("container", ("pan",), _PAN),
-            ObjectWanted(
+            ObjectSpec("container", ("pan",), _PAN),
+            ObjectSpec(
                 "obj",
                 ("food",),
                 on_counter("stove", (0.3, 0.3), try_to_place_in="plate"),
@@ -193,11 +191,11 @@ STOVE = (
     Task(
         name="PickPlaceStoveToCounter",
         summary="The object is in the plate or bowl on the counter, the gripper away.",
-        fixtures=(FixtureWanted("stove", "stove"), counter_near("stove", size=(0.3, 0.4))),
+        fixtures=(FixtureSpec("stove", "stove"), counter_near("stove", size=(0.3, 0.4))),
         robot_start=RobotStart("stove"),
         objects=(
-            ObjectWanted("obj_container", ("pan",), _PAN),
-            ObjectWanted(
+            ObjectSpec("obj_container", ("pan",), _PAN),
+            ObjectSpec(
                 "obj",
                 ("food",),
                 Placement(object="obj_container", size=(0.02, 0.02)),
@@ -205,7 +203,7 @@ STOVE = (
                 properties=("cookable",),
                 max_size=(0.15, 0.15, None),
             ),
-            ObjectWanted("container", ("plate", "bowl"), on_counter("stove", (0.3, 0.3))),
+            ObjectSpec("container", ("plate", "bowl"), on_counter("stove", (0.3, 0.3))),
         ),
         goal=AllOf(ObjectOn("obj", "container", within=_IN_PAN_M), GripperFar("obj")),
         stages=place(target="container"),
@@ -223,17 +221,17 @@ MICROWAVE = (
     Task(
         name="PickPlaceCounterToMicrowave",
         summary="The object is on the plate in the microwave, the gripper away.",
-        fixtures=(FixtureWanted("microwave", "microwave"), counter_near("microwave")),
+        fixtures=(FixtureSpec("microwave", "microwave"), counter_near("microwave")),
         robot_start=RobotStart("microwave"),
         objects=(
-            ObjectWanted(
+            ObjectSpec(
                 "obj",
                 ("food",),
                 on_counter("microwave", (0.3, 0.3), try_to_place_in="plate"),
                 graspable=True,
                 properties=("microwavable",),
             ),
-            ObjectWanted(
+            ObjectSpec(
                 "container", ("plate",), Placement("microwave", size=(0.05, 0.05), pos=(0.0, 0.0), ensure_inside=False)
             ),
             _back("microwave", (0.3, 0.3)),
@@ -252,17 +250,17 @@ MICROWAVE = (
     Task(
         name="PickPlaceMicrowaveToCounter",
         summary="The object is on the plate on the counter, the gripper away.",
-        fixtures=(FixtureWanted("microwave", "microwave"), counter_near("microwave")),
+        fixtures=(FixtureSpec("microwave", "microwave"), counter_near("microwave")),
         robot_start=RobotStart("microwave"),
         objects=(
-            ObjectWanted(
+            ObjectSpec(
                 "obj",
                 ("food",),
                 Placement("microwave", size=(0.05, 0.05), pos=(0.0, 0.0), ensure_inside=False, try_to_place_in="plate"),
                 graspable=True,
                 properties=("microwavable",),
             ),
-            ObjectWanted("container", ("plate",), on_counter("microwave", (0.3, 0.3))),
+            ObjectSpec("container", ("plate",), on_counter("microwave", (0.3, 0.3))),
             _back("microwave", (0.3, 0.3)),
         ),
         initial=(InitialOpenness("microwave", *_DOOR_OPEN),),

@@ -12,9 +12,9 @@ from robocasa_lerobot.envs.predicates import (
 from robocasa_lerobot.envs.scene.initial_states import LidAside, PartAt
 from robocasa_lerobot.envs.scene.spec import (
     Choice,
-    FixtureWanted,
+    FixtureSpec,
     InitialOpenness,
-    ObjectWanted,
+    ObjectSpec,
     Placement,
     RobotStart,
     SampleRegion,
@@ -26,14 +26,14 @@ OVENS = (
     Task(
         name="PickPlaceCounterToOven",
         summary="The object is on the tray, the tray on the rack, the gripper away.",
-        fixtures=(FixtureWanted("oven", "oven"), counter_near("oven")),
+        fixtures=(FixtureSpec("oven", "oven"), counter_near("oven")),
         robot_start=RobotStart("counter", at_object="obj"),
         choices=(Choice("rack", of="oven"),),
         objects=(
-            ObjectWanted(
+            ObjectSpec(
                 "obj", ("oven_ready",), on_counter("oven", (0.45, 0.3), try_to_place_in="plate"), graspable=True
             ),
-            ObjectWanted(
+            ObjectSpec(
                 "oven_tray",
                 ("oven_tray",),
                 Placement(
@@ -56,11 +56,11 @@ OVENS = (
     Task(
         name="PickPlaceCounterToToasterOven",
         summary="The object lies on the pulled-out rack, the gripper away.",
-        fixtures=(FixtureWanted("toaster_oven", "toaster_oven"), counter_near("toaster_oven")),
+        fixtures=(FixtureSpec("toaster_oven", "toaster_oven"), counter_near("toaster_oven")),
         robot_start=RobotStart("toaster_oven"),
         choices=(Choice("rack", of="toaster_oven"),),
         objects=(
-            ObjectWanted(
+            ObjectSpec(
                 "obj",
                 ("bread_food",),
                 on_counter("toaster_oven", (0.45, 0.3), loc="left_right", try_to_place_in="plate"),
@@ -82,18 +82,18 @@ OVENS = (
     Task(
         name="PickPlaceToasterOvenToCounter",
         summary="The object is on the plate, the plate on the counter, the gripper away.",
-        fixtures=(FixtureWanted("toaster_oven", "toaster_oven"), counter_near("toaster_oven")),
+        fixtures=(FixtureSpec("toaster_oven", "toaster_oven"), counter_near("toaster_oven")),
         robot_start=RobotStart("toaster_oven"),
         choices=(Choice("rack", of="toaster_oven"),),
         objects=(
-            ObjectWanted(
+            ObjectSpec(
                 "obj",
                 ("bread_food",),
                 Placement("toaster_oven", region=SampleRegion(name="{rack}"), size=(0.5, 0.4), pos=(0.0, -1.0)),
                 graspable=True,
                 scale=0.8,
             ),
-            ObjectWanted("container", ("plate",), on_counter("toaster_oven", (0.3, 0.3), loc="left_right")),
+            ObjectSpec("container", ("plate",), on_counter("toaster_oven", (0.3, 0.3), loc="left_right")),
         ),
         initial=(InitialOpenness("toaster_oven", 1.0, 1.0), PartAt("toaster_oven", "{rack}", (1.0, 1.0))),
         goal=AllOf(ObjectOn("obj", "container"), ObjectTouches("container", "counter"), GripperFar("obj")),
@@ -109,11 +109,11 @@ OVENS = (
     Task(
         name="PickPlaceToasterToCounter",
         summary="The slice is on the plate, the gripper away.",
-        fixtures=(FixtureWanted("toaster", "toaster"), counter_near("toaster")),
+        fixtures=(FixtureSpec("toaster", "toaster"), counter_near("toaster")),
         robot_start=RobotStart("toaster"),
         choices=(Choice("slot", of="toaster"),),
         objects=(
-            ObjectWanted(
+            ObjectSpec(
                 "obj",
                 ("sandwich_bread",),
                 Placement(
@@ -122,7 +122,7 @@ OVENS = (
                 scale=0.85,
                 upright=True,
             ),
-            ObjectWanted("plate", ("plate",), on_counter("toaster", (0.8, 0.3))),
+            ObjectSpec("plate", ("plate",), on_counter("toaster", (0.8, 0.3))),
         ),
         goal=AllOf(ObjectOn("obj", "plate"), GripperFar("obj")),
         stages=place(target="plate"),
@@ -140,10 +140,10 @@ BLENDER_AND_MIXER = (
     Task(
         name="PickPlaceCounterToBlender",
         summary="The fruit is in the blender's jar, the gripper away.",
-        fixtures=(FixtureWanted("blender", "blender"), counter_near("blender")),
+        fixtures=(FixtureSpec("blender", "blender"), counter_near("blender")),
         robot_start=RobotStart("blender"),
         objects=(
-            ObjectWanted(
+            ObjectSpec(
                 "obj",
                 ("fruit",),
                 on_counter("blender", (0.5, 0.25), loc="left_right"),
@@ -151,7 +151,7 @@ BLENDER_AND_MIXER = (
                 scale=0.8,
                 max_size=(0.085, 0.085, None),
             ),
-            ObjectWanted(
+            ObjectSpec(
                 "distr_counter",
                 ("any",),
                 on_counter("blender", (0.5, 0.3), pos=("ref", -0.5)),
@@ -172,10 +172,10 @@ BLENDER_AND_MIXER = (
     Task(
         name="PickPlaceCounterToStandMixer",
         summary="The object is in the lower half of the mixer's bowl, the gripper away.",
-        fixtures=(FixtureWanted("stand_mixer", "stand_mixer"), counter_near("stand_mixer")),
+        fixtures=(FixtureSpec("stand_mixer", "stand_mixer"), counter_near("stand_mixer")),
         robot_start=RobotStart("stand_mixer"),
         objects=(
-            ObjectWanted(
+            ObjectSpec(
                 "obj",
                 ("cheese", "bread", "cake"),
                 on_counter("stand_mixer", (0.3, 0.3), loc="left_right"),
@@ -196,7 +196,7 @@ BLENDER_AND_MIXER = (
     Task(
         name="OpenBlenderLid",
         summary="The lid lies on a counter, the gripper 15 cm away.",
-        fixtures=(FixtureWanted("blender", "blender"), counter_near("blender")),
+        fixtures=(FixtureSpec("blender", "blender"), counter_near("blender")),
         robot_start=RobotStart("blender"),
         goal=AllOf(
             ObjectTouchesAnyCounter("{blender}_lid"),
@@ -215,7 +215,7 @@ BLENDER_AND_MIXER = (
     Task(
         name="CloseBlenderLid",
         summary="The lid sits on the jar, the gripper 15 cm away.",
-        fixtures=(FixtureWanted("blender", "blender"), counter_near("blender")),
+        fixtures=(FixtureSpec("blender", "blender"), counter_near("blender")),
         robot_start=RobotStart("blender"),
         initial=(LidAside("blender"),),
         goal=AllOf(StateIs("blender", "lid"), GripperFar("{blender}_lid", 0.15)),

@@ -7,7 +7,7 @@ from robocasa_lerobot.envs.predicates import (
     ObjectOn,
     ObjectTouches,
 )
-from robocasa_lerobot.envs.scene.spec import FixtureWanted, ObjectWanted, Placement, RobotStart
+from robocasa_lerobot.envs.scene.spec import FixtureSpec, ObjectSpec, Placement, RobotStart
 from robocasa_lerobot.envs.tasks.atomic.common import counter_near, on_counter, place
 from robocasa_lerobot.envs.tasks.task import Task
 
@@ -15,18 +15,18 @@ COUNTER = (
     Task(
         name="CheesyBread",
         summary="The bread is on the board, the cheese on the bread, the gripper away.",
-        fixtures=(FixtureWanted("counter", "counter", size=(0.6, 0.6)),),
+        fixtures=(FixtureSpec("counter", "counter", size=(0.6, 0.6)),),
         robot_start=RobotStart("counter", at_object="cheese"),
         objects=(
-            ObjectWanted("bread_container", ("cutting_board",), Placement("counter", size=(0.5, 0.7), pos=(0.0, -1.0))),
-            ObjectWanted("bread", ("bread_flat",), Placement(object="bread_container"), scale=1.5),
-            ObjectWanted(
+            ObjectSpec("bread_container", ("cutting_board",), Placement("counter", size=(0.5, 0.7), pos=(0.0, -1.0))),
+            ObjectSpec("bread", ("bread_flat",), Placement(object="bread_container"), scale=1.5),
+            ObjectSpec(
                 "cheese",
                 ("cheese",),
                 Placement("counter", reuse_region_from="bread_container", size=(1.0, 0.3), pos=(0.0, -1.0)),
                 graspable=True,
             ),
-            ObjectWanted(
+            ObjectSpec(
                 "distr_counter",
                 ("any",),
                 Placement("counter", reuse_region_from="bread_container", size=(1.0, 0.2), pos=(0.0, 1.0)),
@@ -45,15 +45,15 @@ COUNTER = (
     Task(
         name="MakeIcedCoffee",
         summary="One of the ice cubes is inside the glass, the gripper 15 cm away from both.",
-        fixtures=(FixtureWanted("cabinet", "cabinet"), counter_near("cabinet")),
+        fixtures=(FixtureSpec("cabinet", "cabinet"), counter_near("cabinet")),
         robot_start=RobotStart("counter", at_object="ice_bowl"),
         objects=(
-            ObjectWanted("ice_bowl", ("bowl",), on_counter("cabinet", (1.0, 0.4), pos=(0.0, -1.0))),
-            ObjectWanted("ice_cube1", ("ice_cube",), Placement(object="ice_bowl"), graspable=True, scale=0.8),
-            ObjectWanted(
+            ObjectSpec("ice_bowl", ("bowl",), on_counter("cabinet", (1.0, 0.4), pos=(0.0, -1.0))),
+            ObjectSpec("ice_cube1", ("ice_cube",), Placement(object="ice_bowl"), graspable=True, scale=0.8),
+            ObjectSpec(
                 "ice_cube2", ("ice_cube",), Placement(object="ice_bowl"), graspable=True, scale=0.8, repeats=True
             ),
-            ObjectWanted(
+            ObjectSpec(
                 "cup",
                 ("glass_cup",),
                 Placement("counter", reuse_region_from="ice_bowl", size=(0.5, 0.25), pos=(0.0, -1.0)),
@@ -78,17 +78,17 @@ COUNTER = (
     Task(
         name="PackDessert",
         summary="Both foods are in the box, the gripper away.",
-        fixtures=(FixtureWanted("counter", "counter"),),
+        fixtures=(FixtureSpec("counter", "counter"),),
         robot_start=RobotStart("counter", at_object="cooked_food_container"),
         objects=(
-            ObjectWanted(
+            ObjectSpec(
                 "cooked_food_container",
                 ("tupperware",),
                 Placement("counter", size=(0.5, 0.5), pos=(0.0, -1.0), rotation=(0.0, 0.0)),
                 scale=2.0,
             ),
-            ObjectWanted("cooked_food", ("cooked_food",), Placement(object="cooked_food_container"), graspable=True),
-            ObjectWanted(
+            ObjectSpec("cooked_food", ("cooked_food",), Placement(object="cooked_food_container"), graspable=True),
+            ObjectSpec(
                 "dessert",
                 ("sweets",),
                 Placement("counter", reuse_region_from="cooked_food_container", size=(0.5, 0.2), pos=(0.0, -1.0)),

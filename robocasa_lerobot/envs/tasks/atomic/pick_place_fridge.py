@@ -9,9 +9,9 @@ from robocasa_lerobot.envs.predicates import (
 from robocasa_lerobot.envs.scene.initial_states import PartAt
 from robocasa_lerobot.envs.scene.spec import (
     Choice,
-    FixtureWanted,
+    FixtureSpec,
     InitialOpenness,
-    ObjectWanted,
+    ObjectSpec,
     Placement,
     RobotStart,
     SampleRegion,
@@ -27,11 +27,11 @@ FRIDGE = (
     Task(
         name="PickPlaceFridgeShelfToDrawer",
         summary="The object is inside the highest drawer of the fridge, the gripper 15 cm away.",
-        fixtures=(FixtureWanted("fridge", "fridge_with_drawer"),),
+        fixtures=(FixtureSpec("fridge", "fridge_with_drawer"),),
         robot_start=RobotStart("fridge", setback=0.3),
         choices=(Choice("level", {"-1": {}, "-2": {}}), DRAWER),
         objects=(
-            ObjectWanted(
+            ObjectSpec(
                 "obj",
                 ("vegetable", "fruit"),
                 Placement(
@@ -43,7 +43,7 @@ FRIDGE = (
                 graspable=True,
                 properties=("fridgable",),
             ),
-            ObjectWanted(
+            ObjectSpec(
                 "distr",
                 ("any",),
                 Placement("fridge", region=SampleRegion(name="fridge_shelf"), size=(0.4, 0.15), pos=(0.0, -0.5)),
@@ -65,18 +65,18 @@ FRIDGE = (
     Task(
         name="PickPlaceFridgeDrawerToShelf",
         summary="The object is on a shelf of the fridge, the gripper 15 cm away.",
-        fixtures=(FixtureWanted("fridge", "fridge_with_drawer"),),
+        fixtures=(FixtureSpec("fridge", "fridge_with_drawer"),),
         robot_start=RobotStart("fridge", setback=0.3),
         choices=(DRAWER,),
         objects=(
-            ObjectWanted(
+            ObjectSpec(
                 "obj",
                 ("vegetable", "fruit"),
                 Placement("fridge", region=SampleRegion(name="{drawer}"), size=(0.4, 0.2), pos=(0.0, 0.25)),
                 graspable=True,
                 properties=("fridgable",),
             ),
-            ObjectWanted(
+            ObjectSpec(
                 "distr",
                 ("any",),
                 Placement("fridge", region=SampleRegion(name="fridge_shelf"), size=(0.4, 0.2), pos=(0.0, 0.5)),

@@ -4,9 +4,9 @@ from robocasa_lerobot.envs.predicates import PartWithin, When
 from robocasa_lerobot.envs.scene.initial_states import PartAt
 from robocasa_lerobot.envs.scene.spec import (
     Choice,
-    FixtureWanted,
+    FixtureSpec,
     InitialOpenness,
-    ObjectWanted,
+    ObjectSpec,
     Placement,
     RobotStart,
     SampleRegion,
@@ -14,21 +14,21 @@ from robocasa_lerobot.envs.scene.spec import (
 from robocasa_lerobot.envs.tasks.conditions import IN_UP_TO, OUT_FROM
 from robocasa_lerobot.envs.tasks.task import Stage, Task
 
-# Which way a rack is to go, with the words for it; one that is to come out starts half out, one to go in all the way.
+# In which direction a rack slides, with the words for it; one to be pulled starts half out, one to be pushed fully out.
 DIRECTION = Choice("direction", {"out": {"verb": "Pull"}, "in": {"verb": "Push"}})
 STARTS = {"out": (0.5, 0.5), "in": (1.0, 1.0)}
 FRIDGE_DRAWER = "{drawer}"  # all are at one height
 DRAWER = Choice("drawer", of="fridge")
 
 _FRIDGE_OBJECTS = (
-    ObjectWanted(
+    ObjectSpec(
         "distr_drawer",
         ("vegetable", "fruit"),
         Placement("fridge", region=SampleRegion(name=FRIDGE_DRAWER), size=(0.4, 0.2), pos=(0.0, 0.5)),
         graspable=True,
         properties=("fridgable",),
     ),
-    ObjectWanted(
+    ObjectSpec(
         "distr_shelf",
         ("any",),
         Placement("fridge", region=SampleRegion(name="fridge_shelf"), size=(0.4, 0.2), pos=(0.0, 0.0)),
@@ -51,7 +51,7 @@ def _fridge_drawer(
     return Task(
         name=name,
         summary=summary,
-        fixtures=(FixtureWanted("fridge", "fridge_with_drawer"),),
+        fixtures=(FixtureSpec("fridge", "fridge_with_drawer"),),
         robot_start=RobotStart("fridge", setback=0.3),
         choices=(DRAWER,),
         objects=_FRIDGE_OBJECTS,
@@ -77,7 +77,7 @@ def _rack(
     return Task(
         name=name,
         summary="The rack is out by at least 95 % of its range, or in to at most 5 %, as the instruction says.",
-        fixtures=(FixtureWanted(kind, kind),),
+        fixtures=(FixtureSpec(kind, kind),),
         robot_start=RobotStart(kind, beside=kind == "dishwasher", setback=0.35 if kind == "oven" else 0.0),
         choices=(DIRECTION, *choices),
         initial=(InitialOpenness(kind, *door), PartAt(kind, part, STARTS, "direction")),

@@ -172,7 +172,7 @@ def _worth_table(found: list[GroupCurves]) -> Table:
         notes=(
             "Read off the curve without pretraining, which is taken as straight between its points on a logarithmic "
             "axis of demonstrations. Beyond its ends only a bound can be said (≥ or ≤). Intervals are 95 %, from "
-            "trials drawn again within tasks. The published curves are read the same way.",
+            "trials drawn again within tasks. The published curves are read by the same rule.",
         ),
         sortable=False,
     )

@@ -95,7 +95,7 @@ class Fridge(Appliance):
         """Shares of the ranges of doors and drawers."""
         return {part: self.share(data, part) for part in (*self.doors, *self.sliding)}
 
-    # Where things are -----------------------------------------------------------------------------------------
+    # Regions and shelves --------------------------------------------------------------------------------------
 
     def _split(self) -> float:
         """Height, or for side by side the x, between freezer and fridge, in the fixture's frame."""
@@ -117,7 +117,7 @@ class Fridge(Appliance):
         return low, high
 
     def _levels(self, part: str) -> list[float]:
-        """Surfaces that things stand on in a compartment, from below."""
+        """Surfaces that objects stand on in a compartment, from below."""
         low, high = self._room(part)
         if part == "freezer":
             if self.record.kind != "fridge_side_by_side":

@@ -19,7 +19,7 @@ class Racked(Appliance):
     """Door `door`; racks `rack0`, and above it `rack1`.
 
     Attributes:
-        rack_gap_m: between the room above a rack and what is over it, metres.
+        rack_gap_m: between the room above a rack and the part over it, metres.
         rack_edge_m: between that room and the walls to the sides, and those at front and back, metres.
     """
 

@@ -103,7 +103,7 @@ class Sink(Appliance):
         self.set_position(data, "handle", low + max(draw, 0.01) * (high - low) if on else 0.0)
 
     def under_water(self, data: mujoco.MjData, point: NDArray[np.float64], radius: float) -> bool:
-        """Whether a thing of a horizontal radius (metres) at a world point stands in running water."""
+        """Whether an object of a horizontal radius (metres) at a world point stands in running water."""
         site = data.site(f"{self.name}_water").xpos
         inside = float(np.linalg.norm(point[:2] - site[:2])) < radius
         return bool(self.water_on(data) and inside and point[2] < site[2])

@@ -112,7 +112,7 @@ class Hob(Appliance):
             self.show(data, f"burner_{location}", _LEVELS[self.burner_level(data, location)])
 
     def add_burners(self, parts: Parts, root: mujoco.MjsBody, top: float) -> None:
-        """Burners, grates and what is seen when they are on, over a hob whose surface is at `top`."""
+        """Burners, grates and their glow when they are on, over a hob whose surface is at `top`."""
         width, depth, _ = self.size
         kind = self.record["hob"]
         for location, (share_x, share_y) in self.burners.items():

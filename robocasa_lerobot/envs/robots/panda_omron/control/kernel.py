@@ -161,7 +161,7 @@ def run(memory: Array, views: Any, places: Any, model: int, data: int, substeps:
     """Advance the simulation by `substeps` physics steps; `model` and `data` are the addresses of their structures.
 
     Returns whether what sleeps is evaluated for another state than the present one: MuJoCo leaves it as it was before
-    the step in which it fell asleep, and relative to a centre of mass that moves with what is awake under the same
+    the step in which it fell asleep, and relative to a centre of mass that moves with the awake bodies under the same
     root (the other door of a cabinet).
     """
     asleep = views.tree_asleep

@@ -1,7 +1,7 @@
 """Brew hot drinks."""
 
 from robocasa_lerobot.envs.predicates import AllOf, GripperFar, OnBurner
-from robocasa_lerobot.envs.scene.spec import FixtureWanted, ObjectWanted, Placement, RobotStart, SampleRegion
+from robocasa_lerobot.envs.scene.spec import FixtureSpec, ObjectSpec, Placement, RobotStart, SampleRegion
 from robocasa_lerobot.envs.tasks.atomic.common import HANDLE_TURN, counter_near, on_counter
 from robocasa_lerobot.envs.tasks.task import Stage, Task
 
@@ -9,16 +9,16 @@ from robocasa_lerobot.envs.tasks.task import Stage, Task
 KETTLE_BOILING = Task(
     name="KettleBoiling",
     summary="The kettle stands on a burner whose knob is on, the gripper away.",
-    fixtures=(FixtureWanted("stove", "stove"), counter_near("stove", size=(0.2, 0.2))),
+    fixtures=(FixtureSpec("stove", "stove"), counter_near("stove", size=(0.2, 0.2))),
     robot_start=RobotStart("stove"),
     objects=(
-        ObjectWanted(
+        ObjectSpec(
             "obj",
             ("kettle_non_electric",),
             on_counter("stove", (0.35, 0.35), loc="left_right"),
             graspable=True,
         ),
-        ObjectWanted(
+        ObjectSpec(
             "stove_distr",
             ("pan", "pot"),
             Placement(

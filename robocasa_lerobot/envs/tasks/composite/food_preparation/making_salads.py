@@ -2,7 +2,7 @@
 
 from robocasa_lerobot.envs.predicates import StepsWhile, UnderWater
 from robocasa_lerobot.envs.scene.initial_states import Water
-from robocasa_lerobot.envs.scene.spec import FixtureWanted, ObjectWanted, Placement, RobotStart
+from robocasa_lerobot.envs.scene.spec import FixtureSpec, ObjectSpec, Placement, RobotStart
 from robocasa_lerobot.envs.tasks.atomic.common import counter_near, on_counter
 from robocasa_lerobot.envs.tasks.task import Stage, Task
 
@@ -12,11 +12,11 @@ _WASHED = StepsWhile(UnderWater("lettuce", "sink"), 25)
 WASH_LETTUCE = Task(
     name="WashLettuce",
     summary="The lettuce has been under running water for 25 steps in total.",
-    fixtures=(FixtureWanted("sink", "sink"), counter_near("sink")),
+    fixtures=(FixtureSpec("sink", "sink"), counter_near("sink")),
     robot_start=RobotStart("sink"),
     objects=(
-        ObjectWanted("lettuce_container", ("colander",), on_counter("sink", (0.4, 0.5), loc="left_right")),
-        ObjectWanted("lettuce", ("lettuce",), Placement(object="lettuce_container")),
+        ObjectSpec("lettuce_container", ("colander",), on_counter("sink", (0.4, 0.5), loc="left_right")),
+        ObjectSpec("lettuce", ("lettuce",), Placement(object="lettuce_container")),
     ),
     initial=(Water("sink", on=False),),
     goal=_WASHED,

@@ -4,9 +4,9 @@ import numpy as np
 
 from robocasa_lerobot.envs.predicates import AllOf, GripperFar, ObjectOn, OnShelf
 from robocasa_lerobot.envs.scene.spec import (
-    FixtureWanted,
+    FixtureSpec,
     InitialOpenness,
-    ObjectWanted,
+    ObjectSpec,
     Placement,
     RobotStart,
     SampleRegion,
@@ -16,13 +16,13 @@ from robocasa_lerobot.envs.tasks.task import Stage, Task
 _ACROSS = (np.pi / 2, np.pi / 2)  # radians
 
 
-def _box(name: str, x: float, *, repeats: bool = False) -> ObjectWanted:
+def _box(name: str, x: float, *, repeats: bool = False) -> ObjectSpec:
     start = Placement("counter", region=SampleRegion(ref="fridge"), size=(1.0, 0.4), pos=(x, -1.0), rotation=_ACROSS)
-    return ObjectWanted(name, ("tupperware",), start, graspable=True, scale=(1.5, 1.5, 1.0), repeats=repeats)
+    return ObjectSpec(name, ("tupperware",), start, graspable=True, scale=(1.5, 1.5, 1.0), repeats=repeats)
 
 
-def _in_box(name: str, group: str, box: str) -> ObjectWanted:
-    return ObjectWanted(name, (group,), Placement(object=box, size=(0.8, 0.8)), graspable=True)
+def _in_box(name: str, group: str, box: str) -> ObjectSpec:
+    return ObjectSpec(name, (group,), Placement(object=box, size=(0.8, 0.8)), graspable=True)
 
 
 def _store(box: str, level: str) -> tuple[Stage, ...]:
@@ -39,7 +39,7 @@ SEPARATE_FREEZER_RACK = Task(
         "The box with the meat is on the second highest shelf of the freezer, the one with both vegetables on the "
         "highest, the gripper away from both."
     ),
-    fixtures=(FixtureWanted("fridge", "fridge_with_freezer"), FixtureWanted("counter", "counter", near="fridge")),
+    fixtures=(FixtureSpec("fridge", "fridge_with_freezer"), FixtureSpec("counter", "counter", near="fridge")),
     needs=("freezer",),
     robot_start=RobotStart("counter", at_object="meat_tupperware"),
     objects=(
@@ -65,8 +65,8 @@ SEPARATE_FREEZER_RACK = Task(
         *_store("veg_tupperware", "highest"),
     ),
     instruction=(
-        "Store the box of {meat} on the freezer rack one below the top and the box of {vegetable1} and {vegetable2} on "
-        "the top rack."
+        "Put the box of {meat} on the second highest shelf of the freezer and the box of {vegetable1} and {vegetable2} "
+        "on the highest."
     ),
     paraphrases=(
         "The box with the {vegetable1} and the {vegetable2} goes on top in the freezer, the {meat} box just below.",

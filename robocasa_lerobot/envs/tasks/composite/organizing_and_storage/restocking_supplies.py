@@ -1,7 +1,7 @@
-"""Fill up what is stored in cabinets."""
+"""Restock cabinets."""
 
 from robocasa_lerobot.envs.predicates import AllOf, DoorsClosed, ObjectInside
-from robocasa_lerobot.envs.scene.spec import FixtureWanted, ObjectWanted, Placement, RobotStart, SampleRegion
+from robocasa_lerobot.envs.scene.spec import FixtureSpec, ObjectSpec, Placement, RobotStart, SampleRegion
 from robocasa_lerobot.envs.tasks.task import Stage, Task
 
 _BELOW = Placement(
@@ -12,13 +12,13 @@ RESTOCK_BOWLS = Task(
     name="RestockBowls",
     summary="Both bowls are in the cabinet, which is shut.",
     fixtures=(
-        FixtureWanted("cabinet", "cabinet_double_door"),
-        FixtureWanted("counter", "counter", near="cabinet", size=(0.5, 0.4)),
+        FixtureSpec("cabinet", "cabinet_double_door"),
+        FixtureSpec("counter", "counter", near="cabinet", size=(0.5, 0.4)),
     ),
     robot_start=RobotStart("cabinet"),
     objects=(
-        ObjectWanted("obj1", ("bowl",), _BELOW, graspable=True),
-        ObjectWanted("obj2", ("bowl",), _BELOW, graspable=True, repeats=True),
+        ObjectSpec("obj1", ("bowl",), _BELOW, graspable=True),
+        ObjectSpec("obj2", ("bowl",), _BELOW, graspable=True, repeats=True),
     ),
     goal=AllOf(ObjectInside("obj1", "cabinet"), ObjectInside("obj2", "cabinet"), DoorsClosed("cabinet")),
     stages=(
@@ -27,7 +27,7 @@ RESTOCK_BOWLS = Task(
         Stage("pick_place", "place", "cabinet", object="obj2"),
         Stage("doors", "close", "cabinet"),
     ),
-    instruction="Open the cabinet, store the two bowls from the counter in it and shut it again.",
+    instruction="Open the cabinet, move both bowls from the counter into it and close it.",
     paraphrases=(
         "Both bowls belong in the cabinet; leave it shut.",
         "Clear the two bowls off the worktop into the cabinet and close its doors.",

@@ -1,10 +1,10 @@
-"""Put what is left of a meal away."""
+"""Put leftovers of a meal away."""
 
 from robocasa_lerobot.envs.predicates import AllOf, GripperFar, ObjectInside, ObjectOn
 from robocasa_lerobot.envs.scene.spec import (
-    FixtureWanted,
+    FixtureSpec,
     InitialOpenness,
-    ObjectWanted,
+    ObjectSpec,
     Placement,
     RobotStart,
     SampleRegion,
@@ -16,36 +16,36 @@ def _before(stool: str, size: tuple[float, float]) -> Placement:
     return Placement("dining_counter", region=SampleRegion(ref=stool), size=size, pos=("ref", "ref"))
 
 
-def _on_a_plate(name: str, stool: str) -> tuple[ObjectWanted, ObjectWanted]:
+def _on_a_plate(name: str, stool: str) -> tuple[ObjectSpec, ObjectSpec]:
     plate = f"{name}_container"
     groups = (name,)
     return (
-        ObjectWanted(plate, ("plate",), _before(stool, (0.4, 0.4)), repeats=True),
-        ObjectWanted(name, groups, Placement(object=plate), graspable=True),
+        ObjectSpec(plate, ("plate",), _before(stool, (0.4, 0.4)), repeats=True),
+        ObjectSpec(name, groups, Placement(object=plate), graspable=True),
     )
 
 
-def _in_fridge(name: str, x: float) -> ObjectWanted:
+def _in_fridge(name: str, x: float) -> ObjectSpec:
     shelf = SampleRegion(name="fridge_shelf", height=(0.5, 1.5))
     start = Placement("fridge", region=shelf, size=(0.3, 0.3), pos=(x, 1.0))
-    return ObjectWanted(name, ("any",), start, properties=("fridgable",))
+    return ObjectSpec(name, ("any",), start, properties=("fridgable",))
 
 
 STORE_LEFTOVERS_IN_BOWL = Task(
     name="StoreLeftoversInBowl",
     summary="Drumstick and vegetable are in the bowl, the bowl on a shelf of the fridge, the gripper away.",
     fixtures=(
-        FixtureWanted("stool1", "stool"),
-        FixtureWanted("stool2", "stool", other_than=("stool1",)),
-        FixtureWanted("dining_counter", "dining_counter", near="stool1"),
-        FixtureWanted("fridge", "fridge"),
+        FixtureSpec("stool1", "stool"),
+        FixtureSpec("stool2", "stool", other_than=("stool1",)),
+        FixtureSpec("dining_counter", "dining_counter", near="stool1"),
+        FixtureSpec("fridge", "fridge"),
     ),
     needs=("dining_counter",),
     robot_start=RobotStart("dining_counter", at_object="bowl"),
     objects=(
         *_on_a_plate("chicken_drumstick", "stool1"),
         *_on_a_plate("vegetable", "stool2"),
-        ObjectWanted("bowl", ("bowl",), _before("stool2", (1.0, 0.4)), graspable=True),
+        ObjectSpec("bowl", ("bowl",), _before("stool2", (1.0, 0.4)), graspable=True),
         _in_fridge("distr1", -0.3),
         _in_fridge("distr2", 0.3),
     ),

@@ -2,9 +2,9 @@
 
 from robocasa_lerobot.envs.predicates import AllOf, GripperFar, ObjectOn, ObjectTouches
 from robocasa_lerobot.envs.scene.spec import (
-    FixtureWanted,
+    FixtureSpec,
     InitialOpenness,
-    ObjectWanted,
+    ObjectSpec,
     Placement,
     RobotStart,
     SampleRegion,
@@ -29,17 +29,17 @@ BUILD_APPETIZER_PLATE = Task(
     name="BuildAppetizerPlate",
     summary="Cheese, meat and vegetable lie on the plate on the dining counter, the gripper away from each.",
     fixtures=(
-        FixtureWanted("fridge", "fridge"),
-        FixtureWanted("stool", "stool"),
-        FixtureWanted("dining_table", "dining_counter", near="stool"),
+        FixtureSpec("fridge", "fridge"),
+        FixtureSpec("stool", "stool"),
+        FixtureSpec("dining_table", "dining_counter", near="stool"),
     ),
     needs=("dining_counter",),
     robot_start=RobotStart("fridge", setback=0.3),
     objects=(
-        ObjectWanted("cheese", ("cheese",), _SHELF, graspable=True),
-        ObjectWanted("vegetable", ("vegetable",), _SHELF, graspable=True),
-        ObjectWanted("meat", ("meat",), _SHELF, graspable=True),
-        ObjectWanted(
+        ObjectSpec("cheese", ("cheese",), _SHELF, graspable=True),
+        ObjectSpec("vegetable", ("vegetable",), _SHELF, graspable=True),
+        ObjectSpec("meat", ("meat",), _SHELF, graspable=True),
+        ObjectSpec(
             "appetizer_plate",
             ("plate",),
             Placement("dining_table", region=SampleRegion(ref="stool"), size=(0.4, 0.4), pos=("ref", "ref")),

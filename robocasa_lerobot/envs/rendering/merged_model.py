@@ -22,7 +22,7 @@ Array = NDArray[np.float64]
 
 VISIBLE_GROUPS = (1, 2)  # of MuJoCo's default options, less the collision shapes
 VISIBLE_GROUP = 1  # of all geoms of a look-alike but its backdrop
-# Edge of the squares of floor over which things that never move are merged: culling still tells them apart.
+# Edge of the squares of floor over which bodies that never move are merged: culling still tells them apart.
 CELL_M = 2.0
 MIN_SAVED_DRAWS = 50  # below it, a look-alike costs more memory and building time than it is worth
 _BOX, _MESH = int(mujoco.mjtGeom.mjGEOM_BOX), int(mujoco.mjtGeom.mjGEOM_MESH)
@@ -34,7 +34,7 @@ _KEPT = (
     int(mujoco.mjtGeom.mjGEOM_ELLIPSOID),
     _MESH,
 )
-# Of a light or camera, what is copied as it stands; its pose is copied with every picture.
+# Of a light or camera, the fields that are copied as they stand; its pose is copied with every picture.
 _LIGHT_FIELDS = (
     *("type", "castshadow", "active", "bulbradius", "intensity", "range"),
     *("attenuation", "cutoff", "exponent", "ambient", "diffuse", "specular"),
@@ -44,12 +44,12 @@ _VISUAL_PARTS = ["global_", "quality", "headlight", "map", "scale", "rgba"]
 
 
 @dataclass
-class LookAlike:
+class MergedModel:
     """A model to draw instead of `source`, and its poses.
 
     Attributes:
         source: the model that is simulated.
-        model, data: what is drawn.
+        model, data: the scene to draw.
         bodies: of the source, by geom of the look-alike; shape (n,).
         geoms: of the source, by geom of the look-alike: the first one of those that were merged; shape (n,).
         loose: geoms of the source that are drawn for themselves because their looks have changed at run time.
@@ -94,11 +94,13 @@ class LookAlike:
         return frozenset(np.flatnonzero(recoloured | (kinds != self._kinds).any(axis=1)).tolist())
 
 
-def look_alike(model: mujoco.MjModel, groups: tuple[int, ...], loose: frozenset[int] = frozenset()) -> LookAlike | None:
+def merged_model(
+    model: mujoco.MjModel, groups: tuple[int, ...], loose: frozenset[int] = frozenset()
+) -> MergedModel | None:
     """Make the look-alike of the geoms in `groups`; None where it would save little, or could not show everything.
 
     Boxes, cylinders, capsules and untextured meshes of one body, material and colour become one mesh, but for the
-    `loose` ones and what is transparent. Other shapes are taken over as they are.
+    `loose` ones and transparent ones. Other shapes are taken over as they are.
     """
     if model.nskin or model.nflex or model.ntendon or model.nhfield:
         return None
@@ -122,7 +124,7 @@ def look_alike(model: mujoco.MjModel, groups: tuple[int, ...], loose: frozenset[
     _copy_looks(model, made)
     first = np.array([geoms[0] for geoms in parts], dtype=np.intp)
     bodies = np.where(poses.fixed[first], 0, model.geom_bodyid[first]).astype(np.intp)
-    return LookAlike(model, made, bodies, first, loose)
+    return MergedModel(model, made, bodies, first, loose)
 
 
 @dataclass(frozen=True)
@@ -298,7 +300,7 @@ def _add_mesh(spec: mujoco.MjSpec, surface: Surface, name: str) -> None:
     mesh.usernormal = surface.normals.ravel()
     mesh.usertexcoord = surface.texcoords.ravel()
     mesh.userface = mesh.userfacenormal = mesh.userfacetexcoord = surface.faces.ravel()
-    mesh.inertia = mujoco.mjtMeshInertia.mjMESH_INERTIA_SHELL  # flat things have no volume
+    mesh.inertia = mujoco.mjtMeshInertia.mjMESH_INERTIA_SHELL  # flat meshes have no volume
 
 
 def _copied_mesh(spec: mujoco.MjSpec, model: mujoco.MjModel, index: int) -> str:

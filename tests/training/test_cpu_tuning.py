@@ -8,7 +8,7 @@ import sys
 
 import pytest
 
-from robocasa_lerobot.training.spinning import limit_spinning
+from robocasa_lerobot.training.cpu_tuning import limit_spinning
 
 
 def test_the_users_own_setting_stays(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -20,13 +20,13 @@ def test_the_users_own_setting_stays(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_the_train_command_sets_it_before_torch_is_loaded() -> None:
     program = """
 import argparse, os, sys
-from robocasa_lerobot.training import spinning
+from robocasa_lerobot.training import cpu_tuning
 from robocasa_lerobot.cli import train as command
 def check():
     assert "torch" not in sys.modules
     print("set")
     sys.exit(0)
-spinning.limit_spinning = check
+cpu_tuning.limit_spinning = check
 command.run(argparse.Namespace(config_path="none.yaml"))
 """
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False)

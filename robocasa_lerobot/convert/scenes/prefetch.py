@@ -24,9 +24,9 @@ if TYPE_CHECKING:
 
 # Where a scene comes from: gives the loadable MJCF and its files. It can be pickled, and compared by value.
 SceneSource = Callable[[], tuple[str, dict[str, bytes]]]
-_STARTED = "started"  # the first thing that the other process says
+_STARTED = "started"  # the other process's first message
 # A renderer without a graphics card uses every core, and is what everybody waits for; but a machine that is busy with
-# other things must not hold up the scene for long.
+# other work must not hold up the scene for long.
 _NICE = 10
 # The other process draws nothing: MuJoCo need not load a driver.
 _WITHOUT_OPENGL = {"MUJOCO_GL": "disabled"}
@@ -108,7 +108,7 @@ class _Compiler:
     """The other process, seen from this one."""
 
     def __init__(self) -> None:
-        self.files = anonymous_file("model"), anonymous_file("look_alike")
+        self.files = anonymous_file("model"), anonymous_file("merged_model")
         down_read, down_write = os.pipe()
         up_read, up_write = os.pipe()
         self._process = start_serving(__name__, (down_read, up_write, *self.files), **_WITHOUT_OPENGL)
@@ -141,11 +141,11 @@ class _Compiler:
 
 
 def serve(down: int, up: int, *files: int) -> None:
-    """The other process: compile what is asked for until the pipe is closed.
+    """The other process: compile the requested scenes until the pipe is closed.
 
     Args:
         down: file descriptor to read requests from.
-        up: file descriptor to write to: first that it is ready, then for each request what is kept beside the files, or
+        up: file descriptor to write to: first that it is ready, then for each request the record beside the files, or
             None where something failed.
         files: file descriptors into which the models are written.
     """
@@ -153,7 +153,7 @@ def serve(down: int, up: int, *files: int) -> None:
 
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # a user's Ctrl-C: the process that asks ends this one
     os.nice(_NICE)
-    model, look_alike = files
+    model, merged_model = files
     with os.fdopen(down, "rb") as pipe, os.fdopen(up, "wb") as answers, contextlib.suppress(BrokenPipeError, EOFError):
         pickle.dump(_STARTED, answers)
         answers.flush()
@@ -163,6 +163,6 @@ def serve(down: int, up: int, *files: int) -> None:
             with contextlib.suppress(Exception):  # whatever it is, the process that asks will see it for itself
                 xml, assets = source()
                 scene = CompiledScene.of(xml, assets, preset)
-                answer = keep(scene.with_look_alike() if pictures else scene, (model, look_alike))
+                answer = keep(scene.with_merged_model() if pictures else scene, (model, merged_model))
             pickle.dump(answer, answers)
             answers.flush()

@@ -3,7 +3,7 @@
 HDF5 is a C library: on damaged files it has been seen to loop forever (0.6 % of randomly damaged files in HDF5 2.0),
 with Python's lock held, so that nothing in the same process could stop it. The walk touches every attribute, header,
 index of parts and small array. Where the process dies, the episode that it was in is left alone and the walk starts
-again without it. On the way every episode gets a digest, by which copies are found.
+again without it. Meanwhile every episode gets a digest, by which copies are found.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ _MAX_DEPTH = 12
 _READ_BYTES = 1 << 20  # larger arrays are read in part
 _FIRST_PART_BYTES = 64 << 20
 _SKIPPED = ("next_obs",)  # never converted
-_MODULE = "robocasa_lerobot.convert.reading.survey"
+_MODULE = "robocasa_lerobot.convert.reading.safe_scan"
 
 
 @dataclass
@@ -112,7 +112,7 @@ def _walk(path: Path, traps: frozenset[str]) -> Iterator[dict[str, str]]:
         with reading("it"):
             file = h5py.File(path, "r")
     except RejectedEpisodeError:
-        return  # `DemoFile` says what is wrong
+        return  # `DemoFile` names the mistake
     with file:
         yield from _walk_group(file, "", traps, 0, {})
 

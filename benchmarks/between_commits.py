@@ -1,0 +1,177 @@
+"""This checkout beside an earlier commit of ours: processor time per step of simulator, converter and evaluation.
+
+Both sides do the same work, taking turns, on one thread per library, so that whatever else the machine does hits both;
+medians count. Demonstrations and the policy (random weights, so that every trial lasts its horizon) are made by the
+earlier commit, which both sides can read.
+
+    python benchmarks/between_commits.py 500f015
+"""
+
+from __future__ import annotations
+
+import argparse
+import dataclasses
+import json
+import os
+import resource
+import shutil
+import statistics
+import subprocess
+import sys
+import tempfile
+from collections.abc import Sequence
+from pathlib import Path
+
+import common
+import evaluation_sides
+import training_sides
+
+from robocasa_lerobot.progress import Bar
+
+OUTPUT = common.RESULTS / "between_commits.json"
+SIDES = ("before", "now")
+CLI = ("-c", "import sys; from robocasa_lerobot.cli import main; sys.exit(main())")
+TASK, EPISODES = "PickPlaceCounterToSink", 4
+EVALUATED, TRIALS, IMAGE_SIZE = ["CloseDrawer", "PickPlaceCounterToSink"], 2, 96
+STEPS = {"sim": 1200, "sim_pictures": 150}
+CONTROL_STEP = """
+import sys, time
+import numpy as np
+from robocasa_lerobot import contract
+from robocasa_lerobot.envs.kitchen_env import KitchenEnv
+task, steps, pictures = sys.argv[1], int(sys.argv[2]), sys.argv[3] == "True"
+cameras = contract.CAMERAS if pictures else ()
+env = KitchenEnv(task, cameras=cameras, horizon=10**9, terminate_on_success=False)
+rng = np.random.default_rng(0)
+actions = rng.uniform(-0.3, 0.3, size=(steps, contract.ACTION_SIZE)).astype(np.float32)
+env.reset(seed=0)
+for action in actions[:20]:
+    env.step(action)
+env.reset(seed=0)
+started = time.process_time()
+for action in actions:
+    env.step(action)
+print("RESULT", (time.process_time() - started) / steps)
+"""
+
+
+def parse(arguments: Sequence[str] | None = None) -> argparse.Namespace:
+    """The command's options."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("before", help="commit that is compared with")
+    parser.add_argument("--repetitions", type=int, default=5, help="of each side (default 5)")
+    parser.add_argument("--kinds", default="sim,sim_pictures,convert,evaluation", help="default: all")
+    parser.add_argument("--out", type=Path, default=OUTPUT, help="result")
+    return parser.parse_args(arguments)
+
+
+def run(checkout: Path, command: Sequence[str]) -> tuple[str, float]:
+    """What a Python of a checkout prints, and the processor seconds of it and its children."""
+    environment = {**os.environ, "PYTHONPATH": f"{checkout}{os.pathsep}{checkout / 'benchmarks'}"}
+    environment |= {"OMP_NUM_THREADS": "1", "HF_HUB_OFFLINE": "1"}
+    before = _children_s()
+    done = subprocess.run(
+        [sys.executable, *command], cwd=checkout, env=environment, capture_output=True, text=True, check=False
+    )
+    if done.returncode:
+        raise SystemExit(f"{command[0]} failed in {checkout}:\n{done.stdout[-2000:]}\n{done.stderr[-4000:]}")
+    return done.stdout, _children_s() - before
+
+
+def _children_s() -> float:
+    used = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return used.ru_utime + used.ru_stime
+
+
+class Work:
+    """The three kinds of work, as one side does them.
+
+    Args:
+        checkout: of the side.
+        folder: for what it writes.
+        demos: folder of HDF5 demonstrations.
+        checkpoint: of the policy.
+    """
+
+    def __init__(self, checkout: Path, folder: Path, demos: Path, checkpoint: Path) -> None:
+        self._checkout, self._folder, self._demos, self._checkpoint = checkout, folder, demos, checkpoint
+
+    def seconds(self, kind: str) -> float:
+        """Processor seconds per control step, frame or step of a trial; commands count with their start."""
+        shutil.rmtree(self._folder, ignore_errors=True)
+        self._folder.mkdir(parents=True)
+        return {"convert": self._convert, "evaluation": self._evaluate}.get(kind, lambda: self._simulate(kind))()
+
+    def _simulate(self, kind: str) -> float:
+        said, _ = run(self._checkout, ["-c", CONTROL_STEP, TASK, str(STEPS[kind]), str(kind == "sim_pictures")])
+        return float(said.rsplit("RESULT", 1)[1])
+
+    def _convert(self) -> float:
+        out = self._folder / "dataset"
+        command = [*CLI, "convert", str(self._demos / f"{TASK}.hdf5"), f"--out={out}", "--workers=1"]
+        _, seconds = run(self._checkout, command)
+        info = json.loads((out / "meta" / "info.json").read_text(encoding="utf-8"))
+        return seconds / int(info["total_frames"])
+
+    def _evaluate(self) -> float:
+        job = evaluation_sides.Job(
+            str(self._checkpoint), EVALUATED, TRIALS, 1, IMAGE_SIZE, str(self._folder / "out"), films=False
+        )
+        file = self._folder / "job.json"
+        file.write_text(json.dumps(dataclasses.asdict(job)), encoding="utf-8")
+        script = self._checkout / "benchmarks" / "evaluation_sides.py"
+        said, seconds = run(self._checkout, [str(script), evaluation_sides.OURS, str(file)])
+        return seconds / sum(json.loads(said.rsplit("RESULT ", 1)[1])["steps"])
+
+
+def measure(before: Path, scratch: Path, kinds: Sequence[str], repetitions: int) -> dict[str, dict[str, list[float]]]:
+    """Seconds of all kinds on both sides, the sides in turn, each first as often as the other."""
+    demos, checkpoint = scratch / "demos", scratch / "policy"
+    if "convert" in kinds:
+        command = [*CLI, "demos", f"--tasks={TASK}", f"--episodes={EPISODES}", f"--out={demos}"]
+        run(before, [*command, "--workers=1"])
+    if "evaluation" in kinds:
+        evaluation_sides.make_checkpoint(checkpoint, training_sides.policy_settings("demo"), IMAGE_SIZE)
+    work = {
+        side: Work(checkout, scratch / side, demos, checkpoint)
+        for side, checkout in (("before", before), ("now", common.REPOSITORY))
+    }
+    found: dict[str, dict[str, list[float]]] = {kind: {side: [] for side in SIDES} for kind in kinds}
+    jobs = [(kind, turn) for turn in range(repetitions) for kind in kinds]
+    with Bar(jobs, total=len(jobs), unit="pair") as bar:
+        for kind, turn in bar:
+            for side in SIDES if turn % 2 == 0 else SIDES[::-1]:
+                found[kind][side].append(work[side].seconds(kind))
+    return found
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Measure, print, write."""
+    options = parse(arguments)
+    busy = common.busy_share()
+    with tempfile.TemporaryDirectory() as folder:
+        scratch = Path(folder)
+        before = common.unpack(options.before, scratch / "checkout")
+        found = measure(before, scratch, options.kinds.split(","), options.repetitions)
+    medians = {kind: {side: statistics.median(values) for side, values in row.items()} for kind, row in found.items()}
+    ratios = {f"{kind}_now_to_before": round(row["now"] / row["before"], 4) for kind, row in medians.items()}
+    lines = [
+        [kind, *(f"{1000 * row[side]:.2f}" for side in SIDES), f"{ratios[f'{kind}_now_to_before']:.3f}"]
+        for kind, row in medians.items()
+    ]
+    print(common.table(["processor ms per step", *SIDES, "ratio"], lines))
+    body = {
+        "machine": common.machine(),
+        "versions": common.versions("mujoco", "numpy", "torch", "lerobot"),
+        "before": options.before,
+        "busy_before": busy,
+        "ratios": ratios,
+        "seconds_per_step": {kind: {s: common.spread(v) for s, v in row.items()} for kind, row in found.items()},
+    }
+    common.write_result(options.out, "between_commits", body)
+    print(options.out)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,151 @@
+"""Where the base has room: by the fixtures' footprints, or by the robot's shapes against the kitchen as it is now."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from weakref import WeakKeyDictionary
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from robocasa_lerobot.demos.motion import Array
+from robocasa_lerobot.demos.planning.collision import CollisionChecker, Held, Touched
+from robocasa_lerobot.envs.scene.robot_poses import Obstacles, RobotPose
+from robocasa_lerobot.envs.scene.scene import Scene
+
+# A goal that touches something is exchanged for the nearest free pose up to this far away.
+SHIFT_M, SHIFT_STEP_M = 0.18, 0.03
+STEP_M, STEP_RAD = 0.05, 0.1  # between tested poses of a straight move
+CLOSE_STEP_M, CLOSE_STEP_RAD = 0.025, 0.06  # the same where a margin is to be kept
+# From the start, within which bodies touched there already may still be touched; and from the goal.
+LEAVING_M, COMING_M = 0.15, 0.20
+
+_obstacles: WeakKeyDictionary[mujoco.MjModel, Obstacles] = WeakKeyDictionary()
+
+
+class Room:
+    """Answers whether the robot can stand at poses, asking the fixtures' footprints.
+
+    Attributes:
+        margin_m: kept from what stands around.
+    """
+
+    margin_m = 0.0
+
+    def __init__(self, scene: Scene) -> None:
+        self.scene = scene
+        if scene.model not in _obstacles:
+            fixtures = {name: fixture for name, fixture in scene.fixtures.items() if name != "floor"}
+            _obstacles[scene.model] = Obstacles(fixtures, scene.robot.shape)
+        self._obstacles = _obstacles[scene.model]
+
+    def free(self, pose: RobotPose) -> bool:
+        """Whether nothing is touched, inside of the walls."""
+        return bool(self.all_free([pose])[0])
+
+    def all_free(self, poses: Sequence[RobotPose]) -> NDArray[np.bool_]:
+        """The same of N poses, (N,)."""
+        if not poses:
+            return np.zeros(0, dtype=np.bool_)
+        x, y = np.array([(pose.x, pose.y) for pose in poses]).T
+        bounds = self.scene.layout.room
+        inside = (bounds["x_min"] < x) & (x < bounds["x_max"]) & (bounds["y_min"] < y) & (y < 0.0)
+        return inside & self._obstacles.leave_free(poses)
+
+    def nearest(self, goal: RobotPose) -> RobotPose:
+        """The goal, or the free pose of the same heading that is nearest to it, or the goal if there is none."""
+        return goal if self.free(goal) else next(iter(self.near(goal)), goal)
+
+    def near(self, goal: RobotPose) -> list[RobotPose]:
+        """Free poses of a goal's heading up to `SHIFT_M` from it, the nearest first."""
+        reach = np.arange(-SHIFT_M, SHIFT_M + 1e-9, SHIFT_STEP_M)
+        shifts = sorted(((float(x), float(y)) for x in reach for y in reach), key=lambda shift: np.hypot(*shift))
+        poses = [RobotPose(goal.x + x, goal.y + y, goal.yaw) for x, y in shifts if np.hypot(x, y) <= SHIFT_M]
+        return [pose for pose, free in zip(poses, self.all_free(poses), strict=True) if free]
+
+    def straight(self, start: RobotPose, goal: RobotPose) -> bool:
+        """Whether the robot can move and turn at once from one pose to another."""
+        return bool(self.all_free(_between(start, goal, STEP_M, STEP_RAD)).all())
+
+    def closely(self, one: RobotPose, other: RobotPose) -> bool:
+        """The same with poses tested that lie no farther apart than a handle is wide."""
+        return bool(self.all_free(_between(one, other, CLOSE_STEP_M, CLOSE_STEP_RAD)).all())
+
+
+class Space(Room):
+    """The same, and the robot's shapes against those of the kitchen as it is now.
+
+    Args:
+        scene: of the kitchen.
+        checker: of the present state.
+        start: where the base stands; bodies touched there are no obstacles near it.
+        goal: where it is to stand.
+        held: the object in the gripper.
+        joints: (7,) of the arm on the way, radians; None takes those it has.
+        margin_m: kept from what stands around.
+        close_m: the same near the start and the goal.
+    """
+
+    def __init__(
+        self,
+        scene: Scene,
+        checker: CollisionChecker,
+        start: RobotPose,
+        goal: RobotPose,
+        held: Held | None,
+        joints: Array | None,
+        margin_m: float,
+        close_m: float = 0.0,
+    ) -> None:
+        super().__init__(scene)
+        self._checker = checker
+        self._held, self.margin_m, self._close = held, margin_m, close_m
+        self._joints = self._checker.present_joints if joints is None else joints
+        self._start, self._goal = start, goal
+        self._leaning = self._touched([start], 8, close_m).all()
+
+    def all_free(self, poses: Sequence[RobotPose]) -> NDArray[np.bool_]:
+        """Whether nothing is touched, inside of the walls; poses near the start may touch what the start does.
+
+        Near the start and the goal little or no margin is kept: robots stand close to what they work on.
+        """
+        free = super().all_free(poses)
+        places = np.flatnonzero(free)
+        if not len(places):
+            return free
+        at = np.array([(poses[index].x, poses[index].y) for index in places])
+        leaving = np.hypot(*(at - [self._start.x, self._start.y]).T) < LEAVING_M
+        coming = np.hypot(*(at - [self._goal.x, self._goal.y]).T) < COMING_M
+        for close in (False, True):
+            mine = places[(leaving | coming) == close]
+            if not len(mine):
+                continue
+            found = self._touched(
+                [poses[index] for index in mine], 8 if close else 1, self._close if close else self.margin_m
+            )
+            for index, count, bodies in zip(mine, found.counts, found.bodies, strict=True):
+                touched = frozenset(bodies[:count].tolist())
+                left = np.hypot(poses[index].x - self._start.x, poses[index].y - self._start.y) < LEAVING_M
+                free[index] = not (touched - self._leaning if left else touched)
+        return free
+
+    def _touched(self, poses: Sequence[RobotPose], most: int, margin_m: float) -> Touched:
+        bases = np.array([(pose.x, pose.y, pose.yaw) for pose in poses])
+        return self._checker.touched(bases, self._joints, held=self._held, margin_m=margin_m, most=most)
+
+
+def _between(start: RobotPose, goal: RobotPose, step_m: float, step_rad: float) -> list[RobotPose]:
+    """Poses on a straight move, both ends left out, with no more than such steps between them."""
+    turn = wrap(goal.yaw - start.yaw)
+    length = float(np.hypot(goal.x - start.x, goal.y - start.y))
+    steps = int(np.ceil(max(length / step_m, abs(turn) / step_rad, 1.0)))
+    return [
+        RobotPose(start.x + (goal.x - start.x) * t, start.y + (goal.y - start.y) * t, start.yaw + turn * t)
+        for t in (np.arange(1, steps) / steps).tolist()
+    ]
+
+
+def wrap(angle: float) -> float:
+    """The same angle between -pi and pi, radians."""
+    return float(np.arctan2(np.sin(angle), np.cos(angle)))

@@ -1,0 +1,76 @@
+"""Buttons and doors in kitchens where the plain way to hold the hand, or the plain place to stand, does not do."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from types import SimpleNamespace
+from typing import cast
+
+import pytest
+
+from robocasa_lerobot.demos.motion import Array
+from robocasa_lerobot.demos.recorder import Recording, record_episode
+from robocasa_lerobot.demos.skills import arc_motion
+from robocasa_lerobot.demos.skills.articulated_part import ArticulatedPart
+from robocasa_lerobot.envs.kitchen_env import KitchenEnv
+
+
+def demonstration(task: str, split: str, seed: int) -> Recording:
+    env = KitchenEnv(task, split=split, cameras=(), terminate_on_success=False)
+    try:
+        return record_episode(env, seed, varied=True)
+    finally:
+        env.close()
+
+
+@pytest.mark.parametrize(("split", "seed"), [("target", 100_002), ("pretrain", 100_009)])
+def test_a_low_button_beside_a_doors_handle_is_pressed_at_once(split: str, seed: int) -> None:
+    # Level hands meet the handle: without hands turned to the side, every press misses.
+    recording = demonstration("TurnOffMicrowave", split, seed)
+    assert recording.success, recording.reason
+    assert len(recording.actions) < 150
+
+
+@pytest.mark.parametrize(("split", "seed"), [("target", 100_002), ("pretrain", 100_011)])
+def test_a_door_before_an_island_is_lifted_from_beside_it(split: str, seed: int) -> None:
+    # The arm, solved from its home pose alone, does not get down to the edge from there.
+    recording = demonstration("CloseDishwasher", split, seed)
+    assert recording.success, recording.reason
+
+
+@pytest.mark.parametrize(("split", "seed"), [("target", 100_006), ("pretrain", 100_003)])
+def test_a_freezer_below_is_opened_with_the_arm_let_down(split: str, seed: int) -> None:
+    recording = demonstration("OpenFridge", split, seed)
+    assert recording.success, recording.reason
+
+
+def test_a_hand_that_knocks_a_door_back_goes_no_farther(monkeypatch: pytest.MonkeyPatch) -> None:
+    # It would push on from outside until its steps are used up.
+    led: list[float] = []
+
+    def knock(env: KitchenEnv, joints: object, gripper: float) -> Iterator[Array]:
+        door.angle -= 2 * arc_motion.KNOCKED_RAD
+        return iter(())
+
+    def lead(*_: object, **__: object) -> Iterator[Array]:
+        led.append(door.angle)
+        return iter(())
+
+    door = SimpleNamespace(name="door", angle=1.0)
+    plan = SimpleNamespace(cost=0.0, joints=None, path=SimpleNamespace(waypoints=(), contact=0))
+    for name, value in {
+        "arm_bends": lambda *_: None,
+        "plan_contact": lambda *_, **__: plan,
+        "spots": lambda *_: None,
+        "take_stance": lambda *_: iter(()),
+        "draw_back": lambda *_: iter(()),
+        "follow_joint_path": knock,
+        "follow_arc": lead,
+    }.items():
+        monkeypatch.setattr(arc_motion, name, value)
+    env = cast(KitchenEnv, SimpleNamespace(data=None))
+    part = cast(ArticulatedPart, door)
+    assert list(arc_motion.push_arc(env, part, [], [], 1.5)) == []  # opened: it was knocked shut
+    assert led == []
+    assert list(arc_motion.push_arc(env, part, [], [], 0.0)) == []  # shut: it was knocked on its way
+    assert len(led) == 1

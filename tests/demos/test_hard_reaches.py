@@ -1,0 +1,67 @@
+"""Where the arm is longest, and how what lies across behind a front is turned."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import mujoco
+import numpy as np
+import pytest
+
+from robocasa_lerobot.demos.motion import Array, base_pose, floor_axes
+from robocasa_lerobot.demos.planning.kinematics import Arm
+from robocasa_lerobot.demos.skills.pick_place.graspable import graspable
+from robocasa_lerobot.demos.skills.pick_place.turn_across import ACROSS_COS, lies_across, long_axis, turn_across
+from robocasa_lerobot.envs.kitchen_env import KitchenEnv
+from robocasa_lerobot.envs.robots.panda_omron.names import ARM_JOINTS
+from robocasa_lerobot.envs.robots.panda_omron.robot import PANDA_OMRON
+
+# Over the counter, the elbow past the stretched arm and at its limit.
+PAST_STRETCHED = (-0.03, 0.8, -0.04, -0.07, 0.04, 0.79, 0.76)
+TURNED_RAD, DEEPER_M = 0.05, 0.03
+
+
+def carry_out(env: KitchenEnv, actions: Iterator[Array]) -> int:
+    """Step through a skill's actions; how many they were."""
+    count = 0
+    for action in actions:
+        env.step(action.astype(np.float32))
+        count += 1
+    return count
+
+
+@pytest.fixture
+def stretched() -> Iterator[KitchenEnv]:
+    env = KitchenEnv("PickPlaceToasterToCounter", split="target", cameras=(), terminate_on_success=False)
+    env.reset(seed=3)
+    env.data.qpos[Arm(env.model, env.data, env.scene.robot).addresses] = PAST_STRETCHED
+    mujoco.mj_forward(env.model, env.data)
+    yield env
+    env.close()
+
+
+def test_the_arm_is_longest_where_its_elbow_is_said_to_be_stretched(stretched: KitchenEnv) -> None:
+    data, arm = stretched.data, Arm(stretched.model, stretched.data, stretched.scene.robot)
+    far = []
+    angles = np.linspace(-1.0, -0.08, 47)
+    for angle in angles:
+        data.qpos[arm.addresses[3]] = angle
+        mujoco.mj_kinematics(stretched.model, data)
+        # The axes of joints 2 and 6: of the shoulder and of the wrist.
+        far.append(np.linalg.norm(data.joint(ARM_JOINTS[1]).xanchor - data.joint(ARM_JOINTS[5]).xanchor))
+    assert angles[int(np.argmax(far))] == pytest.approx(PANDA_OMRON.reach.stretched, abs=0.02)
+
+
+def test_what_lies_across_in_a_microwave_is_turned_by_pushing_its_end() -> None:
+    env = KitchenEnv("PickPlaceMicrowaveToCounter", split="pretrain", cameras=(), terminate_on_success=False)
+    env.reset(seed=100_011)
+    obj = graspable(env, "obj")
+    _, yaw = base_pose(env.data)
+    ahead = floor_axes(yaw)[0]
+    before, deep = abs(float(long_axis(env, obj)[0] @ ahead)), float(env.data.body(obj.name).xpos @ ahead)
+    assert lies_across(env, obj)
+    assert before < ACROSS_COS
+    assert carry_out(env, turn_across(env, obj))
+    assert abs(float(long_axis(env, obj)[0] @ ahead)) > before + TURNED_RAD
+    assert float(env.data.body(obj.name).xpos @ ahead) > deep + DEEPER_M
+    env.close()
