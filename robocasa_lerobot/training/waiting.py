@@ -7,7 +7,8 @@ because its connections close.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from datetime import timedelta
 from typing import Any
 
@@ -25,12 +26,14 @@ def first_process_works[T](accelerator: Accelerator, work: Callable[[], T]) -> T
     """What `work` returns, which the first process alone does; all go on when it is done.
 
     Raises:
-        UserError: in the other processes, the work failed in the first one, where its own error is raised.
+        UserError: in the other processes, the work failed in the first one, where its own error is raised; or a
+            process that this one waits for has ended.
     """
     if accelerator.num_processes == 1:
         return work()
-    group = torch.distributed.new_group(backend="gloo", timeout=_LONGEST)
     said: list[Any] = ["it was ended", None]  # why it failed, or None, and what it returned
+    with _named_when_gone(accelerator):
+        group = torch.distributed.new_group(backend="gloo", timeout=_LONGEST)
     try:
         if accelerator.is_main_process:
             try:
@@ -41,13 +44,25 @@ def first_process_works[T](accelerator: Accelerator, work: Callable[[], T]) -> T
             finally:
                 torch.distributed.broadcast_object_list(said, src=0, group=group)
         else:
-            try:
+            with _named_when_gone(accelerator):
                 torch.distributed.broadcast_object_list(said, src=0, group=group)
-            except RuntimeError as error:
-                raise UserError(f"the first process is not there any more: {error}") from error
     finally:
         torch.distributed.destroy_process_group(group)
     if said[0] is not None:
         raise UserError(f"the first process could not go on: {said[0]}")
     found: T = said[1]
     return found
+
+
+@contextmanager
+def _named_when_gone(accelerator: Accelerator) -> Iterator[None]:
+    """What torch says of a lost connection, in words: which process has ended.
+
+    Where the first process ends between two works, the others meet it already when they make their group, because
+    it keeps the store in which groups are made.
+    """
+    try:
+        yield
+    except RuntimeError as error:
+        gone = "another process" if accelerator.is_main_process else "the first process"
+        raise UserError(f"{gone} is not there any more: {error}") from error
