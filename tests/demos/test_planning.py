@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import copy
+import gc
 import itertools
+import weakref
 from collections.abc import Iterator
 from types import SimpleNamespace
 
@@ -21,6 +23,7 @@ from robocasa_lerobot.demos.planning.errors import NoPlanError
 from robocasa_lerobot.demos.planning.follow import CLOSELY, hand_poses
 from robocasa_lerobot.demos.planning.kinematics import Arm
 from robocasa_lerobot.demos.planning.motion_planner import MotionPlanner, WaypointPath, plan_near
+from robocasa_lerobot.demos.recorder import record_episode
 from robocasa_lerobot.demos.skills.common import SkillError
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.robots.panda_omron.names import HAND, MOBILE_BASE
@@ -309,3 +312,15 @@ def test_a_path_that_begins_where_the_hand_is_already_is_planned(cabinet: Kitche
     assert plan.path is path
     present = data.qpos[Arm(model, data, cabinet.scene.robot).addresses]
     assert np.abs(plan.joints[-1] - present).max() < 0.05
+
+
+def test_nothing_keeps_a_scene_alive_after_its_demonstration() -> None:
+    """Thousands of demonstrations are recorded by one process, each in a kitchen of some megabytes."""
+    env = KitchenEnv("NavigateKitchen", cameras=(), terminate_on_success=False)
+    recording = record_episode(env, 3)
+    assert len(recording.actions)
+    models = weakref.WeakSet([env.model])
+    env.close()
+    del env
+    gc.collect()
+    assert len(models) == 0

@@ -24,7 +24,8 @@ from robocasa_lerobot.envs.scene.scene import Scene
 MOST_TOUCHED = 3  # bodies that are told apart
 FLOOR = "floor"
 
-_scratch: WeakKeyDictionary[mujoco.MjModel, mujoco.MjData] = WeakKeyDictionary()
+# By the state that is asked about, not by its model: what is kept refers to the model, which it would keep alive.
+_scratch: WeakKeyDictionary[mujoco.MjData, mujoco.MjData] = WeakKeyDictionary()
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,7 +122,7 @@ class CollisionChecker:
     def __init__(self, scene: Scene, data: mujoco.MjData, *, allowed: Iterable[int] = ()) -> None:
         model, names = scene.model, scene.robot.names
         self._model, self.arm = model, Arm(model, data, scene.robot)
-        self._data = _scratch_data(model)
+        self._data = _scratch_data(model, data)
         self._robot = scene.subtree(names.mobile_base)
         self._hand = scene.subtree(names.hand)
         self._all = _shapes(model, data, np.ones(model.nbody, dtype=np.bool_))
@@ -298,11 +299,11 @@ class _LinkPoses:
         return self._numbers.get(body, 0)
 
 
-def _scratch_data(model: mujoco.MjModel) -> mujoco.MjData:
-    """Memory for MuJoCo's distance function; one for each model, since making it costs more than a plan."""
-    if model not in _scratch:
-        _scratch[model] = mujoco.MjData(model)
-    return _scratch[model]
+def _scratch_data(model: mujoco.MjModel, data: mujoco.MjData) -> mujoco.MjData:
+    """Memory for MuJoCo's distance function; one for each state's memory, since making it costs more than a plan."""
+    if data not in _scratch:
+        _scratch[data] = mujoco.MjData(model)
+    return _scratch[data]
 
 
 def _shapes(model: mujoco.MjModel, data: mujoco.MjData, bodies: NDArray[np.bool_]) -> kernel.Shapes:
