@@ -90,13 +90,13 @@ def measure_steps(
     """Control steps per second of each program in each configuration: the sum over the processes, and its spread."""
     rates: dict[str, dict[str, list[float]]] = {name: {} for name in names}
     for repetition in range(effort.repetitions):
-        for number, (key, cameras, processes) in enumerate(sim_report.CONFIGURATIONS):
+        for number, (key, cameras, processes, standing) in enumerate(sim_report.CONFIGURATIONS):
             # Who goes first alternates: a slow drift of the machine favours nobody.
             for name in names if repetition % 2 == 0 else reversed(names):
                 bar.set_description(f"{name}, {_camera_key(cameras)}, {processes} process(es)")
                 note_noise(noise)
                 seed = 10_000 * (repetition + 1) + 1_000 * number
-                answers = run_together(workers[name, cameras][:processes], effort.window_s[cameras], seed)
+                answers = run_together(workers[name, cameras][:processes], effort.window_s[cameras], seed, standing)
                 rates[name].setdefault(key, []).append(sum(a["steps"] / a["seconds"] for a in answers))
                 bar.update()
     return {name: {key: common.spread(values) for key, values in by_key.items()} for name, by_key in rates.items()}

@@ -107,14 +107,16 @@ class Worker:
         return "\n".join(lines[-15:]) or "it said nothing"
 
 
-def run_together(workers: Sequence[Worker], seconds: float, seed: int) -> list[dict[str, Any]]:
+def run_together(workers: Sequence[Worker], seconds: float, seed: int, standing: bool = False) -> list[dict[str, Any]]:
     """Let workers step at the same time, from one common instant on, each in its own episodes.
+
+    With `standing` base and torso are not commanded.
 
     Returns:
         For each worker the steps, the seconds that they took, and what `peers/sim_loop.py` says beside them.
     """
     for i, worker in enumerate(workers):
-        worker.send("prepare", seed=seed + 100 * i)
+        worker.send("prepare", seed=seed + 100 * i, standing=standing)
     for worker in workers:
         worker.receive()
     at = time.perf_counter() + BARRIER_S

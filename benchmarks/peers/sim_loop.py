@@ -51,8 +51,10 @@ class Simulator(Protocol):
         """Seconds per control step of each part of the work; only where the simulator can tell."""
 
 
-def episode_actions(seed: int, steps: int) -> NDArray[np.float64]:
+def episode_actions(seed: int, steps: int, standing: bool = False) -> NDArray[np.float64]:
     """Small random actions (steps, 12) of an episode, in robosuite's order; the same for every simulator.
+
+    With `standing` base and torso are not commanded, as in most of what people have recorded.
 
     End-effector position 3 and rotation 3, gripper, base 3, torso, base mode. Gripper and mode are binary; the mode
     stays at -1 (the arm's command is added to the pose that it has reached), as in the recorded demonstrations.
@@ -61,6 +63,8 @@ def episode_actions(seed: int, steps: int) -> NDArray[np.float64]:
     actions = rng.uniform(-ARM_BASE_TORSO, ARM_BASE_TORSO, (steps, ACTION_SIZE))
     actions[:, 6] = np.where(actions[:, 6] > 0, 1.0, -1.0)
     actions[:, 11] = -1.0
+    if standing:
+        actions[:, 7:11] = 0.0
     return actions
 
 
@@ -70,6 +74,7 @@ class Loop:
     def __init__(self, simulator: Simulator) -> None:
         self._simulator = simulator
         self._seed = 0
+        self._standing = False
 
     def hello(self) -> dict[str, Any]:
         """An answer, which says that everything is imported."""
@@ -105,8 +110,9 @@ class Loop:
             seconds.append(time.perf_counter() - start)
         return {"seconds": seconds, "growth_mib": (resident_mib() - before) / count}
 
-    def prepare(self, seed: int) -> dict[str, Any]:
-        """Begin the first episode of a run."""
+    def prepare(self, seed: int, standing: bool = False) -> dict[str, Any]:
+        """Begin the first episode of a run; with `standing` base and torso are not commanded in it."""
+        self._standing = standing
         self._reset(seed, same_scene=False)
         self._steps(WARM_UP_STEPS)
         return {}
@@ -120,7 +126,7 @@ class Loop:
         while (wait := at - time.perf_counter()) > 0:
             time.sleep(min(wait, 0.05))
         steps, counted, episodes, in_episode = 0, 0.0, 1, 0
-        actions = episode_actions(self._seed, EPISODE_STEPS)
+        actions = episode_actions(self._seed, EPISODE_STEPS, self._standing)
         while True:
             start = time.perf_counter()
             self._simulator.step(actions[in_episode])
@@ -129,9 +135,9 @@ class Loop:
             if now >= at + seconds:
                 break
             if in_episode == EPISODE_STEPS:
-                self.prepare(self._seed + 1)
+                self.prepare(self._seed + 1, self._standing)
                 episodes, in_episode = episodes + 1, 0
-                actions = episode_actions(self._seed, EPISODE_STEPS)
+                actions = episode_actions(self._seed, EPISODE_STEPS, self._standing)
         return {"steps": steps, "seconds": counted, "episodes": episodes}
 
     def split(self, seed: int, steps: int) -> dict[str, Any]:
@@ -143,7 +149,7 @@ class Loop:
         self._simulator.reset(seed, same_scene)
 
     def _steps(self, count: int) -> None:
-        for action in episode_actions(self._seed, count):
+        for action in episode_actions(self._seed, count, self._standing):
             self._simulator.step(action)
 
 

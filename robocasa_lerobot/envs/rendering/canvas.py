@@ -10,6 +10,8 @@ import atexit
 import os
 import threading
 import weakref
+from collections.abc import Iterator
+from contextlib import contextmanager
 from functools import cache
 from typing import Any
 
@@ -95,14 +97,15 @@ class Canvas:
         finally:
             self._model.geom_group[:] = groups
 
-    def see_nearest_first(self, data: mujoco.MjData, camera: int) -> None:
+    def see_nearest_first(self, data: mujoco.MjData, camera: int, geoms: NDArray[np.bool_] | None = None) -> None:
         """Aim a camera, and have what reaches into its view drawn from the nearest to the farthest.
 
-        For models of geoms alone.
+        For models of geoms alone; of these only the chosen ones, (ngeom,), are drawn.
         """
         model, scene = self._model, self._scene
         groups = model.geom_group.copy()
-        seen = np.flatnonzero(in_view(model, data, camera, self._aspect))
+        reaching = in_view(model, data, camera, self._aspect)
+        seen = np.flatnonzero(reaching if geoms is None else reaching & geoms)
         # By distance alone: where faces lie in one plane, the order decides, and must not hang on what was left out.
         layers = np.searchsorted(_LAYER_EDGES_M, distances(model, data, camera)[seen])
         layers[groups[seen] == BACKDROP_GROUP] = len(_LAYER_EDGES_M) + 1
@@ -137,18 +140,41 @@ class Canvas:
         colours, _ = self._surface.read(number, depth=False)
         return np.ascontiguousarray(colours[::-1])
 
+    def drawn_with_depth(self, number: int = 0) -> tuple[NDArray[np.uint8], NDArray[np.float32]]:
+        """The picture of that number and its reversed depth buffer, (height, width), both the lowest row first."""
+        colours, buffer = self._surface.read(number, depth=True)
+        assert buffer is not None
+        return colours, buffer
+
+    def drawn_depth(self, number: int = 0) -> NDArray[np.float32]:
+        """The reversed depth buffer, (height, width), of what was last seen, as if nothing were transparent."""
+        with self._as_segments():
+            self._surface.draw(self._scene, number)
+            return self.drawn_with_depth(number)[1]
+
+    def in_view(self, data: mujoco.MjData, camera: int) -> NDArray[np.bool_]:
+        """Which geoms, (ngeom,), reach into a camera's view."""
+        return in_view(self._model, data, camera, self._aspect)
+
     def geometry(self) -> tuple[NDArray[np.float32], NDArray[np.int32]]:
         """Depth in metres and geom ids (-1 where none is seen) of what was last seen, each (height, width), upright."""
-        scene = self._scene
-        usual = scene.flags.copy()
-        scene.flags[mujoco.mjtRndFlag.mjRND_SHADOW] = scene.flags[mujoco.mjtRndFlag.mjRND_REFLECTION] = False
-        scene.flags[mujoco.mjtRndFlag.mjRND_SEGMENT] = scene.flags[mujoco.mjtRndFlag.mjRND_IDCOLOR] = True
-        self._surface.draw(scene)
-        colours, buffer = self._surface.read(depth=True)
-        scene.flags[:] = usual
-        assert buffer is not None
-        depth, ids = self._metres(buffer), _geom_ids(scene, colours)
+        with self._as_segments():
+            self._surface.draw(self._scene)
+            colours, buffer = self.drawn_with_depth()
+        depth, ids = self._metres(buffer), _geom_ids(self._scene, colours)
         return np.ascontiguousarray(depth[::-1]), np.ascontiguousarray(ids[::-1])
+
+    @contextmanager
+    def _as_segments(self) -> Iterator[None]:
+        """Each geom in the colour of its number, and opaque."""
+        flags = self._scene.flags
+        usual = flags.copy()
+        flags[mujoco.mjtRndFlag.mjRND_SHADOW] = flags[mujoco.mjtRndFlag.mjRND_REFLECTION] = False
+        flags[mujoco.mjtRndFlag.mjRND_SEGMENT] = flags[mujoco.mjtRndFlag.mjRND_IDCOLOR] = True
+        try:
+            yield
+        finally:
+            flags[:] = usual
 
     def close(self) -> None:
         """Free what it holds on the graphics card."""

@@ -59,3 +59,9 @@ def distances(model: mujoco.MjModel, data: mujoco.MjData, camera_id: int) -> NDA
     position = (data.cam_xpos[camera_id] - data.geom_xpos)[:, None, :] @ rotations  # in the geoms' own frames
     outside = np.abs(position[:, 0] - model.geom_aabb[:, :3]) - model.geom_aabb[:, 3:]
     return np.where(model.geom_rbound == 0, np.inf, np.linalg.norm(np.maximum(outside, 0.0), axis=1))
+
+
+def opaque(model: mujoco.MjModel) -> NDArray[np.bool_]:
+    """Which geoms nothing is seen through, (ngeom,)."""
+    materials = np.append(model.mat_rgba[:, 3], 1.0) == 1.0  # the last for geoms without any, number -1
+    return np.asarray((model.geom_rgba[:, 3] == 1.0) & materials[model.geom_matid])

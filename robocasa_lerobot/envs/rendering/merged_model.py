@@ -15,8 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robocasa_lerobot.envs.rendering.canvas import BACKDROP_GROUP
+from robocasa_lerobot.envs.rendering.frustum import opaque as opaque_geoms
 from robocasa_lerobot.envs.rendering.hidden_faces import shown_faces
 from robocasa_lerobot.envs.rendering.tessellation import Surface, boxes, capsule, cylinder, joined
+from robocasa_lerobot.envs.rendering.view_grid import on_grid
 
 Array = NDArray[np.float64]
 
@@ -76,13 +78,27 @@ class MergedModel:
         rotations = data.xmat.reshape(-1, 3, 3)[self.bodies]
         own.geom_xpos[:] = data.xpos[self.bodies] + (rotations @ model.geom_pos[:, :, None])[:, :, 0]
         own.geom_xmat[:] = (rotations @ self._rotations).reshape(-1, 9)
-        own.cam_xpos[:], own.cam_xmat[:] = data.cam_xpos, data.cam_xmat
+        own.cam_xpos[:], own.cam_xmat[:] = on_grid(data.cam_xpos, data.cam_xmat)
         own.light_xpos[:], own.light_xdir[:] = data.light_xpos, data.light_xdir
         for name in ("cam_fovy", "light_active", "light_diffuse"):
             getattr(model, name)[:] = getattr(source, name)
         for name in ("mat_rgba", "mat_emission"):
             getattr(model, name)[:] = np.repeat(getattr(source, name), 2, axis=0)  # baked and not
         model.geom_rgba[:] = source.geom_rgba[self.geoms]
+
+    def looks(self) -> Array:
+        """Pose, colour and glow of each of its geoms, (n, 21): where two of these are alike the geom is drawn alike."""
+        model, data = self.model, self.data
+        materials = np.column_stack((model.mat_rgba, model.mat_emission))
+        materials = np.concatenate((materials, np.zeros((1, 5))))[model.geom_matid]  # the last one for no material
+        return np.column_stack((data.geom_xpos, data.geom_xmat, model.geom_rgba, materials))
+
+    def view(self, camera: int) -> bytes:
+        """From where, how wide and in what light a camera sees: views that are alike have the same bytes."""
+        model, data = self.model, self.data
+        camera_is = (data.cam_xpos[camera], data.cam_xmat[camera], model.cam_fovy[camera])
+        lights = (data.light_xpos, data.light_xdir, model.light_active, model.light_diffuse)
+        return b"".join(np.asarray(value).tobytes() for value in (*camera_is, *lights))
 
     def changed(self) -> frozenset[int]:
         """Geoms of the source that no longer look as when the look-alike was made, so that it must be made anew."""
@@ -162,7 +178,7 @@ def _shown_faces(
 ) -> NDArray[np.bool_]:
     """Which faces of a geom, if it is a box, are drawn, (ngeom, 6): those of one body hide some."""
     shown = np.ones((model.ngeom, 6), dtype=np.bool_)
-    chosen = visible & (model.geom_type == _BOX) & _opaque(model)
+    chosen = visible & (model.geom_type == _BOX) & opaque_geoms(model)
     chosen[list(loose)] = False
     for group in (poses.fixed, ~poses.fixed):
         geoms = np.flatnonzero(chosen & group)
@@ -171,15 +187,9 @@ def _shown_faces(
     return shown
 
 
-def _opaque(model: mujoco.MjModel) -> NDArray[np.bool_]:
-    """Which geoms nothing is seen through, (ngeom,)."""
-    materials = np.append(model.mat_rgba[:, 3], 1.0) == 1.0  # the last for geoms without any, number -1
-    return np.asarray((model.geom_rgba[:, 3] == 1.0) & materials[model.geom_matid])
-
-
 def _parts(model: mujoco.MjModel, poses: _Poses, visible: NDArray[np.bool_], loose: frozenset[int]) -> list[list[int]]:
     """Geoms that are drawn together: of one body, or, where nothing moves, of one cell of the room."""
-    cells, opaque = np.floor(poses.positions[:, :2] / CELL_M).tolist(), _opaque(model)
+    cells, opaque = np.floor(poses.positions[:, :2] / CELL_M).tolist(), opaque_geoms(model)
     parts: dict[tuple[float, ...], list[int]] = {}
     for geom in np.flatnonzero(visible).tolist():
         material, rgba = int(model.geom_matid[geom]), tuple(model.geom_rgba[geom].tolist())

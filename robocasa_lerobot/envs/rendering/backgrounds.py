@@ -1,0 +1,176 @@
+"""What stands still before a camera, kept as colours and depth, so that only what moves is drawn anew.
+
+A picture does not depend on what is kept: whatever is joined from a background equals the full drawing bit for bit.
+Where that is not certain (something moves that is transparent or is seen through it, or two surfaces are at one
+depth) the view is drawn in full.
+"""
+
+from __future__ import annotations
+
+import time
+from collections import OrderedDict
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from robocasa_lerobot.envs.rendering.canvas import Canvas
+from robocasa_lerobot.envs.rendering.depth_join import join_by_depth
+from robocasa_lerobot.envs.rendering.frustum import opaque
+from robocasa_lerobot.envs.rendering.merged_model import MergedModel
+from robocasa_lerobot.gl import is_software, note_renderer
+
+Key = tuple[int, bytes]
+Picture = NDArray[np.uint8]
+
+KEPT_VIEWS = 8  # of a camera: a base that is held goes to and fro between few places of the grid
+SEEN_VIEWS = 64  # that were drawn in full, to know one that comes again
+RESTED = 10  # pictures for which a shape has not moved that belongs to a new background
+TIMED = 8  # drawings of each kind whose shortest time decides whether joining is cheaper on a graphics card
+DOUBTFUL = 20  # pictures of a camera that are drawn in full after one that could not be joined for certain
+MOST_MOVED = 0.5  # share of the shapes in view from which on nothing is gained
+
+# By OpenGL's name of a graphics card: whether joining takes less time there than drawing in full; reading depth back
+# may take more than drawing. It decides how long a picture takes, never what is seen.
+_joining_pays: dict[str, bool] = {}
+
+
+@dataclass(frozen=True)
+class Background:
+    """One view of the shapes that stand still.
+
+    Attributes:
+        colours: (height, width, 3), the lowest row first.
+        depth: reversed depth buffer of what is opaque, (height, width).
+        veil: that of what is transparent, if anything is.
+        still: which shapes are in it, (n,).
+        looks: pose and colours of all shapes when it was drawn, (n, k).
+    """
+
+    colours: Picture
+    depth: NDArray[np.float32]
+    veil: NDArray[np.float32] | None
+    still: NDArray[np.bool_]
+    looks: NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class _Plan:
+    """How a view is drawn: in full without `still`; else what is still is kept, or drawn now and then kept."""
+
+    camera: int
+    key: Key
+    still: NDArray[np.bool_] | None
+    background: Background | None
+
+
+class Backgrounds:
+    """Draws views of a look-alike on its canvas, and keeps what stands still in them."""
+
+    def __init__(self, alike: MergedModel, canvas: Canvas) -> None:
+        self._alike, self._canvas = alike, canvas
+        self._device = note_renderer()
+        self._kept: OrderedDict[Key, Background] = OrderedDict()
+        self._seen: OrderedDict[Key, None] = OrderedDict()
+        self._doubtful: dict[int, int] = {}  # pictures that are still to be drawn in full, by camera
+        self._looks: NDArray[np.float64] = np.empty((0, 0))
+        self._rested: NDArray[np.int64] = np.empty(0, dtype=np.int64)
+
+    def pictures(self, cameras: Sequence[int]) -> list[Picture]:
+        """One picture (height, width, 3), upright, of each camera, of the state that the look-alike follows."""
+        self._note_what_moved()
+        plans = [self._plan(camera) for camera in cameras]
+        # All are begun before one is read: the device draws while the next one is prepared.
+        for place, plan in enumerate(plans):
+            if plan.still is not None and plan.background is None:
+                self._draw(plan.camera, plan.still, place + len(plans))
+            self._draw(plan.camera, None if plan.still is None else ~plan.still, place)
+        return [self._finished(plan, place, place + len(plans)) for place, plan in enumerate(plans)]
+
+    def _note_what_moved(self) -> None:
+        looks = self._alike.looks()
+        if len(self._looks) != len(looks):
+            self._rested = np.full(len(looks), RESTED)
+        else:
+            self._rested = np.where((looks != self._looks).any(axis=1), 0, self._rested + 1)
+        self._looks = looks
+
+    def _draw(self, camera: int, shapes: NDArray[np.bool_] | None, place: int = 0) -> None:
+        self._canvas.see_nearest_first(self._alike.data, camera, shapes)
+        self._canvas.draw(place, shadows=False)
+
+    def _plan(self, camera: int) -> _Plan:
+        """How a view is drawn: over a background if it has come before and most of it stands still."""
+        full = _Plan(camera, (camera, b""), None, None)
+        if not _joining_pays.get(self._device, True):
+            return full
+        if self._doubtful.get(camera, 0) > 0:
+            self._doubtful[camera] -= 1
+            return full
+        key = (camera, self._alike.view(camera))
+        background = self._kept.get(key)
+        if background is not None and ((self._looks != background.looks).any(axis=1) & background.still).any():
+            background = None
+        elif background is None and key not in self._seen:
+            self._seen[key] = None
+            while len(self._seen) > SEEN_VIEWS:
+                self._seen.popitem(last=False)
+            return full
+        still = self._rested >= RESTED if background is None else background.still
+        in_view = self._canvas.in_view(self._alike.data, camera)
+        moved = ~still & in_view
+        if moved.sum() > MOST_MOVED * in_view.sum() or (moved & ~opaque(self._alike.model)).any():
+            return full
+        return _Plan(camera, key, still, background)
+
+    def _finished(self, plan: _Plan, place: int, behind: int) -> Picture:
+        """The picture of a plan, whose parts have been begun in these places."""
+        if plan.still is None:
+            return self._canvas.drawn(place)
+        background = plan.background
+        if background is None:
+            background = self._made(plan.camera, plan.still, behind)
+            if not is_software(self._device) and self._device not in _joining_pays:
+                self._compare(plan.camera, background, behind)
+        self._keep(plan.key, background)
+        colours, depth = self._canvas.drawn_with_depth(place)
+        picture, certain = join_by_depth(background.colours, background.depth, colours, depth, background.veil)
+        if certain:
+            return np.ascontiguousarray(picture[::-1])
+        self._doubtful[plan.camera] = DOUBTFUL
+        self._draw(plan.camera, None, place)
+        return self._canvas.drawn(place)
+
+    def _keep(self, key: Key, background: Background) -> None:
+        self._kept[key] = background
+        self._kept.move_to_end(key)
+        mine = [other for other in self._kept if other[0] == key[0]]
+        if len(mine) > KEPT_VIEWS:
+            del self._kept[mine[0]]
+
+    def _made(self, camera: int, still: NDArray[np.bool_], place: int) -> Background:
+        """What has been drawn in a place of what stands still."""
+        colours, depth = self._canvas.drawn_with_depth(place)
+        veil = None
+        solid = opaque(self._alike.model)
+        if (still & ~solid & self._canvas.in_view(self._alike.data, camera)).any():
+            self._canvas.see_nearest_first(self._alike.data, camera, still & ~solid)
+            veil = self._canvas.drawn_depth(place)
+            self._canvas.see_nearest_first(self._alike.data, camera, still & solid)
+            depth = self._canvas.drawn_depth(place)
+        return Background(colours, depth, veil, still, self._looks)
+
+    def _compare(self, camera: int, background: Background, place: int) -> None:
+        """Measure once for each graphics card whether joining pays."""
+        seconds: dict[bool, list[float]] = {True: [], False: []}
+        for joins in (True, False) * TIMED:
+            started = time.perf_counter()
+            self._draw(camera, ~background.still if joins else None, place)
+            if joins:
+                colours, depth = self._canvas.drawn_with_depth(place)
+                join_by_depth(background.colours, background.depth, colours, depth, background.veil)
+            else:
+                self._canvas.drawn(place)
+            seconds[joins].append(time.perf_counter() - started)
+        _joining_pays[self._device] = min(seconds[True]) < min(seconds[False])
