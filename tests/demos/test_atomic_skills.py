@@ -44,6 +44,25 @@ def test_a_freezer_below_is_opened_with_the_arm_let_down(split: str, seed: int) 
     assert recording.success, recording.reason
 
 
+@pytest.mark.parametrize(
+    ("task", "split", "seed"),
+    [
+        ("TurnOnToaster", "pretrain", 100_400),  # the palm would lie on the toaster's case
+        ("TurnOnToaster", "pretrain", 100_403),
+        ("CloseElectricKettleLid", "pretrain", 100_402),  # below wall cabinets
+    ],
+)
+def test_what_is_low_or_under_a_cabinet_is_pressed_by_a_turned_hand(task: str, split: str, seed: int) -> None:
+    recording = demonstration(task, split, seed)
+    assert recording.success, recording.reason
+
+
+def test_food_that_falls_into_a_bowl_leaves_both_fingers() -> None:
+    # Between open fingers of different heights it would hang on the lower one.
+    recording = demonstration("PickPlaceCounterToStandMixer", "pretrain", 100_401)
+    assert recording.success, recording.reason
+
+
 def test_a_hand_that_knocks_a_door_back_goes_no_farther(monkeypatch: pytest.MonkeyPatch) -> None:
     # It would push on from outside until its steps are used up.
     led: list[float] = []

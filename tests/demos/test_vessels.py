@@ -20,6 +20,7 @@ from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.kitchens.appliances.kinds.sink import Sink
 from robocasa_lerobot.envs.kitchens.appliances.kinds.stove import Hob
 from robocasa_lerobot.envs.predicates import AllOf, GripperFar, OnBurner, StateIs, UnderWater
+from robocasa_lerobot.envs.predicates.objects import RECEPTACLE_SHARE, radius
 from robocasa_lerobot.envs.tasks.conditions import stage_condition
 from robocasa_lerobot.envs.tasks.stage_text import stage_text
 from robocasa_lerobot.envs.tasks.task import Stage
@@ -65,6 +66,20 @@ def test_what_goes_into_a_vessel_goes_beside_what_lies_across_it(leftovers: Kitc
         along, across = np.abs(rotation_about(UP, -yaw) @ (best.point - data.body("chicken_drumstick").xpos))[:2]
         assert across > 0.012  # it is longer along its x axis
         assert np.linalg.norm((best.point - bowl)[:2]) < 0.06, along
+
+
+def test_every_pose_on_a_tray_counts_as_on_it() -> None:
+    """Also beside what lies there: the corners are farther from the middle than goals count."""
+    env = KitchenEnv("PackDessert", split="pretrain", cameras=())
+    env.reset(seed=100_403)
+    holder = "cooked_food_container"
+    assert graspable(env, holder).contents == ("cooked_food",)
+    middle = env.data.body(holder).xpos
+    found = [pose.point for pose in on_object(env, graspable(env, "dessert"), holder)()]
+    away = np.linalg.norm(np.array(found)[:, :2] - middle[:2], axis=1)
+    limit = RECEPTACLE_SHARE * radius(env.scene, holder)
+    assert 0.5 * limit < away.max() < limit
+    env.close()
 
 
 def test_a_tilted_vessel_is_turned_upright_by_the_least_turn_and_one_that_lies_is_left() -> None:
