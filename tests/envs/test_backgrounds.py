@@ -9,17 +9,17 @@ from typing import Any
 import mujoco
 import numpy as np
 import pytest
+import task_selection
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from robocasa_lerobot import contract
-from robocasa_lerobot.demos.demonstrator import can_demonstrate, demonstrate
+from robocasa_lerobot.demos.demonstrator import demonstrate
 from robocasa_lerobot.demos.planning.errors import SkillError
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.rendering import SceneRenderer, backgrounds
 from robocasa_lerobot.envs.rendering.depth_join import join_by_depth
 from robocasa_lerobot.envs.rendering.view_grid import GRID_M, GRID_QUATERNION, on_grid
-from robocasa_lerobot.envs.tasks.registry import get_task, task_names
 
 PIXELS = 64
 # Behind glass, with water that begins to run, and with a burner that begins to glow.
@@ -38,14 +38,9 @@ def joined(monkeypatch: pytest.MonkeyPatch) -> list[bool]:
         return picture, certain
 
     monkeypatch.setattr(backgrounds, "join_by_depth", noted)
-    monkeypatch.setattr(backgrounds.Backgrounds, "_compare", lambda self, camera, background, place: None)
+    monkeypatch.setattr(backgrounds.Backgrounds, "_compare", lambda self, plan, background, place: None)
     monkeypatch.setattr(backgrounds, "_joining_pays", {})
     return found
-
-
-def equal(one: NDArray[np.uint8], other: NDArray[np.uint8]) -> bool:
-    """Whether two pictures are the same, bit for bit."""
-    return np.array_equal(one, other)
 
 
 def walk(env: KitchenEnv, seed: int) -> Iterator[None]:
@@ -59,14 +54,7 @@ def walk(env: KitchenEnv, seed: int) -> Iterator[None]:
                 return
 
 
-@pytest.mark.parametrize(
-    "task",
-    [
-        task if task in FAST else pytest.param(task, marks=pytest.mark.slow)
-        for task in task_names()
-        if can_demonstrate(get_task(task))
-    ],
-)
+@pytest.mark.parametrize("task", task_selection.demonstrated(fast=FAST))
 def test_a_joined_picture_is_the_full_drawing(task: str, joined: list[bool]) -> None:
     env = KitchenEnv(task, cameras=(), terminate_on_success=False)
     renderers: list[SceneRenderer] = []
@@ -76,8 +64,8 @@ def test_a_joined_picture_is_the_full_drawing(task: str, joined: list[bool]) -> 
         if not renderers:
             renderers = [SceneRenderer(env.model, PIXELS, PIXELS, keeps_backgrounds=keeps) for keeps in (False, True)]
         full, keeping = (renderer.pictures(env.data, contract.CAMERAS) for renderer in renderers)
-        differing = [name for name, *two in zip(contract.CAMERAS, full, keeping, strict=True) if not equal(*two)]
-        assert differing == []
+        pairs = zip(contract.CAMERAS, full, keeping, strict=True)
+        assert [name for name, one, other in pairs if not np.array_equal(one, other)] == []
     for renderer in renderers:
         renderer.close()
     env.close()
@@ -97,7 +85,7 @@ def test_a_picture_does_not_depend_on_what_was_drawn_before(joined: list[bool]) 
         mujoco.mj_forward(env.model, env.data)
         pictures = renderer.pictures(env.data, contract.CAMERAS)
         first = drawn.setdefault(number, pictures)
-        assert all(equal(*two) for two in zip(first, pictures, strict=True))
+        assert all(np.array_equal(*two) for two in zip(first, pictures, strict=True))
     assert sum(joined) > len(states) > 0
     renderer.close()
     env.close()

@@ -21,9 +21,9 @@ def solvable() -> tuple[str, ...]:
     return tuple(name for name in task_names() if can_demonstrate(get_task(name)))
 
 
-def demonstrated() -> list[Any]:
-    """Tasks whose stages all have a skill; those that are not of the sample are slow tests."""
-    return _marked(solvable(), _SOLVED)
+def demonstrated(fast: Sequence[str] = _SOLVED) -> list[Any]:
+    """Tasks whose stages all have a skill; those that are not among the fast ones are slow tests."""
+    return _marked(solvable(), fast)
 
 
 def every_task(wanted: Callable[[Task], bool] = lambda task: True) -> list[Any]:

@@ -10,7 +10,7 @@ from __future__ import annotations
 import time
 from collections import OrderedDict
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -60,32 +60,35 @@ class _Plan:
     """How a view is drawn: in full without `still`; else what is still is kept, or drawn now and then kept."""
 
     camera: int
-    key: Key
-    still: NDArray[np.bool_] | None
-    background: Background | None
+    in_view: NDArray[np.bool_]
+    key: Key | None = None
+    still: NDArray[np.bool_] | None = None
+    background: Background | None = None
 
 
 class Backgrounds:
-    """Draws views of a look-alike on its canvas, and keeps what stands still in them."""
+    """Draws views of a look-alike on its canvas, and, unless told otherwise, keeps what stands still in them."""
 
-    def __init__(self, alike: MergedModel, canvas: Canvas) -> None:
-        self._alike, self._canvas = alike, canvas
+    def __init__(self, alike: MergedModel, canvas: Canvas, *, keeps: bool = True) -> None:
+        self._alike, self._canvas, self._keeps = alike, canvas, keeps
         self._device = note_renderer()
         self._kept: OrderedDict[Key, Background] = OrderedDict()
         self._seen: OrderedDict[Key, None] = OrderedDict()
         self._doubtful: dict[int, int] = {}  # pictures that are still to be drawn in full, by camera
         self._looks: NDArray[np.float64] = np.empty((0, 0))
         self._rested: NDArray[np.int64] = np.empty(0, dtype=np.int64)
+        self._solid: NDArray[np.bool_] = np.empty(0, dtype=np.bool_)
 
     def pictures(self, cameras: Sequence[int]) -> list[Picture]:
         """One picture (height, width, 3), upright, of each camera, of the state that the look-alike follows."""
-        self._note_what_moved()
+        if self._keeps:
+            self._note_what_moved()
         plans = [self._plan(camera) for camera in cameras]
         # All are begun before one is read: the device draws while the next one is prepared.
         for place, plan in enumerate(plans):
             if plan.still is not None and plan.background is None:
-                self._draw(plan.camera, plan.still, place + len(plans))
-            self._draw(plan.camera, None if plan.still is None else ~plan.still, place)
+                self._draw(plan, plan.still, place + len(plans))
+            self._draw(plan, None if plan.still is None else ~plan.still, place)
         return [self._finished(plan, place, place + len(plans)) for place, plan in enumerate(plans)]
 
     def _note_what_moved(self) -> None:
@@ -95,15 +98,21 @@ class Backgrounds:
         else:
             self._rested = np.where((looks != self._looks).any(axis=1), 0, self._rested + 1)
         self._looks = looks
+        self._solid = opaque(self._alike.model)
 
-    def _draw(self, camera: int, shapes: NDArray[np.bool_] | None, place: int = 0) -> None:
-        self._canvas.see_nearest_first(self._alike.data, camera, shapes)
+    def _draw(self, plan: _Plan, shapes: NDArray[np.bool_] | None, place: int) -> None:
+        """Begin a picture of what is in view, or of those shapes of it."""
+        self._see(plan, shapes)
         self._canvas.draw(place, shadows=False)
+
+    def _see(self, plan: _Plan, shapes: NDArray[np.bool_] | None) -> None:
+        seen = plan.in_view if shapes is None else plan.in_view & shapes
+        self._canvas.see_nearest_first(self._alike.data, plan.camera, seen)
 
     def _plan(self, camera: int) -> _Plan:
         """How a view is drawn: over a background if it has come before and most of it stands still."""
-        full = _Plan(camera, (camera, b""), None, None)
-        if not _joining_pays.get(self._device, True):
+        full = _Plan(camera, self._canvas.in_view(self._alike.data, camera))
+        if not self._keeps or not _joining_pays.get(self._device, True):
             return full
         if self._doubtful.get(camera, 0) > 0:
             self._doubtful[camera] -= 1
@@ -118,11 +127,10 @@ class Backgrounds:
                 self._seen.popitem(last=False)
             return full
         still = self._rested >= RESTED if background is None else background.still
-        in_view = self._canvas.in_view(self._alike.data, camera)
-        moved = ~still & in_view
-        if moved.sum() > MOST_MOVED * in_view.sum() or (moved & ~opaque(self._alike.model)).any():
+        moved = ~still & full.in_view
+        if moved.sum() > MOST_MOVED * full.in_view.sum() or (moved & ~self._solid).any():
             return full
-        return _Plan(camera, key, still, background)
+        return replace(full, key=key, still=still, background=background)
 
     def _finished(self, plan: _Plan, place: int, behind: int) -> Picture:
         """The picture of a plan, whose parts have been begun in these places."""
@@ -130,16 +138,17 @@ class Backgrounds:
             return self._canvas.drawn(place)
         background = plan.background
         if background is None:
-            background = self._made(plan.camera, plan.still, behind)
+            background = self._made(plan, plan.still, behind)
             if not is_software(self._device) and self._device not in _joining_pays:
-                self._compare(plan.camera, background, behind)
+                self._compare(plan, background, behind)
+        assert plan.key is not None
         self._keep(plan.key, background)
         colours, depth = self._canvas.drawn_with_depth(place)
         picture, certain = join_by_depth(background.colours, background.depth, colours, depth, background.veil)
         if certain:
             return np.ascontiguousarray(picture[::-1])
         self._doubtful[plan.camera] = DOUBTFUL
-        self._draw(plan.camera, None, place)
+        self._draw(plan, None, place)
         return self._canvas.drawn(place)
 
     def _keep(self, key: Key, background: Background) -> None:
@@ -149,24 +158,23 @@ class Backgrounds:
         if len(mine) > KEPT_VIEWS:
             del self._kept[mine[0]]
 
-    def _made(self, camera: int, still: NDArray[np.bool_], place: int) -> Background:
+    def _made(self, plan: _Plan, still: NDArray[np.bool_], place: int) -> Background:
         """What has been drawn in a place of what stands still."""
         colours, depth = self._canvas.drawn_with_depth(place)
         veil = None
-        solid = opaque(self._alike.model)
-        if (still & ~solid & self._canvas.in_view(self._alike.data, camera)).any():
-            self._canvas.see_nearest_first(self._alike.data, camera, still & ~solid)
+        if (still & ~self._solid & plan.in_view).any():
+            self._see(plan, still & ~self._solid)
             veil = self._canvas.drawn_depth(place)
-            self._canvas.see_nearest_first(self._alike.data, camera, still & solid)
+            self._see(plan, still & self._solid)
             depth = self._canvas.drawn_depth(place)
         return Background(colours, depth, veil, still, self._looks)
 
-    def _compare(self, camera: int, background: Background, place: int) -> None:
+    def _compare(self, plan: _Plan, background: Background, place: int) -> None:
         """Measure once for each graphics card whether joining pays."""
         seconds: dict[bool, list[float]] = {True: [], False: []}
         for joins in (True, False) * TIMED:
             started = time.perf_counter()
-            self._draw(camera, ~background.still if joins else None, place)
+            self._draw(plan, ~background.still if joins else None, place)
             if joins:
                 colours, depth = self._canvas.drawn_with_depth(place)
                 join_by_depth(background.colours, background.depth, colours, depth, background.veil)

@@ -97,15 +97,14 @@ class Canvas:
         finally:
             self._model.geom_group[:] = groups
 
-    def see_nearest_first(self, data: mujoco.MjData, camera: int, geoms: NDArray[np.bool_] | None = None) -> None:
-        """Aim a camera, and have what reaches into its view drawn from the nearest to the farthest.
+    def see_nearest_first(self, data: mujoco.MjData, camera: int, geoms: NDArray[np.bool_]) -> None:
+        """Aim a camera, and have these geoms, (ngeom,) of what is in its view, drawn from the nearest to the farthest.
 
-        For models of geoms alone; of these only the chosen ones, (ngeom,), are drawn.
+        For models of geoms alone.
         """
         model, scene = self._model, self._scene
         groups = model.geom_group.copy()
-        reaching = in_view(model, data, camera, self._aspect)
-        seen = np.flatnonzero(reaching if geoms is None else reaching & geoms)
+        seen = np.flatnonzero(geoms)
         # By distance alone: where faces lie in one plane, the order decides, and must not hang on what was left out.
         layers = np.searchsorted(_LAYER_EDGES_M, distances(model, data, camera)[seen])
         layers[groups[seen] == BACKDROP_GROUP] = len(_LAYER_EDGES_M) + 1

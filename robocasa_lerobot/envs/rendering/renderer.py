@@ -116,14 +116,9 @@ class SceneRenderer:
         """Pictures of the state that the look-alike follows."""
         assert self._merged is not None
         assert self._alike is not None
-        if self._keeps:
-            if self._backgrounds is None:
-                self._backgrounds = Backgrounds(self._alike, self._merged)
-            return self._backgrounds.pictures(cameras)
-        for place, number in enumerate(cameras):
-            self._merged.see_nearest_first(self._alike.data, number)
-            self._merged.draw(place, shadows=False)
-        return [self._merged.drawn(place) for place in range(len(cameras))]
+        if self._backgrounds is None:
+            self._backgrounds = Backgrounds(self._alike, self._merged, keeps=self._keeps)
+        return self._backgrounds.pictures(cameras)
 
     def _camera(self, camera: str | mujoco.MjvCamera) -> int | mujoco.MjvCamera:
         if not isinstance(camera, str):
