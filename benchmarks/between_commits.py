@@ -1,5 +1,7 @@
 """This checkout beside an earlier commit of ours: processor time per step of simulator, converter and evaluation.
 
+And per demonstration of planning: of all that a demonstrator does between two actions, in every third atomic task.
+
 Both sides do the same work, taking turns, on one thread per library, so that whatever else the machine does hits both;
 medians count. Demonstrations and the policy (random weights, so that every trial lasts its horizon) are made by the
 earlier commit, which both sides can read.
@@ -26,10 +28,13 @@ import common
 import evaluation_sides
 import training_sides
 
+from robocasa_lerobot.benchmark.tasks import facts_of
+from robocasa_lerobot.envs.tasks.registry import task_names
 from robocasa_lerobot.progress import Bar
 
 OUTPUT = common.RESULTS / "between_commits.json"
 SIDES = ("before", "now")
+KINDS = ("sim", "sim_pictures", "convert", "evaluation", "planning")
 CLI = ("-c", "import sys; from robocasa_lerobot.cli import main; sys.exit(main())")
 TASK, EPISODES = "PickPlaceCounterToSink", 4
 EVALUATED, TRIALS, IMAGE_SIZE = ["CloseDrawer", "PickPlaceCounterToSink"], 2, 96
@@ -54,13 +59,39 @@ for action in actions:
 print("RESULT", (time.process_time() - started) / steps)
 """
 
+PLANNED_SEEDS, EVERY = 2, 3
+PLANNING = """
+import sys, time
+from robocasa_lerobot.demos.demonstrator import SkillError, demonstrate
+from robocasa_lerobot.envs.kitchen_env import KitchenEnv
+seconds = []
+for task in sys.argv[2].split(","):
+    env = KitchenEnv(task, cameras=(), terminate_on_success=False)
+    for seed in range(100_000, 100_000 + int(sys.argv[1])):
+        env.reset(seed=seed)
+        actions, used, over = demonstrate(env), 0.0, False
+        while not over:
+            started = time.process_time()
+            try:
+                action = next(actions)
+            except (SkillError, StopIteration):
+                over = True
+            used += time.process_time() - started
+            if not over:
+                *_, truncated, info = env.step(action.astype("float32"))
+                over = truncated or info["success"]
+        seconds.append(used)
+    env.close()
+print("RESULT", sum(seconds) / len(seconds))
+"""
+
 
 def parse(arguments: Sequence[str] | None = None) -> argparse.Namespace:
     """The command's options."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("before", help="commit that is compared with")
     parser.add_argument("--repetitions", type=int, default=5, help="of each side (default 5)")
-    parser.add_argument("--kinds", default="sim,sim_pictures,convert,evaluation", help="default: all")
+    parser.add_argument("--kinds", default=",".join(KINDS), help="default: all")
     parser.add_argument("--out", type=Path, default=OUTPUT, help="result")
     return parser.parse_args(arguments)
 
@@ -84,7 +115,7 @@ def _children_s() -> float:
 
 
 class Work:
-    """The three kinds of work, as one side does them.
+    """All kinds of work, as one side does them.
 
     Args:
         checkout: of the side.
@@ -97,10 +128,19 @@ class Work:
         self._checkout, self._folder, self._demos, self._checkpoint = checkout, folder, demos, checkpoint
 
     def seconds(self, kind: str) -> float:
-        """Processor seconds per control step, frame or step of a trial; commands count with their start."""
+        """Processor seconds per control step, frame, step of a trial or demonstration; commands count with their start.
+
+        Planning does not: the first call of a compiled function compiles it, in the first repetition.
+        """
         shutil.rmtree(self._folder, ignore_errors=True)
         self._folder.mkdir(parents=True)
-        return {"convert": self._convert, "evaluation": self._evaluate}.get(kind, lambda: self._simulate(kind))()
+        others = {"convert": self._convert, "evaluation": self._evaluate, "planning": self._plan}
+        return others.get(kind, lambda: self._simulate(kind))()
+
+    def _plan(self) -> float:
+        tasks = [name for name in task_names() if facts_of(name).kind == "atomic"]
+        said, _ = run(self._checkout, ["-c", PLANNING, str(PLANNED_SEEDS), ",".join(tasks[::EVERY])])
+        return float(said.rsplit("RESULT", 1)[1])
 
     def _simulate(self, kind: str) -> float:
         said, _ = run(self._checkout, ["-c", CONTROL_STEP, TASK, str(STEPS[kind]), str(kind == "sim_pictures")])
@@ -159,14 +199,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
         [kind, *(f"{1000 * row[side]:.2f}" for side in SIDES), f"{ratios[f'{kind}_now_to_before']:.3f}"]
         for kind, row in medians.items()
     ]
-    print(common.table(["processor ms per step", *SIDES, "ratio"], lines))
+    print(common.table(["processor ms per step, demonstration", *SIDES, "ratio"], lines))
     body = {
         "machine": common.machine(),
         "versions": common.versions("mujoco", "numpy", "torch", "lerobot"),
         "before": options.before,
         "busy_before": busy,
         "ratios": ratios,
-        "seconds_per_step": {kind: {s: common.spread(v) for s, v in row.items()} for kind, row in found.items()},
+        "seconds_each": {kind: {s: common.spread(v) for s, v in row.items()} for kind, row in found.items()},
     }
     common.write_result(options.out, "between_commits", body)
     print(options.out)

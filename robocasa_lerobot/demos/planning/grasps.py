@@ -20,6 +20,7 @@ from robocasa_lerobot.envs.robots.robot import GripperGeometry
 _TABLE_GAP = 0.0025  # between finger tips and what the object stands on
 _ANGLES = 8
 _LINE_STEP = 0.01
+_FLAT_M = 0.030  # rings and the like that are lower are held across their holes as well
 _MOST_JUDGED, _MOST_POSES = 1200, 24
 
 
@@ -155,7 +156,7 @@ def _plan(solids: list[Solid], turn: Array, gripper: GripperGeometry) -> tuple[G
     for k in range(_ANGLES):
         angle = np.pi * k / _ANGLES
         u, w = np.array([np.cos(angle), np.sin(angle), 0.0]), np.array([-np.sin(angle), np.cos(angle), 0.0])
-        found += _across(faces, cloud, center, u, w, levels, gripper.opening)
+        found += _across(faces, cloud, center, u, w, levels, gripper.opening, span=top - bottom < _FLAT_M)
     found.sort(key=lambda candidate: -candidate.score)
     # Best first, but such that the first ones differ; whether there is room is asked of those that count only.
     chosen: list[_Candidate] = []
@@ -178,9 +179,9 @@ def _pose(candidate: _Candidate) -> GraspPose:
 
 
 def _across(
-    faces: _Faces, cloud: Array, center: Array, u: Array, w: Array, levels: list[float], opening: float
+    faces: _Faces, cloud: Array, center: Array, u: Array, w: Array, levels: list[float], opening: float, span: bool
 ) -> list[_Candidate]:
-    """Candidates that open along u, the fingers' width along w."""
+    """Candidates that open along u, the fingers' width along w; with `span` those across holes, too."""
     reach = cloud @ w
     middle = float(center @ w)
     steps = int(np.ceil((reach.max() - reach.min()) / _LINE_STEP / 2))
@@ -200,7 +201,7 @@ def _across(
         for index, row in enumerate(rows):
             lines = parts[level, index]
             # A surface lower than the pads' middle is held by their lower ends.
-            for low, high in _merged(lines[4]) or _merged(lines[3]):
+            for low, high in _intervals(lines[4], span) or _intervals(lines[3], span):
                 if not 0.002 < high - low < opening:
                     continue
                 ends = []
@@ -222,6 +223,12 @@ def _score(ends: Array, low: float, high: float, row: float, z: float, u: Array,
     above = abs(z - float(center[2])) / 0.06
     tight = max(high - low - 0.066, 0.0) / 0.01
     return 2.0 * support - 0.8 * slope - lever - 0.15 * above - 0.7 * tight
+
+
+def _intervals(parts: Array, span: bool) -> list[tuple[float, float]]:
+    """What pads can close on along a line: what is filled without a gap, and, with `span`, all of it."""
+    found = _merged(parts)
+    return [*found, (found[0][0], found[-1][1])] if span and len(found) > 1 else found
 
 
 def _merged(parts: Array) -> list[tuple[float, float]]:

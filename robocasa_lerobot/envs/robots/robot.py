@@ -109,7 +109,9 @@ class GripperGeometry:
 
     Attributes:
         opening: the widest object that it is sent to grasp.
-        tips_below_grip: how far the finger tips reach beyond the grip site.
+        tips_below_grip: how far the finger tips reach beyond the grip site, with room for what is uneven.
+        pad_corner: half width of the pads along x, and how far they reach beyond the grip site: what is lowest of a
+            hand that is tipped over the line between its fingers.
         palm_above_grip: nothing may be higher than this above the grip site.
         finger_inner, finger_outer: of an open finger, from the middle.
         finger_half_width: along the hand's x.
@@ -119,6 +121,7 @@ class GripperGeometry:
 
     opening: float
     tips_below_grip: float
+    pad_corner: tuple[float, float]
     palm_above_grip: float
     finger_inner: float
     finger_outer: float

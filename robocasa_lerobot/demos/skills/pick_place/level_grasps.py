@@ -10,7 +10,7 @@ from robocasa_lerobot.demos.skills.pick_place.graspable import DOWN, Graspable, 
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 
 PALM_HALF_M, GIVES_WAY_M = (0.028, 0.10), 0.004  # along the hand's x and y; food yields a little
-GAP_M = 0.003  # between the fingers' lowest corners and what the object lies on
+GAP_M = 0.002  # between the fingers' lowest corners and what the object lies on
 INWARDS = 0.5  # least cosine between the hand's heading and the approach's
 
 
@@ -26,8 +26,8 @@ def level_grasps(env: KitchenEnv, obj: Graspable, approach: Array) -> list[Grasp
     body = env.data.body(obj.name)
     turn = body.xmat.reshape(3, 3)
     gripper = env.robot.gripper
-    lowest = float(body.xpos[2]) - obj.below(turn) + gripper.tips_below_grip * steepness
-    lowest = lowest + gripper.finger_half_width * flat + GAP_M
+    pad_half_width, pad_reach = gripper.pad_corner
+    lowest = float(body.xpos[2]) - obj.below(turn) + pad_reach * steepness + pad_half_width * flat + GAP_M
     points = body.xpos + np.concatenate([filled(solid.cloud()) for solid in obj.solids]) @ turn.T
     found = []
     for pose in grasps(env, obj, DOWN):
@@ -38,7 +38,7 @@ def level_grasps(env: KitchenEnv, obj: Graspable, approach: Array) -> list[Grasp
             continue
         z = flat * heading - steepness * UP
         position = pose.position.copy()
-        position[2] = max(position[2], lowest)
+        position[2] = max(position[2] - (gripper.tips_below_grip - pad_reach), lowest)
         rotation = np.column_stack([np.cross(opening, z), opening, z])
         x, y, deep = ((points - position) @ rotation).T
         if np.any(

@@ -219,16 +219,18 @@ def _clear_of_counter(obj: Graspable, drawer: Drawer) -> Callable[[KitchenEnv], 
 
 
 def _turn_first(obj: Graspable, strategy: GraspStrategy) -> Callable[[KitchenEnv], Iterator[Array]]:
-    """Before a grasp through a front: turn what lies across where no grasp is worth a try, or where one failed."""
-    left, again = MOST_TURNS, False
+    """Before a grasp through a front: turn what lies across where no grasp is worth a try.
+
+    Where one has failed, another one is tried first: a push takes as long as two grasps.
+    """
+    left = MOST_TURNS
 
     def first(env: KitchenEnv) -> Iterator[Array]:
-        nonlocal left, again
-        while left and lies_across(env, obj) and (again or best_grasp(env, obj, strategy).cost > HOPELESS):
-            left, again = left - 1, False
+        nonlocal left
+        while left and lies_across(env, obj) and best_grasp(env, obj, strategy).cost > HOPELESS:
+            left -= 1
             if not (yield from turn_across(env, obj)):
                 break
-        again = True
 
     return first
 

@@ -53,6 +53,7 @@ PANDA_OMRON = Robot(
     gripper=GripperGeometry(
         opening=0.076,
         tips_below_grip=0.014,
+        pad_corner=(0.0085, 0.0105),
         palm_above_grip=0.029,
         finger_inner=0.0395,
         finger_outer=0.056,

@@ -1,0 +1,68 @@
+"""Grasps know the gripper as it is: how low its pads reach when the hand is tipped, and what they can close across."""
+
+from __future__ import annotations
+
+import mujoco
+import numpy as np
+import pytest
+from scipy.spatial import ConvexHull
+
+from robocasa_lerobot.demos.motion import grip_position, hand_rotation
+from robocasa_lerobot.demos.planning.grasps import GraspPose, grasp_poses, pieces
+from robocasa_lerobot.envs.kitchen_env import KitchenEnv
+from robocasa_lerobot.envs.objects.catalogue import CATEGORIES, INSTANCES_PER_CATEGORY, Instance, instance
+from robocasa_lerobot.envs.robots.panda_omron.robot import PANDA_OMRON
+
+FINGERS = ("leftfinger", "rightfinger", "finger_joint1_tip", "finger_joint2_tip")
+
+
+def finger_points(env: KitchenEnv) -> np.ndarray:
+    """Corners of what collides of both fingers, from the grip site, in the hand's axes, metres."""
+    model, data = env.model, env.data
+    found = []
+    for geom in range(model.ngeom):
+        if not model.body(model.geom_bodyid[geom]).name.endswith(FINGERS) or not model.geom_contype[geom]:
+            continue
+        mesh = model.geom_dataid[geom]
+        if model.geom_type[geom] == mujoco.mjtGeom.mjGEOM_MESH:
+            first = model.mesh_vertadr[mesh]
+            corners = model.mesh_vert[first : first + model.mesh_vertnum[mesh]]
+        else:
+            corners = np.stack(np.meshgrid(*[[-1, 1]] * 3), axis=-1).reshape(-1, 3) * model.geom_size[geom]
+        found.append(corners @ data.geom_xmat[geom].reshape(3, 3).T + data.geom_xpos[geom])
+    return (np.concatenate(found) - grip_position(data)) @ hand_rotation(data)
+
+
+def test_the_pads_corner_is_what_is_lowest_of_a_tipped_hand() -> None:
+    env = KitchenEnv("OpenDrawer", cameras=())
+    env.reset(seed=1)
+    points = finger_points(env)
+    half_width, reach = PANDA_OMRON.gripper.pad_corner
+    for tilt in np.deg2rad([0.0, 35.0, 48.0, 60.0, 72.0, 86.0]):
+        for side in (-1.0, 1.0):
+            lowest = float((points @ [side * np.sin(tilt), 0.0, np.cos(tilt)]).max())
+            assert lowest == pytest.approx(reach * np.cos(tilt) + half_width * np.sin(tilt), abs=5e-4)
+    assert len(points) > 16
+    env.close()
+
+
+def spans_a_hole(item: Instance, pose: GraspPose) -> bool:
+    """Whether an object has a gap between the places that the pads close on; the lower rows of a pad may be those."""
+    for below in (0.002, 0.010):
+        line = (
+            pose.position - [0.0, 0.0, below] + np.linspace(-0.5, 0.5, 200)[:, None] * pose.width * pose.rotation[:, 1]
+        )
+        filled = np.zeros(len(line), dtype=bool)
+        for solid in pieces(item):
+            faces = ConvexHull(solid.cloud()).equations
+            filled |= (line @ faces[:, :3].T + faces[:, 3] < 1e-4).all(axis=1)
+        if filled[3] and filled[-4] and not filled.all():
+            return True
+    return False
+
+
+@pytest.mark.parametrize("name", ["pretzel", "donut"])
+def test_flat_rings_are_held_across_their_holes(name: str) -> None:
+    items = [instance(CATEGORIES[name], index) for index in range(INSTANCES_PER_CATEGORY)]
+    across = [any(spans_a_hole(item, pose) for pose in grasp_poses(item, PANDA_OMRON.gripper)) for item in items]
+    assert sum(across) >= 0.8 * len(items)
