@@ -8,6 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from robocasa_lerobot.contract import ACTION_SIZE, SUBSTEPS, ContractError
 from robocasa_lerobot.envs.physics import native
+from robocasa_lerobot.envs.physics.nearby import Nearby
 from robocasa_lerobot.envs.robots.panda_omron import names
 from robocasa_lerobot.envs.robots.panda_omron.control import indices, kernel
 from robocasa_lerobot.errors import UserError
@@ -28,6 +29,7 @@ class PandaOmronController:
         self._model, self._data = model, data  # the compiled code holds their addresses
         self._memory = np.zeros(kernel.MEMORY_SIZE)
         self._places = _places(model)
+        self._nearby = Nearby(model, data)
         self._views = kernel.Views(
             qpos=data.qpos,
             qvel=data.qvel,
@@ -72,8 +74,15 @@ class PandaOmronController:
         Before and after: positions and velocities are evaluated (`mj_forward`, `mj_step1`). Returns whether what
         sleeps must be evaluated anew (`physics.write_physics`).
         """
-        model, data = self._model, self._data
-        return kernel.run(self._memory, self._views, self._places, model._address, data._address, substeps)
+        memory, views, places, watch = self._memory, self._views, self._places, self._nearby.watch
+        model, data = self._model._address, self._data._address
+        stale = False
+        while True:
+            self._nearby.leave_out()
+            made, now = kernel.run(memory, views, places, watch, model, data, substeps)
+            stale, substeps = stale or now, substeps - made
+            if substeps == 0:
+                return stale
 
     def goal_in_base(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Goal position (3,) metres and rotation matrix (3, 3) of the grip site in the arm's base frame."""

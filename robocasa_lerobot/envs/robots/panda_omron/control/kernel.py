@@ -157,38 +157,77 @@ def apply(memory: Array, views: Any, places: Any) -> None:
 
 
 @compiled
-def run(memory: Array, views: Any, places: Any, model: int, data: int, substeps: int) -> bool:
+def run(memory: Array, views: Any, places: Any, watch: Any, model: int, data: int, substeps: int) -> tuple[int, bool]:
     """Advance the simulation by `substeps` physics steps; `model` and `data` are the addresses of their structures.
 
-    Returns whether what sleeps is evaluated for another state than the present one: MuJoCo leaves it as it was before
-    the step in which it fell asleep, and relative to a centre of mass that moves with the awake bodies under the same
-    root (the other door of a cabinet).
+    Before: `Nearby.leave_out`. It ends early when bodies cannot stay left out; after it MuJoCo looks at all of them.
+
+    Returns how many steps were made, and whether what sleeps is evaluated for another state than the present one:
+    MuJoCo leaves it as it was before the step in which it fell asleep, and relative to a centre of mass that moves
+    with the awake bodies under the same root (the other door of a cabinet). The latter is looked for after the last
+    step alone.
     """
     asleep = views.tree_asleep
     slept = asleep >= 0
     stale = False
-    for _ in range(substeps):
+    change = made = 0
+    while made < substeps and change == 0:
         apply(memory, views, places)
         _mj_step2(model, data)
         _mj_step1(model, data)
+        made += 1
+        if watch.n_watched[0]:
+            change = _change(watch, slept, asleep)
+            if change == 2:
+                _look_at_all(watch)
+                _mj_step1(model, data)
         for tree in range(asleep.size):
             if slept[tree] != (asleep[tree] >= 0):
                 slept[tree] = not slept[tree]
                 stale = True
-    moving = np.zeros(places.tree_roots.max() + 1, dtype=np.bool_)
-    for tree in range(asleep.size):
-        moving[places.tree_roots[tree]] |= not slept[tree]
-    for tree in range(asleep.size):
-        stale |= slept[tree] and moving[places.tree_roots[tree]]
-    return stale
+    _look_at_all(watch)
+    if made == substeps:
+        moving = np.zeros(places.tree_roots.max() + 1, dtype=np.bool_)
+        for tree in range(asleep.size):
+            moving[places.tree_roots[tree]] |= not slept[tree]
+        for tree in range(asleep.size):
+            stale |= slept[tree] and moving[places.tree_roots[tree]]
+    return made, stale
 
 
 @compiled
-def run_uncontrolled(model: int, data: int, substeps: int) -> None:
-    """The physics of `run` alone, with the controls as they are: for measuring what the controllers cost."""
-    for _ in range(substeps):
-        _mj_step2(model, data)
-        _mj_step1(model, data)
+def _change(watch: Any, slept: Any, asleep: Any) -> int:
+    """Whether bodies can stay left out: 0 yes, 1 not in the next step, 2 they should not have been in this one.
+
+    Something may have woken, or have moved too far; a fast one needs the last quarter of its way for the next step.
+    """
+    change = 0
+    for tree in range(asleep.size):
+        if slept[tree] and asleep[tree] < 0:
+            change = max(change, 1 if watch.may_move[tree] else 2)
+    for i in range(watch.n_watched[0]):
+        body = watch.bodies[i]
+        shift = turn = 0.0
+        for k in range(3):
+            shift += (watch.all_xpos[body, k] - watch.xpos[i, k]) ** 2
+        for k in range(9):
+            turn += (watch.all_xmat[body, k] - watch.xmat[i, k]) ** 2
+        # No point of it has moved farther: two rotations differ by sqrt(turn / 2) times a vector's length at most.
+        moved = np.sqrt(shift) + watch.radius[i] * np.sqrt(0.5 * turn)
+        if not moved <= watch.free[i]:
+            return 2
+        if moved > 0.75 * watch.free[i]:
+            change = max(change, 1)
+    return change
+
+
+@compiled
+def _look_at_all(watch: Any) -> None:
+    """Give the bodies that were left out their masks back."""
+    if watch.n_watched[0]:
+        watch.contype_now[:] = watch.contype
+        watch.conaffinity_now[:] = watch.conaffinity
+        watch.n_watched[0] = 0
 
 
 @compiled
