@@ -19,6 +19,7 @@ from peers import sim_loop
 import robocasa_lerobot
 from robocasa_lerobot import contract
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
+from robocasa_lerobot.envs.physics.nearby import Nearby
 from robocasa_lerobot.envs.robots.control_step import control_step
 from robocasa_lerobot.envs.robots.panda_omron.control.controller import PandaOmronController
 
@@ -71,7 +72,8 @@ class KitchenSimulator:
 
         The episode is run in three ways from the same start with the same actions, and so through the same states:
         the whole step with pictures, without them, and the controlled physics alone. At every state of the last one
-        MuJoCo's own 25 steps are timed as well, on a copy, with the controls held. Parts are differences of these:
+        MuJoCo's own 25 steps are timed as well, on a copy, with the controls held, and with contacts searched for among
+        the same bodies (`physics/nearby.py`; choosing these counts as control). Parts are differences of these:
         rendering, Python (observation without pictures, goal, info, checks), control, physics.
         """
         if self._seed != seed:
@@ -112,15 +114,18 @@ class KitchenSimulator:
         controller = PandaOmronController(model, data)
         controller.set_state(self._env.get_state().controller)
         held = copy.copy(data)
+        nearby = Nearby(model, held)
         controlled = physics = 0.0
         for action in actions:
             mujoco.mj_copyData(held, model, data)
+            nearby.leave_out()
             start = time.perf_counter()
             mujoco.mj_step(model, held, contract.SUBSTEPS)
-            middle = time.perf_counter()
+            physics += time.perf_counter() - start
+            nearby.look_at_all()
+            start = time.perf_counter()
             control_step(model, data, controller, action)
-            physics += middle - start
-            controlled += time.perf_counter() - middle
+            controlled += time.perf_counter() - start
         return controlled, physics
 
 

@@ -158,3 +158,5 @@ def test_nothing_is_left_out_where_more_can_move() -> None:
         nearby.leave_out()
         assert bool(nearby.watch.n_watched[0]) is not bool(extra)
         assert bool((model.body_contype[1:] == 0).any()) is not bool(extra)
+        nearby.look_at_all()
+        assert (model.body_contype[1:] == 1).all()

@@ -111,6 +111,13 @@ class Nearby:
         if self._applies:
             leave_out(self._shapes, self.watch, self._asleep)
 
+    def look_at_all(self) -> None:
+        """Give the bodies that were left out their masks back."""
+        if self.watch.n_watched[0]:
+            self.watch.contype_now[:] = self.watch.contype
+            self.watch.conaffinity_now[:] = self.watch.conaffinity
+            self.watch.n_watched[0] = 0
+
 
 @compiled
 def leave_out(shapes: Any, watch: Any, asleep: NDArray[np.int32]) -> None:
