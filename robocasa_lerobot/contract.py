@@ -122,6 +122,7 @@ def _permutation(source: Mapping[str, slice], target: Sequence[Part]) -> NDArray
 
 _HDF5_TO_STORED = _permutation(ACTION_SLICES_HDF5, ACTION_PARTS)
 _STORED_TO_HDF5 = _permutation(ACTION_SLICES, ACTION_PARTS_HDF5)
+_BINARY = np.concatenate([np.arange(ACTION_SLICES[p].start, ACTION_SLICES[p].stop) for p in BINARY_PARTS])
 
 
 def hdf5_to_stored(action: ArrayLike) -> NDArray[Any]:
@@ -175,9 +176,7 @@ def join_action(parts: Mapping[str, ArrayLike]) -> NDArray[Any]:
 def binarize(action: ArrayLike) -> NDArray[Any]:
     """Actions in stored order with their binary parts set to -1 or +1, as they are executed."""
     out = np.array(_checked(action, ACTION_SIZE, "action in stored order"), copy=True)
-    for name in BINARY_PARTS:
-        where = ACTION_SLICES[name]
-        out[..., where] = np.where(out[..., where] >= BINARY_THRESHOLD, 1.0, -1.0)
+    out[..., _BINARY] = np.where(out[..., _BINARY] >= BINARY_THRESHOLD, 1.0, -1.0)
     return out
 
 

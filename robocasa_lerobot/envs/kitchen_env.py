@@ -135,9 +135,11 @@ class KitchenEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         self.render_observations = True
         self.rendering_seconds = 0.0  # wall time in which observations' pictures were made, since the env was made
         self.task_description = ""
+        pictures = picture_spaces(self.cameras, image_size, **self._kinds)
+        self._picture_keys = tuple(sorted(pictures))
         self.observation_space = gymnasium.spaces.Dict(
             {
-                **picture_spaces(self.cameras, image_size, **self._kinds),
+                **pictures,
                 "agent_pos": gymnasium.spaces.Box(-np.inf, np.inf, (contract.STATE_SIZE,), np.float64),
             }
         )
@@ -312,7 +314,7 @@ class KitchenEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
 
     def _observe(self) -> Observation:
         if not self.cameras:
-            pictures: Pictures = {key: {} for key in self.observation_space if key != "agent_pos"}
+            pictures: Pictures = {key: {} for key in self._picture_keys}
         else:
             if self.render_observations or not self._pictures:
                 started = time.perf_counter()

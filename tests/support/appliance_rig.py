@@ -10,7 +10,7 @@ import mujoco
 import numpy as np
 
 from robocasa_lerobot.contract import SUBSTEPS
-from robocasa_lerobot.envs.kitchens.appliances.base import update_all
+from robocasa_lerobot.envs.kitchens.appliances.acting import ActingAppliances
 from robocasa_lerobot.envs.kitchens.appliances.catalogue import build_appliance
 from robocasa_lerobot.envs.kitchens.materials import MaterialPalette, load_style
 from robocasa_lerobot.envs.physics.options import apply_simulation_options
@@ -35,6 +35,7 @@ class Bench:
         _add_finger(spec)
         _add_pincer(spec)
         self.model = spec.compile()
+        self.acting = ActingAppliances([self.it], self.model)
         self.data = mujoco.MjData(self.model)
         mujoco.mj_forward(self.model, self.data)
         self.finger = subtree(self.model, "finger")
@@ -53,7 +54,7 @@ class Bench:
                 self.data.mocap_pos[self.mocap] += way / SUBSTEPS
                 mujoco.mj_step2(self.model, self.data)
                 mujoco.mj_step1(self.model, self.data)
-            update_all([self.it], self.model, self.data, self.toucher)
+            self.acting.act(self.data, self.toucher)
             assert np.isfinite(self.data.qpos).all()
 
     def start(self, **shares: float) -> None:

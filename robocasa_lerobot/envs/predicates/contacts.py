@@ -48,12 +48,13 @@ def _touching_asleep(
     still = _still(model, data)
     ours = np.flatnonzero((first & still)[model.geom_bodyid] & (model.geom_contype | model.geom_conaffinity > 0))
     theirs = np.flatnonzero((second & still)[model.geom_bodyid] & (model.geom_contype | model.geom_conaffinity > 0))
-    for geom in ours:
-        reach = model.geom_rbound[theirs] + model.geom_rbound[geom] + ASLEEP_TOUCH_M
-        # A plane has no bounding sphere.
-        reach = np.where((model.geom_rbound[theirs] == 0) | (model.geom_rbound[geom] == 0), np.inf, reach)
-        near = np.linalg.norm(data.geom_xpos[theirs] - data.geom_xpos[geom], axis=1) <= reach
-        for other in theirs[near]:
+    sizes = model.geom_rbound
+    # A plane has no bounding sphere.
+    reach = np.where(sizes == 0, np.inf, sizes)
+    apart = np.linalg.norm(data.geom_xpos[theirs][None] - data.geom_xpos[ours][:, None], axis=2)
+    near = apart <= reach[theirs] + reach[ours][:, None] + ASLEEP_TOUCH_M
+    for geom, others in zip(ours, near, strict=True):
+        for other in theirs[others]:
             if not _may_collide(model, int(geom), int(other)):
                 continue
             if mujoco.mj_geomDistance(model, data, int(geom), int(other), 2 * ASLEEP_TOUCH_M, None) <= ASLEEP_TOUCH_M:

@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 from robocasa_lerobot.envs.kitchens.appliances.kinds.sink import Sink
 from robocasa_lerobot.envs.kitchens.fixtures.base import Region
 from robocasa_lerobot.envs.kitchens.fixtures.counters import Counter
-from robocasa_lerobot.envs.kitchens.fixtures.regions import region_names, regions_of
 from robocasa_lerobot.envs.predicates.contacts import touching
 from robocasa_lerobot.envs.predicates.logic import Term, plain
 
@@ -70,14 +69,19 @@ class ObjectInside(Term):
         return f"{self.object}_inside_{self.fixture}"
 
     def holds(self, scene: Scene, data: mujoco.MjData) -> bool:
-        """Test the corners against each region."""
-        fixture = scene.fixture(self.fixture)
-        wanted = region_names(fixture, scene.fill(self.region))
-        corners, origin = object_corners(scene, data, self.object), data.body(scene.fill(self.object)).xpos
+        """Test the origin against each region, then the corners."""
+        origin = data.body(scene.fill(self.object)).xpos
+        around = [
+            region
+            for region in scene.regions(self.fixture, self.region)
+            if self._has(data, region, origin) and self._usable(data, region)
+        ]
+        if not around:
+            return False
+        corners = object_corners(scene, data, self.object)
         return any(
-            self._usable(data, region) and self._inside(data, region, corners, origin)
-            for name, region in regions_of(fixture)
-            if name.startswith(wanted)
+            bool(np.all(np.abs(region.all_local(data, corners)) <= np.asarray(region.half) + self.margin))
+            for region in around
         )
 
     def _usable(self, data: mujoco.MjData, region: Region) -> bool:
@@ -85,14 +89,10 @@ class ObjectInside(Term):
         floor = float(region.world(data, (0.0, 0.0, -region.half[2]))[2])
         return low <= floor <= high and 2 * region.half[2] >= least
 
-    def _inside(
-        self, data: mujoco.MjData, region: Region, corners: NDArray[np.float64], origin: NDArray[np.float64]
-    ) -> bool:
-        half = np.asarray(region.half)
-        local = np.array([region.local(data, corner) for corner in corners])
+    def _has(self, data: mujoco.MjData, region: Region, origin: NDArray[np.float64]) -> bool:
         middle = region.local(data, origin)
-        inside = np.all(np.abs(local) <= half + self.margin) and np.all(np.abs(middle) <= half)
-        return bool(inside) and float(middle[2]) <= (2 * self.lower - 1) * half[2]
+        inside = np.all(np.abs(middle) <= region.half)
+        return bool(inside) and float(middle[2]) <= (2 * self.lower - 1) * region.half[2]
 
 
 @dataclass(frozen=True)

@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robocasa_lerobot.contract import ACTION_SIZE
-from robocasa_lerobot.envs.kitchens.appliances.base import update_all
+from robocasa_lerobot.envs.kitchens.appliances.acting import ActingAppliances
 from robocasa_lerobot.envs.kitchens.appliances.kinds.blender import Blender
-from robocasa_lerobot.envs.kitchens.fixtures.base import Fixture, of_kind, yaw_quat
-from robocasa_lerobot.envs.kitchens.fixtures.regions import region_names
+from robocasa_lerobot.envs.kitchens.fixtures.base import Fixture, Region, of_kind, yaw_quat
+from robocasa_lerobot.envs.kitchens.fixtures.regions import region_names, regions_of
 from robocasa_lerobot.envs.kitchens.layout import Layout
 from robocasa_lerobot.envs.robots.cameras import camera_configs
 from robocasa_lerobot.envs.robots.control_step import control_step
@@ -94,6 +94,8 @@ class Scene(Drawn):
     remembering: tuple[Remembering, ...] = ()
     memory: Memory = field(default_factory=Memory)
     _subtrees: dict[tuple[str, ...], NDArray[np.bool_]] = field(default_factory=dict, init=False, repr=False)
+    _regions: dict[tuple[str, str], tuple[Region, ...]] = field(default_factory=dict, init=False, repr=False)
+    _acting: ActingAppliances | None = field(default=None, init=False, repr=False)
 
     @property
     def fixtures(self) -> dict[str, Fixture]:
@@ -119,6 +121,15 @@ class Scene(Drawn):
         text = self.fill(text)
         names = region_names(self.fixture(role), text)
         return names[0] if len(names) == 1 else text.partition(":")[0]
+
+    def regions(self, role: str, text: str) -> tuple[Region, ...]:
+        """The regions that a declaration names at a fixture, all if by nothing, choices filled in; kept."""
+        key = (role, text)
+        if key not in self._regions:
+            fixture = self.fixture(role)
+            wanted = region_names(fixture, self.fill(text))
+            self._regions[key] = tuple(region for name, region in regions_of(fixture) if name.startswith(wanted))
+        return self._regions[key]
 
     def subtree(self, *bodies: str) -> NDArray[np.bool_]:
         """For each body of the model whether it is one of the named ones or hangs on one, (nbody,); kept."""
@@ -173,7 +184,9 @@ class Scene(Drawn):
 
     def update_appliances(self, data: mujoco.MjData) -> None:
         """Let appliances latch, time and light up, once after each control step."""
-        update_all(self.fixtures.values(), self.model, data, self.subtree(self.robot.names.gripper))
+        if self._acting is None:
+            self._acting = ActingAppliances(self.fixtures.values(), self.model)
+        self._acting.act(data, self.subtree(self.robot.names.gripper))
 
     def ep_meta(self) -> dict[str, Any]:
         """Description of the episode in RoboCasa's keys (JSON-able)."""

@@ -8,7 +8,6 @@ catches that hold a lever in `eq_active`: both are part of the integration state
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import Any, ClassVar
 
@@ -34,20 +33,23 @@ class Touches:
     Args:
         model, data: with contacts evaluated.
         toucher: for each body whether it belongs to what touches, (nbody,).
+
+    Attributes:
+        bodies: numbers of those that it touches.
     """
 
     def __init__(self, model: mujoco.MjModel, data: mujoco.MjData, toucher: NDArray[np.bool_]) -> None:
-        self._bodies: frozenset[int] = frozenset()
+        self.bodies: frozenset[int] = frozenset()
         if data.ncon == 0:
             return
         bodies = model.geom_bodyid[data.contact.geom]
         mine = toucher[bodies]
         touching = data.contact.dist <= 0.0
-        self._bodies = frozenset(bodies[(mine[:, ::-1] & ~mine) & touching[:, None]].tolist())
+        self.bodies = frozenset(bodies[(mine[:, ::-1] & ~mine) & touching[:, None]].tolist())
 
     def body(self, number: int) -> bool:
         """Whether a body is touched."""
-        return number in self._bodies
+        return number in self.bodies
 
 
 @dataclass(frozen=True)
@@ -201,14 +203,18 @@ class Appliance(Fixture):
     def update(self, model: mujoco.MjModel, data: mujoco.MjData, contacts: Touches) -> bool:
         """Latches and timers, once per control step; returns whether positions or catches changed.
 
-        After a change `take_effect` must evaluate the state anew; the scene does so once for all appliances.
+        After a change `take_effect` must evaluate the state anew; `ActingAppliances` does so once for all of them.
         """
         self._changed = False
         self.react(model, data, contacts)
         return self._changed
 
     def react(self, model: mujoco.MjModel, data: mujoco.MjData, contacts: Touches) -> None:
-        """What the category does; see `update`."""
+        """What the category does; see `update`.
+
+        It may look at its own joints, at what touches its bodies, its memory and its catches, and at nothing else:
+        where all of these are as they were when no appliance did anything, none is asked (`ActingAppliances`).
+        """
 
     def touched(self, model: mujoco.MjModel, contacts: Touches, part: str) -> bool:
         """Whether the gripper touches a part."""
@@ -235,22 +241,6 @@ class Appliance(Fixture):
         # What sleeps together is a cycle of numbers.
         while data.tree_asleep[tree] >= 0:
             data.tree_asleep[tree], tree = _AWAKE, int(data.tree_asleep[tree])
-
-
-def update_all(
-    fixtures: Iterable[Fixture], model: mujoco.MjModel, data: mujoco.MjData, gripper: NDArray[np.bool_]
-) -> None:
-    """Let the appliances among fixtures do what they do by themselves.
-
-    Before and after: positions and contacts are evaluated. `gripper` are the bodies that press buttons, (nbody,).
-    """
-    appliances = [fixture for fixture in fixtures if isinstance(fixture, Appliance)]
-    if not appliances:
-        return
-    contacts = Touches(model, data, gripper)
-    changed = [appliance.update(model, data, contacts) for appliance in appliances]
-    if any(changed):
-        take_effect(model, data)
 
 
 def take_effect(model: mujoco.MjModel, data: mujoco.MjData) -> None:

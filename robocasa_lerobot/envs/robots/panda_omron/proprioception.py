@@ -13,17 +13,23 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from robocasa_lerobot.contract import STATE_PART_HDF5_KEYS, join_state
+from robocasa_lerobot.contract import STATE_PART_HDF5_KEYS, STATE_SIZE, STATE_SLICES
 from robocasa_lerobot.envs.robots.panda_omron import names
 from robocasa_lerobot.envs.robots.panda_omron.control.indices import joint_positions, joint_velocities
 
 Array = NDArray[np.float64]
+# Where the observations of a name lie in the contract's state.
+_IN_STATE = tuple((STATE_PART_HDF5_KEYS[part], where) for part, where in STATE_SLICES.items())
+_XYZW = np.array([1, 2, 3, 0])  # of wxyz
 
 
 def read_state(model: mujoco.MjModel, data: mujoco.MjData) -> Array:
     """The contract's state (16,) float64: base pose in the world, end-effector pose in the base, finger positions."""
     readings = _state_observations(_indices(model), data)
-    return join_state({part: readings[key] for part, key in STATE_PART_HDF5_KEYS.items()})
+    state = np.empty(STATE_SIZE)
+    for key, where in _IN_STATE:
+        state[where] = readings[key]
+    return state
 
 
 def read_observations(model: mujoco.MjModel, data: mujoco.MjData) -> dict[str, Array]:
@@ -74,8 +80,9 @@ _CACHE: WeakKeyDictionary[mujoco.MjModel, _Indices] = WeakKeyDictionary()  # fin
 
 
 def _indices(model: mujoco.MjModel) -> _Indices:
-    if model not in _CACHE:
-        _CACHE[model] = _Indices(
+    found = _CACHE.get(model)
+    if found is None:
+        found = _CACHE[model] = _Indices(
             arm_qpos=joint_positions(model, names.ARM_JOINTS),
             arm_qvel=joint_velocities(model, names.ARM_JOINTS),
             finger_qpos=joint_positions(model, names.FINGER_JOINTS),
@@ -84,7 +91,7 @@ def _indices(model: mujoco.MjModel) -> _Indices:
             grip_site=model.site(names.GRIP_SITE).id,
             hand_body=model.body(names.HAND).id,
         )
-    return _CACHE[model]
+    return found
 
 
 def _state_observations(at: _Indices, data: mujoco.MjData) -> dict[str, Array]:
@@ -106,4 +113,4 @@ def _quaternion(matrix: Array) -> Array:
     mujoco.mju_mat2Quat(wxyz, np.ascontiguousarray(matrix).ravel())
     if wxyz[0] < 0.0:
         wxyz = -wxyz
-    return wxyz[[1, 2, 3, 0]]
+    return wxyz[_XYZW]
