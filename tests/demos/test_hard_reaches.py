@@ -11,6 +11,8 @@ import pytest
 from robocasa_lerobot.demos.motion import Array, base_pose, floor_axes
 from robocasa_lerobot.demos.planning.kinematics import Arm
 from robocasa_lerobot.demos.skills.pick_place.graspable import graspable
+from robocasa_lerobot.demos.skills.pick_place.pick import best_grasp
+from robocasa_lerobot.demos.skills.pick_place.strategies import OUT_OF_CABINET
 from robocasa_lerobot.demos.skills.pick_place.turn_across import ACROSS_COS, lies_across, long_axis, turn_across
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.robots.panda_omron.names import ARM_JOINTS
@@ -64,4 +66,15 @@ def test_what_lies_across_in_a_microwave_is_turned_by_pushing_its_end() -> None:
     assert carry_out(env, turn_across(env, obj))
     assert abs(float(long_axis(env, obj)[0] @ ahead)) > before + TURNED_RAD
     assert float(env.data.body(obj.name).xpos @ ahead) > deep + DEEPER_M
+    env.close()
+
+
+def test_a_low_object_deep_in_a_cabinet_is_grasped_without_meeting_the_shelf() -> None:
+    env = KitchenEnv("PickPlaceCabinetToCounter", split="pretrain", cameras=(), terminate_on_success=False)
+    env.reset(seed=100_508)
+    obj = graspable(env, "obj")
+    assert obj.item is not None
+    assert obj.item.size[2] < 0.04
+    # A path that touches nothing costs less than 1; with the tilts of any approach it was 2.2.
+    assert best_grasp(env, obj, OUT_OF_CABINET).cost < 1.0
     env.close()

@@ -56,7 +56,14 @@ from robocasa_lerobot.envs.predicates.objects import ObjectInside
 from robocasa_lerobot.envs.tasks.conditions import IN_RANGE, stage_condition
 from robocasa_lerobot.envs.tasks.task import Stage
 
-OUT_OF_CABINET = replace(ANY_APPROACH, narrow=True, poses=level_grasps)
+# Between the two steep and the two flat ones of any approach: a palm that is level meets the shelf before low objects.
+_CABINET_TILTS = ((0, 0.0), (35, 0.1), (42, 0.1), (50, 0.15), (65, 0.2), (88, 0.3))
+OUT_OF_CABINET = replace(
+    ANY_APPROACH,
+    tilts=tuple((float(np.deg2rad(tilt)), extra) for tilt, extra in _CABINET_TILTS),
+    narrow=True,
+    poses=level_grasps,
+)
 HARD = 1.0  # cost of taking something out of a drawer, from which on it is pulled out first
 MOST_TURNS = 2  # of what lies across behind a front
 FARTHER_OUT_M = 0.12  # how far
