@@ -2,7 +2,8 @@
 
 Seeds from 500,000 on in both splits: nothing was chosen by them. Every trial is a line of
 `outputs/demonstrators.jsonl`, so that a run can be stopped and continued; the result holds all trials that are there.
-After a skill was changed, run its tasks again:
+They are kept beside it (`.trials.gz`), where a checkout without such a file begins. After a skill was changed, run its
+tasks again:
 
     python benchmarks/demonstrators.py --tasks OpenDrawer,CloseDrawer --fresh
 
@@ -15,6 +16,7 @@ Rates may be measured beside other work, demonstrations an hour not: these are t
 from __future__ import annotations
 
 import argparse
+import gzip
 import json
 import multiprocessing
 import os
@@ -40,6 +42,7 @@ from robocasa_lerobot.progress import Bar
 OUTPUT = common.RESULTS / "demonstrators.json"
 PICTURE = common.RESULTS / "demonstrators.png"
 TRIALS = common.REPOSITORY / "outputs" / "demonstrators.jsonl"
+KEPT = ".trials.gz"
 SPLITS = ("target", "pretrain")
 FIRST_SEED = 500_000  # below, skills are tuned and compared, and earlier tables were made
 LONGEST_S = 600  # of wall time; a trial that takes longer hangs, and has failed
@@ -97,6 +100,19 @@ def read_trials(path: Path) -> dict[Key, Trial]:
     return {trial.key: trial for trial in trials}
 
 
+def keep(trials: Iterable[Trial], path: Path) -> None:
+    """Write down the trials of a result, packed; the same trials give the same bytes."""
+    lines = "".join(json.dumps(asdict(trial)) + "\n" for trial in sorted(trials, key=lambda trial: trial.key))
+    path.write_bytes(gzip.compress(lines.encode(), mtime=0))
+
+
+def take_up(kept: Path, path: Path) -> None:
+    """Begin the file of finished trials with those of the last result, where there is none yet."""
+    if kept.exists() and not path.exists():
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_bytes(gzip.decompress(kept.read_bytes()))
+
+
 def forget(path: Path, keys: Iterable[Key]) -> None:
     """Remove trials from the file."""
     gone = set(keys)
@@ -146,6 +162,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     # Seed by seed, so that a run that is stopped has seen all tasks about equally often.
     able = [name for name in names if can_demonstrate(get_task(name))]
     jobs = [(name, split, seed, *how) for seed in seeds for split in splits for name in able]
+    take_up(kept := options.out.with_suffix(KEPT), options.trials)
     if not options.report:
         if options.fresh:
             forget(options.trials, [key for key in read_trials(options.trials) if key[0] in names and key[3:] == how])
@@ -181,8 +198,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     common.write_result(options.out, "demonstrators", body)
     draw(tasks, options.out.with_suffix(".png"))
     if trials:
+        keep(trials, kept)
         options.out.with_suffix(".md").write_text(page(body), encoding="utf-8")
-    print(f"{options.out}, and beside it a page (.md) and its picture (.png)")
+    print(f"{options.out}, and beside it a page (.md), its picture (.png) and the trials ({KEPT})")
     return 0
 
 

@@ -107,7 +107,9 @@ def page(body: Mapping[str, Any]) -> str:
         "",
         f"`benchmarks/demonstrators.py`, {body['trials']} trials, seeds from {settings['first_seed']} on, "
         f"{settings['seeds_per_split']} in each split, action noise {settings['action_noise']:g}; "
-        f"MuJoCo {body['versions']['mujoco']}.",
+        f"MuJoCo {body['versions']['mujoco']}. Made at "
+        + ", ".join(f"{commit} ({count})" for commit, count in body["commits"].items())
+        + ".",
         f"In short: {_averages(body)}.",
         "",
         "![Rates with their intervals](demonstrators.png)",

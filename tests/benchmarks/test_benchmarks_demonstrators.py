@@ -104,6 +104,14 @@ def test_finished_trials_are_kept_replaced_and_forgotten(
     page = out.with_suffix(".md").read_text()
     assert "|CloseDrawer|4/4|100%|" in page
     assert "|OpenFridge|" not in page
+    assert "Made at abc (8)." in page
+    made.clear()
+    before = (kept := out.with_suffix(".trials.gz")).read_bytes()
+    file.unlink()  # another checkout, which has the result alone
+    bench.main(["--tasks", "OpenDrawer,CloseDrawer", *options])
+    assert made == []
+    assert json.loads(out.read_text())["trials"] == 8
+    assert kept.read_bytes() == before
 
 
 def test_whatever_goes_wrong_is_a_failed_trial(bench: ModuleType, monkeypatch: pytest.MonkeyPatch) -> None:
