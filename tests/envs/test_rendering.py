@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Callable
 
 import mujoco
 import numpy as np
@@ -14,7 +15,10 @@ from robocasa_lerobot import contract
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.rendering import SceneRenderer
 from robocasa_lerobot.envs.rendering.merged_model import merged_model
-from robocasa_lerobot.envs.rendering.tessellation import Surface, boxes, capsule, cylinder
+from robocasa_lerobot.envs.rendering.merged_shapes import merged_shapes
+from robocasa_lerobot.envs.rendering.mesh_assets import add_surface
+from robocasa_lerobot.envs.rendering.rest_poses import RestPoses
+from robocasa_lerobot.envs.rendering.tessellation import Surface, boxes, capsules, cylinders, used_slices
 
 GROUPS = (1, 2)
 
@@ -27,11 +31,19 @@ def _boxes(half_sizes: list[tuple[float, float, float]]) -> Surface:
     return boxes(np.array(half_sizes), places, np.array(turns), np.ones((len(half_sizes), 2)), all_faces)
 
 
+def _round(shape: Callable[..., Surface], radius: float, half_length: float, most: int) -> Surface:
+    """Two of a round shape, the second half as large in every direction."""
+    sizes = np.array([radius, radius / 2]), np.array([half_length, half_length / 2])
+    slices = int(used_slices(np.array([radius]), most)[0])
+    turns = np.array([np.eye(3), Rotation.from_euler("xyz", (0.3, 0.5, 0.7)).as_matrix()])
+    return shape(*sizes, slices, np.array([(0.0, 0.0, 0.0), (2.0, 0.0, 1.0)]), turns, np.ones((2, 2)))
+
+
 SHAPES = {
     "box": (_boxes([(0.3, 0.2, 0.1)]), 8 * 0.3 * 0.2 * 0.1),
-    "cylinder": (cylinder(0.5, 0.2, 64), np.pi * 0.5**2 * 0.4),
-    "capsule": (capsule(0.5, 0.2, 64), np.pi * 0.5**2 * 0.4 + 4 / 3 * np.pi * 0.5**3),
-    "thin bar": (capsule(0.006, 0.1, 10), np.pi * 0.006**2 * 0.2 + 4 / 3 * np.pi * 0.006**3),
+    "cylinder": (_round(cylinders, 0.5, 0.2, 64), 1.125 * (np.pi * 0.5**2 * 0.4)),
+    "capsule": (_round(capsules, 0.5, 0.2, 64), 1.125 * (np.pi * 0.5**2 * 0.4 + 4 / 3 * np.pi * 0.5**3)),
+    "thin bar": (_round(capsules, 0.006, 0.1, 10), 1.125 * (np.pi * 0.006**2 * 0.2 + 4 / 3 * np.pi * 0.006**3)),
     "both": (_boxes([(0.1, 0.1, 0.1), (0.1, 0.1, 0.2)]), 0.008 + 0.016),
 }
 
@@ -57,6 +69,52 @@ def test_surfaces_are_closed_and_seen_from_outside(name: str) -> None:
     whole = np.linalg.norm(flat, axis=1) > 1e-12
     facing = (flat[whole, None] * surface.normals[surface.faces][whole]).sum(axis=-1)
     assert (facing > 0).all()
+
+
+def test_shapes_made_together_are_those_made_one_by_one() -> None:
+    env = KitchenEnv("PickPlaceCounterToSink", cameras=())
+    env.reset(seed=3)
+    model, poses = env.model, RestPoses.of(env.model)
+    shown = np.random.default_rng(0).random((model.ngeom, 6)) < 0.8
+    shown[:, 0] = True
+    geoms = np.flatnonzero(model.geom_group == 1)
+    kinds = [int(kind) for kind in (mujoco.mjtGeom.mjGEOM_BOX, mujoco.mjtGeom.mjGEOM_CYLINDER)]
+    kinds += [int(mujoco.mjtGeom.mjGEOM_CAPSULE), int(mujoco.mjtGeom.mjGEOM_MESH)]
+    geoms = geoms[np.isin(model.geom_type[geoms], kinds)]
+    assert set(model.geom_type[geoms].tolist()) == set(kinds)
+    parts = [part.tolist() for part in np.array_split(np.random.default_rng(1).permutation(geoms), 200)]
+    together = merged_shapes(model, poses, shown, parts)
+    for part, whole in zip(parts, together, strict=True):
+        # Boxes come last in a part.
+        order = sorted(part, key=lambda geom: int(model.geom_type[geom]) == kinds[0])
+        each = [merged_shapes(model, poses, shown, [[geom]])[0] for geom in order]
+        for name in ("vertices", "normals", "texcoords"):
+            assert np.array_equal(getattr(whole, name), np.concatenate([getattr(one, name) for one in each])), name
+        starts = np.cumsum([0, *(len(one.vertices) for one in each)])
+        faces = [one.faces + start for one, start in zip(each, starts, strict=False)]
+        assert np.array_equal(whole.faces, np.concatenate(faces))
+
+
+def test_a_surface_is_compiled_as_if_it_were_given_number_by_number() -> None:
+    surface = _round(cylinders, 0.5, 0.2, 12)
+    quick, slow = mujoco.MjSpec(), mujoco.MjSpec()
+    add_surface(quick, surface, "shape")
+    mesh = slow.add_mesh(name="shape")
+    mesh.uservert, mesh.usernormal = surface.vertices.ravel(), surface.normals.ravel()
+    mesh.usertexcoord = surface.texcoords.ravel()
+    mesh.userface = mesh.userfacenormal = mesh.userfacetexcoord = surface.faces.ravel()
+    mesh.inertia = mujoco.mjtMeshInertia.mjMESH_INERTIA_SHELL
+    for spec in (quick, slow):
+        spec.worldbody.add_geom(type=mujoco.mjtGeom.mjGEOM_MESH, meshname="shape", contype=0, conaffinity=0)
+    found, expected = quick.compile(), slow.compile()
+    names = [name for name in dir(expected) if name.startswith(("mesh_", "geom_"))]
+    differ = [
+        name
+        for name in names
+        if isinstance(getattr(expected, name), np.ndarray)
+        and not np.array_equal(getattr(found, name), getattr(expected, name))
+    ]
+    assert differ in ([], ["mesh_pathadr"])
 
 
 def volume_of(surface: Surface) -> float:

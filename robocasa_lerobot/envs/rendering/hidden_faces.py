@@ -12,6 +12,7 @@ Array = NDArray[np.float64]
 
 # A face counts as hidden when the places this far before it are in another box, or this near to it, metres.
 _BEFORE_M, _NEAR_M = 5e-4, 2e-4
+_ROUNDING_M = 1e-6  # what a quick question allows for, so that the exact one after it decides
 # A box thinner than this shows its two broad faces only: at a metre's distance a pixel covers 4 mm.
 _THIN_M = 0.002
 _AXES = np.repeat(np.arange(3), 2)  # of a box's faces, in the order of `tessellation.box`
@@ -32,7 +33,13 @@ def shown_faces(
     hidden = _edges_of_thin(halves)
     bodies = np.zeros(len(positions), np.intp) if bodies is None else bodies
     inner, outer = _touching(positions, (np.abs(rotations) @ halves[:, :, None])[:, :, 0], bodies)
-    corners = positions[:, None] + _places(halves).reshape(-1, 24, 3) @ rotations.transpose(0, 2, 1)
+    places = _places(halves)
+    # Few pairs have a face whose middle is covered, which is soon asked.
+    middles = positions[:, None] + places.mean(axis=2) @ rotations.transpose(0, 2, 1)
+    local = np.abs((middles[inner] - positions[outer, None]) @ rotations[outer])
+    near = (local <= halves[outer, None] + _NEAR_M + _ROUNDING_M).all(axis=2).any(axis=1)
+    inner, outer = inner[near], outer[near]
+    corners = positions[:, None] + places.reshape(-1, 24, 3) @ rotations.transpose(0, 2, 1)
     local = (corners[inner] - positions[outer, None]) @ rotations[outer]
     within = np.abs(local) <= halves[outer, None] + _NEAR_M
     covered = within.reshape(-1, 6, 4 * 3).all(axis=2)
@@ -53,13 +60,25 @@ def _places(halves: Array) -> Array:
 
 def _touching(positions: Array, reach: Array, bodies: NDArray[np.intp]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     """Ordered pairs of different boxes of one body whose bounds, (n, 3) half sizes, come near each other."""
-    near = bodies[:, None] == bodies[None, :]
-    np.fill_diagonal(near, False)
+    first, second = _overlapping(positions[:, 0], reach[:, 0] + (_BEFORE_M + _NEAR_M) / 2 + _ROUNDING_M)
+    near = bodies[first] == bodies[second]
     for axis in range(3):
-        apart = np.abs(positions[:, None, axis] - positions[None, :, axis])
-        near &= apart <= reach[:, None, axis] + reach[None, :, axis] + _BEFORE_M + _NEAR_M
-    first, second = np.nonzero(near)
-    return first, second
+        first, second = first[near], second[near]
+        apart = np.abs(positions[first, axis] - positions[second, axis])
+        near = apart <= reach[first, axis] + reach[second, axis] + _BEFORE_M + _NEAR_M
+    first, second = first[near], second[near]
+    return np.concatenate((first, second)), np.concatenate((second, first))
+
+
+def _overlapping(middles: Array, halves: Array) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Pairs of intervals (n,) that overlap, each once: of all pairs of a kitchen's boxes one in five."""
+    order = np.argsort(middles - halves)
+    low, high = (middles - halves)[order], (middles + halves)[order]
+    after = np.arange(1, len(order) + 1)
+    counts = np.maximum(np.searchsorted(low, high, side="right") - after, 0)
+    first = np.repeat(after - 1, counts)
+    second = first + 1 + np.arange(len(first)) - np.repeat(np.cumsum(counts) - counts, counts)
+    return order[first], order[second]
 
 
 def _edges_of_thin(halves: Array) -> NDArray[np.bool_]:

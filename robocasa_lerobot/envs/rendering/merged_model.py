@@ -17,7 +17,9 @@ from numpy.typing import NDArray
 from robocasa_lerobot.envs.rendering.canvas import BACKDROP_GROUP
 from robocasa_lerobot.envs.rendering.frustum import opaque as opaque_geoms
 from robocasa_lerobot.envs.rendering.hidden_faces import shown_faces
-from robocasa_lerobot.envs.rendering.tessellation import Surface, boxes, capsule, cylinder, joined
+from robocasa_lerobot.envs.rendering.merged_shapes import merged_shapes
+from robocasa_lerobot.envs.rendering.mesh_assets import add_surface, copy_mesh
+from robocasa_lerobot.envs.rendering.rest_poses import RestPoses, matrices
 from robocasa_lerobot.envs.rendering.view_grid import on_grid
 
 Array = NDArray[np.float64]
@@ -66,7 +68,7 @@ class MergedModel:
     def __post_init__(self) -> None:
         self.data = mujoco.MjData(self.model)
         mujoco.mj_forward(self.model, self.data)
-        self._rotations = _matrices(self.model.geom_quat)
+        self._rotations = matrices(self.model.geom_quat)
         self._colours = self.source.geom_rgba.copy()
         self._kinds = _kinds(self.source)
         self._colours_matter = np.ones(self.source.ngeom, dtype=bool)
@@ -123,15 +125,14 @@ def merged_model(
     visible = np.isin(model.geom_group, groups) & (model.geom_rgba[:, 3] > 0)
     if not np.isin(model.geom_type[visible], (*_MERGED, *_KEPT)).all():
         return None
-    poses = _Poses.of(model)
+    poses = RestPoses.of(model)
     shown = _shown_faces(model, poses, visible, loose)
     parts = _parts(model, poses, visible & shown.any(axis=1), loose)
     if visible.sum() - len(parts) < MIN_SAVED_DRAWS:
         return None
     spec = mujoco.MjSpec()
     _add_textures_and_materials(spec, model)
-    for index, geoms in enumerate(parts):
-        _add_part(spec, model, poses, shown, geoms, f"part{index}")
+    _add_parts(spec, model, poses, shown, parts)
     for camera in range(model.ncam):
         spec.worldbody.add_camera(name=f"camera{camera}")
     for light in range(model.nlight):
@@ -143,38 +144,8 @@ def merged_model(
     return MergedModel(model, made, bodies, first, loose)
 
 
-@dataclass(frozen=True)
-class _Poses:
-    """Where geoms are drawn: those that never move in the world's frame, the others in their body's.
-
-    Attributes:
-        fixed: whether a geom never moves, (ngeom,).
-        positions, rotations: (ngeom, 3) and (ngeom, 3, 3).
-        quats: wxyz, (ngeom, 4).
-    """
-
-    fixed: NDArray[np.bool_]
-    positions: Array
-    rotations: Array
-    quats: Array
-
-    @classmethod
-    def of(cls, model: mujoco.MjModel) -> _Poses:
-        """Of all geoms of a model."""
-        data = mujoco.MjData(model)
-        mujoco.mj_kinematics(model, data)
-        fixed = (model.body_weldid == 0) & (model.body_mocapid < 0)
-        at_rest = fixed[model.geom_bodyid]
-        rotations = np.where(at_rest[:, None, None], data.geom_xmat.reshape(-1, 3, 3), _matrices(model.geom_quat))
-        positions = np.where(at_rest[:, None], data.geom_xpos, model.geom_pos)
-        quats = model.geom_quat.copy()
-        for geom in np.flatnonzero(at_rest):
-            mujoco.mju_mat2Quat(quats[geom], data.geom_xmat[geom])
-        return cls(at_rest, positions, rotations, quats)
-
-
 def _shown_faces(
-    model: mujoco.MjModel, poses: _Poses, visible: NDArray[np.bool_], loose: frozenset[int]
+    model: mujoco.MjModel, poses: RestPoses, visible: NDArray[np.bool_], loose: frozenset[int]
 ) -> NDArray[np.bool_]:
     """Which faces of a geom, if it is a box, are drawn, (ngeom, 6): those of one body hide some."""
     shown = np.ones((model.ngeom, 6), dtype=np.bool_)
@@ -187,16 +158,19 @@ def _shown_faces(
     return shown
 
 
-def _parts(model: mujoco.MjModel, poses: _Poses, visible: NDArray[np.bool_], loose: frozenset[int]) -> list[list[int]]:
+def _parts(
+    model: mujoco.MjModel, poses: RestPoses, visible: NDArray[np.bool_], loose: frozenset[int]
+) -> list[list[int]]:
     """Geoms that are drawn together: of one body, or, where nothing moves, of one cell of the room."""
-    cells, opaque = np.floor(poses.positions[:, :2] / CELL_M).tolist(), opaque_geoms(model)
+    mergeable = _mergeable(model, loose)
+    cells = np.floor(poses.positions[:, :2] / CELL_M).tolist()
+    alone, in_room = (~mergeable).tolist(), (poses.fixed & mergeable).tolist()
+    bodies, materials, colours = model.geom_bodyid.tolist(), model.geom_matid.tolist(), model.geom_rgba.tolist()
     parts: dict[tuple[float, ...], list[int]] = {}
     for geom in np.flatnonzero(visible).tolist():
-        material, rgba = int(model.geom_matid[geom]), tuple(model.geom_rgba[geom].tolist())
-        mergeable = opaque[geom] and _can_be_merged(model, geom) and geom not in loose
-        own = -1 if mergeable else geom
-        where = (-1, *cells[geom]) if poses.fixed[geom] and mergeable else (int(model.geom_bodyid[geom]), 0, 0)
-        parts.setdefault((*where, material, own, *rgba), []).append(geom)
+        where = (-1, *cells[geom]) if in_room[geom] else (bodies[geom], 0, 0)
+        key = (*where, materials[geom], geom if alone[geom] else -1, *colours[geom])
+        parts.setdefault(key, []).append(geom)
     return list(parts.values())
 
 
@@ -223,114 +197,39 @@ def _add_textures_and_materials(spec: mujoco.MjSpec, model: mujoco.MjModel) -> N
                     textures[role] = f"texture{texture}"
 
 
-def _add_part(
-    spec: mujoco.MjSpec, model: mujoco.MjModel, poses: _Poses, shown: NDArray[np.bool_], geoms: list[int], name: str
+def _add_parts(
+    spec: mujoco.MjSpec, model: mujoco.MjModel, poses: RestPoses, shown: NDArray[np.bool_], parts: list[list[int]]
 ) -> None:
-    first = geoms[0]
-    material = int(model.geom_matid[first])
-    kind = int(model.geom_type[first])
+    first = np.array([geoms[0] for geoms in parts], dtype=np.intp)
+    kinds, materials = model.geom_type[first].tolist(), model.geom_matid[first].tolist()
+    behind = ((model.geom_bodyid[first] == 0) & (model.geom_group[first] == BACKDROP_GROUP)).tolist()
     # A single box is drawn as fast by MuJoCo itself; a round shape is not, with its facets for all sizes.
-    merged = len(geoms) > 1 or kind in (_CYLINDER, _CAPSULE)
-    geom = spec.worldbody.add_geom(type=mujoco.mjtGeom(_MESH if merged else kind))
-    if merged:
-        _add_mesh(spec, _merged(model, poses, shown, geoms), name)
-        geom.meshname = name
-    else:
-        geom.pos, geom.quat, geom.size = poses.positions[first], poses.quats[first], model.geom_size[first]
-        if kind == _MESH:
-            geom.meshname = _copied_mesh(spec, model, int(model.geom_dataid[first]))
-    backdrop = model.geom_bodyid[first] == 0 and model.geom_group[first] == BACKDROP_GROUP
-    geom.group = BACKDROP_GROUP if backdrop else VISIBLE_GROUP
-    geom.contype = geom.conaffinity = 0
-    geom.mass = 0.0
-    geom.rgba = model.geom_rgba[first]
-    if material >= 0:
-        geom.material = f"{'baked' if merged else 'material'}{material}"
+    merged = [len(geoms) > 1 or kind in (_CYLINDER, _CAPSULE) for geoms, kind in zip(parts, kinds, strict=True)]
+    shapes = iter(merged_shapes(model, poses, shown, [parts[index] for index in np.flatnonzero(merged)]))
+    for index, source in enumerate(first.tolist()):
+        geom = spec.worldbody.add_geom()
+        if merged[index]:
+            geom.type, geom.meshname = mujoco.mjtGeom.mjGEOM_MESH, f"part{index}"
+            add_surface(spec, next(shapes), geom.meshname)
+        else:
+            geom.type = mujoco.mjtGeom(kinds[index])
+            geom.pos, geom.quat, geom.size = poses.positions[source], poses.quats[source], model.geom_size[source]
+            if kinds[index] == _MESH:
+                geom.meshname = copy_mesh(spec, model, int(model.geom_dataid[source]))
+        geom.group = BACKDROP_GROUP if behind[index] else VISIBLE_GROUP
+        geom.contype = geom.conaffinity = 0
+        geom.mass = 0.0
+        geom.rgba = model.geom_rgba[source]
+        if materials[index] >= 0:
+            geom.material = f"{'baked' if merged[index] else 'material'}{materials[index]}"
 
 
-def _merged(model: mujoco.MjModel, poses: _Poses, shown: NDArray[np.bool_], geoms: list[int]) -> Surface:
-    """The shape of geoms of one body and material in its frame, with texture coordinates as MuJoCo generates them."""
-    found = [_surface(model, poses, geom) for geom in geoms if model.geom_type[geom] != _BOX]
-    box = np.array([geom for geom in geoms if model.geom_type[geom] == _BOX], dtype=np.intp)
-    if len(box):
-        sizes = model.geom_size[box]
-        repeat = _repetitions(model, geoms[0], sizes[:, :2])
-        found.append(boxes(sizes, poses.positions[box], poses.rotations[box], repeat, shown[box]))
-    return joined(found)
-
-
-def _surface(model: mujoco.MjModel, poses: _Poses, geom: int) -> Surface:
-    kind, size = model.geom_type[geom], model.geom_size[geom]
-    slices = int(model.vis.quality.numslices)
-    if kind == _MESH:
-        shape = _mesh_surface(model, int(model.geom_dataid[geom]))
-    elif kind == _CYLINDER:
-        shape = cylinder(size[0], size[1], slices)
-    else:
-        shape = capsule(size[0], size[1], slices)
-    repeat = _repetitions(model, geom, size[[0, 0]])
-    return shape.textured(repeat).placed(poses.positions[geom], poses.rotations[geom])
-
-
-def _repetitions(model: mujoco.MjModel, geom: int, sizes: Array) -> Array:
-    """How often the texture of a geom is repeated over shapes of half sizes (..., 2) in its plane, (..., 2)."""
-    material = int(model.geom_matid[geom])
-    if material < 0:
-        return np.ones_like(sizes)
-    repeat = np.broadcast_to(model.mat_texrepeat[material].astype(np.float64), sizes.shape)
-    return repeat * sizes if model.mat_texuniform[material] else repeat  # uniform: per metre instead of per shape
-
-
-def _can_be_merged(model: mujoco.MjModel, geom: int) -> bool:
-    """Whether a geom's triangles are known: of a mesh those without a texture, which would need its coordinates."""
-    if model.geom_type[geom] != _MESH:
-        return int(model.geom_type[geom]) in _MERGED
-    material = int(model.geom_matid[geom])
-    return material < 0 or bool((model.mat_texid[material] < 0).all())
-
-
-def _mesh_surface(model: mujoco.MjModel, index: int) -> Surface:
-    """A mesh of the model, with a vertex for each pair of a place and a normal."""
-    start, count = int(model.mesh_faceadr[index]), int(model.mesh_facenum[index])
-    places = model.mesh_face[start : start + count] + model.mesh_vertadr[index]
-    normals = model.mesh_facenormal[start : start + count] + model.mesh_normaladr[index]
-    pairs, faces = np.unique(places * np.int64(len(model.mesh_normal)) + normals, return_inverse=True)
-    where, facing = np.divmod(pairs, len(model.mesh_normal))
-    return Surface(
-        model.mesh_vert[where].astype(np.float64),
-        model.mesh_normal[facing].astype(np.float64),
-        np.zeros((len(pairs), 2)),
-        faces.reshape(-1, 3).astype(np.int32),
-    )
-
-
-def _add_mesh(spec: mujoco.MjSpec, surface: Surface, name: str) -> None:
-    mesh = spec.add_mesh(name=name)
-    mesh.uservert = surface.vertices.ravel()
-    mesh.usernormal = surface.normals.ravel()
-    mesh.usertexcoord = surface.texcoords.ravel()
-    mesh.userface = mesh.userfacenormal = mesh.userfacetexcoord = surface.faces.ravel()
-    mesh.inertia = mujoco.mjtMeshInertia.mjMESH_INERTIA_SHELL  # flat meshes have no volume
-
-
-def _copied_mesh(spec: mujoco.MjSpec, model: mujoco.MjModel, index: int) -> str:
-    name = f"mesh{index}"
-    if spec.mesh(name) is not None:
-        return name
-
-    def rows(values: NDArray[np.generic], start: NDArray[np.int32], count: NDArray[np.int32]) -> NDArray[np.generic]:
-        return values[start[index] : start[index] + count[index]].ravel()
-
-    mesh = spec.add_mesh(name=name)
-    mesh.uservert = rows(model.mesh_vert, model.mesh_vertadr, model.mesh_vertnum)
-    mesh.usernormal = rows(model.mesh_normal, model.mesh_normaladr, model.mesh_normalnum)
-    mesh.userface = rows(model.mesh_face, model.mesh_faceadr, model.mesh_facenum)
-    mesh.userfacenormal = rows(model.mesh_facenormal, model.mesh_faceadr, model.mesh_facenum)
-    if model.mesh_texcoordadr[index] >= 0:
-        mesh.usertexcoord = rows(model.mesh_texcoord, model.mesh_texcoordadr, model.mesh_texcoordnum)
-        mesh.userfacetexcoord = rows(model.mesh_facetexcoord, model.mesh_faceadr, model.mesh_facenum)
-    mesh.inertia = mujoco.mjtMeshInertia.mjMESH_INERTIA_SHELL
-    return name
+def _mergeable(model: mujoco.MjModel, loose: frozenset[int]) -> NDArray[np.bool_]:
+    """Geoms whose triangles are known, (ngeom,): of meshes those without texture coordinates."""
+    untextured = np.append((model.mat_texid < 0).all(axis=1), True)[model.geom_matid]  # the last for no material
+    known = np.isin(model.geom_type, _MERGED) | ((model.geom_type == _MESH) & untextured)
+    known[list(loose)] = False
+    return np.asarray(known & opaque_geoms(model))
 
 
 def _copy_textures(source: mujoco.MjModel, made: mujoco.MjModel) -> None:
@@ -362,14 +261,3 @@ def _copy_looks(source: mujoco.MjModel, made: mujoco.MjModel) -> None:
 def _kinds(model: mujoco.MjModel) -> NDArray[np.int32]:
     """Material and group of each geom, which may be changed at run time to show a state; shape (ngeom, 2)."""
     return np.column_stack((model.geom_matid, model.geom_group))
-
-
-def _matrices(quaternions: Array) -> Array:
-    """Rotation matrices (n, 3, 3) of unit quaternions wxyz (n, 4)."""
-    w, x, y, z = quaternions.T
-    rows = (
-        (1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)),
-        (2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)),
-        (2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)),
-    )
-    return np.moveaxis(np.array(rows), -1, 0)

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
@@ -22,7 +22,7 @@ class Surface:
     Attributes:
         vertices: metres, (n, 3).
         normals: at the vertices, unit length, (n, 3).
-        texcoords: at the vertices, (n, 2); of an untextured shape its x and y in units of its half sizes.
+        texcoords: at the vertices, (n, 2); of a unit shape its x and y.
         faces: indices of vertices, (m, 3).
     """
 
@@ -30,20 +30,6 @@ class Surface:
     normals: Array
     texcoords: Array
     faces: NDArray[np.int32]
-
-    def textured(self, repeat: Array) -> Surface:
-        """With texture coordinates as MuJoCo generates them for primitives: projected along the shape's own z.
-
-        `repeat` (2,) counts the texture's repetitions over the shape. The rule was measured on pictures of MuJoCo
-        3.17: u = repeat (1 + x) / 2 and v = repeat (1 - y) / 2 with x and y from -1 to 1.
-        """
-        return replace(self, texcoords=0.5 * repeat * (1.0 + self.texcoords * (1.0, -1.0)))
-
-    def placed(self, position: ArrayLike, rotation: Array) -> Surface:
-        """Moved to `position` (3,) metres and turned by `rotation` (3, 3)."""
-        return replace(
-            self, vertices=self.vertices @ rotation.T + np.asarray(position), normals=self.normals @ rotation.T
-        )
 
 
 def joined(surfaces: Sequence[Surface]) -> Surface:
@@ -66,28 +52,65 @@ def boxes(half_sizes: Array, positions: Array, rotations: Array, repeat: Array, 
         half_sizes: metres, (n, 3).
         positions: of their middles, metres, (n, 3).
         rotations: (n, 3, 3).
-        repeat: of the texture, as in `Surface.textured`, (n, 2).
+        repeat: of the texture, as in `textured`, (n, 2).
         shown: which faces they have, to lower and higher x, then y, then z, (n, 6).
     """
     turned = rotations.transpose(0, 2, 1)
     vertices = (_BOX_CORNERS * half_sizes[:, None]) @ turned + positions[:, None]
-    texcoords = 0.5 * repeat[:, None] * (1.0 + _BOX_CORNERS[:, :2] * (1.0, -1.0))
+    texcoords = textured(_BOX_CORNERS[:, :2], repeat[:, None])
     kept = np.repeat(shown, 4, axis=1)
     starts = 4 * np.arange(int(shown.sum()), dtype=np.int32)
     faces = (starts[:, None, None] + _BOX_FACES[:2]).reshape(-1, 3)
     return Surface(vertices[kept], (_BOX_NORMALS @ turned)[kept], texcoords[kept], faces)
 
 
-def cylinder(radius: float, half_length: float, slices: int) -> Surface:
-    """A closed cylinder along z, with at most `slices` facets."""
-    unit = _unit_cylinder(_slices(radius, slices))
-    return replace(unit, vertices=unit.vertices * (radius, radius, half_length))
+def cylinders(
+    radii: Array, half_lengths: Array, slices: int, positions: Array, rotations: Array, repeat: Array
+) -> Surface:
+    """One surface of n closed cylinders along their z, of equal numbers of vertices and of faces each; as `boxes`.
+
+    Args:
+        radii: metres, (n,).
+        half_lengths: metres, (n,).
+        slices: facets around each.
+        positions: of their middles, metres, (n, 3).
+        rotations: (n, 3, 3).
+        repeat: of the texture, as in `textured`, (n, 2).
+    """
+    unit = _unit_cylinder(slices)
+    vertices = unit.vertices * np.column_stack((radii, radii, half_lengths))[:, None]
+    return _placed(unit, vertices, positions, rotations, repeat)
 
 
-def capsule(radius: float, half_length: float, slices: int) -> Surface:
-    """A cylinder along z with a half sphere on each end; `half_length` is of the cylinder, as in MuJoCo."""
-    unit, ends = _unit_capsule(_slices(radius, slices))
-    return replace(unit, vertices=radius * unit.vertices + half_length * ends)
+def capsules(
+    radii: Array, half_lengths: Array, slices: int, positions: Array, rotations: Array, repeat: Array
+) -> Surface:
+    """As `cylinders`, with a half sphere on each end; `half_lengths` are of the cylinders, as in MuJoCo."""
+    unit, ends = _unit_capsule(slices)
+    vertices = radii[:, None, None] * unit.vertices + half_lengths[:, None, None] * ends
+    return _placed(unit, vertices, positions, rotations, repeat)
+
+
+def _placed(unit: Surface, vertices: Array, positions: Array, rotations: Array, repeat: Array) -> Surface:
+    """Copies of a unit shape that have `vertices` (n, k, 3) each."""
+    turned = rotations.transpose(0, 2, 1)
+    count, own = vertices.shape[:2]
+    faces = unit.faces + own * np.arange(count, dtype=np.int32)[:, None, None]
+    return Surface(
+        (vertices @ turned + positions[:, None]).reshape(-1, 3),
+        (unit.normals @ turned).reshape(-1, 3),
+        textured(unit.texcoords, repeat[:, None]).reshape(-1, 2),
+        faces.reshape(-1, 3),
+    )
+
+
+def textured(texcoords: Array, repeat: Array) -> Array:
+    """Texture coordinates as MuJoCo generates them for primitives: projected along the shape's own z.
+
+    `texcoords` (..., 2) are x and y from -1 to 1, `repeat` (..., 2) counts the texture's repetitions over a shape.
+    The rule was measured on pictures of MuJoCo 3.17: u = repeat (1 + x) / 2 and v = repeat (1 - y) / 2.
+    """
+    return np.asarray(0.5 * repeat * (1.0 + texcoords * (1.0, -1.0)))
 
 
 @cache
@@ -109,8 +132,9 @@ def _unit_capsule(slices: int) -> tuple[Surface, Array]:
     return surface, ends
 
 
-def _slices(radius: float, most: int) -> int:
-    return int(np.clip(np.ceil(2 * np.pi * radius / FACET_M), MIN_SLICES, max(most, MIN_SLICES)))
+def used_slices(radii: Array, most: int) -> NDArray[np.intp]:
+    """How many facets round shapes of these radii, metres, get at most `most` of."""
+    return np.clip(np.ceil(2 * np.pi * radii / FACET_M), MIN_SLICES, max(most, MIN_SLICES)).astype(np.intp)
 
 
 def _circle(slices: int) -> Array:
