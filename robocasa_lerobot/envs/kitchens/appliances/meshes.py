@@ -1,8 +1,14 @@
-"""Meshes generated from a few numbers: lofts through rings, turned profiles, rounded blocks, pipes. Few triangles."""
+"""Meshes generated from a few numbers: lofts through rings, turned profiles, rounded blocks, pipes. Few triangles.
+
+What was made last is kept: a kitchen has a hundred of them, nearly all in earlier kitchens too.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import functools
+import hashlib
+import pickle
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,6 +18,8 @@ from robocasa_lerobot.envs.kitchens.fixtures.base import Vector
 
 Points = NDArray[np.float64]
 
+KEPT_MESHES = 2048  # of each kind; one takes about 3 kB
+
 
 @dataclass(frozen=True)
 class Mesh:
@@ -20,7 +28,32 @@ class Mesh:
     vertices: Points
     faces: NDArray[np.int64]
 
+    @functools.cached_property
+    def digest(self) -> str:
+        """Sixteen characters that meshes which are equal to 10 micrometres have in common."""
+        vertices = np.round(self.vertices, 5) + 0.0  # no negative zeros
+        return hashlib.sha1(vertices.tobytes() + self.faces.tobytes(), usedforsecurity=False).hexdigest()[:16]
 
+
+def _kept[**P](make: Callable[P, Mesh]) -> Callable[P, Mesh]:
+    """Keep the meshes that a function has made last, by the bits of its arguments: 0.0 and -0.0 are not the same."""
+
+    @functools.lru_cache(KEPT_MESHES)
+    def made(arguments: bytes) -> Mesh:
+        positional, named = pickle.loads(arguments)
+        mesh = make(*positional, **named)
+        for shared in (mesh.vertices, mesh.faces):
+            shared.flags.writeable = False
+        return mesh
+
+    @functools.wraps(make)
+    def kept(*positional: P.args, **named: P.kwargs) -> Mesh:
+        return made(pickle.dumps((positional, named), protocol=pickle.HIGHEST_PROTOCOL))
+
+    return kept
+
+
+@_kept
 def loft(rings: Sequence[Points], *, caps: bool = True, foot: bool = True) -> Mesh:
     """The skin through rings of n points each, counter-clockwise as seen against the direction of the rings' order.
 
@@ -73,6 +106,7 @@ def rounded_rectangle(width: float, depth: float, z: float, radius: float, per_c
     return np.array(points)
 
 
+@_kept
 def turned(profile: Sequence[tuple[float, float]], segments: int = 12, *, caps: bool = True, foot: bool = True) -> Mesh:
     """A body of revolution about z through (radius, z) points, which must go upwards along the outside.
 
@@ -81,6 +115,7 @@ def turned(profile: Sequence[tuple[float, float]], segments: int = 12, *, caps: 
     return loft([circle(r, z, segments) for r, z in profile], caps=caps, foot=foot)
 
 
+@_kept
 def block(size: Vector, radius: float, *, bevel: float = 0.004, taper: float = 1.0, per_corner: int = 3) -> Mesh:
     """A block with upright edges of a radius and bevelled upper and lower edges; the top is scaled by `taper`."""
     width, depth, height = size
@@ -96,6 +131,7 @@ def block(size: Vector, radius: float, *, bevel: float = 0.004, taper: float = 1
     return loft([at(low, bevel), at(low + bevel, 0.0), at(high - bevel, 0.0), at(high, bevel)])
 
 
+@_kept
 def dome(size: Vector, radius: float, *, shoulder: float, per_corner: int = 3) -> Mesh:
     """A block whose upper edge is rounded over the height `shoulder`; as bread bins, retro toasters and kettles."""
     width, depth, height = size
@@ -108,6 +144,7 @@ def dome(size: Vector, radius: float, *, shoulder: float, per_corner: int = 3) -
     return loft(rings)
 
 
+@_kept
 def pipe(path: Sequence[Vector], radius: float, sides: int = 6) -> Mesh:
     """A round bar along a polyline of points, mitred at its bends, with flat ends."""
     points = _cut_corners(np.asarray(path, dtype=np.float64), 1.6 * radius)
@@ -144,6 +181,7 @@ def _cut_corners(points: Points, cut: float) -> Points:
     return np.array([*out, points[-1]])
 
 
+@_kept
 def disc(radius: float, segments: int = 16) -> Mesh:
     """A flat cone about z, hardly raised in its middle, seen only from above: for what lies on a surface."""
     ring = circle(radius, 0.0, segments)
@@ -152,6 +190,7 @@ def disc(radius: float, segments: int = 16) -> Mesh:
     return Mesh(vertices, np.array(faces))
 
 
+@_kept
 def crown(radius: float, height: float, points: int = 10) -> Mesh:
     """A ring of pointed tongues about z that lean outwards, seen from outside and from above: flames."""
     low, high = circle(radius, 0.0, 2 * points), circle(radius * 1.12, height, 2 * points)

@@ -5,7 +5,6 @@ Round shapes are seen as generated meshes and touched as simple shapes that came
 
 from __future__ import annotations
 
-import hashlib
 import itertools
 from collections.abc import Sequence
 
@@ -57,22 +56,16 @@ class Shapes:
 
     def mesh(self, body: mujoco.MjsBody, mesh: Mesh, center: Vector, finish: str, *, axis: str = "z") -> mujoco.MjsGeom:
         """A mesh that is only seen; equal meshes of a scene are stored once."""
-        key = f"mesh_{_digest(mesh)}"
+        key = f"mesh_{mesh.digest}"
         if self.spec.mesh(key) is None:
             asset = self.spec.add_mesh(name=key)
             asset.uservert = mesh.vertices.ravel().tolist()
             asset.userface = mesh.faces.ravel().tolist()
             asset.inertia = mujoco.mjtMeshInertia.mjMESH_INERTIA_SHELL
-        geom = body.add_geom(
-            type=mujoco.mjtGeom.mjGEOM_MESH,
-            meshname=key,
-            pos=list(center),
-            quat=AXIS_QUATS[axis],
-            material=self.material(finish),
-            group=base.VISUAL_GROUP,
-            contype=0,
-            conaffinity=0,
-        )
+        geom = body.add_geom()
+        geom.type, geom.meshname, geom.pos, geom.quat = mujoco.mjtGeom.mjGEOM_MESH, key, center, AXIS_QUATS[axis]
+        geom.material, geom.group = self.material(finish), base.VISUAL_GROUP
+        geom.contype = geom.conaffinity = 0
         geom.mass = 0.0
         return geom
 
@@ -204,8 +197,3 @@ class Shapes:
     def site(self, body: mujoco.MjsBody, part: str, pos: Vector) -> None:
         """A named point."""
         body.add_site(name=f"{self.name}_{part}", pos=list(pos), size=[0.005, 0, 0], group=5)
-
-
-def _digest(mesh: Mesh) -> str:
-    vertices = np.round(mesh.vertices, 5) + 0.0  # no negative zeros
-    return hashlib.sha1(vertices.tobytes() + mesh.faces.tobytes(), usedforsecurity=False).hexdigest()[:16]
