@@ -45,7 +45,8 @@ def digests(order: list[int]) -> dict[int, str]:
 def test_a_scene_does_not_hang_on_those_before_it() -> None:
     forwards = digests([0, 1, 2, 3, 4])
     assert len(set(forwards.values())) == len(SCENES)
-    assert digests([2, 0, 1]) == {number: forwards[number] for number in (2, 0, 1)}, "kept, but not the same"
+    for _ in range(2):  # a kitchen is kept when it comes again, and then copied
+        assert digests([2, 0, 1]) == {number: forwards[number] for number in (2, 0, 1)}, "kept, but not the same"
     fresh = subprocess.run([sys.executable, __file__], capture_output=True, text=True, check=True)
     backwards = {int(number): digest for number, digest in json.loads(fresh.stdout.splitlines()[-1]).items()}
     assert backwards == forwards

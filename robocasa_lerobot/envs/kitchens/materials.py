@@ -152,11 +152,21 @@ def load_style(style_id: int) -> Style:
 
 
 class MaterialPalette:
-    """Adds a style's materials to an MjSpec, each once, when a geom first asks for it; without textures on request."""
+    """Adds a style's materials to an MjSpec, each once, when a geom first asks for it; without textures on request.
 
-    def __init__(self, spec: mujoco.MjSpec, style: Style, *, textures: bool = True) -> None:
+    `added` are names of materials that the spec has already.
+    """
+
+    def __init__(
+        self, spec: mujoco.MjSpec, style: Style, *, textures: bool = True, added: frozenset[str] = frozenset()
+    ) -> None:
         self._spec, self.style, self._textures = spec, style, textures
-        self._added: set[str] = set()
+        self._added = set(added)
+
+    @property
+    def added(self) -> frozenset[str]:
+        """Names of the materials that the spec has by now."""
+        return frozenset(self._added)
 
     def __call__(self, role: str) -> str:
         """Name of the material of a surface role, e.g. `cabinet`."""

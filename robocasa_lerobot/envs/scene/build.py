@@ -17,9 +17,9 @@ from robocasa_lerobot.envs.objects.shapes import add_object
 from robocasa_lerobot.envs.robots.camera_noise import CameraNoise, add_camera_noise
 from robocasa_lerobot.envs.robots.panda_omron.robot import PANDA_OMRON
 from robocasa_lerobot.envs.robots.robot import Robot
-from robocasa_lerobot.envs.scene.assembly import bare_kitchen
 from robocasa_lerobot.envs.scene.drawn import Drawn, PlacedObject
 from robocasa_lerobot.envs.scene.initial_states import Initial, LidAside, PartAt
+from robocasa_lerobot.envs.scene.kept_kitchens import kitchen
 from robocasa_lerobot.envs.scene.memory import Memory, add_memory
 from robocasa_lerobot.envs.scene.placement.counter_areas import counter_areas
 from robocasa_lerobot.envs.scene.placement.objects import place_objects
@@ -245,7 +245,7 @@ def _lid_spot(
 def _assemble(
     task: SceneSpec, layout: Layout, look: _Look, robot: Robot, objects: dict[str, PlacedObject]
 ) -> mujoco.MjSpec:
-    spec, palette = bare_kitchen(layout, look.render_preset)
+    spec, palette = kitchen(layout, look.render_preset)
     robot.add_to(spec, look.render_preset, look.camera_set)
     liquids = {
         name: LIQUIDS[wanted.filled]
