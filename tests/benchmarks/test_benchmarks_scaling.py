@@ -97,6 +97,7 @@ def test_the_command_measures_steps(scaling: ModuleType, tmp_path: Path) -> None
 
 @pytest.mark.slow
 @pytest.mark.render
+@pytest.mark.timeout(1200)
 def test_the_command_measures_every_kind(scaling: ModuleType, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(scaling, "EVALUATED", ["CloseDrawer"])
     monkeypatch.setattr(scaling, "EPISODES", 1)
