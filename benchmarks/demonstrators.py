@@ -196,10 +196,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     }
     print(text(body))
     common.write_result(options.out, "demonstrators", body)
-    draw(tasks, options.out.with_suffix(".png"))
+    draw(tasks, picture := options.out.with_suffix(".png"))
     if trials:
         keep(trials, kept)
-        options.out.with_suffix(".md").write_text(page(body), encoding="utf-8")
+        options.out.with_suffix(".md").write_text(page(body, picture.name), encoding="utf-8")
     print(f"{options.out}, and beside it a page (.md), its picture (.png) and the trials ({KEPT})")
     return 0
 

@@ -99,8 +99,8 @@ def text(body: Mapping[str, Any]) -> str:
     return "\n".join(lines)
 
 
-def page(body: Mapping[str, Any]) -> str:
-    """The same for people who read it later: a page in Markdown."""
+def page(body: Mapping[str, Any], picture: str) -> str:
+    """The same for people who read it later: a page in Markdown, with a picture that lies beside it."""
     settings = body["settings"]
     lines = [
         "# Demonstrators",
@@ -112,7 +112,7 @@ def page(body: Mapping[str, Any]) -> str:
         + ".",
         f"In short: {_averages(body)}.",
         "",
-        "![Rates with their intervals](demonstrators.png)",
+        f"![Rates with their intervals]({picture})",
         "",
         "|".join(["", *_HEADER, ""]),
         "|".join(["", "---", *["--:"] * (len(_HEADER) - 2), "---", ""]),

@@ -105,6 +105,7 @@ def test_finished_trials_are_kept_replaced_and_forgotten(
     assert "|CloseDrawer|4/4|100%|" in page
     assert "|OpenFridge|" not in page
     assert "Made at abc (8)." in page
+    assert "(result.png)" in page
     made.clear()
     before = (kept := out.with_suffix(".trials.gz")).read_bytes()
     file.unlink()  # another checkout, which has the result alone
