@@ -12,6 +12,8 @@ earlier commit, which both sides can read.
 from __future__ import annotations
 
 import argparse
+import contextlib
+import ctypes
 import dataclasses
 import json
 import os
@@ -59,6 +61,7 @@ for action in actions:
 print("RESULT", (time.process_time() - started) / steps)
 """
 
+_SET_CHILD_SUBREAPER = 36  # of prctl(2)
 PLANNED_SEEDS, EVERY = 2, 3
 PLANNING = """
 import sys, time
@@ -100,13 +103,30 @@ def run(checkout: Path, command: Sequence[str]) -> tuple[str, float]:
     """What a Python of a checkout prints, and the processor seconds of it and its children."""
     environment = {**os.environ, "PYTHONPATH": f"{checkout}{os.pathsep}{checkout / 'benchmarks'}"}
     environment |= {"OMP_NUM_THREADS": "1", "HF_HUB_OFFLINE": "1"}
+    _adopt_orphans()
     before = _children_s()
     done = subprocess.run(
         [sys.executable, *command], cwd=checkout, env=environment, capture_output=True, text=True, check=False
     )
+    _await_orphans()
     if done.returncode:
         raise SystemExit(f"{command[0]} failed in {checkout}:\n{done.stdout[-2000:]}\n{done.stderr[-4000:]}")
     return done.stdout, _children_s() - before
+
+
+def _adopt_orphans() -> None:
+    """Make this process the parent of what its children leave behind, where the system can do that (Linux).
+
+    Workers are children of a fork server that nobody waits for: without this their seconds are counted nowhere.
+    """
+    if sys.platform == "linux":
+        ctypes.CDLL(None).prctl(_SET_CHILD_SUBREAPER, 1, 0, 0, 0)
+
+
+def _await_orphans() -> None:
+    with contextlib.suppress(ChildProcessError):
+        while True:
+            os.waitpid(-1, 0)
 
 
 def _children_s() -> float:
