@@ -48,7 +48,8 @@ class Film:
 
             shadows = env.render_preset == "quality"
             self._renderer = SceneRenderer(env.model, FILM_SIZE, FILM_SIZE, shadows=shadows)
-        return {camera: self._renderer.render(env.data, camera) for camera in contract.CAMERAS}
+        pictures = self._renderer.pictures(env.data, contract.CAMERAS)  # together: the state is looked at once
+        return dict(zip(contract.CAMERAS, pictures, strict=True))
 
     def __enter__(self) -> Film:
         return self
