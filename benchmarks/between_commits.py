@@ -20,7 +20,6 @@ import os
 import resource
 import shutil
 import statistics
-import subprocess
 import sys
 import tempfile
 from collections.abc import Sequence
@@ -29,6 +28,7 @@ from pathlib import Path
 import common
 import evaluation_sides
 import training_sides
+from commands import CLI, run
 
 from robocasa_lerobot.benchmark.tasks import facts_of
 from robocasa_lerobot.envs.tasks.registry import task_names
@@ -37,7 +37,6 @@ from robocasa_lerobot.progress import Bar
 OUTPUT = common.RESULTS / "between_commits.json"
 SIDES = ("before", "now")
 KINDS = ("sim", "sim_pictures", "convert", "evaluation", "planning")
-CLI = ("-c", "import sys; from robocasa_lerobot.cli import main; sys.exit(main())")
 TASK, EPISODES = "PickPlaceCounterToSink", 4
 EVALUATED, TRIALS, IMAGE_SIZE = ["CloseDrawer", "PickPlaceCounterToSink"], 2, 96
 STEPS = {"sim": 1200, "sim_pictures": 150}
@@ -99,19 +98,13 @@ def parse(arguments: Sequence[str] | None = None) -> argparse.Namespace:
     return parser.parse_args(arguments)
 
 
-def run(checkout: Path, command: Sequence[str]) -> tuple[str, float]:
+def timed_run(checkout: Path, command: Sequence[str]) -> tuple[str, float]:
     """What a Python of a checkout prints, and the processor seconds of it and its children."""
-    environment = {**os.environ, "PYTHONPATH": f"{checkout}{os.pathsep}{checkout / 'benchmarks'}"}
-    environment |= {"OMP_NUM_THREADS": "1", "HF_HUB_OFFLINE": "1"}
     _adopt_orphans()
     before = _children_s()
-    done = subprocess.run(
-        [sys.executable, *command], cwd=checkout, env=environment, capture_output=True, text=True, check=False
-    )
+    said = run(checkout, command)
     _await_orphans()
-    if done.returncode:
-        raise SystemExit(f"{command[0]} failed in {checkout}:\n{done.stdout[-2000:]}\n{done.stderr[-4000:]}")
-    return done.stdout, _children_s() - before
+    return said, _children_s() - before
 
 
 def _adopt_orphans() -> None:
@@ -159,17 +152,17 @@ class Work:
 
     def _plan(self) -> float:
         tasks = [name for name in task_names() if facts_of(name).kind == "atomic"]
-        said, _ = run(self._checkout, ["-c", PLANNING, str(PLANNED_SEEDS), ",".join(tasks[::EVERY])])
+        said = run(self._checkout, ["-c", PLANNING, str(PLANNED_SEEDS), ",".join(tasks[::EVERY])])
         return float(said.rsplit("RESULT", 1)[1])
 
     def _simulate(self, kind: str) -> float:
-        said, _ = run(self._checkout, ["-c", CONTROL_STEP, TASK, str(STEPS[kind]), str(kind == "sim_pictures")])
+        said = run(self._checkout, ["-c", CONTROL_STEP, TASK, str(STEPS[kind]), str(kind == "sim_pictures")])
         return float(said.rsplit("RESULT", 1)[1])
 
     def _convert(self) -> float:
         out = self._folder / "dataset"
         command = [*CLI, "convert", str(self._demos / f"{TASK}.hdf5"), f"--out={out}", "--workers=1"]
-        _, seconds = run(self._checkout, command)
+        _, seconds = timed_run(self._checkout, command)
         info = json.loads((out / "meta" / "info.json").read_text(encoding="utf-8"))
         return seconds / int(info["total_frames"])
 
@@ -180,7 +173,7 @@ class Work:
         file = self._folder / "job.json"
         file.write_text(json.dumps(dataclasses.asdict(job)), encoding="utf-8")
         script = self._checkout / "benchmarks" / "evaluation_sides.py"
-        said, seconds = run(self._checkout, [str(script), evaluation_sides.OURS, str(file)])
+        said, seconds = timed_run(self._checkout, [str(script), evaluation_sides.OURS, str(file)])
         return seconds / sum(json.loads(said.rsplit("RESULT ", 1)[1])["steps"])
 
 

@@ -37,6 +37,7 @@ from robocasa_lerobot.demos.demonstrator import can_demonstrate
 from robocasa_lerobot.demos.recorder import record_episode
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.tasks.registry import get_task, task_names
+from robocasa_lerobot.files import write_text, written_aside
 from robocasa_lerobot.progress import Bar
 
 OUTPUT = common.RESULTS / "demonstrators.json"
@@ -102,25 +103,28 @@ def read_trials(path: Path) -> dict[Key, Trial]:
 
 def keep(trials: Iterable[Trial], path: Path) -> None:
     """Write down the trials of a result, packed; the same trials give the same bytes."""
-    lines = "".join(json.dumps(asdict(trial)) + "\n" for trial in sorted(trials, key=lambda trial: trial.key))
-    path.write_bytes(gzip.compress(lines.encode(), mtime=0))
+    lines = _lines(sorted(trials, key=lambda trial: trial.key))
+    with written_aside(path) as aside:
+        aside.write_bytes(gzip.compress(lines.encode(), mtime=0))
 
 
 def take_up(kept: Path, path: Path) -> None:
     """Begin the file of finished trials with those of the last result, where there is none yet."""
     if kept.exists() and not path.exists():
         path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_bytes(gzip.decompress(kept.read_bytes()))
+        write_text(path, gzip.decompress(kept.read_bytes()).decode())
 
 
 def forget(path: Path, keys: Iterable[Key]) -> None:
     """Remove trials from the file."""
     gone = set(keys)
     left = [trial for key, trial in read_trials(path).items() if key not in gone]
-    aside = path.with_name(path.name + ".part")
     path.parent.mkdir(parents=True, exist_ok=True)
-    aside.write_text("".join(json.dumps(asdict(trial)) + "\n" for trial in left), encoding="utf-8")
-    aside.replace(path)
+    write_text(path, _lines(left))
+
+
+def _lines(trials: Iterable[Trial]) -> str:
+    return "".join(json.dumps(asdict(trial)) + "\n" for trial in trials)
 
 
 def run(jobs: list[Key], path: Path, workers: int) -> None:

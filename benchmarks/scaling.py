@@ -15,10 +15,8 @@ import argparse
 import contextlib
 import dataclasses
 import json
-import os
 import shutil
 import statistics
-import subprocess
 import sys
 import tempfile
 import time
@@ -30,6 +28,7 @@ from typing import Any
 import common
 import evaluation_sides
 import training_sides
+from commands import CLI, run
 from scaling_limits import Use, Watch, limit
 from workers import Worker, run_together
 
@@ -40,7 +39,6 @@ KINDS = ("steps_no_cameras", "steps_three_cameras", "evaluating", "converting")
 DEMONSTRATED, EPISODES = "OpenDrawer", 4  # of the file that is converted, for each process
 EVALUATED, TRIALS, IMAGE_SIZE = ["CloseDrawer", "OpenDrawer"], 1, 96  # trials of each task for each process
 SEEDS_APART = 10_000
-CLI = ("-c", "import sys; from robocasa_lerobot.cli import main; sys.exit(main())")
 
 
 @dataclass(frozen=True)
@@ -152,7 +150,7 @@ class Work:
         file = self._scratch / "job.json"
         file.write_text(json.dumps(dataclasses.asdict(job)), encoding="utf-8")
         script = common.REPOSITORY / "benchmarks" / "evaluation_sides.py"
-        said = _run([str(script), evaluation_sides.OURS, str(file)])
+        said = run(common.REPOSITORY, [str(script), evaluation_sides.OURS, str(file)])
         return Done(sum(json.loads(said.rsplit("RESULT ", 1)[1])["steps"]))
 
     def _demos(self, part: int) -> Path:
@@ -161,26 +159,17 @@ class Work:
     def _record(self, part: int) -> None:
         """Demonstrations for one more process, each file with seeds of its own."""
         command = [*CLI, "demos", f"--tasks={DEMONSTRATED}", f"--episodes={EPISODES}", f"--out={self._demos(part)}"]
-        _run([*command, f"--seed={part}", "--workers=1"])
+        run(common.REPOSITORY, [*command, f"--seed={part}", "--workers=1"])
 
     def _convert(self, processes: int) -> Done:
         files = [str(self._demos(part) / f"{DEMONSTRATED}.hdf5") for part in range(1, processes + 1)]
         out = self._fresh()
-        _run([*CLI, "convert", *files, f"--out={out}", f"--workers={processes}"])
+        run(common.REPOSITORY, [*CLI, "convert", *files, f"--out={out}", f"--workers={processes}"])
         return Done(json.loads((out / "meta" / "info.json").read_text(encoding="utf-8"))["total_frames"])
 
     def _fresh(self) -> Path:
         shutil.rmtree(self._scratch / "out", ignore_errors=True)
         return self._scratch / "out"
-
-
-def _run(command: Sequence[str]) -> str:
-    """What a Python prints; its own threads of numerical libraries would hide how processes scale."""
-    environment = {**os.environ, "OMP_NUM_THREADS": "1", "HF_HUB_OFFLINE": "1"}
-    done = subprocess.run([sys.executable, *command], env=environment, capture_output=True, text=True, check=False)
-    if done.returncode:
-        raise SystemExit(f"{command[0]} failed:\n{done.stdout[-2000:]}\n{done.stderr[-4000:]}")
-    return done.stdout
 
 
 def summary(found: dict[str, dict[int, list[Measured]]]) -> dict[str, dict[str, Any]]:

@@ -6,10 +6,10 @@ from typing import Any
 
 import numpy as np
 import pytest
+from demonstration_steps import demonstrated_commands
 from numpy.typing import NDArray
 from task_selection import every_task
 
-from robocasa_lerobot.demos.demonstrator import demonstrate
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.kitchens.appliances.acting import ActingAppliances
 from robocasa_lerobot.envs.kitchens.appliances.base import Appliance
@@ -69,12 +69,7 @@ def test_random_motion_is_the_same(task: str, asked: list[str]) -> None:
 def test_a_demonstration_at_an_appliance_is_the_same(task: str, asked: list[str]) -> None:
     env = KitchenEnv(task, cameras=())
     env.reset(seed=4)
-    commands = []
-    for command in demonstrate(env):
-        commands.append(command.astype(np.float32))
-        _, _, terminated, truncated, _ = env.step(commands[-1])
-        if terminated or truncated:
-            break
+    commands = list(demonstrated_commands(env))
     asked.clear()
     assert_same_as_all_asked(task, commands, asked)
 

@@ -8,10 +8,10 @@ from contextlib import contextmanager
 import mujoco
 import numpy as np
 import pytest
+from demonstration_steps import demonstrated_commands
 from numpy.typing import NDArray
 from task_selection import demonstrated, every_task
 
-from robocasa_lerobot.demos.demonstrator import demonstrate
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.physics.nearby import Nearby
 
@@ -93,12 +93,7 @@ def test_demonstrations_are_the_same(task: str) -> None:
     """In grasps, with doors and drawers in motion, while things fall asleep and wake."""
     env = KitchenEnv(task, cameras=())
     env.reset(seed=1)
-    commands = []
-    for command in demonstrate(env):
-        commands.append(command.astype(np.float32))
-        _, _, terminated, truncated, _ = env.step(commands[-1])
-        if terminated or truncated:
-            break
+    commands = list(demonstrated_commands(env))
     rows = run(task, 1, commands)
     with all_looked_at():
         assert rows == run(task, 1, commands)

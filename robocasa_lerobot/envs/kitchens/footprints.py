@@ -121,14 +121,17 @@ class Area:
         if not self.inside:
             x = x - (np.cos(yaw) * middle[0] - np.sin(yaw) * middle[1])
             y = y - (np.sin(yaw) * middle[0] + np.cos(yaw) * middle[1])
-        c, s = np.cos(self.yaw), np.sin(self.yaw)
-        room = self.origin[0] + c * x - s * y, self.origin[1] + s * x + c * y
-        return np.stack([*room, self.yaw + yaw], axis=1)
+        return np.column_stack([self._in_room(x, y), self.yaw + yaw])
 
     def to_room(self, x: float, y: float) -> tuple[float, float]:
         """Where a point of the fixture's frame is in the room, metres."""
+        room_x, room_y = self._in_room(np.array([x]), np.array([y]))[0].tolist()
+        return room_x, room_y
+
+    def _in_room(self, x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Where n points of the fixture's frame are in the room, metres, (n, 2)."""
         c, s = np.cos(self.yaw), np.sin(self.yaw)
-        return float(self.origin[0] + c * x - s * y), float(self.origin[1] + s * x + c * y)
+        return np.stack((self.origin[0] + c * x - s * y, self.origin[1] + s * x + c * y), axis=1)
 
     def holds(self, footprint: Footprint) -> bool:
         """Whether all corners of a footprint lie in the rectangle."""
@@ -150,9 +153,7 @@ class Area:
         """Square metres that no footprint covers, counted on a grid."""
         xs = self.x0 + (np.arange(grid) + 0.5) * (self.x1 - self.x0) / grid
         ys = self.y0 + (np.arange(grid) + 0.5) * (self.y1 - self.y0) / grid
-        along, across = np.repeat(xs, grid), np.tile(ys, grid)
-        c, s = np.cos(self.yaw), np.sin(self.yaw)
-        points = np.stack((self.origin[0] + c * along - s * across, self.origin[1] + s * along + c * across), axis=1)
+        points = self._in_room(np.repeat(xs, grid), np.tile(ys, grid))
         free = np.ones(len(points), dtype=bool)
         for other in occupied:
             local = np.abs((points - (other.x, other.y)) @ other.axes().T)

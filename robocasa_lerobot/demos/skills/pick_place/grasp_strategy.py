@@ -53,6 +53,11 @@ class GraspStrategy:
     first: Callable[[KitchenEnv], Iterator[Array]] | None = None
 
 
+def in_radians(*tilts: tuple[float, float]) -> tuple[tuple[float, float], ...]:
+    """Tilts given in degrees, with their costs, as strategies have them."""
+    return tuple((float(np.deg2rad(tilt)), cost) for tilt, cost in tilts)
+
+
 FROM_ABOVE = GraspStrategy(((0.0, 0.0), (np.deg2rad(30.0), 0.25)))
 ANY_APPROACH = GraspStrategy(
     ((0.0, 0.0), (np.deg2rad(35.0), 0.1), (np.deg2rad(65.0), 0.2), (np.deg2rad(88.0), 0.3)), ("up", "across", "out")
@@ -66,7 +71,7 @@ FROM_A_SLOT = GraspStrategy(
 )
 # Out of a drawer below a shelf, whose hind part the shelf covers.
 FROM_CRISPER = GraspStrategy(
-    tuple((float(np.deg2rad(tilt)), extra) for tilt, extra in ((35, 0.0), (50, 0.1), (20, 0.1), (65, 0.2), (5, 0.2))),
+    in_radians((35, 0.0), (50, 0.1), (20, 0.1), (65, 0.2), (5, 0.2)),
     ("along",),
     narrow=True,
 )

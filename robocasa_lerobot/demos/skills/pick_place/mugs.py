@@ -12,7 +12,7 @@ import numpy as np
 
 from robocasa_lerobot.demos.motion import UP, Array, frame
 from robocasa_lerobot.demos.planning.grasps import GraspPose
-from robocasa_lerobot.demos.skills.pick_place.grasp_strategy import GraspStrategy, ahead_of
+from robocasa_lerobot.demos.skills.pick_place.grasp_strategy import GraspStrategy, ahead_of, in_radians
 from robocasa_lerobot.demos.skills.pick_place.graspable import UPRIGHT_COS, Graspable, grasps
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 
@@ -64,7 +64,7 @@ def _across(
 
 
 FROM_THE_SIDE = GraspStrategy(
-    tuple((float(np.deg2rad(tilt)), extra) for tilt, extra in ((78.0, 0.0), (84.0, 0.05), (60.0, 0.5))),
+    in_radians((78, 0.0), (84, 0.05), (60, 0.5)),
     ("up", "across", "out"),
     turns=tuple(float(np.deg2rad(turn)) for turn in (20.0, -20.0, 0.0, 45.0, -45.0)),
     poses=from_the_side,

@@ -11,7 +11,7 @@ import numpy as np
 from robocasa_lerobot.demos.motion import OPEN, Array, base_pose, floor_axes
 from robocasa_lerobot.demos.planning.collision import CollisionChecker
 from robocasa_lerobot.demos.skills.navigation import Room
-from robocasa_lerobot.demos.skills.pick_place.grasp_strategy import GraspStrategy
+from robocasa_lerobot.demos.skills.pick_place.grasp_strategy import GraspStrategy, in_radians
 from robocasa_lerobot.demos.skills.pick_place.level_grasps import level_grasps
 from robocasa_lerobot.demos.skills.reaching import go_to
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
@@ -25,9 +25,7 @@ STEP_M = 0.06  # between places that are tested
 
 
 OUT_OF_A_MICROWAVE = GraspStrategy(
-    tuple(
-        (float(np.deg2rad(tilt)), extra) for tilt, extra in ((60, 0.0), (72, 0.05), (48, 0.05), (35, 0.1), (86, 0.2))
-    ),
+    in_radians((60, 0.0), (72, 0.05), (48, 0.05), (35, 0.1), (86, 0.2)),
     ("across", "out"),
     poses=level_grasps,
 )

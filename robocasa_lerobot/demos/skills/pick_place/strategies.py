@@ -18,6 +18,7 @@ from robocasa_lerobot.demos.skills.pick_place.grasp_strategy import (
     FROM_CRISPER,
     OUT_OF_DRAWER,
     GraspStrategy,
+    in_radians,
 )
 from robocasa_lerobot.demos.skills.pick_place.graspable import Graspable
 from robocasa_lerobot.demos.skills.pick_place.level_grasps import level_grasps
@@ -57,13 +58,8 @@ from robocasa_lerobot.envs.tasks.conditions import IN_RANGE, stage_condition
 from robocasa_lerobot.envs.tasks.task import Stage
 
 # Between the two steep and the two flat ones of any approach: a palm that is level meets the shelf before low objects.
-_CABINET_TILTS = ((0, 0.0), (35, 0.1), (42, 0.1), (50, 0.15), (65, 0.2), (88, 0.3))
-OUT_OF_CABINET = replace(
-    ANY_APPROACH,
-    tilts=tuple((float(np.deg2rad(tilt)), extra) for tilt, extra in _CABINET_TILTS),
-    narrow=True,
-    poses=level_grasps,
-)
+_CABINET_TILTS = in_radians((0, 0.0), (35, 0.1), (42, 0.1), (50, 0.15), (65, 0.2), (88, 0.3))
+OUT_OF_CABINET = replace(ANY_APPROACH, tilts=_CABINET_TILTS, narrow=True, poses=level_grasps)
 HARD = 1.0  # cost of taking something out of a drawer, from which on it is pulled out first
 MOST_TURNS = 2  # of what lies across behind a front
 FARTHER_OUT_M = 0.12  # how far
@@ -73,10 +69,10 @@ OFF_M = 0.10  # of the hand from what it has let go
 DEEP_M, DEEP_LEAN = 0.035, float(np.deg2rad(30.0))
 # Of a vessel at its rim, that is to go through a front: the hand is tilted so that it fits under the edge above, yet
 # about as walls of bowls lean. Fingers that are askew to a wall turn the vessel: the grasp counts for more.
-_RIM_TILTS = ((46, 0.0), (40, 0.0), (52, 0.0), (34, 0.05), (58, 0.1), (64, 0.2), (24, 0.3), (0, 0.7))
+_RIM_TILTS = in_radians((46, 0.0), (40, 0.0), (52, 0.0), (34, 0.05), (58, 0.1), (64, 0.2), (24, 0.3), (0, 0.7))
 LEANING_GRASP = replace(
     ANY_APPROACH,
-    tilts=tuple((float(np.deg2rad(tilt)), extra) for tilt, extra in _RIM_TILTS),
+    tilts=_RIM_TILTS,
     worse_grasp=1.0,
     among_tilts=True,
 )

@@ -13,7 +13,7 @@ import numpy as np
 from robocasa_lerobot.demos.motion import CLOSED, OPEN, UP, Array, HandTarget, frame, rotation_about
 from robocasa_lerobot.demos.planning.follow import follow_joint_path
 from robocasa_lerobot.demos.skills.common import close_fingers, move_hand
-from robocasa_lerobot.demos.skills.pick_place.grasp_strategy import ahead_of, entry
+from robocasa_lerobot.demos.skills.pick_place.grasp_strategy import ahead_of, entry, in_radians
 from robocasa_lerobot.demos.skills.pick_place.graspable import Graspable, filled
 from robocasa_lerobot.demos.skills.reaching import MotionPlan, WaypointPath, approach, plan_reach
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
@@ -23,7 +23,7 @@ LONG, ACROSS_COS = 1.25, 0.8  # long by wide; cosine of the long axis and the he
 END_SHARES = (0.75, 0.6)  # of half its length from the middle, where it is pushed
 PUSH_SHARES = (1.1, 0.8, 0.5)  # of half its length, how far; with a cost for each share less
 LESS_COST = 0.5
-TILTS = tuple((float(np.deg2rad(tilt)), extra) for tilt, extra in ((65, 0.0), (78, 0.05), (52, 0.05)))
+TILTS = in_radians((65, 0.0), (78, 0.05), (52, 0.05))
 TURNS = tuple(float(np.deg2rad(turn)) for turn in (0.0, 20.0, -20.0))
 BEFORE_M, IN_M, RISES_M = 0.03, 0.25, (0.004, 0.012)
 HOPELESS = 2.5  # cost of a push from which on it is not tried

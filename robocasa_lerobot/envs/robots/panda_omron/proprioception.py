@@ -13,23 +13,18 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from robocasa_lerobot.contract import STATE_PART_HDF5_KEYS, STATE_SIZE, STATE_SLICES
+from robocasa_lerobot.contract import STATE_PART_HDF5_KEYS, join_state
 from robocasa_lerobot.envs.robots.panda_omron import names
 from robocasa_lerobot.envs.robots.panda_omron.control.indices import joint_positions, joint_velocities
 
 Array = NDArray[np.float64]
-# Where the observations of a name lie in the contract's state.
-_IN_STATE = tuple((STATE_PART_HDF5_KEYS[part], where) for part, where in STATE_SLICES.items())
 _XYZW = np.array([1, 2, 3, 0])  # of wxyz
 
 
 def read_state(model: mujoco.MjModel, data: mujoco.MjData) -> Array:
     """The contract's state (16,) float64: base pose in the world, end-effector pose in the base, finger positions."""
     readings = _state_observations(_indices(model), data)
-    state = np.empty(STATE_SIZE)
-    for key, where in _IN_STATE:
-        state[where] = readings[key]
-    return state
+    return join_state({part: readings[key] for part, key in STATE_PART_HDF5_KEYS.items()})
 
 
 def read_observations(model: mujoco.MjModel, data: mujoco.MjData) -> dict[str, Array]:

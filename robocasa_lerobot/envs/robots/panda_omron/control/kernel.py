@@ -223,7 +223,10 @@ def _change(watch: Any, slept: Any, asleep: Any) -> int:
 
 @compiled
 def _look_at_all(watch: Any) -> None:
-    """Give the bodies that were left out their masks back."""
+    """Give the bodies that were left out their masks back.
+
+    As `Nearby.look_at_all`, but in this file: numba would not notice a change of a function in another one.
+    """
     if watch.n_watched[0]:
         watch.contype_now[:] = watch.contype
         watch.conaffinity_now[:] = watch.conaffinity
