@@ -18,7 +18,7 @@ export PYTHONUNBUFFERED := 1
 export UV_HTTP_TIMEOUT ?= 300
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
-.PHONY: help setup demo test test-slow walk lint format lock docs doctor bench bench-convert bench-training bench-evaluation bench-grasps bench-demonstrators bench-demo bench-kitchens clean
+.PHONY: help setup demo study test test-slow walk lint format lock docs doctor bench bench-convert bench-training bench-evaluation bench-grasps bench-demonstrators bench-demo bench-kitchens clean
 
 help:  ## this list
 	@sed -n 's/^\([a-z-]*\):.*  ## /\1\t/p' Makefile | awk -F '\t' '{printf "  make %-20s %s\n", $$1, $$2}'
@@ -44,6 +44,11 @@ $(STAMP): requirements.lock pyproject.toml $(COMPANION)/pyproject.toml scripts/f
 
 demo: $(STAMP)  ## demonstrations, dataset, two training phases, evaluation and report
 	PYTHON=$(BIN)/python sh scripts/demo.sh
+
+# About a day on two idle cores; goes on where it was stopped. PARTS="multitask lifelong" runs some,
+# STUDY_ARGS=--plan tells hours and disk, STUDY_ARGS="--device cuda" is for one GPU.
+study: $(STAMP)  ## what small policies learn: trainings from data to trials, and docs/results.md
+	$(BIN)/robocasa-lerobot study $(PARTS) --results docs/results --page docs/results.md $(STUDY_ARGS)
 
 test: $(STAMP)  ## the fast tests
 	PYTHON=$(BIN)/python sh scripts/test.sh $(PYTEST_ARGS)

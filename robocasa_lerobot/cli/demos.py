@@ -25,7 +25,11 @@ def configure(parser: argparse.ArgumentParser) -> None:
         "--tasks", required=True, help="names and sets (atomic_seen, ...) separated by commas, or `all`; see `tasks`"
     )
     parser.add_argument("--episodes", type=int, default=20, help="successful episodes per task (default 20)")
-    parser.add_argument("--split", default="target", help="kitchens: target or pretrain (default target)")
+    parser.add_argument(
+        "--split",
+        default="target",
+        help="kitchens: target, pretrain, or of the latter pretrain_train and pretrain_val (default target)",
+    )
     for what in ("layouts", "styles"):
         parser.add_argument(
             f"--{what}",

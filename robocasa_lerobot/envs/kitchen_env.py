@@ -52,7 +52,7 @@ class KitchenEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
 
     Args:
         task: name of a registered task, or a declaration that is in the making.
-        split: "target" or "pretrain".
+        split: "target" or "pretrain"; or of the latter "pretrain_val", fifty kitchens, or "pretrain_train", the others.
         render_preset: "fast" (no shadows) or "quality".
         image_size: height and width of the pictures, pixels.
         cameras: names of the cameras that are observed, of the robot's `camera_sets`.

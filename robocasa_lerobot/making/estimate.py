@@ -16,7 +16,7 @@ from robocasa_lerobot.benchmark.tasks import task_facts
 from robocasa_lerobot.making.needs import Need
 
 # Of one core, failed attempts included; and the mean of the tasks' medians of steps, of 50 ms each.
-SECONDS_PER_DEMONSTRATION: Mapping[str, float] = {"atomic": 1.8, "composite": 32.0}
+SECONDS_PER_DEMONSTRATION: Mapping[str, float] = {"atomic": 0.71, "composite": 7.6}
 STEPS_PER_DEMONSTRATION: Mapping[str, int] = {"atomic": 165, "composite": 950}
 STEPS_PER_SECOND = 53.0  # of one core, with three cameras
 BYTES_PER_STEP = 6_000

@@ -17,7 +17,16 @@ from robocasa_lerobot.envs.kitchens.fixtures.hoods import DESIGNS as HOODS
 from robocasa_lerobot.envs.kitchens.fixtures.stools import DESIGNS as STOOLS
 from robocasa_lerobot.envs.kitchens.layout import Layout, layout_ids, layout_record, load_layout
 from robocasa_lerobot.envs.kitchens.materials import COMMON_SURFACES, load_style, split_of, style_ids
-from robocasa_lerobot.envs.kitchens.splits import EXCLUDED, GROUPS, expand, scene_ids, without
+from robocasa_lerobot.envs.kitchens.splits import (
+    EXCLUDED,
+    GROUPS,
+    NAMED,
+    benchmark_split,
+    expand,
+    scene_ids,
+    validation_kitchens,
+    without,
+)
 from robocasa_lerobot.envs.scene.placement.counter_areas import standing_on
 from robocasa_lerobot.envs.scene.robot_poses import footprint
 from robocasa_lerobot.envs.scene.roles import candidates
@@ -200,6 +209,17 @@ def test_pairs_of_the_splits() -> None:
     )
     assert without([(32, 1), (33, 1)], ("double_cab",)) == [(33, 1)]
     assert expand([-5, 2, 60], "layout") == (*ISLANDS, 60)
+
+
+def test_fifty_pretraining_kitchens_are_kept_for_validation() -> None:
+    kept, others = scene_ids("pretrain_val"), scene_ids("pretrain_train")
+    assert kept == validation_kitchens()
+    assert [len({pair[i] for pair in kept}) for i in (0, 1)] == [50, 50]
+    assert sorted([*kept, *others]) == scene_ids("pretrain")
+    assert not set(kept) & set(NAMED["5x5"]), "the scene diversity's kitchens are recorded in"
+    layout, style = kept[0]
+    assert scene_ids("pretrain_train", layouts=layout, styles=[style, style % 60 + 1]) == [(layout, style % 60 + 1)]
+    assert [benchmark_split(name) for name in ("pretrain_train", "pretrain_val")] == ["pretrain", "pretrain"]
 
 
 def test_wrong_kitchens_are_refused() -> None:

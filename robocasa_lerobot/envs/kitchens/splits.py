@@ -9,6 +9,10 @@ from robocasa_lerobot.envs.kitchens.materials import LAST_TARGET_ID, style_ids
 from robocasa_lerobot.errors import UnknownNameError, UserError
 
 SPLITS = ("pretrain", "target")
+# Parts of the pretraining kitchens, for choosing between policies without a look at the target kitchens: fifty of the
+# 2,500 to evaluate in, each layout and each style once, and all others to record in.
+TRAINING, VALIDATION = "pretrain_train", "pretrain_val"
+PARTS = {TRAINING: "pretrain", VALIDATION: "pretrain"}
 Pairs = list[tuple[int, int]]
 
 # Ids of groups of layouts, or of styles, by RoboCasa's negative numbers (docs/robocasa.md, section 6).
@@ -38,6 +42,25 @@ _WITH = {
 }
 EXCLUDED |= {need: tuple(i for i in range(1, 61) if i not in usable) for need, usable in _WITH.items()}
 PROBLEMATIC_BLENDER_LID_STYLES = (13, 29, 31)
+
+_STYLES_ON = 29  # styles further on is the one in which a layout is kept: none of the 25 kitchens of `5x5`
+
+
+def benchmark_split(split: str) -> str:
+    """The benchmark's own split of which this is one, or a part: it says which objects and appliances there are.
+
+    Raises:
+        UnknownNameError: no such split.
+    """
+    if split not in (*SPLITS, *PARTS):
+        raise UnknownNameError("split", split, (*SPLITS, *PARTS))
+    return PARTS.get(split, split)
+
+
+def validation_kitchens() -> Pairs:
+    """The fifty pretraining kitchens in which nothing of `pretrain_train` is recorded, by layout."""
+    ids = GROUPS[-2]
+    return [(layout, ids[(place + _STYLES_ON) % len(ids)]) for place, layout in enumerate(ids)]
 
 
 def expand(ids: int | Iterable[int], what: str) -> tuple[int, ...]:
@@ -69,7 +92,7 @@ def scene_ids(
     """(layout, style) pairs of a split: target pairs (i, i), pretraining every layout with every style.
 
     Args:
-        split: "pretrain" or "target".
+        split: one of `SPLITS` or `PARTS`.
         layouts: of these only (ids or group ids); then every layout with every style.
         styles: the same for styles.
         exclude: names of `EXCLUDED`: what the task needs.
@@ -79,9 +102,7 @@ def scene_ids(
         UnknownNameError: no such split, layout, style, group or need.
         UserError: nothing is left.
     """
-    if split not in SPLITS:
-        raise UnknownNameError("split", split, SPLITS)
-    of_split = GROUPS[-1] if split == "target" else GROUPS[-2]
+    of_split = GROUPS[-1] if benchmark_split(split) == "target" else GROUPS[-2]
     if layouts is None and styles is None and split == "target":
         pairs = [(i, i) for i in range(1, LAST_TARGET_ID + 1)]
     else:
@@ -89,6 +110,9 @@ def scene_ids(
             of_split if ids is None else expand(ids, what) for ids, what in ((layouts, "layout"), (styles, "style"))
         ]
         pairs = [(i, j) for i in chosen[0] for j in chosen[1]]
+    if split in PARTS:
+        apart = set(validation_kitchens())
+        pairs = [pair for pair in pairs if (pair in apart) == (split == VALIDATION)]
     return without(pairs, exclude, exclude_styles)
 
 

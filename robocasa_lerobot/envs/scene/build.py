@@ -12,7 +12,7 @@ from robocasa_lerobot.envs.kitchens.appliances.kinds.blender import Blender
 from robocasa_lerobot.envs.kitchens.fixtures.base import of_kind
 from robocasa_lerobot.envs.kitchens.footprints import PlacementError, place
 from robocasa_lerobot.envs.kitchens.layout import Layout, load_layout
-from robocasa_lerobot.envs.kitchens.splits import Pairs, scene_ids, without
+from robocasa_lerobot.envs.kitchens.splits import Pairs, benchmark_split, scene_ids, without
 from robocasa_lerobot.envs.objects.shapes import add_object
 from robocasa_lerobot.envs.robots.camera_noise import CameraNoise, add_camera_noise
 from robocasa_lerobot.envs.robots.panda_omron.robot import PANDA_OMRON
@@ -120,7 +120,7 @@ def _attempt(
     rng: np.random.Generator,
 ) -> Scene:
     layout = load_layout(layout_id, style_id)
-    arranged = arrange(rng, task, split, layout, robot)
+    arranged = arrange(rng, task, benchmark_split(split), layout, robot)
     roles, choices, objects, pose = arranged.roles, arranged.choices, arranged.objects, arranged.robot_pose
     spots = {role: _lid_spot(rng, layout, roles[role], objects) for role, gone in arranged.lids.items() if not gone}
     spec = _assemble(task, layout, look, robot, objects)

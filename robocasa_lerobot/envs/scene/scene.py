@@ -15,6 +15,7 @@ from robocasa_lerobot.envs.kitchens.appliances.kinds.blender import Blender
 from robocasa_lerobot.envs.kitchens.fixtures.base import Fixture, Region, of_kind, yaw_quat
 from robocasa_lerobot.envs.kitchens.fixtures.regions import region_names, regions_of
 from robocasa_lerobot.envs.kitchens.layout import Layout
+from robocasa_lerobot.envs.kitchens.splits import benchmark_split
 from robocasa_lerobot.envs.robots.cameras import camera_configs
 from robocasa_lerobot.envs.robots.control_step import control_step
 from robocasa_lerobot.envs.robots.robot import Controller, Robot
@@ -203,7 +204,7 @@ class Scene(Drawn):
                     "info": {
                         "cat": placed.item.category.name,
                         "model": placed.item.model,
-                        "split": self.split,
+                        "split": benchmark_split(self.split),
                         "groups": list(placed.item.category.groups),
                     },
                     "placement": {"pos": list(placed.pos), "yaw": placed.yaw},

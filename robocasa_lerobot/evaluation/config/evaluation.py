@@ -12,7 +12,7 @@ from robocasa_lerobot.errors import UnknownNameError, UserError
 from robocasa_lerobot.evaluation.records.results import file_name
 
 KITCHEN_ENV_FACTORY = "robocasa_lerobot.envs.kitchen_env:KitchenEnv"
-SPLITS = ("target", "pretrain")
+SPLITS = ("target", "pretrain", "pretrain_train", "pretrain_val")
 RENDER_PRESETS = ("fast", "quality")
 DEVICES = ("auto", "cpu", "cuda", "mps")
 PLACEMENTS = ("auto", "workers", "servers")
@@ -63,7 +63,7 @@ class EnvSettings:
     tasks_per_set: so many tasks of each set, the first that this version has; default: all.
     allow_missing_tasks: tasks that this version does not have are left out, and the results are marked as partial;
         false refuses to run without them.
-    split: target or pretrain scenes.
+    split: target or pretrain scenes; or of the latter pretrain_val, fifty kitchens, or pretrain_train, all others.
     render_preset: fast or quality.
     image_size: pixels, height and width; default: what the checkpoint was trained at, else 256.
     horizon: control steps at 20 Hz for all tasks; default: each task's own.

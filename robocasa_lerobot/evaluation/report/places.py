@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import fnmatch
 import functools
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -60,7 +61,7 @@ def tables() -> dict[str, dict[str, Any]]:
 
 @functools.cache
 def named_experiments() -> frozenset[str]:
-    """The experiments that `places.yaml` names; other experiments' policies are placed by their labels."""
+    """Names of experiments in `places.yaml`, or patterns; other experiments' policies are placed by their labels."""
     own = (str(name) for one in _descriptions(tables()) for name in one.get("experiment", ()))
     return frozenset((*own, *_content()[_UNPUBLISHED]))
 
@@ -93,7 +94,8 @@ def _places_in(name: str, facts: Mapping[str, object]) -> Iterator[Place]:
 
 
 def _any_fits(alternatives: Sequence[Description], facts: Mapping[str, object]) -> bool:
-    named = facts["experiment"] in named_experiments()
+    experiment = str(facts["experiment"])
+    named = any(fnmatch.fnmatchcase(experiment, name) for name in named_experiments())
     return any(("experiment" in one) is named and _fits(one, facts) for one in alternatives)
 
 

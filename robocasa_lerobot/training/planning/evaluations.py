@@ -57,6 +57,7 @@ class PlannedEvaluation:
         partial: what it leaves out; None if nothing.
         tasks: that it runs.
         trials: on all of them.
+        steps: control steps of all trials, if none is solved before its horizon; 0 where the env decides.
         plan: a name of the planned run, the same as long as that is.
     """
 
@@ -67,6 +68,7 @@ class PlannedEvaluation:
     partial: str | None
     tasks: int
     trials: int
+    steps: int
     plan: str
 
     @property
@@ -122,7 +124,7 @@ def plan_evaluations(experiment: ExperimentConfig, phases: Sequence[PhaseConfig]
     ]
     if mistakes:
         raise UserError("evaluations that cannot run as they are written:\n" + "\n".join(dict.fromkeys(mistakes)))
-    names = ("nothing", "partial", "tasks", "trials", "plan")
+    names = ("nothing", "partial", "tasks", "trials", "steps", "plan")
     return [
         PlannedEvaluation(phase, evaluation, tuple(arguments), **{name: answer[name] for name in names})
         for (phase, evaluation, arguments), answer in zip(asked, answers, strict=True)

@@ -80,7 +80,10 @@ class PhasePlan:
 
 
 def plan_experiment(
-    experiment: ExperimentConfig, only: str | None = None, measured_steps: int = MEASURED_STEPS
+    experiment: ExperimentConfig,
+    only: str | None = None,
+    measured_steps: int = MEASURED_STEPS,
+    measured: dict[str, float | str] | None = None,
 ) -> list[PhasePlan]:
     """The plan of each phase, or of one; nothing is trained or written in `output_dir`.
 
@@ -88,12 +91,13 @@ def plan_experiment(
         experiment: what to plan.
         only: the one phase to plan; None is all.
         measured_steps: optimiser steps with made-up data that are timed for each kind of step that differs; 0: none.
+        measured: times of kinds of steps that are known already, and to which new ones are added.
 
     Raises:
         UserError: a mistake in the settings. Missing data or weights are not one: the plan tells of them.
     """
     device = builders.best_device(experiment.device)
-    plans, measured = [], dict[str, float | str]()
+    plans, measured = [], {} if measured is None else measured
     whole, (experiment, said) = experiment, runnable(experiment)
     for asked in [whole.phase(only)] if only is not None else whole.phases:
         about = [item for item in said if item.phase == asked.name]

@@ -23,7 +23,12 @@ TRANSPOSED = (
     "low_rank",
 )
 LONGER_HORIZONS = "1.0.1"  # release of RoboCasa that multiplied them by 1.5
-SPLITS = {"target": "target scenes", "pretrain": "pretraining scenes"}
+SPLITS = {
+    "target": "target scenes",
+    "pretrain": "pretraining scenes",
+    "pretrain_train": "pretraining scenes, those for training",
+    "pretrain_val": "pretraining scenes, those kept for validation",
+}
 
 
 def section(data: ReportData) -> Section | None:
@@ -134,7 +139,7 @@ def _stands(policy: PolicyResult) -> bool:
 
 def table_for(policies: list[PolicyResult]) -> str:
     """Name of the published table whose setting is nearest: by the scenes of the last policy."""
-    return "multi_task" if policies[-1].header.split == "pretrain" else "foundation"
+    return "multi_task" if policies[-1].header.split.startswith("pretrain") else "foundation"
 
 
 def _table(data: ReportData, policies: list[PolicyResult], table: PublishedTable) -> Table:

@@ -1,0 +1,89 @@
+"""`robocasa-lerobot study`: trainings that answer questions, from data to trials, and the page of their results."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+EXAMPLE = (
+    "robocasa-lerobot study --plan\n"
+    "  robocasa-lerobot study multitask --seeds 1\n"
+    "  robocasa-lerobot study --results docs/results --page docs/results.md"
+)
+
+
+def configure(parser: argparse.ArgumentParser) -> None:
+    """Add the options."""
+    from robocasa_lerobot.study.runs import CPU, DEVICES
+
+    parser.add_argument("parts", nargs="*", metavar="PART", help="parts of the study (default: all, in their order)")
+    parser.add_argument("--config_path", type=Path, metavar="FILE", help="study file (default: configs/study.yaml)")
+    parser.add_argument(
+        "--plan", action="store_true", help="print demonstrations, hours and disk of each part, and end"
+    )
+    parser.add_argument(
+        "--measure", type=int, default=20, metavar="STEPS", help="steps that --plan times; 0: none (default 20)"
+    )
+    parser.add_argument("--seeds", type=int, metavar="N", help="trainings of each experiment (default: the part's own)")
+    parser.add_argument(
+        "--device", choices=DEVICES, default=CPU, help="cuda: a larger policy and pictures of 128 pixels"
+    )
+    parser.add_argument("--workers", type=int, help="processes that make data (default: all cores)")
+    parser.add_argument("--scale", metavar="NAME", help="as in `train`: try all of it in minutes")
+    parser.add_argument(
+        "--episodes", metavar="KIND=N,...", help="as in `data`: demonstrations of each task (default: the registry's)"
+    )
+    parser.add_argument("--root", type=Path, metavar="DIR", help="folder of the trainings (default: the study file's)")
+    parser.add_argument("--results", type=Path, metavar="DIR", help="where ended runs are kept (default: ROOT/results)")
+    parser.add_argument("--page", type=Path, metavar="FILE", help="Markdown page (default: RESULTS/results.md)")
+    parser.add_argument("--report", action="store_true", help="run nothing: write the page of what has ended")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Plan, or run what has not ended yet and write the page after each run."""
+    from robocasa_lerobot.data.registry.registry import open_registry
+    from robocasa_lerobot.errors import UserError
+    from robocasa_lerobot.making.estimate import cores_here
+    from robocasa_lerobot.study.costs import cost_lines, costs
+    from robocasa_lerobot.study.page import write_page
+    from robocasa_lerobot.study.runs import CPU, configs_for, runs_of
+    from robocasa_lerobot.study.settings import load_study
+    from robocasa_lerobot.study.stored import read_stored, store
+
+    for name in ("seeds", "workers"):
+        if getattr(args, name) is not None and getattr(args, name) < 1:
+            raise UserError(f"--{name} is {getattr(args, name)}, expected at least 1.")
+    study = load_study(args.config_path, args.seeds)
+    parts = study.chosen(args.parts)
+    root = args.root or Path(study.root if args.device == CPU else f"{study.root}_{args.device}")
+    results = args.results or root / "results"
+    asked = (args.scale, args.episodes)
+    configs = configs_for(args.device, study, root)
+    sets = open_registry(str(configs / study.registry)).task_sets
+    if args.plan:
+        runs, planned = {}, set[str]()
+        for name, part in parts.items():
+            runs[name] = [run for run in runs_of([part], root, configs, *asked) if run.name not in planned]
+            planned |= {run.name for run in runs[name]}
+        cores = args.workers or cores_here()
+        found = costs(study, runs, configs, cores, args.measure)
+        print("\n".join(cost_lines(parts, found, cores, args.device)))
+        return 0
+    whole = runs_of(list(study.parts.values()), root, configs, *asked)
+
+    def report() -> None:
+        there = [read_stored(results, run.experiment, run.seed) for run in whole]
+        stored = {(one.experiment, one.seed): one for one in there if one is not None}
+        write_page(study, stored, sets, results, args.page or results / "results.md")
+
+    wanted = [] if args.report else runs_of(list(parts.values()), root, configs, *asked)
+    for number, run in enumerate(wanted, start=1):
+        if read_stored(results, run.experiment, run.seed) is not None:
+            continue
+        print(f"== {number} of {len(wanted)}: {run.name}", flush=True)
+        run.carry_out(args.workers)
+        print(f"kept: {store(run, results)}", flush=True)
+        report()
+    report()
+    print(f"written: {args.page or results / 'results.md'}")
+    return 0

@@ -1,0 +1,125 @@
+"""What a study takes, told beforehand: demonstrations, hours of each kind of work, and disk."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from robocasa_lerobot.making.estimate import estimate
+from robocasa_lerobot.making.needs import needs_of, parse_episodes
+from robocasa_lerobot.settings import load_yaml
+from robocasa_lerobot.study.runs import Run
+from robocasa_lerobot.study.settings import PartConfig, StudyConfig
+from robocasa_lerobot.training.config.experiment import ExperimentConfig, load_experiment
+from robocasa_lerobot.training.planning.evaluations import plan_evaluations
+from robocasa_lerobot.training.planning.plan import PhasePlan, plan_experiment
+
+# Of one core, a small policy on the CPU, without films (`benchmarks/results/scaling.json`); and the part of their
+# horizons that trials last on average, since those that succeed end before (the demo's: 0.6).
+TRIAL_STEPS_PER_SECOND = 66.0
+PART_OF_HORIZON = 0.6
+
+
+@dataclass(frozen=True)
+class Cost:
+    """Of a part, without what earlier parts have made already.
+
+    Attributes:
+        runs: trainings.
+        demonstrations: to record.
+        data_hours, training_hours, trial_hours: on this machine; None where a training could not be measured.
+        trials: of all runs.
+        longest_hours: the longest single training.
+        size: bytes on disk of datasets and checkpoints.
+    """
+
+    runs: int
+    demonstrations: int
+    data_hours: float
+    training_hours: float | None
+    trials: int
+    trial_hours: float
+    longest_hours: float | None
+    size: int
+
+    @property
+    def hours(self) -> float:
+        """All of it that is known."""
+        return self.data_hours + (self.training_hours or 0.0) + self.trial_hours
+
+
+def costs(
+    study: StudyConfig, runs: Mapping[str, list[Run]], configs: Path, cores: int, measured_steps: int
+) -> dict[str, Cost]:
+    """What each part takes; `runs` are those of each part that no earlier part has.
+
+    Raises:
+        UserError: a mistake in an experiment.
+    """
+    registry = load_yaml(configs / study.registry)
+    pixels = min(int(dataset["make"]["image_size"]) for dataset in registry["datasets"])
+    measured: dict[str, float | str] = {}
+    recorded: set[Path] = set()
+    plans: dict[str, tuple[list[PhasePlan], int, int]] = {}
+    out: dict[str, Cost] = {}
+    for part, own in runs.items():
+        needs = []
+        for run in own:
+            asked = parse_episodes(run.episodes) if run.episodes else {}
+            for need in needs_of(load_experiment(run.write_file(), scale=run.scale), asked)[0]:
+                if need.root not in recorded and need.missing:
+                    recorded.add(need.root)
+                    needs.append(need)
+            if run.experiment not in plans:
+                plans[run.experiment] = _planned(run, pixels, measured_steps, measured)
+        data = estimate(needs, cores)
+        mine = [plans[run.experiment] for run in own]
+        hours = [sum(plan.hours or 0.0 for plan in phases) for phases, _, _ in mine]
+        known = all(plan.hours is not None for phases, _, _ in mine for plan in phases)
+        steps = sum(steps for _, _, steps in mine)
+        out[part] = Cost(
+            runs=len(own),
+            demonstrations=data.demonstrations,
+            data_hours=data.recording_hours + data.converting_hours,
+            training_hours=sum(hours) if known else None,
+            trials=sum(trials for _, trials, _ in mine),
+            trial_hours=steps * PART_OF_HORIZON / TRIAL_STEPS_PER_SECOND / cores / 3600,
+            longest_hours=max((plan.hours or 0.0 for phases, _, _ in mine for plan in phases), default=0.0)
+            if known
+            else None,
+            size=data.size + sum((plan.checkpoint_bytes or 0) * plan.kept for phases, _, _ in mine for plan in phases),
+        )
+    return out
+
+
+def _planned(
+    run: Run, pixels: int, measured_steps: int, measured: dict[str, float | str]
+) -> tuple[list[PhasePlan], int, int]:
+    """Its phases, and the trials and control steps of their evaluations."""
+    experiment: ExperimentConfig = load_experiment(run.write_file(), (f"--loader.image_size={pixels}",), run.scale)
+    phases = plan_experiment(experiment, measured_steps=measured_steps, measured=measured)
+    evaluations = plan_evaluations(experiment, [plan.phase for plan in phases if not plan.left_out])
+    return phases, sum(item.trials for item in evaluations), sum(item.steps for item in evaluations)
+
+
+def cost_lines(parts: Mapping[str, PartConfig], found: Mapping[str, Cost], cores: int, device: str) -> list[str]:
+    """The costs as a table, and their sum."""
+    head = ("part", "runs", "demos", "data h", "training h", "trials", "trials h", "GB")
+    rows = [head]
+    for name, cost in found.items():
+        training = "?" if cost.training_hours is None else f"{cost.training_hours:.1f}"
+        numbers = (str(cost.runs), f"{cost.demonstrations:,}", f"{cost.data_hours:.1f}", training)
+        rows.append((name, *numbers, f"{cost.trials:,}", f"{cost.trial_hours:.1f}", f"{cost.size / 1e9:.1f}"))
+    widths = [max(len(row[column]) for row in rows) for column in range(len(head))]
+    lines = []
+    for row in rows:
+        cells = [row[0].ljust(widths[0]), *(cell.rjust(w) for cell, w in zip(row[1:], widths[1:], strict=True))]
+        lines.append("  ".join(cells))
+        if row is not head:
+            lines.append(f"    {parts[row[0]].asks}")
+    all_hours = sum(cost.hours for cost in found.values())
+    longest = max((cost.longest_hours or 0.0 for cost in found.values()), default=0.0)
+    lines += ["", f"in all about {all_hours:.1f} hours on {cores} core(s) and {device}, what is there left out"]
+    lines += [f"the longest single training: {60 * longest:.0f} minutes"] if longest else []
+    return lines

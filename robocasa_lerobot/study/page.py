@@ -1,0 +1,196 @@
+"""The study's results as a page of Markdown with figures: each question, its answer in a sentence, tables, compute."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+
+from robocasa_lerobot.evaluation.statistics.averages import Estimate, linear_combination
+from robocasa_lerobot.files import write_text
+from robocasa_lerobot.study.figures import draw_curves, draw_rates
+from robocasa_lerobot.study.settings import PartConfig, RowConfig, StudyConfig
+from robocasa_lerobot.study.stored import FILMED_SEED, StoredRun, StoredTrial, stored_folder, strips_name
+from robocasa_lerobot.study.tables import (
+    CellRate,
+    Stored,
+    cell,
+    difference,
+    failure_terms,
+    row_trials,
+    summaries,
+    variants,
+)
+
+Sets = Mapping[str, Sequence[str]]
+_HEAD = """# Results
+
+What small policies learn in our kitchens, and what helps them. Written by `robocasa-lerobot study` from the trials,
+curves and circumstances that are kept in [`{folder}`]({folder}). `make study` makes them again, part by part, from
+nothing but seeds (`configs/study.yaml`). Intervals are 95 % and cover the drawing of trials: what another training
+would change, the seeds beside each other show. Trials of one seed are the same in all rows of a table, and differences
+are computed from these pairs. Published numbers are of policies a thousand times as large, of human demonstrations and
+other kitchens: they show the direction of an effect, no more.
+"""
+
+
+def write_page(study: StudyConfig, stored: Stored, sets: Sets, results: Path, page: Path) -> None:
+    """Write the page, and its figures into the folder of the results.
+
+    Args:
+        study: whose questions they are.
+        stored: the runs that have ended.
+        sets: tasks of each set.
+        results: folder of what was kept.
+        page: Markdown file.
+    """
+    folder = _relative(results, page)
+    lines = [_HEAD.format(folder=folder)]
+    for name, part in study.parts.items():
+        own = {key: run for key, run in stored.items() if key[0] in part.experiments and key[1] < part.seeds}
+        lines += [f"## {part.asks}", ""]
+        lines += [f"Published: {part.published}", ""] if part.published else []
+        if not own:
+            lines += [f"Not run yet: `robocasa-lerobot study {name}`.", ""]
+            continue
+        lines += _part(name, part, own, sets, results, folder)
+    page.parent.mkdir(parents=True, exist_ok=True)
+    write_text(page, "\n".join(lines).rstrip("\n") + "\n")
+
+
+def _part(name: str, part: PartConfig, stored: Stored, sets: Sets, results: Path, folder: str) -> list[str]:
+    there = {row: trials for row in part.rows if (trials := row_trials(part, row, stored))}
+    head = ["", *part.sets, "trials", "each training"]
+    head += [f"against {part.reference}"] if part.reference else []
+    table: list[list[str]] = []
+    rates: dict[str, CellRate] = {}
+    for row, trials in there.items():
+        cells = [cell(trials, sets[task_set]) for task_set in part.sets]
+        first = cells[0]
+        if first is not None:
+            rates[row] = first
+        line = [row, *map(_shown, cells), str(len(trials)), _seeds(first)]
+        if part.reference:
+            apart = part.reference in there and row != part.reference
+            points = difference(trials, there[part.reference], sets[part.sets[0]]) if apart else None
+            line.append(_points(points))
+        table.append(line)
+    lines = [*_answers(part, rates, stored, sets), "", *_markdown(head, table), ""]
+    if part.matrix:
+        lines += _forgetting(part, stored, sets)
+    if part.tasks:
+        lines += _by_task(there, sets[part.sets[0]])
+    figures = (f"{name}_rates.svg", f"{name}_curves.svg")
+    if rates:
+        draw_rates(rates, results / figures[0])
+        lines += [f"![Rates]({folder}/{figures[0]})", ""]
+    draw_curves(stored.values(), results / figures[1])
+    lines += [f"![Losses]({folder}/{figures[1]})", ""]
+    for row in there:
+        lines += _strips(part.rows[row], row, results, folder)
+    terms = failure_terms(trial for trials in there.values() for trial in trials)
+    if terms:
+        listed = "; ".join(f"{task}: `{term}` ({count})" for task, term, count in terms)
+        lines += [f"What most often did not hold at the end of a failed trial: {listed}.", ""]
+    return [*lines, *_circumstances(part, stored.values()), ""]
+
+
+def _answers(part: PartConfig, rates: Mapping[str, CellRate], stored: Stored, sets: Sets) -> list[str]:
+    """A sentence or two, of numbers alone."""
+    if not rates:
+        return ["No row of the table has all its trials yet."]
+    if part.matrix:
+        return [_retained(part, name, row, stored, sets) for name, row in variants(part).items()]
+    best = max(rates, key=lambda row: rates[row].rate.value)
+    said = [f"{row}: {_shown(rate)} of {part.sets[0]}." for row, rate in rates.items()] if len(rates) < 3 else []
+    said += [f"Most: {best}, {_shown(rates[best])}."] if len(rates) >= 3 else []
+    return [" ".join(said)]
+
+
+def _retained(part: PartConfig, name: str, rows: Mapping[int, str], stored: Stored, sets: Sets) -> str:
+    found = summaries(part, stored, sets).get(name)
+    last = max(rows)
+    if found is None or last not in found.matrix:
+        return f"- {name}: not run to its end yet."
+    kept = [found.matrix[last][j] for j in sorted(rows) if j < last and j in found.matrix.get(j, {})]
+    reached = [found.matrix[j][j] for j in sorted(rows) if j < last and j in found.matrix.get(j, {})]
+    after, before = _mean(kept), _mean(reached)
+    share = f", {after.value / before.value:.0%} of it" if before.value else ""
+    return f"- {name}: the earlier phases reached {_percent(before)}, and after the last one {_percent(after)}{share}."
+
+
+def _forgetting(part: PartConfig, stored: Stored, sets: Sets) -> list[str]:
+    last = len(part.sets)
+    rows = []
+    for name, found in summaries(part, stored, sets).items():
+        unseen = [found.matrix[j - 1][j] for j in range(2, last + 1) if j in found.matrix.get(j - 1, {})]
+        forgotten, average = found.forgetting.get(last), found.average.get(last)
+        rows.append([name, *(_points_of(one) for one in (average, forgotten, _mean(unseen) if unseen else None))])
+    head = ["", f"all tasks after phase {last}", "forgetting", "next phase's tasks, before it"]
+    return [*_markdown(head, rows), ""]
+
+
+def _by_task(there: Mapping[str, Sequence[tuple[int, StoredTrial]]], tasks: Sequence[str]) -> list[str]:
+    rows = [[task, *(_shown(cell(trials, [task])) for trials in there.values())] for task in tasks]
+    return [*_markdown(["task", *there], rows), ""]
+
+
+def _strips(row: RowConfig, label: str, results: Path, folder: str) -> list[str]:
+    """The picture of a row's films, where there is one."""
+    place = stored_folder(Path(), row.experiment, FILMED_SEED) / strips_name(row.phase, row.evaluation)
+    if not (results / place).is_file():
+        return []
+    return [f"![{label}: trials that were solved, and others]({folder}/{place.as_posix()})", ""]
+
+
+def _circumstances(part: PartConfig, stored: Iterable[StoredRun]) -> list[str]:
+    runs = list(stored)
+    wanted = len(part.experiments) * part.seeds
+    training = sum(float(run.about["training_hours"]) for run in runs)
+    trying = sum(float(run.about["trial_hours_of_one_process"]) for run in runs)
+    commits = sorted({_short_commit(str(run.about["commit"])) for run in runs})
+    machines = sorted({f"{run.about['machine']['processor']}, {run.about['machine']['cores']} cores" for run in runs})
+    versions = sorted({f"{name} {number}" for run in runs for name, number in run.about["versions"].items()})
+    text = (
+        f"{len(runs)} of {wanted} trainings, {training:.1f} hours of training and {trying:.1f} process-hours of trials "
+        f"on {'; '.join(machines)}; commits {', '.join(commits)}; {', '.join(versions)}."
+    )
+    scales = sorted({str(run.about["scale"]) for run in runs if run.about["scale"]})
+    return [text, *([f"**Tried at the scale {', '.join(scales)}: these numbers mean nothing.**"] if scales else [])]
+
+
+def _short_commit(commit: str) -> str:
+    number, _, dirty = commit.partition("-")
+    return number[:12] + (f"-{dirty}" if dirty else "")
+
+
+def _markdown(head: Sequence[str], rows: Iterable[Sequence[str]]) -> list[str]:
+    rule = "|".join(["---", *("--:" for _ in head[1:])])
+    return [f"|{'|'.join(head)}|", f"|{rule}|", *(f"|{'|'.join(row)}|" for row in rows)]
+
+
+def _shown(found: CellRate | None) -> str:
+    return "" if found is None else _percent(found.rate)
+
+
+def _percent(rate: Estimate) -> str:
+    return f"{100 * rate.value:.0f} % ({100 * rate.low:.0f} to {100 * rate.high:.0f})"
+
+
+def _points(found: Estimate | None) -> str:
+    return "" if found is None else f"{100 * found.value:+.0f} ({100 * found.low:+.0f} to {100 * found.high:+.0f})"
+
+
+def _points_of(found: Estimate | None) -> str:
+    return "" if found is None else _percent(found)
+
+
+def _seeds(found: CellRate | None) -> str:
+    return "" if found is None else ", ".join(f"{100 * rate:.0f}" for rate in found.seeds)
+
+
+def _mean(parts: Sequence[Estimate]) -> Estimate:
+    return linear_combination(parts, [1 / len(parts)] * len(parts))
+
+
+def _relative(results: Path, page: Path) -> str:
+    return results.resolve().relative_to(page.parent.resolve(), walk_up=True).as_posix()

@@ -1,0 +1,143 @@
+"""The trainings of a study: one for each experiment and seed, run by the commands that anyone would type."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from robocasa_lerobot.config_files import configs_folder
+from robocasa_lerobot.errors import UserError
+from robocasa_lerobot.files import write_text
+from robocasa_lerobot.settings import load_yaml
+from robocasa_lerobot.study.settings import EXPERIMENTS, PartConfig, StudyConfig
+from robocasa_lerobot.training.config.experiment import load_experiment
+
+CPU, CUDA = "cpu", "cuda"
+DEVICES = (CPU, CUDA)
+_GPU_PIXELS = 128  # of the pictures that are recorded for a GPU
+_POLICY, _GPU_POLICY = "study_policy.yaml", "study_gpu.yaml"  # in configs/experiments/parts
+
+
+class StoppedError(UserError):
+    """A command of a run ended before its end; the same study goes on there."""
+
+
+@dataclass(frozen=True)
+class Run:
+    """An experiment with a seed.
+
+    Attributes:
+        experiment: file in `configs/experiments/study/`, without its ending.
+        seed: of the training and of its trials; demonstrations are the same for all.
+        root: folder of all trainings.
+        configs: folder with `experiments/`.
+        scale: to try it; see `train --scale`.
+        episodes: demonstrations by kind, `KIND=N,...`, instead of the registry's; see `data --episodes`.
+    """
+
+    experiment: str
+    seed: int
+    root: Path
+    configs: Path
+    scale: str | None = None
+    episodes: str | None = None
+
+    @property
+    def name(self) -> str:
+        """Unlike that of any other run."""
+        return f"{self.experiment}/seed_{self.seed}"
+
+    @property
+    def folder(self) -> Path:
+        """Of its phases, with their checkpoints and evaluations."""
+        return self.root / self.experiment / f"seed_{self.seed}"
+
+    @property
+    def file(self) -> Path:
+        """Its experiment file, which `train` and `data` take."""
+        return self.root / "experiments" / f"{self.experiment}-seed_{self.seed}.yaml"
+
+    def write_file(self) -> Path:
+        """Write that file and return its path."""
+        base = self.configs / "experiments" / EXPERIMENTS / f"{self.experiment}.yaml"
+        if not base.is_file():
+            raise UserError(f"the study names the experiment {self.experiment!r}; there is no {base}.")
+        # Other trials with each seed: three trainings tried in the same kitchens would say less.
+        phases = [
+            {"name": phase.name, "evaluations": [f"{text} --seed={self.seed}" for text in phase.evaluations]}
+            for phase in load_experiment(base).phases
+        ]
+        content = {"base": str(base.absolute()), "seed": self.seed, "output_dir": str(self.folder), "phases": phases}
+        self.file.parent.mkdir(parents=True, exist_ok=True)
+        write_text(self.file, yaml.safe_dump(content, sort_keys=False))
+        return self.file
+
+    def commands(self, workers: int | None) -> list[list[str]]:
+        """Arguments of `robocasa-lerobot` that make its data, train it, and try what it has learnt."""
+        scale = [] if self.scale is None else [f"--scale={self.scale}"]
+        made = [] if workers is None else [f"--workers={workers}"]
+        made += [] if self.episodes is None else [f"--episodes={self.episodes}"]
+        return [
+            ["data", str(self.file), "--make", *made, *scale],
+            ["train", f"--config_path={self.file}", "--evaluate", *scale],
+        ]
+
+    def carry_out(self, workers: int | None) -> None:
+        """Run its commands; what is finished takes seconds.
+
+        Raises:
+            StoppedError: one did not end well; its own message stands above.
+        """
+        self.write_file()
+        for command in self.commands(workers):
+            done = subprocess.run([sys.executable, "-m", "robocasa_lerobot.cli", *command], check=False)
+            if done.returncode:
+                raise StoppedError(
+                    f"{self.name}: `robocasa-lerobot {' '.join(command)}` ended with status {done.returncode}; "
+                    "the same study goes on there."
+                )
+
+
+def runs_of(
+    parts: Sequence[PartConfig],
+    root: Path,
+    configs: Path,
+    scale: str | None = None,
+    episodes: str | None = None,
+) -> list[Run]:
+    """The runs of parts, each once, part by part; all seeds of an experiment after each other."""
+    found: dict[tuple[str, int], Run] = {}
+    for part in parts:
+        for experiment in part.experiments:
+            for seed in range(part.seeds):
+                found.setdefault((experiment, seed), Run(experiment, seed, root, configs, scale, episodes))
+    return list(found.values())
+
+
+def configs_for(device: str, study: StudyConfig, root: Path) -> Path:
+    """The folder of configuration files for a device: the package's own, or for a GPU a copy in `root`.
+
+    In the copy the larger policy stands in the place of the small one, and recorded pictures are of 128 pixels, in a
+    dataset folder of their own.
+    """
+    configs = configs_folder()
+    if device == CPU:
+        return configs
+    copy = root / "configs"
+    shutil.copytree(configs, copy, dirs_exist_ok=True)
+    parts = copy / "experiments" / "parts"
+    shutil.copyfile(parts / _GPU_POLICY, parts / _POLICY)
+    registry = copy / study.registry
+    content: dict[str, Any] = load_yaml(registry)
+    content["root"] = f"{content['root']}_{_GPU_PIXELS}"
+    for dataset in content["datasets"]:
+        dataset["make"]["image_size"] = max(_GPU_PIXELS, int(dataset["make"]["image_size"]) * 2)
+    write_text(registry, yaml.safe_dump(content, sort_keys=False))
+    return copy

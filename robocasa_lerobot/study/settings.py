@@ -1,0 +1,124 @@
+"""A study as typed configuration: questions, the experiments that answer them, and the rows of their tables.
+
+`configs/study.yaml` is the package's own.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from robocasa_lerobot.config_files import configs_folder
+from robocasa_lerobot.errors import UnknownNameError, UserError
+from robocasa_lerobot.settings import decode, load_yaml
+
+EXPERIMENTS = "study"  # folder in configs/experiments/
+FILE = "study.yaml"
+
+
+@dataclass(frozen=True)
+class RowConfig:
+    """A row of a table: the trials of one evaluation of a phase, over all seeds.
+
+    Attributes:
+        experiment: file in `configs/experiments/study/`, without its ending.
+        phase: of the experiment.
+        evaluation: of the phase, by the name of its file.
+    """
+
+    experiment: str
+    phase: str
+    evaluation: str
+
+
+@dataclass(frozen=True)
+class PartConfig:
+    """A question and its table.
+
+    Attributes:
+        asks: the question.
+        rows: by their labels, in order.
+        sets: task sets of the registry, a column each.
+        seeds: trainings of each experiment, with the seeds from 0 on.
+        tasks: whether each task has a row in a table of its own.
+        reference: row that all others are compared with.
+        published: what the benchmark's paper found.
+        matrix: whether the rows are phases of lifelong learning, `NAME, after phase K`, and the sets those phases'.
+    """
+
+    asks: str
+    rows: dict[str, RowConfig]
+    sets: list[str]
+    seeds: int = 3
+    tasks: bool = False
+    reference: str | None = None
+    published: str = ""
+    matrix: bool = False
+
+    def __post_init__(self) -> None:
+        if not self.rows or not self.sets or self.seeds < 1:
+            raise UserError(f"part {self.asks!r}: expected rows, sets, and at least one seed.")
+        if self.reference is not None and self.reference not in self.rows:
+            raise UnknownNameError("row", self.reference, self.rows, f"(`reference` of the part {self.asks!r})")
+
+    @property
+    def experiments(self) -> tuple[str, ...]:
+        """Names of its experiments, each once."""
+        return tuple(dict.fromkeys(row.experiment for row in self.rows.values()))
+
+
+@dataclass(frozen=True)
+class StudyConfig:
+    """A study file.
+
+    Attributes:
+        root: folder of the trainings.
+        registry: of the data and task sets, counted from `configs/`.
+        parts: by name, in the order in which they are run.
+    """
+
+    root: str
+    registry: str
+    parts: dict[str, PartConfig] = field(default_factory=dict)
+
+    def chosen(self, names: Sequence[str]) -> dict[str, PartConfig]:
+        """The parts of these names, in the study's order; all without names.
+
+        Raises:
+            UnknownNameError: there is no such part.
+        """
+        for name in names:
+            if name not in self.parts:
+                raise UnknownNameError("part of the study", name, self.parts)
+        return {name: part for name, part in self.parts.items() if not names or name in names}
+
+
+def load_study(path: Path | None = None, seeds: int | None = None) -> StudyConfig:
+    """The study of a file, the package's own by default; with `seeds` all parts have so many.
+
+    Raises:
+        UserError: no such file, an unknown key, or a value that does not fit.
+    """
+    file = path or configs_folder() / FILE
+    data = load_yaml(file)
+    _check_keys(StudyConfig, data, file)
+    for part in (data.get("parts") or {}).values():
+        _check_keys(PartConfig, part, file)
+        for row in (part.get("rows") or {}).values():
+            _check_keys(RowConfig, row, file)
+    study = decode(StudyConfig, data, str(file))
+    if seeds is None:
+        return study
+    parts = {name: dataclasses.replace(part, seeds=seeds) for name, part in study.parts.items()}
+    return dataclasses.replace(study, parts=parts)
+
+
+def _check_keys(kind: type, data: object, file: Path) -> None:
+    known = [f.name for f in dataclasses.fields(kind)]
+    if not isinstance(data, Mapping):
+        raise UserError(f"{file}: found {data!r}, expected a mapping with {', '.join(known)}.")
+    for key in data:
+        if key not in known:
+            raise UnknownNameError("key", str(key), known, f"(in {file})")

@@ -1,0 +1,188 @@
+"""What is kept of a run when its checkpoints are gone: trials, curves, circumstances, and a picture of its films."""
+
+from __future__ import annotations
+
+import csv
+import dataclasses
+import gzip
+import io
+import json
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from robocasa_lerobot.errors import UserError
+from robocasa_lerobot.evaluation.records.results import TrialRecord, read_results
+from robocasa_lerobot.files import write_text, written_aside
+from robocasa_lerobot.provenance import git_commit, machine, utc_now, versions
+from robocasa_lerobot.study.runs import Run
+from robocasa_lerobot.study.strips import write_strips
+from robocasa_lerobot.training.config.experiment import load_experiment
+from robocasa_lerobot.training.metrics import METRICS, read_lines
+from robocasa_lerobot.training.planning.evaluations import FOLDER
+
+TRIALS, CURVES, ABOUT = "trials.csv.gz", "curves.csv", "about.json"
+FILMED_SEED = 0  # whose film strips are kept
+_CURVE_POINTS = 100  # of each phase
+
+
+@dataclass(frozen=True)
+class StoredTrial:
+    """A trial in short; `failed` are the terms of the goal that did not hold at its end."""
+
+    phase: str
+    evaluation: str
+    task: str
+    trial: int
+    seed: int
+    layout_id: int | None
+    style_id: int | None
+    success: bool
+    steps: int
+    outcome: str
+    failed: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class StoredRun:
+    """A run that has ended.
+
+    Attributes:
+        experiment, seed: which one.
+        trials: of all its evaluations.
+        about: commit, versions, machine, hours.
+        curves: rows of phase, step and loss.
+    """
+
+    experiment: str
+    seed: int
+    trials: tuple[StoredTrial, ...]
+    about: dict[str, Any]
+    curves: tuple[tuple[str, int, float], ...]
+
+
+def stored_folder(results: Path, experiment: str, seed: int) -> Path:
+    """Where a run's files lie."""
+    return results / experiment / f"seed_{seed}"
+
+
+def strips_name(phase: str, evaluation: str) -> str:
+    """The picture of an evaluation's film strips, in the folder of its run."""
+    return f"{phase}-{evaluation}.jpg"
+
+
+def store(run: Run, results: Path) -> Path:
+    """Keep a run that has ended; its folder. The last file written is `about.json`: with it, all are there.
+
+    Raises:
+        UserError: a phase has no finished evaluation that its experiment asks for.
+    """
+    experiment = load_experiment(run.file, scale=run.scale)
+    out = stored_folder(results, run.experiment, run.seed)
+    trials: list[StoredTrial] = []
+    curves: list[tuple[str, int, float]] = []
+    training = trying = 0.0
+    for phase in experiment.phases:
+        folder = run.folder / phase.name
+        lines = read_lines(folder / METRICS)
+        training += sum(_seconds(lines))
+        thinned = lines[:: max(1, len(lines) // _CURVE_POINTS)]
+        curves += [(phase.name, int(line["step"]), float(line["loss"])) for line in thinned]
+        for text in phase.evaluations:
+            name = text.split()[0]
+            if not (folder / FOLDER / name / "finished").is_file():
+                raise UserError(f"{run.name}: the evaluation {name} of phase {phase.name} is not finished.")
+            records = read_results(folder / FOLDER / name).trials
+            trials += [_short(phase.name, name, record) for record in records]
+            trying += sum(record.seconds.total for record in records)
+            if run.seed == FILMED_SEED:
+                write_strips(folder / FOLDER / name, records, out / strips_name(phase.name, name))
+    out.mkdir(parents=True, exist_ok=True)
+    _write_trials(out / TRIALS, trials)
+    rows = ["phase,step,loss", *(f"{phase},{step},{loss:.6g}" for phase, step, loss in curves)]
+    write_text(out / CURVES, "\n".join(rows) + "\n")
+    about = {
+        "experiment": run.experiment,
+        "seed": run.seed,
+        "scale": run.scale,
+        "commit": git_commit(),
+        "versions": versions("lerobot", "torch", "mujoco"),
+        "machine": machine(),
+        "device": experiment.device,
+        "steps": {phase.name: phase.steps for phase in experiment.phases},
+        "training_hours": round(training / 3600, 3),
+        "trial_hours_of_one_process": round(trying / 3600, 3),
+        "ended": utc_now(),
+    }
+    write_text(out / ABOUT, json.dumps(about, indent=1) + "\n")
+    return out
+
+
+def read_stored(results: Path, experiment: str, seed: int) -> StoredRun | None:
+    """A run that was kept; None where none was."""
+    folder = stored_folder(results, experiment, seed)
+    if not (folder / ABOUT).is_file():
+        return None
+    about = json.loads((folder / ABOUT).read_text(encoding="utf-8"))
+    text = gzip.decompress((folder / TRIALS).read_bytes()).decode()
+    trials = tuple(_read_trial(row) for row in csv.DictReader(io.StringIO(text)))
+    with (folder / CURVES).open(encoding="utf-8", newline="") as file:
+        curves = tuple((row["phase"], int(row["step"]), float(row["loss"])) for row in csv.DictReader(file))
+    return StoredRun(experiment, seed, trials, about, curves)
+
+
+def _seconds(lines: Iterable[dict[str, Any]]) -> Iterable[float]:
+    before = 0
+    for line in lines:
+        yield float(line["seconds_per_step"]) * (int(line["step"]) - before)
+        before = int(line["step"])
+
+
+def _short(phase: str, evaluation: str, record: TrialRecord) -> StoredTrial:
+    failed = tuple(name for name, term in record.terms.items() if not term.final) if not record.success else ()
+    return StoredTrial(
+        phase,
+        evaluation,
+        record.task,
+        record.trial,
+        record.seed,
+        record.layout_id,
+        record.style_id,
+        record.success,
+        record.steps,
+        record.outcome,
+        failed,
+    )
+
+
+def _write_trials(path: Path, trials: Iterable[StoredTrial]) -> None:
+    """Packed; the same trials give the same bytes."""
+    text = io.StringIO()
+    names = [field.name for field in dataclasses.fields(StoredTrial)]
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(names)
+    for trial in sorted(trials, key=lambda one: (one.phase, one.evaluation, one.task, one.trial)):
+        values = {**dataclasses.asdict(trial), "failed": "+".join(trial.failed), "success": int(trial.success)}
+        writer.writerow(["" if values[name] is None else values[name] for name in names])
+    with written_aside(path) as aside:
+        aside.write_bytes(gzip.compress(text.getvalue().encode(), mtime=0))
+
+
+def _read_trial(row: dict[str, str]) -> StoredTrial:
+    def number(name: str) -> int | None:
+        return int(row[name]) if row[name] else None
+
+    return StoredTrial(
+        phase=row["phase"],
+        evaluation=row["evaluation"],
+        task=row["task"],
+        trial=int(row["trial"]),
+        seed=int(row["seed"]),
+        layout_id=number("layout_id"),
+        style_id=number("style_id"),
+        success=row["success"] == "1",
+        steps=int(row["steps"]),
+        outcome=row["outcome"],
+        failed=tuple(row["failed"].split("+")) if row["failed"] else (),
+    )

@@ -1,0 +1,111 @@
+"""The numbers of a study: rates of rows and columns over all seeds, with intervals, and what rows differ by."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from robocasa_lerobot.evaluation.statistics.averages import Estimate, average_over_tasks
+from robocasa_lerobot.evaluation.statistics.lifelong import Lifelong, lifelong
+from robocasa_lerobot.evaluation.statistics.paired import paired_difference
+from robocasa_lerobot.study.settings import PartConfig
+from robocasa_lerobot.study.stored import StoredRun, StoredTrial
+
+Stored = Mapping[tuple[str, int], StoredRun]  # by experiment and seed
+_AFTER = ", after phase "
+
+
+@dataclass(frozen=True)
+class CellRate:
+    """Mean rate of some tasks over all seeds.
+
+    Attributes:
+        rate: with its 95 % interval, which covers the drawing of trials, not that of trainings.
+        trials: in all.
+        seeds: the mean rate of each training.
+    """
+
+    rate: Estimate
+    trials: int
+    seeds: tuple[float, ...]
+
+
+def row_trials(part: PartConfig, row: str, stored: Stored) -> list[tuple[int, StoredTrial]]:
+    """Trials of a row, each with its run's seed."""
+    wanted = part.rows[row]
+    return [
+        (seed, trial)
+        for (experiment, seed), run in sorted(stored.items())
+        if experiment == wanted.experiment and seed < part.seeds
+        for trial in run.trials
+        if (trial.phase, trial.evaluation) == (wanted.phase, wanted.evaluation)
+    ]
+
+
+def cell(trials: Sequence[tuple[int, StoredTrial]], tasks: Iterable[str]) -> CellRate | None:
+    """The rate of these tasks; None where one of them was not tried."""
+    counts = [_count([trial for _, trial in trials if trial.task == task]) for task in tasks]
+    if not counts or any(n == 0 for _, n in counts):
+        return None
+    seeds = sorted({seed for seed, _ in trials})
+    each = []
+    for seed in seeds:
+        own = [_count([trial for s, trial in trials if s == seed and trial.task == task]) for task in tasks]
+        each.append(float(np.mean([solved / n for solved, n in own if n])) if any(n for _, n in own) else float("nan"))
+    return CellRate(average_over_tasks(counts), sum(n for _, n in counts), tuple(each))
+
+
+def difference(
+    one: Sequence[tuple[int, StoredTrial]], other: Sequence[tuple[int, StoredTrial]], tasks: Iterable[str]
+) -> Estimate | None:
+    """Rate of `one` minus rate of `other` over the trials that both have; None where they share none."""
+    kept = tuple(tasks)
+    pairs: dict[str, tuple[list[bool], list[bool]]] = {}
+    theirs = {(seed, trial.task, trial.trial, trial.seed): trial.success for seed, trial in other}
+    for seed, trial in one:
+        key = (seed, trial.task, trial.trial, trial.seed)
+        if trial.task in kept and key in theirs:
+            own = pairs.setdefault(trial.task, ([], []))
+            own[0].append(theirs[key])
+            own[1].append(trial.success)
+    if not pairs:
+        return None
+    return paired_difference({task: (np.array(a), np.array(b)) for task, (a, b) in pairs.items()})
+
+
+def variants(part: PartConfig) -> dict[str, dict[int, str]]:
+    """Of a part with `matrix`: the rows of each variant, by phase."""
+    found: dict[str, dict[int, str]] = {}
+    for row in part.rows:
+        name, _, phase = row.rpartition(_AFTER)
+        found.setdefault(name, {})[int(phase)] = row
+    return found
+
+
+def summaries(part: PartConfig, stored: Stored, sets: Mapping[str, Sequence[str]]) -> dict[str, Lifelong]:
+    """Of a part with `matrix`: what each variant of which there are trials gained and forgot, over all seeds."""
+    found = {}
+    for name, rows in variants(part).items():
+        counts: dict[int, dict[int, list[tuple[int, int]]]] = {}
+        for phase, row in rows.items():
+            trials = [trial for _, trial in row_trials(part, row, stored)]
+            for number, task_set in enumerate(part.sets, start=1):
+                own = [_count([trial for trial in trials if trial.task == task]) for task in sets[task_set]]
+                if all(n for _, n in own):
+                    counts.setdefault(phase, {})[number] = own
+        if counts:
+            found[name] = lifelong(counts)
+    return found
+
+
+def failure_terms(trials: Iterable[tuple[int, StoredTrial]], most: int = 5) -> list[tuple[str, str, int]]:
+    """The terms of goals that kept most trials from success: task, term, trials."""
+    counts = Counter((trial.task, term) for _, trial in trials for term in trial.failed)
+    return [(task, term, n) for (task, term), n in counts.most_common(most)]
+
+
+def _count(trials: Sequence[StoredTrial]) -> tuple[int, int]:
+    return sum(trial.success for trial in trials), len(trials)

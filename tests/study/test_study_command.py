@@ -1,0 +1,92 @@
+"""`robocasa-lerobot study`, as users type it."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from robocasa_lerobot.config_files import configs_folder
+from robocasa_lerobot.study.runs import configs_for, runs_of
+from robocasa_lerobot.study.settings import load_study
+from robocasa_lerobot.training.config.experiment import load_experiment
+
+TINY = ("--scale=tiny", "--episodes=pretrain=1,target=1,few=1", "--seeds=1", "--measure=0")
+
+
+def study(folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, "-m", "robocasa_lerobot.cli", "study", *arguments]
+    environment = {**os.environ, "HF_HUB_OFFLINE": "1"}
+    return subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True, check=False)
+
+
+def test_the_plan_tells_what_each_part_takes(tmp_path: Path) -> None:
+    done = study(tmp_path, "--plan", "--measure=0", "multitask", "lifelong")
+    assert done.returncode == 0, done.stderr
+    lines = {line.split()[0]: line.split() for line in done.stdout.splitlines() if line and not line.startswith(" ")}
+    assert lines["multitask"][1:3] == ["3", "1,800"]
+    assert lines["lifelong"][1:3] == ["12", "0"], "its data are the first part's"
+    assert lines["multitask"][4] == "?", "trainings were not measured"
+    assert not (tmp_path / "datasets").exists()
+
+
+def test_a_misspelt_part_is_told(tmp_path: Path) -> None:
+    done = study(tmp_path, "multitsk")
+    assert done.returncode == 2
+    assert "multitask" in done.stderr
+
+
+def test_trials_differ_between_seeds_and_data_do_not(tmp_path: Path) -> None:
+    whole = load_study()
+    runs = runs_of([whole.parts["multitask"]], tmp_path, configs_folder())
+    assert [run.name for run in runs] == ["multitask/seed_0", "multitask/seed_1", "multitask/seed_2"]
+    first, second = (load_experiment(run.write_file()) for run in runs[:2])
+    assert (first.seed, second.seed) == (0, 1)
+    assert first.phases[0].mixture == second.phases[0].mixture
+    assert [text.split()[-1] for text in second.phases[0].evaluations] == ["--seed=1", "--seed=1"]
+    assert Path(second.output_dir) == tmp_path / "multitask" / "seed_1"
+
+
+def test_parts_share_their_runs() -> None:
+    parts = load_study().parts
+    runs = runs_of([parts["recipes"], parts["quality"]], Path("r"), configs_folder())
+    assert len({run.name for run in runs}) == len(runs)
+    assert sum(run.experiment == "quality_varied" for run in runs) == 3
+
+
+def test_on_a_gpu_every_experiment_has_the_larger_policy_and_pictures(tmp_path: Path) -> None:
+    whole = load_study()
+    configs = configs_for("cuda", whole, tmp_path)
+    for run in runs_of(list(whole.parts.values()), tmp_path, configs):
+        experiment = load_experiment(run.write_file())
+        assert (experiment.device, experiment.mixed_precision) == ("cuda", "bf16")
+        registry = Path(str(experiment.registry))
+        assert registry.is_relative_to(tmp_path)
+    text = (configs / whole.registry).read_text(encoding="utf-8")
+    assert "image_size: 64" not in text
+    assert "root: datasets/study_128" in text
+    assert "study_gpu" not in (configs_folder() / "experiments/parts/study_policy.yaml").read_text(encoding="utf-8")
+
+
+@pytest.mark.slow
+@pytest.mark.render
+@pytest.mark.parametrize("part", load_study().parts)
+def test_a_part_runs_from_data_to_its_table(part: str, tmp_path: Path) -> None:
+    done = study(tmp_path, part, *TINY)
+    assert done.returncode == 0, done.stderr[-3000:]
+    results = tmp_path / "outputs/study/results"
+    page = (results / "results.md").read_text(encoding="utf-8")
+    assert "these numbers mean nothing" in page
+    config = load_study(seeds=1).parts[part]
+    for experiment in config.experiments:
+        about = json.loads((results / experiment / "seed_0/about.json").read_text(encoding="utf-8"))
+        assert about["scale"]
+    for row in config.rows:
+        assert f"|{row}|" in page, "every row has trials"
+    again = study(tmp_path, part, *TINY)
+    assert again.returncode == 0
+    assert "==" not in again.stdout, "what has ended is not run again"

@@ -1,0 +1,146 @@
+"""What is computed from stored runs, against numbers worked out by hand, and the page that shows them."""
+
+from __future__ import annotations
+
+import dataclasses
+from pathlib import Path
+
+import pytest
+
+from robocasa_lerobot.errors import UserError
+from robocasa_lerobot.study import stored as files
+from robocasa_lerobot.study.page import write_page
+from robocasa_lerobot.study.settings import PartConfig, RowConfig, StudyConfig
+from robocasa_lerobot.study.stored import StoredRun, StoredTrial, read_stored
+from robocasa_lerobot.study.tables import cell, difference, failure_terms, row_trials, summaries
+
+SETS = {"both": ["A", "B"], "first": ["A"], "second": ["B"]}
+ABOUT = {
+    "commit": "0123456789abcdef-dirty",
+    "versions": {"torch": "1"},
+    "machine": {"processor": "P", "cores": "2"},
+    "scale": None,
+    "training_hours": 1.5,
+    "trial_hours_of_one_process": 0.25,
+}
+
+
+def trials(phase: str, outcomes: dict[str, str], evaluation: str = "study_target") -> list[StoredTrial]:
+    """A trial for each letter: `+` solved, `-` not."""
+    return [
+        StoredTrial(
+            phase, evaluation, task, number, 100 + number, 1, 2, mark == "+", 50, "finished", ("open",) * (mark == "-")
+        )
+        for task, marks in outcomes.items()
+        for number, mark in enumerate(marks)
+    ]
+
+
+def run(experiment: str, seed: int, *phases: list[StoredTrial]) -> StoredRun:
+    curve = tuple((phase[0].phase, step, 1 / step) for phase in phases for step in (1, 2))
+    return StoredRun(experiment, seed, tuple(trial for phase in phases for trial in phase), ABOUT, curve)
+
+
+def row(experiment: str, phase: str = "train") -> RowConfig:
+    return RowConfig(experiment, phase, "study_target")
+
+
+PART = PartConfig("Which?", {"few": row("few"), "many": row("many")}, ["both", "first"], 2, tasks=True, reference="few")
+RUNS = [
+    run("few", 0, trials("train", {"A": "++--", "B": "----"})),
+    run("few", 1, trials("train", {"A": "+---", "B": "----"})),
+    run("many", 0, trials("train", {"A": "++++", "B": "++--"})),
+    run("many", 1, trials("train", {"A": "+++-", "B": "+---"})),
+    run("many", 2, trials("train", {"A": "++++", "B": "++++"})),  # a seed that the part does not have
+]
+STORED = {(one.experiment, one.seed): one for one in RUNS}
+
+
+def test_rates_are_means_over_tasks_and_seeds() -> None:
+    few, many = (row_trials(PART, name, STORED) for name in PART.rows)
+    assert len(few) == len(many) == 16
+    found = cell(many, SETS["both"])
+    assert found is not None
+    assert found.rate.value == pytest.approx((7 / 8 + 3 / 8) / 2)
+    assert found.seeds == pytest.approx((0.75, 0.5))
+    assert found.trials == 16
+    assert cell(few, ["A", "C"]) is None, "a task that was not tried"
+    apart = difference(many, few, SETS["both"])
+    assert apart is not None
+    assert apart.value == pytest.approx((4 / 8 + 3 / 8) / 2)
+    assert apart.low < apart.value < apart.high
+    assert difference(many, [], SETS["both"]) is None
+    assert failure_terms(few)[0] == ("B", "open", 8)
+
+
+def test_forgetting_of_two_phases() -> None:
+    rows = {f"plain, after phase {k}": row("lifelong", f"phase{k}") for k in (1, 2)}
+    part = PartConfig("What?", rows, ["first", "second"], 1, matrix=True)
+    phases = [trials("phase1", {"A": "++++", "B": "+---"}), trials("phase2", {"A": "+---", "B": "++--"})]
+    found = summaries(part, {("lifelong", 0): run("lifelong", 0, *phases)}, SETS)["plain"]
+    assert found.forgetting[2].value == pytest.approx(0.75)
+    assert found.average[2].value == pytest.approx((0.25 + 0.5) / 2)
+    assert found.matrix[1][2].value == pytest.approx(0.25), "the next phase's tasks, before it"
+
+
+def test_a_stored_run_comes_back_as_it_was(tmp_path: Path) -> None:
+    one = RUNS[0].trials[0]
+    kept = [one, dataclasses.replace(one, trial=1, layout_id=None, success=False, failed=("open", "let go"))]
+    folder = files.stored_folder(tmp_path, "few", 0)
+    folder.mkdir(parents=True)
+    files._write_trials(folder / files.TRIALS, kept)
+    (folder / files.CURVES).write_text("phase,step,loss\ntrain,1,0.5\n")
+    assert read_stored(tmp_path, "few", 0) is None, "without its last file it has not ended"
+    (folder / files.ABOUT).write_text('{"scale": null}')
+    found = read_stored(tmp_path, "few", 0)
+    assert found is not None
+    assert list(found.trials) == kept
+    assert found.curves == (("train", 1, 0.5),)
+    packed = (folder / files.TRIALS).read_bytes()
+    files._write_trials(folder / files.TRIALS, kept[::-1])
+    assert (folder / files.TRIALS).read_bytes() == packed
+
+
+def test_the_page_has_rates_differences_and_circumstances(tmp_path: Path) -> None:
+    study = StudyConfig("r", "x", {"amount": PART, "later": PartConfig("When?", {"one": row("other")}, ["both"])})
+    results, page = tmp_path / "results", tmp_path / "results.md"
+    write_page(study, STORED, SETS, results, page)
+    text = page.read_text(encoding="utf-8")
+    assert "|many|62 % (" in text
+    assert "|75, 50|+44 (" in text
+    assert "|B|0 % (0 to 32)|38 % (" in text
+    assert "4 of 4 trainings, 6.0 hours of training" in text
+    assert "0123456789ab-dirty" in text
+    assert "Not run yet: `robocasa-lerobot study later`." in text
+    for figure in ("amount_rates.svg", "amount_curves.svg"):
+        assert f"(results/{figure})" in text
+        assert (results / figure).read_text(encoding="utf-8").startswith("<?xml")
+    before = (results / "amount_rates.svg").read_bytes()
+    write_page(study, STORED, SETS, results, page)
+    assert (results / "amount_rates.svg").read_bytes() == before
+    small = {key: dataclasses.replace(one, about={**ABOUT, "scale": {"name": "tiny"}}) for key, one in STORED.items()}
+    write_page(study, small, SETS, results, page)
+    assert "these numbers mean nothing" in page.read_text(encoding="utf-8")
+
+
+def test_the_table_of_phases(tmp_path: Path) -> None:
+    rows = {f"plain, after phase {k}": row("lifelong", f"phase{k}") for k in (1, 2)}
+    part = PartConfig("What?", rows, ["first", "second"], 1, matrix=True)
+    phases = [trials("phase1", {"A": "++++", "B": "+---"}), trials("phase2", {"A": "+---", "B": "++--"})]
+    stored = {("lifelong", 0): run("lifelong", 0, *phases)}
+    write_page(StudyConfig("r", "x", {"lifelong": part}), stored, SETS, tmp_path / "results", tmp_path / "page.md")
+    text = (tmp_path / "page.md").read_text(encoding="utf-8")
+    assert (
+        "plain: the earlier phases reached 100 % (51 to 100), and after the last one 25 % (5 to 70), 25% of it." in text
+    )
+    assert "|plain|38 % (" in text
+
+
+def test_an_unfinished_evaluation_is_not_stored(tmp_path: Path) -> None:
+    from robocasa_lerobot.config_files import configs_folder
+    from robocasa_lerobot.study.runs import Run
+
+    one = Run("multitask", 0, tmp_path, configs_folder())
+    one.write_file()
+    with pytest.raises(UserError, match="study_target of phase multitask is not finished"):
+        files.store(one, tmp_path / "results")

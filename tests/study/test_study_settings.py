@@ -1,0 +1,80 @@
+"""The package's study: every row of every table is a phase of an experiment that there is, with its evaluation."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+import yaml
+
+from robocasa_lerobot.config_files import config_names, configs_folder
+from robocasa_lerobot.data.registry.registry import open_registry
+from robocasa_lerobot.errors import UnknownNameError, UserError
+from robocasa_lerobot.study.settings import EXPERIMENTS, load_study
+from robocasa_lerobot.training.config.experiment import load_experiment
+from robocasa_lerobot.training.planning.evaluations import phase_evaluations
+
+STUDY = load_study()
+ROWS = [(part, row) for part, config in STUDY.parts.items() for row in config.rows]
+
+
+@pytest.mark.parametrize(("part", "row"), ROWS, ids=lambda value: value.replace(" ", "_"))
+def test_a_row_is_a_phase_with_its_evaluation(part: str, row: str) -> None:
+    wanted = STUDY.parts[part].rows[row]
+    experiment = load_experiment(configs_folder() / "experiments" / EXPERIMENTS / f"{wanted.experiment}.yaml")
+    names = [evaluation.name for evaluation in phase_evaluations(experiment.phase(wanted.phase))]
+    assert wanted.evaluation in names
+
+
+@pytest.mark.parametrize("part", STUDY.parts)
+def test_the_evaluations_of_a_part_try_the_tasks_of_its_columns(part: str) -> None:
+    sets = open_registry(str(configs_folder() / STUDY.registry)).task_sets
+    config = STUDY.parts[part]
+    tried: dict[str, set[str]] = {}
+    for row, wanted in config.rows.items():
+        experiment = load_experiment(configs_folder() / "experiments" / EXPERIMENTS / f"{wanted.experiment}.yaml")
+        for evaluation in phase_evaluations(experiment.phase(wanted.phase)):
+            if evaluation.name == wanted.evaluation:
+                named = next(text for text in evaluation.settings if text.startswith("--env.task_sets="))
+                own = {task for name in named.partition("=")[2].split(",") for task in sets[name]}
+                tried[row] = own
+    columns = {task for name in config.sets for task in sets[name]}
+    if config.matrix:  # the last phases' tasks come later
+        assert set().union(*tried.values()) == columns
+    else:
+        assert {row for row, own in tried.items() if columns <= own} == set(config.rows)
+
+
+def test_every_experiment_of_the_study_is_in_it() -> None:
+    named = {experiment for part in STUDY.parts.values() for experiment in part.experiments}
+    start = f"{EXPERIMENTS}/"
+    there = {name.removeprefix(start) for name in config_names("experiments") if name.startswith(start)}
+    assert named == there
+
+
+def test_lifelong_phases_and_the_two_groups_share_out_the_tasks() -> None:
+    sets = open_registry(str(configs_folder() / STUDY.registry)).task_sets
+    phases = [task for number in range(1, 5) for task in sets[f"study_phase{number}"]]
+    assert sorted(phases) == sorted(sets["study_12"]) == sorted([*sets["study_10"], *sets["study_2"]])
+    assert set(sets["study_4"]) | set(sets["study_pick_place"]) <= set(sets["study_12"])
+
+
+def test_wrong_studies_are_refused(tmp_path: Path) -> None:
+    row = {"experiment": "multitask", "phase": "multitask", "evaluation": "study_target"}
+    part = {"asks": "?", "rows": {"one": row}, "sets": ["study_12"]}
+    whole = {"root": "outputs/study", "registry": "x.yaml", "parts": {"a": part}}
+
+    def loaded(content: dict[str, object]) -> object:
+        file = tmp_path / "study.yaml"
+        file.write_text(yaml.safe_dump(content))
+        return load_study(file)
+
+    assert loaded(whole)
+    with pytest.raises(UnknownNameError, match="experiment"):
+        loaded({**whole, "parts": {"a": {**part, "rows": {"one": {**row, "experimnt": 1}}}}})
+    with pytest.raises(UnknownNameError, match="one"):
+        loaded({**whole, "parts": {"a": {**part, "reference": "oen"}}})
+    with pytest.raises(UserError, match="at least one seed"):
+        loaded({**whole, "parts": {"a": {**part, "seeds": 0}}})
+    with pytest.raises(UnknownNameError, match="multitask"):
+        STUDY.chosen(["multitasking"])
