@@ -1,6 +1,7 @@
 """This checkout beside an earlier commit of ours: processor time per step of simulator, converter and evaluation.
 
-And per demonstration of planning: of all that a demonstrator does between two actions, in every third atomic task.
+And per demonstration of planning: of all that a demonstrator does between two actions, in every third atomic task. Of
+new scenes it is wall time, the median over all atomic tasks in both splits, of resets without and with three pictures.
 
 Both sides do the same work, taking turns, on one thread per library, so that whatever else the machine does hits both;
 medians count. Demonstrations and the policy (random weights, so that every trial lasts its horizon) are made by the
@@ -22,7 +23,7 @@ import shutil
 import statistics
 import sys
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import common
@@ -36,7 +37,7 @@ from robocasa_lerobot.progress import Bar
 
 OUTPUT = common.RESULTS / "between_commits.json"
 SIDES = ("before", "now")
-KINDS = ("sim", "sim_pictures", "convert", "evaluation", "planning")
+KINDS = ("sim", "sim_pictures", "convert", "evaluation", "planning", "new_scene", "new_scene_pictures")
 TASK, EPISODES = "PickPlaceCounterToSink", 4
 EVALUATED, TRIALS, IMAGE_SIZE = ["CloseDrawer", "PickPlaceCounterToSink"], 2, 96
 STEPS = {"sim": 1200, "sim_pictures": 150}
@@ -85,6 +86,23 @@ for task in sys.argv[2].split(","):
         seconds.append(used)
     env.close()
 print("RESULT", sum(seconds) / len(seconds))
+"""
+SCENES = """
+import statistics, sys, time
+from robocasa_lerobot import contract
+from robocasa_lerobot.envs.kitchen_env import KitchenEnv
+cameras = contract.CAMERAS if sys.argv[2] == "True" else ()
+tasks = sys.argv[1].split(",")
+KitchenEnv(tasks[0], cameras=cameras).reset(seed=0)
+seconds = []
+for number, task in enumerate(tasks):
+    for split in ("target", "pretrain"):
+        env = KitchenEnv(task, split=split, cameras=cameras)
+        started = time.perf_counter()
+        env.reset(seed=1000 + number)
+        seconds.append(time.perf_counter() - started)
+        env.close()
+print("RESULT", statistics.median(seconds))
 """
 
 
@@ -141,18 +159,29 @@ class Work:
         self._checkout, self._folder, self._demos, self._checkpoint = checkout, folder, demos, checkpoint
 
     def seconds(self, kind: str) -> float:
-        """Processor seconds per control step, frame, step of a trial or demonstration; commands count with their start.
+        """Seconds per control step, frame, step of a trial, demonstration or scene; commands count with their start.
 
         Planning does not: the first call of a compiled function compiles it, in the first repetition.
         """
         shutil.rmtree(self._folder, ignore_errors=True)
         self._folder.mkdir(parents=True)
-        others = {"convert": self._convert, "evaluation": self._evaluate, "planning": self._plan}
+        others: dict[str, Callable[[], float]] = {
+            "convert": self._convert,
+            "evaluation": self._evaluate,
+            "planning": self._plan,
+            "new_scene": lambda: self._scene(pictures=False),
+            "new_scene_pictures": lambda: self._scene(pictures=True),
+        }
         return others.get(kind, lambda: self._simulate(kind))()
 
     def _plan(self) -> float:
         tasks = [name for name in task_names() if facts_of(name).kind == "atomic"]
         said = run(self._checkout, ["-c", PLANNING, str(PLANNED_SEEDS), ",".join(tasks[::EVERY])])
+        return float(said.rsplit("RESULT", 1)[1])
+
+    def _scene(self, pictures: bool) -> float:
+        tasks = [name for name in task_names() if facts_of(name).kind == "atomic"]
+        said = run(self._checkout, ["-c", SCENES, ",".join(tasks), str(pictures)])
         return float(said.rsplit("RESULT", 1)[1])
 
     def _simulate(self, kind: str) -> float:
