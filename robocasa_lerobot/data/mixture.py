@@ -28,7 +28,7 @@ from robocasa_lerobot.data.statistics import (
     cached_statistics,
     pooled_statistics,
 )
-from robocasa_lerobot.errors import UserError
+from robocasa_lerobot.errors import UnknownNameError, UserError
 
 Item = dict[str, Any]
 
@@ -101,6 +101,7 @@ class MixtureDataset(torch.utils.data.Dataset[Item]):
                 opened[root] = DatasetSource(root)
         self.sources = {root: opened[root] for root in roots}
         _check_alike(list(self.sources.values()), any_image_size=image_size is not None)
+        self._unseen = _unseen(next(iter(self.sources.values())).features, loader.cameras)
         # Whether the numbers of all datasets stay on disk, mapped into memory as they are used.
         self._mapped = sum(s.column_bytes for s in self.sources.values()) > loader.cache_columns_above_gb * 1e9
         tasks = sorted({text for source in self.sources.values() for text in source.instructions})
@@ -123,7 +124,9 @@ class MixtureDataset(torch.utils.data.Dataset[Item]):
         self._offsets = np.cumsum([0, *(m.source.total_frames for m in self._members)])
         first = self._members[0].source
         self.meta = MixtureMeta(
-            features={key: self._feature(feature) for key, feature in first.features.items()},
+            features={
+                key: self._feature(feature) for key, feature in first.features.items() if key not in self._unseen
+            },
             fps=first.fps,
             robot_type=first.robot_type,
             tasks=tasks,
@@ -165,8 +168,10 @@ class MixtureDataset(torch.utils.data.Dataset[Item]):
         Without `images`, of the numbers alone. With a cache folder they are computed once for all processes.
         """
         if self._cache_dir is None:
-            return pooled_statistics(self._parts(), images)
-        return cached_statistics(self._parts(), self._cache_dir, images)
+            found = pooled_statistics(self._parts(), images)
+        else:
+            found = cached_statistics(self._parts(), self._cache_dir, images)
+        return {key: value for key, value in found.items() if key not in self._unseen}
 
     def _parts(self) -> list[Part]:
         shares = zip(self._members, self.probabilities, strict=True)
@@ -340,6 +345,21 @@ def open_mixture(
 
 def _is_image(feature: Mapping[str, Any]) -> bool:
     return feature["dtype"] in ("video", "image")
+
+
+def _unseen(features: Mapping[str, Mapping[str, Any]], cameras: Sequence[str] | None) -> frozenset[str]:
+    """The pictures that a policy does not get, if it gets those of some cameras only.
+
+    Raises:
+        UnknownNameError: the data have no such camera.
+    """
+    if cameras is None:
+        return frozenset()
+    found = {key: key.rpartition(".")[2] for key, feature in features.items() if _is_image(feature)}
+    for camera in cameras:
+        if camera not in found.values():
+            raise UnknownNameError("camera", camera, found.values(), "(in `loader.cameras`)")
+    return frozenset(key for key, camera in found.items() if camera not in cameras)
 
 
 def _check_alike(sources: Sequence[DatasetSource], any_image_size: bool) -> None:

@@ -141,6 +141,7 @@ class LoaderConfig:
         cache_budget_gb: what "if they fit" means, in 10^9 bytes for all datasets of a phase together.
         cache_dir: where frames, statistics and columns are kept; null is `<output_dir>/frame_cache`.
         image_size: height and width in pixels handed to the policy; null is the dataset's own size.
+        cameras: whose pictures the policy gets, such as `robot0_eye_in_hand`; null is all of the data.
         cache_columns_above_gb: states, actions and other numbers of larger mixtures stay in memory-mapped files in
             the cache folder instead of memory (10^9 bytes for all datasets of a phase, in each loader process).
         cache_open_files: videos, and datasets' memory-mapped numbers, that a loader process keeps open at once.
@@ -151,12 +152,14 @@ class LoaderConfig:
     cache_budget_gb: float = 8.0
     cache_dir: str | None = None
     image_size: int | None = None
+    cameras: list[str] | None = None
     cache_columns_above_gb: float = 2.0
     cache_open_files: int = 64
 
     def __post_init__(self) -> None:
         if self.cache_open_files < 1:
             raise UserError(f"loader: cache_open_files is {self.cache_open_files}, expected at least 1.")
+        _check_lists("loader", cameras=self.cameras)
 
 
 def demo_count(demos: str, total: int) -> int:

@@ -20,7 +20,7 @@ from robocasa_lerobot.data.reading.column_file import map_columns
 from robocasa_lerobot.data.reading.pictures import PictureReader
 from robocasa_lerobot.data.reading.source import DatasetSource
 from robocasa_lerobot.data.reading.video_reader import VideoReader
-from robocasa_lerobot.errors import UserError
+from robocasa_lerobot.errors import UnknownNameError, UserError
 
 KEY = contract.IMAGE_KEYS[0]
 COPIES, OPEN = 9, 4
@@ -196,3 +196,21 @@ def test_pictures_that_are_stored_singly_equal_lerobots(tmp_path: Path) -> None:
         assert dataset[index][KEY].dtype == torch.uint8
         assert torch.equal(dataset[index][KEY].float() / 255, wanted[KEY])  # which are floats from 0 to 1
         assert torch.equal(dataset[index][f"{KEY}_is_pad"], wanted[f"{KEY}_is_pad"])
+
+
+def test_pictures_of_some_cameras_only(root: Path, tmp_path: Path) -> None:
+    whole = open_many([root])
+    wrist = "robot0_eye_in_hand"
+    some = open_many([root], cameras=[wrist], cache_dir=str(tmp_path))
+    assert some.meta.camera_keys == [contract.image_key(wrist)]
+    one, other = whole[3], some[3]
+    unseen = tuple(contract.IMAGE_KEYS[:2])
+    assert set(one) - set(other) == {key for key in one if key.startswith(unseen)}
+    assert torch.equal(one[contract.image_key(wrist)], other[contract.image_key(wrist)])
+    assert some.cache_frames(tmp_path)
+    assert torch.equal(some[3][contract.image_key(wrist)], other[contract.image_key(wrist)])
+    assert set(whole.statistics()) - set(some.statistics()) == set(unseen)
+    with pytest.raises(UnknownNameError, match="robot0_eye_in_hand"):
+        open_many([root], cameras=["robot0_eye_in_hnad"])
+    with pytest.raises(UserError, match="cameras"):
+        LoaderConfig(cameras=[])
