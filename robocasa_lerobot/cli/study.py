@@ -46,16 +46,16 @@ def run(args: argparse.Namespace) -> int:
     from robocasa_lerobot.making.estimate import cores_here
     from robocasa_lerobot.study.costs import cost_lines, costs
     from robocasa_lerobot.study.page import write_page
-    from robocasa_lerobot.study.runs import CPU, configs_for, runs_of
+    from robocasa_lerobot.study.runs import configs_for, root_for, runs_of
     from robocasa_lerobot.study.settings import load_study
-    from robocasa_lerobot.study.stored import read_stored, store
+    from robocasa_lerobot.study.stored import is_stored, read_stored, store
 
     for name in ("seeds", "workers"):
         if getattr(args, name) is not None and getattr(args, name) < 1:
             raise UserError(f"--{name} is {getattr(args, name)}, expected at least 1.")
     study = load_study(args.config_path, args.seeds)
     parts = study.chosen(args.parts)
-    root = args.root or Path(study.root if args.device == CPU else f"{study.root}_{args.device}")
+    root = args.root or root_for(study, args.device, args.scale)
     results = args.results or root / "results"
     asked = (args.scale, args.episodes)
     configs = configs_for(args.device, study, root)
@@ -78,7 +78,7 @@ def run(args: argparse.Namespace) -> int:
 
     wanted = [] if args.report else runs_of(list(parts.values()), root, configs, *asked)
     for number, run in enumerate(wanted, start=1):
-        if read_stored(results, run.experiment, run.seed) is not None:
+        if is_stored(run, results):
             continue
         print(f"== {number} of {len(wanted)}: {run.name}", flush=True)
         run.carry_out(args.workers)

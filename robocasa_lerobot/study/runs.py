@@ -85,7 +85,8 @@ class Run:
         made = [] if workers is None else [f"--workers={workers}"]
         made += [] if self.episodes is None else [f"--episodes={self.episodes}"]
         return [
-            ["data", str(self.file), "--make", *made, *scale],
+            # What a trial with fewer demonstrations has left does not stand for them.
+            ["data", str(self.file), "--make", "--replace", *made, *scale],
             ["train", f"--config_path={self.file}", "--evaluate", *scale],
         ]
 
@@ -119,6 +120,12 @@ def runs_of(
             for seed in range(part.seeds):
                 found.setdefault((experiment, seed), Run(experiment, seed, root, configs, scale, episodes))
     return list(found.values())
+
+
+def root_for(study: StudyConfig, device: str, scale: str | None) -> Path:
+    """The folder of the trainings: another one for each device and scale, which are other trainings."""
+    others = [name for name in (device if device != CPU else None, Path(scale).stem if scale else None) if name]
+    return Path("_".join([study.root, *others]))
 
 
 def configs_for(device: str, study: StudyConfig, root: Path) -> Path:

@@ -106,6 +106,7 @@ def store(run: Run, results: Path) -> Path:
         "experiment": run.experiment,
         "seed": run.seed,
         "scale": run.scale,
+        "episodes": run.episodes,
         "commit": git_commit(),
         "versions": versions("lerobot", "torch", "mujoco"),
         "machine": machine(),
@@ -117,6 +118,15 @@ def store(run: Run, results: Path) -> Path:
     }
     write_text(out / ABOUT, json.dumps(about, indent=1) + "\n")
     return out
+
+
+def is_stored(run: Run, results: Path) -> bool:
+    """Whether a run was kept that had the same scale and demonstrations: a trial of the study does not stand for it."""
+    file = stored_folder(results, run.experiment, run.seed) / ABOUT
+    if not file.is_file():
+        return False
+    about = json.loads(file.read_text(encoding="utf-8"))
+    return (about["scale"], about["episodes"]) == (run.scale, run.episodes)
 
 
 def read_stored(results: Path, experiment: str, seed: int) -> StoredRun | None:

@@ -11,8 +11,9 @@ from pathlib import Path
 import pytest
 
 from robocasa_lerobot.config_files import configs_folder
-from robocasa_lerobot.study.runs import configs_for, runs_of
+from robocasa_lerobot.study.runs import configs_for, root_for, runs_of
 from robocasa_lerobot.study.settings import load_study
+from robocasa_lerobot.study.stored import ABOUT, is_stored, stored_folder
 from robocasa_lerobot.training.config.experiment import load_experiment
 
 TINY = ("--scale=tiny", "--episodes=pretrain=1,target=1,few=1", "--seeds=1", "--measure=0")
@@ -72,13 +73,29 @@ def test_on_a_gpu_every_experiment_has_the_larger_policy_and_pictures(tmp_path: 
     assert "study_gpu" not in (configs_folder() / "experiments/parts/study_policy.yaml").read_text(encoding="utf-8")
 
 
+def test_a_trial_of_the_study_does_not_stand_for_it(tmp_path: Path) -> None:
+    whole = load_study()
+    parts = [whole.parts["multitask"]]
+    asked, tried = (
+        runs_of(parts, tmp_path, configs_folder(), *made)[0] for made in ((None, None), ("tiny", "pretrain=1"))
+    )
+    folder = stored_folder(tmp_path, tried.experiment, tried.seed)
+    folder.mkdir(parents=True)
+    (folder / ABOUT).write_text(json.dumps({"scale": tried.scale, "episodes": tried.episodes}))
+    assert is_stored(tried, tmp_path)
+    assert not is_stored(asked, tmp_path)
+    assert "--replace" in asked.commands(None)[0], "its data neither"
+    roots = [root_for(whole, *case) for case in (("cpu", None), ("cpu", "tiny"), ("cuda", None))]
+    assert [str(root) for root in roots] == ["outputs/study", "outputs/study_tiny", "outputs/study_cuda"]
+
+
 @pytest.mark.slow
 @pytest.mark.render
 @pytest.mark.parametrize("part", load_study().parts)
 def test_a_part_runs_from_data_to_its_table(part: str, tmp_path: Path) -> None:
     done = study(tmp_path, part, *TINY)
     assert done.returncode == 0, done.stderr[-3000:]
-    results = tmp_path / "outputs/study/results"
+    results = tmp_path / "outputs/study_tiny/results"
     page = (results / "results.md").read_text(encoding="utf-8")
     assert "these numbers mean nothing" in page
     config = load_study(seeds=1).parts[part]
