@@ -125,6 +125,10 @@ def timed_run(checkout: Path, command: Sequence[str]) -> tuple[str, float]:
     return said, _children_s() - before
 
 
+def _atomic() -> list[str]:
+    return [name for name in task_names() if facts_of(name).kind == "atomic"]
+
+
 def _adopt_orphans() -> None:
     """Make this process the parent of what its children leave behind, where the system can do that (Linux).
 
@@ -175,17 +179,17 @@ class Work:
         return others.get(kind, lambda: self._simulate(kind))()
 
     def _plan(self) -> float:
-        tasks = [name for name in task_names() if facts_of(name).kind == "atomic"]
-        said = run(self._checkout, ["-c", PLANNING, str(PLANNED_SEEDS), ",".join(tasks[::EVERY])])
-        return float(said.rsplit("RESULT", 1)[1])
+        return self._answer(PLANNING, str(PLANNED_SEEDS), ",".join(_atomic()[::EVERY]))
 
     def _scene(self, pictures: bool) -> float:
-        tasks = [name for name in task_names() if facts_of(name).kind == "atomic"]
-        said = run(self._checkout, ["-c", SCENES, ",".join(tasks), str(pictures)])
-        return float(said.rsplit("RESULT", 1)[1])
+        return self._answer(SCENES, ",".join(_atomic()), str(pictures))
 
     def _simulate(self, kind: str) -> float:
-        said = run(self._checkout, ["-c", CONTROL_STEP, TASK, str(STEPS[kind]), str(kind == "sim_pictures")])
+        return self._answer(CONTROL_STEP, TASK, str(STEPS[kind]), str(kind == "sim_pictures"))
+
+    def _answer(self, program: str, *arguments: str) -> float:
+        """The number that a program of this file prints as its result."""
+        said = run(self._checkout, ["-c", program, *arguments])
         return float(said.rsplit("RESULT", 1)[1])
 
     def _convert(self) -> float:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import dataclasses
 import re
+import typing
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -94,6 +96,38 @@ def set_dotted(data: Data, dotted: str, value: Any) -> None:
         here[_list_index(here, last, dotted)] = value
     else:
         here[last] = value
+
+
+def check_keys(kind: type, data: Any, where: str) -> None:
+    """Check that mappings have only keys that the dataclass `kind` (and those inside it) knows.
+
+    Raises:
+        UnknownNameError: the first unknown key, with the closest match.
+    """
+    if not dataclasses.is_dataclass(kind) or not isinstance(data, Mapping):
+        return
+    hints = typing.get_type_hints(kind)
+    for key, value in data.items():
+        if key not in hints:
+            raise UnknownNameError("key", str(key), hints, f"(in {where})")
+        inside = next(iter(_dataclasses_in(hints[key])), None)
+        if inside is None:
+            continue
+        if isinstance(value, list):
+            for number, item in enumerate(value):
+                name = item.get("name", number) if isinstance(item, Mapping) else number
+                check_keys(inside, item, f"{where}.{key}.{name}")
+        elif typing.get_origin(hints[key]) is dict and isinstance(value, Mapping):
+            for name, item in value.items():
+                check_keys(inside, item, f"{where}.{key}.{name}")
+        else:
+            check_keys(inside, value, f"{where}.{key}")
+
+
+def _dataclasses_in(hint: Any) -> list[type]:
+    if isinstance(hint, type) and dataclasses.is_dataclass(hint):
+        return [hint]
+    return [found for argument in typing.get_args(hint) for found in _dataclasses_in(argument)]
 
 
 def decode[T](cls: type[T], data: Mapping[str, Any], where: str = "") -> T:

@@ -97,3 +97,11 @@ def read_frames(path: Path, indices: Sequence[int]) -> list[NDArray[np.uint8]]:
             if len(found) == len(wanted):
                 break
     return [found[index] for index in indices if index in found]
+
+
+def spread_frames(path: Path, count: int) -> list[tuple[float, NDArray[np.uint8]]]:
+    """At most `count` evenly spaced frames (H, W, 3), the first and the last among them, each with its second."""
+    total, rate = frames_and_rate(path)
+    count = min(count, total)
+    indices = sorted({round(place * (total - 1) / max(1, count - 1)) for place in range(count)})
+    return [(index / rate, picture) for index, picture in zip(indices, read_frames(path, indices), strict=True)]

@@ -7,11 +7,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from robocasa_lerobot.making.estimate import estimate
-from robocasa_lerobot.making.needs import needs_of, parse_episodes
+from robocasa_lerobot.making.needs import Need, needs_of, parse_episodes
 from robocasa_lerobot.settings import load_yaml
 from robocasa_lerobot.study.runs import Run
 from robocasa_lerobot.study.settings import PartConfig, StudyConfig
-from robocasa_lerobot.training.config.experiment import ExperimentConfig, load_experiment
+from robocasa_lerobot.training.config.experiment import load_experiment
 from robocasa_lerobot.training.planning.evaluations import plan_evaluations
 from robocasa_lerobot.training.planning.plan import PhasePlan, plan_experiment
 
@@ -61,46 +61,53 @@ def costs(
     pixels = min(int(dataset["make"]["image_size"]) for dataset in registry["datasets"])
     measured: dict[str, float | str] = {}
     recorded: set[Path] = set()
-    plans: dict[str, tuple[list[PhasePlan], int, int]] = {}
+    plans: dict[str, _Plan] = {}
     out: dict[str, Cost] = {}
     for part, own in runs.items():
-        needs = []
+        needs: list[Need] = []
         for run in own:
-            asked = parse_episodes(run.episodes) if run.episodes else {}
-            for need in needs_of(load_experiment(run.write_file(), scale=run.scale), asked)[0]:
-                if need.root not in recorded and need.missing:
-                    recorded.add(need.root)
-                    needs.append(need)
-            if run.experiment not in plans:
+            if run.experiment not in plans:  # other seeds need the same data and take as long
                 plans[run.experiment] = _planned(run, pixels, measured_steps, measured)
-        data = estimate(needs, cores)
-        mine = [plans[run.experiment] for run in own]
-        hours = [sum(plan.hours or 0.0 for plan in phases) for phases, _, _ in mine]
-        known = all(plan.hours is not None for phases, _, _ in mine for plan in phases)
-        steps = sum(steps for _, _, steps in mine)
+            needs += [need for need in plans[run.experiment].needs if need.root not in recorded]
+            recorded |= {need.root for need in needs}
+        data, mine = estimate(needs, cores), [plans[run.experiment] for run in own]
+        phases = [phase for plan in mine for phase in plan.phases]
+        hours = [phase.hours for phase in phases if phase.hours is not None]
+        known = len(hours) == len(phases)
         out[part] = Cost(
             runs=len(own),
             demonstrations=data.demonstrations,
             data_hours=data.recording_hours + data.converting_hours,
             training_hours=sum(hours) if known else None,
-            trials=sum(trials for _, trials, _ in mine),
-            trial_hours=steps * PART_OF_HORIZON / TRIAL_STEPS_PER_SECOND / cores / 3600,
-            longest_hours=max((plan.hours or 0.0 for phases, _, _ in mine for plan in phases), default=0.0)
-            if known
-            else None,
-            size=data.size + sum((plan.checkpoint_bytes or 0) * plan.kept for phases, _, _ in mine for plan in phases),
+            trials=sum(plan.trials for plan in mine),
+            trial_hours=sum(plan.steps for plan in mine) * PART_OF_HORIZON / TRIAL_STEPS_PER_SECOND / cores / 3600,
+            longest_hours=max(hours, default=0.0) if known else None,
+            size=data.size + sum((phase.checkpoint_bytes or 0) * phase.kept for phase in phases),
         )
     return out
 
 
-def _planned(
-    run: Run, pixels: int, measured_steps: int, measured: dict[str, float | str]
-) -> tuple[list[PhasePlan], int, int]:
-    """Its phases, and the trials and control steps of their evaluations."""
-    experiment: ExperimentConfig = load_experiment(run.write_file(), (f"--loader.image_size={pixels}",), run.scale)
+@dataclass(frozen=True)
+class _Plan:
+    """Of an experiment: missing data, phases, and the trials and control steps of their evaluations."""
+
+    needs: list[Need]
+    phases: list[PhasePlan]
+    trials: int
+    steps: int
+
+
+def _planned(run: Run, pixels: int, measured_steps: int, measured: dict[str, float | str]) -> _Plan:
+    experiment = load_experiment(run.write_file(), (f"--loader.image_size={pixels}",), run.scale)
+    needs, _ = needs_of(experiment, parse_episodes(run.episodes) if run.episodes else {})
     phases = plan_experiment(experiment, measured_steps=measured_steps, measured=measured)
     evaluations = plan_evaluations(experiment, [plan.phase for plan in phases if not plan.left_out])
-    return phases, sum(item.trials for item in evaluations), sum(item.steps for item in evaluations)
+    return _Plan(
+        [need for need in needs if need.missing],
+        phases,
+        sum(item.trials for item in evaluations),
+        sum(item.steps for item in evaluations),
+    )
 
 
 def cost_lines(parts: Mapping[str, PartConfig], found: Mapping[str, Cost], cores: int, device: str) -> list[str]:

@@ -6,6 +6,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
 from robocasa_lerobot.evaluation.statistics.averages import Estimate, linear_combination
+from robocasa_lerobot.evaluation.statistics.lifelong import Lifelong
 from robocasa_lerobot.files import write_text
 from robocasa_lerobot.study.figures import draw_curves, draw_rates
 from robocasa_lerobot.study.settings import PartConfig, RowConfig, StudyConfig
@@ -74,9 +75,15 @@ def _part(name: str, part: PartConfig, stored: Stored, sets: Sets, results: Path
             points = difference(trials, there[part.reference], sets[part.sets[0]]) if apart else None
             line.append(_points(points))
         table.append(line)
-    lines = [*_answers(part, rates, stored, sets), "", *_markdown(head, table), ""]
+    lifelong = summaries(part, stored, sets) if part.matrix else {}
+    answers = (
+        [_retained(name, rows, lifelong) for name, rows in variants(part).items()]
+        if part.matrix
+        else _most(part, rates)
+    )
+    lines = [*answers, "", *_markdown(head, table), ""]
     if part.matrix:
-        lines += _forgetting(part, stored, sets)
+        lines += _forgetting(len(part.sets), lifelong)
     if part.tasks:
         lines += _by_task(there, sets[part.sets[0]])
     figures = (f"{name}_rates.svg", f"{name}_curves.svg")
@@ -94,37 +101,32 @@ def _part(name: str, part: PartConfig, stored: Stored, sets: Sets, results: Path
     return [*lines, *_circumstances(part, stored.values()), ""]
 
 
-def _answers(part: PartConfig, rates: Mapping[str, CellRate], stored: Stored, sets: Sets) -> list[str]:
+def _most(part: PartConfig, rates: Mapping[str, CellRate]) -> list[str]:
     """A sentence or two, of numbers alone."""
     if not rates:
         return ["No row of the table has all its trials yet."]
-    if part.matrix:
-        return [_retained(part, name, row, stored, sets) for name, row in variants(part).items()]
+    if len(rates) < 3:
+        return [" ".join(f"{row}: {_percent(found.rate)} of {part.sets[0]}." for row, found in rates.items())]
     best = max(rates, key=lambda row: rates[row].rate.value)
-    said = [f"{row}: {_shown(rate)} of {part.sets[0]}." for row, rate in rates.items()] if len(rates) < 3 else []
-    said += [f"Most: {best}, {_shown(rates[best])}."] if len(rates) >= 3 else []
-    return [" ".join(said)]
+    return [f"Most: {best}, {_percent(rates[best].rate)}."]
 
 
-def _retained(part: PartConfig, name: str, rows: Mapping[int, str], stored: Stored, sets: Sets) -> str:
-    found = summaries(part, stored, sets).get(name)
-    last = max(rows)
+def _retained(name: str, rows: Mapping[int, str], lifelong: Mapping[str, Lifelong]) -> str:
+    found, last = lifelong.get(name), max(rows)
     if found is None or last not in found.matrix:
         return f"- {name}: not run to its end yet."
-    kept = [found.matrix[last][j] for j in sorted(rows) if j < last and j in found.matrix.get(j, {})]
-    reached = [found.matrix[j][j] for j in sorted(rows) if j < last and j in found.matrix.get(j, {})]
-    after, before = _mean(kept), _mean(reached)
+    earlier = [j for j in rows if j < last and j in found.matrix.get(j, {})]
+    after, before = _mean([found.matrix[last][j] for j in earlier]), _mean([found.matrix[j][j] for j in earlier])
     share = f", {after.value / before.value:.0%} of it" if before.value else ""
     return f"- {name}: the earlier phases reached {_percent(before)}, and after the last one {_percent(after)}{share}."
 
 
-def _forgetting(part: PartConfig, stored: Stored, sets: Sets) -> list[str]:
-    last = len(part.sets)
+def _forgetting(last: int, lifelong: Mapping[str, Lifelong]) -> list[str]:
     rows = []
-    for name, found in summaries(part, stored, sets).items():
+    for name, found in lifelong.items():
         unseen = [found.matrix[j - 1][j] for j in range(2, last + 1) if j in found.matrix.get(j - 1, {})]
-        forgotten, average = found.forgetting.get(last), found.average.get(last)
-        rows.append([name, *(_points_of(one) for one in (average, forgotten, _mean(unseen) if unseen else None))])
+        numbers = (found.average.get(last), found.forgetting.get(last), _mean(unseen) if unseen else None)
+        rows.append([name, *map(_percent, numbers)])
     head = ["", f"all tasks after phase {last}", "forgetting", "next phase's tasks, before it"]
     return [*_markdown(head, rows), ""]
 
@@ -169,19 +171,15 @@ def _markdown(head: Sequence[str], rows: Iterable[Sequence[str]]) -> list[str]:
 
 
 def _shown(found: CellRate | None) -> str:
-    return "" if found is None else _percent(found.rate)
+    return _percent(None if found is None else found.rate)
 
 
-def _percent(rate: Estimate) -> str:
-    return f"{100 * rate.value:.0f} % ({100 * rate.low:.0f} to {100 * rate.high:.0f})"
+def _percent(rate: Estimate | None) -> str:
+    return "" if rate is None else f"{100 * rate.value:.0f} % ({100 * rate.low:.0f} to {100 * rate.high:.0f})"
 
 
 def _points(found: Estimate | None) -> str:
     return "" if found is None else f"{100 * found.value:+.0f} ({100 * found.low:+.0f} to {100 * found.high:+.0f})"
-
-
-def _points_of(found: Estimate | None) -> str:
-    return "" if found is None else _percent(found)
 
 
 def _seeds(found: CellRate | None) -> str:

@@ -6,13 +6,13 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
 from robocasa_lerobot.config_files import configs_folder
 from robocasa_lerobot.errors import UnknownNameError, UserError
-from robocasa_lerobot.settings import decode, load_yaml
+from robocasa_lerobot.settings import check_keys, decode, load_yaml
 
 EXPERIMENTS = "study"  # folder in configs/experiments/
 FILE = "study.yaml"
@@ -103,22 +103,9 @@ def load_study(path: Path | None = None, seeds: int | None = None) -> StudyConfi
     """
     file = path or configs_folder() / FILE
     data = load_yaml(file)
-    _check_keys(StudyConfig, data, file)
-    for part in (data.get("parts") or {}).values():
-        _check_keys(PartConfig, part, file)
-        for row in (part.get("rows") or {}).values():
-            _check_keys(RowConfig, row, file)
+    check_keys(StudyConfig, data, file.name)
     study = decode(StudyConfig, data, str(file))
     if seeds is None:
         return study
     parts = {name: dataclasses.replace(part, seeds=seeds) for name, part in study.parts.items()}
     return dataclasses.replace(study, parts=parts)
-
-
-def _check_keys(kind: type, data: object, file: Path) -> None:
-    known = [f.name for f in dataclasses.fields(kind)]
-    if not isinstance(data, Mapping):
-        raise UserError(f"{file}: found {data!r}, expected a mapping with {', '.join(known)}.")
-    for key in data:
-        if key not in known:
-            raise UnknownNameError("key", str(key), known, f"(in {file})")

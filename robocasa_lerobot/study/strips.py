@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from robocasa_lerobot import contract
 from robocasa_lerobot.evaluation.records.results import TrialRecord
 from robocasa_lerobot.files import written_aside
-from robocasa_lerobot.video import frames_and_rate, read_frames
+from robocasa_lerobot.video import spread_frames
 
 MOST_ROWS = 6  # of solved trials, and as many of others
 FRAMES = 5
@@ -52,23 +52,14 @@ def write_strips(folder: Path, records: Sequence[TrialRecord], path: Path) -> bo
         what = "solved" if record.success else "not solved"
         where = f"kitchen {record.layout_id}, style {record.style_id}"
         draw.text((2, place * height), f"{record.task}: {what}, {record.steps} steps, {where}", fill="black")
-        for column, picture in enumerate(_frames(folder / str(record.video))):
-            views = _views(picture)
-            for number, view in enumerate(views):
+        for column, (_, picture) in enumerate(spread_frames(folder / str(record.video), FRAMES)):
+            for number, view in enumerate(_views(picture)):
                 shown = Image.fromarray(view).resize((VIEW_PIXELS, VIEW_PIXELS), Image.Resampling.LANCZOS)
                 sheet.paste(shown, ((2 * column + number) * VIEW_PIXELS, place * height + _TEXT_PIXELS))
     path.parent.mkdir(parents=True, exist_ok=True)
     with written_aside(path) as aside:
         sheet.save(aside, format="JPEG", quality=_QUALITY, optimize=True)
     return True
-
-
-def _frames(video: Path) -> list[NDArray[np.uint8]]:
-    """Evenly spaced frames, the first and the last among them."""
-    total, _ = frames_and_rate(video)
-    count = min(FRAMES, total)
-    indices = sorted({round(place * (total - 1) / max(1, count - 1)) for place in range(count)})
-    return list(read_frames(video, indices))
 
 
 def _views(picture: NDArray[np.uint8]) -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:

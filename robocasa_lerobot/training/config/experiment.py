@@ -15,7 +15,7 @@ import yaml
 
 from robocasa_lerobot.data.mixture_config import LoaderConfig
 from robocasa_lerobot.errors import UnknownNameError, UserError
-from robocasa_lerobot.settings import decode, parse_overrides
+from robocasa_lerobot.settings import check_keys, decode, parse_overrides
 from robocasa_lerobot.training.config import experiment_files as overlay
 from robocasa_lerobot.training.config.phase import EmaConfig, PhaseConfig, check_choice
 from robocasa_lerobot.training.config.scale import ScaleConfig, load_scale, scaled
@@ -153,7 +153,7 @@ def load_experiment(path: Path, overrides: Sequence[str] = (), scale: str | None
         UserError: a missing file, an unknown key (the closest match is named), or a value that does not fit.
     """
     data = overlay.resolve(path, parse_overrides(overrides))
-    overlay.check_keys(ExperimentConfig, data, path.name)
+    check_keys(ExperimentConfig, data, path.name)
     experiment = decode(ExperimentConfig, data, str(path))
     if scale is None:
         return experiment

@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import copy
-import dataclasses
 import fnmatch
 import functools
-import typing
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -114,26 +112,6 @@ def _merge_phases(base: list[Data], changes: list[Data]) -> list[Data]:
     return list(out.values())
 
 
-def check_keys(kind: type, data: Any, where: str) -> None:
-    """Check that mappings have only keys that the dataclass `kind` (and those inside it) knows.
-
-    Raises:
-        UnknownNameError: the first unknown key, with the closest match.
-    """
-    if not dataclasses.is_dataclass(kind) or not isinstance(data, Mapping):
-        return
-    hints = typing.get_type_hints(kind)
-    for key, value in data.items():
-        if key not in hints:
-            raise UnknownNameError("key", str(key), hints, f"(in {where})")
-        inside = next((t for t in _dataclasses_in(hints[key])), None)
-        if inside is None:
-            continue
-        for number, item in enumerate(value if isinstance(value, list) else [value]):
-            name = item.get("name", number) if isinstance(item, Mapping) else number
-            check_keys(inside, item, f"{where}.{key}.{name}" if isinstance(value, list) else f"{where}.{key}")
-
-
 def flatten(data: Any, prefix: str = "") -> dict[str, Any]:
     """Nested mappings and lists as dotted names; a list item that has a `name` is named by it."""
     if isinstance(data, Mapping) and data:
@@ -146,12 +124,6 @@ def flatten(data: Any, prefix: str = "") -> dict[str, Any]:
     for key, value in pairs:
         out |= flatten(value, f"{prefix}.{key}" if prefix else key)
     return out
-
-
-def _dataclasses_in(hint: Any) -> list[type]:
-    if isinstance(hint, type) and dataclasses.is_dataclass(hint):
-        return [hint]
-    return [found for argument in typing.get_args(hint) for found in _dataclasses_in(argument)]
 
 
 def _at_file_keys(data: Data, change: Callable[[Any], Any]) -> Data:

@@ -16,8 +16,7 @@ from typing import Any
 from robocasa_lerobot.config_files import find_config
 from robocasa_lerobot.data.mixture_config import LoaderConfig, MixtureConfig
 from robocasa_lerobot.errors import UserError
-from robocasa_lerobot.settings import decode, load_yaml
-from robocasa_lerobot.training.config.experiment_files import check_keys
+from robocasa_lerobot.settings import check_keys, decode, load_yaml
 from robocasa_lerobot.training.config.phase import PhaseConfig
 
 _IDENTITY = ("type", "path", "file")  # settings that say which policy it is

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from robocasa_lerobot.evaluation.records.results import TrialRecord
 from robocasa_lerobot.evaluation.report.model import Film, Frame
 from robocasa_lerobot.evaluation.report.policies import PolicyResult, ReportData
-from robocasa_lerobot.video import frames_and_rate, read_frames
+from robocasa_lerobot.video import frames_and_rate, spread_frames
 
 FRAMES = 6
 JPEG_QUALITY = 80
@@ -92,12 +92,7 @@ def _film(policy: PolicyResult, record: TrialRecord) -> Film:
 
 def make_frames(video: Path, count: int = FRAMES) -> list[Frame]:
     """`count` evenly spaced frames of a video, the first and the last among them."""
-    total, rate = frames_and_rate(video)
-    indices = sorted({round(i * (total - 1) / max(1, count - 1)) for i in range(min(count, total))})
-    pictures = read_frames(video, indices)
-    return [
-        Frame(index / rate, data_uri(stack_cameras(picture))) for index, picture in zip(indices, pictures, strict=True)
-    ]
+    return [Frame(second, data_uri(stack_cameras(picture))) for second, picture in spread_frames(video, count)]
 
 
 def clip(video: Path) -> tuple[str, float]:
