@@ -16,6 +16,7 @@ from robocasa_lerobot.data.registry.registry_file import load_registry
 from robocasa_lerobot.evaluation.config.evaluation import EvaluationConfig
 from robocasa_lerobot.evaluation.config.loader import load_config
 from robocasa_lerobot.evaluation.planning.check import check
+from robocasa_lerobot.settings import check_keys
 from robocasa_lerobot.training.config import experiment_files as overlay
 from robocasa_lerobot.training.config.experiment import FROM_SCRATCH, HUB, ExperimentConfig, load_experiment, to_yaml
 from robocasa_lerobot.training.planning import skipped
@@ -38,7 +39,7 @@ def name_of(path: Path) -> str:
 @pytest.mark.parametrize("path", MIXTURES, ids=name_of)
 def test_mixture_parses(path: Path) -> None:
     data = overlay.load_yaml(path)
-    overlay.check_keys(MixtureConfig, data, path.name)
+    check_keys(MixtureConfig, data, path.name)
     mixture = draccus.decode(MixtureConfig, data)
     assert mixture.members or mixture.select
 
