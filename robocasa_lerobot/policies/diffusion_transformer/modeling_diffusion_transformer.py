@@ -21,6 +21,7 @@ from robocasa_lerobot.policies.common.chunks import (
     starting_noise,
     target_actions,
 )
+from robocasa_lerobot.policies.common.traced import Traced
 from robocasa_lerobot.policies.diffusion_transformer.configuration_diffusion_transformer import (
     DiffusionTransformerConfig,
 )
@@ -54,6 +55,7 @@ class DiffusionTransformerPolicy(PreTrainedPolicy):
             dropout=config.dropout,
         )
         self.scheduler = _noise_scheduler(config)
+        self._denoise = Traced(self.denoiser)
         self._observed_keys = (*self.observation_encoder.image_keys, OBS_STATE)
         self.reset()
 
@@ -126,7 +128,8 @@ class DiffusionTransformerPolicy(PreTrainedPolicy):
     @torch.no_grad()
     def sample(self, batch: dict[str, Tensor], noise: Tensor | None = None, generator: Generators = None) -> Tensor:
         """All predicted actions, (B, horizon, A), from offset 1 - n_obs_steps on. Arguments as above."""
-        self.eval()
+        if self.training:  # asked, because telling all modules takes milliseconds
+            self.eval()
         features = self.observation_encoder(self._with_time_axis(batch)).float()
         random = generator if generator is None or isinstance(generator, torch.Generator) else list(generator)
         shape = (features.shape[0], self.config.horizon, self.action_dim)
@@ -134,7 +137,7 @@ class DiffusionTransformerPolicy(PreTrainedPolicy):
         self.scheduler.set_timesteps(self.config.num_inference_steps or self.config.num_train_timesteps)
         for time in self.scheduler.timesteps.tolist():
             times = torch.full(shape[:1], time, device=x.device, dtype=torch.long)
-            prediction = self.denoiser(x, times, features).float()
+            prediction = self._denoise(x, times, features).float()
             x = self.scheduler.step(prediction, time, x, generator=random).prev_sample
         return x
 

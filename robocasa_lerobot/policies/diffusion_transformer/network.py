@@ -110,7 +110,8 @@ class DenoisingTransformer(nn.Module):
         condition = torch.cat([time, self.embed_observation(features)], dim=1)
         memory = self.condition_encoder(self.dropout(condition + self.condition_position))
         x = self.dropout(self.embed_action(noisy_actions) + self.action_position)
-        x = self.decoder(x, memory, tgt_mask=self.causal_mask, memory_mask=self.memory_mask)
+        # Told nothing about the masks, PyTorch compares them with a causal one of its own, each time.
+        x = self.decoder(x, memory, self.causal_mask, self.memory_mask, tgt_is_causal=False, memory_is_causal=False)
         return self.head(self.norm(x))
 
 

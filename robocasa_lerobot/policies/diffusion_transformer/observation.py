@@ -10,6 +10,7 @@ from robocasa_lerobot.errors import UserError
 from robocasa_lerobot.policies.common.images import center_crop, random_crop, resize, to_signed_float
 from robocasa_lerobot.policies.common.language import ClipTextEncoder, TokenEncoder
 from robocasa_lerobot.policies.common.state import StateInput
+from robocasa_lerobot.policies.common.traced import Traced
 from robocasa_lerobot.policies.common.vision import ConvNet, ResNet18, VisionEncoder
 from robocasa_lerobot.policies.diffusion_transformer.configuration_diffusion_transformer import (
     DiffusionTransformerConfig,
@@ -28,6 +29,7 @@ class ObservationEncoder(nn.Module):
         condition_dim = dim if config.language_film else None
         names = ["shared"] if config.vision_shared else self.image_keys
         self.vision = nn.ModuleDict({_module_name(name): _vision_encoder(config, condition_dim) for name in names})
+        self._encoders = {name: Traced(encoder) for name, encoder in self.vision.items()}
         self.camera_embedding = (
             nn.Parameter(torch.randn(len(self.image_keys), dim) * 0.02)
             if config.vision_shared and config.language_film
@@ -70,10 +72,10 @@ class ObservationEncoder(nn.Module):
             conditions = [language + embedding for embedding in self.camera_embedding]
         conditions = [c.repeat_interleave(steps, dim=0) for c in conditions]
         if self.config.vision_shared:
-            encoder = self.vision["shared"]
+            encoder = self._encoders["shared"]
             features = encoder(torch.cat(pictures), torch.cat(conditions)).chunk(len(pictures))
         else:
-            encoders = [self.vision[_module_name(key)] for key in self.image_keys]
+            encoders = [self._encoders[_module_name(key)] for key in self.image_keys]
             features = [e(p, c) for e, p, c in zip(encoders, pictures, conditions, strict=True)]
         return torch.cat([f.unflatten(0, (-1, steps)) for f in features], dim=-1)
 

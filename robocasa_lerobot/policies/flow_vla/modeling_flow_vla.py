@@ -132,7 +132,8 @@ class FlowVlaPolicy(PreTrainedPolicy):
 
         Without `cached_prefix` the prefix is read anew in each step: slower, the same actions; for comparison.
         """
-        self.eval()
+        if self.training:  # asked, because telling all modules takes milliseconds
+            self.eval()
         state = self._state(batch)
         x = starting_noise(noise, (state.shape[0], self.config.chunk_size, self.action_dim), generator, state)
         cache = self.prefix(batch) if cached_prefix else None

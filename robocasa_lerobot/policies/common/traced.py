@@ -1,0 +1,74 @@
+"""A network's kernels recorded once and run without the Python between them, for sampling on a CPU.
+
+Small networks at a batch of one spend most of their time in PyTorch's modules, not in its kernels.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Callable
+from typing import Any
+
+import torch
+from torch import Tensor, nn
+
+_MOST_SHAPES = 8  # recordings of one network; batches of evaluation have one shape, training none
+_CHECKED_RUNS = 3  # TorchScript looks at the first runs and may change a recording after them
+
+type _Key = tuple[tuple[torch.Size, torch.dtype], ...]
+
+
+class Traced:
+    """A module as a function of tensors: the same bits as the module's, sooner.
+
+    On a CPU, without gradients and outside training, its kernels are recorded by TorchScript for each shape of its
+    inputs; anywhere else, and where the module has hooks, it is called. Of modules inside it, hooks count that are
+    there at the first call. Recordings use the module's own parameters, so that they follow whatever
+    changes these in place. A recording that does not give what the module gives, to the bit, is not used: so do
+    modules whose course depends on values, if those of the first call show it. Copies and pickles hold none.
+
+    Args:
+        module: its forward takes tensors and gives one tensor.
+    """
+
+    def __init__(self, module: nn.Module) -> None:
+        self._module = module
+        self._recorded: dict[_Key, Callable[..., Tensor]] = {}
+
+    def __call__(self, *inputs: Tensor) -> Tensor:
+        """What the module gives for these inputs."""
+        out: Tensor
+        changes = torch.is_grad_enabled() or self._module.training or _has_hooks(self._module)
+        if changes or any(x.device.type != "cpu" for x in inputs):
+            out = self._module(*inputs)
+            return out
+        key = tuple((x.shape, x.dtype) for x in inputs)
+        if key not in self._recorded:
+            if len(self._recorded) == _MOST_SHAPES:
+                self._recorded.pop(next(iter(self._recorded)))
+            self._recorded[key] = self._record(inputs)
+        out = self._recorded[key](*inputs)
+        return out
+
+    def _record(self, inputs: tuple[Tensor, ...]) -> Callable[..., Tensor]:
+        if any(_has_hooks(module) for module in self._module.modules()):
+            return self._module
+        expected = self._module(*inputs)
+        try:
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore")  # shapes are constants here, and TorchScript has successors elsewhere
+                recorded: Callable[..., Tensor] = torch.jit.trace(self._module, inputs, check_trace=False)
+        except Exception:  # whatever TorchScript cannot record; and it may be gone one day
+            return self._module
+        alike = all(torch.equal(recorded(*inputs), expected) for _ in range(_CHECKED_RUNS))
+        return recorded if alike else self._module
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {"_module": self._module, "_recorded": {}}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__dict__.update(state)
+
+
+def _has_hooks(module: nn.Module) -> bool:
+    return bool(module._forward_hooks or module._forward_pre_hooks)
