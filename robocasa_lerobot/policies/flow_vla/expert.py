@@ -55,6 +55,22 @@ def attention_mask(prefix_mask: Tensor, actions: int) -> Tensor:
     return torch.cat([prefix, own.expand(batch, -1, -1)], dim=-1).unsqueeze(1)
 
 
+def expert_context(
+    prefix: PrefixCache, actions: int, rotary: Callable[[Tensor, Tensor], Rotary], like: Tensor
+) -> list[Tensor]:
+    """What the expert takes of a prefix: the mask, cosines, sines, and the layers' keys and values.
+
+    Args:
+        prefix: its keys and values; positions go on after its last token that counts.
+        actions: length of a chunk.
+        rotary: cosines and sines of positions (B, 1 + actions), of the prefix's kind.
+        like: has the expert's type, which may be finer than a frozen prefix's.
+    """
+    positions = prefix.mask.sum(dim=1, keepdim=True) + torch.arange(1 + actions, device=prefix.mask.device)
+    cosines, sines = rotary(like, positions)
+    return [attention_mask(prefix.mask, actions), cosines, sines, *prefix.keys, *prefix.values]
+
+
 def time_embedding(times: Tensor, dim: int, min_period: float, max_period: float) -> Tensor:
     """Times (B,) in [0, 1] as sines and cosines (B, dim), with periods that grow geometrically; in float32.
 
@@ -190,27 +206,29 @@ class ActionExpert(nn.Module):
         state: Tensor,
         noisy_actions: Tensor,
         times: Tensor,
-        prefix: PrefixCache,
-        rotary: Callable[[Tensor, Tensor], Rotary],
+        mask: Tensor,
+        cosines: Tensor,
+        sines: Tensor,
+        *keys_and_values: Tensor,
     ) -> Tensor:
-        """Predict the velocity, noise - actions.
+        """Predict the velocity, noise - actions; what follows the times is of `expert_context`.
 
         Args:
             state: (B, S), normalised.
             noisy_actions: (B, T, A), normalised.
             times: (B,) in [0, 1], 1 is noise.
-            prefix: its keys and values; positions go on after its last token that counts.
-            rotary: cosines and sines of positions (B, 1 + T), of the prefix's kind.
+            mask: who sees whom, see `attention_mask`.
+            cosines: of the positions of state and actions, (B, 1 + T, head_dim).
+            sines: likewise.
+            keys_and_values: of the prefix, all layers' keys and then all layers' values.
 
         Returns:
             (B, T, A).
         """
         x, condition = self.embed(state, noisy_actions, times)
-        mask = attention_mask(prefix.mask, noisy_actions.shape[1])
-        positions = prefix.mask.sum(dim=1, keepdim=True) + torch.arange(x.shape[1], device=x.device)
-        angles = rotary(x, positions)
-        for layer, keys, values in zip(self.layers, prefix.keys, prefix.values, strict=True):
-            x = layer(x, condition, keys, values, mask, angles)
+        keys, values = keys_and_values[: len(self.layers)], keys_and_values[len(self.layers) :]
+        for layer, k, v in zip(self.layers, keys, values, strict=True):
+            x = layer(x, condition, k, v, mask, (cosines, sines))
         return self.head(self.norm(x[:, 1:], condition)[0])
 
 

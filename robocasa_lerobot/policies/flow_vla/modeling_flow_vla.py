@@ -22,8 +22,9 @@ from robocasa_lerobot.policies.common.chunks import (
     target_actions,
 )
 from robocasa_lerobot.policies.common.state import StateInput
+from robocasa_lerobot.policies.common.traced import Traced
 from robocasa_lerobot.policies.flow_vla.configuration_flow_vla import FlowVlaConfig
-from robocasa_lerobot.policies.flow_vla.expert import ActionExpert, PrefixCache
+from robocasa_lerobot.policies.flow_vla.expert import ActionExpert, PrefixCache, expert_context
 from robocasa_lerobot.policies.flow_vla.prefix import Prefix, ScratchPrefix
 from robocasa_lerobot.policies.flow_vla.pretrained import PretrainedPrefix
 
@@ -52,6 +53,7 @@ class FlowVlaPolicy(PreTrainedPolicy):
             periods=(config.time_min_period, config.time_max_period),
             **self.prefix.shape,
         )
+        self._ask_expert = Traced(self.expert)
         self.reset()
 
     def get_optim_params(self) -> list[dict[str, Any]]:
@@ -101,7 +103,7 @@ class FlowVlaPolicy(PreTrainedPolicy):
 
     def velocity(self, state: Tensor, noisy: Tensor, times: Tensor, prefix: PrefixCache) -> Tensor:
         """The predicted velocity (B, T, A), in float32; see `ActionExpert.forward`."""
-        return self.expert(state, noisy, times, prefix, self.prefix.rotary).float()
+        return self.expert(state, noisy, times, *self._context(prefix)).float()
 
     @torch.no_grad()
     def predict_action_chunk(
@@ -136,12 +138,12 @@ class FlowVlaPolicy(PreTrainedPolicy):
             self.eval()
         state = self._state(batch)
         x = starting_noise(noise, (state.shape[0], self.config.chunk_size, self.action_dim), generator, state)
-        cache = self.prefix(batch) if cached_prefix else None
-        return euler_integrate(
-            lambda noisy, times: self.velocity(state, noisy, times, cache or self.prefix(batch)),
-            x,
-            self.config.num_inference_steps,
-        )
+        context = self._context(self.prefix(batch)) if cached_prefix else None
+
+        def velocity(noisy: Tensor, times: Tensor) -> Tensor:
+            return self._ask_expert(state, noisy, times, *(context or self._context(self.prefix(batch)))).float()
+
+        return euler_integrate(velocity, x, self.config.num_inference_steps)
 
     def reset(self) -> None:
         """Forget planned actions; called at the start of an episode."""
@@ -166,6 +168,9 @@ class FlowVlaPolicy(PreTrainedPolicy):
         if not self._planned:
             self._planned.extend(self.predict_action_chunk(batch, noise=noise, generator=generator).unbind(dim=1))
         return self._planned.popleft()
+
+    def _context(self, prefix: PrefixCache) -> list[Tensor]:
+        return expert_context(prefix, self.config.chunk_size, self.prefix.rotary, like=self.expert.head.weight)
 
     def _state(self, batch: dict[str, Tensor]) -> Tensor:
         state = batch[OBS_STATE].float()
