@@ -1,146 +1,30 @@
 """Composite tasks are declared as their blueprints ask for, and no easier: fixtures, objects, starts, goals, stages.
 
-To add a task: what its blueprint says of its goal and of its initial states, each sentence with the words of ours.
+To add a task: a module in `tests/support/blueprint_words`, named as its activity: what its blueprint
+says of its goal and of its initial states, each sentence with the words of ours.
 """
 
 from __future__ import annotations
 
 import json
 import re
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from blueprint_words import all_words
 
-from robocasa_lerobot.envs.predicates import (
-    DoorsClosed,
-    Goal,
-    GripperFar,
-    ObjectInside,
-    ObjectOn,
-    ObjectTouches,
-    OnBurner,
-    OnShelf,
-    StateIs,
-    StepsWhile,
-    UnderWater,
-)
 from robocasa_lerobot.envs.predicates.logic import AllOf
 from robocasa_lerobot.envs.predicates.objects import RECEPTACLE_SHARE
 from robocasa_lerobot.envs.scene.build import build_scene
-from robocasa_lerobot.envs.scene.initial_states import Water
-from robocasa_lerobot.envs.scene.scene_spec import InitialState
-from robocasa_lerobot.envs.scene.spec import InitialOpenness, ObjectSpec, Placement
+from robocasa_lerobot.envs.scene.spec import ObjectSpec, Placement
 from robocasa_lerobot.envs.tasks.registry import get_task, task_names
 from robocasa_lerobot.envs.tasks.task import Stage, Task
 from robocasa_lerobot.envs.tasks.typical import goal_of, stages_of
 
-
-@dataclass(frozen=True)
-class Ours:
-    """What stands for the sentences of a blueprint.
-
-    Attributes:
-        goal: part of our goal by sentence.
-        initial: initial state by sentence; None where fixtures start so anyway, or the name of an object.
-        order: what stands for `order_or_memory`, if it says anything.
-        besides: parts of our goal that the blueprint does not ask for.
-        same: roles of the blueprint that are the same fixture as another role, which ours calls by that one alone.
-    """
-
-    goal: dict[str, Goal]
-    initial: dict[str, InitialState | str | None]
-    order: Goal | None = None
-    besides: frozenset[Goal] = frozenset()
-    same: dict[str, str] = field(default_factory=dict)
-
-
-LIT = OnBurner("obj", "stove", lit=True, within=0.15)  # it also asks that the object touches the stove
-WASHED = StepsWhile(UnderWater("lettuce", "sink"), 25)
-RUNS = StateIs("microwave", "on")
-NEAR_THE_MIDDLE = "(contact AND centre xy distance < 0.7 x {} radius)"
-ON_A_SHELF = "bbox in region (tol 0.05), origin z within lower 90% of region"
-IN_A_REGION = "(all bbox corners within one interior region, tol 0.05)"
-ON_ITS_PLATE = NEAR_THE_MIDDLE.format("appetizer_plate")
-OURS = {
-    "KettleBoiling": Ours(
-        goal={
-            "obj in contact with stove": LIT,
-            "obj within 0.15 m (xy) of a burner centre": LIT,
-            "knob of that same burner in [0.35, 2pi-0.35]": LIT,
-            "gripper > 0.25 m from obj": GripperFar("obj", 0.25),
-        },
-        initial={"all stove knobs off": None, "pan or pot on a burner chosen at random": "stove_distr"},
-    ),
-    "WashLettuce": Ours(
-        goal={"washed >= 25 steps in total under running water": WASHED},
-        initial={"faucet off": Water("sink", on=False)},
-        order=WASHED,
-    ),
-    "MicrowaveThawing": Ours(
-        goal={
-            "obj inside microwave (bbox, margin 0.05 m)": ObjectInside("obj", "microwave", margin=0.05),
-            "gripper > 0.25 m from obj": GripperFar("obj", 0.25),
-            "microwave on (start button pressed with door not open >= 0.90)": RUNS,
-        },
-        initial={"microwave door closed and off": None},
-        order=RUNS,
-        besides=frozenset({DoorsClosed("microwave")}),  # it would also run while the door is ajar
-        same={"distractor_counter": "counter"},
-    ),
-    "StoreLeftoversInBowl": Ours(
-        goal={
-            "chicken_drumstick in bowl (contact; centre xy < 0.7*bowl radius)": ObjectOn("chicken_drumstick", "bowl"),
-            "vegetable in bowl (contact; centre xy < 0.7*bowl radius)": ObjectOn("vegetable", "bowl"),
-            "bowl inside fridge shelf region, any shelf (origin z between shelf floor and 90% of shelf height; bbox "
-            "corners inside, tol 0.05)": ObjectInside("bowl", "fridge", region="fridge_shelf", margin=0.05, lower=0.9),
-            "gripper > 0.25 m from bowl": GripperFar("bowl", 0.25),
-        },
-        initial={"fridge doors open": InitialOpenness("fridge", 0.9, 1.0), "robot base centred on bowl": "bowl"},
-    ),
-    "BuildAppetizerPlate": Ours(
-        goal={
-            f"cheese on appetizer_plate {ON_ITS_PLATE}": ObjectOn("cheese", "appetizer_plate"),
-            f"meat on appetizer_plate {ON_ITS_PLATE}": ObjectOn("meat", "appetizer_plate"),
-            f"vegetable on appetizer_plate {ON_ITS_PLATE}": ObjectOn("vegetable", "appetizer_plate"),
-            "appetizer_plate touches dining_table (contact)": ObjectTouches("appetizer_plate", "dining_table"),
-            "gripper > 0.25 m from cheese": GripperFar("cheese", 0.25),
-            "gripper > 0.25 m from meat": GripperFar("meat", 0.25),
-            "gripper > 0.25 m from vegetable": GripperFar("vegetable", 0.25),
-        },
-        initial={"fridge door(s) open (0.90-1.0)": InitialOpenness("fridge", 0.9, 1.0)},
-    ),
-    "RestockBowls": Ours(
-        goal={
-            f"obj1 inside cabinet {IN_A_REGION}": ObjectInside("obj1", "cabinet", margin=0.05),
-            f"obj2 inside cabinet {IN_A_REGION}": ObjectInside("obj2", "cabinet", margin=0.05),
-            "cabinet doors closed (<= 0.005 of range)": DoorsClosed("cabinet", 0.005),
-        },
-        initial={"cabinet doors closed": None},
-    ),
-    "SeparateFreezerRack": Ours(
-        goal={
-            f"meat in meat_tupperware {NEAR_THE_MIDDLE.format('meat_tupperware')}": ObjectOn("meat", "meat_tupperware"),
-            f"vegetable1 in veg_tupperware {NEAR_THE_MIDDLE.format('veg_tupperware')}": ObjectOn(
-                "vegetable1", "veg_tupperware"
-            ),
-            f"vegetable2 in veg_tupperware {NEAR_THE_MIDDLE.format('veg_tupperware')}": ObjectOn(
-                "vegetable2", "veg_tupperware"
-            ),
-            f"veg_tupperware inside highest freezer shelf: {ON_A_SHELF}": OnShelf(
-                "veg_tupperware", "fridge", "highest", "freezer"
-            ),
-            f"meat_tupperware inside second highest freezer shelf (highest if only one): {ON_A_SHELF}": OnShelf(
-                "meat_tupperware", "fridge", "second_highest", "freezer"
-            ),
-            "gripper > 0.25 m from meat_tupperware": GripperFar("meat_tupperware", 0.25),
-            "gripper > 0.25 m from veg_tupperware": GripperFar("veg_tupperware", 0.25),
-        },
-        initial={"freezer door open (0.90-1.0)": InitialOpenness("fridge", 0.9, 1.0, part="freezer")},
-    ),
-}
+OURS = all_words()
 # First words of the blueprints' stages, with our skill and verb; a verb of objects is found from the rest.
 VERBS = {
     "open_door": ("doors", "open"),

@@ -1,0 +1,30 @@
+"""What stands in our declaration of a composite task for the sentences of its blueprint."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from robocasa_lerobot.envs.predicates import Goal
+from robocasa_lerobot.envs.scene.scene_spec import InitialState
+
+# Sentences that several blueprints have.
+NEAR_THE_MIDDLE = "(contact AND centre xy distance < 0.7 x {} radius)"
+
+
+@dataclass(frozen=True)
+class Ours:
+    """What stands for the sentences of a blueprint.
+
+    Attributes:
+        goal: part of our goal by sentence.
+        initial: initial state by sentence; None where fixtures start so anyway, or the name of an object.
+        order: what stands for `order_or_memory`, if it says anything.
+        besides: parts of our goal that the blueprint does not ask for.
+        same: roles of the blueprint that are the same fixture as another role, which ours calls by that one alone.
+    """
+
+    goal: dict[str, Goal]
+    initial: dict[str, InitialState | str | None]
+    order: Goal | None = None
+    besides: frozenset[Goal] = frozenset()
+    same: dict[str, str] = field(default_factory=dict)
