@@ -21,7 +21,7 @@ from robocasa_lerobot.training.config.experiment import load_experiment
 
 CPU, CUDA = "cpu", "cuda"
 DEVICES = (CPU, CUDA)
-_GPU_PIXELS = 128  # of the pictures that are recorded for a GPU
+_GPU_PIXELS = 2  # times as many each way in the pictures of a GPU
 _POLICY, _GPU_POLICY = "study_policy.yaml", "study_gpu.yaml"  # in configs/experiments/parts
 
 
@@ -131,8 +131,8 @@ def root_for(study: StudyConfig, device: str, scale: str | None) -> Path:
 def configs_for(device: str, study: StudyConfig, root: Path) -> Path:
     """The folder of configuration files for a device: the package's own, or for a GPU a copy in `root`.
 
-    In the copy the larger policy stands in the place of the small one, and recorded pictures are of 128 pixels, in a
-    dataset folder of their own.
+    In the copy the larger policy stands in the place of the small one, and recorded pictures have twice as many pixels
+    each way, in a dataset folder of their own; so have those of experiments that name a size.
     """
     configs = configs_folder()
     if device == CPU:
@@ -143,8 +143,14 @@ def configs_for(device: str, study: StudyConfig, root: Path) -> Path:
     shutil.copyfile(parts / _GPU_POLICY, parts / _POLICY)
     registry = copy / study.registry
     content: dict[str, Any] = load_yaml(registry)
-    content["root"] = f"{content['root']}_{_GPU_PIXELS}"
+    content["root"] = f"{content['root']}_{CUDA}"
     for dataset in content["datasets"]:
-        dataset["make"]["image_size"] = max(_GPU_PIXELS, int(dataset["make"]["image_size"]) * 2)
+        dataset["make"]["image_size"] = int(dataset["make"]["image_size"]) * _GPU_PIXELS
     write_text(registry, yaml.safe_dump(content, sort_keys=False))
+    for file in sorted((copy / "experiments" / EXPERIMENTS).glob("*.yaml")):
+        experiment: dict[str, Any] = load_yaml(file)
+        policy = experiment.get("policy")
+        if isinstance(policy, dict) and "image_size" in policy:
+            policy["image_size"] = [pixels * _GPU_PIXELS for pixels in policy["image_size"]]
+            write_text(file, yaml.safe_dump(experiment, sort_keys=False))
     return copy

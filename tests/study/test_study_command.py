@@ -69,7 +69,12 @@ def test_on_a_gpu_every_experiment_has_the_larger_policy_and_pictures(tmp_path: 
         assert registry.is_relative_to(tmp_path)
     text = (configs / whole.registry).read_text(encoding="utf-8")
     assert "image_size: 64" not in text
-    assert "root: datasets/study_128" in text
+    assert "root: datasets/study_cuda" in text
+    sizes = [
+        load_experiment(configs / "experiments/study" / f"{name}.yaml").policy["image_size"]
+        for name in ("quality_varied", "recipe_more_pixels")
+    ]
+    assert sizes == [[128, 128], [192, 192]]
     assert "study_gpu" not in (configs_folder() / "experiments/parts/study_policy.yaml").read_text(encoding="utf-8")
 
 
