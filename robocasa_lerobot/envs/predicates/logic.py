@@ -199,6 +199,12 @@ class ForEach(Goal):
     def __init__(self, object: str, make: Callable[[str], Goal]) -> None:
         self.object, self.make = object, make
 
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, ForEach) and (other.object, other.pattern) == (self.object, self.pattern)
+
+    def __hash__(self) -> int:
+        return hash((ForEach, self.object, self.pattern))
+
     @property
     def name(self) -> str:
         """E.g. `each_ice_i_on_cup`."""

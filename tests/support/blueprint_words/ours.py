@@ -21,6 +21,7 @@ class Ours:
         order: what stands for `order_or_memory`, if it says anything.
         besides: parts of our goal that the blueprint does not ask for.
         same: roles of the blueprint that are the same fixture as another role, which ours calls by that one alone.
+        turned: bounds of the turn, radians, of objects whose models lie along another axis than the blueprint's.
     """
 
     goal: dict[str, Goal]
@@ -28,3 +29,4 @@ class Ours:
     order: Goal | None = None
     besides: frozenset[Goal] = frozenset()
     same: dict[str, str] = field(default_factory=dict)
+    turned: dict[str, tuple[float, float]] = field(default_factory=dict)

@@ -7,6 +7,8 @@ from robocasa_lerobot.envs.tasks.task import Stage, Task
 
 # Handles of cookware point away from the knobs by this much to either side, radians.
 HANDLE_TURN = (0.785, 1.178)
+# Handles of our pans lie along -x, RoboCasa's along -y: the turn that stands for its usual one, of up to 45 degrees.
+HANDLE_TO_FRONT = (0.7853981633974483, 2.356194490192345)
 TASKS: tuple[Task, ...] = ()
 
 

@@ -1,0 +1,1 @@
+"""Composite tasks of the family "cooking"."""
