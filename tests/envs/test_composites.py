@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from blueprint_reading import Category, category, counted, lengths, offset, per_axis, rectangle, scale, turn
 from blueprint_words import all_words
 
 from robocasa_lerobot.envs.predicates.logic import AllOf
@@ -25,18 +26,19 @@ from robocasa_lerobot.envs.tasks.task import Stage, Task
 from robocasa_lerobot.envs.tasks.typical import goal_of, stages_of
 
 OURS = all_words()
-# First words of the blueprints' stages, with our skills and verbs; a verb of objects is found from the rest.
+# First words of the blueprints' stages, with our skill and its verbs for it; a verb of objects is found from the rest.
 VERBS = {
-    "open_door": {("doors", "open")},
-    "close_door": {("doors", "close"), ("doors", "lift_shut")},
-    "press_button": {("buttons", "press")},
-    "turn_knob": {("knobs", "on"), ("knobs", "raise")},
-    "turn_lever": {("levers", "on"), ("levers", "press"), ("levers", "sweep")},
-    "slide_rack": {("racks", "pull"), ("racks", "push")},
-    "navigate": {("navigation", "drive")},
-    "wipe": {("pick_place", "wipe")},
-    "pour": {("pick_place", "pour")},
-    "stir": {("pick_place", "stir")},
+    "open_door": ("doors", "open"),
+    "open_drawer": ("drawers", "open"),
+    "close_door": ("doors", "close", "close_large", "lift_shut", "lift_low"),
+    "press_button": ("buttons", "press"),
+    "turn_knob": ("knobs", "on", "raise"),
+    "turn_lever": ("levers", "on", "press", "sweep"),
+    "slide_rack": ("racks", "pull", "push"),
+    "navigate": ("navigation", "drive"),
+    "wipe": ("pick_place", "wipe"),
+    "pour": ("pick_place", "pour"),
+    "stir": ("pick_place", "stir"),
 }
 # What the benchmark's tables call activities of the blueprints.
 RENAMED = {
@@ -67,32 +69,48 @@ def test_numbers_fixtures_and_stages(name: str, blueprints: dict[str, Any]) -> N
     assert (len(stages), len(row["stages"])) == (len(said_stages), row["subtasks"])
     for stage, said in zip(stages, said_stages, strict=True):
         _check_stage(task, stage, said)
-    assert {fixture.role for fixture in task.fixtures} == set(row["fixtures"]) - set(ours.same)
+    assert {fixture.role for fixture in task.fixtures} == set(row["fixtures"]) - {*ours.same, *ours.drawn}
     for fixture in task.fixtures:
         said = row["fixtures"][fixture.role]
         # Which of a kitchen's stools are the first and the second is drawn: blueprints have the order of the layout.
-        assert said.replace("reachable ", "").replace(" ", "_").startswith(fixture.kind)
+        kind = ours.kinds.get(fixture.role, said.replace("reachable ", "").replace(" ", "_"))
+        assert said.startswith("stool") == fixture.kind.startswith("stool")
+        assert kind.startswith(fixture.kind)
         near = re.search(r"(?:near|nearest|serving) (\w+)", said)
         assert fixture.near == (near.group(1) if near else "")
-        assert list(fixture.size) == (_lengths(said) or [0.0, 0.0])
+        assert list(fixture.size) == (lengths(said) or [0.0, 0.0])
         assert ("layouts with dining counter" not in said) or "dining_counter" in task.needs
         assert ("reachable freezer" not in said) or "freezer" in task.needs
     for role, other in ours.same.items():
         assert row["fixtures"][role] == row["fixtures"][other]
-    facing, *_ = row["robot_start"].split()
-    before = re.search(r"in front of (\w+)|base centred on (\w+)", " ".join([row["robot_start"], *row["initial"]]))
-    assert task.robot_start.fixture == facing
-    before_it = [said["name"] for said in row["objects"] if "robot starts in front of it" in str(said)]
-    before_it += [before.group(before.lastindex or 0)] if before else []
-    assert [task.robot_start.at_object] == (before_it or [""])
+    _check_robot_start(task, row)
     assert len(task.paraphrases) >= 4
     assert row["instruction"] not in (task.instruction, *task.paraphrases)
 
 
+def _check_robot_start(task: Task, row: dict[str, Any]) -> None:
+    """Before a fixture, or beside it; in line with an object, which may say so itself."""
+    facing, *_ = row["robot_start"].split()
+    told = " ".join([row["robot_start"], *row["initial"]])
+    before = re.search(r"in front of (\w+)|base centred on (\w+)", told)
+    in_front_of = {
+        said["name"] for said in row["objects"] if "robot starts in front" in str(said.get("size_or_offset"))
+    }
+    in_front_of |= {before.group(before.lastindex or 0)} if before else set()
+    beside = re.search(r"beside the (\w+), .* half width \+ ([\d.]+) m, back ([\d.]+) m", told)
+    start = task.robot_start
+    assert start.fixture == (beside.group(1) if beside else facing)
+    assert {start.at_object} == (in_front_of or {""})
+    assert start.beside == ("left or right" in told)
+    assert not beside or (start.clearance, start.setback) == (float(beside.group(2)), float(beside.group(3)))
+
+
 def _check_stage(task: Task, stage: Stage, said: str) -> None:
     first, *rest = re.findall(r"\w+", said)
-    if first != "pick_place":
-        assert (stage.skill, stage.verb) in VERBS[first]
+    if first not in ("pick_place", "insertion"):
+        skill, *verbs = VERBS[first]
+        assert stage.skill == skill
+        assert stage.verb in verbs
         return
     assert stage.skill == "pick_place"
     # A surface that is wiped is reached with the tool by the stage that wipes it.
@@ -100,10 +118,11 @@ def _check_stage(task: Task, stage: Stage, said: str) -> None:
     taken = wiped or "-> gripper" in said or ("->" not in said and re.search(r"\((pick|grasp)", said))
     assert stage.verb in ({"pick"} if taken else {"place", "hold"})
     # An object is called by its name or kind, or ours carries it in what it lies in.
+    called = OURS[task.name].called.get(rest[0], rest[0])
     ours = {wanted.name if wanted.count == (1, 1) else f"{wanted.name}_i": wanted for wanted in task.objects}
     inside = {name for name, wanted in ours.items() if _holder(wanted) == stage.object}
     kinds = {group for name in {stage.object, *inside} for group in ours[name].groups}
-    assert rest[0] in {stage.object, *inside} or any(kind.startswith(rest[0].rstrip("0")) for kind in kinds)
+    assert called in {stage.object, *inside} or any(kind.startswith(called.rstrip("0")) for kind in kinds)
 
 
 def _holder(wanted: ObjectSpec) -> str:
@@ -118,22 +137,33 @@ def test_objects_and_where_they_start(name: str, blueprints: dict[str, Any]) -> 
     assert set(ours) == {said["name"].replace("{i}", "") for said in row["objects"]}
     for said in row["objects"]:
         wanted = ours[said["name"].replace("{i}", "")]
-        category, property_ = re.fullmatch(r"([^(]+?)(?: \((\w+)\))?", said["category"]).groups()
-        groups = category.replace("all", "any").split(", ")
-        assert wanted.groups == tuple(group for group in groups if not group.startswith("-"))
-        assert wanted.exclude == tuple(group[1:] for group in groups if group.startswith("-"))
-        low, _, high = str(said["count"]).partition("-")
-        assert wanted.count == (int(low), int(high or low))
+        of = category(said["category"])
+        _check_kinds(task, wanted, said["category"], of)
+        assert wanted.count == counted(said["count"])
         placed = said.get("size_or_offset")
-        placed = placed if isinstance(placed, dict) else {}
-        needs = {*placed.get("require", ()), *filter(None, [property_, *said.get("needs", "").split(", ")])}
+        required = placed.get("require", ()) if isinstance(placed, dict) else ()
+        needs = {*required, *filter(None, said.get("needs", "").split(", "))}
         assert needs <= {*wanted.properties, *(["graspable"] if wanted.graspable else [])}
-        assert _per_axis(wanted.scale) == _per_axis(placed.get("scale", _said_scale(said)))
-        # A demonstrator's object that cannot be grasped goes with what it lies in; thin ones are made thicker.
+        assert per_axis(wanted.scale) == per_axis(OURS[name].scales.get(wanted.name, scale(placed)))
+        # A demonstrator's object that cannot be grasped goes with what it lies in; flat tools are made higher.
         handled = {stage.object for stage in stages_of(task)}
-        thicker = _per_axis(wanted.scale)[2] >= 1.5
-        assert wanted.graspable >= (said["graspable"] and said["name"] in handled and not thicker)
+        made_so = len(set(per_axis(wanted.scale))) > 1
+        assert wanted.graspable >= (said["graspable"] and said["name"] in handled and not made_so)
         _check_start(task, wanted, said)
+
+
+def _check_kinds(task: Task, wanted: ObjectSpec, said: str, of: Category) -> None:
+    """Groups and what is left out of them; or the kind of another object, or one that is drawn."""
+    if said.startswith("same category as "):
+        assert wanted.same_category_as == said.removeprefix("same category as ")
+    elif " OR " in said:
+        ((group,), either) = wanted.groups, re.findall(r"\w+(?= OR)|(?<=OR )\w+", said)
+        options = [option for choice in task.choices for option in choice.options.values()]
+        assert {option[group.strip("{}")] for option in options if group.strip("{}") in option} == set(either)
+    else:
+        assert wanted.groups == of.groups or wanted.groups == (of.brackets,)
+        assert of.brackets in {"", *wanted.properties, *wanted.groups}
+        assert set(of.exclude) <= set(wanted.exclude)
 
 
 def _container_of(wanted: ObjectSpec) -> list[ObjectSpec]:
@@ -144,20 +174,6 @@ def _container_of(wanted: ObjectSpec) -> list[ObjectSpec]:
     return [ObjectSpec(f"{wanted.name}_container", (start.try_to_place_in,), replace(start, try_to_place_in=""))]
 
 
-def _per_axis(scale: float | str | list[float] | tuple[float, ...]) -> list[float]:
-    assert not isinstance(scale, str)
-    return list(map(float, scale)) if isinstance(scale, list | tuple) else [float(scale)] * 3
-
-
-def _said_scale(said: dict[str, Any]) -> float | list[float]:
-    """The scale that a text says: "scale 1.25", "scale 1.1,0.8,1", "scale z 2"."""
-    found = re.search(r"scale (z )?\[?([\d.,]+)", str(said.get("size_or_offset", "")))
-    if found is None:
-        return 1.0
-    factors = [float(number) for number in found.group(2).strip(",.").split(",")]
-    return [1.0, 1.0, factors[0]] if found.group(1) else factors if len(factors) == 3 else factors[0]
-
-
 def _check_start(task: Task, wanted: ObjectSpec, said: dict[str, Any]) -> None:
     start, at = wanted.start, said["at"]
     assert isinstance(start, Placement)
@@ -166,36 +182,42 @@ def _check_start(task: Task, wanted: ObjectSpec, said: dict[str, Any]) -> None:
         words = (start.object, *(f"{group} (container)" for group in holder.groups))
         assert at.startswith(tuple(f"{where} {word}" for where in ("in", "on") for word in words))
         return
-    size, pos = _said_rectangle(said.get("size_or_offset", {}))
+    placed = said.get("size_or_offset") or {}
+    size, pos = rectangle(placed)
     if start.try_to_place_in:
-        holder, kind = f"{wanted.name}_container", start.try_to_place_in
-        if at == f"on {holder} ({kind})":  # all else is said of the container
+        # Of the container all else is compared.
+        kind = start.try_to_place_in
+        if at in (f"on {wanted.name}_container ({kind})", f"on {kind}_container"):
             return
-        assert at.startswith(f"on {kind} ({holder})")  # whose rectangle is compared
+        own = [f"{kind} ({prefix}container)" for prefix in ("", f"{wanted.name}_")]
+        own += [f"{prefix}container ({kind})" for prefix in ("", f"{wanted.name}_")]
+        assert at.startswith(tuple(f"on {holder}" for holder in own))
     else:
         assert list(start.size or ()) == size
-    if pos is not None:
+    if pos is not None and not _stands_at(start, pos):
         assert list(start.pos) == pos
-    for axis, amount in re.findall(r"offset ([xy]) ([+-][\d.]+)", str(said.get("size_or_offset", ""))):
-        assert start.offset["xy".index(axis)] == float(amount)
+    for axis, by in offset(placed).items():
+        assert start.offset[axis] == by
     assert ("left or right" in at) == (start.region.loc == "left_right")
     assert (start.region.name == "any") == ("random" in at)
     low, high = (float(bound) for bound in (re.findall(r"([\d.]+)-([\d.]+) m", at) or [start.region.height])[0])
     assert start.region.height == (low, high)
-    if isinstance(said.get("size_or_offset"), dict) and "min_patch" in said["size_or_offset"]:
-        assert list(start.region.top_size) == said["size_or_offset"]["min_patch"]
+    if isinstance(placed, dict) and "min_patch" in placed:
+        assert list(start.region.top_size) == placed["min_patch"]
     _check_fixture(task, start, at)
-    if pos is None and start.offset == (0.0, 0.0):
+    if pos is None and not offset(placed):
         _check_part(start, at)
-    turned = "turned 90 deg" in at or "yaw" in str(said.get("size_or_offset"))
-    other = OURS[task.name].turned.get(wanted.name)
-    if other is not None:
-        assert start.rotation == pytest.approx(other, abs=1e-3)
-        return
-    assert turned == (start.rotation != Placement().rotation)
-    if turned:
-        bounds = (np.pi / 2, np.pi / 2) if "90 deg" in at else (np.pi / 4, 3 * np.pi / 8)
-        assert start.rotation == pytest.approx(bounds, abs=1e-3)
+    turned = OURS[task.name].turned.get(wanted.name) or turn(at, placed)
+    assert (turned is not None) == (start.rotation != Placement().rotation)
+    if turned is not None:
+        assert start.rotation == pytest.approx(turned, abs=1e-3)
+
+
+def _stands_at(start: Placement, pos: list[float | str]) -> bool:
+    """Whether what the blueprint places before a stool, "pos (0.3,...)", starts in line with that, so much aside."""
+    across, along = pos
+    aside = across if isinstance(across, float) else 0.0
+    return start.pos == ("ref", along) and start.offset[0] <= aside and start.region.ref != ""
 
 
 def _check_fixture(task: Task, start: Placement, at: str) -> None:
@@ -203,7 +225,8 @@ def _check_fixture(task: Task, start: Placement, at: str) -> None:
     same = OURS[task.name].same
     named = {fixture.role for fixture in task.fixtures if re.search(rf"\b{fixture.role}\b", at)}
     named |= {other for role, other in same.items() if role in at}
-    assert named <= {start.fixture, start.region.ref}
+    drawn = {choice.name: set(choice.options) for choice in task.choices}
+    assert named <= {start.fixture, start.region.ref, *drawn.get(start.region.ref.strip("{}"), ())}
     kinds = {fixture.role: fixture.kind.replace("_", " ") for fixture in task.fixtures}
     on_burner = "burner" in at and kinds[start.fixture] == "stove"
     assert start.fixture in named or kinds[start.fixture] in at or on_burner
@@ -213,7 +236,7 @@ def _check_part(start: Placement, at: str) -> None:
     """Front, back, left and right of the fixture; not the fixture that it is in front of."""
     words = set(re.findall(r"\w+", re.sub(r"in front of|left or right", "", at)))
     across, along = start.pos
-    assert ("front" not in words) or along == -1.0
+    assert ("front" not in words) or along == -1.0 or (along == -0.95 and "near" in words)
     assert ("back" not in words) or along == 1.0
     assert ("centre" not in words) or across == 0.0
     if words & {"left", "right"}:
@@ -221,26 +244,6 @@ def _check_part(start: Placement, at: str) -> None:
         assert ("right" in words) == (across > 0.0)
     if "setting" in words or "at stool" in at:
         assert (across, along) == ("ref", "ref")
-
-
-def _said_rectangle(placed: dict[str, Any] | list[float] | str) -> tuple[list[float], list[float | str] | None]:
-    """Size, and position if it is said, of "region 0.35x0.35 m, pos (ref,-1)" and of records."""
-    if isinstance(placed, list):
-        return placed, None
-    if isinstance(placed, dict):
-        return placed.get("size", []), placed.get("pos")
-    pos = re.search(r"pos \((-?[\w.]+),(-?[\w.]+)\)", placed)
-    return _lengths(placed), [_where(text) for text in pos.groups()] if pos else None
-
-
-def _where(text: str) -> float | str:
-    return text if text == "ref" else float(text)
-
-
-def _lengths(text: str) -> list[float]:
-    """The first two lengths of a text such as "counter, >= 0.2x0.3 m"; none if it has none."""
-    found = re.search(r"([\d.]+|full width )x ?([\d.]+)", text)
-    return [np.inf if number == "full width " else float(number) for number in found.groups()] if found else []
 
 
 @pytest.mark.parametrize("name", OURS)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from enum import IntEnum
 
@@ -136,6 +137,20 @@ def _with_drawer(layout: Layout, fixture: Fixture) -> bool:
     return FILTERS[FixtureType.FRIDGE](layout, fixture) and bool(fixture.parts_to_choose("drawer"))
 
 
+def _of_three_stools(*, at_end: bool) -> Filter:
+    """A stool of a row of three, at either end of it or between: where a layout has exactly three."""
+
+    def found(layout: Layout, fixture: Fixture) -> bool:
+        row = layout.of_type("stool")
+        if len(row) != 3 or fixture not in row:
+            return False
+        # The middle one is the nearest to both others together.
+        middle = min(row, key=lambda stool: sum(math.dist(stool.pos[:2], other.pos[:2]) for other in row))
+        return (fixture is not middle) == at_end
+
+    return found
+
+
 # What a robot is sent from and to (docs/robocasa.md, section 8).
 _LANDMARKS = (
     "coffee_machine", "toaster", "toaster_oven", "stove", "stove_wide", "stovetop", "open_cabinet", "microwave", "sink",
@@ -153,6 +168,8 @@ def _once(layout: Layout, fixture: Fixture) -> bool:
 FIXTURE_KINDS |= {
     "fridge_with_drawer": _with_drawer,
     "fridge_with_freezer": _with_freezer,
+    "stool_at_end_of_three": _of_three_stools(at_end=True),
+    "stool_amid_three": _of_three_stools(at_end=False),
     "landmark": _types(*_SOURCES),
     "landmark_once": _once,
 }

@@ -39,7 +39,7 @@ MAX_ATTEMPTS = 50
 _CAMERA_NOISE_STREAM = 2
 
 # Liquids in a vessel: colour and opacity.
-LIQUIDS = {"coffee": (0.25, 0.13, 0.06, 1.0)}
+LIQUIDS = {"coffee": (0.25, 0.13, 0.06, 1.0), "lemonade": (0.95, 0.90, 0.50, 0.6)}
 
 
 @dataclass(frozen=True)

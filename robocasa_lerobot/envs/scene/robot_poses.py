@@ -18,7 +18,6 @@ from robocasa_lerobot.envs.robots.robot import StandingShape
 from robocasa_lerobot.envs.scene.roles import ground_fixture
 from robocasa_lerobot.envs.scene.spec import RobotStart
 
-BESIDE_CLEARANCE_M = 0.20
 # Free poses are searched for with the start's deviation, then with wider ones (docs/robocasa.md, section 6); RoboCasa
 # widens without end, ours gives the layout up and takes another.
 SPAWN_TRIES, SPAWN_ROUNDS = 50, 4
@@ -123,7 +122,7 @@ def robot_pose(
         PlacementError: no pose was free.
     """
     ground = ground_fixture(layout, fixture)
-    lateral = fixture.width / 2 + BESIDE_CLEARANCE_M
+    lateral = fixture.width / 2 + start.clearance
     # Standing to the left of the fixture, it is at the robot's right, and vice versa.
     options = [("right", -lateral), ("left", lateral)] if start.beside else [("", 0.0)]
     if start.setback and layout.types[fixture.name] == "fridge_bottom_freezer":

@@ -138,6 +138,7 @@ class Placement:
         reuse_region_from: name of an object whose part of the fixture is taken again.
         ensure_inside: the whole footprint lies in the rectangle, not its middle alone.
         slot: it stands along the longer side of the part, and out of its top, as bread does in a toaster.
+        heaped: on an object, it may lie on what is there already, as low as possible.
     """
 
     fixture: str = ""
@@ -152,6 +153,7 @@ class Placement:
     reuse_region_from: str = ""
     ensure_inside: bool = True
     slot: bool = False
+    heaped: bool = False
 
 
 @dataclass(frozen=True)
@@ -203,7 +205,8 @@ class RobotStart:
 
     Attributes:
         fixture: role; this and `at_object` may name a choice in braces.
-        beside: stand half the fixture's width plus 0.2 m to its left or right, whichever is free.
+        beside: stand half the fixture's width plus the clearance to its left or right, whichever is free.
+        clearance: beside it, metres.
         deviation: half ranges of the uniform noise along and towards the counter, metres.
         setback: farther from it than usual, metres.
         at_object: name of an object that it stands in line with, instead of the fixture's middle.
@@ -211,6 +214,7 @@ class RobotStart:
 
     fixture: str
     beside: bool = False
+    clearance: float = 0.2
     deviation: tuple[float, float] = (0.15, 0.05)
     setback: float = 0.0
     at_object: str = ""

@@ -3,9 +3,20 @@
 from __future__ import annotations
 
 from blueprint_words.ours import Ours
-from robocasa_lerobot.envs.predicates import GripperFar, OnBurner
+from robocasa_lerobot.envs.predicates import (
+    DoorsClosed,
+    GripperFar,
+    GripperFarFromPart,
+    ObjectAtSite,
+    ObjectOn,
+    OnBurner,
+    StateIs,
+)
+from robocasa_lerobot.envs.scene.spec import InitialOpenness
 
 LIT = OnBurner("obj", "stove", lit=True, within=0.15)  # it also asks that the object touches the stove
+ON_TRAY = "in/on container (contact AND xy centre distance < 0.7 x container horizontal radius)"
+RUNS = StateIs("coffee_machine", "on")
 
 OURS = {
     "KettleBoiling": Ours(
@@ -16,5 +27,29 @@ OURS = {
             "gripper > 0.25 m from obj": GripperFar("obj", 0.25),
         },
         initial={"all stove knobs off": None, "pan or pot on a burner chosen at random": "stove_distr"},
+    ),
+    "ArrangeTea": Ours(
+        goal={
+            f"obj {ON_TRAY}": ObjectOn("obj", "container"),
+            f"obj2 {ON_TRAY}": ObjectOn("obj2", "container"),
+            "cab doors closed (every door joint <= 0.005 of range)": DoorsClosed("cab", 0.005),
+            "gripper > 0.25 m from obj": GripperFar("obj", 0.25),
+        },
+        initial={"cab doors open (0.90-1.0 of range)": InitialOpenness("cab", 0.9, 1.0)},
+    ),
+    "PrepareCoffee": Ours(
+        goal={
+            "obj under coffee_machine dispenser (xy < 0.04 m and |dz| < 0.10 m from receptacle site)": ObjectAtSite(
+                "obj", "coffee_machine", "receptacle", across=0.04, high=0.10
+            ),
+            "gripper > 0.25 m from obj": GripperFar("obj", 0.25),
+            "coffee_machine turned on": RUNS,
+            "gripper > 0.15 m from every start button": GripperFarFromPart("coffee_machine", "start_button", 0.15),
+        },
+        initial={
+            "cab doors open (0.90-1.0 of range)": InitialOpenness("cab", 0.9, 1.0),
+            "coffee machine off": None,
+        },
+        order=RUNS,
     ),
 }

@@ -20,13 +20,21 @@ class Ours:
         initial: initial state by sentence; None where fixtures start so anyway, or the name of an object.
         order: what stands for `order_or_memory`, if it says anything.
         besides: parts of our goal that the blueprint does not ask for.
+        called: names of objects by what the blueprint's stages call them instead.
         same: roles of the blueprint that are the same fixture as another role, which ours calls by that one alone.
         turned: bounds of the turn, radians, of objects whose models lie along another axis than the blueprint's.
+        drawn: roles of the blueprint that are one of several others, by which is drawn; the choice's name.
+        kinds: our kinds of fixtures where the blueprint says in a sentence what is meant.
+        scales: ours where the blueprint's would not fit our models.
     """
 
     goal: dict[str, Goal]
     initial: dict[str, InitialState | str | None]
     order: Goal | None = None
     besides: frozenset[Goal] = frozenset()
+    called: dict[str, str] = field(default_factory=dict)
     same: dict[str, str] = field(default_factory=dict)
     turned: dict[str, tuple[float, float]] = field(default_factory=dict)
+    drawn: dict[str, str] = field(default_factory=dict)
+    kinds: dict[str, str] = field(default_factory=dict)
+    scales: dict[str, tuple[float, float, float]] = field(default_factory=dict)

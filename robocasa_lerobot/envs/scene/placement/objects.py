@@ -211,14 +211,35 @@ def _put_on(
         floor = z + holder.item.size[2] / 2
     area = Area(cx - half[0], cx + half[0], cy - half[1], cy + half[1], (x, y), holder.yaw, floor, holder.name)
     area = replace(area, rotation=start.rotation, inside=start.ensure_inside)
+    width, depth, height = item.size
+    what = f"{name} ({item.model})"
+    if start.heaped:
+        footprint, floor = _on_heap(rng, table, area, (width / 2, depth / 2), holder, what)
+        at = (footprint.x, footprint.y, floor + height / 2 + PLACEMENT_GAP_M)
+        table.placed[name] = PlacedObject(name, item, at, footprint.yaw)
+        return
     others = [
         p.footprint
         for other, p in table.placed.items()
         if other != holder.name and abs(p.pos[2] - p.item.size[2] / 2 - floor) < 0.03
     ]
-    width, depth, height = item.size
-    what = f"{name} ({item.model})"
     footprint, _ = place(rng, [area], (width / 2, depth / 2), others, margin=0.002, what=what)
     at = (footprint.x, footprint.y, floor + height / 2 + PLACEMENT_GAP_M)
     table.placed[name] = PlacedObject(name, item, at, footprint.yaw)
     table.taken.append((footprint, floor))
+
+
+def _on_heap(
+    rng: np.random.Generator, table: _Table, area: Area, half: tuple[float, float], holder: PlacedObject, what: str
+) -> tuple[Footprint, float]:
+    """The lowest of several places on what a holder has in it already, and the height there, metres."""
+    others = [other for other in table.placed.values() if other is not holder and other.pos[2] > area.z]
+    best: tuple[Footprint, float] | None = None
+    for _ in range(_TURNS):
+        footprint, _ = place(rng, [area], half, [], what=what)
+        tops = [other.pos[2] + other.item.size[2] / 2 for other in others if other.footprint.overlaps(footprint)]
+        floor = max([area.z, *tops])
+        if best is None or floor < best[1]:
+            best = footprint, floor
+    assert best is not None
+    return best

@@ -5,6 +5,7 @@ from __future__ import annotations
 from robocasa_lerobot.envs.scene.spec import FixtureSpec, ObjectSpec, Placement, SampleRegion
 from robocasa_lerobot.envs.tasks.task import Stage, Task
 
+WITHIN_REACH_M = (0.5, 1.65)  # heights of shelves that the arm reaches
 # Handles of cookware point away from the knobs by this much to either side, radians.
 HANDLE_TURN = (0.785, 1.178)
 # Handles of our pans lie along -x, RoboCasa's along -y: the turn that stands for its usual one, of up to 45 degrees.
@@ -39,3 +40,10 @@ def distractors(ref: str) -> ObjectSpec:
 def place(object_: str = "obj", target: str = "counter", verb: str = "place", part: str = "") -> tuple[Stage, ...]:
     """The one stage of a pick-and-place task."""
     return (Stage("pick_place", verb, target, object=object_, part=part),)
+
+
+def in_cabinet(
+    role: str, size: tuple[float, float], *, pos: tuple[float | None, float | None] = (0.0, -1.0), **more: object
+) -> Placement:
+    """On a shelf of a cabinet that the arm reaches, by default at its front."""
+    return Placement(role, region=SampleRegion(height=WITHIN_REACH_M), size=size, pos=pos, **more)  # type: ignore[arg-type]

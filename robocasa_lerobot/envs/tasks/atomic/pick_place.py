@@ -17,7 +17,7 @@ from robocasa_lerobot.envs.scene.spec import (
     RobotStart,
     SampleRegion,
 )
-from robocasa_lerobot.envs.tasks.atomic.common import HANDLE_TURN, counter_near, on_counter, place
+from robocasa_lerobot.envs.tasks.atomic.common import HANDLE_TURN, counter_near, in_cabinet, on_counter, place
 from robocasa_lerobot.envs.tasks.task import Task
 
 _TOOLS, _NOT_TOOLS = ("reamer", "strainer", "cheese_grater"), ("tool", "utensil")
@@ -30,7 +30,6 @@ _PAN = Placement(
     rotation=HANDLE_TURN,
     ensure_inside=False,
 )
-_WITHIN_REACH_M = (0.5, 1.65)  # heights of shelves that the arm reaches
 _DOOR_OPEN = (0.90, 1.0)
 
 
@@ -69,7 +68,7 @@ CABINET = (
             ObjectSpec(
                 "obj",
                 ("any",),
-                Placement("cab", region=SampleRegion(height=_WITHIN_REACH_M), size=(0.5, 0.2), pos=(0.0, -1.0)),
+                in_cabinet("cab", (0.5, 0.2)),
                 graspable=True,
             ),
             _back("cab", (1.0, 0.3), (0.0, -0.05)),

@@ -1,8 +1,24 @@
 """Brew hot drinks."""
 
-from robocasa_lerobot.envs.predicates import AllOf, GripperFar, OnBurner
-from robocasa_lerobot.envs.scene.spec import FixtureSpec, ObjectSpec, Placement, RobotStart, SampleRegion
-from robocasa_lerobot.envs.tasks.atomic.common import HANDLE_TURN, counter_near, on_counter
+from robocasa_lerobot.envs.predicates import (
+    AllOf,
+    DoorsClosed,
+    GripperFar,
+    GripperFarFromPart,
+    ObjectAtSite,
+    ObjectOn,
+    OnBurner,
+    StateIs,
+)
+from robocasa_lerobot.envs.scene.spec import (
+    FixtureSpec,
+    InitialOpenness,
+    ObjectSpec,
+    Placement,
+    RobotStart,
+    SampleRegion,
+)
+from robocasa_lerobot.envs.tasks.atomic.common import HANDLE_TURN, counter_near, in_cabinet, on_counter
 from robocasa_lerobot.envs.tasks.task import Stage, Task
 
 # Knobs of stoves are off at the start, as no initial state says otherwise.
@@ -46,4 +62,57 @@ KETTLE_BOILING = Task(
     ),
 )
 
-TASKS = (KETTLE_BOILING,)
+ARRANGE_TEA = Task(
+    name="ArrangeTea",
+    summary="Kettle and mug are on the tray, the cabinet is shut, the gripper away from the mug.",
+    fixtures=(FixtureSpec("cab", "cabinet_double_door"), counter_near("cab", size=(0.6, 0.4))),
+    robot_start=RobotStart("cab"),
+    objects=(
+        ObjectSpec("obj", ("mug",), in_cabinet("cab", (0.5, 0.2)), graspable=True),
+        ObjectSpec("obj2", ("kettle_non_electric",), on_counter("cab", (0.5, 0.5), offset=(0.1, 0.0)), graspable=True),
+        ObjectSpec("container", ("tray",), on_counter("cab", (0.7, 0.7), pos=("ref", -0.6), offset=(-0.1, 0.0))),
+    ),
+    initial=(InitialOpenness("cab", 0.9, 1.0),),
+    goal=AllOf(ObjectOn("obj", "container"), ObjectOn("obj2", "container"), DoorsClosed("cab"), GripperFar("obj")),
+    stages=(
+        Stage("pick_place", "place", "container", object="obj2"),
+        Stage("pick_place", "place", "container", object="obj"),
+        Stage("doors", "close", "cab"),
+    ),
+    instruction="Set the kettle from the counter and the mug from the cabinet on the tray, then close the cabinet.",
+    paraphrases=(
+        "Kettle and mug belong on the tray; leave the cabinet shut.",
+        "Get the tray ready for tea with the kettle first, then the {obj} out of the cabinet, and shut its doors.",
+        "Put the kettle on the tray, fetch the {obj} to it and close both doors of the cabinet.",
+        "The tea tray needs the kettle that stands beside it and the cabinet's {obj}. Close the cabinet after that.",
+    ),
+)
+
+_BREWS = AllOf(StateIs("coffee_machine", "on"), GripperFarFromPart("coffee_machine", "start_button"))
+_UNDER_SPOUT = AllOf(ObjectAtSite("obj", "coffee_machine", "receptacle", across=0.04, high=0.10), GripperFar("obj"))
+
+PREPARE_COFFEE = Task(
+    name="PrepareCoffee",
+    summary="The mug stands under the spout of the machine, which brews, the gripper away from mug and button.",
+    fixtures=(FixtureSpec("coffee_machine", "coffee_machine"), FixtureSpec("cab", "cabinet", near="coffee_machine")),
+    robot_start=RobotStart("cab"),
+    objects=(
+        ObjectSpec("obj", ("mug",), in_cabinet("cab", (0.3, 0.2)), graspable=True),
+        ObjectSpec("distr_cab", ("any",), in_cabinet("cab", (1.0, 0.2), pos=(0.0, 1.0))),
+    ),
+    initial=(InitialOpenness("cab", 0.9, 1.0),),
+    goal=AllOf(*_UNDER_SPOUT.parts, *_BREWS.parts),
+    stages=(
+        Stage("pick_place", "place", "coffee_machine", object="obj", part="receptacle", until=_UNDER_SPOUT),
+        Stage("buttons", "press", "coffee_machine", part="start_button", until=_BREWS),
+    ),
+    instruction="Put the {obj} from the cabinet under the coffee machine's dispenser and start the machine.",
+    paraphrases=(
+        "Make a coffee with the {obj} that is in the cabinet.",
+        "Bring the cabinet's {obj} to the coffee machine, below its outlet, and press the button.",
+        "Get the {obj} out of the cabinet, place it where the coffee comes out, and begin brewing.",
+        "The coffee machine should fill the {obj} from the cabinet.",
+    ),
+)
+
+TASKS = (KETTLE_BOILING, ARRANGE_TEA, PREPARE_COFFEE)

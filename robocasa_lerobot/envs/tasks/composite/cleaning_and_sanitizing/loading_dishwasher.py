@@ -1,0 +1,45 @@
+"""Load the dishwasher."""
+
+from robocasa_lerobot.envs.predicates import AllOf, DoorsClosed, GripperFar, ObjectTouches
+from robocasa_lerobot.envs.scene.initial_states import PartAt
+from robocasa_lerobot.envs.scene.spec import FixtureSpec, InitialOpenness, ObjectSpec, RobotStart
+from robocasa_lerobot.envs.tasks.atomic.common import counter_near, on_counter
+from robocasa_lerobot.envs.tasks.task import Stage, Task
+
+_RACK = "rack1"  # the upper one
+_ABOVE = on_counter("dishwasher", (0.35, 0.25))
+_SHUT = DoorsClosed("dishwasher", 0.05)
+
+
+def _on_rack(name: str) -> ObjectTouches:
+    return ObjectTouches(name, "dishwasher", part=_RACK)
+
+
+def _load(name: str) -> Stage:
+    until = AllOf(_on_rack(name), GripperFar(name))
+    text = f"put the {{{name}}} on the top rack of the dishwasher"
+    return Stage("pick_place", "place", "dishwasher", object=name, part=_RACK, until=until, text=text)
+
+
+LOAD_DISHWASHER = Task(
+    name="LoadDishwasher",
+    summary="Cup and bowl are on the top rack of the dishwasher, which is shut.",
+    fixtures=(FixtureSpec("dishwasher", "dishwasher"), counter_near("dishwasher")),
+    robot_start=RobotStart("dishwasher", beside=True, clearance=0.25, setback=0.15),
+    objects=(
+        ObjectSpec("dish0", ("cup",), _ABOVE),
+        ObjectSpec("dish1", ("bowl",), _ABOVE, scale=0.5),
+    ),
+    initial=(InitialOpenness("dishwasher", 0.9, 1.0), PartAt("dishwasher", _RACK, (1.0, 1.0))),
+    goal=AllOf(_on_rack("dish0"), _on_rack("dish1"), _SHUT),
+    stages=(_load("dish0"), _load("dish1"), Stage("doors", "lift_low", "dishwasher", until=_SHUT)),
+    instruction="Put the {dish0} and the {dish1} on the top rack of the dishwasher and close it.",
+    paraphrases=(
+        "The {dish0} and the {dish1} on the counter need washing: load them into the dishwasher and shut its door.",
+        "Fill the upper rack of the dishwasher with {dish0} and {dish1}, then close the dishwasher.",
+        "Clear the {dish0} and the {dish1} into the open dishwasher, on its top rack, and fold the door up.",
+        "Both dishes go on the dishwasher's upper rack. Leave the dishwasher closed.",
+    ),
+)
+
+TASKS = (LOAD_DISHWASHER,)

@@ -1,0 +1,55 @@
+"""Keep condiments in order."""
+
+import numpy as np
+
+from robocasa_lerobot.envs.predicates import AllOf, GripperFar, Near, ObjectInside
+from robocasa_lerobot.envs.scene.spec import FixtureSpec, InitialOpenness, ObjectSpec, Placement, RobotStart
+from robocasa_lerobot.envs.tasks.atomic.common import counter_near, in_cabinet, on_counter
+from robocasa_lerobot.envs.tasks.task import Stage, Task
+
+_BOTTLES = ("condiment_bottle", "ketchup", "syrup_bottle")
+_BEFORE = on_counter("cabinet", (0.5, 0.2))
+_BESIDE_M = 0.15
+
+
+def _in_cabinet() -> Placement:
+    return in_cabinet("cabinet", (np.inf, 0.2))
+
+
+def _stored(name: str) -> AllOf:
+    """In the cabinet beside what is like it there, and let go."""
+    return AllOf(ObjectInside(name, "cabinet"), Near(name, f"cab_{name}", _BESIDE_M), GripperFar(name))
+
+
+def _store(name: str) -> Stage:
+    text = f"put the {{{name}}} into the cabinet beside the {{cab_{name}}}"
+    return Stage("pick_place", "place", "cabinet", object=name, until=_stored(name), text=text)
+
+
+CATEGORIZE_CONDIMENTS = Task(
+    name="CategorizeCondiments",
+    summary="Bottle and shaker are in the cabinet beside the other bottle and the other shaker, the gripper away.",
+    fixtures=(FixtureSpec("cabinet", "cabinet"), counter_near("cabinet")),
+    robot_start=RobotStart("counter", at_object="obj1"),
+    objects=(
+        ObjectSpec("obj1", _BOTTLES, _BEFORE, graspable=True),
+        ObjectSpec("obj2", ("shaker",), _BEFORE, graspable=True),
+        ObjectSpec("cab_obj1", _BOTTLES, _in_cabinet(), graspable=True, repeats=True),
+        ObjectSpec("cab_obj2", ("shaker",), _in_cabinet(), graspable=True, repeats=True),
+        ObjectSpec(
+            "distr_counter1", ("any",), on_counter("cabinet", (np.inf, 0.3), pos=("ref", 1.0)), exclude=("condiment",)
+        ),
+    ),
+    initial=(InitialOpenness("cabinet", 0.9, 1.0),),
+    goal=AllOf(*_stored("obj1").parts, *_stored("obj2").parts),
+    stages=(_store("obj1"), _store("obj2")),
+    instruction="Put the {obj1} from the counter next to the {cab_obj1} in the cabinet, and the shaker to the other.",
+    paraphrases=(
+        "Sort the condiments into the cabinet: bottle beside bottle, shaker beside shaker.",
+        "The {obj1} and the shaker on the counter belong in the cabinet, each with its own kind.",
+        "Clear the counter's {obj1} and shaker away, next to the cabinet's {cab_obj1} and shaker.",
+        "In the cabinet, the {obj1} should join the {cab_obj1}, and the shaker the one that is there.",
+    ),
+)
+
+TASKS = (CATEGORIZE_CONDIMENTS,)

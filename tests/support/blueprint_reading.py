@@ -1,0 +1,106 @@
+"""What a blueprint says of an object: kinds, how many, how large, where, and how it is turned."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+type Pos = list[float | str]
+
+
+@dataclass(frozen=True)
+class Category:
+    """Of "all, -lemon", "one meat category", "kettle (kettle_non_electric)", "vegetable (washable)".
+
+    Attributes:
+        groups: that it is one of.
+        exclude: that it is none of.
+        brackets: the word in brackets: a kind, or a property.
+    """
+
+    groups: tuple[str, ...]
+    exclude: tuple[str, ...]
+    brackets: str
+
+
+def category(text: str) -> Category:
+    """What a blueprint calls the kinds of an object."""
+    found = re.search(r" \((\w+)\)", text)
+    words = re.sub(r"^one (\w+) category", r"\1", re.sub(r" \(\w+\)", "", text)).replace("all", "any")
+    kinds = [word.strip() for word in words.split(",")]
+    return Category(
+        tuple(kind for kind in kinds if not kind.startswith("-")),
+        tuple(kind[1:] for kind in kinds if kind.startswith("-")),
+        found.group(1) if found else "",
+    )
+
+
+def counted(said: int | str) -> tuple[int, int]:
+    """Bounds of 2 or "1-3"."""
+    low, _, high = str(said).partition("-")
+    return int(low), int(high or low)
+
+
+def per_axis(scale: float | str | list[float] | tuple[float, ...]) -> list[float]:
+    """One factor, or three."""
+    assert not isinstance(scale, str)
+    return list(map(float, scale)) if isinstance(scale, list | tuple) else [float(scale)] * 3
+
+
+def scale(placed: Any) -> list[float]:
+    """Of a record, or of "scale 1.25", "scale 1.1,0.8,1", "scale z 2"."""
+    if isinstance(placed, dict):
+        return per_axis(placed.get("scale", 1.0))
+    found = re.search(r"scale (z )?\[?([\d.,]+)", str(placed))
+    if found is None:
+        return per_axis(1.0)
+    factors = [float(number) for number in found.group(2).strip(",.").split(",")]
+    if found.group(1):
+        return [1.0, 1.0, factors[0]]
+    return per_axis(factors if len(factors) == 3 else factors[0])
+
+
+def rectangle(placed: Any) -> tuple[list[float], Pos | None]:
+    """Size, and position if it is said, of "region 0.35x0.35 m, pos (ref,-1)" and of records."""
+    if isinstance(placed, list):
+        return placed, None
+    if isinstance(placed, dict):
+        return placed.get("size", []), placed.get("pos")
+    pos = re.search(r"pos \((-?[\w.]+),(-?[\w.]+)\)", placed)
+    return lengths(placed), [_number_or_word(text) for text in pos.groups()] if pos else None
+
+
+def offset(placed: Any) -> dict[int, float]:
+    """By axis, of "offset x +0.1", "offset (+0.1,0)" and of records; axes that nothing is said of are left out."""
+    if isinstance(placed, dict):
+        return dict(enumerate(map(float, placed.get("offset", ()))))
+    both = re.search(r"offset \(([-+\d.]+),([-+\d.]+)\)", str(placed))
+    if both:
+        return dict(enumerate(map(float, both.groups())))
+    return {"xy".index(axis): float(by) for axis, by in re.findall(r"offset ([xy]) ([+-][\d.]+)", str(placed))}
+
+
+def turn(at: str, placed: Any) -> tuple[float, float] | None:
+    """Bounds of the turn, radians: of a right angle, of none at all, or of what is said to have a yaw."""
+    text = str(placed)
+    if "turned 90 deg" in at or "rotation 90 deg" in text or ("rotation" in text and "90 deg" in text):
+        return np.pi / 2, np.pi / 2
+    if "'rotation_rad': 0" in text:
+        return 0.0, 0.0
+    return (np.pi / 4, 3 * np.pi / 8) if "yaw" in text or "rotation" in text else None
+
+
+def lengths(text: str) -> list[float]:
+    """The first two lengths of a text such as "counter, >= 0.2x0.3 m"; none if it has none."""
+    found = re.search(r"([\d.]+|full width )x ?([\d.]+)", text)
+    return [WHOLE if number == "full width " else float(number) for number in found.groups()] if found else []
+
+
+WHOLE = float("inf")  # the full width, which declarations may say as they do elsewhere
+
+
+def _number_or_word(text: str) -> float | str:
+    return text if text == "ref" else float(text)

@@ -1,0 +1,21 @@
+"""Arranging condiments: our words for its blueprints."""
+
+from __future__ import annotations
+
+from blueprint_words.ours import Ours
+from robocasa_lerobot.envs.predicates import GripperFar, Near, ObjectInside
+from robocasa_lerobot.envs.scene.spec import InitialOpenness
+
+OURS = {
+    "CategorizeCondiments": Ours(
+        goal={
+            "obj1 inside cabinet (bbox, margin 0.05 m)": ObjectInside("obj1", "cabinet", margin=0.05),
+            "obj2 inside cabinet (bbox, margin 0.05 m)": ObjectInside("obj2", "cabinet", margin=0.05),
+            "obj1 within 0.15 m (xy) of cab_obj1": Near("obj1", "cab_obj1", 0.15),
+            "obj2 within 0.15 m (xy) of cab_obj2": Near("obj2", "cab_obj2", 0.15),
+            "gripper > 0.25 m from obj1": GripperFar("obj1", 0.25),
+            "gripper > 0.25 m from obj2": GripperFar("obj2", 0.25),
+        },
+        initial={"cabinet door(s) open (0.90-1.0 of range)": InitialOpenness("cabinet", 0.9, 1.0)},
+    ),
+}

@@ -1,0 +1,24 @@
+"""Organizing dishes and containers: our words for its blueprints."""
+
+from __future__ import annotations
+
+from blueprint_words.ours import Ours
+from robocasa_lerobot.envs.predicates import GripperFar, ObjectInside, ObjectOn
+from robocasa_lerobot.envs.scene.spec import InitialOpenness
+
+IN_A_REGION = "(all bbox corners within one interior region, tol 0.05)"
+
+OURS = {
+    "StackBowlsCabinet": Ours(
+        goal={
+            f"bowl1 inside cabinet {IN_A_REGION}": ObjectInside("bowl1", "cabinet", margin=0.05),
+            f"bowl2 inside cabinet {IN_A_REGION}": ObjectInside("bowl2", "cabinet", margin=0.05),
+            # Ours: the small one in the large one, as the instruction says.
+            "OR(bowl2 in bowl1 (contact; centre xy < 0.7*bowl1 radius), bowl1 in bowl2 (contact; centre xy < "
+            "0.7*bowl2 radius))": ObjectOn("bowl1", "bowl2"),
+            "gripper > 0.25 m from bowl1": GripperFar("bowl1", 0.25),
+            "gripper > 0.25 m from bowl2": GripperFar("bowl2", 0.25),
+        },
+        initial={"cabinet doors open": InitialOpenness("cabinet", 0.9, 1.0)},
+    ),
+}

@@ -1,0 +1,27 @@
+"""Portioning meals: our words for its blueprints."""
+
+from __future__ import annotations
+
+from blueprint_words.ours import Ours
+from robocasa_lerobot.envs.predicates import Exactly, GripperFar, ObjectOn
+
+
+def one_on(plate: str, name: str) -> Exactly:
+    return Exactly(1, ObjectOn(f"{name}1", plate), ObjectOn(f"{name}2", plate))
+
+
+OURS = {
+    "PortionHotDogs": Ours(
+        goal={
+            "exactly 1 bun on plate1": one_on("plate1", "hotdog_bun"),
+            "exactly 1 sausage on plate1": one_on("plate1", "sausage"),
+            "exactly 1 bun on plate2": one_on("plate2", "hotdog_bun"),
+            "exactly 1 sausage on plate2 (on = contact, centre xy < 0.7*plate radius)": one_on("plate2", "sausage"),
+            "gripper > 0.25 m from hotdog_bun1": GripperFar("hotdog_bun1", 0.25),
+            "gripper > 0.25 m from hotdog_bun2": GripperFar("hotdog_bun2", 0.25),
+            "gripper > 0.25 m from sausage1": GripperFar("sausage1", 0.25),
+            "gripper > 0.25 m from sausage2": GripperFar("sausage2", 0.25),
+        },
+        initial={"robot base centred on bowl": "bowl"},
+    ),
+}
