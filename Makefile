@@ -69,8 +69,9 @@ format: $(STAMP)  ## rewrite the sources in the project's format
 	$(BIN)/ruff check --fix .
 	$(BIN)/ruff format .
 
-docs: $(STAMP)  ## write docs/tasks.md from the declarations of the tasks
+docs: $(STAMP)  ## write docs/tasks.md and docs/deviations.md from the declarations of the tasks
 	$(BIN)/robocasa-lerobot tasks --markdown docs/tasks.md
+	$(BIN)/robocasa-lerobot tasks --deviations docs/deviations.md
 
 doctor: $(STAMP)  ## check this machine
 	$(BIN)/robocasa-lerobot doctor

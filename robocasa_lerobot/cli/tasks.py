@@ -31,6 +31,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--split", default="target", help="kitchens of --pictures (default target)")
     parser.add_argument("--seed", type=int, default=0, help="seed of --pictures (default 0)")
     parser.add_argument("--markdown", type=Path, metavar="FILE", help="write the page docs/tasks.md")
+    parser.add_argument("--deviations", type=Path, metavar="FILE", help="write the page docs/deviations.md")
     parser.add_argument(
         "--check",
         action="store_true",
@@ -52,6 +53,12 @@ def run(args: argparse.Namespace) -> int:
     if args.markdown:
         write_text(args.markdown, pages(tasks))
         print(f"{args.markdown}: {len(tasks)} tasks")
+        return 0
+    if args.deviations:
+        from robocasa_lerobot.gallery.deviations import deviations
+
+        write_text(args.deviations, deviations(tasks))
+        print(f"{args.deviations}: {len(tasks)} tasks")
         return 0
     if args.pictures:
         from robocasa_lerobot.gallery.task_pictures import render_states

@@ -262,6 +262,11 @@ def test_goal_and_initial_states(name: str, blueprints: dict[str, Any]) -> None:
     assert {state for state in ours.initial.values() if isinstance(state, str)} <= {o.name for o in task.objects}
 
 
+@pytest.mark.parametrize("name", [name for name, ours in OURS.items() if ours.besides or ours.turned or ours.scales])
+def test_what_differs_has_a_reason_that_users_read(name: str) -> None:
+    assert get_task(name).facts.note
+
+
 @pytest.mark.parametrize("seed", [300_000, 300_006, 300_008])
 def test_objects_on_several_shelves_do_not_lie_in_each_other(seed: int) -> None:
     scene = build_scene(get_task("BuildAppetizerPlate"), "target", seed)

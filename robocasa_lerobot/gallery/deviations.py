@@ -1,0 +1,95 @@
+"""Where our tasks differ from the published ones, and how many kitchens admit each: `docs/deviations.md`."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from fractions import Fraction
+
+import numpy as np
+
+from robocasa_lerobot.envs.kitchens.footprints import PlacementError
+from robocasa_lerobot.envs.kitchens.layout import load_layout
+from robocasa_lerobot.envs.kitchens.splits import EXCLUDED, SPLITS, benchmark_split, scene_ids
+from robocasa_lerobot.envs.scene.build import arrange
+from robocasa_lerobot.envs.tasks.task import Task
+from robocasa_lerobot.errors import UserError
+
+TRIES = 5  # arrangements of a task in a kitchen before it counts as one that does not admit it
+FEW = Fraction(1, 5)  # of the kitchens: a task that fewer admit says why
+_HEAD = """# Other than the original
+
+Generated from the declarations by `make docs`; do not edit. What our tasks ask for is compared with the published tasks
+by tests, sentence by sentence (`tests/envs/test_composites.py`); what differs, and why, stands here.
+
+"Kitchens" are those in which the task finds its fixtures, and room for its objects within {tries} draws: of the
+{target} target kitchens, and of one kitchen of each of the {pretrain} pretraining layouts. Scenes are drawn from these
+alone.
+
+| task | target | pretraining | what differs |
+|---|---:|---:|---|
+"""
+
+
+@dataclass(frozen=True)
+class Admitted:
+    """Kitchens of a split that a task can be set up in, and how many were asked."""
+
+    kitchens: int
+    of: int
+
+    @property
+    def share(self) -> Fraction:
+        """Of all that were asked."""
+        return Fraction(self.kitchens, self.of)
+
+
+def deviations(tasks: Iterable[Task]) -> str:
+    """The whole of `docs/deviations.md`: each task that differs, or that not all kitchens admit."""
+    asked = {split: kitchens(split) for split in SPLITS}
+    lines = [_HEAD.format(tries=TRIES, **{split: len(pairs) for split, pairs in asked.items()}).rstrip("\n")]
+    for task in tasks:
+        found = [admitted(task, split) for split in ("target", "pretrain")]
+        said = explained(task)
+        if said or any(one.share < 1 for one in found):
+            numbers = " | ".join(f"{one.kitchens} of {one.of}" for one in found)
+            lines.append(f"| [{task.name}](tasks.md#{task.name.lower()}) | {numbers} | {said} |")
+    return "\n".join(lines) + "\n"
+
+
+def explained(task: Task) -> str:
+    """What differs from the published task, and which kitchens it leaves out."""
+    return " ".join(filter(None, [task.facts.note, *_left_out(task)]))
+
+
+def admitted(task: Task, split: str) -> Admitted:
+    """In how many kitchens of a split a task can be set up, by drawing; always the same ones."""
+    pairs = kitchens(split)
+    return Admitted(sum(_fits(task, split, *pair) for pair in pairs), len(pairs))
+
+
+def kitchens(split: str) -> list[tuple[int, int]]:
+    """Of each layout of a split one kitchen: its own style where there are pairs, else styles in turn."""
+    found: dict[int, list[int]] = {}
+    for layout, style in scene_ids(split):
+        found.setdefault(layout, []).append(style)
+    return [(layout, styles[number % len(styles)]) for number, (layout, styles) in enumerate(sorted(found.items()))]
+
+
+def _fits(task: Task, split: str, layout_id: int, style_id: int) -> bool:
+    if any(layout_id in EXCLUDED[need] for need in task.needs) or style_id in task.exclude_styles:
+        return False
+    for seed in range(TRIES):
+        try:
+            arrange(np.random.default_rng(seed), task, benchmark_split(split), load_layout(layout_id, style_id))
+        except (PlacementError, UserError):
+            continue
+        return True
+    return False
+
+
+def _left_out(task: Task) -> Iterator[str]:
+    if task.needs:
+        yield f"Kitchens with {' and '.join(need.replace('_', ' ') for need in task.needs)} only, as published."
+    if task.exclude_styles:
+        yield f"Not in styles {', '.join(map(str, task.exclude_styles))}."
