@@ -18,7 +18,7 @@ from robocasa_lerobot.cli import SUBCOMMANDS
 # What each part of the package may import of the rest of the package. Parts on one level stay apart.
 BASE = {
     *("benchmark", "config_files", "contract", "errors", "files", "gl", "jobs", "jsonl", "progress"),
-    *("provenance", "settings", "video"),
+    *("provenance", "settings", "video", "wire"),
 }
 LOW = {"envs", "convert", "data", "policies"}
 MAY_IMPORT: dict[str, set[str]] = {
@@ -34,6 +34,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     "jobs": {"errors", "progress"},
     "settings": {"errors"},
     "video": {"contract"},
+    "wire": set(),
     **dict.fromkeys(LOW, BASE),
     "convert": BASE | {"envs"},  # its rendering alone: see ONLY_ROOMS
     "demos": BASE | {"envs"},
@@ -42,8 +43,10 @@ MAY_IMPORT: dict[str, set[str]] = {
     "making": BASE | {"envs", "convert", "data", "demos", "training"},  # data that an experiment needs
     "study": BASE | {"data", "training", "evaluation", "making"},
     "gallery": BASE | {"envs", "demos"},
+    "serving": BASE | {"envs", "evaluation"},  # policies for others' evaluations, kitchens for others' policies
+    "teleop": BASE | {"envs", "demos", "evaluation"},
     "plugins": BASE | LOW | {"demos", "training", "evaluation"},
-    "cli": BASE | LOW | {"demos", "training", "evaluation", "making", "gallery", "study"},
+    "cli": BASE | LOW | {"demos", "training", "evaluation", "making", "gallery", "study", "serving", "teleop"},
 }
 # Of these parts, what each room (a folder, or a file beside the folders) may import of the other rooms.
 ROOMS: dict[str, dict[str, set[str]]] = {
@@ -74,6 +77,7 @@ FORBIDDEN: dict[str, set[str]] = {
     "progress": TORCH | PHYSICS,
     "settings": TORCH | PHYSICS,
     "video": TORCH | PHYSICS,
+    "wire": TORCH | PHYSICS,
     "envs": TORCH,
     "demos": TORCH,
     "data": PHYSICS,

@@ -1,0 +1,1 @@
+"""What policies and simulators behind a socket say to each other, without a policy or a simulator."""
