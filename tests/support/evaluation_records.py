@@ -12,6 +12,7 @@ from robocasa_lerobot.evaluation.records.results import (
     PolicyInfo,
     RunHeader,
     Seconds,
+    StageSummary,
     TermSummary,
     TrialRecord,
 )
@@ -64,6 +65,7 @@ def record(**changes: object) -> TrialRecord:
         "first_success_step": 80,
         "steps": 80,
         "terms": {"drawer_open": TermSummary(80, 0.0125, True)},
+        "stages": StageSummary(total=1, met=1, given=0, next=None),
         "outcome": "finished",
         "error": None,
         "attempts": 1,

@@ -16,7 +16,7 @@ import numpy as np
 from scipy.stats import norm
 
 from robocasa_lerobot.benchmark import published
-from robocasa_lerobot.benchmark.tasks import published_task_sets
+from robocasa_lerobot.benchmark.tasks import published_task_sets, task_facts
 from robocasa_lerobot.evaluation.config.evaluation import EvaluationConfig
 from robocasa_lerobot.evaluation.config.loader import load_config
 from robocasa_lerobot.evaluation.records.results import (
@@ -24,6 +24,7 @@ from robocasa_lerobot.evaluation.records.results import (
     PolicyInfo,
     RunHeader,
     Seconds,
+    StageSummary,
     TermSummary,
     TrialRecord,
 )
@@ -107,6 +108,9 @@ def trials(
                 name: TermSummary(10 * (i + 1) if met[i] else None, 0.5 if met[i] else 0.0, bool(met[i]) and not lost)
                 for i, name in enumerate(TERMS)
             }
+            total = task_facts()[task].subtasks if task in task_facts() else 1
+            reached = total if success else int(own.integers(total))
+            stages = StageSummary(total, reached, 0, None if success else f"do part {reached + 1} of {task}")
             film = films is not None and trial in films.get(task, ())
             out.append(
                 TrialRecord(
@@ -127,6 +131,7 @@ def trials(
                     first_success_step=first,
                     steps=first or horizon,
                     terms={} if errors[trial] else terms,
+                    stages=None if errors[trial] else stages,
                     outcome="crashed" if errors[trial] else "finished",
                     error="Traceback: a synthetic error" if errors[trial] else None,
                     attempts=2 if errors[trial] else 1,

@@ -23,7 +23,8 @@ from robocasa_lerobot.errors import UserError
 from robocasa_lerobot.evaluation.records.schema import SchemaError, build
 
 TRIALS_FILE = "trials.jsonl"
-SCHEMA_VERSION = 3
+SCHEMA_VERSION = 4
+READABLE_VERSIONS = (3, 4)  # trials of 3 do not say how far they came in their stages
 # What kind of end a trial had. Only `finished` trials ran to success or horizon; the others carry an error.
 FINISHED, CRASHED, HUNG, DIVERGED = "finished", "crashed", "hung", "diverged"
 OUTCOMES = (FINISHED, CRASHED, HUNG, DIVERGED)
@@ -51,6 +52,25 @@ class TermSummary:
     first_step: int | None
     share: float
     final: bool
+
+
+@dataclass(frozen=True)
+class StageSummary:
+    """How far a trial came in its task's stages, in order.
+
+    `total` is how many the episode had, `met` those whose conditions were met in order (all of them with the goal),
+    `given` those of them that held before the first step; `next` is the first one that was not met, in words.
+    """
+
+    total: int
+    met: int
+    given: int
+    next: str | None
+
+    @property
+    def progress(self) -> float:
+        """Share of the stages that were left to do at the start and were met, 0 to 1."""
+        return 1.0 if self.met == self.total else (self.met - self.given) / (self.total - self.given)
 
 
 @dataclass(frozen=True)
@@ -185,6 +205,7 @@ class TrialRecord:
         first_success_step: the first step after which the goal held (with rule "hold": had held long enough).
         steps: steps run.
         terms: the goal's predicates, in short.
+        stages: how far it came in the task's stages; None for an env without stages, and for a trial that broke.
         outcome: one of `OUTCOMES`.
         error: of a trial that did not finish: what happened, in its second attempt.
         attempts: 1, or 2 if it was tried again.
@@ -213,6 +234,7 @@ class TrialRecord:
     first_success_step: int | None
     steps: int
     terms: dict[str, TermSummary]
+    stages: StageSummary | None
     outcome: str
     error: str | None
     attempts: int
@@ -298,10 +320,12 @@ def parse_line(line: str, where: str) -> RunHeader | TrialRecord:
         raise ResultsError(f"{where}: not a JSON object ({error}). Remove the line, or restore the file.") from error
     if not isinstance(values, dict):
         raise ResultsError(f"{where}: found {type(values).__name__}, expected a JSON object.")
-    if values.get("schema") != SCHEMA_VERSION:
-        found = values.get("schema")
-        raise ResultsError(f"{where}: schema {found!r}, this version reads {SCHEMA_VERSION}; evaluate again.")
+    if (found := values.get("schema")) not in READABLE_VERSIONS:
+        readable = " and ".join(map(str, READABLE_VERSIONS))
+        raise ResultsError(f"{where}: schema {found!r}, this version reads {readable}; evaluate again.")
     kind = values.pop("kind", None)
+    if kind == "trial" and found == 3:
+        values.setdefault("stages", None)
     try:
         if kind == "trial":
             record = build(TrialRecord, values)

@@ -14,6 +14,7 @@ from robocasa_lerobot.evaluation.records.results import PolicyInfo, RunHeader, T
 from robocasa_lerobot.evaluation.report.places import PERTURBATIONS, Place, places, tables
 from robocasa_lerobot.evaluation.statistics import Estimate, Rate, average_over_tasks
 from robocasa_lerobot.evaluation.statistics.paired import Outcomes
+from robocasa_lerobot.evaluation.statistics.progress import mean_progress
 
 REFERENCES = {
     "random": "reference: actions drawn uniformly from [-1, 1] at each step",
@@ -55,6 +56,19 @@ class TaskResult:
     median_seconds: float | None
     failed: int
     terms: tuple[TermCount, ...]
+
+    @cached_property
+    def progress(self) -> Estimate | None:
+        """Mean share of the stages that trials met; None where no trial says. One that broke has met none."""
+        known = [r for r in self.trials if r.stages is not None or r.error is not None]
+        if all(r.stages is None for r in known):
+            return None
+        return mean_progress([0.0 if r.stages is None else r.stages.progress for r in known])
+
+    @property
+    def stages(self) -> int | None:
+        """The most stages that a trial of the task had; None where no trial says."""
+        return max((r.stages.total for r in self.trials if r.stages is not None), default=None)
 
     @property
     def counts(self) -> tuple[int, int]:

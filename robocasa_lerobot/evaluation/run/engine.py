@@ -303,6 +303,7 @@ def _record(completed: Completed, header: RunHeader) -> TrialRecord:
         first_success_step=outcome.first_success_step,
         steps=outcome.steps,
         terms=outcome.terms,
+        stages=outcome.stages,
         outcome=result.kind,
         error=result.error,
         attempts=completed.attempts,

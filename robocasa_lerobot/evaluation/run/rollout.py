@@ -11,10 +11,11 @@ from typing import Any
 import gymnasium
 import numpy as np
 
+from robocasa_lerobot.envs.tasks.stage_progress import StageProgress
 from robocasa_lerobot.errors import UserError
 from robocasa_lerobot.evaluation.actors.actor import Actor
 from robocasa_lerobot.evaluation.planning.trials import TrialSpec
-from robocasa_lerobot.evaluation.records.results import Seconds, TermSummary
+from robocasa_lerobot.evaluation.records.results import Seconds, StageSummary, TermSummary
 from robocasa_lerobot.evaluation.run.film import Film
 from robocasa_lerobot.evaluation.run.physics_warnings import PhysicsWarnings
 from robocasa_lerobot.evaluation.run.success import SuccessRule
@@ -55,6 +56,7 @@ class DivergedError(RolloutError):
 class Outcome:
     """What a trial gave; `steps` are control steps at 20 Hz, the first step is number 1.
 
+    `stages` is how far it came in the task's stages, None for an env that has none.
     `trajectory` is a SHA-256 over all actions and proprioception: two trials with the same one took the same course.
     """
 
@@ -62,6 +64,7 @@ class Outcome:
     steps: int = 0
     first_success_step: int | None = None
     terms: dict[str, TermSummary] = field(default_factory=dict)
+    stages: StageSummary | None = None
     instruction: str = ""
     layout_id: int | None = None
     style_id: int | None = None
@@ -109,6 +112,7 @@ def run_trial(
         filming += time.perf_counter() - started - building
     digest = hashlib.sha256(np.asarray(observation["agent_pos"], dtype=np.float64).tobytes())
     counts: dict[str, TermCount] = {}
+    progress = StageProgress(base.declaration, base.scene, base.data) if hasattr(base, "declaration") else None
     ended = False
     while not ended:
         if outcome.steps >= limit:
@@ -132,11 +136,15 @@ def run_trial(
         _check_finite(observation, outcome.steps, warnings)
         for name, met in info.get("success_terms", {}).items():
             counts.setdefault(name, TermCount()).note(outcome.steps, bool(met))
+        if progress is not None:
+            progress.note(base.data, success=bool(info["is_success"]))
         done = decided.note(outcome.steps, bool(info["is_success"]))
         ended = bool(terminated or truncated or done)
     outcome.first_success_step = decided.success_step()
     outcome.success = outcome.first_success_step is not None
     outcome.terms = {name: count.summary(outcome.steps) for name, count in counts.items()}
+    if progress is not None:
+        outcome.stages = StageSummary(progress.total, progress.met, progress.given, progress.next_text)
     outcome.warnings = warnings.counts()
     outcome.trajectory = digest.hexdigest()
     pictures = getattr(base, "rendering_seconds", 0.0) - rendered

@@ -2,7 +2,7 @@
 
 One question per file: `rates` (one task), `averages` (several tasks), `paired` (two policies on the same trials),
 `power` (what so many trials can show), `horizon` (success against time), `lifelong` (the matrix of phases),
-`data_efficiency` (how many demonstrations pretraining is worth).
+`data_efficiency` (how many demonstrations pretraining is worth), `progress` (how far trials come).
 """
 
 from robocasa_lerobot.evaluation.statistics.averages import Estimate, average_over_tasks, linear_combination

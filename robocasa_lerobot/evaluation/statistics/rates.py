@@ -21,10 +21,10 @@ class Rate:
     high: float
 
 
-def wilson_interval(successes: int, trials: int, confidence: float = CONFIDENCE) -> tuple[float, float]:
+def wilson_interval(successes: float, trials: int, confidence: float = CONFIDENCE) -> tuple[float, float]:
     """Wilson score interval (low, high) of a binomial proportion, as statsmodels computes it.
 
-    It stays inside [0, 1] and has a sensible width at 0 of n and n of n.
+    It stays inside [0, 1] and has a sensible width at 0 of n and n of n. `successes` need not be whole.
     Source: E. B. Wilson, "Probable inference, the law of succession, and statistical inference", JASA 22 (1927).
 
     Raises:

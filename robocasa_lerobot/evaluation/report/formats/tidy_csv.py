@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from robocasa_lerobot.benchmark import published
 from robocasa_lerobot.evaluation.report.formats.csv_text import csv_text
 from robocasa_lerobot.evaluation.report.policies import PolicyResult, ReportData, average_of
+from robocasa_lerobot.evaluation.statistics import Estimate
 
 COLUMNS = (
     "policy",
@@ -22,13 +23,17 @@ COLUMNS = (
     "high",
     "errors",
     "median_seconds_to_success",
+    "stages",
+    "mean_progress",
+    "progress_low",
+    "progress_high",
     "published_rate",
     "synthetic",
 )
 
 
 def render(data: ReportData) -> str:
-    """Rates and ends of intervals lie in [0, 1]; `task` is empty in rows of averages."""
+    """Rates, progress and ends of intervals lie in [0, 1]; `task` is empty in rows of averages."""
     return csv_text(COLUMNS, _rows(data))
 
 
@@ -42,7 +47,7 @@ def _rows(data: ReportData) -> Iterator[dict[str, object]]:
                 "synthetic": int(bool(policy.header.settings.get("synthetic"))),
             }
             for result in tasks:
-                rate, known = result.rate, published.per_task_rates().get(result.task)
+                rate, progress, known = result.rate, result.progress, published.per_task_rates().get(result.task)
                 yield {
                     **common,
                     "task": result.task,
@@ -56,6 +61,7 @@ def _rows(data: ReportData) -> Iterator[dict[str, object]]:
                     "errors": result.errors,
                     "median_seconds_to_success": "" if result.median_seconds is None else result.median_seconds,
                     "published_rate": "" if known is None else known / 100,
+                    **({} if progress is None else _progress(result.stages, progress)),
                 }
             for group in _groups(policy):
                 results = tasks if group == "all" else policy.group(group, condition)
@@ -72,6 +78,15 @@ def _rows(data: ReportData) -> Iterator[dict[str, object]]:
                         "high": f"{mean.high:.6f}",
                         "errors": sum(r.errors for r in results),
                     }
+
+
+def _progress(stages: int | None, progress: Estimate) -> dict[str, object]:
+    return {
+        "stages": stages,
+        "mean_progress": f"{progress.value:.6f}",
+        "progress_low": f"{progress.low:.6f}",
+        "progress_high": f"{progress.high:.6f}",
+    }
 
 
 def _groups(policy: PolicyResult) -> list[str]:
