@@ -2,8 +2,9 @@
 
 Seeds from 500,000 on in both splits: nothing was chosen by them. Every trial is a line of
 `outputs/demonstrators.jsonl`, so that a run can be stopped and continued; the result holds all trials that are there.
-They are kept beside it (`.trials.gz`), where a checkout without such a file begins. After a skill was changed, run its
-tasks again:
+They are kept beside it (`.trials.gz`), where a checkout without such a file begins. A trial says which declaration and
+which code of skills it was made with: the same command makes those again for which that has changed, and no others.
+`--fresh` makes all of them again:
 
     python benchmarks/demonstrators.py --tasks OpenDrawer,CloseDrawer --fresh
 
@@ -27,9 +28,11 @@ from collections.abc import Iterable, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import asdict
 from pathlib import Path
+from typing import Any
 
 import common
 from demonstrators_report import draw, page, ratios, summary, text
+from demonstrators_sources import sources_of
 from demonstrators_trial import Key, Trial
 
 from robocasa_lerobot.demos.choose import expand_names
@@ -73,18 +76,22 @@ def attempt(key: Key, workers: int, commit: str) -> Trial:
     signal.signal(signal.SIGALRM, _too_long)
     signal.alarm(LONGEST_S)
     env = KitchenEnv(task, split=split, cameras=(), terminate_on_success=False)
-    success, steps, reason, false_terms = False, 0, "", ()
+    success, steps, reason, false_terms, stages = False, 0, "", (), ()
     try:
         recording = record_episode(env, seed, action_noise=action_noise, varied=varied)
         success, steps, reason = recording.success, len(recording.actions), recording.reason
         false_terms = recording.false_terms
+        stages = tuple(
+            (f"{row['skill']} {row['verb']}", row["attempts"], row["done"], row["skipped"])
+            for row in recording.ep_meta["stages"]
+        )
     except Exception as error:
         reason = f"{type(error).__name__}: {error}"
     finally:
         signal.alarm(0)
         env.close()
     seconds = round(time.perf_counter() - started, 3)
-    return Trial(*key, success, steps, seconds, workers, reason, false_terms, commit)
+    return Trial(*key, success, steps, seconds, workers, reason, false_terms, commit, sources_of(task), stages)
 
 
 def _too_long(number: int, frame: object) -> None:
@@ -97,8 +104,18 @@ def read_trials(path: Path) -> dict[Key, Trial]:
         return {}
     lines = path.read_text(encoding="utf-8").splitlines(keepends=True)
     found = (json.loads(line) for line in lines if line.endswith("\n"))  # the last one may be cut off
-    trials = (Trial(**{**values, "false_terms": tuple(values["false_terms"])}) for values in found)
+    trials = (_trial(values) for values in found)
     return {trial.key: trial for trial in trials}
+
+
+def _trial(values: dict[str, Any]) -> Trial:
+    tuples = {"false_terms": tuple(values["false_terms"]), "stages": tuple(map(tuple, values.get("stages", ())))}
+    return Trial(**{**values, **tuples})
+
+
+def is_current(trial: Trial) -> bool:
+    """Whether a trial was made with the present declaration and skills; those that do not say are taken as they are."""
+    return trial.sources in ("", sources_of(trial.task))
 
 
 def keep(trials: Iterable[Trial], path: Path) -> None:
@@ -170,13 +187,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if not options.report:
         if options.fresh:
             forget(options.trials, [key for key in read_trials(options.trials) if key[0] in names and key[3:] == how])
-        done = read_trials(options.trials)
+        done = {key for key, trial in read_trials(options.trials).items() if is_current(trial)}
         todo = [job for job in jobs if job not in done]
         print(f"{len(able)} of {len(names)} tasks have a demonstrator; {len(todo)} of {len(jobs)} trials to make")
         if todo:
             run(todo, options.trials, options.workers)
     wanted = {(split, seed) for split in splits for seed in seeds}
-    trials = [t for t in read_trials(options.trials).values() if t.key[3:] == how and (t.split, t.seed) in wanted]
+    found = [t for t in read_trials(options.trials).values() if t.key[3:] == how and (t.split, t.seed) in wanted]
+    trials = [trial for trial in found if is_current(trial)]
+    if len(trials) < len(found):
+        print(f"{len(found) - len(trials)} trials were made with other skills or declarations, and do not count")
     tasks = summary(trials, {name: can_demonstrate(get_task(name)) for name in task_names()})
     body = {
         "machine": common.machine(),

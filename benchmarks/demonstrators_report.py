@@ -45,6 +45,7 @@ def summary(trials: Sequence[Trial], able: Mapping[str, bool]) -> dict[str, Any]
             }
             entry |= _seconds([trial for trial in mine if trial.success], human)
             entry["failures"] = dict(Counter(_kind(t) for t in mine if not t.success).most_common(_REASONS))
+            entry["stages"] = _stages(mine)
             entry["failed_seeds"] = sorted([t.split, t.seed] for t in mine if not t.success)
         out[name] = entry
     return out
@@ -119,8 +120,22 @@ def page(body: Mapping[str, Any], picture: str) -> str:
         *("|".join(["", *row, ""]) for row in _rows(body)),
         "",
         "`s`: median of the simulated seconds of the demonstrations that succeeded; `human s`: of human ones.",
+        *_stages_page(body),
     ]
     return "\n".join(lines) + "\n"
+
+
+def _stages_page(body: Mapping[str, Any]) -> list[str]:
+    """Per-stage rates of the tasks of several stages."""
+    rows = [
+        f"|{name}|{number}|{stage['stage']}|{stage['done']}/{stage['reached']}|{stage['attempts_mean'] or '-'}|"
+        for name, task in sorted(body["tasks"].items())
+        for number, stage in enumerate(task.get("stages", ()), start=1)
+    ]
+    if not rows:
+        return []
+    head = ["|task|stage|what|done, of reached|attempts where tried|", "|---|--:|---|--:|--:|"]
+    return ["", "## Stages", "", *head, *rows]
 
 
 _HEADER = ["task", "solved", "rate", "95 %", *_SPLITS, "s", "human s", "most frequent failure"]
@@ -214,6 +229,25 @@ def _rate(trials: Sequence[Trial]) -> dict[str, Any]:
         "successes": rate.successes,
         "trials": rate.trials,
     }
+
+
+def _stages(trials: Sequence[Trial]) -> list[dict[str, Any]]:
+    """What came of each stage of a task of several, where all its trials have the same ones and say it."""
+    said = [trial.stages for trial in trials if trial.stages]
+    if not said or len(said[0]) < 2 or len({tuple(stage[0] for stage in stages) for stages in said}) > 1:
+        return []
+    out = []
+    for column in zip(*said, strict=True):
+        tried = [attempts for _, attempts, _, _ in column if attempts]
+        out.append(
+            {
+                "stage": column[0][0],
+                "reached": sum(attempts > 0 or skipped for _, attempts, _, skipped in column),
+                "done": sum(done for _, _, done, _ in column),
+                "attempts_mean": round(statistics.mean(tried), 2) if tried else None,
+            }
+        )
+    return out
 
 
 def _seconds(solved: Sequence[Trial], human: float | None) -> dict[str, Any]:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+# What came of a stage: which it is, how often it was tried, whether it was done in the end, and done at the start.
+type Stage = tuple[str, int, bool, bool]
 type Key = tuple[str, str, int, float, bool]  # task, split, seed, action noise, whether it is varied
 
 
@@ -20,6 +22,8 @@ class Trial:
         reason: why it failed.
         false_terms: terms of the goal that did not hold then.
         commit: of the checkout.
+        sources: hash of the declaration and the skills that it depends on; "" of trials that do not say.
+        stages: what came of each stage, in order; () of trials that do not say.
     """
 
     task: str
@@ -34,6 +38,8 @@ class Trial:
     reason: str
     false_terms: tuple[str, ...]
     commit: str
+    sources: str = ""
+    stages: tuple[Stage, ...] = ()
 
     @property
     def key(self) -> Key:

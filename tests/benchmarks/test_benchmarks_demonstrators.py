@@ -115,6 +115,42 @@ def test_finished_trials_are_kept_replaced_and_forgotten(
     assert kept.read_bytes() == before
 
 
+def test_trials_are_made_again_where_their_skills_or_declaration_changed(
+    bench: ModuleType, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    sources = importlib.import_module("demonstrators_sources")
+    press, open_drawer = (sources.sources_of(task) for task in ("TurnOnMicrowave", "OpenDrawer"))
+    assert press != open_drawer
+    bare = "def f(x):\n    'Says nothing.'\n    return x  # so\n"
+    assert sources._bare(bare) == sources._bare("def f(x): return x")
+    assert sources._bare(bare) != sources._bare("def f(x): return -x")
+    own = sources._code
+    changed = "robocasa_lerobot.demos.skills.drawers"
+    monkeypatch.setattr(sources, "_code", lambda module: own(module) + "pass" * (module == changed))
+    sources.sources_of.cache_clear()
+    assert sources.sources_of("OpenDrawer") != open_drawer
+    assert sources.sources_of("TurnOnMicrowave") == press  # it opens no drawer
+
+    file, out, made = tmp_path / "trials.jsonl", tmp_path / "result.json", []
+    monkeypatch.setattr(bench, "run", lambda jobs, path, workers: made.extend(jobs))
+    monkeypatch.setattr(bench, "draw", lambda *_: None)
+    tasks = {"TurnOnMicrowave": press, "OpenDrawer": open_drawer}
+    stages = (("a b", 2, True, False), ("c d", 1, False, False))
+    old = [_trial(bench, n, "target", 7, True, sources=found, stages=stages) for n, found in tasks.items()]
+    file.write_text(bench._lines([*old, _trial(bench, "CloseDrawer", "target", 7, True)]))
+    options = ["--seeds=1", "--first-seed=7", "--splits=target", f"--trials={file}", f"--out={out}"]
+    bench.main(["--tasks=TurnOnMicrowave,OpenDrawer,CloseDrawer", *options])
+    assert [job[0] for job in made] == ["OpenDrawer"]
+    result = json.loads(out.read_text())
+    assert result["tasks"]["OpenDrawer"]["success_rate"] is None  # what an older skill did is no result of this one
+    assert result["tasks"]["TurnOnMicrowave"]["stages"] == [
+        {"stage": "a b", "reached": 1, "done": 1, "attempts_mean": 2},
+        {"stage": "c d", "reached": 1, "done": 0, "attempts_mean": 1},
+    ]
+    assert "|TurnOnMicrowave|2|c d|0/1|1|" in out.with_suffix(".md").read_text()
+    sources.sources_of.cache_clear()
+
+
 def test_whatever_goes_wrong_is_a_failed_trial(bench: ModuleType, monkeypatch: pytest.MonkeyPatch) -> None:
     def hangs(*_: Any, **__: Any) -> None:
         time.sleep(5.0)
