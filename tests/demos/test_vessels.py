@@ -15,7 +15,7 @@ from robocasa_lerobot.demos.skills.navigation import LOADED_CHANGE, Pace
 from robocasa_lerobot.demos.skills.pick_place.carrying.level import levelled
 from robocasa_lerobot.demos.skills.pick_place.graspable import graspable
 from robocasa_lerobot.demos.skills.pick_place.hold import hold_poses
-from robocasa_lerobot.demos.skills.pick_place.place_poses import on_object, over_burners
+from robocasa_lerobot.demos.skills.pick_place.poses.place_poses import on_object, over_burners
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.kitchens.appliances.kinds.sink import Sink
 from robocasa_lerobot.envs.kitchens.appliances.kinds.stove import Hob

@@ -11,7 +11,6 @@ import numpy as np
 from robocasa_lerobot.demos.motion import OPEN, UP, Array, HandTarget, grip_position, hand_rotation
 from robocasa_lerobot.demos.skills.common import SkillError, hold_hand, move_hand
 from robocasa_lerobot.demos.skills.drawers import drag_open
-from robocasa_lerobot.demos.skills.pick_place.counter_poses import NEAR_M, on_counter
 from robocasa_lerobot.demos.skills.pick_place.grasp_strategy import (
     ANY_APPROACH,
     FROM_A_SLOT,
@@ -26,7 +25,8 @@ from robocasa_lerobot.demos.skills.pick_place.location import Location, locate
 from robocasa_lerobot.demos.skills.pick_place.mugs import FROM_THE_SIDE, UNDER_A_SPOUT
 from robocasa_lerobot.demos.skills.pick_place.pick import HOPELESS, RELEASE_STEPS, best_grasp
 from robocasa_lerobot.demos.skills.pick_place.place import PlaceStrategy
-from robocasa_lerobot.demos.skills.pick_place.place_poses import (
+from robocasa_lerobot.demos.skills.pick_place.poses.counter_poses import NEAR_M, on_counter
+from robocasa_lerobot.demos.skills.pick_place.poses.place_poses import (
     DROPS_M,
     at_site,
     in_basin,

@@ -10,7 +10,7 @@ import numpy as np
 from robocasa_lerobot.demos.motion import UP, Array, base_pose, grip_position
 from robocasa_lerobot.demos.skills.pick_place.graspable import Graspable
 from robocasa_lerobot.demos.skills.pick_place.place import PlacePose
-from robocasa_lerobot.demos.skills.pick_place.place_poses import PlacePoses
+from robocasa_lerobot.demos.skills.pick_place.poses.place_poses import PlacePoses
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.kitchens.fixtures.counters import Counter
 
