@@ -25,6 +25,7 @@ from robocasa_lerobot.envs.predicates import (
     NearerThan,
     Not,
     OnBurner,
+    OnOneSide,
     PartWithin,
     StateIs,
     UnderWater,
@@ -321,3 +322,16 @@ def test_no_registered_task_hides_a_term(name: str) -> None:
     task = get_task(name)
     assert terms_by_name(task.goal)
     assert (task.facts.kind == "atomic") <= (parts_with_memory([task.goal]) == ())
+
+
+def test_a_group_is_at_one_side_of_another_object_as_seen_from_before_the_fixture(scenes: dict[str, Scene]) -> None:
+    scene = scenes["sink"]
+    data = state(scene)
+    yaw = scene.fixture("sink").yaw
+    right = np.array([np.cos(yaw), np.sin(yaw), 0.0])
+    goal = OnOneSide(("obj", "distr_sink"), "distr_counter", "sink", apart=0.02)
+    data.joint("distr_counter_joint0").qpos[:3] = [0.0, -2.0, 1.0]
+    for first, second, held in ((0.03, 0.3, True), (-0.03, -0.3, True), (0.01, 0.3, False), (-0.1, 0.1, False)):
+        for name, aside in (("obj", first), ("distr_sink", second)):
+            data.joint(f"{name}_joint0").qpos[:3] = np.array([0.0, -2.0, 1.0]) + aside * right + [0.0, 0.0, 0.1]
+        assert (hold(goal, scene, data) is None) == held

@@ -13,7 +13,7 @@ from robocasa_lerobot.envs.predicates.fixtures import (
 from robocasa_lerobot.envs.predicates.heat_and_water import OnBurner, UnderWater
 from robocasa_lerobot.envs.predicates.logic import AllOf, AnyOf, Exactly, ForEach, Goal, Not, Term, When
 from robocasa_lerobot.envs.predicates.memory import Never, Once, StepsWhile, WithMemory, parts_with_memory
-from robocasa_lerobot.envs.predicates.near import Near, NearerThan
+from robocasa_lerobot.envs.predicates.near import Near, NearerThan, OnOneSide
 from robocasa_lerobot.envs.predicates.objects import (
     ObjectAtSite,
     ObjectInBasin,
@@ -62,6 +62,7 @@ __all__ = [
     "ObjectTouchesAnyCounter",
     "ObjectUpright",
     "OnBurner",
+    "OnOneSide",
     "OnShelf",
     "Once",
     "PartTurned",

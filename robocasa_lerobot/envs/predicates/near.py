@@ -80,6 +80,36 @@ class NearerThan(Term):
         return max(_distance(data, a, b, axes=3) for a, b in pairs)
 
 
+@dataclass(frozen=True)
+class OnOneSide(Term):
+    """Objects are all to the left of another one, or all to its right, as seen by who stands before a fixture.
+
+    Attributes:
+        objects: names.
+        of: name.
+        fixture: role.
+        apart: least distance across, metres.
+    """
+
+    objects: tuple[str, ...]
+    of: str
+    fixture: str
+    apart: float = 0.0
+
+    @property
+    def name(self) -> str:
+        """E.g. `cup1_and_cup2_on_one_side_of_bowl`."""
+        return plain(f"{'_and_'.join(self.objects)}_on_one_side_of_{self.of}")
+
+    def holds(self, scene: Scene, data: mujoco.MjData) -> bool:
+        """Compare the origins across the fixture."""
+        yaw = scene.fixture(self.fixture).yaw
+        across = np.array([np.cos(yaw), np.sin(yaw), 0.0])
+        other = data.body(scene.fill(self.of)).xpos
+        aside = [float(across @ (data.body(scene.fill(name)).xpos - other)) for name in self.objects]
+        return min(aside) > self.apart or max(aside) < -self.apart
+
+
 def _several(names: Names) -> tuple[str, ...]:
     return (names,) if isinstance(names, str) else names
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 
 from robocasa_lerobot.envs.predicates import Goal
 from robocasa_lerobot.envs.scene.scene_spec import InitialState
+from robocasa_lerobot.envs.scene.spec import Placement
 
 # Sentences that several blueprints have.
 NEAR_THE_MIDDLE = "(contact AND centre xy distance < 0.7 x {} radius)"
@@ -25,6 +26,7 @@ class Ours:
         turned: bounds of the turn, radians, of objects whose models lie along another axis than the blueprint's.
         drawn: roles of the blueprint that are one of several others, by which is drawn; the choice's name.
         kinds: our kinds of fixtures where the blueprint says in a sentence what is meant.
+        placed: ours where the blueprint's own stages would not lead from there to its goal.
         scales: ours where the blueprint's would not fit our models.
     """
 
@@ -37,4 +39,5 @@ class Ours:
     turned: dict[str, tuple[float, float]] = field(default_factory=dict)
     drawn: dict[str, str] = field(default_factory=dict)
     kinds: dict[str, str] = field(default_factory=dict)
+    placed: dict[str, Placement] = field(default_factory=dict)
     scales: dict[str, tuple[float, float, float]] = field(default_factory=dict)

@@ -43,7 +43,7 @@ def place(object_: str = "obj", target: str = "counter", verb: str = "place", pa
 
 
 def in_cabinet(
-    role: str, size: tuple[float, float], *, pos: tuple[float | None, float | None] = (0.0, -1.0), **more: object
+    role: str, size: tuple[float, float], *, pos: tuple[float | str | None, float | None] = (0.0, -1.0), **more: object
 ) -> Placement:
     """On a shelf of a cabinet that the arm reaches, by default at its front."""
     return Placement(role, region=SampleRegion(height=WITHIN_REACH_M), size=size, pos=pos, **more)  # type: ignore[arg-type]
