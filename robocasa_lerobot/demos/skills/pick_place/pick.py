@@ -33,7 +33,7 @@ from robocasa_lerobot.demos.skills.pick_place.grasp_strategy import (
     entry,
     steep,
 )
-from robocasa_lerobot.demos.skills.pick_place.graspable import Graspable
+from robocasa_lerobot.demos.skills.pick_place.graspable import Graspable, contents_of, graspable, holder_of
 from robocasa_lerobot.demos.skills.reaching import (
     GOOD_ENOUGH,
     Held,
@@ -55,6 +55,7 @@ LOW_COST = 0.05
 BLOCKED_M, BACK_M = 0.05, 0.08  # a hand as far as this from where the grasp begins is blocked: another grasp is next
 HELD_UP_M, LOWER_M = 0.08, 0.03
 LEVEL_LIFT_M, LEVEL_COST = 0.004, 0.1  # before it is drawn out level
+JOSTLE_COST = 0.5
 TRIED, ALIKE_M = 1.2, 0.015  # cost of a grasp like one that has failed: its place in the object is as near as this
 # An object that is held is nearer than this to where it was in the hand when that closed, and has risen by this share
 # of the lift.
@@ -201,7 +202,36 @@ def _best(
     tried: list[HandTarget],
     blocked: Sequence[RobotPose],
 ) -> MotionPlan:
-    """The first tilt's best path if that is good, else the best of all tilts.
+    """The best path that meets nothing; where there is none worth a try, one that jostles what lies in the same vessel.
+
+    Raises:
+        SkillError: no pose fits.
+    """
+    best = _best_of_tilts(env, obj, strategy, tried, blocked)
+    beside = _beside(env, obj) if best.cost > HOPELESS else frozenset()
+    if not beside:
+        return best
+    jostling = _best_of_tilts(env, obj, strategy, tried, blocked, beside)
+    jostling = replace(jostling, cost=jostling.cost + JOSTLE_COST)
+    return min(best, jostling, key=lambda choice: choice.cost)
+
+
+def _beside(env: KitchenEnv, obj: Graspable) -> frozenset[int]:
+    """Bodies of the other objects in or on what an object lies in or on."""
+    holder = holder_of(env, obj.name)
+    others = [name for name in contents_of(env, holder) if name != obj.name] if holder else []
+    return frozenset(body for name in others for body in graspable(env, name).bodies)
+
+
+def _best_of_tilts(
+    env: KitchenEnv,
+    obj: Graspable,
+    strategy: GraspStrategy,
+    tried: list[HandTarget],
+    blocked: Sequence[RobotPose],
+    yielding: frozenset[int] = frozenset(),
+) -> MotionPlan:
+    """The first tilt's best path if that is good, else the best of all tilts; bodies that are `yielding` may be met.
 
     Raises:
         SkillError: no pose fits.
@@ -213,7 +243,7 @@ def _best(
     for tilt, extra in strategy.tilts:
         best = max([*compared, *(pose.score for pose in grasps(tilt))], default=0.0)
         paths = _paths(env, obj, strategy, tried, grasps(tilt), extra, best)
-        found += plan_reach(env, paths, point, key=2, allowed=obj.bodies, blocked=blocked)[:1]
+        found += plan_reach(env, paths, point, key=2, allowed=obj.bodies | yielding, blocked=blocked)[:1]
         if found and found[-1].cost <= GOOD_ENOUGH + extra:
             break
     if not found:
