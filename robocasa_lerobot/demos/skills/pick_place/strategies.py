@@ -26,8 +26,11 @@ from robocasa_lerobot.demos.skills.pick_place.mugs import FROM_THE_SIDE, UNDER_A
 from robocasa_lerobot.demos.skills.pick_place.pick import HOPELESS, RELEASE_STEPS, best_grasp
 from robocasa_lerobot.demos.skills.pick_place.place import PlaceStrategy
 from robocasa_lerobot.demos.skills.pick_place.poses.counter_poses import NEAR_M, on_counter
+from robocasa_lerobot.demos.skills.pick_place.poses.distance_poses import at_distances, distance_terms, near_to
 from robocasa_lerobot.demos.skills.pick_place.poses.place_poses import (
+    COLUMNS,
     DROPS_M,
+    MANY_COLUMNS,
     at_site,
     in_basin,
     in_regions,
@@ -122,6 +125,7 @@ def place_strategy(env: KitchenEnv, stage: Stage, obj: Graspable) -> PlaceStrate
     An object that holds others is kept level, or nearly so where it is deep.
     """
     strategy = _by_target(env, stage, obj)
+    strategy = replace(strategy, poses=at_distances(env, stage, obj, strategy.poses))
     if not obj.contents:
         return strategy
     steepest = DEEP_LEAN if _is_deep(obj) else 0.0
@@ -151,9 +155,8 @@ def _by_target(env: KitchenEnv, stage: Stage, obj: Graspable) -> PlaceStrategy:
     match fixture:
         case Counter():
             within = FARTHER_M if isinstance(locate(env, obj.name).fixture, Drawer) else NEAR_M
-            return PlaceStrategy(
-                on_counter(env, obj, fixture, within), leans=(0.0, _STEEP), entries=("up", "across"), grasp=ANY_APPROACH
-            )
+            poses = on_counter(env, obj, fixture, within, near_to(env, stage))
+            return PlaceStrategy(poses, leans=(0.0, _STEEP), entries=("up", "across"), grasp=ANY_APPROACH)
         case Sink():
             return PlaceStrategy(in_basin(env, fixture.basin), leans=_OPEN_LEANS, entries=("up", "across"))
         case CoffeeMachine():
@@ -164,10 +167,13 @@ def _by_target(env: KitchenEnv, stage: Stage, obj: Graspable) -> PlaceStrategy:
         return PlaceStrategy(over_burners(env, obj, fixture, burners), entries=("up", "across"))
     named = [(name, region) for name, region in regions_of(fixture) if name.startswith(part)]
     regions = [region for _, region in named if _counts(env, stage, region)]
-    return _into_regions(env, obj, fixture, part, regions)
+    columns = MANY_COLUMNS if distance_terms(env, stage) else COLUMNS
+    return _into_regions(env, obj, fixture, part, regions, columns)
 
 
-def _into_regions(env: KitchenEnv, obj: Graspable, fixture: Fixture, part: str, regions: list[Region]) -> PlaceStrategy:
+def _into_regions(
+    env: KitchenEnv, obj: Graspable, fixture: Fixture, part: str, regions: list[Region], columns: int
+) -> PlaceStrategy:
     match fixture:
         case Blender():
             return PlaceStrategy(
@@ -189,7 +195,7 @@ def _into_regions(env: KitchenEnv, obj: Graspable, fixture: Fixture, part: str, 
             # Past the edge of what it came from, a shelf's or a drawer's, in a straight line.
             narrow = "drawer" in locate(env, obj.name).region
             return PlaceStrategy(
-                in_regions(env, obj, regions, (0.0,)), leans=_CLOSED_LEANS, entries=("up", "across", "out"),
+                in_regions(env, obj, regions, (0.0,), columns), leans=_CLOSED_LEANS, entries=("up", "across", "out"),
                 grasp=ANY_APPROACH, in_m=0.28, narrow=narrow,
             )  # fmt: skip
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+from collections.abc import Sequence
 
 import mujoco
 import numpy as np
@@ -16,11 +17,17 @@ from robocasa_lerobot.envs.kitchens.fixtures.counters import Counter
 
 GRID_M, EDGE_M, NEAR_M = 0.07, 0.02, 0.75
 MOST_POSES = 14
+BESIDE_M, MOST_BESIDE = 0.32, 40  # of places that it is to come beside
 FAR_COST = 0.8  # for each metre
 
 
-def on_counter(env: KitchenEnv, obj: Graspable, counter: Counter, within_m: float = NEAR_M) -> PlacePoses:
-    """Points on a counter's top, near the robot, where an object as it is turned now meets nothing."""
+def on_counter(
+    env: KitchenEnv, obj: Graspable, counter: Counter, within_m: float = NEAR_M, beside: Sequence[Array] = ()
+) -> PlacePoses:
+    """Points on a counter's top, near the robot, where an object as it is turned now meets nothing.
+
+    With places `beside` which it is to come, world, metres, each (3,), points near these, wherever the robot is.
+    """
 
     def poses() -> list[PlacePose]:
         body = env.data.body(obj.name)
@@ -32,7 +39,7 @@ def on_counter(env: KitchenEnv, obj: Graspable, counter: Counter, within_m: floa
         quat = np.empty(4)
         mujoco.mju_mat2Quat(quat, turn.reshape(9))
         found = []
-        for point, far in _near(env, counter, edge, within_m):
+        for point, far in _near(env, counter, edge, within_m, beside):
             origin = point + (obj.below(turn) + 0.004) * UP
             scratch.joint(f"{obj.name}_joint0").qpos[:] = [*origin, *quat]
             mujoco.mj_kinematics(model, scratch)
@@ -41,15 +48,17 @@ def on_counter(env: KitchenEnv, obj: Graspable, counter: Counter, within_m: floa
             met = (mine[pairs[:, 0]] & others[pairs[:, 1]]) | (mine[pairs[:, 1]] & others[pairs[:, 0]])
             if not met.any():
                 found.append(PlacePose(point, FAR_COST * far))
-            if len(found) == MOST_POSES:
+            if len(found) == (MOST_BESIDE if beside else MOST_POSES):
                 break
         return found
 
     return poses
 
 
-def _near(env: KitchenEnv, counter: Counter, edge: float, within_m: float) -> list[tuple[Array, float]]:
-    """Points of a grid on a counter with their distances from the hand, the nearest first."""
+def _near(
+    env: KitchenEnv, counter: Counter, edge: float, within_m: float, beside: Sequence[Array]
+) -> list[tuple[Array, float]]:
+    """Points of a grid on a counter with their distances from the hand, or from places beside, the nearest first."""
     cos, sin = np.cos(counter.yaw), np.sin(counter.yaw)
     base, _ = base_pose(env.data)
     grip = grip_position(env.data)
@@ -60,6 +69,10 @@ def _near(env: KitchenEnv, counter: Counter, edge: float, within_m: float) -> li
                 point = np.array(
                     [counter.pos[0] + cos * x - sin * y, counter.pos[1] + sin * x + cos * y, counter.surface_z]
                 )
-                if np.linalg.norm((point - base)[:2]) < within_m:
+                if beside:
+                    apart = min(float(np.linalg.norm((point - other)[:2])) for other in beside)
+                    if apart < BESIDE_M:
+                        found.append((point, apart))
+                elif np.linalg.norm((point - base)[:2]) < within_m:
                     found.append((point, float(np.linalg.norm((point - grip)[:2]))))
     return sorted(found, key=lambda pair: pair[1])

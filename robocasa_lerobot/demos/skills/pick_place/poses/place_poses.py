@@ -29,6 +29,7 @@ HEAP_COST, BESIDE_SHARES = 8.0, (1.0, 1.4)
 BASIN_AHEAD_M, BASIN_ASIDE_M = 0.09, 0.08  # from the basin's middle: before the faucet, whose spout reaches over it
 # Heights of the underside over the basin's rim at which an object is let go, metres, with their costs.
 BASIN_DROPS = ((-0.07, 0.0), (-0.03, 0.2), (0.02, 0.5))
+COLUMNS, MANY_COLUMNS = 5, 13  # points across a region; where its place among others matters
 REGION_EDGE_M = 0.015  # kept from a region's sides
 INWARDS = (0.0, 0.05, 0.10)  # from the front of a region, metres
 DROPS_M = (0.0, 0.04, 0.08, 0.12)  # over the floor of receptacles that are open above
@@ -113,8 +114,13 @@ def in_basin(env: KitchenEnv, basin: Region) -> PlacePoses:
     return poses
 
 
-def in_regions(env: KitchenEnv, obj: Graspable, regions: list[Region], drops: tuple[float, ...]) -> PlacePoses:
-    """On the floors of regions, near their fronts, or let fall from heights `drops` above, metres."""
+def in_regions(
+    env: KitchenEnv, obj: Graspable, regions: list[Region], drops: tuple[float, ...], columns: int = COLUMNS
+) -> PlacePoses:
+    """On the floors of regions, near their fronts, or let fall from heights `drops` above, metres.
+
+    Of the points across a region, so many are taken that are nearest to the robot.
+    """
     data = env.data
 
     def poses() -> list[PlacePose]:
@@ -127,9 +133,9 @@ def in_regions(env: KitchenEnv, obj: Graspable, regions: list[Region], drops: tu
             wide, deep, tall = region.half
             room_x, room_y = max(wide - across - REGION_EDGE_M, 0.0), max(deep - across - REGION_EDGE_M, 0.0)
             own = float(np.clip(region.local(data, base)[0], -room_x, room_x))
-            columns = sorted({round(x, 3) for x in (own, *np.linspace(-room_x, room_x, 5))}, key=lambda x: abs(x - own))
+            across_it = {round(x, 3) for x in (own, *np.linspace(-room_x, room_x, columns).tolist())}
             rise = float(region.world(data, (0, 0, -tall))[2]) - lowest
-            for x in columns[:5]:
+            for x in sorted(across_it, key=lambda x: abs(x - own))[:columns]:
                 for inwards in INWARDS:
                     y = min(-room_y + inwards, room_y)
                     for drop in drops:

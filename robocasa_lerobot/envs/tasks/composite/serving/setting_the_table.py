@@ -2,7 +2,7 @@
 
 from robocasa_lerobot.envs.predicates import AllOf, GripperFar, ObjectOn, ObjectTouches
 from robocasa_lerobot.envs.scene.spec import FixtureSpec, ObjectSpec, Placement, RobotStart
-from robocasa_lerobot.envs.tasks.atomic.common import counter_near, on_counter
+from robocasa_lerobot.envs.tasks.atomic.common import counter_near, in_cabinet, on_counter
 from robocasa_lerobot.envs.tasks.task import Stage, Task
 
 _CENTRE = Placement("dining_table", size=(1.0, 0.3), pos=(0.0, 0.0))
@@ -19,7 +19,7 @@ ARRANGE_BREAD_BASKET = Task(
     needs=("dining_counter",),
     robot_start=RobotStart("cabinet"),
     objects=(
-        ObjectSpec("bread", ("bread",), Placement("cabinet", size=(0.5, 0.4), pos=(0.0, -1.0)), graspable=True),
+        ObjectSpec("bread", ("bread",), in_cabinet("cabinet", (0.5, 0.4)), graspable=True),
         ObjectSpec("basket", ("basket",), on_counter("cabinet", (0.5, 0.5))),
         ObjectSpec("dstr_dining", ("any",), _CENTRE),
         ObjectSpec("dstr_dining2", ("any",), _CENTRE),
