@@ -18,7 +18,13 @@ from robocasa_lerobot.demos.skills.doors import push_lid
 from robocasa_lerobot.demos.skills.drawers import close_drawer, open_drawer
 from robocasa_lerobot.demos.skills.handles import open_doors
 from robocasa_lerobot.demos.skills.knobs import raise_knob, turn_burner_low, turn_knob, turn_off_burner, turn_on_burner
-from robocasa_lerobot.demos.skills.levers import press_lever, turn_off_water, turn_on_water, turn_sideways
+from robocasa_lerobot.demos.skills.levers import (
+    press_lever,
+    sweep_sideways,
+    turn_off_water,
+    turn_on_water,
+    turn_sideways,
+)
 from robocasa_lerobot.demos.skills.mixer_head import lower_head, raise_head
 from robocasa_lerobot.demos.skills.pick_place.hold import hold_object
 from robocasa_lerobot.demos.skills.pick_place.verbs import drive, pick_object, place_object
@@ -53,6 +59,7 @@ SKILLS: dict[tuple[str, str], Skill] = {
     ("levers", "on"): turn_on_water,
     ("levers", "off"): turn_off_water,
     ("levers", "turn"): turn_sideways,
+    ("levers", "sweep"): sweep_sideways,
     ("pick_place", "pick"): pick_object,
     ("pick_place", "place"): place_object,
     ("pick_place", "hold"): hold_object,

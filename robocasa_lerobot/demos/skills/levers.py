@@ -5,7 +5,7 @@ The finger tips end short of the case behind a lever.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Generator, Iterator
 
 import mujoco
 import numpy as np
@@ -19,10 +19,11 @@ from robocasa_lerobot.demos.motion import (
     base_pose,
     frame,
     grip_position,
+    hand_rotation,
     rotation_about,
 )
 from robocasa_lerobot.demos.planning.follow import follow_joint_path
-from robocasa_lerobot.demos.planning.motion_planner import plan_near
+from robocasa_lerobot.demos.planning.motion_planner import MotionPlan, plan_near
 from robocasa_lerobot.demos.skills.base_shift import shift_base
 from robocasa_lerobot.demos.skills.common import SkillError, hold_hand, move_hand, stage_done
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
@@ -44,8 +45,12 @@ PUSH_SPEED, LEAD_SPEED = 0.45, 0.35
 # How far from its middle towards the tip a faucet's lever is grasped, as a share of its length; angles in radians.
 WATER_ON_RAD, WATER_OFF_RAD = 0.70, 0.0
 SPOUT_RAD = 0.80
+LONG_TURN_RAD, MOST_AHEAD_RAD = 1.0, 0.18
+SWEEP_RAD = 0.66  # of the spout from the middle, to either side: beyond what counts as a side
 HOT_SHARE, COLD_SHARE = 0.80, 0.20
 DONE_RAD = 0.12
+# A lever this far down, as a share of its travel, is waited for while an appliance may hold it (a toaster for 25 s).
+HELD_DOWN, MOST_WAIT_STEPS, COMING_UP_STEPS = 0.9, 700, 10
 SHIFTS = (
     (0.0, 0.0),
     (-0.15, 0.0),
@@ -98,9 +103,22 @@ def press_lever(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
         yield from hold_hand(data, HandTarget(grip_position(data) + direction * 0.01, rotation), CLOSED, 4)
         back = HandTarget(before.position + (UP * 0.05) - rotation[:, 2] * 0.06, rotation)
         yield from move_hand(data, back, CLOSED, tolerance=0.03, max_steps=40)
+        yield from _wait_while_down(env, stage, fixture, part, back)
         if stage_done(env, stage):
             return
     raise SkillError(f"{part} of {fixture.name} is at {fixture.share(data, part):.0%} after {ATTEMPTS} attempts")
+
+
+def _wait_while_down(env: KitchenEnv, stage: Stage, fixture: Appliance, part: str, away: HandTarget) -> Iterator[Array]:
+    """Keep the hand away while a lever that was pressed is held down, where the stage is done when it has come up."""
+    for _ in range(MOST_WAIT_STEPS):
+        if stage_done(env, stage) or fixture.share(env.data, part) < HELD_DOWN:
+            break
+        yield from hold_hand(env.data, away, CLOSED, 1)
+    for _ in range(COMING_UP_STEPS):
+        if stage_done(env, stage):
+            return
+        yield from hold_hand(env.data, away, CLOSED, 1)
 
 
 def turn_on_water(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
@@ -129,6 +147,41 @@ def turn_sideways(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
         yield from turn_on_water(env, stage)
 
 
+def sweep_sideways(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
+    """Grasp the spout and lead it to one side and to the other without letting go, the water running all the while.
+
+    Raises:
+        SkillError: the stage is not done after that, in four rounds.
+    """
+    data, sink = env.data, env.scene.fixture(stage.target, Sink)
+    allowed = frozenset(int(i) for i in np.flatnonzero(env.scene.subtree(f"{sink.name}_spout")))
+    tried: list[Array] = []
+    for attempt in range(ATTEMPTS):
+        if not sink.water_on(data):  # the hand has leaned on the lever
+            yield from turn_on_water(env, stage)
+        joint = data.joint(sink.joint("spout"))
+        anchor, axis, present = joint.xanchor.copy(), joint.xaxis.copy(), sink.position(data, "spout")
+        grip, along = _hold_of(env, sink.name, "spout")
+        first = SWEEP_RAD if (present > 0.0) != (attempt % 2 == 1) else -SWEEP_RAD
+        rows = []
+        for rotation in _grasps(env, along, np.cross(axis, grip - anchor)):
+            at = HandTarget(grip, rotation)
+            ends = (_turned(at, anchor, axis, goal - present, turns_hand=True) for goal in (first, -first))
+            rows.append((HandTarget(grip - rotation[:, 2] * STANDOFF_M, rotation), at, *ends))
+        plan = plan_near(env, rows, SHIFTS, allowed=allowed, tried=tried)
+        tried.append(plan.targets[1].rotation)
+        at = yield from _take_hold(env, plan)
+        held = HandTarget(grip_position(data), at.rotation)
+        for goal in (first, -first):
+            turn = goal - present
+            yield from _lead_to(env, held, anchor, axis, turn, lambda goal=goal: goal - sink.position(data, "spout"))
+            held, present = HandTarget(grip_position(data), hand_rotation(data)), sink.position(data, "spout")
+        yield from _let_go(env)
+        if stage_done(env, stage):
+            return
+    raise SkillError(f"the spout of {sink.name} has not rinsed all sides in {ATTEMPTS} rounds")
+
+
 def _lead(env: KitchenEnv, stage: Stage, part: str, left_over: Callable[[], float]) -> Iterator[Array]:
     """Grasp a part on a hinge and lead it until nothing is left over of its turn, radians.
 
@@ -153,31 +206,57 @@ def _lead(env: KitchenEnv, stage: Stage, part: str, left_over: Callable[[], floa
             rows.append((*row, _turned(row[1], anchor, axis, angle, turns_hand=turning)))
         plan = plan_near(env, rows, SHIFTS, allowed=allowed, tried=tried)
         tried.append(plan.targets[-1].rotation)
-        yield from shift_base(env, plan.shift, OPEN)
-        yield from follow_joint_path(env, plan.joints, OPEN)
-        before, at, _ = plan.targets
-        yield from move_hand(data, before, OPEN, tolerance=0.015)
-        yield from move_hand(data, at, OPEN, speed=0.6, tolerance=0.008, max_steps=40)
-        yield from hold_hand(data, at, CLOSED, GRASP_STEPS)
+        at = yield from _take_hold(env, plan)
         held = HandTarget(grip_position(data), at.rotation)
-        total = left_over()
         # Water that runs stays on: its lever is carried, not leaned on.
         lift = UP * (0.012 if part == "handle_temp" else 0.0)
-        for step in range(80):
-            share = min(1.0, (step + 1) / 30)
-            if abs(left_over()) < 0.04:
-                break
-            # A little ahead of the part, which drags behind.
-            goal = _turned(held, anchor, axis, total * min(1.15, share + 0.15), turns_hand=turning)
-            goal = HandTarget(goal.position + lift, goal.rotation)
-            yield from hold_hand(data, goal, CLOSED, 1)
-        rest = HandTarget(grip_position(data), data.body("robot0_right_hand").xmat.reshape(3, 3).copy())
-        yield from hold_hand(data, rest, OPEN, GRASP_STEPS)
-        away = HandTarget(rest.position - rest.rotation[:, 2] * 0.10, rest.rotation)
-        yield from move_hand(data, away, OPEN, max_steps=30, tolerance=0.03)
+        yield from _lead_to(env, held, anchor, axis, left_over(), left_over, turns_hand=turning, lift=lift)
+        yield from _let_go(env)
         if abs(left_over()) < DONE_RAD or stage_done(env, stage):
             return
     raise SkillError(f"{part} of {sink.name}: {np.degrees(left_over()):.0f} degrees left after {ATTEMPTS} attempts")
+
+
+def _take_hold(env: KitchenEnv, plan: MotionPlan) -> Generator[Array, None, HandTarget]:
+    """Go along a plan to its second pose, and close the fingers there; that is returned."""
+    yield from shift_base(env, plan.shift, OPEN)
+    yield from follow_joint_path(env, plan.joints, OPEN)
+    before, at = plan.targets[:2]
+    yield from move_hand(env.data, before, OPEN, tolerance=0.015)
+    yield from move_hand(env.data, at, OPEN, speed=0.6, tolerance=0.008, max_steps=40)
+    yield from hold_hand(env.data, at, CLOSED, GRASP_STEPS)
+    return at
+
+
+def _lead_to(
+    env: KitchenEnv,
+    held: HandTarget,
+    anchor: Array,
+    axis: Array,
+    total: float,
+    left_over: Callable[[], float],
+    *,
+    turns_hand: bool = True,
+    lift: Array | float = 0.0,
+) -> Iterator[Array]:
+    """Turn a hand that holds a part about its hinge by an angle `total`, until nothing is left over."""
+    steps = 30 if abs(total) < LONG_TURN_RAD else 60
+    for step in range(steps + 50):
+        share = min(1.0, (step + 1) / steps)
+        if abs(left_over()) < 0.04:
+            break
+        # A little ahead of the part, which drags behind.
+        ahead = min(abs(total) * min(1.15, share + 0.15), abs(total) + MOST_AHEAD_RAD)
+        goal = _turned(held, anchor, axis, float(np.sign(total)) * ahead, turns_hand=turns_hand)
+        yield from hold_hand(env.data, HandTarget(goal.position + lift, goal.rotation), CLOSED, 1)
+
+
+def _let_go(env: KitchenEnv) -> Iterator[Array]:
+    """Open the fingers, and draw the hand back along its approach."""
+    rest = HandTarget(grip_position(env.data), hand_rotation(env.data))
+    yield from hold_hand(env.data, rest, OPEN, GRASP_STEPS)
+    away = HandTarget(rest.position - rest.rotation[:, 2] * 0.10, rest.rotation)
+    yield from move_hand(env.data, away, OPEN, max_steps=30, tolerance=0.03)
 
 
 def _hold_of(env: KitchenEnv, sink: str, part: str) -> tuple[Array, Array]:
