@@ -6,6 +6,7 @@ The finger tips end short of the case behind a lever.
 from __future__ import annotations
 
 from collections.abc import Callable, Generator, Iterator
+from functools import partial
 
 import mujoco
 import numpy as np
@@ -174,12 +175,16 @@ def sweep_sideways(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
         held = HandTarget(grip_position(data), at.rotation)
         for goal in (first, -first):
             turn = goal - present
-            yield from _lead_to(env, held, anchor, axis, turn, lambda goal=goal: goal - sink.position(data, "spout"))
+            yield from _lead_to(env, held, anchor, axis, turn, partial(_left_to, env, sink, goal))
             held, present = HandTarget(grip_position(data), hand_rotation(data)), sink.position(data, "spout")
         yield from _let_go(env)
         if stage_done(env, stage):
             return
     raise SkillError(f"the spout of {sink.name} has not rinsed all sides in {ATTEMPTS} rounds")
+
+
+def _left_to(env: KitchenEnv, sink: Sink, goal: float) -> float:
+    return goal - sink.position(env.data, "spout")
 
 
 def _lead(env: KitchenEnv, stage: Stage, part: str, left_over: Callable[[], float]) -> Iterator[Array]:

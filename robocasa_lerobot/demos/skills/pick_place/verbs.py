@@ -15,6 +15,7 @@ from robocasa_lerobot.demos.skills.pick_place.carrying.carry import carry_to, go
 from robocasa_lerobot.demos.skills.pick_place.grasp_strategy import ANY_APPROACH, GraspStrategy
 from robocasa_lerobot.demos.skills.pick_place.graspable import Graspable, graspable
 from robocasa_lerobot.demos.skills.pick_place.location import locate
+from robocasa_lerobot.demos.skills.pick_place.long_tool import BY_THE_HANDLE
 from robocasa_lerobot.demos.skills.pick_place.pick import is_held, pick
 from robocasa_lerobot.demos.skills.pick_place.place import PlaceStrategy, put
 from robocasa_lerobot.demos.skills.pick_place.reach_in import drive_around_open_door
@@ -130,8 +131,17 @@ def _around_door(env: KitchenEnv, fixture: Fixture | None) -> Iterator[Array]:
 
 def _free_grasp(env: KitchenEnv, stage: Stage) -> GraspStrategy:
     """How an object that stands free is grasped best for where it goes next."""
+    if _next_use(env, stage) == "stir":
+        return BY_THE_HANDLE
     following = _placing(env, stage)
     return ANY_APPROACH if following is None else place_strategy(env, following, graspable(env, stage.object)).grasp
+
+
+def _next_use(env: KitchenEnv, stage: Stage) -> str:
+    """The verb of the next stage that does something with a stage's object in the hand; empty where there is none."""
+    stages = env.declaration.stages
+    later = stages[stages.index(stage) + 1 :] if stage in stages else ()
+    return next((each.verb for each in later if each.object == stage.object and each.skill == "pick_place"), "")
 
 
 def _next_place(env: KitchenEnv, stage: Stage, obj: Graspable) -> Array | None:

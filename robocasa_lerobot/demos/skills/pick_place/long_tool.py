@@ -1,0 +1,68 @@
+"""Long tools such as spatulas: which end works, and how they are held so that this end is free."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from robocasa_lerobot.demos.motion import Array
+from robocasa_lerobot.demos.planning.grasps import GraspPose
+from robocasa_lerobot.demos.skills.pick_place.grasp_strategy import ANY_APPROACH
+from robocasa_lerobot.demos.skills.pick_place.graspable import Graspable, filled, grasps
+from robocasa_lerobot.envs.kitchen_env import KitchenEnv
+
+END_SHARE = 0.25  # of the length, at each end, by whose width the working end is told
+TIP_SHARE = 0.06
+FAR_SHARE = 0.60  # of the length, that a grasp is away from the tip
+FARTHER_SCORE = 12.0  # of a metre that it is farther away
+
+
+@dataclass(frozen=True)
+class WorkingEnd:
+    """The end of a long object that is wider than the other.
+
+    Attributes:
+        tip: its farthest part, in the object's axes, metres.
+        axis: unit vector from there to the other end, in the object's axes.
+        length: of the object along that, metres.
+    """
+
+    tip: Array
+    axis: Array
+    length: float
+
+
+def working_end(obj: Graspable) -> WorkingEnd:
+    """Find the wider end of an object."""
+    points = np.concatenate([filled(solid.cloud()) for solid in obj.solids])
+    long = int(np.argmax(np.ptp(points, axis=0)))
+    low, high = float(points[:, long].min()), float(points[:, long].max())
+    length = high - low
+
+    def wide(inside: Array) -> float:
+        return float(np.delete(np.ptp(points[inside], axis=0), long).max())
+
+    at_high = wide(points[:, long] > high - END_SHARE * length) >= wide(points[:, long] < low + END_SHARE * length)
+    end = points[points[:, long] > high - TIP_SHARE * length if at_high else points[:, long] < low + TIP_SHARE * length]
+    tip = (end.min(axis=0) + end.max(axis=0)) / 2
+    tip[long] = high if at_high else low
+    axis = np.zeros(3)
+    axis[long] = -1.0 if at_high else 1.0
+    return WorkingEnd(tip, axis, length)
+
+
+def by_the_handle(env: KitchenEnv, obj: Graspable, approach: Array) -> list[GraspPose]:
+    """Grasps far from the working end, those that are farthest from it first."""
+    end = working_end(obj)
+    body = env.data.body(obj.name)
+    turn = body.xmat.reshape(3, 3)
+    found = []
+    for pose in grasps(env, obj, approach):
+        far = float((turn.T @ (pose.position - body.xpos) - end.tip) @ end.axis)
+        if far > FAR_SHARE * end.length:
+            found.append(replace(pose, score=pose.score + FARTHER_SCORE * far))
+    return sorted(found, key=lambda pose: -pose.score)
+
+
+BY_THE_HANDLE = replace(ANY_APPROACH, poses=by_the_handle)

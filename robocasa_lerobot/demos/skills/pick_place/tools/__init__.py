@@ -1,0 +1,1 @@
+"""What a held tool or vessel is used for: wiping, stirring, pouring."""
