@@ -13,9 +13,9 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-import h5py
 import numpy as np
 import pytest
+from cluster_work import hdf5_content
 from slurm_support import stand_in
 
 from robocasa_lerobot import cli
@@ -164,20 +164,6 @@ def test_what_a_skill_should_not_raise_is_a_failure_of_its_attempt(
     assert result.gave_up
 
 
-def _content(path: Path) -> dict[str, Any]:
-    """Everything in a file but when it was written."""
-    found: dict[str, Any] = {}
-
-    def note(name: str, item: h5py.Group | h5py.Dataset) -> None:
-        found.update({f"{name}@{key}": value for key, value in item.attrs.items() if key not in ("date", "time")})
-        if isinstance(item, h5py.Dataset):
-            found[name] = item[()]
-
-    with h5py.File(path) as file:
-        file.visititems(note)
-    return found
-
-
 @pytest.mark.slow
 def test_a_cluster_records_what_this_machine_does(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
@@ -193,7 +179,7 @@ def test_a_cluster_records_what_this_machine_does(
     settings = [RecordingSettings(task, 1, seed=40, action_noise=0.1) for task in QUICK]
     record_tasks(settings, tmp_path / "here", show_progress=False)
     for task in QUICK:
-        there, here = (_content(tmp_path / place / f"{task}.hdf5") for place in ("slurm_out", "here"))
+        there, here = (hdf5_content(tmp_path / place / f"{task}.hdf5") for place in ("slurm_out", "here"))
         assert all(np.array_equal(value, there[key]) for key, value in here.items())
 
 
@@ -233,7 +219,7 @@ def test_a_recording_that_is_killed_again_and_again_is_that_of_an_uninterrupted_
         assert time.monotonic() < deadline
     assert kills > 0
     for one in settings:
-        whole, killed = (_content(tmp_path / place / f"{one.task}.hdf5") for place in ("whole", "killed"))
+        whole, killed = (hdf5_content(tmp_path / place / f"{one.task}.hdf5") for place in ("whole", "killed"))
         assert list(whole) == list(killed)
         for key, value in whole.items():
             assert np.array_equal(value, killed[key]), key
