@@ -40,6 +40,7 @@ SUBCOMMANDS: dict[str, Subcommand] = {
     "data": Subcommand("robocasa_lerobot.cli.data", "list the data that an experiment needs, and make missing ones"),
     "train": Subcommand("robocasa_lerobot.cli.train", "run the training phases of an experiment file"),
     "eval": Subcommand("robocasa_lerobot.cli.eval", "run seeded trials of a policy and report"),
+    "serve": Subcommand("robocasa_lerobot.cli.serve", "answer others' evaluations with a policy, over a socket"),
     "study": Subcommand("robocasa_lerobot.cli.study", "run the trainings of a study, from data to trials and tables"),
     "report": Subcommand("robocasa_lerobot.cli.report", "compare runs: report.html, .md, .tex and .csv"),
     "leaderboard": Subcommand(

@@ -19,7 +19,7 @@ REPLAY = "replay"  # written replay:FILE
 # They say where a checkpoint comes from, and change nothing of what the policy does.
 _ABOUT_TRAINING = ("train_config.json", ORIGIN_FILE)
 _PREPROCESSOR, _RENAMES = "policy_preprocessor.json", "rename_observations_processor"  # LeRobot's names
-_PICTURES = "observation.image"
+_PICTURE_PREFIX = "observation.image"
 _WEIGHTS = ("model.safetensors", "adapter_model.safetensors")
 
 
@@ -155,14 +155,9 @@ def camera_size(config: dict[str, Any], folder: Path) -> tuple[int, int] | None:
     Raises:
         CheckpointError: the policy has cameras, and none of them is the env's; or they have several sizes.
     """
-    inputs = {
-        name: feature
-        for name, feature in (config.get("input_features") or {}).items()
-        if feature.get("type", "VISUAL") == "VISUAL" and name.startswith(_PICTURES)
-    }
-    renamed = _renamed(folder)
-    filled = [renamed.get(key, key) for key in contract.IMAGE_KEYS]
-    sizes = {tuple(map(int, inputs[name]["shape"][-2:])) for name in filled if name in inputs}
+    inputs = _pictures(config)
+    filled = filled_cameras(config, folder)
+    sizes = {tuple(map(int, inputs[name]["shape"][-2:])) for name in filled.values()}
     if inputs and not sizes:
         raise CheckpointError(
             f"{folder}: the policy takes the pictures {', '.join(inputs)}, and the env has "
@@ -173,6 +168,22 @@ def camera_size(config: dict[str, Any], folder: Path) -> tuple[int, int] | None:
         raise CheckpointError(f"{folder}: cameras of several sizes {sorted(sizes)}; one size is expected.")
     height, width = sizes.pop() if sizes else (None, None)
     return None if height is None or width is None else (height, width)
+
+
+def filled_cameras(config: Mapping[str, Any], folder: Path) -> dict[str, str]:
+    """The env's cameras that a policy looks at, each with the name of the input that it fills."""
+    inputs, renamed = _pictures(config), _renamed(folder)
+    names = {camera: renamed.get(key, key) for camera, key in zip(contract.CAMERAS, contract.IMAGE_KEYS, strict=True)}
+    return {camera: name for camera, name in names.items() if name in inputs}
+
+
+def _pictures(config: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
+    """The camera inputs of a policy by name."""
+    return {
+        name: feature
+        for name, feature in (config.get("input_features") or {}).items()
+        if feature.get("type", "VISUAL") == "VISUAL" and name.startswith(_PICTURE_PREFIX)
+    }
 
 
 def _renamed(folder: Path) -> dict[str, str]:

@@ -1,0 +1,65 @@
+"""What `robocasa-lerobot serve` was asked for, and the server of each protocol."""
+
+from __future__ import annotations
+
+import asyncio
+import signal
+from collections.abc import Awaitable, Callable
+from dataclasses import dataclass, field
+
+from robocasa_lerobot.serving.access import Access
+from robocasa_lerobot.serving.host import Host
+from robocasa_lerobot.serving.limits import Limits
+
+PROTOCOLS = ("openpi", "gr00t", "vla_eval")
+PORTS = {"openpi": 8000, "gr00t": 5555, "vla_eval": 8000}
+GROOT_VERSIONS = ("1.5", "1.6")
+Ready = Callable[[int], None]
+
+
+@dataclass(frozen=True)
+class ServerSettings:
+    """How a policy is served. `groot_version` is that of the modality config; requests tell theirs themselves."""
+
+    protocol: str
+    access: Access
+    limits: Limits = field(default_factory=Limits)
+    groot_version: str = "1.6"
+    allow_kill: bool = False
+
+
+def run_server(host: Host, settings: ServerSettings, ready: Ready) -> bool:
+    """Serve until SIGINT or SIGTERM; False where a computation had to be left behind.
+
+    Raises:
+        UserError: the address cannot be listened on, or a package is missing.
+    """
+
+    async def run() -> None:
+        stop = asyncio.Event()
+        loop = asyncio.get_running_loop()
+        for one in (signal.SIGINT, signal.SIGTERM):
+            loop.add_signal_handler(one, stop.set)
+        await serve(host, settings, stop, ready)
+
+    try:
+        asyncio.run(run())
+    finally:
+        ended = host.close()
+    return ended
+
+
+def serve(host: Host, settings: ServerSettings, stop: asyncio.Event, ready: Ready) -> Awaitable[None]:
+    """The server of a protocol, until `stop` is set; `ready` is called with its port."""
+    access, limits = settings.access, settings.limits
+    from robocasa_lerobot.serving.openpi import OPEN_PAGES, OpenpiServer
+    from robocasa_lerobot.serving.web import serve_websockets
+
+    server = OpenpiServer(host, limits)
+    return serve_websockets(server.handle, OPEN_PAGES, {}, access, limits, stop, ready)
+
+
+def address(settings: ServerSettings, port: int) -> str:
+    """Where clients find the server."""
+    host = f"[{settings.access.host}]" if ":" in settings.access.host else settings.access.host
+    return f"{'tcp' if settings.protocol == 'gr00t' else 'ws'}://{host}:{port}"

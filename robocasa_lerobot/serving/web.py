@@ -1,0 +1,99 @@
+"""What the two WebSocket protocols share: HTTP answers on the same port, the token, limits, and a clean end."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Awaitable, Callable
+from contextlib import suppress
+from http import HTTPStatus
+from urllib.parse import parse_qs, urlsplit
+
+from websockets.asyncio.server import ServerConnection, serve
+from websockets.exceptions import ConnectionClosed
+from websockets.http11 import Request, Response
+
+from robocasa_lerobot.errors import UserError
+from robocasa_lerobot.serving.access import Access
+from robocasa_lerobot.serving.limits import Limits
+
+Handler = Callable[[ServerConnection], Awaitable[None]]
+Page = Callable[[], str]
+_CLOSE_SECONDS = 10.0
+
+
+async def serve_websockets(
+    handler: Handler,
+    open_pages: dict[str, str],
+    closed_pages: dict[str, Page],
+    access: Access,
+    limits: Limits,
+    stop: asyncio.Event,
+    ready: Callable[[int], None],
+) -> None:
+    """Answer clients until `stop` is set.
+
+    Args:
+        handler: of one client's connection.
+        open_pages: bodies of HTTP answers by path, for anybody.
+        closed_pages: bodies of HTTP answers by path, for who has the token.
+        access: where to listen, and the token.
+        limits: of messages and clients.
+        stop: ends the server.
+        ready: called with the port when clients can come.
+
+    Raises:
+        UserError: the address cannot be listened on.
+    """
+    clients: set[ServerConnection] = set()
+
+    def before_handshake(connection: ServerConnection, request: Request) -> Response | None:
+        path = urlsplit(request.path).path
+        if path in open_pages:
+            return connection.respond(HTTPStatus.OK, open_pages[path])
+        if not access.allows(_token(request)):
+            return connection.respond(
+                HTTPStatus.UNAUTHORIZED, "a valid token is needed: Authorization: Api-Key TOKEN\n"
+            )
+        if path in closed_pages:
+            return connection.respond(HTTPStatus.OK, closed_pages[path]())
+        if len(clients) >= limits.clients:
+            return connection.respond(HTTPStatus.SERVICE_UNAVAILABLE, f"{limits.clients} clients are served already\n")
+        return None
+
+    async def counted(connection: ServerConnection) -> None:
+        clients.add(connection)
+        try:
+            with suppress(ConnectionClosed):  # the client went away; nobody else is concerned
+                await handler(connection)
+        finally:
+            clients.discard(connection)
+
+    try:
+        server = await serve(
+            counted,
+            access.host,
+            access.port,
+            process_request=before_handshake,
+            origins=[None],  # no page of a browser may ask a server on its machine
+            compression=None,
+            max_size=limits.message_bytes,
+            max_queue=1,
+            ping_interval=None,  # a client that renders or plans for minutes is not gone
+        )
+    except OSError as error:
+        raise UserError(f"cannot listen on {access.host}:{access.port}: {error.strerror or error}") from error
+    ready(server.sockets[0].getsockname()[1])
+    await stop.wait()
+    server.close()
+    with suppress(TimeoutError):  # a computation may go on; the process ends all the same
+        await asyncio.wait_for(server.wait_closed(), _CLOSE_SECONDS)
+
+
+def _token(request: Request) -> str | None:
+    """What a client gave as its token: a header (`Api-Key` or `Bearer`), or `token=` in the address."""
+    headers = request.headers.get_all("Authorization")
+    if len(headers) == 1:
+        scheme, _, value = headers[0].partition(" ")
+        return value.strip() if scheme.lower() in ("api-key", "bearer") else None
+    values = parse_qs(urlsplit(request.path).query).get("token", [])
+    return values[0] if len(values) == 1 and not headers else None

@@ -1,0 +1,118 @@
+"""`robocasa-lerobot serve`: starts, answers, ends when told to, and refuses what is unsafe or impossible."""
+
+from __future__ import annotations
+
+import os
+import re
+import signal
+import socket
+import subprocess
+import sys
+import urllib.error
+import urllib.request
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import numpy as np
+import pytest
+from websockets.exceptions import InvalidStatus
+from websockets.sync.client import connect
+
+from robocasa_lerobot import cli
+from robocasa_lerobot.wire.codec import decode, encode
+
+TOKEN = "0123456789abcdef-token"
+
+
+@contextmanager
+def command(*arguments: str, **environment: str) -> Iterator[tuple[subprocess.Popen[str], int]]:
+    """A server as users start it; gives its process and port."""
+    line = [sys.executable, "-m", "robocasa_lerobot.cli", "serve", "--policy.path=random", "--port=0", *arguments]
+    process = subprocess.Popen(line, stdout=subprocess.PIPE, text=True, env={**os.environ, **environment})
+    try:
+        assert process.stdout is not None
+        found = re.search(r"serving random .* at \w+://[\d.]+:(\d+);", process.stdout.readline())
+        assert found
+        yield process, int(found[1])
+    finally:
+        process.kill()
+        process.wait()
+
+
+@pytest.mark.parametrize("how", [signal.SIGTERM, signal.SIGINT])
+def test_it_answers_and_ends_cleanly_with_a_client_connected(how: signal.Signals) -> None:
+    with command() as (process, port), connect(f"ws://127.0.0.1:{port}", compression=None) as connection:
+        assert decode(connection.recv(timeout=30))["policy"]["type"] == "random"
+        connection.send(encode({"observation.state": np.zeros(16), "task": "x"}, "openpi"))
+        assert decode(connection.recv(timeout=30))["actions"].shape == (1, 12)
+        process.send_signal(how)
+        assert process.wait(30) == 0
+        assert "the server has ended" in process.stdout.read()  # type: ignore[union-attr]
+
+
+def test_the_token_is_asked_for_everywhere_but_for_health(tmp_path: Path) -> None:
+    file = tmp_path / "token"
+    file.write_text(TOKEN + "\n")
+    with command("--host=0.0.0.0", f"--token-file={file}") as (_, port):
+        url = f"ws://127.0.0.1:{port}"
+        with urllib.request.urlopen(f"http://127.0.0.1:{port}/healthz", timeout=30) as page:
+            assert page.status == 200
+        wrong = [
+            {},
+            {"Authorization": f"Api-Key {TOKEN}x"},
+            {"Authorization": TOKEN},
+            {"Authorization": f"Basic {TOKEN}"},
+            {"Authorization": "Api-Key"},
+            {"Authorization": "Api-Key \xff\xfe"},
+            {"Authorization": "Api-Key " + "a" * 5000},
+        ]
+        for headers in wrong:
+            with pytest.raises(InvalidStatus, match="401"), connect(url, additional_headers=headers):
+                pass
+        with pytest.raises(InvalidStatus, match="401"), connect(f"{url}/?token=wrong"):
+            pass
+        # A page in a browser says where it comes from.
+        with pytest.raises(InvalidStatus, match="403"), connect(f"{url}/?token={TOKEN}", origin="http://localhost"):  # type: ignore[arg-type]
+            pass
+        for right in ({"Authorization": f"Api-Key {TOKEN}"}, {"Authorization": f"Bearer {TOKEN}"}):
+            with connect(url, additional_headers=right) as connection:
+                assert decode(connection.recv(timeout=30))["server"] == "robocasa_lerobot"
+
+
+def test_more_clients_than_allowed_are_sent_away() -> None:
+    with command("--max-clients=1") as (_, port), connect(f"ws://127.0.0.1:{port}") as connection:
+        connection.recv(timeout=30)
+        with pytest.raises(InvalidStatus, match="503"), connect(f"ws://127.0.0.1:{port}"):
+            pass
+
+
+@pytest.mark.parametrize(
+    ("arguments", "text"),
+    [
+        (["--host=0.0.0.0"], "give a token with --token-file"),
+        (["--host=::"], "give a token with --token-file"),
+        (["--token-file=missing"], "cannot be read"),
+        (["--policy.path=demonstrator"], "the simulator's own state"),
+        (["--policy.path=nowhere"], "no such folder"),
+        (["--executed-steps=4"], "it acts step by step"),
+        (["--port=70000"], "expected 0"),
+        (["--max-message=0"], "MiB"),
+        (["--max-clients=0"], "at least 1"),
+    ],
+)
+def test_mistakes_are_one_sentence(arguments: list[str], text: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.main(["serve", "--policy.path=random", *arguments]) == 2
+    assert text in capsys.readouterr().err
+
+
+def test_a_short_token_and_a_taken_port_are_refused(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with socket.create_server(("127.0.0.1", 0)) as taken:
+        port = taken.getsockname()[1]
+        assert cli.main(["serve", "--policy.path=random", f"--port={port}"]) == 2
+        assert "cannot listen" in capsys.readouterr().err
+    monkeypatch.setenv("ROBOCASA_LEROBOT_TOKEN", "short")
+    assert cli.main(["serve", "--policy.path=random"]) == 2
+    assert "at least 16" in capsys.readouterr().err
