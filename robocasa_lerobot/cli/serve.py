@@ -9,7 +9,7 @@ EXAMPLE = (
     "robocasa-lerobot serve --policy.path=outputs/demo/finetune/checkpoints/last/pretrained_model"
     " --protocol=openpi --port=8000"
 )
-_PROTOCOLS = ("openpi", "gr00t", "vla_eval")
+_PORTS = {"openpi": 8000, "gr00t": 5555, "vla_eval": 8000}  # those of the protocols' own servers
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
@@ -38,7 +38,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
         "--repeat-history", action="store_true", help="let one observation stand for a policy's whole history"
     )
     door = parser.add_argument_group("door")
-    door.add_argument("--protocol", choices=_PROTOCOLS, default="openpi", help="default openpi")
+    door.add_argument("--protocol", choices=tuple(_PORTS), default="openpi", help="default openpi")
     door.add_argument(
         "--host", default="127.0.0.1", help="address to listen on (default 127.0.0.1, this machine alone)"
     )
@@ -57,6 +57,10 @@ def configure(parser: argparse.ArgumentParser) -> None:
         help="largest message (default %(default)g MiB)",
     )
     door.add_argument("--max-clients", type=int, default=limits.clients, help="clients at a time (default %(default)s)")
+    door.add_argument(
+        "--groot-version", choices=("1.5", "1.6"), default="1.6", help="of gr00t's modality config (default 1.6)"
+    )
+    door.add_argument("--allow-kill", action="store_true", help="gr00t's clients may end the server")
 
 
 def run(args: argparse.Namespace) -> int:
@@ -67,7 +71,7 @@ def run(args: argparse.Namespace) -> int:
     from robocasa_lerobot.serving.host import Host
     from robocasa_lerobot.serving.limits import Limits
     from robocasa_lerobot.serving.policy import load_served
-    from robocasa_lerobot.serving.server import PORTS, ServerSettings, address, run_server
+    from robocasa_lerobot.serving.server import ServerSettings, address, run_server
 
     for name, number, low in (
         ("policy.threads", args.threads, 1),
@@ -80,11 +84,13 @@ def run(args: argparse.Namespace) -> int:
             raise UserError(f"--{name}: found {number}, expected at least {low}.")
     if not 0 < args.max_message <= 1024:
         raise UserError(f"--max-message: found {args.max_message}, expected MiB above 0 and at most 1024.")
-    port = PORTS[args.protocol] if args.port is None else args.port
+    port = _PORTS[args.protocol] if args.port is None else args.port
     settings = ServerSettings(
         args.protocol,
         make_access(args.host, port, args.token_file),
         Limits(int(args.max_message * 2**20), args.max_clients),
+        args.groot_version,
+        args.allow_kill,
     )
     policy = load_served(read_source(args.path, args.label), args.device, args.executed_steps, args.width, args.threads)
     host = Host(policy, args.seed, args.resize, args.repeat_history)

@@ -11,9 +11,6 @@ from robocasa_lerobot.serving.access import Access
 from robocasa_lerobot.serving.host import Host
 from robocasa_lerobot.serving.limits import Limits
 
-PROTOCOLS = ("openpi", "gr00t", "vla_eval")
-PORTS = {"openpi": 8000, "gr00t": 5555, "vla_eval": 8000}
-GROOT_VERSIONS = ("1.5", "1.6")
 Ready = Callable[[int], None]
 
 
@@ -52,6 +49,10 @@ def run_server(host: Host, settings: ServerSettings, ready: Ready) -> bool:
 def serve(host: Host, settings: ServerSettings, stop: asyncio.Event, ready: Ready) -> Awaitable[None]:
     """The server of a protocol, until `stop` is set; `ready` is called with its port."""
     access, limits = settings.access, settings.limits
+    if settings.protocol == "gr00t":
+        from robocasa_lerobot.serving.gr00t import GrootServer
+
+        return GrootServer(host, access, limits, settings.groot_version, settings.allow_kill).serve(stop, ready)
     from robocasa_lerobot.serving.openpi import OPEN_PAGES, OpenpiServer
     from robocasa_lerobot.serving.web import serve_websockets
 

@@ -142,13 +142,16 @@ def _to_array(text: Mapping[str, Any], dtype_key: str) -> np.ndarray:
     return np.frombuffer(data, dtype).reshape(tuple(shape))
 
 
-def _from_npy(data: Any) -> np.ndarray:
+def _from_npy(data: Any) -> Any:
+    """An array; lists of text for one of text."""
     if not isinstance(data, bytes):
         raise WireError(f"an array's npy bytes are missing; found {type(data).__name__}")
     try:
         array: np.ndarray = np.load(io.BytesIO(data), allow_pickle=False)
     except Exception as error:  # numpy parses the header with ast: broken ones raise anything
         raise WireError(f"an array's npy bytes cannot be read: {error}") from error
+    if array.dtype.kind == "U":  # instructions, as GR00T's clients send them
+        return array.tolist()
     if array.dtype.kind not in KINDS:
         raise WireError(f"an array of dtype {array.dtype} is refused; booleans, integers and floats are read")
     array.flags.writeable = False

@@ -62,6 +62,13 @@ def test_what_is_no_number_is_not_sent(dialect: Dialect, array: np.ndarray) -> N
         encode({"a": array}, dialect)
 
 
+def test_text_in_npy_bytes_becomes_lists() -> None:
+    npy = io.BytesIO()
+    np.save(npy, np.array([["open the drawer"]]))
+    message = msgpack.packb({"__ndarray_class__": True, "as_npy": npy.getvalue()})
+    assert decode(message) == [["open the drawer"]]
+
+
 class _Bomb:
     def __reduce__(self) -> tuple[object, tuple[str]]:
         return exec, ("raise SystemExit('a pickle was executed')",)

@@ -1,0 +1,184 @@
+"""GR00T's inference service over ZeroMQ, in the shapes of N1.5 and of N1.6 and N1.7; a request tells which it is.
+
+N1.5 sends an observation as `data` and gets a map of actions; N1.6 sends `data: {"observation", "options"}` and gets
+the list of a map of actions and one of information. `seed`, `number` and `reset` stand in `options` (N1.5: beside the
+observation), each a number, or a list with one for each row of a batch.
+Source: Isaac-GR00T N1.5 (0a015f6), N1.6 (ade260e), and a public fork of N1.7.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from collections import OrderedDict
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from robocasa_lerobot.errors import UserError
+from robocasa_lerobot.serving.access import Access
+from robocasa_lerobot.serving.gr00t_messages import modality_config, rows_of, to_actions
+from robocasa_lerobot.serving.host import Host, Reply
+from robocasa_lerobot.serving.limits import Limits
+from robocasa_lerobot.serving.openpi import describe, is_clients_mistake
+from robocasa_lerobot.serving.request import RequestError, Session, whole_number
+from robocasa_lerobot.wire.codec import decode, encode
+
+_log = logging.getLogger(__name__)
+_UNAUTHORIZED = "Unauthorized: Invalid API token"  # their words, which clients look for
+
+
+class GrootServer:
+    """Answers the requests of all clients, each of them one at a time.
+
+    Args:
+        host: the policy.
+        access: where to listen, and the token.
+        limits: of messages and clients.
+        version: "1.5" or "1.6", of the modality config, which no request tells.
+        allow_kill: clients may end the server.
+    """
+
+    def __init__(self, host: Host, access: Access, limits: Limits, version: str, allow_kill: bool) -> None:
+        self._host, self._access, self._limits = host, access, limits
+        self._version, self._allow_kill = version, allow_kill
+        self._clients: OrderedDict[bytes, list[Session]] = OrderedDict()
+        self._busy: set[bytes] = set()
+        self._stop = asyncio.Event()
+
+    async def serve(self, stop: asyncio.Event, ready: Callable[[int], None]) -> None:
+        """Answer until `stop` is set, or a client may and does end the server.
+
+        Raises:
+            UserError: pyzmq is missing, or the address cannot be listened on.
+        """
+        try:
+            import zmq
+            import zmq.asyncio
+        except ImportError as error:
+            raise UserError("--protocol=gr00t needs pyzmq: install robocasa_lerobot[gr00t].") from error
+        self._stop = stop
+        context = zmq.asyncio.Context()
+        socket = context.socket(zmq.ROUTER)
+        tasks: set[asyncio.Task[None]] = set()
+        try:
+            socket.setsockopt(zmq.MAXMSGSIZE, self._limits.message_bytes)
+            socket.setsockopt(zmq.LINGER, 1000)
+            socket.setsockopt(zmq.IPV6, int(":" in self._access.host))
+            host = f"[{self._access.host}]" if ":" in self._access.host else self._access.host
+            try:
+                socket.bind(f"tcp://{'127.0.0.1' if host == 'localhost' else host}:{self._access.port or '*'}")
+            except zmq.ZMQError as error:
+                raise UserError(f"cannot listen on {self._access.host}:{self._access.port}: {error}") from error
+            ready(int(socket.getsockopt_string(zmq.LAST_ENDPOINT).rpartition(":")[2]))
+            ending = asyncio.ensure_future(stop.wait())
+            while not stop.is_set():
+                arriving = asyncio.ensure_future(socket.recv_multipart())
+                await asyncio.wait({arriving, ending}, return_when=asyncio.FIRST_COMPLETED)
+                if not arriving.done():
+                    arriving.cancel()
+                    break
+                task = asyncio.ensure_future(self._serve_one(socket, arriving.result()))
+                tasks.add(task)
+                task.add_done_callback(tasks.discard)
+            if tasks:
+                await asyncio.wait(tasks, timeout=10.0)
+        finally:
+            socket.close()
+            context.term()
+
+    async def _serve_one(self, socket: Any, parts: list[bytes]) -> None:
+        client, envelope, body = parts[0], parts[:-1], parts[-1]
+        if len(parts) > 3 or (len(parts) == 3 and parts[1]):
+            await socket.send_multipart([*envelope[:2], _error("a request is one message part")])
+            return
+        if client in self._busy or len(self._busy) >= self._limits.clients:
+            await socket.send_multipart([*envelope, _error("busy: one request of a client at a time")])
+            return
+        self._busy.add(client)
+        try:
+            answer = await self._answer(client, body)
+        except Exception as error:
+            _log.warning("a client's request failed: %s", error, exc_info=not is_clients_mistake(error))
+            answer = _error(describe(error))
+        finally:
+            self._busy.discard(client)
+        await socket.send_multipart([*envelope, answer])
+
+    async def _answer(self, client: bytes, body: bytes) -> bytes:
+        message = await asyncio.to_thread(decode, body, self._limits.message_bytes)
+        if not isinstance(message, Mapping):
+            raise RequestError(f"found a {type(message).__name__}, expected a map with `endpoint` and `data`.")
+        if not self._access.allows(message.get("api_token")):
+            return _error(_UNAUTHORIZED)
+        endpoint, data = message.get("endpoint", "get_action"), message.get("data")
+        match endpoint:
+            case "ping":
+                return encode({"status": "ok", "message": "Server is running"}, "gr00t")
+            case "kill":
+                if not self._allow_kill:
+                    raise RequestError("kill is refused: the server was not started with --allow-kill.")
+                self._stop.set()
+                return encode({"status": "ok", "message": "Server is ending"}, "gr00t")
+            case "get_modality_config":
+                return encode(modality_config(self._host.served, self._version), "gr00t")
+            case "reset":
+                options = data.get("options") if isinstance(data, Mapping) else None
+                for row, session in enumerate(self._sessions(client, 1)):
+                    session.begin(whole_number(_row_options(options or {}, row), "seed"))
+                return encode({}, "gr00t")
+            case "get_action":
+                return encode(await self._get_action(client, data), "gr00t")
+        raise RequestError(f"Unknown endpoint: {endpoint!r:.60}")
+
+    async def _get_action(self, client: bytes, data: Any) -> Any:
+        if not isinstance(data, Mapping):
+            raise RequestError(f"data: found a {type(data).__name__}, expected a map.")
+        wrapped = "observation" in data  # N1.6 and later: the arguments of a function
+        observation = data["observation"] if wrapped else data
+        options = (data.get("options") or {}) if wrapped else data
+        rows = rows_of(observation, self._limits.clients)
+        each = [_row_options(options, row) for row in range(len(rows.maps))]
+        sessions = self._sessions(client, len(rows.maps))
+        asked = zip(sessions, rows.maps, each, strict=False)  # an earlier batch may have had more rows
+        replies: list[Reply] = []
+        for reply in await asyncio.gather(*(self._host.answer(*one) for one in asked), return_exceptions=True):
+            if isinstance(reply, BaseException):
+                raise reply
+            replies.append(reply)
+        actions = to_actions([reply.actions for reply in replies], rows)
+        if not wrapped:
+            return actions
+        return [actions, {"number": [reply.number for reply in replies]}]
+
+    def _sessions(self, client: bytes, count: int) -> list[Session]:
+        """A client's sessions, one for each row of its batches; who has not asked for longest is forgotten."""
+        own = self._clients.setdefault(client, [])
+        self._clients.move_to_end(client)
+        while len(own) < count:
+            own.append(self._host.session())
+        while len(self._clients) > self._limits.clients:
+            self._clients.popitem(last=False)
+        return own
+
+
+def _row_options(options: Mapping[Any, Any], row: int) -> dict[str, Any]:
+    if not isinstance(options, Mapping):
+        raise RequestError(f"options: found a {type(options).__name__}, expected a map or nothing.")
+    return {key: _option(options, key, row) for key in ("seed", "number", "reset")}
+
+
+def _option(options: Mapping[Any, Any], key: str, row: int) -> Any:
+    value = options.get(key)
+    if isinstance(value, np.ndarray):
+        value = value.tolist()
+    if not isinstance(value, Sequence) or isinstance(value, str | bytes):
+        return value
+    if row >= len(value):
+        raise RequestError(f"options.{key}: found {len(value)} of them, expected one for each row of the batch.")
+    return value[row]
+
+
+def _error(text: str) -> bytes:
+    return encode({"error": text}, "gr00t")
