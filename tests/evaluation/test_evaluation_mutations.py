@@ -91,7 +91,7 @@ def check_the_policy_is_told_what_the_record_says() -> None:
         told.append(request.instruction)
         return ChunkReply(np.zeros((2, contract.ACTION_SIZE), np.float32), 0.0)
 
-    policy = ChunkActor("label", ChunkShape(executed=2, history=1), predict)
+    policy = ChunkActor("label", ChunkShape(executed=2), predict)
     outcome, env = slide(next(spec for spec in slide_plan() if not slide(spec)[0].success), policy)
     assert env.task_description == outcome.instruction == "slide the block"
     assert told == ["slide the block"] * 4

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import collections
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Protocol
 
@@ -39,17 +39,26 @@ class Actor(Protocol):
 
 @dataclass(frozen=True)
 class ChunkShape:
-    """How often a chunked policy looks: `executed` actions of each chunk, from the last `history` observations."""
+    """How often a chunked policy looks: `executed` actions of each chunk, from the observations at `offsets`.
+
+    Offsets are control steps, ascending up to 0, the newest; before the trial's start its first observation counts, as
+    in training.
+    """
 
     executed: int
-    history: int
+    offsets: tuple[int, ...] = (0,)
+
+    @property
+    def history(self) -> int:
+        """Number of observations of a request."""
+        return len(self.offsets)
 
 
 @dataclass(frozen=True)
 class ChunkRequest:
     """What a chunk of actions is computed from, and nothing else: a chunk is a function of its request.
 
-    `observations` are the last ones, oldest first; `seed` and `number` (of the chunk in its trial) fix its noise.
+    `observations` are those at the policy's offsets, oldest first; `seed` and `number` (of the chunk in its trial) fix its noise.
     """
 
     label: str
@@ -90,17 +99,18 @@ class ChunkActor:
         self.time = ActingTime()
         self._seed, self._number, self._step = seed, 0, 0
         self._queue: collections.deque[NDArray[np.float32]] = collections.deque()
-        self._history: collections.deque[Observation] = collections.deque(maxlen=self._shape.history)
+        self._seen: dict[int, Observation] = {}  # by step; those that a later chunk can still look back at
 
     def act(self, observation: Observation, instruction: str) -> NDArray[np.float32]:
         """The next action of the chunk, or the first of a new one."""
-        if self.sees(self._step):
-            self._history.append(observation)
+        step, oldest = self._step, self._shape.offsets[0]
         self._step += 1
+        if self.sees(step):
+            self._seen[step] = observation
         if not self._queue:
-            missing = self._shape.history - len(self._history)
-            seen: Sequence[Observation] = [self._history[0]] * missing + list(self._history)
-            request = ChunkRequest(self._label, tuple(seen), instruction, self._seed, self._number)
+            seen = tuple(self._seen[max(0, step + offset)] for offset in self._shape.offsets)
+            self._seen = {at: one for at, one in self._seen.items() if at == 0 or at > step + oldest}
+            request = ChunkRequest(self._label, seen, instruction, self._seed, self._number)
             started = time.perf_counter()
             reply = self._predict(request)
             self.time.policy += reply.seconds
@@ -110,5 +120,5 @@ class ChunkActor:
         return self._queue.popleft()
 
     def sees(self, step: int) -> bool:
-        """Whether step `step` is among the last observations up to a step at which a chunk is predicted."""
-        return (-step) % self._shape.executed < self._shape.history
+        """Whether a chunk that is predicted at step `step` or later looks at it."""
+        return any((step - offset) % self._shape.executed == 0 for offset in self._shape.offsets)

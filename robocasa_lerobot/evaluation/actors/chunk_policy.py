@@ -39,6 +39,12 @@ def default_width(kinds: Iterable[str], device: str) -> int:
     return GPU_BATCH_WIDTH if device != "cpu" and each_alone else 1
 
 
+def observation_offsets(config: Any) -> tuple[int, ...]:
+    """Control steps at which a policy with this configuration looks, ascending up to 0."""
+    chosen = getattr(config, "observation_offsets", None)
+    return tuple(chosen) if chosen else tuple(range(1 - int(getattr(config, "n_obs_steps", 1)), 1))
+
+
 class BatchingError(UserError):
     """A policy's actions are no function of the request: they depend on others, or come in other numbers."""
 
@@ -58,10 +64,11 @@ class ChunkPolicy:
         self._loaded, self._width = loaded, width
         self._checked: set[bool] = set()
         config = loaded.config
-        self._history = int(getattr(config, "n_obs_steps", 1))
+        offsets = observation_offsets(config)
+        self._history = len(offsets)
         # GR00T's own weights may say that fewer actions are executed than its settings ask for.
         executed = getattr(loaded.policy, "_action_queue_steps", config.n_action_steps)
-        self.shape = ChunkShape(executed=int(executed), history=self._history)
+        self.shape = ChunkShape(executed=int(executed), offsets=offsets)
         parameters = inspect.signature(loaded.policy.predict_action_chunk).parameters
         self._takes_generators = "generator" in parameters
         if width > 1 and not self._takes_generators and config.type != _WITHOUT_NOISE:

@@ -29,8 +29,11 @@ class DiffusionTransformerConfig(ActionChunkConfig):
     """Fields of the policy beside the common ones; lengths in control steps."""
 
     # Time. Predicted actions lie at offsets 1 - n_obs_steps ... horizon - n_obs_steps from the newest observation;
-    # the `n_action_steps` from offset 0 on are executed.
+    # the `n_action_steps` from offset 0 on are executed. Observations are the last n_obs_steps, or those at the given
+    # offsets, ascending up to 0, such as [-6, -4, -2, 0]: n_obs_steps is then their number. Before an episode's start
+    # its first observation counts, in training and in evaluation.
     n_obs_steps: int = 2
+    observation_offsets: list[int] | None = None
     horizon: int = 10
     n_action_steps: int = 8
     drop_n_last_frames: int | None = None  # None: horizon - n_action_steps - n_obs_steps + 1, as LeRobot's diffusion
@@ -92,10 +95,25 @@ class DiffusionTransformerConfig(ActionChunkConfig):
 
     def __post_init__(self) -> None:
         super().__post_init__()
+        if self.observation_offsets is not None:
+            self.n_obs_steps = self._number_of_offsets(self.observation_offsets)
         if self.drop_n_last_frames is None:
             self.drop_n_last_frames = max(0, self.horizon - self.n_action_steps - self.n_obs_steps + 1)
         self._check_names()
         self._check_sizes()
+
+    def _number_of_offsets(self, offsets: list[int]) -> int:
+        default = type(self).__dataclass_fields__["n_obs_steps"].default
+        if not offsets or offsets[-1] != 0 or sorted(set(offsets)) != offsets:
+            raise UserError(
+                f"observation_offsets: found {offsets}, expected ascending control steps up to 0, such as "
+                "[-6, -4, -2, 0]."
+            )
+        if self.n_obs_steps not in (default, len(offsets)):
+            raise UserError(
+                f"n_obs_steps is {self.n_obs_steps}, but observation_offsets has {len(offsets)}: leave n_obs_steps out."
+            )
+        return len(offsets)
 
     def _check_names(self) -> None:
         for kind, name, known in (
@@ -134,7 +152,7 @@ class DiffusionTransformerConfig(ActionChunkConfig):
     @property
     def observation_delta_indices(self) -> list[int]:
         """Frame offsets of the observations of a sample."""
-        return list(range(1 - self.n_obs_steps, 1))
+        return list(self.observation_offsets or range(1 - self.n_obs_steps, 1))
 
     @property
     def action_delta_indices(self) -> list[int]:

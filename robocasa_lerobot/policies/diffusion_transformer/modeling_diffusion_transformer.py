@@ -144,12 +144,14 @@ class DiffusionTransformerPolicy(PreTrainedPolicy):
     def reset(self) -> None:
         """Forget observations and planned actions; called at the start of an episode."""
         self._planned: deque[Tensor] = deque()
-        self._history: deque[dict[str, Tensor]] = deque(maxlen=self.config.n_obs_steps)
+        self._step = 0
+        self._seen: dict[int, dict[str, Tensor]] = {}  # by step; those that a later chunk can still look back at
 
     @property
     def needs_observation(self) -> bool:
         """Whether the observation of the next `select_action` will be looked at, now or as the history of a chunk."""
-        return len(self._planned) < self.config.n_obs_steps or not self._history
+        every = self.config.n_action_steps
+        return any((self._step - offset) % every == 0 for offset in self.config.observation_delta_indices)
 
     @torch.no_grad()
     def select_action(
@@ -163,15 +165,19 @@ class DiffusionTransformerPolicy(PreTrainedPolicy):
             generator: likewise.
         """
         if self.needs_observation:
-            self._history.append({key: batch[key] for key in self._observed_keys})
+            self._seen[self._step] = {key: batch[key] for key in self._observed_keys}
         if not self._planned:
-            steps = [self._history[0]] * (self.config.n_obs_steps - len(self._history)) + list(self._history)
+            offsets = self.config.observation_delta_indices
+            steps = [self._seen[max(0, self._step + offset)] for offset in offsets]
+            oldest = self._step + offsets[0]
+            self._seen = {at: one for at, one in self._seen.items() if at == 0 or at > oldest}
             stacked = {key: torch.stack([step[key] for step in steps], dim=1) for key in self._observed_keys}
             for key in (OBS_LANGUAGE_TOKENS, OBS_LANGUAGE_ATTENTION_MASK):
                 if key in batch:
                     stacked[key] = batch[key]
             chunk = self.predict_action_chunk(stacked, noise=noise, generator=generator)
             self._planned.extend(chunk.unbind(dim=1))
+        self._step += 1
         return self._planned.popleft()
 
     def _with_time_axis(self, batch: dict[str, Tensor]) -> dict[str, Tensor]:
