@@ -54,6 +54,8 @@ def write_part(path: Path, recording: Recording) -> None:
         dones = np.zeros(len(recording.actions), dtype=np.int64)
         dones[-1] = 1
         demo.create_dataset("dones", data=dones)
+        for key, values in recording.per_step.items():
+            demo.create_dataset(key, data=values, compression="gzip")
         for key, values in recording.observations.items():
             # A chunk for each picture: they are read one after the other, and h5py's own choice of chunks (16 steps
             # of an eighth of the picture) takes three times as long to unpack.

@@ -41,6 +41,7 @@ class Recording:
         model_file: MJCF.
         assets: files of textures and objects that the MJCF names.
         ep_meta: description of the scene.
+        per_step: further values of each step, (T, k), which are written beside the actions.
     """
 
     seed: int
@@ -57,10 +58,13 @@ class Recording:
     model_file: str
     assets: dict[str, bytes]
     ep_meta: dict[str, Any]
+    per_step: dict[str, NDArray[Any]] = field(default_factory=dict)
 
 
 @dataclass
-class _Buffer:
+class EpisodeBuffer:
+    """What an episode has come to so far; entry t is the state before action t, and that action."""
+
     states: list[Array] = field(default_factory=list)
     actions: list[Array] = field(default_factory=list)
     rewards: list[float] = field(default_factory=list)
@@ -68,7 +72,11 @@ class _Buffer:
     terms: list[dict[str, bool]] = field(default_factory=list)
     observations: dict[str, list[NDArray[Any]]] = field(default_factory=dict)
 
-    def add(self, env: KitchenEnv, action: Array, info: dict[str, Any], stage: int, *, images: bool) -> None:
+    def __len__(self) -> int:
+        return len(self.actions)
+
+    def add(self, env: KitchenEnv, action: Array, info: dict[str, Any], stage: int, *, images: bool = False) -> None:
+        """Note the present state and the action (12,), stored order and binarized, that is about to be carried out."""
         data = env.data
         self.stages.append(stage)
         self.terms.append(info["success_terms"])
@@ -80,6 +88,50 @@ class _Buffer:
         if images:
             for camera in env.cameras:
                 self.observations.setdefault(f"{camera}_image", []).append(env.render_camera(camera))
+
+    def drop_from(self, step: int) -> None:
+        """Forget step `step` and all after it."""
+        for values in (self.states, self.actions, self.rewards, self.stages, self.terms, *self.observations.values()):
+            del values[step:]
+
+    def recording(
+        self,
+        env: KitchenEnv,
+        info: dict[str, Any],
+        ep_meta: dict[str, Any],
+        *,
+        success: bool,
+        reason: str = "",
+        model_file: str = "",
+    ) -> Recording:
+        """The episode as it is kept.
+
+        Args:
+            env: in the episode's scene.
+            info: of the last step.
+            ep_meta: beyond what the scene says of itself.
+            success: whether the goal held at the end.
+            reason: why not, if not.
+            model_file: the scene's MJCF, where it has been written already.
+        """
+        return Recording(
+            seed=env.scene.seed,
+            success=success,
+            reason=reason,
+            false_terms=tuple(name for name, held in info["success_terms"].items() if not held),
+            states=np.array(self.states),
+            actions=np.array(self.actions),
+            observations={key: np.array(values) for key, values in self.observations.items()},
+            rewards=np.array(self.rewards),
+            stages=np.array(self.stages, dtype=np.int32),
+            success_terms=np.array([list(terms.values()) for terms in self.terms], dtype=bool),
+            term_names=tuple(info["success_terms"]),
+            model_file=model_file or env.scene.spec.to_xml(),
+            assets={
+                name: data for name, data in env.scene.spec.assets.items() if name.startswith(("textures/", "objects/"))
+            },
+            ep_meta={**env.scene.ep_meta(), **_kitchens(env), **ep_meta},
+        )
 
 
 def record_episode(
@@ -101,7 +153,7 @@ def record_episode(
     style = MotionStyle.draw(np.random.default_rng([seed, _STYLE_STREAM])) if varied else PLAIN
     _, info = env.reset(seed=seed)
     model_file = env.scene.spec.to_xml()
-    buffer = _Buffer()
+    buffer = EpisodeBuffer()
     held, reason, log = 0, "", StageLog()
     try:
         for wanted in demonstrate(env, style, log):
@@ -119,34 +171,22 @@ def record_episode(
     except SkillError as error:
         reason = str(error)
     log.close(env)
-    stages = env.declaration.stages
-    return Recording(
-        seed=seed,
+    return buffer.recording(
+        env,
+        info,
+        {"action_noise": action_noise, "motion_style": asdict(style), "stages": stage_rows(env, log)},
         success=held >= SUCCESS_HOLD_STEPS,
         reason=reason,
-        false_terms=tuple(name for name, held in info["success_terms"].items() if not held),
-        states=np.array(buffer.states),
-        actions=np.array(buffer.actions),
-        observations={key: np.array(values) for key, values in buffer.observations.items()},
-        rewards=np.array(buffer.rewards),
-        stages=np.array(buffer.stages, dtype=np.int32),
-        success_terms=np.array([list(terms.values()) for terms in buffer.terms], dtype=bool),
-        term_names=tuple(info["success_terms"]),
         model_file=model_file,
-        assets={
-            name: data for name, data in env.scene.spec.assets.items() if name.startswith(("textures/", "objects/"))
-        },
-        ep_meta={
-            **env.scene.ep_meta(),
-            **_kitchens(env),
-            "action_noise": action_noise,
-            "motion_style": asdict(style),
-            "stages": [
-                {"text": stage_text(stage, env.scene), **row}
-                for stage, row in zip(stages, log.table(stages), strict=True)
-            ],
-        },
     )
+
+
+def stage_rows(env: KitchenEnv, log: StageLog) -> list[dict[str, Any]]:
+    """What `ep_meta` says of the stages of the running episode."""
+    stages = env.declaration.stages
+    return [
+        {"text": stage_text(stage, env.scene), **row} for stage, row in zip(stages, log.table(stages), strict=True)
+    ]
 
 
 def _kitchens(env: KitchenEnv) -> dict[str, Any]:

@@ -1,0 +1,204 @@
+"""What sessions leave: one file for each saved episode, a line for each attempt, one file of all, figures of the work.
+
+Files of single episodes are what counts. The file of all of them is made from them at the end of a session, and at
+the start of the next one where a session was killed.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import statistics
+import time
+from collections import Counter
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any
+
+import h5py
+
+from robocasa_lerobot.demos.hdf5 import Failure, merge_parts, read_summary, write_part
+from robocasa_lerobot.demos.recorder import Recording
+from robocasa_lerobot.errors import UserError
+from robocasa_lerobot.files import write_text
+from robocasa_lerobot.jobs.publish import held_folder
+from robocasa_lerobot.teleop.settings import TeleopSettings
+
+STATS_FILE = "teleop-stats.json"
+REDO = "redo"  # reason of a discarded attempt whose kitchen comes again
+_ATTEMPTS, _SETTINGS, _ASIDE = "attempts.jsonl", "settings.json", ".partial"
+
+
+@dataclass(frozen=True)
+class Attempt:
+    """How an attempt ended.
+
+    Attributes:
+        number: of the kitchen, whose seed is the session's first plus it.
+        saved: or discarded.
+        reason: why, if discarded.
+        steps: recorded.
+        undos: of it.
+        wall_seconds: from its first input to its end.
+        session: when its session began, seconds since 1970.
+        at: seconds from then to its end.
+    """
+
+    number: int
+    saved: bool
+    reason: str = ""
+    steps: int = 0
+    undos: int = 0
+    wall_seconds: float = 0.0
+    session: float = 0.0
+    at: float = 0.0
+
+
+@dataclass
+class Store:
+    """The folder of a task's sessions; use it as `with Store(settings).held() as store`."""
+
+    settings: TeleopSettings
+    attempts: list[Attempt] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        self.folder = self.settings.out / f".{self.settings.task}.teleop"
+        self.path = self.settings.out / f"{self.settings.task}.hdf5"
+        self._began = time.time()
+
+    @contextlib.contextmanager
+    def held(self) -> Iterator[Store]:
+        """Keep other sessions out, read what earlier ones left, and merge what a killed one has not.
+
+        Raises:
+            UserError: another session holds the folder, or there are episodes that were recorded otherwise.
+        """
+        self.settings.out.mkdir(parents=True, exist_ok=True)
+        self._check()
+        with held_folder(self.folder):
+            self._read()
+            write_text(self.folder / _SETTINGS, json.dumps(self.settings.identity()))
+            if self.saved and (not self.path.exists() or read_summary(self.path).episodes != len(self.saved)):
+                self.merge()
+            yield self
+
+    @property
+    def saved(self) -> list[int]:
+        """Numbers of the kitchens with a saved episode, in the order of the kitchens."""
+        return sorted(attempt.number for attempt in self.attempts if attempt.saved)
+
+    @property
+    def discarded(self) -> int:
+        """How many attempts were discarded, those that were made again included."""
+        return sum(not attempt.saved for attempt in self.attempts)
+
+    def next_number(self) -> int:
+        """The first kitchen that is neither saved nor discarded for good."""
+        ended = {attempt.number for attempt in self.attempts if attempt.saved or attempt.reason != REDO}
+        return next(number for number in range(len(ended) + 1) if number not in ended)
+
+    def part(self, number: int) -> Path:
+        """The file of a saved episode."""
+        return self.folder / f"{number:06d}.hdf5"
+
+    def save(self, number: int, recording: Recording, *, undos: int, wall_seconds: float) -> None:
+        """Keep an episode; it counts from when its file has its name."""
+        write_part(self.part(number), recording)
+        self._note(number, "", len(recording.actions), undos, wall_seconds, saved=True)
+
+    def discard(self, number: int, reason: str, *, steps: int, undos: int, wall_seconds: float) -> None:
+        """Note that an attempt came to nothing."""
+        self._note(number, reason, steps, undos, wall_seconds, saved=False)
+
+    def merge(self) -> Path | None:
+        """Write the file of all saved episodes; None where there are none."""
+        saved = self.saved
+        if saved:
+            first = self.settings.seed
+            merge_parts(
+                self.path,
+                [self.part(number) for number in saved],
+                env_name=self.settings.task,
+                env_kwargs=self.settings.env_kwargs(),
+                settings=self.settings.identity(),
+                tried=len(self.attempts),
+                failures=[Failure(first + a.number, a.reason) for a in self.attempts if not a.saved],
+            )
+        self._write_stats()
+        return self.path if saved else None
+
+    def stats(self) -> dict[str, Any]:
+        """Figures of the work on this task, over all sessions."""
+        kept = [attempt for attempt in self.attempts if attempt.saved]
+        sessions: dict[float, float] = {}
+        for attempt in self.attempts:
+            sessions[attempt.session] = max(sessions.get(attempt.session, 0.0), attempt.at)
+        hours = sum(sessions.values()) / 3600
+        first = [attempt.at for attempt in kept if attempt.session == min(sessions)]
+        reasons = Counter(attempt.reason for attempt in self.attempts if not attempt.saved)
+        return {
+            "saved": len(kept),
+            "discarded": dict(reasons.most_common()),
+            "success_share": round(len(kept) / len(self.attempts), 4) if self.attempts else None,
+            "hours": round(hours, 4),
+            "demonstrations_per_hour": round(len(kept) / hours, 2) if hours else None,
+            "seconds_to_first_episode": round(min(first), 1) if first else None,
+            "sessions": len(sessions),
+            "undos_per_saved": round(sum(a.undos for a in kept) / len(kept), 2) if kept else None,
+            "median_steps": statistics.median(a.steps for a in kept) if kept else None,
+            "median_wall_seconds": round(statistics.median(a.wall_seconds for a in kept), 1) if kept else None,
+        }
+
+    def _note(self, number: int, reason: str, steps: int, undos: int, wall_seconds: float, *, saved: bool) -> None:
+        at = time.time() - self._began
+        attempt = Attempt(number, saved, reason, steps, undos, round(wall_seconds, 3), self._began, round(at, 3))
+        with (self.folder / _ATTEMPTS).open("a", encoding="utf-8") as file:
+            file.write(json.dumps(asdict(attempt)) + "\n")
+            file.flush()
+            os.fsync(file.fileno())
+        self.attempts.append(attempt)
+        self._write_stats()
+
+    def _read(self) -> None:
+        """Attempts of earlier sessions: the lines that are whole, and episodes that were saved just before a kill."""
+        file = self.folder / _ATTEMPTS
+        lines = file.read_text(encoding="utf-8").split("\n") if file.exists() else [""]
+        self.attempts = [Attempt(**json.loads(line)) for line in lines[:-1]]
+        if lines[-1]:  # cut off by a kill; what follows would be added to it
+            write_text(file, "".join(line + "\n" for line in lines[:-1]))
+        known = set(self.saved)
+        for left in self.folder.glob(f"*{_ASIDE}"):
+            left.unlink()
+        for part in sorted(self.folder.glob("[0-9]*.hdf5")):
+            if int(part.stem) not in known:
+                with h5py.File(part) as opened:
+                    steps = int(opened["demo"].attrs["num_samples"])
+                self._note(int(part.stem), "", steps, 0, 0.0, saved=True)
+        gone = [number for number in self.saved if not self.part(number).exists()]
+        if gone:
+            raise UserError(
+                f"{self.folder} lacks the files of {len(gone)} saved episodes ({self.part(gone[0]).name}, ...): "
+                "put them back, or choose another --out."
+            )
+
+    def _check(self) -> None:
+        note = self.folder / _SETTINGS
+        if note.exists() and json.loads(note.read_text(encoding="utf-8")) != self.settings.identity():
+            found = json.loads(note.read_text(encoding="utf-8"))
+            now = self.settings.identity()
+            differing = ", ".join(f"{k}: {found.get(k)!r}, now {v!r}" for k, v in now.items() if found.get(k) != v)
+            raise UserError(
+                f"{self.settings.out} has episodes of {self.settings.task} that were recorded with other settings "
+                f"({differing}). Give those, or choose another --out."
+            )
+        if self.path.exists() and not note.exists():
+            raise UserError(
+                f"{self.path} exists, and this command did not record it here. Move it away, or choose another --out."
+            )
+
+    def _write_stats(self) -> None:
+        file = self.settings.out / STATS_FILE
+        known: dict[str, Any] = json.loads(file.read_text(encoding="utf-8")) if file.exists() else {}
+        write_text(file, json.dumps({**known, self.settings.task: self.stats()}, indent=1) + "\n")

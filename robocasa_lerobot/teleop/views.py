@@ -1,0 +1,147 @@
+"""Pictures for people: the robot's cameras, one that flies along, the kitchen from above; all as JPEG."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import cv2
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from robocasa_lerobot import contract
+from robocasa_lerobot.demos.motion import base_pose
+from robocasa_lerobot.envs.kitchen_env import KitchenEnv
+from robocasa_lerobot.envs.rendering import SceneRenderer
+from robocasa_lerobot.teleop.messages import Message
+from robocasa_lerobot.teleop.settings import PICTURE_QUALITY
+
+Picture = NDArray[np.uint8]
+
+FREE = "free"
+SEEN = (*contract.CAMERAS, FREE)
+_LOOK_AT_M = 0.9  # height of what the free camera looks at
+_MAP_PIXELS, _MAP_MARGIN_M = 640, 0.15
+_MAP_FROM_M = 12.0  # height that the map is seen from: the higher, the less does what is tall lean outwards
+_CUT_M = 1.55  # geoms that are wholly above it hide nothing on the map
+_HIDDEN_GROUP = 5
+
+
+def jpeg(picture: Picture, quality: int = PICTURE_QUALITY) -> bytes:
+    """A picture (H, W, 3) RGB as JPEG."""
+    good, data = cv2.imencode(".jpg", cv2.cvtColor(picture, cv2.COLOR_RGB2BGR), [cv2.IMWRITE_JPEG_QUALITY, quality])
+    assert good
+    return data.tobytes()
+
+
+@dataclass
+class FreeCamera:
+    """The camera that flies along with the robot, or stays where it was put.
+
+    Attributes:
+        follow: whether its angle is relative to the robot's heading, and it goes along.
+        azimuth, elevation: radians; distance: metres, from what it looks at.
+    """
+
+    follow: bool = True
+    azimuth: float = 0.6
+    elevation: float = -0.5
+    distance: float = 2.2
+    anchor: tuple[float, float] | None = None
+
+    def set(self, message: Message, data: mujoco.MjData) -> None:
+        """Take the fields of a `view` message; a camera that does not follow looks at where the robot is now."""
+        for name in ("follow", "azimuth", "elevation", "distance"):
+            setattr(self, name, message.get(name, getattr(self, name)))
+        x, y = base_pose(data)[0][:2].tolist()
+        self.anchor = None if self.follow else self.anchor or (x, y)
+
+    def camera(self, data: mujoco.MjData) -> mujoco.MjvCamera:
+        """The camera for a state."""
+        position, heading = base_pose(data)
+        camera = mujoco.MjvCamera()
+        x, y = self.anchor or position[:2].tolist()
+        camera.lookat = [x, y, _LOOK_AT_M]
+        turn = self.azimuth + (heading if self.follow else 0.0)
+        camera.azimuth, camera.elevation = float(np.degrees(turn)), float(np.degrees(self.elevation))
+        camera.distance = self.distance
+        return camera
+
+
+def take(env: KitchenEnv, seen: dict[str, Picture], cameras: Sequence[str], free: FreeCamera) -> list[dict[str, Any]]:
+    """Pictures of the present state: `camera`, `width`, `height` and `jpeg` of each.
+
+    Args:
+        env: in that state.
+        seen: pictures of it that there are already.
+        cameras: wanted, of `SEEN`.
+        free: where the free one is.
+    """
+    out = []
+    for camera in cameras:
+        if camera == FREE:
+            picture = env.render_camera(free.camera(env.data))
+        else:
+            picture = seen[camera] if camera in seen else env.render_camera(camera)
+        height, width = picture.shape[:2]
+        out.append({"camera": camera, "width": width, "height": height, "jpeg": jpeg(picture)})
+    return out
+
+
+@dataclass(frozen=True)
+class KitchenMap:
+    """The kitchen from above without what hangs: `left` and `top` are the world's x and y of its upper left corner."""
+
+    jpeg: bytes
+    width: int
+    height: int
+    left: float
+    top: float
+    metres_per_pixel: float
+
+    def describe(self, url: str) -> dict[str, Any]:
+        """As it is told to clients."""
+        return {
+            "url": url,
+            "width": self.width,
+            "height": self.height,
+            "left": self.left,
+            "top": self.top,
+            "metres_per_pixel": self.metres_per_pixel,
+        }
+
+
+def kitchen_map(env: KitchenEnv) -> KitchenMap:
+    """Draw the running episode's kitchen from above; the robot is left out: it moves."""
+    room = env.scene.layout.room
+    left, right = room["x_min"] if "x_min" in room else 0.0, room["x_max"]
+    bottom, top = room["y_min"], room["y_max"] if "y_max" in room else 0.0
+    left, right, bottom, top = (
+        left - _MAP_MARGIN_M,
+        right + _MAP_MARGIN_M,
+        bottom - _MAP_MARGIN_M,
+        top + _MAP_MARGIN_M,
+    )
+    scale = max(right - left, top - bottom) / _MAP_PIXELS
+    width, height = round((right - left) / scale), round((top - bottom) / scale)
+    model, data = env.model, env.data
+    groups, fovy = model.geom_group.copy(), model.vis.global_.fovy
+    robot = env.scene.subtree(env.robot.names.base)[model.geom_bodyid]
+    low = data.geom_xpos[:, 2] - model.geom_rbound
+    planes = model.geom_type == int(mujoco.mjtGeom.mjGEOM_PLANE)
+    camera = mujoco.MjvCamera()
+    camera.lookat = [(left + right) / 2, (bottom + top) / 2, 0.0]
+    camera.distance, camera.azimuth, camera.elevation = _MAP_FROM_M, 90.0, -90.0
+    try:
+        model.geom_group[robot | ((low > _CUT_M) & ~planes)] = _HIDDEN_GROUP
+        model.vis.global_.fovy = float(np.degrees(2 * np.arctan((top - bottom) / 2 / _MAP_FROM_M)))
+        renderer = SceneRenderer(model, height, width, keeps_backgrounds=False)
+        try:
+            picture = renderer.render(data, camera)
+        finally:
+            renderer.close()
+    finally:
+        model.geom_group[:], model.vis.global_.fovy = groups, fovy
+    return KitchenMap(jpeg(picture), width, height, left, top, scale)
