@@ -45,7 +45,8 @@ MAY_IMPORT: dict[str, set[str]] = {
     "gallery": BASE | {"envs", "demos"},
     "serving": BASE | {"envs", "evaluation"},  # policies for others' evaluations, kitchens for others' policies
     "teleop": BASE | {"envs", "demos", "evaluation"},
-    "plugins": BASE | LOW | {"demos", "training", "evaluation"},
+    "devices": BASE | {"envs", "demos"},  # the kitchen as a LeRobot robot
+    "plugins": BASE | LOW | {"demos", "training", "evaluation", "devices"},
     "cli": BASE | LOW | {"demos", "training", "evaluation", "making", "gallery", "study", "serving", "teleop"},
 }
 # Of these parts, what each room (a folder, or a file beside the folders) may import of the other rooms.

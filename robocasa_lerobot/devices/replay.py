@@ -1,0 +1,96 @@
+"""A teleoperator without a human: it repeats recorded demonstrations, one per episode."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from lerobot.teleoperators.teleoperator import Teleoperator
+from numpy.typing import NDArray
+
+from robocasa_lerobot import contract
+from robocasa_lerobot.demos.replay import demonstrations, read_demonstration
+from robocasa_lerobot.devices.announcements import Announcements
+from robocasa_lerobot.devices.config_replay import RobocasaReplayConfig
+from robocasa_lerobot.devices.translation import NAMES
+
+
+class RobocasaReplay(Teleoperator):
+    """Says the actions of a demonstration, one at each `get_action`; after its last one it holds still.
+
+    In its kitchen (`--robot.demos` of the same file) they reach the goal again. Raises UserError where there are none.
+    """
+
+    config_class = RobocasaReplayConfig
+    name = "robocasa_replay"
+
+    def __init__(self, config: RobocasaReplayConfig) -> None:
+        super().__init__(config)
+        self._chosen = demonstrations([config.demos])
+        self._announcements = Announcements(self._begin)
+        self._connected = False
+        self._episode, self._started = 0, False
+        self._load()
+
+    @property
+    def action_features(self) -> dict[str, type]:
+        """The twelve numbers by name."""
+        return dict.fromkeys(NAMES, float)
+
+    @property
+    def feedback_features(self) -> dict[str, type]:
+        """None."""
+        return {}
+
+    @property
+    def is_connected(self) -> bool:
+        """Between `connect` and `disconnect`."""
+        return self._connected
+
+    def connect(self, calibrate: bool = True) -> None:
+        """Listen for the beginnings of episodes."""
+        self._announcements.listen()
+        self._connected = True
+
+    @property
+    def is_calibrated(self) -> bool:
+        """Nothing is to be calibrated."""
+        return True
+
+    def calibrate(self) -> None:
+        """Do nothing."""
+
+    def configure(self) -> None:
+        """Do nothing."""
+
+    def get_action(self) -> dict[str, float]:
+        """The next action of the demonstration."""
+        index = min(self._step, len(self._actions) - 1)
+        action: NDArray[np.float64] = self._actions[index].copy()
+        if self._step >= len(self._actions):
+            kept = contract.ACTION_SLICES["gripper_close"], contract.ACTION_SLICES["control_mode"]
+            still = np.zeros_like(action)
+            for where in kept:
+                still[where] = action[where]
+            action = still
+        self._step += 1
+        return dict(zip(NAMES, action.tolist(), strict=True))
+
+    def send_feedback(self, feedback: dict[str, Any]) -> None:
+        """Do nothing."""
+
+    def disconnect(self) -> None:
+        """Stop listening."""
+        self._announcements.close()
+        self._connected = False
+
+    def _begin(self, again: bool) -> None:
+        if self._started and not again:
+            self._episode += 1
+        self._started = True
+        self._load()
+
+    def _load(self) -> None:
+        path, demo = self._chosen[self._episode % len(self._chosen)]
+        self._actions = read_demonstration(path, demo).actions
+        self._step = 0

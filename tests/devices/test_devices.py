@@ -1,0 +1,152 @@
+"""The kitchen as a LeRobot robot and the teleoperators for it, as LeRobot's loops call them."""
+
+from __future__ import annotations
+
+import inspect
+import logging
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+from lerobot.robots.config import RobotConfig
+from lerobot.robots.utils import make_robot_from_config
+from lerobot.scripts import lerobot_record
+from lerobot.teleoperators.config import TeleoperatorConfig
+from scipy.spatial.transform import Rotation
+
+import robocasa_lerobot.plugins  # noqa: F401
+from robocasa_lerobot import contract
+from robocasa_lerobot.devices.announcements import AGAIN, BEGIN, Announcements
+from robocasa_lerobot.devices.config_hand import RobocasaHandConfig
+from robocasa_lerobot.devices.config_kitchen import RobocasaKitchenConfig
+from robocasa_lerobot.devices.kitchen import RobocasaKitchen, _check_rate
+from robocasa_lerobot.devices.translation import NAMES, HandTranslator
+from robocasa_lerobot.errors import UserError
+
+STAY, CLOSE, OPEN = 1, 0, 2
+
+
+@pytest.fixture(scope="module")
+def robot() -> Iterator[RobocasaKitchen]:
+    # Through LeRobot's own factory, which finds the class beside its configuration.
+    made = make_robot_from_config(RobocasaKitchenConfig(seed=100_000, image_size=32, realtime=False))
+    made.connect()
+    yield made
+    made.disconnect()
+
+
+def deltas(x: float = 0, y: float = 0, z: float = 0, gripper: int = STAY) -> dict[str, float]:
+    return {"delta_x": x, "delta_y": y, "delta_z": z, "gripper": gripper}
+
+
+def phone(position: list[float], rotation: list[float] | None = None, enabled: bool = True) -> dict[str, float]:
+    names = ("target_x", "target_y", "target_z", "target_wx", "target_wy", "target_wz")
+    return {
+        "enabled": enabled,
+        "gripper_vel": 0.0,
+        **dict(zip(names, [*position, *(rotation or [0, 0, 0])], strict=True)),
+    }
+
+
+def test_lerobot_knows_the_types() -> None:
+    assert "robocasa_kitchen" in RobotConfig.get_known_choices()
+    assert {"robocasa_hand", "robocasa_replay", "gamepad", "phone"} <= set(TeleoperatorConfig.get_known_choices())
+
+
+@pytest.mark.render
+def test_observation_and_features_are_the_contract(robot: RobocasaKitchen) -> None:
+    seen = robot.get_observation()
+    assert list(seen) == list(robot.observation_features)
+    for name, kind in robot.observation_features.items():
+        assert seen[name].shape == kind if isinstance(kind, tuple) else isinstance(seen[name], float)
+    assert tuple(robot.action_features) == NAMES == tuple(contract.dataset_features()["action"]["names"])
+    assert robot.name == contract.ROBOT_TYPE
+
+
+@pytest.mark.render
+def test_a_gamepads_motion_moves_the_hand_forward(robot: RobocasaKitchen) -> None:
+    before = robot.get_observation()
+    for _ in range(8):
+        sent = robot.send_action(deltas(x=0.5))
+    after = robot.get_observation()
+    assert sent["eef_dx"] == 0.5
+    assert sent["control_mode"] == -1
+    assert 0.02 < after["eef_x"] - before["eef_x"] < 0.25
+    assert abs(after["eef_y"] - before["eef_y"]) < 0.02
+
+
+@pytest.mark.render
+def test_announcements_bring_the_next_kitchen_and_the_same_one_again(robot: RobocasaKitchen) -> None:
+    def begin(*announcements: str) -> dict[str, object]:
+        for text in announcements:
+            logging.info(text)
+        return robot.get_observation()
+
+    logging.getLogger().setLevel(logging.INFO)
+    robot._reset()
+    first = robot.get_observation()
+    assert begin(f"{BEGIN}0")["base_x"] == first["base_x"]  # nobody has touched it
+    robot.send_action(dict.fromkeys(NAMES, 0.0))
+    again = begin(AGAIN, f"{BEGIN}0")
+    assert all(np.array_equal(again[key], first[key]) for key in first)  # type: ignore[call-overload]
+    robot.send_action(dict.fromkeys(NAMES, 0.0))
+    assert begin(f"{BEGIN}1")["base_x"] != first["base_x"]
+
+
+def test_the_sentences_are_those_of_lerobot() -> None:
+    source = inspect.getsource(lerobot_record.record)
+    assert f'log_say(f"{BEGIN}{{dataset.num_episodes}}"' in source
+    assert f'log_say("{AGAIN}"' in source
+
+
+def test_announcements_are_read_from_the_log_until_closed() -> None:
+    heard: list[bool] = []
+    listener = Announcements(heard.append)
+    listener.listen()
+    logging.getLogger().setLevel(logging.INFO)
+    for text in ("Reset the environment", f"{BEGIN}0", AGAIN, f"{BEGIN}0", f"{BEGIN}1"):
+        logging.info(text)
+    listener.close()
+    logging.info(f"{BEGIN}2")
+    assert heard == [False, True, False]
+
+
+def test_the_gripper_stays_as_it_was_told() -> None:
+    translator = HandTranslator()
+    told = [OPEN, STAY, CLOSE, STAY, STAY, OPEN, STAY]
+    assert [translator.action(deltas(gripper=g))["gripper_close"] for g in told] == [-1, -1, 1, 1, 1, -1, -1]
+    translator.action(deltas(gripper=CLOSE))
+    assert translator.action({})["gripper_close"] == 1
+    translator.reset()
+    assert translator.action({})["gripper_close"] == -1
+
+
+def test_speed_and_the_keyboards_own_axes() -> None:
+    said = HandTranslator(speed=0.5, keyboard_axes=True).action(deltas(x=1, y=-1, z=3))
+    assert (said["eef_dx"], said["eef_dy"], said["eef_dz"]) == (0.5, 0.5, 1.0)  # up key: forward; left key: left
+
+
+def test_a_phone_moves_the_hand_by_what_it_moved_while_held() -> None:
+    translator = HandTranslator()
+    turn = Rotation.from_rotvec([0, 0, 0.1]).as_rotvec().tolist()
+    assert translator.action(phone([0.5, 0, 0]))["eef_dx"] == 0  # the first pose is the reference
+    moved = translator.action(phone([0.52, 0, -0.01], turn))
+    np.testing.assert_allclose([moved["eef_dx"], moved["eef_dz"], moved["eef_rz"]], [0.4, -0.2, 0.2], atol=1e-9)
+    assert translator.action(phone([0.72, 0, 0], turn))["eef_dx"] == 0  # a jump: tracking was lost
+    assert translator.action(phone([0.9, 0, 0], enabled=False))["eef_dx"] == 0
+    assert translator.action(phone([0.95, 0, 0]))["eef_dx"] == 0  # held again: a new reference
+
+
+def test_mistakes_are_explained() -> None:
+    with pytest.raises(UserError, match=r"shoulder\.pos.*robocasa_hand"):
+        HandTranslator().action({"shoulder.pos": 1.0})
+    with pytest.raises(UserError, match="gamepad"):
+        RobocasaHandConfig(device="gamepd")
+    with pytest.raises(UserError, match="speed"):
+        RobocasaHandConfig(speed=0)
+    with pytest.raises(UserError, match=r"--dataset\.fps=20"):
+        _check_rate(["lerobot-record", "--dataset.repo_id=a/b"])
+    with pytest.raises(UserError, match="found 30"):
+        _check_rate(["lerobot-record", "--dataset.repo_id=a/b", "--dataset.fps", "30"])
+    _check_rate(["lerobot-record", "--dataset.repo_id=a/b", "--dataset.fps=20"])
+    _check_rate(["lerobot-teleoperate"])
