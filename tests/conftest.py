@@ -5,10 +5,12 @@ from __future__ import annotations
 import gc
 import os
 import shutil
+import subprocess
 import tempfile
 from pathlib import Path
 
 import pytest
+import task_selection
 from hypothesis import settings
 
 from robocasa_lerobot import gl
@@ -20,11 +22,26 @@ settings.register_profile("tests", deadline=None, derandomize=True, max_examples
 settings.load_profile("tests")
 
 
+def pytest_addoption(parser: pytest.Parser) -> None:
+    parser.addoption("--task-sample", metavar="TEXT", help="draw the fast tests' tasks by this (default: the commit)")
+
+
+def pytest_report_header(config: pytest.Config) -> str:
+    sample = os.environ[task_selection.SAMPLE_VARIABLE]
+    return f"tasks beside the usual ones: {', '.join(task_selection.drawn())}; again with --task-sample={sample}"
+
+
+def _commit() -> str:
+    git = ["git", "-C", str(REPOSITORY), "rev-parse", "--short=12", "HEAD"]
+    return subprocess.run(git, capture_output=True, text=True, check=False).stdout.strip() or "none"
+
+
 def pytest_configure(config: pytest.Config) -> None:
     # Before any test module imports the Hugging Face libraries, which read these when they are imported.
     config.stash[_CACHE] = cache = tempfile.mkdtemp(prefix="robocasa_lerobot_tests_")
     os.environ.update(HF_HOME=cache, HF_HUB_OFFLINE="1", WANDB_MODE="disabled")
     # Tiny networks: more threads only wait for each other (12 s became 150 s beside other work on two cores).
+    os.environ[task_selection.SAMPLE_VARIABLE] = config.getoption("--task-sample") or _commit()
     os.environ.setdefault("OMP_NUM_THREADS", "1")
 
 

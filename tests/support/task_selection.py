@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+import hashlib
+import os
 from collections.abc import Callable, Sequence
 from typing import Any
 
 import pytest
 
+from robocasa_lerobot.benchmark.tasks import facts_of
 from robocasa_lerobot.demos.demonstrator import can_demonstrate
 from robocasa_lerobot.envs.tasks.registry import get_task, task_names
 from robocasa_lerobot.envs.tasks.task import Task
 
 # Among the fast tests: one task of every sort that is declared, and one of every sort that a demonstrator solves.
 _SORTS = ("OpenFridge", "TurnOnStove", "PickPlaceToasterToCounter")
+SAMPLE_VARIABLE = "ROBOCASA_LEROBOT_TASK_SAMPLE"  # set by conftest: the commit, or what --task-sample says
 _SOLVED = ("OpenDrawer", "CloseDrawer", "PickPlaceCounterToSink")
 
 
@@ -27,13 +31,24 @@ def demonstrated(fast: Sequence[str] = _SOLVED) -> list[Any]:
 
 
 def every_task(wanted: Callable[[Task], bool] = lambda task: True) -> list[Any]:
-    """All tasks, or those wanted; those that are not of the sample are slow tests."""
-    return _marked([name for name in task_names() if wanted(get_task(name))], (*_SOLVED, *_SORTS))
+    """All tasks, or those wanted; those that are of no sample are slow tests."""
+    return _marked([name for name in task_names() if wanted(get_task(name))], (*_SOLVED, *_SORTS, *drawn()))
 
 
 def sample() -> tuple[str, ...]:
     """The solved tasks of the fast tests."""
     return _SOLVED
+
+
+def drawn(seed: str | None = None) -> tuple[str, ...]:
+    """One atomic and one composite task for this run: they follow from the commit, or from `--task-sample`.
+
+    So the fast tests walk through all tasks in time, and a failure can be repeated.
+    """
+    seed = os.environ.get(SAMPLE_VARIABLE, "") if seed is None else seed
+    kinds = ("atomic", "composite")
+    of_kind = [sorted(name for name in task_names() if facts_of(name).kind == kind) for kind in kinds]
+    return tuple(names[int(hashlib.sha256(seed.encode()).hexdigest(), 16) % len(names)] for names in of_kind)
 
 
 def _marked(names: Sequence[str], fast: Sequence[str]) -> list[Any]:
