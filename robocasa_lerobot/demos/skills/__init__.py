@@ -27,6 +27,7 @@ from robocasa_lerobot.demos.skills.levers import (
 )
 from robocasa_lerobot.demos.skills.mixer_head import lower_head, raise_head
 from robocasa_lerobot.demos.skills.pick_place.hold import hold_object
+from robocasa_lerobot.demos.skills.pick_place.tools.pour import pour
 from robocasa_lerobot.demos.skills.pick_place.tools.stir import stir
 from robocasa_lerobot.demos.skills.pick_place.tools.wipe import wipe
 from robocasa_lerobot.demos.skills.pick_place.verbs import drive, pick_object, place_object
@@ -65,6 +66,7 @@ SKILLS: dict[tuple[str, str], Skill] = {
     ("pick_place", "pick"): pick_object,
     ("pick_place", "place"): place_object,
     ("pick_place", "hold"): hold_object,
+    ("pick_place", "pour"): pour,
     ("pick_place", "stir"): stir,
     ("pick_place", "wipe"): wipe,
     ("pick_place", "uncover"): uncover,

@@ -11,11 +11,11 @@ from robocasa_lerobot.demos.planning.base_path import base_now
 from robocasa_lerobot.demos.skills.common import SkillError, hold_hand, stage_done
 from robocasa_lerobot.demos.skills.fold import fold_arm
 from robocasa_lerobot.demos.skills.navigation import drive_to
+from robocasa_lerobot.demos.skills.pick_place.by_handle import PAN_BY_THE_HANDLE, TOOL_BY_THE_HANDLE
 from robocasa_lerobot.demos.skills.pick_place.carrying.carry import carry_to, go_to_object, in_reach, standing_pose_for
 from robocasa_lerobot.demos.skills.pick_place.grasp_strategy import ANY_APPROACH, GraspStrategy
 from robocasa_lerobot.demos.skills.pick_place.graspable import Graspable, graspable
 from robocasa_lerobot.demos.skills.pick_place.location import locate
-from robocasa_lerobot.demos.skills.pick_place.long_tool import BY_THE_HANDLE
 from robocasa_lerobot.demos.skills.pick_place.pick import is_held, pick
 from robocasa_lerobot.demos.skills.pick_place.place import PlaceStrategy, put
 from robocasa_lerobot.demos.skills.pick_place.reach_in import drive_around_open_door
@@ -28,6 +28,7 @@ from robocasa_lerobot.envs.tasks.task import Stage
 
 ATTEMPTS = 4
 SETTLE_STEPS = 15
+BY_USE = {"stir": TOOL_BY_THE_HANDLE, "pour": PAN_BY_THE_HANDLE}
 MOST_PLACES = 2  # that an object is reached for from
 
 
@@ -131,8 +132,9 @@ def _around_door(env: KitchenEnv, fixture: Fixture | None) -> Iterator[Array]:
 
 def _free_grasp(env: KitchenEnv, stage: Stage) -> GraspStrategy:
     """How an object that stands free is grasped best for where it goes next."""
-    if _next_use(env, stage) == "stir":
-        return BY_THE_HANDLE
+    use = _next_use(env, stage)
+    if use in BY_USE:
+        return BY_USE[use]
     following = _placing(env, stage)
     return ANY_APPROACH if following is None else place_strategy(env, following, graspable(env, stage.object)).grasp
 

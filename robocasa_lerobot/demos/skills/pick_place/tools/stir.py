@@ -9,10 +9,10 @@ import numpy as np
 
 from robocasa_lerobot.demos.motion import CLOSED, UP, Array, HandTarget, arm_action, grip_position, rotation_about
 from robocasa_lerobot.demos.skills.common import SkillError, move_hand, stage_done
+from robocasa_lerobot.demos.skills.pick_place.by_handle import TOOL_BY_THE_HANDLE, WorkingEnd, working_end
 from robocasa_lerobot.demos.skills.pick_place.carrying.carry import carry_to, in_reach, standing_pose_for
 from robocasa_lerobot.demos.skills.pick_place.graspable import Graspable, contents_of, graspable
 from robocasa_lerobot.demos.skills.pick_place.location import locate
-from robocasa_lerobot.demos.skills.pick_place.long_tool import BY_THE_HANDLE, WorkingEnd, working_end
 from robocasa_lerobot.demos.skills.pick_place.pick import is_held
 from robocasa_lerobot.demos.skills.pick_place.verbs import take
 from robocasa_lerobot.demos.skills.reaching import Held, MotionPlan, WaypointPath, follow_with, plan_reach
@@ -47,7 +47,7 @@ def stir(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
     for _ in range(ATTEMPTS):
         obj = graspable(env, stage.object)
         if not is_held(env, obj.name):
-            yield from take(env, obj, BY_THE_HANDLE)
+            yield from take(env, obj, TOOL_BY_THE_HANDLE)
         middle = env.data.body(vessel).xpos.copy()
         fixture = locate(env, vessel).fixture
         if fixture is not None and not in_reach(env, middle):

@@ -1,10 +1,12 @@
-"""Long tools such as spatulas: which end works, and how they are held so that this end is free."""
+"""Objects with a handle, such as spatulas and pans: which end works, and grasps of the other one."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
+from numpy.typing import NDArray
 
 from robocasa_lerobot.demos.motion import Array
 from robocasa_lerobot.demos.planning.grasps import GraspPose
@@ -15,7 +17,7 @@ from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 END_SHARE = 0.25  # of the length, at each end, by whose width the working end is told
 TIP_SHARE = 0.06
 FAR_SHARE = 0.60  # of the length, that a grasp is away from the tip
-FARTHER_SCORE = 12.0  # of a metre that it is farther away
+TOOL_SCORE, PAN_SCORE = 12.0, -12.0  # of a metre that it is farther away
 
 
 @dataclass(frozen=True)
@@ -40,7 +42,7 @@ def working_end(obj: Graspable) -> WorkingEnd:
     low, high = float(points[:, long].min()), float(points[:, long].max())
     length = high - low
 
-    def wide(inside: Array) -> float:
+    def wide(inside: NDArray[np.bool_]) -> float:
         return float(np.delete(np.ptp(points[inside], axis=0), long).max())
 
     at_high = wide(points[:, long] > high - END_SHARE * length) >= wide(points[:, long] < low + END_SHARE * length)
@@ -52,8 +54,8 @@ def working_end(obj: Graspable) -> WorkingEnd:
     return WorkingEnd(tip, axis, length)
 
 
-def by_the_handle(env: KitchenEnv, obj: Graspable, approach: Array) -> list[GraspPose]:
-    """Grasps far from the working end, those that are farthest from it first."""
+def by_the_handle(env: KitchenEnv, obj: Graspable, approach: Array, farther_score: float) -> list[GraspPose]:
+    """Grasps of the part that is away from the working end, with a score for each metre from that."""
     end = working_end(obj)
     body = env.data.body(obj.name)
     turn = body.xmat.reshape(3, 3)
@@ -61,8 +63,10 @@ def by_the_handle(env: KitchenEnv, obj: Graspable, approach: Array) -> list[Gras
     for pose in grasps(env, obj, approach):
         far = float((turn.T @ (pose.position - body.xpos) - end.tip) @ end.axis)
         if far > FAR_SHARE * end.length:
-            found.append(replace(pose, score=pose.score + FARTHER_SCORE * far))
+            found.append(replace(pose, score=pose.score + farther_score * far))
     return sorted(found, key=lambda pose: -pose.score)
 
 
-BY_THE_HANDLE = replace(ANY_APPROACH, poses=by_the_handle)
+# A tool is held far from its working end, which reaches into something; a pan near it, since it hangs on that.
+TOOL_BY_THE_HANDLE = replace(ANY_APPROACH, poses=partial(by_the_handle, farther_score=TOOL_SCORE))
+PAN_BY_THE_HANDLE = replace(ANY_APPROACH, poses=partial(by_the_handle, farther_score=PAN_SCORE))

@@ -1,0 +1,163 @@
+"""Pour what lies in a held vessel onto an object: the vessel's edge over it, then the vessel tilted over that."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from robocasa_lerobot.demos.motion import (
+    CLOSED,
+    UP,
+    Array,
+    HandTarget,
+    arm_action,
+    rotation_about,
+)
+from robocasa_lerobot.demos.skills.common import SkillError, move_hand, stage_done
+from robocasa_lerobot.demos.skills.pick_place.by_handle import PAN_BY_THE_HANDLE
+from robocasa_lerobot.demos.skills.pick_place.carrying.carry import carry_to, in_reach, standing_pose_for
+from robocasa_lerobot.demos.skills.pick_place.carrying.level import level_out, levelled
+from robocasa_lerobot.demos.skills.pick_place.graspable import Graspable, graspable
+from robocasa_lerobot.demos.skills.pick_place.location import locate
+from robocasa_lerobot.demos.skills.pick_place.pick import is_held
+from robocasa_lerobot.demos.skills.pick_place.verbs import take
+from robocasa_lerobot.demos.skills.reaching import Held, MotionPlan, WaypointPath, follow_with, plan_reach
+from robocasa_lerobot.envs.kitchen_env import KitchenEnv
+from robocasa_lerobot.envs.tasks.task import Stage
+
+ATTEMPTS = 4
+YAWS, EDGES = 12, 16  # turns of the vessel about the vertical; points of its edge that it may be poured over
+STEEP_RAD = tuple(
+    float(np.deg2rad(angle)) for angle in (70.0, 95.0)
+)  # of the vessel in the end, and farther if need be
+CLEARANCES_M = (0.045, 0.08)  # of the vessel's lowest point over the receptacle, with a cost for each metre
+HIGH_COST, TURN_COST, ACROSS_COST = 4.0, 0.08, 0.3
+SHORT_SHARE = 0.35  # of the vessel's radius, by which its edge ends short of the middle: what slides off goes on
+TILT_STEPS, WAIT_STEPS, SHAKES = 45, 12, 3
+SHAKE_M = 0.02
+AGAIN, AGAIN_M = 0.4, 0.03  # cost of a hand that goes where it went without success, as near as this
+
+
+@dataclass(frozen=True)
+class Tilting:
+    """How a vessel is tilted: about an axis through a point of its edge.
+
+    Attributes:
+        pivot: world, metres.
+        axis: unit vector, world.
+        angle: radians.
+    """
+
+    pivot: Array
+    axis: Array
+    angle: float
+
+    def after(self, hand: HandTarget, share: float) -> HandTarget:
+        """Where the hand is when a share of the angle is done."""
+        turn = rotation_about(self.axis, share * self.angle)
+        return HandTarget(self.pivot + turn @ (hand.position - self.pivot), turn @ hand.rotation)
+
+
+def pour(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
+    """Empty the stage's object, a vessel, over the stage's target, an object, and hold it upright again.
+
+    A vessel that is not in the hand is picked up first.
+
+    Raises:
+        SkillError: the stage is not done after all attempts, or there is nothing in the vessel any more.
+    """
+    target = env.scene.fill(stage.target)
+    failed: list[Array] = []
+    for _ in range(ATTEMPTS):
+        obj = graspable(env, stage.object)
+        if not obj.contents:
+            raise SkillError(f"{obj.title} is empty, but what was in it is not where it belongs")
+        if not is_held(env, obj.name):
+            yield from take(env, obj, PAN_BY_THE_HANDLE)
+        middle = env.data.body(target).xpos.copy()
+        fixture = locate(env, target).fixture
+        if fixture is not None and not in_reach(env, middle):
+            yield from carry_to(env, obj, standing_pose_for(env, fixture, middle), middle)
+        obj = graspable(env, stage.object)
+        choice, tilting = _choose(env, obj, target, failed)
+        if choice.base is not None:
+            yield from carry_to(env, obj, choice.base, middle)
+            choice, tilting = _choose(env, obj, target, failed, may_drive=False)
+        held = Held.now(env.data, obj.name, obj.contents)
+        yield from follow_with(env, choice.joints, held)
+        over, level, *_ = choice.path.targets
+        failed.append(level.position)
+        yield from move_hand(env.data, over, CLOSED, tolerance=0.03, max_steps=80)
+        yield from move_hand(env.data, level, CLOSED, speed=0.6, tolerance=0.015, max_steps=60, start=over.position)
+        yield from _tilt(env, stage, level, tilting)
+        yield from move_hand(env.data, over, CLOSED, speed=0.7, tolerance=0.03, max_steps=50)
+        yield from level_out(env, graspable(env, stage.object))
+        if stage_done(env, stage):
+            return
+    raise SkillError(f"{graspable(env, stage.object).title} was poured out in vain {ATTEMPTS} times")
+
+
+def _tilt(env: KitchenEnv, stage: Stage, level: HandTarget, tilting: Tilting) -> Iterator[Array]:
+    """Tilt slowly, until the stage is done; shake what does not come off; turn back."""
+    share = 0.0
+    for step in range(TILT_STEPS):
+        if stage_done(env, stage):
+            break
+        share = (step + 1) / TILT_STEPS
+        yield arm_action(env.data, tilting.after(level, share), CLOSED)
+    steep = tilting.after(level, share)
+    for step in range(WAIT_STEPS * (1 + SHAKES)):
+        if stage_done(env, stage):
+            break
+        shaken = SHAKE_M * np.sin(2 * np.pi * step / WAIT_STEPS) if step >= WAIT_STEPS else 0.0
+        yield arm_action(env.data, HandTarget(steep.position + shaken * UP, steep.rotation), CLOSED)
+    for step in range(TILT_STEPS // 2):
+        yield arm_action(env.data, tilting.after(level, share * (1 - (step + 1) / (TILT_STEPS // 2))), CLOSED)
+
+
+def _choose(
+    env: KitchenEnv, obj: Graspable, target: str, failed: list[Array], *, may_drive: bool = True
+) -> tuple[MotionPlan, Tilting]:
+    """The edge, turn and height for pouring that the arm takes best.
+
+    Raises:
+        SkillError: there is none.
+    """
+    data, item = env.data, env.scene.objects[obj.name].item
+    held = Held.now(data, obj.name, obj.contents)
+    inside = item.interior
+    if inside is None:
+        raise SkillError(f"{obj.title} is no vessel")
+    receptacle, body = env.scene.objects[target].item, data.body(target)
+    top = body.xpos + UP * receptacle.size[2] / 2
+    center, half = np.array(inside.center), np.array(inside.half)
+    radius = float(min(half[:2])) * np.sqrt(2.0)  # the box is the one that a round inside holds
+    rim = center[2] + half[2]
+    upright = levelled(data.body(obj.name).xmat.reshape(3, 3))
+    found: dict[int, Tilting] = {}
+    paths = []
+    for index, edge, clearance, steep in itertools.product(range(YAWS), range(EDGES), CLEARANCES_M, STEEP_RAD[-1:]):
+        yaw = 2 * np.pi * index / YAWS
+        turn = rotation_about(UP, yaw) @ upright
+        bearing = 2 * np.pi * edge / EDGES
+        out = turn @ np.array([np.cos(bearing), np.sin(bearing), 0.0])
+        lip = turn @ np.array([center[0] + radius * np.cos(bearing), center[1] + radius * np.sin(bearing), rim])
+        pivot = top + (clearance + 0.02) * UP - SHORT_SHARE * radius * out
+        rotation = turn @ held.rotation.T
+        at = pivot - lip - rotation @ held.position
+        level = HandTarget(at, rotation)
+        tilting = Tilting(pivot, np.cross(UP, out) / np.linalg.norm(np.cross(UP, out)), steep)
+        half_way, end = tilting.after(level, 0.5), tilting.after(level, 1.0)
+        again = sum(np.linalg.norm(at - other) < AGAIN_M for other in failed)
+        cost = HIGH_COST * clearance + TURN_COST * min(yaw, 2 * np.pi - yaw) + AGAIN * float(again)
+        path = WaypointPath((HandTarget(at + 0.10 * UP, rotation), level, half_way, end), cost)
+        found[id(path)] = tilting
+        paths.append(path)
+    allowed = obj.bodies | obj.carried
+    plans = plan_reach(env, paths, top, key=2, held=held, loaded=2, allowed=allowed, may_drive=may_drive)
+    if not plans:
+        raise SkillError(f"{obj.title}: there is no way to pour it out over {target}")
+    return plans[0], found[id(plans[0].path)]
