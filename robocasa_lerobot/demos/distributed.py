@@ -12,7 +12,8 @@ from typing import Any
 
 from robocasa_lerobot.demos.recording import RecordingSettings, record_tasks
 from robocasa_lerobot.demos.summary import print_summary
-from robocasa_lerobot.jobs.executors import Execution, run_with_ray, submit_to_slurm
+from robocasa_lerobot.jobs.executors import Execution, submit_to_slurm
+from robocasa_lerobot.jobs.ray import run_with_ray
 
 _FOLDER, _LOGS = ".executor", "slurm"
 

@@ -112,20 +112,6 @@ def execution_of(args: argparse.Namespace) -> Execution:
     return Execution(args.executor, args.workers, chosen("slurm", SlurmSettings), chosen("ray", RaySettings))
 
 
-def run_with_ray(step: Callable[..., None], pieces: int, folder: Path, settings: RaySettings) -> None:
-    """Run all pieces that are not complete, and wait for them."""
-    from datatrove.executor.ray import RayPipelineExecutor
-
-    RayPipelineExecutor(
-        [step],
-        tasks=pieces,
-        workers=settings.jobs,
-        cpus_per_task=settings.cpus,
-        mem_per_cpu_gb=settings.mem_per_cpu_gb,
-        logging_dir=str(folder),
-    ).run()
-
-
 def submit_to_slurm(
     step: Callable[..., None], finish: Callable[[], object], pieces: int, folder: Path, logs: Path, slurm: SlurmSettings
 ) -> tuple[str | None, str]:

@@ -7,8 +7,9 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 from robocasa_lerobot.errors import UserError
-from robocasa_lerobot.jobs.executors import Execution, run_with_ray, submit_to_slurm
+from robocasa_lerobot.jobs.executors import Execution, submit_to_slurm
 from robocasa_lerobot.jobs.pool import PoolExecutor, exit_if_orphaned, polled
+from robocasa_lerobot.jobs.ray import run_with_ray
 from robocasa_lerobot.progress import Bar
 
 _EXECUTOR = "executor"  # folder of completion markers

@@ -62,6 +62,11 @@ class PoolExecutor(LocalPipelineExecutor):
                     except multiprocess.TimeoutError:
                         _check_alive(processes)
 
+    def run_rank(self, rank: int) -> None:
+        """Run one piece in this process, unless it has its completion marker."""
+        _start_worker(self._initializer)
+        self._run_for_rank(rank)
+
 
 def _check_alive(processes: Sequence[Any]) -> None:
     """Raise WorkerDiedError if one of the processes has ended."""

@@ -17,8 +17,9 @@ from typing import Any, Protocol
 
 from robocasa_lerobot.errors import UserError
 from robocasa_lerobot.files import write_text
-from robocasa_lerobot.jobs.executors import Execution, run_with_ray, submit_to_slurm
+from robocasa_lerobot.jobs.executors import Execution, submit_to_slurm
 from robocasa_lerobot.jobs.pool import PoolExecutor, polled
+from robocasa_lerobot.jobs.ray import run_with_ray
 from robocasa_lerobot.progress import Bar
 
 FAILED, LOG = "failed.txt", "log.txt"

@@ -8,7 +8,8 @@ from typing import Any
 
 from robocasa_lerobot.errors import UserError
 from robocasa_lerobot.evaluation.config.evaluation import EvaluationConfig
-from robocasa_lerobot.jobs.executors import Execution, run_with_ray, submit_to_slurm
+from robocasa_lerobot.jobs.executors import Execution, submit_to_slurm
+from robocasa_lerobot.jobs.ray import run_with_ray
 
 _FOLDER, _LOGS = ".executor", "slurm"
 
