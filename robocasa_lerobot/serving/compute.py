@@ -26,18 +26,26 @@ class ComputeThread:
         self._policy = policy
         self._waiting: queue.SimpleQueue[tuple[Work, Future[NDArray[np.float32]]] | None] = queue.SimpleQueue()
         self._refused: Exception | None = None
+        self._lock, self._ending = threading.Lock(), False
         self._thread = threading.Thread(target=self._run, name="policy", daemon=True)
         self._thread.start()
 
     def submit(self, work: Work) -> Future[NDArray[np.float32]]:
         """Actions (executed, 12) in stored order of a request, when they are computed."""
         future: Future[NDArray[np.float32]] = Future()
-        self._waiting.put((work, future))
+        with self._lock:  # nothing comes after the end, where nobody would answer it
+            if self._ending:
+                future.set_exception(RuntimeError("the server is ending"))
+            else:
+                self._waiting.put((work, future))
         return future
 
     def close(self, seconds: float = 10.0) -> bool:
-        """End after what is being computed; False where that takes longer."""
-        self._waiting.put(_END)
+        """End after what waits; False where that takes longer."""
+        with self._lock:
+            if not self._ending:
+                self._ending = True
+                self._waiting.put(_END)
         self._thread.join(seconds)
         return not self._thread.is_alive()
 

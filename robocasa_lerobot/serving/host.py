@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import asyncio
+import dataclasses
 import itertools
 import time
 from collections.abc import Mapping
+from concurrent.futures import Future
 from dataclasses import dataclass
 from typing import Any
 
@@ -50,6 +52,8 @@ class Host:
         self._seed, self._sessions = seed, itertools.count()
         served = self.served
         self.wanted = Wanted(served.cameras, served.image_size, served.history, resize, repeat_history)
+        # Of a client that sends every step: the history is put together here.
+        self.wanted_now = dataclasses.replace(self.wanted, history=1)
 
     def session(self) -> Session:
         """A new client's."""
@@ -67,13 +71,13 @@ class Host:
         if options.get("reset"):
             session.begin(seed)
         seed, number = session.next(seed, number)
-        actions = await self.compute(session, asked, seed, number)
+        request = ChunkRequest(self.served.source.label, asked.observations, asked.instruction, seed, number)
+        actions = await asyncio.wrap_future(self.submit(session, request))
         return Reply(actions, asked, number, time.perf_counter() - began)
 
-    async def compute(self, session: Session, asked: Asked, seed: int, number: int) -> NDArray[np.float32]:
-        """Actions (executed, 12) in stored order."""
-        request = ChunkRequest(self.served.source.label, asked.observations, asked.instruction, seed, number)
-        return await asyncio.wrap_future(self._compute.submit(Work(session, request)))
+    def submit(self, session: Session, request: ChunkRequest) -> Future[NDArray[np.float32]]:
+        """Actions (executed, 12) in stored order of a request, when they are computed."""
+        return self._compute.submit(Work(session, request))
 
     def close(self) -> bool:
         """End the computing; False where it does not end."""

@@ -29,8 +29,8 @@ class Served:
     """What clients are told about the policy.
 
     `executed` actions are answered to one request, from the last `history` observations of consecutive control steps;
-    the policy itself predicts `horizon` of them. `image_size` is (height, width) of the pictures of `cameras`, None
-    where it looks at none.
+    the policy itself predicts `horizon` of them, for `width` requests at once. `image_size` is (height, width) of the
+    pictures of `cameras`, None where it looks at none.
     """
 
     source: PolicySource
@@ -38,6 +38,7 @@ class Served:
     executed: int
     history: int
     horizon: int
+    width: int = 1
 
     @property
     def image_size(self) -> tuple[int, int] | None:
@@ -75,6 +76,7 @@ class Served:
             "state_parts": [[part.name, part.size] for part in contract.STATE_PARTS],
             "action_parts": [[part.name, part.size] for part in contract.ACTION_PARTS],
             "action_parts_hdf5": [[part.name, part.size] for part in contract.ACTION_PARTS_HDF5],
+            "batch_width": self.width,
             "accepts": ["seed", "number", "reset"],
         }
 
@@ -236,11 +238,12 @@ def load_served(
                 "steps and answers step by step: leave --executed-steps out."
             )
         return ServedPolicy(Served(source, cameras, 1, 1, 1), None, lambda: StepPolicy(_fork(loaded)))
-    chunks = ChunkPolicy(loaded, width or default_width([source.type], device))
+    width = width or default_width([source.type], device)
+    chunks = ChunkPolicy(loaded, width)
     horizon = next((int(getattr(loaded.config, n)) for n in ("horizon", "chunk_size") if hasattr(loaded.config, n)), 0)
     shape = chunks.shape
     return ServedPolicy(
-        Served(source, cameras, shape.executed, shape.history, max(horizon, shape.executed)), chunks, None
+        Served(source, cameras, shape.executed, shape.history, max(horizon, shape.executed), width), chunks, None
     )
 
 

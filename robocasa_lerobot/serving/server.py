@@ -53,11 +53,18 @@ def serve(host: Host, settings: ServerSettings, stop: asyncio.Event, ready: Read
         from robocasa_lerobot.serving.gr00t import GrootServer
 
         return GrootServer(host, access, limits, settings.groot_version, settings.allow_kill).serve(stop, ready)
-    from robocasa_lerobot.serving.openpi import OPEN_PAGES, OpenpiServer
     from robocasa_lerobot.serving.web import serve_websockets
 
-    server = OpenpiServer(host, limits)
-    return serve_websockets(server.handle, OPEN_PAGES, {}, access, limits, stop, ready)
+    if settings.protocol == "vla_eval":
+        from robocasa_lerobot.serving import vla_eval
+
+        episodes = vla_eval.VlaEvalServer(host, limits)
+        pages = episodes.pages()
+        return serve_websockets(episodes.handle, vla_eval.OPEN_PAGES, pages, access, limits, stop, ready)
+    from robocasa_lerobot.serving import openpi
+
+    server = openpi.OpenpiServer(host, limits)
+    return serve_websockets(server.handle, openpi.OPEN_PAGES, {}, access, limits, stop, ready)
 
 
 def address(settings: ServerSettings, port: int) -> str:

@@ -17,7 +17,7 @@ from robocasa_lerobot.serving.access import Access
 from robocasa_lerobot.serving.limits import Limits
 
 Handler = Callable[[ServerConnection], Awaitable[None]]
-Page = Callable[[], str]
+Page = Callable[[dict[str, list[str]]], tuple[HTTPStatus, str]]  # of the address's query
 _CLOSE_SECONDS = 10.0
 
 
@@ -35,7 +35,7 @@ async def serve_websockets(
     Args:
         handler: of one client's connection.
         open_pages: bodies of HTTP answers by path, for anybody.
-        closed_pages: bodies of HTTP answers by path, for who has the token.
+        closed_pages: what makes HTTP answers by path, for who has the token.
         access: where to listen, and the token.
         limits: of messages and clients.
         stop: ends the server.
@@ -47,15 +47,15 @@ async def serve_websockets(
     clients: set[ServerConnection] = set()
 
     def before_handshake(connection: ServerConnection, request: Request) -> Response | None:
-        path = urlsplit(request.path).path
-        if path in open_pages:
-            return connection.respond(HTTPStatus.OK, open_pages[path])
+        address = urlsplit(request.path)
+        if address.path in open_pages:
+            return _page(connection, HTTPStatus.OK, open_pages[address.path])
         if not access.allows(_token(request)):
             return connection.respond(
                 HTTPStatus.UNAUTHORIZED, "a valid token is needed: Authorization: Api-Key TOKEN\n"
             )
-        if path in closed_pages:
-            return connection.respond(HTTPStatus.OK, closed_pages[path]())
+        if address.path in closed_pages:
+            return _page(connection, *closed_pages[address.path](parse_qs(address.query)))
         if len(clients) >= limits.clients:
             return connection.respond(HTTPStatus.SERVICE_UNAVAILABLE, f"{limits.clients} clients are served already\n")
         return None
@@ -87,6 +87,14 @@ async def serve_websockets(
     server.close()
     with suppress(TimeoutError):  # a computation may go on; the process ends all the same
         await asyncio.wait_for(server.wait_closed(), _CLOSE_SECONDS)
+
+
+def _page(connection: ServerConnection, status: HTTPStatus, body: str) -> Response:
+    response = connection.respond(status, body)
+    if body.startswith("{"):
+        del response.headers["Content-Type"]
+        response.headers["Content-Type"] = "application/json"
+    return response
 
 
 def _token(request: Request) -> str | None:
