@@ -49,6 +49,11 @@ def trial_seed(seed: int, task: str, trial: int, stream: int = _ENV_STREAM) -> i
     return int(state[0] >> 1)
 
 
+def noise_seed(seed: int, task: str, trial: int) -> int:
+    """The seed of the policy's sampling noise in a trial, independent of that of its scene."""
+    return trial_seed(seed, task, trial, _POLICY_STREAM)
+
+
 def make_plan(
     labels: Sequence[str] | Mapping[str, Sequence[str]],
     horizons: Mapping[str, int | None],
@@ -76,7 +81,7 @@ def make_plan(
             task=task,
             trial=trial,
             seed=seeds[task][trial] if seeds else trial_seed(seed, task, trial),
-            policy_seed=trial_seed(seed, task, trial, _POLICY_STREAM),
+            policy_seed=noise_seed(seed, task, trial),
             horizon=horizons[task],
             film=trial < videos,
             perturbation=perturbation,
