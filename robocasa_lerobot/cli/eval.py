@@ -41,7 +41,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
         metavar="FILE",
         help="YAML file of settings, or a name in configs/evaluations/: quick; options win over it",
     )
-    short = "what to evaluate, short for --policy.path: a checkpoint, demonstrator, random, zero, replay:FILE"
+    short = "what to evaluate, short for --policy.path: a checkpoint, openpi://HOST:PORT, demonstrator, random, zero"
     parser.add_argument("--policy", dest="set:policy", metavar="A,B", default=argparse.SUPPRESS, help=short)
     for name, hint, help_text in describe_settings(EvaluationConfig):
         options: dict[str, Any] = {"nargs": "?", "const": "true"} if hint is bool else {}
@@ -80,7 +80,7 @@ def run(args: argparse.Namespace) -> int:
         return _run_elsewhere(config, args)
     if args.shards is not None:
         raise UserError("--shards is for --executor slurm or ray; here give --shard=I/N, and --merge at the end.")
-    evaluation = prepare(config)
+    evaluation = prepare(config, ask=not args.merge)
     header = evaluation.header
     partial = partial_sentence(header.task_sets, header.missing_tasks, header.missing_by_set)
     if partial is not None:

@@ -58,7 +58,8 @@ class ChunkShape:
 class ChunkRequest:
     """What a chunk of actions is computed from, and nothing else: a chunk is a function of its request.
 
-    `observations` are those at the policy's offsets, oldest first; `seed` and `number` (of the chunk in its trial) fix its noise.
+    `observations` are those at the policy's offsets, oldest first; `seed` and `number` (of the chunk in its trial) fix
+    its noise.
     """
 
     label: str

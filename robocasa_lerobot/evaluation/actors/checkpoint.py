@@ -1,4 +1,4 @@
-"""What a policy checkpoint says about itself, read without importing LeRobot."""
+"""What a policy says about itself: a checkpoint, read without importing LeRobot, or a reference."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from typing import Any
 from robocasa_lerobot import contract
 from robocasa_lerobot.errors import UserError
 from robocasa_lerobot.evaluation.records.results import PolicyInfo
+from robocasa_lerobot.evaluation.remote.introduction import RemotePolicy
 from robocasa_lerobot.policies.origin import ORIGIN_FILE, Origin, read_origin
 
 REFERENCE_POLICIES = ("demonstrator", "random", "zero")
@@ -29,11 +30,11 @@ class CheckpointError(UserError):
 
 @dataclass(frozen=True)
 class PolicySource:
-    """A policy to evaluate: a checkpoint folder, or a reference policy.
+    """A policy to evaluate: a checkpoint folder, a policy behind a socket, or a reference policy.
 
     `fingerprint` is a SHA-256 over weights, config and processors; `experiment`, `phase` and `step` are what the
     checkpoint says about its training. `image_size` is (height, width) of its camera inputs. `queues`: by its settings
-    it remembers earlier steps.
+    it remembers earlier steps. `remote` is a policy behind a socket, whose weights nobody can see.
     """
 
     label: str
@@ -45,21 +46,39 @@ class PolicySource:
     image_size: tuple[int, int] | None = None
     experiment: str | None = None
     queues: bool = False
+    remote: RemotePolicy | None = None
 
     @property
     def is_reference(self) -> bool:
         """Whether this is `demonstrator`, `random`, `zero` or `replay`, and not a checkpoint."""
         return self.type in (*REFERENCE_POLICIES, REPLAY)
 
+    @property
+    def is_checkpoint(self) -> bool:
+        """Whether this needs torch and LeRobot here."""
+        return not self.is_reference and self.remote is None
+
+    @property
+    def repeats(self) -> bool:
+        """Whether the same trial takes the same course again."""
+        return self.remote is None or self.remote.key_map.repeats
+
     def describe(self) -> PolicyInfo:
         """What the header of a run says about it."""
         return PolicyInfo(
-            self.label, self.path, self.type, self.fingerprint, self.phase, self.step, experiment=self.experiment
+            self.label,
+            self.path,
+            self.type,
+            self.fingerprint,
+            self.phase,
+            self.step,
+            experiment=self.experiment,
+            remote=None if self.remote is None else self.remote.describe(),
         )
 
 
 def read_source(path: str, label: str | None = None) -> PolicySource:
-    """The policy at `path`.
+    """The policy at `path`, which is no address: see `remote_sources` for these.
 
     Raises:
         CheckpointError: not a `pretrained_model` folder; the message says where one was expected.
@@ -107,7 +126,7 @@ def find_pretrained(path: Path) -> Path:
     what = "has no config.json" if path.is_dir() else "no such folder"
     found = sorted(str(p.parent) for p in path.glob("**/pretrained_model/config.json"))[:3] if path.is_dir() else []
     hint = f" Did you mean {' or '.join(found)}?" if found else ""
-    known = ", ".join((*REFERENCE_POLICIES, "replay:FILE"))
+    known = ", ".join((*REFERENCE_POLICIES, "replay:FILE", "openpi://HOST:PORT", "gr00t://...", "vla_eval://..."))
     raise CheckpointError(f"policy.path {path}: {what}; expected a pretrained_model folder, or one of {known}.{hint}")
 
 

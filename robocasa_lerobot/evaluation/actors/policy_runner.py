@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +20,7 @@ from robocasa_lerobot.evaluation.actors.reference_policies import (
     ReplayPolicy,
     ZeroPolicy,
 )
+from robocasa_lerobot.evaluation.actors.remote_actor import RemoteActor
 
 
 class StepPolicy:
@@ -61,12 +63,21 @@ class StepPolicy:
         return True
 
 
-def load_actor(source: PolicySource, device: str, executed_steps: int | None, width: int = 1) -> Actor:
-    """What acts for a policy source in this process.
+def load_actor(
+    source: PolicySource,
+    device: str,
+    executed_steps: int | None,
+    width: int = 1,
+    waiting: Callable[[], None] = lambda: None,
+) -> Actor:
+    """What acts for a policy source in this process; `waiting` is called while a policy behind a socket computes.
 
     Raises:
         UserError: see `LoadedCheckpoint` and `ChunkPolicy`.
+        LostError: a policy behind a socket cannot be reached.
     """
+    if source.remote is not None:
+        return RemoteActor(source.label, source.remote, waiting)
     if source.is_reference:
         return load_reference(source)
     loaded = LoadedCheckpoint(source, device, executed_steps)

@@ -10,6 +10,7 @@ from pathlib import Path
 
 from robocasa_lerobot.errors import UnknownNameError, UserError
 from robocasa_lerobot.evaluation.records.results import file_name
+from robocasa_lerobot.evaluation.remote.address import is_address
 
 KITCHEN_ENV_FACTORY = "robocasa_lerobot.envs.kitchen_env:KitchenEnv"
 SPLITS = ("target", "pretrain", "pretrain_train", "pretrain_val")
@@ -25,7 +26,10 @@ class PolicySettings:
     """Which policies are evaluated, and how they compute. `--policy=X` alone is short for `--policy.path=X`.
 
     path: `pretrained_model` folders, or reference policies: `demonstrator`, `random`, `zero`, or `replay:FILE` with an
-        HDF5 file of demonstrations or a LeRobotDataset; several give one report.
+        HDF5 file of demonstrations or a LeRobotDataset; or a server that is asked over a socket: openpi://HOST:PORT,
+        gr00t://HOST:PORT, vla_eval://HOST:PORT. Several give one report.
+    keys: for each policy behind a socket (or one for all), the key map: a preset such as robocasa365_pi0, `auto`, or a
+        YAML file; default: what the protocol or the server itself says.
     label: their names in results and report; default: `experiment/phase-step` of the checkpoint's training.
     device: auto, cpu, cuda or mps.
     devices: devices with a policy process each, such as cuda:0,cuda:1; default: all GPUs.
@@ -41,6 +45,7 @@ class PolicySettings:
     """
 
     path: list[str] = field(default_factory=list)
+    keys: list[str] = field(default_factory=list)
     label: list[str] = field(default_factory=list)
     device: str = "auto"
     devices: list[str] = field(default_factory=list)
@@ -50,6 +55,20 @@ class PolicySettings:
     lifelong_phase: list[int] = field(default_factory=list)
     demo_fraction: list[float] = field(default_factory=list)
     training_data: list[str] = field(default_factory=list)
+
+
+@dataclass
+class RemoteSettings:
+    """Patience with policies behind a socket; outcomes do not depend on it.
+
+    connect_seconds: for which it is tried again while nobody listens, so that a server may start late or again.
+    answer_seconds: until an answer.
+    first_answer_seconds: until the first answer over a connection: servers compile on their first request.
+    """
+
+    connect_seconds: float = 60.0
+    answer_seconds: float = 120.0
+    first_answer_seconds: float = 900.0
 
 
 @dataclass
@@ -145,6 +164,7 @@ class EvaluationConfig:
     """
 
     policy: PolicySettings = field(default_factory=PolicySettings)
+    remote: RemoteSettings = field(default_factory=RemoteSettings)
     env: EnvSettings = field(default_factory=EnvSettings)
     success: SuccessSettings = field(default_factory=SuccessSettings)
     perturbation: PerturbationSettings = field(default_factory=PerturbationSettings)
@@ -170,13 +190,20 @@ class EvaluationConfig:
         """
         policy, env = self.policy, self.env
         if not policy.path:
-            raise UserError("no policy: give --policy.path=CHECKPOINT/pretrained_model, or random, or zero.")
+            raise UserError(
+                "no policy: give --policy.path=CHECKPOINT/pretrained_model, openpi://HOST:PORT, random, or zero."
+            )
         if not env.tasks and not env.task_sets:
             raise UserError("no task: give --env.tasks=OpenDrawer (`robocasa-lerobot tasks` lists them).")
         for name in ("label", "lifelong_phase", "demo_fraction", "training_data"):
             given = getattr(policy, name)
             if given and len(given) != len(policy.path):
                 raise UserError(f"{len(given)} policy.{name} for {len(policy.path)} policy.path.")
+        remote = sum(map(is_address, policy.path))
+        if policy.keys and len(policy.keys) not in (1, remote):
+            raise UserError(f"{len(policy.keys)} policy.keys for {remote} policies behind a socket.")
+        if policy.keys and not remote:
+            raise UserError("policy.keys is for policies behind a socket, such as openpi://HOST:PORT; there is none.")
         if self.lifelong and not (policy.lifelong_phase and env.task_sets):
             raise UserError("lifelong needs env.task_sets in the order of the phases and --policy.lifelong_phase=K.")
         if any(not 0 <= share <= 1 for share in policy.demo_fraction):
@@ -226,6 +253,9 @@ class EvaluationConfig:
             value = getattr(self.perturbation, option.name)
             if option.name != "names" and not (math.isfinite(value) and value >= 0):
                 raise UserError(f"perturbation.{option.name}: found {value}, expected a number of at least 0.")
+        for option in fields(self.remote):
+            if not getattr(self.remote, option.name) > 0:
+                raise UserError(f"remote.{option.name}: found {getattr(self.remote, option.name)}, expected above 0.")
         if env.horizon_multiplier <= 0 or self.stall_seconds <= 0:
             raise UserError("env.horizon_multiplier and stall_seconds must be above 0.")
         if env.horizon is not None and env.horizon_multiplier != 1.0:

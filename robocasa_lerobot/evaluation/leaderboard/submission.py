@@ -123,11 +123,21 @@ def _notes(policy: PolicyResult, facts: SubmissionFacts) -> str:
         "Evaluated in robocasa_lerobot's kitchens, which are made in code in MuJoCo: other scenes, objects and "
         "demonstrations than RoboCasa's own, so not comparable one to one.",
         f"{trials[0]} trials per task, seed {header.seed}, split {header.split}, horizon 1.0x each task's own, success "
-        f"at any step, executed steps {header.executed_steps or 'of the policy'}, on {header.device}.",
+        f"at any step, executed steps {header.executed_steps or 'of the policy'}, on {_computed_on(policy)}.",
         f"95 % intervals (percent): {intervals}.",
-        f"Weights {policy.info.fingerprint[:16]}.",
+        _weights(policy),
     ]
     return " ".join([facts.notes.strip(), *said] if facts.notes.strip() else said)
+
+
+def _computed_on(policy: PolicyResult) -> str:
+    return policy.header.device if policy.info.remote is None else "a server's device"
+
+
+def _weights(policy: PolicyResult) -> str:
+    if policy.info.remote is None:
+        return f"Weights {policy.info.fingerprint[:16]}."
+    return f"Asked over {policy.info.remote['protocol']}, key map {policy.info.remote['keys']}; weights unknown."
 
 
 def _train_config(checkpoint: Path) -> dict[str, Any]:

@@ -20,7 +20,7 @@ from pathlib import Path
 from typing import Any
 
 from robocasa_lerobot.errors import UserError
-from robocasa_lerobot.evaluation.records.schema import SchemaError, build
+from robocasa_lerobot.evaluation.records.schema import OPTIONAL, SchemaError, build
 
 TRIALS_FILE = "trials.jsonl"
 SCHEMA_VERSION = 4
@@ -98,7 +98,8 @@ class PolicyInfo:
     it is too. `fingerprint` is a SHA-256 over weights, config and processors. `experiment`, `phase` and `step` are what
     the checkpoint says about its training, None where it says nothing. `lifelong_phase` (from 1), `demo_fraction` (of
     the target demonstrations, 0 to 1) and `training_data` ("target only", ...) are labels that the user gave for the
-    report.
+    report. `remote` is there for a policy behind a socket: its address, key map, what the server said, and that nobody
+    knows its weights; the fingerprint is then of key map and metadata alone, marked `unknown:`.
     """
 
     label: str
@@ -112,6 +113,8 @@ class PolicyInfo:
     training_data: str | None = None
     weights_version: str | None = None  # of LeRobot, where the checkpoint says it
     experiment: str | None = None
+    # Left out of the line where there is none, so that files without it stay readable.
+    remote: dict[str, Any] | None = field(default=None, metadata=OPTIONAL)
 
 
 @dataclass(frozen=True)
@@ -177,12 +180,19 @@ class RunHeader:
     @cached_property
     def id(self) -> str:
         """The first 16 hexadecimal digits of a SHA-256 over everything but the time of the start."""
-        values = {name: value for name, value in dataclasses.asdict(self).items() if name != "started"}
+        values = {name: value for name, value in self._values().items() if name != "started"}
         return hashlib.sha256(json.dumps(values, sort_keys=True).encode()).hexdigest()[:16]
 
     def to_line(self) -> str:
         """The JSON line of this header, without its newline."""
-        return _dump({"kind": "run", "id": self.id, **dataclasses.asdict(self)})
+        return _dump({"kind": "run", "id": self.id, **self._values()})
+
+    def _values(self) -> dict[str, Any]:
+        values = dataclasses.asdict(self)
+        for policy in values["policies"].values():
+            if policy["remote"] is None:
+                del policy["remote"]
+        return values
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,6 @@
-"""Dataclasses from parsed JSON, strictly: no key may be missing or unknown, and `1` is not `true`."""
+"""Dataclasses from parsed JSON, strictly: no key may be missing (but for `OPTIONAL` ones) or unknown, and `1` is not
+`true`.
+"""
 
 from __future__ import annotations
 
@@ -6,9 +8,13 @@ import dataclasses
 import functools
 import types
 import typing
-from typing import Any
+from collections.abc import Mapping
+from types import MappingProxyType
+from typing import Any, Final
 
 from robocasa_lerobot.errors import suggest
+
+OPTIONAL: Final[Mapping[str, Any]] = MappingProxyType({"optional": True})  # metadata of a field that may be missing
 
 
 class SchemaError(ValueError):
@@ -25,10 +31,16 @@ def build[T](cls: type[T], values: dict[str, Any], prefix: str = "") -> T:
     for name in values:
         if name not in hints:
             raise SchemaError(f"unknown key {prefix + name!r}. {suggest(name, hints)}")
-    missing = [prefix + name for name in hints if name not in values]
+    optional = _optional(cls)  # type: ignore[arg-type]
+    missing = [prefix + name for name in hints if name not in values and name not in optional]
     if missing:
         raise SchemaError(f"missing key(s) {', '.join(missing)}")
-    return cls(**{name: _fit(values[name], hint, prefix + name) for name, hint in hints.items()})
+    return cls(**{name: _fit(values[name], hint, prefix + name) for name, hint in hints.items() if name in values})
+
+
+@functools.cache
+def _optional(cls: type) -> frozenset[str]:
+    return frozenset(field.name for field in dataclasses.fields(cls) if field.metadata.get("optional"))
 
 
 @functools.cache

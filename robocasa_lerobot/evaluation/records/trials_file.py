@@ -54,8 +54,14 @@ def differences(old: RunHeader, new: RunHeader) -> list[str]:
     for label in old.policies.keys() & new.policies.keys():
         before, now = old.policies[label].fingerprint, new.policies[label].fingerprint
         if before != now:
-            found.append(f"policy {label!r}: weights {before[:12]} in the file, {now[:12]} now")
+            what = "weights" if old.policies[label].remote is None else "key map or server's metadata"
+            found.append(f"policy {label!r}: {what} {_short(before)} in the file, {_short(now)} now")
     return found
+
+
+def _short(fingerprint: str) -> str:
+    kind, colon, digits = fingerprint.rpartition(":")
+    return kind + colon + digits[:12]
 
 
 def check_same_run(path: Path, headers: Iterable[RunHeader], new: RunHeader) -> None:

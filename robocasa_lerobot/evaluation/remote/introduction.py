@@ -18,7 +18,7 @@ from robocasa_lerobot.evaluation.remote.client import TOKEN_VARIABLE, PolicyClie
 from robocasa_lerobot.evaluation.remote.connect import connect
 from robocasa_lerobot.evaluation.remote.described import OURS, is_ours, map_of_ours, maps_of_modality_config
 from robocasa_lerobot.evaluation.remote.failures import LostError, RemoteError
-from robocasa_lerobot.evaluation.remote.key_map import AUTO, KeyMap, load_key_map, presets, with_executed
+from robocasa_lerobot.evaluation.remote.key_map import AUTO, KeyMap, from_tree, load_key_map, presets, with_executed
 from robocasa_lerobot.evaluation.remote.probe import probe
 
 UNKNOWN_WEIGHTS = "unknown:"  # what fingerprints begin with: nobody can see the weights behind a socket
@@ -37,6 +37,12 @@ class RemotePolicy:
     key_map: KeyMap
     metadata: dict[str, Any]
     timeouts: Timeouts = field(default_factory=Timeouts)
+
+    @classmethod
+    def recorded(cls, address: Address, described: Mapping[str, Any]) -> RemotePolicy:
+        """The policy of a run's header."""
+        key_map = from_tree(dict(described["key_map"]), f"the key map of {address.text}")
+        return cls(address, str(described["keys"]), key_map, dict(described["metadata"]))
 
     @property
     def fingerprint(self) -> str:

@@ -207,6 +207,8 @@ def describe_policy(policy: PolicyResult) -> str:
     if info.path in REFERENCES:
         return REFERENCES[info.path]
     facts = [info.type]
+    if info.remote is not None:
+        facts = [f"behind a socket ({info.remote['address']}, key map {info.remote['keys']}), weights unknown"]
     if policy.parts:
         phases = [part.info.phase or part.label for part in policy.parts]
         facts.append(f"{len(policy.parts)} policies ({', '.join(phases)})")

@@ -27,7 +27,7 @@ def finish(config: EvaluationConfig) -> None:
     from robocasa_lerobot.evaluation.run.merging import merge
     from robocasa_lerobot.evaluation.run.outputs import write_outputs
 
-    evaluation = prepare(config)
+    evaluation = prepare(config, ask=False)
     merge(evaluation)
     write_outputs(evaluation)
 

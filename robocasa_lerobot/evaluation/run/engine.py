@@ -5,7 +5,7 @@ from __future__ import annotations
 import collections
 import dataclasses
 import sys
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -13,9 +13,10 @@ from typing import Any
 import yaml
 
 from robocasa_lerobot.errors import UserError
-from robocasa_lerobot.evaluation.actors.checkpoint import REPLAY, PolicySource, common_image_size, read_source
+from robocasa_lerobot.evaluation.actors.checkpoint import REPLAY, PolicySource
 from robocasa_lerobot.evaluation.config.evaluation import EvaluationConfig, check_factory, output_folder
 from robocasa_lerobot.evaluation.planning import run_header as resolve
+from robocasa_lerobot.evaluation.planning.sources import open_sources
 from robocasa_lerobot.evaluation.planning.trials import Shard, TrialSpec, make_plan, running_order, to_film
 from robocasa_lerobot.evaluation.records.results import (
     TRIALS_FILE,
@@ -57,16 +58,18 @@ class Evaluation:
     out: Path
 
 
-def prepare(config: EvaluationConfig) -> Evaluation:
+def prepare(config: EvaluationConfig, ask: bool = True) -> Evaluation:
     """Check everything that the user named, and fix the plan.
 
+    Policies behind a socket are asked once; without `ask`, what the results in the output folder say of them counts.
+
     Raises:
-        UserError: an unknown task, a folder that is no checkpoint, two policies with one label, ...
+        UserError: an unknown task, a folder that is no checkpoint, a server that does not answer as it should, two
+            policies with one label, ...
     """
     check_factory(config.env.factory)
     tasks = resolve.plan_tasks(config.env, config.first_sets)
-    asked: list[str | None] = [*config.policy.label] or [None] * len(config.policy.path)
-    sources = [read_source(path, label) for path, label in zip(config.policy.path, asked, strict=True)]
+    sources, image_size = open_sources(config, ask)
     by_label: dict[str, PolicySource] = {}
     for source in sources:
         if source.label in by_label:
@@ -77,10 +80,10 @@ def prepare(config: EvaluationConfig) -> Evaluation:
             )
         by_label[source.label] = source
     _check_folders(by_label)
-    needs_torch = not all(source.is_reference for source in sources)
+    needs_torch = any(source.is_checkpoint for source in sources)
     device = resolve.resolve_device(config.policy.device, needs_torch)
-    kinds = [source.type for source in sources if not source.is_reference]
-    settings = resolve.outcome_settings(config, common_image_size(sources, config.env.image_size), device, kinds)
+    kinds = [source.type for source in sources if source.is_checkpoint]
+    settings = resolve.outcome_settings(config, image_size, device, kinds)
     seeds = _stored_seeds(sources, config, settings, list(tasks.horizons))
     phases: list[int | None] = [*config.policy.lifelong_phase] if config.lifelong else [None] * len(sources)
     own_tasks = {label: tasks.of_policy(phase) for label, phase in zip(by_label, phases, strict=True)}
@@ -183,16 +186,20 @@ def evaluate(evaluation: Evaluation) -> list[TrialRecord]:
     return [records[spec.key] for spec in evaluation.todo_plan]
 
 
-def showcase(plan: Sequence[TrialSpec], records: Mapping[TrialKey, TrialRecord]) -> list[TrialSpec]:
+def showcase(
+    plan: Sequence[TrialSpec], records: Mapping[TrialKey, TrialRecord], never: Collection[str] = ()
+) -> list[TrialSpec]:
     """Trials to run once more for their films: the first success and the first failure that no film shows yet.
 
     Which trials succeed is not known when the filmed ones are fixed; a trial can be run again, because it takes the
-    same course. Only policies that are filmed at all are looked at.
+    same course. Only policies that are filmed at all are looked at, and not those in `never`, whose trials take no
+    course twice.
     """
     chosen = []
     groups: dict[tuple[str, str], list[TrialSpec]] = {}
     for spec in plan:
-        groups.setdefault((spec.label, spec.task), []).append(spec)
+        if spec.label not in never:
+            groups.setdefault((spec.label, spec.task), []).append(spec)
     for specs in groups.values():
         if not any(spec.film for spec in specs):
             continue
@@ -232,7 +239,8 @@ def _run(
     evaluation: Evaluation, todo: Sequence[TrialSpec], records: Mapping[TrialKey, TrialRecord]
 ) -> Iterator[Completed]:
     """The missing trials, then the ones to film, with a progress bar; `records` grows while this runs."""
-    if not todo and not showcase(evaluation.todo_plan, records):
+    never = {label for label, source in evaluation.sources.items() if not source.repeats}
+    if not todo and not showcase(evaluation.todo_plan, records, never):
         print(f"all {len(evaluation.todo_plan)} trials are in {evaluation.out / TRIALS_FILE}: nothing to run.")
         return
     config, settings = evaluation.config, worker_settings(evaluation)
@@ -245,7 +253,7 @@ def _run(
         pool = WorkerPool(settings, config.worker_count(max(1, len(todo))), config.stall_seconds, servers)
 
         def more() -> list[TrialSpec]:
-            specs = showcase(evaluation.todo_plan, records)
+            specs = showcase(evaluation.todo_plan, records, never)
             bar.total = (bar.total or 0) + len(specs)
             if specs:
                 bar.set_description("films")

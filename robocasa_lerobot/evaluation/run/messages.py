@@ -22,13 +22,17 @@ class Alive:
 
 @dataclass(frozen=True)
 class Finished:
-    """A trial ended; `error` is the reason of one that did not finish, `kind` the record's outcome."""
+    """A trial ended; `error` is the reason of one that did not finish, `kind` the record's outcome.
+
+    `lost` says how the connection to a policy behind a socket ended: the trial is none, and is repeated.
+    """
 
     outcome: Outcome
     video: str | None
     wall_seconds: float
     error: str | None
     kind: str = FINISHED
+    lost: str | None = None
 
 
 @dataclass(frozen=True)

@@ -22,7 +22,7 @@ def served_labels(sources: Mapping[str, PolicySource], settings: PolicySettings,
     """
     from robocasa_lerobot.policies.registry import POLICY_TYPES
 
-    checkpoints = {label: source for label, source in sources.items() if not source.is_reference}
+    checkpoints = {label: source for label, source in sources.items() if source.is_checkpoint}
     able = {
         label
         for label, source in checkpoints.items()

@@ -9,6 +9,7 @@ import traceback
 import warnings
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import partial
 from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any
@@ -21,8 +22,10 @@ from robocasa_lerobot.evaluation.actors.actor import Actor
 from robocasa_lerobot.evaluation.actors.checkpoint import PolicySource
 from robocasa_lerobot.evaluation.actors.chunk_policy import BatchingError
 from robocasa_lerobot.evaluation.actors.policy_runner import load_actor
+from robocasa_lerobot.evaluation.actors.remote_actor import RemoteActor
 from robocasa_lerobot.evaluation.planning.trials import TrialSpec
 from robocasa_lerobot.evaluation.records.results import CRASHED, DIVERGED, file_name
+from robocasa_lerobot.evaluation.remote.failures import LostError
 from robocasa_lerobot.evaluation.run.film import Film
 from robocasa_lerobot.evaluation.run.messages import Alive, Finished, Ready, Refused
 from robocasa_lerobot.evaluation.run.policy_server import RemotePolicy
@@ -116,9 +119,10 @@ class _Worker:
         except Exception as error:
             # What the trial left behind may be broken as well: the next one starts from a new env and policy.
             self.close_env()
-            self._policy = None
+            self._drop_policy()
             kind = DIVERGED if isinstance(error, DivergedError) else CRASHED
-            return Finished(Outcome(), None, time.monotonic() - started, traceback.format_exc(), kind)
+            lost = str(error) if isinstance(error, LostError) else None
+            return Finished(Outcome(), None, time.monotonic() - started, traceback.format_exc(), kind, lost)
         return Finished(outcome, video, time.monotonic() - started, None)
 
     def close_env(self) -> None:
@@ -129,12 +133,18 @@ class _Worker:
             except Exception:
                 traceback.print_exc()
 
+    def _drop_policy(self) -> None:
+        if self._policy is not None:
+            actor, self._policy = self._policy[1], None
+            if isinstance(actor, RemoteActor):
+                actor.close()
+
     def _alive(self, step: int) -> None:
         self._connection.send(Alive(step))
 
     def _policy_of(self, label: str) -> Actor | Refused:
         if self._policy is None or self._policy[0] != label:
-            self._policy = None  # Free the last one first: two large policies may not fit.
+            self._drop_policy()  # Free the last one first: two large policies may not fit.
             settings = self._settings
             source = settings.sources[label]
             if label in settings.served:
@@ -142,11 +152,17 @@ class _Worker:
                 self._policy = (label, self._remote.actor(label))
                 return self._policy[1]
             try:
-                if not source.is_reference:
+                if source.is_checkpoint:
                     import torch
 
                     torch.set_num_threads(settings.threads)
-                actor = load_actor(source, settings.device, settings.executed_steps, settings.width)
+                waiting = partial(self._alive, -1)
+                actor = load_actor(source, settings.device, settings.executed_steps, settings.width, waiting)
+            except LostError as error:
+                return Refused(
+                    f"policy {label!r} cannot be asked any more: {error}. What has been recorded stays; start the "
+                    "server again, and the same command goes on."
+                )
             except Exception as error:
                 # No other trial will load it either.
                 detail = "" if isinstance(error, UserError) else "\n" + traceback.format_exc()

@@ -22,6 +22,8 @@ from robocasa_lerobot.evaluation.run.rollout import Outcome
 from robocasa_lerobot.evaluation.run.worker import WorkerSettings, worker_main
 
 MAX_ATTEMPTS = 2
+# Of a trial whose policy behind a socket is lost each time; then the run ends, because no other trial will fare better.
+MAX_LOST = 3
 # A worker that dies before it is ready dies of its surroundings (imports, memory); trying for ever would not help.
 MAX_FAILED_STARTS = 3
 # A start takes seconds, on a machine with too much to do many.
@@ -76,7 +78,7 @@ class WorkerPool:
     ) -> None:
         self._settings, self._size, self._stall_seconds = settings, size, stall_seconds
         self._servers = servers
-        self._context = process_context(not all(source.is_reference for source in settings.sources.values()))
+        self._context = process_context(any(source.is_checkpoint for source in settings.sources.values()))
         self._slots: list[_Slot] = []
         self._failed_starts = 0
 
@@ -107,7 +109,10 @@ class WorkerPool:
                     if slot.ready and slot.attempt is None and pending and self._may_begin(pending[0].spec):
                         self._give(slot, pending.popleft())
                 for completed in self._collect():
-                    if completed.result.error is not None and completed.attempts < MAX_ATTEMPTS:
+                    lost = completed.result.lost
+                    if lost is not None and completed.attempts >= MAX_LOST:
+                        raise UserError(_gave_up(completed, lost))
+                    if completed.result.error is not None and (lost is not None or completed.attempts < MAX_ATTEMPTS):
                         pending.appendleft(_Attempt(completed.spec, completed.attempts + 1, completed.result))
                     else:
                         yield completed
@@ -211,3 +216,11 @@ class WorkerPool:
                 slot.process.join()
             slot.connection.close()
         self._slots.clear()
+
+
+def _gave_up(completed: Completed, why: str) -> str:
+    spec = completed.spec
+    return (
+        f"policy {spec.label!r} was lost {completed.attempts} times during {spec.task} trial {spec.trial}: {why}. What "
+        "has been recorded stays; start the server again, and the same command goes on."
+    )

@@ -5,12 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from robocasa_lerobot.evaluation.records.results import TRIALS_FILE
+from robocasa_lerobot.evaluation.records.results import TRIALS_FILE, PolicyInfo
 from robocasa_lerobot.evaluation.report.model import Block, Listing, Section
 from robocasa_lerobot.evaluation.report.policies import PolicyResult, ReportData, describe_policy
 from robocasa_lerobot.evaluation.report.sections.beside_published import horizon_phrase, success_phrase
 
 MAX_ERRORS = 30
+MAX_SAID = 20  # lines of what a server says about itself
 
 
 def section(data: ReportData) -> Section:
@@ -20,11 +21,30 @@ def section(data: ReportData) -> Section:
         items = (
             ("what", describe_policy(policy)),
             ("path", policy.info.path),
-            ("weights", f"{policy.info.fingerprint} (SHA-256)"),
+            *_what_decided(policy.info),
             ("results", f"{policy.folder.name}/{TRIALS_FILE}"),
         )
         parts.append(Listing(policy.label, items, folded=len(data.single) > 2))
     return Section("settings", "Settings and provenance", parts=tuple(parts))
+
+
+def _what_decided(info: PolicyInfo) -> list[tuple[str, str]]:
+    """What made the actions: weights that were hashed, or a server that was asked."""
+    if info.remote is None:
+        return [("weights", f"{info.fingerprint} (SHA-256)")]
+    remote = flat(info.remote)
+    said = [
+        (f"server: {name.removeprefix('metadata.')}", _plain(remote[name]))
+        for name in remote
+        if name.startswith("metadata.")
+    ]
+    return [
+        ("weights", f"{info.remote['weights']}: they are behind a socket"),
+        ("key map", f"{info.remote['keys']}; with the server's metadata {info.fingerprint} (SHA-256)"),
+        ("executed steps of each answer", str(info.remote["key_map"]["executed_steps"])),
+        ("outcomes", str(info.remote["outcomes"])),
+        *said[:MAX_SAID],
+    ]
 
 
 def errors(data: ReportData) -> Section | None:

@@ -1,0 +1,97 @@
+"""The policies of an evaluation: checkpoints are read, servers are asked, and all agree on one size of pictures."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Mapping
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Any
+
+from robocasa_lerobot.errors import UserError
+from robocasa_lerobot.evaluation.actors.checkpoint import PolicySource, common_image_size, read_source
+from robocasa_lerobot.evaluation.config.evaluation import EvaluationConfig, RemoteSettings, output_folder
+from robocasa_lerobot.evaluation.records.results import TRIALS_FILE, read_results
+from robocasa_lerobot.evaluation.remote.address import Address, is_address, parse_address
+from robocasa_lerobot.evaluation.remote.client import Timeouts
+from robocasa_lerobot.evaluation.remote.introduction import Introduction, RemotePolicy
+
+Described = Mapping[str, Any]  # what a header says of a policy behind a socket
+
+
+def open_sources(config: EvaluationConfig, ask: bool = True) -> tuple[list[PolicySource], int]:
+    """The policies that the settings name, in their order, and the pixels at which the env renders.
+
+    Servers are asked once, which is where mistakes in their key maps come up. Without `ask`, what the headers in the
+    output folder say of them counts.
+
+    Raises:
+        UserError: a folder that is no checkpoint, a server that cannot be reached or whose first answer does not fit,
+            pictures of different sizes.
+    """
+    policy = config.policy
+    labels: list[str | None] = [*policy.label] or [None] * len(policy.path)
+    remotes = sum(map(is_address, policy.path))
+    given: list[str | None] = [*policy.keys] or [None]
+    keys = iter(given if len(given) == remotes else given * remotes)
+    recorded = {} if ask or not remotes else _recorded_remotes(output_folder(config, _labels(config)))
+    sources: list[PolicySource] = []
+    asked: dict[int, Introduction] = {}
+    with ExitStack() as stack:
+        for place, (path, label) in enumerate(zip(policy.path, labels, strict=True)):
+            if not is_address(path):
+                sources.append(read_source(path, label))
+                continue
+            address, key_map = parse_address(path), next(keys)
+            label = label or default_label(address)
+            if not ask:
+                sources.append(_known(label, _recorded(address, recorded)))
+                continue
+            patience = patience_of(config.remote)
+            introduction = asked[place] = Introduction(address, key_map, config.executed_steps, patience)
+            stack.callback(introduction.close)
+            size = (introduction.image_size, introduction.image_size)
+            sources.append(PolicySource(label, address.text, address.protocol, fingerprint="", image_size=size))
+        image_size = common_image_size(sources, config.env.image_size)
+        for place, introduction in asked.items():
+            print(f"{sources[place].path}: a first request; some servers compile for minutes ...", file=sys.stderr)
+            sources[place] = _known(sources[place].label, introduction.probe(image_size))
+    return sources, image_size
+
+
+def default_label(address: Address) -> str:
+    """What a policy behind a socket is called, unless the user says."""
+    return f"{address.protocol}-{address.host.strip('[]').replace(':', '-')}-{address.port}"
+
+
+def patience_of(settings: RemoteSettings) -> Timeouts:
+    """The settings as the clients take them."""
+    return Timeouts(settings.connect_seconds, settings.answer_seconds, settings.first_answer_seconds)
+
+
+def _labels(config: EvaluationConfig) -> list[str]:
+    paths = config.policy.path
+    return config.policy.label or [
+        default_label(parse_address(path)) if is_address(path) else read_source(path).label for path in paths
+    ]
+
+
+def _recorded_remotes(out: Path) -> dict[str, Described]:
+    """What the headers in a results folder and in those of its shards say of policies behind sockets, by address."""
+    found: dict[str, Described] = {}
+    for file in sorted(out.glob(f"**/{TRIALS_FILE}")):
+        for header in read_results(file).headers.values():
+            found |= {info.path: info.remote for info in header.policies.values() if info.remote is not None}
+    return found
+
+
+def _recorded(address: Address, recorded: Mapping[str, Described]) -> RemotePolicy:
+    if address.text not in recorded:
+        raise UserError(f"no results of a run with {address.text}; found {', '.join(recorded) or 'none'}.")
+    return RemotePolicy.recorded(address, recorded[address.text])
+
+
+def _known(label: str, remote: RemotePolicy) -> PolicySource:
+    size = (remote.key_map.image_size, remote.key_map.image_size)
+    text = remote.address.text
+    return PolicySource(label, text, remote.address.protocol, remote.fingerprint, image_size=size, remote=remote)
