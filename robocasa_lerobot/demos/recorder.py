@@ -184,9 +184,7 @@ def record_episode(
 def stage_rows(env: KitchenEnv, log: StageLog) -> list[dict[str, Any]]:
     """What `ep_meta` says of the stages of the running episode."""
     stages = env.declaration.stages
-    return [
-        {"text": stage_text(stage, env.scene), **row} for stage, row in zip(stages, log.table(stages), strict=True)
-    ]
+    return [{"text": stage_text(stage, env.scene), **row} for stage, row in zip(stages, log.table(stages), strict=True)]
 
 
 def _kitchens(env: KitchenEnv) -> dict[str, Any]:

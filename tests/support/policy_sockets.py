@@ -226,3 +226,21 @@ def msgpack_numpy_map(value: Any) -> Any:
     assert isinstance(value, np.ndarray), value
     shape, data = value.shape, value.tobytes()
     return {b"nd": True, b"type": value.dtype.str, b"kind": b"", b"shape": shape, b"data": data}
+
+
+class ScriptedWebsocket(_WebsocketServer):
+    """Frames as bytes: those of `greeting` first, then for each frame the next entry of `replies`, or nothing."""
+
+    def __init__(self, greeting: list[bytes], replies: list[bytes | str | None]) -> None:
+        self._greeting, self._replies = greeting, replies
+        super().__init__()
+
+    def _handle(self, connection: ServerConnection) -> None:
+        replies = iter(self._replies)
+        for frame in self._greeting:
+            connection.send(frame)
+        for frame in connection:
+            self.requests.append(frame)
+            reply = next(replies, None)
+            if reply is not None:
+                connection.send(reply)

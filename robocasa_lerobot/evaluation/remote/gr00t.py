@@ -2,7 +2,7 @@
 
 Source of the protocol: Isaac-GR00T, `gr00t/eval/service.py` of N1.5 and `gr00t/policy/server_client.py` of N1.6 and
 N1.7. N1.5 hands `data` over as one argument, the others as keyword arguments: what the modality configuration looks
-like tells them apart, and so does the complaint about an unexpected keyword.
+like tells them apart, and so does the complaint about unexpected arguments.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from robocasa_lerobot.wire.codec import MAX_MESSAGE_BYTES, WireError, decode, en
 N15, N16, N17 = "N1.5", "N1.6", "N1.7"
 _MARKERS = ("__ModalityConfig_class__", "__ModalityConfig__")
 _RETRY_SECONDS = 0.25
-_UNEXPECTED = "unexpected keyword argument"
+_OTHER_CALL = ("unexpected keyword argument", "required positional argument")  # of a service that is asked wrongly
 
 
 class Gr00tClient:
@@ -80,7 +80,7 @@ class Gr00tClient:
         try:
             answer = self._get_action(observation, seconds)
         except ServerSaidError as error:
-            if _UNEXPECTED not in str(error) or self._answered:
+            if self._answered or not any(words in str(error) for words in _OTHER_CALL):
                 raise
             self._version = N16 if self._version in (None, N15) else N15
             self.metadata["version"] = self._version
