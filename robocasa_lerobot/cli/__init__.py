@@ -29,6 +29,7 @@ class Subcommand:
 
 SUBCOMMANDS: dict[str, Subcommand] = {
     "demos": Subcommand("robocasa_lerobot.cli.demos", "record demonstrations of tasks as HDF5"),
+    "teleop": Subcommand("robocasa_lerobot.cli.teleop", "record demonstrations by hand, in a browser"),
     "replay": Subcommand("robocasa_lerobot.cli.replay", "check that demonstrations can be replayed"),
     "convert": Subcommand("robocasa_lerobot.cli.convert", "convert demonstration files to a LeRobotDataset v3.0"),
     "inspect": Subcommand(

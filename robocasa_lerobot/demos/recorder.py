@@ -91,7 +91,8 @@ class EpisodeBuffer:
 
     def drop_from(self, step: int) -> None:
         """Forget step `step` and all after it."""
-        for values in (self.states, self.actions, self.rewards, self.stages, self.terms, *self.observations.values()):
+        lists: list[list[Any]] = [self.states, self.actions, self.rewards, self.stages, self.terms]
+        for values in (*lists, *self.observations.values()):
             del values[step:]
 
     def recording(

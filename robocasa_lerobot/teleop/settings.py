@@ -9,6 +9,8 @@ from typing import Any
 from robocasa_lerobot.errors import UserError
 
 PICTURE_QUALITY = 80  # of JPEG: 37 kB for three pictures of 256x256
+STALE_S = 0.5  # without an acknowledged picture, after which time stands
+EXPIRES_S = 0.25  # of an input that nobody repeats
 LONGEST_STEPS = 20_000  # of an episode; its states are kept for undoing, 17 kB each
 
 
@@ -28,6 +30,7 @@ class TeleopSettings:
         operator: name that is written into each episode, or "".
         hide_goal: do not tell whether the goal's terms hold.
         policy: name of the policy that drives where nobody intervenes, or "".
+        free_view: address of MuJoCo's own viewer, or "".
     """
 
     task: str
@@ -42,6 +45,7 @@ class TeleopSettings:
     operator: str = ""
     hide_goal: bool = False
     policy: str = ""
+    free_view: str = ""
 
     def __post_init__(self) -> None:
         if self.episodes < 1 or self.image_size < 16:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -70,24 +70,55 @@ class FreeCamera:
         return camera
 
 
-def take(env: KitchenEnv, seen: dict[str, Picture], cameras: Sequence[str], free: FreeCamera) -> list[dict[str, Any]]:
-    """Pictures of the present state: `camera`, `width`, `height` and `jpeg` of each.
+class Views:
+    """Draws what clients see of a kitchen, in one size.
 
     Args:
-        env: in that state.
-        seen: pictures of it that there are already.
-        cameras: wanted, of `SEEN`.
-        free: where the free one is.
+        size: height and width, pixels.
+        preset: "fast" or "quality".
     """
-    out = []
-    for camera in cameras:
-        if camera == FREE:
-            picture = env.render_camera(free.camera(env.data))
-        else:
-            picture = seen[camera] if camera in seen else env.render_camera(camera)
-        height, width = picture.shape[:2]
-        out.append({"camera": camera, "width": width, "height": height, "jpeg": jpeg(picture)})
-    return out
+
+    def __init__(self, size: int, preset: str) -> None:
+        self._size, self._shadows = size, preset == "quality"
+        self._renderer: SceneRenderer | None = None
+
+    def open(self, env: KitchenEnv) -> None:
+        """Of the running episode's kitchen from now on.
+
+        Raises:
+            NoOpenGLError: nothing on this machine can render.
+        """
+        self.close()
+        self._renderer = SceneRenderer(env.model, self._size, self._size, shadows=self._shadows)
+
+    def close(self) -> None:
+        """Free what is kept of a kitchen."""
+        if self._renderer is not None:
+            self._renderer.close()
+            self._renderer = None
+
+    def take(
+        self, env: KitchenEnv, seen: Mapping[str, Picture], cameras: Sequence[str], free: FreeCamera
+    ) -> list[tuple[dict[str, Any], bytes]]:
+        """Pictures of the present state: of each what it is, and the JPEG.
+
+        Args:
+            env: in that state.
+            seen: pictures of it that there are already; those of another size are not used.
+            cameras: wanted, of `SEEN`.
+            free: where the free one is.
+        """
+        assert self._renderer is not None, "no kitchen is open"
+        pictures = {name: picture for name, picture in seen.items() if len(picture) == self._size}
+        missing = [name for name in cameras if name not in pictures and name != FREE]
+        pictures |= dict(zip(missing, self._renderer.pictures(env.data, missing), strict=True))
+        if FREE in cameras:
+            pictures[FREE] = self._renderer.render(env.data, free.camera(env.data))
+        out = []
+        for name in cameras:
+            data = jpeg(pictures[name])
+            out.append(({"camera": name, "bytes": len(data), "width": self._size, "height": self._size}, data))
+        return out
 
 
 @dataclass(frozen=True)
@@ -101,10 +132,9 @@ class KitchenMap:
     top: float
     metres_per_pixel: float
 
-    def describe(self, url: str) -> dict[str, Any]:
-        """As it is told to clients."""
+    def describe(self) -> dict[str, Any]:
+        """As it is told to clients, but for its address."""
         return {
-            "url": url,
             "width": self.width,
             "height": self.height,
             "left": self.left,
@@ -116,20 +146,16 @@ class KitchenMap:
 def kitchen_map(env: KitchenEnv) -> KitchenMap:
     """Draw the running episode's kitchen from above; the robot is left out: it moves."""
     room = env.scene.layout.room
-    left, right = room["x_min"] if "x_min" in room else 0.0, room["x_max"]
-    bottom, top = room["y_min"], room["y_max"] if "y_max" in room else 0.0
-    left, right, bottom, top = (
-        left - _MAP_MARGIN_M,
-        right + _MAP_MARGIN_M,
-        bottom - _MAP_MARGIN_M,
-        top + _MAP_MARGIN_M,
-    )
+    left, right = room["x_min"] - _MAP_MARGIN_M, room["x_max"] + _MAP_MARGIN_M
+    bottom, top = room["y_min"] - _MAP_MARGIN_M, _MAP_MARGIN_M  # the back wall stands at y = 0
     scale = max(right - left, top - bottom) / _MAP_PIXELS
     width, height = round((right - left) / scale), round((top - bottom) / scale)
     model, data = env.model, env.data
     groups, fovy = model.geom_group.copy(), model.vis.global_.fovy
     robot = env.scene.subtree(env.robot.names.base)[model.geom_bodyid]
-    low = data.geom_xpos[:, 2] - model.geom_rbound
+    down = data.geom_xmat.reshape(-1, 3, 3)[:, 2]  # the world's z in the geoms' axes
+    middle = data.geom_xpos[:, 2] + (down * model.geom_aabb[:, :3]).sum(axis=1)
+    low = middle - (np.abs(down) * model.geom_aabb[:, 3:]).sum(axis=1)
     planes = model.geom_type == int(mujoco.mjtGeom.mjGEOM_PLANE)
     camera = mujoco.MjvCamera()
     camera.lookat = [(left + right) / 2, (bottom + top) / 2, 0.0]

@@ -11,13 +11,11 @@ from robocasa_lerobot.demos.motion import CLOSED, DEAD_ZONES, FROM_ACHIEVED, FRO
 from robocasa_lerobot.envs.robots.robot import RobotNames
 from robocasa_lerobot.teleop.messages import Message
 
-EXPIRES_S = 0.25  # of an input that nobody repeats
 TURN_SHARE = 0.5  # of a full command for a turn at full deflection: 70 degrees a second
 TORSO_SHARE = 0.2  # as RoboCasa's devices have it
 _STILL = 1e-3  # deflections below it are none
 _WRIST_CAMERA = "robot0_eye_in_hand"
-# Columns: forward, left and up of a camera's picture in MuJoCo's axes of cameras (x right, y up, z backwards), and of
-# the hand's axes (z is where the fingers point) as the wrist camera shows them.
+# Columns: forward, left and up of a camera's picture in MuJoCo's axes of cameras (x right, y up, z backwards).
 _OF_CAMERA = np.array([[0.0, -1.0, 0.0], [0.0, 0.0, 1.0], [-1.0, 0.0, 0.0]])
 
 
@@ -81,7 +79,8 @@ class Steering:
         Mode "arm": base zeros, control mode -1; "base": arm zeros, +1; "both": all, +1 while the base is told to move.
         """
         gripper = CLOSED if self.closed else OPEN
-        arm, base = np.zeros(6), np.zeros(4)
+        arm: Array = np.zeros(6)
+        base: Array = np.zeros(4)
         if self.mode != "base":
             axes = motion_axes(model, data, robot, held.frame or self.frame, held.camera or self.camera)
             wanted = np.array(held.arm) * self.speed

@@ -1,0 +1,1 @@
+"""Who drives the robot, and how what is held becomes an action."""
