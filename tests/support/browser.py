@@ -77,15 +77,15 @@ class Browser:
         os.close(self._answers)
         self._profile.cleanup()
 
-    def open(self, path: Path, width: int = 1280, height: int = 900, dark: bool = False) -> None:
-        """Load a file; `messages` are then what its console said, `requests` what it asked for beside itself."""
+    def open(self, page: Path | str, width: int = 1280, height: int = 900, dark: bool = False) -> None:
+        """Load a file or address; `messages` are then what its console said, `requests` what it asked for as well."""
         self.messages, self.requests, self._loaded = [], [], False
         theme = [{"name": "prefers-color-scheme", "value": "dark" if dark else "light"}]
         self._send("Emulation.setEmulatedMedia", features=theme)
         self._send(
             "Emulation.setDeviceMetricsOverride", width=width, height=height, deviceScaleFactor=1, mobile=width < 600
         )
-        self._send("Page.navigate", url=path.resolve().as_uri())
+        self._send("Page.navigate", url=page.resolve().as_uri() if isinstance(page, Path) else page)
         deadline = time.monotonic() + self._timeout_s
         while not self._loaded:
             self._read(deadline)
@@ -95,6 +95,53 @@ class Browser:
         answer = self._send("Runtime.evaluate", expression=expression, returnByValue=True, awaitPromise=True)
         assert "exceptionDetails" not in answer, answer["exceptionDetails"]
         return answer["result"].get("value")
+
+    def until(self, expression: str, timeout_s: float = 60.0) -> Any:
+        """The value of a JavaScript expression as soon as it is true; asked for ten times a second."""
+        deadline = time.monotonic() + timeout_s
+        while not (value := self.ask(expression)):
+            assert time.monotonic() < deadline, f"not within {timeout_s:g} s: {expression}; console: {self.messages}"
+            time.sleep(0.1)
+        return value
+
+    def before_load(self, script: str) -> None:
+        """Run a script in every page before its own."""
+        self._send("Page.addScriptToEvaluateOnNewDocument", source=script)
+
+    def key(self, code: str, down: bool, key: str = "", repeat: bool = False) -> None:
+        """Press or let go of a key, named by its place (`KeyW`, `Space`)."""
+        kind = "keyDown" if down else "keyUp"
+        self._send(
+            "Input.dispatchKeyEvent", type=kind, code=code, key=key or code.removeprefix("Key"), autoRepeat=repeat
+        )
+
+    def mouse(self, kind: str, x: float, y: float, **more: Any) -> None:
+        """`mousePressed`, `mouseMoved`, `mouseReleased` (left button) or `mouseWheel` with `deltaY`."""
+        held = (
+            {} if kind == "mouseWheel" else {"button": "left", "buttons": int(kind != "mouseReleased"), "clickCount": 1}
+        )
+        self._send("Input.dispatchMouseEvent", type=kind, x=x, y=y, **held, **more)
+
+    def touch(self, kind: str, *points: tuple[float, float]) -> None:
+        """`touchStart`, `touchMove` or `touchEnd` with the fingers that are down."""
+        self._send("Input.dispatchTouchEvent", type=kind, touchPoints=[{"x": x, "y": y} for x, y in points])
+
+    def line(self, latency_ms: float, bytes_per_second: float = -1) -> None:
+        """Have everything from the network, WebSockets too, come later and slower."""
+        rates = dict.fromkeys(("downloadThroughput", "uploadThroughput"), bytes_per_second)
+        self._send("Network.emulateNetworkConditions", offline=False, latency=latency_ms, **rates)
+
+    def with_focus(self, on: bool = True) -> None:
+        """Have pages believe that their window has the keys, as no window of a headless browser does."""
+        self._send("Emulation.setFocusEmulationEnabled", enabled=on)
+
+    def box(self, selector: str) -> tuple[float, float, float, float]:
+        """Left, top, width and height of an element, CSS pixels of the window."""
+        asked = (
+            f"(r => [r.left, r.top, r.width, r.height])(document.querySelector({selector!r}).getBoundingClientRect())"
+        )
+        left, top, width, height = self.ask(asked)
+        return left, top, width, height
 
     def screenshot(self, path: Path, top: int = 0, height: int | None = None) -> None:
         """The page from `top` for `height` pixels (default: to its end) as PNG."""
