@@ -1,0 +1,111 @@
+// Time: pause, undo, marks, the end of an episode, its review, and what becomes of it.
+
+import { $, choice, chosen, make, show, text } from "./dom.js";
+import { hold } from "./touch.js";
+
+const REPEAT_MS = 80;
+const UNDO_SPEED = 2; // times real time
+const SPEEDS = [1, 4];
+
+export class Transport {
+  constructor(send) {
+    this.send = send;
+    this.head = null;
+    this.undoing = null;
+    const click = (id, action) =>
+      $(id).addEventListener("click", (event) => {
+        action();
+        if (event.detail) event.currentTarget.blur(); // a click must not leave Space and Enter on the button
+      });
+    click("pause", () => this.pause());
+    hold($("undo"), (on) => this.undo(on));
+    click("mark", () => send({ type: "mark" }));
+    click("back-to-mark", () => send({ type: "back_to_mark" }));
+    click("end", () => send({ type: "end" }));
+    click("stop-assist", () => send({ type: "stop" }));
+    click("finish", () => send({ type: "finish" }));
+    for (const id of ["redo", "review-redo"]) click(id, () => send({ type: "redo" }));
+    for (const id of ["discard", "review-discard"]) click(id, () => $("discard-dialog").showModal());
+    click("veil-button", () => send({ type: "resume" }));
+    click("save", () => send({ type: "save", trim: $("trim").checked }));
+    click("continue", () => send({ type: "continue" }));
+    click("play", () => {
+      const review = this.head?.review;
+      const again = review && !review.playing && this.head.step >= review.steps - 1;
+      send({ type: "review", play: !review?.playing, ...(again ? { seek: 0 } : {}) });
+    });
+    choice($("review-speed"), SPEEDS.map((speed) => [speed, `${speed}×`]), (speed) => send({ type: "review", speed }));
+    $("seek").addEventListener("input", () => send({ type: "review", play: false, seek: Number($("seek").value) }));
+    $("discard-dialog").addEventListener("close", () => {
+      if ($("discard-dialog").returnValue !== "ok") return;
+      const reason = $("reason-text").value.trim() || $("reason").value;
+      send({ type: "discard", reason });
+      $("reason-text").value = "";
+    });
+  }
+
+  setUp(hello) {
+    $("reason").replaceChildren(...hello.discard_reasons.map((reason) => make("option", {}, reason)));
+  }
+
+  pause() {
+    this.send({ type: this.head?.phase === "paused" ? "resume" : "pause" });
+  }
+
+  undo(on) {
+    if (on === Boolean(this.undoing)) return;
+    clearInterval(this.undoing);
+    this.undoing = null;
+    if (on) {
+      const say = () => this.send({ type: "rewind", on: true, speed: UNDO_SPEED });
+      say();
+      this.undoing = setInterval(say, REPEAT_MS);
+    } else this.send({ type: "rewind", on: false });
+  }
+
+  frame(head) {
+    this.head = head;
+    const { phase, review } = head;
+    const ended = phase === "review" || phase === "saving";
+    show($("drive-bar"), !ended && phase !== "done");
+    show($("review-bar"), ended);
+    text($("pause"), phase === "paused" ? "Go on" : "Pause");
+    $("pause").disabled = !["running", "paused"].includes(phase) || !head.operator;
+    for (const id of ["undo", "mark", "back-to-mark", "end"]) $(id).disabled = !["running", "paused", "rewinding"].includes(phase) || !head.operator;
+    for (const id of ["redo", "discard", "finish"]) $(id).disabled = !head.operator || phase === "loading";
+    show($("stop-assist"), Boolean(head.assisted));
+    text($("stop-assist"), head.assisted?.planning ? "Stop planning" : "Stop helping");
+    if (review) this.review(head, review);
+    this.track(head);
+  }
+
+  review(head, review) {
+    text($("play"), review.playing ? "Pause" : "Play");
+    chosen($("review-speed"), review.speed);
+    const seek = $("seek");
+    if (Number(seek.max) !== review.steps - 1) seek.max = String(Math.max(1, review.steps - 1));
+    if (document.activeElement !== seek || review.playing) seek.value = String(head.step);
+    show($("trim").parentElement, review.idle_head > 0);
+    text($("trim-text"), `leave out ${review.idle_head} idle steps at the start`);
+    const saving = head.phase === "saving";
+    $("save").disabled = saving || !review.success || !head.operator;
+    $("save").title = review.success ? "" : "The goal does not hold at the end";
+    $("continue").disabled = saving || review.success;
+    for (const id of ["play", "review-redo", "review-discard"]) $(id).disabled = saving;
+  }
+
+  track(head) {
+    const all = head.review ? head.review.steps : head.horizon;
+    const share = Math.min(1, head.step / Math.max(1, all));
+    $("track-fill").style.width = `${(100 * share).toFixed(2)}%`;
+    const marks = JSON.stringify([head.review ? [] : head.marks, all]);
+    if (marks === this.marks) return;
+    this.marks = marks;
+    for (const old of $("track").querySelectorAll("b")) old.remove();
+    for (const step of head.review ? [] : head.marks) {
+      const mark = make("b");
+      mark.style.left = `${(100 * step) / Math.max(1, all)}%`;
+      $("track").append(mark);
+    }
+  }
+}
