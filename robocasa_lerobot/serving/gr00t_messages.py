@@ -66,7 +66,7 @@ def to_actions(chunks: Sequence[NDArray[np.float32]], rows: Rows) -> dict[str, N
 
 def modality_config(served: Served, version: str) -> dict[str, Any]:
     """What the policy takes and gives: keys and offsets in control steps, as that version's clients read it."""
-    history = list(range(1 - served.history, 1))
+    history = list(served.offsets)
     keys: dict[str, tuple[list[int], Sequence[str]]] = {
         "video": (history, served.cameras),
         "state": (history, [part.name for part in contract.STATE_PARTS]),

@@ -51,9 +51,9 @@ class Host:
         self._compute = ComputeThread(policy)
         self._seed, self._sessions = seed, itertools.count()
         served = self.served
-        self.wanted = Wanted(served.cameras, served.image_size, served.history, resize, repeat_history)
+        self.wanted = Wanted(served.cameras, served.image_size, served.offsets, resize, repeat_history)
         # Of a client that sends every step: the history is put together here.
-        self.wanted_now = dataclasses.replace(self.wanted, history=1)
+        self.wanted_now = dataclasses.replace(self.wanted, offsets=(0,))
 
     def session(self) -> Session:
         """A new client's."""

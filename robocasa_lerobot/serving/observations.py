@@ -61,7 +61,7 @@ _MAX_INSTRUCTION: Final = 4096  # characters
 
 @dataclass(frozen=True)
 class Asked:
-    """What a client's observation says: the last `history` observations, and how it wants its actions.
+    """What a client's observation says: the observations that the policy looks at, and how it wants its actions.
 
     `stored_order`: flat actions are wanted in stored order, else in HDF5 order.
     """
@@ -73,14 +73,14 @@ class Asked:
 
 @dataclass(frozen=True)
 class Wanted:
-    """What a policy needs: cameras and their (height, width), and how many observations of consecutive steps.
+    """What a policy needs: cameras and their (height, width), and which observations, by their control steps.
 
     `resize`: pictures of another size are scaled. `repeat`: one observation may stand for all of the history.
     """
 
     cameras: tuple[str, ...]
     image_size: tuple[int, int] | None
-    history: int
+    offsets: tuple[int, ...]
     resize: bool = False
     repeat: bool = False
 
@@ -197,14 +197,14 @@ def _with_history(
     state: NDArray[np.float64], pictures: dict[str, NDArray[np.uint8]], wanted: Wanted
 ) -> tuple[NDArray[np.float64], dict[str, NDArray[np.uint8]]]:
     found = len(state)
-    if found == wanted.history:
+    count = len(wanted.offsets)
+    if found == count:
         return state, pictures
     if found == 1 and wanted.repeat:
-        times = wanted.history
-        return np.repeat(state, times, 0), {camera: np.repeat(one, times, 0) for camera, one in pictures.items()}
+        return np.repeat(state, count, 0), {camera: np.repeat(one, count, 0) for camera, one in pictures.items()}
     raise RequestError(
-        f"observation: found {found} step(s), expected the last {wanted.history} control steps, oldest first: "
-        f"pictures (T, H, W, 3) and states (T, {contract.STATE_SIZE}) with T = {wanted.history}; in a trial's first "
+        f"observation: found {found} step(s), expected those at control steps {list(wanted.offsets)}, 0 the newest: "
+        f"pictures (T, H, W, 3) and states (T, {contract.STATE_SIZE}) with T = {count}; in a trial's first "
         "steps, its first observation is repeated. (`serve --repeat-history` takes one for all, at the cost of a "
         "policy that believes it stands still.)"
     )

@@ -28,17 +28,22 @@ Answer = NDArray[np.float32] | Exception
 class Served:
     """What clients are told about the policy.
 
-    `executed` actions are answered to one request, from the last `history` observations of consecutive control steps;
-    the policy itself predicts `horizon` of them, for `width` requests at once. `image_size` is (height, width) of the
-    pictures of `cameras`, None where it looks at none.
+    `executed` actions are answered to one request, from the observations at `offsets`, control steps ascending to 0,
+    the newest; the policy itself predicts `horizon` of them, for `width` requests at once. `image_size` is (height,
+    width) of the pictures of `cameras`, None where it looks at none.
     """
 
     source: PolicySource
     cameras: tuple[str, ...]
     executed: int
-    history: int
+    offsets: tuple[int, ...]
     horizon: int
     width: int = 1
+
+    @property
+    def history(self) -> int:
+        """Number of observations of a request."""
+        return len(self.offsets)
 
     @property
     def image_size(self) -> tuple[int, int] | None:
@@ -70,7 +75,7 @@ class Served:
             "fps": contract.CONTROL_HZ,
             "action_horizon": self.horizon,
             "executed_steps": self.executed,
-            "history_offsets": list(range(1 - self.history, 1)),
+            "history_offsets": list(self.offsets),
             "cameras": list(self.cameras),
             "image_size": None if self.image_size is None else list(self.image_size),
             "state_parts": [[part.name, part.size] for part in contract.STATE_PARTS],
@@ -223,7 +228,7 @@ def load_served(
             )
         if executed_steps not in (None, 1):
             raise UserError(f"executed_steps={executed_steps} does not fit {source.type}: it acts step by step.")
-        return ServedPolicy(Served(source, (), 1, 1, 1), None, lambda: load_reference(source))
+        return ServedPolicy(Served(source, (), 1, (0,), 1), None, lambda: load_reference(source))
     import torch
 
     torch.set_num_threads(threads)
@@ -237,13 +242,13 @@ def load_served(
                 f"policy.path {source.path}: a policy of type {source.type!r} keeps observations or actions of earlier "
                 "steps and answers step by step: leave --executed-steps out."
             )
-        return ServedPolicy(Served(source, cameras, 1, 1, 1), None, lambda: StepPolicy(_fork(loaded)))
+        return ServedPolicy(Served(source, cameras, 1, (0,), 1), None, lambda: StepPolicy(_fork(loaded)))
     width = width or default_width([source.type], device)
     chunks = ChunkPolicy(loaded, width)
     horizon = next((int(getattr(loaded.config, n)) for n in ("horizon", "chunk_size") if hasattr(loaded.config, n)), 0)
     shape = chunks.shape
     return ServedPolicy(
-        Served(source, cameras, shape.executed, shape.history, max(horizon, shape.executed), width), chunks, None
+        Served(source, cameras, shape.executed, shape.offsets, max(horizon, shape.executed), width), chunks, None
     )
 
 

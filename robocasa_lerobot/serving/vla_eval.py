@@ -145,7 +145,7 @@ class Episode:
         self._host, self._session = host, session
         self._seed, _ = session.next()
         self._stored_order = False
-        shape = ChunkShape(host.served.executed, host.served.history)
+        shape = ChunkShape(host.served.executed, host.served.offsets)
         self._actor = ChunkActor(host.served.source.label, shape, self._predict)
         self._actor.reset(self._seed, None)
         self._step = 0

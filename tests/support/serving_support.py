@@ -114,5 +114,5 @@ class BlockedActor:
 
 def blocked_host(begun: threading.Event, go: threading.Event) -> Host:
     """A host of `BlockedActor`."""
-    served = Served(PolicySource("blocked", "blocked", "blocked", "none"), (), 1, 1, 1)
+    served = Served(PolicySource("blocked", "blocked", "blocked", "none"), (), 1, (0,), 1)
     return Host(ServedPolicy(served, None, lambda: BlockedActor(begun, go)))
