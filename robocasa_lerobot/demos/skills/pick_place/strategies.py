@@ -15,6 +15,7 @@ from robocasa_lerobot.demos.skills.pick_place.grasp_strategy import (
     ANY_APPROACH,
     FROM_A_SLOT,
     FROM_CRISPER,
+    OUT_M,
     OUT_OF_DRAWER,
     GraspStrategy,
     in_radians,
@@ -45,6 +46,7 @@ from robocasa_lerobot.demos.skills.racks import pull
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.kitchens.appliances.kinds.blender import Blender
 from robocasa_lerobot.envs.kitchens.appliances.kinds.coffee_machine import CoffeeMachine
+from robocasa_lerobot.envs.kitchens.appliances.kinds.fridge import Fridge
 from robocasa_lerobot.envs.kitchens.appliances.kinds.microwave import Microwave
 from robocasa_lerobot.envs.kitchens.appliances.kinds.sink import Sink
 from robocasa_lerobot.envs.kitchens.appliances.kinds.stand_mixer import StandMixer
@@ -63,6 +65,8 @@ from robocasa_lerobot.envs.tasks.task import Stage
 # Between the two steep and the two flat ones of any approach: a palm that is level meets the shelf before low objects.
 _CABINET_TILTS = in_radians((0, 0.0), (35, 0.1), (42, 0.1), (50, 0.15), (65, 0.2), (88, 0.3))
 OUT_OF_CABINET = replace(ANY_APPROACH, tilts=_CABINET_TILTS, narrow=True, poses=level_grasps)
+OUT_OF_FRIDGE = OUT_OF_CABINET
+BEFORE_FRONT_M, MOST_OUT_M = 0.03, 0.45
 HARD = 1.0  # cost of taking something out of a drawer, from which on it is pulled out first
 MOST_TURNS = 2  # of what lies across behind a front
 FARTHER_OUT_M = 0.12  # how far
@@ -108,8 +112,18 @@ def grasp_strategy(env: KitchenEnv, obj: Graspable, free: GraspStrategy) -> Gras
             return replace(FROM_CRISPER, first=_pull_out_first(obj, place))
         case _ if in_the_open(place):
             return free
+        case Fridge() as fridge if place.region:
+            return replace(OUT_OF_FRIDGE, out_m=_way_out(env, obj, fridge.regions[place.region]))
         case _:
             return ANY_APPROACH
+
+
+def _way_out(env: KitchenEnv, obj: Graspable, region: Region) -> float:
+    """How far an object is to be drawn out until all of it is before a region's front, metres."""
+    body = env.data.body(obj.name)
+    depth = float(region.local(env.data, body.xpos)[1]) + region.half[1]
+    reach = float(obj.half_extents(body.xmat.reshape(3, 3))[:2].max())
+    return float(np.clip(depth + reach + BEFORE_FRONT_M, OUT_M, MOST_OUT_M))
 
 
 def in_the_open(place: Location) -> bool:

@@ -35,14 +35,17 @@ from robocasa_lerobot.demos.planning.collision import CollisionChecker, Held, is
 from robocasa_lerobot.demos.planning.errors import NoPlanError, ShutInError
 from robocasa_lerobot.demos.planning.follow import in_room
 from robocasa_lerobot.demos.planning.kinematics import Arm
+from robocasa_lerobot.demos.skills.base_shift import shift_base
 from robocasa_lerobot.demos.skills.common import move_hand
 from robocasa_lerobot.demos.skills.pick_place.carrying.level import level_hand, level_out
 from robocasa_lerobot.demos.skills.pick_place.graspable import Graspable
 from robocasa_lerobot.demos.skills.reaching import MotionPlan, WaypointPath, follow_with, plan_reach
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
+from robocasa_lerobot.envs.kitchens.fixtures.base import Fixture
 from robocasa_lerobot.envs.scene.robot_poses import RobotPose
 
 FOLDED_M = (0.42, 0.48, 0.36)  # of the grip site before the base's centre while an object is carried
+FIRST_BACK_M = ((0.0, 0.0), (0.12, 0.05), (0.22, 0.1))  # before it rises to there, and what that costs
 RISES_M = (0.0, 0.08, 0.15)  # over the height that the hand has at home
 TURNS = tuple(float(turn) for turn in np.deg2rad((0.0, 30.0, -30.0, 60.0, -60.0, 90.0, -90.0)))
 # Of the whole arm to the left, where the base cannot drive with it folded before itself: aside, and over its back.
@@ -54,6 +57,10 @@ MOST_SEARCHES, MOST_ALIKE = 30, 5  # paths of the base that are looked for; of t
 # Kept on the drive, and near its ends: the arm comes near a folded pose only. First the one, then the other.
 SPARES_M: tuple[Margins, ...] = ((0.05, 0.04), (0.03, 0.02))
 SETTLE_STEPS = 5
+# A path to a folded pose that costs as much meets something, and a hand as near as this before a fixture will when the
+# base turns: that first drives back, so far at most, metres.
+CRAMPED, BEFORE_M = 0.6, 0.08
+MOST_BACK_M, BACK_STEP_M = 0.4, 0.08
 MOST_COST = 1.5  # of a path to such a pose
 MOST_FOLDS = 2
 
@@ -89,6 +96,10 @@ def fold_with(
     for _ in range(MOST_FOLDS):
         held = Held.now(env.data, obj.name, obj.contents)
         ahead = _ahead(env, obj, held)
+        if stand is not None and ahead is not None and _cramped(env, ahead):
+            yield from _back_off(env, obj, held)
+            held = Held.now(env.data, obj.name, obj.contents)
+            ahead = _ahead(env, obj, held)
         if ahead is None:
             return
         wanted = LOADED_MARGINS_M if is_full(held) else MARGINS_M
@@ -111,17 +122,55 @@ def fold_with(
             return
 
 
+def _cramped(env: KitchenEnv, ahead: MotionPlan) -> bool:
+    """Whether the hand would be folded in a fixture, or close before one, or meets something on its way."""
+    points = [grip_position(env.data), ahead.path.targets[1].position]
+    return ahead.cost > CRAMPED or any(
+        _apart(fixture, point) < BEFORE_M for fixture in env.scene.fixtures.values() for point in points
+    )
+
+
+def _apart(fixture: Fixture, point: Array) -> float:
+    """How far a point is from a fixture's box at the most distant of its three axes; below 0 inside, metres."""
+    x, y = fixture.to_local(point)
+    away = np.abs([x, y, point[2] - fixture.pos[2]]) - np.array([fixture.width, fixture.depth, fixture.height]) / 2
+    return float(away.max())
+
+
+def _back_off(env: KitchenEnv, obj: Graspable, held: Held) -> Iterator[Array]:
+    """Drive straight back with the arm as it is, as far as there is room: out of a front, where it cannot be folded."""
+    checker = CollisionChecker(env.scene, env.data, allowed=obj.bodies | obj.carried)
+    joints, (x, y, yaw) = _present(env), checker.present_base
+    ahead = floor_axes(yaw)[0]
+    steps = np.arange(BACK_STEP_M, MOST_BACK_M + 1e-9, BACK_STEP_M)
+    places = np.array([(x - far * ahead[0], y - far * ahead[1], yaw) for far in steps])
+    there = (
+        checker.touched(places, joints, held=held).counts
+        <= checker.touched(checker.present_base[None], joints, held=held).counts
+    )
+    free = int(np.argmin(there)) if not there.all() else len(there)
+    if free:
+        yield from shift_base(env, (-float(steps[free - 1]), 0.0), CLOSED)
+
+
 def _present(env: KitchenEnv) -> Array:
     joints: Array = np.array(env.data.qpos[Arm(env.model, env.data, env.scene.robot).addresses])
     return joints
 
 
 def _ahead(env: KitchenEnv, obj: Graspable, held: Held) -> MotionPlan | None:
-    """The best path to a folded pose before the base: up, then near."""
+    """The best path to a folded pose before the base: up, or back from under what is above it; then near."""
     base, yaw = base_pose(env.data)
     present, grip = level_hand(env, obj), grip_position(env.data)
-    above = HandTarget(np.array([*grip[:2], max(grip[2], _home_height(env))]), present)
-    paths = [WaypointPath((above, target), cost) for target, cost in _folded(env, obj, base, yaw)]
+    ways = []
+    for back, extra in FIRST_BACK_M:
+        point = grip - back * floor_axes(yaw)[0]
+        ways.append((HandTarget(np.array([*point[:2], max(point[2], _home_height(env))]), present), extra))
+    paths = [
+        WaypointPath((over, target), cost + extra)
+        for target, cost in _folded(env, obj, base, yaw)
+        for over, extra in ways
+    ]
     return _plan(env, obj, held, paths, 1)
 
 
