@@ -58,10 +58,18 @@ def grasp_poses_as_it_lies(
 
 
 def grasp_poses_of(
-    solids: list[Solid], turn: Array, gripper: GripperGeometry, count: int = 16
+    solids: list[Solid],
+    turn: Array,
+    gripper: GripperGeometry,
+    count: int = 16,
+    *,
+    beyond: tuple[Array, float] | None = None,
 ) -> tuple[GraspPose, ...]:
-    """The same for any body made of convex pieces, in its own frame, that was turned by the rotation matrix `turn`."""
-    return _plan(solids, turn, gripper)[:count]
+    """The same for any body made of convex pieces, in its own frame, that was turned by the rotation matrix `turn`.
+
+    With `beyond` only those grasps that lie farther than so many metres from its origin along a direction in its frame.
+    """
+    return _plan(solids, turn, gripper, None if beyond is None else (turn @ beyond[0], beyond[1]))[:count]
 
 
 @functools.lru_cache(maxsize=512)
@@ -141,7 +149,9 @@ class _Candidate:
         return np.asarray(self.middle * self.u + self.row * self.w + np.array([0.0, 0.0, self.z]))
 
 
-def _plan(solids: list[Solid], turn: Array, gripper: GripperGeometry) -> tuple[GraspPose, ...]:
+def _plan(
+    solids: list[Solid], turn: Array, gripper: GripperGeometry, beyond: tuple[Array, float] | None = None
+) -> tuple[GraspPose, ...]:
     clouds = [s.cloud() @ turn.T for s in solids]
     faces = _faces(clouds)
     cloud = np.concatenate(clouds)
@@ -157,6 +167,8 @@ def _plan(solids: list[Solid], turn: Array, gripper: GripperGeometry) -> tuple[G
         angle = np.pi * k / _ANGLES
         u, w = np.array([np.cos(angle), np.sin(angle), 0.0]), np.array([-np.sin(angle), np.cos(angle), 0.0])
         found += _across(faces, cloud, center, u, w, levels, gripper.opening, span=top - bottom < _FLAT_M)
+    if beyond is not None:
+        found = [candidate for candidate in found if candidate.position @ beyond[0] > beyond[1]]
     found.sort(key=lambda candidate: -candidate.score)
     # Best first, but such that the first ones differ; whether there is room is asked of those that count only.
     chosen: list[_Candidate] = []

@@ -60,10 +60,9 @@ def by_the_handle(env: KitchenEnv, obj: Graspable, approach: Array, farther_scor
     body = env.data.body(obj.name)
     turn = body.xmat.reshape(3, 3)
     found = []
-    for pose in grasps(env, obj, approach):
+    for pose in grasps(env, obj, approach, (end.axis, float(end.tip @ end.axis) + FAR_SHARE * end.length)):
         far = float((turn.T @ (pose.position - body.xpos) - end.tip) @ end.axis)
-        if far > FAR_SHARE * end.length:
-            found.append(replace(pose, score=pose.score + farther_score * far))
+        found.append(replace(pose, score=pose.score + farther_score * far))
     return sorted(found, key=lambda pose: -pose.score)
 
 

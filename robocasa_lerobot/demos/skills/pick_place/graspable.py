@@ -91,20 +91,25 @@ def holder_of(env: KitchenEnv, name: str) -> str:
     return min(holders, key=lambda other: float(np.prod(env.scene.objects[other].item.size)), default="")
 
 
-def grasps(env: KitchenEnv, obj: Graspable, approach: Array) -> list[GraspPose]:
-    """Grasp poses in the room for an object as it lies now, by a hand that comes along `approach` (unit vector)."""
+def grasps(
+    env: KitchenEnv, obj: Graspable, approach: Array, beyond: tuple[Array, float] | None = None
+) -> list[GraspPose]:
+    """Grasp poses in the room for an object as it lies now, by a hand that comes along `approach` (unit vector).
+
+    With `beyond` only those that lie farther than so many metres from its origin along a direction in its axes.
+    """
     body = env.data.body(obj.name)
     turn = body.xmat.reshape(3, 3).copy()
     if approach @ DOWN > 0.999:
         upright = np.hypot(turn[0, 0], turn[1, 0])
-        if obj.item is not None and turn[2, 2] > UPRIGHT_COS and upright > 1e-6:
+        if obj.item is not None and turn[2, 2] > UPRIGHT_COS and upright > 1e-6 and beyond is None:
             yaw = np.array([[turn[0, 0], -turn[1, 0], 0], [turn[1, 0], turn[0, 0], 0], [0, 0, 1.0]])
             yaw[:2, :2] /= upright
             return [pose.placed(body.xpos, yaw) for pose in grasp_poses(obj.item, env.robot.gripper)]
         tip = np.eye(3)
     else:
         tip = _to_down(approach)
-    poses = grasp_poses_of(list(obj.solids), tip @ turn, env.robot.gripper)
+    poses = grasp_poses_of(list(obj.solids), tip @ turn, env.robot.gripper, beyond=beyond)
     back = tip.T
     return [GraspPose(body.xpos + back @ pose.position, back @ pose.rotation, pose.width, pose.score) for pose in poses]
 

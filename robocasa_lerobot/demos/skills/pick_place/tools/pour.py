@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -24,17 +25,17 @@ from robocasa_lerobot.demos.skills.pick_place.graspable import Graspable, graspa
 from robocasa_lerobot.demos.skills.pick_place.location import locate
 from robocasa_lerobot.demos.skills.pick_place.pick import is_held
 from robocasa_lerobot.demos.skills.pick_place.verbs import take
-from robocasa_lerobot.demos.skills.reaching import Held, MotionPlan, WaypointPath, follow_with, plan_reach
+from robocasa_lerobot.demos.skills.reaching import Held, MotionPlan, WaypointPath, approach, follow_with, plan_reach
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
+from robocasa_lerobot.envs.scene.robot_poses import RobotPose
 from robocasa_lerobot.envs.tasks.task import Stage
 
 ATTEMPTS = 4
 YAWS, EDGES = 12, 16  # turns of the vessel about the vertical; points of its edge that it may be poured over
-STEEP_RAD = tuple(
-    float(np.deg2rad(angle)) for angle in (70.0, 95.0)
-)  # of the vessel in the end, and farther if need be
+# How far a vessel is tilted in the end: its wall must slope down more than food sticks to it; with costs.
+STEEP_RAD = tuple((float(np.deg2rad(angle)), cost) for angle, cost in ((140.0, 0.0), (120.0, 0.25), (105.0, 0.7)))
 CLEARANCES_M = (0.045, 0.08)  # of the vessel's lowest point over the receptacle, with a cost for each metre
-HIGH_COST, TURN_COST, ACROSS_COST = 4.0, 0.08, 0.3
+HIGH_COST, TURN_COST = 4.0, 0.08
 SHORT_SHARE = 0.35  # of the vessel's radius, by which its edge ends short of the middle: what slides off goes on
 TILT_STEPS, WAIT_STEPS, SHAKES = 45, 12, 3
 SHAKE_M = 0.02
@@ -82,10 +83,10 @@ def pour(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
         if fixture is not None and not in_reach(env, middle):
             yield from carry_to(env, obj, standing_pose_for(env, fixture, middle), middle)
         obj = graspable(env, stage.object)
-        choice, tilting = _choose(env, obj, target, failed)
-        if choice.base is not None:
-            yield from carry_to(env, obj, choice.base, middle)
-            choice, tilting = _choose(env, obj, target, failed, may_drive=False)
+        held = Held.now(env.data, obj.name, obj.contents)
+        yield from approach(env, partial(_plan, env, obj, target, failed), CLOSED, held)
+        yield from level_out(env, obj)
+        choice, tilting = _choose(env, obj, target, failed, may_drive=False)
         held = Held.now(env.data, obj.name, obj.contents)
         yield from follow_with(env, choice.joints, held)
         over, level, *_ = choice.path.targets
@@ -118,8 +119,20 @@ def _tilt(env: KitchenEnv, stage: Stage, level: HandTarget, tilting: Tilting) ->
         yield arm_action(env.data, tilting.after(level, share * (1 - (step + 1) / (TILT_STEPS // 2))), CLOSED)
 
 
+def _plan(
+    env: KitchenEnv, obj: Graspable, target: str, failed: list[Array], blocked: Sequence[RobotPose]
+) -> MotionPlan:
+    return _choose(env, obj, target, failed, blocked)[0]
+
+
 def _choose(
-    env: KitchenEnv, obj: Graspable, target: str, failed: list[Array], *, may_drive: bool = True
+    env: KitchenEnv,
+    obj: Graspable,
+    target: str,
+    failed: list[Array],
+    blocked: Sequence[RobotPose] = (),
+    *,
+    may_drive: bool = True,
 ) -> tuple[MotionPlan, Tilting]:
     """The edge, turn and height for pouring that the arm takes best.
 
@@ -139,7 +152,7 @@ def _choose(
     upright = levelled(data.body(obj.name).xmat.reshape(3, 3))
     found: dict[int, Tilting] = {}
     paths = []
-    for index, edge, clearance, steep in itertools.product(range(YAWS), range(EDGES), CLEARANCES_M, STEEP_RAD[-1:]):
+    for index, edge, clearance, (steep, less) in itertools.product(range(YAWS), range(EDGES), CLEARANCES_M, STEEP_RAD):
         yaw = 2 * np.pi * index / YAWS
         turn = rotation_about(UP, yaw) @ upright
         bearing = 2 * np.pi * edge / EDGES
@@ -152,12 +165,14 @@ def _choose(
         tilting = Tilting(pivot, np.cross(UP, out) / np.linalg.norm(np.cross(UP, out)), steep)
         half_way, end = tilting.after(level, 0.5), tilting.after(level, 1.0)
         again = sum(np.linalg.norm(at - other) < AGAIN_M for other in failed)
-        cost = HIGH_COST * clearance + TURN_COST * min(yaw, 2 * np.pi - yaw) + AGAIN * float(again)
+        cost = less + HIGH_COST * clearance + TURN_COST * min(yaw, 2 * np.pi - yaw) + AGAIN * float(again)
         path = WaypointPath((HandTarget(at + 0.10 * UP, rotation), level, half_way, end), cost)
         found[id(path)] = tilting
         paths.append(path)
     allowed = obj.bodies | obj.carried
-    plans = plan_reach(env, paths, top, key=2, held=held, loaded=2, allowed=allowed, may_drive=may_drive)
+    plans = plan_reach(
+        env, paths, top, key=2, held=held, loaded=2, allowed=allowed, blocked=blocked, may_drive=may_drive
+    )
     if not plans:
         raise SkillError(f"{obj.title}: there is no way to pour it out over {target}")
     return plans[0], found[id(plans[0].path)]

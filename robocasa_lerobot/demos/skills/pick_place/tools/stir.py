@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from functools import partial
 
 import numpy as np
 
@@ -15,11 +16,12 @@ from robocasa_lerobot.demos.skills.pick_place.graspable import Graspable, conten
 from robocasa_lerobot.demos.skills.pick_place.location import locate
 from robocasa_lerobot.demos.skills.pick_place.pick import is_held
 from robocasa_lerobot.demos.skills.pick_place.verbs import take
-from robocasa_lerobot.demos.skills.reaching import Held, MotionPlan, WaypointPath, follow_with, plan_reach
+from robocasa_lerobot.demos.skills.reaching import Held, MotionPlan, WaypointPath, approach, follow_with, plan_reach
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.predicates import ObjectTouches
 from robocasa_lerobot.envs.predicates.logic import every_goal_in
 from robocasa_lerobot.envs.scene.drawn import PlacedObject
+from robocasa_lerobot.envs.scene.robot_poses import RobotPose
 from robocasa_lerobot.envs.tasks.conditions import stage_condition
 from robocasa_lerobot.envs.tasks.task import Stage
 
@@ -52,10 +54,7 @@ def stir(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
         fixture = locate(env, vessel).fixture
         if fixture is not None and not in_reach(env, middle):
             yield from carry_to(env, obj, standing_pose_for(env, fixture, middle))
-        choice = _choose(env, obj, vessel)
-        if choice.base is not None:
-            yield from carry_to(env, obj, choice.base)
-            choice = _choose(env, obj, vessel, may_drive=False)
+        choice = yield from approach(env, partial(_choose, env, obj, vessel), CLOSED, Held.now(env.data, obj.name))
         yield from follow_with(env, choice.joints, Held.now(env.data, obj.name))
         over, inside, *_ = choice.path.targets
         yield from move_hand(env.data, over, CLOSED, tolerance=0.02, max_steps=80)
@@ -148,7 +147,7 @@ def _within(env: KitchenEnv, vessel: str, point: Array) -> Array:
     return near
 
 
-def _choose(env: KitchenEnv, obj: Graspable, vessel: str, *, may_drive: bool = True) -> MotionPlan:
+def _choose(env: KitchenEnv, obj: Graspable, vessel: str, blocked: Sequence[RobotPose]) -> MotionPlan:
     """How the tool stands in the vessel with its tip on the middle of the floor, best for the arm.
 
     The robot alone is tested: the tool comes from above the rim, and goes straight down.
@@ -177,7 +176,7 @@ def _choose(env: KitchenEnv, obj: Graspable, vessel: str, *, may_drive: bool = T
         over = at + (rim - floor[2] + OVER_M) * UP
         around = (at + side * np.array([x, y, 0.0]) for x, y in ((1, 0), (0, 1), (-1, 0), (0, -1)))
         paths.append(WaypointPath(tuple(HandTarget(p, rotation) for p in (over, at, *around)), cost))
-    found = plan_reach(env, paths, bottom, key=1, allowed=obj.bodies | obj.carried, may_drive=may_drive)
+    found = plan_reach(env, paths, bottom, key=1, allowed=obj.bodies | obj.carried, blocked=blocked)
     if not found:
         raise SkillError(f"{obj.title}: there is no way into {vessel}")
     return found[0]

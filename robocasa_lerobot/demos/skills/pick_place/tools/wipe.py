@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from functools import partial
 
 import numpy as np
 
@@ -26,8 +27,9 @@ from robocasa_lerobot.demos.skills.pick_place.location import locate
 from robocasa_lerobot.demos.skills.pick_place.pick import INTEGRAL_GAIN, is_held
 from robocasa_lerobot.demos.skills.pick_place.place import RELEASE_STEPS, leave
 from robocasa_lerobot.demos.skills.pick_place.verbs import take
-from robocasa_lerobot.demos.skills.reaching import Held, MotionPlan, WaypointPath, follow_with, plan_reach
+from robocasa_lerobot.demos.skills.reaching import Held, MotionPlan, WaypointPath, approach, follow_with, plan_reach
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
+from robocasa_lerobot.envs.scene.robot_poses import RobotPose
 from robocasa_lerobot.envs.tasks.task import Stage
 
 ATTEMPTS = 4
@@ -58,10 +60,7 @@ def wipe(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
         fixture = locate(env, surface).fixture
         if fixture is not None and not in_reach(env, middle):
             yield from carry_to(env, obj, standing_pose_for(env, fixture, middle))
-        choice = _choose(env, obj, surface)
-        if choice.base is not None:
-            yield from carry_to(env, obj, choice.base)
-            choice = _choose(env, obj, surface, may_drive=False)
+        choice = yield from approach(env, partial(_choose, env, obj, surface), CLOSED, Held.now(env.data, obj.name))
         yield from follow_with(env, choice.joints, Held.now(env.data, obj.name))
         yield from _rub(env, obj, *choice.path.targets, lane_first=attempt)
         at = HandTarget(grip_position(env.data), hand_rotation(env.data))
@@ -96,7 +95,7 @@ def _rub(
         yield from move_hand(data, HandTarget(point, start.rotation), CLOSED, speed=0.4, tolerance=0.012, max_steps=15)
 
 
-def _choose(env: KitchenEnv, obj: Graspable, surface: str, *, may_drive: bool = True) -> MotionPlan:
+def _choose(env: KitchenEnv, obj: Graspable, surface: str, blocked: Sequence[RobotPose]) -> MotionPlan:
     """The stroke along one of the surface's sides that the arm takes best, the tool level and turned in any way.
 
     Raises:
@@ -122,7 +121,7 @@ def _choose(env: KitchenEnv, obj: Graspable, surface: str, *, may_drive: bool = 
         row = (low + ABOVE_M * UP, low, high)
         paths.append(WaypointPath(tuple(HandTarget(point, rotation) for point in row), cost))
     allowed = obj.bodies | frozenset(np.flatnonzero(env.scene.subtree(surface)).tolist())
-    found = plan_reach(env, paths, top, key=1, held=held, loaded=3, allowed=allowed, may_drive=may_drive)
+    found = plan_reach(env, paths, top, key=1, held=held, loaded=3, allowed=allowed, blocked=blocked)
     if not found:
         raise SkillError(f"{obj.title}: there is no way over {surface}")
     return found[0]
