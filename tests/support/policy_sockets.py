@@ -40,6 +40,10 @@ class _WebsocketServer:
     def __exit__(self, *_: object) -> None:
         self.stop()
 
+    @property
+    def running(self) -> bool:
+        return self._thread.is_alive()
+
     def stop(self) -> None:
         """Drop all connections without a word, as a killed process does."""
         self._server.shutdown()

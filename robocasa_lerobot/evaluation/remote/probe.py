@@ -85,7 +85,7 @@ def _remedy(said: str, message: Mapping[str, Any]) -> str:
     key = missed[-1]
     having = [name for name in presets() if key in _keys(load_key_map(name))]
     if having and key not in message:
-        return f" The key map{'s' * (len(having) > 1)} {' and '.join(having)} have {key!r}: give --policy.keys."
+        return f" {key!r} is in the key map {' and in '.join(having)}: give --policy.keys."
     return f" It asked for {key!r}: give a key map that has it (--policy.keys)."
 
 

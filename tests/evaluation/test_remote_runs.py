@@ -1,0 +1,471 @@
+"""Whole evaluations of policies behind sockets, as a user runs them: probe, faults, resuming, report."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from policy_sockets import Gr00tServer, OpenpiServer, VlaEvalServer
+
+from robocasa_lerobot import contract
+from robocasa_lerobot.cli import main
+from robocasa_lerobot.evaluation.records.results import Results, read_results
+
+ROOT = Path(__file__).parents[2]
+FORWARD = 7  # of the base, in HDF5 order: what moves the slider
+PI0 = "--policy.keys=robocasa365_pi0"
+
+
+def push(request: Any) -> dict[str, Any]:
+    """A policy that depends on what it sees: it pushes the block, backwards where it is far."""
+    state, actions = np.asarray(request["observation/state"]), np.zeros((50, 12), np.float32)
+    assert request["observation/image"].shape == (224, 224, 3)
+    assert state.shape == (16,)
+    actions[:, FORWARD] = 0.15 + 0.25 * state[7]  # base_x, where the slider is
+    return {"actions": actions, "server_timing": {"infer_ms": 0.1}}
+
+
+def command(url: str, out: Path, *more: str, keys: str = PI0) -> list[str]:
+    fixed = ["--seed=1", "--env.factory=evaluation_env:SlideEnv", "--env.image_size=32", "--videos=0", "--workers=1"]
+    label = "--policy.label=theirs"
+    patience = ["--remote.connect_seconds=1", "--remote.answer_seconds=5"]
+    tasks = ["--env.tasks=Slide", "--trials=4"]
+    return [
+        "eval",
+        f"--policy={url}",
+        *([keys] if keys else []),
+        label,
+        f"--out={out}",
+        *fixed,
+        *patience,
+        *tasks,
+        *more,
+    ]
+
+
+def evaluate(url: str, out: Path, *more: str, keys: str = PI0) -> Results:
+    assert main(command(url, out, *more, keys=keys)) == 0
+    return read_results(out)
+
+
+def comparable(results: Results) -> list[dict[str, Any]]:
+    return [record.comparable() for record in sorted(results.trials, key=lambda record: record.key)]
+
+
+def test_outcomes_do_not_depend_on_connections_and_the_header_says_what_is_known(tmp_path: Path) -> None:
+    with OpenpiServer(push, {"model": "pi", "reset_pose": [0.5]}) as server:
+        one = evaluate(server.url, tmp_path / "one", "--trials=6")
+        assert len(server.connections) == 2  # the probe's, and the worker's
+        three = evaluate(server.url, tmp_path / "three", "--trials=6", "--workers=3", "--videos=1")
+        assert len(server.connections) >= 2 + 1 + 2
+        address = server.url
+    assert comparable(one) == comparable(three)
+    assert all(record.error is None for record in one.trials)
+    assert len({record.trajectory for record in one.trials}) == 6
+    assert {record.success for record in one.trials} == {True, False}
+    (header,) = one.headers.values()
+    info = header.policies["theirs"]
+    assert info.fingerprint.startswith("unknown:")
+    assert info.remote is not None
+    assert info.remote["address"] == info.path == address
+    assert info.remote["metadata"] == {"model": "pi", "reset_pose": [0.5]}
+    assert info.remote["weights"] == "unknown"
+    assert info.remote["key_map"]["executed_steps"] == 5
+    assert info.remote["outcomes"] == "depend on the server's random state"
+    report = (tmp_path / "one" / "report.md").read_text()
+    assert "weights unknown" in report
+    assert "server: model" in report
+    assert (tmp_path / "one" / "report.html").is_file()
+    # No film is made by running a trial again: it need not take the same course.
+    assert {record.trial for record in three.trials if record.video} == {0}
+
+
+@contextlib.contextmanager
+def answering(actions: Any) -> Iterator[str]:
+    with OpenpiServer(lambda request: {"actions": actions} if isinstance(actions, np.ndarray) else actions) as server:
+        yield server.url
+
+
+NAN = np.full((50, 12), np.nan, np.float32)
+
+
+@pytest.mark.parametrize(
+    ("answer", "message"),
+    [
+        (
+            {"action": np.zeros((50, 12))},
+            r"actions: not in the answer, which has action \(float64 \(50, 12\)\).*'action'",
+        ),
+        (
+            {"actions": np.zeros((50, 7))},
+            r"actions: found shape \(50, 7\), expected numbers of shape \(at least 5, 12\)",
+        ),
+        ({"actions": np.zeros((2, 50, 12))}, r"found shape \(2, 50, 12\)"),
+        ({"actions": "no"}, "actions: found a str"),
+        ({"actions": np.zeros((4, 12))}, r"found 4 action\(s\), expected at least 5.*--executed_steps=4"),
+        ({"actions": NAN}, "actions: found 150 of 150 numbers of end_effector_position that are not finite"),
+    ],
+)
+def test_the_first_answer_is_looked_at(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], answer: dict[str, Any], message: str
+) -> None:
+    import re
+
+    with answering(answer) as url:
+        assert main(command(url, tmp_path / "out")) == 2
+    assert re.search(message, capsys.readouterr().err.replace("\n", " "))
+    assert not (tmp_path / "out" / "trials.jsonl").exists()
+
+
+def pi05(request: Any) -> dict[str, Any]:
+    request["observation/right_image"]
+    return push(request)
+
+
+@pytest.mark.parametrize(
+    ("keys", "more", "message"),
+    [
+        (PI0, "", "'observation/right_image' is in the key map robocasa365_pi05"),
+        ("", "", "give --policy.keys, one of ours, robocasa365_pi0, robocasa365_pi05, robocasa_libero"),
+        ("--policy.keys=robocasa365_pi", "", "Did you mean 'robocasa365_pi0"),
+        ("--policy.keys=gr00t_n15", "", "the key map gr00t_n15 is for gr00t://"),
+        ("--policy.keys=ours", "", "the server does not say that it is robocasa_lerobot's"),
+        ("--policy.keys=a,b", "", "2 policy.keys for 1 policies behind a socket"),
+        (PI0, "--executed_steps=51", "found 50 action(s), expected at least 51"),
+        ("--policy.keys=robocasa365_pi05", "--remote.answer_seconds=0", "remote.answer_seconds: found 0"),
+    ],
+)
+def test_keys_that_do_not_fit_are_found_before_the_run(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], keys: str, more: str, message: str
+) -> None:
+    with OpenpiServer(pi05 if not more else push) as server:
+        assert main(command(server.url, tmp_path / "out", *filter(None, [more]), keys=keys)) == 2
+    assert message in capsys.readouterr().err
+    assert not (tmp_path / "out" / "trials.jsonl").exists()
+
+
+def test_nobody_there_is_said_as_what_it_is(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    with OpenpiServer(push) as server:
+        url = server.url
+    assert main(command(url, tmp_path / "out")) == 2
+    assert "refused, nobody listens there; tried for 1 s. Start the server" in capsys.readouterr().err
+
+
+class Faulty:
+    """`push`, but from its request `after` on (the probe is number 1) one or all answers are faulty."""
+
+    def __init__(self, fault: Callable[[dict[str, Any]], Any], after: int, once: bool) -> None:
+        self._fault, self._after, self._once, self.asked = fault, after, once, 0
+
+    def __call__(self, request: Any) -> Any:
+        self.asked += 1
+        hit = self.asked == self._after if self._once else self.asked >= self._after
+        return self._fault(push(request)) if hit else push(request)
+
+
+def raising(answer: dict[str, Any]) -> Any:
+    raise MemoryError("the GPU is full")
+
+
+FAULTS: dict[str, tuple[Callable[[dict[str, Any]], Any], str, str]] = {
+    "nan": (lambda answer: {"actions": NAN}, "not finite", "diverged"),
+    "shape": (lambda answer: {"actions": answer["actions"][:, :7]}, "found shape (50, 7)", "crashed"),
+    "text": (raising, "MemoryError: the GPU is full", "crashed"),
+}
+
+
+@pytest.mark.parametrize("fault", FAULTS)
+def test_a_faulty_answer_later_costs_an_attempt_and_one_that_stays_is_recorded(tmp_path: Path, fault: str) -> None:
+    make, words, outcome = FAULTS[fault]
+    with OpenpiServer(push) as server:
+        healthy = evaluate(server.url, tmp_path / "healthy")
+    with OpenpiServer(Faulty(make, after=4, once=True)) as server:
+        results = evaluate(server.url, tmp_path / "once")
+    assert comparable(results) == comparable(healthy)
+    (retried,) = [record for record in results.trials if record.attempts == 2]
+    assert words in str(retried.first_error)
+    assert retried.first_outcome == outcome
+    with OpenpiServer(Faulty(make, after=4, once=False)) as server:
+        results = evaluate(server.url, tmp_path / "always", "--trials=2")
+    assert {record.outcome for record in results.trials} == {outcome}
+    assert all(words in str(record.error) for record in results.trials)
+    assert words in (tmp_path / "always" / "report.md").read_text().replace("\\", "")
+
+
+def stop_soon(server: OpenpiServer) -> None:
+    threading.Thread(target=server.stop).start()
+    time.sleep(1)  # this request is never answered
+
+
+def test_a_server_that_is_killed_and_comes_back_costs_an_attempt(tmp_path: Path) -> None:
+    with OpenpiServer(push) as server:
+        healthy = evaluate(server.url, tmp_path / "healthy")
+    with contextlib.ExitStack() as stack:
+        first = stack.enter_context(OpenpiServer(Faulty(lambda answer: stop_soon(first), after=4, once=True)))
+
+        def again() -> None:
+            while first.running:
+                time.sleep(0.02)
+            stack.enter_context(OpenpiServer(push, port=first.port))
+
+        threading.Thread(target=again).start()
+        results = evaluate(first.url, tmp_path / "out", "--remote.connect_seconds=10")
+    assert comparable(results) == comparable(healthy)
+    (retried,) = [record for record in results.trials if record.attempts == 2]
+    assert "LostError" in str(retried.first_error)
+    assert "closed the connection" in str(retried.first_error)
+
+
+def test_a_server_that_stays_away_ends_the_run_and_the_same_command_goes_on(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "out"
+    with OpenpiServer(push) as server:
+        healthy = evaluate(server.url, tmp_path / "healthy", "--trials=8")
+    with OpenpiServer(Faulty(lambda answer: stop_soon(server), after=12, once=True)) as server:
+        assert main(command(server.url, out, "--trials=8")) == 2
+    error = capsys.readouterr().err
+    assert "refused, nobody listens there" in error
+    assert "the same command goes on" in error
+    before = (out / "trials.jsonl").read_text()
+    recorded = [json.loads(line) for line in before.splitlines()][1:]
+    assert 0 < len(recorded) < 8
+    assert all(record["error"] is None for record in recorded)
+    with OpenpiServer(push, port=server.port) as server:
+        results = evaluate(server.url, out, "--trials=8")
+    assert (out / "trials.jsonl").read_text().startswith(before)
+    assert comparable(results) == comparable(healthy)
+    # Another server under the same label is not mixed in.
+    with OpenpiServer(push, {"model": "another"}) as server:
+        assert main(command(server.url, out, "--trials=8")) == 2
+    assert "policy 'theirs': key map or server's metadata unknown:" in capsys.readouterr().err
+
+
+def test_a_server_that_answers_too_late_is_no_failed_trial(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    def late(answer: dict[str, Any]) -> Any:
+        time.sleep(1.5)
+        return answer
+
+    more = ["--remote.answer_seconds=0.5", "--remote.first_answer_seconds=0.5"]
+    with OpenpiServer(Faulty(late, after=4, once=False)) as server:
+        assert main(command(server.url, tmp_path / "out", *more)) == 2
+    error = capsys.readouterr().err
+    assert "policy 'theirs' was lost 3 times during Slide trial" in error
+    assert "timed out, no answer within 0.5 s" in error
+    assert all(record.error is None for record in read_results(tmp_path / "out").trials)
+
+
+def test_a_long_first_answer_is_waited_for(tmp_path: Path) -> None:
+    """Longer than an answer may take, and longer than a worker may be silent."""
+    compiled = threading.Event()
+
+    def compiling(request: Any) -> Any:
+        if len(server.connections) == 2 and not compiled.is_set():
+            time.sleep(2.5)
+            compiled.set()
+        return push(request)
+
+    with OpenpiServer(compiling) as server:
+        results = evaluate(server.url, tmp_path / "out", "--remote.answer_seconds=0.5", "--stall_seconds=1.5")
+    assert [(record.error, record.attempts) for record in results.trials] == [(None, 1)] * 4
+
+
+def test_shards_merge_when_the_server_has_gone(tmp_path: Path) -> None:
+    with OpenpiServer(push) as server:
+        for shard in ("1/2", "2/2"):
+            assert main(command(server.url, tmp_path / "out", f"--shard={shard}")) == 0
+        whole = evaluate(server.url, tmp_path / "whole")
+    assert main(command(server.url, tmp_path / "out", "--merge")) == 0
+    assert comparable(read_results(tmp_path / "out")) == comparable(whole)
+
+
+PARTS = {part.name: part.size for part in contract.ACTION_PARTS}
+VIDEO = ("robot0_agentview_left", "robot0_agentview_right", "robot0_eye_in_hand")
+STATE = tuple(part.name for part in contract.STATE_PARTS)
+
+
+def modality_config(version: str, offsets: list[int]) -> dict[str, Any]:
+    full = version == "N1.5"
+
+    def group(name: str, keys: Any, deltas: list[int]) -> dict[str, Any]:
+        return {"modality_keys": [f"{name}.{key}" if full else key for key in keys], "delta_indices": deltas}
+
+    language = "annotation.human.task_description"
+    return {
+        "video": group("video", VIDEO, offsets),
+        "state": group("state", STATE, [0]),
+        "action": group("action", PARTS, list(range(16))),
+        "language": {"modality_keys": [language], "delta_indices": [0]},
+    }
+
+
+def gr00t_policy(nested: bool, offsets: list[int]) -> Callable[[Any], Any]:
+    """A strict policy with GR00T's shapes and names."""
+
+    def answer(observation: Any) -> Any:
+        length = len(offsets)
+        if nested:
+            video, state = observation["video"], observation["state"]
+            assert observation["language"] == {"annotation.human.task_description": [["slide the block"]]} or (
+                "drawer" in str(observation["language"])
+            ), observation["language"]
+        else:
+            video = {key: observation[f"video.{key}"] for key in VIDEO}
+            state = {key: observation[f"state.{key}"] for key in STATE}
+            assert isinstance(observation["annotation.human.task_description"], list)
+        assert set(video) == set(VIDEO)
+        for picture in video.values():
+            assert (picture.shape, picture.dtype) == ((1, length, 256, 256, 3), np.uint8)
+        for name, value in state.items():
+            assert value.shape == (1, 1, contract.STATE_SLICES[name].stop - contract.STATE_SLICES[name].start)
+        actions = {name: np.zeros((1, 16, size), np.float32) for name, size in PARTS.items()}
+        actions["base_motion"][..., 0] = 0.15 + 0.25 * state["base_position"][..., :1].reshape(-1)[0]
+        return actions if nested else {f"action.{name}": value for name, value in actions.items()}
+
+    return answer
+
+
+@pytest.mark.parametrize(
+    ("version", "nested", "offsets"),
+    [("N1.5", False, [0]), ("N1.6", True, [0]), ("N1.6", False, [-2, 0]), ("N1.7", True, [-6, -4, -2, 0])],
+)
+def test_gr00ts_services_are_asked_for_what_they_say_they_take(
+    tmp_path: Path, version: str, nested: bool, offsets: list[int]
+) -> None:
+    server = Gr00tServer(gr00t_policy(nested, offsets), version, modality_config(version, offsets))
+    with server:
+        results = evaluate(server.url, tmp_path / "out", "--executed_steps=5", "--env.image_size=48", keys="")
+    assert [record.error for record in results.trials] == [None] * 4
+    (header,) = results.headers.values()
+    remote = header.policies["theirs"].remote
+    assert remote is not None
+    assert (remote["keys"], remote["metadata"]["version"]) == ("auto", version)
+    assert remote["key_map"]["picture_offsets"] == offsets
+    with OpenpiServer(push) as peer:
+        theirs = evaluate(peer.url, tmp_path / "peer", "--env.image_size=48")
+    # The same policy over another protocol: the same successes on the same trials.
+    assert [(r.seed, r.success) for r in results.trials] == [(r.seed, r.success) for r in theirs.trials]
+
+
+def test_a_configuration_that_cannot_be_named_says_which_key(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    config = modality_config("N1.6", [0])
+    config["video"]["modality_keys"] = ["ceiling"]
+    with Gr00tServer(gr00t_policy(True, [0]), "N1.6", config) as server:
+        assert main(command(server.url, tmp_path / "out", keys="")) == 2
+    assert "the server wants the picture 'ceiling', which names none of our cameras" in capsys.readouterr().err
+
+
+def test_vla_evals_servers_get_an_episode_for_each_trial(tmp_path: Path) -> None:
+    def answer(observation: Any) -> Any:
+        assert set(observation["images"]) == {f"video.{camera}" for camera in VIDEO}
+        place = observation["state"]["state.base_position"][0]
+        action = np.zeros(12, np.float32)
+        action[FORWARD] = 0.15 + 0.25 * place
+        return {"actions": action}
+
+    with VlaEvalServer(answer) as server:
+        results = evaluate(server.url, tmp_path / "out", keys="")
+        kinds = [request["type"] for request in server.requests]
+    assert [record.error for record in results.trials] == [None] * 4
+    assert kinds.count("episode_start") == 1 + 4  # the probe's, and one for each trial
+    assert kinds.count("episode_end") == 3  # between the trials of the one worker
+    steps = sum(record.steps for record in results.trials)
+    assert kinds.count("observation") == 1 + steps
+
+
+OWN_MAP = """
+about: two cameras, offsets, an envelope, a reset
+protocol: openpi
+cameras:
+  - {camera: robot0_agentview_left, key: obs > left, size: [24, 32], resize: pad}
+  - {camera: robot0_eye_in_hand, key: obs > wrist, size: [16, 16], resize: stretch}
+state:
+  - {key: obs > gripper, parts: [gripper_qpos], dtype: float64}
+  - {key: obs > base, parts: [base_position, base_rotation]}
+prompt: {key: lang, form: list}
+actions:
+  - {key: data > arm, parts: [end_effector_position, end_effector_rotation, gripper_close]}
+  - {key: data > base, parts: [base_motion, control_mode], start: 1, width: 7}
+executed_steps: 3
+picture_offsets: [-6, -4, -2, 0]
+state_offsets: [-1, 0]
+axes: time
+constants: {endpoint: infer, session_id: abc}
+reset: {endpoint: reset}
+seed: seed
+number: chunk
+"""
+
+
+def test_a_key_map_of_ones_own_says_everything(tmp_path: Path) -> None:
+    seen: list[Any] = []
+    resets = []
+
+    def answer(request: Any) -> Any:
+        if request["endpoint"] == "reset":
+            resets.append(request)
+            return {}
+        assert set(request) == {"endpoint", "session_id", "obs", "lang", "seed", "chunk"}
+        obs = request["obs"]
+        assert {name: value.shape for name, value in obs.items()} == {
+            "left": (4, 24, 32, 3), "wrist": (4, 16, 16, 3), "gripper": (2, 2), "base": (2, 7),
+        }  # fmt: skip
+        assert obs["gripper"].dtype == np.float64
+        assert not obs["left"][:, :, :4].any()  # a square picture between black bars
+        assert obs["left"][:, :, 4:28].all(axis=-1).mean() > 0.9
+        seen.append((request["seed"], request["chunk"], obs["base"][:, 0].copy(), request["lang"]))
+        arm, base = np.zeros((3, 7)), np.full((3, 7), 0.01)
+        base[:, 1] = 0.1  # base_forward, after one number that nobody reads
+        return {"data": {"arm": arm, "base": base}}
+
+    file = tmp_path / "map.yaml"
+    file.write_text(OWN_MAP)
+    with OpenpiServer(answer) as server:
+        results = evaluate(server.url, tmp_path / "out", "--trials=2", keys=f"--policy.keys={file}")
+    assert len(resets) == 1 + 2
+    trials = sorted(results.trials, key=lambda record: record.trial)
+    own = [entry for entry in seen if entry[0] == trials[0].policy_seed]
+    assert [entry[1] for entry in own] == list(range(-(-trials[0].steps // 3)))
+    assert own[0][2][0] == own[0][2][1]  # before the start the first observation counts
+    assert own[1][2][1] - own[1][2][0] == pytest.approx(0.2 * 0.1)
+    assert own[0][3] == ["slide the block"]
+    (header,) = results.headers.values()
+    remote = header.policies["theirs"].remote
+    assert remote is not None
+    assert remote["outcomes"].startswith("fixed by the trial's seed")
+
+
+@pytest.mark.render
+def test_a_kitchen_goes_on_after_a_kill_of_the_evaluation(tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    asked = threading.Event()
+
+    def still(request: Any) -> Any:
+        assert request["observation/image"].std() > 5 or request["prompt"] == "open the drawer"
+        if len(server.connections) > 1:
+            asked.set()
+        return {"actions": np.zeros((50, 12), np.float32)}
+
+    with OpenpiServer(still) as server:
+        arguments = [f"--policy={server.url}", PI0, "--policy.label=theirs", "--env.tasks=OpenDrawer", "--trials=2"]
+        more = ["--env.horizon=10", "--seed=100000", "--videos=0", "--workers=1", f"--out={out}", "--env.image_size=64"]
+        eval_py = [sys.executable, str(ROOT / "eval.py"), *arguments, *more]
+        process = subprocess.Popen(eval_py, cwd=ROOT, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        assert asked.wait(120)
+        process.kill()
+        process.wait()
+        subprocess.run(eval_py, cwd=ROOT, check=True, capture_output=True, timeout=200)
+    records = read_results(out).trials
+    assert [(record.error, record.steps) for record in records] == [(None, 10)] * 2
+    assert "weights unknown" in (out / "report.md").read_text()
