@@ -34,6 +34,7 @@ VARIANTS: dict[str, dict[str, Any]] = {
     "default": {},
     "one observation": {"n_obs_steps": 1, "horizon": 9},
     "three observations": {"n_obs_steps": 3, "horizon": 12, "n_action_steps": 4},
+    "offsets": {"observation_offsets": [-6, -4, -2, 0], "horizon": 12, "n_action_steps": 4},
     "all of the state": {"state_indices": None, "state_clip": None},
     "encoder per camera": {"vision_shared": False},
     "concatenated language": {"language_concat": True},
@@ -249,9 +250,14 @@ def test_actions_depend_on_the_samples_generator_and_not_on_its_batch(scheduler:
         policy.predict_action_chunk(batch, noise=noise[:2])
 
 
-@pytest.mark.parametrize(("n_obs_steps", "n_action_steps"), [(1, 1), (1, 4), (2, 1), (2, 4), (3, 2)])
-def test_select_action_steps_through_chunks_of_the_true_history(n_obs_steps: int, n_action_steps: int) -> None:
-    config = tiny_config(n_obs_steps=n_obs_steps, n_action_steps=n_action_steps, horizon=8)
+@pytest.mark.parametrize(
+    ("offsets", "n_action_steps"),
+    [([0], 1), ([0], 4), ([-1, 0], 1), ([-1, 0], 4), ([-2, -1, 0], 2), ([-6, -4, -2, 0], 3), ([-5, 0], 2)],
+)
+def test_select_action_steps_through_chunks_of_the_true_history(offsets: list[int], n_action_steps: int) -> None:
+    count = len(offsets)
+    chosen_offsets = {"n_obs_steps": count} if offsets[0] == 1 - count else {"observation_offsets": offsets}
+    config = tiny_config(**chosen_offsets, n_action_steps=n_action_steps, horizon=8)
     policy, preprocess, _ = build(config)
     episode = [
         {k: v[:, -1] if isinstance(v, torch.Tensor) else v for k, v in batch_for(config, size=2, seed=t).items()}
@@ -269,7 +275,7 @@ def test_select_action_steps_through_chunks_of_the_true_history(n_obs_steps: int
         else:  # what nobody looks at may be missing
             chosen.append(policy.select_action({}, noise=noise))
     for start in range(0, len(steps), n_action_steps):
-        history = [max(0, start - n_obs_steps + 1 + i) for i in range(n_obs_steps)]
+        history = [max(0, start + offset) for offset in offsets]
         assert set(history) <= looked_at | {0}
         stacked = dict(steps[start])
         for key in (*contract.IMAGE_KEYS, contract.STATE_KEY):
