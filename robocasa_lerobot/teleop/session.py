@@ -227,6 +227,9 @@ class Session:
 
     def _drive(self, now: float) -> bool:
         episode, driver, env = self.driven, self.driver, self.env
+        if driver.assistance is not None and not driver.assistance.told:
+            driver.assistance.told = True  # a picture goes out first: planning may take seconds
+            return True
         if self._policy_looks() and not env.render_observations and not driver.by_steps:
             env.render_observations = True
             episode.show(len(episode))

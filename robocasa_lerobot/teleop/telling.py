@@ -77,7 +77,7 @@ def header(session: Session, number: int, now: float) -> dict[str, Any]:
         "review": None,
     }
     if driver.assistance is not None:
-        steps = {"steps": driver.assistance.steps} if driver.assistance.planned else {"planning": True}
+        steps = {"steps": driver.assistance.steps} if driver.assistance.steps else {"planning": True}
         told["assisted"] = {"kind": driver.assistance.kind, **steps}
     if session.episode is not None:
         told |= _of_episode(session)

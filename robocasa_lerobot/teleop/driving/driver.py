@@ -23,12 +23,12 @@ MOST_WAITING = 64  # actions
 
 @dataclass
 class Assistance:
-    """A planned motion while it runs: of a kind, with the number of its steps so far."""
+    """A planned motion: of a kind, with the number of its steps so far; `told` once clients know that it is planned."""
 
     kind: str
     actions: Iterator[Array]
     steps: int = 0
-    planned: bool = False
+    told: bool = False
 
 
 @dataclass
@@ -148,7 +148,6 @@ class Driver:
             tell("warning", str(error))
             return None
         running.steps += 1
-        running.planned = True
         return np.clip(action, -1.0, 1.0)
 
     def _take_over(self) -> None:

@@ -1,0 +1,335 @@
+"""Any order of what an operator can do leaves whole episodes only; without sockets, time is made up."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+import pytest
+from hypothesis import example, given
+from hypothesis import settings as examples
+from hypothesis import strategies as st
+from teleop_support import SEED, SPLIT, TASK, demonstration, settings
+
+from robocasa_lerobot import contract
+from robocasa_lerobot.demos.recorder import SUCCESS_HOLD_STEPS, Recording
+from robocasa_lerobot.demos.replay import replay
+from robocasa_lerobot.envs.kitchen_env import KitchenEnv
+from robocasa_lerobot.errors import UserError
+from robocasa_lerobot.teleop.keeping.store import REDO, Store
+from robocasa_lerobot.teleop.messages import parse
+from robocasa_lerobot.teleop.orders import carry_out
+from robocasa_lerobot.teleop.session import Session
+from robocasa_lerobot.teleop.telling import header
+
+pytestmark = pytest.mark.render
+
+TICK_S = 0.05
+
+
+@pytest.fixture(scope="module")
+def shown() -> Recording:
+    return demonstration()
+
+
+@pytest.fixture(scope="module")
+def env() -> Iterator[KitchenEnv]:
+    made = KitchenEnv(TASK, split=SPLIT, cameras=(), terminate_on_success=False)
+    yield made
+    made.close()
+
+
+class Desk:
+    """A session whose clock is turned by hand."""
+
+    def __init__(self, store: Store, env: KitchenEnv, shown: Recording) -> None:
+        self.session = Session(store.settings, store, env)
+        self.now, self.told = 100.0, list[dict[str, Any]]()
+        self._actions = contract.hdf5_to_stored(shown.actions)
+
+    def say(self, kind: str, **fields: Any) -> None:
+        carry_out(self.session, parse(json.dumps({"type": kind, **fields})), self.now)
+        self._listen()
+
+    def tick(self, times: int = 1) -> None:
+        for _ in range(times):
+            self.now += TICK_S
+            self.session.tick(self.now)
+            header(self.session, 1, self.now)  # what is told must be there in every phase
+            self._listen()
+
+    def until(self, phase: str) -> None:
+        for _ in range(5):
+            if self.session.phase != phase:
+                self.tick()
+        assert self.session.phase == phase, self.told[-3:]
+
+    def hold(self, steps: int, **held: Any) -> None:
+        for _ in range(steps):
+            self.say("input", frame=0, **held)
+            self.tick()
+
+    def follow(self, steps: int) -> None:
+        """Carry out the demonstrator's actions from where the episode is."""
+        for _ in range(steps):
+            episode = self.session.episode
+            at = len(self._actions) if episode is None else len(episode)
+            if self.session.phase not in ("ready", "running", "paused") or at >= len(self._actions):
+                return
+            self.say("action", frame=0, action=self._actions[at].tolist())
+            if self.session.phase == "paused":
+                self.say("resume")
+            self.tick()
+
+    def notes(self) -> list[str]:
+        return [told["text"] for told in self.told if told["type"] == "note"]
+
+    def _listen(self) -> None:
+        self.told += self.session.outgoing
+        self.session.outgoing.clear()
+
+
+@contextlib.contextmanager
+def desk(out: Path, env: KitchenEnv, shown: Recording, **changes: Any) -> Iterator[Desk]:
+    with Store(settings(out, **changes)).held() as store:
+        made = Desk(store, env, shown)
+        made.until("ready")
+        try:
+            yield made
+        finally:
+            made.session._views.close()
+
+
+OPERATIONS = st.lists(
+    st.one_of(
+        st.tuples(st.just("follow"), st.sampled_from([1, 20, 126])),
+        st.tuples(st.just("succeed"), st.just(0)),
+        st.tuples(st.just("hold"), st.sampled_from([1, 7])),
+        st.tuples(st.just("tick"), st.sampled_from([1, 8])),
+        st.tuples(st.just("undo"), st.sampled_from([1, 15, 500])),
+        st.tuples(st.just("rewind"), st.sampled_from([1, 6])),
+        st.tuples(
+            st.sampled_from(
+                [
+                    "pause",
+                    "resume",
+                    "mark",
+                    "back_to_mark",
+                    "end",
+                    "continue",
+                    "save",
+                    "trim",
+                    "redo",
+                    "finish",
+                    "start",
+                ]
+            ),
+            st.just(0),
+        ),
+        st.tuples(st.sampled_from(["focus", "disconnect", "stale", "grip", "review", "drive", "kill"]), st.just(0)),
+    ),
+    max_size=12,
+)
+
+
+def perform(desk: Desk, what: str, times: int) -> None:
+    session = desk.session
+    if what in ("follow", "tick"):
+        getattr(desk, what)(times)
+    elif what == "succeed":
+        if session.phase in ("running", "paused", "review"):
+            desk.say("rewind", steps=500)
+        desk.follow(200)
+        desk.say("save")
+    elif what == "hold":
+        desk.hold(times, arm=[1, 0, 0.5, 0, 0, 0])
+    elif what == "undo":
+        desk.say("rewind", steps=times)
+    elif what == "rewind":
+        for _ in range(times):
+            desk.say("rewind", on=True, speed=3)
+            desk.tick()
+    elif what == "grip":
+        desk.say("input", frame=0, gripper="closed")
+    elif what == "trim":
+        desk.say("save", trim=True)
+    elif what == "review":
+        desk.say("review", play=True, speed=4, seek=3)
+    elif what == "focus":
+        desk.say("focus", on=False)
+    elif what == "drive":
+        desk.say("drive_to", x=1.0, y=-1.5)
+    elif what in ("disconnect", "stale"):
+        session.hold_still(what)
+    else:
+        desk.say(what)
+
+
+@examples(max_examples=10)
+@given(operations=OPERATIONS)
+@example([("hold", 7), ("undo", 1), ("succeed", 0), ("tick", 8), ("follow", 20), ("disconnect", 0), ("succeed", 0)])
+@example([("succeed", 0), ("tick", 8), ("succeed", 0), ("tick", 8)])
+@example([("follow", 126), ("rewind", 6), ("focus", 0), ("succeed", 0), ("tick", 1), ("kill", 0)])
+def test_any_order_leaves_whole_episodes_only(
+    tmp_path_factory: pytest.TempPathFactory, env: KitchenEnv, shown: Recording, operations: list[tuple[str, int]]
+) -> None:
+    out = tmp_path_factory.mktemp("teleop")
+    with desk(out, env, shown, episodes=2) as table:
+        for what, times in operations:
+            if what == "kill":
+                break
+            perform(table, what, times)
+            episode = table.session.episode
+            if episode is not None:
+                assert len(episode.states) == len(episode) + 1 == len(episode.origins) + 1
+        saved = table.session.store.saved
+        done = table.session.phase == "done"
+    with Store(settings(out, episodes=2)).held() as store:
+        assert store.saved == saved
+        assert sorted(out.glob(".*/*.hdf5")) == [store.part(number) for number in saved]
+        store.merge()
+    path = out / f"{TASK}.hdf5"
+    assert path.exists() == bool(saved)
+    assert not done or all(told["type"] != "scene" for told in table.told[-1:])
+    if saved:
+        with h5py.File(path) as file:
+            assert len(file["data"]) == len(saved)
+        for index in range(len(saved)):
+            found = replay(path, f"demo_{index}")
+            assert (found.actions, found.states, found.same_start, found.deviation) == (True, True, True, 0.0)
+
+
+def test_undone_steps_are_dropped_and_the_rest_replays(tmp_path: Path, env: KitchenEnv, shown: Recording) -> None:
+    with desk(tmp_path, env, shown) as table:
+        table.follow(40)
+        table.say("mark")
+        table.hold(30, arm=[0, 1, 0, 0, 0.5, 0], gripper="open")
+        assert len(table.session.driven) == 70
+        table.say("rewind", on=True, speed=4)
+        table.tick(3)
+        assert table.session.phase == "rewinding"
+        table.tick(10)  # nobody holds it any more
+        assert table.session.phase == "paused"
+        assert not table.session.driver.steering.closed
+        table.say("back_to_mark")
+        assert len(table.session.driven) == 40
+        assert table.session.driver.steering.closed  # as the demonstrator has it there
+        assert table.session.driven.undos == 2
+        table.follow(200)
+        assert table.session.phase == "review"
+        table.say("review", play=True, speed=10, seek=0)
+        table.tick(3)
+        assert table.session.playback.step == 30
+        table.say("save")
+        table.until("done")
+    found = replay(tmp_path / f"{TASK}.hdf5", "demo_0")
+    assert (found.actions, found.states, found.deviation) == (True, True, 0.0)
+    with h5py.File(tmp_path / f"{TASK}.hdf5") as file:
+        demo = file["data/demo_0"]
+        assert np.array_equal(demo["actions"], shown.actions)
+        meta = json.loads(demo.attrs["ep_meta"])["teleop"]
+        assert (meta["undos"], meta["undone_steps"]) == (2, 30)
+
+
+def test_an_idle_head_is_trimmed_where_it_still_succeeds(tmp_path: Path, env: KitchenEnv, shown: Recording) -> None:
+    with desk(tmp_path, env, shown) as table:
+        table.say("start")
+        table.tick(12)
+        table.say("rewind", steps=2)
+        for action in contract.hdf5_to_stored(shown.actions):
+            table.say("action", frame=0, action=action.tolist())
+            table.tick()
+        assert table.session.driven.idle_head() == 10
+        assert len(table.session.driven) == 10 + len(shown.actions)
+        table.say("save", trim=True)
+        table.until("done")
+    found = replay(tmp_path / f"{TASK}.hdf5", "demo_0")
+    assert (found.actions, found.same_start, found.deviation) == (True, True, 0.0)
+    with h5py.File(tmp_path / f"{TASK}.hdf5") as file:
+        assert np.array_equal(file["data/demo_0/actions"], shown.actions)
+
+
+def test_nothing_counts_before_the_first_input(tmp_path: Path, env: KitchenEnv, shown: Recording) -> None:
+    with desk(tmp_path, env, shown) as table:
+        start = env.data.time
+        table.hold(5)
+        table.tick(20)
+        assert (table.session.phase, len(table.session.driven), env.data.time) == ("ready", 0, start)
+        table.hold(1, gripper="closed")
+        assert (table.session.phase, len(table.session.driven)) == ("running", 1)
+
+
+def test_what_is_held_expires_and_is_let_go_where_time_stops(tmp_path: Path, env: KitchenEnv, shown: Recording) -> None:
+    with desk(tmp_path, env, shown) as table:
+        arm = contract.ACTION_SLICES["end_effector_position"]
+        table.hold(3, arm=[1, 0, 0, 0, 0, 0])
+        table.tick(8)
+        moved = np.abs(table.session.driven.actions()[:, arm]).max(axis=1) > 0
+        assert len(moved) == 11
+        assert moved[:6].all()
+        assert not moved[8:].any()  # a quarter of a second, five steps, after the last message
+        table.say("input", frame=0, arm=[1, 0, 0, 0, 0, 0])
+        table.say("focus", on=False)
+        assert (table.session.phase, table.session.pause) == ("paused", "focus")
+        table.say("input", frame=0, arm=[1, 0, 0, 0, 0, 0])
+        assert table.session.phase == "paused"
+        table.say("resume")
+        table.tick()
+        assert not table.session.driven.actions()[-1][arm].any()
+
+
+def test_what_fails_is_not_saved_and_the_reason_is_kept(tmp_path: Path, env: KitchenEnv, shown: Recording) -> None:
+    with desk(tmp_path, env, shown) as table:
+        table.follow(30)
+        table.say("save")
+        assert "not possible while running" in table.notes()[-1]
+        table.say("end")
+        table.say("save")
+        assert "goal is reached" in table.notes()[-1]
+        table.say("continue")
+        table.follow(200)
+        assert table.session.driven.held == SUCCESS_HOLD_STEPS
+        table.say("continue")
+        assert "ended by success" in table.notes()[-1]
+        table.say("redo")
+        table.until("ready")
+        assert table.session.driven.seed == SEED
+        table.say("discard", reason="kitchen unsuitable")
+        table.until("ready")
+        assert table.session.driven.seed == SEED + 1
+        assert [attempt.reason for attempt in table.session.store.attempts] == [REDO, "kitchen unsuitable"]
+        table.say("finish")
+    assert not (tmp_path / f"{TASK}.hdf5").exists()
+    stats = json.loads((tmp_path / "teleop-stats.json").read_text())[TASK]
+    assert stats["discarded"] == {REDO: 1, "kitchen unsuitable": 1}
+    with Store(settings(tmp_path)).held() as store:
+        assert store.next_number() == 1
+
+
+def test_sessions_go_on_and_a_killed_one_loses_nothing(tmp_path: Path, env: KitchenEnv, shown: Recording) -> None:
+    with desk(tmp_path, env, shown, episodes=2) as table:
+        table.follow(200)
+        table.say("save")
+        table.until("ready")
+        assert table.session.driven.seed == SEED + 1
+        table.follow(10)
+    assert not (tmp_path / f"{TASK}.hdf5").exists()  # killed before it was merged
+    folder = tmp_path / f".{TASK}.teleop"
+    (folder / "attempts.jsonl").write_text('{"number": 0, "sav')  # even while the line was written
+    (folder / "000001.hdf5.partial").write_bytes(b"half of an episode")
+    with Store(settings(tmp_path, episodes=2)).held() as store:
+        assert (store.saved, store.next_number()) == ([0], 1)
+        assert (tmp_path / f"{TASK}.hdf5").exists()
+        assert not list(folder.glob("*.partial"))
+        with pytest.raises(UserError, match="running already"), Store(settings(tmp_path)).held():
+            pass
+    with pytest.raises(UserError, match=r"other settings \(seed"), Store(settings(tmp_path, seed=SEED + 5)).held():
+        pass
+    (tmp_path / f".{TASK}.teleop").rename(tmp_path / "elsewhere")
+    with pytest.raises(UserError, match="did not record it here"), Store(settings(tmp_path)).held():
+        pass
