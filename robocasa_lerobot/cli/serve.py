@@ -48,7 +48,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
         "--token-file",
         type=Path,
         metavar="FILE",
-        help="what clients must send (or the environment's ROBOCASA_LEROBOT_TOKEN); needed for any other host",
+        help="what clients must send (or the environment's ROBOCASA_LEROBOT_POLICY_TOKEN); needed for any other host",
     )
     door.add_argument(
         "--max-message",

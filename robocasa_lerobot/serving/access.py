@@ -9,8 +9,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from robocasa_lerobot.errors import UserError
+from robocasa_lerobot.evaluation.remote.client import TOKEN_VARIABLE
 
-TOKEN_VARIABLE = "ROBOCASA_LEROBOT_TOKEN"
 _MIN_TOKEN = 16
 
 
@@ -32,8 +32,8 @@ class Access:
 def make_access(host: str, port: int, token_file: Path | None) -> Access:
     """Check where a server is to listen.
 
-    The token comes from a file or from the environment's ROBOCASA_LEROBOT_TOKEN: what stands on a command line is
-    seen by everybody on the machine.
+    The token comes from a file, or from the environment, where our clients look as well: what stands on a command line
+    is seen by everybody on the machine.
 
     Raises:
         UserError: another host than loopback without a token, a short or unreadable token, or no such port.

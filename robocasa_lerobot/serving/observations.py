@@ -61,7 +61,7 @@ _MAX_INSTRUCTION: Final = 4096  # characters
 
 @dataclass(frozen=True)
 class Asked:
-    """What a client's observation says: the observations that the policy looks at, and how it wants its actions.
+    """What a client's observation says: those at the policy's offsets, and how it wants its actions.
 
     `stored_order`: flat actions are wanted in stored order, else in HDF5 order.
     """
@@ -73,7 +73,7 @@ class Asked:
 
 @dataclass(frozen=True)
 class Wanted:
-    """What a policy needs: cameras and their (height, width), and which observations, by their control steps.
+    """What a policy needs: cameras and their (height, width), and observations at which control steps, up to 0.
 
     `resize`: pictures of another size are scaled. `repeat`: one observation may stand for all of the history.
     """
@@ -88,7 +88,7 @@ class Wanted:
 def read_observation(message: Any, wanted: Wanted) -> Asked:
     """The observations in a client's map.
 
-    Pictures are uint8 (H, W, 3), upright RGB, or (T, H, W, 3) with the last T steps, oldest first; states (16,) or
+    Pictures are uint8 (H, W, 3), upright RGB, or (T, H, W, 3) at the policy's T offsets, oldest first; states (16,) or
     (T, 16).
 
     Raises:
@@ -196,17 +196,16 @@ def _read_pictures(flat: Mapping[str, Any], camera: str) -> NDArray[np.uint8]:
 def _with_history(
     state: NDArray[np.float64], pictures: dict[str, NDArray[np.uint8]], wanted: Wanted
 ) -> tuple[NDArray[np.float64], dict[str, NDArray[np.uint8]]]:
-    found = len(state)
-    count = len(wanted.offsets)
-    if found == count:
+    found, times = len(state), len(wanted.offsets)
+    if found == times:
         return state, pictures
     if found == 1 and wanted.repeat:
-        return np.repeat(state, count, 0), {camera: np.repeat(one, count, 0) for camera, one in pictures.items()}
+        return np.repeat(state, times, 0), {camera: np.repeat(one, times, 0) for camera, one in pictures.items()}
     raise RequestError(
-        f"observation: found {found} step(s), expected those at control steps {list(wanted.offsets)}, 0 the newest: "
-        f"pictures (T, H, W, 3) and states (T, {contract.STATE_SIZE}) with T = {count}; in a trial's first "
-        "steps, its first observation is repeated. (`serve --repeat-history` takes one for all, at the cost of a "
-        "policy that believes it stands still.)"
+        f"observation: found {found} step(s), expected those at the control steps {list(wanted.offsets)}, oldest "
+        f"first: pictures (T, H, W, 3) and states (T, {contract.STATE_SIZE}) with T = {times}; before a trial's start its "
+        "first observation counts. (`serve --repeat-history` takes one for all, at the cost of a policy that believes "
+        "it stands still.)"
     )
 
 

@@ -28,9 +28,9 @@ Answer = NDArray[np.float32] | Exception
 class Served:
     """What clients are told about the policy.
 
-    `executed` actions are answered to one request, from the observations at `offsets`, control steps ascending to 0,
-    the newest; the policy itself predicts `horizon` of them, for `width` requests at once. `image_size` is (height,
-    width) of the pictures of `cameras`, None where it looks at none.
+    `executed` actions are answered to one request, from the observations at `offsets` (control steps, ascending up to
+    0); the policy itself predicts `horizon` of them, for `width` requests at once. `image_size` is (height, width) of
+    the pictures of `cameras`, None where it looks at none.
     """
 
     source: PolicySource
@@ -41,11 +41,6 @@ class Served:
     width: int = 1
 
     @property
-    def history(self) -> int:
-        """Number of observations of a request."""
-        return len(self.offsets)
-
-    @property
     def image_size(self) -> tuple[int, int] | None:
         """(height, width) of its pictures, pixels."""
         return self.source.image_size if self.cameras else None
@@ -53,7 +48,8 @@ class Served:
     def describe(self) -> str:
         """The policy in one line."""
         size = "no pictures" if self.image_size is None else f"pictures of {self.image_size[0]}x{self.image_size[1]}"
-        return f"{self.source.label} ({self.source.type}, {size}, {self.executed} action(s) for {self.history} step(s))"
+        chunk = f"{self.executed} action(s) from step(s) {list(self.offsets)}"
+        return f"{self.source.label} ({self.source.type}, {size}, {chunk})"
 
     def metadata(self) -> dict[str, Any]:
         """What a client needs to know, in plain values of msgpack and JSON."""

@@ -2,7 +2,8 @@
 
 Every message is a map of `type`, `payload`, `seq` and `timestamp`. The chunks are this side's matter: an episode's
 observations come step by step, so that histories and chunks are exactly those of an evaluation in process.
-`episode_start` may give the trial's seed, as `seed` in its payload or `policy_seed` in the payload's `task`.
+`episode_start` may give the trial's seed, as `seed` in its payload or `policy_seed` in the payload's `task`; so may the
+episode's first observation, as `seed`.
 Source: vla-eval 0.8.0.
 """
 
@@ -118,11 +119,17 @@ class VlaEvalServer:
             raise RequestError(f"protocol_version: found {version!r:.20}, expected {PROTOCOL_VERSION}.")
         served = self._host.served
         size = served.image_size
+        chunk = {"executed_steps": served.executed, "history_offsets": list(served.offsets)}
         return {
+            **served.metadata(),
+            # What a client has to do with it, which sends every step and gets one action.
+            "executed_steps": 1,
+            "history_offsets": [0],
+            "chunk": chunk,
             "harness_version": f"robocasa_lerobot {__version__}",
             "protocol_version": PROTOCOL_VERSION,
             "model_server": "robocasa_lerobot",
-            "capabilities": served.metadata(),
+            "capabilities": {},
             "observation_params": {"camera_size": size[0]} if size is not None and size[0] == size[1] else {},
             "action_spec": _ACTION_SPEC,
             "observation_spec": _OBSERVATION_SPEC,
@@ -143,11 +150,11 @@ class Episode:
 
     def __init__(self, host: Host, session: Session) -> None:
         self._host, self._session = host, session
-        self._seed, _ = session.next()
+        seed, _ = session.next()
         self._stored_order = False
         shape = ChunkShape(host.served.executed, host.served.offsets)
         self._actor = ChunkActor(host.served.source.label, shape, self._predict)
-        self._actor.reset(self._seed, None)
+        self._actor.reset(seed, None)
         self._step = 0
 
     def act(self, payload: Mapping[Any, Any]) -> np.ndarray:
@@ -156,6 +163,10 @@ class Episode:
         Raises:
             RequestError: the observation is not what the policy needs.
         """
+        seed = whole_number(payload, "seed") if self._step == 0 else None
+        if seed is not None:
+            self._session.begin(seed)
+            self._actor.reset(seed, None)
         observation: Observation = {}
         instruction = ""
         if self._actor.sees(self._step):

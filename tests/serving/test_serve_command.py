@@ -113,6 +113,6 @@ def test_a_short_token_and_a_taken_port_are_refused(
         port = taken.getsockname()[1]
         assert cli.main(["serve", "--policy.path=random", f"--port={port}"]) == 2
         assert "cannot listen" in capsys.readouterr().err
-    monkeypatch.setenv("ROBOCASA_LEROBOT_TOKEN", "short")
+    monkeypatch.setenv("ROBOCASA_LEROBOT_POLICY_TOKEN", "short")
     assert cli.main(["serve", "--policy.path=random"]) == 2
     assert "at least 16" in capsys.readouterr().err

@@ -96,14 +96,13 @@ def test_an_episodes_actions_are_those_of_the_policy_in_process(
 def test_our_own_names_get_stored_order_and_episodes_their_own_noise(port: int, in_process: ChunkPolicy) -> None:
     with client(port) as one:
         found = []
-        for start in ({"seed": 21}, {}, {}):
+        for start, inside in (({"seed": 21}, {}), ({}, {}), ({}, {}), ({}, {"seed": 21})):
             one.send("episode_start", start)
-            message = {
-                key: value if key == "task" else value[0]
-                for key, value in own_names([observation(0)], INSTRUCTION).items()
-            }
+            message = own_names([observation(0)], INSTRUCTION)
+            message = {**{key: value if key == "task" else value[0] for key, value in message.items()}, **inside}
             found.append(one.ask("observation", message)["payload"]["actions"])
-    np.testing.assert_array_equal(found[0], in_process_actions(in_process, 21)[0])
+    for told in (found[0], found[3]):
+        np.testing.assert_array_equal(told, in_process_actions(in_process, 21)[0])
     assert len({one.tobytes() for one in found}) == 3
 
 
@@ -114,7 +113,8 @@ def test_hello_says_what_the_policy_is(port: int) -> None:
     payload = said["payload"]
     assert payload["protocol_version"] == 1
     assert payload["observation_params"] == {"camera_size": SIZE}
-    assert payload["capabilities"]["executed_steps"] == 8
+    assert payload["executed_steps"] == 1
+    assert payload["chunk"] == {"executed_steps": 8, "history_offsets": [-1, 0]}
     assert sum(spec["dims"] for spec in payload["action_spec"].values()) == contract.ACTION_SIZE
 
 
