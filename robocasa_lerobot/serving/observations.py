@@ -203,9 +203,9 @@ def _with_history(
         return np.repeat(state, times, 0), {camera: np.repeat(one, times, 0) for camera, one in pictures.items()}
     raise RequestError(
         f"observation: found {found} step(s), expected those at the control steps {list(wanted.offsets)}, oldest "
-        f"first: pictures (T, H, W, 3) and states (T, {contract.STATE_SIZE}) with T = {times}; before a trial's start its "
-        "first observation counts. (`serve --repeat-history` takes one for all, at the cost of a policy that believes "
-        "it stands still.)"
+        f"first: pictures (T, H, W, 3) and states (T, {contract.STATE_SIZE}) with T = {times}; before a trial's start "
+        "its first observation counts. (`serve --repeat-history` takes one for all, at the cost of a policy that "
+        "believes it stands still.)"
     )
 
 

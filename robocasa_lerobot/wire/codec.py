@@ -18,6 +18,8 @@ import numpy as np
 Dialect = Literal["openpi", "msgpack_numpy", "vla_eval", "gr00t"]
 
 MAX_MESSAGE_BYTES: Final = 64 * 2**20  # eight 1024x1024 pictures and a chunk; more is a mistake or an attack
+# Maps and lists of a message; one byte of it can stand for an empty one, which takes sixty in memory.
+MAX_CONTAINERS: Final = 100_000
 KINDS: Final = "biuf"  # kinds of dtype that cross the wire: bool, integers, floats; never objects, records, text
 
 
@@ -50,14 +52,32 @@ def decode(data: bytes, max_bytes: int = MAX_MESSAGE_BYTES) -> Any:
     """The message in `data`; arrays of every dialect become read-only numpy arrays.
 
     Raises:
-        WireError: not msgpack, larger than `max_bytes`, or an array whose bytes, type and shape do not fit.
+        WireError: not msgpack, larger than `max_bytes`, of too many maps and lists, or an array whose bytes, type and
+            shape do not fit.
     """
     if len(data) > max_bytes:
         raise WireError(f"a message of {len(data)} bytes; at most {max_bytes} are read")
+    left = MAX_CONTAINERS
+
+    def count() -> None:
+        nonlocal left
+        left -= 1
+        if left < 0:
+            raise WireError(f"a message of more than {MAX_CONTAINERS} maps and lists")
+
+    def read_map(raw: dict[Any, Any]) -> Any:
+        count()
+        return _from_map(raw)
+
+    def read_list(raw: list[Any]) -> list[Any]:
+        count()
+        return raw
+
     try:
         return msgpack.unpackb(
             data,
-            object_hook=_from_map,
+            object_hook=read_map,
+            list_hook=read_list,
             raw=False,
             strict_map_key=False,
             max_ext_len=0,

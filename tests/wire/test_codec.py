@@ -112,5 +112,8 @@ def test_what_is_no_msgpack_or_too_large_is_an_error() -> None:
     for data in (b"", b"\xc1", b"\xdf\xff\xff\xff\xff", msgpack.packb([1]) + b"rest", b"\x91" * 5000):
         with pytest.raises(WireError):
             decode(data)
+    for one in (b"\x80", b"\x90"):  # each an empty map or list
+        with pytest.raises(WireError, match="maps and lists"):
+            decode(b"\xdd" + (2**20).to_bytes(4, "big") + one * 2**20)
     with pytest.raises(WireError, match="at most 10"):
         decode(msgpack.packb("a" * 100), max_bytes=10)
