@@ -16,6 +16,7 @@ from robocasa_lerobot.convert.mapping.custom import parse_mapping
 from robocasa_lerobot.convert.mapping.instruction import instruction_of, template_fields
 from robocasa_lerobot.convert.mapping.robot_mapping import RobotMapping
 from robocasa_lerobot.convert.mapping.robots import choose_mapping
+from robocasa_lerobot.convert.reading.decisions import decisions_of
 from robocasa_lerobot.convert.reading.demo import Demo, RejectedEpisodeError, SourceError
 from robocasa_lerobot.convert.reading.demo_file import DemoFile
 from robocasa_lerobot.convert.reading.layout import ACTION_KEYS, Layout
@@ -45,7 +46,8 @@ class ConversionSettings:
     `cameras` None takes the robot's own; `image_size` (pixels, square) None keeps the size of stored pictures and
     renders at the contract's size. `instruction` may be a template (`instruction.py`), and comes before a recorded one
     with `replace_instruction`. `filter_key`, `demos` and `demos_seed` select episodes (`selection.py`). `extra_columns`
-    are HDF5 paths below an episode. `mapping` is the JSON text of a mapping file (`custom_mapping.read_mapping`).
+    are HDF5 paths below an episode; who decided each step (`reading/decisions.py`) is taken along without being named
+    where all demos say it. `mapping` is the JSON text of a mapping file (`custom_mapping.read_mapping`).
     """
 
     asset_roots: tuple[str, ...] = ()
@@ -173,6 +175,10 @@ def make_plan(files: Sequence[Path], settings: ConversionSettings) -> Plan:
         hashes = [pool.submit(file_sha256, file) for file in files]  # meanwhile they are looked into
         try:
             looks = [_look(file, settings, roots) for file in files]
+            told = [key for key in looks[0].decisions if all(key in look.decisions for look in looks)]
+            if more := tuple(key for key in told if key not in settings.extra_columns):
+                settings = replace(settings, extra_columns=(*settings.extra_columns, *more))
+                looks = [_look(file, settings, roots) for file in files]
         except BaseException:
             pool.shutdown(wait=False, cancel_futures=True)
             raise
@@ -237,6 +243,7 @@ class _Look:
     traps: dict[str, str]  # demos that end the process that reads them, and how
     digests: dict[str, str]  # of whole demos
     stages: bool  # whether a demo says which stage its steps belong to
+    decisions: tuple[str, ...]  # what all demos say about who decided
 
 
 def _look(path: Path, settings: ConversionSettings, roots: Sequence[Path]) -> _Look:
@@ -268,7 +275,11 @@ def _look(path: Path, settings: ConversionSettings, roots: Sequence[Path]) -> _L
         # Who names demos has not asked for others.
         strays = file.strays() if settings.filter_key is None and settings.demos is None else {}
         stages = any(has_stages(file.demo(name)) for name in widths)
-        return _Look(path, mapping, cameras, file.control_hz, tuple(demos), strays, all_demos, traps, digests, stages)
+        decisions = decisions_of(file.demo(name) for name in widths)
+        return _Look(
+            *(path, mapping, cameras, file.control_hz, tuple(demos), strays, all_demos, traps, digests, stages),
+            decisions,
+        )
 
 
 def _robot_and_cameras(

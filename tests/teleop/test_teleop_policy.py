@@ -1,0 +1,102 @@
+"""A policy drives, a person corrects it; the file says who decided each step, and conversion keeps that."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pyarrow.parquet as pq
+import pytest
+from teleop_support import TASK, WAIT_S, saved_demo, served, settings
+
+from robocasa_lerobot import cli
+from robocasa_lerobot.convert.settings import ConversionSettings, make_plan
+from robocasa_lerobot.demos.replay import replay
+from robocasa_lerobot.errors import UserError
+from robocasa_lerobot.teleop.client import TeleopClient
+
+pytestmark = pytest.mark.render
+
+
+@pytest.fixture(scope="module")
+def corrected(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A file of one episode: the demonstrator as policy, corrected for a while, undone, and given back to."""
+    out = tmp_path_factory.mktemp("corrected")
+    with served(settings(out), policy="demonstrator") as session, TeleopClient(session.address) as client:
+        client.until_phase("ready", seconds=WAIT_S)
+        assert client.said[0]["policy"] == client.frame["policy"]["name"] == "demonstrator"
+        client.send("start")
+        client.until(lambda: client.frame["step"] >= 20)
+        assert client.frame["policy"]["state"] == "AUTONOMOUS"
+        for _ in range(10):  # any input takes over
+            client.send("input", device="keyboard", arm=[0, 0.5, 0.5, 0, 0, 0])
+            client.receive(WAIT_S)
+        client.until(lambda: client.frame["step"] >= 35)
+        assert client.frame["policy"] == {"name": "demonstrator", "state": "CORRECTING", "interventions": 1}
+        client.send("rewind", steps=2)
+        assert client.until_phase("paused")["policy"]["state"] == "PAUSED"
+        client.send("give_back")
+        client.until_phase("running")
+        client.until(lambda: client.frame["policy"]["state"] == "AUTONOMOUS")
+        client.until_phase("review", seconds=WAIT_S)
+        client.send("save")
+        client.until_told("done", WAIT_S)
+    return out / f"{TASK}.hdf5"
+
+
+def test_the_file_says_who_decided_each_step(corrected: Path) -> None:
+    found = saved_demo(corrected)
+    steps = len(found["actions"])
+    intervention, policy = found["intervention"], found["policy_action"]
+    assert intervention.shape == (steps, 1)
+    assert policy.shape == (steps, 12)
+    changes = np.flatnonzero(np.diff(intervention[:, 0].astype(int))) + 1
+    assert len(changes) == 2  # taken over once, given back once
+    assert 20 <= changes[0] < changes[1] < steps - 20
+    assert np.isfinite(policy).all()
+    asked = intervention[:, 0] == 0
+    binary = [6, 11]  # gripper and mode, HDF5 order, as executed -1 or 1
+    others = [index for index in range(12) if index not in binary]
+    executed = np.clip(policy, -1, 1).astype(np.float32)
+    assert np.array_equal(executed[asked][:, others], found["actions"][asked][:, others].astype(np.float32))
+    assert not found["assisted"].any()
+    with h5py.File(corrected) as file:
+        meta = json.loads(file["data/demo_0"].attrs["ep_meta"])["teleop"]
+    assert meta["policy"] == "demonstrator"
+    assert meta["intervention_steps"] == intervention.sum()
+    assert (meta["interventions"], meta["undos"]) == (1, 1)
+    outcome = replay(corrected, "demo_0")
+    assert (outcome.actions, outcome.states, outcome.deviation) == (True, True, 0.0)
+
+
+@pytest.mark.slow
+def test_conversion_keeps_who_decided_and_verifies(corrected: Path, tmp_path: Path) -> None:
+    data, back = tmp_path / "data", tmp_path / "back.hdf5"
+    assert cli.main(["convert", str(corrected), "--out", str(data), "--image-size", "48"]) == 0
+    assert cli.main(["verify", str(data)]) == 0
+    table = pq.read_table(next(data.glob("data/**/*.parquet"))).to_pydict()
+    found = saved_demo(corrected)
+    for key in ("intervention", "policy_action", "assisted"):
+        values = np.array(table[f"extra.{key}"], dtype=np.float64).reshape(len(found[key]), -1)
+        assert np.array_equal(values, found[key]), key
+    assert cli.main(["export", str(data), "--out", str(back)]) == 0
+    again = saved_demo(back)
+    assert np.array_equal(again["intervention"], found["intervention"][:, 0])
+
+
+def test_files_of_which_some_say_nothing_convert_without(corrected: Path, tmp_path: Path) -> None:
+    other = tmp_path / "other.hdf5"
+    other.write_bytes(corrected.read_bytes())
+    with h5py.File(other, "r+") as file:
+        del file["data/demo_0/intervention"]
+        file["data/demo_0/rewards"][0] = 0.5  # else it is the same demonstration twice
+    plan = make_plan([corrected, other], ConversionSettings(image_size=48))
+    assert plan.settings.extra_columns == ("policy_action", "assisted")
+    assert "extra.intervention" not in plan.features
+
+
+def test_a_policy_that_is_none_is_a_mistake(tmp_path: Path) -> None:
+    with pytest.raises(UserError, match="no such folder"), served(settings(tmp_path), policy=str(tmp_path / "none")):
+        pass
