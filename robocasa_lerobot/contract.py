@@ -53,11 +53,22 @@ STAGE_KEY = "stage_index"
 SUBTASK_KEY = "subtask_index"
 LANGUAGE_KEY = "language_persistent"
 STAGE_KEYS: tuple[str, ...] = (STAGE_KEY, SUBTASK_KEY, LANGUAGE_KEY)
+# Who decided each step, where people have a hand in it: HDF5 datasets below an episode, features `extra.<name>` of a
+# dataset. Whether a person decided while there was a policy (0, 1); what the policy wanted (12, the order of the file's
+# actions); whether the step belongs to a planned motion that the person asked for (0, 1).
+DECISIONS: tuple[str, ...] = ("intervention", "policy_action", "assisted")
+EXTRA_PREFIX = "extra."
+FRAME_KINDS: tuple[str, ...] = ("interventions", "autonomous")  # frames by who decided them
 
 
 def image_key(camera: str) -> str:
     """Dataset feature name of a camera."""
     return IMAGE_PREFIX + camera
+
+
+def decision_key(name: str) -> str:
+    """Dataset feature of one of `DECISIONS`."""
+    return EXTRA_PREFIX + name
 
 
 IMAGE_KEYS: tuple[str, ...] = tuple(image_key(camera) for camera in CAMERAS)

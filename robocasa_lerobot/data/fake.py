@@ -36,15 +36,17 @@ def write_fake_dataset(
     image_size: int = 32,
     seed: int = 0,
     tasks: Sequence[str] = ("OpenDrawer", "CloseDrawer"),
+    decisions: bool = False,
 ) -> Path:
     """Write the dataset at `root`, which must not exist, complete or not at all; episode i has task i % len(tasks).
 
-    Pictures are image_size x image_size pixels; every episode has `length` frames.
+    Pictures are image_size x image_size pixels; every episode has `length` frames. With `decisions` it says who decided
+    them: a person the second half of each episode.
     """
     root.parent.mkdir(parents=True, exist_ok=True)
     aside = Path(tempfile.mkdtemp(prefix=f".{root.name}.", dir=root.parent))
     try:
-        _write(aside / root.name, episodes, length, image_size, np.random.default_rng(seed), tasks)
+        _write(aside / root.name, episodes, length, image_size, np.random.default_rng(seed), tasks, decisions)
         (aside / root.name).rename(root)
     finally:
         shutil.rmtree(aside)
@@ -52,12 +54,20 @@ def write_fake_dataset(
 
 
 def _write(
-    folder: Path, episodes: int, length: int, image_size: int, generator: np.random.Generator, tasks: Sequence[str]
+    folder: Path,
+    episodes: int,
+    length: int,
+    image_size: int,
+    generator: np.random.Generator,
+    tasks: Sequence[str],
+    decisions: bool,
 ) -> None:
+    person = contract.decision_key("intervention")
+    more = {person: {"dtype": "float64", "shape": (1,), "names": None}} if decisions else {}
     dataset = LeRobotDataset.create(
         repo_id=folder.name,
         fps=contract.VIDEO_FPS,
-        features=contract.dataset_features((image_size, image_size)),
+        features=contract.dataset_features((image_size, image_size)) | more,
         root=folder,
         robot_type=contract.ROBOT_TYPE,
         video_backend="pyav",
@@ -70,8 +80,8 @@ def _write(
     try:
         for episode in range(episodes):
             task = tasks[episode % len(tasks)]
-            for frame in _frames(task, length, image_size, generator):
-                dataset.add_frame(frame)
+            for number, frame in enumerate(_frames(task, length, image_size, generator)):
+                dataset.add_frame(frame | {key: np.array([float(number >= length // 2)]) for key in more})
             dataset.save_episode()
             kitchen = KITCHENS[episode // len(tasks) % len(KITCHENS)]
             rows.append(

@@ -5,6 +5,7 @@ Numbers come from memory, pictures from the frame cache or, without one, from Le
 
 from __future__ import annotations
 
+import functools
 import hashlib
 from collections import OrderedDict
 from collections.abc import Mapping, Sequence
@@ -17,11 +18,12 @@ import torch
 from numpy.typing import NDArray
 
 from robocasa_lerobot.data.mixture_config import LoaderConfig, MemberConfig, MixtureConfig
+from robocasa_lerobot.data.reading.decisions import frame_pool
 from robocasa_lerobot.data.reading.frame_cache import FrameCache, cache_bytes, open_or_build, resize_images
 from robocasa_lerobot.data.reading.pictures import PictureReader
 from robocasa_lerobot.data.reading.source import DatasetSource
 from robocasa_lerobot.data.registry.registry import resolve_mixture
-from robocasa_lerobot.data.sampler import FramePool, MixtureSampler, mixture_probabilities
+from robocasa_lerobot.data.sampler import MixtureSampler, mixture_probabilities
 from robocasa_lerobot.data.statistics import (
     Part,
     Statistics,
@@ -57,9 +59,12 @@ class MixtureMeta:
 class _Member:
     source: DatasetSource
     episodes: NDArray[np.int64]
+    kind: str | None = None
 
-    @property
+    @functools.cached_property
     def frames(self) -> int:
+        if self.kind is not None:
+            return frame_pool(self.source, self.episodes, self.kind).size
         return int((self.source.ends - self.source.starts)[self.episodes].sum())
 
 
@@ -113,7 +118,7 @@ class MixtureDataset(torch.utils.data.Dataset[Item]):
         self._members = []
         for member in config.members:
             source = self.sources[Path(member.root)]
-            self._members.append(_Member(source, source.select(member)))
+            self._members.append(_Member(source, source.select(member), member.frames))
         places = {root: place for place, root in enumerate(self.sources)}
         self._source_list = list(self.sources.values())
         self._place = np.array([places[Path(member.root)] for member in config.members])  # of each member's source
@@ -158,6 +163,7 @@ class MixtureDataset(torch.utils.data.Dataset[Item]):
             tasks = ", ".join(member.tasks) if member.tasks else "all tasks"
             for name, kitchens in (("layouts", member.layouts), ("styles", member.styles)):
                 tasks += f"; {name} {', '.join(map(str, kitchens))}" if kitchens else ""
+            tasks += f"; {member.frames}" if member.frames else ""
             counts = f"{len(part.episodes)} episodes, {part.frames} frames"
             lines.append(f"{member.root} ({tasks}): {counts}, {probability:.{1 if probability >= 0.01 else 3}%}")
         return "\n".join(lines)
@@ -179,12 +185,7 @@ class MixtureDataset(torch.utils.data.Dataset[Item]):
 
     def sampler(self, seed: int, drop_last_frames: int = 0) -> MixtureSampler:
         """The sampler over the mixture; the last frames of each episode can be kept from starting a sample."""
-        pools = []
-        for member in self._members:
-            starts = member.source.starts[member.episodes]
-            # A shorter episode keeps its first frame: no episode drops out of the training unnoticed.
-            lengths = np.maximum(1, member.source.ends[member.episodes] - starts - drop_last_frames)
-            pools.append(FramePool(starts, lengths))
+        pools = [frame_pool(m.source, m.episodes, m.kind, drop_last_frames) for m in self._members]
         return MixtureSampler(pools, self.probabilities, seed)
 
     def set_windows(self, delta_timestamps: Mapping[str, Sequence[float]] | None) -> None:

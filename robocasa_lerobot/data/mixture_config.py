@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
+from robocasa_lerobot import contract
 from robocasa_lerobot.errors import UnknownNameError, UserError
 
 # Exponent on the number of frames with which the published benchmark weights its datasets: P ~ L^0.4
@@ -35,6 +36,9 @@ class MemberConfig:
             benchmark's rule (`contract.demo_subset`).
         group: class of the member, for `shares` of the mixture.
         repo_id: `owner/name` of a LeRobotDataset v3.0 on the hub, which training fetches to `root` if it is not there.
+        frames: of the episodes' frames, those that start samples: `interventions`, which a person decided while a
+            policy drove, or `autonomous`, which the policy decided; None is all. A dataset may be a member of each
+            kind, with a weight of its own. Statistics are those of whole episodes.
     """
 
     root: str = ""
@@ -47,8 +51,11 @@ class MemberConfig:
     layouts: list[int] | None = None
     styles: list[int] | None = None
     repo_id: str | None = None
+    frames: str | None = None
 
     def __post_init__(self) -> None:
+        if self.frames is not None and self.frames not in contract.FRAME_KINDS:
+            raise UnknownNameError("kind of frames", self.frames, contract.FRAME_KINDS, "(of a mixture's member)")
         if self.repo_id is not None and not re.fullmatch(r"[\w.-]+/[\w.-]+", self.repo_id):
             raise UserError(f"mixture: repo_id is {self.repo_id!r}, expected OWNER/NAME of a dataset on the hub.")
         if not self.root and self.repo_id is None:

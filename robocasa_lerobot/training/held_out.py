@@ -48,10 +48,10 @@ def without_held_out(
         left = np.setdiff1d(used, held)
         if not len(left):
             raise UserError(f"{member.root}: `held_out` leaves no episode to train on; give more data or less share.")
-        plain = MemberConfig(member.root, weight=float(probability))
+        plain = MemberConfig(member.root, weight=float(probability), frames=member.frames)
         kept.append(dataclasses.replace(plain, episodes=left.tolist()))
         if len(held):
-            apart.append(dataclasses.replace(plain, episodes=held.tolist()))
+            apart.append(dataclasses.replace(plain, episodes=held.tolist(), frames=None))
     if not apart:
         return dataset, None
     return open_mixture(MixtureConfig(members=kept), loader), open_mixture(MixtureConfig(members=apart), loader)

@@ -169,9 +169,9 @@ def all_datasets(tmp_path_factory: pytest.TempPathFactory) -> Path:
     from robocasa_lerobot.data.registry.published import PUBLISHED
 
     work = tmp_path_factory.mktemp("work")
-    small = write_fake_dataset(work / "small", episodes=4, length=4, image_size=32)
+    small = write_fake_dataset(work / "small", episodes=4, length=4, image_size=32, decisions=True)
     large = write_fake_dataset(work / "large", episodes=60, length=4, image_size=32, tasks=tuple(INSTRUCTIONS))
-    places = [work / "outputs/demo/data"]
+    places = [work / "outputs/demo/data", work / "outputs/corrections/data"]
     for split, source in PUBLISHED:
         inner = "20250101" if source == "human" else f"20250101/{source}/demo/000000"
         for task in published_task_sets()[PUBLISHED[split, source]]:

@@ -59,7 +59,7 @@ def write_datasets(work: Path, experiments: Iterable[ExperimentConfig]) -> dict[
             shutil.copytree(written[own], target)
             continue
         episodes = EPISODES * len(own)
-        written[own] = write_fake_dataset(target, episodes, LENGTH, SIZE, seed=len(written), tasks=own)
+        written[own] = write_fake_dataset(target, episodes, LENGTH, SIZE, seed=len(written), tasks=own, decisions=True)
     return {place: tuple(sorted(names)) for place, names in tasks.items()}
 
 

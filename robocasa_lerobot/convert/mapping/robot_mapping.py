@@ -19,7 +19,7 @@ from robocasa_lerobot.convert.reading.demo import Demo, RejectedEpisodeError
 
 # Features of extra columns. LeRobot's policies take every feature that begins with `observation` or `action` for an
 # input or output; these begin with neither.
-EXTRA_PREFIX = "extra."
+EXTRA_PREFIX = contract.EXTRA_PREFIX
 
 
 class Poses(Protocol):

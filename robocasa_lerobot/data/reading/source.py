@@ -46,10 +46,14 @@ class DatasetSource:
         self.fps = int(self._info.fps)
         self.robot_type: str | None = self._info.robot_type
         # Not the stages of episodes: datasets without them go together with those that have them, and a row of one
-        # dataset's table of subtasks means nothing in another.
+        # dataset's table of subtasks means nothing in another. Nor who decided a step, for the first reason.
+        apart = {contract.decision_key(name) for name in contract.DECISIONS}
         self.features: dict[str, dict[str, Any]] = {
-            key: feature for key, feature in self._info.features.items() if key not in contract.STAGE_KEYS
+            key: feature
+            for key, feature in self._info.features.items()
+            if key not in apart and key not in contract.STAGE_KEYS
         }
+        self.decisions = {key: feature for key, feature in self._info.features.items() if key in apart}
         tasks = load_tasks(self.root).sort_values("task_index")
         self.instructions = [str(text) for text in tasks.index]  # text of each `task_index`
 

@@ -18,8 +18,7 @@ from robocasa_lerobot.envs.kitchen_env import KitchenEnv, Observation
 Array = NDArray[np.float64]
 Info = dict[str, Any]
 
-# Datasets beside the actions, which `convert` takes along: (T, 1), (T, 1) and (T, 12).
-INTERVENTION, ASSISTED, POLICY_ACTION = "intervention", "assisted", "policy_action"
+INTERVENTION, POLICY_ACTION, ASSISTED = contract.DECISIONS
 
 
 @dataclass(frozen=True)

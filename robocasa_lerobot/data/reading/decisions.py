@@ -1,0 +1,58 @@
+"""Which frames of a dataset a person decided while a policy drove, and which the policy."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from robocasa_lerobot import contract
+from robocasa_lerobot.data.reading.column_file import column_types, read_columns
+from robocasa_lerobot.data.reading.source import DatasetSource
+from robocasa_lerobot.data.sampler import FramePool
+from robocasa_lerobot.errors import UserError
+
+INTERVENTIONS = "interventions"  # the other one of `contract.FRAME_KINDS` is the policy's own steps
+
+
+def frames_of(source: DatasetSource, kind: str) -> NDArray[np.bool_]:
+    """Which frames (frames,) of a dataset are of a kind of `contract.FRAME_KINDS`.
+
+    Raises:
+        UserError: the dataset does not say who decided.
+    """
+    key = contract.decision_key("intervention")
+    feature = source.decisions.get(key)
+    if feature is None:
+        raise UserError(
+            f"{source.root}: `frames: {kind}` needs the feature {key}, which this dataset lacks. Record with "
+            "`robocasa-lerobot teleop --policy=...` and convert, or leave `frames` out."
+        )
+    index = {"index": {"dtype": "int64", "shape": (1,)}}
+    columns = read_columns(source.root, column_types({**index, key: feature}), source.total_frames)
+    person: NDArray[np.bool_] = columns[key] > 0
+    return person if kind == INTERVENTIONS else ~person
+
+
+def frame_pool(
+    source: DatasetSource, episodes: NDArray[np.int64], kind: str | None, drop_last_frames: int = 0
+) -> FramePool:
+    """The frames of some episodes, ascending, that may start a sample: all, or those of a kind.
+
+    Raises:
+        UserError: there is none of that kind.
+    """
+    starts = source.starts[episodes]
+    # A shorter episode keeps its first frame: no episode drops out of the training unnoticed.
+    lengths = np.maximum(1, source.ends[episodes] - starts - drop_last_frames)
+    if kind is None:
+        return FramePool(starts, lengths)
+    wanted = frames_of(source, kind)
+    runs: list[tuple[int, int]] = []
+    for start, length in zip(starts.tolist(), lengths.tolist(), strict=True):
+        chosen = np.concatenate([[False], wanted[start : start + length], [False]]).astype(np.int8)
+        edges = np.flatnonzero(np.diff(chosen))
+        runs += [(start + begin, end - begin) for begin, end in edges.reshape(-1, 2).tolist()]
+    if not runs:
+        raise UserError(f"{source.root}: no frame is left with frames={kind} in {len(episodes)} episodes.")
+    pool = np.array(runs, dtype=np.int64)
+    return FramePool(pool[:, 0], pool[:, 1])

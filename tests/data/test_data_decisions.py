@@ -1,0 +1,69 @@
+"""Samples of a mixture by who decided them: a person's corrections and the policy's own steps, each with a weight."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from robocasa_lerobot import contract
+from robocasa_lerobot.data.fake import write_fake_dataset
+from robocasa_lerobot.data.mixture import MixtureDataset
+from robocasa_lerobot.data.mixture_config import MemberConfig, MixtureConfig
+from robocasa_lerobot.errors import UnknownNameError, UserError
+
+LENGTH = 6
+
+
+@pytest.fixture(scope="module")
+def data(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("data")
+    write_fake_dataset(folder / "plain", episodes=2, length=LENGTH)
+    write_fake_dataset(folder / "corrected", episodes=3, length=LENGTH, decisions=True)
+    return folder
+
+
+def mixture(data: Path) -> MixtureDataset:
+    return MixtureDataset(
+        MixtureConfig(
+            members=[
+                MemberConfig(str(data / "plain"), weight=0.5),
+                MemberConfig(str(data / "corrected"), frames="interventions", weight=0.4),
+                MemberConfig(str(data / "corrected"), frames="autonomous", weight=0.1),
+            ]
+        )
+    )
+
+
+def test_samples_start_where_the_member_says_and_as_often(data: Path) -> None:
+    dataset = mixture(data)
+    assert dataset.meta.total_frames == 2 * LENGTH + 3 * LENGTH
+    members, frames = dataset.sampler(seed=0).draw(0, 20_000)
+    place = frames % LENGTH
+    assert set(place[members == 0]) == set(range(LENGTH))
+    assert set(place[members == 1]) == {3, 4, 5}
+    assert set(place[members == 2]) == {0, 1, 2}
+    assert {len(set(frames[members == number])) for number in (1, 2)} == {9}
+    assert np.allclose(np.bincount(members) / len(members), [0.5, 0.4, 0.1], atol=0.015)
+    assert "interventions" in dataset.describe()
+    _, fewer = dataset.sampler(seed=0, drop_last_frames=2).draw(0, 5_000)
+    assert set(fewer % LENGTH) == {0, 1, 2, 3}
+
+
+def test_policies_do_not_see_who_decided(data: Path) -> None:
+    dataset = mixture(data)
+    assert contract.decision_key("intervention") not in dataset.meta.features
+    batch = dataset.batch(np.array([0, 1]), np.array([0, 4]))
+    assert not [key for key in batch if key.startswith(contract.EXTRA_PREFIX)]
+    assert contract.decision_key("intervention") not in dataset.statistics(images=False)
+
+
+def test_what_says_nothing_has_no_such_frames(data: Path) -> None:
+    with pytest.raises(UserError, match=r"needs the feature extra\.intervention"):
+        MixtureDataset(MixtureConfig(members=[MemberConfig(str(data / "plain"), frames="autonomous")]))
+    with pytest.raises(UnknownNameError, match="Did you mean 'interventions'"):
+        MemberConfig("x", frames="intervention")
+    dropped = mixture(data)
+    with pytest.raises(UserError, match="no frame is left with frames=interventions"):
+        dropped.sampler(seed=0, drop_last_frames=3)
