@@ -41,6 +41,10 @@ class Browser:
         arguments = ["--headless=new", "--no-sandbox", "--disable-gpu", "--no-first-run", "--disable-extensions"]
         arguments += ["--disable-background-networking", "--disable-dev-shm-usage", "--hide-scrollbars"]
         arguments += ["--remote-debugging-pipe", f"--user-data-dir={self._profile.name}", "about:blank"]
+        # Popen's own pipe must not become descriptor 3 or 4 of the child, which `connect` replaces.
+        low = [os.open(os.devnull, os.O_RDONLY)]
+        while low[-1] < 5:
+            low.append(os.open(os.devnull, os.O_RDONLY))
         self._process = subprocess.Popen(
             [program, *arguments],
             pass_fds=(3, 4),
@@ -49,8 +53,8 @@ class Browser:
             stdout=subprocess.DEVNULL,
             stderr=subprocess.DEVNULL,
         )
-        os.close(commands_out)
-        os.close(answers_in)
+        for descriptor in (commands_out, answers_in, *low):
+            os.close(descriptor)
         self._buffer, self._number, self._session = b"", 0, ""
         self.messages: list[str] = []
         self.requests: list[str] = []
@@ -125,11 +129,6 @@ class Browser:
     def touch(self, kind: str, *points: tuple[float, float]) -> None:
         """`touchStart`, `touchMove` or `touchEnd` with the fingers that are down."""
         self._send("Input.dispatchTouchEvent", type=kind, touchPoints=[{"x": x, "y": y} for x, y in points])
-
-    def line(self, latency_ms: float, bytes_per_second: float = -1) -> None:
-        """Have everything from the network, WebSockets too, come later and slower."""
-        rates = dict.fromkeys(("downloadThroughput", "uploadThroughput"), bytes_per_second)
-        self._send("Network.emulateNetworkConditions", offline=False, latency=latency_ms, **rates)
 
     def with_focus(self, on: bool = True) -> None:
         """Have pages believe that their window has the keys, as no window of a headless browser does."""

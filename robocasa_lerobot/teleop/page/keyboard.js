@@ -189,9 +189,10 @@ export class Keyboard {
     const group = (title, entries, open) =>
       make("details", open ? { open: true } : {}, make("summary", {}, title), make("div", { class: "key-grid" }, ...entries));
     const motions = Object.entries(MOTIONS);
+    const open = matchMedia("(min-width: 761px)").matches;
     $("keys").replaceChildren(
-      group("Hand (or base)", motions.filter(([n]) => !n.startsWith("drive_")).map(([n, [label]]) => entry(n, label)), true),
-      group("Commands", Object.entries(COMMANDS).map(([n, label]) => entry(n, label)), true),
+      group("Hand (or base)", motions.filter(([n]) => !n.startsWith("drive_")).map(([n, [label]]) => entry(n, label)), open),
+      group("Commands", Object.entries(COMMANDS).map(([n, label]) => entry(n, label)), open),
       group("Base, in “both”", motions.filter(([n]) => n.startsWith("drive_")).map(([n, [label]]) => entry(n, label)), false),
     );
   }

@@ -14,7 +14,7 @@ import { Transport } from "./transport.js";
 const NOTE_MS = 6000;
 const ACTIVE = ["ready", "running", "paused"];
 
-const state = { hello: null, head: null, line: false, drawn: 0 };
+const state = { hello: null, head: null, line: false, drawn: 0, mine: false };
 const view = { follow: true, azimuth: 0.6, elevation: -0.5, distance: 2.5 };
 const send = (message) => connection.send(message);
 const changed = () => operator.update();
@@ -34,7 +34,7 @@ const tiles = new Tiles($("tiles"), {
   orbit: (dx, dy) => turn({ azimuth: view.azimuth - dx * 0.01, elevation: view.elevation - dy * 0.01 }),
   zoom: (factor) => turn({ distance: Math.min(8, Math.max(0.6, view.distance * factor)) }),
   point: (camera, u, v) => {
-    if (state.head?.operator && ACTIVE.includes(state.head.phase)) send({ type: "reach", camera, u, v, frame: state.head.id });
+    if (state.head?.mine && ACTIVE.includes(state.head.phase)) send({ type: "reach", camera, u, v, frame: state.head.id });
   },
 });
 const connection = new Connection({
@@ -56,9 +56,10 @@ const connection = new Connection({
     if (state.head && head.id < state.head.id) return;
     state.drawn = performance.now();
     state.head = head;
+    head.mine = state.mine; // whether this page drives; `head.operator` says whether anybody does
     operator.frame = head.id;
     operator.mode = head.mode;
-    operator.active = head.operator && ACTIVE.includes(head.phase);
+    operator.active = head.mine && ACTIVE.includes(head.phase);
     panel.frame(head);
     transport.frame(head);
     map.draw(head.robot, head.assisted);
@@ -87,14 +88,14 @@ function scene(message) {
 }
 
 function role(message) {
-  show($("take"), message.role !== "operator");
-  if (message.role !== "operator") operator.release();
+  state.mine = message.role === "operator";
+  if (!state.mine) operator.release();
 }
 
 function who(head) {
   const others = head.viewers ? `, ${head.viewers} watching` : "";
-  text($("role"), head.operator ? `you drive${others}` : "watching");
-  show($("take"), !head.operator);
+  text($("role"), head.mine ? `you drive${others}` : "watching");
+  show($("take"), !head.mine && !head.operator);
 }
 
 function saved(message) {

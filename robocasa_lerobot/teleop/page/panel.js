@@ -5,7 +5,7 @@ import { $, choice, chosen, make, settings, show, text, words } from "./dom.js";
 const FRAMES = { base: "robot", camera: "picture", gripper: "gripper" };
 const PAUSES = {
   asked: ["Paused", "Press a key to move, or go on."],
-  focus: ["Paused", "The page had lost the keys, so everything was let go."],
+  focus: ["Paused", "The page was left, so everything was let go."],
   stale: ["Pictures are late", "No picture was drawn for half a second, so the robot stands."],
   disconnected: ["Paused", "The line was lost, so the robot stands."],
   marked: ["Back at the mark", "Press a key to go on from here."],
@@ -126,10 +126,11 @@ export class Panel {
     let [title, words, button] = ["", "", null];
     if (!line) [title, words] = ["No line to the kitchen", "Trying again…"];
     else if (!head || head.phase === "loading") [title, words] = ["Building the kitchen…", ""];
+    else if (age && head.assisted?.planning) title = "Looking for a way…";
     else if (age) [title, words] = ["Pictures are late", `The newest is ${age.toFixed(1)} s old, so the robot stands.`];
     else if (head.phase === "saving") title = "Saving…";
     else if (head.phase === "done") [title, words] = ["Done", `${head.saved} of ${head.wanted} episodes are saved.`];
-    else if (!head.operator && head.phase === "running") title = "";
+    else if (!head.mine && head.phase === "running") title = "";
     else if (head.phase === "paused") [title, words, button] = [...(PAUSES[head.pause] ?? PAUSES.asked), "Go on"];
     else if (head.phase === "ready") [title, words] = ["Ready", head.policy ? "Start the policy, or move the robot yourself." : ready(matchMedia("(pointer: coarse)").matches)];
     else if (head.phase === "rewinding") [title, words] = ["Going back", "Let go to go on from here."];
@@ -138,7 +139,7 @@ export class Panel {
     $("veil").classList.toggle("warning", Boolean(age) || (head?.phase === "paused" && head.pause === "stale"));
     text($("veil-title"), title);
     text($("veil-text"), words);
-    show($("veil-button"), Boolean(button) && head.operator);
+    show($("veil-button"), Boolean(button) && head.mine);
     text($("veil-button"), button ?? "");
   }
 }

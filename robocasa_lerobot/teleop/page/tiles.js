@@ -113,7 +113,7 @@ export class Tiles {
       ring.firstChild.style.transform = `translate(${dx * scale * 40}px, ${dy * scale * 40}px)`;
     });
     canvas.addEventListener("pointerup", (event) => {
-      if (start && !moved && !start.idle && camera !== "free") {
+      if (start && !moved && !start.idle) {
         const box = canvas.getBoundingClientRect();
         this.on.point(camera, (event.clientX - box.left) / box.width, (event.clientY - box.top) / box.height);
       }

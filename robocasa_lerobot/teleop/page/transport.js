@@ -70,9 +70,9 @@ export class Transport {
     show($("drive-bar"), !ended && phase !== "done");
     show($("review-bar"), ended);
     text($("pause"), phase === "paused" ? "Go on" : "Pause");
-    $("pause").disabled = !["running", "paused"].includes(phase) || !head.operator;
-    for (const id of ["undo", "mark", "back-to-mark", "end"]) $(id).disabled = !["running", "paused", "rewinding"].includes(phase) || !head.operator;
-    for (const id of ["redo", "discard", "finish"]) $(id).disabled = !head.operator || phase === "loading";
+    $("pause").disabled = !["running", "paused"].includes(phase) || !head.mine;
+    for (const id of ["undo", "mark", "back-to-mark", "end"]) $(id).disabled = !["running", "paused", "rewinding"].includes(phase) || !head.mine;
+    for (const id of ["redo", "discard", "finish"]) $(id).disabled = !head.mine || phase === "loading";
     show($("stop-assist"), Boolean(head.assisted));
     text($("stop-assist"), head.assisted?.planning ? "Stop planning" : "Stop helping");
     if (review) this.review(head, review);
@@ -88,7 +88,7 @@ export class Transport {
     show($("trim").parentElement, review.idle_head > 0);
     text($("trim-text"), `leave out ${review.idle_head} idle steps at the start`);
     const saving = head.phase === "saving";
-    $("save").disabled = saving || !review.success || !head.operator;
+    $("save").disabled = saving || !review.success || !head.mine;
     $("save").title = review.success ? "" : "The goal does not hold at the end";
     $("continue").disabled = saving || review.success;
     for (const id of ["play", "review-redo", "review-discard"]) $(id).disabled = saving;
@@ -102,7 +102,7 @@ export class Transport {
     if (marks === this.marks) return;
     this.marks = marks;
     for (const old of $("track").querySelectorAll("b")) old.remove();
-    for (const step of head.review ? [] : head.marks) {
+    for (const step of head.review ? [] : head.marks.filter((at) => at > 0)) {
       const mark = make("b");
       mark.style.left = `${(100 * step) / Math.max(1, all)}%`;
       $("track").append(mark);

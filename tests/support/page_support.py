@@ -1,0 +1,165 @@
+"""The operator's page in a real browser, beside the session that it drives."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import queue
+import socket
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+from urllib.parse import urlsplit
+
+import mujoco
+import numpy as np
+from browser import Browser, find_chromium
+from numpy.typing import NDArray
+from teleop_support import WAIT_S, served
+
+from robocasa_lerobot.envs.robots.panda_omron.names import GRIP_SITE
+from robocasa_lerobot.teleop.session import Session
+from robocasa_lerobot.teleop.settings import TeleopSettings
+
+# A gamepad that tests move: `pad.axes`, `pad.buttons`. Stands in for hardware, and for nothing of ours.
+FAKE_GAMEPAD = """
+window.pad = {id: "test pad", index: 0, connected: false, mapping: "standard", axes: [0, 0, 0, 0],
+              buttons: Array.from({length: 17}, () => ({pressed: false, touched: false, value: 0}))};
+navigator.getGamepads = () => [window.pad.connected ? window.pad : null, null, null, null];
+"""
+CODES = {"Space": " ", "Backspace": "Backspace", "Enter": "Enter"}
+
+
+class Page:
+    """A page that drives a session; what it shows, and what is true of the simulation."""
+
+    def __init__(self, browser: Browser, session: Session, line: Line) -> None:
+        self.browser, self.session, self.line = browser, session, line
+
+    @property
+    def phase(self) -> str:
+        """As the page shows it."""
+        return str(self.browser.ask("document.body.dataset.phase"))
+
+    @property
+    def hand(self) -> NDArray[np.float64]:
+        """The grip site in the world, from the simulation."""
+        data: mujoco.MjData = self.session.env.data
+        return np.array(data.site(GRIP_SITE).xpos)
+
+    def text(self, selector: str) -> str:
+        """What an element says."""
+        return str(self.browser.ask(f"document.querySelector({selector!r}).textContent"))
+
+    def click(self, selector: str) -> None:
+        """With the mouse, in the middle of an element."""
+        left, top, width, height = self.browser.box(selector)
+        for kind in ("mousePressed", "mouseReleased"):
+            self.browser.mouse(kind, left + width / 2, top + height / 2)
+
+    def until(self, phase: str) -> None:
+        """Wait for a phase."""
+        self.browser.until(f"document.body.dataset.phase === {phase!r}", WAIT_S)
+
+    def steps(self, count: int) -> None:
+        """Wait until so many more control steps have been carried out."""
+        episode = self.session.driven
+        last = len(episode) + count
+        deadline = time.monotonic() + WAIT_S
+        while len(episode) < last:
+            assert time.monotonic() < deadline, f"time stands: {self.phase}, {self.text('#veil')}"
+            time.sleep(0.01)
+
+    def hold(self, code: str, steps: int) -> None:
+        """Hold a key for so many control steps."""
+        self.browser.key(code, True, CODES.get(code, ""))
+        try:
+            self.steps(steps)
+        finally:
+            self.browser.key(code, False, CODES.get(code, ""))
+
+    def pad(self, axes: list[float] | None = None, **pressed: float) -> None:
+        """Put the gamepad's sticks and buttons (`b7=0.5`) somewhere."""
+        buttons = {int(name[1:]): value for name, value in pressed.items()}
+        self.browser.ask(
+            f"pad.connected = true, pad.axes = {json.dumps(axes or [0, 0, 0, 0])},"
+            f"pad.buttons.forEach((b, i) => {{ b.value = {json.dumps(buttons)}[i] ?? 0; b.pressed = b.value > 0.5; }})"
+        )
+
+    def fresh(self) -> None:
+        """The same kitchen from its start, with nothing held."""
+        if self.phase == "ready":
+            return
+        scenes = self.session.scenes
+        self.click("#redo" if self.phase not in ("review", "saving") else "#review-redo")
+        deadline = time.monotonic() + WAIT_S
+        while self.session.scenes == scenes or self.phase != "ready":
+            assert time.monotonic() < deadline, f"no fresh kitchen: {self.phase}, {self.browser.messages}"
+            time.sleep(0.05)
+
+
+class Line:
+    """A line between browser and server whose bytes arrive `delay_s` later, for as long as that is set.
+
+    Chromium's own emulation of slow networks leaves WebSockets alone.
+    """
+
+    def __init__(self, port: int) -> None:
+        self.delay_s = 0.0
+        self._port = port
+        self._listener = socket.create_server(("127.0.0.1", 0))
+        self.port: int = self._listener.getsockname()[1]
+        threading.Thread(target=self._listen, daemon=True).start()
+
+    def close(self) -> None:
+        """No further connections; those that are there end with their sides."""
+        self._listener.close()
+
+    def _listen(self) -> None:
+        with contextlib.suppress(OSError):
+            while True:
+                near, _ = self._listener.accept()
+                far = socket.create_connection(("127.0.0.1", self._port))
+                for source, target in ((near, far), (far, near)):
+                    sent: queue.Queue[tuple[float, bytes]] = queue.Queue()
+                    threading.Thread(target=self._take, args=(source, sent), daemon=True).start()
+                    threading.Thread(target=self._give, args=(target, sent), daemon=True).start()
+
+    def _take(self, source: socket.socket, sent: queue.Queue[tuple[float, bytes]]) -> None:
+        data = b"-"
+        while data:
+            try:
+                data = source.recv(1 << 16)
+            except OSError:
+                data = b""
+            sent.put((time.monotonic() + self.delay_s, data))
+
+    def _give(self, target: socket.socket, sent: queue.Queue[tuple[float, bytes]]) -> None:
+        with contextlib.suppress(OSError):
+            while True:
+                at, data = sent.get()
+                time.sleep(max(0.0, at - time.monotonic()))
+                if not data:
+                    target.shutdown(socket.SHUT_WR)
+                    return
+                target.sendall(data)
+
+
+@contextmanager
+def driven_page(settings: TeleopSettings, **window: Any) -> Iterator[Page]:
+    """A session that is served, and a page of it that is ready to drive."""
+    program = find_chromium()
+    assert program is not None
+    with Browser(program) as browser, served(settings) as session:
+        browser.with_focus()
+        browser.before_load(FAKE_GAMEPAD)
+        address = urlsplit(session.address)
+        assert address.port is not None
+        line = Line(address.port)
+        browser.open(session.address.replace(str(address.port), str(line.port), 1), **window)
+        page = Page(browser, session._loop._session, line)
+        page.until("ready")
+        yield page
+        line.close()

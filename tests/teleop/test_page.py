@@ -1,0 +1,240 @@
+"""The operator's page in a real Chromium, with keys, mouse, fingers, a gamepad and a bad line, on a real session."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+from browser import find_chromium
+from page_support import Page, driven_page
+from teleop_support import settings
+
+from robocasa_lerobot.demos.motion import base_pose
+
+pytestmark = [
+    pytest.mark.render,
+    pytest.mark.skipif(find_chromium() is None, reason="no Chromium on this machine ($CHROMIUM may name one)"),
+]
+STEPS = 16
+PIXELS = "[...document.querySelectorAll('.tile canvas')].map(c => c.getContext('2d').getImageData(9, 9, 30, 30).data)"
+
+SWITCHES = {
+    "KeyB": "#mode [data-value=base]",
+    "KeyV": "#motion-frame [data-value=camera]",
+    "Digit3": "#speed [data-value='1']",
+}
+NAMELESS = """
+    [...document.querySelectorAll("button, select, input, #map")].filter((e) => e.checkVisibility()
+    && !(e.textContent.trim() || e.ariaLabel || e.labels?.length || e.title)).map((e) => e.outerHTML)
+"""
+
+
+@pytest.fixture(scope="module")
+def opened(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Page]:
+    out = tmp_path_factory.mktemp("page")
+    with driven_page(settings(out)) as page:
+        yield page
+
+
+@pytest.fixture
+def page(opened: Page) -> Page:
+    opened.fresh()
+    return opened
+
+
+def test_it_shows_the_kitchen_and_asks_nobody_else(page: Page) -> None:
+    browser, session = page.browser, page.session
+    assert page.text("#instruction") == session.driven.info["instruction"]
+    assert [len(set(data)) > 2 for data in browser.ask(f"{PIXELS}.map(d => [...d])")] == [True] * 4
+    assert page.browser.ask("document.querySelectorAll('#terms li').length") == len(
+        session.driven.info["success_terms"]
+    )
+    browser.until("document.querySelector('#map').getContext('2d').getImageData(5, 5, 1, 1).data[3] === 255")
+    shown = [float(number) for number in page.text("#g-hand").split()]
+    np.testing.assert_allclose(shown, page.hand, atol=0.006)
+    assert all(
+        request.startswith("http://127.0.0.1") or request.startswith("ws://127.0.0.1") for request in browser.requests
+    )
+    assert browser.messages == []
+    assert len(session.driven) == 0  # nothing counts before the first input
+
+
+def test_every_control_has_a_name_and_none_is_wider_than_the_window(page: Page) -> None:
+    nameless = page.browser.ask(NAMELESS)
+    assert nameless == []
+    assert page.browser.ask("document.documentElement.scrollWidth <= innerWidth")
+
+
+def test_a_held_key_moves_the_hand_until_it_is_let_go(page: Page) -> None:
+    before = page.hand
+    page.hold("KeyR", STEPS)
+    moved = page.hand - before
+    page.steps(6)
+    # 50 %: half of 5 cm a step is asked for, of which about a quarter arrives.
+    assert 0.04 < moved[2] < 0.20
+    assert np.abs(moved[:2]).max() < 0.03
+    at_rest = page.hand
+    page.steps(4)
+    assert np.abs(page.hand - at_rest).max() < 0.004
+    assert page.text("#g-input") == "keyboard"
+
+
+def test_commands_by_key_and_another_layout(page: Page) -> None:
+    browser = page.browser
+    for code, selector in (
+        ("KeyB", "#mode [data-value=base]"),
+        ("KeyV", "#motion-frame [data-value=camera]"),
+        ("Digit3", "#speed [data-value='1']"),
+    ):
+        browser.key(code, True)
+        browser.key(code, False)
+        browser.until(f"document.querySelector({selector!r}).ariaChecked === 'true'")
+    before = base_pose(page.session.env.data)
+    page.hold("KeyQ", STEPS)
+    assert base_pose(page.session.env.data)[1] - before[1] > 0.1
+    browser.ask("preset.value = 'robocasa', preset.dispatchEvent(new Event('change'))")
+    assert page.text(".key[data-name=gripper]") == "Space"
+    closed = page.session.driver.steering.closed
+    page.hold("Space", 2)
+    browser.until(f"document.querySelector('#gripper').ariaPressed === '{str(not closed).lower()}'")
+    # Give the key of one thing to another: the two change places.
+    page.browser.ask("document.querySelector('.key[data-name=up]').click()")
+    browser.key("KeyB", True)
+    browser.key("KeyB", False)
+    assert (page.text(".key[data-name=up]"), page.text(".key[data-name=mode]")) == ("B", ";")
+    browser.ask("preset.value = 'wasd', preset.dispatchEvent(new Event('change'))")
+    assert page.text(".key[data-name=up]") == "R"
+    for kind, value in (("mode", "arm"), ("motion-frame", "base"), ("speed", "0.5")):
+        page.click(f'#{kind} [data-value="{value}"]')
+
+
+def test_a_lost_focus_lets_everything_go(page: Page) -> None:
+    browser = page.browser
+    browser.key("KeyR", True)
+    page.steps(4)
+    browser.ask("window.dispatchEvent(new Event('blur'))")
+    page.until("paused")
+    assert page.session.pause == "focus"
+    assert page.session.driver._held.moves is False
+    count = len(page.session.driven)
+    browser.key("KeyR", True, repeat=True)  # still down: it says so again and again
+    time.sleep(0.4)
+    assert (page.phase, len(page.session.driven)) == ("paused", count)
+    browser.key("KeyR", False)
+    page.click("#pause")
+    page.until("running")
+
+
+def test_backspace_goes_back_and_a_key_goes_on(page: Page) -> None:
+    page.hold("KeyR", 3 * STEPS)
+    high, steps = page.hand[2], len(page.session.driven)
+    page.browser.key("Backspace", True, "Backspace")
+    page.browser.until("Number(document.querySelector('#g-step').textContent.split(' ')[0]) <= " + str(steps - 30))
+    page.browser.key("Backspace", False, "Backspace")
+    page.until("paused")
+    kept = len(page.session.driven)
+    assert kept <= steps - 30
+    assert page.hand[2] < high - 0.05
+    assert page.session.driven.undos == 1
+    page.hold("KeyF", 3)
+    assert len(page.session.driven) >= kept + 3
+    assert page.phase == "running"
+
+
+def test_late_pictures_stop_the_robot_until_they_come_again(page: Page) -> None:
+    browser = page.browser
+    browser.key("KeyR", True)
+    page.steps(4)
+    page.line.delay_s = 1.5
+    try:
+        browser.until("document.body.dataset.locked === 'stale'")
+        page.until("paused")
+        assert page.session.pause == "stale"
+        browser.until("document.querySelector('#veil-title').textContent.includes('late')")
+    finally:
+        page.line.delay_s = 0.0
+    browser.until("document.querySelector('#veil-button').checkVisibility()")
+    page.click("#veil-button")
+    page.until("running")
+    height = page.hand[2]
+    page.steps(8)  # the key is still down, and counts again only once it was up
+    assert abs(page.hand[2] - height) < 0.02
+    browser.key("KeyR", False)
+
+
+def test_a_gamepad_drives_base_and_hand(page: Page) -> None:
+    before = page.hand
+    page.pad([0, 0, 0, -1])
+    page.steps(STEPS)
+    page.pad([0, 0.08, 0, 0])  # inside the dead zone
+    page.steps(4)
+    assert 0.04 < page.hand[2] - before[2] < 0.20
+    page.pad(b2=1)
+    page.browser.until("document.querySelector('#mode [data-value=base]').ariaChecked === 'true'")
+    start = np.array(base_pose(page.session.env.data)[0])
+    page.pad([0, 1, 0, 0])
+    page.steps(STEPS)
+    page.pad()
+    assert np.linalg.norm(np.array(base_pose(page.session.env.data)[0]) - start) > 0.05
+    assert page.text("#g-input") == "gamepad"
+    page.browser.ask("pad.connected = false")
+    page.click("#mode [data-value=arm]")
+
+
+def test_dragging_in_a_picture_and_turning_the_wheel(page: Page) -> None:
+    browser = page.browser
+    left, top, width, height = browser.box("[data-camera=robot0_agentview_left] canvas")
+    x, y = left + width / 2, top + height / 2
+    before = page.hand
+    browser.mouse("mousePressed", x, y)
+    browser.mouse("mouseMoved", x, y - 45)
+    page.steps(STEPS)
+    browser.mouse("mouseReleased", x, y - 45)
+    assert page.hand[2] - before[2] > 0.03
+    page.steps(3)
+    count = len(page.session.driven)
+    browser.mouse("mouseWheel", x, y, deltaX=0, deltaY=-100)
+    page.steps(4)
+    assert any(origin.device == "mouse" for origin in page.session.driven.origins[count:])
+    assert page.text("#motion-frame [aria-checked=true]") == "robot"  # a drag's frame is its own
+
+
+def test_a_click_on_the_map_drives_there(page: Page) -> None:
+    steps = "document.querySelector('#g-step').textContent"
+    start = np.array(base_pose(page.session.env.data)[0])
+    spot = page.session.map
+    yaw = base_pose(page.session.env.data)[1]
+    goal = start[:2] - 0.25 * np.array([np.cos(yaw), np.sin(yaw)])  # backwards, away from the counter
+    left, top, width, _ = page.browser.box("#map")
+    scale = width / spot.width / spot.metres_per_pixel
+    at = left + (goal[0] - spot.left) * scale, top + (spot.top - goal[1]) * scale
+    for kind in ("mousePressed", "mouseReleased"):
+        page.browser.mouse(kind, *at)
+    page.browser.until(f"{steps} !== '0 / {page.session.env.horizon}'")
+    page.browser.until(
+        f"!document.querySelector('#stop-assist').checkVisibility() && Number({steps}.split(' ')[0]) > 5"
+    )
+    assert np.linalg.norm(np.array(base_pose(page.session.env.data)[0])[:2] - goal) < 0.08
+    assert any(origin.assisted for origin in page.session.driven.origins)
+
+
+def test_fingers_on_the_sticks(page: Page) -> None:
+    browser = page.browser
+    browser.open(browser.ask("location.href"), 390, 844)
+    page.until("ready")
+    before = page.hand
+    left, top, width, height = browser.box("#stick-right")
+    x, y = left + width / 2, top + height / 2
+    browser.touch("touchStart", (x, y))
+    browser.touch("touchMove", (x, y - 60))
+    page.steps(STEPS)
+    browser.touch("touchEnd")
+    assert 0.04 < page.hand[2] - before[2] < 0.20
+    page.steps(6)
+    at_rest = page.hand
+    page.steps(4)
+    assert np.abs(page.hand - at_rest).max() < 0.004
+    assert page.text("#g-input") == "touch"
+    assert browser.ask("document.documentElement.scrollWidth <= innerWidth")
