@@ -7,6 +7,7 @@ export class Connection {
   constructor(on) {
     this.on = on;
     this.tries = 0;
+    this.ended = false; // the session is over: no further try
     this.socket = null;
     this.connect();
   }
@@ -27,7 +28,7 @@ export class Connection {
     socket.onclose = (event) => {
       const refused = event.code === 1008 || event.code === 1009;
       this.on.closed(event.reason, !refused);
-      if (refused) return;
+      if (refused || this.ended) return;
       setTimeout(() => this.connect(), RETRY_MS[Math.min(this.tries++, RETRY_MS.length - 1)]);
     };
     this.socket = socket;

@@ -53,6 +53,9 @@ const SHARED = {
   drive_right: "KeyL",
   drive_turn_left: "KeyU",
 };
+const GAMEPAD =
+  "Left stick: move. Right stick: up and turn. Bumpers: roll. Triggers: tip. A gripper, B undo (hold), X arm or base, " +
+  "Y mark. Cross up and down: speed, left: back to mark, right: give back. Start pause, Back end, left stick pressed: axes.";
 const ARROWS = ["ArrowUp", "ArrowDown", "ArrowLeft", "ArrowRight"];
 export const PRESETS = {
   wasd: {
@@ -193,6 +196,7 @@ export class Keyboard {
     $("keys").replaceChildren(
       group("Hand (or base)", motions.filter(([n]) => !n.startsWith("drive_")).map(([n, [label]]) => entry(n, label)), open),
       group("Commands", Object.entries(COMMANDS).map(([n, label]) => entry(n, label)), open),
+      make("details", {}, make("summary", {}, "Gamepad"), make("p", { class: "quiet pad" }, GAMEPAD)),
       group("Base, in “both”", motions.filter(([n]) => n.startsWith("drive_")).map(([n, [label]]) => entry(n, label)), false),
     );
   }

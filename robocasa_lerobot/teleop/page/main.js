@@ -43,6 +43,7 @@ const connection = new Connection({
     state.drawn = performance.now();
   },
   closed(reason, again) {
+    if (connection.ended) return finished();
     state.line = false;
     state.head = null;
     operator.lock("no line");
@@ -107,7 +108,18 @@ function discarded(message) {
 }
 
 function done(message) {
+  connection.ended = true;
+  state.path = message.path;
   note({ level: "info", text: `${message.saved} episodes are in ${message.path}.` });
+}
+
+function finished() {
+  document.body.dataset.phase = "done";
+  state.head = { ...state.head, phase: "done", path: state.path };
+  operator.lock("done");
+  text($("role"), "finished");
+  panel.veil(state.head);
+  transport.frame(state.head);
 }
 
 function note({ level, text: said }) {
@@ -148,6 +160,7 @@ function command(name, pressed) {
 
 /** Late pictures lock the hands: nobody drives by what they cannot see. */
 function watch() {
+  if (document.body.dataset.phase === "done") return;
   const late = state.line && state.head?.phase === "running" ? performance.now() - state.drawn : 0;
   const age = late > (state.hello?.stale_ms ?? 500) ? late / 1000 : 0;
   const stale = state.head?.phase === "paused" && state.head.pause === "stale";

@@ -129,7 +129,7 @@ export class Panel {
     else if (age && head.assisted?.planning) title = "Looking for a way…";
     else if (age) [title, words] = ["Pictures are late", `The newest is ${age.toFixed(1)} s old, so the robot stands.`];
     else if (head.phase === "saving") title = "Saving…";
-    else if (head.phase === "done") [title, words] = ["Done", `${head.saved} of ${head.wanted} episodes are saved.`];
+    else if (head.phase === "done") [title, words] = ["Done", `${head.saved} of ${head.wanted} episodes are saved${head.path ? ` in ${head.path}` : ""}. You can close this page.`];
     else if (!head.mine && head.phase === "running") title = "";
     else if (head.phase === "paused") [title, words, button] = [...(PAUSES[head.pause] ?? PAUSES.asked), "Go on"];
     else if (head.phase === "ready") [title, words] = ["Ready", head.policy ? "Start the policy, or move the robot yourself." : ready(matchMedia("(pointer: coarse)").matches)];

@@ -10,7 +10,13 @@ export class Touch {
     this.on = on;
     this.sticks = { left: [0, 0], right: [0, 0] };
     this.fingers = { left: null, right: null };
+    this.turning = false; // the left stick then tips and rolls the hand
     for (const name of ["left", "right"]) this.listen(name, $(`stick-${name}`));
+    $("touch-turn").addEventListener("click", () => {
+      this.turning = !this.turning;
+      $("touch-turn").setAttribute("aria-pressed", String(this.turning));
+      $("stick-left").lastElementChild.textContent = this.turning ? "tip, roll" : "move";
+    });
     for (const button of document.querySelectorAll("#touch [data-do]")) {
       button.addEventListener("click", () => {
         on.command(button.dataset.do, true);
@@ -23,6 +29,7 @@ export class Touch {
   axes() {
     const [lx, ly] = this.sticks.left;
     const [rx, ry] = this.sticks.right;
+    if (this.turning) return { x: 0, y: 0, z: -ry, yaw: -rx, roll: lx, pitch: -ly };
     return { x: -ly, y: -lx, z: -ry, yaw: -rx, roll: 0, pitch: 0 };
   }
 

@@ -89,7 +89,7 @@ export class Transport {
     text($("trim-text"), `leave out ${review.idle_head} idle steps at the start`);
     const saving = head.phase === "saving";
     $("save").disabled = saving || !review.success || !head.mine;
-    $("save").title = review.success ? "" : "The goal does not hold at the end";
+    text($("review-note"), review.success ? "" : "The goal does not hold at the end.");
     $("continue").disabled = saving || review.success;
     for (const id of ["play", "review-redo", "review-discard"]) $(id).disabled = saving;
   }
