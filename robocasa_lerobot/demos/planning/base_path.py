@@ -32,6 +32,7 @@ TURN_COST_M = 0.30  # of one heading to the next
 # carries a full vessel swings by some centimetres on the way.
 type Margins = tuple[float, float]
 MARGINS_M: tuple[Margins, ...] = ((0.02, 0.0), (0.0, 0.0))
+HELD_MARGINS_M: tuple[Margins, ...] = ((0.08, 0.03), (0.05, 0.02), *MARGINS_M)
 LOADED_MARGINS_M: tuple[Margins, ...] = ((0.05, 0.03), (0.03, 0.015), *MARGINS_M)
 MOST_CELLS = 20_000  # that are looked at
 # A goal from which fewer cells than these can be reached is shut in; poses near it count as others from this distance.
@@ -78,7 +79,7 @@ def find_path(
         NoPlanError: there is none.
     """
     if data is not None:
-        margins = LOADED_MARGINS_M if is_full(held) else MARGINS_M
+        margins = LOADED_MARGINS_M if is_full(held) else MARGINS_M if held is None else HELD_MARGINS_M
         with contextlib.suppress(NoPlanError):
             return find_free_path(scene, data, start, goal, held, joints, margins_m=margins)
     return BasePath(search_path(Room(scene), start, goal), -1.0)

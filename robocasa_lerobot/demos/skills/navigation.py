@@ -18,7 +18,7 @@ from robocasa_lerobot.demos.motion import (
     base_pose,
     limit,
 )
-from robocasa_lerobot.demos.planning.base_path import MARGINS_M, Room, base_now, carried, find_path, wrap
+from robocasa_lerobot.demos.planning.base_path import HELD_MARGINS_M, Room, base_now, carried, find_path, wrap
 from robocasa_lerobot.demos.planning.collision import Held, is_full
 from robocasa_lerobot.demos.skills.common import SkillError
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
@@ -58,11 +58,11 @@ def drive_to(
     held = held or (carried(env.scene, env.data) if gripper == CLOSED else None)
     path = find_path(env.scene, env.data, base_now(env.data), RobotPose(x, y, yaw), held)
     loaded = is_full(held)
-    tight = loaded or (held is not None and path.margin_m < MARGINS_M[0][0])
+    tight = loaded or (held is not None and path.margin_m < HELD_MARGINS_M[1][0])
     pace = Pace(most=CAREFULLY if tight else None, smooth=loaded)
     for index, pose in enumerate(path.poses):
         last = index == len(path.poses) - 1
-        bounds = (tolerance_m, tolerance_rad) if last else TIGHT if tight else (WAYPOINT_M, WAYPOINT_RAD)
+        bounds = (tolerance_m, tolerance_rad) if last else TIGHT if held is not None else (WAYPOINT_M, WAYPOINT_RAD)
         yield from _approach(env, pose, gripper, bounds, pace, stop=last)
 
 

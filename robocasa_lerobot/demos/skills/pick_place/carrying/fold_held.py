@@ -23,6 +23,7 @@ from robocasa_lerobot.demos.motion import (
     rotation_about,
 )
 from robocasa_lerobot.demos.planning.base_path import (
+    HELD_MARGINS_M,
     LOADED_MARGINS_M,
     MARGINS_M,
     Margins,
@@ -102,8 +103,8 @@ def fold_with(
             ahead = _ahead(env, obj, held)
         if ahead is None:
             return
-        wanted = LOADED_MARGINS_M if is_full(held) else MARGINS_M
-        roomy = wanted[: -len(MARGINS_M)] or MARGINS_M[:1]
+        wanted = LOADED_MARGINS_M if is_full(held) else HELD_MARGINS_M
+        roomy = wanted[: -len(MARGINS_M)]
         drives = stand is None or _can_drive(env, stand, held, _after(env, ahead), roomy)
         aside = None if stand is None or drives else _aside(env, obj, held, stand, towards)
         if stand is None or aside is None:
