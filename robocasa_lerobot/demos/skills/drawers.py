@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import contextlib
+import itertools
 from collections.abc import Iterator
 
 import numpy as np
@@ -19,8 +21,10 @@ from robocasa_lerobot.demos.motion import (
 )
 from robocasa_lerobot.demos.motion_style import motion_style_of
 from robocasa_lerobot.demos.skills.common import SkillError, hold_hand, move_hand, require_near
+from robocasa_lerobot.demos.skills.navigation import Room, drive_to
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.kitchens.fixtures.cabinets import Drawer
+from robocasa_lerobot.envs.scene.robot_poses import RobotPose
 from robocasa_lerobot.envs.tasks.task import Stage
 
 ATTEMPTS = 3
@@ -35,6 +39,8 @@ ALIGN_SPEED, APPROACH_SPEED = 0.7, 0.45
 PULL_SPEED = 0.55
 # Well beyond what tasks ask for: a demonstration that stops at the threshold teaches to stop short of it.
 OPEN_GOAL, CLOSED_GOAL = 1.15, 0.0
+# A robot that stands less far beside a drawer is in its way; where it goes then, from the drawer's side.
+LEAST_ASIDE_M, ASIDES_M = 0.03, (0.20, 0.28, 0.12, 0.36, 0.06)
 # Of a drawer that is dragged: how far it is in before it is worth while, and what the hand needs of it.
 PUSHED_IN_M, HAND_ROOM_M = 0.03, 0.08
 # The hand comes from over the front's upper edge, goes below it close behind it, and is led beyond where it ends.
@@ -49,6 +55,7 @@ def open_drawer(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
     """
     data, drawer = env.data, env.scene.fixture(stage.target, Drawer)
     inwards = _inwards(drawer)
+    yield from _drive_beside(env, stage.target, drawer)
     rotation = _facing(env, drawer, inwards)
     approach = rotation[:, 2]
     for _ in range(ATTEMPTS):
@@ -73,6 +80,24 @@ def open_drawer(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
         yield from hold_hand(data, HandTarget(grip_position(data), rotation), OPEN, GRASP_STEPS)
         yield from move_hand(data, away, OPEN, max_steps=30)
     raise SkillError(f"{drawer.name} is {drawer.openness(data):.0%} open after {ATTEMPTS} attempts")
+
+
+def _drive_beside(env: KitchenEnv, role: str, drawer: Drawer) -> Iterator[Array]:
+    """Drive out of the way of a drawer that is to be opened: to the nearer side of it that is free, if there is one."""
+    base, _ = base_pose(env.data)
+    rightwards = np.cross(_inwards(drawer), UP)
+    aside = float((base - np.asarray(drawer.pos)) @ rightwards)
+    if abs(aside) > drawer.width / 2 + LEAST_ASIDE_M:
+        return
+    before, room = env.scene.standing_pose(role), Room(env.scene)
+    ways = (1.0, -1.0) if aside >= 0.0 else (-1.0, 1.0)
+    for more, way in itertools.product(ASIDES_M, ways):
+        x, y, _ = np.array([before.x, before.y, 0.0]) + way * (drawer.width / 2 + more) * rightwards
+        beside = RobotPose(float(x), float(y), before.yaw)
+        if room.free(beside):
+            with contextlib.suppress(SkillError):
+                yield from drive_to(env, beside.x, beside.y, beside.yaw)
+            return
 
 
 def drag_open(env: KitchenEnv, drawer: Drawer, openness: float = 1.0) -> Iterator[Array]:
