@@ -16,6 +16,7 @@ from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 
 END_SHARE = 0.25  # of the length, at each end, by whose width the working end is told
 TIP_SHARE = 0.06
+LONG = 1.5  # of a vessel with a handle, by its width
 FAR_SHARE = 0.60  # of the length, that a grasp is away from the tip
 TOOL_SCORE, PAN_SCORE = 12.0, -12.0  # of a metre that it is farther away
 
@@ -52,6 +53,15 @@ def working_end(obj: Graspable) -> WorkingEnd:
     axis = np.zeros(3)
     axis[long] = -1.0 if at_high else 1.0
     return WorkingEnd(tip, axis, length)
+
+
+def has_handle(obj: Graspable) -> bool:
+    """Whether an object is a vessel with a long handle."""
+    return (
+        obj.item is not None
+        and obj.item.interior is not None
+        and max(obj.item.size[:2]) > LONG * min(obj.item.size[:2])
+    )
 
 
 def by_the_handle(env: KitchenEnv, obj: Graspable, approach: Array, farther_score: float) -> list[GraspPose]:

@@ -80,6 +80,7 @@ class PlaceStrategy:
         turns: of a leaning hand to the left, radians.
         falls: the fingers are to open side by side, so that the object falls from between them.
         narrow: whether the hand keeps to a straight line in and out also where that is steep.
+        fit: cost of the object's origin (3,) and rotation (3, 3) in the end, by what they leave of the room there.
     """
 
     poses: Callable[[], Sequence[PlacePose]]
@@ -91,6 +92,7 @@ class PlaceStrategy:
     turns: tuple[float, ...] = (0.0,)
     falls: bool = False
     narrow: bool = False
+    fit: Callable[[Array, Array], float] | None = None
 
 
 def put(env: KitchenEnv, obj: Graspable, strategy: PlaceStrategy, failed: list[Array]) -> Iterator[Array]:
@@ -214,6 +216,8 @@ def _paths(
             low = origin - rotation @ held.position
             again = sum(np.linalg.norm(low - other) < AGAIN_M for other in failed)
             cost = pose.extra + AGAIN * float(again) + leaning * lean + SLOPE * slope + 0.08 * min(yaw, 2 * np.pi - yaw)
+            if strategy.fit is not None:
+                cost += strategy.fit(origin, object_turn)
             for name in strategy.entries:
                 for rise in {"up": (UP_RISE_M,), "level": (LEVEL_RISE_M,)}.get(name, RISES_M):
                     extra = cost + (LEVEL_COST if name == "level" else LOW_COST if rise == min(RISES_M) else 0.0)

@@ -11,6 +11,7 @@ import numpy as np
 from robocasa_lerobot.demos.motion import OPEN, UP, Array, HandTarget, grip_position, hand_rotation
 from robocasa_lerobot.demos.skills.common import SkillError, hold_hand, move_hand
 from robocasa_lerobot.demos.skills.drawers import drag_open
+from robocasa_lerobot.demos.skills.pick_place.by_handle import PAN_BY_THE_HANDLE, has_handle
 from robocasa_lerobot.demos.skills.pick_place.grasp_strategy import (
     ANY_APPROACH,
     FROM_A_SLOT,
@@ -26,6 +27,7 @@ from robocasa_lerobot.demos.skills.pick_place.location import Location, locate
 from robocasa_lerobot.demos.skills.pick_place.mugs import FROM_THE_SIDE, UNDER_A_SPOUT
 from robocasa_lerobot.demos.skills.pick_place.pick import HOPELESS, RELEASE_STEPS, best_grasp
 from robocasa_lerobot.demos.skills.pick_place.place import PlaceStrategy
+from robocasa_lerobot.demos.skills.pick_place.poses.basin_poses import below_spout, is_large, on_basin_floor, room_in
 from robocasa_lerobot.demos.skills.pick_place.poses.counter_poses import NEAR_M, on_counter
 from robocasa_lerobot.demos.skills.pick_place.poses.distance_poses import at_distances, distance_terms, near_to
 from robocasa_lerobot.demos.skills.pick_place.poses.place_poses import (
@@ -58,7 +60,7 @@ from robocasa_lerobot.envs.kitchens.fixtures.cabinets import Drawer, HingeCabine
 from robocasa_lerobot.envs.kitchens.fixtures.counters import Counter
 from robocasa_lerobot.envs.kitchens.fixtures.regions import regions_of
 from robocasa_lerobot.envs.predicates.logic import every_goal_in
-from robocasa_lerobot.envs.predicates.objects import ObjectInside
+from robocasa_lerobot.envs.predicates.objects import ObjectAtSite, ObjectInside
 from robocasa_lerobot.envs.tasks.conditions import IN_RANGE, stage_condition
 from robocasa_lerobot.envs.tasks.task import Stage
 
@@ -84,7 +86,7 @@ LEANING_GRASP = replace(
     among_tilts=True,
 )
 LEVEL_HAND = -0.85  # of the hand's approach along the vertical: above it, the hand looks ahead rather than down
-_SMALL, _STEEP, _STEEPEST = np.deg2rad(25.0), np.deg2rad(30.0), np.deg2rad(55.0)
+_SMALL, _STEEP, _LEANT, _STEEPEST = np.deg2rad(25.0), np.deg2rad(30.0), np.deg2rad(45.0), np.deg2rad(55.0)
 _OPEN_LEANS, _CLOSED_LEANS = (0.0, _SMALL), (0.0, _STEEP, _STEEPEST)
 _DRAWER_LEANS, _BOWL_LEANS = (0.0, _STEEP, np.deg2rad(50.0)), (*_CLOSED_LEANS, np.deg2rad(80.0))
 # A jug stands below a wall cabinet: the hand comes level, from any side, and lets go over the rim.
@@ -172,7 +174,7 @@ def _by_target(env: KitchenEnv, stage: Stage, obj: Graspable) -> PlaceStrategy:
             poses = on_counter(env, obj, fixture, within, near_to(env, stage))
             return PlaceStrategy(poses, leans=(0.0, _STEEP), entries=("up", "across"), grasp=ANY_APPROACH)
         case Sink():
-            return PlaceStrategy(in_basin(env, fixture.basin), leans=_OPEN_LEANS, entries=("up", "across"))
+            return _into_sink(env, stage, obj, fixture)
         case CoffeeMachine():
             poses = at_site(env, f"{fixture.name}_{part}", next(iter(fixture.regions.values())))
             return PlaceStrategy(poses, entries=("out", "level"), grasp=FROM_THE_SIDE, in_m=0.17, gap_m=0.003)
@@ -183,6 +185,20 @@ def _by_target(env: KitchenEnv, stage: Stage, obj: Graspable) -> PlaceStrategy:
     regions = [region for _, region in named if _counts(env, stage, region)]
     columns = MANY_COLUMNS if distance_terms(env, stage) else COLUMNS
     return _into_regions(env, obj, fixture, part, regions, columns)
+
+
+def _into_sink(env: KitchenEnv, stage: Stage, obj: Graspable, sink: Sink) -> PlaceStrategy:
+    """A large vessel comes to stand on the basin's floor, below the spout where the stage asks for that."""
+    basin = sink.basin
+    if not is_large(obj):
+        return PlaceStrategy(in_basin(env, basin), leans=_OPEN_LEANS, entries=("up", "across"))
+    terms = every_goal_in(stage_condition(env.declaration, stage))
+    spout = any(isinstance(term, ObjectAtSite) and term.site == "water" for term in terms)
+    poses = below_spout(env, obj, sink) if spout else on_basin_floor(env, basin)
+    return PlaceStrategy(
+        poses, leans=(0.0, _SMALL, _LEANT), entries=("up", "across"), in_m=0.2, fit=room_in(env, obj, basin),
+        grasp=PAN_BY_THE_HANDLE if has_handle(obj) else ANY_APPROACH,
+    )  # fmt: skip
 
 
 def _into_regions(
