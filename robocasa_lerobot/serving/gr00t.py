@@ -1,8 +1,8 @@
 """GR00T's inference service over ZeroMQ, in the shapes of N1.5 and of N1.6 and N1.7; a request tells which it is.
 
 N1.5 sends an observation as `data` and gets a map of actions; N1.6 sends `data: {"observation", "options"}` and gets
-the list of a map of actions and one of information. `seed`, `number` and `reset` stand in `options` (N1.5: beside the
-observation), each a number, or a list with one for each row of a batch.
+the list of a map of actions and one of information. `seed`, `number` and `reset` stand in `options` or in the
+observation's map, each a number, or a list with one for each row of a batch.
 Source: Isaac-GR00T N1.5 (0a015f6), N1.6 (ade260e), and a public fork of N1.7.
 """
 
@@ -26,6 +26,7 @@ from robocasa_lerobot.serving.request import RequestError, Session, whole_number
 from robocasa_lerobot.wire.codec import decode, encode
 
 _log = logging.getLogger(__name__)
+_OPTIONS = ("seed", "number", "reset")
 _UNAUTHORIZED = "Unauthorized: Invalid API token"  # their words, which clients look for
 
 
@@ -137,7 +138,9 @@ class GrootServer:
             raise RequestError(f"data: found a {type(data).__name__}, expected a map.")
         wrapped = "observation" in data  # N1.6 and later: the arguments of a function
         observation = data["observation"] if wrapped else data
-        options = (data.get("options") or {}) if wrapped else data
+        options = data.get("options") or {}
+        if isinstance(observation, Mapping) and isinstance(options, Mapping):
+            options = {**{key: observation.get(key) for key in _OPTIONS}, **options}
         rows = rows_of(observation, self._limits.clients)
         each = [_row_options(options, row) for row in range(len(rows.maps))]
         sessions = self._sessions(client, len(rows.maps))
@@ -166,7 +169,7 @@ class GrootServer:
 def _row_options(options: Mapping[Any, Any], row: int) -> dict[str, Any]:
     if not isinstance(options, Mapping):
         raise RequestError(f"options: found a {type(options).__name__}, expected a map or nothing.")
-    return {key: _option(options, key, row) for key in ("seed", "number", "reset")}
+    return {key: _option(options, key, row) for key in _OPTIONS}
 
 
 def _option(options: Mapping[Any, Any], key: str, row: int) -> Any:

@@ -9,14 +9,14 @@ from __future__ import annotations
 import json
 import os
 import subprocess
-import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 import yaml
+from peer_environments import SUPPORT, peer, prepared
 from serving_support import SIZE, observation, openpi_names, panda_omron_names, serving
 
 from robocasa_lerobot import contract
@@ -35,28 +35,9 @@ from robocasa_lerobot.serving.policy import Answer, Served, ServedPolicy, Work, 
 pytestmark = pytest.mark.slow
 
 REPOSITORY = Path(__file__).parents[2]
-SUPPORT = REPOSITORY / "tests" / "support"
 INSTRUCTION = "open the left drawer"
 SEEDS = [5, 6, 2**40]
 SEED = 100_321  # of evaluations
-
-
-@pytest.fixture(scope="module")
-def prepare() -> Callable[..., Path]:
-    """The Python of a peer's environment."""
-    sys.path.insert(0, str(REPOSITORY / "benchmarks"))
-    try:
-        import venvs
-    finally:
-        sys.path.pop(0)
-
-    def prepared(name: str, on_ours: bool = False) -> Path:
-        try:
-            return Path(venvs.prepare_venv(name, on_ours=on_ours))
-        except venvs.VenvError as error:
-            pytest.skip(f"the environment of {name} cannot be made: {error}")
-
-    return prepared
 
 
 def run_peer(python: Path, program: str, *arguments: str, folder: Path) -> None:
@@ -75,14 +56,12 @@ def expected(policy: ChunkPolicy, steps: list[Observation], number: int) -> np.n
 STEPS = [observation(1), observation(2)]
 
 
-def test_openpis_own_client_gets_the_policys_actions(
-    checkpoint: Path, in_process: ChunkPolicy, prepare: Callable[..., Path], tmp_path: Path
-) -> None:
+def test_openpis_own_client_gets_the_policys_actions(checkpoint: Path, in_process: ChunkPolicy, tmp_path: Path) -> None:
     asked = openpi_names(STEPS, INSTRUCTION)
     asked.pop("prompt")
     np.savez(tmp_path / "observations.npz", instruction=INSTRUCTION, seeds=np.array(SEEDS), **asked)
     with serving(Host(load_served(read_source(str(checkpoint)), "cpu")), "openpi") as port:
-        run_peer(prepare("policy_clients"), "openpi_asks.py", str(port), folder=tmp_path)
+        run_peer(prepared("policy_clients"), "openpi_asks.py", str(port), folder=tmp_path)
     answers = np.load(tmp_path / "answers.npz")
     assert len(answers.files) == len(SEEDS)
     for number in range(len(SEEDS)):
@@ -92,13 +71,13 @@ def test_openpis_own_client_gets_the_policys_actions(
 
 @pytest.mark.parametrize("version", ["1.5", "1.6"])
 def test_gr00ts_protocol_gets_the_policys_actions(
-    checkpoint: Path, in_process: ChunkPolicy, prepare: Callable[..., Path], tmp_path: Path, version: str
+    checkpoint: Path, in_process: ChunkPolicy, tmp_path: Path, version: str
 ) -> None:
     asked = panda_omron_names(STEPS, INSTRUCTION)
     asked.pop("annotation.human.task_description")
     np.savez(tmp_path / "observations.npz", instruction=INSTRUCTION, seeds=np.array(SEEDS), **asked)
     with serving(Host(load_served(read_source(str(checkpoint)), "cpu")), "gr00t", groot_version=version) as port:
-        run_peer(prepare("policy_clients"), "gr00t_client.py", str(port), version, folder=tmp_path)
+        run_peer(prepared("policy_clients"), "gr00t_client.py", str(port), version, folder=tmp_path)
     answers = np.load(tmp_path / "answers.npz")
     for number in range(len(SEEDS)):
         found = contract.join_action({p.name: answers[f"{number}/action.{p.name}"] for p in contract.ACTION_PARTS})
@@ -171,9 +150,9 @@ def evaluate(out: Path, policy: str, tasks: list[str], horizon: int, trials: int
 @pytest.mark.render
 @pytest.mark.timeout(1200)
 def test_vla_evals_runner_in_our_kitchens_with_our_policy_behind_our_server(
-    checkpoint: Path, in_process: ChunkPolicy, prepare: Callable[..., Path], tmp_path: Path
+    checkpoint: Path, in_process: ChunkPolicy, tmp_path: Path
 ) -> None:
-    python, task, horizon, trials = prepare("vla_eval", on_ours=True), "OpenDrawer", 20, 2
+    python, task, horizon, trials = prepared("vla_eval", on_ours=True), "OpenDrawer", 20, 2
     policy = RecordedPolicy(load_served(read_source(str(checkpoint)), "cpu"))
     with serving(Host(policy), "vla_eval") as port:
         found = run_vla_eval(python, port, tmp_path / "vla", trials, tasks=[task], max_steps=horizon)
@@ -211,11 +190,9 @@ def test_vla_evals_runner_in_our_kitchens_with_our_policy_behind_our_server(
 
 @pytest.mark.render
 @pytest.mark.timeout(1200)
-def test_vla_evals_runner_counts_the_same_successes_on_the_same_trials(
-    prepare: Callable[..., Path], tmp_path: Path
-) -> None:
+def test_vla_evals_runner_counts_the_same_successes_on_the_same_trials(tmp_path: Path) -> None:
     """Demonstrations written down in process are asked for over the socket; some do not end within the horizon."""
-    python, tasks, horizon, trials = prepare("vla_eval", on_ours=True), ["CloseDrawer", "OpenDrawer"], 110, 2
+    python, tasks, horizon, trials = prepared("vla_eval", on_ours=True), ["CloseDrawer", "OpenDrawer"], 110, 2
     records = evaluate(tmp_path / "ours", "demonstrator", tasks, horizon, trials)
     kitchens = Kitchens(tasks, camera_size=SIZE, max_steps=horizon, seed=SEED)
     written: dict[int, list[np.ndarray]] = {}
@@ -237,3 +214,14 @@ def test_vla_evals_runner_counts_the_same_successes_on_the_same_trials(
     outcomes = {(record.task, record.trial): (record.success, record.steps) for record in records}
     assert {key: (one["metrics"]["success"], one["steps"]) for key, one in found.items()} == outcomes
     assert {success for success, _ in outcomes.values()} == {True, False}, outcomes
+
+
+@pytest.mark.render
+@pytest.mark.timeout(1200)
+def test_vla_evals_runner_with_its_own_model_server_in_our_kitchens(tmp_path: Path) -> None:
+    """Another project's policy, runner and server; only the kitchens are ours."""
+    python, task, horizon, trials = prepared("vla_eval", on_ours=True), "OpenDrawer", 12, 2
+    with peer(python, "vla_eval") as port:
+        found = run_vla_eval(python, port, tmp_path / "vla", trials, tasks=[task], max_steps=horizon, camera_size=SIZE)
+    assert set(found) == {(task, trial) for trial in range(trials)}
+    assert all(one["steps"] == horizon and one["metrics"]["success"] is False for one in found.values())

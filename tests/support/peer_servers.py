@@ -17,11 +17,12 @@ CHUNK, SIZE = 4, 12
 
 def actions(state: np.ndarray, picture: np.ndarray, length: int = CHUNK) -> np.ndarray:
     """A chunk (length, 12) in [-1, 1] that depends on every number of a state (16,) and a picture."""
-    seen = np.float64(picture.astype(np.float64).mean() / 255.0)
-    numbers = np.concatenate([state.astype(np.float64).ravel(), [seen]])
-    grid = np.outer(np.arange(1, length + 1), np.arange(1, SIZE + 1)).astype(np.float64)
-    weights = np.linspace(0.5, 1.5, numbers.size)
-    return np.sin(grid * 0.37 + float(weights @ numbers)).astype(np.float32)
+    numbers = [float(value) for value in state.ravel()]
+    numbers.append(int(picture.astype(np.int64).sum()) / picture.size / 255.0)
+    # Plain floats in a fixed order: the same bits with every version of numpy.
+    mixed = sum((0.5 + 0.1 * place) * value for place, value in enumerate(numbers))
+    rows = [[(mixed + 0.37 * step * (part + 1)) % 2.0 - 1.0 for part in range(SIZE)] for step in range(1, length + 1)]
+    return np.array(rows, dtype=np.float32)
 
 
 def serve_openpi() -> None:
