@@ -116,7 +116,8 @@ class GrootServer:
         endpoint, data = message.get("endpoint", "get_action"), message.get("data")
         match endpoint:
             case "ping":
-                return encode({"status": "ok", "message": "Server is running"}, "gr00t")
+                running = {"status": "ok", "message": "Server is running", "metadata": self._host.served.metadata()}
+                return encode(running, "gr00t")  # the metadata is for our own clients
             case "kill":
                 if not self._allow_kill:
                     raise RequestError("kill is refused: the server was not started with --allow-kill.")

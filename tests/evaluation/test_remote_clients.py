@@ -101,7 +101,7 @@ def test_golden_replies_of_gr00t() -> None:
     unknown = msgpack.packb({"error": "Unknown endpoint: get_modality_config"})
     with scripted_reply([msgpack.packb({"status": "ok"}), unknown, GR00T_REPLY]) as (port, requests):
         client = connect(f"gr00t://127.0.0.1:{port}", SHORT)
-        assert client.metadata == {"version": None, "modality_config": {}}
+        assert client.metadata == {"gr00t_version": None, "modality_config": {}}
         answer = client.infer({"state.x": np.array([[1.0]], np.float32)})
         np.testing.assert_array_equal(answer["action.x"], np.array([[1.5]], np.float32))
         assert requests[0] == msgpack.packb({"endpoint": "ping"})
@@ -115,7 +115,7 @@ def test_versions_of_gr00t_are_told_apart_and_asked_in_their_way(version: str) -
     config = {"video": {"modality_keys": ["left"], "delta_indices": [-2, 0]}}
     with Gr00tServer(lambda observation: {"action.x": ACTIONS}, version, config, token="secret") as server:
         client = connect(server.url, SHORT, token="secret")
-        assert client.metadata == {"version": version, "modality_config": config}
+        assert client.metadata == {"gr00t_version": version, "modality_config": config}
         np.testing.assert_array_equal(client.infer({"left": ACTIONS})["action.x"], ACTIONS)
         client.reset()
         asked = [request["endpoint"] for request in server.requests]
@@ -135,7 +135,7 @@ def test_a_service_that_hides_its_configuration_is_told_by_its_complaint() -> No
     with Quiet(lambda observation: {"x": ACTIONS}, "N1.6", {}) as server:
         client = connect(server.url, SHORT)
         np.testing.assert_array_equal(client.infer({"left": ACTIONS})["x"], ACTIONS)
-        assert client.metadata["version"] == "N1.6"
+        assert client.metadata["gr00t_version"] == "N1.6"
         client.close()
 
 

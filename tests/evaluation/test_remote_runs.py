@@ -348,7 +348,7 @@ def test_gr00ts_services_are_asked_for_what_they_say_they_take(
     (header,) = results.headers.values()
     remote = header.policies["theirs"].remote
     assert remote is not None
-    assert (remote["keys"], remote["metadata"]["version"]) == ("auto", version)
+    assert (remote["keys"], remote["metadata"]["gr00t_version"]) == ("auto", version)
     assert remote["key_map"]["picture_offsets"] == offsets
     with OpenpiServer(push) as peer:
         theirs = evaluate(peer.url, tmp_path / "peer", "--env.image_size=48")

@@ -8,6 +8,7 @@ from typing import Any
 
 from robocasa_lerobot import contract
 from robocasa_lerobot.errors import UserError, suggest
+from robocasa_lerobot.evaluation.remote.address import GR00T, VLA_EVAL
 from robocasa_lerobot.evaluation.remote.gr00t import N15
 from robocasa_lerobot.evaluation.remote.key_map import ActionKey, CameraKey, KeyMap, PromptKey, StateKey, load_key_map
 
@@ -29,34 +30,41 @@ def is_ours(metadata: Mapping[str, Any]) -> bool:
     return metadata.get("server") == _SERVER
 
 
-def map_of_ours(metadata: Mapping[str, Any]) -> KeyMap:
+def map_of_ours(metadata: Mapping[str, Any], protocol: str) -> KeyMap:
     """The map for our own server, from the preset and what the server says.
+
+    Over vla_eval the server puts histories and chunks together itself; over gr00t names are GR00T's.
 
     Raises:
         UserError: the server says nothing of the kind.
     """
-    preset = load_key_map(OURS)
     if not is_ours(metadata):
         raise UserError(f"key map {OURS}: the server does not say that it is {_SERVER}'s; found {sorted(metadata)}.")
     try:
-        wanted = metadata.get("cameras", list(contract.CAMERAS))
-        size = metadata.get("image_size")
-        accepts = metadata.get("accepts", ["seed", "number"])
-        return dataclasses.replace(
-            preset,
+        found = maps_of_modality_config(metadata)[0] if protocol == GR00T else load_key_map(OURS)
+        size = metadata["image_size"]
+        seeds = "options > {}" if protocol == GR00T and metadata["gr00t_version"] != N15 else "{}"
+        key_map = dataclasses.replace(
+            found,
+            about=f"made from what {_SERVER}'s server says",
             cameras=[
                 dataclasses.replace(one, size=list(size) if size else None, resize="none")
-                for one in preset.cameras
-                if one.camera in wanted
+                for one in found.cameras
+                if one.camera in metadata["cameras"]
             ],
-            image_size=int(size[0]) if size else preset.image_size,
+            state=[dataclasses.replace(one, dtype="float64") for one in found.state],
+            image_size=int(size[0]) if size else found.image_size,
             executed_steps=int(metadata["executed_steps"]),
             picture_offsets=[int(offset) for offset in metadata["history_offsets"]],
-            seed=preset.seed if "seed" in accepts else None,
-            number=preset.number if "number" in accepts else None,
+            state_offsets=None,
+            seed=seeds.format("seed") if "seed" in metadata["accepts"] else None,
+            number=seeds.format("number") if "number" in metadata["accepts"] else None,
         )
     except (KeyError, TypeError, ValueError, IndexError) as error:
         raise UserError(f"key map {OURS}: the server's metadata does not do ({error!r}): {dict(metadata)}") from error
+    if protocol == VLA_EVAL:
+        return dataclasses.replace(key_map, executed_steps=1, picture_offsets=[0], axes="none", number=None)
+    return key_map
 
 
 def maps_of_modality_config(metadata: Mapping[str, Any]) -> list[KeyMap]:
@@ -76,7 +84,7 @@ def maps_of_modality_config(metadata: Mapping[str, Any]) -> list[KeyMap]:
         )
     keys = {name: [str(key) for key in group.get("modality_keys", [])] for name, group in groups.items()}
     offsets = {name: [int(i) for i in group.get("delta_indices", [0])] for name, group in groups.items()}
-    if metadata.get("version") == N15:
+    if metadata.get("gr00t_version") == N15:
         return [_map(keys, offsets, nested=False, executed=len(offsets["action"]))]
     executed = min(_EXECUTED, len(offsets["action"]))
     return [_map(keys, offsets, nested, executed) for nested in (True, False)]

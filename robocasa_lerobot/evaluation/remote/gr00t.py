@@ -29,8 +29,8 @@ _OTHER_CALL = ("unexpected keyword argument", "required positional argument")  #
 class Gr00tClient:
     """A connection to GR00T's inference service; see `PolicyClient`.
 
-    `metadata` has `version` (None where the service does not tell) and `modality_config`: for `video`, `state`,
-    `action` and `language` a map with `modality_keys` and `delta_indices`.
+    `metadata` has `gr00t_version` (None where the service does not tell), `modality_config` (for `video`, `state`,
+    `action` and `language` a map with `modality_keys` and `delta_indices`) and what our own server says with its ping.
 
     Raises:
         LostError: nobody listens, or nobody answers.
@@ -58,7 +58,7 @@ class Gr00tClient:
         self._monitor = self._socket.get_monitor_socket(zmq.EVENT_DISCONNECTED)
         self._socket.connect(f"tcp://{address.host}:{address.port}")
         try:
-            self._ask({"endpoint": "ping"}, timeouts.connect)
+            said = self._ask({"endpoint": "ping"}, timeouts.connect)
             config, version = self._modality_config()
         except ServerSaidError as error:
             self.close()
@@ -67,7 +67,9 @@ class Gr00tClient:
             self.close()
             raise
         self._version = version
-        self.metadata: dict[str, Any] = {"version": version, "modality_config": config}
+        own = said.get("metadata") if isinstance(said, dict) else None
+        own = own if isinstance(own, dict) else {}
+        self.metadata: dict[str, Any] = {**own, "gr00t_version": version, "modality_config": config}
 
     @property
     def version(self) -> str | None:
@@ -75,7 +77,10 @@ class Gr00tClient:
         return self._version
 
     def infer(self, observation: Mapping[str, Any]) -> dict[str, Any]:
-        """The action map of an observation; the service's version, where unknown, follows from its first answer."""
+        """The action map of an observation; the service's version, where unknown, follows from its first answer.
+
+        What the observation has under `options` is handed over as such, by services from N1.6 on.
+        """
         seconds = self._timeouts.answer if self._answered else self._timeouts.first_answer
         try:
             answer = self._get_action(observation, seconds)
@@ -83,7 +88,7 @@ class Gr00tClient:
             if self._answered or not any(words in str(error) for words in _OTHER_CALL):
                 raise
             self._version = N16 if self._version in (None, N15) else N15
-            self.metadata["version"] = self._version
+            self.metadata["gr00t_version"] = self._version
             answer = self._get_action(observation, seconds)
         self._answered = True
         if isinstance(answer, list | tuple) and answer:  # N1.6 and N1.7: actions, and information beside them
@@ -114,7 +119,10 @@ class Gr00tClient:
 
     def _get_action(self, observation: Mapping[str, Any], seconds: float) -> Any:
         old = self._version in (None, N15)
-        data = dict(observation) if old else {"observation": dict(observation), "options": None}
+        data = dict(observation)
+        if not old:
+            options = data.pop("options", None)
+            data = {"observation": data, "options": options}
         return self._ask({"endpoint": "get_action", "data": data}, seconds)
 
     def _modality_config(self) -> tuple[dict[str, Any], str | None]:

@@ -120,14 +120,14 @@ def _choose(address: Address, keys: str | None, metadata: Mapping[str, Any]) -> 
     """Name of the key map, and the maps to try."""
     if keys is None:
         defaults = {OPENPI: None, GR00T: AUTO, VLA_EVAL: VLA_EVAL}
-        keys = OURS if is_ours(metadata) and address.protocol != GR00T else defaults[address.protocol]
+        keys = OURS if is_ours(metadata) else defaults[address.protocol]
     if keys is None:
         raise UserError(
             f"{address.text}: openpi's servers do not say what they take: give --policy.keys, one of "
             f"{', '.join(_presets_for(address.protocol))}, or the file of a key map."
         )
     if keys == OURS:
-        return keys, [map_of_ours(metadata)]
+        return keys, [map_of_ours(metadata, address.protocol)]
     if keys == AUTO:
         if address.protocol != GR00T:
             raise UserError(f"{address.text}: the key map auto is for gr00t://, whose servers say what they take.")

@@ -1,0 +1,42 @@
+"""Our clients ask our servers: the records of the same policy in process, whatever the protocol."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+from serving_support import serving
+
+from robocasa_lerobot.cli import main
+from robocasa_lerobot.evaluation.actors.checkpoint import read_source
+from robocasa_lerobot.evaluation.records.results import read_results
+from robocasa_lerobot.serving.host import Host
+from robocasa_lerobot.serving.policy import load_served
+
+
+def evaluate(policy: str, out: Path, *more: str) -> list[dict[str, Any]]:
+    fixed = ["--env.factory=evaluation_env:SlideEnv", "--env.tasks=Slide", "--trials=3", "--seed=1", "--videos=0"]
+    arguments = ["eval", f"--policy={policy}", "--policy.label=same", f"--out={out}", "--report=false", *fixed, *more]
+    assert main(arguments) == 0
+    records = sorted(read_results(out).trials, key=lambda record: record.key)
+    assert [record.error for record in records] == [None] * 3
+    return [record.comparable() for record in records]
+
+
+@pytest.mark.parametrize("protocol", ["openpi", "vla_eval", "gr00t"])
+def test_a_served_policy_takes_the_course_of_the_one_in_process(
+    checkpoint: Path, tmp_path: Path, protocol: str
+) -> None:
+    with serving(Host(load_served(read_source(str(checkpoint)), "cpu")), protocol) as port:
+        theirs = evaluate(f"{protocol}://127.0.0.1:{port}", tmp_path / "theirs", "--workers=2")
+    ours = evaluate(str(checkpoint), tmp_path / "ours", "--workers=1")
+    assert theirs == ours
+    assert len({record["trajectory"] for record in ours}) == 3
+    (header,) = read_results(tmp_path / "theirs").headers.values()
+    info = header.policies["same"]
+    assert info.remote is not None
+    assert info.remote["keys"] == "ours"
+    assert read_source(str(checkpoint)).fingerprint in info.remote["weights"]
+    assert info.remote["outcomes"].startswith("fixed by the trial's seed")
+    assert header.image_size == 32
