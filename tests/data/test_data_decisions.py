@@ -47,8 +47,9 @@ def test_samples_start_where_the_member_says_and_as_often(data: Path) -> None:
     assert {len(set(frames[members == number])) for number in (1, 2)} == {9}
     assert np.allclose(np.bincount(members) / len(members), [0.5, 0.4, 0.1], atol=0.015)
     assert "interventions" in dataset.describe()
-    _, fewer = dataset.sampler(seed=0, drop_last_frames=2).draw(0, 5_000)
-    assert set(fewer % LENGTH) == {0, 1, 2, 3}
+    for dropped, left in ((2, {3}), (4, {3}), (1, {3, 4})):  # an episode keeps its first frame of the kind
+        members, frames = dataset.sampler(seed=0, drop_last_frames=dropped).draw(0, 5_000)
+        assert set(frames[members == 1] % LENGTH) == left
 
 
 def test_policies_do_not_see_who_decided(data: Path) -> None:
@@ -64,6 +65,6 @@ def test_what_says_nothing_has_no_such_frames(data: Path) -> None:
         MixtureDataset(MixtureConfig(members=[MemberConfig(str(data / "plain"), frames="autonomous")]))
     with pytest.raises(UnknownNameError, match="Did you mean 'interventions'"):
         MemberConfig("x", frames="intervention")
-    dropped = mixture(data)
-    with pytest.raises(UserError, match="no frame is left with frames=interventions"):
-        dropped.sampler(seed=0, drop_last_frames=3)
+    write_fake_dataset(data / "person_alone", episodes=1, length=1, decisions=True)
+    with pytest.raises(UserError, match="no frame is left with frames=autonomous"):
+        MixtureDataset(MixtureConfig(members=[MemberConfig(str(data / "person_alone"), frames="autonomous")]))

@@ -41,17 +41,19 @@ def frame_pool(
     Raises:
         UserError: there is none of that kind.
     """
-    starts = source.starts[episodes]
-    # A shorter episode keeps its first frame: no episode drops out of the training unnoticed.
-    lengths = np.maximum(1, source.ends[episodes] - starts - drop_last_frames)
+    starts, ends = source.starts[episodes], source.ends[episodes]
+    # A shorter episode keeps its first frame (of the kind): no episode drops out of the training unnoticed.
+    lengths = np.maximum(1, ends - starts - drop_last_frames)
     if kind is None:
         return FramePool(starts, lengths)
     wanted = frames_of(source, kind)
     runs: list[tuple[int, int]] = []
-    for start, length in zip(starts.tolist(), lengths.tolist(), strict=True):
-        chosen = np.concatenate([[False], wanted[start : start + length], [False]]).astype(np.int8)
-        edges = np.flatnonzero(np.diff(chosen))
-        runs += [(start + begin, end - begin) for begin, end in edges.reshape(-1, 2).tolist()]
+    for start, end, length in zip(starts.tolist(), ends.tolist(), lengths.tolist(), strict=True):
+        of_episode = wanted[start:end]
+        edges = np.flatnonzero(np.diff(np.concatenate([[False], of_episode[:length], [False]]).astype(np.int8)))
+        runs += [(start + begin, stop - begin) for begin, stop in edges.reshape(-1, 2).tolist()]
+        if not len(edges) and of_episode.any():
+            runs.append((start + int(of_episode.argmax()), 1))
     if not runs:
         raise UserError(f"{source.root}: no frame is left with frames={kind} in {len(episodes)} episodes.")
     pool = np.array(runs, dtype=np.int64)
