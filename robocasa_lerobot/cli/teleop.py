@@ -39,6 +39,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--preset", default="fast", help="fast, or quality: with shadows (default fast)")
     parser.add_argument("--host", default="127.0.0.1", help="address to serve at (default 127.0.0.1, this machine)")
     parser.add_argument("--port", type=int, default=8765, help="port, 0 for a free one (default 8765)")
+    parser.add_argument("--free-view", action="store_true", help="MuJoCo's own viewer in a second tab, on this machine")
     parser.add_argument(
         "--policy",
         default="",
@@ -65,7 +66,14 @@ def run(args: argparse.Namespace) -> int:
         operator=args.operator,
         hide_goal=args.hide_goal,
     )
-    outcome = run_session(settings, Place(args.host, args.port), _announce, policy=args.policy, device=args.device)
+    outcome = run_session(
+        settings,
+        Place(args.host, args.port),
+        _announce,
+        policy=args.policy,
+        device=args.device,
+        free_view=args.free_view,
+    )
     where = f" in {outcome.path}" if outcome.path else ""
     print(f"{outcome.saved} of {args.episodes} episodes{where}")
     return 0 if outcome.saved >= args.episodes else 1
@@ -81,4 +89,7 @@ def _announce(server: TeleopServer, loop: ControlLoop) -> None:
     else:
         line = f"ssh -L {server.port}:127.0.0.1:{server.port} THIS_MACHINE"
         print(f"from another machine, first there: {line}", flush=True)
+    if server.free_view:
+        port = server.free_view.rstrip("/").rpartition(":")[2]
+        print(f"MuJoCo's viewer: {server.free_view} (from another machine: ssh -L {port}:127.0.0.1:{port} as well)")
     print("Ctrl+C ends it; what is saved stays, and the same command goes on", flush=True)

@@ -6,6 +6,7 @@ import asyncio
 import collections
 import json
 import time
+from collections.abc import Callable
 from typing import Any
 
 from aiohttp import WSCloseCode, web
@@ -20,10 +21,11 @@ class ClientLine:
 
     Args:
         socket: of the client, open.
+        sent: called when a picture has left, so that there may be room for the next.
     """
 
-    def __init__(self, socket: web.WebSocketResponse) -> None:
-        self._socket = socket
+    def __init__(self, socket: web.WebSocketResponse, sent: Callable[[], None]) -> None:
+        self._socket, self._left = socket, sent
         self._texts: collections.deque[str] = collections.deque()
         self._picture: tuple[int, bytes] | None = None
         self._sent: collections.OrderedDict[int, float] = collections.OrderedDict()
@@ -53,8 +55,8 @@ class ClientLine:
         self._wake.set()
 
     def overdue(self, seconds: float) -> bool:
-        """Whether pictures wait for an acknowledgement that has not come for so long; said once."""
-        if self._reported or len(self._sent) < MOST_UNACKNOWLEDGED:
+        """Whether a picture has waited for its acknowledgement for so long; said once."""
+        if self._reported or not self._sent:
             return False
         self._reported = time.monotonic() - next(iter(self._sent.values())) > seconds
         return self._reported
@@ -73,6 +75,7 @@ class ClientLine:
                 if self._picture is not None and len(self._sent) < MOST_UNACKNOWLEDGED:
                     (number, message), self._picture = self._picture, None
                     self._sent[number] = time.monotonic()
+                    self._left()
                     await self._socket.send_bytes(message)
         except ConnectionError:
             return

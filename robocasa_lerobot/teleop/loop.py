@@ -5,8 +5,11 @@ from __future__ import annotations
 import queue
 import threading
 import time
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Protocol
+
+import mujoco
 
 from robocasa_lerobot import contract
 from robocasa_lerobot.teleop.messages import Message
@@ -27,6 +30,7 @@ class Event:
     what: str
 
 
+SeenState = Callable[[mujoco.MjModel, mujoco.MjData], None]
 Inbox = queue.SimpleQueue[Message | Event]
 
 
@@ -50,10 +54,11 @@ class ControlLoop:
         session: only this thread touches it.
         inbox: what clients say.
         audience: who is told.
+        seen: is shown the state of each picture, if given.
     """
 
-    def __init__(self, session: Session, inbox: Inbox, audience: Audience) -> None:
-        self._session, self._inbox, self._audience = session, inbox, audience
+    def __init__(self, session: Session, inbox: Inbox, audience: Audience, seen: SeenState | None = None) -> None:
+        self._session, self._inbox, self._audience, self._seen = session, inbox, audience, seen
         self._stop = threading.Event()
 
     def stop(self) -> None:
@@ -115,6 +120,8 @@ class ControlLoop:
 
     def _draw(self, now: float) -> None:
         number, parts = self._session.draw(now)
+        if self._seen is not None and parts:
+            self._seen(self._session.env.model, self._session.env.data)
         told = header(self._session, number, now)
         told["pictures"] = [what for what, _ in parts]
         self._audience.frame(told, [data for _, data in parts])

@@ -13,6 +13,7 @@ from pathlib import Path
 
 from robocasa_lerobot import contract
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
+from robocasa_lerobot.envs.web_view import WebView
 from robocasa_lerobot.gl import ensure_gl
 from robocasa_lerobot.teleop.driving.pilot import Pilot, load_pilot
 from robocasa_lerobot.teleop.keeping.store import Store
@@ -49,6 +50,7 @@ def run_session(
     *,
     policy: str = "",
     device: str = "auto",
+    free_view: bool = False,
 ) -> Outcome:
     """Serve a session until enough is saved, it is ended or the process is interrupted.
 
@@ -58,6 +60,7 @@ def run_session(
         announce: called once clients can connect.
         policy: that drives where nobody intervenes, as of `load_pilot`.
         device: that it computes on.
+        free_view: run MuJoCo's own web viewer beside it, on the loopback address.
 
     Raises:
         UserError: unknown names, episodes of other settings, a port that is taken, a policy that cannot be loaded.
@@ -73,11 +76,15 @@ def run_session(
     env = KitchenEnv(settings.task, terminate_on_success=False, **kwargs)
     env.render_observations = False
     inbox: Inbox = Inbox()
-    with Store(settings).held() as store:
+    with contextlib.ExitStack() as open_things:
+        view = open_things.enter_context(WebView(f"{settings.task}, by hand")) if free_view else None
+        if view is not None:
+            settings = dataclasses.replace(settings, free_view=view.address)
+        store = open_things.enter_context(Store(settings).held())
         server = TeleopServer(settings, inbox, place.host, place.port, place.token, place.tls)
         server.start()
         try:
-            loop = ControlLoop(Session(settings, store, env, pilot), inbox, server)
+            loop = ControlLoop(Session(settings, store, env, pilot), inbox, server, view.sync if view else None)
             with _stopped_by_signals(loop):
                 announce(server, loop)
                 loop.run()

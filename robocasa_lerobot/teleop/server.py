@@ -75,6 +75,11 @@ class TeleopServer:
         host = f"[{self.host}]" if ":" in self.host else self.host
         return f"{scheme}://{host}:{self.port}/?t={self.token}"
 
+    @property
+    def free_view(self) -> str:
+        """Where MuJoCo's own viewer is, or ""."""
+        return self._settings.free_view
+
     def start(self) -> None:
         """Listen.
 
@@ -189,7 +194,7 @@ class TeleopServer:
             raise web.HTTPServiceUnavailable(text="too many clients")
         socket = web.WebSocketResponse(max_msg_size=LONGEST_MESSAGE, heartbeat=_HEARTBEAT_S, compress=False)
         await socket.prepare(request)
-        line = ClientLine(socket)
+        line = ClientLine(socket, self._count)
         self._lines.append(line)
         role = VIEWER if self._operator is not None else OPERATOR
         if role == OPERATOR:

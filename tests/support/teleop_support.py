@@ -38,7 +38,7 @@ class Served:
 
 
 @contextmanager
-def served(settings: TeleopSettings, *, policy: str = "") -> Iterator[Served]:
+def served(settings: TeleopSettings, *, policy: str = "", free_view: bool = False) -> Iterator[Served]:
     """Serve a session; it is stopped at the end, and what it raised is raised here."""
     ready: queue.Queue[Served | BaseException] = queue.Queue()
     place = Place()
@@ -52,7 +52,7 @@ def served(settings: TeleopSettings, *, policy: str = "") -> Iterator[Served]:
 
     def work() -> None:
         try:
-            outcome = run_session(settings, place, announce, policy=policy, device="cpu")
+            outcome = run_session(settings, place, announce, policy=policy, device="cpu", free_view=free_view)
             handle[0].outcome = outcome
         except BaseException as error:
             failures.append(error)
