@@ -148,11 +148,11 @@ class Line:
 
 
 @contextmanager
-def driven_page(settings: TeleopSettings, **window: Any) -> Iterator[Page]:
+def driven_page(settings: TeleopSettings, policy: str = "", **window: Any) -> Iterator[Page]:
     """A session that is served, and a page of it that is ready to drive."""
     program = find_chromium()
     assert program is not None
-    with Browser(program) as browser, served(settings) as session:
+    with Browser(program) as browser, served(settings, policy=policy) as session:
         browser.with_focus()
         browser.before_load(FAKE_GAMEPAD)
         address = urlsplit(session.address)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -238,3 +239,18 @@ def test_fingers_on_the_sticks(page: Page) -> None:
     assert np.abs(page.hand - at_rest).max() < 0.004
     assert page.text("#g-input") == "touch"
     assert browser.ask("document.documentElement.scrollWidth <= innerWidth")
+
+
+def test_a_policy_is_shown_taken_over_from_and_given_back_to(tmp_path: Path) -> None:
+    with driven_page(settings(tmp_path), policy="demonstrator") as page:
+        state = "document.querySelector('#policy-state').textContent"
+        assert page.text("#policy-name") == "demonstrator"
+        page.click("#policy-start")
+        page.until("running")
+        page.browser.until(f"{state} === 'autonomous'")
+        page.hold("KeyR", 3)
+        page.browser.until(f"{state} === 'correcting'")
+        assert page.text("#interventions") == "1 intervention"
+        page.browser.key("KeyP", True)
+        page.browser.key("KeyP", False)
+        page.browser.until(f"{state} === 'autonomous'")

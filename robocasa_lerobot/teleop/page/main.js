@@ -104,7 +104,7 @@ function saved(message) {
 }
 
 function discarded(message) {
-  note({ level: "info", text: `Not kept (${message.reason}).` });
+  note({ level: "info", text: message.reason === "redo" ? "The same kitchen again." : `Not kept: ${message.reason}.` });
 }
 
 function done(message) {
