@@ -12,6 +12,7 @@ from lerobot.robots.config import RobotConfig
 from lerobot.robots.utils import make_robot_from_config
 from lerobot.scripts import lerobot_record
 from lerobot.teleoperators.config import TeleoperatorConfig
+from lerobot.teleoperators.utils import make_teleoperator_from_config
 from scipy.spatial.transform import Rotation
 
 import robocasa_lerobot.plugins  # noqa: F401
@@ -19,6 +20,7 @@ from robocasa_lerobot import contract
 from robocasa_lerobot.devices.announcements import AGAIN, BEGIN, Announcements
 from robocasa_lerobot.devices.config_hand import RobocasaHandConfig
 from robocasa_lerobot.devices.config_kitchen import RobocasaKitchenConfig
+from robocasa_lerobot.devices.hand import RobocasaHand, _phone_step
 from robocasa_lerobot.devices.kitchen import RobocasaKitchen, _check_rate
 from robocasa_lerobot.devices.translation import NAMES, HandTranslator
 from robocasa_lerobot.errors import UserError
@@ -135,6 +137,43 @@ def test_a_phone_moves_the_hand_by_what_it_moved_while_held() -> None:
     assert translator.action(phone([0.72, 0, 0], turn))["eef_dx"] == 0  # a jump: tracking was lost
     assert translator.action(phone([0.9, 0, 0], enabled=False))["eef_dx"] == 0
     assert translator.action(phone([0.95, 0, 0]))["eef_dx"] == 0  # held again: a new reference
+
+
+class Pad:
+    """Stands in for a gamepad's driver: what LeRobot's own device asks of it."""
+
+    deltas, grip = (0.0, 0.0, 0.0), "stay"
+
+    def update(self) -> None: ...
+
+    def get_deltas(self) -> tuple[float, float, float]:
+        return self.deltas
+
+    def gripper_command(self) -> str:
+        return self.grip
+
+
+def test_lerobots_gamepad_leads_the_hand() -> None:
+    hand = make_teleoperator_from_config(RobocasaHandConfig(speed=0.5))
+    assert isinstance(hand, RobocasaHand)
+    hand.device.gamepad = pad = Pad()
+    pad.deltas, pad.grip = (1.0, -0.5, 0.0), "close"
+    said = hand.get_action()
+    assert list(said) == list(NAMES) == list(hand.action_features)
+    assert (said["eef_dx"], said["eef_dy"], said["gripper_close"], said["control_mode"]) == (0.5, -0.25, 1, -1)
+
+
+def test_a_phone_is_read_as_lerobot_reads_it() -> None:
+    step, translator = _phone_step(RobocasaHandConfig(device="phone")), HandTranslator()
+
+    def said(x: float, button: str = "") -> dict[str, float]:
+        inputs = {"reservedButtonA": button == "A", "reservedButtonB": button == "B"}
+        pose = {"phone.pos": np.array([0.0, -x, 0.0]), "phone.rot": Rotation.identity()}
+        return translator.action(step.action({**pose, "phone.raw_inputs": inputs, "phone.enabled": True}))
+
+    said(0.0)
+    assert said(0.02, "B")["eef_dx"] == pytest.approx(0.4)
+    assert [said(0.02)["gripper_close"], said(0.02, "A")["gripper_close"]] == [1, -1]
 
 
 def test_mistakes_are_explained() -> None:

@@ -8,11 +8,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from browser import find_chromium
+from browser import Browser, find_chromium
 from page_support import Page, driven_page
-from teleop_support import settings
+from teleop_support import served, settings
 
 from robocasa_lerobot.demos.motion import base_pose
+from robocasa_lerobot.teleop.client import TeleopClient
 
 pytestmark = [
     pytest.mark.render,
@@ -241,6 +242,31 @@ def test_fingers_on_the_sticks(page: Page) -> None:
     assert browser.ask("document.documentElement.scrollWidth <= innerWidth")
 
 
+@pytest.mark.slow
+def test_a_second_page_watches_until_it_can_take_over(tmp_path: Path) -> None:
+    program = find_chromium()
+    assert program is not None
+    with Browser(program) as browser, served(settings(tmp_path)) as session:
+        with TeleopClient(session.address) as operator:
+            operator.until_phase("ready")
+            browser.with_focus()
+            browser.open(session.address)
+            browser.until("document.body.dataset.phase === 'ready' && role.textContent === 'watching'")
+            for code in ("KeyW", "Space"):
+                browser.key(code, True)
+                browser.key(code, False)
+            assert browser.ask(
+                "[...document.querySelectorAll('.transport button')].every(b => b.disabled || !b.checkVisibility())"
+            )
+            assert not browser.ask("take.checkVisibility()")
+            operator.send("input", device="keyboard", arm=[0, 0, 1, 0, 0, 0])
+            browser.until("document.body.dataset.phase === 'running'")
+        browser.until("take.checkVisibility()")
+        browser.ask("take.click()")
+        browser.until("role.textContent === 'you drive'")
+
+
+@pytest.mark.slow
 def test_a_policy_is_shown_taken_over_from_and_given_back_to(tmp_path: Path) -> None:
     with driven_page(settings(tmp_path), policy="demonstrator") as page:
         state = "document.querySelector('#policy-state').textContent"

@@ -140,7 +140,7 @@ export class Keyboard {
     const target = event.target instanceof Element ? event.target : document.body;
     if (target.matches("input:not([type=range], [type=checkbox]), select, textarea")) return;
     // A control that has the keys by Tab is worked as anywhere else: Space and Enter press it, arrows choose in it.
-    const control = target.closest("button, a, input, [role=radio]");
+    const control = target.closest("button, a, input, summary, [role=radio]");
     const used = ["Space", "Enter", ...(control?.matches("[role=radio], [type=range]") ? ARROWS : [])];
     if (control && used.includes(event.code)) return;
     event.preventDefault();

@@ -56,6 +56,8 @@ const connection = new Connection({
     await tiles.draw(head.id, pictures);
     if (state.head && head.id < state.head.id) return;
     state.drawn = performance.now();
+    // An episode begins with a new press, never with what is still held from the one before.
+    if (head.phase !== state.head?.phase && ["ready", "review"].includes(head.phase)) operator.release();
     state.head = head;
     head.mine = state.mine; // whether this page drives; `head.operator` says whether anybody does
     operator.frame = head.id;

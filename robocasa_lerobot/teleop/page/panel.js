@@ -100,8 +100,9 @@ export class Panel {
   gauges(head) {
     text($("g-step"), `${head.step} / ${head.horizon}`);
     text($("g-time"), `${head.time.toFixed(1)} s`);
-    text($("g-real"), head.real_time === null ? "–" : `× ${head.real_time.toFixed(2)}`);
-    $("g-real").classList.toggle("bad", head.real_time !== null && head.real_time < 0.9);
+    const slow = head.real_time !== null && head.real_time < 0.9;
+    text($("g-real"), head.real_time === null ? "–" : `× ${head.real_time.toFixed(2)}${slow ? ", slower than life" : ""}`);
+    $("g-real").classList.toggle("bad", slow);
     text($("g-age"), head.age_ms === null ? "–" : `${Math.round(head.age_ms)} ms`);
     $("g-age").classList.toggle("bad", head.age_ms !== null && head.age_ms > 250);
     text($("g-cost"), head.step_ms === null ? "–" : `${Math.round(head.step_ms)} ms`);

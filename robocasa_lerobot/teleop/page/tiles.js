@@ -27,6 +27,7 @@ export class Tiles {
   setUp(cameras) {
     this.holder.replaceChildren();
     this.tiles.clear();
+    this.newest.clear();
     for (const camera of cameras) {
       const canvas = make("canvas", { width: 256, height: 256 });
       const label = make("span", { class: "tile-name" }, NAMES[camera] ?? camera.replace(/^robot0_/, "").replaceAll("_", " "));

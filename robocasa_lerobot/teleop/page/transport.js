@@ -18,7 +18,7 @@ export class Transport {
         if (event.detail) event.currentTarget.blur(); // a click must not leave Space and Enter on the button
       });
     click("pause", () => this.pause());
-    hold($("undo"), (on) => this.undo(on));
+    for (const id of ["undo", "review-undo"]) hold($(id), (on) => this.undo(on));
     click("mark", () => send({ type: "mark" }));
     click("back-to-mark", () => send({ type: "back_to_mark" }));
     click("end", () => send({ type: "end" }));
@@ -90,8 +90,8 @@ export class Transport {
     const saving = head.phase === "saving";
     $("save").disabled = saving || !review.success || !head.mine;
     text($("review-note"), review.success ? "" : "The goal does not hold at the end.");
-    $("continue").disabled = saving || review.success;
-    for (const id of ["play", "review-redo", "review-discard"]) $(id).disabled = saving;
+    $("continue").disabled = saving || review.success || !head.mine;
+    for (const id of ["play", "review-undo", "review-redo", "review-discard"]) $(id).disabled = saving || !head.mine;
   }
 
   track(head) {
