@@ -58,7 +58,7 @@ def run(args: argparse.Namespace) -> int:
     """Evaluate, print the success rates, write the report."""
     if args.end_with_input:
         threading.Thread(target=_end_with_input, daemon=True).start()
-    from robocasa_lerobot.evaluation.config.evaluation import KITCHEN_ENV_FACTORY, EvaluationConfig
+    from robocasa_lerobot.evaluation.config.evaluation import EvaluationConfig
     from robocasa_lerobot.evaluation.config.loader import load_config
     from robocasa_lerobot.evaluation.planning.run_header import partial_sentence
     from robocasa_lerobot.evaluation.run.engine import evaluate, prepare
@@ -91,7 +91,7 @@ def run(args: argparse.Namespace) -> int:
         merge(evaluation)
         write_outputs(evaluation)
         return 0
-    if config.env.factory == KITCHEN_ENV_FACTORY:
+    if config.env.is_kitchen:
         ensure_gl()  # Inherited by the workers.
         announce_backend()
     evaluate(evaluation)

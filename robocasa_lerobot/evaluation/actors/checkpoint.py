@@ -77,8 +77,8 @@ class PolicySource:
         )
 
 
-def read_source(path: str, label: str | None = None) -> PolicySource:
-    """The policy at `path`, which is no address: see `remote_sources` for these.
+def read_source(path: str, label: str | None = None, own_pictures: bool = False) -> PolicySource:
+    """The policy at `path`, which is no address; `own_pictures` are another simulator's, whose names are not ours.
 
     Raises:
         CheckpointError: not a `pretrained_model` folder; the message says where one was expected.
@@ -102,7 +102,7 @@ def read_source(path: str, label: str | None = None) -> PolicySource:
         fingerprint(folder),
         origin.phase,
         origin.step,
-        camera_size(config, folder),
+        camera_size(config, folder, own_pictures),
         origin.experiment,
         has_queues(config),
     )
@@ -166,17 +166,18 @@ def has_queues(config: Mapping[str, Any]) -> bool:
     return config.get("n_obs_steps", 1) != 1 or config.get("temporal_ensemble_coeff") is not None
 
 
-def camera_size(config: dict[str, Any], folder: Path) -> tuple[int, int] | None:
+def camera_size(config: dict[str, Any], folder: Path, any_picture: bool = False) -> tuple[int, int] | None:
     """(height, width) of those camera inputs of a policy that the env fills; None for a policy without cameras.
 
-    Inputs have the env's names, or the saved preprocessor gives the env's cameras the policy's names.
+    Inputs have the env's names, or the saved preprocessor gives the env's cameras the policy's names. With
+    `any_picture` all inputs count.
 
     Raises:
         CheckpointError: the policy has cameras, and none of them is the env's; or they have several sizes.
     """
     inputs = _pictures(config)
-    filled = filled_cameras(config, folder)
-    sizes = {tuple(map(int, inputs[name]["shape"][-2:])) for name in filled.values()}
+    filled = inputs if any_picture else filled_cameras(config, folder).values()
+    sizes = {tuple(map(int, inputs[name]["shape"][-2:])) for name in filled}
     if inputs and not sizes:
         raise CheckpointError(
             f"{folder}: the policy takes the pictures {', '.join(inputs)}, and the env has "

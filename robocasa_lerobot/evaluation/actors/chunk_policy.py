@@ -121,11 +121,7 @@ class ChunkPolicy:
 
         loaded, count = self._loaded, len(group)
         flat = [observation for request in group for observation in request.observations]
-        stacked = {
-            "pixels": {camera: np.stack([one["pixels"][camera] for one in flat]) for camera in flat[0]["pixels"]},
-            "agent_pos": np.stack([one["agent_pos"] for one in flat]),
-        }
-        batch = preprocess_observation(stacked)
+        batch = preprocess_observation(_stacked(flat))
         batch["task"] = [request.instruction for request in group for _ in request.observations]
         batch = loaded.pre(batch)
         if self._history > 1:
@@ -157,6 +153,14 @@ class ChunkPolicy:
             return value
         steps = value.reshape(count, self._history, *value.shape[1:])
         return steps[:, -1] if "language" in key else steps
+
+
+def _stacked(observations: Sequence[Any]) -> Any:
+    """Observations of one structure, array by array."""
+    first = observations[0]
+    if isinstance(first, dict):
+        return {name: _stacked([one[name] for one in observations]) for name in first}
+    return np.stack(observations)
 
 
 class LoadedCheckpoint:

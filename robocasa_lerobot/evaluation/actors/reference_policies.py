@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +12,15 @@ from numpy.typing import NDArray
 from robocasa_lerobot import contract
 from robocasa_lerobot.evaluation.actors.actor import ActingTime, Observation
 from robocasa_lerobot.evaluation.actors.stored_episodes import StoredEpisode, read_episodes
+
+
+def action_bounds(env: Any) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Lowest and highest actions of an env; -1 and 1 where it sets no bound, the kitchens' where there is no env."""
+    space = getattr(env, "action_space", None)
+    if space is None:
+        return -np.ones(contract.ACTION_SIZE), np.ones(contract.ACTION_SIZE)
+    low, high = np.asarray(space.low, np.float64), np.asarray(space.high, np.float64)
+    return np.where(np.isfinite(low), low, -1.0), np.where(np.isfinite(high), high, 1.0)
 
 
 class _Blind:
@@ -26,30 +35,38 @@ class _Blind:
 
 
 class ZeroPolicy(_Blind):
-    """Every component zero: the arm holds still, the gripper opens."""
+    """Every component zero: in our kitchens the arm holds still and the gripper opens."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._zeros: NDArray[np.float32] = np.zeros(contract.ACTION_SIZE, dtype=np.float32)
 
     def reset(self, seed: int, env: Any) -> None:
-        """Nothing to forget."""
+        """As many as the env takes."""
+        low, _ = action_bounds(env)
+        self._zeros = np.zeros(low.shape, dtype=np.float32)
 
     def act(self, observation: Observation, instruction: str) -> NDArray[np.float32]:
         """Zeros."""
-        return np.zeros(contract.ACTION_SIZE, dtype=np.float32)
+        return self._zeros
 
 
 class RandomPolicy(_Blind):
-    """Actions uniform in [-1, 1], independent at each step."""
+    """Actions uniform between the env's bounds, [-1, 1] in our kitchens, independent at each step."""
 
     def __init__(self) -> None:
         super().__init__()
         self._rng = np.random.default_rng(0)
+        self._low, self._high = action_bounds(None)
 
     def reset(self, seed: int, env: Any) -> None:
         """Start the stream of this trial."""
         self._rng = np.random.default_rng(seed)
+        self._low, self._high = action_bounds(env)
 
     def act(self, observation: Observation, instruction: str) -> NDArray[np.float32]:
         """A uniform sample."""
-        return self._rng.uniform(-1.0, 1.0, contract.ACTION_SIZE).astype(np.float32)
+        return self._rng.uniform(self._low, self._high).astype(np.float32)
 
 
 class DemonstratorPolicy(_Blind):
@@ -63,19 +80,24 @@ class DemonstratorPolicy(_Blind):
         super().__init__()
         self._actions: Iterator[NDArray[np.float64]] = iter(())
         self._last: NDArray[np.float64] = np.zeros(contract.ACTION_SIZE)
+        self._expert: Callable[[], NDArray[np.float32]] | None = None
 
     def reset(self, seed: int, env: Any) -> None:
-        """Plan for the scene that the env has been reset to.
+        """Plan for the scene that the env has been reset to; an env with an expert of its own is shown by that.
 
         Raises:
             UnknownNameError: a stage of the task needs a skill that does not exist.
         """
         from robocasa_lerobot.demos.demonstrator import demonstrate
 
-        self._actions, self._last = demonstrate(env), np.zeros(contract.ACTION_SIZE)
+        self._expert = getattr(env, "expert_action", None)
+        if self._expert is None:
+            self._actions, self._last = demonstrate(env), np.zeros(contract.ACTION_SIZE)
 
     def act(self, observation: Observation, instruction: str) -> NDArray[np.float32]:
         """The demonstrator's next action, in single precision as it is recorded."""
+        if self._expert is not None:
+            return self._expert()
         from robocasa_lerobot.demos.demonstrator import SkillError
 
         try:

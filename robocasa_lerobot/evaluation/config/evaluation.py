@@ -7,6 +7,7 @@ import os
 from collections.abc import Iterable
 from dataclasses import dataclass, field, fields
 from pathlib import Path
+from typing import Any
 
 from robocasa_lerobot.errors import UnknownNameError, UserError
 from robocasa_lerobot.evaluation.records.results import file_name
@@ -87,7 +88,11 @@ class EnvSettings:
     image_size: pixels, height and width; default: what the checkpoint was trained at, else 256.
     horizon: control steps at 20 Hz for all tasks; default: each task's own.
     horizon_multiplier: factor on each task's own horizon.
-    factory: `module:callable` that makes the env, called with task, split, render_preset, image_size and horizon.
+    factory: `module:callable` that makes the env, called with task, split, render_preset, image_size and horizon; with
+        `python`, `module:callable` or `FILE.py:callable` of that interpreter (docs/simulators.md).
+    python: interpreter in which another simulator's envs run; default: this one.
+    type: `lerobot:NAME`, an env that LeRobot knows, such as lerobot:pusht, in `python` or here, in place of a factory.
+    options: arguments of another simulator's factory, as `--env.options.NAME=VALUE`.
     render_devices: EGL devices that the workers are dealt out to (`robocasa-lerobot doctor` lists them; the numbers
         are not CUDA's); default: EGL's choice, its first one for all.
     """
@@ -103,7 +108,20 @@ class EnvSettings:
     horizon: int | None = None
     horizon_multiplier: float = 1.0
     factory: str = KITCHEN_ENV_FACTORY
+    python: str | None = None
+    type: str | None = None
+    options: dict[str, Any] = field(default_factory=dict)
     render_devices: list[int] = field(default_factory=list)
+
+    @property
+    def is_kitchen(self) -> bool:
+        """Whether the env is this package's own."""
+        return self.factory == KITCHEN_ENV_FACTORY and not self.is_foreign
+
+    @property
+    def is_foreign(self) -> bool:
+        """Whether the env is another simulator's, in a process of its own."""
+        return self.python is not None or self.type is not None
 
 
 @dataclass

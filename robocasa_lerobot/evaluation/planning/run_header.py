@@ -11,7 +11,6 @@ from typing import Any
 from robocasa_lerobot.errors import UnknownNameError, UserError
 from robocasa_lerobot.evaluation.actors.chunk_policy import default_width
 from robocasa_lerobot.evaluation.config.evaluation import (
-    KITCHEN_ENV_FACTORY,
     EnvSettings,
     EvaluationConfig,
     PerturbationSettings,
@@ -65,7 +64,7 @@ def plan_tasks(env: EnvSettings, first_sets: int | None = None) -> PlannedTasks:
         NothingRegisteredError: this version has none of the tasks.
         UserError: tasks are not registered yet and may not be left out (all are named).
     """
-    if env.factory != KITCHEN_ENV_FACTORY:
+    if not env.is_kitchen:
         if env.task_sets:
             raise UserError("env.task_sets are the kitchens'; name the tasks of an env of your own in env.tasks.")
         if env.horizon_multiplier != 1.0:
@@ -202,8 +201,13 @@ def outcome_settings(
 
     `kinds` are the types of the policies that are computed.
     """
-    places = ("tasks", "task_sets", "registry", "tasks_per_set", "allow_missing_tasks", "render_devices")
-    env = {name: value for name, value in dataclasses.asdict(config.env).items() if name not in places}
+    places = ("tasks", "task_sets", "registry", "tasks_per_set", "allow_missing_tasks", "render_devices", "python")
+    new = ("type", "options")  # older results do not have them
+    env = {
+        name: value
+        for name, value in dataclasses.asdict(config.env).items()
+        if name not in places and (value or name not in new)
+    }
     noise = {name: value for name, value in dataclasses.asdict(config.perturbation).items() if name != "names"}
     return {
         "protocol": config.protocol,
@@ -229,7 +233,7 @@ def run_header(
 ) -> RunHeader:
     """The header of a run with these settings on this machine."""
     env = config.env
-    rule = "fixed" if env.horizon else "task" if env.factory == KITCHEN_ENV_FACTORY else "env"
+    rule = "fixed" if env.horizon else "task" if env.is_kitchen else "env"
     return RunHeader(
         protocol=config.protocol,
         task_sets=tasks.sets,
@@ -237,7 +241,7 @@ def run_header(
         missing_tasks=tasks.missing,
         trials=config.trials,
         seed=config.seed,
-        split=env.split,
+        split=settings["split"],
         render_preset=env.render_preset,
         image_size=settings["image_size"],
         horizon_rule=rule,

@@ -40,7 +40,7 @@ def open_sources(config: EvaluationConfig, ask: bool = True) -> tuple[list[Polic
     with ExitStack() as stack:
         for place, (path, label) in enumerate(zip(policy.path, labels, strict=True)):
             if not is_address(path):
-                sources.append(read_source(path, label))
+                sources.append(read_source(path, label, config.env.is_foreign))
                 continue
             address, key_map = parse_address(path), next(keys)
             label = label or default_label(address)

@@ -34,6 +34,9 @@ from robocasa_lerobot.evaluation.records.trials_file import append, check_same_r
 from robocasa_lerobot.evaluation.run.serving import open_servers, served_labels
 from robocasa_lerobot.evaluation.run.worker import WorkerSettings
 from robocasa_lerobot.evaluation.run.worker_pool import Completed, WorkerPool
+from robocasa_lerobot.evaluation.simulators.foreign_env import FACTORY
+from robocasa_lerobot.evaluation.simulators.planning import plan_simulator
+from robocasa_lerobot.evaluation.simulators.simulator import env_arguments, simulator_of
 from robocasa_lerobot.files import write_text
 from robocasa_lerobot.jobs.locks import LockHeldError, locked
 from robocasa_lerobot.progress import Bar
@@ -69,6 +72,7 @@ def prepare(config: EvaluationConfig, ask: bool = True) -> Evaluation:
     """
     check_factory(config.env.factory)
     tasks = resolve.plan_tasks(config.env, config.first_sets)
+    simulator = simulator_of(config.env.python, config.env.type, config.env.factory, config.env.options)
     sources, image_size = open_sources(config, ask)
     by_label: dict[str, PolicySource] = {}
     for source in sources:
@@ -85,6 +89,8 @@ def prepare(config: EvaluationConfig, ask: bool = True) -> Evaluation:
     kinds = [source.type for source in sources if source.is_checkpoint]
     settings = resolve.outcome_settings(config, image_size, device, kinds)
     seeds = _stored_seeds(sources, config, settings, list(tasks.horizons))
+    if simulator is not None:
+        seeds = plan_simulator(simulator, config, sources, settings)
     phases: list[int | None] = [*config.policy.lifelong_phase] if config.lifelong else [None] * len(sources)
     own_tasks = {label: tasks.of_policy(phase) for label, phase in zip(by_label, phases, strict=True)}
     plan = make_plan(
@@ -214,14 +220,14 @@ def showcase(
 def worker_settings(evaluation: Evaluation) -> WorkerSettings:
     """What the workers of an evaluation need."""
     config, header = evaluation.config, evaluation.header
+    factory, env_kwargs = config.env.factory, {"split": config.env.split, "render_preset": config.env.render_preset}
+    simulator = simulator_of(config.env.python, config.env.type, factory, config.env.options)
+    if simulator is not None:
+        factory, env_kwargs = FACTORY, env_arguments(simulator)
     return WorkerSettings(
         sources=evaluation.sources,
-        factory=config.env.factory,
-        env_kwargs={
-            "split": config.env.split,
-            "render_preset": config.env.render_preset,
-            "image_size": header.image_size,
-        },
+        factory=factory,
+        env_kwargs={**env_kwargs, "image_size": header.image_size or None},
         device=header.device,
         threads=config.policy.threads,
         executed_steps=config.executed_steps,

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robocasa_lerobot import contract
+from robocasa_lerobot.errors import UserError
 from robocasa_lerobot.video import VideoWriter, side_by_side
 
 # Half the control rate and 192 pixels: on a CPU, rendering every step at full size would take longer than the trial.
@@ -18,16 +19,20 @@ FILM_FPS = contract.CONTROL_HZ // FILM_EVERY
 FILM_SIZE = 192
 
 
+class NoPicturesError(UserError):
+    """An env that has nothing to film."""
+
+
 class Film:
-    """A video of one trial, in real time at 10 fps.
+    """A video of one trial, in real time: every second picture, at half the control rate (10 fps in our kitchens).
 
     An env with a MuJoCo `model` and `data` is filmed by a renderer of its own, so that a policy with small inputs
     still gets a film that shows something, and the env renders what the policy sees and no more. Of any other env
     the observation's pictures are filmed.
     """
 
-    def __init__(self, path: Path) -> None:
-        self._writer = VideoWriter(path, FILM_FPS)
+    def __init__(self, path: Path, control_hz: float | None = None) -> None:
+        self._writer = VideoWriter(path, max(1, round((control_hz or contract.CONTROL_HZ) / FILM_EVERY)))
         self._renderer: Any = None
 
     def shoot(self, env: Any, observation: dict[str, Any], step: int) -> None:
@@ -41,8 +46,10 @@ class Film:
 
     def _pictures(self, env: Any, observation: dict[str, Any]) -> dict[str, NDArray[np.uint8]]:
         if self.needs_observation(env):
-            pixels: dict[str, NDArray[np.uint8]] = observation["pixels"]
-            return pixels
+            pixels = observation.get("pixels")
+            if pixels is None or len(pixels) == 0:
+                raise NoPicturesError("the env shows no `pixels`: there is nothing to film. Give --videos=0.")
+            return pixels if isinstance(pixels, dict) else {"picture": pixels}
         if self._renderer is None:
             from robocasa_lerobot.envs.rendering import SceneRenderer
 

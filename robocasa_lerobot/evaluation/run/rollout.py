@@ -10,6 +10,7 @@ from typing import Any
 
 import gymnasium
 import numpy as np
+from numpy.typing import NDArray
 
 from robocasa_lerobot.envs.tasks.stage_progress import StageProgress
 from robocasa_lerobot.errors import UserError
@@ -110,7 +111,7 @@ def run_trial(
     if film is not None:
         film.shoot(base, observation, 0)
         filming += time.perf_counter() - started - building
-    digest = hashlib.sha256(np.asarray(observation["agent_pos"], dtype=np.float64).tobytes())
+    digest = hashlib.sha256(proprioception(observation).tobytes())
     counts: dict[str, TermCount] = {}
     progress = StageProgress(base.declaration, base.scene, base.data) if hasattr(base, "declaration") else None
     ended = False
@@ -132,7 +133,7 @@ def run_trial(
             film.shoot(base, observation, outcome.steps)
             filming += time.perf_counter() - shooting
         digest.update(np.asarray(action, dtype=np.float32).tobytes())
-        digest.update(np.asarray(observation["agent_pos"], dtype=np.float64).tobytes())
+        digest.update(proprioception(observation).tobytes())
         _check_finite(observation, outcome.steps, warnings)
         for name, met in info.get("success_terms", {}).items():
             counts.setdefault(name, TermCount()).note(outcome.steps, bool(met))
@@ -160,11 +161,24 @@ def run_trial(
 
 
 def _check_finite(observation: dict[str, Any], step: int, warnings: PhysicsWarnings) -> None:
-    if not np.isfinite(observation["agent_pos"]).all():
-        raise DivergedError(f"proprioception is not finite after step {step}: {observation['agent_pos']}")
+    numbers = proprioception(observation)
+    if not np.isfinite(numbers).all():
+        raise DivergedError(f"proprioception is not finite after step {step}: {numbers}")
     bad = warnings.divergence()
     if bad is not None:
         raise DivergedError(f"the physics diverged at step {step}: MuJoCo warned of {bad}")
+
+
+def proprioception(observation: dict[str, Any]) -> NDArray[np.float64]:
+    """All numbers of an observation beside its pictures, in one vector, by the order of their names."""
+    found: list[NDArray[np.float64]] = []
+    for name in sorted(observation):
+        value = observation[name]
+        if isinstance(value, dict):
+            found += [] if name == "pixels" else [proprioception(value)]
+        elif name != "pixels":
+            found.append(np.asarray(value, dtype=np.float64).ravel())
+    return np.concatenate(found) if found else np.zeros(0)
 
 
 def horizon_of(env: gymnasium.Env[Any, Any], spec: TrialSpec) -> int:

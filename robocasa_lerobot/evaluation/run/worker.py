@@ -26,12 +26,13 @@ from robocasa_lerobot.evaluation.actors.remote_actor import RemoteActor
 from robocasa_lerobot.evaluation.planning.trials import TrialSpec
 from robocasa_lerobot.evaluation.records.results import CRASHED, DIVERGED, file_name
 from robocasa_lerobot.evaluation.remote.failures import LostError
-from robocasa_lerobot.evaluation.run.film import Film
+from robocasa_lerobot.evaluation.run.film import Film, NoPicturesError
 from robocasa_lerobot.evaluation.run.messages import Alive, Finished, Ready, Refused
 from robocasa_lerobot.evaluation.run.policy_server import RemotePolicy
 from robocasa_lerobot.evaluation.run.processes import take_over
 from robocasa_lerobot.evaluation.run.rollout import DivergedError, Outcome, horizon_of, run_trial
 from robocasa_lerobot.evaluation.run.success import SuccessRule
+from robocasa_lerobot.evaluation.simulators.foreign_env import UnfitPolicyError
 
 EnvFactory = Callable[..., gymnasium.Env[Any, Any]]
 
@@ -108,13 +109,13 @@ class _Worker:
             rule = SuccessRule(self._settings.success_rule, self._settings.success_hold_steps)
             if spec.film:
                 video = video_path(spec)
-                with Film(Path(self._settings.out) / video) as film:
+                with Film(Path(self._settings.out) / video, getattr(env.unwrapped, "fps", None)) as film:
                     outcome = run_trial(env, policy, spec, film, self._alive, rule)
             else:
                 outcome = run_trial(env, policy, spec, None, self._alive, rule)
         except (EOFError, BrokenPipeError, ConnectionResetError):
             raise
-        except BatchingError as error:
+        except (BatchingError, NoPicturesError, UnfitPolicyError) as error:
             return Refused(str(error))
         except Exception as error:
             # What the trial left behind may be broken as well: the next one starts from a new env and policy.

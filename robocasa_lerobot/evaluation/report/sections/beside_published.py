@@ -28,6 +28,7 @@ SPLITS = {
     "pretrain": "pretraining scenes",
     "pretrain_train": "pretraining scenes, those for training",
     "pretrain_val": "pretraining scenes, those kept for validation",
+    "own": "another simulator's own scenes",
 }
 
 
