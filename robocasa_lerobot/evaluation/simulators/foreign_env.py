@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robocasa_lerobot.errors import UserError
-from robocasa_lerobot.evaluation.simulators.process import Arrays, ForeignProcess, SimulatorError
+from robocasa_lerobot.evaluation.simulators.process import Arrays, EnvRaisedError, ForeignProcess, SimulatorError
 from robocasa_lerobot.evaluation.simulators.simulator import Simulator
 
 FACTORY = f"{__name__}:make_env"
@@ -33,7 +33,8 @@ class ForeignEnv(gymnasium.Env[Any, Any]):
         arguments: for the factory, beside the options.
 
     Raises:
-        SimulatorError: the process died, or the factory raised.
+        UserError: the factory raised; it would for every other trial.
+        SimulatorError: the process died.
     """
 
     metadata: ClassVar[dict[str, Any]] = {"render_modes": []}
@@ -52,6 +53,9 @@ class ForeignEnv(gymnasium.Env[Any, Any]):
             self.horizon: int | None = said["horizon"]
             self.fps: float | None = said["fps"]
             self.has_expert = bool(said["expert"])
+        except EnvRaisedError as error:
+            self._process.close()
+            raise UserError(f"task {task}: env.factory {simulator.factory} cannot make its env:\n{error}") from error
         except KeyError as error:
             self._process.kill()
             raise SimulatorError(f"the simulator's process made an env without {error}") from error
