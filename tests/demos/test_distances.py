@@ -1,0 +1,98 @@
+"""Objects go beside what they belong to, out of fridges altogether, and drawers open from beside."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator
+
+import mujoco
+import numpy as np
+import pytest
+
+from robocasa_lerobot.demos.motion import UP, Array, base_pose, grip_position
+from robocasa_lerobot.demos.planning.base_path import RobotPose
+from robocasa_lerobot.demos.planning.base_room import between
+from robocasa_lerobot.demos.skills.drawers import open_drawer
+from robocasa_lerobot.demos.skills.pick_place.graspable import graspable
+from robocasa_lerobot.demos.skills.pick_place.pick import HOPELESS, best_grasp
+from robocasa_lerobot.demos.skills.pick_place.poses.distance_poses import distance_terms, near_to
+from robocasa_lerobot.demos.skills.pick_place.strategies import grasp_strategy, place_strategy
+from robocasa_lerobot.envs.kitchen_env import KitchenEnv
+from robocasa_lerobot.envs.kitchens.fixtures.cabinets import Drawer
+
+
+def made(name: str, seed: int = 100_000, split: str = "target") -> Iterator[KitchenEnv]:
+    env = KitchenEnv(name, split=split, cameras=(), terminate_on_success=False)
+    env.reset(seed=seed)
+    yield env
+    env.close()
+
+
+@pytest.fixture(scope="module", params=["RecycleBottlesByType", "CategorizeCondiments", "GatherTableware"])
+def sorting(request: pytest.FixtureRequest) -> Iterator[KitchenEnv]:
+    yield from made(request.param)
+
+
+def test_at_the_best_place_all_that_a_stage_asks_of_distances_holds(sorting: KitchenEnv) -> None:
+    env = sorting
+    for stage in env.declaration.stages:
+        if (stage.skill, stage.verb) != ("pick_place", "place"):
+            continue
+        terms, obj = distance_terms(env, stage), graspable(env, stage.object)
+        assert terms
+        assert near_to(env, stage)
+        best = min(place_strategy(env, stage, obj).poses(), key=lambda pose: pose.extra)
+        before = env.data.joint(f"{obj.name}_joint0").qpos.copy()
+        assert not all(term.holds(env.scene, env.data) for term in terms)
+        env.data.joint(f"{obj.name}_joint0").qpos[:3] = best.point + obj.below(np.eye(3)) * UP
+        mujoco.mj_kinematics(env.model, env.data)
+        assert all(term.holds(env.scene, env.data) for term in terms)
+        env.data.joint(f"{obj.name}_joint0").qpos[:] = before
+        mujoco.mj_kinematics(env.model, env.data)
+
+
+def test_a_stage_that_asks_of_no_distance_keeps_all_its_places() -> None:
+    for env in made("WeighIngredients"):
+        assert distance_terms(env, env.declaration.stages[0]) == ()
+        assert near_to(env, env.declaration.stages[0]) == []
+
+
+def test_what_lies_between_others_in_a_bowl_can_be_grasped() -> None:
+    for env in made("PortionHotDogs"):
+        bun = graspable(env, "hotdog_bun1")
+        strategy = place_strategy(env, env.declaration.stages[0], bun)
+        assert best_grasp(env, bun, grasp_strategy(env, bun, strategy.grasp)).cost < HOPELESS
+
+
+@pytest.mark.parametrize("name", ["GarnishPancake", "PackIdenticalLunches"])
+def test_the_way_out_of_a_fridge_ends_before_its_front(name: str) -> None:
+    for env in made(name):
+        stage = next(stage for stage in env.declaration.stages if stage.verb == "pick")
+        obj, fridge = graspable(env, stage.object), env.scene.fixture("fridge")
+        strategy = grasp_strategy(env, obj, place_strategy(env, env.declaration.stages[-1], obj).grasp)
+        _, y = fridge.to_local(env.data.body(obj.name).xpos)
+        assert strategy.out_m > y + fridge.depth / 2 - 0.1
+
+
+def test_a_drawer_is_opened_from_beside_by_a_robot_that_stood_before_it() -> None:
+    for env in made("DeliverStraw"):
+        drawer = env.scene.fixture("drawer", Drawer)
+        across = np.array([np.cos(drawer.yaw), np.sin(drawer.yaw), 0.0])
+
+        def aside(across: Array = across, drawer: Drawer = drawer, env: KitchenEnv = env) -> float:
+            return abs(float((base_pose(env.data)[0] - np.asarray(drawer.pos)) @ across)) - drawer.width / 2
+
+        assert aside() < 0.0
+        for step in itertools.islice(open_drawer(env, env.declaration.stages[0]), 400):
+            env.step(step.astype(np.float32))
+            if np.linalg.norm(grip_position(env.data) - np.asarray(drawer.pos)) < 0.3:
+                break
+        assert aside() > 0.0
+
+
+def test_a_move_is_divided_so_that_place_and_heading_change_alike() -> None:
+    poses = between(RobotPose(0.0, 0.0, 0.0), RobotPose(1.0, 0.5, 1.0), 0.15, 0.25)
+    assert len(poses) == 7
+    for pose in poses:
+        assert pose.y == pytest.approx(pose.x / 2)
+        assert pose.yaw == pytest.approx(pose.x)
