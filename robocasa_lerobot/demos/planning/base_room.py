@@ -66,11 +66,11 @@ class Room:
 
     def straight(self, start: RobotPose, goal: RobotPose) -> bool:
         """Whether the robot can move and turn at once from one pose to another."""
-        return bool(self.all_free(_between(start, goal, STEP_M, STEP_RAD)).all())
+        return bool(self.all_free(between(start, goal, STEP_M, STEP_RAD)).all())
 
     def closely(self, one: RobotPose, other: RobotPose) -> bool:
         """The same with poses tested that lie no farther apart than a handle is wide."""
-        return bool(self.all_free(_between(one, other, CLOSE_STEP_M, CLOSE_STEP_RAD)).all())
+        return bool(self.all_free(between(one, other, CLOSE_STEP_M, CLOSE_STEP_RAD)).all())
 
 
 class Space(Room):
@@ -135,7 +135,7 @@ class Space(Room):
         return self._checker.touched(bases, self._joints, held=self._held, margin_m=margin_m, most=most)
 
 
-def _between(start: RobotPose, goal: RobotPose, step_m: float, step_rad: float) -> list[RobotPose]:
+def between(start: RobotPose, goal: RobotPose, step_m: float, step_rad: float) -> list[RobotPose]:
     """Poses on a straight move, both ends left out, with no more than such steps between them."""
     turn = wrap(goal.yaw - start.yaw)
     length = float(np.hypot(goal.x - start.x, goal.y - start.y))

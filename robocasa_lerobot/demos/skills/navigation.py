@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterator
 from dataclasses import dataclass
 
@@ -19,6 +20,7 @@ from robocasa_lerobot.demos.motion import (
     limit,
 )
 from robocasa_lerobot.demos.planning.base_path import HELD_MARGINS_M, Room, base_now, carried, find_path, wrap
+from robocasa_lerobot.demos.planning.base_room import between
 from robocasa_lerobot.demos.planning.collision import Held, is_full
 from robocasa_lerobot.demos.skills.common import SkillError
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
@@ -31,6 +33,7 @@ MOVE_GAIN, TURN_GAIN = 2.5, 2.0  # per second
 WAYPOINT_M, WAYPOINT_RAD = 0.12, 0.25
 TIGHT = (0.04, 0.08)  # the same where there is little room for what is carried, metres and radians
 CAREFULLY = (0.3, 0.4)  # greatest speeds there, of moves and turns, as commands beyond the dead zones
+LEG_M, LEG_RAD = 0.15, 0.25  # of a move with something in the hand, along which place and heading change alike
 ARRIVED_M, ARRIVED_RAD = 0.02, 0.03
 STALL_STEPS, STALL_M = 30, 0.01
 # Of the base's commands with a full vessel in the hand: greatest change from one step to the next, and of braking.
@@ -60,8 +63,14 @@ def drive_to(
     loaded = is_full(held)
     tight = loaded or (held is not None and path.margin_m < HELD_MARGINS_M[1][0])
     pace = Pace(most=CAREFULLY if tight else None, smooth=loaded)
-    for index, pose in enumerate(path.poses):
-        last = index == len(path.poses) - 1
+    poses = path.poses
+    if held is not None:  # turned on the way as it was tested
+        places = [base_now(env.data), *poses]
+        poses = [
+            pose for one, other in itertools.pairwise(places) for pose in (*between(one, other, LEG_M, LEG_RAD), other)
+        ]
+    for index, pose in enumerate(poses):
+        last = index == len(poses) - 1
         bounds = (tolerance_m, tolerance_rad) if last else TIGHT if held is not None else (WAYPOINT_M, WAYPOINT_RAD)
         yield from _approach(env, pose, gripper, bounds, pace, stop=last)
 
