@@ -48,6 +48,7 @@ GONE_M = 0.27  # of the grip site from the object's origin: tasks ask for 25 cm
 YAWS = 12
 UP_RISE_M, RISES_M, LOW_COST = 0.06, (0.035, 0.010), 0.05  # over where it is let go, on the path in
 LEVEL_RISE_M, LEVEL_COST = 0.004, 0.1
+BAND_M, POOR = 0.05, 1.2  # of heights that are planned for together, where the best plan of all costs more
 AGAIN, AGAIN_M = 0.5, 0.02  # cost of a hand that goes where it went without success, as near as this
 LEANING, LOADED_LEANING = 0.35, 1.0  # cost of a radian that the object is tilted, and of one with others in it
 LEVEL_FINGERS, SLOPE = 0.35, 0.5  # sine of the slope of the line between the fingers, and what that costs
@@ -168,12 +169,26 @@ def _planner(
     mine = obj.bodies | obj.carried
     middle = np.mean([pose.point for pose in poses], axis=0)
 
-    def plan(blocked: Sequence[RobotPose]) -> MotionPlan:
+    def best(some: list[WaypointPath], blocked: Sequence[RobotPose], *, drives: bool) -> list[MotionPlan]:
         return plan_reach(
-            env, paths, middle, key=2, held=held, loaded=3, allowed=mine, blocked=blocked, may_drive=may_drive
-        )[0]
+            env, some, middle, key=2, held=held, loaded=3, allowed=mine, blocked=blocked, may_drive=drives
+        )[:1]
+
+    def plan(blocked: Sequence[RobotPose]) -> MotionPlan:
+        found = best(paths, blocked, drives=may_drive)
+        if not found or found[0].cost > POOR:  # too many low ones, all of them in the way of something
+            found += [choice for some in _by_height(paths) for choice in best(some, blocked, drives=False)]
+        return min(found, key=lambda choice: choice.cost)
 
     return plan
+
+
+def _by_height(paths: list[WaypointPath]) -> list[list[WaypointPath]]:
+    """Paths in groups of about the same height where the hand lets go, if there is more than one such group."""
+    groups: dict[int, list[WaypointPath]] = {}
+    for path in paths:
+        groups.setdefault(int(path.targets[2].position[2] / BAND_M), []).append(path)
+    return list(groups.values()) if len(groups) > 1 else []
 
 
 def leave(env: KitchenEnv, obj: Graspable) -> Iterator[Array]:

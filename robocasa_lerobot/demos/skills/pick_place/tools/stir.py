@@ -1,9 +1,9 @@
-"""Stir in a vessel with a long tool: its working end down in it, led through what lies there, to and fro."""
+"""Stir in a vessel with a long tool: its working end down in it, led round, so that it takes along what lies there."""
 
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 
 import numpy as np
@@ -18,14 +18,16 @@ from robocasa_lerobot.demos.skills.pick_place.pick import is_held
 from robocasa_lerobot.demos.skills.pick_place.verbs import take
 from robocasa_lerobot.demos.skills.reaching import Held, MotionPlan, WaypointPath, approach, follow_with, plan_reach
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
-from robocasa_lerobot.envs.predicates import ObjectTouches
-from robocasa_lerobot.envs.predicates.logic import every_goal_in
 from robocasa_lerobot.envs.scene.drawn import PlacedObject
 from robocasa_lerobot.envs.scene.robot_poses import RobotPose
-from robocasa_lerobot.envs.tasks.conditions import stage_condition
 from robocasa_lerobot.envs.tasks.task import Stage
 
-ATTEMPTS, STROKES = 3, 14
+ATTEMPTS, ROUNDS = 3, 8
+RADII, ROUND_RAD = (
+    (0.50, 0.65, 0.40, 0.58),
+    8.0,
+)  # shares of the room from the middle, and how far round before it turns back
+AHEAD_RAD, STILL_RAD, STILL_STEPS = 0.45, 0.01, 16  # of the tip; it turns back where it makes no headway
 DIRECTIONS = 12
 TILTS = tuple(float(np.deg2rad(tilt)) for tilt in (0.0, 15.0, 30.0, 45.0, 58.0))  # of the tool from the vertical
 SPINS = tuple(float(np.deg2rad(spin)) for spin in (0.0, 90.0, 180.0, 270.0))  # of the tool about its own axis
@@ -33,8 +35,8 @@ TILT_COST, LOW_COST = 0.15, 20.0  # for a radian; for a metre that the grip is l
 RIM_ROOM_M = 0.055  # of the grip over the rim
 OVER_M, FLOOR_M, WALL_M = 0.06, 0.012, 0.018  # of the tip: over the rim as it comes, over the floor, from the wall
 REACH_SHARE = 0.6  # of the room inside, that the arm must reach to all sides
-BEHIND_M = 0.035  # of the tip before it meets what it pushes
-STEP_M, STEPS_MORE, LIFT_STEPS = 0.011, 6, 25
+STEP_M, STEPS_MORE, MOST_AHEAD_M, RISE_M = 0.011, 6, 0.03, 0.05
+LOST_M = 0.08  # of the tool's origin in the hand: it has slipped out
 
 
 def stir(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
@@ -59,68 +61,82 @@ def stir(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
         over, inside, *_ = choice.path.targets
         yield from move_hand(env.data, over, CLOSED, tolerance=0.02, max_steps=80)
         yield from move_hand(env.data, inside, CLOSED, speed=0.6, tolerance=0.015, max_steps=50, start=over.position)
-        yield from _strokes(env, stage, obj, vessel, inside)
+        yield from _rounds(env, stage, obj, vessel, inside)
         yield from move_hand(env.data, over, CLOSED, speed=0.7, tolerance=0.03, max_steps=50)
         if stage_done(env, stage):
             return
     raise SkillError(f"{graspable(env, stage.object).title} has stirred in {vessel} in vain {ATTEMPTS} times")
 
 
-def _strokes(env: KitchenEnv, stage: Stage, obj: Graspable, vessel: str, inside: HandTarget) -> Iterator[Array]:
-    """Push what lies in the vessel against each other, in turn from all sides, until the stage is done."""
-    data, end, first = env.data, working_end(obj), _wanted(env, stage, obj)
-    for number in range(STROKES):
-        pushed = sorted((name for name in contents_of(env, vessel) if name != obj.name), key=lambda n: n not in first)
-        if not pushed or not is_held(env, obj.name):
-            return
-        at = data.body(pushed[0]).xpos.copy()
-        others = [data.body(name).xpos for name in pushed[1:]]
-        to = others[number % len(others)] if others else _floor(env, vessel)
-        along = (to - at) * [1.0, 1.0, 0.0]
-        along = along / max(float(np.linalg.norm(along)), 1e-6)
-        # Not always straight at it: what is pushed beside its middle gives way to the side, and is met there next.
-        along = rotation_about(UP, float(np.deg2rad((0.0, 25.0, -25.0, 90.0, 0.0, -90.0, 180.0)[number % 7]))) @ along
-        start = _within(env, vessel, at - (BEHIND_M + _radius(env, pushed[0])) * along)
-        yield from _lead_tip(env, stage, obj, end, inside, start, lifted=True)
-        yield from _lead_tip(env, stage, obj, end, inside, _within(env, vessel, at + 0.3 * along), lifted=False)
-        if stage_done(env, stage):
-            return
+def _rounds(env: KitchenEnv, stage: Stage, obj: Graspable, vessel: str, inside: HandTarget) -> Iterator[Array]:
+    """Lead the tip round in the vessel, one way and the other, so that it takes along what lies there."""
+    data, end = env.data, working_end(obj)
+    held, middle = Held.now(data, obj.name), _floor(env, vessel)  # which stays: the vessel is pushed back there, too
+
+    def over() -> bool:
+        slipped = float(np.linalg.norm(Held.now(data, obj.name).position - held.position))
+        return slipped > LOST_M or stage_done(env, stage)
+
+    for number in range(ROUNDS):
+        share, way = RADII[number % len(RADII)], 1.0 if number % 2 == 0 else -1.0
+        start = _at(env, vessel, middle, _gap(env, obj, vessel), share)
+        for point in (_tip(env, obj, end) + RISE_M * UP, start + RISE_M * UP, start):
+            yield from _lead_tip(env, obj, end, inside, point, over)
+        turned, before, still = 0.0, _angle(middle, _tip(env, obj, end)), 0
+        while turned < ROUND_RAD and still < STILL_STEPS:
+            if over():
+                return
+            now = _angle(middle, _tip(env, obj, end))
+            step = float(np.arctan2(np.sin(now - before), np.cos(now - before))) * way
+            turned, before = turned + step, now
+            still = still + 1 if step < STILL_RAD else 0
+            yield _towards(env, obj, end, inside, _at(env, vessel, middle, now + way * AHEAD_RAD, share))
 
 
 def _lead_tip(
-    env: KitchenEnv, stage: Stage, obj: Graspable, end: WorkingEnd, inside: HandTarget, goal: Array, *, lifted: bool
+    env: KitchenEnv, obj: Graspable, end: WorkingEnd, inside: HandTarget, goal: Array, over: Callable[[], bool]
 ) -> Iterator[Array]:
-    """Lead the tip to a point, the hand's rotation kept; `lifted` goes over what lies in between."""
-    data = env.data
-    start, rise = _tip(env, obj, end), 0.06 * UP if lifted else 0.0 * UP
-    points = [start + rise, goal + rise, goal] if lifted else [goal]
-    for point in points:
-        begin = _tip(env, obj, end)
-        count = int(np.ceil(np.linalg.norm(point - begin) / STEP_M))
-        for step in range(1, count + 1 + STEPS_MORE):
-            if stage_done(env, stage) or not is_held(env, obj.name):
-                return
-            wanted = begin + min(step / max(count, 1), 1.0) * (point - begin)
-            ahead = np.clip(wanted - _tip(env, obj, end), -0.03, 0.03)
-            yield arm_action(data, HandTarget(grip_position(data) + ahead, inside.rotation), CLOSED)
+    """Lead the tip to a point along a straight line, the hand's rotation kept."""
+    begin = _tip(env, obj, end)
+    count = int(np.ceil(np.linalg.norm(goal - begin) / STEP_M))
+    for step in range(1, count + 1 + STEPS_MORE):
+        if over():
+            return
+        yield _towards(env, obj, end, inside, begin + min(step / max(count, 1), 1.0) * (goal - begin))
+
+
+def _towards(env: KitchenEnv, obj: Graspable, end: WorkingEnd, inside: HandTarget, point: Array) -> Array:
+    """The action that draws the tip to a point as the tool lies in the hand now."""
+    ahead = np.clip(point - _tip(env, obj, end), -MOST_AHEAD_M, MOST_AHEAD_M)
+    return arm_action(env.data, HandTarget(grip_position(env.data) + ahead, inside.rotation), CLOSED)
+
+
+def _angle(middle: Array, point: Array) -> float:
+    """The bearing of a point from a middle, radians."""
+    away = point - middle
+    return float(np.arctan2(away[1], away[0]))
+
+
+def _at(env: KitchenEnv, vessel: str, middle: Array, angle: float, share: float) -> Array:
+    """A point low in a vessel, at a bearing and a share of the room from a middle of its floor."""
+    room = share * (float(min(_interior(env.scene.objects[vessel])[1][:2])) * np.sqrt(2.0) - WALL_M)
+    point: Array = middle + np.array([room * np.cos(angle), room * np.sin(angle), FLOOR_M])
+    return point
+
+
+def _gap(env: KitchenEnv, obj: Graspable, vessel: str) -> float:
+    """The bearing in a vessel that is farthest from all that lies there, radians."""
+    middle = _floor(env, vessel)
+    taken = [_angle(middle, env.data.body(n).xpos) for n in contents_of(env, vessel) if n != obj.name]
+    bearings = np.linspace(-np.pi, np.pi, 24, endpoint=False)
+    near = [max((float(np.cos(bearing - other)) for other in taken), default=0.0) for bearing in bearings]
+    return float(bearings[int(np.argmin(near))])
 
 
 def _tip(env: KitchenEnv, obj: Graspable, end: WorkingEnd) -> Array:
     body = env.data.body(obj.name)
     tip: Array = body.xpos + body.xmat.reshape(3, 3) @ end.tip
     return tip
-
-
-def _wanted(env: KitchenEnv, stage: Stage, obj: Graspable) -> set[str]:
-    """What the stage's condition wants the tool to touch."""
-    terms = every_goal_in(stage_condition(env.declaration, stage))
-    return {
-        env.scene.fill(t.what) for t in terms if isinstance(t, ObjectTouches) and env.scene.fill(t.object) == obj.name
-    }
-
-
-def _radius(env: KitchenEnv, name: str) -> float:
-    return float(min(env.scene.objects[name].item.size[:2])) / 2
 
 
 def _floor(env: KitchenEnv, vessel: str) -> Array:
@@ -136,15 +152,6 @@ def _interior(placed: PlacedObject) -> tuple[Array, Array]:
     if inside is None:
         raise SkillError(f"{placed.name} has no inside to stir in")
     return np.array(inside.center), np.array(inside.half)
-
-
-def _within(env: KitchenEnv, vessel: str, point: Array) -> Array:
-    """The nearest point to another where a tip may be: over the floor, and not at the wall."""
-    floor, room = _floor(env, vessel), float(min(_interior(env.scene.objects[vessel])[1][:2])) - WALL_M
-    away = (point - floor) * [1.0, 1.0, 0.0]
-    far = float(np.linalg.norm(away))
-    near: Array = floor + away * min(1.0, room / max(far, 1e-6)) + FLOOR_M * UP
-    return near
 
 
 def _choose(env: KitchenEnv, obj: Graspable, vessel: str, blocked: Sequence[RobotPose]) -> MotionPlan:
