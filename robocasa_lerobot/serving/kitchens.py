@@ -114,6 +114,15 @@ class Kitchens:
         named = _named(observation, info)
         return Step(named, float(reward), bool(terminated or truncated), self._success, info)
 
+    @staticmethod
+    def held(actions: Any) -> NDArray[np.float32]:
+        """The action that stands still in the place of one that came too late: the gripper stays as it was told."""
+        out = np.zeros(contract.ACTION_SIZE, dtype=np.float32)
+        if actions is not None:
+            gripper = contract.ACTION_SLICES_HDF5["gripper_close"]
+            out[gripper] = np.asarray(actions, dtype=np.float32)[gripper]
+        return out
+
     def render(self) -> NDArray[np.uint8] | None:
         """A picture for people, None before the first trial."""
         return None if self._env is None else np.asarray(self._env.render(), dtype=np.uint8)

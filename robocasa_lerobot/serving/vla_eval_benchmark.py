@@ -87,6 +87,9 @@ def _benchmark_class() -> type:
         def get_metadata(self) -> dict[str, Any]:
             return {"max_steps": self._kitchens.longest, "seed": self._kitchens.seed}
 
+        def get_hold_action(self, last_action: dict[str, Any] | None) -> dict[str, Any]:
+            return {"actions": self._kitchens.held(None if last_action is None else last_action.get("actions"))}
+
         def get_action_spec(self) -> dict[str, Any]:
             return {
                 "position": specs.POSITION_DELTA,

@@ -74,7 +74,8 @@ async def serve_websockets(
             access.host,
             access.port,
             process_request=before_handshake,
-            origins=[None],  # no page of a browser may ask a server on its machine
+            # Without a token no page of a browser may ask a server on its machine.
+            origins=[None] if access.token is None else None,
             compression=None,
             max_size=limits.message_bytes,
             max_queue=1,

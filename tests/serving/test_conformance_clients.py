@@ -79,6 +79,28 @@ def test_a_policy_behind_our_server_takes_the_same_course_as_in_process(
     assert len({record.trajectory for record in ours}) == TRIALS
 
 
+@pytest.mark.parametrize(
+    ("protocol", "keys", "version"),
+    [
+        ("openpi", "robocasa365_pi05", "1.6"),
+        ("gr00t", "auto", "1.5"),
+        ("gr00t", "auto", "1.6"),
+        ("gr00t", "gr00t_n15", "1.5"),
+        ("gr00t", "gr00t_n16", "1.6"),
+        ("vla_eval", "vla_eval", "1.6"),
+    ],
+)
+def test_servers_understand_the_published_names(
+    checkpoint: Path, tmp_path: Path, protocol: str, keys: str, version: str
+) -> None:
+    """With pictures of 256 or 224 and, but for those that know the offsets, one observation for all of the history."""
+    host = Host(load_served(read_source(str(checkpoint)), "cpu"), resize=True, repeat_history=True)
+    more = [f"--policy.keys={keys}", *(["--executed_steps=8"] if keys == "gr00t_n15" else [])]  # its preset executes 16
+    with serving(host, protocol, groot_version=version) as port:
+        records = evaluate(f"{protocol}://127.0.0.1:{port}", tmp_path / "run", contract.IMAGE_SIZE, *more)
+    assert len({record.trajectory for record in records}) == TRIALS
+
+
 def test_a_token_is_sent_where_the_server_wants_one(
     checkpoint: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

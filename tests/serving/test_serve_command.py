@@ -13,6 +13,7 @@ import urllib.request
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -72,12 +73,16 @@ def test_the_token_is_asked_for_everywhere_but_for_health(tmp_path: Path) -> Non
                 pass
         with pytest.raises(InvalidStatus, match="401"), connect(f"{url}/?token=wrong"):
             pass
-        # A page in a browser says where it comes from.
-        with pytest.raises(InvalidStatus, match="403"), connect(f"{url}/?token={TOKEN}", origin="http://localhost"):  # type: ignore[arg-type]
-            pass
         for right in ({"Authorization": f"Api-Key {TOKEN}"}, {"Authorization": f"Bearer {TOKEN}"}):
             with connect(url, additional_headers=right) as connection:
                 assert decode(connection.recv(timeout=30))["server"] == "robocasa_lerobot"
+
+
+def test_a_page_in_a_browser_may_not_ask_a_server_without_a_token() -> None:
+    with command() as (_, port):
+        origin: Any = "http://localhost"
+        with pytest.raises(InvalidStatus, match="403"), connect(f"ws://127.0.0.1:{port}", origin=origin):
+            pass
 
 
 def test_more_clients_than_allowed_are_sent_away() -> None:
