@@ -101,7 +101,7 @@ class GrootServer:
         try:
             answer = await self._answer(client, body)
         except Exception as error:
-            _log.warning("a client's request failed: %s", error, exc_info=not is_clients_mistake(error))
+            _log.warning("a client's request failed: %a", error, exc_info=not is_clients_mistake(error))
             answer = _error(describe(error))
         finally:
             self._busy.discard(client)

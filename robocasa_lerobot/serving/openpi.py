@@ -39,7 +39,7 @@ class OpenpiServer:
                 answer = await self._answer(session, frame)
             except Exception as error:
                 text = describe(error)
-                _log.warning("a client's request failed: %s", text, exc_info=not is_clients_mistake(error))
+                _log.warning("a client's request failed: %a", text, exc_info=not is_clients_mistake(error))
                 await connection.send(text)
                 await connection.close(_CLOSE_CODE, "the request failed; the text before this says why")
                 return

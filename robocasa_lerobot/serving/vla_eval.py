@@ -92,14 +92,14 @@ class VlaEvalServer:
                 elif kind == "episode_end":
                     episode = None
                 elif kind == "error":
-                    _log.warning("a client says: %.200s", payload)
+                    _log.warning("a client says: %.200a", payload)
                 else:
                     raise RequestError(f"type: found {kind!r:.60}, which no client sends.")
             except ConnectionClosed:
                 raise
             except Exception as error:
                 text = describe(error)
-                _log.warning("a client's request failed: %s", text, exc_info=not is_clients_mistake(error))
+                _log.warning("a client's request failed: %a", text, exc_info=not is_clients_mistake(error))
                 await connection.send(self._pack("error", {"error": text}, sequence))
 
     def _read(self, frame: str | bytes) -> tuple[Any, Mapping[Any, Any], int]:

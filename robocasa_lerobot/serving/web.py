@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import logging
 from collections.abc import Awaitable, Callable
 from contextlib import suppress
 from http import HTTPStatus
@@ -45,6 +46,9 @@ async def serve_websockets(
         UserError: the address cannot be listened on.
     """
     clients: set[ServerConnection] = set()
+    # Whoever only looks whether somebody listens would leave a traceback in the log.
+    quiet = logging.getLogger(f"{__name__}.handshakes")
+    quiet.setLevel(logging.CRITICAL)
 
     def before_handshake(connection: ServerConnection, request: Request) -> Response | None:
         address = urlsplit(request.path)
@@ -76,6 +80,7 @@ async def serve_websockets(
             process_request=before_handshake,
             # Without a token no page of a browser may ask a server on its machine.
             origins=[None] if access.token is None else None,
+            logger=quiet,
             compression=None,
             max_size=limits.message_bytes,
             max_queue=1,

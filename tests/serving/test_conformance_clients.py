@@ -174,3 +174,21 @@ def test_the_peers_policy_depends_on_all_that_it_sees() -> None:
         moved[place] = 0.3
         assert not np.array_equal(peer_servers.actions(moved, picture), first)
     assert not np.array_equal(peer_servers.actions(state, picture + 9), first)
+
+
+@pytest.mark.slow
+@pytest.mark.render
+def test_a_trial_in_a_real_kitchen_takes_the_same_course_behind_a_socket(checkpoint: Path, tmp_path: Path) -> None:
+    kitchen = ["--env.factory=robocasa_lerobot.envs.kitchen_env:KitchenEnv", "--env.tasks=OpenDrawer,CloseDrawer"]
+    kitchen += ["--env.horizon=20", "--trials=1"]
+
+    def course(policy: str, name: str, *more: str) -> list[Any]:
+        arguments = ["eval", f"--policy={policy}", f"--out={tmp_path / name}", f"--seed={SEED}", "--policy.label=x"]
+        arguments += [f"--env.image_size={SIZE}", "--videos=0", "--workers=1", "--report=false", *kitchen, *more]
+        assert main(arguments) == 0
+        return outcomes(sorted(read_results(tmp_path / name).trials, key=lambda record: record.key))
+
+    ours = course(str(checkpoint), "ours", "--policy.device=cpu")
+    with serving(Host(load_served(read_source(str(checkpoint)), "cpu")), "openpi") as port:
+        assert course(f"openpi://127.0.0.1:{port}", "theirs") == ours
+    assert len({trajectory for _, _, trajectory in ours}) == 2
