@@ -24,13 +24,17 @@ def evaluate(policy: str, out: Path, *more: str) -> list[dict[str, Any]]:
     return [record.comparable() for record in records]
 
 
+@pytest.fixture(scope="module")
+def ours(checkpoint: Path, tmp_path_factory: pytest.TempPathFactory) -> list[dict[str, Any]]:
+    return evaluate(str(checkpoint), tmp_path_factory.mktemp("ours"), "--workers=1")
+
+
 @pytest.mark.parametrize("protocol", ["openpi", "vla_eval", "gr00t"])
 def test_a_served_policy_takes_the_course_of_the_one_in_process(
-    checkpoint: Path, tmp_path: Path, protocol: str
+    checkpoint: Path, tmp_path: Path, ours: list[dict[str, Any]], protocol: str
 ) -> None:
     with serving(Host(load_served(read_source(str(checkpoint)), "cpu")), protocol) as port:
         theirs = evaluate(f"{protocol}://127.0.0.1:{port}", tmp_path / "theirs", "--workers=2")
-    ours = evaluate(str(checkpoint), tmp_path / "ours", "--workers=1")
     assert theirs == ours
     assert len({record["trajectory"] for record in ours}) == 3
     (header,) = read_results(tmp_path / "theirs").headers.values()
