@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import collections
 import contextlib
 import threading
 import time
@@ -15,11 +16,14 @@ import zmq
 from policy_sockets import Gr00tServer, OpenpiServer, ScriptedWebsocket, VlaEvalServer
 from websockets.sync.server import serve
 
+from robocasa_lerobot import contract
 from robocasa_lerobot.errors import UserError
 from robocasa_lerobot.evaluation.remote.address import parse_address
 from robocasa_lerobot.evaluation.remote.client import TOKEN_VARIABLE, Timeouts
 from robocasa_lerobot.evaluation.remote.connect import connect
 from robocasa_lerobot.evaluation.remote.failures import AnswerError, LostError, ServerSaidError
+from robocasa_lerobot.evaluation.remote.key_map import ActionKey, KeyMap
+from robocasa_lerobot.evaluation.remote.translation import actions_of
 
 SHORT = Timeouts(connect=0.6, answer=0.6, first_answer=5.0)
 ACTIONS = np.arange(24, dtype=np.float32).reshape(2, 12)
@@ -279,3 +283,63 @@ def test_addresses(text: str, parsed: tuple[str, str, int, str]) -> None:
 def test_an_address_that_is_none_is_an_error(text: str, message: str) -> None:
     with pytest.raises(UserError, match=message):
         parse_address(text)
+
+
+def damaged(frame: bytes, rng: np.random.Generator) -> bytes:
+    """A frame with bytes changed, left out, doubled or cut off."""
+    data = bytearray(frame)
+    for _ in range(int(rng.integers(1, 4))):
+        place = int(rng.integers(0, max(1, len(data))))
+        match int(rng.integers(0, 4)):
+            case 0:
+                data[place : place + 1] = rng.bytes(1)
+            case 1:
+                del data[place : place + int(rng.integers(1, 9))]
+            case 2:
+                data[place:place] = rng.bytes(int(rng.integers(1, 9)))
+            case _:
+                del data[place:]
+    return bytes(data)
+
+
+def outcome_of(client: Any) -> str:
+    try:
+        actions_of(ANY_WIDTH, client.infer({}))
+    except (AnswerError, LostError, ServerSaidError) as error:
+        return type(error).__name__
+    return "actions"
+
+
+ANY_WIDTH = KeyMap(actions=[ActionKey("actions", [part.name for part in contract.ACTION_PARTS])])
+
+
+@pytest.mark.parametrize("protocol", PROTOCOLS)
+def test_damaged_answers_are_errors_or_actions_and_never_more(protocol: str) -> None:
+    rng = np.random.default_rng(len(protocol))
+    chunk = {b"__ndarray__": True, b"data": bytes(96), b"dtype": "<f4", b"shape": [2, 12]}
+    text = {key.decode(): value for key, value in chunk.items()}
+    answers = {
+        "openpi": {"actions": chunk, "server_timing": {"infer_ms": 1.0}},
+        "vla_eval": {"type": "action", "payload": {"actions": text}, "seq": 3, "timestamp": 0.0},
+        "gr00t": [{"actions": text}, {}],
+    }
+    whole = msgpack.packb(answers[protocol])
+    seen = collections.Counter[str]()
+    hasty = Timeouts(connect=5.0, answer=0.1, first_answer=0.1)
+    for frame in (whole, *(damaged(whole, rng) for _ in range(60))):
+        if protocol == "gr00t":
+            unknown = msgpack.packb({"error": "Unknown endpoint"})
+            with scripted_reply([msgpack.packb({"status": "ok"}), unknown, frame]) as (port, _):
+                client = connect(url_of(protocol, port), hasty)
+                seen[outcome_of(client)] += 1
+                client.close()
+            continue
+        greeting = [b"\x80"] if protocol == "openpi" else []
+        replies = [frame] if protocol == "openpi" else [VLA_EVAL_HELLO, None, frame]
+        with ScriptedWebsocket(greeting, replies) as server:
+            client = connect(url_of(protocol, server.port), hasty)
+            seen[outcome_of(client)] += 1
+            client.close()
+    assert seen["actions"] >= 1
+    assert seen["AnswerError"] > 20
+    assert sum(seen.values()) == 61

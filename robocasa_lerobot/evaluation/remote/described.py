@@ -82,8 +82,14 @@ def maps_of_modality_config(metadata: Mapping[str, Any]) -> list[KeyMap]:
             f"key map auto: the modality configuration of the server has {sorted(config) or 'nothing'}, expected "
             f"{', '.join(_GROUPS)}; choose a preset or write a key map (--policy.keys)."
         )
-    keys = {name: [str(key) for key in group.get("modality_keys", [])] for name, group in groups.items()}
-    offsets = {name: [int(i) for i in group.get("delta_indices", [0])] for name, group in groups.items()}
+    try:
+        keys = {name: [str(key) for key in group["modality_keys"]] for name, group in groups.items()}
+        offsets = {name: [int(i) for i in group["delta_indices"]] for name, group in groups.items()}
+    except (KeyError, TypeError, ValueError) as error:
+        raise UserError(
+            f"key map auto: the server's modality configuration cannot be read ({error!r}): {groups}. Choose a preset "
+            "or write a key map (--policy.keys)."
+        ) from error
     if metadata.get("gr00t_version") == N15:
         return [_map(keys, offsets, nested=False, executed=len(offsets["action"]))]
     executed = min(_EXECUTED, len(offsets["action"]))

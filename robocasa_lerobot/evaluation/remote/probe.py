@@ -14,6 +14,7 @@ from robocasa_lerobot.evaluation.remote.client import PolicyClient
 from robocasa_lerobot.evaluation.remote.failures import AnswerError, LostError, RemoteError, ServerSaidError
 from robocasa_lerobot.evaluation.remote.key_map import KeyMap, load_key_map, path_of, presets
 from robocasa_lerobot.evaluation.remote.translation import actions_of, listed, request_of
+from robocasa_lerobot.wire.codec import WireError
 
 INSTRUCTION = "open the drawer"
 _MISSING = re.compile(r"KeyError: ['\"]([^'\"]+)['\"]")
@@ -48,6 +49,8 @@ def probe(client: PolicyClient, candidates: Sequence[KeyMap], image_size: int, w
                 f"the server answered the first request with an error:\n{said}\nSent were {listed(message)} "
                 f"(key map {name}).{_remedy(said, message)}"
             )
+        except WireError as error:
+            raise UserError(f"key map {name}: {error}; look at its `constants` and `reset`.") from error
         except (AnswerError, RemoteError) as error:
             reasons.append(f"the first answer does not fit the key map {name}: {error}.")
     raise UserError(f"{who}: " + "\nThen, with the same names otherwise: ".join(reasons))

@@ -144,7 +144,7 @@ def _array(one: ActionKey, answer: Mapping[str, Any], executed: int) -> NDArray[
             break
     try:
         array = np.asarray(found, dtype=np.float32)
-    except (TypeError, ValueError) as error:
+    except (TypeError, ValueError, OverflowError) as error:
         raise AnswerError(f"{one.key}: found a {type(found).__name__}, expected {expected}") from error
     shape = array.shape
     while array.ndim > 2 and array.shape[0] == 1:  # a batch of one
