@@ -25,7 +25,8 @@ from robocasa_lerobot.evaluation.remote.failures import AnswerError, LostError, 
 from robocasa_lerobot.evaluation.remote.key_map import ActionKey, KeyMap
 from robocasa_lerobot.evaluation.remote.translation import actions_of
 
-SHORT = Timeouts(connect=0.6, answer=0.6, first_answer=5.0)
+SHORT = Timeouts(connect=10.0, answer=1.0, first_answer=10.0)
+HASTY = Timeouts(connect=0.6)
 ACTIONS = np.arange(24, dtype=np.float32).reshape(2, 12)
 # Written by openpi-client 0.1.2, vla-eval 0.8.0 and numpy 2.2.6.
 OPENPI_METADATA = b"\x81\xaareset_pose\x92\x00\x01"
@@ -173,7 +174,7 @@ def test_refused_closed_and_timed_out_are_told_apart(protocol: str) -> None:
 
     def answer(observation: Any) -> Any:
         if slow.is_set():
-            time.sleep(1.2)
+            time.sleep(1.5)
         return {"actions": ACTIONS}
 
     signs = []
@@ -181,7 +182,7 @@ def test_refused_closed_and_timed_out_are_told_apart(protocol: str) -> None:
         client = connect(server.url, SHORT, waiting=lambda: signs.append(1))
         client.infer({})
         slow.set()
-        with pytest.raises(LostError, match=r"timed out, no answer within 0\.6 s"):
+        with pytest.raises(LostError, match=r"timed out, no answer within 1 s"):
             client.infer({})
         assert signs
         client.close()
@@ -195,7 +196,7 @@ def test_refused_closed_and_timed_out_are_told_apart(protocol: str) -> None:
         killed.join()
         patient.close()
     with pytest.raises(LostError, match=r"refused, nobody listens there; tried for 0\.6 s"):
-        connect(url_of(protocol, server.port), SHORT)
+        connect(url_of(protocol, server.port), HASTY)
 
 
 @pytest.mark.parametrize("protocol", PROTOCOLS)
@@ -238,7 +239,7 @@ def test_another_server_than_expected_is_named() -> None:
     with OpenpiServer(lambda observation: {}) as server, pytest.raises(AnswerError, match="expected 'hello'"):
         connect(url_of("vla_eval", server.port), SHORT)
     with VlaEvalServer(lambda observation: {}) as server, pytest.raises(LostError, match="sends its metadata first"):
-        connect(url_of("openpi", server.port), SHORT)
+        connect(url_of("openpi", server.port), HASTY)
 
 
 @pytest.mark.parametrize(("status", "message"), [(401, TOKEN_VARIABLE), (404, "HTTP 404, expected a websocket")])

@@ -118,7 +118,7 @@ def test_keys_that_do_not_fit_are_found_before_the_run(
 def test_nobody_there_is_said_as_what_it_is(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     with OpenpiServer(push) as server:
         url = server.url
-    assert main(command(url, tmp_path / "out")) == 2
+    assert main(command(url, tmp_path / "out", "--remote.connect_seconds=1")) == 2
     assert "refused, nobody listens there; tried for 1 s. Start the server" in capsys.readouterr().err
 
 
@@ -180,7 +180,7 @@ def test_a_server_that_is_killed_and_comes_back_costs_an_attempt(tmp_path: Path)
             stack.enter_context(OpenpiServer(push, port=first.port))
 
         threading.Thread(target=again).start()
-        results = evaluate(first.url, tmp_path / "out", "--remote.connect_seconds=10")
+        results = evaluate(first.url, tmp_path / "out")
     assert comparable(results) == comparable(healthy)
     (retried,) = [record for record in results.trials if record.attempts == 2]
     assert "LostError" in str(retried.first_error)
@@ -194,7 +194,7 @@ def test_a_server_that_stays_away_ends_the_run_and_the_same_command_goes_on(
     with OpenpiServer(push) as server:
         healthy = evaluate(server.url, tmp_path / "healthy", "--trials=8")
     with OpenpiServer(Faulty(lambda answer: stop_soon(server), after=12, once=True)) as server:
-        assert main(command(server.url, out, "--trials=8")) == 2
+        assert main(command(server.url, out, "--trials=8", "--remote.connect_seconds=1")) == 2
     error = capsys.readouterr().err
     assert "refused, nobody listens there" in error
     assert "the same command goes on" in error
@@ -214,15 +214,15 @@ def test_a_server_that_stays_away_ends_the_run_and_the_same_command_goes_on(
 
 def test_a_server_that_answers_too_late_is_no_failed_trial(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     def late(answer: dict[str, Any]) -> Any:
-        time.sleep(1.5)
+        time.sleep(2.0)
         return answer
 
-    more = ["--remote.answer_seconds=0.5", "--remote.first_answer_seconds=0.5"]
+    more = ["--remote.answer_seconds=1", "--remote.first_answer_seconds=1"]
     with OpenpiServer(Faulty(late, after=4, once=False)) as server:
         assert main(command(server.url, tmp_path / "out", *more)) == 2
     error = capsys.readouterr().err
     assert "policy 'theirs' was lost 3 times during Slide trial" in error
-    assert "timed out, no answer within 0.5 s" in error
+    assert "timed out, no answer within 1 s" in error
     assert all(record.error is None for record in read_results(tmp_path / "out").trials)
 
 
@@ -232,12 +232,12 @@ def test_a_long_first_answer_is_waited_for(tmp_path: Path) -> None:
 
     def compiling(request: Any) -> Any:
         if len(server.connections) == 2 and not compiled.is_set():
-            time.sleep(2.5)
+            time.sleep(4.0)
             compiled.set()
         return push(request)
 
     with OpenpiServer(compiling) as server:
-        results = evaluate(server.url, tmp_path / "out", "--remote.answer_seconds=0.5", "--stall_seconds=1.5")
+        results = evaluate(server.url, tmp_path / "out", "--remote.answer_seconds=2", "--stall_seconds=2.5")
     assert [(record.error, record.attempts) for record in results.trials] == [(None, 1)] * 4
 
 

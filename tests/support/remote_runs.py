@@ -26,7 +26,7 @@ def push(request: Any) -> dict[str, Any]:
 def command(url: str, out: Path, *more: str, keys: str = PI0) -> list[str]:
     fixed = ["--seed=1", "--env.factory=evaluation_env:SlideEnv", "--env.image_size=32", "--videos=0", "--workers=1"]
     label = "--policy.label=theirs"
-    patience = ["--remote.connect_seconds=1", "--remote.answer_seconds=5"]
+    patience = ["--remote.connect_seconds=30", "--remote.answer_seconds=20"]
     tasks = ["--env.tasks=Slide", "--trials=4"]
     return [
         "eval",
