@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import contextlib
 import json
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import h5py
 import numpy as np
@@ -14,6 +12,7 @@ import pytest
 from hypothesis import example, given
 from hypothesis import settings as examples
 from hypothesis import strategies as st
+from teleop_desk import Desk, desk
 from teleop_support import SEED, SPLIT, TASK, demonstration, settings
 
 from robocasa_lerobot import contract
@@ -22,14 +21,8 @@ from robocasa_lerobot.demos.replay import replay
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.errors import UserError
 from robocasa_lerobot.teleop.keeping.store import REDO, Store
-from robocasa_lerobot.teleop.messages import parse
-from robocasa_lerobot.teleop.orders import carry_out
-from robocasa_lerobot.teleop.session import Session
-from robocasa_lerobot.teleop.telling import header
 
 pytestmark = pytest.mark.render
-
-TICK_S = 0.05
 
 
 @pytest.fixture(scope="module")
@@ -42,67 +35,6 @@ def env() -> Iterator[KitchenEnv]:
     made = KitchenEnv(TASK, split=SPLIT, cameras=(), terminate_on_success=False)
     yield made
     made.close()
-
-
-class Desk:
-    """A session whose clock is turned by hand."""
-
-    def __init__(self, store: Store, env: KitchenEnv, shown: Recording) -> None:
-        self.session = Session(store.settings, store, env)
-        self.now, self.told = 100.0, list[dict[str, Any]]()
-        self._actions = contract.hdf5_to_stored(shown.actions)
-
-    def say(self, kind: str, **fields: Any) -> None:
-        carry_out(self.session, parse(json.dumps({"type": kind, **fields})), self.now)
-        self._listen()
-
-    def tick(self, times: int = 1) -> None:
-        for _ in range(times):
-            self.now += TICK_S
-            self.session.tick(self.now)
-            header(self.session, 1, self.now)  # what is told must be there in every phase
-            self._listen()
-
-    def until(self, phase: str) -> None:
-        for _ in range(5):
-            if self.session.phase != phase:
-                self.tick()
-        assert self.session.phase == phase, self.told[-3:]
-
-    def hold(self, steps: int, **held: Any) -> None:
-        for _ in range(steps):
-            self.say("input", frame=0, **held)
-            self.tick()
-
-    def follow(self, steps: int) -> None:
-        """Carry out the demonstrator's actions from where the episode is."""
-        for _ in range(steps):
-            episode = self.session.episode
-            at = len(self._actions) if episode is None else len(episode)
-            if self.session.phase not in ("ready", "running", "paused") or at >= len(self._actions):
-                return
-            self.say("action", frame=0, action=self._actions[at].tolist())
-            if self.session.phase == "paused":
-                self.say("resume")
-            self.tick()
-
-    def notes(self) -> list[str]:
-        return [told["text"] for told in self.told if told["type"] == "note"]
-
-    def _listen(self) -> None:
-        self.told += self.session.outgoing
-        self.session.outgoing.clear()
-
-
-@contextlib.contextmanager
-def desk(out: Path, env: KitchenEnv, shown: Recording, **changes: Any) -> Iterator[Desk]:
-    with Store(settings(out, **changes)).held() as store:
-        made = Desk(store, env, shown)
-        made.until("ready")
-        try:
-            yield made
-        finally:
-            made.session._views.close()
 
 
 OPERATIONS = st.lists(

@@ -80,7 +80,13 @@ class Store:
         with held_folder(self.folder):
             self._read()
             write_text(self.folder / _SETTINGS, json.dumps(self.settings.identity()))
-            if self.saved and (not self.path.exists() or read_summary(self.path).episodes != len(self.saved)):
+            merged = read_summary(self.path).episodes if self.path.exists() else 0
+            if merged > len(self.saved):
+                raise UserError(
+                    f"{self.path} has {merged} episodes, and {self.folder} the single files of {len(self.saved)}: put "
+                    "the others back, or choose another --out."
+                )
+            if merged < len(self.saved):
                 self.merge()
             yield self
 
@@ -193,10 +199,17 @@ class Store:
                 f"{self.settings.out} has episodes of {self.settings.task} that were recorded with other settings "
                 f"({differing}). Give those, or choose another --out."
             )
-        if self.path.exists() and not note.exists():
+        if self.path.exists() and (not note.exists() or not self._is_ours()):
             raise UserError(
                 f"{self.path} exists, and this command did not record it here. Move it away, or choose another --out."
             )
+
+    def _is_ours(self) -> bool:
+        """Whether the file of all episodes is one that a session with these settings wrote."""
+        try:
+            return read_summary(self.path).settings == self.settings.identity()
+        except (OSError, KeyError, ValueError):
+            return False
 
     def _write_stats(self) -> None:
         file = self.settings.out / STATS_FILE

@@ -1,0 +1,134 @@
+"""The command: what it prints, that Ctrl+C and a kill leave whole episodes, that the same command goes on."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import signal
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+from teleop_support import SEED, SPLIT, TASK, WAIT_S, demonstration, drive
+
+from robocasa_lerobot import cli
+from robocasa_lerobot.demos.replay import replay
+from robocasa_lerobot.teleop.client import TeleopClient
+
+pytestmark = pytest.mark.render
+
+
+@dataclass
+class Command:
+    """A running command."""
+
+    process: subprocess.Popen[str]
+    address: str
+    printed: str
+
+    def end(self, how: signal.Signals) -> tuple[int, str]:
+        """Its status and what it printed at the end."""
+        self.process.send_signal(how)
+        out, _ = self.process.communicate(timeout=WAIT_S)
+        return self.process.returncode, out
+
+
+@contextmanager
+def command(out: Path, *more: str) -> Iterator[Command]:
+    arguments = ["--task", TASK, "--split", SPLIT, "--seed", str(SEED), "--image-size", "48", "--port", "0"]
+    process = subprocess.Popen(
+        [sys.executable, "-m", "robocasa_lerobot.cli", "teleop", *arguments, "--out", str(out), *more],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        env={**os.environ, "OMP_NUM_THREADS": "1"},
+    )
+    try:
+        assert process.stdout is not None
+        lines = ""
+        while "Ctrl+C" not in lines:
+            line = process.stdout.readline()
+            assert line, lines
+            lines += line
+        found = re.search(r"http\S+", lines)
+        assert found
+        yield Command(process, found[0], lines)
+    finally:
+        if process.poll() is None:
+            process.kill()
+            process.communicate()
+
+
+def save_one(client: TeleopClient, seed: int) -> None:
+    client.until(lambda: any(told["type"] == "scene" and told["seed"] == seed for told in client.said), WAIT_S)
+    client.until_phase("ready", seconds=WAIT_S)
+    drive(client, demonstration(seed).actions)
+    client.until_phase("review")
+    client.send("save")
+    client.until_told("saved", WAIT_S)
+
+
+def test_ctrl_c_keeps_what_is_saved(tmp_path: Path) -> None:
+    with command(tmp_path, "--episodes", "3") as running:
+        assert re.fullmatch(r"http://127\.0\.0\.1:\d+/\?t=[\w-]{20,}", running.address)
+        port = running.address.split(":")[2].split("/")[0]
+        assert f"ssh -L {port}:127.0.0.1:{port}" in running.printed
+        with TeleopClient(running.address) as client:
+            save_one(client, SEED)
+            client.until_phase("ready", seconds=WAIT_S)
+            client.send("clock", clock="free")
+            client.send("start")
+            client.until(lambda: client.frame["step"] > 3)
+            status, printed = running.end(signal.SIGINT)
+    assert status == 1
+    assert f"1 of 3 episodes in {tmp_path / (TASK + '.hdf5')}" in printed
+    assert "Traceback" not in printed
+    with h5py.File(tmp_path / f"{TASK}.hdf5") as file:
+        assert list(file["data"]) == ["demo_0"]
+
+
+@pytest.mark.slow
+def test_a_killed_session_goes_on_with_the_same_command(tmp_path: Path) -> None:
+    with command(tmp_path, "--episodes", "2") as running, TeleopClient(running.address) as client:
+        save_one(client, SEED)
+        client.until_phase("ready", seconds=WAIT_S)
+        running.end(signal.SIGKILL)
+    assert not (tmp_path / f"{TASK}.hdf5").exists()
+    with command(tmp_path, "--episodes", "2") as running, TeleopClient(running.address) as client:
+        assert (tmp_path / f"{TASK}.hdf5").exists()  # merged at the start
+        client.until_phase("ready", seconds=WAIT_S)
+        assert client.frame["saved"] == 1
+        save_one(client, SEED + 1)
+        client.until_told("done", WAIT_S)
+        out, _ = running.process.communicate(timeout=WAIT_S)
+    assert running.process.returncode == 0
+    assert "2 of 2 episodes" in out
+    for demo, seed in (("demo_0", SEED), ("demo_1", SEED + 1)):
+        found = replay(tmp_path / f"{TASK}.hdf5", demo)
+        assert (found.actions, found.states, found.deviation) == (True, True, 0.0)
+        with h5py.File(tmp_path / f"{TASK}.hdf5") as file:
+            assert np.array_equal(file[f"data/{demo}/actions"], demonstration(seed).actions)
+    stats = json.loads((tmp_path / "teleop-stats.json").read_text())[TASK]
+    assert (stats["saved"], stats["sessions"]) == (2, 2)
+    with command(tmp_path, "--episodes", "2") as running:  # nothing is left to do
+        running.process.communicate(timeout=WAIT_S)
+        assert running.process.returncode == 0
+
+
+def test_mistakes_are_told_in_a_sentence(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    out = ["--out", str(tmp_path)]
+    assert cli.main(["teleop", "--task", "CloseDraw", *out]) == 2
+    assert "Did you mean 'CloseDrawer'" in capsys.readouterr().err
+    assert cli.main(["teleop", "--task", TASK, "--episodes", "0", *out]) == 2
+    assert cli.main(["teleop", "--task", TASK, "--host", "192.0.2.1", "--port", "0", *out]) == 2
+    assert "nothing can be served at 192.0.2.1" in capsys.readouterr().err
+    (tmp_path / f"{TASK}.hdf5").write_bytes(b"")
+    assert cli.main(["teleop", "--task", TASK, *out]) == 2
+    assert "did not record it here" in capsys.readouterr().err
