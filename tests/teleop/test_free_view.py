@@ -15,6 +15,7 @@ from teleop_support import WAIT_S
 from robocasa_lerobot.teleop.client import TeleopClient
 
 
+@pytest.mark.slow
 @pytest.mark.render
 def test_the_kitchen_is_in_the_free_view_too(tmp_path: Path) -> None:
     command = [sys.executable, "-m", "robocasa_lerobot.cli", "teleop", "--task=CloseDrawer", "--seed=100002"]

@@ -222,6 +222,19 @@ def test_a_click_on_the_map_drives_there(page: Page) -> None:
     assert any(origin.assisted for origin in page.session.driven.origins)
 
 
+def test_a_click_in_a_picture_asks_for_what_is_there(page: Page) -> None:
+    left, top, width, height = page.browser.box("[data-camera=robot0_agentview_right] canvas")
+    for kind in ("mousePressed", "mouseReleased"):
+        page.browser.mouse(kind, left + 0.5 * width, top + 0.5 * height)
+    # Depending on what the kitchen has there: it reaches, or says why not.
+    said = page.browser.until(
+        "[...document.querySelectorAll('#notes p')].map(p => p.textContent).find(t => /above|itself/.test(t))"
+    )
+    assert "above" in said or "the robot itself" in said
+    page.hold("KeyR", 2)  # any input ends it
+    page.browser.until("!document.querySelector('#stop-assist').checkVisibility()")
+
+
 def test_fingers_on_the_sticks(page: Page) -> None:
     browser = page.browser
     browser.open(browser.ask("location.href"), 390, 844)
