@@ -58,6 +58,8 @@ const connection = new Connection({
     state.drawn = performance.now();
     // An episode begins with a new press, never with what is still held from the one before.
     if (head.phase !== state.head?.phase && ["ready", "review"].includes(head.phase)) operator.release();
+    // After going back in time, a key alone goes on.
+    head.rewound = head.phase === "paused" && (state.head?.phase === "rewinding" || (state.head?.phase === "paused" && state.head.rewound));
     state.head = head;
     head.mine = state.mine; // whether this page drives; `head.operator` says whether anybody does
     operator.frame = head.id;

@@ -47,14 +47,21 @@ export class Operator {
   }
 
   gripper(state) {
-    this.send({ type: "input", frame: this.frame, device: this.device ?? "keyboard", ...this.message(ZERO), gripper: state });
+    if (!this.active || this.locked) return;
+    this.say(this.gather(), { gripper: state }); // with what is held, so that a motion does not stumble
+  }
+
+  say({ axes, camera }, more = {}) {
+    const frame = camera ? { motion_frame: "camera", motion_camera: camera } : {};
+    this.send({ type: "input", frame: this.frame, device: this.device ?? "keyboard", ...this.message(axes), ...frame, ...more });
   }
 
   /** Called at every frame of the page and at every change. */
   update() {
     const now = performance.now();
     if (this.depth && now > this.depth.until) this.depth = null;
-    const { axes, device, camera } = this.gather();
+    const held = this.gather();
+    const { axes, device, camera } = held;
     const moving = Object.values(axes).some((value) => value !== 0);
     if (moving) this.device = device;
     const said = JSON.stringify([axes, camera, this.mode]);
@@ -65,12 +72,10 @@ export class Operator {
     this.last = said;
     this.sent = now;
     this.moving = moving;
-    const frame = camera ? { motion_frame: "camera", motion_camera: camera } : {};
-    this.send({ type: "input", frame: this.frame, device: this.device ?? "keyboard", ...this.message(axes), ...frame });
+    this.say(held);
   }
 
   gather() {
-    if (this.locked) return { axes: ZERO };
     const total = { ...ZERO };
     let device = null;
     for (const [name, source] of Object.entries(this.sources)) {
@@ -80,6 +85,7 @@ export class Operator {
         if (value) [total[axis], device] = [clip(total[axis] + value), name];
       }
     }
+    if (this.locked) return { axes: ZERO }; // commands of a gamepad have been heard all the same
     const camera = this.drag?.camera ?? this.depth?.camera;
     if (camera) {
       // A picture leads by itself: what is dragged counts in its plane, the wheel into it.

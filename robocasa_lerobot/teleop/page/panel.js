@@ -4,7 +4,8 @@ import { $, choice, chosen, make, settings, show, text, words } from "./dom.js";
 
 const FRAMES = { base: "robot", camera: "picture", gripper: "gripper" };
 const PAUSES = {
-  asked: ["Paused", "Press a key to move, or go on."],
+  asked: ["Paused", "Nothing moves until you go on."],
+  rewound: ["Gone back", "Press a key to go on from here."],
   focus: ["Paused", "The page was left, so everything was let go."],
   stale: ["Pictures are late", "No picture was drawn for half a second, so the robot stands."],
   disconnected: ["Paused", "The line was lost, so the robot stands."],
@@ -132,7 +133,7 @@ export class Panel {
     else if (head.phase === "saving") title = "Saving…";
     else if (head.phase === "done") [title, words] = ["Done", `${head.saved} of ${head.wanted} episodes are saved${head.path ? ` in ${head.path}` : ""}. You can close this page.`];
     else if (!head.mine && head.phase === "running") title = "";
-    else if (head.phase === "paused") [title, words, button] = [...(PAUSES[head.pause] ?? PAUSES.asked), "Go on"];
+    else if (head.phase === "paused") [title, words, button] = [...(PAUSES[head.rewound ? "rewound" : head.pause] ?? PAUSES.asked), "Go on"];
     else if (head.phase === "ready") [title, words] = ["Ready", head.policy ? "Start the policy, or move the robot yourself." : ready(matchMedia("(pointer: coarse)").matches)];
     else if (head.phase === "rewinding") [title, words] = ["Going back", "Let go to go on from here."];
     show($("veil"), Boolean(title));
