@@ -84,8 +84,7 @@ class Browser:
     def open(self, page: Path | str, width: int = 1280, height: int = 900, dark: bool = False) -> None:
         """Load a file or address; `messages` are then what its console said, `requests` what it asked for as well."""
         self.messages, self.requests, self._loaded = [], [], False
-        theme = [{"name": "prefers-color-scheme", "value": "dark" if dark else "light"}]
-        self._send("Emulation.setEmulatedMedia", features=theme)
+        self.theme(dark)
         self._send(
             "Emulation.setDeviceMetricsOverride", width=width, height=height, deviceScaleFactor=1, mobile=width < 600
         )
@@ -93,6 +92,11 @@ class Browser:
         deadline = time.monotonic() + self._timeout_s
         while not self._loaded:
             self._read(deadline)
+
+    def theme(self, dark: bool) -> None:
+        """Have the system ask for dark or light pages; a page that is open follows."""
+        theme = [{"name": "prefers-color-scheme", "value": "dark" if dark else "light"}]
+        self._send("Emulation.setEmulatedMedia", features=theme)
 
     def ask(self, expression: str) -> Any:
         """The value of a JavaScript expression."""

@@ -27,6 +27,23 @@ SWITCHES = {
     "KeyV": "#motion-frame [data-value=camera]",
     "Digit3": "#speed [data-value='1']",
 }
+# Words that are hard to read: contrast (WCAG 2) with the nearest ground below 4.5. Words on pictures have their own.
+FAINT = """
+(() => {
+  const channels = (colour) => colour.match(/[\\d.]+/g).map(Number);
+  const light = (colour) => channels(colour).slice(0, 3).map((c) => c / 255)
+    .map((c) => (c <= 0.04045 ? c / 12.92 : ((c + 0.055) / 1.055) ** 2.4))
+    .reduce((sum, c, i) => sum + c * [0.2126, 0.7152, 0.0722][i], 0);
+  const ground = (e) => (!e ? "rgb(255, 255, 255)" : (channels(getComputedStyle(e).backgroundColor)[3] ?? 1) > 0.99
+    ? getComputedStyle(e).backgroundColor : ground(e.parentElement));
+  const own = (e) => [...e.childNodes].some((n) => n.nodeType === 3 && n.textContent.trim());
+  return [...document.querySelectorAll("body *")]
+    .filter((e) => own(e) && e.checkVisibility() && !e.closest("figure, .veil, :disabled, .sr"))
+    .map((e) => [e.textContent.trim(), light(getComputedStyle(e).color), light(ground(e))])
+    .map(([words, a, b]) => [words, (Math.max(a, b) + 0.05) / (Math.min(a, b) + 0.05)])
+    .filter(([, contrast]) => contrast < 4.5);
+})()
+"""
 NAMELESS = """
     [...document.querySelectorAll("button, select, input, #map")].filter((e) => e.checkVisibility()
     && !(e.textContent.trim() || e.ariaLabel || e.labels?.length || e.title)).map((e) => e.outerHTML)
@@ -67,6 +84,13 @@ def test_every_control_has_a_name_and_none_is_wider_than_the_window(page: Page) 
     nameless = page.browser.ask(NAMELESS)
     assert nameless == []
     assert page.browser.ask("document.documentElement.scrollWidth <= innerWidth")
+
+
+def test_words_stand_out_in_light_and_dark(page: Page) -> None:
+    for dark in (False, True):
+        page.browser.theme(dark)
+        assert page.browser.ask("matchMedia('(prefers-color-scheme: dark)').matches") is dark
+        assert page.browser.ask(FAINT) == []
 
 
 def test_a_held_key_moves_the_hand_until_it_is_let_go(page: Page) -> None:
