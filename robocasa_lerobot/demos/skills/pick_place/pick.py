@@ -55,11 +55,14 @@ LOW_COST = 0.05
 BLOCKED_M, BACK_M = 0.05, 0.08  # a hand as far as this from where the grasp begins is blocked: another grasp is next
 HELD_UP_M, LOWER_M = 0.08, 0.03
 LEVEL_LIFT_M, LEVEL_COST = 0.004, 0.1  # before it is drawn out level
-JOSTLE_COST = 0.5
+CROWDED, JOSTLE_COST, BESIDE_M = 1.5, 0.5, 0.12  # of a path that meets what lies beside; how far that is, at most
 TRIED, ALIKE_M = 1.2, 0.015  # cost of a grasp like one that has failed: its place in the object is as near as this
 # An object that is held is nearer than this to where it was in the hand when that closed, and has risen by this share
 # of the lift.
 HELD_M, ROSE_SHARE = 0.05, 0.25
+# Fingers that come closer together than what is between them is wide hold the edge of it, from which they slip off; and
+# those that stay as much farther apart, a corner.
+SHALLOW_M, CORNER_M = 0.007, 0.015
 # Fingers that close askew to the wall of a vessel with others in it turn it as much, or stay apart by as much more than
 # what is between them: it would go on turning on its way.
 ASKEW_RAD, ASKEW_M, ASKEW_ATTEMPTS = float(np.deg2rad(8.0)), 0.010, 2
@@ -106,7 +109,8 @@ def pick(env: KitchenEnv, obj: Graspable, strategy: GraspStrategy) -> Iterator[A
         upright = _uprightness(env, obj)
         yield from close_fingers(data, at, GRASP_STEPS)
         turned, wide = abs(_uprightness(env, obj) - upright), _gap(env) - _width(choice)
-        if obj.contents and attempt < ASKEW_ATTEMPTS and (turned > ASKEW_RAD or wide > ASKEW_M):
+        askew = bool(obj.contents) and (turned > ASKEW_RAD or wide > ASKEW_M)
+        if attempt < ASKEW_ATTEMPTS and (askew or wide < -SHALLOW_M or wide > CORNER_M):
             yield from _let_go(env, tried, planned)
             continue
         inside = _inside(env, obj)
@@ -202,13 +206,13 @@ def _best(
     tried: list[HandTarget],
     blocked: Sequence[RobotPose],
 ) -> MotionPlan:
-    """The best path that meets nothing; where there is none worth a try, one that jostles what lies in the same vessel.
+    """The best path that meets nothing; where there is none, one that may jostle what lies in the same vessel.
 
     Raises:
         SkillError: no pose fits.
     """
     best = _best_of_tilts(env, obj, strategy, tried, blocked)
-    beside = _beside(env, obj) if best.cost > HOPELESS else frozenset()
+    beside = _beside(env, obj) if best.cost > CROWDED else frozenset()
     if not beside:
         return best
     jostling = _best_of_tilts(env, obj, strategy, tried, blocked, beside)
@@ -217,10 +221,19 @@ def _best(
 
 
 def _beside(env: KitchenEnv, obj: Graspable) -> frozenset[int]:
-    """Bodies of the other objects in or on what an object lies in or on."""
+    """Bodies of the other objects close by in or on what an object lies in or on, but for that itself."""
     holder = holder_of(env, obj.name)
-    others = [name for name in contents_of(env, holder) if name != obj.name] if holder else []
-    return frozenset(body for name in others for body in graspable(env, name).bodies)
+    if not holder:
+        return frozenset()
+    point, inside = env.data.body(obj.name).xpos, contents_of(env, holder)
+    near = [
+        name
+        for name in env.scene.objects
+        if name not in (obj.name, holder)
+        and env.scene.objects[name].item.interior is None
+        and (name in inside or np.linalg.norm(env.data.body(name).xpos - point) < BESIDE_M)
+    ]
+    return frozenset(body for name in near for body in graspable(env, name).bodies)
 
 
 def _best_of_tilts(

@@ -19,6 +19,8 @@ type PlacePoses = Callable[[], Sequence[PlacePose]]
 
 # Shares of the depth of what it goes into at which an object may be let go, with their costs.
 DROPS = ((0.0, 0.0), (0.5, 0.4), (1.1, 0.7))
+# The same for what is so narrow, from its middle to its side, that fingers would open against its walls.
+OVER_RIM, NARROW_M = ((1.02, 0.0), (1.2, 0.2)), 0.03
 EDGE_M, OFF_SHARE, BESIDE_COST = 0.005, 0.5, 3.0  # beside the middle, with a cost for each metre
 ASIDE_SHARE, ON_OTHERS_COST = 0.4, 8.0  # beside what lies there, with a gain for each metre from it
 LEAST_ROOM_M, SHALLOW_M = 0.01, 0.02
@@ -75,9 +77,10 @@ def on_object(env: KitchenEnv, obj: Graspable, holder: str) -> PlacePoses:
             if heaped:
                 cost += HEAP_COST * _height_at(tops, floor, width)
             cost -= ON_OTHERS_COST * min((float(np.linalg.norm(floor[:2] - other)) for other in others), default=0.0)
+            narrow = deep > SHALLOW_M and half[:2].min() < NARROW_M
             found += [
                 PlacePose(floor + UP * deep * drop, cost + (extra if deep > SHALLOW_M else 0.0))
-                for drop, extra in DROPS
+                for drop, extra in (OVER_RIM if narrow else DROPS)
             ]
         return found
 
