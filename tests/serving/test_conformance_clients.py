@@ -64,17 +64,13 @@ GROOT_KEYS = {
 }
 
 
-@pytest.mark.parametrize("protocol", ["openpi", "vla_eval", "gr00t"])
-def test_a_policy_behind_our_server_takes_the_same_course_as_in_process(
-    checkpoint: Path, tmp_path: Path, protocol: str
-) -> None:
+def test_a_key_map_of_ones_own_takes_seed_and_number_to_gr00ts_wire(checkpoint: Path, tmp_path: Path) -> None:
+    """(Our servers recognised by themselves: `tests/evaluation/test_remote_and_served.py`.)"""
     ours = evaluate(str(checkpoint), tmp_path / "ours", SIZE, "--policy.device=cpu")
-    more = []
-    if protocol == "gr00t":  # its service tells no size of pictures and takes no seed, but for ours
-        (tmp_path / "keys.yaml").write_text(yaml.safe_dump(GROOT_KEYS))
-        more = [f"--policy.keys={tmp_path / 'keys.yaml'}"]
-    with serving(Host(load_served(read_source(str(checkpoint)), "cpu")), protocol) as port:
-        theirs = evaluate(f"{protocol}://127.0.0.1:{port}", tmp_path / "theirs", SIZE, *more)
+    (tmp_path / "keys.yaml").write_text(yaml.safe_dump(GROOT_KEYS))
+    with serving(Host(load_served(read_source(str(checkpoint)), "cpu")), "gr00t") as port:
+        address, keys = f"gr00t://127.0.0.1:{port}", f"--policy.keys={tmp_path / 'keys.yaml'}"
+        theirs = evaluate(address, tmp_path / "theirs", SIZE, keys)
     assert outcomes(theirs) == outcomes(ours)
     assert len({record.trajectory for record in ours}) == TRIALS
 

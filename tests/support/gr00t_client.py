@@ -68,7 +68,8 @@ def main() -> None:
     """As the module says."""
     port, version = int(sys.argv[1]), sys.argv[2]
     client = GrootClient(port)
-    assert client.call("ping") == {"status": "ok", "message": "Server is running"}
+    said = client.call("ping")
+    assert (said["status"], said["message"]) == ("ok", "Server is running")
     keys = client.call("get_modality_config")["video"]["modality_keys"]
     stored = dict(np.load("observations.npz"))
     instruction, seeds = str(stored.pop("instruction")), stored.pop("seeds").tolist()
