@@ -109,6 +109,7 @@ class Line:
     def __init__(self, port: int) -> None:
         self.delay_s = 0.0
         self._port = port
+        self._open: list[socket.socket] = []
         self._listener = socket.create_server(("127.0.0.1", 0))
         self.port: int = self._listener.getsockname()[1]
         threading.Thread(target=self._listen, daemon=True).start()
@@ -117,11 +118,19 @@ class Line:
         """No further connections; those that are there end with their sides."""
         self._listener.close()
 
+    def cut(self) -> None:
+        """End all connections that there are."""
+        for one in self._open:
+            with contextlib.suppress(OSError):
+                one.shutdown(socket.SHUT_RDWR)
+        self._open.clear()
+
     def _listen(self) -> None:
         with contextlib.suppress(OSError):
             while True:
                 near, _ = self._listener.accept()
                 far = socket.create_connection(("127.0.0.1", self._port))
+                self._open += [near, far]
                 for source, target in ((near, far), (far, near)):
                     sent: queue.Queue[tuple[float, bytes]] = queue.Queue()
                     threading.Thread(target=self._take, args=(source, sent), daemon=True).start()

@@ -190,6 +190,24 @@ def test_late_pictures_stop_the_robot_until_they_come_again(page: Page) -> None:
     browser.key("KeyR", False)
 
 
+def test_a_lost_line_is_taken_up_again_with_nothing_held(page: Page) -> None:
+    browser = page.browser
+    browser.key("KeyR", True)
+    page.steps(4)
+    page.line.cut()
+    browser.until("document.querySelector('#veil-title').textContent === 'No line to the kitchen'")
+    page.until("paused")
+    assert page.session.pause == "disconnected"
+    page.click("#veil-button")
+    page.until("running")
+    page.steps(3)
+    height = page.hand[2]
+    page.steps(8)
+    assert abs(page.hand[2] - height) < 0.02
+    browser.key("KeyR", False)
+    browser.messages.clear()
+
+
 def test_a_gamepad_drives_base_and_hand(page: Page) -> None:
     before = page.hand
     page.pad([0, 0, 0, -1])

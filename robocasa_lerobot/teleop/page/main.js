@@ -14,6 +14,7 @@ import { Transport } from "./transport.js";
 const NOTE_MS = 6000;
 const ACTIVE = ["ready", "running", "paused"];
 
+const controls = document.querySelector(".transport");
 const state = { hello: null, head: null, line: false, drawn: 0, mine: false };
 const view = { follow: true, azimuth: 0.6, elevation: -0.5, distance: 2.5 };
 const send = (message) => connection.send(message);
@@ -40,6 +41,7 @@ const tiles = new Tiles($("tiles"), {
 const connection = new Connection({
   open() {
     state.line = true;
+    controls.inert = false;
     state.drawn = performance.now();
   },
   closed(reason, again) {
@@ -48,6 +50,7 @@ const connection = new Connection({
     state.head = null;
     operator.lock("no line");
     document.body.dataset.phase = "connecting";
+    controls.inert = true; // what would be lost is not offered
     text($("role"), "offline");
     if (reason) note({ level: "error", text: reason });
     if (!again) note({ level: "error", text: "The kitchen has closed this page. Load it again to go on." });
