@@ -69,7 +69,8 @@ def test_the_way_out_of_a_fridge_ends_before_its_front(name: str) -> None:
     for env in made(name):
         stage = next(stage for stage in env.declaration.stages if stage.verb == "pick")
         obj, fridge = graspable(env, stage.object), env.scene.fixture("fridge")
-        strategy = grasp_strategy(env, obj, place_strategy(env, env.declaration.stages[-1], obj).grasp)
+        free = place_strategy(env, env.declaration.stages[-1], obj).grasp
+        strategy = grasp_strategy(env, obj, free, kept=True)
         _, y = fridge.to_local(env.data.body(obj.name).xpos)
         assert strategy.out_m > y + fridge.depth / 2 - 0.1
 

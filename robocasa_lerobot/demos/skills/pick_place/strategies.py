@@ -94,8 +94,11 @@ _JUG_LEANS = (np.deg2rad(72.0), np.deg2rad(85.0))
 _JUG_TURNS = tuple(float(np.deg2rad(turn)) for turn in (0.0, 30.0, -30.0, 60.0, -60.0))
 
 
-def grasp_strategy(env: KitchenEnv, obj: Graspable, free: GraspStrategy) -> GraspStrategy:
-    """How an object is grasped where it is; `free` where it stands in the open."""
+def grasp_strategy(env: KitchenEnv, obj: Graspable, free: GraspStrategy, *, kept: bool = False) -> GraspStrategy:
+    """How an object is grasped where it is; `free` where it stands in the open.
+
+    What is `kept` in the hand, rather than put down from there, is drawn out of a fridge altogether.
+    """
     place = locate(env, obj.name)
     match place.fixture:
         case Microwave():
@@ -114,7 +117,7 @@ def grasp_strategy(env: KitchenEnv, obj: Graspable, free: GraspStrategy) -> Gras
             return replace(FROM_CRISPER, first=_pull_out_first(obj, place))
         case _ if in_the_open(place):
             return free
-        case Fridge() as fridge if place.region:
+        case Fridge() as fridge if kept and place.region:
             return replace(OUT_OF_FRIDGE, out_m=_way_out(env, obj, fridge.regions[place.region]))
         case _:
             return ANY_APPROACH

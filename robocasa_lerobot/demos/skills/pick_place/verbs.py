@@ -38,7 +38,7 @@ def pick_object(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
     Raises:
         SkillError: it is not in the gripper after all attempts.
     """
-    yield from take(env, graspable(env, stage.object), _free_grasp(env, stage))
+    yield from take(env, graspable(env, stage.object), _free_grasp(env, stage), kept=True)
 
 
 def place_object(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
@@ -76,7 +76,7 @@ def drive(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
     holder = target_object(env, stage)
     obj = graspable(env, stage.object) if stage.object else None
     if obj is not None and not is_held(env, obj.name):
-        yield from take(env, obj, _free_grasp(env, stage))
+        yield from take(env, obj, _free_grasp(env, stage), kept=True)
     if holder:
         fixture = locate(env, holder).fixture
         if fixture is None:
@@ -91,7 +91,7 @@ def drive(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
         yield from drive_to(env, stand.x, stand.y, stand.yaw)
 
 
-def take(env: KitchenEnv, obj: Graspable, free: GraspStrategy) -> Iterator[Array]:
+def take(env: KitchenEnv, obj: Graspable, free: GraspStrategy, *, kept: bool = False) -> Iterator[Array]:
     """Drive to an object where it is out of reach, and pick it in the manner of its place.
 
     Raises:
@@ -102,7 +102,7 @@ def take(env: KitchenEnv, obj: Graspable, free: GraspStrategy) -> Iterator[Array
         yield from go_to_object(env, obj.name, been)
         yield from _around_door(env, locate(env, obj.name).fixture)
         try:
-            yield from pick(env, obj, grasp_strategy(env, obj, free))
+            yield from pick(env, obj, grasp_strategy(env, obj, free, kept=kept))
             return
         except SkillError:
             if len(been) == MOST_PLACES - 1:
