@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
-from robocasa_lerobot.demos.motion import Array, action
+import numpy as np
+
+from robocasa_lerobot.demos.motion import Array, action, base_pose
 from robocasa_lerobot.demos.skills import SKILLS, SkillError
 from robocasa_lerobot.demos.skills.common import stage_done, wait_for_stage
 from robocasa_lerobot.demos.skills.fold import fold_arm
+from robocasa_lerobot.demos.skills.navigation import drive_to
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.tasks.conditions import must_never, stage_condition, without_gripper
 from robocasa_lerobot.envs.tasks.task import Stage
@@ -17,6 +21,8 @@ from robocasa_lerobot.errors import UnknownNameError
 
 ATTEMPTS = 3  # of a stage; skills try several grasps in each
 PATIENCE_STEPS = 40  # after a skill, for what falls, swings and settles; as long again after each step that counted
+# Of the base from where it should stand to use a fixture, at the first attempt and at others.
+FAR_OFF_M, FAR_OFF_RAD = (0.35, 0.15), 0.6
 _AS_IT_IS = ("navigation", "pick_place")  # skills that begin with the arm as the stage before has left it
 _TOLD = ("skill", "verb", "target", "object", "part", "to")  # of a stage, to whoever reads the file
 
@@ -87,6 +93,7 @@ def carry_out(env: KitchenEnv, log: StageLog) -> Iterator[Array]:
             continue
         if len(stages) > 1 and stages[index].skill not in _AS_IT_IS:
             yield from fold_arm(env)
+            yield from _stand_before(env, stages[index], FAR_OFF_M[min(outcome.attempts, 1)])
         yield from _attempt(env, stages[index], outcome)
         _check_never(env, outcome)
         outcome.done = stage_done(env, stages[index])
@@ -98,6 +105,20 @@ def carry_out(env: KitchenEnv, log: StageLog) -> Iterator[Array]:
             _check_attempts(env, index, log.outcomes[index], cause=outcome.reason)
         else:
             _check_attempts(env, index, outcome)
+
+
+def _stand_before(env: KitchenEnv, stage: Stage, most_m: float) -> Iterator[Array]:
+    """Drive to where a robot stands to use the stage's fixture, if it is far off: an earlier stage has led it away.
+
+    Skills that use fixtures go farther by themselves only a little.
+    """
+    if stage.target not in env.scene.roles:
+        return
+    stand, (base, yaw) = env.scene.standing_pose(stage.target), base_pose(env.data)
+    turned = abs(float(np.arctan2(np.sin(stand.yaw - yaw), np.cos(stand.yaw - yaw))))
+    if np.hypot(stand.x - base[0], stand.y - base[1]) > most_m or turned > FAR_OFF_RAD:
+        with contextlib.suppress(SkillError):
+            yield from drive_to(env, stand.x, stand.y, stand.yaw)
 
 
 def _attempt(env: KitchenEnv, stage: Stage, outcome: StageOutcome) -> Iterator[Array]:

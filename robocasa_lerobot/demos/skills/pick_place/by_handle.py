@@ -39,12 +39,12 @@ class WorkingEnd:
 def working_end(obj: Graspable) -> WorkingEnd:
     """Find the wider end of an object."""
     points = np.concatenate([filled(solid.cloud()) for solid in obj.solids])
-    long = int(np.argmax(np.ptp(points, axis=0)))
+    long = int(np.argmax(np.ptp(points[:, :2], axis=0)))
     low, high = float(points[:, long].min()), float(points[:, long].max())
     length = high - low
 
     def wide(inside: NDArray[np.bool_]) -> float:
-        return float(np.delete(np.ptp(points[inside], axis=0), long).max())
+        return float(np.ptp(points[inside, 1 - long]))  # as it lies; how high it is says nothing
 
     at_high = wide(points[:, long] > high - END_SHARE * length) >= wide(points[:, long] < low + END_SHARE * length)
     end = points[points[:, long] > high - TIP_SHARE * length if at_high else points[:, long] < low + TIP_SHARE * length]

@@ -111,6 +111,8 @@ def grasp_strategy(env: KitchenEnv, obj: Graspable, free: GraspStrategy, *, kept
             return UNDER_A_SPOUT
         case Drawer() as drawer:
             return replace(OUT_OF_DRAWER, first=_clear_of_counter(obj, drawer))
+        case HingeCabinet() if has_handle(obj):
+            return replace(OUT_OF_CABINET, poses=PAN_BY_THE_HANDLE.poses)
         case HingeCabinet():
             return replace(OUT_OF_CABINET, first=_turn_first(obj, OUT_OF_CABINET))
         case _ if "drawer" in place.region:
