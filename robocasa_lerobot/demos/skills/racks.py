@@ -36,6 +36,10 @@ BEYOND_M = 0.05  # of the commanded end of a slide: with the servo's lag, the fo
 # The hand looks inwards and down by these angles, and across by those, radians.
 TILTS = tuple(np.deg2rad((15.0, 40.0, 65.0, 85.0)))
 TURNS = tuple(np.deg2rad((0.0, 35.0, -35.0)))
+# A plan that costs more than the first meets something: then the edge is hooked from behind. Fingers along the edge;
+# how far they reach below its top, and are behind it as they come down; how far they rise over it and begin before it.
+IN_THE_WAY, ALONG_COS, STEEP_SINE = 0.7, 0.8, 0.35
+HOOK_M, HOOK_GAP_M, HOOK_RISE_M, HOOK_OUT_M = 0.013, 0.003, 0.022, 0.10
 SHIFTS = (
     (0.0, 0.0),
     (-0.15, 0.0),
@@ -106,12 +110,17 @@ def pull(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
                     continue
                 at = spot + part.inwards * part.thick / 2
                 rows.append(_row(at, rotation, -rotation[:, 2], -part.inwards * travel))
-        plan = _plan(env, part, rows, tried)
-        yield from shift_base(env, plan.shift, OPEN)
-        yield from follow_joint_path(env, plan.joints, OPEN)
-        yield from _approach(env, plan, OPEN)
+        plan, fingers = _plan(env, part, rows, tried), OPEN
+        if plan.cost > IN_THE_WAY:
+            hooked = _plan(env, part, _hooks(env, part, travel), tried)
+            if hooked.cost < plan.cost:
+                plan, fingers = hooked, CLOSED
+        yield from shift_base(env, plan.shift, fingers)
+        yield from follow_joint_path(env, plan.joints, fingers)
+        yield from _approach(env, plan, fingers)
         _, _, held, end = plan.targets
-        yield from hold_hand(data, held, CLOSED, GRASP_STEPS)
+        if fingers == OPEN:
+            yield from hold_hand(data, held, CLOSED, GRASP_STEPS)
         goal = HandTarget(end.position - part.inwards * BEYOND_M, end.rotation)
         yield from move_hand(data, goal, CLOSED, speed=SPEED, max_steps=130, until=lambda: part.share >= OUT_GOAL)
         if part.share >= OUT_GOAL:
@@ -119,6 +128,26 @@ def pull(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
         yield from hold_hand(data, HandTarget(grip_position(data), hand_rotation(data)), OPEN, GRASP_STEPS)
         yield from move_hand(data, _off(env, -held.rotation[:, 2]), OPEN, max_steps=25)
     raise SkillError(f"{part.name} is only {part.share:.0%} out after {ATTEMPTS} attempts")
+
+
+def _hooks(env: KitchenEnv, part: _Part, travel: float) -> list[tuple[HandTarget, ...]]:
+    """Closed fingers, side by side along the front edge, that come over it and pull from behind it.
+
+    Where a rack is all the way in, a hand that holds its edge meets the roof or the open door.
+    """
+    rows = []
+    for spot in part.spots((0.0, 0.5)):
+        top = spot + UP * (part.high[2] - part.low[2]) / 2
+        for rotation in rotations(part.inwards):
+            if abs(float(rotation[:, 1] @ part.rightwards)) < ALONG_COS or float(rotation[:, 2] @ UP) > -STEEP_SINE:
+                continue
+            behind = part.thick + HOOK_GAP_M + env.robot.gripper.closed_reach(rotation, -part.inwards)
+            high = env.robot.gripper.closed_reach(rotation, -UP) - HOOK_M
+            at = top + part.inwards * behind + UP * high
+            over = at + UP * HOOK_RISE_M
+            row = (over - part.inwards * HOOK_OUT_M + UP * HOOK_RISE_M, over, at, at - part.inwards * travel)
+            rows.append(tuple(HandTarget(point, rotation) for point in row))
+    return rows
 
 
 def rotations(inwards: Array) -> list[Array]:

@@ -17,7 +17,7 @@ from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 END_SHARE = 0.25  # of the length, at each end, by whose width the working end is told
 TIP_SHARE = 0.06
 LONG = 1.5  # of a vessel with a handle, by its width
-FAR_SHARE = 0.60  # of the length, that a grasp is away from the tip
+TOOL_SHARE, PAN_SHARE = 0.48, 0.60  # of the length, that a grasp is away from the tip at least
 TOOL_SCORE, PAN_SCORE = 12.0, -12.0  # of a metre that it is farther away
 
 
@@ -64,18 +64,20 @@ def has_handle(obj: Graspable) -> bool:
     )
 
 
-def by_the_handle(env: KitchenEnv, obj: Graspable, approach: Array, farther_score: float) -> list[GraspPose]:
-    """Grasps of the part that is away from the working end, with a score for each metre from that."""
+def by_the_handle(
+    env: KitchenEnv, obj: Graspable, approach: Array, *, share: float, farther_score: float
+) -> list[GraspPose]:
+    """Grasps beyond a share of the length from the working end, with a score for each metre from that."""
     end = working_end(obj)
     body = env.data.body(obj.name)
     turn = body.xmat.reshape(3, 3)
     found = []
-    for pose in grasps(env, obj, approach, (end.axis, float(end.tip @ end.axis) + FAR_SHARE * end.length)):
+    for pose in grasps(env, obj, approach, (end.axis, float(end.tip @ end.axis) + share * end.length)):
         far = float((turn.T @ (pose.position - body.xpos) - end.tip) @ end.axis)
         found.append(replace(pose, score=pose.score + farther_score * far))
     return sorted(found, key=lambda pose: -pose.score)
 
 
 # A tool is held far from its working end, which reaches into something; a pan near it, since it hangs on that.
-TOOL_BY_THE_HANDLE = replace(ANY_APPROACH, poses=partial(by_the_handle, farther_score=TOOL_SCORE))
-PAN_BY_THE_HANDLE = replace(ANY_APPROACH, poses=partial(by_the_handle, farther_score=PAN_SCORE))
+TOOL_BY_THE_HANDLE = replace(ANY_APPROACH, poses=partial(by_the_handle, share=TOOL_SHARE, farther_score=TOOL_SCORE))
+PAN_BY_THE_HANDLE = replace(ANY_APPROACH, poses=partial(by_the_handle, share=PAN_SHARE, farther_score=PAN_SCORE))
