@@ -9,16 +9,20 @@ from typing import Any
 
 import numpy as np
 import pytest
+from serving_support import serving
 from tiny_checkpoint import SIZE
 
 from robocasa_lerobot import contract
 from robocasa_lerobot.errors import UserError
+from robocasa_lerobot.evaluation.actors.checkpoint import read_source
 from robocasa_lerobot.evaluation.config.evaluation import EvaluationConfig
 from robocasa_lerobot.evaluation.config.loader import load_config
 from robocasa_lerobot.evaluation.records.results import TrialRecord
 from robocasa_lerobot.evaluation.run import engine
 from robocasa_lerobot.evaluation.simulators.foreign_env import ForeignEnv
 from robocasa_lerobot.evaluation.simulators.simulator import Simulator, simulator_of
+from robocasa_lerobot.serving.host import Host
+from robocasa_lerobot.serving.policy import load_served
 
 STAND_IN = Path(__file__).parents[1] / "support" / "robocasa_stand_in"
 
@@ -83,6 +87,16 @@ def test_a_checkpoint_of_our_kitchens_is_evaluated_there(notes: Path, tmp_path: 
     assert {(line["width"], line["height"]) for line in said if "made" in line} == {(SIZE, SIZE)}
     # LeRobot's env resets itself once more at the end of an episode; the seeds of the trials are ours.
     assert {r.seed for r in records} <= {line["reset"] for line in said if "reset" in line}
+
+
+@pytest.mark.slow
+def test_a_policy_behind_a_socket_takes_the_same_course_there(notes: Path, tmp_path: Path, checkpoint: Path) -> None:
+    own = {"policy.label": "same", "env.tasks": "CloseDrawer", "videos": 0}
+    here = evaluate(tmp_path / "here", policy=checkpoint, **own)
+    with serving(Host(load_served(read_source(str(checkpoint)), "cpu")), "openpi") as port:
+        there = evaluate(tmp_path / "there", policy=f"openpi://127.0.0.1:{port}", **own)
+    assert [record.comparable() for record in there] == [record.comparable() for record in here]
+    assert [record.error for record in here] == [None] * 2
 
 
 @pytest.mark.slow

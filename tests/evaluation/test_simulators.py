@@ -26,7 +26,8 @@ from robocasa_lerobot.evaluation.planning.trials import trial_seed
 from robocasa_lerobot.evaluation.records.results import TRIALS_FILE, TrialRecord, read_results
 from robocasa_lerobot.evaluation.run import engine
 from robocasa_lerobot.evaluation.simulators import foreign_worker
-from robocasa_lerobot.evaluation.simulators.foreign_env import ForeignEnv, UnfitPolicyError
+from robocasa_lerobot.evaluation.simulators.fit import UnfitPolicyError
+from robocasa_lerobot.evaluation.simulators.foreign_env import ForeignEnv
 from robocasa_lerobot.evaluation.simulators.process import ForeignProcess, SimulatorError
 from robocasa_lerobot.evaluation.simulators.simulator import Simulator
 from robocasa_lerobot.video import frames_and_rate
@@ -208,6 +209,14 @@ def test_what_no_other_trial_gets_around_ends_the_run(
 ) -> None:
     with pytest.raises(UserError, match=words):
         evaluate(tmp_path / "out", **{"env.factory": f"{SUPPORT / 'foreign_envs.py'}:{name}"}, **changes)
+
+
+def test_a_policy_that_looks_at_what_is_not_there_is_refused(tmp_path: Path, checkpoint: Path) -> None:
+    own = {"policy": checkpoint, "policy.label": "tiny", "env.tasks": "Slide"}
+    names = "observation.state of 1 numbers, observation.image"
+    words = rf"policy 'tiny' looks at observation.state of 16 numbers, .*robot0_eye_in_hand, and the env shows {names}:"
+    with pytest.raises(UserError, match=words):
+        evaluate(tmp_path / "out", **own, **{"env.factory": f"{SUPPORT / 'foreign_envs.py'}:AnySize"})
 
 
 def test_wrong_pictures_are_an_error_of_their_trial(tmp_path: Path) -> None:

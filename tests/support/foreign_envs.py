@@ -67,6 +67,11 @@ class PlainEnv:
         return seen
 
 
+class AnySize(PlainEnv):
+    def __init__(self, task, image_size=None, **options):
+        super().__init__(task, **options)
+
+
 class WithoutExpert(PlainEnv):
     expert_action = None
 

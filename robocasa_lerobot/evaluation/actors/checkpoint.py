@@ -197,6 +197,11 @@ def filled_cameras(config: Mapping[str, Any], folder: Path) -> dict[str, str]:
     return {camera: name for camera, name in names.items() if name in inputs}
 
 
+def env_names(folder: Path) -> dict[str, str]:
+    """The env's names of a policy's inputs, of those that its saved preprocessor renames."""
+    return {new: old for old, new in _renamed(folder).items()}
+
+
 def _pictures(config: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
     """The camera inputs of a policy by name."""
     return {

@@ -32,7 +32,8 @@ from robocasa_lerobot.evaluation.run.policy_server import RemotePolicy
 from robocasa_lerobot.evaluation.run.processes import take_over
 from robocasa_lerobot.evaluation.run.rollout import DivergedError, Outcome, horizon_of, run_trial
 from robocasa_lerobot.evaluation.run.success import SuccessRule
-from robocasa_lerobot.evaluation.simulators.foreign_env import UnfitPolicyError
+from robocasa_lerobot.evaluation.simulators.fit import UnfitPolicyError, needs_of
+from robocasa_lerobot.evaluation.simulators.foreign_env import ForeignEnv
 
 EnvFactory = Callable[..., gymnasium.Env[Any, Any]]
 
@@ -106,6 +107,8 @@ class _Worker:
             policy = self._policy_of(spec.label)
             if isinstance(policy, Refused):
                 return policy
+            if isinstance(env.unwrapped, ForeignEnv):
+                env.unwrapped.needs = needs_of(self._settings.sources[spec.label])
             rule = SuccessRule(self._settings.success_rule, self._settings.success_hold_steps)
             if spec.film:
                 video = video_path(spec)

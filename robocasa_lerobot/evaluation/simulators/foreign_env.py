@@ -9,15 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robocasa_lerobot.errors import UserError
+from robocasa_lerobot.evaluation.simulators.fit import Needs, UnfitPolicyError
 from robocasa_lerobot.evaluation.simulators.process import Arrays, EnvRaisedError, ForeignProcess, SimulatorError
 from robocasa_lerobot.evaluation.simulators.simulator import Simulator
 
 FACTORY = f"{__name__}:make_env"
 _PICTURES = "pixels"
-
-
-class UnfitPolicyError(UserError):
-    """A policy whose actions the env cannot take: no other trial will get around it."""
 
 
 class ForeignEnv(gymnasium.Env[Any, Any]):
@@ -43,6 +40,7 @@ class ForeignEnv(gymnasium.Env[Any, Any]):
         self.task, self.task_description = task, ""
         self.render_observations = True
         self.rendering_seconds = 0.0
+        self.needs: Needs | None = None  # of the policy that comes next
         self._pictures: dict[str, Any] = {}
         self._process = ForeignProcess(simulator.python)
         try:
@@ -73,10 +71,17 @@ class ForeignEnv(gymnasium.Env[Any, Any]):
         return self._process.pid
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[dict[str, Any], Any]:
-        """Begin an episode; pictures of the last one are forgotten."""
+        """Begin an episode; pictures of the last one are forgotten.
+
+        Raises:
+            UnfitPolicyError: the observation lacks what the next policy `needs`.
+        """
         self._pictures = {}
         said, arrays = self._process.ask("reset", seed=seed, pictures=self.render_observations)
-        return self._observed(arrays), self._info(said)
+        observation = self._observed(arrays)
+        if self.needs is not None:
+            self.needs.check(observation)
+        return observation, self._info(said)
 
     def step(self, action: Any) -> tuple[dict[str, Any], float, bool, bool, dict[str, Any]]:
         """One control step.

@@ -84,6 +84,8 @@ class ForeignProcess:
             EnvRaisedError: the other side answered with an exception.
             SimulatorError: it died, or its answer is none; the process is then ended.
         """
+        if self._questions.closed:
+            raise SimulatorError("the simulator's process has been ended")
         try:
             write_frame(self._questions, {"ask": name, **message}, arrays)
             answer, found = read_frame(self._answers)
