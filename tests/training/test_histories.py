@@ -116,7 +116,7 @@ def test_a_trials_actions_are_those_of_the_window(dataset: MixtureDataset) -> No
         ({"observation_offsets": [0, -2]}, "ascending control steps up to 0"),
         ({"observation_offsets": []}, "ascending control steps up to 0"),
         ({"observation_offsets": [-2, -2, 0]}, "ascending control steps up to 0"),
-        ({"observation_offsets": [-2, 0], "n_obs_steps": 3}, "n_obs_steps is 3, but observation_offsets has 2"),
+        ({"observation_offsets": [-2, 0], "n_obs_steps": 3}, "n_obs_steps is 3, but observation_offsets has 2 steps"),
     ],
 )
 def test_offsets_that_are_no_history_are_an_error(settings: dict[str, Any], message: str) -> None:

@@ -111,7 +111,7 @@ class DiffusionTransformerConfig(ActionChunkConfig):
             )
         if self.n_obs_steps not in (default, len(offsets)):
             raise UserError(
-                f"n_obs_steps is {self.n_obs_steps}, but observation_offsets has {len(offsets)}: leave n_obs_steps out."
+                f"n_obs_steps is {self.n_obs_steps}, but observation_offsets has {len(offsets)} steps: set both alike."
             )
         return len(offsets)
 
