@@ -13,6 +13,7 @@ from typing import Any
 from robocasa_lerobot import contract
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.robots.control_step import DivergedError
+from robocasa_lerobot.gl import NoOpenGLError
 from robocasa_lerobot.provenance import git_commit
 from robocasa_lerobot.teleop.driving.driver import Driver
 from robocasa_lerobot.teleop.driving.pilot import AUTONOMOUS, Pilot
@@ -28,6 +29,7 @@ REWINDING, REVIEW, SAVING, DONE = "rewinding", "review", "saving", "done"
 _AGES, _STEP_TIMES, _DRAWN = 2000, 20, 256  # of what is remembered
 _PACE_STEPS = 41  # over which simulated seconds per second are counted
 _BACK_ON_DIVERGENCE = 20  # steps
+_MOST_UNMADE = 5  # kitchens, one after the other, that cannot be made
 
 
 class Session:
@@ -66,7 +68,7 @@ class Session:
         self._views = Views(settings.image_size, settings.render_preset)
         self._number, self._began = store.next_number(), 0.0
         self._announced = self._trim = False
-        self._picture = 0
+        self._picture = self._unmade = 0
         self._drawn: collections.OrderedDict[int, float] = collections.OrderedDict()
         if len(store.saved) >= settings.episodes:
             self.finish()
@@ -130,8 +132,7 @@ class Session:
 
     def run(self, now: float) -> None:
         """Let time run; with the first input the episode begins."""
-        if self.phase == READY:
-            self._began = now
+        self._began = self._began or now
         self.phase, self.pause, self.resumes = RUNNING, "", False
 
     def hold_still(self, why: str) -> None:
@@ -208,10 +209,23 @@ class Session:
     def _load(self) -> None:
         again = self.episode is not None and self.episode.seed == self.settings.seed + self._number
         self.env.render_observations, self.episode = False, None
-        self.episode = Episode(self.env, self.settings.seed + self._number)
-        if not again:
-            self._views.open(self.env)
-            self.map = kitchen_map(self.env)
+        try:
+            self.episode = Episode(self.env, self.settings.seed + self._number)
+            if not again:
+                self._views.open(self.env)
+                self.map = kitchen_map(self.env)
+            self._unmade = 0
+        except (OSError, MemoryError, NoOpenGLError):
+            raise
+        except Exception as error:  # as for demonstrators: one kitchen that cannot be made ends no session
+            self.episode, self._unmade = None, self._unmade + 1
+            if self._unmade >= _MOST_UNMADE:
+                raise
+            self.note("error", f"kitchen {self.settings.seed + self._number} cannot be made ({error})", "scene")
+            why = f"{type(error).__name__}: {error}"
+            self.store.discard(self._number, why, steps=0, undos=0, wall_seconds=0.0)
+            self._next()
+            return
         self.scenes += 1
         self.free.anchor = None
         self.driver.begin()
@@ -276,7 +290,12 @@ class Session:
         wall = self._wall(now)
         meta = {"teleop": self._meta(episode, trimmed, wall)}
         recording = episode.recording(meta, with_policy=self.pilot is not None)
-        self.store.save(self._number, recording, undos=episode.undos, wall_seconds=wall)
+        try:
+            self.store.save(self._number, recording, undos=episode.undos, wall_seconds=wall)
+        except OSError as error:
+            self.note("error", f"it could not be written ({error}): free disk space and save it again", "save")
+            self.review()
+            return
         saved, wanted = len(self.store.saved), self.settings.episodes
         told = {"seed": episode.seed, "steps": len(episode), "saved": saved, "wanted": wanted}
         self.outgoing.append({"type": "saved", **told})

@@ -13,6 +13,7 @@ from teleop_support import settings
 from robocasa_lerobot import contract
 from robocasa_lerobot.demos.recorder import Recording
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
+from robocasa_lerobot.teleop.driving.pilot import Pilot
 from robocasa_lerobot.teleop.keeping.store import Store
 from robocasa_lerobot.teleop.messages import parse
 from robocasa_lerobot.teleop.orders import carry_out
@@ -25,8 +26,10 @@ TICK_S = 0.05
 class Desk:
     """A session whose clock is turned by hand."""
 
-    def __init__(self, store: Store, env: KitchenEnv, shown: Recording | None = None) -> None:
-        self.session = Session(store.settings, store, env)
+    def __init__(
+        self, store: Store, env: KitchenEnv, shown: Recording | None = None, pilot: Pilot | None = None
+    ) -> None:
+        self.session = Session(store.settings, store, env, pilot)
         self.now, self.told = 100.0, list[dict[str, Any]]()
         self._actions = [] if shown is None else list(contract.hdf5_to_stored(shown.actions))
 
@@ -73,9 +76,11 @@ class Desk:
 
 
 @contextlib.contextmanager
-def desk(out: Path, env: KitchenEnv, shown: Recording | None = None, **changes: Any) -> Iterator[Desk]:
+def desk(
+    out: Path, env: KitchenEnv, shown: Recording | None = None, pilot: Pilot | None = None, **changes: Any
+) -> Iterator[Desk]:
     with Store(settings(out, **changes)).held() as store:
-        made = Desk(store, env, shown)
+        made = Desk(store, env, shown, pilot)
         made.until("ready")
         try:
             yield made

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import h5py
 import numpy as np
@@ -265,3 +266,35 @@ def test_sessions_go_on_and_a_killed_one_loses_nothing(tmp_path: Path, env: Kitc
     (tmp_path / f".{TASK}.teleop").rename(tmp_path / "elsewhere")
     with pytest.raises(UserError, match="did not record it here"), Store(settings(tmp_path)).held():
         pass
+
+
+def test_a_full_disk_leaves_the_episode_to_be_saved_again(tmp_path: Path, env: KitchenEnv, shown: Recording) -> None:
+    with desk(tmp_path, env, shown) as table:
+        table.follow(200)
+        folder = tmp_path / f".{TASK}.teleop"
+        block = folder / "000000.hdf5.partial"
+        block.mkdir()  # nothing can be written there
+        table.say("save")
+        table.until("review")
+        assert "save it again" in table.notes()[-1]
+        block.rmdir()
+        table.say("save")
+        table.until("done")
+    assert replay(tmp_path / f"{TASK}.hdf5", "demo_0").deviation == 0.0
+
+
+def test_a_kitchen_that_cannot_be_made_is_left_out(
+    tmp_path: Path, env: KitchenEnv, shown: Recording, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    make = env.reset
+
+    def reset(*, seed: int | None = None, options: dict[str, Any] | None = None) -> Any:
+        if seed == SEED:
+            raise RuntimeError("no room for the robot")
+        return make(seed=seed, options=options)
+
+    monkeypatch.setattr(env, "reset", reset)
+    with desk(tmp_path, env, shown) as table:
+        assert "no room for the robot" in table.notes()[0]
+        assert table.session.driven.seed == SEED + 1
+        assert [attempt.reason for attempt in table.session.store.attempts] == ["RuntimeError: no room for the robot"]

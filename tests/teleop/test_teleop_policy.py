@@ -9,13 +9,17 @@ import h5py
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
-from teleop_support import TASK, WAIT_S, saved_demo, served, settings
+from teleop_desk import desk
+from teleop_support import SPLIT, TASK, WAIT_S, saved_demo, served, settings
+from tiny_checkpoint import SIZE
 
-from robocasa_lerobot import cli
+from robocasa_lerobot import cli, contract
 from robocasa_lerobot.convert.settings import ConversionSettings, make_plan
 from robocasa_lerobot.demos.replay import replay
+from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.errors import UserError
 from robocasa_lerobot.teleop.client import TeleopClient
+from robocasa_lerobot.teleop.driving.pilot import load_pilot
 
 pytestmark = pytest.mark.render
 
@@ -95,6 +99,36 @@ def test_files_of_which_some_say_nothing_convert_without(corrected: Path, tmp_pa
     plan = make_plan([corrected, other], ConversionSettings(image_size=48))
     assert plan.settings.extra_columns == ("policy_action", "assisted")
     assert "extra.intervention" not in plan.features
+
+
+@pytest.mark.slow
+def test_a_checkpoint_acts_as_it_does_elsewhere_and_anew_after_a_correction(tmp_path: Path, checkpoint: Path) -> None:
+    pilot, size = load_pilot(str(checkpoint), "cpu")
+    assert size == SIZE
+    env = KitchenEnv(TASK, split=SPLIT, image_size=SIZE, terminate_on_success=False)
+    with desk(tmp_path, env, pilot=pilot) as table:
+        table.say("start")
+        table.tick(12)
+        table.hold(3, arm=[0, 0, 1, 0, 0, 0])
+        table.say("give_back")
+        table.session.draw(table.now)  # pictures for people are of another size
+        table.tick(12)
+        episode = table.session.driven
+        driven, states = episode.actions(), list(episode.states)
+        by_person = [origin.intervention for origin in episode.origins]
+    first = by_person.index(True)
+    assert by_person == [False] * 12 + [True] * 3 + [False] * 12
+    actor = pilot._actor  # the same policy, asked directly
+    for turn, (start, end) in enumerate([(0, first), (15, 27)]):
+        env.render_observations = True
+        observation, info = env.set_state(states[start])
+        noise = np.random.SeedSequence([env.scene.seed, turn]).generate_state(1)[0]
+        actor.reset(int(noise), env)
+        for step in range(start, end):
+            action = np.clip(actor.act(observation, info["instruction"]), -1, 1)
+            assert np.array_equal(contract.binarize(action.astype(np.float64)), driven[step]), (turn, step)
+            observation, _, _, _, info = env.step(action)
+    env.close()
 
 
 def test_a_policy_that_is_none_is_a_mistake(tmp_path: Path) -> None:

@@ -1,0 +1,5 @@
+"""Fixtures of several tests of driving by hand."""
+
+from tiny_checkpoint import checkpoint
+
+__all__ = ["checkpoint"]
