@@ -24,6 +24,8 @@ class RobocasaKitchenConfig(RobotConfig):
             recorded again. With False they all start in the first one.
         render_preset: "fast" or "quality".
         image_size: height and width of the pictures, pixels.
+        suffix: ending of all names of state and action. `lerobot-rollout` leaves out those that end neither in ".pos"
+            nor in ".vel", and drives back to where ".pos" were at its start: it needs ".vel".
         realtime: carry out at most 20 actions a second, as a real robot does, whoever sends them.
     """
 
@@ -34,4 +36,5 @@ class RobocasaKitchenConfig(RobotConfig):
     next_kitchen: bool = True
     render_preset: str = "fast"
     image_size: int = contract.IMAGE_SIZE
+    suffix: str = ""
     realtime: bool = True

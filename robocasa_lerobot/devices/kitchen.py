@@ -21,6 +21,8 @@ from robocasa_lerobot.envs.kitchen_env import KitchenEnv, Observation
 from robocasa_lerobot.errors import UserError
 
 _STATES = tuple(contract.component_names(contract.STATE_PARTS))
+_STEP_S = 1.0 / contract.CONTROL_HZ
+_SLACK_S = 0.5 * _STEP_S
 _RATE_FLAG = "--dataset.fps"
 
 
@@ -50,6 +52,8 @@ class RobocasaKitchen(Robot):
             styles=first.meta.get("styles") if first else None,
         )
         self.cameras: dict[str, None] = dict.fromkeys(contract.CAMERAS)  # LeRobot counts them
+        self._states = tuple(name + config.suffix for name in _STATES)
+        self._names = tuple(name + config.suffix for name in NAMES)
         self._translator = HandTranslator()
         self._announcements = Announcements(self._begin)
         self._observation: Observation | None = None
@@ -61,12 +65,12 @@ class RobocasaKitchen(Robot):
     def observation_features(self) -> dict[str, Any]:
         """State by component, pictures by camera."""
         size = self.config.image_size
-        return {**dict.fromkeys(_STATES, float), **dict.fromkeys(contract.CAMERAS, (size, size, 3))}
+        return {**dict.fromkeys(self._states, float), **dict.fromkeys(contract.CAMERAS, (size, size, 3))}
 
     @property
     def action_features(self) -> dict[str, type]:
         """The twelve numbers by name."""
-        return dict.fromkeys(NAMES, float)
+        return dict.fromkeys(self._names, float)
 
     @property
     def is_connected(self) -> bool:
@@ -101,7 +105,7 @@ class RobocasaKitchen(Robot):
             UserError: before `connect`.
         """
         seen = self._seen()
-        return {**dict(zip(_STATES, seen["agent_pos"].tolist(), strict=True)), **seen["pixels"]}
+        return {**dict(zip(self._states, seen["agent_pos"].tolist(), strict=True)), **seen["pixels"]}
 
     def send_action(self, action: Mapping[str, Any]) -> dict[str, float]:
         """Carry out one action; returns it as it was carried out.
@@ -110,15 +114,19 @@ class RobocasaKitchen(Robot):
             UserError: before `connect`, or an action of no known kind.
         """
         self._seen()
-        named = self._translator.action(action) if not set(NAMES) <= action.keys() else action
-        vector = np.array([float(named[name]) for name in NAMES], dtype=np.float32)
+        if set(self._names) <= action.keys():
+            said = [action[name] for name in self._names]
+        else:  # a teleoperator's own names
+            named = action if set(NAMES) <= action.keys() else self._translator.action(action)
+            said = [named[name] for name in NAMES]
+        vector = np.array([float(number) for number in said], dtype=np.float32)
         self._wait()
         self._observation, _, _, _, info = self._env.step(vector)
         self._steps += 1
         if info["success"] and not self._succeeded:
             logging.info("The goal is reached: %s", info["instruction"])
         self._succeeded |= bool(info["success"])
-        return dict(zip(NAMES, contract.binarize(vector).tolist(), strict=True))
+        return dict(zip(self._names, contract.binarize(vector).tolist(), strict=True))
 
     def disconnect(self) -> None:
         """Leave the kitchen."""
@@ -151,9 +159,11 @@ class RobocasaKitchen(Robot):
 
     def _wait(self) -> None:
         now = time.monotonic()
-        if self.config.realtime and self._due > now:
-            time.sleep(self._due - now)
-        self._due = max(now, self._due) + 1.0 / contract.CONTROL_HZ
+        # Half a step early is let through: LeRobot's loops keep the pace themselves, not to the millisecond.
+        early = self._due - _SLACK_S - now
+        if self.config.realtime and early > 0:
+            time.sleep(early)
+        self._due = max(now, self._due) + _STEP_S
 
 
 def _kitchens_of(config: RobocasaKitchenConfig) -> list[Demonstration]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import inspect
 import logging
+import time
 from collections.abc import Iterator
 
 import numpy as np
@@ -93,6 +94,18 @@ def test_announcements_bring_the_next_kitchen_and_the_same_one_again(robot: Robo
     assert all(np.array_equal(again[key], first[key]) for key in first)  # type: ignore[call-overload]
     robot.send_action(dict.fromkeys(NAMES, 0.0))
     assert begin(f"{BEGIN}1")["base_x"] != first["base_x"]
+
+
+@pytest.mark.render
+def test_a_hurried_sender_gets_twenty_steps_a_second(robot: RobocasaKitchen) -> None:
+    still = dict.fromkeys(NAMES, 0.0)
+    robot.config.realtime = True
+    robot.send_action(still)
+    begun = time.monotonic()
+    for _ in range(20):
+        robot.send_action(still)
+    robot.config.realtime = False
+    assert time.monotonic() - begun > 0.9  # a busy machine takes longer, none less
 
 
 def test_the_sentences_are_those_of_lerobot() -> None:

@@ -78,7 +78,16 @@ def test_an_episode_is_recorded_and_trains(demos: Path, tmp_path: Path) -> None:
         *("--policy.dim_feedforward=32", "--policy.chunk_size=4", "--policy.n_action_steps=4"),
         *("--policy.push_to_hub=false", "--steps=2", "--batch_size=2", "--num_workers=0", f"--output_dir={trained}"),
     )
-    assert (trained / "checkpoints" / "last" / "pretrained_model" / "model.safetensors").is_file()
+    policy = trained / "checkpoints" / "last" / "pretrained_model"
+    assert (policy / "model.safetensors").is_file()
+
+    said = lerobot(
+        "lerobot-rollout",
+        *("--strategy.type=base", f"--policy.path={policy}", "--task=open", "--duration=3", "--device=cpu"),
+        *("--robot.type=robocasa_kitchen", f"--robot.demos={demos}", f"--robot.image_size={PIXELS}"),
+        *("--robot.suffix=.vel", f"--fps={contract.CONTROL_HZ}"),
+    )
+    assert f"Kitchen of seed {wanted.seed}: {wanted.instruction}" in said
 
 
 @pytest.mark.slow
