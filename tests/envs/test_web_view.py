@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import os
 import re
 import signal
@@ -98,7 +99,9 @@ def test_without_display_the_command_names_the_way(
 def test_the_command_serves_a_kitchen() -> None:
     command = [sys.executable, "-m", "robocasa_lerobot.cli", "view", "--task=OpenDrawer", "--seed=100000", "--web"]
     environment = {k: v for k, v in os.environ.items() if k not in ("DISPLAY", "WAYLAND_DISPLAY")}
-    process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env=environment)
+    # A shell's background jobs ignore this signal, and so would what they start; in a terminal nobody does.
+    heeds = functools.partial(signal.signal, signal.SIGINT, signal.SIG_DFL)
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env=environment, preexec_fn=heeds)
     try:
         assert process.stdout is not None
         found = None
@@ -106,6 +109,7 @@ def test_the_command_serves_a_kitchen() -> None:
             found = re.search(r"http://127\.0\.0\.1:\d+/", line)
         assert found is not None, "the command printed no address"
         assert len(fetch(found[0] + "model")) > 0
-    finally:
         process.send_signal(signal.SIGINT)
         assert process.wait(60) in (0, 130)
+    finally:
+        process.kill()
