@@ -60,9 +60,8 @@ TRIED, ALIKE_M = 1.2, 0.015  # cost of a grasp like one that has failed: its pla
 # An object that is held is nearer than this to where it was in the hand when that closed, and has risen by this share
 # of the lift.
 HELD_M, ROSE_SHARE = 0.05, 0.25
-# Fingers that come closer together than what is between them is wide hold the edge of it, from which they slip off; and
-# those that stay as much farther apart, a corner.
-SHALLOW_M, CORNER_M = 0.007, 0.015
+# Fingers that come closer together than what is between them is wide hold the edge of it, from which they slip off.
+SHALLOW_M = 0.007
 # Fingers that close askew to the wall of a vessel with others in it turn it as much, or stay apart by as much more than
 # what is between them: it would go on turning on its way.
 ASKEW_RAD, ASKEW_M, ASKEW_ATTEMPTS = float(np.deg2rad(8.0)), 0.010, 2
@@ -110,7 +109,7 @@ def pick(env: KitchenEnv, obj: Graspable, strategy: GraspStrategy) -> Iterator[A
         yield from close_fingers(data, at, GRASP_STEPS)
         turned, wide = abs(_uprightness(env, obj) - upright), _gap(env) - _width(choice)
         askew = bool(obj.contents) and (turned > ASKEW_RAD or wide > ASKEW_M)
-        if attempt < ASKEW_ATTEMPTS and (askew or wide < -SHALLOW_M or wide > CORNER_M):
+        if attempt < ASKEW_ATTEMPTS and (askew or wide < -SHALLOW_M):
             yield from _let_go(env, tried, planned)
             continue
         inside = _inside(env, obj)
