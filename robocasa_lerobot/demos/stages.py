@@ -112,7 +112,7 @@ def _stand_before(env: KitchenEnv, stage: Stage, most_m: float) -> Iterator[Arra
 
     Skills that use fixtures go farther by themselves only a little.
     """
-    if stage.target not in env.scene.roles:
+    if not stage.target or stage.target not in env.scene.roles:
         return
     stand, (base, yaw) = env.scene.standing_pose(stage.target), base_pose(env.data)
     turned = abs(float(np.arctan2(np.sin(stand.yaw - yaw), np.cos(stand.yaw - yaw))))
