@@ -44,3 +44,13 @@ def test_a_served_policy_takes_the_course_of_the_one_in_process(
     assert read_source(str(checkpoint)).fingerprint in info.remote["weights"]
     assert info.remote["outcomes"].startswith("fixed by the trial's seed")
     assert header.image_size == 32
+
+
+def test_pictures_that_the_policy_was_not_trained_at_are_an_error(
+    checkpoint: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with serving(Host(load_served(read_source(str(checkpoint)), "cpu")), "openpi") as port:
+        policy = f"--policy=openpi://127.0.0.1:{port}"
+        arguments = ["--env.factory=evaluation_env:SlideEnv", "--env.tasks=Slide", f"--out={tmp_path / 'out'}"]
+        assert main(["eval", policy, *arguments, "--env.image_size=48"]) == 2
+    assert "found pictures of 48x48, expected 32x32" in capsys.readouterr().err

@@ -122,6 +122,14 @@ def test_nobody_there_is_said_as_what_it_is(tmp_path: Path, capsys: pytest.Captu
     assert "refused, nobody listens there; tried for 1 s. Start the server" in capsys.readouterr().err
 
 
+def test_an_env_that_shows_something_else_ends_the_run(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    with OpenpiServer(push) as server:
+        other = "--env.factory=remote_runs:OtherEnv"
+        assert main(command(server.url, tmp_path / "out", other)) == 2
+    assert "the env shows no picture of robot0_agentview_left" in capsys.readouterr().err
+    assert read_results(tmp_path / "out").trials == []
+
+
 class Faulty:
     """`push`, but from its request `after` on (the probe is number 1) one or all answers are faulty."""
 

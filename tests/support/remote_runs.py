@@ -6,12 +6,21 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from evaluation_env import SlideEnv
 
 from robocasa_lerobot.cli import main
 from robocasa_lerobot.evaluation.records.results import Results, read_results
 
 FORWARD = 7  # of the base, in HDF5 order: what moves the slider
 PI0 = "--policy.keys=robocasa365_pi0"
+
+
+class OtherEnv(SlideEnv):
+    """An env that is no kitchen: a camera less, and two numbers of proprioception."""
+
+    def _observe(self) -> Any:
+        seen = super()._observe()
+        return {"pixels": {"front": seen["pixels"]["robot0_agentview_left"]}, "agent_pos": seen["agent_pos"][:2]}
 
 
 def push(request: Any) -> dict[str, Any]:

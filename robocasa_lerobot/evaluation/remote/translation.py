@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robocasa_lerobot import contract
-from robocasa_lerobot.errors import suggest
+from robocasa_lerobot.errors import UserError, suggest
 from robocasa_lerobot.evaluation.remote.failures import AnswerError
 from robocasa_lerobot.evaluation.remote.key_map import ActionKey, CameraKey, KeyMap, path_of
 from robocasa_lerobot.evaluation.remote.pictures import resized
@@ -17,8 +17,8 @@ from robocasa_lerobot.evaluation.remote.pictures import resized
 _SHOWN = 12
 
 
-class PictureSizeError(AnswerError):
-    """A picture that has not the size that the map says, and may not be resized."""
+class UnfitEnvError(UserError):
+    """What the env shows is not what the key map sends: no trial will get around it."""
 
 
 def request_of(
@@ -32,7 +32,11 @@ def request_of(
         instruction: what the robot is told.
         seed: of the trial's noise.
         number: of the request in its trial, from 0.
+
+    Raises:
+        UnfitEnvError: the env has other cameras, another state or pictures of another size than the map.
     """
+    _check_env(key_map, observations[-1])
     at = dict(zip(key_map.offsets, observations, strict=True))
     out: dict[str, Any] = {}
     for name, value in key_map.constants.items():
@@ -102,12 +106,29 @@ def listed(message: Mapping[Any, Any]) -> str:
     return (shown or "nothing") + (f" and {len(shapes) - _SHOWN} more" if len(shapes) > _SHOWN else "")
 
 
+def _check_env(key_map: KeyMap, observation: Mapping[str, Any]) -> None:
+    pixels = observation.get("pixels")
+    shown = list(pixels) if isinstance(pixels, Mapping) else []
+    for one in key_map.cameras:
+        if one.camera not in shown:
+            raise UnfitEnvError(
+                f"{one.key}: the env shows no picture of {one.camera}, which the key map sends; it has "
+                f"{', '.join(shown) or 'none'}. Policies behind a socket are asked about what our kitchens show."
+            )
+    state = np.asarray(observation.get("agent_pos")).shape
+    if key_map.state and state != (contract.STATE_SIZE,):
+        raise UnfitEnvError(
+            f"{key_map.state[0].key}: the env's agent_pos has shape {state}, expected ({contract.STATE_SIZE},). "
+            "Policies behind a socket are asked about what our kitchens show."
+        )
+
+
 def _picture(one: CameraKey, picture: NDArray[np.uint8]) -> NDArray[np.uint8]:
     if one.size is None:
         return picture
     height, width = one.size
     if one.resize == "none" and picture.shape[:2] != (height, width):
-        raise PictureSizeError(
+        raise UnfitEnvError(
             f"{one.key}: found pictures of {picture.shape[0]}x{picture.shape[1]}, expected {height}x{width}, and "
             f"`resize: none`; use --env.image_size={height}"
         )

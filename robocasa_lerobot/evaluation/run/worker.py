@@ -26,6 +26,7 @@ from robocasa_lerobot.evaluation.actors.remote_actor import RemoteActor
 from robocasa_lerobot.evaluation.planning.trials import TrialSpec
 from robocasa_lerobot.evaluation.records.results import CRASHED, DIVERGED, file_name
 from robocasa_lerobot.evaluation.remote.failures import LostError
+from robocasa_lerobot.evaluation.remote.translation import UnfitEnvError
 from robocasa_lerobot.evaluation.run.film import Film, NoPicturesError
 from robocasa_lerobot.evaluation.run.messages import Alive, Finished, Ready, Refused
 from robocasa_lerobot.evaluation.run.policy_server import RemotePolicy
@@ -118,7 +119,7 @@ class _Worker:
                 outcome = run_trial(env, policy, spec, None, self._alive, rule)
         except (EOFError, BrokenPipeError, ConnectionResetError):
             raise
-        except (BatchingError, NoPicturesError, UnfitPolicyError) as error:
+        except (BatchingError, NoPicturesError, UnfitEnvError, UnfitPolicyError) as error:
             return Refused(str(error))
         except Exception as error:
             # What the trial left behind may be broken as well: the next one starts from a new env and policy.
