@@ -45,6 +45,9 @@ def configure(parser: argparse.ArgumentParser) -> None:
         default="",
         help="drives until you take over: a checkpoint folder, or a policy or address that `eval` takes",
     )
+    parser.add_argument(
+        "--policy-keys", default="", help="key map of a policy behind a socket, as eval's --policy.keys"
+    )
     parser.add_argument("--device", default="auto", help="that the policy computes on: auto, cpu or cuda")
 
 
@@ -72,6 +75,7 @@ def run(args: argparse.Namespace) -> int:
         _announce,
         policy=args.policy,
         device=args.device,
+        keys=args.policy_keys,
         free_view=args.free_view,
     )
     where = f" in {outcome.path}" if outcome.path else ""

@@ -50,6 +50,7 @@ def run_session(
     *,
     policy: str = "",
     device: str = "auto",
+    keys: str = "",
     free_view: bool = False,
 ) -> Outcome:
     """Serve a session until enough is saved, it is ended or the process is interrupted.
@@ -60,6 +61,7 @@ def run_session(
         announce: called once clients can connect.
         policy: that drives where nobody intervenes, as of `load_pilot`.
         device: that it computes on.
+        keys: its key map, where it is behind a socket.
         free_view: run MuJoCo's own web viewer beside it, on the loopback address.
 
     Raises:
@@ -70,7 +72,7 @@ def run_session(
     pilot: Pilot | None = None
     size = settings.image_size
     if policy:
-        pilot, size = load_pilot(policy, device)
+        pilot, size = load_pilot(policy, settings.task, device, keys)
         settings = dataclasses.replace(settings, policy=pilot.name)
     kwargs = {**settings.env_kwargs(), "image_size": size, "cameras": contract.CAMERAS if pilot else ()}
     env = KitchenEnv(settings.task, terminate_on_success=False, **kwargs)

@@ -247,7 +247,15 @@ class Session:
         if self._policy_looks() and not env.render_observations and not driver.by_steps:
             env.render_observations = True
             episode.show(len(episode))
-        planned = driver.next(env, episode.observation, now, lambda level, text: self.note(level, text, "assist"))
+        try:
+            planned = driver.next(env, episode.observation, now, lambda level, text: self.note(level, text, "assist"))
+        except Exception as error:
+            if self.pilot is None:
+                raise
+            self.note("error", f"the policy failed ({error}): you drive; give back to try it again", "policy")
+            self.pilot.lost()
+            self.hold_still("asked")
+            return True
         if planned is None:
             return False
         if driver.answered is not None and driver.answered in self._drawn:

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from typing import Any
 
 import h5py
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
+from policy_sockets import OpenpiServer
 from teleop_desk import desk
 from teleop_support import SPLIT, TASK, WAIT_S, saved_demo, served, settings
 from tiny_checkpoint import SIZE
@@ -103,7 +105,7 @@ def test_files_of_which_some_say_nothing_convert_without(corrected: Path, tmp_pa
 
 @pytest.mark.slow
 def test_a_checkpoint_acts_as_it_does_elsewhere_and_anew_after_a_correction(tmp_path: Path, checkpoint: Path) -> None:
-    pilot, size = load_pilot(str(checkpoint), "cpu")
+    pilot, size = load_pilot(str(checkpoint), TASK, "cpu")
     assert size == SIZE
     env = KitchenEnv(TASK, split=SPLIT, image_size=SIZE, terminate_on_success=False)
     with desk(tmp_path, env, pilot=pilot) as table:
@@ -119,6 +121,7 @@ def test_a_checkpoint_acts_as_it_does_elsewhere_and_anew_after_a_correction(tmp_
     first = by_person.index(True)
     assert by_person == [False] * 12 + [True] * 3 + [False] * 12
     actor = pilot._actor  # the same policy, asked directly
+    assert actor is not None
     for turn, (start, end) in enumerate([(0, first), (15, 27)]):
         env.render_observations = True
         observation, info = env.set_state(states[start])
@@ -129,6 +132,39 @@ def test_a_checkpoint_acts_as_it_does_elsewhere_and_anew_after_a_correction(tmp_
             assert np.array_equal(contract.binarize(action.astype(np.float64)), driven[step]), (turn, step)
             observation, _, _, _, info = env.step(action)
     env.close()
+
+
+def push(request: Any) -> dict[str, Any]:
+    """A policy behind a socket that lifts the hand."""
+    actions = np.zeros((50, 12), np.float32)
+    actions[:, contract.ACTION_SLICES_HDF5["end_effector_position"]] = (0.0, 0.0, 0.5)
+    return {"actions": actions}
+
+
+def test_a_policy_behind_a_socket_drives_and_its_end_is_no_end(tmp_path: Path) -> None:
+    with OpenpiServer(push) as server:
+        pilot, size = load_pilot(server.url, TASK, keys="robocasa365_pi0")
+        env = KitchenEnv(TASK, split=SPLIT, image_size=size, terminate_on_success=False)
+        with desk(tmp_path, env, pilot=pilot) as table:
+            table.say("start")
+            table.tick(7)
+            assert not any(origin.intervention for origin in table.session.driven.origins)
+            up = contract.ACTION_SLICES["end_effector_position"].start + 2
+            assert np.allclose(table.session.driven.actions()[:, up], 0.5)
+            server.stop()
+            table.tick(10)  # what it has answered already is carried out first
+            assert (table.session.phase, pilot.state) == ("paused", "CORRECTING")
+            assert "the policy failed" in table.notes()[-1]
+            steps = len(table.session.driven)
+            table.say("resume")
+            table.hold(2, arm=[1, 0, 0, 0, 0, 0])
+            assert len(table.session.driven) == steps + 2
+            with OpenpiServer(push, port=server.port):
+                table.say("give_back")
+                table.tick(3)
+                assert (table.session.phase, pilot.state) == ("running", "AUTONOMOUS")
+                assert len(table.session.driven) == steps + 5
+        env.close()
 
 
 def test_a_policy_that_is_none_is_a_mistake(tmp_path: Path) -> None:

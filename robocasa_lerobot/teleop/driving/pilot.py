@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -20,15 +21,16 @@ class Pilot:
 
     Args:
         name: of the policy.
-        actor: the policy.
+        make: the policy; it is made again after a failure, over a new connection where it is behind a socket.
 
     Attributes:
         state: `AUTONOMOUS` or `CORRECTING`.
         interventions: of the running episode.
     """
 
-    def __init__(self, name: str, actor: Actor) -> None:
-        self.name, self._actor = name, actor
+    def __init__(self, name: str, make: Callable[[], Actor]) -> None:
+        self.name, self._make = name, make
+        self._actor: Actor | None = make()
         self.begin()
 
     def begin(self) -> None:
@@ -53,11 +55,18 @@ class Pilot:
 
     def act(self, env: KitchenEnv, observation: Observation, instruction: str) -> NDArray[np.float64]:
         """The policy's action (12,), stored order; its noise follows from the kitchen's seed and how often it began."""
+        if self._actor is None:
+            self._actor, self._fresh = self._make(), False
         if not self._fresh:
             noise = np.random.SeedSequence([env.scene.seed, self._hand_backs]).generate_state(1)[0]
             self._actor.reset(int(noise), env)
             self._fresh, self._hand_backs = True, self._hand_backs + 1
         return np.asarray(self._actor.act(observation, instruction), dtype=np.float64)
+
+    def lost(self) -> None:
+        """It has failed: a person drives, and the policy is made again when it is given back to."""
+        self._actor = None
+        self.take_over()
 
     def describe(self, *, driving: bool) -> dict[str, Any]:
         """As it is told to clients."""
@@ -65,15 +74,24 @@ class Pilot:
         return {"name": self.name, "state": state, "interventions": self.interventions}
 
 
-def load_pilot(policy: str, device: str = "auto", image_size: int | None = None) -> tuple[Pilot, int]:
-    """The policy at a path, a reference policy or an address that `eval` takes; and the pixels of its pictures.
+def load_pilot(policy: str, task: str, device: str = "auto", keys: str = "") -> tuple[Pilot, int]:
+    """The policy at a path, a reference policy or an address, as `eval` takes them; and the pixels of its pictures.
+
+    Args:
+        policy: what `eval --policy=` takes.
+        task: that it drives.
+        device: that a checkpoint computes on.
+        keys: key map of a policy behind a socket, or "" for its protocol's own.
 
     Raises:
-        UserError: there is none, or it cannot be loaded.
+        UserError: there is none, or it cannot be loaded or reached.
     """
-    from robocasa_lerobot.evaluation.actors.checkpoint import common_image_size, read_source
     from robocasa_lerobot.evaluation.actors.policy_runner import load_actor, pick_device
+    from robocasa_lerobot.evaluation.config.evaluation import EnvSettings, EvaluationConfig, PolicySettings
+    from robocasa_lerobot.evaluation.planning.sources import open_sources
 
-    source = read_source(policy)
-    where = "cpu" if source.is_reference else pick_device(device)
-    return Pilot(source.label, load_actor(source, where, None)), common_image_size([source], image_size)
+    asked = PolicySettings(path=[policy], keys=[keys] if keys else [])
+    (source,), size = open_sources(EvaluationConfig(policy=asked, env=EnvSettings(tasks=[task])))
+    here = not (source.is_reference or source.remote)
+    where = pick_device(device) if here else "cpu"
+    return Pilot(source.label, lambda: load_actor(source, where, None)), size
