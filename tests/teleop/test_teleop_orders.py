@@ -22,6 +22,7 @@ from robocasa_lerobot.demos.replay import replay
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.errors import UserError
 from robocasa_lerobot.teleop.keeping.store import REDO, Store
+from robocasa_lerobot.teleop.telling import header
 
 pytestmark = pytest.mark.render
 
@@ -298,3 +299,13 @@ def test_a_kitchen_that_cannot_be_made_is_left_out(
         assert "no room for the robot" in table.notes()[0]
         assert table.session.driven.seed == SEED + 1
         assert [attempt.reason for attempt in table.session.store.attempts] == ["RuntimeError: no room for the robot"]
+
+
+def test_a_hidden_goal_is_told_nowhere(tmp_path: Path, env: KitchenEnv, shown: Recording) -> None:
+    for hidden in (False, True):
+        with desk(tmp_path / str(hidden), env, shown, hide_goal=hidden) as table:
+            table.follow(len(shown.actions) - 2)
+            told = header(table.session, 1, table.now)
+            scene = next(message for message in table.told if message["type"] == "scene")
+            assert bool(scene["terms"]) is bool(told["terms"]) is bool(told["held"]) is not hidden
+            assert told["success"] is (None if hidden else True)
