@@ -20,6 +20,7 @@ pytestmark = [
     pytest.mark.skipif(find_chromium() is None, reason="no Chromium on this machine ($CHROMIUM may name one)"),
 ]
 STEPS = 16
+KEYS_PAGE = Path(__file__).parents[2] / "docs" / "teleoperation_keys.md"
 PIXELS = "[...document.querySelectorAll('.tile canvas')].map(c => c.getContext('2d').getImageData(9, 9, 30, 30).data)"
 
 SWITCHES = {
@@ -134,6 +135,15 @@ def test_commands_by_key_and_another_layout(page: Page) -> None:
     assert page.text(".key[data-name=up]") == "R"
     for kind, value in (("mode", "arm"), ("motion-frame", "base"), ("speed", "0.5")):
         page.click(f'#{kind} [data-value="{value}"]')
+
+
+def test_the_keys_that_are_written_down_are_those_of_the_page(page: Page) -> None:
+    rows = [line.split("|") for line in KEYS_PAGE.read_text(encoding="utf-8").splitlines() if line.startswith("| ")]
+    for column, preset in ((2, "robocasa"), (1, "wasd")):
+        page.browser.ask(f"preset.value = '{preset}', preset.dispatchEvent(new Event('change'))")
+        shown = page.browser.ask("[...document.querySelectorAll('.key')].map(key => key.textContent)")
+        written = {word for row in rows[1:] for word in row[column + 1].split()}
+        assert {"Backspace" if key == "⌫" else key for key in shown} == written
 
 
 def test_a_lost_focus_lets_everything_go(page: Page) -> None:
