@@ -185,6 +185,8 @@ def _check_rate(arguments: Sequence[str]) -> None:
         return  # no recording, or its settings are in a file
     given = [a.partition("=")[2] for a in arguments if a.startswith(f"{_RATE_FLAG}=")]
     given += [b for a, b in itertools.pairwise(arguments) if a == _RATE_FLAG]
+    if not given and any(argument.startswith("--config_path") for argument in arguments):
+        return  # it may stand in that file
     if not given or float(given[-1]) != contract.CONTROL_HZ:
         found = given[-1] if given else "none (LeRobot's default is 30)"
         raise UserError(

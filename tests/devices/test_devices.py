@@ -201,4 +201,5 @@ def test_mistakes_are_explained() -> None:
     with pytest.raises(UserError, match="found 30"):
         _check_rate(["lerobot-record", "--dataset.repo_id=a/b", "--dataset.fps", "30"])
     _check_rate(["lerobot-record", "--dataset.repo_id=a/b", "--dataset.fps=20"])
+    _check_rate(["lerobot-record", "--config_path=record.yaml", "--dataset.repo_id=a/b"])
     _check_rate(["lerobot-teleoperate"])
