@@ -15,6 +15,7 @@ from robocasa_lerobot import contract
 from robocasa_lerobot.demos.motion import base_pose
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.rendering import SceneRenderer
+from robocasa_lerobot.envs.robots.panda_omron.names import ROBOT_BASE
 from robocasa_lerobot.teleop.messages import Message
 from robocasa_lerobot.teleop.settings import PICTURE_QUALITY
 
@@ -23,6 +24,9 @@ Picture = NDArray[np.uint8]
 FREE = "free"
 SEEN = (*contract.CAMERAS, FREE)
 _LOOK_AT_M = 0.9  # height of what the free camera looks at
+_RAISE_RAD, _HIGHEST_RAD = 0.15, -1.45  # the free camera goes up where something is in its way, in such steps
+_CLEAR_M, _NEAREST_M = 0.1, 0.6  # it stays that far before what is in its way, and from the robot
+_PAST_M = 0.05  # beyond a part of the robot, which is in nobody's way
 _MAP_PIXELS, _MAP_MARGIN_M = 640, 0.15
 _MAP_FROM_M = 12.0  # height that the map is seen from: the higher, the less does what is tall lean outwards
 _CUT_M = 1.55  # geoms that are wholly above it hide nothing on the map
@@ -65,9 +69,40 @@ class FreeCamera:
         x, y = self.anchor or position[:2].tolist()
         camera.lookat = [x, y, _LOOK_AT_M]
         turn = self.azimuth + (heading if self.follow else 0.0)
-        camera.azimuth, camera.elevation = float(np.degrees(turn)), float(np.degrees(self.elevation))
-        camera.distance = self.distance
+        elevation, distance = _in_the_open(data, np.array(camera.lookat), turn, self.elevation, self.distance)
+        camera.azimuth, camera.elevation = float(np.degrees(turn)), float(np.degrees(elevation))
+        camera.distance = distance
         return camera
+
+
+def _in_the_open(
+    data: mujoco.MjData, target: NDArray[np.float64], azimuth: float, elevation: float, distance: float
+) -> tuple[float, float]:
+    """Elevation and distance from which nothing but the robot hides the target: higher up if need be, else nearer."""
+    best = elevation, 0.0
+    for raised in (elevation, *np.arange(elevation - _RAISE_RAD, _HIGHEST_RAD, -_RAISE_RAD)):
+        back = -np.array([np.cos(raised) * np.cos(azimuth), np.cos(raised) * np.sin(azimuth), np.sin(raised)])
+        free = _free_way(data, target, back, distance)
+        if free >= distance:
+            return float(raised), distance
+        if free > best[1]:
+            best = float(raised), free
+    return best[0], max(best[1] - _CLEAR_M, _NEAREST_M)
+
+
+def _free_way(data: mujoco.MjData, start: NDArray[np.float64], way: NDArray[np.float64], far: float) -> float:
+    """Metres along a unit vector to the first thing that is not the robot, at most `far`."""
+    model, hit, gone = data.model, np.full(1, -1, dtype=np.int32), 0.0
+    robot = model.body_rootid[model.body(ROBOT_BASE).id]
+    while gone < far:
+        step = mujoco.mj_ray(model, data, start + gone * way, way, None, 1, -1, hit)
+        if step < 0:
+            return far
+        gone += step
+        if model.body_rootid[model.geom_bodyid[hit[0]]] != robot:
+            return min(gone, far)
+        gone += _PAST_M
+    return far
 
 
 class Views:

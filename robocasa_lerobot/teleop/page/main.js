@@ -117,7 +117,7 @@ function discarded(message) {
 function done(message) {
   connection.ended = true;
   state.path = message.path;
-  note({ level: "info", text: `${message.saved} episodes are in ${message.path}.` });
+  note({ level: "info", text: message.path ? `${message.saved} episodes are in ${message.path}.` : "No episode was saved." });
 }
 
 function finished() {
