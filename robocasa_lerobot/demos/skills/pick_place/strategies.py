@@ -70,6 +70,7 @@ OUT_OF_CABINET = replace(ANY_APPROACH, tilts=_CABINET_TILTS, narrow=True, poses=
 OUT_OF_FRIDGE = OUT_OF_CABINET
 BEFORE_FRONT_M, MOST_OUT_M = 0.03, 0.45
 HARD = 1.0  # cost of taking something out of a drawer, from which on it is pulled out first
+FLAT_COST = 8.0  # for each metre that something is higher than it need be, on a rack
 MOST_TURNS = 2  # of what lies across behind a front
 FARTHER_OUT_M = 0.12  # how far
 FARTHER_M = 1.1  # of a free place on a counter from the base, where an open drawer keeps the robot off
@@ -221,6 +222,11 @@ def _into_regions(
             )
         case Drawer():
             return PlaceStrategy(in_regions(env, obj, regions, DROPS_M), leans=_DRAWER_LEANS, entries=("up", "across"))
+        case ToasterOven() if len(regions) == 1:  # what stands out over the edge of its rack meets the door
+            return PlaceStrategy(
+                in_regions(env, obj, regions, (0.0,), columns), leans=_CLOSED_LEANS, entries=("up", "across", "out"),
+                grasp=ANY_APPROACH, in_m=0.28, fit=room_in(env, obj, regions[0], flat_cost=FLAT_COST),
+            )  # fmt: skip
         case _ if "drawer" in part:
             return PlaceStrategy(
                 in_regions(env, obj, regions, DROPS_M), leans=_CLOSED_LEANS, entries=("up", "across", "out"),

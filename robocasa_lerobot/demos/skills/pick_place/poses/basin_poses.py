@@ -61,16 +61,22 @@ def below_spout(env: KitchenEnv, obj: Graspable, sink: Sink) -> PlacePoses:
     return poses
 
 
-def room_in(env: KitchenEnv, obj: Graspable, basin: Region) -> Callable[[Array, Array], float]:
-    """The cost of an object that would meet the walls of a basin, by its origin (3,) and rotation (3, 3)."""
+def room_in(
+    env: KitchenEnv, obj: Graspable, basin: Region, *, flat_cost: float = 0.0
+) -> Callable[[Array, Array], float]:
+    """The cost of an object that would meet the walls of a basin, by its origin (3,) and rotation (3, 3).
+
+    With `flat_cost` also of what it is higher than it need be, for each metre: it would come to lean on something.
+    """
     body = env.data.body(basin.body)
     axes = body.xmat.reshape(3, 3).copy()
     center = basin.world(env.data)
     half = np.asarray(basin.half[:2]) - SPARE_M
+    lowest = float(np.ptp(obj.cloud, axis=0).min())
 
     def cost(origin: Array, turn: Array) -> float:
         points = (obj.cloud @ turn.T + origin - center) @ axes
         out = np.maximum(np.abs(points[:, :2]).max(axis=0) - half, 0.0)
-        return OUT_COST * float(out.sum())
+        return OUT_COST * float(out.sum()) + flat_cost * (float(np.ptp(points[:, 2])) - lowest)
 
     return cost

@@ -21,6 +21,9 @@ type PlacePoses = Callable[[], Sequence[PlacePose]]
 DROPS = ((0.0, 0.0), (0.5, 0.4), (1.1, 0.7))
 # The same for what is so narrow, from its middle to its side, that fingers would open against its walls.
 OVER_RIM, NARROW_M = ((1.02, 0.0), (1.2, 0.2)), 0.03
+# The same for pots, in which fingers that open brace against the walls, and lift the pot as they leave.
+POT_DROPS = ((0.0, 1.3), (0.5, 1.1), (1.1, 0.3), (1.4, 0.4))
+POT_DEEP_M, POT_HALF_M = 0.08, (0.04, 0.075)  # least depth; half of its width inside
 EDGE_M, OFF_SHARE, BESIDE_COST = 0.005, 0.5, 3.0  # beside the middle, with a cost for each metre
 ASIDE_SHARE, ON_OTHERS_COST = 0.4, 8.0  # beside what lies there, with a gain for each metre from it
 LEAST_ROOM_M, SHALLOW_M = 0.01, 0.02
@@ -80,11 +83,16 @@ def on_object(env: KitchenEnv, obj: Graspable, holder: str) -> PlacePoses:
             narrow = deep > SHALLOW_M and half[:2].min() < NARROW_M
             found += [
                 PlacePose(floor + UP * deep * drop, cost + (extra if deep > SHALLOW_M else 0.0))
-                for drop, extra in (OVER_RIM if narrow else DROPS)
+                for drop, extra in (OVER_RIM if narrow else POT_DROPS if _jams(half) else DROPS)
             ]
         return found
 
     return poses
+
+
+def _jams(half: Array) -> bool:
+    """Whether an open hand is about as wide as a vessel inside, whose half extents (3,) are given, and that is deep."""
+    return bool(2 * half[2] > POT_DEEP_M and POT_HALF_M[0] < min(half[:2]) < POT_HALF_M[1])
 
 
 def _points_of(env: KitchenEnv, names: Sequence[str]) -> Array:
