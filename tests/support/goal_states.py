@@ -45,6 +45,7 @@ from robocasa_lerobot.envs.predicates import (
     ObjectUpright,
     OnBurner,
     Once,
+    OnOneSide,
     PartTurned,
     PartWithin,
     StandsBefore,
@@ -225,9 +226,19 @@ def _near(goal: Near, scene: Scene, data: mujoco.MjData) -> None:
 
 @write.register
 def _nearer(goal: NearerThan, scene: Scene, data: mujoco.MjData) -> None:
-    assert isinstance(goal.objects, str)
-    assert isinstance(goal.to, str)
-    data.joint(f"{goal.objects}_joint0").qpos[:3] = data.body(goal.to).xpos + np.array([0.0, 0.0, 0.01])
+    names = [goal.objects] if isinstance(goal.objects, str) else [*goal.objects]
+    first = goal.to if isinstance(goal.to, str) else goal.to[0]
+    for number, name in enumerate((name for name in names if name != first), start=1):
+        data.joint(f"{name}_joint0").qpos[:3] = data.body(first).xpos + np.array([0.0, 0.0, 0.01 * number])
+
+
+@write.register
+def _on_one_side(goal: OnOneSide, scene: Scene, data: mujoco.MjData) -> None:
+    yaw = scene.fixture(goal.fixture).yaw
+    across = np.array([np.cos(yaw), np.sin(yaw), 0.0])
+    for number, name in enumerate(goal.objects):
+        beside = data.body(scene.fill(goal.of)).xpos + across * (goal.apart + 0.1 + 0.01 * number)
+        data.joint(f"{scene.fill(name)}_joint0").qpos[:3] = beside
 
 
 @write.register(Grasped)
