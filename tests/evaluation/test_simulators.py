@@ -93,6 +93,11 @@ def test_the_same_env_here_and_in_another_process_gives_the_same_trials(tmp_path
     assert len({record.trajectory for record in here}) == 8
 
 
+def test_check_says_where_trials_run(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["eval", "--check", *arguments(tmp_path)]) == 0
+    assert "2 tasks, 18 trials in another simulator" in capsys.readouterr().out
+
+
 def test_fixed_starts_are_the_seeds(tmp_path: Path) -> None:
     own = {"policy": "zero", "env.options.fixed": "true"}
     records = evaluate(tmp_path / "a", **own)

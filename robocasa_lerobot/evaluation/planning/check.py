@@ -95,7 +95,8 @@ def describe(config: EvaluationConfig, tasks: PlannedTasks) -> Checked:
 def lines(config: EvaluationConfig, tasks: PlannedTasks) -> list[str]:
     """What a person wants to know of an evaluation before it runs."""
     checked = describe(config, tasks)
-    out = [f"protocol {config.protocol}: {checked.tasks} tasks, {checked.trials:,} trials in {config.env.split} scenes"]
+    where = "another simulator" if config.env.is_foreign else f"{config.env.split} scenes"
+    out = [f"protocol {config.protocol}: {checked.tasks} tasks, {checked.trials:,} trials in {where}"]
     if checked.steps:
         hours = checked.steps / contract.CONTROL_HZ / 3600
         out.append(f"  at most {checked.steps:,} control steps, {hours:,.1f} simulated hours")
