@@ -61,7 +61,8 @@ TRIED, ALIKE_M = 1.2, 0.015  # cost of a grasp like one that has failed: its pla
 # of the lift.
 HELD_M, ROSE_SHARE = 0.05, 0.25
 # Fingers that come closer together than what is between them is wide hold the edge of it, from which they slip off.
-SHALLOW_M = 0.007
+# Fingers that still come closer together as they lift it slide off a slope: it would be lost on its way.
+SHALLOW_M, CREEP_M = 0.007, 0.0004
 # Fingers that close askew to the wall of a vessel with others in it turn it as much, or stay apart by as much more than
 # what is between them: it would go on turning on its way.
 ASKEW_RAD, ASKEW_M, ASKEW_ATTEMPTS = float(np.deg2rad(8.0)), 0.010, 2
@@ -112,7 +113,7 @@ def pick(env: KitchenEnv, obj: Graspable, strategy: GraspStrategy) -> Iterator[A
         if attempt < ASKEW_ATTEMPTS and (askew or wide < -SHALLOW_M):
             yield from _let_go(env, tried, planned)
             continue
-        inside = _inside(env, obj)
+        inside, closed = _inside(env, obj), _gap(env)
         lift = float(lifted.position[2] - choice.path.targets[2].position[2])
         yield from move_hand(
             data,
@@ -123,6 +124,10 @@ def pick(env: KitchenEnv, obj: Graspable, strategy: GraspStrategy) -> Iterator[A
             max_steps=50,
             integral_gain=INTEGRAL_GAIN,
         )
+        if attempt < ASKEW_ATTEMPTS and closed - _gap(env) > CREEP_M and is_held(env, obj.name):
+            yield from move_hand(data, at, CLOSED, speed=0.7, tolerance=0.01, max_steps=30)
+            yield from _let_go(env, tried, planned)
+            continue
         rise = data.body(obj.name).xpos[2] - start[2] - moved[2]
         if (rise > ROSE_SHARE * lift and _stays(env, obj, inside)) or is_held(env, obj.name):
             yield from _draw_out(env, _shifted(lifted, moved), _shifted(out, moved), strategy.narrow)

@@ -67,7 +67,7 @@ from robocasa_lerobot.envs.tasks.task import Stage
 # Between the two steep and the two flat ones of any approach: a palm that is level meets the shelf before low objects.
 _CABINET_TILTS = in_radians((0, 0.0), (35, 0.1), (42, 0.1), (50, 0.15), (65, 0.2), (88, 0.3))
 OUT_OF_CABINET = replace(ANY_APPROACH, tilts=_CABINET_TILTS, narrow=True, poses=level_grasps)
-OUT_OF_FRIDGE = OUT_OF_CABINET
+OUT_OF_FRIDGE = ANY_APPROACH
 BEFORE_FRONT_M, MOST_OUT_M = 0.03, 0.45
 HARD = 1.0  # cost of taking something out of a drawer, from which on it is pulled out first
 FLAT_COST = 8.0  # for each metre that something is higher than it need be, on a rack
