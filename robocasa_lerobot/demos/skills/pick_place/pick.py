@@ -61,7 +61,8 @@ TRIED, ALIKE_M = 1.2, 0.015  # cost of a grasp like one that has failed: its pla
 # of the lift.
 HELD_M, ROSE_SHARE = 0.05, 0.25
 # Fingers that come closer together than what is between them is wide hold the edge of it, from which they slip off.
-# Fingers that still come closer together as they lift it slide off a slope: it would be lost on its way.
+# Fingers that still come closer together as they lift it slide off a slope: it would be lost on its way. Those
+# at the wall of a vessel come to lie on it.
 SHALLOW_M, CREEP_M = 0.007, 0.0004
 # Fingers that close askew to the wall of a vessel with others in it turn it as much, or stay apart by as much more than
 # what is between them: it would go on turning on its way.
@@ -124,7 +125,8 @@ def pick(env: KitchenEnv, obj: Graspable, strategy: GraspStrategy) -> Iterator[A
             max_steps=50,
             integral_gain=INTEGRAL_GAIN,
         )
-        if attempt < ASKEW_ATTEMPTS and closed - _gap(env) > CREEP_M and is_held(env, obj.name):
+        creeps = closed - _gap(env) > CREEP_M and (obj.item is None or obj.item.interior is None)
+        if attempt < ASKEW_ATTEMPTS and creeps and is_held(env, obj.name):
             yield from move_hand(data, at, CLOSED, speed=0.7, tolerance=0.01, max_steps=30)
             yield from _let_go(env, tried, planned)
             continue
