@@ -18,7 +18,7 @@ from robocasa_lerobot.demos.skills.pick_place.by_handle import (
     working_end,
 )
 from robocasa_lerobot.demos.skills.pick_place.graspable import DOWN, graspable
-from robocasa_lerobot.demos.skills.pick_place.poses.basin_poses import below_spout, is_large, on_basin_floor, room_in
+from robocasa_lerobot.demos.skills.pick_place.poses.basin_poses import below_spout, is_large, on_floor, room_in
 from robocasa_lerobot.demos.skills.pick_place.tools.pour import Tilting
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.kitchens.appliances.kinds.sink import Sink
@@ -85,7 +85,7 @@ def test_a_pan_has_room_in_a_basin_along_it_and_not_across(soak: KitchenEnv) -> 
     assert cost(middle, along) == 0.0
     assert cost(middle, rotation_about(UP, np.pi / 2) @ along) > 0.1
     floor = sink.basin.world(env.data, (0.0, 0.0, -sink.basin.half[2]))[2]
-    poses = on_basin_floor(env, sink.basin)()
+    poses = on_floor(env, sink.basin)()
     assert min(pose.point[2] for pose in poses) == pytest.approx(floor)
     assert all(sink.basin.contains(env.data, pose.point + 0.001 * UP) for pose in poses)
 

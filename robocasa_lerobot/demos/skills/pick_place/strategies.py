@@ -27,7 +27,7 @@ from robocasa_lerobot.demos.skills.pick_place.location import Location, locate
 from robocasa_lerobot.demos.skills.pick_place.mugs import FROM_THE_SIDE, UNDER_A_SPOUT
 from robocasa_lerobot.demos.skills.pick_place.pick import HOPELESS, RELEASE_STEPS, best_grasp
 from robocasa_lerobot.demos.skills.pick_place.place import PlaceStrategy
-from robocasa_lerobot.demos.skills.pick_place.poses.basin_poses import below_spout, is_large, on_basin_floor, room_in
+from robocasa_lerobot.demos.skills.pick_place.poses.basin_poses import below_spout, is_large, on_floor, room_in
 from robocasa_lerobot.demos.skills.pick_place.poses.counter_poses import NEAR_M, on_counter
 from robocasa_lerobot.demos.skills.pick_place.poses.distance_poses import at_distances, distance_terms, near_to
 from robocasa_lerobot.demos.skills.pick_place.poses.place_poses import (
@@ -70,7 +70,7 @@ OUT_OF_CABINET = replace(ANY_APPROACH, tilts=_CABINET_TILTS, narrow=True, poses=
 OUT_OF_FRIDGE = ANY_APPROACH
 BEFORE_FRONT_M, MOST_OUT_M = 0.03, 0.45
 HARD = 1.0  # cost of taking something out of a drawer, from which on it is pulled out first
-FLAT_COST = 8.0  # for each metre that something is higher than it need be, on a rack
+BEYOND_COST, FLAT_COST = 50.0, 8.0  # for each metre that something stands out beyond a rack, and is too high on it
 MOST_TURNS = 2  # of what lies across behind a front
 FARTHER_OUT_M = 0.12  # how far
 FARTHER_M = 1.1  # of a free place on a counter from the base, where an open drawer keeps the robot off
@@ -200,7 +200,7 @@ def _into_sink(env: KitchenEnv, stage: Stage, obj: Graspable, sink: Sink) -> Pla
         return PlaceStrategy(in_basin(env, basin), leans=_OPEN_LEANS, entries=("up", "across"))
     terms = every_goal_in(stage_condition(env.declaration, stage))
     spout = any(isinstance(term, ObjectAtSite) and term.site == "water" for term in terms)
-    poses = below_spout(env, obj, sink) if spout else on_basin_floor(env, basin)
+    poses = below_spout(env, obj, sink) if spout else on_floor(env, basin)
     return PlaceStrategy(
         poses, leans=(0.0, _SMALL, _LEANT), entries=("up", "across"), in_m=0.2, fit=room_in(env, obj, basin),
         grasp=PAN_BY_THE_HANDLE if has_handle(obj) else ANY_APPROACH,
@@ -224,8 +224,9 @@ def _into_regions(
             return PlaceStrategy(in_regions(env, obj, regions, DROPS_M), leans=_DRAWER_LEANS, entries=("up", "across"))
         case ToasterOven() if len(regions) == 1:  # what stands out over the edge of its rack meets the door
             return PlaceStrategy(
-                in_regions(env, obj, regions, (0.0,), columns), leans=_CLOSED_LEANS, entries=("up", "across", "out"),
-                grasp=ANY_APPROACH, in_m=0.28, fit=room_in(env, obj, regions[0], flat_cost=FLAT_COST),
+                on_floor(env, regions[0]), leans=_CLOSED_LEANS, entries=("up", "across", "out"),
+                grasp=ANY_APPROACH, in_m=0.28,
+                fit=room_in(env, obj, regions[0], out_cost=BEYOND_COST, flat_cost=FLAT_COST),
             )  # fmt: skip
         case _ if "drawer" in part:
             return PlaceStrategy(

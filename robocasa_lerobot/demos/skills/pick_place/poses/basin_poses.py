@@ -18,7 +18,7 @@ from robocasa_lerobot.envs.predicates.objects import middle_of
 
 LARGE_M = 0.17  # a vessel longer than this is not dropped into a basin, where it might lean on a wall
 # Of where its origin may come: shares of the basin's half sizes; heights over the floor, metres, with costs.
-ACROSS, DEEP = (-0.5, -0.25, 0.0, 0.25, 0.5), (-0.35, -0.15, 0.0, 0.2)
+ACROSS, DEEP = (-0.5, -0.25, 0.0, 0.25, 0.5), (-0.6, -0.35, -0.15, 0.0, 0.2)
 DROPS_M, DROP_COST = (0.0, 0.03, 0.07), 2.0
 # Below the spout: of the vessel's middle before its tip, and to a side, metres; a cost for each of them.
 BEFORE_M, ASIDE_M, OFF_COST = (0.0, 0.02, 0.04, 0.06), (0.0, -0.03, 0.03), 2.0
@@ -30,8 +30,8 @@ def is_large(obj: Graspable) -> bool:
     return obj.item is not None and obj.item.interior is not None and max(obj.item.size[:2]) > LARGE_M
 
 
-def on_basin_floor(env: KitchenEnv, basin: Region) -> PlacePoses:
-    """All over the floor of a basin: which of these have room for an object is asked by `room_in`."""
+def on_floor(env: KitchenEnv, basin: Region) -> PlacePoses:
+    """All over the floor of a basin, or of a rack: which of these have room for an object is asked by `room_in`."""
 
     def poses() -> list[PlacePose]:
         wide, deep, tall = basin.half
@@ -62,7 +62,7 @@ def below_spout(env: KitchenEnv, obj: Graspable, sink: Sink) -> PlacePoses:
 
 
 def room_in(
-    env: KitchenEnv, obj: Graspable, basin: Region, *, flat_cost: float = 0.0
+    env: KitchenEnv, obj: Graspable, basin: Region, *, out_cost: float = OUT_COST, flat_cost: float = 0.0
 ) -> Callable[[Array, Array], float]:
     """The cost of an object that would meet the walls of a basin, by its origin (3,) and rotation (3, 3).
 
@@ -77,6 +77,6 @@ def room_in(
     def cost(origin: Array, turn: Array) -> float:
         points = (obj.cloud @ turn.T + origin - center) @ axes
         out = np.maximum(np.abs(points[:, :2]).max(axis=0) - half, 0.0)
-        return OUT_COST * float(out.sum()) + flat_cost * (float(np.ptp(points[:, 2])) - lowest)
+        return out_cost * float(out.sum()) + flat_cost * (float(np.ptp(points[:, 2])) - lowest)
 
     return cost
