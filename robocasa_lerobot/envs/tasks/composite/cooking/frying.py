@@ -7,10 +7,9 @@ from robocasa_lerobot.envs.scene.spec import (
     FixtureSpec,
     InitialOpenness,
     ObjectSpec,
-    Placement,
     RobotStart,
 )
-from robocasa_lerobot.envs.tasks.atomic.common import counter_near, on_counter
+from robocasa_lerobot.envs.tasks.atomic.common import counter_near, in_cabinet, on_counter
 from robocasa_lerobot.envs.tasks.task import Stage, Task
 
 _IN_PAN = ObjectOn("meat", "pan", within=0.07)
@@ -30,7 +29,7 @@ SEARING_MEAT = Task(
         ObjectSpec(
             "pan",
             ("pan",),
-            Placement("cabinet", size=(0.8, 0.5), pos=(0.0, -1.0), rotation=(-0.2, 0.2)),
+            in_cabinet("cabinet", (0.8, 0.5), rotation=(-0.2, 0.2)),
             graspable=True,
         ),
         ObjectSpec(
