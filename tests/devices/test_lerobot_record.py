@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import os
 import signal
 import subprocess
@@ -36,6 +37,8 @@ def lerobot(command: str, *arguments: str, keys: dict[str, bytes] | None = None)
         stderr=subprocess.STDOUT,
         text=True,
         env=environment,
+        # A shell's background jobs ignore this signal, and so would what they start; in a terminal nobody does.
+        preexec_fn=functools.partial(signal.signal, signal.SIGINT, signal.SIG_DFL),
     )
     said = ""
     assert process.stdout is not None
