@@ -4,7 +4,7 @@
 set -eu
 cd "$(dirname "$0")/.."
 PYTHON=${PYTHON:-.venv/bin/python}
-FIRST="tests/envs tests/policies tests/training"
+FIRST="tests/envs tests/policies tests/training tests/evaluation"
 
 if [ $# -gt 0 ] || [ "$(getconf _NPROCESSORS_ONLN)" -lt 2 ]; then
     exec "$PYTHON" -m pytest "$@"
