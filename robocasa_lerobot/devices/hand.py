@@ -4,15 +4,14 @@ from __future__ import annotations
 
 from typing import Any
 
-from lerobot.teleoperators.teleoperator import Teleoperator
 from lerobot.teleoperators.utils import make_teleoperator_from_config
 
-from robocasa_lerobot.devices.announcements import Announcements
 from robocasa_lerobot.devices.config_hand import RobocasaHandConfig
-from robocasa_lerobot.devices.translation import NAMES, HandTranslator
+from robocasa_lerobot.devices.kitchen_teleoperator import KitchenTeleoperator
+from robocasa_lerobot.devices.translation import HandTranslator
 
 
-class RobocasaHand(Teleoperator):
+class RobocasaHand(KitchenTeleoperator):
     """Reads a gamepad, keyboard or phone through LeRobot and says the kitchen's twelve numbers.
 
     The base stands and the mode is the arm's: these devices have no more axes. A new episode starts with an open hand.
@@ -22,38 +21,15 @@ class RobocasaHand(Teleoperator):
     name = "robocasa_hand"
 
     def __init__(self, config: RobocasaHandConfig) -> None:
-        super().__init__(config)
+        super().__init__(config, lambda again: self._translator.reset())
         self.device = make_teleoperator_from_config(config.of_device())
         self._phone = _phone_step(config) if config.device == "phone" else None
         self._translator = HandTranslator(config.speed, keyboard_axes=config.device == "keyboard_ee")
-        self._announcements = Announcements(lambda again: self._translator.reset())
-        self._connected = False
-
-    @property
-    def action_features(self) -> dict[str, type]:
-        """The twelve numbers by name."""
-        return dict.fromkeys(NAMES, float)
-
-    @property
-    def feedback_features(self) -> dict[str, type]:
-        """None."""
-        return {}
-
-    @property
-    def is_connected(self) -> bool:
-        """Whether the device is."""
-        return self._connected
 
     def connect(self, calibrate: bool = True) -> None:
         """Open the device (a phone is calibrated by that)."""
         self.device.connect()
-        self._announcements.listen()
-        self._connected = True
-
-    @property
-    def is_calibrated(self) -> bool:
-        """Nothing is to be calibrated here."""
-        return True
+        super().connect(calibrate)
 
     def calibrate(self) -> None:
         """Leave it to the device."""
@@ -75,13 +51,9 @@ class RobocasaHand(Teleoperator):
         ask = getattr(self.device, "get_teleop_events", None)
         return dict(ask()) if ask is not None else {}
 
-    def send_feedback(self, feedback: dict[str, Any]) -> None:
-        """Do nothing."""
-
     def disconnect(self) -> None:
         """Close the device."""
-        self._announcements.close()
-        self._connected = False
+        super().disconnect()
         self.device.disconnect()
 
 

@@ -2,20 +2,17 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
-from lerobot.teleoperators.teleoperator import Teleoperator
 from numpy.typing import NDArray
 
 from robocasa_lerobot import contract
 from robocasa_lerobot.demos.replay import demonstrations, read_demonstration
-from robocasa_lerobot.devices.announcements import Announcements
 from robocasa_lerobot.devices.config_replay import RobocasaReplayConfig
+from robocasa_lerobot.devices.kitchen_teleoperator import KitchenTeleoperator
 from robocasa_lerobot.devices.translation import NAMES
 
 
-class RobocasaReplay(Teleoperator):
+class RobocasaReplay(KitchenTeleoperator):
     """Says the actions of a demonstration, one at each `get_action`; after its last one it holds still.
 
     In its kitchen (`--robot.demos` of the same file) they reach the goal again. Raises UserError where there are none.
@@ -25,43 +22,10 @@ class RobocasaReplay(Teleoperator):
     name = "robocasa_replay"
 
     def __init__(self, config: RobocasaReplayConfig) -> None:
-        super().__init__(config)
+        super().__init__(config, self._begin)
         self._chosen = demonstrations([config.demos])
-        self._announcements = Announcements(self._begin)
-        self._connected = False
         self._episode, self._started = 0, False
         self._load()
-
-    @property
-    def action_features(self) -> dict[str, type]:
-        """The twelve numbers by name."""
-        return dict.fromkeys(NAMES, float)
-
-    @property
-    def feedback_features(self) -> dict[str, type]:
-        """None."""
-        return {}
-
-    @property
-    def is_connected(self) -> bool:
-        """Between `connect` and `disconnect`."""
-        return self._connected
-
-    def connect(self, calibrate: bool = True) -> None:
-        """Listen for the beginnings of episodes."""
-        self._announcements.listen()
-        self._connected = True
-
-    @property
-    def is_calibrated(self) -> bool:
-        """Nothing is to be calibrated."""
-        return True
-
-    def calibrate(self) -> None:
-        """Do nothing."""
-
-    def configure(self) -> None:
-        """Do nothing."""
 
     def get_action(self) -> dict[str, float]:
         """The next action of the demonstration."""
@@ -75,14 +39,6 @@ class RobocasaReplay(Teleoperator):
             action = still
         self._step += 1
         return dict(zip(NAMES, action.tolist(), strict=True))
-
-    def send_feedback(self, feedback: dict[str, Any]) -> None:
-        """Do nothing."""
-
-    def disconnect(self) -> None:
-        """Stop listening."""
-        self._announcements.close()
-        self._connected = False
 
     def _begin(self, again: bool) -> None:
         if self._started and not again:

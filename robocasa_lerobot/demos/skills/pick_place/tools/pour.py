@@ -19,12 +19,9 @@ from robocasa_lerobot.demos.motion import (
 )
 from robocasa_lerobot.demos.skills.common import SkillError, move_hand, stage_done
 from robocasa_lerobot.demos.skills.pick_place.by_handle import PAN_BY_THE_HANDLE
-from robocasa_lerobot.demos.skills.pick_place.carrying.carry import carry_to, in_reach, standing_pose_for
 from robocasa_lerobot.demos.skills.pick_place.carrying.level import level_out, levelled
 from robocasa_lerobot.demos.skills.pick_place.graspable import Graspable, graspable
-from robocasa_lerobot.demos.skills.pick_place.location import locate
-from robocasa_lerobot.demos.skills.pick_place.pick import is_held
-from robocasa_lerobot.demos.skills.pick_place.verbs import take
+from robocasa_lerobot.demos.skills.pick_place.tools.brought import bring
 from robocasa_lerobot.demos.skills.reaching import Held, MotionPlan, WaypointPath, approach, follow_with, plan_reach
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.scene.robot_poses import RobotPose
@@ -76,12 +73,7 @@ def pour(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
         obj = graspable(env, stage.object)
         if not obj.contents:
             raise SkillError(f"{obj.title} is empty, but what was in it is not where it belongs")
-        if not is_held(env, obj.name):
-            yield from take(env, obj, PAN_BY_THE_HANDLE)
-        middle = env.data.body(target).xpos.copy()
-        fixture = locate(env, target).fixture
-        if fixture is not None and not in_reach(env, middle):
-            yield from carry_to(env, obj, standing_pose_for(env, fixture, middle), middle)
+        yield from bring(env, obj, target, PAN_BY_THE_HANDLE, towards_target=True)
         obj = graspable(env, stage.object)
         held = Held.now(env.data, obj.name, obj.contents)
         yield from approach(env, partial(_plan, env, obj, target, failed), CLOSED, held)

@@ -11,11 +11,8 @@ import numpy as np
 from robocasa_lerobot.demos.motion import CLOSED, UP, Array, HandTarget, arm_action, grip_position, rotation_about
 from robocasa_lerobot.demos.skills.common import SkillError, move_hand, stage_done
 from robocasa_lerobot.demos.skills.pick_place.by_handle import TOOL_BY_THE_HANDLE, WorkingEnd, working_end
-from robocasa_lerobot.demos.skills.pick_place.carrying.carry import carry_to, in_reach, standing_pose_for
 from robocasa_lerobot.demos.skills.pick_place.graspable import Graspable, contents_of, graspable
-from robocasa_lerobot.demos.skills.pick_place.location import locate
-from robocasa_lerobot.demos.skills.pick_place.pick import is_held
-from robocasa_lerobot.demos.skills.pick_place.verbs import take
+from robocasa_lerobot.demos.skills.pick_place.tools.brought import bring
 from robocasa_lerobot.demos.skills.reaching import Held, MotionPlan, WaypointPath, approach, follow_with, plan_reach
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.scene.drawn import PlacedObject
@@ -23,10 +20,8 @@ from robocasa_lerobot.envs.scene.robot_poses import RobotPose
 from robocasa_lerobot.envs.tasks.task import Stage
 
 ATTEMPTS, ROUNDS = 3, 8
-RADII, ROUND_RAD = (
-    (0.50, 0.65, 0.40, 0.58),
-    8.0,
-)  # shares of the room from the middle, and how far round before it turns back
+RADII = (0.50, 0.65, 0.40, 0.58)  # shares of the room, from the middle
+ROUND_RAD = 8.0  # how far round before it turns back
 AHEAD_RAD, STILL_RAD, STILL_STEPS = 0.45, 0.01, 16  # of the tip; it turns back where it makes no headway
 DIRECTIONS = 12
 TILTS = tuple(float(np.deg2rad(tilt)) for tilt in (0.0, 15.0, 30.0, 45.0, 58.0))  # of the tool from the vertical
@@ -50,12 +45,7 @@ def stir(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
     vessel = env.scene.fill(stage.target)
     for _ in range(ATTEMPTS):
         obj = graspable(env, stage.object)
-        if not is_held(env, obj.name):
-            yield from take(env, obj, TOOL_BY_THE_HANDLE)
-        middle = env.data.body(vessel).xpos.copy()
-        fixture = locate(env, vessel).fixture
-        if fixture is not None and not in_reach(env, middle):
-            yield from carry_to(env, obj, standing_pose_for(env, fixture, middle))
+        yield from bring(env, obj, vessel, TOOL_BY_THE_HANDLE)
         choice = yield from approach(env, partial(_choose, env, obj, vessel), CLOSED, Held.now(env.data, obj.name))
         yield from follow_with(env, choice.joints, Held.now(env.data, obj.name))
         over, inside, *_ = choice.path.targets

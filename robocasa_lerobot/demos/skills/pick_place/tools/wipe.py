@@ -19,14 +19,12 @@ from robocasa_lerobot.demos.motion import (
     rotation_about,
 )
 from robocasa_lerobot.demos.skills.common import SkillError, hold_hand, move_hand, stage_done
-from robocasa_lerobot.demos.skills.pick_place.carrying.carry import carry_to, in_reach, standing_pose_for
 from robocasa_lerobot.demos.skills.pick_place.carrying.level import levelled
 from robocasa_lerobot.demos.skills.pick_place.grasp_strategy import ANY_APPROACH
 from robocasa_lerobot.demos.skills.pick_place.graspable import Graspable, graspable
-from robocasa_lerobot.demos.skills.pick_place.location import locate
 from robocasa_lerobot.demos.skills.pick_place.pick import INTEGRAL_GAIN, is_held
 from robocasa_lerobot.demos.skills.pick_place.place import RELEASE_STEPS, leave
-from robocasa_lerobot.demos.skills.pick_place.verbs import take
+from robocasa_lerobot.demos.skills.pick_place.tools.brought import bring
 from robocasa_lerobot.demos.skills.reaching import Held, MotionPlan, WaypointPath, approach, follow_with, plan_reach
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.scene.robot_poses import RobotPose
@@ -54,12 +52,7 @@ def wipe(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
     surface = env.scene.fill(stage.target)
     for attempt in range(ATTEMPTS):
         obj = graspable(env, stage.object)
-        if not is_held(env, obj.name):
-            yield from take(env, obj, ANY_APPROACH)
-        middle = env.data.body(surface).xpos.copy()
-        fixture = locate(env, surface).fixture
-        if fixture is not None and not in_reach(env, middle):
-            yield from carry_to(env, obj, standing_pose_for(env, fixture, middle))
+        yield from bring(env, obj, surface, ANY_APPROACH)
         choice = yield from approach(env, partial(_choose, env, obj, surface), CLOSED, Held.now(env.data, obj.name))
         yield from follow_with(env, choice.joints, Held.now(env.data, obj.name))
         yield from _rub(env, obj, *choice.path.targets, lane_first=attempt)
