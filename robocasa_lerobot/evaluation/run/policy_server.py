@@ -141,7 +141,7 @@ class _Server:
             self._parent.send(Alive())
 
 
-class RemotePolicy:
+class PolicyConnection:
     """A worker's side: connects when it is needed, and again after the server was replaced.
 
     Args:

@@ -29,7 +29,7 @@ from robocasa_lerobot.evaluation.remote.failures import LostError
 from robocasa_lerobot.evaluation.remote.translation import UnfitEnvError
 from robocasa_lerobot.evaluation.run.film import Film, NoPicturesError
 from robocasa_lerobot.evaluation.run.messages import Alive, Finished, Ready, Refused
-from robocasa_lerobot.evaluation.run.policy_server import RemotePolicy
+from robocasa_lerobot.evaluation.run.policy_server import PolicyConnection
 from robocasa_lerobot.evaluation.run.processes import take_over
 from robocasa_lerobot.evaluation.run.rollout import DivergedError, Outcome, horizon_of, run_trial
 from robocasa_lerobot.evaluation.run.success import SuccessRule
@@ -92,7 +92,7 @@ def worker_main(
 class _Worker:
     def __init__(self, connection: Connection, settings: WorkerSettings, server: str | None) -> None:
         self._connection, self._settings = connection, settings
-        self._remote = None if server is None else RemotePolicy(server, self._alive)
+        self._remote = None if server is None else PolicyConnection(server, self._alive)
         self._policy: tuple[str, Actor] | None = None
         self._env: tuple[tuple[Any, ...], gymnasium.Env[Any, Any]] | None = None
 
