@@ -6,12 +6,13 @@ import gc
 import os
 import shutil
 import subprocess
+import sys
 import tempfile
 from pathlib import Path
 
 import pytest
-import task_selection
 from hypothesis import settings
+from task_sample import SAMPLE_VARIABLE
 
 from robocasa_lerobot import gl
 
@@ -26,9 +27,12 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption("--task-sample", metavar="TEXT", help="draw the fast tests' tasks by this (default: the commit)")
 
 
-def pytest_report_header(config: pytest.Config) -> str:
-    sample = os.environ[task_selection.SAMPLE_VARIABLE]
-    return f"tasks beside the usual ones: {', '.join(task_selection.drawn())}; again with --task-sample={sample}"
+def pytest_report_collectionfinish() -> str | None:
+    selection = sys.modules.get("task_selection")  # only where a test module asked for tasks: it loads all of them
+    if selection is None:
+        return None
+    sample = os.environ[SAMPLE_VARIABLE]
+    return f"tasks beside the usual ones: {', '.join(selection.drawn())}; again with --task-sample={sample}"
 
 
 def _commit() -> str:
@@ -41,7 +45,7 @@ def pytest_configure(config: pytest.Config) -> None:
     config.stash[_CACHE] = cache = tempfile.mkdtemp(prefix="robocasa_lerobot_tests_")
     os.environ.update(HF_HOME=cache, HF_HUB_OFFLINE="1", WANDB_MODE="disabled")
     # Tiny networks: more threads only wait for each other (12 s became 150 s beside other work on two cores).
-    os.environ[task_selection.SAMPLE_VARIABLE] = config.getoption("--task-sample") or _commit()
+    os.environ[SAMPLE_VARIABLE] = config.getoption("--task-sample") or _commit()
     os.environ.setdefault("OMP_NUM_THREADS", "1")
 
 

@@ -14,12 +14,12 @@ from typing import Any
 
 import pytest
 from tiny_checkpoint import SIZE
+from trial_faults import REASONS, assert_faults_cost_only_their_trials
 
 from robocasa_lerobot.cli import main
 from robocasa_lerobot.errors import UserError
 from robocasa_lerobot.evaluation.config.evaluation import EvaluationConfig
 from robocasa_lerobot.evaluation.config.loader import load_config
-from robocasa_lerobot.evaluation.planning.trials import trial_seed
 from robocasa_lerobot.evaluation.records.results import TRIALS_FILE, TrialRecord, read_results
 from robocasa_lerobot.evaluation.run import engine
 from robocasa_lerobot.evaluation.run.merging import merge
@@ -155,31 +155,6 @@ def test_slurm_runs_the_shards_and_joins_them(
     assert main(command) == 2, "the number of shards is needed"
 
 
-# Ten in a hundred trials have a fault, in both attempts.
-FAULTS = {1: "crash", 5: "hang", 9: "sigkill", 14: "nan"}
-REASONS = {
-    "crash": ("crashed", "RuntimeError: the block fell off"),
-    "hang": ("hung", "no progress for 3 s"),
-    "sigkill": ("crashed", "ended by SIGKILL"),
-    "nan": ("diverged", "proprioception is not finite after step 2"),
-}
-
-
 def test_faulty_trials_cost_only_themselves(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     own: dict[str, Any] = {"policy": "zero", "env.tasks": "Slide", "trials": 40, "workers": 2, "stall_seconds": 3}
-    healthy = evaluate(tmp_path / "healthy", **own)
-    # Only trials that get to their second step can be faulty there.
-    chosen = dict(zip([r.trial for r in healthy if r.steps > 2], FAULTS.values(), strict=False))
-    faulty = {str(trial_seed(0, "Slide", trial)): kind for trial, kind in chosen.items()}
-    monkeypatch.setenv("SLIDE_FAULTY_SEEDS", json.dumps(faulty))
-    records = evaluate(tmp_path / "out", **own)
-    assert len(records) == 40
-    for record, well in zip(records, healthy, strict=True):
-        if record.trial not in chosen:
-            assert record.comparable() == well.comparable()
-            continue
-        outcome, words = REASONS[chosen[record.trial]]
-        assert (record.outcome, record.first_outcome, record.attempts) == (outcome, outcome, 2)
-        assert words in str(record.error)
-        assert words in str(record.first_error)
-        assert not record.success
+    assert_faults_cost_only_their_trials(evaluate, own, REASONS, tmp_path, monkeypatch)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import ast
 import dataclasses
 import io
-import json
 import os
 import signal
 import subprocess
@@ -16,7 +15,9 @@ from typing import Any
 
 import numpy as np
 import pytest
+import trial_faults
 from tiny_checkpoint import SIZE
+from trial_faults import assert_faults_cost_only_their_trials
 
 from robocasa_lerobot.cli import main
 from robocasa_lerobot.errors import UserError
@@ -141,30 +142,13 @@ def _alive(pid: int) -> bool:
     return state != "Z"
 
 
-FAULTS = {1: "crash", 5: "hang", 9: "sigkill", 14: "nan"}
-REASONS = {
-    "crash": ("crashed", "RuntimeError: the block fell off"),
-    "hang": ("hung", "no progress for 3 s"),
-    "sigkill": ("crashed", "the simulator's process was ended by SIGKILL"),
-    "nan": ("diverged", "proprioception is not finite after step 2"),
-}
+REASONS = {**trial_faults.REASONS, "sigkill": ("crashed", "the simulator's process was ended by SIGKILL")}
 
 
 def test_faulty_trials_cost_only_themselves(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     own: dict[str, Any] = {"policy": "zero", "env.tasks": "Slide", "trials": 12, "workers": 2, "stall_seconds": 3}
     own["env.factory"] = SLIDE
-    healthy = evaluate(tmp_path / "healthy", **own)
-    chosen = dict(zip([r.trial for r in healthy if r.steps > 2], FAULTS.values(), strict=False))
-    assert len(chosen) == len(FAULTS)
-    faulty = {str(trial_seed(0, "Slide", trial)): kind for trial, kind in chosen.items()}
-    monkeypatch.setenv("SLIDE_FAULTY_SEEDS", json.dumps(faulty))
-    for record, well in zip(evaluate(tmp_path / "out", **own), healthy, strict=True):
-        if record.trial not in chosen:
-            assert record.comparable() == well.comparable()
-            continue
-        outcome, words = REASONS[chosen[record.trial]]
-        assert (record.outcome, record.first_outcome, record.attempts) == (outcome, outcome, 2)
-        assert words in str(record.error)
+    assert_faults_cost_only_their_trials(evaluate, own, REASONS, tmp_path, monkeypatch)
 
 
 def test_what_a_simulator_prints_is_no_answer_and_nonsense_has_a_cause(tmp_path: Path) -> None:

@@ -8,6 +8,7 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 import pytest
+from task_sample import SAMPLE_VARIABLE
 
 from robocasa_lerobot.benchmark.tasks import facts_of
 from robocasa_lerobot.demos.demonstrator import can_demonstrate
@@ -16,7 +17,6 @@ from robocasa_lerobot.envs.tasks.task import Task
 
 # Among the fast tests: one task of every sort that is declared, and one of every sort that a demonstrator solves.
 _SORTS = ("OpenFridge", "TurnOnStove", "PickPlaceToasterToCounter")
-SAMPLE_VARIABLE = "ROBOCASA_LEROBOT_TASK_SAMPLE"  # set by conftest: the commit, or what --task-sample says
 _SOLVED = ("OpenDrawer", "CloseDrawer", "PickPlaceCounterToSink")
 
 
