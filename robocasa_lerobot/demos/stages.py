@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from robocasa_lerobot.demos.motion import Array, action, base_pose
+from robocasa_lerobot.demos.planning.base_room import wrap
 from robocasa_lerobot.demos.skills import SKILLS, SkillError
 from robocasa_lerobot.demos.skills.common import stage_done, wait_for_stage
 from robocasa_lerobot.demos.skills.fold import fold_arm
@@ -115,7 +116,7 @@ def _stand_before(env: KitchenEnv, stage: Stage, most_m: float) -> Iterator[Arra
     if not stage.target or stage.target not in env.scene.roles:
         return
     stand, (base, yaw) = env.scene.standing_pose(stage.target), base_pose(env.data)
-    turned = abs(float(np.arctan2(np.sin(stand.yaw - yaw), np.cos(stand.yaw - yaw))))
+    turned = abs(wrap(stand.yaw - yaw))
     if np.hypot(stand.x - base[0], stand.y - base[1]) > most_m or turned > FAR_OFF_RAD:
         with contextlib.suppress(SkillError):
             yield from drive_to(env, stand.x, stand.y, stand.yaw)

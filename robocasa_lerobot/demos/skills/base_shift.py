@@ -15,6 +15,7 @@ from robocasa_lerobot.demos.motion import (
     floor_axes,
     limit,
 )
+from robocasa_lerobot.demos.planning.base_room import wrap
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 
 _BASE_TOLERANCE_M = 0.02
@@ -30,7 +31,7 @@ def shift_base(env: KitchenEnv, shift: tuple[float, float], gripper: float, max_
         if float(np.hypot(away[0], away[1])) < _BASE_TOLERANCE_M:
             break
         wanted = limit(floor_axes(now) @ away * 2.5, 0.5)
-        turn = float(np.arctan2(np.sin(yaw - now), np.cos(yaw - now)))
+        turn = wrap(yaw - now)
         command = [_beyond_dead_zone(float(v)) for v in (*wanted, turn if abs(turn) > 0.02 else 0.0)]
         yield action(gripper=gripper, base=np.array([*command, 0.0]), mode=FROM_DESIRED)
     for _ in range(3):

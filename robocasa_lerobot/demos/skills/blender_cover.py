@@ -24,6 +24,7 @@ from robocasa_lerobot.demos.motion import (
     hand_rotation,
     rotation_about,
 )
+from robocasa_lerobot.demos.planning.base_room import wrap
 from robocasa_lerobot.demos.planning.follow import follow_joint_path
 from robocasa_lerobot.demos.skills.blender_lid import (
     ATTEMPTS,
@@ -211,7 +212,7 @@ def _lid_turns(env: KitchenEnv, blender: Blender, turn: Array) -> list[tuple[Arr
     found = []
     for quarter in range(4):
         goal = blender.yaw + quarter * np.pi / 2
-        more = abs(float(np.arctan2(np.sin(goal - yaw), np.cos(goal - yaw))))
+        more = abs(wrap(goal - yaw))
         found.append((rotation_about(UP, goal), TURN_COST * more))
     return found
 

@@ -9,6 +9,7 @@ from functools import partial
 import numpy as np
 
 from robocasa_lerobot.demos.motion import CLOSED, UP, Array, HandTarget, arm_action, grip_position, rotation_about
+from robocasa_lerobot.demos.planning.base_room import wrap
 from robocasa_lerobot.demos.skills.common import SkillError, move_hand, stage_done
 from robocasa_lerobot.demos.skills.pick_place.by_handle import TOOL_BY_THE_HANDLE, WorkingEnd, working_end
 from robocasa_lerobot.demos.skills.pick_place.graspable import Graspable, contents_of, graspable
@@ -77,7 +78,7 @@ def _rounds(env: KitchenEnv, stage: Stage, obj: Graspable, vessel: str, inside: 
             if over():
                 return
             now = _angle(middle, _tip(env, obj, end))
-            step = float(np.arctan2(np.sin(now - before), np.cos(now - before))) * way
+            step = wrap(now - before) * way
             turned, before = turned + step, now
             still = still + 1 if step < STILL_RAD else 0
             yield _towards(env, obj, end, inside, _at(env, vessel, middle, now + way * AHEAD_RAD, share))
