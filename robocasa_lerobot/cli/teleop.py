@@ -15,7 +15,6 @@ EXAMPLE = (
     "robocasa-lerobot teleop --task OpenDrawer --split pretrain --episodes 20 --out demos/\n"
     "  robocasa-lerobot teleop --task OpenDrawer --policy outputs/demo/finetune --episodes 10 --out corrections/"
 )
-LOOPBACK = ("127.0.0.1", "localhost", "::1")
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
@@ -84,8 +83,10 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _announce(server: TeleopServer, loop: ControlLoop) -> None:
+    from robocasa_lerobot.serving.access import is_loopback
+
     print(f"open {server.address}", flush=True)
-    if server.host not in LOOPBACK:
+    if not is_loopback(server.host):
         print("anybody who has this address can drive; nothing else is served", flush=True)
     elif "SSH_CONNECTION" in os.environ:
         machine = os.environ["SSH_CONNECTION"].split()[2]

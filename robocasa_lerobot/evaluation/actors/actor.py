@@ -11,6 +11,8 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from robocasa_lerobot.policies.common.look_back import LookBack
+
 Observation = dict[str, Any]
 
 
@@ -100,18 +102,15 @@ class ChunkActor:
         self.time = ActingTime()
         self._seed, self._number, self._step = seed, 0, 0
         self._queue: collections.deque[NDArray[np.float32]] = collections.deque()
-        self._seen: dict[int, Observation] = {}  # by step; those that a later chunk can still look back at
+        self._back: LookBack[Observation] = LookBack(self._shape.offsets, self._shape.executed)
 
     def act(self, observation: Observation, instruction: str) -> NDArray[np.float32]:
         """The next action of the chunk, or the first of a new one."""
-        step, oldest = self._step, self._shape.offsets[0]
+        step = self._step
         self._step += 1
-        if self.sees(step):
-            self._seen[step] = observation
+        self._back.note(step, observation)
         if not self._queue:
-            seen = tuple(self._seen[max(0, step + offset)] for offset in self._shape.offsets)
-            self._seen = {at: one for at, one in self._seen.items() if at == 0 or at > step + oldest}
-            request = ChunkRequest(self._label, seen, instruction, self._seed, self._number)
+            request = ChunkRequest(self._label, self._back.at(step), instruction, self._seed, self._number)
             started = time.perf_counter()
             reply = self._predict(request)
             self.time.policy += reply.seconds
@@ -122,4 +121,4 @@ class ChunkActor:
 
     def sees(self, step: int) -> bool:
         """Whether a chunk that is predicted at step `step` or later looks at it."""
-        return any((step - offset) % self._shape.executed == 0 for offset in self._shape.offsets)
+        return self._back.sees(step)

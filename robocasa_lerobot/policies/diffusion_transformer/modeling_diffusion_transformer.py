@@ -21,6 +21,7 @@ from robocasa_lerobot.policies.common.chunks import (
     starting_noise,
     target_actions,
 )
+from robocasa_lerobot.policies.common.look_back import LookBack
 from robocasa_lerobot.policies.common.traced import Traced
 from robocasa_lerobot.policies.diffusion_transformer.configuration_diffusion_transformer import (
     DiffusionTransformerConfig,
@@ -145,13 +146,13 @@ class DiffusionTransformerPolicy(PreTrainedPolicy):
         """Forget observations and planned actions; called at the start of an episode."""
         self._planned: deque[Tensor] = deque()
         self._step = 0
-        self._seen: dict[int, dict[str, Tensor]] = {}  # by step; those that a later chunk can still look back at
+        config = self.config
+        self._back: LookBack[dict[str, Tensor]] = LookBack(config.observation_delta_indices, config.n_action_steps)
 
     @property
     def needs_observation(self) -> bool:
         """Whether the observation of the next `select_action` will be looked at, now or as the history of a chunk."""
-        every = self.config.n_action_steps
-        return any((self._step - offset) % every == 0 for offset in self.config.observation_delta_indices)
+        return self._back.sees(self._step)
 
     @torch.no_grad()
     def select_action(
@@ -165,12 +166,9 @@ class DiffusionTransformerPolicy(PreTrainedPolicy):
             generator: likewise.
         """
         if self.needs_observation:
-            self._seen[self._step] = {key: batch[key] for key in self._observed_keys}
+            self._back.note(self._step, {key: batch[key] for key in self._observed_keys})
         if not self._planned:
-            offsets = self.config.observation_delta_indices
-            steps = [self._seen[max(0, self._step + offset)] for offset in offsets]
-            oldest = self._step + offsets[0]
-            self._seen = {at: one for at, one in self._seen.items() if at == 0 or at > oldest}
+            steps = self._back.at(self._step)
             stacked = {key: torch.stack([step[key] for step in steps], dim=1) for key in self._observed_keys}
             for key in (OBS_LANGUAGE_TOKENS, OBS_LANGUAGE_ATTENTION_MASK):
                 if key in batch:
