@@ -27,6 +27,7 @@ from robocasa_lerobot import contract
 from robocasa_lerobot.errors import suggest
 from robocasa_lerobot.evaluation.actors.actor import Observation
 from robocasa_lerobot.serving.request import RequestError
+from robocasa_lerobot.wire.codec import text_of
 
 LEFT, RIGHT, WRIST = contract.CAMERAS
 # What other peers call the cameras, beside the contract's names; after `video.`, `images.` or nothing.
@@ -119,7 +120,7 @@ def flatten(message: Any, depth: int = 4) -> dict[str, Any]:
         raise RequestError(f"observation: found {_what(message)}, expected a map.")
     out: dict[str, Any] = {}
     for key, value in message.items():
-        name = key.decode("utf-8", "replace") if isinstance(key, bytes) else key
+        name = text_of(key)
         if not isinstance(name, str):
             raise RequestError(f"observation: found the key {name!r:.60}, expected text.")
         if isinstance(value, Mapping):

@@ -88,6 +88,11 @@ def decode(data: bytes, max_bytes: int = MAX_MESSAGE_BYTES) -> Any:
         raise WireError(f"not a readable msgpack message: {type(error).__name__}: {error}") from error
 
 
+def text_of(key: Any) -> Any:
+    """A map's key as text where it is bytes, which some dialects write; others as they are."""
+    return key.decode("utf-8", "replace") if isinstance(key, bytes) else key
+
+
 def _array_to_map(array: np.ndarray, dialect: Dialect) -> dict[Any, Any]:
     if array.dtype.kind not in KINDS:
         raise WireError(f"an array of dtype {array.dtype} cannot be sent; booleans, integers and floats can")
@@ -113,7 +118,7 @@ def _scalar_to_map(value: np.generic, dialect: Dialect) -> Any:
 
 def _from_map(raw: dict[Any, Any]) -> Any:
     """A decoded map, or the array that it stands for."""
-    text = {key.decode("utf-8", "replace") if isinstance(key, bytes) else key: value for key, value in raw.items()}
+    text = {text_of(key): value for key, value in raw.items()}
     if "__ndarray__" in text:
         return _to_array(text, "dtype")
     if "nd" in text and "type" in text:

@@ -20,6 +20,7 @@ from robocasa_lerobot.evaluation.remote.described import OURS, is_ours, map_of_o
 from robocasa_lerobot.evaluation.remote.failures import LostError, RemoteError
 from robocasa_lerobot.evaluation.remote.key_map import AUTO, KeyMap, from_tree, load_key_map, presets, with_executed
 from robocasa_lerobot.evaluation.remote.probe import probe
+from robocasa_lerobot.wire.codec import text_of
 
 UNKNOWN_WEIGHTS = "unknown:"  # what fingerprints begin with: nobody can see the weights behind a socket
 _LONG_ARRAY, _LONG_TEXT = 64, 2000
@@ -146,7 +147,7 @@ def _presets_for(protocol: str) -> list[str]:
 def plain(value: Any) -> Any:
     """A decoded message in values of JSON: long texts and arrays are shortened to what they are."""
     if isinstance(value, Mapping):
-        return {_text(key): plain(one) for key, one in value.items()}
+        return {str(text_of(key)): plain(one) for key, one in value.items()}
     if isinstance(value, list | tuple):
         return [plain(one) for one in value]
     if isinstance(value, np.ndarray | np.generic):
@@ -159,7 +160,3 @@ def plain(value: Any) -> Any:
         return value
     text = str(value)
     return text if len(text) <= _LONG_TEXT else text[:_LONG_TEXT] + "..."
-
-
-def _text(key: Any) -> str:
-    return key.decode("utf-8", "replace") if isinstance(key, bytes) else str(key)

@@ -13,6 +13,7 @@ from robocasa_lerobot.errors import UserError, suggest
 from robocasa_lerobot.evaluation.remote.failures import AnswerError
 from robocasa_lerobot.evaluation.remote.key_map import ActionKey, CameraKey, KeyMap, path_of
 from robocasa_lerobot.evaluation.remote.pictures import resized
+from robocasa_lerobot.wire.codec import text_of
 
 _SHOWN = 12
 
@@ -89,7 +90,7 @@ def flat_shapes(message: Mapping[Any, Any], prefix: str = "") -> dict[str, str]:
     """Every entry of a nested map with its type and shape, for errors."""
     out: dict[str, str] = {}
     for key, value in message.items():
-        name = prefix + (key.decode("utf-8", "replace") if isinstance(key, bytes) else str(key))
+        name = prefix + str(text_of(key))
         if isinstance(value, Mapping):
             out |= flat_shapes(value, f"{name} > ")
         elif isinstance(value, np.ndarray):
@@ -153,7 +154,7 @@ def _array(one: ActionKey, answer: Mapping[str, Any], executed: int) -> NDArray[
     expected = f"numbers of shape (at least {executed}, {width})"
     found: Any = answer
     for name in path_of(one.key):
-        inside = {(k.decode("utf-8", "replace") if isinstance(k, bytes) else k): v for k, v in found.items()}
+        inside = {text_of(key): value for key, value in found.items()}
         if name not in inside:
             names = flat_shapes(answer)
             raise AnswerError(

@@ -92,6 +92,5 @@ def load_pilot(policy: str, task: str, device: str = "auto", keys: str = "") -> 
 
     asked = PolicySettings(path=[policy], keys=[keys] if keys else [])
     (source,), size = open_sources(EvaluationConfig(policy=asked, env=EnvSettings(tasks=[task])))
-    here = not (source.is_reference or source.remote)
-    where = pick_device(device) if here else "cpu"
+    where = pick_device(device) if source.is_checkpoint else "cpu"
     return Pilot(source.label, lambda: load_actor(source, where, None)), size
