@@ -66,3 +66,29 @@ def test_flat_rings_are_held_across_their_holes(name: str) -> None:
     items = [instance(CATEGORIES[name], index) for index in range(INSTANCES_PER_CATEGORY)]
     across = [any(spans_a_hole(item, pose) for pose in grasp_poses(item, PANDA_OMRON.gripper)) for item in items]
     assert sum(across) >= 0.8 * len(items)
+
+
+def test_what_is_held_is_filled_and_the_open_hand_meets_nothing() -> None:
+    """Every pose of several objects, against Qhull's hulls: filled inside the pads, empty where the fingers come."""
+    gripper = PANDA_OMRON.gripper
+    rng = np.random.default_rng(5)
+    poses = 0
+    for name in sorted(CATEGORIES)[::12]:
+        item = instance(CATEGORIES[name], int(rng.integers(INSTANCES_PER_CATEGORY)))
+        hulls = [ConvexHull(solid.cloud()).equations for solid in pieces(item)]
+
+        def filled(points: np.ndarray, slack: float, hulls: list[np.ndarray] = hulls) -> np.ndarray:
+            return np.any([(points @ f[:, :3].T + f[:, 3] < slack).all(axis=1) for f in hulls], axis=0)
+
+        for pose in grasp_poses(item, gripper):
+            poses += 1
+            along, across, up = pose.rotation[:, 1], pose.rotation[:, 0], np.array([0.0, 0.0, 1.0])
+            beside = np.linspace(gripper.finger_inner + 1e-4, gripper.finger_outer - 1e-4, 60)
+            t = np.concatenate([-beside, beside])
+            for side in (-gripper.finger_half_width, 0.0, gripper.finger_half_width):
+                for rise in (0.001 - gripper.tips_below_grip, 0.0, 0.02):
+                    line = pose.position + side * across + rise * up + t[:, None] * along
+                    assert not filled(line, -1e-5).any(), (name, pose)
+            ends = pose.position + np.array([[-1.0], [1.0]]) * (pose.width / 2 - 1e-3) * along
+            assert any(filled(ends - below * up, 1e-4).all() for below in (0.002, 0.010)), (name, pose)
+    assert poses > 100
