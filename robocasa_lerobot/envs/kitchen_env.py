@@ -179,6 +179,13 @@ class KitchenEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         assert self._data is not None
         return self._data
 
+    @property
+    def controller(self) -> Controller:
+        """What drives the robot in the running episode."""
+        if self._controller is None:
+            raise UserError("the env has no scene yet, and so no controller in it: call reset() first.")
+        return self._controller
+
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Observation, dict[str, Any]]:

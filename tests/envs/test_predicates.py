@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any
-
 import mujoco
 import numpy as np
 import pytest
 from goal_states import hold, put_object, write
+from predicate_scenes import SINK, STOVE, Change, beside, check_hits_and_misses, shift, state
 
 from robocasa_lerobot.envs.kitchens.appliances.kinds.sink import Sink
 from robocasa_lerobot.envs.kitchens.appliances.kinds.stove import ON_FROM, Hob
@@ -33,65 +31,18 @@ from robocasa_lerobot.envs.predicates import (
     parts_with_memory,
 )
 from robocasa_lerobot.envs.predicates.logic import every_goal_in, terms_by_name
-from robocasa_lerobot.envs.predicates.objects import middle_of, radius
+from robocasa_lerobot.envs.predicates.objects import radius
 from robocasa_lerobot.envs.scene.build import build_scene
 from robocasa_lerobot.envs.scene.scene import Scene
-from robocasa_lerobot.envs.scene.scene_spec import SceneSpec
-from robocasa_lerobot.envs.scene.spec import (
-    FixtureSpec,
-    InsideOf,
-    ObjectSpec,
-    OnCounter,
-    Placement,
-    RobotStart,
-    SampleRegion,
-)
 from robocasa_lerobot.envs.tasks.registry import get_task, task_names
 from robocasa_lerobot.envs.tasks.typical import goal_of
 from robocasa_lerobot.errors import UserError
-
-HOB_Z_M = (0.7, 1.2)  # not the oven
-BURNER = Placement(
-    "stove", region=SampleRegion(name="any", height=HOB_Z_M), size=(0.02, 0.02), pos=(0.0, 0.0), ensure_inside=False
-)
-STOVE = SceneSpec(
-    name="TwoOnAStove",
-    fixtures=(FixtureSpec("stove", "stove"),),
-    robot_start=RobotStart("stove"),
-    objects=(ObjectSpec("pan", ("pan",), BURNER), ObjectSpec("pot", ("pot",), BURNER)),
-    instruction="Cook.",
-)
-SINK = SceneSpec(
-    name="OneInASink",
-    fixtures=(FixtureSpec("sink", "sink"),),
-    robot_start=RobotStart("sink"),
-    objects=(
-        ObjectSpec("obj", ("sponge",), OnCounter("sink", loc="left_right", size=(0.30, 0.30))),
-        ObjectSpec("distr_counter", ("apple",), OnCounter("sink", loc="left_right", size=(0.30, 0.40))),
-        ObjectSpec("distr_sink", ("bowl",), InsideOf("sink", size=(0.25, 0.25), at=1.0)),
-    ),
-    instruction="Wash.",
-)
-type Change = Callable[[Scene, mujoco.MjData], Any]
 
 
 @pytest.fixture(scope="module")
 def scenes() -> dict[str, Scene]:
     """By the role of the fixture that they are about."""
     return {"stove": build_scene(STOVE, "target", 4), "sink": build_scene(SINK, "target", 0)}
-
-
-def state(scene: Scene) -> mujoco.MjData:
-    return scene.initial_data(np.random.default_rng(0))[0]
-
-
-def shift(name: str, x: float = 0.0, y: float = 0.0, z: float = 0.0) -> Change:
-    """Move an object, metres."""
-
-    def change(scene: Scene, data: mujoco.MjData) -> None:
-        put_object(scene, data, name, middle_of(scene, data, name) + np.array([x, y, z]))
-
-    return change
 
 
 def away_from_stream(share: float) -> Change:
@@ -135,15 +86,6 @@ def fist(scene: Scene, data: mujoco.MjData) -> None:
     grip = data.site(scene.robot.names.grip_site)
     ahead = scene.robot.gripper.tips_below_grip + scene.objects["obj"].item.size[2] / 2 - 0.006
     data.joint("obj_joint0").qpos[:3] = grip.xpos + ahead * grip.xmat.reshape(3, 3)[:, 2]
-
-
-def beside(name: str, other: str, x: float, z: float = 0.0) -> Change:
-    """Put an object's origin beside another's, metres."""
-
-    def change(scene: Scene, data: mujoco.MjData) -> None:
-        data.joint(f"{name}_joint0").qpos[:3] = data.body(other).xpos + np.array([x, 0.0, z])
-
-    return change
 
 
 def onto(burner: int, name: str = "pan") -> Change:
@@ -247,16 +189,7 @@ CASES: dict[str, tuple[str, Goal, list[Change], list[Change]]] = {
 @pytest.mark.parametrize("case", CASES)
 def test_it_holds_in_its_state_and_in_no_near_miss(case: str, scenes: dict[str, Scene]) -> None:
     where, goal, hits, misses = CASES[case]
-    scene = scenes[where]
-    data = state(scene)
-    write(goal, scene, data)
-    assert hold(goal, scene, data) is None
-    for number, change in enumerate([*hits, *misses]):
-        data = state(scene)
-        write(goal, scene, data)
-        hold(goal, scene, data)  # positions are evaluated, which changes start from
-        change(scene, data)
-        assert (hold(goal, scene, data) is None) == (number < len(hits)), f"change {number}"
+    check_hits_and_misses(scenes[where], goal, hits, misses)
 
 
 def test_every_predicate_that_can_be_missed_by_little_is_among_the_cases() -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from typing import Literal
 
 import mujoco
 import numpy as np
@@ -114,6 +115,15 @@ def test_objects_start_scaled_by_axis_with_what_is_in_them(group: str, scale: Sc
     assert found[scale].model == found[1.0].model
     ratio = np.asarray(found[scale].size) / np.asarray(found[1.0].size)
     assert ratio == pytest.approx(np.broadcast_to(scale, 3), rel=1e-3)
+
+
+@pytest.mark.parametrize(("split", "seed"), [("target", 100_200), ("target", 100_201), ("pretrain", 100_200)])
+def test_a_bowl_is_not_thrown_off_by_what_is_too_wide_for_it(split: Literal["target", "pretrain"], seed: int) -> None:
+    scene = build_scene(get_task("WaffleReheat"), split, seed)
+    data, _ = scene.initial_data(np.random.default_rng(0))
+    bowl = data.body("waffle_container").xpos
+    assert np.linalg.norm(bowl - scene.objects["waffle_container"].pos) < 0.03
+    assert ObjectOn("waffle", "waffle_container").holds(scene, data)
 
 
 def test_a_scale_of_two_factors_is_refused() -> None:

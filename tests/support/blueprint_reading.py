@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-type Pos = list[float | str]
+type Pos = list[float | str | None]
 
 
 @dataclass(frozen=True)
@@ -29,7 +29,8 @@ class Category:
 def category(text: str) -> Category:
     """What a blueprint calls the kinds of an object."""
     found = re.search(r" \((\w+)\)", text)
-    words = re.sub(r"^one (\w+) category", r"\1", re.sub(r" \(\w+\)", "", text)).replace("all", "any")
+    words = re.sub(r"^one (\w+) category", r"\1", re.sub(r" \(\w+\)", "", text))
+    words = re.sub(r"\ball\b", "any", words)
     kinds = [word.strip() for word in words.split(",")]
     return Category(
         tuple(kind for kind in kinds if not kind.startswith("-")),
@@ -69,7 +70,7 @@ def rectangle(placed: Any) -> tuple[list[float], Pos | None]:
         return placed, None
     if isinstance(placed, dict):
         return placed.get("size", []), placed.get("pos")
-    pos = re.search(r"pos \((-?[\w.]+),(-?[\w.]+)\)", placed)
+    pos = re.search(r"pos \((-?[\w.]+),(-?[\w.]+)\)", placed) or re.search(r"x=([-\d.]+) y=([-\d.]+)", placed)
     return lengths(placed), [_number_or_word(text) for text in pos.groups()] if pos else None
 
 
@@ -86,9 +87,11 @@ def offset(placed: Any) -> dict[int, float]:
 def turn(at: str, placed: Any) -> tuple[float, float] | None:
     """Bounds of the turn, radians: of a right angle, of none at all, or of what is said to have a yaw."""
     text = str(placed)
-    if "turned 90 deg" in at or "rotation 90 deg" in text or ("rotation" in text and "90 deg" in text):
+    if "turned 90 deg" in at or ("rotation" in text and "90 deg" in text) or "yaw pi/2" in text or "[1.5708" in text:
         return np.pi / 2, np.pi / 2
-    if "'rotation_rad': 0" in text:
+    if "yaw pi/8 to pi/4" in text:
+        return np.pi / 8, np.pi / 4
+    if "'rotation_rad': 0" in text or re.search(r"rotation 0(?![.\d])", f"{at} {text}"):
         return 0.0, 0.0
     return (np.pi / 4, 3 * np.pi / 8) if "yaw" in text or "rotation" in text else None
 
@@ -102,5 +105,7 @@ def lengths(text: str) -> list[float]:
 WHOLE = float("inf")  # the full width, which declarations may say as they do elsewhere
 
 
-def _number_or_word(text: str) -> float | str:
+def _number_or_word(text: str) -> float | str | None:
+    if text == "any":
+        return None
     return text if text == "ref" else float(text)

@@ -19,6 +19,7 @@ from robocasa_lerobot.envs.kitchens.appliances.kinds.stove import Hob
 from robocasa_lerobot.envs.predicates import (
     AllOf,
     AnyOf,
+    Beside,
     BurnerLevel,
     DoorsClosed,
     DoorsOpen,
@@ -34,12 +35,14 @@ from robocasa_lerobot.envs.predicates import (
     MovedSince,
     Near,
     NearerThan,
+    NearFixture,
     Never,
     Not,
     ObjectAtSite,
     ObjectInBasin,
     ObjectInside,
     ObjectOn,
+    ObjectTilt,
     ObjectTouches,
     ObjectTouchesAnyCounter,
     ObjectUpright,
@@ -48,6 +51,7 @@ from robocasa_lerobot.envs.predicates import (
     OnOneSide,
     PartTurned,
     PartWithin,
+    RestsOn,
     StandsBefore,
     StandsNear,
     StateIs,
@@ -239,6 +243,44 @@ def _on_one_side(goal: OnOneSide, scene: Scene, data: mujoco.MjData) -> None:
     for number, name in enumerate(goal.objects):
         beside = data.body(scene.fill(goal.of)).xpos + across * (goal.apart + 0.1 + 0.01 * number)
         data.joint(f"{scene.fill(name)}_joint0").qpos[:3] = beside
+
+
+@write.register
+def _near_fixture(goal: NearFixture, scene: Scene, data: mujoco.MjData) -> None:
+    """To the right of the fixture, at its front, in the middle of its height, or at the upper corner there."""
+    fixture, name = scene.fixture(goal.fixture), scene.fill(goal.object)
+    turn = np.array([[np.cos(fixture.yaw), -np.sin(fixture.yaw)], [np.sin(fixture.yaw), np.cos(fixture.yaw)]])
+    size = scene.objects[name].item.size
+    aside = 0.0 if goal.to_corner else float(np.linalg.norm(size[:2])) / 2
+    out = turn @ np.array([fixture.width / 2 + aside + 0.5 * goal.within, -fixture.depth / 2])
+    high = fixture.height / 2 if goal.to_corner else 0.0
+    data.joint(f"{name}_joint0").qpos[:3] = np.asarray(fixture.pos) + np.array([*out, high])
+
+
+@write.register
+def _beside(goal: Beside, scene: Scene, data: mujoco.MjData) -> None:
+    fixture = scene.fixture(goal.fixture)
+    right = np.array([np.cos(fixture.yaw), np.sin(fixture.yaw), 0.0])
+    to_left = (scene.fill(goal.side) == "left") != (scene.layout.types[fixture.name] == "stool")
+    aside = (-0.9 if to_left else 0.9) * goal.across * right
+    data.joint(f"{scene.fill(goal.object)}_joint0").qpos[:3] = data.body(scene.fill(goal.other)).xpos + aside
+
+
+@write.register
+def _rests_on(goal: RestsOn, scene: Scene, data: mujoco.MjData) -> None:
+    """A hair into it, so that they touch."""
+    name, other = scene.fill(goal.object), scene.fill(goal.other)
+    lower, upper = scene.objects[other].item, scene.objects[name].item
+    free, under = data.joint(f"{name}_joint0"), data.joint(f"{other}_joint0")
+    high = lower.size[2] + lower.bottom_offset - upper.bottom_offset - 0.002
+    free.qpos[:3] = under.qpos[:3] + np.array([0.0, 0.0, high])
+    free.qpos[3:] = under.qpos[3:] = [1.0, 0.0, 0.0, 0.0]
+
+
+@write.register
+def _tilt(goal: ObjectTilt, scene: Scene, data: mujoco.MjData) -> None:
+    angle = (goal.low + min(goal.high, np.pi)) / 2
+    data.joint(f"{scene.fill(goal.object)}_joint0").qpos[3:] = [np.cos(angle / 2), np.sin(angle / 2), 0.0, 0.0]
 
 
 @write.register(Grasped)

@@ -19,10 +19,12 @@ from robocasa_lerobot.envs.predicates.objects import (
     ObjectInBasin,
     ObjectInside,
     ObjectOn,
+    ObjectTilt,
     ObjectTouches,
     ObjectTouchesAnyCounter,
     ObjectUpright,
 )
+from robocasa_lerobot.envs.predicates.placed_by import Beside, NearFixture, RestsOn
 from robocasa_lerobot.envs.predicates.robot import (
     Grasped,
     GripperFar,
@@ -37,6 +39,7 @@ from robocasa_lerobot.envs.predicates.traces import MovedSince, Strokes
 __all__ = [
     "AllOf",
     "AnyOf",
+    "Beside",
     "BurnerLevel",
     "DoorsClosed",
     "DoorsOpen",
@@ -51,6 +54,7 @@ __all__ = [
     "GripperTouches",
     "MovedSince",
     "Near",
+    "NearFixture",
     "NearerThan",
     "Never",
     "Not",
@@ -58,6 +62,7 @@ __all__ = [
     "ObjectInBasin",
     "ObjectInside",
     "ObjectOn",
+    "ObjectTilt",
     "ObjectTouches",
     "ObjectTouchesAnyCounter",
     "ObjectUpright",
@@ -67,6 +72,7 @@ __all__ = [
     "Once",
     "PartTurned",
     "PartWithin",
+    "RestsOn",
     "StandsBefore",
     "StandsNear",
     "StateIs",

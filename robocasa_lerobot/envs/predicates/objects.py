@@ -112,7 +112,7 @@ class ObjectTouches(Term):
     @property
     def name(self) -> str:
         """E.g. `obj_touches_counter`."""
-        return f"{self.object}_touches_{self.what}"
+        return f"{plain(self.object)}_touches_{self.what}"
 
     def holds(self, scene: Scene, data: mujoco.MjData) -> bool:
         """Look at the contacts."""
@@ -209,6 +209,32 @@ class ObjectUpright(Term):
     def holds(self, scene: Scene, data: mujoco.MjData) -> bool:
         """Compare the tilt with the bound."""
         return bool(data.body(scene.fill(self.object)).xmat.reshape(3, 3)[2, 2] > np.cos(UPRIGHT_RAD))
+
+
+@dataclass(frozen=True)
+class ObjectTilt(Term):
+    """An object's own z axis is turned from the vertical by an angle within bounds.
+
+    Attributes:
+        object: name.
+        low, high: bounds, radians, both allowed; pi is upside down.
+        label: for the term's name.
+    """
+
+    object: str
+    low: float = 0.0
+    high: float = np.pi
+    label: str = "tilted"
+
+    @property
+    def name(self) -> str:
+        """E.g. `strainer_level`."""
+        return plain(f"{self.object}_{self.label}")
+
+    def holds(self, scene: Scene, data: mujoco.MjData) -> bool:
+        """Compare the angle with the bounds."""
+        up = data.body(scene.fill(self.object)).xmat.reshape(3, 3)[2, 2]
+        return bool(self.low <= np.arccos(np.clip(up, -1.0, 1.0)) <= self.high)
 
 
 def radius(scene: Scene, name: str) -> float:

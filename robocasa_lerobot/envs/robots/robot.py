@@ -32,6 +32,12 @@ class Controller(Protocol):
     def run(self, substeps: int = ...) -> bool:
         """Control and advance the physics; whether what sleeps must be evaluated anew."""
 
+    def goal_in_base(self) -> tuple[Array, Array]:
+        """Goal position (3,) metres and rotation (3, 3) of the grip site in the arm's base frame."""
+
+    def arm_frame(self) -> tuple[Array, Array]:
+        """Position (3,) metres and axes (3, 3) of that frame in the world, as commands are taken relative to it."""
+
     def get_state(self) -> Array:
         """A copy of its memory."""
 

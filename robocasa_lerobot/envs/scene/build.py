@@ -39,7 +39,13 @@ MAX_ATTEMPTS = 50
 _CAMERA_NOISE_STREAM = 2
 
 # Liquids in a vessel: colour and opacity.
-LIQUIDS = {"coffee": (0.25, 0.13, 0.06, 1.0), "lemonade": (0.95, 0.90, 0.50, 0.6)}
+LIQUIDS = {
+    "coffee": (0.25, 0.13, 0.06, 1.0),
+    "hot_chocolate": (0.34, 0.19, 0.11, 1.0),
+    "lemonade": (0.95, 0.90, 0.50, 0.6),
+    "tea": (0.60, 0.30, 0.08, 0.8),
+    "water": (0.72, 0.86, 0.94, 0.5),
+}
 
 
 @dataclass(frozen=True)

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from blueprint_words.ours import Ours
-from robocasa_lerobot.envs.predicates import GripperFar, Near, ObjectInside
+from blueprint_words.ours import Ours, away
+from robocasa_lerobot.envs.predicates import GripperFar, Near, ObjectInside, ObjectTouches
 from robocasa_lerobot.envs.scene.spec import InitialOpenness
 
 OURS = {
@@ -15,6 +15,19 @@ OURS = {
             "obj2 within 0.15 m (xy) of cab_obj2": Near("obj2", "cab_obj2", 0.15),
             "gripper > 0.25 m from obj1": GripperFar("obj1", 0.25),
             "gripper > 0.25 m from obj2": GripperFar("obj2", 0.25),
+        },
+        initial={"cabinet door(s) open (0.90-1.0 of range)": InitialOpenness("cabinet", 0.9, 1.0)},
+    ),
+    "OrganizeCondiments": Ours(
+        goal={
+            **{
+                f"condiment{i} inside cabinet (bbox, margin 0.05 m)": ObjectInside(
+                    f"condiment{i}", "cabinet", margin=0.05
+                )
+                for i in (1, 2, 3)
+            },
+            "distractor touching counter": ObjectTouches("distractor", "counter"),
+            **away("condiment1", "condiment2", "condiment3", "distractor"),
         },
         initial={"cabinet door(s) open (0.90-1.0 of range)": InitialOpenness("cabinet", 0.9, 1.0)},
     ),

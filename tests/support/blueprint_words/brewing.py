@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from blueprint_words.ours import Ours
+from blueprint_words.ours import Ours, away
 from robocasa_lerobot.envs.predicates import (
     DoorsClosed,
     GripperFar,
     GripperFarFromPart,
+    Near,
     ObjectAtSite,
     ObjectOn,
+    ObjectTouches,
+    ObjectTouchesAnyCounter,
     OnBurner,
     StateIs,
 )
@@ -19,6 +22,31 @@ ON_TRAY = "in/on container (contact AND xy centre distance < 0.7 x container hor
 RUNS = StateIs("coffee_machine", "on")
 
 OURS = {
+    "DeliverBrewedCoffee": Ours(
+        goal={
+            "brewed_coffee in contact with dining_counter": ObjectTouches("brewed_coffee", "dining_counter"),
+            "breakfast_plate in contact with dining_counter": ObjectTouches("breakfast_plate", "dining_counter"),
+            "brewed_coffee within 0.3 m (xy centres) of breakfast_plate": Near("brewed_coffee", "breakfast_plate", 0.3),
+            **away("brewed_coffee"),
+        },
+        initial={"mug stands under coffee_machine dispenser, filled with coffee (visual liquid only)": "brewed_coffee"},
+    ),
+    "SweetenCoffee": Ours(
+        goal={
+            "milk in contact with any counter": ObjectTouchesAnyCounter("milk"),
+            "coffee in contact with any counter": ObjectTouchesAnyCounter("coffee"),
+            "milk within 0.25 m (xy centres) of coffee": Near("milk", "coffee", 0.25),
+            "sugar_cube in/on coffee (contact AND xy centre distance < 0.7 x coffee horizontal radius)": ObjectOn(
+                "sugar_cube", "coffee"
+            ),
+            **away("milk", "sugar_cube"),
+        },
+        initial={
+            "fridge doors open (0.90-1.0 of range)": InitialOpenness("fridge", 0.9, 1.0, part="fridge"),
+            "mug filled with coffee (visual liquid only)": "coffee",
+            "robot base in front of coffee mug": "coffee",
+        },
+    ),
     "KettleBoiling": Ours(
         goal={
             "obj in contact with stove": LIT,

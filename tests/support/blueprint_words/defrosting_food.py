@@ -2,12 +2,20 @@
 
 from __future__ import annotations
 
-from blueprint_words.ours import Ours
-from robocasa_lerobot.envs.predicates import DoorsClosed, GripperFar, ObjectInside, StateIs
+from blueprint_words.ours import Ours, away
+from robocasa_lerobot.envs.predicates import DoorsClosed, GripperFar, ObjectInside, ObjectOn, StateIs
+from robocasa_lerobot.envs.scene.spec import InitialOpenness
 
 RUNS = StateIs("microwave", "on")
 
 OURS = {
+    "MoveToCounter": Ours(
+        goal={
+            "frosted_food on plate (contact; xy dist < 0.7 x plate radius)": ObjectOn("frosted_food", "plate"),
+            **away("frosted_food"),
+        },
+        initial={"fridge door(s) open (0.90-1.0 of range)": InitialOpenness("fridge", 0.9, 1.0, part="fridge")},
+    ),
     "MicrowaveThawing": Ours(
         goal={
             "obj inside microwave (bbox, margin 0.05 m)": ObjectInside("obj", "microwave", margin=0.05),

@@ -3,12 +3,25 @@
 from __future__ import annotations
 
 from blueprint_words.ours import NEAR_THE_MIDDLE, Ours
-from robocasa_lerobot.envs.predicates import GripperFar, ObjectOn, OnShelf
+from robocasa_lerobot.envs.predicates import DoorsClosed, GripperFar, ObjectOn, OnShelf
 from robocasa_lerobot.envs.scene.spec import InitialOpenness
 
 ON_A_SHELF = "bbox in region (tol 0.05), origin z within lower 90% of region"
 
+ANY_SHELF = "inside any freezer shelf (region bottom z 0.5-1.5 m, height >= 0.20 m)"
+FREEZER_OPEN = {"freezer door open (0.90-1.0)": InitialOpenness("fridge", 0.9, 1.0, part="freezer")}
+
 OURS = {
+    "FreezeBottledWaters": Ours(
+        goal={
+            **{
+                f"{name} {ANY_SHELF}: {ON_A_SHELF}": OnShelf(name, "fridge", compartment="freezer")
+                for name in ("bottle1", "bottle2")
+            },
+            "freezer door closed (every joint <= 0.005 of range)": DoorsClosed("fridge", 0.005, part="freezer"),
+        },
+        initial=FREEZER_OPEN,
+    ),
     "SeparateFreezerRack": Ours(
         goal={
             f"meat in meat_tupperware {NEAR_THE_MIDDLE.format('meat_tupperware')}": ObjectOn("meat", "meat_tupperware"),

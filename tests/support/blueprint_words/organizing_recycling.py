@@ -2,13 +2,25 @@
 
 from __future__ import annotations
 
-from blueprint_words.ours import Ours
-from robocasa_lerobot.envs.predicates import AllOf, GripperFar, Near, ObjectTouches, When
+from blueprint_words.ours import ON_ITS_MIDDLE, Ours, away
+from robocasa_lerobot.envs.predicates import AllOf, GripperFar, Near, ObjectOn, ObjectTouches, RestsOn, When
 
 PLASTIC, GLASS = ("bottle_plastic1", "bottle_plastic2"), ("bottle_glass1", "bottle_glass2")
 BOTTLES = (*PLASTIC, *GLASS, "bottle_plastic_middle", "bottle_glass_middle", "mystery_middle")
 
+STACK = (("yogurt_container2", "yogurt_container1"), ("yogurt_container3", "yogurt_container2"))
+
 OURS = {
+    "RecycleStackedYogurt": Ours(
+        goal={
+            **{f"{name} in/on {other} {ON_ITS_MIDDLE.format(other)}": ObjectOn(name, other) for name, other in STACK},
+            **{f"{name} z > {other} z + 0.04 m": RestsOn(name, other, higher=0.04) for name, other in STACK},
+            **away("yogurt_container1", "yogurt_container2", "yogurt_container3"),
+        },
+        initial={},
+        # The gripper opens by 8 cm.
+        scales={"yogurt_container2": (1.1, 1.1, 1.1), "yogurt_container3": (0.8, 0.8, 0.8)},
+    ),
     "RecycleBottlesByType": Ours(
         goal={
             "bottle_plastic_middle within 0.30 m (xy centres) of OR(bottle_plastic1, bottle_plastic2)": Near(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from blueprint_words.ours import Ours
+from blueprint_words.ours import Ours, away
 from robocasa_lerobot.envs.predicates import Exactly, GripperFar, ObjectOn
 
 
@@ -10,7 +10,37 @@ def one_on(plate: str, name: str) -> Exactly:
     return Exactly(1, ObjectOn(f"{name}1", plate), ObjectOn(f"{name}2", plate))
 
 
+FRUITS = ("fruit1", "fruit2", "fruit3", "fruit4")
+
+
+YOGURTS = ("yogurt1", "yogurt2", "yogurt3", "yogurt4")
+
+
+def two_on(plate: str) -> Exactly:
+    return Exactly(2, *(ObjectOn(name, plate) for name in YOGURTS))
+
+
+def two_in(bowl: str) -> Exactly:
+    return Exactly(2, *(ObjectOn(name, bowl) for name in FRUITS))
+
+
 OURS = {
+    "PortionYogurt": Ours(
+        goal={
+            "exactly 2 yogurts on plate1": two_on("plate1"),
+            "exactly 2 yogurts on plate2 (on = contact, centre xy < 0.7*plate radius)": two_on("plate2"),
+            **away(*YOGURTS),
+        },
+        initial={"robot base centred on plate1": "plate1"},
+    ),
+    "PortionFruitBowl": Ours(
+        goal={
+            "exactly 2 fruits in bowl1": two_in("bowl1"),
+            "exactly 2 fruits in bowl2 (in = contact, centre xy < 0.7*bowl radius)": two_in("bowl2"),
+            **away(*FRUITS),
+        },
+        initial={"robot base centred on plate": "plate"},
+    ),
     "PortionHotDogs": Ours(
         goal={
             "exactly 1 bun on plate1": one_on("plate1", "hotdog_bun"),

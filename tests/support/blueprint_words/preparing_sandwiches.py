@@ -2,14 +2,43 @@
 
 from __future__ import annotations
 
-from blueprint_words.ours import Ours
-from robocasa_lerobot.envs.predicates import DoorsClosed, GripperFar, ObjectTouches, PartWithin
-from robocasa_lerobot.envs.scene.initial_states import PartAt
+import numpy as np
+
+from blueprint_words.ours import Ours, away
+from robocasa_lerobot.envs.predicates import DoorsClosed, GripperFar, Near, ObjectOn, ObjectTouches, PartWithin
+from robocasa_lerobot.envs.scene.initial_states import PartAt, Water
 from robocasa_lerobot.envs.scene.spec import InitialOpenness
 
 TIMER = PartWithin("toaster_oven", "knob_time", low=0.1, label="set")
 
 OURS = {
+    "GatherVegetables": Ours(
+        goal={
+            **{
+                f"{name} on cutting_board (contact; xy dist < 0.7 x cutting_board radius)": ObjectOn(
+                    name, "cutting_board"
+                )
+                for name in ("veg1", "veg2")
+            },
+            **away("veg1", "veg2"),
+        },
+        initial={"faucet off": Water("sink", on=False)},
+        turned={"cutting_board": (np.pi / 2, np.pi / 2)},
+    ),
+    "HotDogSetup": Ours(
+        goal={
+            "hotdog_bun on plate (contact; xy dist < 0.7 x plate radius)": ObjectOn("hotdog_bun", "plate"),
+            "sausage on plate (contact; xy dist < 0.7 x plate radius)": ObjectOn("sausage", "plate"),
+            "plate touching dining_counter": ObjectTouches("plate", "dining_counter"),
+            "condiment within 0.35 m (xy) of plate": Near("condiment", "plate", 0.35),
+            "condiment touching dining_counter": ObjectTouches("condiment", "dining_counter"),
+            **away("hotdog_bun", "sausage", "condiment", "plate"),
+        },
+        initial={
+            "cabinet door(s) open (0.90-1.0 of range)": InitialOpenness("cabinet", 0.9, 1.0),
+            "fridge door(s) closed": None,
+        },
+    ),
     "HeatKebabSandwich": Ours(
         goal={
             "baguette touching toaster_oven rack/tray (level 0 or 1)": ObjectTouches(
@@ -27,5 +56,20 @@ OURS = {
         },
         order=TIMER,
         besides=frozenset({GripperFar("baguette"), GripperFar("kebab")}),
+    ),
+    "PrepareSausageCheese": Ours(
+        goal={
+            **{
+                f"{name} on baguette_container (contact; xy dist < 0.7 x baguette_container radius)": ObjectOn(
+                    name, "baguette_container"
+                )
+                for name in ("sausage", "cheese")
+            },
+            **away("sausage", "cheese"),
+        },
+        initial={
+            "fridge door(s) closed": None,
+            "sausage on random one of top / second highest shelf, cheese on the other": "sausage",
+        },
     ),
 }

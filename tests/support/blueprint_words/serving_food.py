@@ -4,12 +4,58 @@ from __future__ import annotations
 
 import numpy as np
 
-from blueprint_words.ours import Ours
-from robocasa_lerobot.envs.predicates import GripperFar, GripperTouches, Never, ObjectOn, ObjectTouches, OnBurner
+from blueprint_words.ours import ON_ITS_MIDDLE, Ours, away
+from robocasa_lerobot.envs.predicates import (
+    AllOf,
+    AnyOf,
+    GripperFar,
+    GripperTouches,
+    Never,
+    ObjectOn,
+    ObjectTouches,
+    OnBurner,
+)
+from robocasa_lerobot.envs.scene.spec import InitialOpenness
 
 UNTOUCHED = Never(GripperTouches("vegetable"))
 
 OURS = {
+    "DessertUpgrade": Ours(
+        goal={
+            **{
+                f"{name} in/on receptacle {ON_ITS_MIDDLE.format('receptacle')}": ObjectOn(name, "receptacle")
+                for name in ("dessert1", "dessert2")
+            },
+            **away("receptacle"),
+        },
+        initial={"robot base in front of tray": "receptacle"},
+        called={"tray": "receptacle"},
+        turned={"receptacle": (0.0, 0.0)},
+    ),
+    "PlaceFoodInBowls": Ours(
+        goal={
+            "OR(food1 on receptacle1 AND food2 on receptacle2, food1 on receptacle2 AND food2 on receptacle1); 'on' = "
+            "contact AND xy centre distance < 0.7 x bowl horizontal radius": AnyOf(
+                AllOf(ObjectOn("food1", "receptacle1"), ObjectOn("food2", "receptacle2")),
+                AllOf(ObjectOn("food1", "receptacle2"), ObjectOn("food2", "receptacle1")),
+            ),
+            "receptacle1 in contact with counter": ObjectTouches("receptacle1", "counter"),
+            "receptacle2 in contact with counter": ObjectTouches("receptacle2", "counter"),
+            **away("food1", "food2"),
+        },
+        initial={"cab doors open (0.90-1.0 of range)": InitialOpenness("cab", 0.9, 1.0)},
+    ),
+    "ServeSteak": Ours(
+        goal={
+            "obj in/on plate (contact AND xy centre distance < 0.7 x plate horizontal radius)": ObjectOn(
+                "obj", "plate"
+            ),
+            "obj_container in contact with dining_table": ObjectTouches("obj_container", "dining_table"),
+            **away("obj"),
+        },
+        initial={"pan with steak on a burner chosen at random": "obj_container"},
+        turned={"obj_container": (np.pi / 4, 3 * np.pi / 4)},
+    ),
     "PanTransfer": Ours(
         goal={
             "vegetable in/on plate (contact AND xy centre distance < 0.7 x plate horizontal radius)": ObjectOn(

@@ -200,7 +200,10 @@ def _put_on(
     holder: PlacedObject,
     start: Placement,
 ) -> None:
-    """Put an object into, or onto, one that was placed: on the floor of its inside, else on its top."""
+    """Put an object into, or onto, one that was placed: on the floor of its inside, on its rim, or on its top.
+
+    On the rim and in the middle, where it is too wide for the inside of a vessel deeper than itself.
+    """
     x, y, z = holder.pos
     inside = getattr(holder.item, "interior", None)
     if inside is not None:
@@ -224,6 +227,11 @@ def _put_on(
         if other != holder.name and abs(p.pos[2] - p.item.size[2] / 2 - floor) < 0.03
     ]
     footprint, _ = place(rng, [area], (width / 2, depth / 2), others, margin=0.002, what=what)
+    rim = z + holder.item.size[2] / 2
+    if inside is not None and rim > floor + height and not area.holds(footprint):
+        # It would start within the walls of a bowl, which throw it out: it is let down on them from the rim.
+        footprint = replace(footprint, x=area.middle[0], y=area.middle[1])
+        floor = rim
     at = (footprint.x, footprint.y, floor + height / 2 + PLACEMENT_GAP_M)
     table.placed[name] = PlacedObject(name, item, at, footprint.yaw)
     table.taken.append((footprint, floor))

@@ -88,6 +88,13 @@ class PandaOmronController:
         """Goal position (3,) metres and rotation matrix (3, 3) of the grip site in the arm's base frame."""
         return self._memory[kernel.GOAL_POS].copy(), self._memory[kernel.GOAL_MAT].reshape(3, 3).copy()
 
+    def arm_frame(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Position (3,) metres and axes (3, 3) of the arm's base in the world that commands are taken relative to.
+
+        They are those of the last physics step, which a driving base has just left.
+        """
+        return self._memory[kernel.BASE_POS].copy(), self._memory[kernel.BASE_MAT].reshape(3, 3).copy()
+
     def get_state(self) -> NDArray[np.float64]:
         """A copy of the controller's memory, shape (37,)."""
         return self._memory.copy()

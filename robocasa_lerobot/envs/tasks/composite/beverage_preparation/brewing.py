@@ -1,12 +1,19 @@
 """Brew hot drinks."""
 
+from dataclasses import replace
+
+import numpy as np
+
 from robocasa_lerobot.envs.predicates import (
     AllOf,
     DoorsClosed,
     GripperFar,
     GripperFarFromPart,
+    Near,
     ObjectAtSite,
     ObjectOn,
+    ObjectTouches,
+    ObjectTouchesAnyCounter,
     OnBurner,
     StateIs,
 )
@@ -19,6 +26,7 @@ from robocasa_lerobot.envs.scene.spec import (
     SampleRegion,
 )
 from robocasa_lerobot.envs.tasks.atomic.common import HANDLE_TURN, counter_near, in_cabinet, on_counter
+from robocasa_lerobot.envs.tasks.composite.common import before_stool, fetch
 from robocasa_lerobot.envs.tasks.task import Stage, Task
 
 # Knobs of stoves are off at the start, as no initial state says otherwise.
@@ -115,4 +123,99 @@ PREPARE_COFFEE = Task(
     ),
 )
 
-TASKS = (KETTLE_BOILING, ARRANGE_TEA, PREPARE_COFFEE)
+_AS_UNDER_SPOUTS = (np.pi / 8, np.pi / 4)  # radians
+_BY_BREAKFAST = AllOf(
+    ObjectTouches("brewed_coffee", "dining_counter"),
+    Near("brewed_coffee", "breakfast_plate", 0.3),
+    GripperFar("brewed_coffee"),
+)
+*_COFFEE_CARRIED, _COFFEE_PUT = fetch("brewed_coffee", "coffee_machine", "dining_counter", until=_BY_BREAKFAST)
+
+DELIVER_BREWED_COFFEE = Task(
+    name="DeliverBrewedCoffee",
+    summary="The mug of coffee stands on the dining counter, 30 cm from the plate there at most, the gripper away.",
+    fixtures=(
+        FixtureSpec("coffee_machine", "coffee_machine"),
+        FixtureSpec("stool", "stool"),
+        FixtureSpec("dining_counter", "dining_counter", near="stool"),
+    ),
+    robot_start=RobotStart("coffee_machine"),
+    objects=(
+        ObjectSpec(
+            "brewed_coffee",
+            ("mug",),
+            Placement("coffee_machine", region=SampleRegion(name="cup"), rotation=_AS_UNDER_SPOUTS),
+            graspable=True,
+            filled="coffee",
+        ),
+        ObjectSpec("breakfast_plate", ("plate",), before_stool((0.35, 0.35))),
+        ObjectSpec(
+            "breakfast_item1",
+            ("bread_food", "pancake", "waffle"),
+            Placement(object="breakfast_plate"),
+            exclude=("hotdog_bun",),
+        ),
+        ObjectSpec("breakfast_item2", ("fruit", "cheese"), Placement(object="breakfast_plate", heaped=True)),
+    ),
+    goal=AllOf(*_BY_BREAKFAST.parts, ObjectTouches("breakfast_plate", "dining_counter")),
+    stages=(*_COFFEE_CARRIED, replace(_COFFEE_PUT, text="put the {brewed_coffee} on the counter beside the plate")),
+    instruction=(
+        "Take the {brewed_coffee} of coffee from the coffee machine to the dining counter and set it beside the plate."
+    ),
+    paraphrases=(
+        "Serve the coffee: the {brewed_coffee} under the machine's dispenser goes next to the breakfast plate.",
+        "The coffee is ready; carry it to the dining counter, close to the plate with breakfast.",
+        "Breakfast on the dining counter lacks its coffee, which is still at the machine.",
+        "Bring the {brewed_coffee} at the coffee machine over to the breakfast on the dining counter.",
+    ),
+)
+
+_BY_COFFEE = AllOf(ObjectTouchesAnyCounter("milk"), Near("milk", "coffee", 0.25), GripperFar("milk"))
+*_MILK_CARRIED, _MILK_PUT = fetch("milk", "fridge", "counter", until=_BY_COFFEE)
+
+SWEETEN_COFFEE = Task(
+    name="SweetenCoffee",
+    summary="The sugar cube is in the mug of coffee, the milk stands 25 cm from that at most, the gripper away.",
+    fixtures=(
+        FixtureSpec("coffee_machine", "coffee_machine"),
+        counter_near("coffee_machine"),
+        FixtureSpec("fridge", "fridge"),
+    ),
+    robot_start=RobotStart("counter", at_object="coffee"),
+    objects=(
+        ObjectSpec("coffee", ("mug",), on_counter("coffee_machine", (0.5, 0.25)), graspable=True, filled="coffee"),
+        ObjectSpec(
+            "milk",
+            ("milk",),
+            Placement(
+                "fridge",
+                region=SampleRegion(name="fridge_shelf", height=(1.0, 1.5)),
+                size=(0.3, 0.15),
+                pos=(0.0, -1.0),
+            ),
+            graspable=True,
+            properties=("fridgable",),
+        ),
+        ObjectSpec("saucer_plate", ("plate",), on_counter("coffee_machine", (0.7, 0.35)), scale=(0.6, 0.6, 1.0)),
+        ObjectSpec("sugar_cube", ("sugar_cube",), Placement(object="saucer_plate"), graspable=True, scale=1.1),
+    ),
+    initial=(InitialOpenness("fridge", 0.9, 1.0, part="fridge"),),
+    goal=AllOf(
+        *_BY_COFFEE.parts, ObjectTouchesAnyCounter("coffee"), ObjectOn("sugar_cube", "coffee"), GripperFar("sugar_cube")
+    ),
+    stages=(
+        Stage("pick_place", "place", "coffee", object="sugar_cube"),
+        Stage("navigation", "drive", "fridge"),
+        *_MILK_CARRIED,
+        replace(_MILK_PUT, text="put the milk on the counter beside the {coffee}"),
+    ),
+    instruction="Put the sugar cube from the saucer into the coffee, then bring the milk from the fridge beside it.",
+    paraphrases=(
+        "Coffee with sugar and milk: the cube goes into the {coffee}, the fridge's milk next to it.",
+        "Drop the saucer's sugar cube into the {coffee} and stand the milk out of the fridge close by.",
+        "The coffee needs the sugar cube in it and the milk at its side; the milk is in the open fridge.",
+        "Sweeten the coffee with the sugar cube, and fetch the milk to it.",
+    ),
+)
+
+TASKS = (KETTLE_BOILING, ARRANGE_TEA, DELIVER_BREWED_COFFEE, PREPARE_COFFEE, SWEETEN_COFFEE)

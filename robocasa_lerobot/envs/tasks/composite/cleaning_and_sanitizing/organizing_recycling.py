@@ -1,8 +1,9 @@
 """Sort what is recycled."""
 
-from robocasa_lerobot.envs.predicates import AllOf, Goal, GripperFar, Near, ObjectTouches, When
+from robocasa_lerobot.envs.predicates import AllOf, Goal, GripperFar, Near, ObjectOn, ObjectTouches, RestsOn, When
 from robocasa_lerobot.envs.scene.spec import Choice, FixtureSpec, ObjectSpec, Placement, RobotStart, SampleRegion
 from robocasa_lerobot.envs.tasks.atomic.common import counter_near
+from robocasa_lerobot.envs.tasks.composite.common import before_stool
 from robocasa_lerobot.envs.tasks.task import Stage, Task
 
 _PLASTIC, _GLASS = ("bottle_plastic1", "bottle_plastic2"), ("bottle_glass1", "bottle_glass2")
@@ -92,4 +93,49 @@ RECYCLE_BOTTLES_BY_TYPE = Task(
     ),
 )
 
-TASKS = (RECYCLE_BOTTLES_BY_TYPE,)
+_HIGHER_M = 0.04
+# The gripper opens by 8 cm, less than the published scale of the second, 1.3, would make ours wide.
+_YOGURTS = {"yogurt_container1": 2.0, "yogurt_container2": 1.1, "yogurt_container3": 0.8}
+
+
+def _on_next(name: str, other: str) -> AllOf:
+    return AllOf(ObjectOn(name, other), RestsOn(name, other, higher=_HIGHER_M))
+
+
+def _stack(name: str, other: str) -> Stage:
+    until = AllOf(*_on_next(name, other).parts, GripperFar(name))
+    return Stage("pick_place", "place", other, object=name, until=until, text=f"put the next smaller {{{name}}} on top")
+
+
+RECYCLE_STACKED_YOGURT = Task(
+    name="RecycleStackedYogurt",
+    summary="The yogurts are one stack, the largest below and the smallest on top, the gripper away from all three.",
+    fixtures=(FixtureSpec("stool", "stool"), FixtureSpec("counter", "dining_counter", near="stool")),
+    robot_start=RobotStart("stool"),
+    objects=tuple(
+        ObjectSpec(
+            name,
+            ("yogurt",),
+            before_stool((0.7, 0.3), counter="counter", pos=(0.0, "ref")),
+            graspable=name != "yogurt_container1",
+            scale=scale,
+            repeats=True,
+        )
+        for name, scale in _YOGURTS.items()
+    ),
+    goal=AllOf(
+        *_on_next("yogurt_container2", "yogurt_container1").parts,
+        *_on_next("yogurt_container3", "yogurt_container2").parts,
+        *map(GripperFar, _YOGURTS),
+    ),
+    stages=(_stack("yogurt_container2", "yogurt_container1"), _stack("yogurt_container3", "yogurt_container2")),
+    instruction="Stack the three yogurts by size, the largest at the bottom and the smallest at the top.",
+    paraphrases=(
+        "Recycle the yogurts as one stack that gets smaller upwards.",
+        "Build a tower of the yogurts on the largest of them.",
+        "Put the middle yogurt on the large one, and the small one on that.",
+        "The yogurts should stand on each other, ordered by their size.",
+    ),
+)
+
+TASKS = (RECYCLE_BOTTLES_BY_TYPE, RECYCLE_STACKED_YOGURT)

@@ -1,7 +1,16 @@
 """Thaw frozen food."""
 
-from robocasa_lerobot.envs.predicates import AllOf, DoorsClosed, GripperFar, ObjectInside, StateIs
-from robocasa_lerobot.envs.scene.spec import FixtureSpec, ObjectSpec, Placement, RobotStart, SampleRegion
+from robocasa_lerobot.envs.predicates import AllOf, DoorsClosed, GripperFar, ObjectInside, ObjectOn, StateIs
+from robocasa_lerobot.envs.scene.spec import (
+    FixtureSpec,
+    InitialOpenness,
+    ObjectSpec,
+    Placement,
+    RobotStart,
+    SampleRegion,
+)
+from robocasa_lerobot.envs.tasks.atomic.common import counter_near, on_counter
+from robocasa_lerobot.envs.tasks.composite.common import fetch
 from robocasa_lerobot.envs.tasks.task import Stage, Task
 
 _BEFORE = SampleRegion(ref="microwave", loc="nn")
@@ -49,4 +58,31 @@ MICROWAVE_THAWING = Task(
     ),
 )
 
-TASKS = (MICROWAVE_THAWING,)
+_FROSTED = ("meat", "vegetable")
+_FRONT_OF_SHELF = Placement(
+    "fridge", region=SampleRegion(name="fridge_shelf", height=(0.5, 1.5)), size=(0.3, 0.25), pos=(None, -1.0)
+)
+
+MOVE_TO_COUNTER = Task(
+    name="MoveToCounter",
+    summary="The food lies on the plate on the counter, the gripper away from it.",
+    fixtures=(FixtureSpec("fridge", "fridge"), counter_near("fridge")),
+    robot_start=RobotStart("fridge"),
+    objects=(
+        ObjectSpec("frosted_food", _FROSTED, _FRONT_OF_SHELF, graspable=True),
+        ObjectSpec("distractor_obj", ("any",), _FRONT_OF_SHELF, graspable=True, exclude=_FROSTED),
+        ObjectSpec("plate", ("plate",), on_counter("fridge", (0.4, 0.4))),
+    ),
+    initial=(InitialOpenness("fridge", 0.9, 1.0, part="fridge"),),
+    goal=AllOf(ObjectOn("frosted_food", "plate"), GripperFar("frosted_food")),
+    stages=fetch("frosted_food", "fridge", "plate"),
+    instruction="Take the {frosted_food} out of the fridge and put it on the plate on the counter to defrost.",
+    paraphrases=(
+        "Let the {frosted_food} thaw on the counter's plate; it is in the open fridge.",
+        "The {frosted_food} is to defrost: carry it from the fridge to the plate.",
+        "The plate on the counter waits for the fridge's {frosted_food}.",
+        "Move the {frosted_food} from the fridge to where it gets warmer, onto the plate.",
+    ),
+)
+
+TASKS = (MICROWAVE_THAWING, MOVE_TO_COUNTER)

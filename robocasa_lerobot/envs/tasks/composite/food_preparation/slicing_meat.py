@@ -1,7 +1,15 @@
 """Slice meat."""
 
 from robocasa_lerobot.envs.predicates import AllOf, GripperFar, ObjectOn
-from robocasa_lerobot.envs.scene.spec import FixtureSpec, InitialOpenness, ObjectSpec, Placement, RobotStart
+from robocasa_lerobot.envs.scene.spec import (
+    FixtureSpec,
+    InitialOpenness,
+    ObjectSpec,
+    Placement,
+    RobotStart,
+    SampleRegion,
+)
+from robocasa_lerobot.envs.tasks.composite.common import fetch
 from robocasa_lerobot.envs.tasks.task import Stage, Task
 
 _FRONT = (0.0, -1.0)
@@ -43,4 +51,40 @@ SET_UP_CUTTING_STATION = Task(
     ),
 )
 
-TASKS = (SET_UP_CUTTING_STATION,)
+_SHELF = SampleRegion(name="fridge_shelf", height=(1.0, 1.5))
+_LEFT = (-0.6, -0.5)
+
+RETRIEVE_MEAT = Task(
+    name="RetrieveMeat",
+    summary="The meat lies on the cutting board, the gripper away from it.",
+    fixtures=(FixtureSpec("fridge", "fridge"), FixtureSpec("counter", "counter", near="fridge")),
+    robot_start=RobotStart("fridge"),
+    objects=(
+        ObjectSpec(
+            "meat",
+            ("meat",),
+            Placement("fridge", region=_SHELF, size=(0.5, 0.25), pos=_FRONT, try_to_place_in="plate"),
+            graspable=True,
+        ),
+        ObjectSpec(
+            "dist_obj",
+            ("vegetable",),
+            Placement("fridge", region=_SHELF, size=(0.5, 0.25), pos=_FRONT),
+            graspable=True,
+        ),
+        ObjectSpec("receptacle", ("cutting_board",), Placement("counter", size=(1.0, 0.4), pos=_LEFT)),
+        ObjectSpec("knife", ("knife",), Placement("counter", size=(0.3, 0.3), pos=_LEFT)),
+    ),
+    initial=(InitialOpenness("fridge", 0.9, 1.0, part="fridge"),),
+    goal=AllOf(ObjectOn("meat", "receptacle"), GripperFar("meat")),
+    stages=fetch("meat", "fridge", "receptacle"),
+    instruction="Take the {meat} out of the fridge and put it on the cutting board.",
+    paraphrases=(
+        "The {meat} in the fridge is to be sliced: bring it to the cutting board.",
+        "Carry the {meat} from its plate in the open fridge to the cutting board on the counter.",
+        "The cutting board should have the fridge's {meat} on it.",
+        "Fetch the {meat} for slicing and lay it on the board.",
+    ),
+)
+
+TASKS = (RETRIEVE_MEAT, SET_UP_CUTTING_STATION)

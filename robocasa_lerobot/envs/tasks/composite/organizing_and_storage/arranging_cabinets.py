@@ -1,8 +1,17 @@
 """Arrange what is in cabinets."""
 
-from robocasa_lerobot.envs.predicates import AllOf, GripperFar, NearerThan, ObjectInside, OnOneSide
+from robocasa_lerobot.envs.predicates import (
+    AllOf,
+    AnyOf,
+    DoorsClosed,
+    GripperFar,
+    NearerThan,
+    ObjectInside,
+    OnOneSide,
+    RestsOn,
+)
 from robocasa_lerobot.envs.scene.spec import Choice, FixtureSpec, InitialOpenness, ObjectSpec, Placement, RobotStart
-from robocasa_lerobot.envs.tasks.atomic.common import counter_near, in_cabinet
+from robocasa_lerobot.envs.tasks.atomic.common import counter_near, in_cabinet, on_counter
 from robocasa_lerobot.envs.tasks.task import Stage, Task
 
 _MUGS = ("glass1", "glass2", "glass3")
@@ -62,4 +71,84 @@ GATHER_TABLEWARE = Task(
     ),
 )
 
-TASKS = (GATHER_TABLEWARE,)
+_CABINETS = ("cabinet1", "cabinet2", "cabinet3")
+
+RESET_CABINET_DOORS = Task(
+    name="ResetCabinetDoors",
+    summary="All three cabinets are shut.",
+    fixtures=(
+        FixtureSpec("cabinet1", "cabinet_with_door"),
+        FixtureSpec("cabinet2", "cabinet_with_door", other_than=("cabinet1",)),
+        FixtureSpec("cabinet3", "cabinet_with_door", other_than=("cabinet1", "cabinet2")),
+        counter_near("cabinet1"),
+    ),
+    robot_start=RobotStart("counter"),
+    objects=(ObjectSpec("distr_counter_1", ("any",), on_counter("cabinet1", (0.3, 0.3), offset=(0.0, 0.3))),),
+    initial=(
+        InitialOpenness("cabinet1", 0.3, 1.0),
+        InitialOpenness("cabinet2", 0.4, 1.0),
+        InitialOpenness("cabinet3", 0.25, 0.9),
+    ),
+    goal=AllOf(*map(DoorsClosed, _CABINETS)),
+    stages=(
+        Stage("doors", "close", "cabinet1"),
+        Stage("navigation", "drive", "cabinet2"),
+        Stage("doors", "close", "cabinet2"),
+        Stage("navigation", "drive", "cabinet3"),
+        Stage("doors", "close", "cabinet3"),
+    ),
+    instruction="Close all three cabinets that are open.",
+    paraphrases=(
+        "No cabinet should be left open: shut the three that are.",
+        "Go round the kitchen and close the doors of every open cabinet.",
+        "Three cabinets are open. Shut them, one after the other.",
+        "Leave the kitchen with all its cabinets closed.",
+    ),
+)
+
+_CANS = ("can1", "can2", "can3", "can4")
+_PAIRINGS = (
+    (("can1", "can2"), ("can3", "can4")),
+    (("can1", "can3"), ("can2", "can4")),
+    (("can1", "can4"), ("can2", "can3")),
+)
+
+
+def _stacked(first: str, second: str) -> AnyOf:
+    return AnyOf(RestsOn(first, second), RestsOn(second, first))
+
+
+def _stack(name: str, other: str) -> Stage:
+    return Stage("pick_place", "place", other, object=name, until=AllOf(RestsOn(name, other), GripperFar(name)))
+
+
+def _can(name: str) -> ObjectSpec:
+    again = "" if name == "can1" else "can1"
+    start = in_cabinet("cabinet", (1.0, 0.15), pos=(0.0, -0.9), reuse_region_from=again)
+    return ObjectSpec(name, ("canned_food",), start, graspable=True, repeats=True)
+
+
+STACK_CANS = Task(
+    name="StackCans",
+    summary="The four cans are two stacks, of two cans each, the gripper away from all of them.",
+    fixtures=(FixtureSpec("cabinet", "cabinet_double_door"), counter_near("cabinet")),
+    robot_start=RobotStart("cabinet"),
+    objects=(
+        *map(_can, _CANS),
+        ObjectSpec("distr_counter", ("any",), on_counter("cabinet", (1.0, 0.3), pos=(0.0, 1.0), offset=(0.0, -0.05))),
+    ),
+    initial=(InitialOpenness("cabinet", 0.9, 1.0),),
+    goal=AllOf(
+        AnyOf(*(AllOf(_stacked(*first), _stacked(*second)) for first, second in _PAIRINGS)), *map(GripperFar, _CANS)
+    ),
+    stages=(_stack("can1", "can2"), _stack("can3", "can4")),
+    instruction="Stack the four cans in the cabinet in pairs, one can on another.",
+    paraphrases=(
+        "Make room in the cabinet: two stacks of two cans each.",
+        "Put two of the cans on top of the other two.",
+        "The cabinet's cans should stand in two stacks instead of a row.",
+        "Build two towers of two cans from the four in the cabinet.",
+    ),
+)
+
+TASKS = (GATHER_TABLEWARE, RESET_CABINET_DOORS, STACK_CANS)

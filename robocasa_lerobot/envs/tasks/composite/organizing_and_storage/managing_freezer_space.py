@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from robocasa_lerobot.envs.predicates import AllOf, GripperFar, ObjectOn, OnShelf
+from robocasa_lerobot.envs.predicates import AllOf, DoorsClosed, GripperFar, ObjectOn, OnShelf
 from robocasa_lerobot.envs.scene.spec import (
     FixtureSpec,
     InitialOpenness,
@@ -11,6 +11,7 @@ from robocasa_lerobot.envs.scene.spec import (
     RobotStart,
     SampleRegion,
 )
+from robocasa_lerobot.envs.tasks.composite.common import fetch
 from robocasa_lerobot.envs.tasks.task import Stage, Task
 
 _ACROSS = (np.pi / 2, np.pi / 2)  # radians
@@ -76,4 +77,45 @@ SEPARATE_FREEZER_RACK = Task(
     ),
 )
 
-TASKS = (SEPARATE_FREEZER_RACK,)
+_BOTTLES = ("bottle1", "bottle2")
+
+
+def _bottle(name: str) -> ObjectSpec:
+    again = "" if name == "bottle1" else "bottle1"
+    start = Placement(
+        "counter", region=SampleRegion(ref="fridge"), size=(0.5, 0.3), pos=(0.0, -1.0), reuse_region_from=again
+    )
+    return ObjectSpec(name, ("bottled_water",), start, graspable=True, repeats=True)
+
+
+def _freeze(name: str) -> tuple[Stage, ...]:
+    return fetch(name, "counter", "fridge", part="freezer_shelf:any")
+
+
+FREEZE_BOTTLED_WATERS = Task(
+    name="FreezeBottledWaters",
+    summary="Both bottles are on shelves of the freezer, which is shut.",
+    fixtures=(FixtureSpec("fridge", "fridge_with_freezer"), FixtureSpec("counter", "counter", near="fridge")),
+    needs=("freezer",),
+    robot_start=RobotStart("counter", at_object="bottle1"),
+    objects=tuple(map(_bottle, _BOTTLES)),
+    initial=(InitialOpenness("fridge", 0.9, 1.0, part="freezer"),),
+    goal=AllOf(
+        *(OnShelf(name, "fridge", compartment="freezer") for name in _BOTTLES), DoorsClosed("fridge", part="freezer")
+    ),
+    stages=(
+        *_freeze("bottle1"),
+        Stage("navigation", "drive", "bottle2"),
+        *_freeze("bottle2"),
+        Stage("doors", "close_large", "fridge", part="freezer"),
+    ),
+    instruction="Put both bottles of water into the freezer and close it.",
+    paraphrases=(
+        "Freeze the two bottles of water on the counter; leave the freezer shut.",
+        "Both water bottles belong on a shelf of the freezer, behind its closed {freezer_doors}.",
+        "Carry one bottle of water after the other from the counter to the open freezer, then shut that.",
+        "Load the freezer with the counter's two bottles and close the {freezer_doors}.",
+    ),
+)
+
+TASKS = (FREEZE_BOTTLED_WATERS, SEPARATE_FREEZER_RACK)

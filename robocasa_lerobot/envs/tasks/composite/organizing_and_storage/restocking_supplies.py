@@ -1,7 +1,26 @@
 """Restock cabinets."""
 
-from robocasa_lerobot.envs.predicates import AllOf, DoorsClosed, ObjectInside
-from robocasa_lerobot.envs.scene.spec import FixtureSpec, ObjectSpec, Placement, RobotStart, SampleRegion
+from robocasa_lerobot.envs.predicates import (
+    AllOf,
+    AnyOf,
+    DoorsClosed,
+    GripperFar,
+    NearerThan,
+    ObjectInside,
+    ObjectTouches,
+    ObjectTouchesAnyCounter,
+)
+from robocasa_lerobot.envs.scene.spec import (
+    Choice,
+    FixtureSpec,
+    InitialOpenness,
+    ObjectSpec,
+    Placement,
+    RobotStart,
+    SampleRegion,
+)
+from robocasa_lerobot.envs.tasks.atomic.common import counter_near, in_cabinet, on_counter
+from robocasa_lerobot.envs.tasks.composite.common import before_stool, fetch
 from robocasa_lerobot.envs.tasks.task import Stage, Task
 
 _BELOW = Placement(
@@ -36,4 +55,187 @@ RESTOCK_BOWLS = Task(
     ),
 )
 
-TASKS = (RESTOCK_BOWLS,)
+RESTOCK_CANNED_FOOD = Task(
+    name="RestockCannedFood",
+    summary="The new can is in the cabinet, the old one on a counter, the gripper away from both.",
+    fixtures=(FixtureSpec("cabinet", "cabinet"), counter_near("cabinet")),
+    robot_start=RobotStart("cabinet"),
+    objects=(
+        ObjectSpec("canned_food_new", ("canned_food",), on_counter("cabinet", (0.5, 0.2)), graspable=True),
+        ObjectSpec(
+            "distr_counter",
+            ("any",),
+            on_counter("cabinet", (1.0, 0.3), pos=(0.0, 0.0), reuse_region_from="canned_food_new"),
+            exclude=("canned_food",),
+        ),
+        ObjectSpec(
+            "canned_food_old", ("canned_food",), in_cabinet("cabinet", (0.5, 0.2)), graspable=True, repeats=True
+        ),
+    ),
+    initial=(InitialOpenness("cabinet", 0.9, 1.0),),
+    goal=AllOf(
+        ObjectInside("canned_food_new", "cabinet"),
+        ObjectTouchesAnyCounter("canned_food_old"),
+        GripperFar("canned_food_old"),
+        GripperFar("canned_food_new"),
+    ),
+    stages=(
+        Stage(
+            "pick_place",
+            "place",
+            "cabinet",
+            object="canned_food_new",
+            text="put the new {canned_food_new} into the cabinet",
+        ),
+        Stage(
+            "pick_place",
+            "place",
+            "counter",
+            object="canned_food_old",
+            text="put the old {canned_food_old} on the counter",
+        ),
+    ),
+    instruction="Put the can from the counter into the cabinet, and the old can from the cabinet on the counter.",
+    paraphrases=(
+        "Exchange the two cans: the one in the cabinet comes out, the one on the counter goes in.",
+        "The can on the counter is fresh; store it in the cabinet and take out the one that was there.",
+        "Restock the cabinet with the counter's can and leave its old can on the counter.",
+        "Swap cans between counter and cabinet.",
+    ),
+)
+
+
+def _can(name: str) -> ObjectSpec:
+    return ObjectSpec(name, ("canned_food",), on_counter("cabinet", (0.5, 0.3)), graspable=True, repeats=True)
+
+
+def _with_its_like(name: str) -> AllOf:
+    return AllOf(ObjectInside(name, "cabinet"), NearerThan(name, "cab_obj1", "cab_obj2", factor=2.0), GripperFar(name))
+
+
+def _shelve(name: str) -> Stage:
+    text = f"put the {{{name}}} into the cabinet beside the {{cab_obj1}}"
+    return Stage("pick_place", "place", "cabinet", object=name, until=_with_its_like(name), text=text)
+
+
+RESTOCK_PANTRY = Task(
+    name="RestockPantry",
+    summary=("Both cans are in the cabinet, twice as near to the can there as to the other thing, the gripper away."),
+    fixtures=(FixtureSpec("cabinet", "cabinet_double_door"), counter_near("cabinet")),
+    robot_start=RobotStart("cabinet"),
+    choices=(Choice("can_side", {"left": {}, "right": {}}),),
+    objects=(
+        _can("obj1"),
+        _can("obj2"),
+        ObjectSpec(
+            "cab_obj1",
+            ("canned_food",),
+            in_cabinet("cabinet", (0.2, 0.3), pos=("{can_side}", -0.3)),
+            graspable=True,
+            repeats=True,
+        ),
+        ObjectSpec(
+            "cab_obj2",
+            ("any",),
+            in_cabinet("cabinet", (0.2, 0.3), pos=("-{can_side}", 0.3)),
+            graspable=True,
+            exclude=("canned_food",),
+        ),
+        ObjectSpec("distr_counter", ("any",), on_counter("cabinet", (1.0, 0.3), pos=(0.0, 1.0), offset=(0.0, -0.05))),
+    ),
+    initial=(InitialOpenness("cabinet", 1.0, 1.0),),
+    goal=AllOf(*_with_its_like("obj1").parts, *_with_its_like("obj2").parts),
+    stages=(_shelve("obj1"), _shelve("obj2")),
+    instruction="Put both cans from the counter into the cabinet, at the side where the other can stands.",
+    paraphrases=(
+        "Cans belong with cans: move the two from the counter next to the one in the cabinet.",
+        "Restock the cabinet with both cans, beside the can and away from the {cab_obj2}.",
+        "One side of the cabinet is for cans; put the counter's two there.",
+        "Store the two cans where the cabinet already has one.",
+    ),
+)
+
+REFILL_CONDIMENT_STATION = Task(
+    name="RefillCondimentStation",
+    summary="The condiment stands on the dining counter, the gripper away from it.",
+    fixtures=(
+        FixtureSpec("cabinet", "cabinet_with_door"),
+        FixtureSpec("stool", "stool"),
+        FixtureSpec("dining_counter", "dining_counter", near="stool"),
+    ),
+    needs=("dining_counter",),
+    robot_start=RobotStart("cabinet"),
+    objects=(
+        ObjectSpec("condiment", ("condiment",), in_cabinet("cabinet", (0.5, 0.2)), graspable=True),
+        ObjectSpec("distr", ("any",), in_cabinet("cabinet", (0.6, 0.3), pos=(0.0, 1.0)), exclude=("condiment",)),
+        ObjectSpec(
+            "dining_table_condiment",
+            ("condiment",),
+            before_stool((0.6, 0.4)),
+            same_category_as="condiment",
+            repeats=True,
+        ),
+    ),
+    goal=AllOf(ObjectTouches("condiment", "dining_counter"), GripperFar("condiment")),
+    stages=(Stage("doors", "open", "cabinet"), *fetch("condiment", "cabinet", "dining_counter")),
+    instruction="Open the cabinet and bring a second {condiment} from it to the dining counter.",
+    paraphrases=(
+        "The dining counter should get another {condiment}; there is one in the cabinet.",
+        "Refill the condiments at the dining counter with the cabinet's {condiment}.",
+        "Take the {condiment} out of the closed cabinet and set it down on the dining counter.",
+        "One {condiment} on the dining counter is not enough: add the one in the cabinet.",
+    ),
+)
+
+_ALCOHOL, _SOFT = ("alcohol1", "alcohol2"), ("non_alcohol1", "non_alcohol2")
+
+
+def _drinks(names: tuple[str, ...], group: str, exclude: str) -> tuple[ObjectSpec, ...]:
+    start = on_counter("cabinet1", (0.5, 0.4), pos=(0.0, -1.0))
+    return tuple(ObjectSpec(name, (group,), start, graspable=True, exclude=(exclude,), repeats=True) for name in names)
+
+
+def _apart(first: str, second: str) -> AllOf:
+    stored = [*(ObjectInside(name, first) for name in _ALCOHOL), *(ObjectInside(name, second) for name in _SOFT)]
+    return AllOf(*stored)
+
+
+def _take_away(name: str) -> tuple[Stage, ...]:
+    return fetch(name, "counter", "cabinet2")
+
+
+BEVERAGE_SORTING = Task(
+    name="BeverageSorting",
+    summary="Drinks with alcohol are in one cabinet, those without in the other, the gripper away from all four.",
+    fixtures=(
+        FixtureSpec("cabinet1", "cabinet_with_door"),
+        FixtureSpec("cabinet2", "cabinet_with_door", other_than=("cabinet1",)),
+        counter_near("cabinet1", size=(0.5, 0.5)),
+    ),
+    robot_start=RobotStart("counter", at_object="alcohol1"),
+    objects=(*_drinks(_ALCOHOL, "alcohol", "wine"), *_drinks(_SOFT, "drink", "alcohol")),
+    initial=(InitialOpenness("cabinet1", 0.9, 1.0), InitialOpenness("cabinet2", 0.9, 1.0)),
+    goal=AllOf(
+        AnyOf(_apart("cabinet1", "cabinet2"), _apart("cabinet2", "cabinet1")),
+        *map(GripperFar, (*_ALCOHOL, *_SOFT)),
+    ),
+    stages=(
+        Stage("pick_place", "place", "cabinet1", object="alcohol1"),
+        Stage("pick_place", "place", "cabinet1", object="alcohol2"),
+        *_take_away("non_alcohol1"),
+        Stage("navigation", "drive", "non_alcohol2"),
+        *_take_away("non_alcohol2"),
+    ),
+    instruction=(
+        "Store the drinks with alcohol in one of the open cabinets and those without in the other: on the counter are "
+        "{alcohol1+alcohol2+non_alcohol1+non_alcohol2}."
+    ),
+    paraphrases=(
+        "Sort the drinks into the two open cabinets, one for alcohol, one for the rest.",
+        "{alcohol1+alcohol2} go into one cabinet, {non_alcohol1+non_alcohol2} into the other.",
+        "No cabinet should hold both alcohol and soft drinks: put the four drinks away like that.",
+        "Keep alcohol and soft drinks apart, each kind in an open cabinet of its own.",
+    ),
+)
+
+TASKS = (BEVERAGE_SORTING, REFILL_CONDIMENT_STATION, RESTOCK_BOWLS, RESTOCK_CANNED_FOOD, RESTOCK_PANTRY)

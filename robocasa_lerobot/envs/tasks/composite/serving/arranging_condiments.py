@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from robocasa_lerobot.envs.predicates import AllOf, GripperFar, Near, ObjectInside
+from robocasa_lerobot.envs.predicates import AllOf, GripperFar, Near, ObjectInside, ObjectTouches
 from robocasa_lerobot.envs.scene.spec import FixtureSpec, InitialOpenness, ObjectSpec, Placement, RobotStart
 from robocasa_lerobot.envs.tasks.atomic.common import counter_near, in_cabinet, on_counter
 from robocasa_lerobot.envs.tasks.task import Stage, Task
@@ -52,4 +52,44 @@ CATEGORIZE_CONDIMENTS = Task(
     ),
 )
 
-TASKS = (CATEGORIZE_CONDIMENTS,)
+_CONDIMENTS = ("condiment1", "condiment2", "condiment3")
+_SHAKERS = ("shaker", "salt_and_pepper_shaker")
+
+
+def _beside(name: str, groups: tuple[str, ...], depth: float = 0.3, exclude: tuple[str, ...] = ()) -> ObjectSpec:
+    again = "" if name == "condiment1" else "condiment1"
+    start = on_counter("cabinet", (np.inf, depth), reuse_region_from=again)
+    return ObjectSpec(name, groups, start, graspable=True, exclude=exclude, repeats=True)
+
+
+ORGANIZE_CONDIMENTS = Task(
+    name="OrganizeCondiments",
+    summary="The three condiments are in the cabinet, what is none is on the counter, the gripper away from all four.",
+    fixtures=(FixtureSpec("cabinet", "cabinet"), counter_near("cabinet")),
+    robot_start=RobotStart("counter", at_object="condiment1"),
+    objects=(
+        _beside("condiment1", ("condiment",)),
+        _beside("condiment2", _SHAKERS),
+        _beside("condiment3", ("condiment", *_SHAKERS)),
+        _beside("distractor", ("any",), depth=0.5, exclude=("condiment", *_SHAKERS)),
+    ),
+    initial=(InitialOpenness("cabinet", 0.9, 1.0),),
+    goal=AllOf(
+        *(ObjectInside(name, "cabinet") for name in _CONDIMENTS),
+        ObjectTouches("distractor", "counter"),
+        *map(GripperFar, (*_CONDIMENTS, "distractor")),
+    ),
+    stages=tuple(Stage("pick_place", "place", "cabinet", object=name) for name in _CONDIMENTS),
+    instruction=(
+        "Put the {condiment1}, the {condiment2} and the {condiment3} into the cabinet; the {distractor} stays on the "
+        "counter."
+    ),
+    paraphrases=(
+        "Put every condiment and shaker on the counter away into the open cabinet, but not the {distractor}.",
+        "Three things on the counter season food: they belong in the cabinet. Leave the {distractor}.",
+        "Tidy {condiment1}, {condiment2} and {condiment3} into the cabinet above.",
+        "The cabinet is for the {condiment1}, the {condiment2} and the {condiment3}, the counter for the {distractor}.",
+    ),
+)
+
+TASKS = (CATEGORIZE_CONDIMENTS, ORGANIZE_CONDIMENTS)

@@ -8,6 +8,7 @@ from robocasa_lerobot.envs.scene.spec import (
     RobotStart,
     SampleRegion,
 )
+from robocasa_lerobot.envs.tasks.composite.common import before_stool, fetch
 from robocasa_lerobot.envs.tasks.task import Stage, Task
 
 GARNISH_PANCAKE = Task(
@@ -68,4 +69,94 @@ GARNISH_PANCAKE = Task(
     ),
 )
 
-TASKS = (GARNISH_PANCAKE,)
+ADD_LEMON_TO_FISH = Task(
+    name="AddLemonToFish",
+    summary="The lemon wedge lies on the plate with the fish on the dining counter, the gripper away.",
+    fixtures=(
+        FixtureSpec("fridge", "fridge"),
+        FixtureSpec("stool", "stool"),
+        FixtureSpec("dining_counter", "dining_counter", near="stool"),
+    ),
+    robot_start=RobotStart("fridge"),
+    objects=(
+        ObjectSpec(
+            "lemon_wedge",
+            ("lemon_wedge",),
+            Placement(
+                "fridge",
+                region=SampleRegion(name="fridge_shelf", height=(1.0, 1.5)),
+                size=(0.15, 0.15),
+                pos=(0.0, -1.0),
+            ),
+            graspable=True,
+        ),
+        ObjectSpec(
+            "distr_fridge",
+            ("food",),
+            Placement("fridge", region=SampleRegion(name="fridge_shelf"), size=(0.3, 0.3), pos=(0.0, 1.0)),
+            properties=("fridgable",),
+        ),
+        ObjectSpec("fish_container", ("plate",), before_stool((0.35, 0.35))),
+        ObjectSpec("fish", ("fish",), Placement(object="fish_container")),
+    ),
+    goal=AllOf(
+        ObjectOn("lemon_wedge", "fish_container"),
+        ObjectOn("fish", "fish_container"),
+        ObjectTouches("fish_container", "dining_counter"),
+        GripperFar("lemon_wedge"),
+    ),
+    stages=(
+        Stage("doors", "open", "fridge", part="fridge"),
+        *fetch("lemon_wedge", "fridge", "fish_container"),
+    ),
+    instruction="Bring the lemon wedge from the fridge to the dining counter and put it on the plate with the {fish}.",
+    paraphrases=(
+        "Garnish the {fish} on the dining counter with the lemon wedge out of the fridge.",
+        "The plate with the {fish} lacks its lemon wedge, which is in the fridge.",
+        "Open the fridge and carry the lemon wedge to the plate of {fish}.",
+        "A lemon wedge goes with the {fish}: fetch the one in the fridge to the dining counter's plate.",
+    ),
+)
+
+_CUBES = ("sugar_cube_1", "sugar_cube_2")
+_AWAY_M = 0.15
+
+
+def _sweetened(name: str) -> AllOf:
+    return AllOf(ObjectOn(name, "cake_container"), GripperFar(name, _AWAY_M))
+
+
+ADD_SUGAR_CUBES = Task(
+    name="AddSugarCubes",
+    summary="Both sugar cubes lie on the plate with the cake on the dining counter, the gripper 15 cm away from them.",
+    fixtures=(FixtureSpec("stool", "stool"), FixtureSpec("dining_counter", "dining_counter", near="stool")),
+    robot_start=RobotStart("stool"),
+    objects=(
+        ObjectSpec("cake_container", ("plate",), before_stool((0.35, 0.25))),
+        ObjectSpec("cake", ("cake",), Placement(object="cake_container"), graspable=True),
+        *(
+            ObjectSpec(
+                name, ("sugar_cube",), before_stool((0.5, 0.15)), graspable=True, scale=(1.0, 1.0, 1.5), repeats=True
+            )
+            for name in _CUBES
+        ),
+    ),
+    goal=AllOf(
+        *_sweetened("sugar_cube_1").parts,
+        *_sweetened("sugar_cube_2").parts,
+        ObjectOn("cake", "cake_container"),
+        ObjectTouches("cake_container", "dining_counter"),
+    ),
+    stages=tuple(
+        Stage("pick_place", "place", "cake_container", object=name, until=_sweetened(name)) for name in _CUBES
+    ),
+    instruction="Put both sugar cubes on the plate with the cake.",
+    paraphrases=(
+        "The cake's plate should have the two sugar cubes on it as well.",
+        "Garnish the plate of cake with both sugar cubes.",
+        "Lay one sugar cube after the other beside the cake, on its plate.",
+        "Two sugar cubes lie by the plate with the cake; they belong on it.",
+    ),
+)
+
+TASKS = (ADD_LEMON_TO_FISH, ADD_SUGAR_CUBES, GARNISH_PANCAKE)

@@ -2,6 +2,7 @@
 
 from robocasa_lerobot.envs.predicates import AllOf, Exactly, GripperFar, ObjectOn
 from robocasa_lerobot.envs.scene.spec import FixtureSpec, ObjectSpec, Placement, RobotStart, SampleRegion
+from robocasa_lerobot.envs.tasks.composite.common import before_stool
 from robocasa_lerobot.envs.tasks.task import Stage, Task
 
 _BUNS, _SAUSAGES = ("hotdog_bun1", "hotdog_bun2"), ("sausage1", "sausage2")
@@ -60,4 +61,94 @@ PORTION_HOT_DOGS = Task(
     ),
 )
 
-TASKS = (PORTION_HOT_DOGS,)
+_FRUITS = ("fruit1", "fruit2", "fruit3", "fruit4")
+_BOWLS = ("bowl1", "bowl2")
+
+
+def _bowl(name: str, stool: str) -> ObjectSpec:
+    return ObjectSpec(name, ("bowl",), before_stool((1.0, 0.4), stool=stool), repeats=True)
+
+
+PORTION_FRUIT_BOWL = Task(
+    name="PortionFruitBowl",
+    summary="Each of the two bowls has exactly two of the fruits, the gripper away from all four.",
+    fixtures=(
+        FixtureSpec("stool1", "stool"),
+        FixtureSpec("stool2", "stool", other_than=("stool1",)),
+        FixtureSpec("dining_counter", "dining_counter", near="stool1"),
+    ),
+    needs=("dining_counter",),
+    robot_start=RobotStart("dining_counter", at_object="plate"),
+    objects=(
+        ObjectSpec("plate", ("plate",), before_stool((1.0, 0.35), stool="stool1", pos=(0.0, -1.0)), scale=1.25),
+        _bowl("bowl1", "stool1"),
+        _bowl("bowl2", "stool2"),
+        *(
+            ObjectSpec(name, ("fruit",), Placement(object="plate", heaped=True), graspable=True, repeats=True)
+            for name in _FRUITS
+        ),
+    ),
+    goal=AllOf(
+        *(Exactly(2, *(ObjectOn(name, bowl) for name in _FRUITS)) for bowl in _BOWLS), *map(GripperFar, _FRUITS)
+    ),
+    stages=tuple(
+        Stage("pick_place", "place", bowl, object=name)
+        for bowl, names in zip(_BOWLS, (_FRUITS[:2], _FRUITS[2:]), strict=True)
+        for name in names
+    ),
+    instruction="Put two of the four fruits on the plate into one bowl and two into the other.",
+    paraphrases=(
+        "Share the plate's fruit equally between the two bowls.",
+        "Either bowl gets two fruits from the plate.",
+        "Divide {fruit1+fruit2+fruit3+fruit4}: two into each bowl.",
+        "Fill both bowls with fruit, the same number in each, until the plate is empty.",
+    ),
+)
+
+_YOGURTS = {
+    "yogurt1": ("stool1", 0.25),
+    "yogurt2": ("stool1", -0.25),
+    "yogurt3": ("stool2", -0.25),
+    "yogurt4": ("stool2", 0.25),
+}
+_PLATES = ("plate1", "plate2")
+
+PORTION_YOGURT = Task(
+    name="PortionYogurt",
+    summary="On each of the two plates stand exactly two of the yogurts, the gripper away from all four.",
+    fixtures=(
+        FixtureSpec("stool1", "stool"),
+        FixtureSpec("stool2", "stool", other_than=("stool1",)),
+        FixtureSpec("dining_counter", "dining_counter", near="stool1"),
+    ),
+    needs=("dining_counter",),
+    robot_start=RobotStart("dining_counter", at_object="plate1"),
+    objects=(
+        *(
+            ObjectSpec(f"plate{number}", ("plate",), before_stool((0.5, 0.35), stool=f"stool{number}"), repeats=True)
+            for number in (1, 2)
+        ),
+        *(
+            ObjectSpec(
+                name, ("yogurt",), before_stool((0.5, 0.4), stool=stool, pos=(x, -1.0)), graspable=True, repeats=True
+            )
+            for name, (stool, x) in _YOGURTS.items()
+        ),
+    ),
+    goal=AllOf(
+        *(Exactly(2, *(ObjectOn(name, plate) for name in _YOGURTS)) for plate in _PLATES), *map(GripperFar, _YOGURTS)
+    ),
+    stages=tuple(
+        Stage("pick_place", "place", stool.replace("stool", "plate"), object=name)
+        for name, (stool, _) in _YOGURTS.items()
+    ),
+    instruction="Put two of the four yogurts on one plate and two on the other.",
+    paraphrases=(
+        "Share the yogurts equally between the two plates.",
+        "Either plate on the dining counter gets two yogurts.",
+        "Portion the four yogurts: two for each plate.",
+        "Serve yogurt on both plates, the same number on each, until none is left beside them.",
+    ),
+)
+
+TASKS = (PORTION_FRUIT_BOWL, PORTION_HOT_DOGS, PORTION_YOGURT)

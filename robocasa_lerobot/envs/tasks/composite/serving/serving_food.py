@@ -2,6 +2,7 @@
 
 from robocasa_lerobot.envs.predicates import (
     AllOf,
+    AnyOf,
     GripperFar,
     GripperTouches,
     Never,
@@ -9,8 +10,16 @@ from robocasa_lerobot.envs.predicates import (
     ObjectTouches,
     OnBurner,
 )
-from robocasa_lerobot.envs.scene.spec import FixtureSpec, ObjectSpec, Placement, RobotStart, SampleRegion
-from robocasa_lerobot.envs.tasks.atomic.common import HANDLE_TO_FRONT, counter_near, on_counter
+from robocasa_lerobot.envs.scene.spec import (
+    FixtureSpec,
+    InitialOpenness,
+    ObjectSpec,
+    Placement,
+    RobotStart,
+    SampleRegion,
+)
+from robocasa_lerobot.envs.tasks.atomic.common import HANDLE_TO_FRONT, counter_near, in_cabinet, on_counter
+from robocasa_lerobot.envs.tasks.composite.common import before_stool, fetch
 from robocasa_lerobot.envs.tasks.task import Stage, Task
 
 _SERVED = ObjectOn("vegetable", "plate")
@@ -81,4 +90,123 @@ PAN_TRANSFER = Task(
     ),
 )
 
-TASKS = (PAN_TRANSFER,)
+*_PAN_CARRIED, _PAN_PUT = fetch("obj_container", "stove", "dining_table")
+
+SERVE_STEAK = Task(
+    name="ServeSteak",
+    summary="The steak lies on the plate, the pan stands on the dining counter, the gripper away from the steak.",
+    fixtures=(
+        FixtureSpec("stove", "stove"),
+        FixtureSpec("stool", "stool"),
+        FixtureSpec("dining_table", "counter", near="stool", size=(0.75, 0.2)),
+    ),
+    robot_start=RobotStart("stove"),
+    objects=(
+        ObjectSpec(
+            "obj_container",
+            ("pan",),
+            Placement(
+                "stove",
+                region=SampleRegion(name="any", height=(0.7, 1.2)),
+                size=(0.05, 0.05),
+                rotation=HANDLE_TO_FRONT,
+                ensure_inside=False,
+            ),
+            graspable=True,
+        ),
+        ObjectSpec("obj", ("steak",), Placement(object="obj_container"), graspable=True),
+        ObjectSpec("plate", ("plate",), before_stool((0.5, 0.35), counter="dining_table", pos=("ref", -1.0))),
+        ObjectSpec(
+            "dstr_dining",
+            ("mug", "cup"),
+            before_stool((0.5, 0.25), counter="dining_table", pos=("ref", -1.0), offset=(0.0, 0.1)),
+            graspable=True,
+        ),
+    ),
+    goal=AllOf(ObjectOn("obj", "plate"), ObjectTouches("obj_container", "dining_table"), GripperFar("obj")),
+    stages=(*_PAN_CARRIED, _PAN_PUT, Stage("pick_place", "place", "plate", object="obj")),
+    instruction="Carry the pan with the steak from the stove to the dining counter and put the steak on the plate.",
+    paraphrases=(
+        "Serve the steak: its pan goes on the dining counter, and the steak goes from there on the plate.",
+        "Bring the steak in its pan to the dining counter, then lay it on the plate.",
+        "The plate at the dining counter waits for the steak that lies in the pan on the stove; bring that pan along.",
+        "Set the pan down on the dining counter and move the steak out of it onto the plate.",
+    ),
+)
+
+_DESSERTS = ("dessert1", "dessert2")
+
+
+def _at_front(**more: object) -> Placement:
+    region = SampleRegion(top_size=(0.9, 0.4))
+    return Placement("counter", region=region, size=(1.0, 0.4), pos=(0.0, -1.0), **more)  # type: ignore[arg-type]
+
+
+DESSERT_UPGRADE = Task(
+    name="DessertUpgrade",
+    summary="Both desserts lie on the tray, the gripper away from it.",
+    fixtures=(FixtureSpec("counter", "counter", size=(0.9, 0.4)),),
+    robot_start=RobotStart("counter", at_object="receptacle"),
+    objects=(
+        ObjectSpec("receptacle", ("tray",), _at_front(rotation=(0.0, 0.0))),  # else plates hardly find room beside it
+        *(
+            ObjectSpec(
+                name, ("sweets",), _at_front(reuse_region_from="receptacle", try_to_place_in="plate"), graspable=True
+            )
+            for name in _DESSERTS
+        ),
+    ),
+    goal=AllOf(*(ObjectOn(name, "receptacle") for name in _DESSERTS), GripperFar("receptacle")),
+    stages=tuple(Stage("pick_place", "place", "receptacle", object=name) for name in _DESSERTS),
+    instruction="Move the {dessert1} and the {dessert2} from their plates to the tray.",
+    paraphrases=(
+        "Serve the desserts on the tray: {dessert1} and {dessert2}.",
+        "The {dessert1} and the {dessert2} look better on the tray than on plates; put them there.",
+        "Take both desserts off the plates and lay them on the tray.",
+        "The tray should have the {dessert1} on it, and the {dessert2} too.",
+    ),
+)
+
+
+def _one_each(first: str, second: str) -> AllOf:
+    return AllOf(ObjectOn("food1", first), ObjectOn("food2", second))
+
+
+_BOWLS = ("receptacle1", "receptacle2")
+
+PLACE_FOOD_IN_BOWLS = Task(
+    name="PlaceFoodInBowls",
+    summary="Both bowls stand on the counter, each with one of the two foods in it, the gripper away from the food.",
+    fixtures=(FixtureSpec("cab", "cabinet_double_door"), counter_near("cab")),
+    robot_start=RobotStart("cab"),
+    objects=(
+        ObjectSpec("receptacle1", ("bowl",), in_cabinet("cab", (0.4, 0.4), pos=(-1.0, -1.0)), graspable=True),
+        ObjectSpec(
+            "receptacle2", ("bowl",), in_cabinet("cab", (0.4, 0.4), pos=(1.0, -1.0)), graspable=True, repeats=True
+        ),
+        ObjectSpec("food1", ("food",), on_counter("cab", (0.6, 0.3)), graspable=True),
+        ObjectSpec("food2", ("food",), on_counter("cab", (0.6, 0.3)), graspable=True),
+        ObjectSpec("distr_counter", ("any",), on_counter("cab", (0.5, 0.2), pos=("ref", 1.0))),
+    ),
+    initial=(InitialOpenness("cab", 0.9, 1.0),),
+    goal=AllOf(
+        AnyOf(_one_each(*_BOWLS), _one_each(*reversed(_BOWLS))),
+        *(ObjectTouches(bowl, "counter") for bowl in _BOWLS),
+        GripperFar("food1"),
+        GripperFar("food2"),
+    ),
+    stages=(
+        *(Stage("pick_place", "place", "counter", object=bowl) for bowl in _BOWLS),
+        Stage("pick_place", "place", "receptacle1", object="food1"),
+        Stage("pick_place", "place", "receptacle2", object="food2"),
+    ),
+    instruction="Set the cabinet's two bowls on the counter, and put {food1} into one, {food2} into the other.",
+    paraphrases=(
+        "The {food1} and the {food2} need a bowl each; the bowls are in the cabinet.",
+        "Set the cabinet's two bowls on the counter, then fill one with the {food1}, the other with the {food2}.",
+        "Serve {food1} and {food2} in separate bowls out of the cabinet.",
+        "Bowls down from the cabinet, {food1} into the one, {food2} into the other.",
+    ),
+)
+
+TASKS = (DESSERT_UPGRADE, PAN_TRANSFER, PLACE_FOOD_IN_BOWLS, SERVE_STEAK)
