@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 
 from robocasa_lerobot.demos.motion import Array, action
 from robocasa_lerobot.demos.motion_style import PLAIN, MotionStyle, give_motion_style
-from robocasa_lerobot.demos.skills import SKILLS, SkillError
+from robocasa_lerobot.demos.skills import SKILLS, Skill, SkillError
 from robocasa_lerobot.demos.stages import StageLog, carry_out
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.tasks.registry import get_task, task_names
@@ -38,12 +38,18 @@ def check_demonstrable(names: Iterable[str]) -> None:
         )
 
 
-def demonstrate(env: KitchenEnv, style: MotionStyle = PLAIN, log: StageLog | None = None) -> Iterator[Array]:
+def demonstrate(
+    env: KitchenEnv,
+    style: MotionStyle = PLAIN,
+    log: StageLog | None = None,
+    skills: Mapping[tuple[str, str], Skill] | None = None,
+) -> Iterator[Array]:
     """Actions (12,), stored order, for the episode that `env` has been reset to, one per control step.
 
     Each action is computed from the state that the env is in when it is asked for, so the caller must step the env
     with it before asking for the next. It ends after the last stage, with the arm held still from then on. `style`
-    says how it is carried out; `log` tells which stage each action belongs to, and what came of them.
+    says how it is carried out; `log` tells which stage each action belongs to, and what came of them; `skills` are
+    those that do it, the demonstrator's own if None.
 
     Raises:
         UnknownNameError: a stage needs a skill that does not exist.
@@ -51,7 +57,7 @@ def demonstrate(env: KitchenEnv, style: MotionStyle = PLAIN, log: StageLog | Non
     """
     gripper = -1.0
     give_motion_style(env, style)
-    for step in carry_out(env, StageLog() if log is None else log):
+    for step in carry_out(env, StageLog() if log is None else log, skills):
         gripper = float(step[-1])
         yield style.carry_out(step)
     while True:

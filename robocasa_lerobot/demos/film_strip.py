@@ -46,7 +46,7 @@ def film_strip(path: Path, demo: str, out: Path) -> None:
             show_state(env.model, data, recorded.states[step])
             pictures = [
                 *renderer.pictures(data, contract.CAMERAS),
-                renderer.render(data, _beside_the_hand(env.model, data)),
+                renderer.render(data, beside_the_hand(env.model, data)),
             ]
             columns.append(titled(np.vstack(pictures), f"{step / contract.CONTROL_HZ:.1f} s"))
     finally:
@@ -66,7 +66,8 @@ def show_state(model: mujoco.MjModel, data: mujoco.MjData, state: NDArray[np.flo
     mujoco.mj_camlight(model, data)
 
 
-def _beside_the_hand(model: mujoco.MjModel, data: mujoco.MjData) -> mujoco.MjvCamera:
+def beside_the_hand(model: mujoco.MjModel, data: mujoco.MjData) -> mujoco.MjvCamera:
+    """A camera that looks at the hand from 0.9 m, over a shoulder or from where nothing stands between."""
     heading = float(np.degrees(base_pose(data)[1]))
     hand = data.site(GRIP_SITE).xpos
     best, most = mujoco.MjvCamera(), -1.0

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
@@ -11,11 +11,13 @@ import numpy as np
 
 from robocasa_lerobot.demos.motion import Array, action, base_pose
 from robocasa_lerobot.demos.planning.base_room import wrap
-from robocasa_lerobot.demos.skills import SKILLS, SkillError
+from robocasa_lerobot.demos.skills import SKILLS, Skill, SkillError
 from robocasa_lerobot.demos.skills.common import stage_done, wait_for_stage
 from robocasa_lerobot.demos.skills.fold import fold_arm
 from robocasa_lerobot.demos.skills.navigation import drive_to
+from robocasa_lerobot.demos.skills.pick_place.heaps import uppermost
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
+from robocasa_lerobot.envs.predicates.logic import terms_by_name
 from robocasa_lerobot.envs.tasks.conditions import must_never, stage_condition, without_gripper
 from robocasa_lerobot.envs.tasks.task import Stage
 from robocasa_lerobot.errors import UnknownNameError
@@ -66,12 +68,18 @@ class StageLog:
         ]
 
 
-def carry_out(env: KitchenEnv, log: StageLog) -> Iterator[Array]:
+def carry_out(env: KitchenEnv, log: StageLog, skills: Mapping[tuple[str, str], Skill] | None = None) -> Iterator[Array]:
     """Actions (12,), stored order, that do all stages; it ends when the last is done.
 
     A stage that is done already is left out. One that fails is tried again; if the one before it has come undone
     meanwhile (an object has slipped off), that one comes first. Where the task's goal does not hold in the end, it goes
-    on with the first stage that has to do with the terms that fail.
+    on with the first stage that has to do with the terms that fail. Of what lies heaped in a vessel, the upper is taken
+    first.
+
+    Args:
+        env: in the episode.
+        log: tells which stage is on.
+        skills: what carries out a stage, by its skill and verb; None takes the demonstrator's.
 
     Raises:
         UnknownNameError: a stage needs a skill that does not exist.
@@ -95,11 +103,17 @@ def carry_out(env: KitchenEnv, log: StageLog) -> Iterator[Array]:
         if len(stages) > 1 and stages[index].skill not in _AS_IT_IS:
             yield from fold_arm(env)
             yield from _stand_before(env, stages[index], FAR_OFF_M[min(outcome.attempts, 1)])
-        yield from _attempt(env, stages[index], outcome)
+        turn = uppermost(env, stages, index)
+        if log.outcomes[turn].attempts >= ATTEMPTS:
+            turn = index
+        log.current, outcome = turn, log.outcomes[turn]
+        yield from _attempt(env, stages[turn], outcome, SKILLS if skills is None else skills)
         _check_never(env, outcome)
-        outcome.done = stage_done(env, stages[index])
+        outcome.done = stage_done(env, stages[turn])
+        outcome.reason = "" if outcome.done else outcome.reason
+        if turn != index:
+            continue
         if outcome.done:
-            outcome.reason = ""
             index += 1
         elif index > 0 and not _still_holds(env, index - 1):
             index -= 1  # the stage that it rests on has come undone
@@ -122,16 +136,18 @@ def _stand_before(env: KitchenEnv, stage: Stage, most_m: float) -> Iterator[Arra
             yield from drive_to(env, stand.x, stand.y, stand.yaw)
 
 
-def _attempt(env: KitchenEnv, stage: Stage, outcome: StageOutcome) -> Iterator[Array]:
+def _attempt(
+    env: KitchenEnv, stage: Stage, outcome: StageOutcome, skills: Mapping[tuple[str, str], Skill]
+) -> Iterator[Array]:
     """One go at a stage with its skill, and a while of standing still after it; a failure is noted."""
     key = (stage.skill, stage.verb)
-    if key not in SKILLS:
-        raise UnknownNameError("skill", " ".join(key), (" ".join(k) for k in SKILLS))
+    if key not in skills:
+        raise UnknownNameError("skill", " ".join(key), (" ".join(k) for k in skills))
     outcome.attempts += 1
     outcome.reason = "it is not done"
     gripper = -1.0
     try:
-        for step in SKILLS[key](env, stage):
+        for step in skills[key](env, stage):
             gripper = float(step[-1])
             yield step
     except SkillError as error:
@@ -162,14 +178,24 @@ def _still_holds(env: KitchenEnv, index: int) -> bool:
 
 
 def _undone(env: KitchenEnv) -> int | None:
-    """The first stage that the goal's failing terms belong to; None where the goal holds, or nobody knows."""
+    """The first stage that the goal's failing terms belong to; None where the goal holds, or nobody knows.
+
+    It has such a term itself; or else it puts an object down of which such a term tells, and that is not there: a goal
+    may ask in one term for what two stages do, as for a pan on a lit burner.
+    """
     task = env.declaration
     wanted: dict[str, bool] = {}
     if len(task.stages) == 1 or task.goal.evaluate(env.scene, env.data, wanted):
         return None
+    failing = [term for name, terms in terms_by_name(task.goal).items() if wanted.get(name) is False for term in terms]
+    objects = {getattr(term, "object", "") for term in failing}
+    moved: int | None = None
     for index, stage in enumerate(task.stages):
         terms: dict[str, bool] = {}
-        done = stage_condition(task, stage).evaluate(env.scene, env.data, terms)
-        if not done and any(not held and wanted.get(name) is False for name, held in terms.items()):
+        if stage_condition(task, stage).evaluate(env.scene, env.data, terms):
+            continue
+        if any(not held and wanted.get(name) is False for name, held in terms.items()):
             return index
-    return None
+        if moved is None and stage.verb == "place" and stage.object in objects:
+            moved = index
+    return moved

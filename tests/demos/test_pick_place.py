@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from robocasa_lerobot.demos.motion import Array, base_pose, floor_axes
-from robocasa_lerobot.demos.planning.base_path import Room
+from robocasa_lerobot.demos.planning.base_path import Room, wrap
 from robocasa_lerobot.demos.planning.collision import CollisionChecker
 from robocasa_lerobot.demos.skills.common import SkillError, stage_done
-from robocasa_lerobot.demos.skills.pick_place.carrying.carry import OTHER_M, in_reach, standing_pose_for
+from robocasa_lerobot.demos.skills.pick_place.carrying.carry import OTHER_M, OTHER_RAD, in_reach, standing_pose_for
 from robocasa_lerobot.demos.skills.pick_place.grasp_strategy import GraspStrategy, entry
 from robocasa_lerobot.demos.skills.pick_place.graspable import contents_of, graspable, holder_of
 from robocasa_lerobot.demos.skills.pick_place.location import locate
@@ -157,7 +157,8 @@ def test_a_standing_pose_is_free_and_near(env: KitchenEnv) -> None:
             assert first is not None, name
         other = stand_for(env, name, [first]) if first is not None else None
         if first is not None and other is not None:
-            assert np.hypot(other.x - first.x, other.y - first.y) > OTHER_M
+            apart = np.hypot(other.x - first.x, other.y - first.y)
+            assert apart > OTHER_M or abs(wrap(other.yaw - first.yaw)) > OTHER_RAD
         for stand in filter(None, (first, other)):
             assert np.hypot(stand.x - x, stand.y - y) < REACH_M
             assert Room(env.scene).free(stand)
@@ -194,7 +195,8 @@ def test_where_all_places_are_taken_there_is_none_to_stand() -> None:
     fixture = locate(env, "obj").fixture
     assert fixture is not None
     around = np.arange(0.0, 2 * np.pi, np.pi / 8)
-    taken = [RobotPose(point[0] + d * np.cos(a), point[1] + d * np.sin(a), 0.0) for a in around for d in (0.5, 0.7)]
+    spots = [point[:2] + d * np.array([np.cos(a), np.sin(a)]) for a in around for d in (0.5, 0.7, 0.9)]
+    taken = [RobotPose(*spot, yaw) for spot in spots for yaw in np.arange(0.0, 2 * np.pi, OTHER_RAD)]
     with pytest.raises(SkillError, match="no room to stand"):
         standing_pose_for(env, fixture, point, taken)
     env.close()

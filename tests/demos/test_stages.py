@@ -170,6 +170,29 @@ def test_a_stage_that_is_done_by_what_does_not_hold_is_not_the_one_that_is_lacki
     assert [(o.attempts, o.done) for o in log.outcomes] == [(0, True), (1, True)]
 
 
+class ObjectFlag(Flag):
+    """A flag that tells of an object."""
+
+    def __init__(self, key: str, object: str) -> None:
+        super().__init__(key)
+        self.object = object
+
+
+def test_what_was_put_down_and_moved_since_comes_again_though_the_goal_has_another_word_for_it(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """A pan on a lit burner is asked for by one term; that it stands there is a stage's, that it is lit another's."""
+    env = made(monkeypatch, {"place": does({"there": True, "pan": True}), "on": does({"on": True, "there": False})})
+    again = does({"there": True, "pan": True}, {"there": True, "pan": True, "lit": True})
+    monkeypatch.setitem(module.SKILLS, ("made", "place"), again)
+    stages = (Stage("made", "place", "", object="pan", until=Flag("there")), Stage("made", "on", "", until=Flag("on")))
+    env.declaration = SimpleNamespace(name="made", stages=stages, goal=AllOf(ObjectFlag("lit", "pan"), Flag("on")))
+    log = StageLog()
+    list(carry_out(env, log))
+    assert env.flags["lit"]
+    assert [(o.attempts, o.done) for o in log.outcomes] == [(2, True), (1, True)]
+
+
 def test_it_gives_up_with_the_skills_own_words(monkeypatch: pytest.MonkeyPatch) -> None:
     env = made(monkeypatch, {"a": does(*[SkillError("the lid is stuck")] * ATTEMPTS), "b": does({"b": True})})
     log = StageLog()

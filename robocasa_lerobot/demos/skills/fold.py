@@ -7,15 +7,17 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from robocasa_lerobot.demos.motion import OPEN, Array
+from robocasa_lerobot.demos.motion import OPEN, Array, HandTarget, grip_position, hand_rotation
 from robocasa_lerobot.demos.planning.approach import Approach
 from robocasa_lerobot.demos.planning.base_path import carried
 from robocasa_lerobot.demos.planning.collision import CollisionChecker
 from robocasa_lerobot.demos.planning.costs import REACHING
 from robocasa_lerobot.demos.planning.follow import follow_joint_path
+from robocasa_lerobot.demos.skills.common import draw_back, hold_hand
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 
 FOLDED_RAD = 0.35  # of each joint from its angle at the start
+LET_GO_STEPS, OFF_M = 6, 0.08  # of a hand that has just used a handle, which would take the part along
 
 
 def fold_arm(env: KitchenEnv) -> Iterator[Array]:
@@ -27,6 +29,13 @@ def fold_arm(env: KitchenEnv) -> Iterator[Array]:
     home = checker.arm.home
     if np.abs(present - home).max() < FOLDED_RAD:
         return
+    touched = checker.touched(base[None], present[None], most=8).all()
+    if any(env.model.body_dofnum[body] == 1 for body in touched):  # a door or a drawer
+        at = HandTarget(grip_position(env.data), hand_rotation(env.data))
+        yield from hold_hand(env.data, at, OPEN, LET_GO_STEPS)
+        yield from draw_back(env.data, OPEN, OFF_M)
+        checker = CollisionChecker(env.scene, env.data)
+        base, present = checker.present_base, checker.present_joints
     # What it leans on already is no reason to stay there.
     checker.allow(checker.touched(base[None], present[None]).all())
 

@@ -6,7 +6,7 @@ drive where the arm falls short. A grasp that fails is followed by another one.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cache, partial
 
@@ -26,6 +26,7 @@ from robocasa_lerobot.demos.motion import (
 from robocasa_lerobot.demos.planning.follow import follow_joint_path
 from robocasa_lerobot.demos.planning.grasps import GraspPose
 from robocasa_lerobot.demos.skills.common import SkillError, close_fingers, draw_back, hold_hand, move_hand
+from robocasa_lerobot.demos.skills.pick_place.carrying.finger_watch import FingerWatch, finger_gap
 from robocasa_lerobot.demos.skills.pick_place.grasp_strategy import (
     LIFT_M,
     GraspStrategy,
@@ -50,7 +51,7 @@ ATTEMPTS = 5
 INTEGRAL_GAIN = 0.12
 GRASP_STEPS, RELEASE_STEPS = 11, 8
 STANDOFF_M = 0.06
-HOPELESS = 3.5  # cost of a path from which on it is not tried
+HOPELESS, POOR = 3.5, 1.5  # cost of a path from which on it is not tried, or not before one from another side
 LOW_COST = 0.05
 BLOCKED_M, BACK_M = 0.05, 0.08  # a hand as far as this from where the grasp begins is blocked: another grasp is next
 HELD_UP_M, LOWER_M = 0.08, 0.03
@@ -61,16 +62,26 @@ TRIED, ALIKE_M = 1.2, 0.015  # cost of a grasp like one that has failed: its pla
 # of the lift.
 HELD_M, ROSE_SHARE = 0.05, 0.25
 # Fingers that come closer together than what is between them is wide hold the edge of it, from which they slip off.
-# Fingers that still come closer together as they lift it slide off a slope: it would be lost on its way. Those
-# at the wall of a vessel come to lie on it.
-SHALLOW_M, CREEP_M = 0.007, 0.0004
+SHALLOW_M = 0.007
+# What slides out of the fingers (`carrying/finger_watch.py`) would be lost on its way; at a vessel's wall they settle.
+CREEP_ATTEMPTS = 2
+# What is not between the fingers, but hangs from one of them, is put back; a wall that slopes is held so, in the end.
+HANG_ATTEMPTS = 2
 # Fingers that close askew to the wall of a vessel with others in it turn it as much, or stay apart by as much more than
 # what is between them: it would go on turning on its way.
 ASKEW_RAD, ASKEW_M, ASKEW_ATTEMPTS = float(np.deg2rad(8.0)), 0.010, 2
 
 
-def pick(env: KitchenEnv, obj: Graspable, strategy: GraspStrategy) -> Iterator[Array]:
+def pick(
+    env: KitchenEnv, obj: Graspable, strategy: GraspStrategy, elsewhere: Callable[[], bool] = lambda: False
+) -> Iterator[Array]:
     """Grasp an object, and lift it or draw it out; the gripper stays closed.
+
+    Args:
+        env: the kitchen.
+        obj: to be grasped.
+        strategy: how.
+        elsewhere: whether it could be reached for from another side: then poor grasps are not tried after a failure.
 
     Raises:
         SkillError: it is not in the gripper after all attempts.
@@ -83,7 +94,7 @@ def pick(env: KitchenEnv, obj: Graspable, strategy: GraspStrategy) -> Iterator[A
         body = data.body(obj.name)
         start = body.xpos.copy()
         choice = yield from approach(env, lambda blocked: _best(env, obj, strategy, tried, blocked), OPEN)
-        if choice.cost > HOPELESS:
+        if choice.cost > HOPELESS or (attempt and choice.cost > POOR and elsewhere()):
             raise SkillError(f"{obj.title} is out of reach from here, or too near to other things")
         far, before, at, lifted, out = choice.path.targets
         planned = _in_object(env, obj, at)  # which grasp this was, wherever the hand gets to
@@ -109,39 +120,66 @@ def pick(env: KitchenEnv, obj: Graspable, strategy: GraspStrategy) -> Iterator[A
             yield from move_hand(data, at, OPEN, speed=0.4, tolerance=0.004, max_steps=15)
         upright = _uprightness(env, obj)
         yield from close_fingers(data, at, GRASP_STEPS)
-        turned, wide = abs(_uprightness(env, obj) - upright), _gap(env) - _width(choice)
+        turned, wide = abs(_uprightness(env, obj) - upright), finger_gap(env) - _width(choice)
         askew = bool(obj.contents) and (turned > ASKEW_RAD or wide > ASKEW_M)
         if attempt < ASKEW_ATTEMPTS and (askew or wide < -SHALLOW_M):
             yield from _let_go(env, tried, planned)
             continue
-        inside, closed = _inside(env, obj), _gap(env)
+        inside = _inside(env, obj)
         lift = float(lifted.position[2] - choice.path.targets[2].position[2])
-        yield from move_hand(
-            data,
-            _shifted(lifted, moved),
-            CLOSED,
-            speed=0.7,
-            tolerance=0.4 * lift,
-            max_steps=50,
-            integral_gain=INTEGRAL_GAIN,
+        lifted, out = _shifted(lifted, moved), _shifted(out, moved)
+        watch = FingerWatch(env)
+        yield from watch.over(
+            move_hand(
+                data,
+                lifted,
+                CLOSED,
+                speed=0.7,
+                tolerance=0.4 * lift,
+                max_steps=50,
+                integral_gain=INTEGRAL_GAIN,
+            )
         )
-        creeps = closed - _gap(env) > CREEP_M and (obj.item is None or obj.item.interior is None)
-        if attempt < ASKEW_ATTEMPTS and creeps and is_held(env, obj.name):
+        slippery = attempt < CREEP_ATTEMPTS and (obj.item is None or obj.item.interior is None)
+        if slippery and watch.creeps() and _stays(env, obj, inside):
             yield from move_hand(data, at, CLOSED, speed=0.7, tolerance=0.01, max_steps=30)
             yield from _let_go(env, tried, planned)
             continue
         rise = data.body(obj.name).xpos[2] - start[2] - moved[2]
         if (rise > ROSE_SHARE * lift and _stays(env, obj, inside)) or is_held(env, obj.name):
-            yield from _draw_out(env, _shifted(lifted, moved), _shifted(out, moved), strategy.narrow)
-            if _stays(env, obj, inside) or is_held(env, obj.name):
+            yield from watch.over(_draw_out(env, lifted, out, strategy.narrow))
+            stays, held = _stays(env, obj, inside), is_held(env, obj.name)
+            loose = not held and attempt < HANG_ATTEMPTS
+            poor = stays and (loose or (slippery and watch.creeps()))
+            if poor or (not (stays or held) and hangs(env, obj)):
+                yield from _put_back(env, at, lifted)
+            elif stays or held:
                 return
         yield from _let_go(env, tried, planned)
     raise SkillError(f"{obj.title} was not lifted in {ATTEMPTS} attempts")
 
 
+def _put_back(env: KitchenEnv, at: HandTarget, lifted: HandTarget) -> Iterator[Array]:
+    """Bring an object that slides out of the hand back to where it was grasped, the way that it came out."""
+    start = grip_position(env.data)
+    yield from move_hand(env.data, lifted, CLOSED, speed=0.8, tolerance=0.01, start=start)
+    yield from move_hand(env.data, at, CLOSED, speed=0.7, tolerance=0.01, max_steps=30)
+
+
 def is_held(env: KitchenEnv, name: str) -> bool:
     """Whether an object is between the fingers."""
     return Grasped(name).holds(env.scene, env.data)
+
+
+def hangs(env: KitchenEnv, obj: Graspable) -> bool:
+    """Whether an object touches the hand, and nothing else but what lies in it: it falls when the fingers open."""
+    hand = env.scene.subtree(env.scene.robot.names.hand)
+    mine = np.zeros(env.model.nbody, dtype=np.bool_)
+    mine[list(obj.bodies | obj.carried)] = True
+    pairs = env.model.geom_bodyid[env.data.contact.geom].reshape(-1, 2)
+    sides = np.concatenate([pairs, pairs[:, ::-1]])
+    met = sides[mine[sides[:, 0]] & ~mine[sides[:, 1]], 1]
+    return len(met) > 0 and bool(hand[met].all())
 
 
 def _stays(env: KitchenEnv, obj: Graspable, inside: Array) -> bool:
@@ -166,11 +204,6 @@ def _let_go(env: KitchenEnv, tried: list[HandTarget], planned: HandTarget) -> It
 def _uprightness(env: KitchenEnv, obj: Graspable) -> float:
     """How far an object's z axis is from the vertical, radians."""
     return float(np.arccos(np.clip(env.data.body(obj.name).xmat[8], -1.0, 1.0)))
-
-
-def _gap(env: KitchenEnv) -> float:
-    """How far apart the fingers are, metres."""
-    return float(sum(abs(env.data.joint(name).qpos[0]) for name in env.scene.robot.names.finger_joints))
 
 
 def _draw_out(env: KitchenEnv, lifted: HandTarget, out: HandTarget, narrow: bool) -> Iterator[Array]:

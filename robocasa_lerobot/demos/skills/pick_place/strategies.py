@@ -41,7 +41,9 @@ from robocasa_lerobot.demos.skills.pick_place.poses.place_poses import (
     over_bowl,
     over_burners,
     over_jug,
+    reach_on,
 )
+from robocasa_lerobot.demos.skills.pick_place.poses.plate_poses import is_flat, side_by_side
 from robocasa_lerobot.demos.skills.pick_place.reach_in import OUT_OF_A_MICROWAVE, OUT_OF_A_TOASTER_OVEN
 from robocasa_lerobot.demos.skills.pick_place.turn_across import lies_across, turn_across
 from robocasa_lerobot.demos.skills.racks import pull
@@ -169,10 +171,14 @@ def target_object(env: KitchenEnv, stage: Stage) -> str:
 def _by_target(env: KitchenEnv, stage: Stage, obj: Graspable) -> PlaceStrategy:
     holder = target_object(env, stage)
     if holder:
-        poses = on_object(env, obj, holder)
+        more = _more_comes(env, stage)
+        poses = on_object(env, obj, holder, more=more)
+        fit = side_by_side(env, obj, holder, reach_on(env, holder), more=more) if is_flat(env, holder) else None
         if in_the_open(locate(env, holder)) and not _looks_ahead(env) and in_the_open(locate(env, obj.name)):
-            return PlaceStrategy(poses, leans=_OPEN_LEANS)
-        return PlaceStrategy(poses, leans=_CLOSED_LEANS, entries=("up", "across", "out"), grasp=ANY_APPROACH, in_m=0.25)
+            return PlaceStrategy(poses, leans=_OPEN_LEANS, fit=fit)
+        return PlaceStrategy(
+            poses, leans=_CLOSED_LEANS, entries=("up", "across", "out"), grasp=ANY_APPROACH, in_m=0.25, fit=fit
+        )
     fixture, part = env.scene.fixture(stage.target), env.scene.part(stage.target, stage.part)
     match fixture:
         case Counter():
@@ -191,6 +197,16 @@ def _by_target(env: KitchenEnv, stage: Stage, obj: Graspable) -> PlaceStrategy:
     regions = [region for _, region in named if _counts(env, stage, region)]
     columns = MANY_COLUMNS if distance_terms(env, stage) else COLUMNS
     return _into_regions(env, obj, fixture, part, regions, columns)
+
+
+def _more_comes(env: KitchenEnv, stage: Stage) -> bool:
+    """Whether a stage that is not done yet puts another object on or in the same object."""
+    return any(
+        (other.skill, other.verb, other.target) == (stage.skill, stage.verb, stage.target)
+        and other.object != stage.object
+        and not stage_condition(env.declaration, other).evaluate(env.scene, env.data, {})
+        for other in env.declaration.stages
+    )
 
 
 def _into_sink(env: KitchenEnv, stage: Stage, obj: Graspable, sink: Sink) -> PlaceStrategy:

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import partial
 
 import numpy as np
 
 from robocasa_lerobot.demos.motion import CLOSED, OPEN, Array, HandTarget, grip_position, hand_rotation
-from robocasa_lerobot.demos.planning.base_path import base_now
+from robocasa_lerobot.demos.planning.base_path import base_now, wrap
 from robocasa_lerobot.demos.skills.common import SkillError, hold_hand, stage_done
 from robocasa_lerobot.demos.skills.fold import fold_arm
 from robocasa_lerobot.demos.skills.navigation import drive_to
@@ -16,10 +17,15 @@ from robocasa_lerobot.demos.skills.pick_place.carrying.carry import carry_to, go
 from robocasa_lerobot.demos.skills.pick_place.grasp_strategy import ANY_APPROACH, GraspStrategy
 from robocasa_lerobot.demos.skills.pick_place.graspable import Graspable, graspable
 from robocasa_lerobot.demos.skills.pick_place.location import locate
-from robocasa_lerobot.demos.skills.pick_place.pick import is_held, pick
+from robocasa_lerobot.demos.skills.pick_place.pick import hangs, is_held, pick
 from robocasa_lerobot.demos.skills.pick_place.place import PlaceStrategy, put
 from robocasa_lerobot.demos.skills.pick_place.reach_in import drive_around_open_door
-from robocasa_lerobot.demos.skills.pick_place.strategies import grasp_strategy, place_strategy, target_object
+from robocasa_lerobot.demos.skills.pick_place.strategies import (
+    grasp_strategy,
+    in_the_open,
+    place_strategy,
+    target_object,
+)
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.kitchens.appliances.kinds.microwave import Microwave
 from robocasa_lerobot.envs.kitchens.fixtures.base import Fixture
@@ -29,7 +35,8 @@ from robocasa_lerobot.envs.tasks.task import Stage
 ATTEMPTS = 4
 SETTLE_STEPS = 15
 BY_USE = {"stir": TOOL_BY_THE_HANDLE, "pour": PAN_BY_THE_HANDLE}
-MOST_PLACES = 2  # that an object is reached for from
+MOST_PLACES = 3  # that an object is reached for from
+OTHER_SIDE_RAD = 0.7  # between the robot's headings at two sides of a counter, at least
 
 
 def pick_object(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
@@ -51,16 +58,19 @@ def place_object(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
     for attempt in range(ATTEMPTS):
         obj = graspable(env, stage.object)
         strategy = place_strategy(env, stage, obj)
-        if not is_held(env, obj.name):
+        if not is_held(env, obj.name) and not hangs(env, obj):
             if attempt == 0:
                 yield from _around_door(env, _target_fixture(env, stage))
-            yield from take(env, obj, strategy.grasp)
+            holder = target_object(env, stage)
+            towards = env.data.body(holder).xpos.copy() if holder else None
+            yield from take(env, obj, strategy.grasp, towards=towards)
         yield from _bring(env, stage, obj, strategy)
         yield from put(env, obj, strategy, failed)
         for _ in range(SETTLE_STEPS):
             if stage_done(env, stage):
                 return
-            fingers = CLOSED if is_held(env, obj.name) else OPEN  # what was blocked on its way is kept
+            # What was blocked on its way is kept.
+            fingers = CLOSED if is_held(env, obj.name) or hangs(env, obj) else OPEN
             yield from hold_hand(env.data, HandTarget(grip_position(env.data), hand_rotation(env.data)), fingers, 1)
     raise SkillError(f"{graspable(env, stage.object).title} is not where it belongs after {ATTEMPTS} attempts")
 
@@ -91,23 +101,45 @@ def drive(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
         yield from drive_to(env, stand.x, stand.y, stand.yaw)
 
 
-def take(env: KitchenEnv, obj: Graspable, free: GraspStrategy, *, kept: bool = False) -> Iterator[Array]:
+def take(
+    env: KitchenEnv, obj: Graspable, free: GraspStrategy, *, kept: bool = False, towards: Array | None = None
+) -> Iterator[Array]:
     """Drive to an object where it is out of reach, and pick it in the manner of its place.
+
+    Args:
+        env: the kitchen.
+        obj: to be picked up.
+        free: how it is grasped where it stands in the open.
+        kept: whether it stays in the hand for a later stage.
+        towards: where it goes then, world, metres: the robot rather stands on that side of it.
 
     Raises:
         SkillError: it is not in the gripper after all attempts.
     """
     been: list[RobotPose] = []
     while True:
-        yield from go_to_object(env, obj.name, been)
+        yield from go_to_object(env, obj.name, been, towards)
         yield from _around_door(env, locate(env, obj.name).fixture)
         try:
-            yield from pick(env, obj, grasp_strategy(env, obj, free, kept=kept))
+            elsewhere = partial(_has_other_side, env, obj.name) if not been else lambda: False
+            yield from pick(env, obj, grasp_strategy(env, obj, free, kept=kept), elsewhere)
             return
         except SkillError:
             if len(been) == MOST_PLACES - 1:
                 raise
         been.append(base_now(env.data))
+
+
+def _has_other_side(env: KitchenEnv, name: str) -> bool:
+    """Whether the robot can stand at another side of what an object lies on in the open."""
+    place, here = locate(env, name), base_now(env.data)
+    if place.fixture is None or not in_the_open(place):
+        return False
+    try:
+        stand = standing_pose_for(env, place.fixture, env.data.body(name).xpos.copy(), [here])
+    except SkillError:
+        return False
+    return abs(wrap(stand.yaw - here.yaw)) > OTHER_SIDE_RAD
 
 
 def _bring(env: KitchenEnv, stage: Stage, obj: Graspable, strategy: PlaceStrategy) -> Iterator[Array]:

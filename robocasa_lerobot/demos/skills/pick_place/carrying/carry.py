@@ -17,8 +17,8 @@ from robocasa_lerobot.demos.motion import (
 )
 from robocasa_lerobot.demos.planning.base_path import Room, wrap
 from robocasa_lerobot.demos.planning.collision import CollisionChecker, Held
-from robocasa_lerobot.demos.planning.follow import follow_joint_path
 from robocasa_lerobot.demos.skills.common import SkillError
+from robocasa_lerobot.demos.skills.fold import fold_arm
 from robocasa_lerobot.demos.skills.navigation import drive_to
 from robocasa_lerobot.demos.skills.pick_place.carrying.fold_held import fold_with
 from robocasa_lerobot.demos.skills.pick_place.graspable import Graspable
@@ -33,9 +33,10 @@ LEAST_AHEAD_M, MOST_ASIDE_M, NEAR_M = 0.15, 0.75, 0.72
 # Places to stand round a point: distances, the best first, and headings; costs in metres of driving.
 STAND_FAR_M, DIRECTIONS = (0.58, 0.52, 0.64, 0.70, 0.76, 0.82), 16
 FAR_COST, ASKEW_COST = 4.0, 0.5
-# Of the point to the robot's left; to its side only where there is no room straight before it: by an open oven's door.
-ASIDES_M = ((0.0,), (0.15, -0.15, 0.3, -0.3))
-OTHER_M = 0.25  # places nearer than this to each other count as the same
+# Of the point to the robot's left; to its side only where there is no room straight before it: by an open oven's door,
+# and farther still before what is in a corner.
+ASIDES_M = ((0.0,), (0.15, -0.15, 0.3, -0.3), (0.45, -0.45, 0.6, -0.6))
+OTHER_M, OTHER_RAD = 0.25, 0.35  # places nearer than this to each other, and turned less, count as the same
 
 
 def in_reach(env: KitchenEnv, point: Array) -> bool:
@@ -50,17 +51,22 @@ def in_reach(env: KitchenEnv, point: Array) -> bool:
 
 
 def standing_pose_for(
-    env: KitchenEnv, fixture: Fixture, point: Array, other_than: Sequence[RobotPose] = ()
+    env: KitchenEnv,
+    fixture: Fixture,
+    point: Array,
+    other_than: Sequence[RobotPose] = (),
+    towards: Array | None = None,
 ) -> RobotPose:
     """Where to stand to reach a point of a fixture: near it, square to the fixture's sides where there is room.
 
-    Places near those of `other_than` are left out.
+    Places near those of `other_than` are left out; those are better that are near a point `towards` which it goes.
 
     Raises:
         SkillError: no place is free from where the arm reaches the point.
     """
     for asides in ASIDES_M:
-        poses = [pose for pose in _stands_round(env, fixture, point, asides) if _lies_apart(pose, other_than)]
+        stands = _stands_round(env, fixture, point, asides, towards)
+        poses = [pose for pose in stands if _lies_apart(pose, other_than)]
         free = _free(env, poses)
         if free.any():
             return poses[int(np.argmax(free))]
@@ -68,10 +74,15 @@ def standing_pose_for(
 
 
 def _lies_apart(pose: RobotPose, others: Sequence[RobotPose]) -> bool:
-    return all(np.hypot(pose.x - other.x, pose.y - other.y) > OTHER_M for other in others)
+    return all(
+        np.hypot(pose.x - other.x, pose.y - other.y) > OTHER_M or abs(wrap(pose.yaw - other.yaw)) > OTHER_RAD
+        for other in others
+    )
 
 
-def _stands_round(env: KitchenEnv, fixture: Fixture, point: Array, asides: Sequence[float]) -> list[RobotPose]:
+def _stands_round(
+    env: KitchenEnv, fixture: Fixture, point: Array, asides: Sequence[float], towards: Array | None
+) -> list[RobotPose]:
     """Places round a point, which lies ahead or as far to the left as that, metres; the best first."""
     base, _ = base_pose(env.data)
     found: list[tuple[float, RobotPose]] = []
@@ -81,6 +92,8 @@ def _stands_round(env: KitchenEnv, fixture: Fixture, point: Array, asides: Seque
         askew = abs(np.sin(2 * (yaw - fixture.yaw)))
         x, y, _ = (point - far * ahead - aside * left).tolist()
         cost = FAR_COST * abs(far - STAND_FAR_M[0]) + ASKEW_COST * askew + float(np.hypot(x - base[0], y - base[1]))
+        if towards is not None:
+            cost += float(np.hypot(x - towards[0], y - towards[1]))
         found.append((cost, RobotPose(x, y, yaw)))
     found.sort(key=lambda pair: pair[0])
     return [pose for _, pose in found]
@@ -96,13 +109,18 @@ def _free(env: KitchenEnv, poses: Sequence[RobotPose]) -> NDArray[np.bool_]:
     return free
 
 
-def go_to_object(env: KitchenEnv, name: str, other_than: Sequence[RobotPose] = ()) -> Iterator[Array]:
-    """Drive to where an object lies, with an empty hand, unless it is in reach; or in any case to another place."""
+def go_to_object(
+    env: KitchenEnv, name: str, other_than: Sequence[RobotPose] = (), towards: Array | None = None
+) -> Iterator[Array]:
+    """Drive to where an object lies, with an empty hand, unless it is in reach; or in any case to another place.
+
+    With a point `towards` which it goes then, rather to that side of it.
+    """
     point = env.data.body(name).xpos.copy()
     fixture = locate(env, name).fixture
     if fixture is not None and (other_than or not in_reach(env, point)):
-        yield from follow_joint_path(env, np.array(env.scene.robot.home.arm), OPEN)
-        stand = standing_pose_for(env, fixture, point, other_than)
+        yield from fold_arm(env)
+        stand = standing_pose_for(env, fixture, point, other_than, towards)
         yield from drive_to(env, stand.x, stand.y, stand.yaw, gripper=OPEN)
 
 

@@ -10,6 +10,7 @@ import numpy as np
 from robocasa_lerobot.demos.motion import UP, Array, base_pose
 from robocasa_lerobot.demos.skills.pick_place.graspable import Graspable, contents_of, filled, graspable
 from robocasa_lerobot.demos.skills.pick_place.place import PlacePose
+from robocasa_lerobot.demos.skills.pick_place.poses.plate_poses import is_flat, offsets
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.kitchens.appliances.kinds.stove import Hob
 from robocasa_lerobot.envs.kitchens.fixtures.base import Region
@@ -48,8 +49,13 @@ ELSEWHERE_M = 0.6  # an object's origin as far as this is nowhere near
 KNOB_ROOM_M, TIGHT_COST, ON_TOP_M = 0.30, 2.0, 0.05
 
 
-def on_object(env: KitchenEnv, obj: Graspable, holder: str) -> PlacePoses:
-    """In or on another object: its middle, or beside what lies there already."""
+def reach_on(env: KitchenEnv, holder: str) -> float:
+    """How far from an object's middle others count as in or on it, with some to spare, metres."""
+    return COUNTS_SHARE * RECEPTACLE_SHARE * radius(env.scene, holder)
+
+
+def on_object(env: KitchenEnv, obj: Graspable, holder: str, *, more: bool = False) -> PlacePoses:
+    """In or on another object: its middle, or beside what lies there already, or is to come where there is `more`."""
     data, placed = env.data, env.scene.objects[holder]
 
     def poses() -> list[PlacePose]:
@@ -59,7 +65,7 @@ def on_object(env: KitchenEnv, obj: Graspable, holder: str) -> PlacePoses:
             return [PlacePose(body.xpos + UP * placed.item.size[2] / 2)]
         middle, half = np.array(inside.center), np.array(inside.half)
         deep = 2 * half[2]
-        most = COUNTS_SHARE * RECEPTACLE_SHARE * radius(env.scene, placed.name)
+        most = reach_on(env, placed.name)
         names = [name for name in contents_of(env, placed.name) if name != obj.name]
         others = [data.body(name).xpos[:2].copy() for name in names]
         tops = _points_of(env, names)
@@ -69,6 +75,12 @@ def on_object(env: KitchenEnv, obj: Graspable, holder: str) -> PlacePoses:
         if others:  # beside them, though it may then lean on the wall
             room = np.maximum(room, ASIDE_SHARE * half[:2])
         found = []
+        if (others or more) and is_flat(env, placed.name):
+            for beside in offsets(most):
+                floor = body.xpos + turn @ (middle + np.array([*beside, -half[2]]))
+                cost = BESIDE_COST * float(np.linalg.norm(beside))
+                found += [PlacePose(floor + UP * deep * drop, cost + extra) for drop, extra in DROPS]
+            return found
         sides, heaped = (0.0, -1.0, 1.0), bool(others) and deep > SHALLOW_M
         for i, j, share in itertools.product(sides, sides, BESIDE_SHARES if heaped else BESIDE_SHARES[:1]):
             if (i, j) != (0.0, 0.0) and room.max() <= LEAST_ROOM_M:
