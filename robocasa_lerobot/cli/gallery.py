@@ -1,11 +1,13 @@
-"""`robocasa-lerobot gallery`: pictures of tasks, layouts, styles, appliances and objects."""
+"""`robocasa-lerobot gallery`: pages and pictures of tasks, layouts, styles, appliances and objects."""
 
 from __future__ import annotations
 
 import argparse
+import os
 from pathlib import Path
 
 EXAMPLE = (
+    "robocasa-lerobot gallery --show tasks --rates benchmarks/results/demonstrators.json --out gallery/\n  "
     "robocasa-lerobot gallery --tasks OpenDrawer --seeds 0,1 --preset quality --out gallery/\n"
     "  robocasa-lerobot gallery --show layouts,styles,appliances,objects --split target --out gallery/"
 )
@@ -15,56 +17,95 @@ def configure(parser: argparse.ArgumentParser) -> None:
     """Add the arguments."""
     parser.add_argument(
         "--show",
-        default="tasks",
-        help="what, separated by commas: tasks (default), layouts, styles, appliances, objects, or all; everything but "
-        "tasks as contact sheets and on one page, gallery.html",
+        default="starts",
+        help="what, separated by commas: starts (default: two pictures of each task and seed), tasks (a page to browse "
+        "them all, tasks.html), layouts, styles, appliances, objects (contact sheets and a page, gallery.html), or all",
     )
     parser.add_argument("--tasks", help="task names separated by commas (default: all)")
-    parser.add_argument("--seeds", default="0", help="seeds separated by commas (default 0)")
+    parser.add_argument(
+        "--seeds", default="0", help="seeds separated by commas (default 0); the page of tasks begins with the first"
+    )
     parser.add_argument("--split", help="target or pretrain (default: target for tasks, else both)")
     parser.add_argument("--category", help="plans, fixture types, object categories or groups, separated by commas")
-    parser.add_argument("--preset", default="fast", help="render preset of tasks: fast or quality (default fast)")
+    parser.add_argument("--rates", type=Path, help="of the page of tasks: a result of benchmarks/demonstrators.py")
+    parser.add_argument(
+        "--workers", type=int, default=os.cpu_count() or 1, help="of the page of tasks: processes (default: all cores)"
+    )
+    parser.add_argument("--preset", default="fast", help="render preset of starts: fast or quality (default fast)")
     parser.add_argument("--image-size", type=int, default=256, help="height and width of camera pictures (default 256)")
     parser.add_argument("--overview-size", default="1280x720", help="size of the view of the whole kitchen")
-    parser.add_argument("--format", choices=["png", "jpg"], default="png", help="of the tasks' pictures (default png)")
+    parser.add_argument(
+        "--format", choices=["png", "jpg"], default="png", help="of the pictures of starts (default png)"
+    )
     parser.add_argument("--out", type=Path, required=True, help="folder for the pictures")
 
 
 def run(args: argparse.Namespace) -> int:
-    """Write the pictures of tasks, and contact sheets and a page of everything else that is asked for."""
+    """Write what is asked for: pictures of starts, the page of tasks, contact sheets and a page of everything else."""
     from robocasa_lerobot.errors import UnknownNameError
     from robocasa_lerobot.gallery.sections import SECTIONS
 
-    known = ["tasks", *SECTIONS]
+    known = ["starts", "tasks", *SECTIONS]
     shown = known if args.show == "all" else [name.strip() for name in args.show.split(",")]
     for name in shown:
         if name not in known:
             raise UnknownNameError("part of the gallery", name, [*known, "all"])
+    if "starts" in shown:
+        _starts(args)
     if "tasks" in shown:
         _tasks(args)
-    sections = [name for name in shown if name != "tasks"]
+    sections = [name for name in shown if name in SECTIONS]
     if sections:
         _sections(args, sections)
     return 0
 
 
 def _tasks(args: argparse.Namespace) -> None:
+    """The page of all tasks. What a run that was stopped has made is kept beside it, and taken up."""
+    from robocasa_lerobot.gallery.tasks.cards import cards, read_rates
+    from robocasa_lerobot.gallery.tasks.page import entry, write_page
+    from robocasa_lerobot.gallery.tasks.pictures import make, read
+    from robocasa_lerobot.jobs.as_completed import as_they_end
+    from robocasa_lerobot.progress import Bar
+
+    rates = read_rates(args.rates) if args.rates else None
+    names, (seed, *_), split = _names(args), _seeds(args), args.split or "target"
+    folder = args.out / "tasks"
+    todo = [(name, split, seed, folder) for name in names if read(name, split, seed, folder) is None]
+    bar = Bar(as_they_end(make, todo, args.workers), total=len(todo), desc="tasks", unit="task")
+    for name in bar:
+        bar.set_postfix(made=name)
+    shown = {name: read(name, split, seed, folder) for name in names}
+    page = write_page(args.out / "tasks.html", [entry(card, shown.get(card.name), folder) for card in cards(rates)])
+    print(f"{page} ({page.stat().st_size / 1e6:.1f} MB)")
+
+
+def _names(args: argparse.Namespace) -> list[str]:
+    from robocasa_lerobot.demos.choose import expand_names
+    from robocasa_lerobot.envs.tasks.registry import task_names
+
+    return list(expand_names(args.tasks) if args.tasks else task_names())
+
+
+def _seeds(args: argparse.Namespace) -> list[int]:
+    from robocasa_lerobot.errors import UserError
+
+    try:
+        return [int(s) for s in args.seeds.split(",")]
+    except ValueError:
+        raise UserError(f"--seeds {args.seeds!r}: expected numbers separated by commas.") from None
+
+
+def _starts(args: argparse.Namespace) -> None:
     """For each task and seed, the three camera pictures side by side and a view of the kitchen."""
-    from robocasa_lerobot.envs.tasks.registry import get_task, task_names
     from robocasa_lerobot.errors import UserError
     from robocasa_lerobot.gallery.scene_pictures import render_task
 
-    names = [n.strip() for n in args.tasks.split(",")] if args.tasks else list(task_names())
+    names, seeds = _names(args), _seeds(args)
     try:
-        seeds = [int(s) for s in args.seeds.split(",")]
         width, height = (int(s) for s in args.overview_size.split("x"))
     except ValueError:
-        raise UserError(
-            f"--seeds {args.seeds!r} must be numbers separated by commas, and --overview-size {args.overview_size!r} "
-            "WIDTHxHEIGHT in pixels."
-        ) from None
-    for name in names:
-        get_task(name)
+        raise UserError(f"--overview-size {args.overview_size!r}: expected WIDTHxHEIGHT in pixels.") from None
     for name in names:
         for seed in seeds:
             for path in render_task(

@@ -1,0 +1,128 @@
+"""Pictures of a task for its card: the kitchen at the start, and a strip of its demonstration; kept in files.
+
+What is there already for the same split and seed is taken as it is, so that work that was stopped goes on.
+"""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image
+
+from robocasa_lerobot import contract
+from robocasa_lerobot.demos.demonstrator import can_demonstrate
+from robocasa_lerobot.demos.film_strip import beside_the_hand, show_state
+from robocasa_lerobot.demos.recorder import record_episode
+from robocasa_lerobot.envs.kitchen_env import KitchenEnv
+from robocasa_lerobot.envs.rendering import SceneRenderer
+from robocasa_lerobot.envs.tasks.registry import get_task
+from robocasa_lerobot.files import write_text, written_aside
+from robocasa_lerobot.gallery.scene_pictures import visitor_camera
+
+START_SIZE = (270, 432)  # height and width, pixels
+STRIP_PICTURES, STRIP_COLUMNS, STRIP_SIZE = 8, 4, 144
+START_QUALITY, STRIP_QUALITY = 58, 40  # of WebP; 365 tasks are to fit in 15 MB
+TRIES = 3  # seeds, until one is solved
+
+
+@dataclass(frozen=True)
+class Shown:
+    """What the pictures of a task show.
+
+    Attributes:
+        split, seed: of the scene.
+        instruction: of the episode.
+        seconds: length of the demonstration; None without one.
+        stages: of the episode, in words.
+        failure: why the demonstration did not end well; empty where it did, or where there is none.
+    """
+
+    split: str
+    seed: int
+    instruction: str
+    seconds: float | None = None
+    stages: tuple[str, ...] = ()
+    failure: str = ""
+
+
+def make(name: str, split: str, seed: int, folder: Path) -> str:
+    """Write `<name>_start.webp`, `<name>_strip.webp` where there is a demonstrator, and `<name>.json`; returns `name`.
+
+    Of seeds from `seed` on, the first that the demonstrator solves; the last that was tried where it solves none.
+    """
+    if read(name, split, seed, folder) is not None:
+        return name
+    folder.mkdir(parents=True, exist_ok=True)
+    env = KitchenEnv(name, split=split, cameras=(), terminate_on_success=False)
+    try:
+        if not can_demonstrate(get_task(name)):
+            env.reset(seed=seed)
+            shown = Shown(split, seed, env.task_description)
+            states = None
+        else:
+            for tried in range(seed, seed + TRIES):
+                recording = record_episode(env, tried)
+                if recording.success:
+                    break
+            shown = Shown(
+                split,
+                tried,
+                env.task_description,
+                len(recording.actions) / contract.CONTROL_HZ,
+                tuple(stage["text"] for stage in recording.ep_meta["stages"]),
+                "" if recording.success else recording.reason,
+            )
+            states = recording.states
+            env.reset(seed=tried)  # the start again
+        _save(_start(env), folder / f"{name}_start.webp", START_QUALITY)
+        if states is not None:
+            _save(_strip(env, states), folder / f"{name}_strip.webp", STRIP_QUALITY)
+    finally:
+        env.close()
+    # Last: what has it is whole.
+    write_text(folder / f"{name}.json", json.dumps({"asked": seed, **asdict(shown)}))
+    return name
+
+
+def read(name: str, split: str, seed: int, folder: Path) -> Shown | None:
+    """What was made of a task for this split and seed; None where nothing was."""
+    path = folder / f"{name}.json"
+    if not path.exists():
+        return None
+    values = json.loads(path.read_text(encoding="utf-8"))
+    if (values.pop("asked"), values["split"]) != (seed, split):
+        return None
+    return Shown(**{**values, "stages": tuple(values["stages"])})
+
+
+def _start(env: KitchenEnv) -> NDArray[np.uint8]:
+    renderer = SceneRenderer(env.model, *START_SIZE)
+    try:
+        return renderer.render(env.data, visitor_camera(env.scene))
+    finally:
+        renderer.close()
+
+
+def _strip(env: KitchenEnv, states: NDArray[np.float64]) -> NDArray[np.uint8]:
+    """Pictures beside the hand, from the first state to the last, in rows of `STRIP_COLUMNS`."""
+    data = mujoco.MjData(env.model)
+    renderer = SceneRenderer(env.model, STRIP_SIZE, STRIP_SIZE)
+    pictures = []
+    try:
+        for step in np.linspace(0, len(states) - 1, STRIP_PICTURES).round().astype(int):
+            show_state(env.model, data, states[step])
+            pictures.append(renderer.render(data, beside_the_hand(env.model, data)))
+    finally:
+        renderer.close()
+    rows = [pictures[first : first + STRIP_COLUMNS] for first in range(0, len(pictures), STRIP_COLUMNS)]
+    return np.vstack([np.hstack(row) for row in rows])
+
+
+def _save(picture: NDArray[np.uint8], path: Path, quality: int) -> None:
+    with written_aside(path) as aside:
+        Image.fromarray(picture).save(aside, format="WEBP", quality=quality, method=6)
