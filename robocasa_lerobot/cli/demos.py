@@ -21,6 +21,15 @@ def configure(parser: argparse.ArgumentParser) -> None:
     """Add the arguments."""
     from robocasa_lerobot.jobs.executors import add_options
 
+    add_kitchen_options(parser)
+    parser.add_argument(
+        "--plain", action="store_true", help="no variety: speed, paths and choice of grasps as the skills have them"
+    )
+    add_options(parser)
+
+
+def add_kitchen_options(parser: argparse.ArgumentParser) -> None:
+    """Add what every recording of attempts asks for: tasks, episodes, kitchens, seeds, noise and pictures."""
     parser.add_argument(
         "--tasks", required=True, help="names and sets (atomic_seen, ...) separated by commas, or `all`; see `tasks`"
     )
@@ -47,9 +56,6 @@ def configure(parser: argparse.ArgumentParser) -> None:
         help="standard deviation of noise on arm commands, 1 is a full command; 0.05 is a good one (default: none)",
     )
     parser.add_argument(
-        "--plain", action="store_true", help="no variety: speed, paths and choice of grasps as the skills have them"
-    )
-    parser.add_argument(
         "--images", action="store_true", help="store camera pictures too (the converter can render them)"
     )
     parser.add_argument("--image-size", type=int, default=256, help="height and width of stored pictures (default 256)")
@@ -58,7 +64,6 @@ def configure(parser: argparse.ArgumentParser) -> None:
         action="store_true",
         help="write failures/<task>/seed_<n>.mp4 and .json: a film, why, and the terms of the goal that did not hold",
     )
-    add_options(parser)
 
 
 def run(args: argparse.Namespace) -> int:

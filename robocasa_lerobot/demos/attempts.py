@@ -72,6 +72,10 @@ class RecordingSettings:
         """The greatest number of attempts."""
         return self.episodes * MAX_ATTEMPTS_PER_EPISODE
 
+    def record(self, env: KitchenEnv, seed: int) -> Recording:
+        """Make the attempt of a seed."""
+        return record_episode(env, seed, action_noise=self.action_noise, images=self.images, varied=self.varied)
+
     def make_env(self) -> KitchenEnv:
         """The env that attempts are made in; it renders nothing unless pictures are stored."""
         kwargs = self.env_kwargs() if self.images else {**self.env_kwargs(), "cameras": ()}
@@ -180,9 +184,7 @@ class Parts:
         seed = settings.seed + number
         recording: Recording | None = None
         try:
-            recording = record_episode(
-                env, seed, action_noise=settings.action_noise, images=settings.images, varied=settings.varied
-            )
+            recording = settings.record(env, seed)
         except (OSError, MemoryError, NoOpenGLError):
             raise
         except Exception as error:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
@@ -19,6 +20,8 @@ Array = NDArray[np.float64]
 
 # An episode ends after this many consecutive steps in which the goal holds (docs/robocasa.md, section 4).
 SUCCESS_HOLD_STEPS = 15
+# What acts in an episode, with its style, and tells the log which stage is on.
+Actor = Callable[[KitchenEnv, MotionStyle, StageLog], Iterator[Array]]
 # Keys of the generators of action noise and of the motion style, apart from those of the scene and the arm.
 _NOISE_STREAM, _STYLE_STREAM = 2, 6
 
@@ -136,7 +139,13 @@ class EpisodeBuffer:
 
 
 def record_episode(
-    env: KitchenEnv, seed: int, *, action_noise: float = 0.0, images: bool = False, varied: bool = False
+    env: KitchenEnv,
+    seed: int,
+    *,
+    action_noise: float = 0.0,
+    images: bool = False,
+    varied: bool = False,
+    actor: Actor = demonstrate,
 ) -> Recording:
     """Attempt a demonstration of the env's task in the scene of `seed`.
 
@@ -147,6 +156,7 @@ def record_episode(
             it is part of the action that is executed and recorded.
         images: also keep the camera pictures.
         varied: draw how the demonstration is carried out (`MotionStyle`) from the seed; else as the skills have it.
+        actor: what acts; it is asked for an action at a time, each of which is carried out before the next.
     """
     assert not env.terminate_on_success, "the recorder decides when an episode ends"
     env.render_observations = False
@@ -157,7 +167,7 @@ def record_episode(
     buffer = EpisodeBuffer()
     held, reason, log = 0, "", StageLog()
     try:
-        for wanted in demonstrate(env, style, log):
+        for wanted in actor(env, style, log):
             # Everything is carried out in single precision, as a policy's action is, and recorded as carried out.
             action = _with_noise(rng, wanted, action_noise).astype(np.float32).astype(np.float64)
             buffer.add(env, contract.binarize(action), info, log.current, images=images)

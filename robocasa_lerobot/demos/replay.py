@@ -62,6 +62,7 @@ class Demonstration:
         states: (T, 1 + nq + nv) time, positions, velocities.
         actions: (T, 12) in stored order.
         last_terms: whether each of the goal's terms held in the last state, by name; empty where that is not recorded.
+        stage: (T,) number of the stage of each step; None where that is not recorded.
     """
 
     task: str
@@ -69,6 +70,7 @@ class Demonstration:
     states: Array
     actions: Array
     last_terms: dict[str, bool] = field(default_factory=dict)
+    stage: NDArray[np.int64] | None = None
 
     @property
     def seed(self) -> int:
@@ -126,9 +128,10 @@ def read_demonstration(path: Path, demo: str) -> Demonstration:
         meta = json.loads(group.attrs["ep_meta"])
         states, actions = group["states"][()], contract.hdf5_to_stored(group["actions"][()])
         terms = _last_terms(group)
+        stage = np.asarray(group["stage"][()], dtype=np.int64) if "stage" in group else None
     if "seed" not in meta or "split" not in meta:
         raise UserError(f"{path}, {demo}: its ep_meta has no scene seed and split; it was recorded by other software.")
-    return Demonstration(task, meta, states, actions, terms)
+    return Demonstration(task, meta, states, actions, terms, stage)
 
 
 def _last_terms(group: h5py.Group) -> dict[str, bool]:
@@ -175,7 +178,7 @@ def kitchen_of(recorded: Demonstration, declaration: Task | None = None) -> Kitc
 
 def _carry_out(env: KitchenEnv, states: Array, actions: Array) -> tuple[bool, float]:
     """Whether the actions reach the goal and keep it, from the recorded first state, and the largest deviation."""
-    _put(env, env.data, states[0])
+    put_state(env, env.data, states[0])
     held, deviation = 0, 0.0
     for state, action in zip(states, actions, strict=True):
         deviation = max(deviation, float(np.abs(env.data.qpos - state[1 : 1 + env.model.nq]).max()))
@@ -191,7 +194,7 @@ def _goal_held_at_the_end(env: KitchenEnv, recorded: Demonstration) -> tuple[boo
     state itself shows how it came about. The terms that were recorded at the time must say the same.
     """
     data = mujoco.MjData(env.model)
-    _put(env, data, recorded.states[-1])
+    put_state(env, data, recorded.states[-1])
     holds = bool(env.declaration.goal.evaluate(env.scene, data, {}))
     for part in parts_with_memory([env.declaration.goal]):
         then, now = recorded.last_terms.get(part.name), part.holds(env.scene, data)
@@ -201,7 +204,7 @@ def _goal_held_at_the_end(env: KitchenEnv, recorded: Demonstration) -> tuple[boo
     return holds, ""
 
 
-def _put(env: KitchenEnv, data: mujoco.MjData, state: Array) -> None:
+def put_state(env: KitchenEnv, data: mujoco.MjData, state: Array) -> None:
     """Write a recorded state, unless it is there already: variables that are not in it (latches, sleep) then stay."""
     model = env.model
     wanted = state[1 : 1 + model.nq], state[1 + model.nq :]

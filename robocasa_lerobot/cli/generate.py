@@ -1,0 +1,86 @@
+"""`robocasa-lerobot generate`: demonstrations in new scenes out of prepared ones."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+from dataclasses import asdict
+from pathlib import Path
+
+from robocasa_lerobot.cli.demos import add_kitchen_options
+
+EXAMPLE = (
+    "robocasa-lerobot generate --source demos/ --tasks OpenDrawer --episodes 100 --split pretrain --seed 100000 "
+    "--out generated/"
+)
+
+
+def configure(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments."""
+    from robocasa_lerobot.jobs.executors import add_options
+
+    parser.add_argument(
+        "--source", type=Path, required=True, help="prepared demonstrations (see `prepare`): a folder, or one file"
+    )
+    add_kitchen_options(parser)
+    parser.add_argument("--base", choices=("replan", "copy", "fixed"), default="replan", help="where the robot stands")
+    parser.add_argument("--bridge", choices=("plan", "line"), default="plan", help="how segments are joined")
+    parser.add_argument(
+        "--select",
+        choices=("feasible", "random", "nearest_object", "nearest_robot"),
+        default="feasible",
+        help="which source a segment is taken from (default: %(default)s)",
+    )
+    parser.add_argument(
+        "--spread",
+        type=float,
+        default=0.3,
+        help="how evenly sources are used: cost that each has at random in an attempt (default: %(default)s)",
+    )
+    parser.add_argument(
+        "--rules", type=Path, metavar="YAML", help="how verbs are cut into segments, where that is not to be derived"
+    )
+    add_options(parser)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Generate for every task and print a table; status 1 if one had to be given up."""
+    from robocasa_lerobot.demos.choose import expand_names
+    from robocasa_lerobot.demos.distributed import record_distributed
+    from robocasa_lerobot.demos.generate.settings import GenerationSettings
+    from robocasa_lerobot.demos.generate.sources.rules import read_rules
+    from robocasa_lerobot.demos.recording import record_tasks
+    from robocasa_lerobot.demos.summary import print_summary
+    from robocasa_lerobot.jobs.executors import execution_of
+
+    execution = execution_of(args)
+    rules = json.dumps({verb: asdict(rule) for verb, rule in read_rules(args.rules).items()} if args.rules else {})
+    settings = [
+        GenerationSettings.of(
+            args.source,
+            task=name,
+            episodes=args.episodes,
+            split=args.split,
+            seed=args.seed,
+            action_noise=args.action_noise,
+            images=args.images,
+            image_size=args.image_size,
+            layouts=args.layouts,
+            styles=args.styles,
+            varied=False,
+            base=args.base,
+            bridge=args.bridge,
+            select=args.select,
+            spread=args.spread,
+            rules=rules,
+        )
+        for name in expand_names(args.tasks)
+    ]
+    if execution.kind != "local":
+        line, status = record_distributed(settings, args.out, execution, keep_failures=args.keep_failures)
+        if line:
+            print(line)
+        return status
+    workers = args.workers if args.workers is not None else os.cpu_count() or 1
+    return print_summary(record_tasks(settings, args.out, workers=workers, keep_failures=args.keep_failures))

@@ -1,0 +1,81 @@
+"""What a generated episode keeps of itself while it runs: choices at random, and where each step comes from."""
+
+from __future__ import annotations
+
+from collections.abc import Generator, Iterator
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from robocasa_lerobot.demos.generate.select import Manner
+from robocasa_lerobot.demos.generate.sources.source import Piece, Source
+from robocasa_lerobot.demos.motion import Array
+
+FREE, CONTACT, BRIDGE, DRIVE, SETTLE = range(5)  # kinds of steps
+AT_REST = (-1, BRIDGE, -1)  # label of steps in which it is waited
+KINDS = ("free", "contact", "bridge", "drive", "settle")
+
+
+@dataclass
+class Course:
+    """A running episode.
+
+    Attributes:
+        sources: it may take segments from.
+        rng: of its choices.
+        manner: how segments are chosen and joined.
+        spread: cost that a source may have at random, so that the same one is not always taken.
+        label: source, kind of step, and step in the source, of the action that comes next.
+        labels: of all actions so far.
+        used: the segments that were carried out, in plain values.
+        rest: rotation (3, 3) of each object before it was touched.
+    """
+
+    sources: list[Source]
+    rng: np.random.Generator
+    manner: Manner
+    spread: float
+    label: tuple[int, int, int] = AT_REST
+    labels: list[tuple[int, int, int]] = field(default_factory=list)
+    used: list[dict[str, Any]] = field(default_factory=list)
+    rest: dict[str, Array] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        self.bias = self.rng.uniform(0.0, self.spread, size=max((s.number for s in self.sources), default=0) + 1)
+
+    def begin(self, piece: Piece, **about: Any) -> dict[str, Any]:
+        """Note that a segment is about to be carried out; what comes of it can be added to what is returned."""
+        row = {
+            "source": piece.source.name,
+            "demo": piece.source.number,
+            "kind": piece.segment.kind,
+            "ref": piece.segment.ref,
+            "steps": [piece.segment.lead, piece.segment.end],
+            **about,
+        }
+        self.used.append(row)
+        return row
+
+    def labelled(self, steps: Iterator[Array], kind: int) -> Iterator[Array]:
+        """Actions as steps of one kind that come from no source."""
+        for step in steps:
+            self.label = (-1, kind, -1)
+            yield step
+
+    def choosing[T](self, steps: Generator[Array, None, T], kind: int) -> Generator[Array, None, T]:
+        """The same; returns what they return."""
+        while True:
+            self.label = (-1, kind, -1)
+            try:
+                step = next(steps)
+            except StopIteration as end:
+                chosen: T = end.value
+                return chosen
+            yield step
+
+    def counted(self, steps: Iterator[Array]) -> Iterator[Array]:
+        """All actions of the episode, each with its label kept."""
+        for step in steps:
+            self.labels.append(self.label)
+            yield step

@@ -1,0 +1,170 @@
+"""Carrying out a segment in another scene: hand poses as commands, in step with what the hand moves."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from robocasa_lerobot.demos.generate.course import BRIDGE, CONTACT, FREE, SETTLE, Course
+from robocasa_lerobot.demos.generate.sources.source import Piece
+from robocasa_lerobot.demos.generate.sources.transform import command_to, inverse, make_pose
+from robocasa_lerobot.demos.motion import (
+    DEAD_ZONE,
+    FROM_ACHIEVED,
+    FROM_DESIRED,
+    TURN_DEAD_ZONE,
+    Array,
+    HandTarget,
+    action,
+    arm_action,
+    base_pose,
+    grip_position,
+    hand_rotation,
+    limit,
+    pose_error,
+)
+from robocasa_lerobot.demos.planning.base_room import wrap
+from robocasa_lerobot.demos.skills.common import move_hand
+from robocasa_lerobot.envs.kitchen_env import KitchenEnv
+
+# The hand waits for itself where it is farther than this from where it was in the source; all waits together.
+BEHIND_M, BEHIND_RAD, MOST_WAITS = 0.02, 0.15, 40
+LOST_M = 0.09  # of a hand from where it would hold on to a handle
+MOVING_SHARE = 0.002  # of its range in a step: a part that moves by less has stalled
+MOST_AHEAD_M = 0.15  # of a goal from the hand, from which on the next one starts from the hand again
+# Before the fingers move it comes as near as this, in so many steps at most.
+ARRIVED_M, GAIN = 0.012, 0.12  # of the hand at the segment's beginning
+SETTLED_M, SETTLED_RAD, SETTLE_STEPS = 0.006, 0.08, 12
+LATE_WAITS, FIRMER = 90, 0.1  # steps that a part is waited for, and by how much more it is pushed after each
+BASE_NEAR_M, BASE_NEAR_RAD, BASE_GAIN, BASE_MOST = 0.012, 0.03, 3.0, 0.45
+
+
+@dataclass(frozen=True)
+class Carried:
+    """A segment as it is carried out.
+
+    Attributes:
+        piece: the segment.
+        target: pose (4, 4) that the controller is led to at a step of the source, as things stand.
+        hand: pose (4, 4) that the hand has there.
+        late: whether what the hand moves is behind what it was at that step.
+        base: where the base belongs at that step: x, y, heading; None keeps it at rest.
+        met: whether what the hand goes to has moved already, so that the contact has begun.
+        position: of what the hand moves, as a share of its range.
+        enter: step of the contact that is gone on with, since what the hand moves has come as far already.
+    """
+
+    piece: Piece
+    target: Callable[[int], Array]
+    hand: Callable[[int], Array]
+    late: Callable[[int], bool] = lambda step: False
+    base: Callable[[int], Array] | None = None
+    met: Callable[[], bool] = lambda: False
+    position: Callable[[], float] = lambda: 0.0
+    enter: int = 0
+
+
+def hand_now(env: KitchenEnv) -> Array:
+    """World pose (4, 4) of the hand."""
+    return make_pose(grip_position(env.data), hand_rotation(env.data))
+
+
+def as_target(pose: Array) -> HandTarget:
+    """A pose (4, 4) as the servo takes it."""
+    return HandTarget(pose[:3, 3], pose[:3, :3])
+
+
+def pose_command(env: KitchenEnv, pose: Array, gripper: float, base: Array | None = None) -> Array:
+    """Action (12,), stored order, that sets the controller's goal to a world pose (4, 4), as far as one step may.
+
+    A goal that lies farther from the hand than one command reaches, as that of a firm push, is come to from the goal
+    before, in the other control mode.
+    """
+    to_frame = inverse(make_pose(*env.controller.arm_frame()))
+    hand = hand_now(env)
+    move, turn = command_to(to_frame @ pose, to_frame @ hand)
+    mode = FROM_ACHIEVED
+    if max(np.abs(move).max(), np.abs(turn).max()) > 1.0:
+        position, rotation = env.controller.goal_in_base()
+        site = env.data.site(env.scene.robot.names.grip_site).xmat.reshape(3, 3)
+        goal = make_pose(position, rotation @ site.T @ hand[:3, :3])
+        if np.linalg.norm(position - (to_frame @ hand)[:3, 3]) < MOST_AHEAD_M:
+            move, turn = command_to(to_frame @ pose, goal)
+            mode = FROM_DESIRED
+    return action(position=limit(move, 1.0), rotation=limit(turn, 1.0), gripper=gripper, base=base, mode=mode)
+
+
+def carry_out_segment(env: KitchenEnv, course: Course, carried: Carried, stop: Callable[[], bool]) -> Iterator[Array]:
+    """Actions of a segment from its lead on; it ends early where `stop` says so."""
+    segment, data = carried.piece.segment, carried.piece.data
+    number = carried.piece.source.number
+    step, waits, late = segment.lead, MOST_WAITS, LATE_WAITS
+    course.label = (number, BRIDGE, -1)
+    yield from move_hand(
+        env.data, as_target(carried.hand(step)), float(data.gripper[step]), tolerance=ARRIVED_M, integral_gain=GAIN
+    )
+    stalled, before = 0, carried.position()
+    grasps = data.gripper[segment.lead] < 0
+    while step < segment.end and not stop():
+        if step < segment.contact and carried.met():
+            step = segment.contact
+        gripper = float(data.gripper[step])
+        if step > segment.lead and gripper != data.gripper[step - 1]:
+            for _ in range(SETTLE_STEPS):
+                pose = as_target(carried.hand(step))
+                error = pose_error(env.data, pose)
+                if error.position < SETTLED_M and error.rotation < SETTLED_RAD:
+                    break
+                course.label = (number, SETTLE, step)
+                yield arm_action(env.data, pose, float(data.gripper[step - 1]))
+        in_contact = segment.contact <= step < segment.release
+        course.label = (number, CONTACT if in_contact else FREE, step)
+        base = None if carried.base is None else base_command(env, carried.base(step))
+        yield pose_command(env, _firmer(carried.target(step), carried.hand(step), stalled), gripper, base)
+        if grasps and in_contact and gripper > 0 and _lost(env, carried.hand(step)):
+            return
+        now = carried.position()
+        stalled, before = (stalled + 1 if abs(now - before) < MOVING_SHARE else 0), now
+        if in_contact and late and carried.late(step):
+            late -= 1
+            continue
+        stalled = 0
+        if step == segment.contact and carried.enter > step:
+            step = carried.enter
+        elif not in_contact and waits and _behind(env, carried.hand(min(step + 1, segment.end - 1))):
+            waits -= 1
+        else:
+            step += 1
+
+
+def _firmer(target: Array, hand: Array, stalled: int) -> Array:
+    """A target that is the farther ahead of the hand, the longer nothing has moved."""
+    more = (target[:3, 3] - hand[:3, 3]) * FIRMER * stalled
+    return make_pose(target[:3, 3] + more, target[:3, :3])
+
+
+def _lost(env: KitchenEnv, pose: Array) -> bool:
+    """Whether the hand has slipped off what it held."""
+    return pose_error(env.data, as_target(pose)).position > LOST_M
+
+
+def _behind(env: KitchenEnv, pose: Array) -> bool:
+    error = pose_error(env.data, as_target(pose))
+    return error.position > BEHIND_M or error.rotation > BEHIND_RAD
+
+
+def base_command(env: KitchenEnv, goal: Array) -> Array:
+    """Base command (4,) towards x, y and heading, with the dead zones made up for."""
+    position, yaw = base_pose(env.data)
+    cos, sin = np.cos(yaw), np.sin(yaw)
+    away = np.array([[cos, sin], [-sin, cos]]) @ (goal[:2] - position[:2])
+    turn = wrap(float(goal[2]) - yaw)
+    command = np.zeros(4)
+    if float(np.hypot(*away)) > BASE_NEAR_M:
+        speed = limit(away * BASE_GAIN, BASE_MOST)
+        command[:2] = speed + np.sign(speed) * DEAD_ZONE * (np.abs(speed) > 0.02)
+    if abs(turn) > BASE_NEAR_RAD:
+        command[2] = np.clip(turn * BASE_GAIN, -0.4, 0.4) + np.sign(turn) * TURN_DEAD_ZONE
+    return command

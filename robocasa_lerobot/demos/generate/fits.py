@@ -1,0 +1,135 @@
+"""Which segments of sources fit a part of this scene, and the frames in which they do."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from robocasa_lerobot.demos.generate.sources.frames import HANDLE, REST, Part, anchor, anchored, parts_of, shares_of
+from robocasa_lerobot.demos.generate.sources.rules import rules_for
+from robocasa_lerobot.demos.generate.sources.segments import PART
+from robocasa_lerobot.demos.generate.sources.source import Piece, Source, pieces_for
+from robocasa_lerobot.demos.generate.sources.transform import inverse, make_pose, mirrored
+from robocasa_lerobot.demos.motion import Array, rotation_about
+from robocasa_lerobot.envs.kitchen_env import KitchenEnv
+from robocasa_lerobot.envs.tasks.task import Stage
+
+APART_SHARE = 0.12  # of its range: a part may stand as far before where it stood in the source
+LEAST_SPIN_RAD = 0.1  # of a knob from where it stood in the source
+LEFT_SHARE = 0.003  # of its range that a segment must still have to go
+HALF_TURN = np.diag([-1.0, -1.0, 1.0, 1.0])
+RELATIVE = ("turn",)  # verbs whose goal is counted from where the part stood
+
+
+@dataclass(frozen=True)
+class Fit:
+    """A source's segment on a part of this scene.
+
+    Attributes:
+        piece: the segment.
+        part: of this scene.
+        mirror: whether it is reflected, since the part hangs on the other side.
+        flip: whether the hand has made half a turn about its fingers, which leaves a gripper as it was.
+        spin: turn about the part's axis in its frame, radians, so that a knob is held as it was in the source's room.
+        point: where its frame lies in the part, (3,) in the part's axes, metres.
+        source_point: the same in the source.
+    """
+
+    piece: Piece
+    part: Part
+    mirror: bool
+    flip: bool
+    spin: float
+    point: Array
+    source_point: Array
+
+    @classmethod
+    def of(cls, piece: Piece, part: Part, *, flip: bool = False, spin: float = 0.0) -> Fit:
+        """With the frame at the middle of what the hand touches first."""
+        segment, data = piece.segment, piece.data
+        about = data.about["parts"][segment.ref]
+        touched = data.touching[segment.ref][segment.contact : segment.release]
+        points = data.contact_points[segment.ref][segment.contact : segment.release]
+        known = ~np.isnan(points[:, 0])
+        frame = rules_for(piece.source.rules, piece.words).frame
+        group = frame or (HANDLE if (touched[known] == 1).mean() > 0.5 else REST)
+        if group not in about["boxes"] or group not in part.boxes:
+            group = next(iter(part.boxes))
+        box = np.array(about["boxes"].get(group, next(iter(about["boxes"].values()))))
+        shares = shares_of(points[known].mean(axis=0), box)
+        mirror = part.side * int(about["side"]) < 0
+        return cls(
+            piece, part, mirror, flip, spin, anchor(part.boxes[group], shares, mirror=mirror), anchor(box, shares)
+        )
+
+    def source_frame(self, step: int) -> Array:
+        """Of the source at a step, (4, 4)."""
+        return anchored(self.piece.data.poses[self.piece.segment.ref][step], self.source_point)
+
+    def local(self, pose: Array, step: int) -> Array:
+        """A source's world pose (4, 4) at a step in the part's frame, as it is to be here."""
+        inside = inverse(self.source_frame(step)) @ pose
+        if self.mirror:
+            inside = mirrored(inside)
+        if self.spin:
+            inside = make_pose(np.zeros(3), rotation_about(self.part.axis, self.spin)) @ inside
+        return inside @ HALF_TURN if self.flip else inside
+
+    def way(self) -> tuple[float, float]:
+        """Position of the part's joint at the segment's beginning and end in the source, as it would be here."""
+        about = self.piece.data.about["parts"][self.piece.segment.ref]
+        low, high = about["range"]
+        first, far = self.piece.travel()
+        sign = self._sign(low, high)
+        begin = self._here((first - low) / (high - low), sign)
+        end = self._here((first + far - low) / (high - low), sign)
+        return begin, end
+
+    @property
+    def springs(self) -> bool:
+        """Whether the part goes back by itself when it is let go."""
+        path = self.piece.data.joints[self.piece.segment.ref][self.piece.segment.contact : self.piece.segment.end]
+        far = np.abs(path - path[0])
+        return bool(far[-1] < 0.5 * far.max())
+
+    def apart(self, position: float) -> float:
+        """How far a part is from where it stood when the segment began, as a share of its range."""
+        return 0.0 if self.words_relative or self.springs else abs(position - self.way()[0]) / self.part.span
+
+    @property
+    def words_relative(self) -> bool:
+        """Whether the goal is counted from where the part stood."""
+        return self.piece.words["verb"] in RELATIVE
+
+    def _sign(self, low: float, high: float) -> bool:
+        """Whether the part's joint counts the other way round than the source's."""
+        own = self.part.range
+        return (abs(low) > abs(high) and abs(own[0]) < abs(own[1])) or (
+            abs(low) < abs(high) and abs(own[0]) > abs(own[1])
+        )
+
+    def _here(self, share: float, flipped: bool) -> float:
+        share = 1.0 - share if flipped else share
+        return float(self.part.range[0] + share * self.part.span)
+
+
+def fits_of(env: KitchenEnv, stage: Stage, sources: Sequence[Source]) -> list[Fit]:
+    """Segments that lead the stage's parts on from where they stand."""
+    drawn = env.scene.fill(stage.to)
+    pieces = pieces_for(sources, stage, PART, drawn)
+    found = []
+    for part in parts_of(env, stage):
+        for piece in pieces:
+            own = piece.data.about["parts"][piece.segment.ref]
+            if bool(own["slides"]) != part.slides or (own["side"] == 0) != (part.side == 0):
+                continue
+            fit = Fit.of(piece, part)
+            begin, end = fit.way()
+            now, ahead = part.position(env.data), float(np.sign(end - begin))
+            near = (begin - now) * ahead < APART_SHARE * part.span
+            if stage.verb in RELATIVE or fit.springs or (near and (end - now) * ahead > LEFT_SHARE * part.span):
+                spins = (0.0, begin - now) if stage.skill == "knobs" and abs(begin - now) > LEAST_SPIN_RAD else (0.0,)
+                found += [Fit.of(piece, part, flip=flip, spin=spin) for flip in (False, True) for spin in spins]
+    return found

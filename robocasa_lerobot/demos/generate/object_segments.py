@@ -1,0 +1,338 @@
+"""Segments about objects: taken hold of as in a source where the new object can be grasped, put down as there.
+
+A grasp of the source is brought to the nearest place where the gripper fits the object that is there now; what is put
+down goes as the source's object went, by its underside, so that another size or hold makes no difference.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from robocasa_lerobot.demos.generate.bridge import bridged
+from robocasa_lerobot.demos.generate.course import BRIDGE, DRIVE, Course
+from robocasa_lerobot.demos.generate.execute import Carried, as_target, carry_out_segment, hand_now
+from robocasa_lerobot.demos.generate.select import narrowed
+from robocasa_lerobot.demos.generate.sources.segments import PICK, PLACE
+from robocasa_lerobot.demos.generate.sources.source import Piece, pieces_for
+from robocasa_lerobot.demos.generate.sources.transform import heading, inverse, make_pose, yaw_pose
+from robocasa_lerobot.demos.motion import CLOSED, OPEN, UP, Array, axis_angle, base_pose, hand_rotation, rotation_about
+from robocasa_lerobot.demos.planning.grasps import GraspPose
+from robocasa_lerobot.demos.skills.common import SkillError, draw_back, hold_hand, stage_done
+from robocasa_lerobot.demos.skills.pick_place.grasp_strategy import ANY_APPROACH, GraspStrategy
+from robocasa_lerobot.demos.skills.pick_place.graspable import Graspable, graspable
+from robocasa_lerobot.demos.skills.pick_place.pick import is_held
+from robocasa_lerobot.demos.skills.pick_place.place import PlacePose, PlaceStrategy, leave
+from robocasa_lerobot.demos.skills.pick_place.strategies import grasp_strategy, place_strategy
+from robocasa_lerobot.demos.skills.reaching import Held, MotionPlan, WaypointPath, approach, plan_reach
+from robocasa_lerobot.envs.kitchen_env import KitchenEnv
+from robocasa_lerobot.envs.scene.robot_poses import RobotPose
+from robocasa_lerobot.envs.tasks.task import Stage
+
+TRIES = 5  # of picking up and putting down together
+STEEP_RAD = np.deg2rad(15.0)  # of a hand from straight down, up to which it may come turned in any way
+TURNS = tuple(np.deg2rad((0.0, 30.0, -30.0, 60.0, -60.0)))  # of a flatter one, to the sides
+MOST_ASKEW_RAD = 0.45  # of a grasp from the source's, beside a turn about the vertical
+ASKEW_COST, WORSE_GRASP, TRIED_COST, ALIKE_M = 0.3, 0.45, 1.2, 0.015
+MOST_PATHS, MOST_GRASPS, MOST_SPOTS, YAWS = 200, 10, 12, 8
+TURN_COST, LEANING_COST, AGAIN_COST, AGAIN_M = 0.08, 0.35, 0.5, 0.03  # a radian of turn, of tilt, ...
+RELEASE_STEPS = 8
+
+
+@dataclass(frozen=True)
+class _Way(WaypointPath):
+    """A segment in this scene: `hands` are the hand's poses here at the steps from its lead to its end."""
+
+    piece: Piece | None = None
+    targets_here: tuple[Array, ...] = ()
+    hands_here: tuple[Array, ...] = ()
+
+
+def object_stage(env: KitchenEnv, stage: Stage, course: Course) -> Iterator[Array]:
+    """Take hold of the stage's object, and put it down if the stage says so, with segments of sources.
+
+    Raises:
+        SkillError: no source has such segments, none is within reach, or it is not done after all tries.
+    """
+    name = graspable(env, stage.object).name
+    if name not in course.rest:
+        course.rest[name] = env.data.body(name).xmat.reshape(3, 3).copy()
+    tried: list[Array] = []
+    put_down: list[Array] = []
+    for _ in range(TRIES):
+        if stage_done(env, stage):
+            return
+        obj = graspable(env, stage.object)
+        if not is_held(env, obj.name):
+            yield from _pick(env, stage, obj, course, tried)
+            if not is_held(env, obj.name):
+                continue
+        if stage.verb == "pick":
+            return
+        yield from _place(env, stage, obj, course, put_down)
+        for _ in range(15):
+            if stage_done(env, stage):
+                return
+            yield from hold_hand(env.data, as_target(hand_now(env)), CLOSED if is_held(env, obj.name) else OPEN, 1)
+    raise SkillError(f"{graspable(env, stage.object).title} is not where it belongs after {TRIES} tries")
+
+
+def _pick(env: KitchenEnv, stage: Stage, obj: Graspable, course: Course, tried: list[Array]) -> Iterator[Array]:
+    pieces = pieces_for(course.sources, stage, PICK)
+    if not pieces:
+        raise SkillError("no source picks anything up")
+    free = place_strategy(env, stage, obj).grasp if stage.verb == "place" else ANY_APPROACH
+    strategy = grasp_strategy(env, obj, free, kept=stage.verb == "pick")
+    if strategy.first is not None:
+        yield from course.labelled(strategy.first(env), BRIDGE)
+    origin = env.data.body(obj.name).xpos.copy()
+    ways = _pick_ways(env, obj, strategy, pieces, course, tried)
+    if not ways:
+        raise SkillError(f"{obj.title}: no source's grasp fits it")
+
+    def plan(blocked: Sequence[RobotPose]) -> MotionPlan:
+        drives = course.manner.base != "fixed"
+        found = plan_reach(env, ways, origin, key=2, allowed=obj.bodies, blocked=blocked, may_drive=drives)
+        if not found:
+            raise SkillError(f"{obj.title}: no source's grasp is within reach")
+        return found[0]
+
+    choice = yield from course.choosing(approach(env, plan, OPEN), DRIVE)
+    way = choice.path
+    assert isinstance(way, _Way)
+    assert way.piece is not None
+    tried.append(way.targets[2].position - origin)
+    yield from course.labelled(bridged(env, course.manner, choice, way.hands_here[0], OPEN), BRIDGE)
+    start = env.data.body(obj.name).xpos.copy()
+    row = course.begin(way.piece, cost=round(choice.cost, 3))
+    yield from carry_out_segment(env, course, _along(way, start - origin), lambda: False)
+    row["held"] = is_held(env, obj.name)
+    if not row["held"]:
+        at = as_target(hand_now(env))
+        yield from course.labelled(hold_hand(env.data, at, OPEN, RELEASE_STEPS), BRIDGE)
+        yield from course.labelled(draw_back(env.data, OPEN, 0.08), BRIDGE)
+
+
+def _along(way: _Way, moved: Array) -> Carried:
+    """The segment along a way, moved by metres (3,) with what it is about."""
+    assert way.piece is not None
+    lead, count = way.piece.segment.lead, len(way.hands_here)
+    shift = make_pose(moved, np.eye(3))
+
+    def at(poses: tuple[Array, ...], step: int) -> Array:
+        found: Array = shift @ poses[min(step - lead, count - 1)]
+        return found
+
+    return Carried(way.piece, lambda step: at(way.targets_here, step), lambda step: at(way.hands_here, step))
+
+
+def _pick_ways(
+    env: KitchenEnv,
+    obj: Graspable,
+    strategy: GraspStrategy,
+    pieces: list[Piece],
+    course: Course,
+    tried: list[Array],
+) -> list[_Way]:
+    """The segments brought to grasps of the object."""
+    _, yaw = base_pose(env.data)
+    known: dict[tuple[float, ...], list[GraspPose]] = {}
+    ways: list[_Way] = []
+    for piece in pieces:
+        segment, data = piece.segment, piece.data
+        source = data.eef[segment.contact][:3, :3]
+        tilt = float(np.arccos(np.clip(-source[2, 2], -1.0, 1.0)))
+        for turn in (0.0,) if tilt < STEEP_RAD else TURNS:
+            about = rotation_about(UP, yaw - float(data.base[segment.contact, 2]) + turn)
+            comes = -UP if tilt < STEEP_RAD else about @ source[:, 2]
+            key = tuple(np.round(comes, 2).tolist())
+            if key not in known:
+                known[key] = strategy.poses(env, obj, comes)
+            best = max((pose.score for pose in known[key]), default=0.0)
+            for pose in known[key][:MOST_GRASPS]:
+                again = sum(
+                    float(np.linalg.norm(pose.position - env.data.body(obj.name).xpos - other)) < ALIKE_M
+                    for other in tried
+                )
+                extra = WORSE_GRASP * (best - pose.score) + TRIED_COST * again + 0.1 * abs(turn)
+                extra += float(course.bias[piece.source.number])
+                for rotation in (pose.rotation, pose.rotation @ np.diag([-1.0, -1.0, 1.0])):
+                    way = _pick_way(piece, pose.position, rotation, extra)
+                    if way is not None:
+                        ways.append(way)
+    return _cheapest(env, ways, course)
+
+
+def _cheapest(env: KitchenEnv, ways: list[_Way], course: Course) -> list[_Way]:
+    """The ways that are planned for: those of the sources that are selected, the cheapest of them."""
+
+    def change(way: _Way) -> Array:
+        assert way.piece is not None
+        segment, data = way.piece.segment, way.piece.data
+        position, yaw = base_pose(env.data)
+        here = inverse(yaw_pose(float(position[0]), float(position[1]), yaw)) @ way.hands_here[-1]
+        return inverse(inverse(data.base_pose(segment.begin)) @ data.eef[segment.end - 1]) @ here
+
+    ways = narrowed(
+        ways,
+        course.manner,
+        course.rng,
+        source=lambda way: -1 if way.piece is None else way.piece.source.number,
+        object_change=change,
+        first_pose=lambda way: way.hands_here[0],
+        hand=hand_now(env),
+    )
+    return sorted(ways, key=lambda way: way.extra)[:MOST_PATHS]
+
+
+def _pick_way(piece: Piece, position: Array, rotation: Array, extra: float) -> _Way | None:
+    """A segment brought to a grasp; None where that would tip the hand over."""
+    segment, data = piece.segment, piece.data
+    source = data.eef[segment.contact]
+    turn = rotation @ source[:3, :3].T
+    level = rotation_about(UP, heading(turn))
+    askew = float(np.linalg.norm(axis_angle(turn @ level.T)))
+    if askew > MOST_ASKEW_RAD:
+        return None
+
+    def here(pose: Array) -> Array:
+        return make_pose(position + level @ (pose[:3, 3] - source[:3, 3]), turn @ pose[:3, :3])
+
+    steps = range(segment.lead, segment.end)
+    hands = tuple(here(data.eef[step]) for step in steps)
+    targets = tuple(here(data.target[step]) for step in steps)
+    at = segment.contact - segment.lead
+    chosen = [hands[0], hands[at // 2], hands[min(at, len(hands) - 1)], hands[-1]]
+    return _Way(tuple(as_target(pose) for pose in chosen), extra + ASKEW_COST * askew, None, piece, targets, hands)
+
+
+def _place(env: KitchenEnv, stage: Stage, obj: Graspable, course: Course, put_down: list[Array]) -> Iterator[Array]:
+    pieces = pieces_for(course.sources, stage, PLACE)
+    if not pieces:
+        raise SkillError("no source puts anything down")
+    strategy = place_strategy(env, stage, obj)
+    held = Held.now(env.data, obj.name, obj.contents)
+
+    def ways() -> list[_Way]:
+        return _place_ways(env, obj, held, strategy, pieces, course, put_down)
+
+    found = ways()
+    if not found:
+        raise SkillError(f"{obj.title}: nowhere to put it")
+    middle = np.mean([way.targets[2].position for way in found], axis=0)
+    mine = obj.bodies | obj.carried
+
+    def plan(blocked: Sequence[RobotPose]) -> MotionPlan:
+        drives = course.manner.base != "fixed"
+        plans = plan_reach(
+            env, found, middle, key=2, held=held, loaded=3, allowed=mine, blocked=blocked, may_drive=drives
+        )
+        if not plans:
+            raise SkillError(f"{obj.title}: no source's way to put it down is within reach")
+        return plans[0]
+
+    choice = yield from course.choosing(approach(env, plan, CLOSED, held), DRIVE)
+    if not is_held(env, obj.name):
+        return
+    way = choice.path
+    assert isinstance(way, _Way)
+    assert way.piece is not None
+    yield from course.labelled(bridged(env, course.manner, choice, way.hands_here[0], CLOSED, held), BRIDGE)
+    if not is_held(env, obj.name):
+        return
+    put_down.append(way.targets[2].position)
+    course.begin(way.piece, cost=round(choice.cost, 3))
+    yield from carry_out_segment(env, course, _along(way, np.zeros(3)), lambda: False)
+    yield from course.labelled(leave(env, obj), BRIDGE)
+
+
+def _place_ways(
+    env: KitchenEnv,
+    obj: Graspable,
+    held: Held,
+    strategy: PlaceStrategy,
+    pieces: list[Piece],
+    course: Course,
+    put_down: list[Array],
+) -> list[_Way]:
+    """The segments brought to the places where the object may come to lie, turned about the vertical."""
+    _, yaw = base_pose(env.data)
+    rest = course.rest[obj.name]
+    spots = sorted(strategy.poses(), key=lambda pose: pose.extra)[:MOST_SPOTS]
+    ways = []
+    present = hand_rotation(env.data)
+    for piece, spot, number in itertools.product(pieces, spots, range(YAWS)):
+        about = rotation_about(UP, yaw - float(piece.data.base[piece.segment.contact, 2]))
+        way = _place_way(obj, held, rest, present, piece, spot, strategy, about, 2 * np.pi * number / YAWS)
+        again = sum(float(np.linalg.norm(way.targets[2].position - other)) < AGAIN_M for other in put_down)
+        extra = way.extra + AGAIN_COST * again + float(course.bias[piece.source.number])
+        ways.append(_Way(way.targets, extra, None, piece, way.targets_here, way.hands_here))
+    return _cheapest(env, ways, course)
+
+
+def _place_way(
+    obj: Graspable,
+    held: Held,
+    rest: Array,
+    present: Array,
+    piece: Piece,
+    spot: PlacePose,
+    strategy: PlaceStrategy,
+    about: Array,
+    yaw: float,
+) -> _Way:
+    """A segment that puts an object down at a spot, turned by `yaw` radians from how it is held now."""
+    segment, data = piece.segment, piece.data
+    poses, low = data.poses[segment.ref], data.undersides[segment.ref]
+    begin = _rest_step(piece)
+    upright = rest @ held.rotation.T  # the hand's turn with the object as it lay
+    spin = rotation_about(UP, yaw + heading(present @ upright.T))
+    lean = about @ (poses[segment.contact][:3, :3] @ poses[begin][:3, :3].T)
+    lean = rotation_about(UP, -heading(lean)) @ lean
+    turned = spin @ rest
+    end = spot.point + strategy.gap_m * UP
+    last = data.eef[segment.contact]
+    hands, targets = [], []
+    let_go: Array | None = None
+    for step in range(segment.lead, segment.end):
+        if step <= segment.contact:
+            turn = about @ poses[step][:3, :3] @ poses[segment.contact][:3, :3].T @ about.T @ lean @ turned
+            under = end + about @ (low[step] - low[segment.contact])
+            hand_turn = turn @ held.rotation.T
+            at = under + obj.below(turn) * UP - hand_turn @ held.position
+            hands.append(make_pose(at, hand_turn))
+            let_go = hands[-1]
+        else:
+            assert let_go is not None
+            hands.append(_after(let_go, last, data.eef[step], about))
+        # The controller was led ahead of the hand by so much.
+        ahead = about @ (data.target[step][:3, 3] - data.eef[step][:3, 3])
+        twist = hands[-1][:3, :3] @ data.eef[step][:3, :3].T @ data.target[step][:3, :3]
+        targets.append(make_pose(hands[-1][:3, 3] + ahead, twist))
+    at = segment.contact - segment.lead
+    chosen = [hands[0], hands[at // 2], hands[min(at, len(hands) - 1)], hands[min(at + 12, len(hands) - 1)], hands[-1]]
+    tilt = float(np.arccos(np.clip(lean[2, 2], -1.0, 1.0)))
+    cost = spot.extra + TURN_COST * min(yaw, 2 * np.pi - yaw) + LEANING_COST * tilt
+    if strategy.fit is not None:
+        let = hands[min(at, len(hands) - 1)]
+        cost += strategy.fit(let[:3, 3] + let[:3, :3] @ held.position, let[:3, :3] @ held.rotation)
+    return _Way(tuple(as_target(p) for p in chosen), cost, None, piece, tuple(targets), tuple(hands))
+
+
+def _after(let_go: Array, last: Array, pose: Array, about: Array) -> Array:
+    """A hand's pose after it has let go: away as in the source, out along its own fingers where it is flat."""
+    turn = let_go[:3, :3] @ last[:3, :3].T
+    flat = np.arccos(np.clip(-last[2, 2], -1.0, 1.0)) > STEEP_RAD
+    way = rotation_about(UP, heading(turn)) if flat else about
+    return make_pose(let_go[:3, 3] + way @ (pose[:3, 3] - last[:3, 3]), turn @ pose[:3, :3])
+
+
+def _rest_step(piece: Piece) -> int:
+    """The step at which the object lay as it was found, before it was taken hold of."""
+    for one in piece.source.segments:
+        if one.kind == PICK and one.ref == piece.segment.ref:
+            return one.contact
+    return 0

@@ -1,0 +1,270 @@
+"""Segments about a part of a fixture: which fit it as it stands, how the hand goes along with it, and from where."""
+
+from __future__ import annotations
+
+from collections.abc import Generator, Iterator
+
+import numpy as np
+
+from robocasa_lerobot.demos.generate.base import go_near, stands_like
+from robocasa_lerobot.demos.generate.bridge import bridged
+from robocasa_lerobot.demos.generate.course import BRIDGE, DRIVE, Course
+from robocasa_lerobot.demos.generate.execute import Carried, as_target, carry_out_segment, hand_now
+from robocasa_lerobot.demos.generate.fits import Fit, fits_of
+from robocasa_lerobot.demos.generate.select import narrowed
+from robocasa_lerobot.demos.generate.sources.frames import Part, anchored, body_pose
+from robocasa_lerobot.demos.generate.sources.transform import heading, inverse, make_pose, yaw_pose
+from robocasa_lerobot.demos.motion import OPEN, Array, base_pose, rotation_about
+from robocasa_lerobot.demos.planning.collision import CollisionChecker, MovingPart
+from robocasa_lerobot.demos.planning.motion_planner import MotionPlan, MotionPlanner, WaypointPath
+from robocasa_lerobot.demos.skills.common import SkillError, draw_back, hold_hand, stage_done
+from robocasa_lerobot.envs.kitchen_env import KitchenEnv
+from robocasa_lerobot.envs.scene.robot_poses import RobotPose
+from robocasa_lerobot.envs.tasks.task import Stage
+
+MOST_SEGMENTS = 5  # of a stage, tries that come to nothing among them
+SAMPLES = 4  # poses of a contact that reach and collisions are judged by, besides where it begins
+# A part that is behind by this share of its way is waited for; less and less, down to the second, towards the end.
+LATE_SHARE, END_SHARE = 0.06, 0.003
+AHEAD_STEPS = 3  # before it should be at the end, since the hand may draw back by then
+RELEASE_STEPS, BACK_M = 6, 0.08
+APART_COST, FLIP_COST = 0.8, 0.05  # of its whole range from where the segment began; of half a turn
+MOST_APPROACHES = 6  # of the best plans for a contact, whose ways there are planned
+MET_SHARE = 0.01  # of its range: a part that has moved as far has been touched
+SWEEP = 4  # positions of a part that the base must not be in the way of
+FRUITLESS_SHARE, FAILED_COST = 0.02, 1.0  # of its range; cost of a source that has come to nothing
+DRIVES_M = 0.03  # a base that goes farther in a segment drives
+
+
+def part_stage(env: KitchenEnv, stage: Stage, course: Course) -> Iterator[Array]:
+    """Carry out segments on the stage's parts until it is done.
+
+    Raises:
+        SkillError: no source has a segment for it, or it is not done after all tries.
+    """
+    failed: dict[int, int] = {}
+    for number in range(MOST_SEGMENTS):
+        if stage_done(env, stage):
+            return
+        fits = fits_of(env, stage, course.sources)
+        if not fits:
+            raise SkillError(
+                f"{stage.target}: no source shows how to go on from here"
+                if number
+                else f"{stage.target}: no source has a segment of `{stage.skill} {stage.verb}`"
+            )
+        if number:
+            yield from course.labelled(_let_go(env), BRIDGE)
+        fit, cost = yield from _approach(env, course, fits, failed)
+        before = fit.part.position(env.data)
+        begin, end = fit.way()
+        row = course.begin(fit.piece, part=fit.part.name, mirror=fit.mirror, cost=round(cost, 3))
+        yield from carry_out_segment(env, course, _carried(env, fit), lambda: False)
+        moved = fit.part.position(env.data) - before
+        row["moved"] = moved / fit.part.span
+        if moved * np.sign(end - begin) < FRUITLESS_SHARE * fit.part.span:
+            failed[fit.piece.source.number] = failed.get(fit.piece.source.number, 0) + 1
+    if not stage_done(env, stage):
+        raise SkillError(f"{stage.target}: not done after {MOST_SEGMENTS} segments")
+
+
+def _let_go(env: KitchenEnv) -> Iterator[Array]:
+    """Open the fingers where they are, and draw the hand back."""
+    yield from hold_hand(env.data, as_target(hand_now(env)), OPEN, RELEASE_STEPS)
+    yield from draw_back(env.data, OPEN, BACK_M)
+
+
+def _approach(
+    env: KitchenEnv, course: Course, fits: list[Fit], failed: dict[int, int]
+) -> Generator[Array, None, tuple[Fit, float]]:
+    """Choose a segment and a stand, go there, and bring the hand to where the segment begins.
+
+    Returns the segment, and what it costs.
+    """
+    fits = narrowed(
+        fits,
+        course.manner,
+        course.rng,
+        source=lambda fit: fit.piece.source.number,
+        object_change=lambda fit: _change(env, fit),
+        first_pose=lambda fit: _poses(env, fit)[0],
+        hand=hand_now(env),
+    )
+    paths = [
+        WaypointPath(
+            tuple(as_target(pose) for pose in _poses(env, fit)),
+            float(course.bias[fit.piece.source.number])
+            + FAILED_COST * failed.get(fit.piece.source.number, 0)
+            + APART_COST * fit.apart(fit.part.position(env.data))
+            + FLIP_COST * fit.flip,
+        )
+        for fit in fits
+    ]
+    allowed = frozenset(
+        int(body) for fit in fits for body in np.flatnonzero(env.scene.subtree(env.model.body(fit.part.body).name))
+    )
+    planner = MotionPlanner(env, paths, 1, allowed=allowed)
+    stands = _beside(env, fits, stands_like(env, [_stand(env, fit) for fit in fits], course.manner))
+    plans = planner.best(stands)[:MOST_APPROACHES]
+    if not plans:
+        raise SkillError("no source's segment is within reach")
+    ways = [(plan, _free_way(env, plan, plan.base)) for plan in plans]
+    plan, _ = min(ways, key=lambda one: one[0].cost + one[1].cost)
+    fit = next(one for one, path in zip(fits, paths, strict=True) if path is plan.path)
+    gripper = float(fit.piece.data.gripper[fit.piece.segment.lead])
+    if plan.base is not None:
+        yield from course.labelled(go_near(env, plan.base, gripper), DRIVE)
+    way = _free_way(env, plan, None)
+    yield from course.labelled(bridged(env, course.manner, way, _poses(env, fit)[0], gripper), BRIDGE)
+    return fit, plan.cost + way.cost
+
+
+def _free_way(env: KitchenEnv, plan: MotionPlan, base: RobotPose | None) -> MotionPlan:
+    """The way to where a segment begins, on which the hand may not touch the part either."""
+    return MotionPlanner(env, [WaypointPath(plan.targets[:1])], 0).best([base])[0]
+
+
+def _change(env: KitchenEnv, fit: Fit) -> Array:
+    """Where the part is before the robot, in the frame of where it was before the source's robot, (4, 4)."""
+    segment, data = fit.piece.segment, fit.piece.data
+    position, yaw = base_pose(env.data)
+    here = inverse(yaw_pose(float(position[0]), float(position[1]), yaw)) @ body_pose(env.data, fit.part.body)
+    there = inverse(data.base_pose(segment.begin)) @ data.poses[segment.ref][segment.begin]
+    return inverse(there) @ here
+
+
+def _beside(env: KitchenEnv, fits: list[Fit], stands: list[RobotPose | None]) -> list[RobotPose | None]:
+    """Those stands where the base is not in the way of the parts; all of them where it is everywhere."""
+    checker = CollisionChecker(env.scene, env.data)
+    joints = checker.arm.home
+    out = []
+    for stand in stands:
+        place = checker.present_base if stand is None else np.array([stand.x, stand.y, stand.yaw])
+        meets = False
+        for part in {fit.part.name: fit.part for fit in fits}.values():
+            ends = [fit.way()[1] for fit in fits if fit.part is part]
+            shares = np.arange(SWEEP) / (SWEEP - 1)
+            values: Array = part.position(env.data) + shares * (float(np.mean(ends)) - part.position(env.data))
+            moving = MovingPart(
+                env.model, env.data, env.model.joint(int(env.model.body_jntadr[part.body])).name, values
+            )
+            touched = checker.touched(
+                np.tile(place, (SWEEP, 1)), joints, part=moving, states=np.arange(SWEEP), links=(0,), most=8
+            )
+            meets |= any(moving.inside[body] for body in touched.all())
+        if not meets:
+            out.append(stand)
+    return out or stands
+
+
+def _poses(env: KitchenEnv, fit: Fit) -> list[Array]:
+    """Hand poses of a segment here: where it begins, where it touches, and along the way of the part.
+
+    Those of a base that drives are as they look from where it begins.
+    """
+    segment, data = fit.piece.segment, fit.piece.data
+    steps = [segment.lead, segment.contact]
+    steps += (
+        np.linspace(segment.contact, max(segment.release - 1, segment.contact), SAMPLES + 1)[1:].astype(int).tolist()
+    )
+    _, end = fit.way()
+    first, far = fit.piece.travel()
+    out = []
+    for step in steps:
+        share = 0.0 if far == 0.0 else (data.joints[segment.ref][step] - first) / far
+        now = fit.part.position(env.data)
+        at = now + float(np.clip(share, 0.0, 1.0)) * (end - now) if step > segment.contact else now
+        out.append(anchored(_part_pose_at(env, fit.part, at), fit.point) @ fit.local(data.eef[step], step))
+    return out
+
+
+def _part_pose_at(env: KitchenEnv, part: Part, position: float) -> Array:
+    """World pose (4, 4) of a part with its joint at another position."""
+    data, pose = env.data, body_pose(env.data, part.body)
+    joint = int(env.model.body_jntadr[part.body])
+    axis, anchor_point = data.xaxis[joint], data.xanchor[joint]
+    away = position - part.position(data)
+    if part.slides:
+        return make_pose(pose[:3, 3] + away * axis, pose[:3, :3])
+    turn = rotation_about(axis, away)
+    return make_pose(anchor_point + turn @ (pose[:3, 3] - anchor_point), turn @ pose[:3, :3])
+
+
+def _floor_map(env: KitchenEnv, fit: Fit) -> tuple[Array, Array]:
+    """Frames (4, 4) on the floor below the frame's point in the source and here, with their fixtures' headings."""
+    data, segment = fit.piece.data, fit.piece.segment
+    role = segment.ref.partition(".")[0]
+    there = fit.source_frame(segment.contact)[:3, 3]
+    here = anchored(body_pose(env.data, fit.part.body), fit.point)[:3, 3]
+    yaw = float(env.scene.fixture(fit.part.name.partition(".")[0]).yaw)
+    return (
+        yaw_pose(float(there[0]), float(there[1]), float(data.about["fixtures"][role]["yaw"])),
+        yaw_pose(float(here[0]), float(here[1]), yaw),
+    )
+
+
+def _base_like(fit: Fit, frames: tuple[Array, Array], step: int) -> Array:
+    """Where the base belongs at a step of the source: x, y, heading."""
+    there, here = frames
+    inside = inverse(there) @ fit.piece.data.base_pose(step)
+    if fit.mirror:
+        ahead = np.pi - heading(inside[:3, :3])
+        inside = yaw_pose(-float(inside[0, 3]), float(inside[1, 3]), ahead)
+    pose = here @ inside
+    return np.array([pose[0, 3], pose[1, 3], heading(pose[:3, :3])])
+
+
+def _stand(env: KitchenEnv, fit: Fit) -> RobotPose:
+    x, y, yaw = _base_like(fit, _floor_map(env, fit), fit.piece.segment.lead).tolist()
+    return RobotPose(x, y, yaw)
+
+
+def _carried(env: KitchenEnv, fit: Fit) -> Carried:
+    """The segment with its frame on the part as it moves, the base going along where it did in the source."""
+    segment, data, part = fit.piece.segment, fit.piece.data, fit.part
+    begin, end = fit.way()
+    start = part.position(env.data)
+    if fit.words_relative:
+        begin, end = start, start + end - begin
+    if (begin - start) * (end - begin) > 0:  # the part has yet to come to where it stood in the source
+        begin = start
+
+    def share(step: int) -> float:
+        first, far = fit.piece.travel()
+        return (float(data.joints[segment.ref][step]) - first) / far
+
+    def here() -> float:
+        return (part.position(env.data) - begin) / (end - begin)
+
+    before = anchored(body_pose(env.data, part.body), fit.point)
+
+    def frame(step: int) -> Array:
+        return before if step < segment.contact else anchored(body_pose(env.data, part.body), fit.point)
+
+    def late(step: int) -> bool:
+        soon = min(share(min(step + AHEAD_STEPS, segment.release - 1)), 1.0)
+        wanted = soon if soon > 1.0 - LATE_SHARE / 2 else share(step)
+        return here() < wanted - LATE_SHARE * (1.0 - wanted) - END_SHARE
+
+    steps = range(segment.contact, segment.release)
+    enter = next((step for step in steps if share(step) >= here()), segment.contact) if here() > LATE_SHARE else 0
+    base = None
+    path = data.base[segment.lead : segment.end]
+    if len(path) and np.hypot(*(path - path[0])[:, :2].T).max() > DRIVES_M:
+        frames = _floor_map(env, fit)
+        position, yaw = base_pose(env.data)
+        off = np.array([position[0], position[1], yaw]) - _base_like(fit, frames, segment.lead)
+
+        def base(step: int) -> Array:
+            return _base_like(fit, frames, step) + off
+
+    return Carried(
+        fit.piece,
+        lambda step: frame(step) @ fit.local(data.target[step], step),
+        lambda step: frame(step) @ fit.local(data.eef[step], step),
+        (lambda step: False) if fit.springs else late,
+        base,
+        lambda: abs(part.position(env.data) - start) > MET_SHARE * part.span,
+        lambda: part.position(env.data) / part.span,
+        0 if fit.springs else enter,
+    )

@@ -1,0 +1,1 @@
+"""Prepared demonstrations as sources: what preparing notes, how they are cut into segments, which fit a stage."""

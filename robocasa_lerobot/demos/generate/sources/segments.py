@@ -1,0 +1,193 @@
+"""Segments: the pieces of a demonstration in which the hand works on one thing, found from what preparing noted.
+
+A stage about a part of a fixture has a segment for every time that the hand touches the part and moves it. A stage
+that moves an object has one that takes hold of it and one that puts it down. What lies between, the free motion, is
+planned anew or bridged; MimicGen's own subtasks, which cover all of a demonstration, end where the contact ends.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from robocasa_lerobot.demos.generate.sources.frames import JOINTED
+from robocasa_lerobot.demos.generate.sources.prepared import Prepared
+from robocasa_lerobot.demos.generate.sources.rules import DERIVED, CutRules, rules_for
+
+PART, PICK, PLACE = "part", "pick", "place"
+LEAVING_M = 0.12  # of the hand from where the contact ends: the retreat
+DRIVES_M, TURNS_RAD = 0.10, 0.10  # of the base, which stays about where it is during an approach
+LIFTED_M, MOVED_M = 0.04, 0.06  # an object that has risen, or gone, as far is in the hand
+FIRM_STEPS = 10  # of fingers that close
+
+
+@dataclass(frozen=True)
+class Segment:
+    """A piece of a demonstration; steps are counted from its beginning.
+
+    Attributes:
+        kind: PART, PICK or PLACE.
+        stage: number of its stage.
+        ref: what it is relative to: a part's or an object's name; of PLACE the object that is put down.
+        begin: where the subtask begins, with the free motion before it.
+        lead: where the hand comes near what it is about to touch, and goes straight to it from then on.
+        contact: of a part, when it is touched first; of an object, when the fingers begin to close, or to open.
+        release: when that ends.
+        end: where the segment ends: the hand is off.
+        signal: name of the signal that says so.
+    """
+
+    kind: str
+    stage: int
+    ref: str
+    begin: int
+    lead: int
+    contact: int
+    release: int
+    end: int
+
+    @property
+    def signal(self) -> str:
+        """Of MimicGen's name for it: when its subtask is over."""
+        return f"{self.kind}_{self.ref}"
+
+
+def cut(found: Prepared, rules: Mapping[str, CutRules] = DERIVED) -> list[Segment]:
+    """The segments of a demonstration, in the order of their contacts; they do not overlap.
+
+    Args:
+        found: what preparing noted.
+        rules: by skill and verb, as "drawers open", where they are not the common ones.
+    """
+    raw: list[Segment] = []
+    for number, words in enumerate(found.about["stages"]):
+        steps = np.flatnonzero(found.stage == number)
+        if not len(steps):
+            continue
+        stage = _Stage(number, words, int(steps[0]), int(steps[-1]) + 1, rules_for(rules, words))
+        if words["skill"] in JOINTED:
+            raw += _part_segments(found, stage)
+        elif words["skill"] == "pick_place":
+            raw += _object_segments(found, stage)
+    raw.sort(key=lambda one: one.contact)
+    return list(_apart(found, raw))
+
+
+def signals_of(segments: list[Segment], steps: int) -> dict[str, NDArray[np.int64]]:
+    """For each segment but the last a signal (steps,) that rises where its contact has ended."""
+    out: dict[str, NDArray[np.int64]] = {}
+    for number, one in enumerate(segments[:-1]):
+        rises = np.zeros(steps, dtype=np.int64)
+        rises[min(one.release, steps - 1) :] = 1
+        out[f"{number}_{one.signal}"] = rises
+    return out
+
+
+@dataclass(frozen=True)
+class _Stage:
+    """A stage of a demonstration: its number, its words, the steps [first, last), and the rules for it."""
+
+    number: int
+    words: dict[str, Any]
+    first: int
+    last: int
+    rules: CutRules
+
+
+def _part_segments(found: Prepared, stage: _Stage) -> Iterator[Segment]:
+    rules, first, last = stage.rules, stage.first, stage.last
+    for name in stage.words["parts"]:
+        position = found.joints[name]
+        low, high = found.about["parts"][name]["range"]
+        for start, stop in runs(found.touching[name][first:last] > 0, rules.gap_steps):
+            begin, end = first + start, min(first + stop, last)
+            moved = np.abs(position[begin : min(end + 5, len(position))] - position[begin]).max()
+            if moved > rules.moved_share * (high - low):
+                lead = _lead(found, begin, first, rules.near_m, rules.far_steps)
+                yield Segment(PART, stage.number, name, first, lead, begin, end, last)
+
+
+def _object_segments(found: Prepared, stage: _Stage) -> Iterator[Segment]:
+    rules, first, last, name = stage.rules, stage.first, stage.last, stage.words["thing"]
+    touched = found.touching[name] > 0
+    # Commands to close that bring the object into the hand; the last one counts, and what was let go after it.
+    holds = []
+    for start, stop in runs(found.gripper[first:last] > 0, 0):
+        begin, end = first + start, first + stop
+        if end - begin > FIRM_STEPS and touched[begin:end].mean() > 0.5 and _carried(found, name, begin, end):
+            holds.append((begin, end))
+    if not holds:
+        return
+    close, opened = holds[-1]
+    if close > first:
+        lifted = _when_lifted(found, name, close, opened)
+        lead = _lead(found, close, first, rules.near_m, rules.far_steps)
+        yield Segment(PICK, stage.number, name, first, lead, close, lifted, lifted)
+    if stage.words["verb"] != "pick" and opened < last:
+        lead = _lead(found, opened, close, rules.place_near_m, rules.far_steps)
+        yield Segment(PLACE, stage.number, name, close, lead, opened, opened, last)
+
+
+def _carried(found: Prepared, name: str, begin: int, end: int) -> bool:
+    path = found.poses[name][begin:end, :3, 3]
+    return bool(np.linalg.norm(path - path[0], axis=1).max() > MOVED_M)
+
+
+def _when_lifted(found: Prepared, name: str, close: int, opened: int) -> int:
+    path = found.poses[name][close:opened, :3, 3]
+    up = (path[:, 2] - path[0, 2] > LIFTED_M) | (np.linalg.norm(path - path[0], axis=1) > 2 * MOVED_M)
+    return close + int(np.argmax(up)) + 1 if up.any() else opened
+
+
+def _lead(found: Prepared, contact: int, first: int, near_m: float, far_steps: int) -> int:
+    """The step from which hand and base stay near where they are at a contact; fingers may close."""
+    at, lead = found.eef[contact][:3, 3], contact
+    while lead > max(first, contact - far_steps):
+        step = lead - 1
+        drives = np.hypot(*(found.base[contact] - found.base[step])[:2]) > DRIVES_M
+        turns = abs(found.base[contact, 2] - found.base[step, 2]) > TURNS_RAD
+        if drives or turns or np.linalg.norm(found.eef[step][:3, 3] - at) > near_m:
+            break
+        if lead < contact and found.gripper[step] > found.gripper[lead]:  # it has let something go here
+            break
+        lead = step
+    return lead
+
+
+def _apart(found: Prepared, segments: list[Segment]) -> Iterator[Segment]:
+    """The same without overlaps: each begins where the one before has drawn the hand back."""
+    begin = 0
+    for number, one in enumerate(segments):
+        later = segments[number + 1] if number + 1 < len(segments) else None
+        end = one.end
+        if later is not None:
+            end = _left(found, one, min(later.lead, one.end) if one.kind == PART else one.end)
+            end = min(max(end, one.release), max(later.lead, one.release), later.contact)
+        lead = min(max(one.lead, begin), one.contact)
+        yield Segment(one.kind, one.stage, one.ref, begin, lead, one.contact, min(one.release, end), end)
+        begin = end
+
+
+def _left(found: Prepared, one: Segment, limit: int) -> int:
+    """The step at which the hand is off what it worked on."""
+    at = found.eef[min(one.release, len(found) - 1)][:3, 3]
+    for step in range(one.release, limit):
+        if np.linalg.norm(found.eef[step][:3, 3] - at) > LEAVING_M:
+            return step
+    return limit
+
+
+def runs(held: NDArray[np.bool_], gap: int) -> list[tuple[int, int]]:
+    """Where something holds, as [start, stop) pairs; breaks of at most `gap` steps do not count."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], held, [False]]).astype(np.int8)))
+    out: list[tuple[int, int]] = []
+    for start, stop in edges.reshape(-1, 2).tolist():
+        if out and start - out[-1][1] <= gap:
+            out[-1] = (out[-1][0], stop)
+        else:
+            out.append((start, stop))
+    return out

@@ -1,0 +1,140 @@
+"""Prepared demonstrations as sources: read once a process, and asked for the segments that fit a stage."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+
+import h5py
+import numpy as np
+
+from robocasa_lerobot.demos.generate.sources.frames import JOINTED
+from robocasa_lerobot.demos.generate.sources.prepared import GROUP, VERSION, Prepared, is_prepared, read_prepared
+from robocasa_lerobot.demos.generate.sources.rules import CutRules, rules_from
+from robocasa_lerobot.demos.generate.sources.segments import PART, Segment, cut
+from robocasa_lerobot.demos.replay import demonstrations
+from robocasa_lerobot.envs.tasks.task import Stage
+from robocasa_lerobot.errors import UserError
+
+
+@dataclass(frozen=True, eq=False)
+class Source:
+    """A prepared demonstration.
+
+    Attributes:
+        number: among the sources.
+        name: file and demonstration.
+        task: that it solves.
+        seed: of its scene.
+        data: what preparing found.
+        segments: its pieces.
+        rules: by which it was cut.
+    """
+
+    number: int
+    name: str
+    task: str
+    seed: int
+    data: Prepared
+    segments: tuple[Segment, ...]
+    rules: Mapping[str, CutRules]
+
+
+@dataclass(frozen=True, eq=False)
+class Piece:
+    """A segment of a source."""
+
+    source: Source
+    segment: Segment
+
+    @property
+    def data(self) -> Prepared:
+        """Of its demonstration."""
+        return self.source.data
+
+    @property
+    def words(self) -> dict[str, object]:
+        """Of its stage."""
+        found: dict[str, object] = self.data.about["stages"][self.segment.stage]
+        return found
+
+    def travel(self) -> tuple[float, float]:
+        """Where a part stood when the segment began, and how far it got from there, metres or radians.
+
+        A part that springs back, as a button, got to where it was pressed to.
+        """
+        assert self.segment.kind == PART
+        path = self.data.joints[self.segment.ref][self.segment.contact : self.segment.end + 1]
+        far = path - path[0]
+        last = float(far[-1])
+        most = float(far[np.argmax(np.abs(far))])
+        return float(path[0]), last if abs(last) > 0.5 * abs(most) else most
+
+
+def sources_of(folder: Path, task: str, rules: str = "{}") -> list[Source]:
+    """The sources for a task: its own demonstrations, or else those of all tasks in the folder.
+
+    Args:
+        folder: that they lie in; or one file.
+        task: name.
+        rules: JSON of what `rules.rules_from` takes.
+
+    Raises:
+        UserError: nothing there has been prepared.
+    """
+    own = folder / f"{task}.hdf5"
+    found = _read(own if folder.is_dir() and own.exists() else folder, _stamp(folder), rules)
+    if not found:
+        raise UserError(
+            f"{folder}: no demonstration there has been prepared, or none replays. "
+            f"`robocasa-lerobot prepare {folder}` makes them ready."
+        )
+    return list(found)
+
+
+def digest_of(sources: Sequence[Source]) -> str:
+    """What tells one set of sources from another."""
+    digest = hashlib.sha256(str(VERSION).encode())
+    for source in sources:
+        digest.update(f"{source.task} {source.seed} {len(source.data)}".encode())
+        digest.update(np.ascontiguousarray(source.data.target).tobytes())
+    return digest.hexdigest()[:16]
+
+
+def pieces_for(sources: Sequence[Source], stage: Stage, kind: str, drawn_to: str = "") -> list[Piece]:
+    """The segments of a kind from stages like one: of its skill, verb and direction."""
+    found = []
+    for source in sources:
+        for segment in source.segments:
+            words = source.data.about["stages"][segment.stage]
+            if segment.kind != kind or words["skill"] != stage.skill:
+                continue
+            if stage.skill in JOINTED and (words["verb"] != stage.verb or words["drawn_to"] != drawn_to):
+                continue
+            found.append(Piece(source, segment))
+    return found
+
+
+def _stamp(folder: Path) -> float:
+    files = sorted(folder.glob("*.hdf5")) if folder.is_dir() else [folder]
+    return max((file.stat().st_mtime for file in files if file.exists()), default=0.0)
+
+
+@lru_cache(maxsize=4)
+def _read(path: Path, stamp: float, rules: str) -> tuple[Source, ...]:
+    found: list[Source] = []
+    cuts = rules_from(json.loads(rules))
+    for file, demo in demonstrations([path]):
+        with h5py.File(file) as opened:
+            group = opened[f"data/{demo}"]
+            if not is_prepared(group):
+                continue
+            data = read_prepared(group[GROUP])
+            task = str(opened["data"].attrs["env"])
+            seed = int(group.attrs.get("seed", -1))
+        found.append(Source(len(found), f"{file.stem}/{demo}", task, seed, data, tuple(cut(data, cuts)), cuts))
+    return tuple(found)

@@ -1,0 +1,57 @@
+"""The skills of generation: each carries out a stage with segments of sources instead of plans of its own."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from functools import partial
+
+from robocasa_lerobot.demos.demonstrator import demonstrate
+from robocasa_lerobot.demos.generate.course import AT_REST, DRIVE, Course
+from robocasa_lerobot.demos.generate.object_segments import object_stage
+from robocasa_lerobot.demos.generate.part_segments import part_stage
+from robocasa_lerobot.demos.generate.sources.frames import JOINTED
+from robocasa_lerobot.demos.motion import Array
+from robocasa_lerobot.demos.motion_style import MotionStyle
+from robocasa_lerobot.demos.skills import SKILLS, Skill
+from robocasa_lerobot.demos.stages import StageLog
+from robocasa_lerobot.envs.kitchen_env import KitchenEnv
+from robocasa_lerobot.envs.tasks.task import Stage
+
+OBJECT_VERBS = ("pick", "place")
+
+
+def generated(env: KitchenEnv, style: MotionStyle, log: StageLog, course: Course) -> Iterator[Array]:
+    """Actions (12,), stored order, of a generated episode; see `demonstrate`.
+
+    Raises:
+        UnknownNameError: a stage's verb cannot be generated.
+        SkillError: a stage is not done after all its attempts.
+    """
+    yield from course.counted(demonstrate(env, style, log, skills_with(course)))
+
+
+def skills_with(course: Course) -> dict[tuple[str, str], Skill]:
+    """What carries out stages with the sources of an episode; drives between fixtures are planned."""
+    skills: dict[tuple[str, str], Skill] = {}
+    for skill, verb in SKILLS:
+        if skill in JOINTED:
+            skills[skill, verb] = _bound(part_stage, course)
+        elif skill == "pick_place" and verb in OBJECT_VERBS:
+            skills[skill, verb] = _bound(object_stage, course)
+        elif skill == "navigation":
+            skills[skill, verb] = partial(_driven, course, SKILLS[skill, verb])
+    return skills
+
+
+def _bound(carry_out: Callable[[KitchenEnv, Stage, Course], Iterator[Array]], course: Course) -> Skill:
+    def skill(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
+        try:
+            yield from carry_out(env, stage, course)
+        finally:
+            course.label = AT_REST
+
+    return skill
+
+
+def _driven(course: Course, skill: Skill, env: KitchenEnv, stage: Stage) -> Iterator[Array]:
+    yield from course.labelled(skill(env, stage), DRIVE)

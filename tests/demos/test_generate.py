@@ -1,0 +1,158 @@
+"""Generation: sources are chosen as asked, their segments succeed in other kitchens, and files are what they say."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+from cluster_work import hdf5_content
+
+from robocasa_lerobot import cli
+from robocasa_lerobot.demos.attempts import RecordingSettings
+from robocasa_lerobot.demos.generate.course import KINDS
+from robocasa_lerobot.demos.generate.select import NEAREST, Manner, narrowed, pose_distance
+from robocasa_lerobot.demos.generate.settings import GenerationSettings
+from robocasa_lerobot.demos.generate.sources.frames import anchor, shares_of
+from robocasa_lerobot.demos.generate.sources.prepare import prepare_files
+from robocasa_lerobot.demos.generate.sources.rules import CutRules, read_rules, rules_for
+from robocasa_lerobot.demos.generate.sources.source import digest_of, sources_of
+from robocasa_lerobot.demos.generate.sources.transform import make_pose, yaw_pose
+from robocasa_lerobot.demos.recording import record_tasks
+from robocasa_lerobot.demos.replay import replay
+from robocasa_lerobot.errors import UserError
+
+TASK = "CloseDrawer"
+
+
+def test_a_frame_lies_at_the_same_share_of_another_box() -> None:
+    narrow, wide = np.array([[0.0, 0.0, 0.0], [0.4, 0.02, 0.6]]), np.array([[0.0, 0.0, 0.0], [0.8, 0.02, 0.6]])
+    shares = shares_of(np.array([0.3, 0.02, 0.3]), narrow)
+    np.testing.assert_allclose(anchor(wide, shares), [0.6, 0.02, 0.3])
+    # A door that hangs on the other side reaches from its hinge to the left.
+    left = np.array([[-0.8, 0.0, 0.0], [0.0, 0.02, 0.6]])
+    np.testing.assert_allclose(anchor(left, shares, mirror=True), [-0.6, 0.02, 0.3])
+
+
+def test_sources_are_selected_as_asked() -> None:
+    places = {0: 0.9, 1: 0.1, 2: 0.2, 3: 0.3, 4: 0.8}
+    options = [(number, way) for number in places for way in ("one", "other")]
+
+    def chosen(select: str, seed: int) -> list[tuple[int, str]]:
+        return narrowed(
+            options,
+            Manner(select=select),
+            np.random.default_rng(seed),
+            source=lambda option: option[0],
+            object_change=lambda option: yaw_pose(places[option[0]], 0.0, 0.0),
+            first_pose=lambda option: yaw_pose(1.0 - places[option[0]], 0.0, 0.0),
+            hand=np.eye(4),
+        )
+
+    assert chosen("feasible", 0) == options
+    for select, possible in (
+        ("random", set(places)),
+        ("nearest_object", {1, 2, 3}),
+        ("nearest_robot", {0, 4, 3}),
+    ):
+        drawn = [chosen(select, seed) for seed in range(60)]
+        assert all(len({number for number, _ in one}) == 1 for one in drawn)
+        assert all(len(one) == 2 for one in drawn)  # what a source offers stays together
+        assert {one[0][0] for one in drawn} == possible
+        assert chosen(select, 5) == chosen(select, 5)
+    assert NEAREST == 3
+
+
+def test_the_distance_of_poses_counts_metres_and_radians() -> None:
+    assert pose_distance(yaw_pose(1.0, 2.0, 0.5), yaw_pose(1.0, 2.3, 0.9)) == pytest.approx(0.7)
+    assert pose_distance(make_pose([0, 0, 1], np.eye(3)), np.eye(4)) == pytest.approx(1.0)
+
+
+def test_rules_of_a_file_replace_what_is_derived(tmp_path: Path) -> None:
+    path = tmp_path / "rules.yaml"
+    path.write_text("drawers open: {near_m: 0.1, frame: handle}")
+    rules = read_rules(path)
+    assert rules_for(rules, {"skill": "drawers", "verb": "open"}) == CutRules(near_m=0.1, frame="handle")
+    assert rules_for(rules, {"skill": "drawers", "verb": "close"}) == CutRules()
+    for wrong, said in (
+        ("drawers pen: {}", "drawers open"),
+        ("drawers open: {nearm: 1}", "near_m"),
+        ("drawers open: {gap_steps: few}", "should be a int"),
+        ("- a", "should name"),
+    ):
+        path.write_text(wrong)
+        with pytest.raises(UserError, match=said):
+            read_rules(path)
+
+
+@pytest.fixture(scope="module")
+def sources(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    out = tmp_path_factory.mktemp("sources")
+    record_tasks([RecordingSettings(TASK, 2, split="pretrain", seed=100_000)], out, show_progress=False)
+    with pytest.raises(UserError, match="prepare"):
+        sources_of(out, TASK)
+    assert not any(outcome.dropped for outcome in prepare_files([out]))
+    whole, near = sources_of(out, TASK)[0], sources_of(out, TASK, '{"drawers close": {"near_m": 0.05}}')[0]
+    assert near.segments[0].lead > whole.segments[0].lead
+    return out
+
+
+@pytest.mark.slow
+def test_generated_files_replay_and_say_where_each_step_comes_from(sources: Path, tmp_path: Path) -> None:
+    arguments = f"--source {sources} --tasks {TASK} --episodes 2 --split pretrain --seed 100500 --workers 1"
+    assert cli.main(["generate", *arguments.split(), "--action-noise", "0.05", "--out", str(tmp_path / "one")]) == 0
+    path = tmp_path / "one" / f"{TASK}.hdf5"
+    for demo in ("demo_0", "demo_1"):
+        found = replay(path, demo)
+        assert found.actions
+        assert found.states
+        assert found.same_start
+        assert found.deviation == 0.0  # nothing but its actions has moved anything
+    with h5py.File(path) as file:
+        for group in file["data"].values():
+            steps = len(group["actions"])
+            labels, kinds, at = group["src_demo_labels"][()], group["segment_kind"][()], group["src_step"][()]
+            assert labels.shape == (steps, 1)
+            assert kinds.shape == at.shape == (steps,)
+            assert set(labels[:, 0]) <= {-1, 0, 1}
+            assert KINDS[1] == "contact"
+            of_source = labels[:, 0] >= 0
+            assert (kinds == 1).any()
+            assert of_source[kinds == 1].all()
+            assert (at[of_source & (kinds != KINDS.index("bridge"))] >= 0).all()
+            segments = json.loads(group.attrs["ep_meta"])["generation"]["segments"]
+            assert group["src_demo_inds"][()].tolist() == [row["demo"] for row in segments]
+            assert segments[-1]["kind"] == "part"
+            assert segments[-1]["ref"] == "drawer.box"
+    # The file follows from seeds and sources alone: attempts that another run had made before it was killed are kept.
+    other = tmp_path / "two"
+    values = {"task": TASK, "split": "pretrain", "seed": 100_500, "action_noise": 0.05, "varied": False}
+    moved = shutil.copytree(sources, tmp_path / "moved")  # wherever they lie
+    record_tasks([GenerationSettings.of(moved, episodes=1, **values)], other, show_progress=False)
+    (other / f"{TASK}.hdf5").unlink()
+    record_tasks([GenerationSettings.of(moved, episodes=2, **values)], other, show_progress=False)
+    here, there = hdf5_content(path), hdf5_content(other / f"{TASK}.hdf5")
+    assert here.keys() == there.keys()
+    assert all(np.array_equal(value, there[key]) for key, value in here.items())
+
+
+@pytest.mark.slow
+def test_a_source_succeeds_in_its_own_scene(sources: Path) -> None:
+    settings = GenerationSettings(TASK, 1, split="pretrain", varied=False, source=str(sources))
+    for source in sources_of(sources, TASK):
+        env = settings.make_env()
+        recording = settings.record(env, source.seed)
+        env.close()
+        assert recording.success, recording.reason
+
+
+@pytest.mark.slow
+def test_nothing_is_generated_in_a_sources_own_scene(sources: Path) -> None:
+    with pytest.raises(UserError, match="own scene"):
+        GenerationSettings.of(sources, task=TASK, episodes=2, split="pretrain", seed=99_999)
+    settings = GenerationSettings.of(sources, task=TASK, episodes=2, split="pretrain", seed=100_500)
+    assert settings.identity()["sources"] == digest_of(sources_of(sources, TASK))
+    assert "source" not in settings.identity()
