@@ -33,6 +33,7 @@ from robocasa_lerobot.convert.settings import ConversionSettings
 from robocasa_lerobot.convert.writing.encoder import ENCODER_THREADS
 from robocasa_lerobot.convert.writing.statistics import column
 from robocasa_lerobot.envs.rendering import SceneRenderer
+from robocasa_lerobot.quiet import quiet_libraries
 
 Picture = NDArray[np.uint8]
 BATCH = 16
@@ -284,7 +285,7 @@ def _wait_until(at: float) -> None:
 
 def main() -> None:
     """Answer commands."""
-    pipeline.quiet_libraries()
+    quiet_libraries()
     encoding = Encoding()
     sim_loop.answer_commands(
         hello, convert, record_with_lerobot, encoding.load_pictures, encoding.encode, render, encode_png, decode

@@ -110,6 +110,12 @@ class Loop:
             seconds.append(time.perf_counter() - start)
         return {"seconds": seconds, "growth_mib": (resident_mib() - before) / count}
 
+    def new_scene(self, seed: int) -> dict[str, Any]:
+        """Seconds of one reset to a new scene."""
+        start = time.perf_counter()
+        self._reset(seed, same_scene=False)
+        return {"seconds": time.perf_counter() - start}
+
     def prepare(self, seed: int, standing: bool = False) -> dict[str, Any]:
         """Begin the first episode of a run; with `standing` base and torso are not commanded in it."""
         self._standing = standing
@@ -185,7 +191,7 @@ def resident_mib() -> float:
 def serve(simulator: Simulator) -> None:
     """Answer the commands of a simulator's loop until stdin ends."""
     loop = Loop(simulator)
-    answer_commands(loop.hello, loop.make, loop.resets, loop.prepare, loop.run, loop.split)
+    answer_commands(loop.hello, loop.make, loop.resets, loop.new_scene, loop.prepare, loop.run, loop.split)
 
 
 def answer_commands(*commands: Callable[..., dict[str, Any]]) -> None:

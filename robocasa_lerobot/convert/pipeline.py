@@ -42,7 +42,7 @@ from robocasa_lerobot.convert.scenes.prefetch import scenes_ahead
 from robocasa_lerobot.convert.settings import ConversionSettings, Plan, Shard, SourceRecord, make_plan
 from robocasa_lerobot.convert.shard import convert_shard
 from robocasa_lerobot.convert.writing.card import write_dataset_card
-from robocasa_lerobot.convert.writing.encoder import CODECS, SAMPLED_FRAMES, SAMPLED_PIXELS, Histogram, quiet_libraries
+from robocasa_lerobot.convert.writing.encoder import CODECS, SAMPLED_FRAMES, SAMPLED_PIXELS, Histogram
 from robocasa_lerobot.convert.writing.encoding_process import shared_encoder
 from robocasa_lerobot.convert.writing.modality import MODALITY_FILE, modality, write_modality
 from robocasa_lerobot.errors import UserError
@@ -58,6 +58,7 @@ from robocasa_lerobot.jobs.publish import (
 )
 from robocasa_lerobot.jobs.workers import check_workers, num_workers
 from robocasa_lerobot.jsonl import read_jsonl, write_jsonl
+from robocasa_lerobot.quiet import quiet_libraries
 
 # Our part of a dataset's folder; LeRobot reads nothing in it.
 # Starting a worker imports LeRobot and MuJoCo (about 6 s of CPU time); below this much work that does not pay: 3,150

@@ -19,12 +19,12 @@ from robocasa_lerobot.convert.rerender.plan import SOURCE_FORMAT as RERENDERED
 from robocasa_lerobot.convert.rerender.verify import verify_rerendered
 from robocasa_lerobot.convert.settings import ConversionSettings, SourceRecord, file_sha256
 from robocasa_lerobot.convert.verification import Source, Verification
-from robocasa_lerobot.convert.writing.encoder import quiet_libraries
 from robocasa_lerobot.errors import UserError
 from robocasa_lerobot.jobs.as_completed import as_they_end
 from robocasa_lerobot.jobs.workers import check_workers, num_workers
 from robocasa_lerobot.jsonl import read_jsonl
 from robocasa_lerobot.progress import Bar
+from robocasa_lerobot.quiet import quiet_libraries
 
 # Each further process imports LeRobot and MuJoCo, which takes as long as looking at some dozens of episodes.
 _MIN_EPISODES_PER_WORKER = 64

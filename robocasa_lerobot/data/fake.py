@@ -20,6 +20,7 @@ from lerobot.datasets.lerobot_dataset import LeRobotDataset
 
 from robocasa_lerobot import contract
 from robocasa_lerobot.data.reading.source import EPISODE_TABLE
+from robocasa_lerobot.quiet import quiet_libraries
 
 INSTRUCTIONS = {
     "OpenDrawer": "open the left drawer",
@@ -43,6 +44,7 @@ def write_fake_dataset(
     Pictures are image_size x image_size pixels; every episode has `length` frames. With `decisions` it says who decided
     them: a person the second half of each episode.
     """
+    quiet_libraries()
     root.parent.mkdir(parents=True, exist_ok=True)
     aside = Path(tempfile.mkdtemp(prefix=f".{root.name}.", dir=root.parent))
     try:

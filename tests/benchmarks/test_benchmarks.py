@@ -142,6 +142,28 @@ def test_a_reset_that_is_not_what_it_claims_is_an_error() -> None:
 
 
 @pytest.mark.render
+def test_scenes_of_composite_tasks_are_measured(tmp_path: Path) -> None:
+    sim = module("ours_tasks_sim")
+    seeds = {sim.reset_seed(task, split, scene) for task in range(32) for split in range(2) for scene in range(3)}
+    assert len(sim.TASKS) == 32
+    assert len(seeds) == 32 * 2 * 3
+    simulator = sim.TasksSimulator()
+    simulator.make(cameras=False)
+    simulator.reset(sim.reset_seed(5, 1, 100_400), same_scene=False)
+    assert (simulator._env.task, simulator._env.split) == (sim.TASKS[5], "pretrain")
+    with pytest.raises(RuntimeError, match="new scenes"):
+        simulator.reset(0, same_scene=True)
+    out = tmp_path / "task_scenes.json"
+    arguments = ["--quick", "--tasks", "1", "--without-peer", "--out", str(out)]
+    assert module("task_scenes").main(arguments) == 0
+    result = json.loads(out.read_text())
+    assert [(row["task"], row["split"]) for row in result["tasks"]] == [(sim.TASKS[0], s) for s in sim.SPLITS]
+    assert result["reset_s"]["count"] == 2
+    assert 0 < result["reset_s"]["median"] <= result["reset_s"]["p99"] <= result["reset_s"]["max"]
+    assert result["steps_per_second"]["ours"] > 0
+
+
+@pytest.mark.render
 def test_parts_of_our_time_make_the_whole() -> None:
     simulator = module("ours_sim").KitchenSimulator()
     simulator.make(cameras=True)

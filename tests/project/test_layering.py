@@ -18,7 +18,7 @@ from robocasa_lerobot.cli import SUBCOMMANDS
 # What each part of the package may import of the rest of the package. Parts on one level stay apart.
 BASE = {
     *("benchmark", "config_files", "contract", "errors", "files", "gl", "jobs", "jsonl", "progress"),
-    *("provenance", "settings", "video", "wire"),
+    *("provenance", "quiet", "settings", "video", "wire"),
 }
 LOW = {"envs", "convert", "data", "policies"}
 MAY_IMPORT: dict[str, set[str]] = {
@@ -31,6 +31,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     "jsonl": set(),
     "provenance": set(),
     "progress": set(),
+    "quiet": set(),
     "jobs": {"errors", "progress"},
     "settings": {"errors"},
     "video": {"contract"},
@@ -76,6 +77,7 @@ FORBIDDEN: dict[str, set[str]] = {
     "provenance": TORCH | PHYSICS,
     "jobs": TORCH | PHYSICS,
     "progress": TORCH | PHYSICS,
+    "quiet": TORCH | PHYSICS,
     "settings": TORCH | PHYSICS,
     "video": TORCH | PHYSICS,
     "wire": TORCH | PHYSICS,

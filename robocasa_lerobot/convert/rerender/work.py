@@ -36,7 +36,6 @@ from robocasa_lerobot.convert.writing.encoder import (
     CODECS,
     Histogram,
     VideoSettings,
-    quiet_libraries,
     sampled_frames,
     unit_statistics,
 )
@@ -57,6 +56,7 @@ from robocasa_lerobot.jobs.publish import (
     publish,
 )
 from robocasa_lerobot.jobs.workers import check_workers, num_workers
+from robocasa_lerobot.quiet import quiet_libraries
 
 _HISTOGRAMS = "histograms.npz"
 _MIN_FRAMES_PER_WORKER = 200

@@ -216,19 +216,6 @@ class _Video:
             self.num_packets += 1
 
 
-def quiet_libraries() -> None:
-    """Silence what libraries print about every file they write; their errors still arrive as exceptions."""
-    import datasets
-
-    datasets.disable_progress_bars()
-    quiet_codecs()
-
-
-def quiet_codecs() -> None:
-    """Silence what codecs print about every file; their errors still arrive as exceptions."""
-    av.logging.set_libav_level(av.logging.ERROR)
-
-
 def planes_of(picture: NDArray[np.uint8]) -> NDArray[np.uint8]:
     """A picture (H, W, 3) RGB as the planes of `PIXEL_FORMAT` below each other, (H * 3 / 2, W) uint8.
 

@@ -29,10 +29,10 @@ from robocasa_lerobot.convert.writing.encoder import (
     EpisodeEncoder,
     FramePreparation,
     VideoSettings,
-    quiet_codecs,
 )
 from robocasa_lerobot.convert.writing.frame_ring import FrameReceiver, FrameSender
 from robocasa_lerobot.jobs.child_process import start_serving
+from robocasa_lerobot.quiet import quiet_codecs
 
 if TYPE_CHECKING:
     from robocasa_lerobot.convert.writing.video import VideoForm

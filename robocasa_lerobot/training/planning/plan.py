@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
+import io
 import json
 import statistics
 import tempfile
@@ -223,9 +225,10 @@ def _measure(experiment: ExperimentConfig, phase: PhaseConfig, device: str, step
         trial = dataclasses.replace(experiment, output_dir=folder, phases=[alone], loader=loader, trackers=[])
         accelerator = Accelerator(cpu=device == "cpu", mixed_precision=experiment.mixed_precision)
         try:
-            run = prepare_phase(trial, alone, device, accelerator)
-            run.save = False
-            train_phase(run, accelerator)
+            with contextlib.redirect_stdout(io.StringIO()):  # what a training tells of itself is not about the plan
+                run = prepare_phase(trial, alone, device, accelerator)
+                run.save = False
+                train_phase(run, accelerator)
         except (UserError, RuntimeError) as error:  # too little memory is a RuntimeError
             return f"could not be measured: {_first_line(error)}"
         finally:
