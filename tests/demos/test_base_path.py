@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from robocasa_lerobot.demos.planning.base_path import CELL_M, search_path
 from robocasa_lerobot.demos.planning.base_room import SHIFT_M, Room
 from robocasa_lerobot.demos.planning.errors import ShutInError
+from robocasa_lerobot.demos.skills.navigation import _legs
 from robocasa_lerobot.envs.scene.robot_poses import RobotPose
 
 BORDER_M = 1.5
@@ -68,3 +69,24 @@ def test_where_all_goals_are_shut_in_there_is_no_path() -> None:
 
     with pytest.raises(ShutInError, match="no path for the base"):
         search_path(Field(ring), RobotPose(-0.5, 0.0, 0.0), RobotPose(0.5, 0.0, 0.0))
+
+
+def test_steps_from_cell_to_cell_become_straight_moves_that_are_free_all_along() -> None:
+    def wall(x: float, y: float) -> bool:
+        return 0.035 < x < 0.065 and abs(y) < 0.3
+
+    room, start, goal = Field(wall), RobotPose(-0.5, 0.0, 0.0), RobotPose(0.5, 0.0, 1.5)
+    path = search_path(room, start, goal)
+    assert all(room.closely(one, other) for one, other in itertools.pairwise([start, *path]))
+    assert len(path) <= 4  # round one end of the wall, instead of ten cells and more
+    steps = np.array([(pose.x, pose.y) for pose in (start, *path)])
+    assert np.linalg.norm(np.diff(steps, axis=0), axis=1).sum() < 1.35
+
+
+def test_a_piece_of_a_path_is_not_braked_for_where_the_next_goes_straight_on() -> None:
+    poses = [RobotPose(0.45, 0.0, 0.0), RobotPose(0.45, 0.45, 0.0)]
+    legs = _legs(RobotPose(0.0, 0.0, 0.0), poses)
+    assert [leg.goal for leg in legs][-1] == poses[-1]
+    assert [leg.beyond_m for leg in legs] == pytest.approx([0.30, 0.15, 0.0, 0.30, 0.15, 0.0])
+    turning = _legs(RobotPose(0.0, 0.0, 0.0), [RobotPose(0.0, 0.0, 0.5), RobotPose(0.0, 0.0, 0.0)])
+    assert [leg.beyond_rad for leg in turning] == pytest.approx([0.25, 0.0, 0.25, 0.0])

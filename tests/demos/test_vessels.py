@@ -11,7 +11,7 @@ from goal_states import put_object
 
 from robocasa_lerobot.demos.motion import DEAD_ZONE, UP, rotation_about
 from robocasa_lerobot.demos.skills import SkillError
-from robocasa_lerobot.demos.skills.navigation import LOADED_CHANGE, Pace
+from robocasa_lerobot.demos.skills.navigation import SOFTLY, Pace
 from robocasa_lerobot.demos.skills.pick_place.carrying.level import levelled
 from robocasa_lerobot.demos.skills.pick_place.graspable import graspable
 from robocasa_lerobot.demos.skills.pick_place.hold import hold_poses
@@ -93,12 +93,12 @@ def test_a_tilted_vessel_is_turned_upright_by_the_least_turn_and_one_that_lies_i
 
 
 def test_a_base_with_a_loaded_vessel_changes_its_speed_by_and_by() -> None:
-    pace, free = Pace(smooth=True), Pace()
+    pace, free = Pace(changes=SOFTLY), Pace()
     wanted, before = np.array([1.0, -0.4, 0.3, 0.0]), np.zeros(4)
     assert np.array_equal(free.next(wanted), wanted)
     for step in range(20):
         now = pace.next(wanted)
-        assert np.abs(now - before).max() <= LOADED_CHANGE + (DEAD_ZONE if step == 0 else 0.0) + 1e-9
+        assert np.abs(now - before).max() <= SOFTLY[0] + (DEAD_ZONE if step == 0 else 0.0) + 1e-9
         before = now
     assert np.allclose(now, wanted)
     for _ in range(30):

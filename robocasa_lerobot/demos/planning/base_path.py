@@ -156,8 +156,20 @@ def search_path(room: Room, start: RobotPose, goal: RobotPose) -> list[RobotPose
         cells = grid.search()
         if cells is None:
             raise NoPlanError(_no_path(start, goal))
-        return [*(grid.pose(cell) for cell in cells[1:]), end]
+        return shortened(room, start, [*(grid.pose(cell) for cell in cells[1:]), end])
     raise ShutInError(_no_path(start, goal))
+
+
+def shortened(room: Room, start: RobotPose, poses: Sequence[RobotPose]) -> list[RobotPose]:
+    """A path with its steps from cell to cell put together to straight moves, which may turn on the way, where free."""
+    places, found, here = [start, *poses], list[RobotPose](), 0
+    while here < len(poses):
+        there = len(poses)
+        while there > here + 1 and not room.closely(places[here], places[there]):
+            there = here + (there - here + 1) // 2
+        found.append(places[there])
+        here = there
+    return found
 
 
 def _ends(room: Room, goal: RobotPose) -> Iterator[RobotPose]:
