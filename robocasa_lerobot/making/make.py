@@ -5,18 +5,22 @@ from __future__ import annotations
 import contextlib
 import json
 import shutil
+import sys
+from collections import deque
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 
 from robocasa_lerobot.data.registry.published import dataset_version
 from robocasa_lerobot.data.registry.recipes import RecipeConfig
 from robocasa_lerobot.demos.attempts import Parts, RecordingSettings
+from robocasa_lerobot.errors import UserError
 from robocasa_lerobot.jobs.executors import Execution
 from robocasa_lerobot.making.needs import WORK, Need
 from robocasa_lerobot.making.pieces import Outcome, run_pieces
 
 _PRELOAD = ("robocasa_lerobot.envs.kitchen_env", "robocasa_lerobot.convert.shard")
+SOURCES, SOURCE_SEEDS = "sources", 50_000_000  # folder of those that are multiplied, and how far off their seeds are
 _HALF = 0.5  # of the work on a dataset is recording, half drawing and encoding
 
 
@@ -87,13 +91,38 @@ class MadeDataset:
         from robocasa_lerobot.convert.settings import ConversionSettings
         from robocasa_lerobot.demos.recording import record_task
 
-        recorded = record_task(recording_settings(self.need), self.work, workers=workers, show_progress=False)
+        settings = recording_settings(self.need)
+        try:
+            made = record_task(self._settings(workers), self.work, workers=workers, show_progress=False)
+        except UserError as error:
+            if _recipe(self.need).sources is None:
+                raise
+            print(f"{settings.task} is recorded, since generating it came to nothing: {error}", file=sys.stderr)
+            made = record_task(settings, self.work, workers=workers, show_progress=False)
         self.need.root.parent.mkdir(parents=True, exist_ok=True)
-        settings = ConversionSettings(image_size=_recipe(self.need).image_size)
-        convert([recorded.path], self.need.root, settings, workers, overwrite=self.replace)
+        conversion = ConversionSettings(image_size=_recipe(self.need).image_size)
+        convert([made.path], self.need.root, conversion, workers, overwrite=self.replace)
         if self.keep:
             kept = self.need.root.with_name(f"{self.need.root.name}.hdf5")
-            shutil.move(recorded.path, kept)
+            shutil.move(made.path, kept)
+
+    def _settings(self, workers: int) -> RecordingSettings:
+        """What is recorded, or generated from sources that are recorded before."""
+        from robocasa_lerobot.demos.generate.settings import GenerationSettings
+        from robocasa_lerobot.demos.generate.sources.prepare import prepare_files
+        from robocasa_lerobot.demos.generate.stage import can_generate
+        from robocasa_lerobot.demos.recording import record_task
+        from robocasa_lerobot.envs.tasks.registry import get_task
+
+        settings, number = recording_settings(self.need), _recipe(self.need).sources
+        if number is None or not can_generate(get_task(settings.task)):
+            return settings
+        # In kitchens of the same kind; of other seeds, since nothing is generated in a source's own scene.
+        own = replace(settings, episodes=number, seed=settings.seed + SOURCE_SEEDS, action_noise=0.0)
+        sources = record_task(own, self.work / SOURCES, workers=workers, show_progress=False)
+        deque(prepare_files([sources.path], workers=workers), maxlen=0)
+        values = {entry.name: getattr(settings, entry.name) for entry in fields(settings)}
+        return GenerationSettings.of(sources.path.parent, **values | {"varied": False})
 
     def _draw_again(self, need: Need, workers: int) -> None:
         from robocasa_lerobot.convert.rerender.camera_configs import camera_set

@@ -10,6 +10,7 @@ import sys
 import time
 from pathlib import Path
 
+import h5py
 import pytest
 import v2_support as v2
 import yaml
@@ -191,6 +192,21 @@ def test_missing_data_are_recorded_converted_and_drawn_again(
     assert cli.main(command) == 0
     assert [root.stat().st_mtime_ns for root in roots] == before
     assert cli.main(["data", str(file), "--check"]) == 0
+
+
+@pytest.mark.slow
+@pytest.mark.render
+def test_a_few_recorded_ones_are_multiplied_where_a_recipe_says_so(tmp_path: Path) -> None:
+    file = experiment_on(tmp_path, {**HUMAN, "task_set": "mimicgen60", "source": "mg"})
+    assert cli.main(["data", str(file), "--make", "--episodes", "mg=2", "--workers", "2", "--keep-recordings"]) == 0
+    root = Path("datasets/kitchens/pretrain/mg/CloseDrawer")
+    rows = [json.loads(line) for line in (root / "meta/robocasa/episodes.jsonl").read_text().splitlines()]
+    assert len(rows) == 2
+    with h5py.File(root.with_name("CloseDrawer.hdf5")) as recorded:
+        for row, demo in zip(rows, recorded["data"].values(), strict=True):
+            assert row["mimicgen"]["source_demos"] == demo["src_demo_inds"][:].tolist()
+            assert {*row["mimicgen"]["source_demos"]} <= {*range(10)}
+            assert json.loads(demo.attrs["ep_meta"])["generation"]["segments"]
 
 
 @pytest.mark.slow

@@ -28,6 +28,8 @@ class RecipeConfig:
         action_noise: standard deviation of noise on arm commands, as `demos --action-noise`.
         varied: each demonstration in a style of its own, as `demos` without `--plain`.
         image_size: height and width of the pictures, pixels.
+        sources: so many demonstrations are recorded, and multiplied to as many as asked for, as `generate` does; null
+            records all of them. A task that cannot be generated yet is recorded, too.
         redraw: instead of recording: `path` of the registry's dataset whose episodes are drawn again.
         camera_set: of the cameras that `redraw` draws with, as `render --camera-set`.
     """
@@ -39,12 +41,17 @@ class RecipeConfig:
     action_noise: float = 0.0
     varied: bool = True
     image_size: int = IMAGE_SIZE
+    sources: int | None = None
     redraw: str | None = None
     camera_set: str | None = None
 
     def __post_init__(self) -> None:
         if (self.redraw is None) != (self.camera_set is None):
             raise UserError("recipe of a dataset: `redraw` and `camera_set` go together; one of them is missing.")
+        if self.sources is not None and self.sources < 1:
+            raise UserError(
+                f"recipe of a dataset: `sources` is {self.sources}; it takes one at least, or null."
+            )
 
 
 @functools.cache

@@ -15,9 +15,19 @@ from robocasa_lerobot.demos.motion_style import MotionStyle
 from robocasa_lerobot.demos.skills import SKILLS, Skill
 from robocasa_lerobot.demos.stages import StageLog
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
-from robocasa_lerobot.envs.tasks.task import Stage
+from robocasa_lerobot.envs.tasks.task import Stage, Task
+from robocasa_lerobot.envs.tasks.typical import stages_of
 
 OBJECT_VERBS = ("pick", "place")
+
+
+def can_generate(task: Task) -> bool:
+    """Whether every stage of a task is of a kind that is carried out with segments of sources."""
+    return all(_is_generated(stage.skill, stage.verb) for stage in stages_of(task))
+
+
+def _is_generated(skill: str, verb: str) -> bool:
+    return skill in JOINTED or skill == "navigation" or (skill == "pick_place" and verb in OBJECT_VERBS)
 
 
 def generated(env: KitchenEnv, style: MotionStyle, log: StageLog, course: Course) -> Iterator[Array]:
@@ -34,12 +44,12 @@ def skills_with(course: Course) -> dict[tuple[str, str], Skill]:
     """What carries out stages with the sources of an episode; drives between fixtures are planned."""
     skills: dict[tuple[str, str], Skill] = {}
     for skill, verb in SKILLS:
-        if skill in JOINTED:
-            skills[skill, verb] = _bound(part_stage, course)
-        elif skill == "pick_place" and verb in OBJECT_VERBS:
-            skills[skill, verb] = _bound(object_stage, course)
-        elif skill == "navigation":
+        if not _is_generated(skill, verb):
+            continue
+        if skill == "navigation":
             skills[skill, verb] = partial(_driven, course, SKILLS[skill, verb])
+        else:
+            skills[skill, verb] = _bound(part_stage if skill in JOINTED else object_stage, course)
     return skills
 
 
