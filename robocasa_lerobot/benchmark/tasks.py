@@ -18,8 +18,9 @@ class TaskFacts:
 
     `kind` is `atomic` or `composite`. `activity` (one of 60) and its `family` (one of 6) are None for atomic tasks.
     `subtasks` is the number of skills in a row, `mobile` whether the base has to move. `horizon` is RoboCasa 1.0.1's,
-    control steps at 20 Hz, None where none is published. `human_seconds` is the length of a human
-    demonstration, `note` where our task differs from the published one.
+    control steps at 20 Hz, None where none is published; `own_horizon` is ours for those, five times the
+    demonstrator's median. `human_seconds` is the length of a human demonstration, `note` where our task differs from
+    the published one.
     """
 
     task: str
@@ -32,6 +33,7 @@ class TaskFacts:
     human_seconds: float
     sets: frozenset[str]
     note: str = ""
+    own_horizon: int | None = None
 
 
 @functools.cache

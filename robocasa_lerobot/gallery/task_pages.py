@@ -64,7 +64,8 @@ def page(task: Task) -> Iterator[str]:
     yield ""
     yield "Other wordings: " + " / ".join(task.paraphrases)
     yield ""
-    yield f"- Horizon: {task.horizon} steps ({task.horizon / contract.CONTROL_HZ:g} s)" + (
+    ours = "; ours, none is published" if task.facts.horizon is None else ""
+    yield f"- Horizon: {task.horizon} steps ({task.horizon / contract.CONTROL_HZ:g} s{ours})" + (
         f"; human median {human:g} s" if human else ""
     )
     yield f"- {DEMONSTRATOR}{able}; stages: " + ", ".join(

@@ -63,7 +63,7 @@ def test_numbers_fixtures_and_stages(name: str, blueprints: dict[str, Any]) -> N
     task, row, ours = get_task(name), blueprints[name], OURS[name]
     facts = task.facts
     activity = RENAMED.get(row["activity"], row["activity"])
-    assert (task.horizon, facts.activity, facts.mobile) == (row["horizon"], activity, row["mobile"])
+    assert (facts.horizon, facts.activity, facts.mobile) == (row["horizon"], activity, row["mobile"])
     stages = stages_of(task)
     # Of several objects of which a number is drawn, our stages are those of any of them.
     said_stages = [said for said in row["stages"] if "repeat per" not in said]

@@ -110,8 +110,9 @@ class Task(SceneSpec):
     @property
     def horizon(self) -> int:
         """Control steps at 20 Hz until an episode counts as failed."""
-        assert self.facts.horizon is not None, f"{self.name}: no horizon is published"
-        return self.facts.horizon
+        steps = self.facts.horizon or self.facts.own_horizon
+        assert steps is not None, f"{self.name}: no horizon is published, and `own_horizon` is not set"
+        return steps
 
     def bound(self, scene: Drawn) -> BoundTask:
         """The task as it is in a scene.
