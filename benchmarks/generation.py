@@ -58,6 +58,7 @@ def parse(arguments: Sequence[str] | None = None) -> argparse.Namespace:
     parser.add_argument("--select", choices=SELECTIONS, default="feasible")
     parser.add_argument("--base", choices=BASES, default="replan")
     parser.add_argument("--bridge", choices=BRIDGES, default="plan")
+    parser.add_argument("--cap", type=float, default=0.2, help="as of `generate` (default 0.2)")
     parser.add_argument("--trials", type=Path, default=common.REPOSITORY / "outputs" / "generation.jsonl")
     parser.add_argument("--out", type=Path, default=common.RESULTS / "generation.md")
     return parser.parse_args(arguments)
@@ -114,7 +115,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     """Make the missing attempts, and write the table."""
     args = parse(arguments)
     names = expand_names(args.tasks) if args.tasks else tuple(sorted(path.stem for path in args.source.glob("*.hdf5")))
-    manner = f"{args.select} {args.base} {args.bridge}" + (" own" if args.own else "")
+    manner = f"{args.select} {args.base} {args.bridge} cap {args.cap:g}" + (" own" if args.own else "")
     lines = args.trials.read_text().splitlines() if args.trials.exists() else []
     done = [Trial(**json.loads(line) | {"sources": tuple(json.loads(line)["sources"])}) for line in lines]
     known = {(trial.task, trial.seed, trial.manner): trial for trial in done}
@@ -122,7 +123,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     for name in names:
         settings = GenerationSettings(
             name, 1, split="pretrain", varied=False, source=str(args.source),
-            select=args.select, base=args.base, bridge=args.bridge,
+            select=args.select, base=args.base, bridge=args.bridge, cap=args.cap,
         )  # fmt: skip
         own = [one.seed for one in sources_of(args.source, name)]
         seeds = own if args.own else range(args.first_seed, args.first_seed + args.attempts)

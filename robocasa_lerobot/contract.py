@@ -55,8 +55,9 @@ LANGUAGE_KEY = "language_persistent"
 STAGE_KEYS: tuple[str, ...] = (STAGE_KEY, SUBTASK_KEY, LANGUAGE_KEY)
 # Who decided each step, where people have a hand in it: HDF5 datasets below an episode, features `extra.<name>` of a
 # dataset. Whether a person decided while there was a policy (0, 1); what the policy wanted (12, the order of the file's
-# actions); whether the step belongs to a planned motion that the person asked for (0, 1).
-DECISIONS: tuple[str, ...] = ("intervention", "policy_action", "assisted")
+# actions); whether the step belongs to a planned motion that the person asked for (0, 1). And what a demonstrator
+# wanted before noise came to it (12, as before).
+DECISIONS: tuple[str, ...] = ("intervention", "policy_action", "assisted", "clean_action")
 EXTRA_PREFIX = "extra."
 FRAME_KINDS: tuple[str, ...] = ("interventions", "autonomous")  # frames by who decided them
 

@@ -39,6 +39,13 @@ def configure(parser: argparse.ArgumentParser) -> None:
         help="how evenly sources are used: cost that each has at random in an attempt (default: %(default)s)",
     )
     parser.add_argument(
+        "--cap",
+        type=float,
+        default=0.2,
+        metavar="SHARE",
+        help="of the segments that one source should have at most; 1 takes whichever fits best (default: %(default)s)",
+    )
+    parser.add_argument(
         "--rules", type=Path, metavar="YAML", help="how verbs are cut into segments, where that is not to be derived"
     )
     add_options(parser)
@@ -73,6 +80,7 @@ def run(args: argparse.Namespace) -> int:
             bridge=args.bridge,
             select=args.select,
             spread=args.spread,
+            cap=args.cap,
             rules=rules,
         )
         for name in expand_names(args.tasks)

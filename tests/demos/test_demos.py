@@ -73,6 +73,20 @@ def test_demonstrator_solves_its_task(task, recordings):
     assert recording.rewards[-(SUCCESS_HOLD_STEPS - 1) :].all()
 
 
+def test_what_was_wanted_is_kept_beside_actions_with_noise(recordings):
+    recording = recordings["CloseDrawer"]
+    clean = recording.per_step["clean_action"]
+    assert clean.shape == recording.actions.shape
+    arm = slice(0, 6)  # of the order of robosuite's files
+    np.testing.assert_allclose(np.delete(recording.actions, arm, 1), np.delete(clean, arm, 1), atol=1e-6)
+    inside = (np.abs(clean[:, arm]) < 0.7) & (np.abs(recording.actions[:, arm]) < 0.999)
+    noise = (recording.actions - clean)[:, arm][inside]
+    assert 0.04 < noise.std() < 0.06
+    env = KitchenEnv("CloseDrawer", cameras=(), terminate_on_success=False)
+    assert "clean_action" not in record_episode(env, 3).per_step
+    env.close()
+
+
 @pytest.mark.slow
 @pytest.mark.timeout(900)
 @pytest.mark.parametrize("task", demonstrated())

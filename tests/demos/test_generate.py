@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import shutil
+from collections import Counter
 from pathlib import Path
 
 import h5py
@@ -13,7 +14,7 @@ from cluster_work import hdf5_content
 
 from robocasa_lerobot import cli
 from robocasa_lerobot.demos.attempts import RecordingSettings
-from robocasa_lerobot.demos.generate.course import KINDS
+from robocasa_lerobot.demos.generate.course import KINDS, source_costs
 from robocasa_lerobot.demos.generate.select import NEAREST, Manner, narrowed, pose_distance
 from robocasa_lerobot.demos.generate.settings import GenerationSettings
 from robocasa_lerobot.demos.generate.sources.frames import anchor, shares_of
@@ -64,6 +65,22 @@ def test_sources_are_selected_as_asked() -> None:
         assert {one[0][0] for one in drawn} == possible
         assert chosen(select, 5) == chosen(select, 5)
     assert NEAREST == 3
+
+
+def test_sources_that_are_not_drawn_cost_more_and_all_are_drawn_alike() -> None:
+    numbers = [4, 0, 7, 1, 2, 3, 5, 9, 8, 6]
+
+    def drawn(seed: int, cap: float) -> set[int]:
+        costs = source_costs(numbers, np.random.default_rng(seed), 0.3, cap)
+        assert costs.min() >= 0.0
+        return {number for number in numbers if costs[number] <= 0.3}
+
+    times = Counter(number for seed in range(600) for number in drawn(seed, 0.2))
+    assert sum(times.values()) == 1200
+    assert set(times) == set(numbers)
+    assert max(times.values()) < 160  # about 120 each
+    assert drawn(3, 1.0) == set(numbers)
+    assert len(drawn(3, 0.01)) == 1
 
 
 def test_the_distance_of_poses_counts_metres_and_radians() -> None:

@@ -49,9 +49,7 @@ class RecipeConfig:
         if (self.redraw is None) != (self.camera_set is None):
             raise UserError("recipe of a dataset: `redraw` and `camera_set` go together; one of them is missing.")
         if self.sources is not None and self.sources < 1:
-            raise UserError(
-                f"recipe of a dataset: `sources` is {self.sources}; it takes one at least, or null."
-            )
+            raise UserError(f"recipe of a dataset: `sources` is {self.sources}; it takes one at least, or null.")
 
 
 @functools.cache

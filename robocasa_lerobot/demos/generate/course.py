@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator, Iterator
+from collections.abc import Generator, Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -13,6 +13,7 @@ from robocasa_lerobot.demos.generate.sources.source import Piece, Source
 from robocasa_lerobot.demos.motion import Array
 
 FREE, CONTACT, BRIDGE, DRIVE, SETTLE = range(5)  # kinds of steps
+NOT_DRAWN_COST = 1.0  # as of a hand that touches something: see `planning/costs.py`
 AT_REST = (-1, BRIDGE, -1)  # label of steps in which it is waited
 KINDS = ("free", "contact", "bridge", "drive", "settle")
 
@@ -26,6 +27,7 @@ class Course:
         rng: of its choices.
         manner: how segments are chosen and joined.
         spread: cost that a source may have at random, so that the same one is not always taken.
+        cap: share of an average demonstration's segments that one source should have at most; see `source_costs`.
         label: source, kind of step, and step in the source, of the action that comes next.
         labels: of all actions so far.
         used: the segments that were carried out, in plain values.
@@ -36,13 +38,14 @@ class Course:
     rng: np.random.Generator
     manner: Manner
     spread: float
+    cap: float = 1.0
     label: tuple[int, int, int] = AT_REST
     labels: list[tuple[int, int, int]] = field(default_factory=list)
     used: list[dict[str, Any]] = field(default_factory=list)
     rest: dict[str, Array] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        self.bias = self.rng.uniform(0.0, self.spread, size=max((s.number for s in self.sources), default=0) + 1)
+        self.bias = source_costs([one.number for one in self.sources], self.rng, self.spread, self.cap)
 
     def begin(self, piece: Piece, **about: Any) -> dict[str, Any]:
         """Note that a segment is about to be carried out; what comes of it can be added to what is returned."""
@@ -79,3 +82,16 @@ class Course:
         for step in steps:
             self.labels.append(self.label)
             yield step
+
+
+def source_costs(numbers: Sequence[int], rng: np.random.Generator, spread: float, cap: float) -> Array:
+    """What it costs in an episode to take a segment of each source, by its number.
+
+    An episode is a function of its seed and knows nothing of the others: so that none of N sources has more than its
+    share, `cap` times N of them are drawn, and the others are only for what these cannot do.
+    """
+    bias: Array = rng.uniform(0.0, spread, size=max(numbers, default=0) + 1)
+    drawn = rng.permutation(np.array(numbers, dtype=np.int64))[: max(1, int(np.floor(cap * len(numbers) + 1e-9)))]
+    others = np.ones(len(bias), dtype=np.bool_)
+    others[drawn] = False
+    return bias + NOT_DRAWN_COST * others

@@ -30,6 +30,7 @@ class GenerationSettings(RecordingSettings):
         select, base, bridge: see `Manner`.
         rules: how stages are cut, where that is not derived: JSON of what `rules.rules_from` takes.
         spread: cost that each source has at random in an attempt: the greater, the more evenly they are used.
+        cap: share of all segments that one source should have at most; 1 takes whichever fits best.
     """
 
     source: str = ""
@@ -39,6 +40,7 @@ class GenerationSettings(RecordingSettings):
     bridge: str = "plan"
     rules: str = "{}"
     spread: float = 0.3
+    cap: float = 0.2
 
     @classmethod
     def of(cls, source: Path, **values: Any) -> GenerationSettings:
@@ -65,7 +67,7 @@ class GenerationSettings(RecordingSettings):
         """Make the attempt of a seed."""
         sources = sources_of(Path(self.source), self.task, self.rules)
         manner = Manner(self.select, self.base, self.bridge)
-        course = Course(sources, np.random.default_rng([seed, _CHOICE_STREAM]), manner, self.spread)
+        course = Course(sources, np.random.default_rng([seed, _CHOICE_STREAM]), manner, self.spread, self.cap)
         recording = record_episode(
             env,
             seed,

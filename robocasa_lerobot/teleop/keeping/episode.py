@@ -18,7 +18,7 @@ from robocasa_lerobot.envs.kitchen_env import KitchenEnv, Observation
 Array = NDArray[np.float64]
 Info = dict[str, Any]
 
-INTERVENTION, POLICY_ACTION, ASSISTED = contract.DECISIONS
+INTERVENTION, POLICY_ACTION, ASSISTED = contract.DECISIONS[:3]
 
 
 @dataclass(frozen=True)
