@@ -10,13 +10,21 @@ import dataclasses
 import json
 import math
 import shutil
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
+from robocasa_lerobot import contract
+from robocasa_lerobot.demos.demonstrator import demonstrate
 from robocasa_lerobot.demos.failures import film_of, keep_failure
 from robocasa_lerobot.demos.hdf5 import Failure, write_part
-from robocasa_lerobot.demos.recorder import Recording, record_episode
+from robocasa_lerobot.demos.motion import Array
+from robocasa_lerobot.demos.motion_style import MotionStyle
+from robocasa_lerobot.demos.recorder import Actor, Recording, record_episode
+from robocasa_lerobot.demos.stages import StageLog
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.files import write_text
 from robocasa_lerobot.gl import NoOpenGLError
@@ -25,6 +33,7 @@ from robocasa_lerobot.jobs.pool import exit_if_orphaned
 # Give up when this many attempts per wanted episode were not enough, or when none of the first ones has succeeded.
 MAX_ATTEMPTS_PER_EPISODE, HOPELESS = 10, 20
 _ENOUGH_FOR_A_RATE = 10
+CLEAN_ACTION = contract.DECISIONS[3]
 
 
 @dataclass(frozen=True)
@@ -74,7 +83,23 @@ class RecordingSettings:
 
     def record(self, env: KitchenEnv, seed: int) -> Recording:
         """Make the attempt of a seed."""
-        return record_episode(env, seed, action_noise=self.action_noise, images=self.images, varied=self.varied)
+        return self.labelled_episode(env, seed, demonstrate)
+
+    def labelled_episode(self, env: KitchenEnv, seed: int, actor: Actor) -> Recording:
+        """An episode of an actor's; where noise comes to its actions, what it wanted is kept beside them."""
+        clean: list[Array] = []
+
+        def noted(env: KitchenEnv, style: MotionStyle, log: StageLog) -> Iterator[Array]:
+            for wanted in actor(env, style, log):
+                clean.append(contract.stored_to_hdf5(contract.binarize(np.clip(wanted, -1.0, 1.0))))
+                yield wanted
+
+        recording = record_episode(
+            env, seed, action_noise=self.action_noise, images=self.images, varied=self.varied, actor=noted
+        )
+        if self.action_noise > 0.0:
+            recording.per_step[CLEAN_ACTION] = np.array(clean)[: len(recording.actions)]
+        return recording
 
     def make_env(self) -> KitchenEnv:
         """The env that attempts are made in; it renders nothing unless pictures are stored."""

@@ -22,7 +22,6 @@ Array = NDArray[np.float64]
 SUCCESS_HOLD_STEPS = 15
 # What acts in an episode, with its style, and tells the log which stage is on.
 Actor = Callable[[KitchenEnv, MotionStyle, StageLog], Iterator[Array]]
-CLEAN_ACTION = contract.DECISIONS[3]
 # Keys of the generators of action noise and of the motion style, apart from those of the scene and the arm.
 _NOISE_STREAM, _STYLE_STREAM = 2, 6
 
@@ -154,7 +153,7 @@ def record_episode(
         env: made with `terminate_on_success=False`.
         seed: of the scene, the arm's initial noise and the action noise.
         action_noise: standard deviation of Gaussian noise on the six commanded arm components (unit: full command);
-            it is part of the action that is executed and recorded; what it came to is kept beside it.
+            it is part of the action that is executed and recorded.
         images: also keep the camera pictures.
         varied: draw how the demonstration is carried out (`MotionStyle`) from the seed; else as the skills have it.
         actor: what acts; it is asked for an action at a time, each of which is carried out before the next.
@@ -167,13 +166,11 @@ def record_episode(
     model_file = env.scene.spec.to_xml()
     buffer = EpisodeBuffer()
     held, reason, log = 0, "", StageLog()
-    clean: list[Array] = []
     try:
         for wanted in actor(env, style, log):
             # Everything is carried out in single precision, as a policy's action is, and recorded as carried out.
             action = _with_noise(rng, wanted, action_noise).astype(np.float32).astype(np.float64)
             buffer.add(env, contract.binarize(action), info, log.current, images=images)
-            clean.append(contract.stored_to_hdf5(contract.binarize(np.clip(wanted, -1.0, 1.0))))
             _, _, _, truncated, info = env.step(action.astype(np.float32))
             held = held + 1 if info["success"] else 0
             if held >= SUCCESS_HOLD_STEPS:
@@ -185,7 +182,7 @@ def record_episode(
     except SkillError as error:
         reason = str(error)
     log.close(env)
-    recording = buffer.recording(
+    return buffer.recording(
         env,
         info,
         {"action_noise": action_noise, "motion_style": asdict(style), "stages": stage_rows(env, log)},
@@ -193,9 +190,6 @@ def record_episode(
         reason=reason,
         model_file=model_file,
     )
-    if action_noise > 0.0:
-        recording.per_step[CLEAN_ACTION] = np.array(clean)
-    return recording
 
 
 def stage_rows(env: KitchenEnv, log: StageLog) -> list[dict[str, Any]]:

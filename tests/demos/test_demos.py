@@ -73,8 +73,10 @@ def test_demonstrator_solves_its_task(task, recordings):
     assert recording.rewards[-(SUCCESS_HOLD_STEPS - 1) :].all()
 
 
-def test_what_was_wanted_is_kept_beside_actions_with_noise(recordings):
-    recording = recordings["CloseDrawer"]
+def test_what_was_wanted_is_kept_beside_actions_with_noise():
+    settings = RecordingSettings("CloseDrawer", 1, action_noise=0.05)
+    env = settings.make_env()
+    recording = settings.record(env, 3)
     clean = recording.per_step["clean_action"]
     assert clean.shape == recording.actions.shape
     arm = slice(0, 6)  # of the order of robosuite's files
@@ -82,8 +84,7 @@ def test_what_was_wanted_is_kept_beside_actions_with_noise(recordings):
     inside = (np.abs(clean[:, arm]) < 0.7) & (np.abs(recording.actions[:, arm]) < 0.999)
     noise = (recording.actions - clean)[:, arm][inside]
     assert 0.04 < noise.std() < 0.06
-    env = KitchenEnv("CloseDrawer", cameras=(), terminate_on_success=False)
-    assert "clean_action" not in record_episode(env, 3).per_step
+    assert "clean_action" not in RecordingSettings("CloseDrawer", 1).record(env, 3).per_step
     env.close()
 
 

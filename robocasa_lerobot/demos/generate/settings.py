@@ -13,7 +13,7 @@ from robocasa_lerobot.demos.generate.course import KINDS, Course
 from robocasa_lerobot.demos.generate.select import Manner
 from robocasa_lerobot.demos.generate.sources.source import digest_of, sources_of
 from robocasa_lerobot.demos.generate.stage import generated
-from robocasa_lerobot.demos.recorder import Recording, record_episode
+from robocasa_lerobot.demos.recorder import Recording
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.errors import UserError
 
@@ -68,14 +68,7 @@ class GenerationSettings(RecordingSettings):
         sources = sources_of(Path(self.source), self.task, self.rules)
         manner = Manner(self.select, self.base, self.bridge)
         course = Course(sources, np.random.default_rng([seed, _CHOICE_STREAM]), manner, self.spread, self.cap)
-        recording = record_episode(
-            env,
-            seed,
-            action_noise=self.action_noise,
-            images=self.images,
-            varied=self.varied,
-            actor=lambda env, style, log: generated(env, style, log, course),
-        )
+        recording = self.labelled_episode(env, seed, lambda env, style, log: generated(env, style, log, course))
         return labelled(recording, course)
 
 
