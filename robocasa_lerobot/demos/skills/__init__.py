@@ -17,6 +17,7 @@ from robocasa_lerobot.demos.skills.common import SkillError
 from robocasa_lerobot.demos.skills.doors import push_lid
 from robocasa_lerobot.demos.skills.drawers import close_drawer, open_drawer
 from robocasa_lerobot.demos.skills.handles import open_doors
+from robocasa_lerobot.demos.skills.hot_water import run_hot_water
 from robocasa_lerobot.demos.skills.knobs import raise_knob, turn_burner_low, turn_knob, turn_off_burner, turn_on_burner
 from robocasa_lerobot.demos.skills.levers import (
     press_lever,
@@ -28,6 +29,8 @@ from robocasa_lerobot.demos.skills.levers import (
 from robocasa_lerobot.demos.skills.mixer_head import lower_head, raise_head
 from robocasa_lerobot.demos.skills.pick_place.hold import hold_object
 from robocasa_lerobot.demos.skills.pick_place.tools.pour import pour
+from robocasa_lerobot.demos.skills.pick_place.tools.press import press
+from robocasa_lerobot.demos.skills.pick_place.tools.rinse import rinse
 from robocasa_lerobot.demos.skills.pick_place.tools.stir import stir
 from robocasa_lerobot.demos.skills.pick_place.tools.wipe import wipe
 from robocasa_lerobot.demos.skills.pick_place.verbs import drive, pick_object, place_object
@@ -62,11 +65,14 @@ SKILLS: dict[tuple[str, str], Skill] = {
     ("levers", "on"): turn_on_water,
     ("levers", "off"): turn_off_water,
     ("levers", "turn"): turn_sideways,
+    ("levers", "hot"): run_hot_water,
     ("levers", "sweep"): sweep_sideways,
     ("pick_place", "pick"): pick_object,
     ("pick_place", "place"): place_object,
     ("pick_place", "hold"): hold_object,
+    ("pick_place", "rinse"): rinse,
     ("pick_place", "pour"): pour,
+    ("pick_place", "press"): press,
     ("pick_place", "stir"): stir,
     ("pick_place", "wipe"): wipe,
     ("pick_place", "uncover"): uncover,

@@ -137,6 +137,10 @@ def _with_drawer(layout: Layout, fixture: Fixture) -> bool:
     return FILTERS[FixtureType.FRIDGE](layout, fixture) and bool(fixture.parts_to_choose("drawer"))
 
 
+def _with_two_basins(layout: Layout, fixture: Fixture) -> bool:
+    return FILTERS[FixtureType.SINK](layout, fixture) and len(fixture.regions) > 1
+
+
 def _of_three_stools(*, at_end: bool) -> Filter:
     """A stool of a row of three, at either end of it or between: where a layout has exactly three."""
 
@@ -168,6 +172,7 @@ def _once(layout: Layout, fixture: Fixture) -> bool:
 FIXTURE_KINDS |= {
     "fridge_with_drawer": _with_drawer,
     "fridge_with_freezer": _with_freezer,
+    "sink_with_two_basins": _with_two_basins,
     "stool_at_end_of_three": _of_three_stools(at_end=True),
     "stool_amid_three": _of_three_stools(at_end=False),
     "landmark": _types(*_SOURCES),

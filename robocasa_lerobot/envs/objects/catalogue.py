@@ -117,6 +117,8 @@ class Instance:
         seed: for details such as labels.
         scale: factors of its axes.
         upright: whether its longest axis was turned up.
+        face_down: whether it was turned over about its x axis.
+        stained: the colour that all of it has instead of its own looks.
     """
 
     category: Category
@@ -126,6 +128,8 @@ class Instance:
     seed: int
     scale: Size = (1.0, 1.0, 1.0)
     upright: bool = False
+    face_down: bool = False
+    stained: Rgb | None = None
 
     @property
     def model(self) -> str:

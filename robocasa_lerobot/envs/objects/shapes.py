@@ -38,6 +38,8 @@ def add_object(
     body.add_freejoint(name=f"{name}_joint0")
     shape = model_of(item)
     turn = about(item.upright_axis, -np.pi / 2) if item.upright_axis else IDENTITY
+    if item.face_down:
+        turn = about("x", np.pi)
     _add_looks(spec, body, name, item, shape, turn)
     pieces = [piece if item.scale == (1, 1, 1) else piece.scaled(item.scale) for piece in shape.solids]
     for index, piece in enumerate(pieces):
@@ -58,7 +60,7 @@ def _add_looks(
     spec: mujoco.MjSpec, body: mujoco.MjsBody, name: str, item: Instance, shape: Model, turn: tuple[float, ...]
 ) -> None:
     texture = f"{item.model}_texture"
-    if spec.texture(texture) is None:
+    if item.stained is None and spec.texture(texture) is None:
         added = spec.add_texture(name=texture, type=mujoco.mjtTexture.mjTEXTURE_2D)
         added.file = f"objects/{item.model}.png"
         spec.assets[added.file] = shape.png
@@ -69,12 +71,13 @@ def _add_looks(
             mesh.scale = item.scale
             mesh.inertia = mujoco.mjtMeshInertia.mjMESH_INERTIA_SHELL  # thin sheets have no volume
             spec.assets[mesh.file] = text
-        material_name = f"{item.model}_{finish}"
+        material_name = f"{name if item.stained else item.model}_{finish}"
         if spec.material(material_name) is None:
             shininess, specular, opacity = FINISHES[finish]
-            material = spec.add_material(name=material_name, rgba=(1.0, 1.0, 1.0, opacity))
+            material = spec.add_material(name=material_name, rgba=(*(item.stained or (1.0, 1.0, 1.0)), opacity))
             material.shininess, material.specular = shininess, specular
-            material.textures[mujoco.mjtTextureRole.mjTEXROLE_RGB] = texture
+            if item.stained is None:
+                material.textures[mujoco.mjtTextureRole.mjTEXROLE_RGB] = texture
         geom = body.add_geom(type=mujoco.mjtGeom.mjGEOM_MESH, meshname=mesh_name, material=material_name, quat=turn)
         geom.name = f"{name}_v{index}"
         geom.group = VISUAL_GROUP

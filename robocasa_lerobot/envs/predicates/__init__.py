@@ -23,8 +23,9 @@ from robocasa_lerobot.envs.predicates.objects import (
     ObjectTouches,
     ObjectTouchesAnyCounter,
     ObjectUpright,
+    OverBasin,
 )
-from robocasa_lerobot.envs.predicates.placed_by import Beside, NearFixture, RestsOn
+from robocasa_lerobot.envs.predicates.placed_by import Beside, Higher, NearFixture, RestsOn
 from robocasa_lerobot.envs.predicates.robot import (
     Grasped,
     GripperFar,
@@ -52,6 +53,7 @@ __all__ = [
     "GripperFar",
     "GripperFarFromPart",
     "GripperTouches",
+    "Higher",
     "MovedSince",
     "Near",
     "NearFixture",
@@ -70,6 +72,7 @@ __all__ = [
     "OnOneSide",
     "OnShelf",
     "Once",
+    "OverBasin",
     "PartTurned",
     "PartWithin",
     "RestsOn",

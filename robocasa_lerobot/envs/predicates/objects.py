@@ -43,6 +43,32 @@ class ObjectInBasin(Term):
 
 
 @dataclass(frozen=True)
+class OverBasin(Term):
+    """An object's centre is over one basin of a sink, at whatever height.
+
+    Attributes:
+        object: name.
+        fixture: role of the sink.
+        basin: its name, "basin0" (the left one, under the spout) or "basin1".
+    """
+
+    object: str
+    fixture: str
+    basin: str
+
+    @property
+    def name(self) -> str:
+        """E.g. `cup_over_sink_basin0`."""
+        return plain(f"{self.object}_over_{self.fixture}_{self.basin}")
+
+    def holds(self, scene: Scene, data: mujoco.MjData) -> bool:
+        """Test the body's origin against the basin's region, on the floor plan."""
+        region = scene.fixture(self.fixture, Sink).regions[scene.fill(self.basin)]
+        local = region.local(data, data.body(scene.fill(self.object)).xpos)
+        return bool(np.all(np.abs(local[:2]) <= np.asarray(region.half)[:2]))
+
+
+@dataclass(frozen=True)
 class ObjectInside(Term):
     """All corners of an object's bounding box are in one of a fixture's regions, or nearly, its origin altogether.
 

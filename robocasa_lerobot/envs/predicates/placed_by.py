@@ -125,6 +125,29 @@ class RestsOn(Term):
         return bool(over) and touching(scene.model, data, scene.subtree(name), scene.subtree(other))
 
 
+@dataclass(frozen=True)
+class Higher(Term):
+    """An object's origin is higher than another one's, by more than half of that one's height.
+
+    Attributes:
+        object, other: names.
+    """
+
+    object: str
+    other: str
+
+    @property
+    def name(self) -> str:
+        """E.g. `fruit_higher_than_reamer`."""
+        return plain(f"{self.object}_higher_than_{self.other}")
+
+    def holds(self, scene: Scene, data: mujoco.MjData) -> bool:
+        """Compare the heights."""
+        name, other = scene.fill(self.object), scene.fill(self.other)
+        apart = float(data.body(name).xpos[2] - data.body(other).xpos[2])
+        return apart > scene.objects[other].item.size[2] / 2
+
+
 def _seen_from(fixture: Fixture, points: NDArray[np.float64]) -> NDArray[np.float64]:
     """Points of the room, (..., 3), along the axes of a fixture: to its right, to its back, up; from its middle."""
     c, s = np.cos(fixture.yaw), np.sin(fixture.yaw)

@@ -43,6 +43,7 @@ class Choice:
         options: by value, the words that instructions may use besides the value itself; of these, those whose name
             begins with an underscore are values for the declaration instead.
         of: role of a fixture whose parts are the options instead: burners, racks, or slots.
+        without: start of the names of parts that are no options, such as "rear".
 
     Raises:
         UserError: the name begins with an underscore.
@@ -51,6 +52,7 @@ class Choice:
     name: str
     options: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
     of: str = ""
+    without: str = ""
 
     def __post_init__(self) -> None:
         # An option's word for the choice itself would be such a value too, and replace the one that was drawn.
@@ -177,6 +179,8 @@ class ObjectSpec:
         repeats: may be of a category that the scene already has.
         same_category_as: name of an earlier object whose category it has; of several, their own name makes them alike.
         same_model: with it, the very same model, at its own scale.
+        face_down: turned over; its axes are those of how it lies then.
+        stained: red, green and blue of the colour that all of it has instead of its own looks, each 0 to 1.
         filled: the liquid in it, one of `LIQUIDS` in `envs/scene/build.py`; it is there for the eye only.
     """
 
@@ -196,6 +200,8 @@ class ObjectSpec:
     repeats: bool = False
     same_category_as: str = ""
     same_model: bool = False
+    face_down: bool = False
+    stained: tuple[float, float, float] | None = None
     filled: str = ""
 
 

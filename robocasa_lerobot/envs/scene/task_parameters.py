@@ -40,6 +40,8 @@ def draw_choices(
     drawn = Choices(dict(roles))
     for choice in task.choices:
         options = fixtures[roles[choice.of]].parts_to_choose(choice.name) if choice.of else choice.options
+        if choice.without:
+            options = {value: words for value, words in options.items() if not value.startswith(choice.without)}
         if not options:
             raise PlacementError(f"{roles[choice.of]} has no {choice.name} to choose")
         value = list(options)[int(rng.integers(len(options)))]
@@ -91,11 +93,11 @@ def item_of(
     like = _like(wanted, index, items)
     if like is not None and wanted.same_model:
         item = catalogue.scaled(catalogue.instance(like.category, like.index), factors)
-        return replace(item, upright=True) if wanted.upright else item
+        return replace(item, upright=wanted.upright, stained=wanted.stained)
     groups = tuple(filled(group, choices) for group in wanted.groups) if like is None else (like.category.name,)
     # An instruction names one object of the scene.
     used = frozenset(() if wanted.repeats or like is not None else (item.category.name for item in items.values()))
-    return catalogue.sample(
+    drawn = catalogue.sample(
         rng,
         groups,
         split,
@@ -108,6 +110,9 @@ def item_of(
         object_scale=factors,
         rotate_upright=wanted.upright,
     )
+    if wanted.stained is None and not wanted.face_down:
+        return drawn
+    return replace(drawn, stained=wanted.stained, face_down=wanted.face_down)
 
 
 def start_of(

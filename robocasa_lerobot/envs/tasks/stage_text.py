@@ -200,11 +200,13 @@ _BY_VERB: dict[tuple[str, str], _Wording] = {
     ("knobs", "raise"): _parted("turn up the {part} of the {target}"),
     ("knobs", "turn"): _parted("turn the {part} of the {target} {to}"),
     ("levers", "on"): _parted("turn on the faucet of the {target}"),
+    ("levers", "hot"): _parted("let hot water run from the faucet of the {target}"),
     ("levers", "off"): _parted("turn off the faucet of the {target}"),
     ("levers", "turn"): _turned,
     ("pick_place", "pick"): _parted("pick up the {object}"),
     ("pick_place", "place"): _parted("put the {object} {placed}"),
     ("pick_place", "hold"): _held,
+    ("pick_place", "rinse"): _parted("rinse the {object} under the faucet of the {target} and put it down"),
     ("pick_place", "cover"): _parted("put the lid on the {target}"),
     ("pick_place", "uncover"): _parted("take the lid off the {target}"),
 }

@@ -211,7 +211,7 @@ def _more_comes(env: KitchenEnv, stage: Stage) -> bool:
 
 def _into_sink(env: KitchenEnv, stage: Stage, obj: Graspable, sink: Sink) -> PlaceStrategy:
     """A large vessel comes to stand on the basin's floor, below the spout where the stage asks for that."""
-    basin = sink.basin
+    basin = sink.regions.get(env.scene.part(stage.target, stage.part), sink.basin)
     if not is_large(obj):
         return PlaceStrategy(in_basin(env, basin), leans=_OPEN_LEANS, entries=("up", "across"))
     terms = every_goal_in(stage_condition(env.declaration, stage))

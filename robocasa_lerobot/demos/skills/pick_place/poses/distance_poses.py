@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import mujoco
@@ -14,8 +14,9 @@ from robocasa_lerobot.demos.skills.pick_place.graspable import Graspable
 from robocasa_lerobot.demos.skills.pick_place.place import PlacePose
 from robocasa_lerobot.demos.skills.pick_place.poses.place_poses import PlacePoses
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
-from robocasa_lerobot.envs.predicates.logic import Term, every_goal_in
+from robocasa_lerobot.envs.predicates.logic import Goal, Not, Term
 from robocasa_lerobot.envs.predicates.near import Near, NearerThan, OnOneSide
+from robocasa_lerobot.envs.predicates.placed_by import NearFixture
 from robocasa_lerobot.envs.tasks.conditions import stage_condition
 from robocasa_lerobot.envs.tasks.task import Stage
 
@@ -25,29 +26,43 @@ SLIP_COST, MISS_COST = 0.3, 6.0  # of each slip after which, and of a place at w
 
 
 def distance_terms(env: KitchenEnv, stage: Stage) -> tuple[Term, ...]:
-    """What a stage asks of the distances between its object and others."""
+    """What a stage asks of the distances between its object and others, or fixtures."""
     name = env.scene.fill(stage.object)
     found: list[Term] = []
-    for term in every_goal_in(stage_condition(env.declaration, stage)):
+    for term in _asked_for(stage_condition(env.declaration, stage)):
         match term:
-            case Near() if name == env.scene.fill(term.object):
+            case Near() | NearFixture() if name == env.scene.fill(term.object):
                 found.append(term)
             case NearerThan() | OnOneSide() if name in _names(env, term.objects):
                 found.append(term)
     return tuple(found)
 
 
+def _asked_for(goal: Goal) -> Iterator[Goal]:
+    """Everything that a goal is made of but what is not to hold."""
+    if isinstance(goal, Not):
+        return
+    for part in goal.inner:
+        yield from _asked_for(part)
+    yield goal
+
+
 def near_to(env: KitchenEnv, stage: Stage) -> list[Array]:
-    """Where the others are that a stage's object is to be near to, world, metres, each (3,)."""
+    """Where the others are that a stage's object is to be near to, world, metres, each (3,); of fixtures both sides."""
     names: list[str] = []
+    sides: list[Array] = []
     for term in distance_terms(env, stage):
         match term:
             case Near():
                 names += _names(env, term.other)
             case NearerThan():
                 names += _names(env, term.to)
+            case NearFixture():
+                fixture = env.scene.fixture(term.fixture)
+                sides += [fixture.to_world((side * fixture.width / 2, 0.0, 0.0)) for side in (-1, 1)]
     own = env.scene.fill(stage.object)
-    return [env.data.body(name).xpos.copy() for name in dict.fromkeys(names) if name != own]
+    others = [env.data.body(name).xpos.copy() for name in dict.fromkeys(names) if name != own]
+    return others or sides
 
 
 def at_distances(env: KitchenEnv, stage: Stage, obj: Graspable, poses: PlacePoses) -> PlacePoses:

@@ -12,17 +12,23 @@ from robocasa_lerobot.demos.skills.pick_place.location import locate
 from robocasa_lerobot.demos.skills.pick_place.pick import is_held
 from robocasa_lerobot.demos.skills.pick_place.verbs import take
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
+from robocasa_lerobot.envs.kitchens.fixtures.base import Fixture
 
 
 def bring(
-    env: KitchenEnv, obj: Graspable, target: str, strategy: GraspStrategy, *, towards_target: bool = False
+    env: KitchenEnv,
+    obj: Graspable,
+    target: str | tuple[Array, Fixture | None],
+    strategy: GraspStrategy,
+    *,
+    towards_target: bool = False,
 ) -> Iterator[Array]:
-    """Pick an object up unless it is in the hand, and drive along with it unless `target`, an object, is in reach.
+    """Pick an object up unless it is in the hand, and drive along with it unless the target is in reach.
 
     Args:
         env: in its scene.
         obj: what is brought.
-        target: name of the object that it is used on.
+        target: name of the object that it is used on; or a place, world, metres, and the fixture that it belongs to.
         strategy: how it is grasped.
         towards_target: the arm is folded for where it goes on to the target from there.
 
@@ -31,8 +37,9 @@ def bring(
     """
     if not is_held(env, obj.name):
         yield from take(env, obj, strategy)
-    middle = env.data.body(target).xpos.copy()
-    fixture = locate(env, target).fixture
+    middle, fixture = (
+        (env.data.body(target).xpos.copy(), locate(env, target).fixture) if isinstance(target, str) else target
+    )
     if fixture is not None and not in_reach(env, middle):
         stand = standing_pose_for(env, fixture, middle)
         yield from carry_to(env, obj, stand, middle if towards_target else None)

@@ -24,6 +24,8 @@ from robocasa_lerobot.demos.skills.pick_place.graspable import Graspable, graspa
 from robocasa_lerobot.demos.skills.pick_place.tools.brought import bring
 from robocasa_lerobot.demos.skills.reaching import Held, MotionPlan, WaypointPath, approach, follow_with, plan_reach
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
+from robocasa_lerobot.envs.kitchens.appliances.kinds.sink import Sink
+from robocasa_lerobot.envs.kitchens.fixtures.base import Fixture
 from robocasa_lerobot.envs.scene.robot_poses import RobotPose
 from robocasa_lerobot.envs.tasks.task import Stage
 
@@ -60,7 +62,7 @@ class Tilting:
 
 
 def pour(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
-    """Empty the stage's object, a vessel, over the stage's target, an object, and hold it upright again.
+    """Empty the stage's object, a vessel, over the stage's target, an object or a sink, and hold it upright again.
 
     A vessel that is not in the hand is picked up first.
 
@@ -73,7 +75,10 @@ def pour(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
         obj = graspable(env, stage.object)
         if not obj.contents:
             raise SkillError(f"{obj.title} is empty, but what was in it is not where it belongs")
-        yield from bring(env, obj, target, PAN_BY_THE_HANDLE, towards_target=True)
+        top, fixture = _top(env, target)
+        yield from bring(
+            env, obj, target if fixture is None else (top, fixture), PAN_BY_THE_HANDLE, towards_target=True
+        )
         obj = graspable(env, stage.object)
         held = Held.now(env.data, obj.name, obj.contents)
         yield from approach(env, partial(_plan, env, obj, target, failed), CLOSED, held)
@@ -117,6 +122,14 @@ def _plan(
     return _choose(env, obj, target, failed, blocked)[0]
 
 
+def _top(env: KitchenEnv, target: str) -> tuple[Array, Fixture | None]:
+    """Over what is poured, world, metres, and the fixture if it is one; of a sink the middle of the basin's edge."""
+    if target in env.scene.objects:
+        return env.data.body(target).xpos + UP * env.scene.objects[target].item.size[2] / 2, None
+    sink = env.scene.fixture(target, Sink)
+    return sink.basin.world(env.data, (0.0, 0.0, sink.basin.half[2])), sink
+
+
 def _choose(
     env: KitchenEnv,
     obj: Graspable,
@@ -136,8 +149,7 @@ def _choose(
     inside = item.interior
     if inside is None:
         raise SkillError(f"{obj.title} is no vessel")
-    receptacle, body = env.scene.objects[target].item, data.body(target)
-    top = body.xpos + UP * receptacle.size[2] / 2
+    top, _ = _top(env, target)
     center, half = np.array(inside.center), np.array(inside.half)
     radius = float(min(half[:2])) * np.sqrt(2.0)  # the box is the one that a round inside holds
     rim = center[2] + half[2]

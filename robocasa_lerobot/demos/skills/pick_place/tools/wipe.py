@@ -1,4 +1,4 @@
-"""Wipe an object's top with what is in the hand: pressed onto it, to and fro in lanes, then let go."""
+"""Wipe a surface with what is in the hand: pressed onto it, to and fro in lanes, then let go."""
 
 from __future__ import annotations
 
@@ -25,6 +25,7 @@ from robocasa_lerobot.demos.skills.pick_place.graspable import Graspable, graspa
 from robocasa_lerobot.demos.skills.pick_place.pick import INTEGRAL_GAIN, is_held
 from robocasa_lerobot.demos.skills.pick_place.place import RELEASE_STEPS, leave
 from robocasa_lerobot.demos.skills.pick_place.tools.brought import bring
+from robocasa_lerobot.demos.skills.pick_place.tools.surfaces import Surface, surface_of
 from robocasa_lerobot.demos.skills.reaching import Held, MotionPlan, WaypointPath, approach, follow_with, plan_reach
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.scene.robot_poses import RobotPose
@@ -42,17 +43,21 @@ LIFTED_M = 0.10
 
 
 def wipe(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
-    """Rub the stage's object over the top of its target, an object, until enough places are done; then let it go.
+    """Rub the stage's object over its target until enough is done; then let it go.
+
+    The target is an object, wiped on its top or, a vessel, inside; a sink, or a counter where the tool lay on it.
 
     An object that is not in the hand is picked up first.
 
     Raises:
         SkillError: the stage is not done after all attempts.
     """
-    surface = env.scene.fill(stage.target)
+    target = env.scene.fill(stage.target)
+    lay = env.data.body(env.scene.fill(stage.object)).xpos.copy()
     for attempt in range(ATTEMPTS):
         obj = graspable(env, stage.object)
-        yield from bring(env, obj, surface, ANY_APPROACH)
+        surface = surface_of(env, target, lay)
+        yield from bring(env, obj, (surface.middle, surface.fixture), ANY_APPROACH)
         choice = yield from approach(env, partial(_choose, env, obj, surface), CLOSED, Held.now(env.data, obj.name))
         yield from follow_with(env, choice.joints, Held.now(env.data, obj.name))
         yield from _rub(env, obj, *choice.path.targets, lane_first=attempt)
@@ -62,7 +67,9 @@ def wipe(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
         yield from leave(env, obj)
         if stage_done(env, stage):
             return
-    raise SkillError(f"{graspable(env, stage.object).title} has not rubbed enough of {surface} in {ATTEMPTS} attempts")
+    raise SkillError(
+        f"{graspable(env, stage.object).title} has not rubbed enough of {surface.title} in {ATTEMPTS} attempts"
+    )
 
 
 def _rub(
@@ -88,7 +95,7 @@ def _rub(
         yield from move_hand(data, HandTarget(point, start.rotation), CLOSED, speed=0.4, tolerance=0.012, max_steps=15)
 
 
-def _choose(env: KitchenEnv, obj: Graspable, surface: str, blocked: Sequence[RobotPose]) -> MotionPlan:
+def _choose(env: KitchenEnv, obj: Graspable, surface: Surface, blocked: Sequence[RobotPose]) -> MotionPlan:
     """The stroke along one of the surface's sides that the arm takes best, the tool level and turned in any way.
 
     Raises:
@@ -96,16 +103,14 @@ def _choose(env: KitchenEnv, obj: Graspable, surface: str, blocked: Sequence[Rob
     """
     data = env.data
     held = Held.now(data, obj.name)
-    body, size = data.body(surface), np.array(env.scene.objects[surface].item.size)
-    axes = body.xmat.reshape(3, 3).T
-    top = body.xpos + UP * size[2] / 2
+    axes, top = surface.axes, surface.middle
     level = levelled(data.body(obj.name).xmat.reshape(3, 3))
     paths = []
     for axis, sign, index in itertools.product((0, 1), (1.0, -1.0), range(YAWS)):
         yaw = 2 * np.pi * index / YAWS
         turn = rotation_about(UP, yaw) @ level
         rotation = turn @ held.rotation.T
-        length = min(STROKE_M, float(size[axis]) - 2 * EDGE_M)
+        length = min(STROKE_M, surface.size[axis] - 2 * EDGE_M)
         underside = (obj.below(turn) - PRESS_M) * UP
         low, high = (
             top + way * sign * length / 2 * axes[axis] + underside - rotation @ held.position for way in (-1.0, 1.0)
@@ -113,8 +118,8 @@ def _choose(env: KitchenEnv, obj: Graspable, surface: str, blocked: Sequence[Rob
         cost = TURN_COST * min(yaw, 2 * np.pi - yaw) + SHORT_COST * (STROKE_M - length)
         row = (low + ABOVE_M * UP, low, high)
         paths.append(WaypointPath(tuple(HandTarget(point, rotation) for point in row), cost))
-    allowed = obj.bodies | frozenset(np.flatnonzero(env.scene.subtree(surface)).tolist())
+    allowed = obj.bodies | surface.bodies
     found = plan_reach(env, paths, top, key=1, held=held, loaded=3, allowed=allowed, blocked=blocked)
     if not found:
-        raise SkillError(f"{obj.title}: there is no way over {surface}")
+        raise SkillError(f"{obj.title}: there is no way over {surface.title}")
     return found[0]
