@@ -28,7 +28,10 @@ def made(name: str, seed: int = 100_000, split: str = "target") -> Iterator[Kitc
     env.close()
 
 
-@pytest.fixture(scope="module", params=["RecycleBottlesByType", "CategorizeCondiments", "GatherTableware"])
+@pytest.fixture(
+    scope="module",
+    params=["RecycleBottlesByType", "CategorizeCondiments", "GatherTableware", "ArrangeSinkSanitization"],
+)
 def sorting(request: pytest.FixtureRequest) -> Iterator[KitchenEnv]:
     yield from made(request.param)
 
@@ -55,6 +58,13 @@ def test_a_stage_that_asks_of_no_distance_keeps_all_its_places() -> None:
     for env in made("WeighIngredients"):
         assert distance_terms(env, env.declaration.stages[0]) == ()
         assert near_to(env, env.declaration.stages[0]) == []
+
+
+def test_a_stage_is_not_led_to_what_it_asks_to_keep_away_from() -> None:
+    for env in made("ClearSinkArea"):
+        away = next(stage for stage in env.declaration.stages if stage.verb == "place")
+        assert distance_terms(env, away) == ()
+        assert near_to(env, away) == []
 
 
 def test_what_lies_between_others_in_a_bowl_can_be_grasped() -> None:

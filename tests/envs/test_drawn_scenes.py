@@ -18,6 +18,7 @@ from robocasa_lerobot.envs.predicates import AllOf, ForEach, ObjectOn, StateIs
 from robocasa_lerobot.envs.scene.build import build_scene
 from robocasa_lerobot.envs.scene.scene import Scene
 from robocasa_lerobot.envs.scene.spec import Choice, FixtureSpec, ObjectSpec, Placement, RobotStart, SampleRegion
+from robocasa_lerobot.envs.tasks.registry import get_task
 from robocasa_lerobot.envs.tasks.stage_text import stage_text
 from robocasa_lerobot.envs.tasks.task import BoundTask, Stage, StagesWhen, Task
 from robocasa_lerobot.envs.tasks.typical import goal_of, stages_of
@@ -124,6 +125,13 @@ def test_the_robot_starts_where_a_choice_says() -> None:
         assert np.hypot(wanted.x - pose.x, wanted.y - pose.y) < 0.3
         starts.add(scene.choices["at"])
     assert starts == {"cab", "other"}
+
+
+def test_parts_that_a_choice_leaves_out_are_not_drawn() -> None:
+    task = get_task("SweetenHotChocolate")
+    burners = {build_scene(task, "target", seed).choices["burner"] for seed in range(5)}
+    assert len(burners) > 1
+    assert not any(burner.startswith("rear") for burner in burners)
 
 
 def test_categories_goals_and_stages_by_a_choice() -> None:

@@ -24,6 +24,7 @@ from robocasa_lerobot.envs.predicates import (
     Not,
     OnBurner,
     OnOneSide,
+    OverBasin,
     PartWithin,
     StateIs,
     UnderWater,
@@ -42,7 +43,8 @@ from robocasa_lerobot.errors import UserError
 @pytest.fixture(scope="module")
 def scenes() -> dict[str, Scene]:
     """By the role of the fixture that they are about."""
-    return {"stove": build_scene(STOVE, "target", 4), "sink": build_scene(SINK, "target", 0)}
+    basins = build_scene(get_task("PreRinseStation"), "target", 0)
+    return {"stove": build_scene(STOVE, "target", 4), "sink": build_scene(SINK, "target", 0), "basins": basins}
 
 
 def away_from_stream(share: float) -> Change:
@@ -51,6 +53,16 @@ def away_from_stream(share: float) -> Change:
     def change(scene: Scene, data: mujoco.MjData) -> None:
         stream = data.site(f"{scene.roles['sink']}_water").xpos
         put_object(scene, data, "obj", stream + np.array([share * radius(scene, "obj"), 0.0, -0.15]))
+
+    return change
+
+
+def over_basin(basin: str, share: float, up_m: float = 0.0) -> Change:
+    """Put the object over a basin, at a share of half its width beside its middle."""
+
+    def change(scene: Scene, data: mujoco.MjData) -> None:
+        region = scene.fixture("sink", Sink).regions[basin]
+        data.joint("left_obj_joint0").qpos[:3] = region.world(data, (share * region.half[0], 0.0, up_m))
 
     return change
 
@@ -141,6 +153,12 @@ CASES: dict[str, tuple[str, Goal, list[Change], list[Change]]] = {
         [],
         [onto(0, "pot"), onto(1)],
     ),
+    "over a basin": (
+        "basins",
+        OverBasin("left_obj", "sink", "basin0"),
+        [over_basin("basin0", 0.99), over_basin("basin0", -0.99, up_m=0.5)],
+        [over_basin("basin0", 1.01), over_basin("basin0", -1.01), over_basin("basin1", 0.0)],
+    ),
     "grasped": (
         "sink",
         Grasped("obj"),
@@ -194,7 +212,7 @@ def test_it_holds_in_its_state_and_in_no_near_miss(case: str, scenes: dict[str, 
 
 def test_every_predicate_that_can_be_missed_by_little_is_among_the_cases() -> None:
     kinds = {type(part) for _, goal, _, _ in CASES.values() for part in every_goal_in(goal)}
-    assert {UnderWater, OnBurner, Grasped, GripperTouches, Near, NearerThan} <= kinds
+    assert {UnderWater, OnBurner, OverBasin, Grasped, GripperTouches, Near, NearerThan} <= kinds
 
 
 def test_groups_are_compared_by_their_farthest(scenes: dict[str, Scene]) -> None:

@@ -8,7 +8,7 @@ import pytest
 from goal_states import hold
 from predicate_scenes import SINK, Change, check_hits_and_misses, shift, state
 
-from robocasa_lerobot.envs.predicates import Beside, Goal, NearFixture, ObjectTilt, RestsOn
+from robocasa_lerobot.envs.predicates import Beside, Goal, Higher, NearFixture, ObjectTilt, RestsOn
 from robocasa_lerobot.envs.scene.build import build_scene
 from robocasa_lerobot.envs.scene.scene import Scene
 from robocasa_lerobot.envs.tasks.registry import get_task
@@ -101,6 +101,11 @@ CASES: dict[str, tuple[Goal, list[Change], list[Change]]] = {
         [shift("distr_counter", z=0.006), shift("distr_counter", x=0.1), shift("distr_counter", z=-0.07)],
     ),
     "rests on, higher": (RestsOn("distr_counter", "obj", higher=0.04), [], [shift("distr_counter", z=-0.02)]),
+    "higher": (
+        Higher("obj", "distr_counter"),
+        [shift("obj", z=0.5), shift("obj", x=0.5)],
+        [shift("obj", z=-0.011), shift("distr_counter", z=0.011)],
+    ),
     "tilted": (
         ObjectTilt("obj", high=np.deg2rad(30.0)),
         [tilted(0.0), tilted(29.9), tilted(-29.9)],

@@ -28,6 +28,9 @@ class Category:
 
 def category(text: str) -> Category:
     """What a blueprint calls the kinds of an object."""
+    text = text.replace(" | ", ", ").removeprefix("another one of ").removesuffix(" (one, random)")
+    text = re.sub(r"^any (\w+able)\b", r"any (\1)", text)
+    text = re.sub(r"^any not \w+,", "any,", re.sub(r": category \w\b", "", text))
     found = re.search(r" \((\w+)\)", text)
     words = re.sub(r"^one (\w+) category", r"\1", re.sub(r" \(\w+\)", "", text))
     words = re.sub(r"\ball\b", "any", words)
@@ -70,7 +73,7 @@ def rectangle(placed: Any) -> tuple[list[float], Pos | None]:
         return placed, None
     if isinstance(placed, dict):
         return placed.get("size", []), placed.get("pos")
-    pos = re.search(r"pos \((-?[\w.]+),(-?[\w.]+)\)", placed) or re.search(r"x=([-\d.]+) y=([-\d.]+)", placed)
+    pos = re.search(r"pos \((-?[\w.]+),(-?[\w.]+)\)", placed) or re.search(r"x=\+?([-\d.]+) y=([-\d.]+)", placed)
     return lengths(placed), [_number_or_word(text) for text in pos.groups()] if pos else None
 
 
@@ -91,7 +94,7 @@ def turn(at: str, placed: Any) -> tuple[float, float] | None:
         return np.pi / 2, np.pi / 2
     if "yaw pi/8 to pi/4" in text:
         return np.pi / 8, np.pi / 4
-    if "'rotation_rad': 0" in text or re.search(r"rotation 0(?![.\d])", f"{at} {text}"):
+    if "'rotation_rad': 0" in text or re.search(r"(rotation|yaw) 0(?![.\d])", f"{at} {text}"):
         return 0.0, 0.0
     return (np.pi / 4, 3 * np.pi / 8) if "yaw" in text or "rotation" in text else None
 
@@ -106,6 +109,6 @@ WHOLE = float("inf")  # the full width, which declarations may say as they do el
 
 
 def _number_or_word(text: str) -> float | str | None:
-    if text == "any":
+    if text in ("any", "random"):
         return None
     return text if text == "ref" else float(text)

@@ -32,6 +32,7 @@ from robocasa_lerobot.envs.predicates import (
     GripperFar,
     GripperFarFromPart,
     GripperTouches,
+    Higher,
     MovedSince,
     Near,
     NearerThan,
@@ -49,6 +50,7 @@ from robocasa_lerobot.envs.predicates import (
     OnBurner,
     Once,
     OnOneSide,
+    OverBasin,
     PartTurned,
     PartWithin,
     RestsOn,
@@ -264,6 +266,19 @@ def _beside(goal: Beside, scene: Scene, data: mujoco.MjData) -> None:
     to_left = (scene.fill(goal.side) == "left") != (scene.layout.types[fixture.name] == "stool")
     aside = (-0.9 if to_left else 0.9) * goal.across * right
     data.joint(f"{scene.fill(goal.object)}_joint0").qpos[:3] = data.body(scene.fill(goal.other)).xpos + aside
+
+
+@write.register
+def _higher(goal: Higher, scene: Scene, data: mujoco.MjData) -> None:
+    name, other = scene.fill(goal.object), scene.fill(goal.other)
+    high = scene.objects[other].item.size[2] / 2 + 0.01
+    data.joint(f"{name}_joint0").qpos[:3] = data.joint(f"{other}_joint0").qpos[:3] + np.array([0.0, 0.0, high])
+
+
+@write.register
+def _over_basin(goal: OverBasin, scene: Scene, data: mujoco.MjData) -> None:
+    region = scene.fixture(goal.fixture, Sink).regions[scene.fill(goal.basin)]
+    data.joint(f"{scene.fill(goal.object)}_joint0").qpos[:3] = region.world(data, (0.0, 0.0, 0.0))
 
 
 @write.register

@@ -24,6 +24,15 @@ def two_in(cup: str) -> Exactly:
 
 
 OURS = {
+    "RetrieveIceTray": Ours(
+        goal={
+            "ice_cube_tray in contact with dining_counter": ObjectTouches("ice_cube_tray", "dining_counter"),
+            **away("ice_cube_tray"),
+        },
+        initial={"freezer door closed": None, "fridge door closed": None},
+        kinds={"fridge": "fridge_with_freezer"},
+        scales={"ice_cube_tray": (1.0, 0.7, 1.0)},  # the gripper opens by 8 cm
+    ),
     "PlaceEqualIceCubes": Ours(
         goal={
             "for each of glass_cup1, glass_cup2: exactly 2 cubes = (cubes in cup: contact with cup, centre xy < 0.5 m; "

@@ -19,9 +19,24 @@ from robocasa_lerobot.envs.scene.spec import InitialOpenness
 
 LIT = OnBurner("obj", "stove", lit=True, within=0.15)  # it also asks that the object touches the stove
 ON_TRAY = "in/on container (contact AND xy centre distance < 0.7 x container horizontal radius)"
+ADDED = ("obj1", "obj2")
 RUNS = StateIs("coffee_machine", "on")
 
 OURS = {
+    "OrganizeCoffeeCondiments": Ours(
+        goal={
+            **{f"{name} within 0.3 m (3D centres) of mug": Near(name, "mug", 0.3, in_space=True) for name in ADDED},
+            **{
+                f"{name} in contact with coffee_machine_counter": ObjectTouches(name, "coffee_machine_counter")
+                for name in ADDED
+            },
+            **away(*ADDED, metres=0.15),
+        },
+        initial={
+            "cab doors open (0.90-1.0 of range)": InitialOpenness("cab", 0.9, 1.0),
+            "mug filled with coffee (visual liquid only)": "mug",
+        },
+    ),
     "DeliverBrewedCoffee": Ours(
         goal={
             "brewed_coffee in contact with dining_counter": ObjectTouches("brewed_coffee", "dining_counter"),

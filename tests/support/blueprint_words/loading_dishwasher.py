@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from blueprint_words.ours import Ours
-from robocasa_lerobot.envs.predicates import DoorsClosed, ObjectTouches
+from robocasa_lerobot.envs.predicates import DoorsClosed, DoorsOpen, ObjectTouches, PartWithin
 from robocasa_lerobot.envs.scene.initial_states import PartAt
 from robocasa_lerobot.envs.scene.spec import InitialOpenness
 
@@ -19,6 +19,19 @@ OURS = {
             "top rack slid out (1.0)": PartAt("dishwasher", "rack1", (1.0, 1.0)),
             "robot base beside the dishwasher, left or right at random where free (lateral half width + 0.25 m, back "
             "0.15 m)": None,
+        },
+    ),
+    "PrepareDishwasher": Ours(
+        goal={
+            "dishwasher door open (>= 0.70 of range)": DoorsOpen("dishwasher", 0.7),
+            "dishwasher top rack pulled out (>= 0.50 of range)": PartWithin(
+                "dishwasher", "rack1", low=0.5, label="out"
+            ),
+        },
+        initial={
+            "dishwasher door closed, rack in (default)": None,
+            "robot base beside the dishwasher, left or right at random where free (lateral half width + 0.275 m, back "
+            "0.10 m)": None,
         },
     ),
 }

@@ -30,6 +30,8 @@ class Ours:
         turned: bounds of the turn, radians, of objects whose models lie along another axis than the blueprint's.
         drawn: roles of the blueprint that are one of several others, by which is drawn; the choice's name.
         kinds: our kinds of fixtures where the blueprint says in a sentence what is meant.
+        near: what our fixtures are near where the blueprint leaves open which of a kitchen's it is, by role.
+        more: roles of ours that the blueprint names in its stages alone.
         placed: ours where the blueprint's own stages would not lead from there to its goal.
         scales: ours where the blueprint's would not fit our models.
     """
@@ -44,6 +46,8 @@ class Ours:
     turned: dict[str, tuple[float, float]] = field(default_factory=dict)
     drawn: dict[str, str] = field(default_factory=dict)
     kinds: dict[str, str] = field(default_factory=dict)
+    near: dict[str, str] = field(default_factory=dict)
+    more: set[str] = field(default_factory=set)
     placed: dict[str, Placement] = field(default_factory=dict)
     scales: dict[str, tuple[float, float, float]] = field(default_factory=dict)
 

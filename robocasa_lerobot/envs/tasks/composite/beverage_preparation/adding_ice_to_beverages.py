@@ -1,5 +1,7 @@
 """Put ice into drinks."""
 
+import numpy as np
+
 from robocasa_lerobot.envs.predicates import AllOf, AnyOf, Exactly, GripperFar, ObjectOn, ObjectTouches
 from robocasa_lerobot.envs.scene.spec import (
     FixtureSpec,
@@ -9,7 +11,7 @@ from robocasa_lerobot.envs.scene.spec import (
     SampleRegion,
 )
 from robocasa_lerobot.envs.tasks.atomic.common import counter_near, on_counter
-from robocasa_lerobot.envs.tasks.composite.common import before_stool
+from robocasa_lerobot.envs.tasks.composite.common import before_stool, fetch, on_shelf
 from robocasa_lerobot.envs.tasks.task import Stage, Task
 
 _ICE = ("ice_cube1", "ice_cube2")
@@ -183,4 +185,47 @@ PLACE_EQUAL_ICE_CUBES = Task(
     ),
 )
 
-TASKS = (MAKE_ICE_LEMONADE, PLACE_EQUAL_ICE_CUBES, PLACE_ICE_IN_CUP)
+_TURNED = (np.pi / 2, np.pi / 2)  # radians
+
+RETRIEVE_ICE_TRAY = Task(
+    name="RetrieveIceTray",
+    summary="The ice cube tray is on the dining counter, the gripper away from it.",
+    fixtures=(
+        FixtureSpec("fridge", "fridge_with_freezer"),
+        FixtureSpec("stool", "stool"),
+        FixtureSpec("dining_counter", "dining_counter", near="stool"),
+    ),
+    needs=("dining_counter", "freezer"),
+    robot_start=RobotStart("fridge"),
+    objects=(
+        ObjectSpec(
+            "ice_cube_tray",
+            ("ice_cube_tray",),
+            on_shelf("highest", (0.25, 0.3), compartment="freezer", rotation=_TURNED),
+            properties=("freezable",),
+            scale=(1.0, 0.7, 1.0),
+        ),
+        ObjectSpec(
+            "fridge_distractor",
+            ("any",),
+            Placement("fridge", region=SampleRegion(name="freezer_shelf:second_highest")),
+            properties=("fridgable", "freezable"),
+            exclude=("ice_cube_tray",),
+        ),
+        ObjectSpec("glass_cup", ("glass_cup",), before_stool((0.15, 0.15))),
+    ),
+    goal=AllOf(ObjectTouches("ice_cube_tray", "dining_counter"), GripperFar("ice_cube_tray")),
+    stages=(
+        Stage("doors", "open", "fridge", part="freezer"),
+        *fetch("ice_cube_tray", "fridge", "dining_counter"),
+    ),
+    instruction="Open the freezer, take the ice cube tray out and put it on the dining counter.",
+    paraphrases=(
+        "The dining counter needs the ice cube tray, which is in the closed freezer.",
+        "Get ice for the glass: bring the tray from the freezer to the dining counter.",
+        "Fetch the ice cube tray out of the freezer and set it down on the dining counter.",
+        "From the freezer's top shelf to the dining counter: that is the way of the ice cube tray.",
+    ),
+)
+
+TASKS = (MAKE_ICE_LEMONADE, PLACE_EQUAL_ICE_CUBES, PLACE_ICE_IN_CUP, RETRIEVE_ICE_TRAY)

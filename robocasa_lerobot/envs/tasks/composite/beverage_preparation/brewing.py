@@ -218,4 +218,48 @@ SWEETEN_COFFEE = Task(
     ),
 )
 
-TASKS = (KETTLE_BOILING, ARRANGE_TEA, DELIVER_BREWED_COFFEE, PREPARE_COFFEE, SWEETEN_COFFEE)
+_AT_MUG_M, _CLEAR_M = 0.3, 0.15
+
+
+def _by_mug(name: str) -> AllOf:
+    return AllOf(
+        Near(name, "mug", _AT_MUG_M, in_space=True),
+        ObjectTouches(name, "coffee_machine_counter"),
+        GripperFar(name, _CLEAR_M),
+    )
+
+
+def _put_by_mug(name: str) -> Stage:
+    text = f"put the {{{name}}} on the counter beside the mug"
+    return Stage("pick_place", "place", "coffee_machine_counter", object=name, until=_by_mug(name), text=text)
+
+
+ORGANIZE_COFFEE_CONDIMENTS = Task(
+    name="OrganizeCoffeeCondiments",
+    summary="Both condiments stand on the counter, 30 cm from the mug at most, the gripper 15 cm away from them.",
+    fixtures=(
+        FixtureSpec("coffee_machine", "coffee_machine"),
+        FixtureSpec("cab", "cabinet", near="coffee_machine"),
+        counter_near("cab"),
+        counter_near("coffee_machine", name="coffee_machine_counter"),
+    ),
+    robot_start=RobotStart("cab"),
+    objects=(
+        ObjectSpec("obj1", ("syrup_bottle", "cinnamon"), in_cabinet("cab", (0.5, 0.2)), graspable=True),
+        ObjectSpec("obj2", ("honey_bottle",), in_cabinet("cab", (0.5, 0.2)), graspable=True),
+        ObjectSpec("mug", ("mug",), on_counter("cab", (1.0, 0.3), pos=(0.0, -1.0)), graspable=True, filled="coffee"),
+        ObjectSpec("distr_cab", ("any",), in_cabinet("cab", (1.0, 0.2), pos=(0.0, 1.0))),
+    ),
+    initial=(InitialOpenness("cab", 0.9, 1.0),),
+    goal=AllOf(*_by_mug("obj1").parts, *_by_mug("obj2").parts),
+    stages=(_put_by_mug("obj1"), _put_by_mug("obj2")),
+    instruction="Put {obj1+obj2} from the cabinet on the counter, beside the mug of coffee.",
+    paraphrases=(
+        "What the coffee may need is in the cabinet: set {obj1+obj2} down next to the mug.",
+        "Take {obj1+obj2} out of the cabinet, to the mug.",
+        "The mug of coffee should have {obj1+obj2} at its side.",
+        "Organize the coffee corner: {obj1+obj2} from the cabinet go next to the mug.",
+    ),
+)
+
+TASKS = (ORGANIZE_COFFEE_CONDIMENTS, KETTLE_BOILING, ARRANGE_TEA, DELIVER_BREWED_COFFEE, PREPARE_COFFEE, SWEETEN_COFFEE)

@@ -1,9 +1,11 @@
 """Sweeten hot chocolate."""
 
-from robocasa_lerobot.envs.predicates import AllOf, GripperFar, ObjectOn
-from robocasa_lerobot.envs.scene.spec import FixtureSpec, ObjectSpec, Placement, RobotStart, SampleRegion
+from robocasa_lerobot.envs.predicates import AllOf, ForEach, Goal, GripperFar, ObjectOn
+from robocasa_lerobot.envs.scene.initial_states import BurnerAt
+from robocasa_lerobot.envs.scene.spec import Choice, FixtureSpec, ObjectSpec, Placement, RobotStart, SampleRegion
+from robocasa_lerobot.envs.tasks.atomic.common import HANDLE_TO_FRONT, counter_near, on_counter
 from robocasa_lerobot.envs.tasks.composite.common import before_stool, fetch
-from robocasa_lerobot.envs.tasks.task import Task
+from robocasa_lerobot.envs.tasks.task import EachStage, Stage, Task
 
 _IN_MUG = AllOf(ObjectOn("marshmallow", "mug"), GripperFar("mug"))
 
@@ -42,4 +44,63 @@ ADD_MARSHMALLOW = Task(
     ),
 )
 
-TASKS = (ADD_MARSHMALLOW,)
+
+def _in_saucepan(name: str) -> Goal:
+    return ObjectOn(name, "saucepan")
+
+
+SWEETEN_HOT_CHOCOLATE = Task(
+    name="SweetenHotChocolate",
+    summary="All the sugar cubes are in the saucepan of hot chocolate, the gripper away from it.",
+    fixtures=(FixtureSpec("stove", "stove"), counter_near("stove")),
+    robot_start=RobotStart("stove"),
+    choices=(Choice("burner", of="stove", without="rear"),),
+    objects=(
+        ObjectSpec(
+            "saucepan",
+            ("saucepan",),
+            Placement(
+                "stove",
+                region=SampleRegion(name="{burner}"),
+                size=(0.05, 0.05),
+                rotation=HANDLE_TO_FRONT,
+                ensure_inside=False,
+            ),
+            graspable=True,
+            filled="hot_chocolate",
+        ),
+        ObjectSpec(
+            "sugar",
+            ("sugar_cube",),
+            on_counter("stove", (0.25, 0.25), loc="left_right"),
+            count=(1, 3),
+            graspable=True,
+            repeats=True,
+        ),
+    ),
+    initial=(BurnerAt("stove", "{burner}", "high"),),
+    goal=AllOf(ForEach("sugar", _in_saucepan), GripperFar("saucepan")),
+    stages=(
+        EachStage(
+            "sugar",
+            lambda name: (
+                Stage(
+                    "pick_place",
+                    "place",
+                    "saucepan",
+                    object=name,
+                    until=AllOf(_in_saucepan(name), GripperFar("saucepan")),
+                ),
+            ),
+        ),
+    ),
+    instruction="Put {sugar} from the counter into the saucepan of hot chocolate.",
+    paraphrases=(
+        "Sweeten the hot chocolate on the stove with {sugar}.",
+        "The hot chocolate is not sweet yet: {sugar} into the saucepan.",
+        "All the sugar beside the stove belongs in the saucepan.",
+        "Drop {sugar} into the hot chocolate that is on the burner.",
+    ),
+)
+
+TASKS = (ADD_MARSHMALLOW, SWEETEN_HOT_CHOCOLATE)

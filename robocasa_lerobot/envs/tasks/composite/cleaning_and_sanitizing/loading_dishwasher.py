@@ -1,6 +1,6 @@
 """Load the dishwasher."""
 
-from robocasa_lerobot.envs.predicates import AllOf, DoorsClosed, GripperFar, ObjectTouches
+from robocasa_lerobot.envs.predicates import AllOf, DoorsClosed, DoorsOpen, GripperFar, ObjectTouches, PartWithin
 from robocasa_lerobot.envs.scene.initial_states import PartAt
 from robocasa_lerobot.envs.scene.spec import FixtureSpec, InitialOpenness, ObjectSpec, RobotStart
 from robocasa_lerobot.envs.tasks.atomic.common import counter_near, on_counter
@@ -42,4 +42,33 @@ LOAD_DISHWASHER = Task(
     ),
 )
 
-TASKS = (LOAD_DISHWASHER,)
+_WIDE = DoorsOpen("dishwasher", 0.7)
+_HALF_OUT = PartWithin("dishwasher", _RACK, low=0.5, label="out")
+
+PREPARE_DISHWASHER = Task(
+    name="PrepareDishwasher",
+    summary="The dishwasher is open and its top rack pulled out.",
+    fixtures=(FixtureSpec("dishwasher", "dishwasher"),),
+    robot_start=RobotStart("dishwasher", beside=True, clearance=0.275, setback=0.1),
+    goal=AllOf(_WIDE, _HALF_OUT),
+    stages=(
+        Stage("doors", "open", "dishwasher", until=_WIDE),
+        Stage(
+            "racks",
+            "pull",
+            "dishwasher",
+            part=_RACK,
+            until=_HALF_OUT,
+            text="pull the top rack of the dishwasher out",
+        ),
+    ),
+    instruction="Open the dishwasher and pull out its top rack.",
+    paraphrases=(
+        "Prepare the dishwasher: door down, upper rack out.",
+        "The dishwasher will be loaded; open it and slide the top rack towards you.",
+        "Fold the dishwasher's door down, then draw out the upper of its racks.",
+        "I want to fill the dishwasher's top rack, so open up and pull it out.",
+    ),
+)
+
+TASKS = (LOAD_DISHWASHER, PREPARE_DISHWASHER)
