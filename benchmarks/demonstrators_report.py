@@ -16,8 +16,9 @@ from robocasa_lerobot.benchmark.tasks import facts_of
 from robocasa_lerobot.evaluation.statistics.rates import success_rate
 
 # What a finished set of demonstrators is to reach: of atomic tasks the mean and the lowest rate, of composite ones
-# the lowest; and seconds over the human median.
-AIM_MEAN, AIM_TASK, AIM_COMPOSITE, AIM_TIMES_HUMAN = 0.94, 0.70, 0.50, 1.5
+# too; and seconds over the human median.
+AIM_MEAN, AIM_TASK, AIM_TIMES_HUMAN = 0.94, 0.70, 1.5
+AIM_MEAN_COMPOSITE, AIM_COMPOSITE = 0.80, 0.40
 _SPLITS = {"target": "#1f77b4", "pretrain": "#ff7f0e"}
 _REASONS = 3
 
@@ -163,25 +164,28 @@ def _averages(body: Mapping[str, Any]) -> str:
     found, tasks = body["ratios"], body["tasks"]
     quick = round(found["tasks_within_1.5_times_human"] * len(tasks))
     tried = sum(task["success_rate"] is not None for task in tasks.values())
-    aims = {"atomic": (AIM_MEAN, AIM_TASK), "composite": (None, AIM_COMPOSITE)}
+    aims = {"atomic": (AIM_MEAN, AIM_TASK), "composite": (AIM_MEAN_COMPOSITE, AIM_COMPOSITE)}
     parts = []
     for kind, (mean, worst) in aims.items():
         if found[f"mean_success_{kind}"] is None:
             continue
-        aim = "" if mean is None else f" (aim {mean:.0%})"
         lowest = f"worst {found[f'worst_task_{kind}']:.0%} (aim {worst:.0%})"
-        parts.append(f"{kind} tasks: mean {found[f'mean_success_{kind}']:.1%}{aim}, {lowest}")
+        parts.append(f"{kind} tasks: mean {found[f'mean_success_{kind}']:.1%} (aim {mean:.0%}), {lowest}")
     return (
         f"{'; '.join(parts)}; {tried} tasks were tried, {quick} take at most {AIM_TIMES_HUMAN} times the human median"
     )
 
 
 def draw(tasks: Mapping[str, Any], path: Path) -> None:
-    """A picture of the rates with their intervals, the best task on top; tasks without a demonstrator stand last."""
+    """A picture of the rates with their intervals, the best task on top; tasks without a demonstrator stand last.
+
+    Tasks with a demonstrator that were not tried are left out: a table may be of some tasks only.
+    """
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    order = sorted(tasks, key=lambda name: (_place(tasks[name]), name))
+    shown = [name for name, task in tasks.items() if task["success_rate"] is not None or not task["demonstrator"]]
+    order = sorted(shown, key=lambda name: (_place(tasks[name]), name))
     figure = Figure(figsize=(9, 1.2 + 0.21 * len(order)), dpi=110, layout="constrained")
     FigureCanvasAgg(figure)
     axes = figure.add_subplot()
@@ -196,8 +200,7 @@ def draw(tasks: Mapping[str, Any], path: Path) -> None:
             axes.errorbar(rates, heights, xerr=spread, fmt="o", ms=4, lw=1.2, color=colour, label=split)
     for y, name in enumerate(order):
         if tasks[name]["success_rate"] is None:
-            note = "not tried" if tasks[name]["demonstrator"] else "no demonstrator"
-            axes.text(0.01, y, note, va="center", fontsize=7, color="0.5")
+            axes.text(0.01, y, "no demonstrator", va="center", fontsize=7, color="0.5")
     axes.set_yticks(range(len(order)), order, fontsize=7)
     axes.set_ylim(-0.7, len(order) - 0.3)
     axes.set_xlim(0, 1.005)
