@@ -31,6 +31,7 @@ def category(text: str) -> Category:
     text = text.replace(" | ", ", ").removeprefix("another one of ").removesuffix(" (one, random)")
     text = re.sub(r"^any (\w+able)\b", r"any (\1)", text)
     text = re.sub(r"^any not \w+,", "any,", re.sub(r": category \w\b", "", text))
+    text = re.sub(r"^one of | \((category \d, \w+|not that of \w+)\)", "", text)
     found = re.search(r" \((\w+)\)", text)
     words = re.sub(r"^one (\w+) category", r"\1", re.sub(r" \(\w+\)", "", text))
     words = re.sub(r"\ball\b", "any", words)
@@ -90,12 +91,19 @@ def offset(placed: Any) -> dict[int, float]:
 def turn(at: str, placed: Any) -> tuple[float, float] | None:
     """Bounds of the turn, radians: of a right angle, of none at all, or of what is said to have a yaw."""
     text = str(placed)
-    if "turned 90 deg" in at or ("rotation" in text and "90 deg" in text) or "yaw pi/2" in text or "[1.5708" in text:
+    if (
+        "turned 90 deg" in at
+        or ("rotation" in text and "90 deg" in text)
+        or "yaw pi/2" in text
+        or re.search(r"(\[|'rotation_rad': )1\.5708", text)
+    ):
         return np.pi / 2, np.pi / 2
     if "yaw pi/8 to pi/4" in text:
         return np.pi / 8, np.pi / 4
     if "'rotation_rad': 0" in text or re.search(r"(rotation|yaw) 0(?![.\d])", f"{at} {text}"):
         return 0.0, 0.0
+    if re.search(r"yaw pi(?!/)", text):
+        return np.pi, np.pi
     return (np.pi / 4, 3 * np.pi / 8) if "yaw" in text or "rotation" in text else None
 
 

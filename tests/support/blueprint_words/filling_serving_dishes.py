@@ -43,4 +43,24 @@ OURS = {
         },
         initial={},
     ),
+    "DisplayMeatVariety": Ours(
+        goal={
+            "chicken on serving_tray (contact AND centre xy distance < 0.7 x serving_tray radius)": ObjectOn(
+                "chicken", "serving_tray"
+            ),
+            "shrimp on serving_tray (contact AND centre xy distance < 0.7 x serving_tray radius)": ObjectOn(
+                "shrimp", "serving_tray"
+            ),
+            "beef on serving_tray (contact AND centre xy distance < 0.7 x serving_tray radius)": ObjectOn(
+                "beef", "serving_tray"
+            ),
+            "serving_tray touches dining_table (contact)": ObjectTouches("serving_tray", "dining_table"),
+            "gripper > 0.25 m from chicken": GripperFar("chicken", 0.25),
+            "gripper > 0.25 m from shrimp": GripperFar("shrimp", 0.25),
+            "gripper > 0.25 m from beef": GripperFar("beef", 0.25),
+        },
+        initial={
+            "fridge door(s) open (0.90-1.0)": InitialOpenness("fridge", 0.9, 1.0, part="fridge"),
+        },
+    ),
 }

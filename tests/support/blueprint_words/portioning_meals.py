@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from blueprint_words.ours import Ours, away
 from robocasa_lerobot.envs.predicates import Exactly, GripperFar, ObjectOn
 
@@ -53,5 +55,38 @@ OURS = {
             "gripper > 0.25 m from sausage2": GripperFar("sausage2", 0.25),
         },
         initial={"robot base centred on bowl": "bowl"},
+    ),
+    "DistributeChicken": Ours(
+        goal={
+            "exactly 1 drumstick on plate1": one_on("plate1", "chicken_drumstick"),
+            "exactly 1 drumstick on plate2 (on = contact, centre xy < 0.7*plate radius)": one_on(
+                "plate2", "chicken_drumstick"
+            ),
+            "gripper > 0.25 m from chicken_drumstick1": GripperFar("chicken_drumstick1", 0.25),
+            "gripper > 0.25 m from chicken_drumstick2": GripperFar("chicken_drumstick2", 0.25),
+        },
+        initial={
+            "pan burner chosen at random among those with knobs": "pan",
+            "all burners off": None,
+            "robot base centred on pan": "pan",
+        },
+        turned={"pan": (np.pi / 4, 3 * np.pi / 4)},
+    ),
+    "PortionInTupperware": Ours(
+        goal={
+            "exactly 1 cooked_food in tupperware1": one_on("tupperware1", "cooked_food"),
+            "exactly 1 vegetable in tupperware1": one_on("tupperware1", "vegetable"),
+            "exactly 1 cooked_food in tupperware2": one_on("tupperware2", "cooked_food"),
+            "exactly 1 vegetable in tupperware2 (in = contact, centre xy < 0.7*tupperware radius)": one_on(
+                "tupperware2", "vegetable"
+            ),
+            "gripper > 0.25 m from cooked_food1": GripperFar("cooked_food1", 0.25),
+            "gripper > 0.25 m from cooked_food2": GripperFar("cooked_food2", 0.25),
+            "gripper > 0.25 m from vegetable1": GripperFar("vegetable1", 0.25),
+            "gripper > 0.25 m from vegetable2": GripperFar("vegetable2", 0.25),
+        },
+        initial={
+            "robot base centred on plate": "plate",
+        },
     ),
 }

@@ -8,6 +8,7 @@ from blueprint_words.ours import ON_ITS_MIDDLE, Ours, away
 from robocasa_lerobot.envs.predicates import (
     AllOf,
     AnyOf,
+    DoorsClosed,
     GripperFar,
     GripperTouches,
     Never,
@@ -71,5 +72,27 @@ OURS = {
         initial={"pan with vegetable on a burner chosen at random": "vegetable_container"},
         order=UNTOUCHED,
         turned={"vegetable_container": (np.pi / 4, 3 * np.pi / 4)},
+    ),
+    "AlcoholServingPrep": Ours(
+        goal={
+            "alcohol in contact with dining_table": ObjectTouches("alcohol", "dining_table"),
+            "cup in contact with dining_table": ObjectTouches("cup", "dining_table"),
+            "gripper > 0.25 m from alcohol": GripperFar("alcohol", 0.25),
+            "gripper > 0.25 m from cup": GripperFar("cup", 0.25),
+        },
+        initial={
+            "cab doors closed": None,
+        },
+    ),
+    "PrepareSoupServing": Ours(
+        goal={
+            "ladle in/on pot (contact AND xy centre distance < 0.7 x pot horizontal radius)": ObjectOn("ladle", "pot"),
+            "cab doors closed (every door joint <= 0.005 of range)": DoorsClosed("cab", 0.005),
+        },
+        initial={
+            "cab doors closed": None,
+            "pot on a burner chosen at random": "pot",
+        },
+        turned={"ladle": (-np.pi / 8, np.pi / 8)},
     ),
 }

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
-from robocasa_lerobot.envs.predicates import Goal
+from collections.abc import Callable, Iterable
+
+from robocasa_lerobot.envs.predicates import AllOf, Goal, GripperFar, GripperFarFromPart, StateIs
 from robocasa_lerobot.envs.scene.spec import Placement, SampleRegion
 from robocasa_lerobot.envs.tasks.task import Stage, Task
 
 TASKS: tuple[Task, ...] = ()
+BLENDER_ON = AllOf(StateIs("blender", "on"), GripperFarFromPart("blender", "button"))  # it runs with its lid on only
+JAR_MOUTH_M = (0.085, 0.085, None)  # greatest width and depth of what goes into a blender
 
 
 def fetch(name: str, source: str, target: str, *, part: str = "", until: Goal | None = None) -> tuple[Stage, ...]:
@@ -23,6 +27,48 @@ def fetch(name: str, source: str, target: str, *, part: str = "", until: Goal | 
         Stage("pick_place", "pick", source, object=name),
         Stage("navigation", "drive", target, object=name),
         Stage("pick_place", "place", target, object=name, part=part, until=until),
+    )
+
+
+def fetch_in_turn(
+    names: Iterable[str],
+    source: str,
+    target: str,
+    *,
+    part: str = "",
+    until: Callable[[str], Goal] | None = None,
+    along: bool = False,
+) -> tuple[Stage, ...]:
+    """Several objects, one after the other, with a drive back before each but the first.
+
+    Args:
+        names: of the objects.
+        source: as of `fetch`.
+        target: as of `fetch`.
+        part: as of `fetch`.
+        until: by an object's name, when it is done, where not as it always is.
+        along: the way back leads to the object, where its fixture is long; else to the fixture.
+    """
+    stages: list[Stage] = []
+    for name in names:
+        if stages:
+            stages.append(Stage("navigation", "drive", name if along else source))
+        stages += fetch(name, source, target, part=part, until=until and until(name))
+    return tuple(stages)
+
+
+def cover_and_blend() -> tuple[Stage, Stage]:
+    """The lid of the role "blender" is put on, then its button is pressed."""
+    lid = "{blender}_lid"
+    return (
+        Stage(
+            "pick_place",
+            "cover",
+            "blender",
+            object=lid,
+            until=AllOf(StateIs("blender", "lid"), GripperFar(lid, 0.15)),
+        ),
+        Stage("buttons", "press", "blender", part="button", until=BLENDER_ON),
     )
 
 

@@ -16,7 +16,7 @@ from robocasa_lerobot.demos.skills.pick_place.poses.place_poses import PlacePose
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.predicates.logic import Goal, Not, Term
 from robocasa_lerobot.envs.predicates.near import Near, NearerThan, OnOneSide
-from robocasa_lerobot.envs.predicates.placed_by import NearFixture
+from robocasa_lerobot.envs.predicates.placed_by import Beside, NearFixture
 from robocasa_lerobot.envs.tasks.conditions import stage_condition
 from robocasa_lerobot.envs.tasks.task import Stage
 
@@ -31,7 +31,7 @@ def distance_terms(env: KitchenEnv, stage: Stage) -> tuple[Term, ...]:
     found: list[Term] = []
     for term in _asked_for(stage_condition(env.declaration, stage)):
         match term:
-            case Near() | NearFixture() if name == env.scene.fill(term.object):
+            case Near() | Beside() | NearFixture() if name == env.scene.fill(term.object):
                 found.append(term)
             case NearerThan() | OnOneSide() if name in _names(env, term.objects):
                 found.append(term)
@@ -53,7 +53,7 @@ def near_to(env: KitchenEnv, stage: Stage) -> list[Array]:
     sides: list[Array] = []
     for term in distance_terms(env, stage):
         match term:
-            case Near():
+            case Near() | Beside():
                 names += _names(env, term.other)
             case NearerThan():
                 names += _names(env, term.to)

@@ -2,9 +2,10 @@
 
 import numpy as np
 
-from robocasa_lerobot.envs.predicates import AllOf, GripperFar, Near, ObjectInside, ObjectTouches
+from robocasa_lerobot.envs.predicates import AllOf, Beside, GripperFar, Near, NearFixture, ObjectInside, ObjectTouches
 from robocasa_lerobot.envs.scene.spec import FixtureSpec, InitialOpenness, ObjectSpec, Placement, RobotStart
 from robocasa_lerobot.envs.tasks.atomic.common import counter_near, in_cabinet, on_counter
+from robocasa_lerobot.envs.tasks.composite.common import fetch
 from robocasa_lerobot.envs.tasks.task import Stage, Task
 
 _BOTTLES = ("condiment_bottle", "ketchup", "syrup_bottle")
@@ -92,4 +93,42 @@ ORGANIZE_CONDIMENTS = Task(
     ),
 )
 
-TASKS = (CATEGORIZE_CONDIMENTS, ORGANIZE_CONDIMENTS)
+
+_IN_A_ROW = Beside("condiment2", "condiment1", "counter", across=0.2, along=0.05)
+
+
+def _by_stove(name: str) -> AllOf:
+    return AllOf(ObjectTouches(name, "counter"), NearFixture(name, "stove", 0.35), GripperFar(name))
+
+
+def _in_front(name: str) -> ObjectSpec:
+    groups = ("condiment", "shaker", "salt_and_pepper_shaker")
+    return ObjectSpec(name, groups, in_cabinet("cabinet", (np.inf, 0.2)), graspable=True, repeats=True)
+
+
+LINE_UP_CONDIMENTS = Task(
+    name="LineUpCondiments",
+    summary="Both condiments stand in a row on the counter, 35 cm from the stove at most, the gripper away from them.",
+    fixtures=(FixtureSpec("cabinet", "cabinet"), FixtureSpec("stove", "stove"), counter_near("stove")),
+    robot_start=RobotStart("cabinet"),
+    objects=(_in_front("condiment1"), _in_front("condiment2")),
+    initial=(InitialOpenness("cabinet", 0.9, 1.0),),
+    goal=AllOf(*_by_stove("condiment1").parts, *_by_stove("condiment2").parts, _IN_A_ROW),
+    stages=(
+        *fetch("condiment1", "cabinet", "counter", until=_by_stove("condiment1")),
+        Stage("navigation", "drive", "cabinet"),
+        *fetch("condiment2", "cabinet", "counter", until=AllOf(*_by_stove("condiment2").parts, _IN_A_ROW)),
+    ),
+    instruction=(
+        "Put both condiments from the cabinet on the counter by the stove, next to each other in a row along the "
+        "counter's edge."
+    ),
+    paraphrases=(
+        "Line the two condiments up beside the stove; they are in the open cabinet.",
+        "Bring {condiment1+condiment2} to the counter at the stove and stand them side by side.",
+        "The cook wants both condiments close to the stove, one next to the other.",
+        "By the stove there should be a row of two: {condiment1+condiment2}.",
+    ),
+)
+
+TASKS = (CATEGORIZE_CONDIMENTS, LINE_UP_CONDIMENTS, ORGANIZE_CONDIMENTS)

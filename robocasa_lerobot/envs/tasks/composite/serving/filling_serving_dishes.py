@@ -1,5 +1,7 @@
 """Fill dishes at the dining counter."""
 
+import numpy as np
+
 from robocasa_lerobot.envs.predicates import AllOf, AnyOf, GripperFar, ObjectOn, ObjectTouches
 from robocasa_lerobot.envs.scene.spec import (
     FixtureSpec,
@@ -9,7 +11,7 @@ from robocasa_lerobot.envs.scene.spec import (
     RobotStart,
     SampleRegion,
 )
-from robocasa_lerobot.envs.tasks.composite.common import before_stool, fetch, on_shelf
+from robocasa_lerobot.envs.tasks.composite.common import before_stool, fetch, fetch_in_turn, on_shelf
 from robocasa_lerobot.envs.tasks.task import Stage, Task
 
 _STARTERS = ("cheese", "meat", "vegetable")
@@ -163,4 +165,54 @@ MIXED_FRUIT_PLATTER = Task(
     ),
 )
 
-TASKS = (BUILD_APPETIZER_PLATE, MEAT_SKEWER_ASSEMBLY, MIXED_FRUIT_PLATTER)
+
+_MEATS = {"chicken": "chicken_drumstick", "shrimp": "shrimp", "beef": "steak"}
+
+DISPLAY_MEAT_VARIETY = Task(
+    name="DisplayMeatVariety",
+    summary="Drumstick, shrimp and steak lie on the tray on the dining counter, the gripper away from them.",
+    fixtures=(
+        FixtureSpec("fridge", "fridge"),
+        FixtureSpec("stool", "stool"),
+        FixtureSpec("dining_table", "dining_counter", near="stool"),
+    ),
+    robot_start=RobotStart("fridge"),
+    objects=(
+        *(
+            ObjectSpec(
+                name,
+                (kind,),
+                Placement(
+                    "fridge",
+                    region=SampleRegion(name="fridge_shelf", height=(1.0, 1.5)),
+                    size=(0.4, 0.2),
+                    pos=(0.0, -1.0),
+                ),
+                graspable=True,
+                scale=(1.0, 1.0, 3.0) if name == "shrimp" else 1.0,
+            )
+            for name, kind in _MEATS.items()
+        ),
+        ObjectSpec(
+            "serving_tray",
+            ("tray",),
+            before_stool((0.6, 0.4), counter="dining_table", rotation=(np.pi / 2, np.pi / 2)),
+        ),
+    ),
+    initial=(InitialOpenness("fridge", 0.9, 1.0, part="fridge"),),
+    goal=AllOf(
+        *(ObjectOn(name, "serving_tray") for name in _MEATS),
+        ObjectTouches("serving_tray", "dining_table"),
+        *map(GripperFar, _MEATS),
+    ),
+    stages=fetch_in_turn(_MEATS, "fridge", "serving_tray"),
+    instruction="Bring the {chicken}, the {shrimp} and the {beef} from the fridge to the tray on the dining counter.",
+    paraphrases=(
+        "Display three meats on the dining counter's tray: {chicken}, {shrimp} and {beef}, all in the open fridge.",
+        "The tray on the dining counter should carry the fridge's {chicken}, {shrimp} and {beef}.",
+        "Fetch {chicken}, {shrimp} and {beef} out of the fridge, one after the other, and lay them on the tray.",
+        "Serve meat: everything of it that is in the fridge goes onto the tray at the dining counter.",
+    ),
+)
+
+TASKS = (BUILD_APPETIZER_PLATE, DISPLAY_MEAT_VARIETY, MEAT_SKEWER_ASSEMBLY, MIXED_FRUIT_PLATTER)

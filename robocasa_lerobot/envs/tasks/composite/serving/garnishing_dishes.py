@@ -1,13 +1,17 @@
 """Garnish dishes at the dining counter."""
 
-from robocasa_lerobot.envs.predicates import AllOf, GripperFar, ObjectOn, ObjectTouches
+from dataclasses import replace
+
+from robocasa_lerobot.envs.predicates import AllOf, AnyOf, Exactly, GripperFar, Near, ObjectOn, ObjectTouches
 from robocasa_lerobot.envs.scene.spec import (
     FixtureSpec,
+    InitialOpenness,
     ObjectSpec,
     Placement,
     RobotStart,
     SampleRegion,
 )
+from robocasa_lerobot.envs.tasks.atomic.common import in_cabinet
 from robocasa_lerobot.envs.tasks.composite.common import before_stool, fetch
 from robocasa_lerobot.envs.tasks.task import Stage, Task
 
@@ -159,4 +163,106 @@ ADD_SUGAR_CUBES = Task(
     ),
 )
 
-TASKS = (ADD_LEMON_TO_FISH, ADD_SUGAR_CUBES, GARNISH_PANCAKE)
+
+_CHERRIES, _STRAWBERRIES = ("cherry1", "cherry2"), ("strawberry1", "strawberry2")
+
+
+def _on_cake_or_plate(name: str) -> AnyOf:
+    return AnyOf(ObjectOn(name, "cake"), ObjectOn(name, "cake_plate"))
+
+
+GARNISH_CAKE = Task(
+    name="GarnishCake",
+    summary="One cherry is on the cake or its plate, one strawberry on that plate, the gripper away from it.",
+    fixtures=(FixtureSpec("stool", "stool"), FixtureSpec("dining_counter", "dining_counter", near="stool")),
+    robot_start=RobotStart("dining_counter", at_object="fruit_plate"),
+    objects=(
+        ObjectSpec("cake_plate", ("plate",), before_stool((0.35, 0.35)), scale=1.2),
+        ObjectSpec("fruit_plate", ("plate",), before_stool((1.0, 0.35), pos=(0.0, "ref")), repeats=True),
+        ObjectSpec("cake", ("cake",), Placement(object="cake_plate"), graspable=True, scale=1.4),
+        *(
+            ObjectSpec(
+                name, (name.rstrip("12"),), Placement(object="fruit_plate", heaped=True), graspable=True, repeats=True
+            )
+            for name in (*_CHERRIES, *_STRAWBERRIES)
+        ),
+    ),
+    goal=AllOf(
+        Exactly(1, *map(_on_cake_or_plate, _CHERRIES)),
+        Exactly(1, *(ObjectOn(name, "cake_plate") for name in _STRAWBERRIES)),
+        ObjectTouches("cake_plate", "dining_counter"),
+        GripperFar("cake_plate"),
+    ),
+    stages=(
+        Stage(
+            "pick_place",
+            "place",
+            "cake_plate",
+            object="cherry1",
+            until=AllOf(_on_cake_or_plate("cherry1"), GripperFar("cake_plate")),
+        ),
+        Stage("pick_place", "place", "cake_plate", object="strawberry1"),
+    ),
+    instruction="Put one of the cherries on the cake or on its plate, and one of the strawberries on that plate.",
+    paraphrases=(
+        "Garnish the cake with one cherry, on it or beside it, and one strawberry beside it.",
+        "The cake's plate should get a single strawberry and a single cherry from the plate of fruit.",
+        "One cherry and one strawberry go to the cake; the other two fruits stay where they are.",
+        "From the plate of fruit, take a cherry and a strawberry over to the cake.",
+    ),
+)
+
+_BY_CUPCAKE = AllOf(
+    Near("cinnamon", "cupcake_container", 0.3), ObjectTouches("cinnamon", "dining_counter"), GripperFar("cinnamon")
+)
+*_CINNAMON_CARRIED, _CINNAMON_PUT = fetch("cinnamon", "cabinet", "dining_counter", until=_BY_CUPCAKE)
+
+GARNISH_CUPCAKE = Task(
+    name="GarnishCupcake",
+    summary=(
+        "Chocolate and cupcake are on the plate on the dining counter, the cinnamon is 30 cm from it at most, the "
+        "gripper away from both."
+    ),
+    fixtures=(
+        FixtureSpec("cabinet", "cabinet"),
+        FixtureSpec("stool", "stool"),
+        FixtureSpec("dining_counter", "dining_counter", near="stool"),
+    ),
+    robot_start=RobotStart("cabinet"),
+    objects=(
+        ObjectSpec("cinnamon", ("cinnamon",), in_cabinet("cabinet", (1.0, 0.2)), graspable=True),
+        ObjectSpec(
+            "distr_cabinet",
+            ("cup", "mug", "bowl"),
+            in_cabinet("cabinet", (1.0, 0.3), pos=(0.0, 1.0)),
+            graspable=True,
+        ),
+        ObjectSpec("cupcake_container", ("plate",), before_stool((0.35, 0.35))),
+        ObjectSpec("cupcake", ("cupcake",), Placement(object="cupcake_container"), graspable=True),
+        ObjectSpec("chocolate", ("chocolate",), before_stool((1.0, 0.3), pos=("ref", -1.0)), scale=(0.8, 0.8, 1.8)),
+    ),
+    initial=(InitialOpenness("cabinet", 0.9, 1.0),),
+    goal=AllOf(
+        *_BY_CUPCAKE.parts,
+        *(ObjectOn(name, "cupcake_container") for name in ("chocolate", "cupcake")),
+        ObjectTouches("cupcake_container", "dining_counter"),
+        GripperFar("chocolate"),
+    ),
+    stages=(
+        *_CINNAMON_CARRIED,
+        replace(_CINNAMON_PUT, text="put the cinnamon on the dining counter beside the plate"),
+        Stage("pick_place", "place", "cupcake_container", object="chocolate"),
+    ),
+    instruction=(
+        "Stand the cinnamon from the cabinet beside the cupcake's plate on the dining counter, and put the chocolate "
+        "on that plate."
+    ),
+    paraphrases=(
+        "Garnish the cupcake: chocolate onto its plate, and the cabinet's cinnamon next to the plate.",
+        "Bring the cinnamon to the dining counter, close to the cupcake, and lay the chocolate beside the cupcake.",
+        "By the plate with the cupcake there should be cinnamon, and on it the chocolate.",
+        "Carry the cinnamon over to the cupcake, then add the dining counter's chocolate to its plate.",
+    ),
+)
+
+TASKS = (ADD_LEMON_TO_FISH, ADD_SUGAR_CUBES, GARNISH_CAKE, GARNISH_CUPCAKE, GARNISH_PANCAKE)

@@ -1,8 +1,11 @@
 """Share meals out at the dining counter."""
 
+import numpy as np
+
 from robocasa_lerobot.envs.predicates import AllOf, Exactly, GripperFar, ObjectOn
-from robocasa_lerobot.envs.scene.spec import FixtureSpec, ObjectSpec, Placement, RobotStart, SampleRegion
-from robocasa_lerobot.envs.tasks.composite.common import before_stool
+from robocasa_lerobot.envs.scene.spec import Choice, FixtureSpec, ObjectSpec, Placement, RobotStart, SampleRegion
+from robocasa_lerobot.envs.tasks.atomic.common import HANDLE_TO_FRONT
+from robocasa_lerobot.envs.tasks.composite.common import before_stool, fetch
 from robocasa_lerobot.envs.tasks.task import Stage, Task
 
 _BUNS, _SAUSAGES = ("hotdog_bun1", "hotdog_bun2"), ("sausage1", "sausage2")
@@ -151,4 +154,124 @@ PORTION_YOGURT = Task(
     ),
 )
 
-TASKS = (PORTION_FRUIT_BOWL, PORTION_HOT_DOGS, PORTION_YOGURT)
+
+_DRUMSTICKS = ("chicken_drumstick1", "chicken_drumstick2")
+
+DISTRIBUTE_CHICKEN = Task(
+    name="DistributeChicken",
+    summary="On each of the two plates lies exactly one of the drumsticks, the gripper away from both.",
+    fixtures=(
+        FixtureSpec("stove", "stove"),
+        FixtureSpec("stool1", "stool"),
+        FixtureSpec("stool2", "stool", other_than=("stool1",)),
+        FixtureSpec("dining_counter", "dining_counter", near="stool1"),
+    ),
+    needs=("dining_counter",),
+    robot_start=RobotStart("stove", at_object="pan"),
+    choices=(Choice("knob", of="stove"),),
+    objects=(
+        ObjectSpec(
+            "pan",
+            ("pan",),
+            Placement(
+                "stove",
+                region=SampleRegion(name="{knob}"),
+                size=(0.05, 0.05),
+                pos=(0.0, 0.0),
+                rotation=HANDLE_TO_FRONT,
+                ensure_inside=False,
+            ),
+            scale=1.25,
+        ),
+        *(
+            ObjectSpec(f"plate{number}", ("plate",), before_stool((0.35, 0.35), stool=f"stool{number}"), repeats=True)
+            for number in (1, 2)
+        ),
+        *(
+            ObjectSpec(name, ("chicken_drumstick",), Placement(object="pan", heaped=True), graspable=True, repeats=True)
+            for name in _DRUMSTICKS
+        ),
+    ),
+    goal=AllOf(
+        *(Exactly(1, *(ObjectOn(name, plate) for name in _DRUMSTICKS)) for plate in _PLATES),
+        *map(GripperFar, _DRUMSTICKS),
+    ),
+    stages=(
+        *fetch("chicken_drumstick1", "stove", "plate1"),
+        Stage("navigation", "drive", "stove"),
+        *fetch("chicken_drumstick2", "stove", "plate2"),
+    ),
+    instruction="Put one of the two drumsticks in the pan on each of the plates on the dining counter.",
+    paraphrases=(
+        "Share the drumsticks out: one for either plate on the dining counter.",
+        "Carry the drumsticks from the stove to the dining counter, one to each plate.",
+        "Each plate gets a drumstick from the pan on the stove.",
+        "Serve the chicken: a drumstick on this plate, a drumstick on that one.",
+    ),
+)
+
+_COOKED, _VEGETABLES = ("cooked_food1", "cooked_food2"), ("vegetable1", "vegetable2")
+_BOXES = ("tupperware1", "tupperware2")
+
+
+def _portion(name: str) -> ObjectSpec:
+    group = name.rstrip("12")
+    return ObjectSpec(
+        name,
+        (group,),
+        Placement(object="plate", heaped=True),
+        graspable=True,
+        exclude=("kebab_skewer",) if group == "cooked_food" else (),
+        repeats=True,
+    )
+
+
+PORTION_IN_TUPPERWARE = Task(
+    name="PortionInTupperware",
+    summary="Each of the two boxes has exactly one cooked food and one vegetable, the gripper away from all four.",
+    fixtures=(
+        FixtureSpec("stool1", "stool"),
+        FixtureSpec("stool2", "stool", other_than=("stool1",)),
+        FixtureSpec("dining_counter", "dining_counter", near="stool1"),
+    ),
+    needs=("dining_counter",),
+    robot_start=RobotStart("dining_counter", at_object="plate"),
+    objects=(
+        *(
+            ObjectSpec(
+                name,
+                ("tupperware",),
+                before_stool(
+                    (1.0, 0.5),
+                    stool=name.replace("tupperware", "stool"),
+                    pos=("ref", -1.0),
+                    rotation=(np.pi / 2, np.pi / 2),
+                ),
+                scale=(1.75, 1.75, 1.0),
+                repeats=True,
+            )
+            for name in _BOXES
+        ),
+        ObjectSpec("plate", ("plate",), before_stool((1.0, 0.45), stool="stool1", pos=(0.0, -1.0)), scale=1.5),
+        *map(_portion, (*_COOKED, *_VEGETABLES)),
+    ),
+    goal=AllOf(
+        *(Exactly(1, *(ObjectOn(name, box) for name in names)) for box in _BOXES for names in (_COOKED, _VEGETABLES)),
+        *map(GripperFar, (*_COOKED, *_VEGETABLES)),
+    ),
+    stages=tuple(
+        Stage("pick_place", "place", box, object=name)
+        for box, names in zip(_BOXES, zip(_COOKED, _VEGETABLES, strict=True), strict=True)
+        for name in names
+    ),
+    instruction="Put one cooked food and one vegetable from the plate into each of the two boxes.",
+    paraphrases=(
+        "Portion the plate's food: either box gets a cooked thing and a vegetable.",
+        "Fill both boxes on the dining counter alike, with one cooked food and one vegetable each.",
+        "Share out {cooked_food1}, {cooked_food2}, {vegetable1} and {vegetable2}: a vegetable in every box, and a "
+        "cooked food too.",
+        "Two boxes, two cooked foods, two vegetables: one of each kind goes into each box.",
+    ),
+)
+
+TASKS = (DISTRIBUTE_CHICKEN, PORTION_FRUIT_BOWL, PORTION_HOT_DOGS, PORTION_IN_TUPPERWARE, PORTION_YOGURT)

@@ -4,10 +4,19 @@ from dataclasses import replace
 
 import numpy as np
 
-from robocasa_lerobot.envs.predicates import AllOf, GripperFar, Near, ObjectOn, ObjectTouches
+from robocasa_lerobot.envs.predicates import (
+    AllOf,
+    AnyOf,
+    Beside,
+    GripperFar,
+    Near,
+    ObjectOn,
+    ObjectTouches,
+    ObjectUpright,
+)
 from robocasa_lerobot.envs.scene.spec import FixtureSpec, InitialOpenness, ObjectSpec, Placement, RobotStart
 from robocasa_lerobot.envs.tasks.atomic.common import counter_near, in_cabinet, on_counter
-from robocasa_lerobot.envs.tasks.composite.common import before_stool, fetch, on_shelf
+from robocasa_lerobot.envs.tasks.composite.common import before_stool, fetch, fetch_in_turn, on_shelf
 from robocasa_lerobot.envs.tasks.task import Stage, Task
 
 _IN_GLASS = AllOf(ObjectOn("straw", "glass_cup", within=0.06), GripperFar("straw"))
@@ -158,4 +167,192 @@ PREPARE_DRINK_STATION = Task(
     ),
 )
 
-TASKS = (DELIVER_STRAW, PREPARE_COCKTAIL_STATION, PREPARE_DRINK_STATION)
+
+_PAIRS = {"wine_bottle": "wine_glass", "juice_bottle": "glass_cup"}
+
+
+def _by_its_glass(bottle: str) -> AllOf:
+    return AllOf(
+        Near(bottle, _PAIRS[bottle], 0.25),
+        ObjectTouches(bottle, "dining_counter"),
+        ObjectUpright(bottle),
+        GripperFar(bottle),
+    )
+
+
+def _to_its_glass(bottle: str) -> tuple[Stage, ...]:
+    *carried, put = fetch(bottle, "counter", "dining_counter", until=_by_its_glass(bottle))
+    text = f"put the {{{bottle}}} on the dining counter beside the {{{_PAIRS[bottle]}}}"
+    return *carried, replace(put, text=text)
+
+
+def _bottle(name: str, group: str, again: str = "") -> ObjectSpec:
+    start = Placement("counter", size=(0.8, 0.2), pos=(0.0, -1.0), reuse_region_from=again)
+    return ObjectSpec(name, (group,), start, graspable=True)
+
+
+MATCH_CUP_AND_DRINK = Task(
+    name="MatchCupAndDrink",
+    summary="On the dining counter, the wine stands 25 cm from the wine glass at most, the juice so by the glass.",
+    fixtures=(
+        FixtureSpec("stool1", "stool"),
+        FixtureSpec("stool2", "stool", other_than=("stool1",)),
+        FixtureSpec("dining_counter", "dining_counter", near="stool1"),
+        FixtureSpec("counter", "counter", other_than=("dining_counter",)),
+    ),
+    needs=("dining_counter",),
+    robot_start=RobotStart("counter", at_object="wine_bottle"),
+    objects=(
+        ObjectSpec("wine_glass", ("wine_glass",), before_stool((0.25, 0.15), stool="stool1")),
+        ObjectSpec("glass_cup", ("glass_cup",), before_stool((0.25, 0.15), stool="stool2")),
+        _bottle("wine_bottle", "wine"),
+        _bottle("juice_bottle", "juice", again="wine_bottle"),
+    ),
+    goal=AllOf(*(part for bottle in _PAIRS for part in _by_its_glass(bottle).parts)),
+    stages=(
+        *_to_its_glass("wine_bottle"),
+        Stage("navigation", "drive", "juice_bottle"),
+        *_to_its_glass("juice_bottle"),
+    ),
+    instruction="Stand the wine beside the wine glass and the juice beside the other glass on the dining counter.",
+    paraphrases=(
+        "Every drink goes to its glass: the wine next to the wine glass, the juice next to the tumbler.",
+        "Carry the wine to the wine glass on the dining counter, then the juice to the other glass.",
+        "Match drinks and glasses on the dining counter; both bottles come from the counter ahead.",
+        "The juice belongs close to the plain glass and the wine close to the stemmed one.",
+    ),
+)
+
+_SODAS = ("soda1", "soda2")
+
+
+def _chilled(name: str) -> AllOf:
+    return AllOf(ObjectOn(name, "ice_bowl"), GripperFar(name, 0.15))
+
+
+SETUP_SODA_BOWL = Task(
+    name="SetupSodaBowl",
+    summary="Both sodas are in the bowl with the ice on the dining counter, the gripper away.",
+    fixtures=(
+        FixtureSpec("stool", "stool"),
+        FixtureSpec("dining_counter", "dining_counter", near="stool"),
+        FixtureSpec("fridge", "fridge"),
+    ),
+    needs=("dining_counter",),
+    robot_start=RobotStart("fridge"),
+    objects=(
+        ObjectSpec("ice_bowl", ("bowl",), before_stool((0.3, 0.3))),
+        *(
+            ObjectSpec(name, ("ice_cube",), Placement(object="ice_bowl", heaped=True), scale=0.5, repeats=True)
+            for name in ("ice1", "ice2", "ice3")
+        ),
+        *(
+            ObjectSpec(
+                name,
+                ("bottled_drink", "can"),
+                on_shelf(level, (0.5, 0.2)),
+                graspable=True,
+                properties=("fridgable",),
+                repeats=True,
+            )
+            for name, level in zip(_SODAS, ("highest", "second_highest"), strict=True)
+        ),
+    ),
+    goal=AllOf(
+        *(ObjectOn(name, "ice_bowl") for name in _SODAS),
+        ObjectTouches("ice_bowl", "dining_counter"),
+        *(GripperFar(name, 0.15) for name in (*_SODAS, "ice_bowl")),
+    ),
+    stages=(
+        Stage("doors", "open", "fridge", part="fridge"),
+        *fetch_in_turn(_SODAS, "fridge", "ice_bowl", until=_chilled),
+    ),
+    instruction="Put {soda1+soda2} from the fridge into the bowl of ice on the dining counter.",
+    paraphrases=(
+        "The sodas should stay cool: open the fridge and set both into the ice bowl on the dining counter.",
+        "Bring {soda1+soda2} from the fridge to the dining counter, into the bowl with the ice cubes.",
+        "Chill both drinks of the fridge in the bowl that holds ice.",
+        "The bowl with ice on the dining counter is for the two drinks in the fridge.",
+    ),
+)
+
+
+_CUPS, _MEALS = ("cup1", "cup2"), ("plate1", "plate2")
+
+
+def _at_side(cup: str, plate: str) -> Beside:
+    return Beside(cup, plate, plate.replace("plate", "stool"), across=0.25, along=0.15)
+
+
+def _cup_served(cup: str) -> AllOf:
+    plate = cup.replace("cup", "plate")
+    return AllOf(_at_side(cup, plate), ObjectTouches(cup, "dining_counter"), GripperFar(cup))
+
+
+SERVE_MEAL_JUICE = Task(
+    name="ServeMealJuice",
+    summary="Each plate on the dining counter has a cup of juice of its own beside it, the gripper away from both.",
+    fixtures=(
+        FixtureSpec("cabinet", "cabinet"),
+        counter_near("cabinet"),
+        FixtureSpec("stool1", "stool"),
+        FixtureSpec("stool2", "stool", other_than=("stool1",)),
+        FixtureSpec("dining_counter", "dining_counter", near="stool1"),
+    ),
+    needs=("dining_counter",),
+    robot_start=RobotStart("counter", at_object="cup1"),
+    objects=(
+        *(
+            ObjectSpec(
+                plate, ("plate",), before_stool((0.35, 0.3), stool=plate.replace("plate", "stool")), repeats=True
+            )
+            for plate in _MEALS
+        ),
+        *(
+            ObjectSpec(
+                f"food_{plate}",
+                ("cooked_food", "chicken_drumstick"),
+                Placement(object=plate),
+                exclude=("pizza",),
+                repeats=True,
+            )
+            for plate in _MEALS
+        ),
+        ObjectSpec("cup1", ("cup",), on_counter("cabinet", (0.5, 0.2)), graspable=True, filled="orange_juice"),
+        ObjectSpec(
+            "cup2",
+            ("cup",),
+            on_counter("cabinet", (0.5, 0.2), pos=(0.0, -1.0), reuse_region_from="cup1"),
+            graspable=True,
+            filled="orange_juice",
+            repeats=True,
+        ),
+    ),
+    goal=AllOf(
+        AnyOf(
+            *(
+                AllOf(*(_at_side(*pair) for pair in zip(_CUPS, plates, strict=True)))
+                for plates in (_MEALS, _MEALS[::-1])
+            )
+        ),
+        *(ObjectTouches(cup, "dining_counter") for cup in _CUPS),
+        *map(GripperFar, _CUPS),
+    ),
+    stages=fetch_in_turn(_CUPS, "counter", "dining_counter", until=_cup_served, along=True),
+    instruction="Carry both cups of juice to the dining counter, and set one beside each plate.",
+    paraphrases=(
+        "Every meal on the dining counter gets a cup of juice at its side; both cups are on the counter.",
+        "Serve juice with the meals: a cup next to either plate.",
+        "Bring one cup to the side of one plate and the other cup to the other plate.",
+        "The two plates on the dining counter should each have a cup close by.",
+    ),
+)
+
+TASKS = (
+    DELIVER_STRAW,
+    MATCH_CUP_AND_DRINK,
+    PREPARE_COCKTAIL_STATION,
+    PREPARE_DRINK_STATION,
+    SERVE_MEAL_JUICE,
+    SETUP_SODA_BOWL,
+)

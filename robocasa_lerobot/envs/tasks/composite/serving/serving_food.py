@@ -1,8 +1,11 @@
 """Serve food."""
 
+import numpy as np
+
 from robocasa_lerobot.envs.predicates import (
     AllOf,
     AnyOf,
+    DoorsClosed,
     GripperFar,
     GripperTouches,
     Never,
@@ -11,6 +14,7 @@ from robocasa_lerobot.envs.predicates import (
     OnBurner,
 )
 from robocasa_lerobot.envs.scene.spec import (
+    Choice,
     FixtureSpec,
     InitialOpenness,
     ObjectSpec,
@@ -19,7 +23,7 @@ from robocasa_lerobot.envs.scene.spec import (
     SampleRegion,
 )
 from robocasa_lerobot.envs.tasks.atomic.common import HANDLE_TO_FRONT, counter_near, in_cabinet, on_counter
-from robocasa_lerobot.envs.tasks.composite.common import before_stool, fetch
+from robocasa_lerobot.envs.tasks.composite.common import before_stool, fetch, fetch_in_turn
 from robocasa_lerobot.envs.tasks.task import Stage, Task
 
 _SERVED = ObjectOn("vegetable", "plate")
@@ -209,4 +213,87 @@ PLACE_FOOD_IN_BOWLS = Task(
     ),
 )
 
-TASKS = (DESSERT_UPGRADE, PAN_TRANSFER, PLACE_FOOD_IN_BOWLS, SERVE_STEAK)
+
+_FOR_DRINKING = ("alcohol", "cup")
+
+ALCOHOL_SERVING_PREP = Task(
+    name="AlcoholServingPrep",
+    summary="Bottle and cup stand on the dining counter, the gripper away from them.",
+    fixtures=(
+        FixtureSpec("cab", "cabinet_double_door"),
+        FixtureSpec("dining_table", "dining_counter", size=(0.75, 0.2)),
+        FixtureSpec("sink", "sink"),
+    ),
+    robot_start=RobotStart("cab"),
+    objects=(
+        ObjectSpec("alcohol", ("alcohol",), in_cabinet("cab", (0.5, 0.2), pos=(-0.6, -1.0)), graspable=True),
+        ObjectSpec("cup", ("cup", "mug"), in_cabinet("cab", (0.5, 0.2), pos=(0.6, -1.0)), graspable=True),
+        ObjectSpec("decoration", ("decoration",), Placement("dining_table", size=(0.3, 0.3), pos=(0.0, 0.0))),
+        ObjectSpec(
+            "distr_counter",
+            ("vegetable", "fruit", "sweets", "dairy"),
+            Placement("dining_table", size=(0.3, 0.3), pos=(-1.0, -1.0)),
+        ),
+        ObjectSpec(
+            "distr_sink", ("any",), Placement("sink", size=(0.25, 0.25), pos=(0.0, 1.0)), properties=("washable",)
+        ),
+    ),
+    goal=AllOf(*(ObjectTouches(name, "dining_table") for name in _FOR_DRINKING), *map(GripperFar, _FOR_DRINKING)),
+    stages=(Stage("doors", "open", "cab"), *fetch_in_turn(_FOR_DRINKING, "cab", "dining_table")),
+    instruction="Open the cabinet and bring its {alcohol} and its {cup} to the dining counter with the {decoration}.",
+    paraphrases=(
+        "Serve a drink: {alcohol} and {cup} are in the closed cabinet and belong on the dining counter.",
+        "The dining counter, where the {decoration} is, should also have the cabinet's {alcohol} and {cup}.",
+        "Take the {alcohol} out of the cabinet to the dining counter, then the {cup}.",
+        "Carry {alcohol} and {cup} from behind the cabinet's doors over to the dining counter.",
+    ),
+)
+
+PREPARE_SOUP_SERVING = Task(
+    name="PrepareSoupServing",
+    summary="The ladle is in the pot, the cabinet is shut.",
+    fixtures=(
+        FixtureSpec("stove", "stove"),
+        FixtureSpec("cab", "cabinet_with_door", near="stove"),
+        counter_near("stove"),
+    ),
+    robot_start=RobotStart("cab"),
+    choices=(Choice("burner", of="stove"),),
+    objects=(
+        ObjectSpec(
+            "ladle",
+            ("ladle",),
+            in_cabinet("cab", (0.5, 0.2), rotation=(-np.pi / 8, np.pi / 8)),
+            graspable=True,
+        ),
+        ObjectSpec(
+            "pot",
+            ("pot",),
+            Placement(
+                "stove",
+                region=SampleRegion(name="{burner}"),
+                size=(0.02, 0.02),
+                pos=(0.0, 0.0),
+                ensure_inside=False,
+                rotation=(np.pi / 4, 3 * np.pi / 8),
+            ),
+            graspable=True,
+        ),
+        ObjectSpec("bowl1", ("bowl",), on_counter("stove", (0.4, 0.4), loc="left_right"), graspable=True),
+    ),
+    goal=AllOf(ObjectOn("ladle", "pot"), DoorsClosed("cab")),
+    stages=(
+        Stage("doors", "open", "cab"),
+        Stage("pick_place", "place", "pot", object="ladle"),
+        Stage("doors", "close", "cab"),
+    ),
+    instruction="Take the ladle out of the cabinet, put it into the pot on the stove, and close the cabinet.",
+    paraphrases=(
+        "The soup in the pot is to be served: fetch the ladle from the cabinet into it and shut the cabinet.",
+        "Open the cabinet, lay the ladle into the pot, and leave the cabinet closed.",
+        "The pot on the stove needs the ladle that is in the cabinet; close the cabinet afterwards.",
+        "Move the ladle from the cabinet to the pot and shut the cabinet's door.",
+    ),
+)
+
+TASKS = (ALCOHOL_SERVING_PREP, DESSERT_UPGRADE, PAN_TRANSFER, PLACE_FOOD_IN_BOWLS, PREPARE_SOUP_SERVING, SERVE_STEAK)
