@@ -7,10 +7,13 @@ from robocasa_lerobot.envs.predicates import (
     AllOf,
     AnyOf,
     DoorsClosed,
+    GripperFar,
     NearerThan,
     ObjectInside,
     ObjectTouches,
     ObjectTouchesAnyCounter,
+    OnShelf,
+    When,
 )
 from robocasa_lerobot.envs.scene.spec import InitialOpenness
 
@@ -87,5 +90,49 @@ OURS = {
             "cabinet doors closed (<= 0.005 of range)": DoorsClosed("cabinet", 0.005),
         },
         initial={"cabinet doors closed": None},
+    ),
+    "FreshProduceOrganization": Ours(
+        goal={
+            "food inside fridge shelf region, shelf holding its own kind (origin z between shelf floor "
+            "and 90% of shelf height; bbox corners inside, tol 0.05)": When(
+                "kind",
+                {
+                    "fruit": OnShelf("food", "fridge", "{fruit_shelf}"),
+                    "vegetable": OnShelf("food", "fridge", "{_vegetable_shelf}"),
+                },
+            ),
+            "vegetable_fridge inside fridge shelf region, vegetable shelf (origin z between shelf floor "
+            "and 90% of shelf height; bbox corners inside, tol 0.05)": OnShelf(
+                "vegetable_fridge", "fridge", "{_vegetable_shelf}"
+            ),
+            "fruit_fridge inside fridge shelf region, fruit shelf (origin z between shelf floor and 90% "
+            "of shelf height; bbox corners inside, tol 0.05)": OnShelf("fruit_fridge", "fridge", "{fruit_shelf}"),
+            "fridge doors closed (<= 0.005 of range)": DoorsClosed("fridge", 0.005, part="fridge"),
+            "gripper > 0.25 m from vegetable_fridge": GripperFar("vegetable_fridge", 0.25),
+            "gripper > 0.25 m from fruit_fridge": GripperFar("fruit_fridge", 0.25),
+            "gripper > 0.25 m from food": GripperFar("food", 0.25),
+        },
+        initial={
+            "fridge doors open": InitialOpenness("fridge", 0.9, 1.0, part="fridge"),
+            "food is a fruit or a vegetable at random": "food",
+            "fruit shelf is the top shelf (-1) or the second (-2) at random; vegetable shelf is the other": None,
+            "robot base centred on food": "food",
+        },
+    ),
+    "StockingBreakfastFoods": Ours(
+        goal={
+            "obj1 inside cabinet1 (all bbox corners within one interior region, tol 0.05)": ObjectInside(
+                "obj1", "cabinet1", margin=0.05
+            ),
+            "obj2 inside cabinet2 (all bbox corners within one interior region, tol 0.05)": ObjectInside(
+                "obj2", "cabinet2", margin=0.05
+            ),
+            "gripper > 0.25 m from obj1": GripperFar("obj1", 0.25),
+            "gripper > 0.25 m from obj2": GripperFar("obj2", 0.25),
+        },
+        initial={
+            "both cabinets' doors open": InitialOpenness("cabinet1", 0.9, 1.0),
+        },
+        more_initial=frozenset({InitialOpenness("cabinet2", 0.9, 1.0)}),
     ),
 }

@@ -9,7 +9,10 @@ from robocasa_lerobot.envs.predicates import (
     ObjectInside,
     ObjectTouches,
     ObjectTouchesAnyCounter,
+    OnShelf,
+    When,
 )
+from robocasa_lerobot.envs.scene.drawn import Drawn
 from robocasa_lerobot.envs.scene.spec import (
     Choice,
     FixtureSpec,
@@ -20,7 +23,7 @@ from robocasa_lerobot.envs.scene.spec import (
     SampleRegion,
 )
 from robocasa_lerobot.envs.tasks.atomic.common import counter_near, in_cabinet, on_counter
-from robocasa_lerobot.envs.tasks.composite.common import before_stool, fetch
+from robocasa_lerobot.envs.tasks.composite.common import before_stool, fetch, on_shelf
 from robocasa_lerobot.envs.tasks.task import Stage, Task
 
 _BELOW = Placement(
@@ -238,4 +241,124 @@ BEVERAGE_SORTING = Task(
     ),
 )
 
-TASKS = (BEVERAGE_SORTING, REFILL_CONDIMENT_STATION, RESTOCK_BOWLS, RESTOCK_CANNED_FOOD, RESTOCK_PANTRY)
+
+_SHELF_OF = {"fruit": "{fruit_shelf}", "vegetable": "{_vegetable_shelf}"}
+
+
+def _shelve_food(scene: Drawn) -> tuple[Stage, ...]:
+    shelf = scene.fill(_SHELF_OF[scene.choices["kind"]])
+    return (
+        *fetch("food", "counter", "fridge", part=f"fridge_shelf:{shelf}"),
+        Stage("doors", "close_large", "fridge", part="fridge"),
+    )
+
+
+FRESH_PRODUCE_ORGANIZATION = Task(
+    name="FreshProduceOrganization",
+    summary="Fruit is on one shelf of the fridge, vegetables on another, the fridge is shut, the gripper away.",
+    fixtures=(FixtureSpec("fridge", "fridge"), counter_near("fridge")),
+    robot_start=RobotStart("counter", at_object="food"),
+    choices=(
+        Choice("kind", {"fruit": {}, "vegetable": {}}),
+        Choice(
+            "fruit_shelf",
+            {
+                "highest": {"_vegetable_shelf": "second_highest"},
+                "second_highest": {"_vegetable_shelf": "highest"},
+            },
+        ),
+    ),
+    objects=(
+        ObjectSpec(
+            "food",
+            ("{kind}",),
+            on_counter("fridge", (1.0, 0.4), pos=(-0.25, -1.0)),
+            graspable=True,
+            properties=("graspable", "fridgable"),
+            max_height=0.2,
+        ),
+        *(
+            ObjectSpec(
+                f"{kind}_fridge",
+                (kind,),
+                on_shelf(shelf, (0.4, 0.2), (None, None)),
+                properties=("fridgable",),
+                max_height=0.2,
+            )
+            for kind, shelf in reversed(_SHELF_OF.items())
+        ),
+    ),
+    initial=(InitialOpenness("fridge", 0.9, 1.0, part="fridge"),),
+    goal=AllOf(
+        When("kind", {kind: OnShelf("food", "fridge", shelf) for kind, shelf in _SHELF_OF.items()}),
+        *(OnShelf(f"{kind}_fridge", "fridge", shelf) for kind, shelf in _SHELF_OF.items()),
+        DoorsClosed("fridge", part="fridge"),
+        *map(GripperFar, ("vegetable_fridge", "fruit_fridge", "food")),
+    ),
+    stages=_shelve_food,
+    instruction="Put the {food} on the shelf of the fridge where another {kind} is, and close the fridge.",
+    paraphrases=(
+        "Fruit with fruit, vegetables with vegetables: that tells the shelf for the {food}. Shut the fridge then.",
+        "The fridge has a shelf for each kind of produce; put the {food} on the right one and close the doors.",
+        "Carry the {food} to the fridge, to the shelf that holds a {kind} already, and shut the fridge.",
+        "Restock the fridge with the {food}, sorted, and leave it closed.",
+    ),
+)
+
+
+def _breakfast(number: int) -> tuple[ObjectSpec, ...]:
+    cabinet, counter = f"cabinet{number}", "counter" if number == 1 else "counter2"
+    return (
+        ObjectSpec(
+            f"obj{number}",
+            ("packaged_food",),
+            on_counter(cabinet, (0.4, 0.2), counter=counter),
+            graspable=True,
+        ),
+        ObjectSpec(
+            f"distr_counter{number}",
+            ("any",),
+            on_counter(cabinet, (1.0, 0.3), pos=(0.0, 1.0), offset=(0.0, -0.05), counter=counter),
+        ),
+        ObjectSpec(f"distr_cab{number}", ("any",), in_cabinet(cabinet, (1.0, 0.2), pos=(0.0, 1.0))),
+    )
+
+
+STOCKING_BREAKFAST_FOODS = Task(
+    name="StockingBreakfastFoods",
+    summary="Each of the two packages is in the cabinet above it, the gripper away from both.",
+    fixtures=(
+        FixtureSpec("cabinet1", "cabinet"),
+        FixtureSpec("cabinet2", "cabinet", other_than=("cabinet1",)),
+        counter_near("cabinet1"),
+        counter_near("cabinet2", name="counter2"),
+    ),
+    robot_start=RobotStart("cabinet1"),
+    objects=(*_breakfast(1), *_breakfast(2)),
+    initial=(InitialOpenness("cabinet1", 0.9, 1.0), InitialOpenness("cabinet2", 0.9, 1.0)),
+    goal=AllOf(
+        ObjectInside("obj1", "cabinet1"), ObjectInside("obj2", "cabinet2"), GripperFar("obj1"), GripperFar("obj2")
+    ),
+    stages=(
+        Stage("pick_place", "place", "cabinet1", object="obj1"),
+        Stage("navigation", "drive", "cabinet2"),
+        Stage("pick_place", "place", "cabinet2", object="obj2"),
+    ),
+    instruction="Put the {obj1} into the open cabinet above it, and the {obj2} into the other open cabinet, above it.",
+    paraphrases=(
+        "Stock both open cabinets, each with the package that stands below it.",
+        "The {obj1} and the {obj2} belong in the cabinets over them.",
+        "Store the {obj1} here, go to the other open cabinet, and store the {obj2} there.",
+        "Two packages of breakfast food, two open cabinets: put each into the nearest one.",
+    ),
+)
+
+TASKS = (
+    BEVERAGE_SORTING,
+    FRESH_PRODUCE_ORGANIZATION,
+    REFILL_CONDIMENT_STATION,
+    RESTOCK_BOWLS,
+    RESTOCK_CANNED_FOOD,
+    RESTOCK_PANTRY,
+    STOCKING_BREAKFAST_FOODS,
+)
