@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from blueprint_words.ours import Ours, away
-from robocasa_lerobot.envs.predicates import AllOf, AnyOf, ForEach, GripperFar, Not, ObjectOn
+from robocasa_lerobot.envs.predicates import AllOf, AnyOf, ForEach, GripperFar, Not, ObjectOn, ObjectTouches, OnShelf
 from robocasa_lerobot.envs.scene.initial_states import Water
+from robocasa_lerobot.envs.scene.spec import InitialOpenness
 
 BOARD = "non_vegetable_container"
 NEAR = "(contact; xy dist < 0.7 x {} radius)"
@@ -59,5 +60,40 @@ OURS = {
             ),
         },
         initial={},
+    ),
+    "ArrangeCuttingFruits": Ours(
+        goal={
+            "fruit1 on cutting_board (contact; xy dist < 0.7 x cutting_board radius)": ObjectOn(
+                "fruit1", "cutting_board"
+            ),
+            "fruit2 on cutting_board (contact; xy dist < 0.7 x cutting_board radius)": ObjectOn(
+                "fruit2", "cutting_board"
+            ),
+            "non_fruit1 on fridge any shelf (bbox inside region, margin 0.05 m; height <= 90% of region)": OnShelf(
+                "non_fruit1", "fridge"
+            ),
+            "non_fruit2 on fridge any shelf (bbox inside region, margin 0.05 m; height <= 90% of region)": OnShelf(
+                "non_fruit2", "fridge"
+            ),
+            "gripper > 0.25 m from fruit1": GripperFar("fruit1", 0.25),
+            "gripper > 0.25 m from fruit2": GripperFar("fruit2", 0.25),
+            "gripper > 0.25 m from non_fruit1": GripperFar("non_fruit1", 0.25),
+            "gripper > 0.25 m from non_fruit2": GripperFar("non_fruit2", 0.25),
+        },
+        initial={
+            "fridge door(s) open (0.90-1.0 of range)": InitialOpenness("fridge", 0.9, 1.0, part="fridge"),
+        },
+        turned={"cutting_board": (np.pi / 2, np.pi / 2)},
+    ),
+    "MeatTransfer": Ours(
+        goal={
+            "container touching counter": ObjectTouches("container", "counter"),
+            "gripper > 0.25 m from meat": GripperFar("meat", 0.25),
+            "meat in container (contact; xy dist < 0.7 x container radius)": ObjectOn("meat", "container"),
+        },
+        initial={
+            "cabinet doors closed": None,
+        },
+        turned={"container": (-0.2, 0.2)},
     ),
 }

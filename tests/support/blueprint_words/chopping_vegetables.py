@@ -29,4 +29,20 @@ OURS = {
         },
         called={"correct": TOOL},
     ),
+    "GatherCuttingTools": Ours(
+        goal={
+            "gripper > 0.25 m from cutting_board": GripperFar("cutting_board", 0.25),
+            "peeler on cutting_board (contact AND centre xy distance < 0.7 x cutting_board radius)": ObjectOn(
+                "peeler", "cutting_board"
+            ),
+            "knife on cutting_board (contact AND centre xy distance < 0.7 x cutting_board radius)": ObjectOn(
+                "knife", "cutting_board"
+            ),
+        },
+        initial={
+            "drawer closed": None,
+            "drawer_top chosen at random; robot base stands to its left or right (half width + 0.2 m), "
+            "whichever is free": None,
+        },
+    ),
 }

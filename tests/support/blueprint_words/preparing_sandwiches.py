@@ -5,11 +5,32 @@ from __future__ import annotations
 import numpy as np
 
 from blueprint_words.ours import Ours, away
-from robocasa_lerobot.envs.predicates import DoorsClosed, GripperFar, Near, ObjectOn, ObjectTouches, PartWithin
+from robocasa_lerobot.envs.predicates import (
+    AllOf,
+    AnyOf,
+    DoorsClosed,
+    GripperFar,
+    Near,
+    NearFixture,
+    ObjectOn,
+    ObjectTouches,
+    ObjectTouchesAnyCounter,
+    PartWithin,
+)
 from robocasa_lerobot.envs.scene.initial_states import PartAt, Water
 from robocasa_lerobot.envs.scene.spec import InitialOpenness
 
 TIMER = PartWithin("toaster_oven", "knob_time", low=0.1, label="set")
+
+BOWL = "ingredient_bowl"
+SLICES = ("tomato_slice", "pickle_slice", "turkey_slice")
+
+
+def kept_in_bowl(name: str) -> AnyOf:
+    others = (other for other in SLICES if other != name)
+    on_others = (AllOf(ObjectTouches(name, other), ObjectOn(other, BOWL)) for other in others)
+    return AnyOf(ObjectOn(name, BOWL), *on_others)
+
 
 OURS = {
     "GatherVegetables": Ours(
@@ -70,6 +91,45 @@ OURS = {
         initial={
             "fridge door(s) closed": None,
             "sausage on random one of top / second highest shelf, cheese on the other": "sausage",
+        },
+    ),
+    "PrepareSandwichStation": Ours(
+        goal={
+            "each of tomato_slice, pickle_slice, turkey_slice: OR(in ingredient_bowl (contact; xy dist < "
+            "0.7 x radius); touching another slice that is in the bowl)": AllOf(*map(kept_in_bowl, SLICES)),
+            "at least one slice in ingredient_bowl": AnyOf(*(ObjectOn(name, BOWL) for name in SLICES)),
+            "ingredient_bowl touching any counter": ObjectTouchesAnyCounter(BOWL),
+            "baguette touching any counter": ObjectTouchesAnyCounter("baguette"),
+            "ingredient_bowl bbox within 0.35 m of toaster_oven": NearFixture(BOWL, "toaster_oven", 0.35),
+            "baguette bbox within 0.35 m of toaster_oven": NearFixture("baguette", "toaster_oven", 0.35),
+            "gripper > 0.25 m from ingredient_bowl": GripperFar("ingredient_bowl", 0.25),
+            "gripper > 0.25 m from baguette": GripperFar("baguette", 0.25),
+        },
+        initial={
+            "fridge door(s) open (0.90-1.0 of range)": InitialOpenness("fridge", 0.9, 1.0, part="fridge"),
+            "bowl on random one of top / second highest shelf, baguette on the other": BOWL,
+        },
+        kinds={"counter": "counter"},
+        near={"counter": "toaster_oven"},
+    ),
+    "ToastHeatableIngredients": Ours(
+        goal={
+            "sausage touching toaster_oven rack/tray (level 0 or 1)": ObjectTouches(
+                "sausage", "toaster_oven", part="{rack}"
+            ),
+            "bread touching toaster_oven rack/tray (level 0 or 1)": ObjectTouches(
+                "bread", "toaster_oven", part="{rack}"
+            ),
+            "tomato on plate (contact; xy dist < 0.7 x plate radius)": ObjectOn("tomato", "plate"),
+            "onion on plate (contact; xy dist < 0.7 x plate radius)": ObjectOn("onion", "plate"),
+            "gripper > 0.15 m from sausage": GripperFar("sausage", 0.15),
+            "gripper > 0.15 m from bread": GripperFar("bread", 0.15),
+            "gripper > 0.15 m from tomato": GripperFar("tomato", 0.15),
+            "gripper > 0.15 m from onion": GripperFar("onion", 0.15),
+            "gripper > 0.15 m from plate": GripperFar("plate", 0.15),
+        },
+        initial={
+            "toaster_oven door closed": None,
         },
     ),
 }

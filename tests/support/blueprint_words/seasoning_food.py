@@ -3,7 +3,14 @@
 from __future__ import annotations
 
 from blueprint_words.ours import Ours, away
-from robocasa_lerobot.envs.predicates import Beside, NearFixture, ObjectTouches, ObjectTouchesAnyCounter
+from robocasa_lerobot.envs.predicates import (
+    Beside,
+    GripperFar,
+    NearFixture,
+    ObjectOn,
+    ObjectTouches,
+    ObjectTouchesAnyCounter,
+)
 from robocasa_lerobot.envs.scene.spec import InitialOpenness
 
 OPEN = {"cabinet door(s) open (0.90-1.0)": InitialOpenness("cabinet", 0.9, 1.0)}
@@ -30,5 +37,16 @@ OURS = {
             **away(*SPICES),
         },
         initial=OPEN,
+    ),
+    "LemonSeasoningFish": Ours(
+        goal={
+            "lemon on fish_container (contact AND centre xy distance < 0.7 x fish_container radius)": ObjectOn(
+                "lemon", "fish_container"
+            ),
+            "gripper > 0.25 m from lemon": GripperFar("lemon", 0.25),
+        },
+        initial={
+            "fridge closed": None,
+        },
     ),
 }

@@ -2,10 +2,18 @@
 
 import numpy as np
 
-from robocasa_lerobot.envs.predicates import AllOf, AnyOf, ForEach, GripperFar, Not, ObjectOn
+from robocasa_lerobot.envs.predicates import AllOf, AnyOf, ForEach, GripperFar, Not, ObjectOn, ObjectTouches, OnShelf
 from robocasa_lerobot.envs.scene.initial_states import Water
-from robocasa_lerobot.envs.scene.spec import FixtureSpec, ObjectSpec, Placement, RobotStart, SampleRegion
-from robocasa_lerobot.envs.tasks.atomic.common import counter_near
+from robocasa_lerobot.envs.scene.spec import (
+    FixtureSpec,
+    InitialOpenness,
+    ObjectSpec,
+    Placement,
+    RobotStart,
+    SampleRegion,
+)
+from robocasa_lerobot.envs.tasks.atomic.common import counter_near, in_cabinet, on_counter
+from robocasa_lerobot.envs.tasks.composite.common import fetch_in_turn
 from robocasa_lerobot.envs.tasks.task import EachStage, Stage, Task
 
 _ACROSS, _ALONG = (np.pi / 2, np.pi / 2), (0.0, 0.0)  # radians
@@ -165,4 +173,103 @@ ORGANIZE_VEGETABLES = Task(
     ),
 )
 
-TASKS = (ARRANGE_VEGETABLES, BREAD_SETUP_SLICING, CLEAR_CUTTING_BOARD, ORGANIZE_VEGETABLES)
+
+_FRUITS, _KEPT = ("fruit1", "fruit2"), ("non_fruit1", "non_fruit2")
+
+
+def _in_fridge(name: str, x: float) -> ObjectSpec:
+    region = SampleRegion(name="fridge_shelf", height=(1.0, 1.5))
+    fruit = name in _FRUITS
+    return ObjectSpec(
+        name,
+        ("fruit",) if fruit else ("any",),
+        Placement("fridge", region=region, size=(0.5 if fruit else 0.8, 0.25), pos=(x, -1.0)),
+        graspable=True,
+        exclude=() if fruit else ("fruit",),
+        properties=() if fruit else ("fridgable",),
+    )
+
+
+def _by_board(size: tuple[float, float], along: float | None) -> Placement:
+    return Placement(
+        "counter",
+        region=SampleRegion(ref="sink"),
+        size=size,
+        pos=(None, along),
+        rotation=(0.0, 0.0),
+        reuse_region_from="cutting_board",
+    )
+
+
+ARRANGE_CUTTING_FRUITS = Task(
+    name="ArrangeCuttingFruits",
+    summary="Both fruits are on the cutting board, what else the fridge had is on its shelves, the gripper away.",
+    fixtures=(
+        FixtureSpec("fridge", "fridge"),
+        FixtureSpec("sink", "sink"),
+        counter_near("sink", size=(0.5, 0.5)),
+    ),
+    robot_start=RobotStart("fridge"),
+    objects=(
+        ObjectSpec(
+            "cutting_board",
+            ("cutting_board",),
+            on_counter("sink", (0.35, 0.45), loc="left_right", rotation=(np.pi / 2, np.pi / 2)),
+        ),
+        ObjectSpec("knife", ("knife",), _by_board((0.5, 0.35), -1.0)),
+        ObjectSpec("bowl", ("bowl",), _by_board((np.inf, 0.7), None)),
+        *(_in_fridge(names, x) for names, x in zip((*_FRUITS, *_KEPT), (0.5, -0.5, 0.5, -0.5), strict=True)),
+    ),
+    initial=(InitialOpenness("fridge", 0.9, 1.0, part="fridge"),),
+    goal=AllOf(
+        *(ObjectOn(name, "cutting_board") for name in _FRUITS),
+        *(OnShelf(name, "fridge") for name in _KEPT),
+        *map(GripperFar, (*_FRUITS, *_KEPT)),
+    ),
+    stages=fetch_in_turn(_FRUITS, "fridge", "cutting_board"),
+    instruction="Bring {fruit1} and {fruit2} from the fridge to the cutting board by the sink; the rest stays inside.",
+    paraphrases=(
+        "Only the fridge's fruits go to the cutting board: {fruit1} and {fruit2}.",
+        "The {fruit1} and the {fruit2} will be cut: carry them from the fridge to the board at the sink.",
+        "Lay both fruits of the fridge on the cutting board and leave everything else in the fridge.",
+        "Take the {fruit1}, then the {fruit2}, out of the open fridge to the board beside the sink.",
+    ),
+)
+
+MEAT_TRANSFER = Task(
+    name="MeatTransfer",
+    summary="The container stands on the counter with the meat in it, the gripper away from the meat.",
+    fixtures=(FixtureSpec("cabinet", "cabinet_double_door"), counter_near("cabinet", size=(0.5, 0.5))),
+    robot_start=RobotStart("cabinet"),
+    objects=(
+        ObjectSpec(
+            "container",
+            ("pan", "bowl", "tupperware"),
+            in_cabinet("cabinet", (np.inf, 0.5), rotation=(-0.2, 0.2)),
+            graspable=True,
+        ),
+        ObjectSpec("meat", ("meat",), on_counter("cabinet", (0.5, 0.4)), graspable=True),
+    ),
+    goal=AllOf(ObjectTouches("container", "counter"), GripperFar("meat"), ObjectOn("meat", "container")),
+    stages=(
+        Stage("doors", "open", "cabinet"),
+        Stage("pick_place", "place", "counter", object="container"),
+        Stage("pick_place", "place", "container", object="meat"),
+    ),
+    instruction="Take the {container} out of the cabinet, set it on the counter and put the {meat} into it.",
+    paraphrases=(
+        "The {meat} on the counter belongs in the {container}, which is still in the cabinet.",
+        "Open the cabinet, bring the {container} down to the counter, and lay the {meat} in it.",
+        "Get the cabinet's {container} for the {meat}: onto the counter with it, and the {meat} inside.",
+        "Transfer the {meat} into the {container}, once that stands on the counter.",
+    ),
+)
+
+TASKS = (
+    ARRANGE_CUTTING_FRUITS,
+    ARRANGE_VEGETABLES,
+    BREAD_SETUP_SLICING,
+    CLEAR_CUTTING_BOARD,
+    MEAT_TRANSFER,
+    ORGANIZE_VEGETABLES,
+)

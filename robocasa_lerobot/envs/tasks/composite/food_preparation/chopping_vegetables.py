@@ -64,4 +64,41 @@ CUTTING_TOOL_SELECTION = Task(
     ),
 )
 
-TASKS = (CUTTING_TOOL_SELECTION,)
+
+_BOTH = ("peeler", "knife")
+
+GATHER_CUTTING_TOOLS = Task(
+    name="GatherCuttingTools",
+    summary="Peeler and knife lie on the cutting board, the gripper away from it.",
+    fixtures=(FixtureSpec("drawer", "drawer_top"), counter_near("drawer", size=(0.5, 0.5))),
+    robot_start=RobotStart("drawer", beside=True),
+    objects=(
+        ObjectSpec("peeler", ("peeler",), _IN_DRAWER, scale=_HIGHER, graspable=True),
+        ObjectSpec("knife", ("knife",), _IN_DRAWER, scale=_HIGHER),
+        ObjectSpec("distr", ("any",), on_counter("drawer", (0.6, 0.2), pos=("ref", 1.0))),
+        ObjectSpec("cutting_board", ("cutting_board",), on_counter("drawer", (0.5, 0.5))),
+    ),
+    goal=AllOf(GripperFar("cutting_board"), *(ObjectOn(name, "cutting_board") for name in _BOTH)),
+    stages=(
+        Stage("drawers", "open", "drawer"),
+        *(
+            Stage(
+                "pick_place",
+                "place",
+                "cutting_board",
+                object=name,
+                until=AllOf(ObjectOn(name, "cutting_board"), GripperFar("cutting_board")),
+            )
+            for name in _BOTH
+        ),
+    ),
+    instruction="Open the drawer and put the peeler and the knife from it on the cutting board.",
+    paraphrases=(
+        "Peeler and knife are in the closed drawer; lay both on the cutting board.",
+        "Gather what cuts: the drawer's knife and peeler belong on the board.",
+        "Pull the drawer out, and move the peeler, then the knife, to the cutting board on the counter.",
+        "The cutting board should have the peeler and the knife that the drawer holds.",
+    ),
+)
+
+TASKS = (CUTTING_TOOL_SELECTION, GATHER_CUTTING_TOOLS)

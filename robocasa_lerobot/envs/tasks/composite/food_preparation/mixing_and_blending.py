@@ -1,8 +1,25 @@
 """Gather what is mixed."""
 
-from robocasa_lerobot.envs.predicates import AllOf, GripperFar, ObjectOn, ObjectTouches
-from robocasa_lerobot.envs.scene.spec import FixtureSpec, ObjectSpec, Placement, RobotStart, SampleRegion
+from robocasa_lerobot.envs.predicates import (
+    AllOf,
+    GripperFar,
+    NearFixture,
+    ObjectInside,
+    ObjectOn,
+    ObjectTouches,
+    ObjectTouchesAnyCounter,
+)
+from robocasa_lerobot.envs.scene.initial_states import LidAside
+from robocasa_lerobot.envs.scene.spec import (
+    FixtureSpec,
+    InitialOpenness,
+    ObjectSpec,
+    Placement,
+    RobotStart,
+    SampleRegion,
+)
 from robocasa_lerobot.envs.tasks.atomic.common import counter_near, in_cabinet, on_counter
+from robocasa_lerobot.envs.tasks.composite.common import fetch
 from robocasa_lerobot.envs.tasks.task import Stage, Task
 
 _SALSA = ("avocado", "onion", "tomato", "bell_pepper")
@@ -81,4 +98,65 @@ SPICY_MARINADE = Task(
     ),
 )
 
-TASKS = (COLORFUL_SALSA, SPICY_MARINADE)
+
+_SHELF = SampleRegion(name="fridge_shelf", height=(1.0, 1.5))
+_IN_JUG = AllOf(ObjectInside("banana", "blender", margin=0.01), GripperFar("banana"))
+
+
+def _by_blender(name: str) -> AllOf:
+    return AllOf(NearFixture(name, "blender", 0.3), ObjectTouchesAnyCounter(name), GripperFar(name))
+
+
+def _in_front(name: str, kind: str, depth: float) -> ObjectSpec:
+    return ObjectSpec(
+        name, (kind,), Placement("fridge", region=_SHELF, size=(0.5, depth), pos=(0.0, -1.0)), graspable=True
+    )
+
+
+MAKE_BANANA_MILKSHAKE = Task(
+    name="MakeBananaMilkshake",
+    summary="The banana is in the blender's jug, milk and honey stand 30 cm from it at most, the gripper away.",
+    fixtures=(
+        FixtureSpec("fridge", "fridge"),
+        FixtureSpec("cabinet", "cabinet"),
+        FixtureSpec("blender", "blender"),
+        counter_near("blender"),
+    ),
+    robot_start=RobotStart("cabinet"),
+    objects=(
+        _in_front("banana", "banana", 0.2),
+        _in_front("milk", "milk", 0.15),
+        ObjectSpec(
+            "fridge_distractor",
+            ("any",),
+            Placement("fridge", region=SampleRegion(name="fridge_shelf"), size=(0.5, 0.3), pos=(0.0, 0.0)),
+            exclude=("milk", "honey_bottle", "banana"),
+        ),
+        ObjectSpec("honey", ("honey_bottle",), in_cabinet("cabinet", (0.3, 0.2)), graspable=True),
+    ),
+    initial=(
+        InitialOpenness("fridge", 0.9, 1.0, part="fridge"),
+        InitialOpenness("cabinet", 0.9, 1.0),
+        LidAside("blender"),
+    ),
+    goal=AllOf(*_IN_JUG.parts, *_by_blender("milk").parts, *_by_blender("honey").parts),
+    stages=(
+        *fetch("honey", "cabinet", "counter", until=_by_blender("honey")),
+        Stage("navigation", "drive", "fridge"),
+        *fetch("banana", "fridge", "blender", until=_IN_JUG),
+        Stage("navigation", "drive", "fridge"),
+        *fetch("milk", "fridge", "counter", until=_by_blender("milk")),
+    ),
+    instruction=(
+        "Put the banana from the fridge into the blender, and the honey from the cabinet and the milk from the fridge "
+        "beside it."
+    ),
+    paraphrases=(
+        "For a milkshake, the banana goes into the blender's jug, milk and honey next to the blender.",
+        "Bring honey, banana and milk to the blender; only the banana goes in.",
+        "Fill the open blender with the fridge's banana, and set milk and honey down close to it.",
+        "Beside the blender there should be honey and milk, and inside it the banana.",
+    ),
+)
+
+TASKS = (COLORFUL_SALSA, MAKE_BANANA_MILKSHAKE, SPICY_MARINADE)

@@ -4,11 +4,14 @@ from robocasa_lerobot.envs.predicates import (
     AllOf,
     GripperFar,
     Near,
+    ObjectInside,
     ObjectOn,
     ObjectTouches,
     ObjectTouchesAnyCounter,
 )
+from robocasa_lerobot.envs.scene.initial_states import LidAside
 from robocasa_lerobot.envs.scene.spec import (
+    Choice,
     FixtureSpec,
     InitialOpenness,
     ObjectSpec,
@@ -16,8 +19,8 @@ from robocasa_lerobot.envs.scene.spec import (
     RobotStart,
     SampleRegion,
 )
-from robocasa_lerobot.envs.tasks.atomic.common import counter_near, in_cabinet, on_counter
-from robocasa_lerobot.envs.tasks.composite.common import fetch
+from robocasa_lerobot.envs.tasks.atomic.common import HANDLE_TO_FRONT, counter_near, in_cabinet, on_counter
+from robocasa_lerobot.envs.tasks.composite.common import BLENDER_ON, JAR_MOUTH_M, cover_and_blend, fetch, fetch_in_turn
 from robocasa_lerobot.envs.tasks.task import Stage, Task
 
 _BESIDE_M = 0.3
@@ -94,4 +97,84 @@ GATHER_MARINADE_INGREDIENTS = Task(
     ),
 )
 
-TASKS = (GATHER_MARINADE_INGREDIENTS,)
+
+_VEGETABLES = ("marinade_veg1", "marinade_veg2")
+
+BLEND_MARINADE = Task(
+    name="BlendMarinade",
+    summary="Both ingredients are in the blender, which is covered and runs, the gripper away from its button.",
+    fixtures=(FixtureSpec("blender", "blender"), counter_near("blender"), FixtureSpec("fridge", "fridge")),
+    robot_start=RobotStart("fridge"),
+    objects=tuple(
+        ObjectSpec(
+            name,
+            ("garlic", "onion", "lemon", "lemon_wedge", "lime"),
+            Placement("fridge", region=_SHELF, size=(0.3, 0.15), pos=(x, -1.0)),
+            graspable=True,
+            max_size=JAR_MOUTH_M,
+            repeats=True,
+        )
+        for name, x in zip(_VEGETABLES, (-0.3, 0.3), strict=True)
+    ),
+    initial=(InitialOpenness("fridge", 0.9, 1.0, part="fridge"), LidAside("blender")),
+    goal=AllOf(*(ObjectInside(name, "blender", margin=0.01) for name in _VEGETABLES), *BLENDER_ON.parts),
+    stages=(*fetch_in_turn(_VEGETABLES, "fridge", "blender"), *cover_and_blend()),
+    instruction=(
+        "Put {marinade_veg1+marinade_veg2} from the fridge into the blender, put its lid on and switch it on."
+    ),
+    paraphrases=(
+        "Blend a marinade of what is in the fridge, {marinade_veg1+marinade_veg2}, with the lid on the jar.",
+        "Carry {marinade_veg1+marinade_veg2} to the blender one after the other, cover the jar, and press the button.",
+        "The open blender gets {marinade_veg1+marinade_veg2}; then it is closed and runs.",
+        "From the fridge into the blender with {marinade_veg1+marinade_veg2}; lid on, power on.",
+    ),
+)
+
+PLACE_MEAT_IN_MARINADE = Task(
+    name="PlaceMeatInMarinade",
+    summary="The meat is in the pan of marinade on the stove, the gripper away from it.",
+    fixtures=(FixtureSpec("fridge", "fridge"), FixtureSpec("stove", "stove")),
+    robot_start=RobotStart("stove"),
+    choices=(Choice("knob", of="stove"),),
+    objects=(
+        ObjectSpec(
+            "pan",
+            ("saucepan", "pan"),
+            Placement(
+                "stove",
+                region=SampleRegion(name="{knob}"),
+                size=(0.05, 0.05),
+                pos=(0.0, 0.0),
+                rotation=HANDLE_TO_FRONT,
+                ensure_inside=False,
+            ),
+            filled="marinade",
+        ),
+        ObjectSpec("meat_container", ("plate",), Placement("fridge", region=_SHELF, size=(0.4, 0.25), pos=(0.0, -1.0))),
+        ObjectSpec("meat", ("meat",), Placement(object="meat_container"), graspable=True, exclude=("shrimp",)),
+        ObjectSpec(
+            "fridge_distractor",
+            ("any",),
+            Placement("fridge", region=SampleRegion(name="fridge_shelf"), size=(0.4, 0.3), pos=(0.0, 1.0)),
+            exclude=("meat",),
+            properties=("fridgable",),
+        ),
+    ),
+    goal=AllOf(ObjectOn("meat", "pan"), ObjectTouches("pan", "stove"), GripperFar("meat")),
+    stages=(
+        Stage("navigation", "drive", "fridge"),
+        Stage("doors", "open", "fridge", part="fridge"),
+        Stage("pick_place", "pick", "fridge", object="meat"),
+        Stage("navigation", "drive", "stove", object="meat"),
+        Stage("pick_place", "place", "pan", object="meat"),
+    ),
+    instruction="Take the {meat} out of the fridge and put it into the pan with the marinade on the stove.",
+    paraphrases=(
+        "The {meat} should soak: bring it from the closed fridge to the pan of marinade.",
+        "Go to the fridge, open it, and carry the {meat} to the pan on the stove.",
+        "Lay the fridge's {meat} in the marinade; its pan is on the stove.",
+        "The pan on the stove holds a marinade for the {meat} that is in the fridge.",
+    ),
+)
+
+TASKS = (BLEND_MARINADE, GATHER_MARINADE_INGREDIENTS, PLACE_MEAT_IN_MARINADE)

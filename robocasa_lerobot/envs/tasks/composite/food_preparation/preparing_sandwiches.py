@@ -6,11 +6,14 @@ import numpy as np
 
 from robocasa_lerobot.envs.predicates import (
     AllOf,
+    AnyOf,
     DoorsClosed,
     GripperFar,
     Near,
+    NearFixture,
     ObjectOn,
     ObjectTouches,
+    ObjectTouchesAnyCounter,
     PartWithin,
 )
 from robocasa_lerobot.envs.scene.initial_states import PartAt, Water
@@ -24,7 +27,7 @@ from robocasa_lerobot.envs.scene.spec import (
     SampleRegion,
 )
 from robocasa_lerobot.envs.tasks.atomic.common import counter_near, in_cabinet, on_counter
-from robocasa_lerobot.envs.tasks.composite.common import before_stool, fetch, on_shelf
+from robocasa_lerobot.envs.tasks.composite.common import before_stool, fetch, fetch_in_turn, on_shelf
 from robocasa_lerobot.envs.tasks.task import Stage, Task
 
 _TIMER = PartWithin("toaster_oven", "knob_time", low=0.10, label="set")
@@ -233,4 +236,118 @@ GATHER_VEGETABLES = Task(
     ),
 )
 
-TASKS = (GATHER_VEGETABLES, HEAT_KEBAB_SANDWICH, HOT_DOG_SETUP, PREPARE_SAUSAGE_CHEESE)
+
+_BOWL = "ingredient_bowl"
+_SLICES = ("tomato_slice", "pickle_slice", "turkey_slice")
+_STATION = (_BOWL, "baguette")
+
+
+def _kept_in_bowl(name: str) -> AnyOf:
+    """In the bowl, or on another slice that is."""
+    others = (other for other in _SLICES if other != name)
+    return AnyOf(
+        ObjectOn(name, _BOWL), *(AllOf(ObjectTouches(name, other), ObjectOn(other, _BOWL)) for other in others)
+    )
+
+
+def _at_toaster_oven(name: str) -> AllOf:
+    return AllOf(ObjectTouchesAnyCounter(name), NearFixture(name, "toaster_oven", 0.35), GripperFar(name))
+
+
+PREPARE_SANDWICH_STATION = Task(
+    name="PrepareSandwichStation",
+    summary=(
+        "The bowl with its slices and the baguette are on the counter, 35 cm from the toaster oven at most, the "
+        "gripper away from both."
+    ),
+    fixtures=(
+        FixtureSpec("fridge", "fridge"),
+        FixtureSpec("toaster_oven", "toaster_oven"),
+        counter_near("toaster_oven"),
+    ),
+    robot_start=RobotStart("fridge"),
+    choices=(
+        Choice(
+            "bowl_shelf",
+            {"highest": {"_other_shelf": "second_highest"}, "second_highest": {"_other_shelf": "highest"}},
+        ),
+    ),
+    objects=(
+        ObjectSpec(_BOWL, ("bowl",), on_shelf("{bowl_shelf}", (0.5, 0.3)), graspable=True),
+        *(ObjectSpec(name, (name,), Placement(object=_BOWL, heaped=True)) for name in _SLICES),
+        ObjectSpec(
+            "baguette", ("baguette",), on_shelf("{_other_shelf}", (0.5, 0.27), rotation=(0.0, 0.0)), graspable=True
+        ),
+    ),
+    initial=(InitialOpenness("fridge", 0.9, 1.0, part="fridge"),),
+    goal=AllOf(
+        AllOf(*map(_kept_in_bowl, _SLICES)),
+        AnyOf(*(ObjectOn(name, _BOWL) for name in _SLICES)),
+        *(part for name in _STATION for part in _at_toaster_oven(name).parts),
+    ),
+    stages=fetch_in_turn(_STATION, "fridge", "counter", until=_at_toaster_oven),
+    instruction="Bring the bowl with its slices and the baguette from the fridge to the counter by the toaster oven.",
+    paraphrases=(
+        "Sandwiches are made beside the toaster oven: baguette and filled bowl out of the fridge belong there.",
+        "Carry the fridge's bowl without spilling it, then the baguette, to the side of the toaster oven.",
+        "Set up for sandwiches: first the bowl of slices, then the baguette, next to the toaster oven.",
+        "Close to the toaster oven there should be the baguette and the bowl that are in the open fridge.",
+    ),
+)
+
+_WARM, _COLD = ("sausage", "bread"), ("tomato", "onion")
+
+
+TOAST_HEATABLE_INGREDIENTS = Task(
+    name="ToastHeatableIngredients",
+    summary="Sausage and baguette are on the toaster oven's rack, the rest is on the plate, the gripper 15 cm away.",
+    fixtures=(FixtureSpec("toaster_oven", "toaster_oven"), counter_near("toaster_oven")),
+    robot_start=RobotStart("counter", at_object="plate"),
+    choices=(Choice("rack", of="toaster_oven"),),
+    objects=(
+        ObjectSpec("plate", ("plate",), on_counter("toaster_oven", (0.75, 0.5), loc="left_right"), scale=1.5),
+        # As long as the plate is wide.
+        ObjectSpec("bread", ("baguette",), Placement(object="plate", ensure_inside=False), graspable=True),
+        ObjectSpec("sausage", ("sausage",), Placement(object="plate", heaped=True), graspable=True),
+        *(ObjectSpec(name, (name,), Placement(object="plate", heaped=True)) for name in _COLD),
+    ),
+    goal=AllOf(
+        *map(_on_rack, _WARM),
+        *(ObjectOn(name, "plate") for name in _COLD),
+        *(GripperFar(name, 0.15) for name in (*_WARM, *_COLD, "plate")),
+    ),
+    stages=(
+        Stage("doors", "open", "toaster_oven"),
+        Stage("racks", "pull", "toaster_oven", part="{rack}"),
+        *(
+            Stage(
+                "pick_place",
+                "place",
+                "toaster_oven",
+                object=name,
+                part="{rack}",
+                until=AllOf(_on_rack(name), GripperFar(name, 0.15)),
+            )
+            for name in _WARM
+        ),
+    ),
+    instruction=(
+        "Open the toaster oven, pull out its {rack} and put the sausage and the baguette on it; tomato and onion stay "
+        "on the plate."
+    ),
+    paraphrases=(
+        "Only what is eaten hot goes on the toaster oven's {rack}: the sausage and the baguette.",
+        "Load the {rack} of the closed toaster oven with sausage and baguette, and leave the rest on the plate.",
+        "From the plate, move baguette and sausage to the {rack} of the toaster oven.",
+        "Tomato and onion are served cold; put the other two things on the {rack} of the toaster oven.",
+    ),
+)
+
+TASKS = (
+    GATHER_VEGETABLES,
+    HEAT_KEBAB_SANDWICH,
+    HOT_DOG_SETUP,
+    PREPARE_SANDWICH_STATION,
+    PREPARE_SAUSAGE_CHEESE,
+    TOAST_HEATABLE_INGREDIENTS,
+)

@@ -7,11 +7,19 @@ from robocasa_lerobot.envs.predicates import (
     Beside,
     GripperFar,
     NearFixture,
+    ObjectOn,
     ObjectTouches,
     ObjectTouchesAnyCounter,
 )
-from robocasa_lerobot.envs.scene.spec import FixtureSpec, InitialOpenness, ObjectSpec, RobotStart
-from robocasa_lerobot.envs.tasks.atomic.common import in_cabinet
+from robocasa_lerobot.envs.scene.spec import (
+    FixtureSpec,
+    InitialOpenness,
+    ObjectSpec,
+    Placement,
+    RobotStart,
+    SampleRegion,
+)
+from robocasa_lerobot.envs.tasks.atomic.common import counter_near, in_cabinet, on_counter
 from robocasa_lerobot.envs.tasks.composite.common import before_stool, fetch
 from robocasa_lerobot.envs.tasks.task import Stage, Task
 
@@ -93,4 +101,40 @@ SET_UP_SPICE_STATION = Task(
     ),
 )
 
-TASKS = (SEASONING_STEAK, SET_UP_SPICE_STATION)
+
+LEMON_SEASONING_FISH = Task(
+    name="LemonSeasoningFish",
+    summary="The lemon is on the fish's cutting board, the gripper away from it.",
+    fixtures=(FixtureSpec("fridge", "fridge"), counter_near("fridge")),
+    robot_start=RobotStart("fridge"),
+    objects=(
+        ObjectSpec(
+            "lemon",
+            ("lemon",),
+            Placement(
+                "fridge",
+                region=SampleRegion(name="fridge_shelf", height=(1.0, 1.5)),
+                size=(0.15, 0.1),
+                pos=(0.0, -1.0),
+                margin=0.0,
+            ),
+            graspable=True,
+        ),
+        ObjectSpec("fish_container", ("cutting_board",), on_counter("fridge", (1.0, 0.5), pos=(0.0, -1.0))),
+        ObjectSpec("fish", ("fish",), Placement(object="fish_container")),
+    ),
+    goal=AllOf(ObjectOn("lemon", "fish_container"), GripperFar("lemon")),
+    stages=(
+        Stage("doors", "open", "fridge", part="fridge"),
+        Stage("pick_place", "place", "fish_container", object="lemon"),
+    ),
+    instruction="Open the fridge, take the lemon out of it and put it on the cutting board with the fish.",
+    paraphrases=(
+        "The fish on the board wants a lemon; there is one in the fridge.",
+        "Bring the fridge's lemon to the cutting board, beside the fish.",
+        "Season the fish: fetch the lemon from the closed fridge and lay it on the fish's board.",
+        "On the board with the fish there should also be the lemon that is in the fridge.",
+    ),
+)
+
+TASKS = (LEMON_SEASONING_FISH, SEASONING_STEAK, SET_UP_SPICE_STATION)
