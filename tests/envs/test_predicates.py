@@ -6,8 +6,9 @@ import mujoco
 import numpy as np
 import pytest
 from goal_states import hold, put_object, write
-from predicate_scenes import SINK, STOVE, Change, beside, check_hits_and_misses, shift, state
+from predicate_scenes import SINK, STOVE, TOASTER_OVEN, Change, beside, check_hits_and_misses, shift, state
 
+from robocasa_lerobot.envs.kitchens.appliances.kinds.racked import Racked
 from robocasa_lerobot.envs.kitchens.appliances.kinds.sink import Sink
 from robocasa_lerobot.envs.kitchens.appliances.kinds.stove import ON_FROM, Hob
 from robocasa_lerobot.envs.predicates import (
@@ -22,6 +23,7 @@ from robocasa_lerobot.envs.predicates import (
     Near,
     NearerThan,
     Not,
+    ObjectOnRack,
     OnBurner,
     OnOneSide,
     OverBasin,
@@ -43,8 +45,12 @@ from robocasa_lerobot.errors import UserError
 @pytest.fixture(scope="module")
 def scenes() -> dict[str, Scene]:
     """By the role of the fixture that they are about."""
-    basins = build_scene(get_task("PreRinseStation"), "target", 0)
-    return {"stove": build_scene(STOVE, "target", 4), "sink": build_scene(SINK, "target", 0), "basins": basins}
+    return {
+        "stove": build_scene(STOVE, "target", 4),
+        "sink": build_scene(SINK, "target", 0),
+        "basins": build_scene(get_task("PreRinseStation"), "target", 0),
+        "toaster_oven": build_scene(TOASTER_OVEN, "target", 0),
+    }
 
 
 def away_from_stream(share: float) -> Change:
@@ -119,6 +125,18 @@ def into_oven(scene: Scene, data: mujoco.MjData) -> None:
     data.joint("pan_joint0").qpos[2] = floor[2] - scene.objects["pan"].item.bottom_offset - 0.0005
 
 
+def onto_rack(region: str) -> Change:
+    """Put the object on a rack, or on the floor below them."""
+
+    def change(scene: Scene, data: mujoco.MjData) -> None:
+        room = scene.fixture("toaster_oven", Racked).regions[region]
+        floor = room.world(data, (0.0, 0.0, -room.half[2]))
+        put_object(scene, data, "obj", floor)
+        data.joint("obj_joint0").qpos[2] = floor[2] - scene.objects["obj"].item.bottom_offset - 0.0005
+
+    return change
+
+
 FIRST = "front_left"
 # Scene, predicate, what still counts, and what does not any more, each from a state in which it holds.
 CASES: dict[str, tuple[str, Goal, list[Change], list[Change]]] = {
@@ -158,6 +176,12 @@ CASES: dict[str, tuple[str, Goal, list[Change], list[Change]]] = {
         OverBasin("left_obj", "sink", "basin0"),
         [over_basin("basin0", 0.99), over_basin("basin0", -0.99, up_m=0.5)],
         [over_basin("basin0", 1.01), over_basin("basin0", -1.01), over_basin("basin1", 0.0)],
+    ),
+    "on any rack": (
+        "toaster_oven",
+        ObjectOnRack("obj", "toaster_oven"),
+        [onto_rack("rack0"), onto_rack("rack1")],
+        [shift("obj", z=0.004), onto_rack("interior")],
     ),
     "grasped": (
         "sink",
@@ -212,7 +236,7 @@ def test_it_holds_in_its_state_and_in_no_near_miss(case: str, scenes: dict[str, 
 
 def test_every_predicate_that_can_be_missed_by_little_is_among_the_cases() -> None:
     kinds = {type(part) for _, goal, _, _ in CASES.values() for part in every_goal_in(goal)}
-    assert {UnderWater, OnBurner, OverBasin, Grasped, GripperTouches, Near, NearerThan} <= kinds
+    assert {UnderWater, ObjectOnRack, OnBurner, OverBasin, Grasped, GripperTouches, Near, NearerThan} <= kinds
 
 
 def test_groups_are_compared_by_their_farthest(scenes: dict[str, Scene]) -> None:

@@ -28,6 +28,7 @@ class Category:
 
 def category(text: str) -> Category:
     """What a blueprint calls the kinds of an object."""
+    text = text.removesuffix(" (with visible liquid)")
     text = text.replace(" | ", ", ").removeprefix("another one of ").removesuffix(" (one, random)")
     text = re.sub(r"^any (\w+able)\b", r"any (\1)", text)
     text = re.sub(r"^any not \w+,", "any,", re.sub(r": category \w\b", "", text))
@@ -98,6 +99,8 @@ def turn(at: str, placed: Any) -> tuple[float, float] | None:
         or re.search(r"(\[|'rotation_rad': )1\.5708", text)
     ):
         return np.pi / 2, np.pi / 2
+    if "handle turned 45-67.5 deg" in at:
+        return np.pi / 4, 3 * np.pi / 8
     if "yaw pi/8 to pi/4" in text:
         return np.pi / 8, np.pi / 4
     if "'rotation_rad': 0" in text or re.search(r"(rotation|yaw) 0(?![.\d])", f"{at} {text}"):

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from robocasa_lerobot.envs.kitchens.appliances.base import Appliance, take_effect
 from robocasa_lerobot.envs.kitchens.appliances.kinds.blender import Blender
+from robocasa_lerobot.envs.kitchens.appliances.kinds.racked import Racked
 from robocasa_lerobot.envs.kitchens.appliances.kinds.sink import Sink
 from robocasa_lerobot.envs.kitchens.appliances.kinds.stove import Hob
 from robocasa_lerobot.envs.predicates import (
@@ -43,6 +44,7 @@ from robocasa_lerobot.envs.predicates import (
     ObjectInBasin,
     ObjectInside,
     ObjectOn,
+    ObjectOnRack,
     ObjectTilt,
     ObjectTouches,
     ObjectTouchesAnyCounter,
@@ -221,6 +223,16 @@ def _on_burner(goal: OnBurner, scene: Scene, data: mujoco.MjData) -> None:
     data.joint(f"{name}_joint0").qpos[2] = top[2] - scene.objects[name].item.bottom_offset - 0.0005
     if goal.lit is not None:
         hob.set_burner(data, burner, "on" if goal.lit else "off")
+
+
+@write.register
+def _on_rack(goal: ObjectOnRack, scene: Scene, data: mujoco.MjData) -> None:
+    """A hair into the highest rack, so that they touch."""
+    fixture, name = scene.fixture(goal.fixture, Racked), scene.fill(goal.object)
+    room = fixture.regions[fixture.racks[-1]]
+    floor = room.world(data, (0.0, 0.0, -room.half[2]))
+    put_object(scene, data, name, floor)
+    data.joint(f"{name}_joint0").qpos[2] = floor[2] - scene.objects[name].item.bottom_offset - 0.0005
 
 
 @write.register

@@ -45,6 +45,13 @@ SINK = SceneSpec(
     ),
     instruction="Wash.",
 )
+TOASTER_OVEN = SceneSpec(
+    name="OneAtAToasterOven",
+    fixtures=(FixtureSpec("toaster_oven", "toaster_oven_with_two_racks"),),
+    robot_start=RobotStart("toaster_oven"),
+    objects=(ObjectSpec("obj", ("sugar_cube",), OnCounter("toaster_oven", loc="left_right", size=(0.30, 0.30))),),
+    instruction="Toast.",
+)
 type Change = Callable[[Scene, mujoco.MjData], Any]
 
 

@@ -18,7 +18,16 @@ from robocasa_lerobot.demos.skills.doors import push_lid
 from robocasa_lerobot.demos.skills.drawers import close_drawer, open_drawer
 from robocasa_lerobot.demos.skills.handles import open_doors
 from robocasa_lerobot.demos.skills.hot_water import run_hot_water
-from robocasa_lerobot.demos.skills.knobs import raise_knob, turn_burner_low, turn_knob, turn_off_burner, turn_on_burner
+from robocasa_lerobot.demos.skills.knobs import (
+    raise_knob,
+    turn_burner_low,
+    turn_burner_medium,
+    turn_highest,
+    turn_knob,
+    turn_lowest,
+    turn_off_burner,
+    turn_on_burner,
+)
 from robocasa_lerobot.demos.skills.levers import (
     press_lever,
     sweep_sideways,
@@ -30,11 +39,14 @@ from robocasa_lerobot.demos.skills.mixer_head import lower_head, raise_head
 from robocasa_lerobot.demos.skills.pick_place.hold import hold_object
 from robocasa_lerobot.demos.skills.pick_place.tools.pour import pour
 from robocasa_lerobot.demos.skills.pick_place.tools.press import press
+from robocasa_lerobot.demos.skills.pick_place.tools.press_with import press_with
 from robocasa_lerobot.demos.skills.pick_place.tools.rinse import rinse
 from robocasa_lerobot.demos.skills.pick_place.tools.stir import stir
+from robocasa_lerobot.demos.skills.pick_place.tools.swing import shake, tilt, turn
 from robocasa_lerobot.demos.skills.pick_place.tools.wipe import wipe
 from robocasa_lerobot.demos.skills.pick_place.verbs import drive, pick_object, place_object
 from robocasa_lerobot.demos.skills.racks import pull, push, slide
+from robocasa_lerobot.demos.skills.waiting import wait
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.tasks.task import Stage
 
@@ -59,8 +71,12 @@ SKILLS: dict[tuple[str, str], Skill] = {
     ("knobs", "on"): turn_on_burner,
     ("knobs", "off"): turn_off_burner,
     ("knobs", "low"): turn_burner_low,
+    ("knobs", "medium"): turn_burner_medium,
+    ("knobs", "lowest"): turn_lowest,
+    ("knobs", "highest"): turn_highest,
     ("knobs", "raise"): raise_knob,
     ("knobs", "turn"): turn_knob,
+    ("knobs", "wait"): wait,
     ("levers", "press"): press_lever,
     ("levers", "on"): turn_on_water,
     ("levers", "off"): turn_off_water,
@@ -73,8 +89,12 @@ SKILLS: dict[tuple[str, str], Skill] = {
     ("pick_place", "rinse"): rinse,
     ("pick_place", "pour"): pour,
     ("pick_place", "press"): press,
+    ("pick_place", "press_with"): press_with,
     ("pick_place", "stir"): stir,
     ("pick_place", "wipe"): wipe,
+    ("pick_place", "shake"): shake,
+    ("pick_place", "tilt"): tilt,
+    ("pick_place", "turn"): turn,
     ("pick_place", "uncover"): uncover,
     ("pick_place", "cover"): cover,
 }

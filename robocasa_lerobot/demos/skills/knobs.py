@@ -43,7 +43,7 @@ TILTS = tuple(np.deg2rad((0.0, 15.0)))
 SHIFTS = ((0.0, 0.0), (-0.15, 0.0), (-0.15, -0.25), (-0.15, 0.25), (-0.3, 0.0), (-0.3, -0.3), (-0.3, 0.3), (-0.45, 0.0))
 DONE_RAD = 0.06
 # Where burners' knobs are turned to, radians; shares of the range for ovens.
-BURNER_ON_RAD, BURNER_LOW_RAD = 1.5, 0.87
+BURNER_ON_RAD, BURNER_MEDIUM_RAD, BURNER_LOW_RAD = 1.5, 1.5, 0.87
 RAISED_SHARE, ADJUST_SHARE = 0.40, 0.26
 
 
@@ -60,6 +60,21 @@ def turn_off_burner(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
 def turn_burner_low(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
     """Turn a burner's knob to the middle of what counts as low."""
     yield from _turn_to(env, stage, BURNER_LOW_RAD)
+
+
+def turn_burner_medium(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
+    """Turn a burner's knob to the middle of what counts as medium."""
+    yield from _turn_to(env, stage, BURNER_MEDIUM_RAD)
+
+
+def turn_lowest(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
+    """Turn an oven's knob down to its stop."""
+    yield from _turn_to(env, stage, 0.0)
+
+
+def turn_highest(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
+    """Turn an oven's knob up to its stop."""
+    yield from _turn_to(env, stage, _range(env, stage))
 
 
 def raise_knob(env: KitchenEnv, stage: Stage) -> Iterator[Array]:

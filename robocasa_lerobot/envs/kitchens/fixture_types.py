@@ -141,6 +141,14 @@ def _with_two_basins(layout: Layout, fixture: Fixture) -> bool:
     return FILTERS[FixtureType.SINK](layout, fixture) and len(fixture.regions) > 1
 
 
+def _with_two_racks(layout: Layout, fixture: Fixture) -> bool:
+    return FILTERS[FixtureType.TOASTER_OVEN](layout, fixture) and len(fixture.parts_to_choose("rack")) == 2
+
+
+def _with_four_slots(layout: Layout, fixture: Fixture) -> bool:
+    return FILTERS[FixtureType.TOASTER](layout, fixture) and len(fixture.parts_to_choose("slot")) == 4
+
+
 def _of_three_stools(*, at_end: bool) -> Filter:
     """A stool of a row of three, at either end of it or between: where a layout has exactly three."""
 
@@ -174,6 +182,8 @@ FIXTURE_KINDS |= {
     "fridge_with_freezer": _with_freezer,
     "sink_with_two_basins": _with_two_basins,
     "stool_at_end_of_three": _of_three_stools(at_end=True),
+    "toaster_with_four_slots": _with_four_slots,
+    "toaster_oven_with_two_racks": _with_two_racks,
     "stool_amid_three": _of_three_stools(at_end=False),
     "landmark": _types(*_SOURCES),
     "landmark_once": _once,

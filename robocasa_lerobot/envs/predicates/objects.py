@@ -9,6 +9,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from robocasa_lerobot.envs.kitchens.appliances.kinds.racked import Racked
 from robocasa_lerobot.envs.kitchens.appliances.kinds.sink import Sink
 from robocasa_lerobot.envs.kitchens.fixtures.base import Region
 from robocasa_lerobot.envs.kitchens.fixtures.counters import Counter
@@ -146,6 +147,25 @@ class ObjectTouches(Term):
         part = scene.fill(self.part)
         what = scene.subtree(f"{body}_{part}" if part else body)
         return touching(scene.model, data, scene.subtree(scene.fill(self.object)), what)
+
+
+@dataclass(frozen=True)
+class ObjectOnRack(Term):
+    """An object touches a rack of an oven, a toaster oven or a dishwasher, whichever."""
+
+    object: str
+    fixture: str
+
+    @property
+    def name(self) -> str:
+        """E.g. `bagel_on_rack_of_toaster_oven`."""
+        return f"{plain(self.object)}_on_rack_of_{self.fixture}"
+
+    def holds(self, scene: Scene, data: mujoco.MjData) -> bool:
+        """Look at the contacts with every rack."""
+        fixture = scene.fixture(self.fixture, Racked)
+        racks = scene.subtree(*(f"{fixture.name}_{rack}" for rack in fixture.racks))
+        return touching(scene.model, data, scene.subtree(scene.fill(self.object)), racks)
 
 
 @dataclass(frozen=True)

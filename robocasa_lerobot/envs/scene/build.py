@@ -42,12 +42,15 @@ _CAMERA_NOISE_STREAM = 2
 LIQUIDS = {
     "coffee": (0.25, 0.13, 0.06, 1.0),
     "hot_chocolate": (0.34, 0.19, 0.11, 1.0),
+    "broth": (0.80, 0.62, 0.28, 0.6),
     "lemonade": (0.95, 0.90, 0.50, 0.6),
     "marinade": (0.42, 0.22, 0.10, 0.95),
     "milk": (0.97, 0.96, 0.92, 1.0),
     "orange_juice": (0.98, 0.62, 0.15, 0.9),
     "smoothie": (0.93, 0.55, 0.58, 1.0),
+    "soy_sauce": (0.28, 0.12, 0.05, 0.6),
     "tea": (0.60, 0.30, 0.08, 0.8),
+    "tomato_sauce": (0.85, 0.25, 0.12, 0.6),
     "water": (0.72, 0.86, 0.94, 0.5),
 }
 
@@ -143,7 +146,8 @@ def _attempt(
     model = spec.compile()
     categories = {name: placed.item.category.name for name, placed in objects.items()}
     words = words_of(layout, roles, categories, [wanted.name for wanted in task.objects if wanted.count != (1, 1)])
-    words.update({"side": pose.side} | choices.words)
+    # A choice's words may name objects: "the {food}" of the bowl that was drawn.
+    words.update({"side": pose.side} | {name: said(word, words) for name, word in choices.words.items()})
     return Scene(
         split=split,
         seed=seed,

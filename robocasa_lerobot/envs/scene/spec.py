@@ -44,6 +44,8 @@ class Choice:
             begins with an underscore are values for the declaration instead.
         of: role of a fixture whose parts are the options instead: burners, racks, or slots.
         without: start of the names of parts that are no options, such as "rear".
+        beginning: start of the parts' names, as "front" of burners; all if empty.
+        last: the last of the parts is always taken, as the highest rack.
 
     Raises:
         UserError: the name begins with an underscore.
@@ -53,6 +55,8 @@ class Choice:
     options: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
     of: str = ""
     without: str = ""
+    beginning: str = ""
+    last: bool = False
 
     def __post_init__(self) -> None:
         # An option's word for the choice itself would be such a value too, and replace the one that was drawn.

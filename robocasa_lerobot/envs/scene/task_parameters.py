@@ -42,9 +42,10 @@ def draw_choices(
         options = fixtures[roles[choice.of]].parts_to_choose(choice.name) if choice.of else choice.options
         if choice.without:
             options = {value: words for value, words in options.items() if not value.startswith(choice.without)}
+        options = {value: words for value, words in options.items() if value.startswith(choice.beginning)}
         if not options:
-            raise PlacementError(f"{roles[choice.of]} has no {choice.name} to choose")
-        value = list(options)[int(rng.integers(len(options)))]
+            raise PlacementError(f"{roles[choice.of]} has no {choice.name} {choice.beginning} to choose".rstrip())
+        value = list(options)[-1 if choice.last else int(rng.integers(len(options)))]
         drawn.values[choice.name] = value
         drawn.values.update({k: v for k, v in options[value].items() if k.startswith("_")})
         drawn.words[choice.name] = value

@@ -61,7 +61,8 @@ from robocasa_lerobot.envs.kitchens.fixtures.base import Fixture, Region
 from robocasa_lerobot.envs.kitchens.fixtures.cabinets import Drawer, HingeCabinet
 from robocasa_lerobot.envs.kitchens.fixtures.counters import Counter
 from robocasa_lerobot.envs.kitchens.fixtures.regions import regions_of
-from robocasa_lerobot.envs.predicates.logic import every_goal_in
+from robocasa_lerobot.envs.predicates.heat_and_water import OnBurner
+from robocasa_lerobot.envs.predicates.logic import Not, every_goal_in
 from robocasa_lerobot.envs.predicates.objects import ObjectAtSite, ObjectInside
 from robocasa_lerobot.envs.tasks.conditions import IN_RANGE, stage_condition
 from robocasa_lerobot.envs.tasks.task import Stage
@@ -191,12 +192,20 @@ def _by_target(env: KitchenEnv, stage: Stage, obj: Graspable) -> PlaceStrategy:
             poses = at_site(env, f"{fixture.name}_{part}", next(iter(fixture.regions.values())))
             return PlaceStrategy(poses, entries=("out", "level"), grasp=FROM_THE_SIDE, in_m=0.17, gap_m=0.003)
     if isinstance(fixture, Hob) and part not in IN_RANGE:
-        burners = [burner for burner in fixture.burners if part in ("", burner)]
+        left_out = _unwanted_burners(env, stage)
+        burners = [burner for burner in fixture.burners if part in ("", burner) and burner not in left_out]
         return PlaceStrategy(over_burners(env, obj, fixture, burners), entries=("up", "across"))
     named = [(name, region) for name, region in regions_of(fixture) if name.startswith(part)]
     regions = [region for _, region in named if _counts(env, stage, region)]
     columns = MANY_COLUMNS if distance_terms(env, stage) else COLUMNS
     return _into_regions(env, obj, fixture, part, regions, columns)
+
+
+def _unwanted_burners(env: KitchenEnv, stage: Stage) -> set[str]:
+    """Burners on which the stage's object must not stand."""
+    terms = every_goal_in(stage_condition(env.declaration, stage))
+    unwanted = [term.part for term in terms if isinstance(term, Not) and isinstance(term.part, OnBurner)]
+    return {env.scene.fill(term.burner) for term in unwanted if isinstance(term, OnBurner)}
 
 
 def _more_comes(env: KitchenEnv, stage: Stage) -> bool:

@@ -34,7 +34,10 @@ from robocasa_lerobot.envs.tasks.task import Stage
 
 ATTEMPTS = 4
 SETTLE_STEPS = 15
-BY_USE = {"stir": TOOL_BY_THE_HANDLE, "pour": PAN_BY_THE_HANDLE}
+BY_USE = {
+    **dict.fromkeys(("stir", "press_with"), TOOL_BY_THE_HANDLE),
+    **dict.fromkeys(("pour", "shake", "tilt", "turn"), PAN_BY_THE_HANDLE),
+}
 MOST_PLACES = 3  # that an object is reached for from
 OTHER_SIDE_RAD = 0.7  # between the robot's headings at two sides of a counter, at least
 

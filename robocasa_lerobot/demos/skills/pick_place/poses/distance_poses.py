@@ -14,7 +14,7 @@ from robocasa_lerobot.demos.skills.pick_place.graspable import Graspable
 from robocasa_lerobot.demos.skills.pick_place.place import PlacePose
 from robocasa_lerobot.demos.skills.pick_place.poses.place_poses import PlacePoses
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
-from robocasa_lerobot.envs.predicates.logic import Goal, Not, Term
+from robocasa_lerobot.envs.predicates.logic import Goal, Not
 from robocasa_lerobot.envs.predicates.near import Near, NearerThan, OnOneSide
 from robocasa_lerobot.envs.predicates.placed_by import Beside, NearFixture
 from robocasa_lerobot.envs.tasks.conditions import stage_condition
@@ -25,12 +25,14 @@ SLIPS = tuple(SLIP_M * np.array(way) for way in ((1.0, 0.0), (-1.0, 0.0), (0.0, 
 SLIP_COST, MISS_COST = 0.3, 6.0  # of each slip after which, and of a place at which, the stage would not be done
 
 
-def distance_terms(env: KitchenEnv, stage: Stage) -> tuple[Term, ...]:
-    """What a stage asks of the distances between its object and others, or fixtures."""
+def distance_terms(env: KitchenEnv, stage: Stage) -> tuple[Goal, ...]:
+    """What a stage asks of the distances between its object and others, or fixtures; of others also not to be near."""
     name = env.scene.fill(stage.object)
-    found: list[Term] = []
+    found: list[Goal] = []
     for term in _asked_for(stage_condition(env.declaration, stage)):
         match term:
+            case Not(part=Near() as near) if name == env.scene.fill(near.object):
+                found.append(term)
             case Near() | Beside() | NearFixture() if name == env.scene.fill(term.object):
                 found.append(term)
             case NearerThan() | OnOneSide() if name in _names(env, term.objects):
@@ -39,8 +41,9 @@ def distance_terms(env: KitchenEnv, stage: Stage) -> tuple[Term, ...]:
 
 
 def _asked_for(goal: Goal) -> Iterator[Goal]:
-    """Everything that a goal is made of but what is not to hold."""
+    """Everything that a goal is made of but what is not to hold, which stays whole."""
     if isinstance(goal, Not):
+        yield goal
         return
     for part in goal.inner:
         yield from _asked_for(part)
@@ -82,7 +85,7 @@ def at_distances(env: KitchenEnv, stage: Stage, obj: Graspable, poses: PlacePose
         def done(point: Array) -> bool:
             free.qpos[:3] = point + obj.below(turn) * UP
             mujoco.mj_kinematics(env.model, scratch)
-            return all(term.holds(env.scene, scratch) for term in terms)
+            return all(term.evaluate(env.scene, scratch, {}) for term in terms)
 
         good, bad = [], []
         for pose in poses():

@@ -146,19 +146,36 @@ def _interior(placed: PlacedObject) -> tuple[Array, Array]:
 
 
 def _choose(env: KitchenEnv, obj: Graspable, vessel: str, blocked: Sequence[RobotPose]) -> MotionPlan:
-    """How the tool stands in the vessel with its tip on the middle of the floor, best for the arm.
+    """How the tool stands in the vessel with its tip on the middle of the floor, best for the arm."""
+    _, half = _interior(env.scene.objects[vessel])
+    floor = _floor(env, vessel)
+    side = REACH_SHARE * float(min(half[:2]))
+    return plan_tip(
+        env, obj, floor + FLOOR_M * UP, float(floor[2] + 2 * half[2]), side, blocked, where=f"into {vessel}"
+    )
+
+
+def plan_tip(
+    env: KitchenEnv, obj: Graspable, bottom: Array, rim: float, side: float, blocked: Sequence[RobotPose], *, where: str
+) -> MotionPlan:
+    """How a held tool stands with its tip at a point, from above the rim of what is round that, best for the arm.
 
     The robot alone is tested: the tool comes from above the rim, and goes straight down.
+
+    Args:
+        env: the kitchen.
+        obj: the tool.
+        bottom: the point, world, metres.
+        rim: height of the rim in the room, metres.
+        side: how far the arm must also reach from there to all sides, metres.
+        blocked: where the robot cannot stand.
+        where: for messages.
 
     Raises:
         SkillError: there is no such way.
     """
     data, end = env.data, working_end(obj)
     held = Held.now(data, obj.name)
-    _, half = _interior(env.scene.objects[vessel])
-    floor = _floor(env, vessel)
-    bottom, rim = floor + FLOOR_M * UP, floor[2] + 2 * half[2]
-    side = REACH_SHARE * float(min(half[:2]))
     # The tool as it stands with its axis up, then leant over, then turned about the vertical.
     upright = _turn_to_up(end.axis)
     paths = []
@@ -171,12 +188,12 @@ def _choose(env: KitchenEnv, obj: Graspable, vessel: str, blocked: Sequence[Robo
         at = bottom - turn @ end.tip - rotation @ held.position
         low = max(rim + RIM_ROOM_M - float(at[2]), 0.0)
         cost = TILT_COST * tilt + LOW_COST * low
-        over = at + (rim - floor[2] + OVER_M) * UP
+        over = at + (rim - bottom[2] + FLOOR_M + OVER_M) * UP
         around = (at + side * np.array([x, y, 0.0]) for x, y in ((1, 0), (0, 1), (-1, 0), (0, -1)))
         paths.append(WaypointPath(tuple(HandTarget(p, rotation) for p in (over, at, *around)), cost))
     found = plan_reach(env, paths, bottom, key=1, allowed=obj.bodies | obj.carried, blocked=blocked)
     if not found:
-        raise SkillError(f"{obj.title}: there is no way into {vessel}")
+        raise SkillError(f"{obj.title}: there is no way {where}")
     return found[0]
 
 
