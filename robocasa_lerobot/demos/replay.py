@@ -195,12 +195,14 @@ def _goal_held_at_the_end(env: KitchenEnv, recorded: Demonstration) -> tuple[boo
     """
     data = mujoco.MjData(env.model)
     put_state(env, data, recorded.states[-1])
-    holds = bool(env.declaration.goal.evaluate(env.scene, data, {}))
-    for part in parts_with_memory([env.declaration.goal]):
-        then, now = recorded.last_terms.get(part.name), part.holds(env.scene, data)
+    found: dict[str, bool] = {}
+    holds = bool(env.declaration.goal.evaluate(env.scene, data, found))
+    # Of one that reads another, as of steps in which something moves, the outer alone is a term of the goal.
+    for name in sorted(found.keys() & {part.name for part in parts_with_memory([env.declaration.goal])}):
+        then, now = recorded.last_terms.get(name), found[name]
         if recorded.last_terms and then != now:
             said = "was not recorded" if then is None else f"was recorded as {then}"
-            return False, f"`{part.name}` is {now} in the last state, but {said}"
+            return False, f"`{name}` is {now} in the last state, but {said}"
     return holds, ""
 
 

@@ -25,7 +25,7 @@ def test_a_demonstration_replays_converts_verifies_and_succeeds_from_the_dataset
     assert main(["demos", f"--tasks={task}", *settings]) == 0
     file = demos / f"{task}.hdf5"
     assert main(["replay", str(file)]) == 0  # bit for bit from its actions, or the command says where not
-    assert main(["convert", str(file), f"--out={data}", "--image-size=32", "--workers=1"]) == 0
+    assert main(["convert", str(file), f"--out={data}", "--image-size=96", "--workers=1"]) == 0
     assert main(["verify", str(data)]) == 0
     arguments = [f"--policy=replay:{data}", f"--env.tasks={task}", "--env.split=pretrain", "--trials=1", "--videos=0"]
     assert main(["eval", *arguments, "--workers=1", f"--out={out}"]) == 0

@@ -16,7 +16,7 @@ from robocasa_lerobot.demos.demonstrator import demonstrate
 from robocasa_lerobot.demos.hdf5 import merge_parts, write_part
 from robocasa_lerobot.demos.motion import Array, action
 from robocasa_lerobot.demos.recorder import SUCCESS_HOLD_STEPS, Recording, record_episode
-from robocasa_lerobot.demos.replay import replay
+from robocasa_lerobot.demos.replay import Demonstration, _goal_held_at_the_end, replay
 from robocasa_lerobot.demos.skills import SKILLS
 from robocasa_lerobot.demos.stages import PATIENCE_STEPS
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
@@ -125,6 +125,22 @@ def test_a_state_restored_midway_counts_on() -> None:
     other.set_state(middle)
     ends = [other.step(command)[2] for command in commands]
     assert ends == [False] * (len(commands) - 1) + [True]
+
+
+def test_of_what_is_remembered_about_what_is_remembered_the_outer_was_recorded() -> None:
+    moves = MovedSince("obj", "step", by_m=0.001)
+    name = Once(moves).name
+    env = KitchenEnv(by_the_sink(Once(moves)), cameras=(), terminate_on_success=False)
+    env.reset(seed=SEED)
+    body = env.model.body("obj")
+    env.data.qvel[env.model.jnt_dofadr[body.jntadr[0]] + 2] = 1.0  # tossed upwards
+    for _ in range(3):
+        *_, info = env.step(np.zeros(12, np.float32))
+    assert info["success_terms"] == {name: True}
+    states = np.concatenate([[env.data.time], env.data.qpos, env.data.qvel])[None]
+    assert _goal_held_at_the_end(env, Demonstration("", {}, states, np.zeros((1, 12)), {name: True})) == (True, "")
+    _, said = _goal_held_at_the_end(env, Demonstration("", {}, states, np.zeros((1, 12)), {name: False}))
+    assert said == f"`{name}` is True in the last state, but was recorded as False"
 
 
 def test_what_cannot_be_made_good_ends_the_attempt() -> None:
