@@ -175,6 +175,7 @@ GARNISH_CAKE = Task(
     name="GarnishCake",
     summary="One cherry is on the cake or its plate, one strawberry on that plate, the gripper away from it.",
     fixtures=(FixtureSpec("stool", "stool"), FixtureSpec("dining_counter", "dining_counter", near="stool")),
+    needs=("dining_counter",),
     robot_start=RobotStart("dining_counter", at_object="fruit_plate"),
     objects=(
         ObjectSpec("cake_plate", ("plate",), before_stool((0.35, 0.35)), scale=1.2),
@@ -182,7 +183,11 @@ GARNISH_CAKE = Task(
         ObjectSpec("cake", ("cake",), Placement(object="cake_plate"), graspable=True, scale=1.4),
         *(
             ObjectSpec(
-                name, (name.rstrip("12"),), Placement(object="fruit_plate", heaped=True), graspable=True, repeats=True
+                name,
+                (name.rstrip("12"),),
+                Placement(object="fruit_plate", heaped=name == "strawberry2"),
+                graspable=True,
+                repeats=True,
             )
             for name in (*_CHERRIES, *_STRAWBERRIES)
         ),
