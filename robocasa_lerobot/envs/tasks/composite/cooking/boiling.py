@@ -153,7 +153,7 @@ COOL_KETTLE = Task(
             "stove",
             part="knob_{burner}",
             until=_COOLED,
-            text="turn off the {burner} burner and let the kettle cool for 8 seconds",
+            text="turn off the {burner} burner and let the kettle cool for eight seconds",
         ),
         *_KETTLE_CARRIED,
         _KETTLE_PUT,

@@ -259,7 +259,7 @@ PREHEAT_POT = Task(
             "stove",
             part="knob_{knob}",
             until=AllOf(_LIT, _PREHEATED),
-            text="turn on the {knob} burner and let the pot heat for 25 seconds",
+            text="turn on the {knob} burner and let the pot heat for twenty-five seconds",
         ),
         Stage("pick_place", "place", "pot", object="vegetable"),
     ),

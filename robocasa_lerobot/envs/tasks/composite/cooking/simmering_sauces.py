@@ -6,7 +6,7 @@ from robocasa_lerobot.envs.scene.spec import Choice, FixtureSpec, ObjectSpec, Pl
 from robocasa_lerobot.envs.tasks.atomic.common import HANDLE_TO_FRONT
 from robocasa_lerobot.envs.tasks.task import Stage, Task
 
-_STEPS = {"460": {"seconds": "23"}, "480": {"seconds": "24"}, "500": {"seconds": "25"}}
+_STEPS = {"460": {"seconds": "twenty-three"}, "480": {"seconds": "twenty-four"}, "500": {"seconds": "twenty-five"}}
 _OFF = StateIs("stove", "{knob}_on", value=False)
 
 

@@ -336,7 +336,7 @@ TOAST_ONE_SLOT_PAIR = Task(
             object="bread_broken",
             part="{_free}",
             until=AllOf(_in_working("bread_broken"), GripperFar("bread_broken")),
-            text="put the slice from the {broken_side} side into the free slot on the {working_side} side",
+            text="put the {bread_broken} from the {broken_side} side into the free slot on the {working_side} side",
         ),
         Stage(
             "levers",
