@@ -73,23 +73,6 @@ OURS = {
         },
         scales={"ice_tray": (1.0, 0.75, 1.0)},
     ),
-    "MaximizeFreezerSpace": Ours(
-        goal={
-            "item1 inside target rack (up: highest freezer shelf; down: second highest): bbox in region "
-            "(tol 0.05), origin z within lower 90% of region": OnShelf("item1", "fridge", "{_to}", "freezer"),
-            "item2 inside target rack (up: highest freezer shelf; down: second highest): bbox in region "
-            "(tol 0.05), origin z within lower 90% of region": OnShelf("item2", "fridge", "{_to}", "freezer"),
-            "item3 inside target rack (up: highest freezer shelf; down: second highest): bbox in region "
-            "(tol 0.05), origin z within lower 90% of region": OnShelf("item3", "fridge", "{_to}", "freezer"),
-            "item4 inside target rack (up: highest freezer shelf; down: second highest): bbox in region "
-            "(tol 0.05), origin z within lower 90% of region": OnShelf("item4", "fridge", "{_to}", "freezer"),
-            "freezer door closed (every joint <= 0.005 of range)": SHUT,
-        },
-        initial={
-            "freezer door open (0.90-1.0)": FREEZER,
-            "direction up or down at random: up = source second highest rack, target highest; down = reverse": None,
-        },
-    ),
     "MoveFridgeToFreezer": Ours(
         goal={
             "refrigerated_item inside any freezer shelf (region bottom z 0.5-1.5 m, height >= 0.20 m): "
