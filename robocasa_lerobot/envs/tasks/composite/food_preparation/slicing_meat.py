@@ -1,6 +1,6 @@
 """Slice meat."""
 
-from robocasa_lerobot.envs.predicates import AllOf, GripperFar, ObjectOn
+from robocasa_lerobot.envs.predicates import AllOf, GripperFar, ObjectInside, ObjectOn, ObjectTouches
 from robocasa_lerobot.envs.scene.spec import (
     FixtureSpec,
     InitialOpenness,
@@ -9,6 +9,7 @@ from robocasa_lerobot.envs.scene.spec import (
     RobotStart,
     SampleRegion,
 )
+from robocasa_lerobot.envs.tasks.atomic.common import counter_near, in_cabinet
 from robocasa_lerobot.envs.tasks.composite.common import fetch
 from robocasa_lerobot.envs.tasks.task import Stage, Task
 
@@ -87,4 +88,58 @@ RETRIEVE_MEAT = Task(
     ),
 )
 
-TASKS = (RETRIEVE_MEAT, SET_UP_CUTTING_STATION)
+
+def _in_sink(name: str) -> AllOf:
+    return AllOf(ObjectInside(name, "sink"), GripperFar(name))
+
+
+CLEAN_BOARD = Task(
+    name="CleanBoard",
+    summary="Cutting board and knife are in the sink, the spray is on the counter, the gripper away from all three.",
+    fixtures=(
+        FixtureSpec("fridge", "fridge"),
+        counter_near("fridge"),
+        FixtureSpec("cabinet", "cabinet", near="counter"),
+        FixtureSpec("sink", "sink", near="counter"),
+    ),
+    robot_start=RobotStart("counter", at_object="receptacle"),
+    objects=(
+        ObjectSpec("spray", ("spray",), in_cabinet("cabinet", (0.3, 0.3), pos=_LEFT), graspable=True),
+        # Flat things are made higher, so that they can be held.
+        ObjectSpec(
+            "receptacle",
+            ("cutting_board",),
+            Placement("counter", size=(1.0, 0.5), pos=_FRONT),
+            scale=(1.0, 1.0, 1.5),
+        ),
+        ObjectSpec("knife", ("knife",), Placement("counter", size=(0.5, 0.5), pos=_FRONT), scale=(1.5, 1.5, 2.0)),
+    ),
+    initial=(InitialOpenness("cabinet", 0.9, 1.0),),
+    goal=AllOf(
+        *_in_sink("knife").parts,
+        *_in_sink("receptacle").parts,
+        ObjectTouches("spray", "counter"),
+        GripperFar("spray"),
+    ),
+    stages=(
+        Stage("pick_place", "pick", "counter", object="receptacle"),
+        Stage("navigation", "drive", "sink", object="receptacle"),
+        Stage("pick_place", "place", "sink", object="receptacle", until=_in_sink("receptacle")),
+        Stage("navigation", "drive", "knife"),
+        Stage("pick_place", "place", "sink", object="knife", until=_in_sink("knife")),
+        Stage("navigation", "drive", "cabinet"),
+        Stage("pick_place", "place", "counter", object="spray"),
+    ),
+    instruction=(
+        "Put the cutting board and the knife from the counter into the sink, and the spray from the cabinet on the "
+        "counter."
+    ),
+    paraphrases=(
+        "After slicing, board and knife go into the sink; take the spray out of the cabinet for the counter.",
+        "The meat is cut: move cutting board, then knife, to the sink, and get the cabinet's spray onto the counter.",
+        "Clean up: cutting board in the sink, knife in the sink, spray bottle on the counter.",
+        "The sink takes the dirty board and the dirty knife. What stands on the counter in the end is the spray.",
+    ),
+)
+
+TASKS = (CLEAN_BOARD, RETRIEVE_MEAT, SET_UP_CUTTING_STATION)
