@@ -35,8 +35,10 @@ def configure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--check",
         action="store_true",
-        help="in both splits, try each task and its demonstrator on 10 seeds",
+        help="in both splits, try each task and its demonstrator on several seeds",
     )
+    parser.add_argument("--seeds", type=int, default=10, metavar="N", help="of --check, from 0 on (default 10)")
+    parser.add_argument("--log", type=Path, metavar="FILE", help="of --check: keep what was found, and go on from it")
     parser.add_argument("--workers", type=int, default=os.cpu_count() or 1, help="of --check (default: all cores)")
     parser.add_argument("--json", action="store_true", help="print JSON")
 
@@ -49,7 +51,9 @@ def run(args: argparse.Namespace) -> int:
 
     tasks = _chosen(args)
     if args.check:
-        return _check(tasks, args.workers)
+        if args.seeds < 1:
+            raise UserError(f"--seeds {args.seeds}: --check needs at least one seed.")
+        return _check(tasks, range(args.seeds), args.workers, args.log)
     if args.markdown:
         write_text(args.markdown, pages(tasks))
         print(f"{args.markdown}: {len(tasks)} tasks")
@@ -112,12 +116,12 @@ def _chosen(args: argparse.Namespace) -> list[Task]:
     return tasks
 
 
-def _check(tasks: list[Task], workers: int) -> int:
+def _check(tasks: list[Task], seeds: range, workers: int, log: Path | None) -> int:
     from robocasa_lerobot.demos.task_check import check_all
     from robocasa_lerobot.envs.kitchens.splits import SPLITS
     from robocasa_lerobot.progress import Bar
 
-    found = check_all([task.name for task in tasks], SPLITS, workers=workers)
+    found = check_all([task.name for task in tasks], SPLITS, seeds, workers=workers, log=log)
     failures = 0
     with Bar(found, total=len(tasks) * len(SPLITS), unit="task", disable=None) as bar:
         for one in bar:

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
+from pathlib import Path
 
 from robocasa_lerobot.demos.demonstrator import can_demonstrate
 from robocasa_lerobot.demos.recorder import record_episode
 from robocasa_lerobot.envs.checks.tasks import CHECK_SEEDS, check_task
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.tasks.registry import get_task
+from robocasa_lerobot.files import write_text
 from robocasa_lerobot.jobs.as_completed import as_they_end
 
 
@@ -51,8 +54,46 @@ def check(task: str, split: str, seeds: Sequence[int] = CHECK_SEEDS) -> Checked:
 
 
 def check_all(
-    tasks: Sequence[str], splits: Sequence[str], seeds: Sequence[int] = CHECK_SEEDS, *, workers: int = 1
+    tasks: Sequence[str],
+    splits: Sequence[str],
+    seeds: Sequence[int] = CHECK_SEEDS,
+    *,
+    workers: int = 1,
+    log: Path | None = None,
 ) -> Iterator[Checked]:
-    """Every task in every split, in the order in which processes finish."""
+    """Every task in every split, in the order in which processes finish.
+
+    Args:
+        tasks: names.
+        splits: names.
+        seeds: tried in each.
+        workers: processes.
+        log: file that results are appended to as they come, a line each; those that it holds for the same seeds come
+            first and are not made again.
+    """
+    before = [] if log is None else _logged(log, seeds)
+    known = {(one.task, one.split): one for one in before}
     jobs = [(task, split, seeds) for split in splits for task in tasks]
-    yield from as_they_end(check, jobs, workers)
+    yield from (known[task, split] for task, split, _ in jobs if (task, split) in known)
+    todo = [job for job in jobs if job[:2] not in known]
+    for one in as_they_end(check, todo, workers):
+        if log is not None:
+            with log.open("a", encoding="utf-8") as file:
+                file.write(json.dumps({**asdict(one), "seeds": list(seeds)}) + "\n")
+        yield one
+
+
+def _logged(log: Path, seeds: Sequence[int]) -> list[Checked]:
+    log.parent.mkdir(parents=True, exist_ok=True)
+    if not log.exists():
+        return []
+    lines = log.read_text(encoding="utf-8").splitlines(keepends=True)
+    whole = [line for line in lines if line.endswith("\n")]  # the last one may be cut off
+    if len(whole) < len(lines):
+        write_text(log, "".join(whole))
+    rows = [json.loads(line) for line in whole]
+    return [
+        Checked(row["task"], row["split"], tuple(row["faults"]), row["solved"], tuple(row["failed"]))
+        for row in rows
+        if row["seeds"] == list(seeds)
+    ]

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import re
+from collections.abc import Sequence
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 
@@ -42,6 +45,40 @@ def test_a_demonstrator_that_solves_nothing_is_a_fault(monkeypatch: pytest.Monke
     found = task_check.check(TASK, "target", (0, 1))
     assert (found.solved, found.failed) == (None, (0, 1))
     assert found.faults == ("the demonstrator solved none of 2 seeds",)
+
+
+def test_what_is_sunk_into_something_is_found_though_it_sleeps(monkeypatch: pytest.MonkeyPatch) -> None:
+    real = KitchenEnv.reset
+
+    def reset(env: KitchenEnv, *, seed: int | None = None, options: dict | None = None):
+        found = real(env, seed=seed, options=options)
+        env.data.qpos[env.model.joint("obj_joint0").qposadr[0] + 2] -= 0.012
+        return found
+
+    assert check_task("PickPlaceCounterToSink", seeds=(0,)) == []
+    monkeypatch.setattr(KitchenEnv, "reset", reset)
+    faults = check_task("PickPlaceCounterToSink", seeds=(0,))
+    assert any(re.fullmatch(r"seed 0, step 0: \w+ reaches \d+ mm into \w+, and .*", one) for one in faults)
+
+
+def test_a_check_goes_on_from_its_log(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    made: list[tuple[str, str]] = []
+
+    def check(task: str, split: str, seeds: Sequence[int]) -> task_check.Checked:
+        made.append((task, split))
+        return task_check.Checked(task, split, (), 1, (0,))
+
+    monkeypatch.setattr(task_check, "check", check)
+    log = tmp_path / "new" / "check.jsonl"
+    names = [TASK, "CloseDrawer"]
+    first = list(task_check.check_all(names[:1], SPLITS, (0, 1), log=log))
+    log.write_text(log.read_text() + '{"task": "CloseDr')  # as a kill may leave it
+    both = list(task_check.check_all(names, SPLITS, (0, 1), log=log))
+    assert made == [(name, split) for name in names for split in SPLITS]
+    assert set(first) < set(both)
+    assert len(both) == 4
+    list(task_check.check_all(names, SPLITS, (0,), log=log))
+    assert len(made) == 8  # other seeds are another check
 
 
 @pytest.mark.slow

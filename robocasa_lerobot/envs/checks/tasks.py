@@ -7,6 +7,7 @@ from collections.abc import Iterable, Iterator
 import numpy as np
 
 from robocasa_lerobot import contract
+from robocasa_lerobot.envs.checks.soundness import sunk_in
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 
 CHECK_SEEDS = range(10)
@@ -19,7 +20,8 @@ def check_task(name: str, split: str = "target", seeds: Iterable[int] = CHECK_SE
     """Faults of a task, in words; an empty list is a pass.
 
     For every seed: it resets; the goal does not hold at reset nor within `IDLE_SECONDS` without an action; observations
-    and states are finite and inside their space; the same seed gives bit-identical observations and states.
+    and states are finite and inside their space; the same seed gives bit-identical observations and states; at reset and
+    after that time nothing reaches more than 6 mm into anything else.
     """
     first = KitchenEnv(name, split=split, image_size=IMAGE_SIZE)
     second = KitchenEnv(name, split=split, image_size=IMAGE_SIZE)
@@ -35,7 +37,8 @@ def _check_seed(first: KitchenEnv, second: KitchenEnv, seed: int) -> Iterator[st
     first.render_observations = second.render_observations = True
     observation, info = first.reset(seed=seed)
     again, _ = second.reset(seed=seed)
-    for step in range(round(IDLE_SECONDS * contract.CONTROL_HZ) + 1):
+    steps = round(IDLE_SECONDS * contract.CONTROL_HZ)
+    for step in range(steps + 1):
         where = f"seed {seed}, step {step}"
         compared = step <= COMPARED_STEPS
         first.render_observations = compared
@@ -54,6 +57,9 @@ def _check_seed(first: KitchenEnv, second: KitchenEnv, seed: int) -> Iterator[st
             if step:
                 again = second.step(idle)[0]
             yield from (f"{where}: {fault}" for fault in _differences(first, second, observation, again))
+        if step in (0, steps):
+            for one, other, depth in sunk_in(first.model, first.data):
+                yield f"{where}: {one} reaches {1000 * depth:.0f} mm into {other}, and nothing presses it"
 
 
 def _differences(first: KitchenEnv, second: KitchenEnv, observation: dict, again: dict) -> Iterator[str]:
