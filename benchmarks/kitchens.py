@@ -30,6 +30,7 @@ from robocasa_lerobot.envs.checks.soundness import MOVED_M, blocked_walkways, fe
 from robocasa_lerobot.envs.kitchens.materials import split_of
 from robocasa_lerobot.envs.kitchens.splits import scene_ids, without
 from robocasa_lerobot.envs.scene.build import build_scene
+from robocasa_lerobot.envs.scene.scene import Scene
 from robocasa_lerobot.envs.tasks.registry import get_task, task_names
 from robocasa_lerobot.envs.tasks.task import Task
 from robocasa_lerobot.errors import UserError
@@ -78,11 +79,18 @@ def examine(pair: tuple[int, int]) -> dict[str, Any]:
     mujoco.mj_comPos(model, plain)
     found["overlaps"] = [[o.first, o.second, o.depth] for o in overlaps(model, plain, scene.fixtures)]
     found["blocked"] = blocked_walkways(scene.layout)
-    data, _ = scene.initial_data(np.random.default_rng(seed))
-    found["fell"] = {name: round(by, 4) for name, by in fell(scene, data).items() if by > FALL_M}
-    found["moved"] = {name: round(by, 4) for name, by in moved(scene, data).items() if by > MOVED_M}
+    found |= unrest(scene, seed)
     found |= {"geoms": model.ngeom, "dofs": model.nv, "triangles": int(model.mesh_facenum.sum())}
     return found
+
+
+def unrest(scene: Scene, seed: int) -> dict[str, dict[str, float]]:
+    """What fell by more than 2 cm while an episode's first state settled, and what moves after that, metres by name."""
+    data, _ = scene.initial_data(np.random.default_rng(seed))
+    return {
+        "fell": {name: round(by, 4) for name, by in fell(scene, data).items() if by > FALL_M},
+        "moved": {name: round(by, 4) for name, by in moved(scene, data).items() if by > MOVED_M},
+    }
 
 
 def _takers(pair: tuple[int, int]) -> list[Task]:

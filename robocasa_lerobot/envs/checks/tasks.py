@@ -20,8 +20,8 @@ def check_task(name: str, split: str = "target", seeds: Iterable[int] = CHECK_SE
     """Faults of a task, in words; an empty list is a pass.
 
     For every seed: it resets; the goal does not hold at reset nor within `IDLE_SECONDS` without an action; observations
-    and states are finite and inside their space; the same seed gives bit-identical observations and states; at reset and
-    after that time nothing reaches more than 6 mm into anything else.
+    and states are finite and inside their space; the same seed gives bit-identical observations and states; nothing
+    reaches more than 6 mm into anything else at reset, nor after that time.
     """
     first = KitchenEnv(name, split=split, image_size=IMAGE_SIZE)
     second = KitchenEnv(name, split=split, image_size=IMAGE_SIZE)
