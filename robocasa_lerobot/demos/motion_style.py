@@ -9,6 +9,7 @@ among candidates (`motion_style_of(env).bonus`), and so is the place (`motion_st
 
 from __future__ import annotations
 
+import functools
 from dataclasses import dataclass
 from weakref import WeakKeyDictionary
 
@@ -75,9 +76,14 @@ class MotionStyle:
         """What a hand rotation (3, 3) gains over others by being preferred, in [0, weight]."""
         if not self.weight:
             return 0.0
+        return self.weight * (float(np.trace(self._hand.T @ rotation)) + 1.0) / 4.0
+
+    @functools.cached_property
+    def _hand(self) -> Array:
+        """The preferred hand rotation, (3, 3)."""
         matrix = np.empty(9)
         mujoco.mju_quat2Mat(matrix, np.array(self.hand))
-        return self.weight * (float(np.trace(matrix.reshape(3, 3).T @ rotation)) + 1.0) / 4.0
+        return matrix.reshape(3, 3)
 
     def carry_out(self, action: Array) -> Array:
         """An action (12,), stored order, as this demonstration carries it out."""

@@ -48,10 +48,14 @@ class Approach:
         went = self._went(start, goal[None])
         if not len(went):
             return 0.0
-        hits, near = self.counts(went[:-1], 0.0), self.counts(went[:-1], self.costs.near_m)
-        worst = sum(int(part.max()) for part in np.array_split(hits, STRETCHES) if len(part))
-        close = sum(int(part.max()) for part in np.array_split(np.maximum(near - hits, 0), STRETCHES) if len(part))
-        return self.costs.hit * worst + self.costs.near * close + self._astray(went, goal)
+        near = self.counts(went[:-1], self.costs.near_m)
+        close = near > 0
+        if not close.any():
+            return self._astray(went, goal)
+        hits = np.zeros_like(near)  # what is not even near does not touch
+        hits[close] = self.counts(went[:-1][close], 0.0)
+        worst, beside = _of_stretches(hits), _of_stretches(np.maximum(near - hits, 0))
+        return self.costs.hit * worst + self.costs.near * beside + self._astray(went, goal)
 
     def detour(self, start: Array, goal: Array, key: Array) -> tuple[Array, float] | None:
         """A joint path (k, 7) round what the straight line meets, and its cost; None where none was found.
@@ -109,3 +113,14 @@ class Approach:
 
     def _astray(self, went: Array, goal: Array) -> float:
         return self.costs.astray * float(np.abs(went[-1] - goal).max() > self.costs.astray_rad)
+
+
+def _of_stretches(counts: NDArray[np.int64]) -> int:
+    """The largest of counts (N,) in each of the stretches of a line, together."""
+    each, more = divmod(len(counts), STRETCHES)
+    values, total, begin = counts.tolist(), 0, 0
+    for stretch in range(STRETCHES):
+        end = begin + each + (stretch < more)
+        total += max(values[begin:end], default=0)
+        begin = end
+    return total

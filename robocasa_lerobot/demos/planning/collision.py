@@ -6,6 +6,7 @@ against the kitchen's. Nothing is simulated and the env's state is not touched.
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -23,6 +24,7 @@ from robocasa_lerobot.envs.scene.scene import Scene
 
 MOST_TOUCHED = 3  # bodies that are told apart
 FLOOR = "floor"
+_NO_POSITIONS, _NO_ROTATIONS = np.zeros((1, 0, 3)), np.zeros((1, 0, 3, 3))
 
 # By the state that is asked about, not by its model: what is kept refers to the model, which it would keep alive.
 _scratch: WeakKeyDictionary[mujoco.MjData, mujoco.MjData] = WeakKeyDictionary()
@@ -144,6 +146,9 @@ class CollisionChecker:
         self._robots: dict[tuple[int, ...] | None, kernel.Shapes] = {}
         self._keep: list[Held | None] = []
         self._stills: dict[tuple[tuple[str, ...], int], kernel.Shapes] = {}
+        self._frames: dict[bytes, Array] = {}
+        self._carried: dict[str, kernel.Shapes] = {}
+        self._loaded: dict[tuple[tuple[str, ...], tuple[int, ...] | None], kernel.Shapes] = {}
         self.present_base = np.array([base[0], base[1], yaw])
         self.present_joints: Array = np.array(data.qpos[self.arm.addresses])
 
@@ -166,6 +171,16 @@ class CollisionChecker:
         frames[:, 2] = self._height
         frames[:, 3] = bases[:, 2] + self._yaw_offset
         return frames
+
+    def _frames_at(self, bases: Array) -> Array:
+        """The same, kept for single places: many configurations are asked about at each, in many calls."""
+        bases = np.asarray(bases, dtype=np.float64)
+        if bases.size != 3:
+            return self.arm_frames(bases)
+        key = bases.tobytes()
+        if key not in self._frames:
+            self._frames[key] = self.arm_frames(bases)
+        return self._frames[key]
 
     def touched(
         self,
@@ -195,11 +210,12 @@ class CollisionChecker:
             most: bodies of each configuration after which no more are looked for.
             links: of the robot that are looked at (0 for the base, 1 to 7); None takes all.
         """
-        joints, frames = np.asarray(joints, dtype=np.float64).reshape(-1, 7), self.arm_frames(bases)
+        joints, frames = np.asarray(joints, dtype=np.float64).reshape(-1, 7), self._frames_at(bases)
         count = max(len(joints), len(frames))
         joints = joints.repeat(count, axis=0) if len(joints) < count else np.ascontiguousarray(joints)
         frames = frames.repeat(count, axis=0) if len(frames) < count else frames
-        frames[:, 2] += raised_m
+        if raised_m:
+            frames = frames + np.array([0.0, 0.0, raised_m, 0.0])
         bodies, counts = np.zeros((count, most), dtype=np.int64), np.zeros(count, dtype=np.int64)
         still = self._still(held, part)
         moves = part.shapes if part is not None else self._none
@@ -212,8 +228,8 @@ class CollisionChecker:
             self._moving(held, links),
             still,
             moves,
-            part.positions if part is not None else np.zeros((1, 0, 3)),
-            part.rotations if part is not None else np.zeros((1, 0, 3, 3)),
+            part.positions if part is not None else _NO_POSITIONS,
+            part.rotations if part is not None else _NO_ROTATIONS,
             self._pardons,
             frames,
             joints,
@@ -237,12 +253,20 @@ class CollisionChecker:
             robot = self._robots.get(links)
             if robot is None:
                 robot = self._robots[links] = self._robot_shapes(links)
-            shapes = robot
-            for body in () if held is None else (held, *held.contents):
-                shapes = _joined(shapes, self._held_shapes(body))
-            self._movers[key] = shapes
+            self._movers[key] = robot if held is None else self._with_held(robot, held, links)
             self._keep.append(held)  # so that its number stays its own
         return self._movers[key]
+
+    def _with_held(self, robot: kernel.Shapes, held: Held, links: tuple[int, ...] | None) -> kernel.Shapes:
+        """The robot's shapes and those of what it holds; where the latter lie in the hand is all that differs often."""
+        carried = [self._held_shapes(body) for body in (held, *held.contents)]
+        key = (held.names, links)
+        if key not in self._loaded:
+            self._loaded[key] = functools.reduce(_joined, carried, robot)
+        return self._loaded[key]._replace(
+            positions=np.concatenate([robot.positions, *(shapes.positions for shapes in carried)]),
+            rotations=np.concatenate([robot.rotations, *(shapes.rotations for shapes in carried)]),
+        )
 
     def _robot_shapes(self, links: tuple[int, ...] | None) -> kernel.Shapes:
         shapes = _take(self._all, self._robot[self._all.bodies])
@@ -257,15 +281,19 @@ class CollisionChecker:
         )
 
     def _held_shapes(self, held: Held) -> kernel.Shapes:
-        inside = subtree(self._model, held.name)
-        shapes = _take(self._all, inside[self._all.bodies])
+        if held.name not in self._carried:
+            inside = subtree(self._model, held.name)
+            shapes = _take(self._all, inside[self._all.bodies])
+            self._carried[held.name] = shapes._replace(
+                links=np.full(len(shapes.geoms), kernel.ARM_DOFS, dtype=np.int64),
+                is_hand=np.ones(len(shapes.geoms), dtype=np.bool_),
+            )
+        shapes = self._carried[held.name]
         origin, turn = self._links.bodies[self._model.body(held.name).id]
         grip, hand = self._grip_from_last
         position = grip + hand @ held.position
         rotation = hand @ held.rotation @ turn.T
         return shapes._replace(
-            links=np.full(len(shapes.geoms), kernel.ARM_DOFS, dtype=np.int64),
-            is_hand=np.ones(len(shapes.geoms), dtype=np.bool_),
             positions=(shapes.positions - origin) @ rotation.T + position,
             rotations=np.ascontiguousarray(rotation @ shapes.rotations),
         )

@@ -280,6 +280,29 @@ def _place(
 
 
 @compiled
+def _place_once(
+    geoms: Indices,
+    many: Indices,
+    count: int,
+    placed: Flags,
+    positions: Array,
+    rotations: Array,
+    xpos: Array,
+    xmat: Array,
+) -> None:
+    """The same for those that are not `placed` yet: of what stands still in a kitchen little is ever near."""
+    for k in range(count):
+        g = many[k]
+        if placed[g]:
+            continue
+        placed[g] = True
+        for i in range(3):
+            xpos[geoms[g], i] = positions[g, i]
+            for j in range(3):
+                xmat[geoms[g], 3 * i + j] = rotations[g, i, j]
+
+
+@compiled
 def _move(
     moving: Any, bases: Array, n: int, position: Array, rotation: Array, positions: Array, rotations: Array
 ) -> None:
@@ -409,8 +432,8 @@ def touched(
     positions, rotations = np.empty((many, 3)), np.empty((many, 3, 3))
     low, high = np.empty((many, 3)), np.empty((many, 3))
     part_low, part_high = np.empty((parts, 3)), np.empty((parts, 3))
-    near, every = np.empty(len(still.geoms), dtype=np.int64), np.arange(max(len(still.geoms), many, parts))
-    _place(still.geoms, every, len(still.geoms), still.positions, still.rotations, xpos, xmat)
+    near, every = np.empty(len(still.geoms), dtype=np.int64), np.arange(max(many, parts))
+    placed = np.zeros(len(still.geoms), dtype=np.bool_)
     state = -1
     for n in range(len(joints)):
         counts[n] = 0
@@ -427,6 +450,7 @@ def touched(
             pardons, hand_may[n], False, margin, n, bodies, counts,
         )  # fmt: skip
         count = _near(low, high, still.low, still.high, margin, near)
+        _place_once(still.geoms, near, count, placed, still.positions, still.rotations, xpos, xmat)
         _meet(
             model, data, moving, low, high, still, still.low, still.high, near, count,
             pardons, hand_may[n], False, margin, n, bodies, counts,

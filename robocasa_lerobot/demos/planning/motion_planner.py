@@ -28,6 +28,8 @@ LOADED_MORE = 4  # times as many of all of them with a full vessel in the hand, 
 SAMPLE_RAD, MOST_SAMPLES = 0.10, 5  # between tested configurations of a line, and how many at most
 NEAR_M, DRIVE_STEP_M = 0.08, 0.07  # a drive as short is not tested; between tested places of a longer one
 _POSES, _LINES, _DETOUR = range(3)
+_TOGETHER = 8  # candidates whose poses are tested in one call, since the next ones are likely to be asked about too
+_SHARES = [((np.arange(count) + 0.7) / max(count, 1))[:, None] for count in range(MOST_SAMPLES + 1)]
 
 
 @dataclass(frozen=True)
@@ -268,25 +270,45 @@ class _Candidates:
         self.cost, self._which, self._where = cost, which, where
         self._places, self._joints = places, np.stack(solved, axis=1)  # (rows, 1 + poses, 7)
         self._lines = len(solved) - 1
+        self._order = np.argsort(cost, kind="stable").tolist()  # in which they are asked about first
+        self._hits: dict[int, int] = {}
+        self._straight: dict[tuple[int, int, bytes], float] = {}
 
     def poses(self, row: int) -> float:
         """Cost of the bodies touched at the poses."""
-        counts = self._counts(row, [(line, self._joints[row, line : line + 1]) for line in range(1, self._lines + 1)])
-        return self._p._costs.hit_at_pose * float(counts.sum())
+        if row not in self._hits:
+            begin = self._order.index(row)
+            self._test_poses(self._order[begin : begin + _TOGETHER])
+        return self._p._costs.hit_at_pose * float(self._hits[row])
+
+    def _test_poses(self, rows: list[int]) -> None:
+        """Count the bodies touched at all poses of some rows; what is held is one question each."""
+        asked: dict[int, tuple[Held | None, list[int], list[int]]] = {}
+        for row in rows:
+            path = self._p._paths[self._which[row]]
+            self._hits[row] = 0
+            for line in range(1, self._lines + 1):
+                held = self._p.held_on(path, line)
+                _, its_rows, its_lines = asked.setdefault(id(held), (held, [], []))
+                its_rows.append(row)
+                its_lines.append(line)
+        for held, its_rows, its_lines in asked.values():
+            places, joints = self._places[self._where[its_rows]], self._joints[its_rows, its_lines]
+            counts = self._p._checker.touched(places, joints, held=held, most=self._p._costs.most_hits).counts
+            for row, count in zip(its_rows, counts.tolist(), strict=True):
+                self._hits[row] += count
 
     def lines(self, row: int) -> float:
         """Cost of the bodies touched on the lines between the poses."""
         joints, worst, at = self._joints[row], 0, 0
-        pieces: list[tuple[int, Array]] = []
-        for line in range(2, len(joints)):
-            away = joints[line] - joints[line - 1]
-            count = int(np.clip(np.ceil(np.abs(away).max() / SAMPLE_RAD), 1, MOST_SAMPLES))
-            # It ends short of the pose, which has been tested.
-            pieces.append((line, joints[line - 1] + ((np.arange(count) + 0.7) / count)[:, None] * away))
+        away = joints[2:] - joints[1:-1]
+        samples = np.clip(np.ceil(np.abs(away).max(axis=1) / SAMPLE_RAD), 1, MOST_SAMPLES).astype(int).tolist()
+        # Lines end short of their poses, which have been tested.
+        pieces = [(line + 2, joints[line + 1] + _SHARES[count] * away[line]) for line, count in enumerate(samples)]
         counts = self._counts(row, pieces)
-        for _, piece in pieces:
-            worst += int(counts[at : at + len(piece)].max())
-            at += len(piece)
+        for count in samples:
+            worst += max(counts[at : at + count])
+            at += count
         return self._p._costs.hit * worst
 
     def drive(self, row: int) -> float:
@@ -300,7 +322,11 @@ class _Candidates:
 
     def straight(self, row: int) -> float:
         """Cost of the straight line to the first pose."""
-        return self._approach(row).straight(self._joints[row, 0], self._joints[row, 1])
+        held = self._p.held_on(self._p._paths[self._which[row]], 1)
+        key = (int(self._where[row]), id(held), self._joints[row, :2].tobytes())
+        if key not in self._straight:  # many paths begin alike
+            self._straight[key] = self._approach(row).straight(self._joints[row, 0], self._joints[row, 1])
+        return self._straight[key]
 
     def detour(self, row: int) -> tuple[Array, float] | None:
         """A joint path (k, 7) to the first pose round what the straight line meets, and its cost."""
@@ -320,12 +346,12 @@ class _Candidates:
         """The plan of a row."""
         return MotionPlan(self._p._paths[self._which[row]], self._bases[self._where[row]], cost, joints)
 
-    def _counts(self, row: int, pieces: list[tuple[int, Array]]) -> NDArray[np.int64]:
+    def _counts(self, row: int, pieces: list[tuple[int, Array]]) -> list[int]:
         """Bodies touched at configurations (n, 7) of lines in their order, with the object held on each, one row."""
         path, place = self._p._paths[self._which[row]], self._places[self._where[row]]
-        found: list[NDArray[np.int64]] = [np.zeros(0, dtype=np.int64)]
+        found: list[int] = []
         for held, group in itertools.groupby(pieces, key=lambda piece: self._p.held_on(path, piece[0])):
             joints = np.concatenate([joints for _, joints in group])
             checked = self._p._checker.touched(place, joints, held=held, most=self._p._costs.most_hits)
-            found.append(checked.counts)
-        return np.concatenate(found)
+            found += checked.counts.tolist()
+        return found
