@@ -70,7 +70,8 @@ from robocasa_lerobot.envs.tasks.task import Stage
 # Between the two steep and the two flat ones of any approach: a palm that is level meets the shelf before low objects.
 _CABINET_TILTS = in_radians((0, 0.0), (35, 0.1), (42, 0.1), (50, 0.15), (65, 0.2), (88, 0.3))
 OUT_OF_CABINET = replace(ANY_APPROACH, tilts=_CABINET_TILTS, narrow=True, poses=level_grasps)
-OUT_OF_FRIDGE = ANY_APPROACH
+# Rooms between a fridge's shelves are as low as those of cabinets, and what lies in them is as low.
+OUT_OF_FRIDGE = OUT_OF_CABINET
 BEFORE_FRONT_M, MOST_OUT_M = 0.03, 0.45
 HARD = 1.0  # cost of taking something out of a drawer, from which on it is pulled out first
 BEYOND_COST, FLAT_COST = 50.0, 8.0  # for each metre that something stands out beyond a rack, and is too high on it
@@ -123,8 +124,9 @@ def grasp_strategy(env: KitchenEnv, obj: Graspable, free: GraspStrategy, *, kept
             return replace(FROM_CRISPER, first=_pull_out_first(obj, place))
         case _ if in_the_open(place):
             return free
-        case Fridge() as fridge if kept and place.region:
-            return replace(OUT_OF_FRIDGE, out_m=_way_out(env, obj, fridge.regions[place.region]))
+        case Fridge() as fridge if place.region:
+            out_m = _way_out(env, obj, fridge.regions[place.region]) if kept else OUT_M
+            return replace(OUT_OF_FRIDGE, out_m=out_m, first=_turn_first(obj, OUT_OF_FRIDGE))
         case _:
             return ANY_APPROACH
 
