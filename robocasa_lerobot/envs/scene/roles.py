@@ -13,6 +13,8 @@ from robocasa_lerobot.envs.kitchens.footprints import PlacementError
 from robocasa_lerobot.envs.kitchens.layout import Layout
 from robocasa_lerobot.envs.scene.spec import FixtureSpec
 
+BESIDE_M = 0.3  # that a fixture reaches beyond another one, to be beside it
+ALIKE_COS = 0.99  # of the angle between fixtures of one row
 HOUSING_BELOW_M = 0.6  # a housing whose underside is lower stands on the floor
 
 
@@ -42,7 +44,16 @@ def _suits(fixture: Fixture, wanted: FixtureSpec, layout: Layout, roles: dict[st
     others = {roles[role] for role in wanted.other_than}
     large = fixture.width >= wanted.size[0] and fixture.depth >= wanted.size[1]
     apart = all(_distance(layout.fixtures[name], fixture) >= wanted.apart_m for name in others)
-    return fixture.name not in others and large and apart
+    beside = not wanted.side or _reaches(fixture, layout.fixtures[roles[wanted.near]], wanted.side)
+    return fixture.name not in others and large and apart and beside
+
+
+def _reaches(fixture: Fixture, ref: Fixture, side: str) -> bool:
+    """Whether a fixture of the same row reaches beyond another one on a side of that."""
+    x, y = ref.to_local(fixture.pos)
+    same_row = abs(y) < ref.depth / 2 and np.cos(fixture.yaw - ref.yaw) > ALIKE_COS
+    beyond = (x if side == "right" else -x) + fixture.width / 2 - ref.width / 2
+    return bool(same_row and beyond > BESIDE_M)
 
 
 def _distance(fixture: Fixture, ref: Fixture) -> float:

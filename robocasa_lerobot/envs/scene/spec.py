@@ -22,6 +22,8 @@ class FixtureSpec:
         other_than: roles of earlier fixtures that it is none of.
         size: least width and depth of its top, metres; of counters.
         apart_m: least distance on the floor from the fixtures of `other_than`, metres.
+        side: of the fixture of `near`, "left" or "right" as seen from before it: it stands in one row with that, and
+            reaches beyond it there, as does a counter that the other is let into; any side if empty.
     """
 
     role: str
@@ -30,6 +32,7 @@ class FixtureSpec:
     other_than: tuple[str, ...] = ()
     size: tuple[float, float] = (0.0, 0.0)
     apart_m: float = 0.0
+    side: str = ""
 
 
 @dataclass(frozen=True)
