@@ -26,8 +26,8 @@ class Field(Room):
     def __init__(self, inside: Callable[[float, float], bool]) -> None:
         self._inside = inside
 
-    def all_free(self, poses: Sequence[RobotPose]) -> NDArray[np.bool_]:
-        free = [max(abs(pose.x), abs(pose.y)) < BORDER_M and not self._inside(pose.x, pose.y) for pose in poses]
+    def free_at(self, poses: NDArray[np.float64]) -> NDArray[np.bool_]:
+        free = [max(abs(x), abs(y)) < BORDER_M and not self._inside(x, y) for x, y, _ in poses.tolist()]
         return np.array(free, dtype=np.bool_)
 
 

@@ -8,6 +8,7 @@ the shapes of the robot, its arm as it is and what it holds, against the kitchen
 from __future__ import annotations
 
 import contextlib
+import functools
 import heapq
 import itertools
 from collections.abc import Iterator, Sequence
@@ -37,7 +38,7 @@ LOADED_MARGINS_M: tuple[Margins, ...] = ((0.05, 0.03), (0.03, 0.015), *MARGINS_M
 MOST_CELLS = 20_000  # that are looked at
 # A goal from which fewer cells than these can be reached is shut in; poses near it count as others from this distance.
 POCKET, APART_M = 1_500, 0.05
-_NEIGHBOURS = [(x, y) for x in (-1, 0, 1) for y in (-1, 0, 1) if x or y]
+_NEIGHBOURS = [(x, y, CELL_M * float(np.hypot(x, y))) for x in (-1, 0, 1) for y in (-1, 0, 1) if x or y]
 
 type _Cell = tuple[int, int, int]
 
@@ -192,13 +193,18 @@ class _Grid:
 
     def __post_init__(self) -> None:
         self._known: dict[tuple[float, float, float], bool] = {}
+        self._yaws: dict[float, float] = {}
+        self._first = self.first()
 
     def pose(self, cell: tuple[float, float, float]) -> RobotPose:
         """The middle of a cell, or between two."""
+        return RobotPose(*self._row(cell))
+
+    def _row(self, cell: tuple[float, float, float]) -> tuple[float, float, float]:
         i, j, k = cell
-        return RobotPose(
-            self.goal.x + i * CELL_M, self.goal.y + j * CELL_M, wrap(self.goal.yaw + k * 2 * np.pi / HEADINGS)
-        )
+        if k not in self._yaws:
+            self._yaws[k] = wrap(self.goal.yaw + k * 2 * np.pi / HEADINGS)
+        return self.goal.x + i * CELL_M, self.goal.y + j * CELL_M, self._yaws[k]
 
     def first(self) -> _Cell:
         """The cell of the start."""
@@ -214,8 +220,8 @@ class _Grid:
 
         A move between cells is tested closely when it would come next, which few of them do.
         """
-        first, number = self.first(), itertools.count()
-        queue = [(self._ahead(first), first, next(number), 0.0, first)]
+        first, number = self._first, itertools.count()
+        queue = [(_ahead(first), first, next(number), 0.0, first)]
         came: dict[_Cell, _Cell] = {}
         while queue and len(came) < MOST_CELLS:
             _, cell, _, cost, before = heapq.heappop(queue)
@@ -227,67 +233,69 @@ class _Grid:
                 while path[-1] != first:
                     path.append(came[path[-1]])
                 return path[::-1]
-            around = list(self._neighbours(cell))
-            self._look(cell, [other for other, _ in around])
-            for other, length in around:
-                if other not in came and self._is_free(cell, other):
+            for other, length in self._free_around(cell):
+                if other not in came:
                     new = cost + length
-                    heapq.heappush(queue, (new + self._ahead(other), other, next(number), new, cell))
+                    heapq.heappush(queue, (new + _ahead(other), other, next(number), new, cell))
         return None
 
     def _is_clear(self, before: _Cell, cell: _Cell) -> bool:
         """Whether a move is free in between, where a margin is to be kept; the first one begins where the base is."""
         if before == cell or self.room.margin_m <= 0.0:
             return True
-        if before == self.first():
+        if before == self._first:
             return not self.room.free(self.start) or self.room.closely(self.start, self.pose(cell))
         return self.room.closely(self.pose(before), self.pose(cell))
 
     def is_shut_in(self) -> bool:
         """Whether all that can be reached from the goal is a pocket of less than `POCKET` cells without the start."""
-        first, goal = self.first(), (0, 0, 0)
+        goal = (0, 0, 0)
         found, queue = {goal}, [goal]
         while queue and len(found) < POCKET:
             cell = queue.pop()
-            if cell == first:
+            if cell == self._first:
                 return False
-            around = [other for other, _ in self._neighbours(cell)]
-            self._look(cell, around)
-            new = [other for other in around if other not in found and self._is_free(cell, other)]
+            new = [other for other, _ in self._free_around(cell) if other not in found]
             found.update(new)
             queue += new
         return not queue
 
-    def _ahead(self, cell: _Cell) -> float:
-        i, j, k = cell
-        return float(np.hypot(i, j)) * CELL_M + min(k, HEADINGS - k) * TURN_COST_M
-
-    def _neighbours(self, cell: _Cell) -> Iterator[tuple[_Cell, float]]:
-        i, j, k = cell
-        for x, y in _NEIGHBOURS:
-            yield (i + x, j + y, k), CELL_M * float(np.hypot(x, y))
-        for turn in (-1, 1):
-            yield (i, j, (k + turn) % HEADINGS), TURN_COST_M
-
-    def _look(self, before: _Cell, cells: Sequence[_Cell]) -> None:
-        """Test cells, and the move there where it leads across a corner or turns, all at once."""
-        wanted: list[tuple[float, float, float]] = [*cells, *(_middle(before, cell) for cell in cells)]
-        new = [cell for cell in dict.fromkeys(wanted) if cell not in self._known]
-        free = self.room.all_free([self.pose(cell) for cell in new])
-        self._known.update(zip(new, free.tolist(), strict=True))
-        self._known[0, 0, 0] = True
-
-    def _is_free(self, before: _Cell, cell: _Cell) -> bool:
-        return self._known[cell] and self._known[_middle(before, cell)]
+    def _free_around(self, cell: _Cell) -> list[tuple[_Cell, float]]:
+        """The neighbours that are free, with the move there where it leads across a corner or turns; and how far."""
+        around = _neighbours(cell)
+        known = self._known
+        new = [place for step in around for place in step[:2] if place not in known]
+        if new:
+            new = list(dict.fromkeys(new))
+            free = self.room.free_at(np.array([self._row(place) for place in new]))
+            known.update(zip(new, free.tolist(), strict=True))
+            known[0, 0, 0] = True
+        return [(other, length) for other, middle, length in around if known[other] and known[middle]]
 
 
-def _middle(before: _Cell, cell: _Cell) -> tuple[float, float, float]:
-    """Between two cells that lie across a corner or have other headings; the second one where they lie side by side."""
-    (i, j, k), (x, y, turned) = before, cell
-    if k == turned:
-        return ((i + x) / 2, (j + y) / 2, k) if i != x and j != y else cell
-    low, high = sorted((k, turned))
-    return (x, y, high + 0.5 if (low, high) == (0, HEADINGS - 1) else low + 0.5)
+def _neighbours(cell: _Cell) -> list[tuple[_Cell, tuple[float, float, float], float]]:
+    """The cells beside one, what lies between (the other itself where they are side by side), and how far they are."""
+    i, j, k = cell
+    found: list[tuple[_Cell, tuple[float, float, float], float]] = []
+    for x, y, length in _NEIGHBOURS:
+        other = (i + x, j + y, k)
+        found.append((other, (i + x / 2, j + y / 2, k) if x and y else other, length))
+    for turn in (-1, 1):
+        other = (i, j, (k + turn) % HEADINGS)
+        low, high = sorted((k, other[2]))
+        found.append((other, (i, j, high + 0.5 if (low, high) == (0, HEADINGS - 1) else low + 0.5), TURN_COST_M))
+    return found
+
+
+def _ahead(cell: _Cell) -> float:
+    """The least that a path from a cell to the goal's can cost."""
+    i, j, k = cell
+    return _apart(i, j) + min(k, HEADINGS - k) * TURN_COST_M
+
+
+@functools.lru_cache(maxsize=100_000)
+def _apart(i: int, j: int) -> float:
+    return float(np.hypot(i, j)) * CELL_M
 
 
 def base_now(data: mujoco.MjData) -> RobotPose:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Sequence
 from weakref import WeakKeyDictionary
 
@@ -20,6 +21,7 @@ STEP_M, STEP_RAD = 0.05, 0.1  # between tested poses of a straight move
 CLOSE_STEP_M, CLOSE_STEP_RAD = 0.025, 0.06  # the same where a margin is to be kept
 # From the start, within which bodies touched there already may still be touched; and from the goal.
 LEAVING_M, COMING_M = 0.15, 0.20
+_MOST_NEAR = 8  # bodies that are told apart there
 
 _obstacles: WeakKeyDictionary[mujoco.MjModel, Obstacles] = WeakKeyDictionary()
 
@@ -40,18 +42,22 @@ class Room:
             _obstacles[scene.model] = Obstacles(fixtures, scene.robot.shape)
         self._obstacles = _obstacles[scene.model]
 
-    def free(self, pose: RobotPose) -> bool:
-        """Whether nothing is touched, inside of the walls."""
-        return bool(self.all_free([pose])[0])
+    def free_at(self, poses: Array) -> NDArray[np.bool_]:
+        """Whether nothing is touched, inside of the walls, at N poses, rows of x and y in metres and yaw, (N,)."""
+        if not len(poses):
+            return np.zeros(0, dtype=np.bool_)
+        x, y = poses[:, 0], poses[:, 1]
+        bounds = self.scene.layout.room
+        inside: NDArray[np.bool_] = (bounds["x_min"] < x) & (x < bounds["x_max"]) & (bounds["y_min"] < y) & (y < 0.0)
+        return inside & self._obstacles.leave_free_at(poses)
 
     def all_free(self, poses: Sequence[RobotPose]) -> NDArray[np.bool_]:
-        """The same of N poses, (N,)."""
-        if not poses:
-            return np.zeros(0, dtype=np.bool_)
-        x, y = np.array([(pose.x, pose.y) for pose in poses]).T
-        bounds = self.scene.layout.room
-        inside = (bounds["x_min"] < x) & (x < bounds["x_max"]) & (bounds["y_min"] < y) & (y < 0.0)
-        return inside & self._obstacles.leave_free(poses)
+        """The same of poses as they are named elsewhere, (N,)."""
+        return self.free_at(np.array([(pose.x, pose.y, pose.yaw) for pose in poses]).reshape(-1, 3))
+
+    def free(self, pose: RobotPose) -> bool:
+        """The same of one pose."""
+        return bool(self.all_free([pose])[0])
 
     def nearest(self, goal: RobotPose) -> RobotPose:
         """The goal, or the free pose of the same heading that is nearest to it, or the goal if there is none."""
@@ -59,18 +65,16 @@ class Room:
 
     def near(self, goal: RobotPose) -> list[RobotPose]:
         """Free poses of a goal's heading up to `SHIFT_M` from it, the nearest first."""
-        reach = np.arange(-SHIFT_M, SHIFT_M + 1e-9, SHIFT_STEP_M)
-        shifts = sorted(((float(x), float(y)) for x in reach for y in reach), key=lambda shift: np.hypot(*shift))
-        poses = [RobotPose(goal.x + x, goal.y + y, goal.yaw) for x, y in shifts if np.hypot(x, y) <= SHIFT_M]
+        poses = [RobotPose(goal.x + x, goal.y + y, goal.yaw) for x, y in _shifts()]
         return [pose for pose, free in zip(poses, self.all_free(poses), strict=True) if free]
 
     def straight(self, start: RobotPose, goal: RobotPose) -> bool:
         """Whether the robot can move and turn at once from one pose to another."""
-        return bool(self.all_free(between(start, goal, STEP_M, STEP_RAD)).all())
+        return bool(self.free_at(rows_between(start, goal, STEP_M, STEP_RAD)).all())
 
     def closely(self, one: RobotPose, other: RobotPose) -> bool:
         """The same with poses tested that lie no farther apart than a handle is wide."""
-        return bool(self.all_free(between(one, other, CLOSE_STEP_M, CLOSE_STEP_RAD)).all())
+        return bool(self.free_at(rows_between(one, other, CLOSE_STEP_M, CLOSE_STEP_RAD)).all())
 
 
 class Space(Room):
@@ -103,47 +107,58 @@ class Space(Room):
         self._held, self.margin_m, self._close = held, margin_m, close_m
         self._joints = self._checker.present_joints if joints is None else joints
         self._start, self._goal = start, goal
-        self._leaning = self._touched([start], 8, close_m).all()
+        leaning = self._touched(np.array([(start.x, start.y, start.yaw)]), _MOST_NEAR, close_m).all()
+        self._leaning = np.zeros(scene.model.nbody, dtype=np.bool_)
+        self._leaning[list(leaning)] = True
 
-    def all_free(self, poses: Sequence[RobotPose]) -> NDArray[np.bool_]:
+    def free_at(self, poses: Array) -> NDArray[np.bool_]:
         """Whether nothing is touched, inside of the walls; poses near the start may touch what the start does.
 
         Near the start and the goal little or no margin is kept: robots stand close to what they work on.
         """
-        free = super().all_free(poses)
+        free = super().free_at(poses)
         places = np.flatnonzero(free)
         if not len(places):
             return free
-        at = np.array([(poses[index].x, poses[index].y) for index in places])
-        leaving = np.hypot(*(at - [self._start.x, self._start.y]).T) < LEAVING_M
-        coming = np.hypot(*(at - [self._goal.x, self._goal.y]).T) < COMING_M
-        for close in (False, True):
-            mine = places[(leaving | coming) == close]
-            if not len(mine):
-                continue
-            found = self._touched(
-                [poses[index] for index in mine], 8 if close else 1, self._close if close else self.margin_m
-            )
-            for index, count, bodies in zip(mine, found.counts, found.bodies, strict=True):
-                touched = frozenset(bodies[:count].tolist())
-                left = np.hypot(poses[index].x - self._start.x, poses[index].y - self._start.y) < LEAVING_M
-                free[index] = not (touched - self._leaning if left else touched)
+        mine = poses[places]
+        leaving = np.hypot(mine[:, 0] - self._start.x, mine[:, 1] - self._start.y) < LEAVING_M
+        close = leaving | (np.hypot(mine[:, 0] - self._goal.x, mine[:, 1] - self._goal.y) < COMING_M)
+        if not close.all():
+            far = ~close
+            free[places[far]] = self._touched(mine[far], 1, self.margin_m).counts == 0
+        if close.any():
+            found = self._touched(mine[close], _MOST_NEAR, self._close)
+            meant = np.arange(_MOST_NEAR) < found.counts[:, None]
+            pardoned = leaving[close][:, None] & self._leaning[found.bodies]
+            free[places[close]] = ~(meant & ~pardoned).any(axis=1)
         return free
 
-    def _touched(self, poses: Sequence[RobotPose], most: int, margin_m: float) -> Touched:
-        bases = np.array([(pose.x, pose.y, pose.yaw) for pose in poses])
-        return self._checker.touched(bases, self._joints, held=self._held, margin_m=margin_m, most=most)
+    def _touched(self, poses: Array, most: int, margin_m: float) -> Touched:
+        return self._checker.touched(poses, self._joints, held=self._held, margin_m=margin_m, most=most)
+
+
+def rows_between(start: RobotPose, goal: RobotPose, step_m: float, step_rad: float) -> Array:
+    """Poses on a straight move as rows of x and y in metres and yaw, both ends left out; steps are no longer."""
+    turn = wrap(goal.yaw - start.yaw) if goal.yaw != start.yaw else 0.0
+    x, y = goal.x - start.x, goal.y - start.y
+    steps = int(np.ceil(max(float(np.hypot(x, y)) / step_m, abs(turn) / step_rad, 1.0)))
+    shares = np.arange(1, steps) / steps
+    rows = np.empty((steps - 1, 3))
+    rows[:, 0], rows[:, 1], rows[:, 2] = start.x + x * shares, start.y + y * shares, start.yaw + turn * shares
+    return rows
 
 
 def between(start: RobotPose, goal: RobotPose, step_m: float, step_rad: float) -> list[RobotPose]:
-    """Poses on a straight move, both ends left out, with no more than such steps between them."""
-    turn = wrap(goal.yaw - start.yaw)
-    length = float(np.hypot(goal.x - start.x, goal.y - start.y))
-    steps = int(np.ceil(max(length / step_m, abs(turn) / step_rad, 1.0)))
-    return [
-        RobotPose(start.x + (goal.x - start.x) * t, start.y + (goal.y - start.y) * t, start.yaw + turn * t)
-        for t in (np.arange(1, steps) / steps).tolist()
-    ]
+    """The same as poses."""
+    return [RobotPose(x, y, yaw) for x, y, yaw in rows_between(start, goal, step_m, step_rad).tolist()]
+
+
+@functools.cache
+def _shifts() -> list[tuple[float, float]]:
+    """Of a goal that touches something, the nearest first, metres."""
+    reach = np.arange(-SHIFT_M, SHIFT_M + 1e-9, SHIFT_STEP_M)
+    shifts = sorted(((float(x), float(y)) for x in reach for y in reach), key=lambda shift: np.hypot(*shift))
+    return [(x, y) for x, y in shifts if np.hypot(x, y) <= SHIFT_M]
 
 
 def wrap(angle: float) -> float:

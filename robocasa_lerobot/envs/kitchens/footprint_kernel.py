@@ -55,6 +55,71 @@ def overlapping(
 
 
 @compiled
+def clear(
+    poses: Array,
+    shapes: Array,
+    starts: NDArray[np.int64],
+    corners: Array,
+    axes: Array,
+    low: Array,
+    high: Array,
+    middles: Array,
+    reaches: Array,
+) -> NDArray[np.bool_]:
+    """At which of n poses none of k rectangles that are fixed to it comes near a mark of its own set; shape (n,).
+
+    As `overlapping` for each of the k, but marks that are too far away to be met are passed over.
+
+    Args:
+        poses: (n, 3), metres and radians.
+        shapes: of the rectangles, (k, 4): how far ahead of the pose its middle is, its half sizes, and the margin.
+        starts: (k + 1,) where each one's marks begin among all m.
+        corners: as of `overlapping`, like the next three.
+        axes: the same.
+        low: the same.
+        high: the same.
+        middles: of the marks, (m, 2), metres.
+        reaches: of the marks' corners from their middles, (m,), metres.
+    """
+    found = np.ones(len(poses), dtype=np.bool_)
+    mine, own = np.empty((4, 2)), np.empty((2, 2))
+    for index in range(len(poses)):
+        yaw = poses[index, 2]
+        cos, sin = np.cos(yaw), np.sin(yaw)
+        own[0, 0], own[0, 1], own[1, 0], own[1, 1] = cos, sin, -sin, cos
+        for shape in range(len(shapes)):
+            ahead, half_x, half_y, margin = shapes[shape, 0], shapes[shape, 1], shapes[shape, 2], shapes[shape, 3]
+            x, y = poses[index, 0] + ahead * cos, poses[index, 1] + ahead * sin
+            for corner in range(4):
+                along = half_x if corner in (0, 3) else -half_x
+                across = half_y if corner in (0, 1) else -half_y
+                mine[corner, 0] = x + (along * cos - across * sin)
+                mine[corner, 1] = y + (along * sin + across * cos)
+            reach = np.sqrt(half_x * half_x + half_y * half_y) + margin + 1e-6
+            for mark in range(starts[shape], starts[shape + 1]):
+                away_x, away_y = middles[mark, 0] - x, middles[mark, 1] - y
+                if away_x * away_x + away_y * away_y > (reach + reaches[mark]) ** 2:
+                    continue
+                apart = False
+                for axis in range(2):
+                    first, last = _span(mine, own[axis])
+                    start, end = _span(corners[mark], own[axis])
+                    if end + margin < first or last + margin < start:
+                        apart = True
+                        break
+                    first, last = _span(mine, axes[mark, axis])
+                    if high[mark, axis] + margin < first or last + margin < low[mark, axis]:
+                        apart = True
+                        break
+                if not apart:
+                    found[index] = False
+                    break
+            if not found[index]:
+                break
+    return found
+
+
+@compiled
 def _span(corners: Array, axis: Array) -> tuple[float, float]:
     """What corners (4, 2) cover of an axis (2,)."""
     low = high = corners[0, 0] * axis[0] + corners[0, 1] * axis[1]

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from robocasa_lerobot.envs.kitchens.footprint_kernel import overlapping
+from robocasa_lerobot.envs.kitchens.footprint_kernel import clear, overlapping
 
 MAX_SAMPLES = 5000  # draws for an object before the scene is given up (docs/robocasa.md, section 6)
 FEW_SAMPLES = 32  # of these, one by one: nearly always enough; the others are drawn together, much faster
@@ -58,10 +58,11 @@ class Footprints:
         middles = np.array([(mark.x, mark.y) for mark in marks], dtype=np.float64).reshape(-1, 1, 2)
         halves = np.array([mark.half for mark in marks], dtype=np.float64).reshape(-1, 1, 2)
         cos, sin = np.cos(yaws), np.sin(yaws)
-        self._axes = np.stack((cos, sin, -sin, cos), axis=1).reshape(-1, 2, 2)
-        self._corners = middles + (_CORNERS * halves) @ self._axes
-        own = self._corners @ self._axes.transpose(0, 2, 1)
-        self._low, self._high = own.min(axis=1), own.max(axis=1)
+        self.axes = np.stack((cos, sin, -sin, cos), axis=1).reshape(-1, 2, 2)
+        self.corners = middles + (_CORNERS * halves) @ self.axes
+        own = self.corners @ self.axes.transpose(0, 2, 1)
+        self.low, self.high = own.min(axis=1), own.max(axis=1)
+        self.middles, self.reaches = middles[:, 0], np.hypot(halves[:, 0, 0], halves[:, 0, 1])
 
     def overlapping(
         self, places: NDArray[np.float64], half: tuple[float, float], margin: float = 0.0
@@ -70,7 +71,41 @@ class Footprints:
 
         `places` are their middles (metres) and yaws, shape (n, 3); `half` are the half sizes of all of them.
         """
-        return overlapping(places, half, self._corners, self._axes, self._low, self._high, margin)
+        return overlapping(places, half, self.corners, self.axes, self.low, self.high, margin)
+
+
+@dataclass(frozen=True)
+class Part:
+    """A rectangle of something that stands at a pose, and what it must not meet.
+
+    Attributes:
+        ahead: of the pose, where its middle is, metres.
+        half: its half sizes along and across the heading, metres.
+        marks: that must not come near it.
+        margin: metres.
+    """
+
+    ahead: float
+    half: tuple[float, float]
+    marks: Footprints
+    margin: float = 0.0
+
+
+class Standing:
+    """Rectangles that go together, asked at once whether there is room for all: a base's path asks 10,000 times."""
+
+    def __init__(self, parts: Sequence[Part]) -> None:
+        sets = [part.marks for part in parts]
+        self._shapes = np.array([(part.ahead, *part.half, part.margin) for part in parts])
+        self._starts = np.cumsum([0, *(len(marks.reaches) for marks in sets)])
+        self._marks = tuple(
+            np.concatenate(arrays)
+            for arrays in zip(*((m.corners, m.axes, m.low, m.high, m.middles, m.reaches) for m in sets), strict=True)
+        )
+
+    def clear(self, poses: NDArray[np.float64]) -> NDArray[np.bool_]:
+        """At which of n poses (x, y in metres and yaw), (n, 3), none of them meets anything; shape (n,)."""
+        return clear(poses, self._shapes, self._starts, *self._marks)
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from robocasa_lerobot.envs.kitchens.fixtures.base import Fixture, SweptBox
 from robocasa_lerobot.envs.kitchens.fixtures.counters import Counter
 from robocasa_lerobot.envs.kitchens.fixtures.stools import SEAT_M
-from robocasa_lerobot.envs.kitchens.footprints import Footprint, Footprints, PlacementError
+from robocasa_lerobot.envs.kitchens.footprints import Footprint, Footprints, Part, PlacementError, Standing
 from robocasa_lerobot.envs.kitchens.layout import Layout
 from robocasa_lerobot.envs.kitchens.plan.islands import STOOL_OUT_M
 from robocasa_lerobot.envs.robots.robot import StandingShape
@@ -158,29 +158,30 @@ class Obstacles:
     """What a robot may meet where it stands: at the height of its base, of the column above it, and of its hand."""
 
     def __init__(self, fixtures: Mapping[str, Fixture], shape: StandingShape, opened: Iterable[Fixture] = ()) -> None:
-        self._shape = shape
         doors = _opened(opened)
-        self._base, self._column = (_standing(fixtures, doors, top) for top in (shape.base_top, shape.column_top))
+        base, column = (_standing(fixtures, doors, top) for top in (shape.base_top, shape.column_top))
         low, high = shape.hand_z
         tall = [f for f in fixtures.values() if f.pos[2] - f.height / 2 < high and f.pos[2] + f.height / 2 > low]
         above = [door.footprint for door in doors if door.low < high and door.high > low]
-        self._tall = Footprints([*(footprint(f) for f in tall), *above])
+        self._standing = Standing(
+            [
+                Part(sum(shape.base_x) / 2, _half(shape.base_x, shape.base_y[1]), base, SPAWN_MARGIN_M),
+                Part(0.0, (shape.column_half, shape.column_half), column, SPAWN_MARGIN_M),
+                Part(
+                    sum(shape.hand_x) / 2,
+                    _half(shape.hand_x, shape.hand_half),
+                    Footprints([*(footprint(f) for f in tall), *above]),
+                ),
+            ]
+        )
 
     def leave_free(self, poses: Sequence[RobotPose]) -> NDArray[np.bool_]:
         """Of n poses those at which the robot touches none, its arm as at the start of an episode; shape (n,)."""
-        at = np.array([(pose.x, pose.y, pose.yaw) for pose in poses])
-        shape = self._shape
-        return ~(
-            self._base.overlapping(_ahead(at, *shape.base_x), _half(shape.base_x, shape.base_y[1]), SPAWN_MARGIN_M)
-            | self._column.overlapping(at, (shape.column_half, shape.column_half), SPAWN_MARGIN_M)
-            | self._tall.overlapping(_ahead(at, *shape.hand_x), _half(shape.hand_x, shape.hand_half))
-        )
+        return self.leave_free_at(np.array([(pose.x, pose.y, pose.yaw) for pose in poses]))
 
-
-def _ahead(at: NDArray[np.float64], near: float, far: float) -> NDArray[np.float64]:
-    """The middles of what reaches from `near` to `far` metres before poses, (n, 3)."""
-    along = (near + far) / 2
-    return at + along * np.stack([np.cos(at[:, 2]), np.sin(at[:, 2]), np.zeros(len(at))], axis=1)
+    def leave_free_at(self, poses: NDArray[np.float64]) -> NDArray[np.bool_]:
+        """The same of poses as rows of x and y in metres and yaw in radians, (n, 3)."""
+        return self._standing.clear(poses)
 
 
 def _half(along: tuple[float, float], across: float) -> tuple[float, float]:
