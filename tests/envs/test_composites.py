@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 from blueprint_reading import Category, category, counted, lengths, offset, per_axis, rectangle, scale, turn
 from blueprint_words import all_words
-from blueprint_words.ours import MISCOUNTED, UNLISTED
+from blueprint_words.ours import MISCOUNTED, UNLISTED, UNLISTED_LAST
 
 from robocasa_lerobot.envs.predicates.logic import AllOf
 from robocasa_lerobot.envs.predicates.objects import RECEPTACLE_SHARE
@@ -67,7 +67,8 @@ def test_numbers_fixtures_and_stages(name: str, blueprints: dict[str, Any]) -> N
     facts = task.facts
     activity = RENAMED.get(row["activity"], row["activity"])
     assert (facts.horizon, facts.activity, facts.mobile) == (row["horizon"], activity, row["mobile"])
-    stages = stages_of(task)[UNLISTED.get(name, 0) :]
+    stages = stages_of(task)
+    stages = stages[UNLISTED.get(name, 0) : len(stages) - UNLISTED_LAST.get(name, 0)]
     # Of several objects of which a number is drawn, our stages are those of any of them.
     as_many = len(stages) == len(row["stages"])
     said_stages = [said for said in row["stages"] if as_many or not _is_of_another(said, row)]
@@ -174,7 +175,7 @@ def test_objects_and_where_they_start(name: str, blueprints: dict[str, Any]) -> 
         wanted = ours[_plain(said["name"])]
         of = category(said["category"])
         _check_kinds(task, wanted, said["category"], of)
-        assert wanted.count == counted(said["count"]) or "only when" in said["at"]
+        assert wanted.count == counted(said["count"]) or "only when" in said["at"] or _by_choice(task, wanted, said)
         placed = said.get("size_or_offset")
         required = placed.get("require", ()) if isinstance(placed, dict) else ()
         needs = {*required, *filter(None, said.get("needs", "").split(", "))}
@@ -187,6 +188,16 @@ def test_objects_and_where_they_start(name: str, blueprints: dict[str, Any]) -> 
         made_so = len(set(per_axis(wanted.scale))) > 1
         assert wanted.graspable >= (said["graspable"] and said["name"] in handled and not made_so)
         _check_start(task, wanted, said)
+
+
+def _by_choice(task: Task, wanted: ObjectSpec, said: dict[str, Any]) -> bool:
+    """Whether a choice says how many there are, with every number that the blueprint has."""
+    if "only if" not in said["at"]:
+        return False
+    low, high = counted(said["count"])
+    options = [words for choice in task.choices for words in choice.options.values()]
+    numbers = {words[str(wanted.count).strip("{}")] for words in options}
+    return numbers == {str(number) for number in range(low, high + 1)}
 
 
 def _plain(name: str) -> str:

@@ -8,7 +8,17 @@ import pytest
 from goal_states import hold
 from predicate_scenes import SINK, Change, check_hits_and_misses, shift, state
 
-from robocasa_lerobot.envs.predicates import Beside, Goal, Higher, NearFixture, ObjectTilt, RestsOn
+from robocasa_lerobot.envs.kitchens.fixtures.base import Fixture
+from robocasa_lerobot.envs.predicates import (
+    BeforeStools,
+    Beside,
+    Goal,
+    HandlePoints,
+    Higher,
+    NearFixture,
+    ObjectTilt,
+    RestsOn,
+)
 from robocasa_lerobot.envs.scene.build import build_scene
 from robocasa_lerobot.envs.scene.scene import Scene
 from robocasa_lerobot.envs.tasks.registry import get_task
@@ -145,3 +155,38 @@ def test_who_sits_on_a_stool_looks_at_the_counter() -> None:
         for way, held in ((sign, True), (-sign, False)):
             data.joint("sausage1_joint0").qpos[:3] = plate + way * 0.2 * right
             assert (hold(goal, scene, data) is None) == held
+
+
+def test_every_object_has_a_stool_of_its_own() -> None:
+    scene = build_scene(get_task("SetupBowls"), "target", 100_000)
+    data = state(scene)
+    first, second, *_ = scene.layout.of_type("stool")
+
+    def put(name: str, stool: Fixture, across: float, along: float) -> None:
+        right, back = axes_of(stool.yaw)
+        data.joint(f"{name}_joint0").qpos[:3] = np.asarray(stool.pos) + across * right - along * back
+
+    goal = BeforeStools(("bowl1", "bowl2"), across=0.15, along=0.3)
+    for one, other in ((first, second), (second, first)):
+        put("bowl1", one, 0.14, 0.29)
+        put("bowl2", other, -0.14, 0.29)
+        assert hold(goal, scene, data) is None
+    for across, along in ((0.16, 0.2), (0.0, 0.31)):
+        put("bowl2", first, across, along)
+        assert hold(goal, scene, data)
+    put("bowl1", first, 0.05, 0.2)
+    put("bowl2", first, -0.05, 0.2)
+    assert hold(goal, scene, data), "both before the same one"
+
+
+@pytest.mark.parametrize("side", ["right", "left", "front", "back"])
+def test_a_handle_points_to_a_side(side: str) -> None:
+    scene = build_scene(get_task("OrganizeMugsByHandle"), "target", 100_000)
+    data, cabinet = state(scene), scene.fixture("cabinet")
+    goal = HandlePoints("mug_counter1", "cabinet", side, float(np.deg2rad(40.0)))
+    middle = {"right": 0.0, "back": 90.0, "left": 180.0, "front": -90.0}[side]
+    for off, held in ((-39.0, True), (39.0, True), (-41.0, False), (41.0, False), (180.0, False)):
+        # Handles of mugs lie along +x.
+        half = (cabinet.yaw + np.deg2rad(middle + off)) / 2
+        data.joint("mug_counter1_joint0").qpos[3:] = [np.cos(half), 0.0, 0.0, np.sin(half)]
+        assert (hold(goal, scene, data) is None) == held

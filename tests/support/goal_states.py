@@ -20,6 +20,7 @@ from robocasa_lerobot.envs.kitchens.appliances.kinds.stove import Hob
 from robocasa_lerobot.envs.predicates import (
     AllOf,
     AnyOf,
+    BeforeStools,
     Beside,
     BurnerLevel,
     DoorsClosed,
@@ -33,6 +34,7 @@ from robocasa_lerobot.envs.predicates import (
     GripperFar,
     GripperFarFromPart,
     GripperTouches,
+    HandlePoints,
     Higher,
     MovedSince,
     Near,
@@ -66,6 +68,7 @@ from robocasa_lerobot.envs.predicates import (
     WithMemory,
 )
 from robocasa_lerobot.envs.predicates.objects import middle_of
+from robocasa_lerobot.envs.predicates.placed_by import handle_direction
 from robocasa_lerobot.envs.scene.initial_states import initial_share
 from robocasa_lerobot.envs.scene.scene import Scene
 
@@ -278,6 +281,22 @@ def _beside(goal: Beside, scene: Scene, data: mujoco.MjData) -> None:
     to_left = (scene.fill(goal.side) == "left") != (scene.layout.types[fixture.name] == "stool")
     aside = (-0.9 if to_left else 0.9) * goal.across * right
     data.joint(f"{scene.fill(goal.object)}_joint0").qpos[:3] = data.body(scene.fill(goal.other)).xpos + aside
+
+
+@write.register
+def _before_stools(goal: BeforeStools, scene: Scene, data: mujoco.MjData) -> None:
+    for name, stool in zip(goal.objects, scene.layout.of_type("stool"), strict=False):
+        ahead = np.array([-np.sin(stool.yaw), np.cos(stool.yaw)]) * 0.5 * goal.along
+        data.joint(f"{scene.fill(name)}_joint0").qpos[:2] = np.asarray(stool.pos)[:2] - ahead
+
+
+@write.register
+def _handle(goal: HandlePoints, scene: Scene, data: mujoco.MjData) -> None:
+    name = scene.fill(goal.object)
+    along = handle_direction(scene, name)
+    side = {"right": 0.0, "back": 0.5, "left": 1.0, "front": -0.5}[goal.to] * np.pi
+    yaw = scene.fixture(goal.fixture).yaw + side + 0.9 * goal.within - np.arctan2(along[1], along[0])
+    data.joint(f"{name}_joint0").qpos[3:] = [np.cos(yaw / 2), 0.0, 0.0, np.sin(yaw / 2)]
 
 
 @write.register

@@ -26,7 +26,7 @@ from robocasa_lerobot.envs.predicates.objects import (
     ObjectUpright,
     OverBasin,
 )
-from robocasa_lerobot.envs.predicates.placed_by import Beside, Higher, NearFixture, RestsOn
+from robocasa_lerobot.envs.predicates.placed_by import BeforeStools, Beside, HandlePoints, Higher, NearFixture, RestsOn
 from robocasa_lerobot.envs.predicates.robot import (
     Grasped,
     GripperFar,
@@ -41,6 +41,7 @@ from robocasa_lerobot.envs.predicates.traces import MovedSince, Strokes
 __all__ = [
     "AllOf",
     "AnyOf",
+    "BeforeStools",
     "Beside",
     "BurnerLevel",
     "DoorsClosed",
@@ -54,6 +55,7 @@ __all__ = [
     "GripperFar",
     "GripperFarFromPart",
     "GripperTouches",
+    "HandlePoints",
     "Higher",
     "MovedSince",
     "Near",

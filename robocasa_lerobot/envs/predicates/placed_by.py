@@ -1,7 +1,11 @@
-"""Conditions on where objects are by a fixture, or beside another one as seen from it. Lengths in metres."""
+"""Conditions on where objects are by a fixture, or beside another one as seen from it, and on how they are turned.
+
+Lengths in metres.
+"""
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -18,6 +22,7 @@ if TYPE_CHECKING:
     from robocasa_lerobot.envs.scene.scene import Scene
 
 _SEAT = "stool"  # type of fixtures that somebody sits on
+_SIDES = {"right": (1.0, 0.0, 0.0), "left": (-1.0, 0.0, 0.0), "front": (0.0, -1.0, 0.0), "back": (0.0, 1.0, 0.0)}
 
 
 @dataclass(frozen=True)
@@ -95,6 +100,71 @@ class Beside(Term):
 
 
 @dataclass(frozen=True)
+class BeforeStools(Term):
+    """Objects are before stools, each before one of its own.
+
+    Attributes:
+        objects: names.
+        across: bound of the distance of an object's origin from the stool's middle to the sides, not allowed itself.
+        along: bound of that to the front, as somebody looks who sits there, or to the back.
+    """
+
+    objects: tuple[str, ...]
+    across: float
+    along: float
+
+    @property
+    def name(self) -> str:
+        """E.g. `bowl1_and_bowl2_before_stools`."""
+        return plain(f"{'_and_'.join(self.objects)}_before_stools")
+
+    def holds(self, scene: Scene, data: mujoco.MjData) -> bool:
+        """Look for stools that the objects can be shared out among."""
+        stools = scene.layout.of_type(_SEAT)
+        origins = [data.body(scene.fill(name)).xpos for name in self.objects]
+        return any(
+            all(self._is_before(stool, origin) for stool, origin in zip(some, origins, strict=True))
+            for some in itertools.permutations(stools, len(origins))
+        )
+
+    def _is_before(self, stool: Fixture, origin: NDArray[np.float64]) -> bool:
+        across, along, _ = np.abs(_seen_from(stool, origin))
+        return bool(across < self.across and along < self.along)
+
+
+@dataclass(frozen=True)
+class HandlePoints(Term):
+    """The handle of a vessel points to a side of a fixture, as seen by who stands before it.
+
+    Attributes:
+        object: name.
+        fixture: role.
+        to: "right", "left", "front" or "back".
+        within: bound of the angle between the two, radians.
+    """
+
+    object: str
+    fixture: str
+    to: str
+    within: float
+
+    @property
+    def name(self) -> str:
+        """E.g. `mug_handle_to_right_of_cabinet`."""
+        return plain(f"{self.object}_handle_to_{self.to}_of_{self.fixture}")
+
+    def holds(self, scene: Scene, data: mujoco.MjData) -> bool:
+        """Compare the angle with the bound."""
+        return self.off(scene, data.body(scene.fill(self.object)).xmat.reshape(3, 3)) <= self.within
+
+    def off(self, scene: Scene, turn: NDArray[np.float64]) -> float:
+        """Angle between the side and the handle of the object if it is turned so, (3, 3), radians."""
+        handle = _seen_from_afar(scene.fixture(self.fixture), turn @ handle_direction(scene, scene.fill(self.object)))
+        long = float(np.hypot(handle[0], handle[1]))
+        return float(np.arccos(np.clip(handle @ np.array(_SIDES[self.to]) / max(long, 1e-9), -1.0, 1.0)))
+
+
+@dataclass(frozen=True)
 class RestsOn(Term):
     """An object stands on another one: they touch, it is over it, and higher.
 
@@ -148,9 +218,23 @@ class Higher(Term):
         return apart > scene.objects[other].item.size[2] / 2
 
 
+def handle_direction(scene: Scene, name: str) -> NDArray[np.float64]:
+    """Unit vector (3,) from the middle of a vessel to its handle, in its own axes."""
+    inside = scene.objects[name].item.interior
+    assert inside is not None, f"{name} is no vessel"
+    away = np.array([-inside.center[0], -inside.center[1], 0.0])
+    unit: NDArray[np.float64] = away / np.linalg.norm(away)
+    return unit
+
+
 def _seen_from(fixture: Fixture, points: NDArray[np.float64]) -> NDArray[np.float64]:
     """Points of the room, (..., 3), along the axes of a fixture: to its right, to its back, up; from its middle."""
+    return _seen_from_afar(fixture, points - np.asarray(fixture.pos))
+
+
+def _seen_from_afar(fixture: Fixture, vectors: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Vectors of the room, (..., 3), along the axes of a fixture."""
     c, s = np.cos(fixture.yaw), np.sin(fixture.yaw)
     axes = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
-    local: NDArray[np.float64] = (points - np.asarray(fixture.pos)) @ axes
+    local: NDArray[np.float64] = vectors @ axes
     return local

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from blueprint_words.ours import Ours
-from robocasa_lerobot.envs.predicates import GripperFar, ObjectInside, ObjectOn
+from robocasa_lerobot.envs.predicates import GripperFar, HandlePoints, ObjectInside, ObjectOn
 from robocasa_lerobot.envs.scene.spec import InitialOpenness
 
 IN_A_REGION = "(all bbox corners within one interior region, tol 0.05)"
@@ -20,5 +22,20 @@ OURS = {
             "gripper > 0.25 m from bowl2": GripperFar("bowl2", 0.25),
         },
         initial={"cabinet doors open": InitialOpenness("cabinet", 0.9, 1.0)},
+    ),
+    "OrganizeMugsByHandle": Ours(
+        goal={
+            f"mug_counter1 inside cabinet {IN_A_REGION}": ObjectInside("mug_counter1", "cabinet", margin=0.05),
+            # Ours: by where the handle points, 40 degrees to either side of the right.
+            "mug_counter1 yaw in cabinet frame in [50, 130] deg": HandlePoints(
+                "mug_counter1", "cabinet", "right", float(np.deg2rad(40.0))
+            ),
+            "gripper > 0.25 m from mug_counter1": GripperFar("mug_counter1", 0.25),
+        },
+        initial={
+            "cabinet doors open": InitialOpenness("cabinet", 0.9, 1.0),
+            "mugs in cabinet have yaw 90 deg (handle right)": "mug1",
+        },
+        turned={"mug1": (0.0, 0.0), "mug2": (0.0, 0.0)},
     ),
 }

@@ -6,6 +6,7 @@ from blueprint_words.ours import Ours
 from robocasa_lerobot.envs.predicates import (
     AllOf,
     AnyOf,
+    BeforeStools,
     Beside,
     GripperFar,
     Near,
@@ -13,6 +14,7 @@ from robocasa_lerobot.envs.predicates import (
     ObjectTouches,
     ObjectTouchesAnyCounter,
 )
+from robocasa_lerobot.envs.scene.spec import InitialOpenness
 from robocasa_lerobot.envs.tasks.registry import get_task
 from robocasa_lerobot.envs.tasks.typical import stages_of
 
@@ -27,6 +29,8 @@ EACH_ITS_OWN = AnyOf(
     AllOf(at_plate("wine_glass1", "plate1"), at_plate("wine_glass2", "plate2")),
     AllOf(at_plate("wine_glass1", "plate2"), at_plate("wine_glass2", "plate1")),
 )
+
+EACH_ITS_STOOL = BeforeStools(("bowl1", "bowl2"), across=0.15, along=0.3)
 
 OURS = {
     "ArrangeDrinkware": Ours(
@@ -75,5 +79,22 @@ OURS = {
         },
         initial={},
         order=EACH_ITS_OWN,
+    ),
+    "SetupBowls": Ours(
+        goal={
+            "bowl1 and bowl2 matched to two different stools: in that stool's frame lateral |dx| < 0.15 m AND forward "
+            "|dy| < 0.3 m": EACH_ITS_STOOL,
+            # Ours: the counter that the instruction names.
+            "bowl1 touching any counter": ObjectTouches("bowl1", "dining_counter"),
+            "bowl2 touching any counter": ObjectTouches("bowl2", "dining_counter"),
+            "gripper > 0.25 m from bowl1": GripperFar("bowl1", 0.25),
+            "gripper > 0.25 m from bowl2": GripperFar("bowl2", 0.25),
+        },
+        initial={"cabinet doors open (0.90-1.0 of range)": InitialOpenness("cabinet", 0.9, 1.0)},
+        order=EACH_ITS_STOOL,
+        drawn={"stool{i}": "stool1"},
+        kinds={"dining_counter": "dining_counter"},
+        near={"dining_counter": "stool"},
+        more={"stool1", "stool2"},
     ),
 }

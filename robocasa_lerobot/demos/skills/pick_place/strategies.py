@@ -44,6 +44,7 @@ from robocasa_lerobot.demos.skills.pick_place.poses.place_poses import (
     reach_on,
 )
 from robocasa_lerobot.demos.skills.pick_place.poses.plate_poses import is_flat, side_by_side
+from robocasa_lerobot.demos.skills.pick_place.poses.turned_poses import as_turned
 from robocasa_lerobot.demos.skills.pick_place.reach_in import OUT_OF_A_MICROWAVE, OUT_OF_A_TOASTER_OVEN
 from robocasa_lerobot.demos.skills.pick_place.turn_across import lies_across, turn_across
 from robocasa_lerobot.demos.skills.racks import pull
@@ -152,7 +153,11 @@ def place_strategy(env: KitchenEnv, stage: Stage, obj: Graspable) -> PlaceStrate
     An object that holds others is kept level, or nearly so where it is deep.
     """
     strategy = _by_target(env, stage, obj)
-    strategy = replace(strategy, poses=at_distances(env, stage, obj, strategy.poses))
+    fit = as_turned(env, stage, strategy.fit)
+    # Held from the side, a vessel needs no tilt on its way in, in which its handle would turn with it.
+    turned = fit is not strategy.fit and "out" in strategy.entries
+    grasp = FROM_THE_SIDE if turned else strategy.grasp
+    strategy = replace(strategy, poses=at_distances(env, stage, obj, strategy.poses), fit=fit, grasp=grasp)
     if not obj.contents:
         return strategy
     steepest = DEEP_LEAN if _is_deep(obj) else 0.0

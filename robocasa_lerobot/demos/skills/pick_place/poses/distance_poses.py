@@ -16,7 +16,7 @@ from robocasa_lerobot.demos.skills.pick_place.poses.place_poses import PlacePose
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.predicates.logic import Goal, Not
 from robocasa_lerobot.envs.predicates.near import Near, NearerThan, OnOneSide
-from robocasa_lerobot.envs.predicates.placed_by import Beside, NearFixture
+from robocasa_lerobot.envs.predicates.placed_by import BeforeStools, Beside, NearFixture
 from robocasa_lerobot.envs.tasks.conditions import stage_condition
 from robocasa_lerobot.envs.tasks.task import Stage
 
@@ -35,7 +35,7 @@ def distance_terms(env: KitchenEnv, stage: Stage) -> tuple[Goal, ...]:
                 found.append(term)
             case Near() | Beside() | NearFixture() if name == env.scene.fill(term.object):
                 found.append(term)
-            case NearerThan() | OnOneSide() if name in _names(env, term.objects):
+            case NearerThan() | OnOneSide() | BeforeStools() if name in _names(env, term.objects):
                 found.append(term)
     return tuple(found)
 
@@ -63,6 +63,8 @@ def near_to(env: KitchenEnv, stage: Stage) -> list[Array]:
             case NearFixture():
                 fixture = env.scene.fixture(term.fixture)
                 sides += [fixture.to_world((side * fixture.width / 2, 0.0, 0.0)) for side in (-1, 1)]
+            case BeforeStools():
+                sides += [stool.to_world((0.0, 0.0, 0.0)) for stool in env.scene.layout.of_type("stool")]
     own = env.scene.fill(stage.object)
     others = [env.data.body(name).xpos.copy() for name in dict.fromkeys(names) if name != own]
     return others or sides

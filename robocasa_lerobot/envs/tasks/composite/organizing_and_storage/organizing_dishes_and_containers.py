@@ -1,7 +1,9 @@
 """Keep dishes in order."""
 
-from robocasa_lerobot.envs.predicates import AllOf, GripperFar, ObjectInside, ObjectOn
-from robocasa_lerobot.envs.scene.spec import FixtureSpec, InitialOpenness, ObjectSpec, RobotStart
+import numpy as np
+
+from robocasa_lerobot.envs.predicates import AllOf, GripperFar, HandlePoints, ObjectInside, ObjectOn
+from robocasa_lerobot.envs.scene.spec import FixtureSpec, InitialOpenness, ObjectSpec, Placement, RobotStart
 from robocasa_lerobot.envs.tasks.atomic.common import counter_near, on_counter
 from robocasa_lerobot.envs.tasks.task import Stage, Task
 
@@ -37,4 +39,56 @@ STACK_BOWLS_CABINET = Task(
     ),
 )
 
-TASKS = (STACK_BOWLS_CABINET,)
+# Handles of our mugs lie along +x, which is to the right of a cabinet as they are.
+_HANDLE_RIGHT = (0.0, 0.0)
+_MOST_OFF = float(np.deg2rad(40.0))  # of the handle from the right: the published 50 to 130 degrees of its yaw
+
+
+def _shelved(name: str, x: float) -> ObjectSpec:
+    start = Placement("cabinet", size=(0.4, 0.2), pos=(x, 0.5), rotation=_HANDLE_RIGHT)
+    return ObjectSpec(name, ("mug",), start, repeats=True)
+
+
+ORGANIZE_MUGS_BY_HANDLE = Task(
+    name="OrganizeMugsByHandle",
+    summary="The mug from the counter is in the cabinet, its handle to the right as the others, the gripper away.",
+    fixtures=(FixtureSpec("cabinet", "cabinet_double_door"), counter_near("cabinet")),
+    robot_start=RobotStart("cabinet"),
+    objects=(
+        _shelved("mug1", -0.9),
+        _shelved("mug2", -0.6),
+        ObjectSpec(
+            "mug_counter1", ("mug",), on_counter("cabinet", (1.0, 0.3), pos=("ref", -0.5)), graspable=True, repeats=True
+        ),
+    ),
+    initial=(InitialOpenness("cabinet", 0.9, 1.0),),
+    goal=AllOf(
+        ObjectInside("mug_counter1", "cabinet"),
+        HandlePoints("mug_counter1", "cabinet", "right", _MOST_OFF),
+        GripperFar("mug_counter1"),
+    ),
+    stages=(
+        Stage("pick_place", "pick", "counter", object="mug_counter1"),
+        Stage(
+            "pick_place",
+            "place",
+            "cabinet",
+            object="mug_counter1",
+            until=AllOf(
+                ObjectInside("mug_counter1", "cabinet"),
+                HandlePoints("mug_counter1", "cabinet", "right", _MOST_OFF),
+                GripperFar("mug_counter1"),
+            ),
+            text="put the mug into the cabinet with its handle to the right",
+        ),
+    ),
+    instruction="Put the mug from the counter into the cabinet with its handle to the right, like the others'.",
+    paraphrases=(
+        "All mugs in the cabinet should have their handles on the right: the one on the counter joins them.",
+        "Store the counter's mug in the open cabinet, turned as the two mugs are that stand there.",
+        "Handle to the right, that is how the mug from the counter goes into the cabinet.",
+        "The cabinet takes a third mug, the one on the counter; its handle, too, is to the right.",
+    ),
+)
+
+TASKS = (ORGANIZE_MUGS_BY_HANDLE, STACK_BOWLS_CABINET)

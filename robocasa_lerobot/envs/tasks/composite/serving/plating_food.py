@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from robocasa_lerobot.envs.predicates import AllOf, GripperFar, ObjectOn
+from robocasa_lerobot.envs.predicates import AllOf, AnyOf, DoorsClosed, GripperFar, ObjectInside, ObjectOn
 from robocasa_lerobot.envs.scene.spec import FixtureSpec, ObjectSpec, Placement, RobotStart, SampleRegion
 from robocasa_lerobot.envs.tasks.atomic.common import HANDLE_TO_FRONT, counter_near, on_counter
 from robocasa_lerobot.envs.tasks.composite.common import before_stool
@@ -90,4 +90,60 @@ PLATE_STEAK_MEAL = Task(
     ),
 )
 
-TASKS = (BALANCED_MEAL_PREP, PLATE_STEAK_MEAL)
+_PANS = Placement(
+    "stove",
+    region=SampleRegion(name="any", height=(0.7, 1.2)),
+    size=(0.2, 0.2),
+    rotation=HANDLE_TO_FRONT,
+    ensure_inside=False,
+)
+_STEAKS = ("meat1", "meat2")
+
+
+def _plated_and_stored(plated: str, stored: str) -> AllOf:
+    return AllOf(ObjectOn(plated, "plate"), ObjectOn(stored, "bowl"), ObjectInside(stored, "fridge"))
+
+
+PLATE_STORE_DINNER = Task(
+    name="PlateStoreDinner",
+    summary="One steak lies on the plate, the other in the bowl, which stands on a shelf of the shut fridge.",
+    fixtures=(FixtureSpec("stove", "stove"), counter_near("stove"), FixtureSpec("fridge", "fridge")),
+    robot_start=RobotStart("stove"),
+    objects=(
+        ObjectSpec("meat1_container", ("pan",), _PANS),
+        ObjectSpec("meat1", ("steak",), Placement(object="meat1_container"), graspable=True),
+        ObjectSpec("meat2_container", ("pan",), _PANS, repeats=True),
+        ObjectSpec("meat2", ("steak",), Placement(object="meat2_container"), graspable=True, repeats=True),
+        ObjectSpec("plate", ("plate",), on_counter("stove", (0.6, 0.45), loc="left_right")),
+        ObjectSpec("bowl", ("bowl",), on_counter("stove", (0.6, 0.45), loc="left_right"), graspable=True),
+    ),
+    goal=AllOf(
+        AnyOf(_plated_and_stored(*_STEAKS), _plated_and_stored(*reversed(_STEAKS))),
+        ObjectInside("bowl", "fridge", region="fridge_shelf", lower=0.9),
+        DoorsClosed("fridge"),
+        *map(GripperFar, _STEAKS),
+    ),
+    stages=(
+        _onto_plate("meat1"),
+        Stage("pick_place", "place", "bowl", object="meat2"),
+        Stage("navigation", "drive", "fridge"),
+        Stage("doors", "open", "fridge", part="fridge"),
+        Stage("navigation", "drive", "bowl"),
+        Stage("pick_place", "pick", "counter", object="bowl"),
+        Stage("navigation", "drive", "fridge", object="bowl"),
+        Stage("pick_place", "place", "fridge", object="bowl", part="fridge_shelf"),
+        Stage("doors", "close_large", "fridge", part="fridge"),
+    ),
+    instruction=(
+        "Put one of the two steaks from the stove on the plate and the other one into the bowl, and store the bowl in "
+        "the fridge, which is shut afterwards."
+    ),
+    paraphrases=(
+        "A steak for now on the plate, a steak for later in the bowl: that goes into the fridge. Shut it.",
+        "The bowl with one steak belongs behind the closed {fridge_doors}, the plate gets the other.",
+        "Share the two pans' steaks between plate and bowl, and keep the bowl on a shelf of the closed fridge.",
+        "Plate one steak; fill the bowl with the second, carry it to the fridge and close that again.",
+    ),
+)
+
+TASKS = (BALANCED_MEAL_PREP, PLATE_STEAK_MEAL, PLATE_STORE_DINNER)

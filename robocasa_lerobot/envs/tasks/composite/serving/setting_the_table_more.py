@@ -5,6 +5,7 @@ from dataclasses import replace
 from robocasa_lerobot.envs.predicates import (
     AllOf,
     AnyOf,
+    BeforeStools,
     Beside,
     GripperFar,
     Near,
@@ -13,8 +14,15 @@ from robocasa_lerobot.envs.predicates import (
     ObjectTouchesAnyCounter,
 )
 from robocasa_lerobot.envs.scene.drawn import Drawn
-from robocasa_lerobot.envs.scene.spec import FixtureSpec, ObjectSpec, Placement, RobotStart, SampleRegion
-from robocasa_lerobot.envs.tasks.atomic.common import counter_near, on_counter
+from robocasa_lerobot.envs.scene.spec import (
+    FixtureSpec,
+    InitialOpenness,
+    ObjectSpec,
+    Placement,
+    RobotStart,
+    SampleRegion,
+)
+from robocasa_lerobot.envs.tasks.atomic.common import counter_near, in_cabinet, on_counter
 from robocasa_lerobot.envs.tasks.composite.common import before_stool, fetch, fetch_in_turn
 from robocasa_lerobot.envs.tasks.task import Stage, Task
 
@@ -220,4 +228,49 @@ SETUP_WINE_GLASSES = Task(
     ),
 )
 
-TASKS = (ARRANGE_DRINKWARE, BEVERAGE_ORGANIZATION, SETUP_BUTTER_PLATE, SETUP_WINE_GLASSES)
+_BOWLS = ("bowl1", "bowl2")
+
+
+def _before_stools(*names: str) -> BeforeStools:
+    return BeforeStools(names, across=0.15, along=0.3)
+
+
+def _bowl_set(name: str) -> AllOf:
+    """Before a stool, the second one before another than the first."""
+    before = _before_stools(*_BOWLS[: _BOWLS.index(name) + 1])
+    return AllOf(before, ObjectTouches(name, "dining_counter"), GripperFar(name))
+
+
+SETUP_BOWLS = Task(
+    name="SetupBowls",
+    summary="Each of the bowls stands on the dining counter before a stool of its own, the gripper away from both.",
+    fixtures=(
+        FixtureSpec("cabinet", "cabinet_double_door"),
+        FixtureSpec("stool1", "stool"),
+        FixtureSpec("stool2", "stool", other_than=("stool1",)),
+        FixtureSpec("dining_counter", "dining_counter", near="stool1"),
+    ),
+    robot_start=RobotStart("cabinet"),
+    objects=(
+        ObjectSpec("bowl1", ("bowl",), in_cabinet("cabinet", (1.0, 0.3), pos=(-1.0, -1.0)), graspable=True),
+        ObjectSpec(
+            "bowl2", ("bowl",), in_cabinet("cabinet", (1.0, 0.3), pos=(1.0, -1.0)), graspable=True, repeats=True
+        ),
+    ),
+    initial=(InitialOpenness("cabinet", 0.9, 1.0),),
+    goal=AllOf(
+        _before_stools(*_BOWLS),
+        *(ObjectTouches(name, "dining_counter") for name in _BOWLS),
+        *map(GripperFar, _BOWLS),
+    ),
+    stages=fetch_in_turn(_BOWLS, "cabinet", "dining_counter", until=_bowl_set),
+    instruction="Take both bowls from the cabinet to the dining counter and put each before another stool.",
+    paraphrases=(
+        "Two people will eat: the cabinet's bowls go to the dining counter, one before the stool of each.",
+        "Lay two places at the dining counter with the bowls from the open cabinet, no two at one stool.",
+        "Carry one bowl after the other from the cabinet to the dining counter; every bowl gets a stool of its own.",
+        "A stool and a bowl before it, twice: the bowls stand in the open cabinet.",
+    ),
+)
+
+TASKS = (ARRANGE_DRINKWARE, BEVERAGE_ORGANIZATION, SETUP_BOWLS, SETUP_BUTTER_PLATE, SETUP_WINE_GLASSES)
