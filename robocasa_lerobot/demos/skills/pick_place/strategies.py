@@ -30,6 +30,7 @@ from robocasa_lerobot.demos.skills.pick_place.place import PlaceStrategy
 from robocasa_lerobot.demos.skills.pick_place.poses.basin_poses import below_spout, is_large, on_floor, room_in
 from robocasa_lerobot.demos.skills.pick_place.poses.counter_poses import NEAR_M, on_counter
 from robocasa_lerobot.demos.skills.pick_place.poses.distance_poses import at_distances, distance_terms, near_to
+from robocasa_lerobot.demos.skills.pick_place.poses.drawer_poses import fits_in_drawer, in_drawer
 from robocasa_lerobot.demos.skills.pick_place.poses.place_poses import (
     COLUMNS,
     DROPS_M,
@@ -252,8 +253,9 @@ def _into_regions(
             return PlaceStrategy(
                 over_bowl(env, regions[0]), leans=_BOWL_LEANS, entries=("up", "across", "out"), in_m=0.2, falls=True
             )
-        case Drawer():
-            return PlaceStrategy(in_regions(env, obj, regions, DROPS_M), leans=_DRAWER_LEANS, entries=("up", "across"))
+        case Drawer() as drawer:
+            fit = fits_in_drawer(env, obj, drawer)
+            return PlaceStrategy(in_drawer(env, drawer), leans=_DRAWER_LEANS, entries=("up", "across"), fit=fit)
         case ToasterOven() if len(regions) == 1:  # what stands out over the edge of its rack meets the door
             return PlaceStrategy(
                 on_floor(env, regions[0]), leans=_CLOSED_LEANS, entries=("up", "across", "out"),
