@@ -167,6 +167,8 @@ def _object(wanted: ObjectSpec) -> str:
         kind = "model" if wanted.same_model else "category"
         own = wanted.same_category_as == wanted.name
         said += f", all of one {kind}" if own else f", of the {kind} of `{wanted.same_category_as}`"
+    if wanted.part_of:
+        said += f" of `{wanted.part_of}`"
     asked = [*(["graspable"] if wanted.graspable else []), *(["washable"] if wanted.washable else [])]
     asked += [word.replace("_", " ") for word in wanted.properties]
     if asked:

@@ -228,6 +228,11 @@ def _check_kinds(task: Task, wanted: ObjectSpec, said: str, of: Category) -> Non
         options = [option for choice in task.choices for option in choice.options.values()]
         groups = [group.strip("{}") for group in wanted.groups]
         assert {option[group] for group in groups for option in options if group in option} == set(either)
+    elif wanted.part_of:
+        whole = next(each for each in task.objects if each.name == wanted.part_of)
+        assert (said.removesuffix(" (matching)").replace(" ", "_"),) == wanted.groups
+        assert whole.groups == ("saucepan_with_lid",)
+        assert per_axis(whole.scale) == per_axis(wanted.scale)
     else:
         assert set(wanted.groups) == set(of.groups) or wanted.groups == (of.brackets,)
         assert of.brackets in {"", *wanted.properties, *wanted.groups}
@@ -245,6 +250,7 @@ def _container_of(wanted: ObjectSpec) -> list[ObjectSpec]:
 
 def _check_start(task: Task, wanted: ObjectSpec, said: dict[str, Any]) -> None:
     start, at = wanted.start, said["at"].replace("cutting board (", "cutting_board (")
+    at = at.replace("on top of", "on")
     at = re.sub(r"^each on own (\w+) \((\w+)_i_container\)", r"on \1 (\2_container)", at)
     assert isinstance(start, Placement)
     if "under each" in at or "only when" in at:  # of what has been compared

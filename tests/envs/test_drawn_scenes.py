@@ -14,6 +14,7 @@ from robocasa_lerobot.demos.demonstrator import can_demonstrate
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.kitchens.appliances.kinds.sink import Sink
 from robocasa_lerobot.envs.kitchens.fixtures.cabinets import HingeCabinet
+from robocasa_lerobot.envs.objects.catalogue import auxiliary
 from robocasa_lerobot.envs.predicates import AllOf, ForEach, ObjectOn, StateIs
 from robocasa_lerobot.envs.scene.build import build_scene
 from robocasa_lerobot.envs.scene.scene import Scene
@@ -208,9 +209,35 @@ def test_of_the_category_of_another() -> None:
         assert scene.words["a+b"].startswith("both ")
 
 
+NOTHING: dict[str, Any] = {
+    "goal": StateIs("sink", "water_on"),
+    "stages": (Stage("levers", "on", "sink"),),
+    "instruction": "-",
+    "paraphrases": (),
+}
+
+
+def test_a_lid_is_that_of_its_own_saucepan() -> None:
+    start = SINK.objects[0].start
+    pan = ObjectSpec("pan", ("saucepan_with_lid",), start, scale=0.6)
+    lid = ObjectSpec("lid", ("saucepan_lid",), start, part_of="pan")
+    for seed in range(4):
+        scene = build_scene(replace(FRUITS, objects=(pan, lid), **NOTHING), "pretrain", seed)
+        one, two = (scene.objects[name].item for name in ("pan", "lid"))
+        assert two == auxiliary(one)
+        assert two.scale == (0.6, 0.6, 0.6)
+    with pytest.raises(UserError, match="which has none"):
+        build_scene(
+            replace(FRUITS, objects=(replace(FRUIT, count=(1, 1)), replace(lid, part_of="fruit")), **NOTHING),
+            "pretrain",
+            0,
+        )
+
+
 @pytest.mark.parametrize(
     ("wanted", "message"),
     [
+        (ObjectSpec("lid", ("saucepan_lid",), FRUIT.start, part_of="nobody"), "is not there before it"),
         (replace(FRUIT, count="{side_count}"), "a number is needed"),
         (replace(FRUIT, scale="{side_count}"), "a number is needed"),
         (replace(FRUIT, same_category_as="nobody"), "is not there before it"),

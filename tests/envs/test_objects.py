@@ -265,6 +265,11 @@ def test_a_saucepan_with_a_lid_names_its_lid_and_liquids_only_look():
     lid = catalogue.auxiliary(item)
     assert lid is not None
     assert (lid.category.name, lid.index, lid.scale) == ("saucepan_lid", 4, item.scale)
+    for index in range(catalogue.INSTANCES_PER_CATEGORY):
+        pan = item_of("saucepan_with_lid", index)
+        lid = catalogue.auxiliary(pan)
+        assert lid is not None
+        assert lid.size[0] / pan.size[1] == pytest.approx(1.06, abs=1e-3)  # it lies on the rim all round
     assert catalogue.auxiliary(item_of("apple")) is None
     spec = mujoco.MjSpec()
     add_object(

@@ -208,6 +208,8 @@ def _read() -> dict[str, Category]:
 
 
 CATEGORIES: dict[str, Category] = _read()
+# What is made to fit another thing, as a lid its saucepan, has its size drawn with that one's seed.
+_FITS = {c.auxiliary: c.name for c in CATEGORIES.values() if c.auxiliary}
 _BASE_GROUPS = tuple(sorted({g for c in CATEGORIES.values() for g in c.groups}))
 GROUPS: tuple[str, ...] = tuple(sorted({*_EVERYTHING, *_UNIONS, *_BASE_GROUPS, *CATEGORIES}))
 
@@ -245,7 +247,7 @@ def split_indices(split: str) -> range:
 @functools.cache
 def instance(category: Category, index: int) -> Instance:
     """The instance of an index: a pure function of category and index."""
-    seed = zlib.crc32(f"{category.name}/{index}".encode())
+    seed = zlib.crc32(f"{_FITS.get(category.name, category.name)}/{index}".encode())
     rng = np.random.default_rng(seed)
     factors = 1 + rng.uniform(-_SPREAD, _SPREAD) + np.zeros(3)
     stretch = 1 + rng.uniform(-_STRETCH, _STRETCH, 3)
@@ -384,7 +386,7 @@ def sample(
 
 
 def auxiliary(item: Instance) -> Instance | None:
-    """The part that comes with an instance, e.g. the lid of a saucepan: same index, same scale."""
+    """The part that comes with an instance and fits it, e.g. the lid of a saucepan: same index, same scale."""
     if item.category.auxiliary is None:
         return None
     return replace(instance(CATEGORIES[item.category.auxiliary], item.index), scale=item.scale)

@@ -186,6 +186,8 @@ class ObjectSpec:
         repeats: may be of a category that the scene already has.
         same_category_as: name of an earlier object whose category it has; of several, their own name makes them alike.
         same_model: with it, the very same model, at its own scale.
+        part_of: name of an earlier object whose separate part it is, as the lid of a saucepan: of that one's model and
+            scale.
         face_down: turned over; its axes are those of how it lies then.
         stained: red, green and blue of the colour that all of it has instead of its own looks, each 0 to 1.
         filled: the liquid in it, one of `LIQUIDS` in `envs/scene/build.py`; it is there for the eye only.
@@ -207,6 +209,7 @@ class ObjectSpec:
     repeats: bool = False
     same_category_as: str = ""
     same_model: bool = False
+    part_of: str = ""
     face_down: bool = False
     stained: tuple[float, float, float] | None = None
     filled: str = ""

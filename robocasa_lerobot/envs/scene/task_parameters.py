@@ -88,8 +88,10 @@ def item_of(
         choices: what was drawn for the task's choices.
 
     Raises:
-        UserError: no category is left, or it is to be like an object that is not there.
+        UserError: no category is left, or it is to be like an object, or the part of one, that is not there.
     """
+    if wanted.part_of:
+        return _part(wanted, items)
     factors = _factors(wanted, index, choices)
     like = _like(wanted, index, items)
     if like is not None and wanted.same_model:
@@ -153,6 +155,19 @@ def _like(wanted: ObjectSpec, index: int, items: Mapping[str, catalogue.Instance
         f"{wanted.name} is to be like {wanted.same_category_as!r}, which is not there before it "
         f"({', '.join(items) or 'nothing is'}). Declare that first."
     )
+
+
+def _part(wanted: ObjectSpec, items: Mapping[str, catalogue.Instance]) -> catalogue.Instance:
+    """The part that belongs to an object that is there already."""
+    whole = items.get(wanted.part_of)
+    part = None if whole is None else catalogue.auxiliary(whole)
+    if part is None or part.category.name not in wanted.groups:
+        raise UserError(
+            f"{wanted.name} is to be the {' or '.join(wanted.groups)} of {wanted.part_of!r}, which "
+            + (f"is not there before it ({', '.join(items) or 'nothing is'})." if whole is None else "has none.")
+            + " Declare before it an object of a category that comes with one."
+        )
+    return part
 
 
 def _factors(wanted: ObjectSpec, index: int, choices: Mapping[str, str]) -> float | tuple[float, float, float]:

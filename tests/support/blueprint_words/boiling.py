@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from blueprint_words.ours import Ours, away
+from blueprint_words.ours import IN_SAUCEPAN, LIT_SAUCEPAN, ON_SAUCEPAN, Ours, away
 from robocasa_lerobot.envs.predicates import (
     AllOf,
     GripperFar,
@@ -24,14 +24,26 @@ COOLED = StepsWhile(
 HEATS = StateIs("electric_kettle", "on")
 
 OURS = {
+    "BoilCorn": Ours(
+        goal={
+            **LIT_SAUCEPAN,
+            **{IN_SAUCEPAN.format(name): ObjectOn(name, "saucepan") for name in ("corn1", "corn2")},
+            **ON_SAUCEPAN,
+            **away("saucepan_auxiliary"),
+        },
+        initial={
+            "burner chosen at random among front burners": None,
+            "chosen burner knob high (>= 80 deg)": BurnerAt("stove", "{knob}", "high"),
+            "lid starts on the saucepan (anchored)": "saucepan_auxiliary",
+            "saucepan holds water (visual liquid)": "saucepan",
+        },
+        called={"lid": "saucepan_auxiliary"},
+        turned={"saucepan": HANDLE_TO_FRONT},
+    ),
     "BoilEggs": Ours(
         goal={
-            "saucepan on chosen burner (contact with stove; centre xy < 0.08 m of burner; its knob in [0.35, "
-            "2pi-0.35])": OnBurner("saucepan", "stove", burner="{knob}", lit=True, within=0.08),
-            **{
-                f"{name} in saucepan (contact; centre xy < 0.7*saucepan radius)": ObjectOn(name, "saucepan")
-                for name in ("egg1", "egg2")
-            },
+            **LIT_SAUCEPAN,
+            **{IN_SAUCEPAN.format(name): ObjectOn(name, "saucepan") for name in ("egg1", "egg2")},
             **away("saucepan"),
         },
         initial={
@@ -86,6 +98,17 @@ OURS = {
             **away("obj", "obj2"),
         },
         initial={"cabinet doors open": InitialOpenness("cabinet", 0.9, 1.0), "all burner knobs off": None},
+    ),
+    "PlaceLidToBoil": Ours(
+        goal={**LIT_SAUCEPAN, **ON_SAUCEPAN, **away("saucepan_auxiliary")},
+        initial={
+            "cabinet doors open": InitialOpenness("cabinet", 0.9, 1.0),
+            "burner chosen at random among front burners": None,
+            "chosen burner knob high (>= 80 deg)": BurnerAt("stove", "{knob}", "high"),
+            "saucepan holds water (visual liquid)": "saucepan",
+        },
+        called={"lid": "saucepan_auxiliary"},
+        turned={"saucepan": HANDLE_TO_FRONT},
     ),
     "StartElectricKettle": Ours(
         goal={

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from robocasa_lerobot.envs.predicates import Goal, GripperFar
+from robocasa_lerobot.envs.predicates import Goal, GripperFar, ObjectOn, OnBurner
 from robocasa_lerobot.envs.scene.scene_spec import InitialState
 from robocasa_lerobot.envs.scene.spec import Placement
 
@@ -18,6 +18,18 @@ UNLISTED = {"SetupFrying": 1}
 UNLISTED_LAST = {"PlateStoreDinner": 1, "OrganizeMetallicUtensils": 4}
 ON_ITS_MIDDLE = "(contact AND xy centre distance < 0.7 x {} horizontal radius)"
 NEAR_THE_MIDDLE = "(contact AND centre xy distance < 0.7 x {} radius)"
+# Of saucepans with lids.
+LIT_SAUCEPAN: dict[str, Goal] = {
+    "saucepan on chosen burner (contact with stove; centre xy < 0.08 m of burner; its knob in [0.35, 2pi-0.35])": (
+        OnBurner("saucepan", "stove", burner="{knob}", lit=True, within=0.08)
+    )
+}
+ON_SAUCEPAN: dict[str, Goal] = {
+    "saucepan_auxiliary (lid) on saucepan (contact; centre xy < 0.02 m)": ObjectOn(
+        "saucepan_auxiliary", "saucepan", within=0.02
+    )
+}
+IN_SAUCEPAN = "{} in saucepan (contact; centre xy < 0.7*saucepan radius)"
 
 
 @dataclass(frozen=True)

@@ -8,6 +8,7 @@ from robocasa_lerobot.envs.predicates import (
     NearFixture,
     ObjectOn,
     ObjectTouchesAnyCounter,
+    OnBurner,
     StepsWhile,
     UnderWater,
 )
@@ -19,6 +20,7 @@ WASHED = StepsWhile(
     50,
     label="vegetables_washed",
 )
+LIT = OnBurner("saucepan", "stove", burner="{knob}", lit=True, within=0.08)
 
 OURS = {
     "PrepareVeggiesForSteaming": Ours(
@@ -52,6 +54,28 @@ OURS = {
             "burner {knob} on": BurnerAt("stove", "{knob}", "on"),
             "burner {knob} chosen at random among front burners": None,
             "saucepan shows water": "saucepan",
+        },
+    ),
+    "SteamVeggiesWithWater": Ours(
+        goal={
+            **{
+                f"{name} in saucepan (contact AND centre xy distance < 0.7 x saucepan radius)": ObjectOn(
+                    name, "saucepan"
+                )
+                for name in ("vegetable1", "vegetable2")
+            },
+            "saucepan_auxiliary on saucepan (contact AND centre xy distance < 0.02 m)": ObjectOn(
+                "saucepan_auxiliary", "saucepan", within=0.02
+            ),
+            "saucepan touches stove, within 0.08 m (xy) of burner {knob}": LIT,
+            "burner {knob} on (knob in [0.35, 2pi-0.35])": LIT,
+            **away("saucepan_auxiliary"),
+        },
+        initial={
+            "burner {knob} on": BurnerAt("stove", "{knob}", "on"),
+            "burner {knob} chosen at random among front burners": None,
+            "saucepan shows water": "saucepan",
+            "saucepan lid off, on counter": "saucepan_auxiliary",
         },
     ),
 }

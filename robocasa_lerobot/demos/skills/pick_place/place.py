@@ -40,6 +40,7 @@ from robocasa_lerobot.envs.scene.robot_poses import RobotPose
 
 RELEASE_STEPS = 9
 GAP_M = 0.012  # of the underside above the place pose when the hand opens
+EXACT_M = 0.003  # of the hand from where it is to let go, where that matters
 BLOCKED_M = 0.08  # a hand as far as this from where it is to let go is blocked, and keeps what it holds
 CLEAR_M = 0.06  # along the hand, out of what it held, before it leaves
 AWAY_M = 0.26
@@ -79,6 +80,7 @@ class PlaceStrategy:
         in_m: length of the path in, metres.
         gap_m: of the underside above the place pose when the hand opens.
         turns: of a leaning hand to the left, radians.
+        exact: the object must come to within a few millimetres of the place pose.
         falls: the fingers are to open side by side, so that the object falls from between them.
         narrow: whether the hand keeps to a straight line in and out also where that is steep.
         fit: cost of the object's origin (3,) and rotation (3, 3) in the end, by what they leave of the room there.
@@ -91,6 +93,7 @@ class PlaceStrategy:
     in_m: float = 0.15
     gap_m: float = GAP_M
     turns: tuple[float, ...] = (0.0,)
+    exact: bool = False
     falls: bool = False
     narrow: bool = False
     fit: Callable[[Array, Array], float] | None = None
@@ -141,7 +144,8 @@ def put(env: KitchenEnv, obj: Graspable, strategy: PlaceStrategy, failed: list[A
     # What has slipped in the hand goes to the place pose, not the hand.
     slipped = (_origin(low, held) - _origin_now(env, obj, low)) * [1.0, 1.0, 0.0]
     low = HandTarget(low.position + np.clip(slipped, -MOST_SLIP_M, MOST_SLIP_M), low.rotation)
-    yield from move_hand(data, low, CLOSED, speed=0.5, tolerance=0.008, max_steps=60, integral_gain=INTEGRAL_GAIN)
+    tolerance = EXACT_M if strategy.exact else 0.008
+    yield from move_hand(data, low, CLOSED, speed=0.5, tolerance=tolerance, max_steps=60, integral_gain=INTEGRAL_GAIN)
     if pose_error(data, low).position > BLOCKED_M:
         yield from move_hand(data, above, CLOSED, speed=0.6, tolerance=0.03, max_steps=30)
         return
@@ -229,8 +233,8 @@ def _paths(
             object_turn = rotation @ held.rotation
             origin = pose.point + (obj.below(object_turn) + strategy.gap_m) * UP
             low = origin - rotation @ held.position
-            again = sum(np.linalg.norm(low - other) < AGAIN_M for other in failed)
-            cost = pose.extra + AGAIN * float(again) + leaning * lean + SLOPE * slope + 0.08 * min(yaw, 2 * np.pi - yaw)
+            again = AGAIN * sum(np.linalg.norm(low - other) < AGAIN_M for other in failed)
+            cost = pose.extra + float(again) + leaning * lean + SLOPE * slope + 0.08 * min(yaw, 2 * np.pi - yaw)
             if strategy.fit is not None:
                 cost += strategy.fit(origin, object_turn)
             for name in strategy.entries:

@@ -38,7 +38,9 @@ from robocasa_lerobot.demos.skills.pick_place.poses.place_poses import (
     at_site,
     in_basin,
     in_regions,
+    is_lid_of,
     on_object,
+    on_rim,
     over_bowl,
     over_burners,
     over_jug,
@@ -80,6 +82,7 @@ BEYOND_COST, FLAT_COST = 50.0, 8.0  # for each metre that something stands out b
 MOST_TURNS = 2  # of what lies across behind a front
 FARTHER_OUT_M = 0.12  # how far
 FARTHER_M = 1.1  # of a free place on a counter from the base, where an open drawer keeps the robot off
+LID_GAP_M = 0.005  # of a lid over the rim when the hand opens
 OFF_M = 0.10  # of the hand from what it has let go
 # A vessel as deep as this keeps what it holds when it is tilted by this much as it goes in, metres, radians.
 DEEP_M, DEEP_LEAN = 0.035, float(np.deg2rad(30.0))
@@ -180,6 +183,10 @@ def target_object(env: KitchenEnv, stage: Stage) -> str:
 def _by_target(env: KitchenEnv, stage: Stage, obj: Graspable) -> PlaceStrategy:
     holder = target_object(env, stage)
     if holder:
+        if is_lid_of(env, obj, holder):
+            return PlaceStrategy(
+                on_rim(env, holder), entries=("up", "across"), grasp=ANY_APPROACH, gap_m=LID_GAP_M, exact=True
+            )
         more = _more_comes(env, stage)
         poses = on_object(env, obj, holder, more=more)
         fit = side_by_side(env, obj, holder, reach_on(env, holder), more=more) if is_flat(env, holder) else None

@@ -70,26 +70,14 @@ def vat(width: float, depth: float, z: float, wall: float, radius: float, *, tap
     return mesh
 
 
-def cover(d: Draft, r: float, z0: float, z1: float, shift: float = 0.0) -> None:
-    """A lid with a knob on a round vessel, from z0 to z1."""
-    h = z1 - z0
+def cover(d: Draft, r: float, z: float) -> None:
+    """A round lid, flat below, and so high a knob that fingers close on it without touching the rest."""
     knob_r = min(0.016, 0.25 * r)
-    dome = lathe([(0, z0), (1.03 * r, z0), (1.03 * r, z0 + 0.1 * h), (0.6 * r, z0 + 0.42 * h), (0, z0 + 0.5 * h)], 18)
-    d.add(dome.moved(shift), (0.82, 0.86, 0.88) if not d.args.get("steel") else STEEL, "metal")
-    d.add(
-        lathe(
-            [
-                (0.4 * knob_r, z0 + 0.46 * h),
-                (0.4 * knob_r, z0 + 0.65 * h),
-                (knob_r, z0 + 0.75 * h),
-                (knob_r, z1 - 0.03 * h),
-                (0, z1),
-            ],
-            10,
-        ).moved(shift),
-        BLACK,
-        "satin",
-    )
-    d.cylinder(1.03 * r, z0, z0 + 0.25 * h, shift)
-    d.cylinder(0.55 * r, z0 + 0.25 * h, z0 + 0.45 * h, shift)
-    d.cylinder(knob_r, z0 + 0.45 * h, z1, shift)
+    dome = lathe([(0, 0), (r, 0), (r, 0.1 * z), (0.6 * r, 0.3 * z), (0, 0.36 * z)], 18)
+    d.add(dome, (0.82, 0.86, 0.88) if not d.args.get("steel") else STEEL, "metal")
+    stem, top = 0.7 * knob_r, 0.66 * z
+    knob = [(stem, 0.34 * z), (stem, 0.5 * z), (knob_r, top), (knob_r, 0.96 * z), (0, z)]
+    d.add(lathe(knob, 10), BLACK, "satin")
+    d.cylinder(r, 0, 0.16 * z)
+    d.cylinder(0.55 * r, 0.16 * z, 0.34 * z)
+    d.cylinder(knob_r, 0.34 * z, z)

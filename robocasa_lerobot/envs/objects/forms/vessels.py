@@ -136,10 +136,8 @@ def basket(d: Draft) -> None:
 
 @form
 def pan(d: Draft) -> None:
-    """Frying pan (low), saucepan (high): a long handle towards -x; with a lid if its record says so."""
-    x, y, z = d.size
-    lid = bool(d.args.get("lid"))
-    height = z * (0.72 if lid else 1.0)
+    """Frying pan (low), saucepan (high): a long handle towards -x."""
+    x, y, height = d.size
     steel = bool(d.args.get("steel"))
     r = y / 2
     shift = (x - y) / 2
@@ -173,13 +171,12 @@ def pan(d: Draft) -> None:
     assert d.inside is not None
     d.inside = (d.inside[0] + [shift, 0, 0], d.inside[1])
     d.box((length, 1.9 * grip, 1.3 * grip), (start - length / 2, 0, z0 + rise))
-    if lid:
-        cover(d, r, height, z, shift)
 
 
 @form
 def saucepan_lid(d: Draft) -> None:
-    cover(d, d.size[0] / 2 / 1.03, 0.0, d.size[2])
+    """A lid that lies on the rim of its saucepan, with a knob to hold it by."""
+    cover(d, d.size[0] / 2, d.size[2])
 
 
 @form

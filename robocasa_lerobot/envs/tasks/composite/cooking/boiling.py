@@ -23,6 +23,19 @@ from robocasa_lerobot.envs.scene.spec import (
 )
 from robocasa_lerobot.envs.tasks.atomic.common import HANDLE_TO_FRONT, counter_near, in_cabinet, on_counter
 from robocasa_lerobot.envs.tasks.composite.common import fetch
+from robocasa_lerobot.envs.tasks.composite.cooking.lids import (
+    COVERED,
+    COVERS,
+    FRONT_BURNER,
+    LID,
+    ON_ITS_PAN,
+    ON_LIT_BURNER,
+    STOVE_AND_COUNTER,
+    UNCOVERS,
+    lid,
+    on_plate,
+    saucepan,
+)
 from robocasa_lerobot.envs.tasks.task import Stage, Task
 
 _LID, _HEATS = PartWithin("electric_kettle", "lid", high=0.01, label="closed"), StateIs("electric_kettle", "on")
@@ -249,4 +262,72 @@ BOIL_POT = Task(
     ),
 )
 
-TASKS = (BOIL_EGGS, BOIL_POT, COOL_KETTLE, FILL_KETTLE, HEAT_MULTIPLE_WATER, START_ELECTRIC_KETTLE)
+_LARGE, _COBS = 1.15, ("corn1", "corn2")
+
+BOIL_CORN = Task(
+    name="BoilCorn",
+    summary="Both cobs are in the saucepan over its lit burner, its lid is on it, the gripper away from the lid.",
+    fixtures=STOVE_AND_COUNTER,
+    robot_start=RobotStart("stove"),
+    choices=(FRONT_BURNER,),
+    objects=(
+        saucepan("water", rotation=HANDLE_TO_FRONT, scale=_LARGE),
+        lid(ON_ITS_PAN, scale=_LARGE),
+        ObjectSpec("corn_plate", ("plate",), on_counter("stove", (0.4, 0.35), loc="left_right")),
+        *(
+            ObjectSpec(name, ("corn",), on_plate("corn_plate"), graspable=True, repeats=True, scale=0.95)
+            for name in _COBS
+        ),
+    ),
+    initial=(BurnerAt("stove", "{knob}", "high"),),
+    goal=AllOf(ON_LIT_BURNER, *(ObjectOn(name, "saucepan") for name in _COBS), *COVERED.parts),
+    stages=(
+        UNCOVERS,
+        *(Stage("pick_place", "place", "saucepan", object=name) for name in _COBS),
+        COVERS,
+    ),
+    instruction="Open the saucepan, put both cobs of corn from the plate into its water and close it with its lid.",
+    paraphrases=(
+        "Boil the corn: both cobs into the saucepan, and the lid on it.",
+        "The water on the {knob} burner is for the corn. Lid off, two cobs in, lid on.",
+        "The corn on the plate should cook in the saucepan, which is covered at the end as it is now.",
+        "Move the cobs from the plate into the hot water under the saucepan's lid.",
+    ),
+)
+
+PLACE_LID_TO_BOIL = Task(
+    name="PlaceLidToBoil",
+    summary="The lid is on the saucepan, which stands on its lit burner; the gripper is away from the lid.",
+    fixtures=(FixtureSpec("stove", "stove"), FixtureSpec("cabinet", "cabinet")),
+    robot_start=RobotStart("cabinet"),
+    choices=(FRONT_BURNER,),
+    objects=(
+        saucepan("water", rotation=HANDLE_TO_FRONT, graspable=True),
+        lid(in_cabinet("cabinet", (0.3, 0.3))),
+    ),
+    initial=(InitialOpenness("cabinet", 0.9, 1.0), BurnerAt("stove", "{knob}", "high")),
+    goal=AllOf(ON_LIT_BURNER, *COVERED.parts),
+    stages=(
+        Stage("pick_place", "pick", "cabinet", object=LID),
+        Stage("navigation", "drive", "stove", object=LID),
+        COVERS,
+    ),
+    instruction="Take the lid out of the open cabinet and cover the saucepan on the stove with it.",
+    paraphrases=(
+        "The water comes to the boil faster under its lid, which is in the cabinet: put it on the saucepan.",
+        "Fetch the saucepan's lid from the cabinet and close the saucepan with it.",
+        "The saucepan on the {knob} burner is open; the cabinet holds what covers it.",
+        "Cabinet to stove: carry the lid over and lay it on the saucepan.",
+    ),
+)
+
+TASKS = (
+    BOIL_CORN,
+    BOIL_EGGS,
+    BOIL_POT,
+    COOL_KETTLE,
+    FILL_KETTLE,
+    HEAT_MULTIPLE_WATER,
+    PLACE_LID_TO_BOIL,
+    START_ELECTRIC_KETTLE,
+)

@@ -12,6 +12,16 @@ from robocasa_lerobot.envs.predicates import (
 from robocasa_lerobot.envs.scene.initial_states import BurnerAt, Water
 from robocasa_lerobot.envs.scene.spec import Choice, FixtureSpec, ObjectSpec, Placement, RobotStart, SampleRegion
 from robocasa_lerobot.envs.tasks.atomic.common import HANDLE_TO_FRONT, HANDLE_TURN, counter_near, on_counter
+from robocasa_lerobot.envs.tasks.composite.cooking.lids import (
+    COVERED,
+    COVERS,
+    FRONT_BURNER,
+    ON_LIT_BURNER,
+    STOVE_AND_COUNTER,
+    lid,
+    on_plate,
+    saucepan,
+)
 from robocasa_lerobot.envs.tasks.task import Stage, Task
 
 _KINDS = ("broccoli", "carrot", "potato", "sweet_potato")
@@ -146,7 +156,37 @@ PREPARE_VEGGIES_FOR_STEAMING = Task(
     ),
 )
 
+_TO_STEAM = ("vegetable1", "vegetable2")
+
+STEAM_VEGGIES_WITH_WATER = Task(
+    name="SteamVeggiesWithWater",
+    summary=(
+        "Both vegetables are in the saucepan over its lit burner, the lid is on the saucepan, the gripper away from "
+        "the lid."
+    ),
+    fixtures=STOVE_AND_COUNTER,
+    robot_start=RobotStart("counter", at_object="vegetable_plate"),
+    choices=(FRONT_BURNER,),
+    objects=(
+        ObjectSpec("vegetable_plate", ("plate",), on_counter("stove", (0.3, 0.3), loc="left_right")),
+        *(ObjectSpec(name, _KINDS, on_plate("vegetable_plate"), graspable=True) for name in _TO_STEAM),
+        saucepan("water"),
+        lid(on_counter("stove", (0.6, 0.55), loc="left_right")),
+    ),
+    initial=(BurnerAt("stove", "{knob}", "on"),),
+    goal=AllOf(*(ObjectOn(name, "saucepan") for name in _TO_STEAM), *COVERED.parts, ON_LIT_BURNER),
+    stages=(*(Stage("pick_place", "place", "saucepan", object=name) for name in _TO_STEAM), COVERS),
+    instruction="Put the {vegetable1} and the {vegetable2} into the saucepan with water and cover it with its lid.",
+    paraphrases=(
+        "Steam the {vegetable1} and the {vegetable2}: both into the saucepan, the lid on top.",
+        "From the plate into the hot water with the {vegetable1} and the {vegetable2}; then the lid goes on.",
+        "The vegetables on the plate are to be steamed in the covered saucepan.",
+        "Fill the saucepan on the {knob} burner with the {vegetable2} and the {vegetable1}, then close it.",
+    ),
+)
+
 TASKS = (
     PREPARE_VEGGIES_FOR_STEAMING,
     REMOVE_STEAMED_VEGETABLES,
+    STEAM_VEGGIES_WITH_WATER,
 )

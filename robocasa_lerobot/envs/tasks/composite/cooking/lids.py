@@ -1,0 +1,51 @@
+"""What tasks with the lid of a saucepan share."""
+
+from __future__ import annotations
+
+from robocasa_lerobot.envs.predicates import AllOf, GripperFar, ObjectOn, ObjectTouches, OnBurner
+from robocasa_lerobot.envs.scene.spec import Choice, FixtureSpec, ObjectSpec, Placement, SampleRegion
+from robocasa_lerobot.envs.tasks.atomic.common import HANDLE_TURN, counter_near
+from robocasa_lerobot.envs.tasks.task import Stage, Task
+
+TASKS: tuple[Task, ...] = ()
+PAN, LID = "saucepan", "saucepan_auxiliary"
+ON_ITS_PAN = Placement(object=PAN)
+ON_THE_PAN_M = 0.02  # of the lid's middle from the saucepan's
+FRONT_BURNER = Choice("knob", of="stove", beginning="front")
+STOVE_AND_COUNTER = (FixtureSpec("stove", "stove"), counter_near("stove"))
+ON_LIT_BURNER = OnBurner(PAN, "stove", burner="{knob}", lit=True, within=0.08)
+COVERED = AllOf(ObjectOn(LID, PAN, within=ON_THE_PAN_M), GripperFar(LID))
+COVERS = Stage("pick_place", "place", PAN, object=LID, until=COVERED)
+UNCOVERS = Stage(
+    "pick_place",
+    "place",
+    "counter",
+    object=LID,
+    until=AllOf(ObjectTouches(LID, "counter"), GripperFar(LID)),
+    text="take the lid off the saucepan and lay it on the counter",
+)
+
+
+def saucepan(
+    filled: str, *, rotation: tuple[float, float] = HANDLE_TURN, scale: float = 1.0, graspable: bool = False
+) -> ObjectSpec:
+    """The saucepan that has a lid, on the burner that was drawn; its handle points to the front, by default askew."""
+    start = Placement(
+        "stove",
+        region=SampleRegion(name="{knob}"),
+        size=(0.05, 0.05),
+        pos=(0.0, 0.0),
+        rotation=rotation,
+        ensure_inside=False,
+    )
+    return ObjectSpec(PAN, ("saucepan_with_lid",), start, graspable=graspable, scale=scale, filled=filled)
+
+
+def lid(start: Placement, *, scale: float = 1.0) -> ObjectSpec:
+    """The lid of that saucepan, which has its scale."""
+    return ObjectSpec(LID, ("saucepan_lid",), start, graspable=True, scale=scale, part_of=PAN)
+
+
+def on_plate(plate: str) -> Placement:
+    """On a plate beside what lies there, or on that where there is no room beside it: our plates are small for two."""
+    return Placement(object=plate, ensure_inside=False, heaped=True)
