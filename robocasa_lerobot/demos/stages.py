@@ -196,6 +196,6 @@ def _undone(env: KitchenEnv) -> int | None:
             continue
         if any(not held and wanted.get(name) is False for name, held in terms.items()):
             return index
-        if moved is None and stage.verb == "place" and stage.object in objects:
+        if moved is None and stage.verb in ("place", "place_upside_down") and stage.object in objects:
             moved = index
     return moved

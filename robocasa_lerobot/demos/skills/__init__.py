@@ -85,6 +85,7 @@ SKILLS: dict[tuple[str, str], Skill] = {
     ("levers", "sweep"): sweep_sideways,
     ("pick_place", "pick"): pick_object,
     ("pick_place", "place"): place_object,
+    ("pick_place", "place_upside_down"): place_object,
     ("pick_place", "hold"): hold_object,
     ("pick_place", "rinse"): rinse,
     ("pick_place", "pour"): pour,

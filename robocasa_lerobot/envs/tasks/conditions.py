@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+import numpy as np
+
 from robocasa_lerobot.envs.predicates import (
     AllOf,
     DoorsClosed,
@@ -18,6 +20,7 @@ from robocasa_lerobot.envs.predicates import (
     Never,
     ObjectInBasin,
     ObjectOn,
+    ObjectTilt,
     ObjectTouches,
     OnBurner,
     PartWithin,
@@ -32,9 +35,10 @@ from robocasa_lerobot.errors import UserError
 OUT_FROM, IN_UP_TO = 0.95, 0.05  # of a rack's or a drawer's range
 IN_RANGE = ("interior", "cavity")  # regions of stoves that are below their burners
 KNOB = "knob_"
+UPSIDE_DOWN_RAD = float(np.deg2rad(170.0))
 
 
-def _placed(task: BoundTask, stage: Stage) -> Goal:
+def _placed(task: BoundTask, stage: Stage) -> AllOf:
     """Where the object belongs, by what the target is, and let go."""
     kind = next((fixture.kind for fixture in task.fixtures if fixture.role == stage.target), None)
     if kind is None:
@@ -48,6 +52,12 @@ def _placed(task: BoundTask, stage: Stage) -> Goal:
     else:
         where = inside(stage.object, stage.target, stage.part)
     return AllOf(where, GripperFar(stage.object))
+
+
+def _upside_down(task: BoundTask, stage: Stage) -> Goal:
+    """Where the object belongs, let go, and on its head."""
+    over = ObjectTilt(stage.object, low=UPSIDE_DOWN_RAD, label="upside_down")
+    return AllOf(*_placed(task, stage).parts, over)
 
 
 def _driven(task: BoundTask, stage: Stage) -> Goal:
@@ -94,6 +104,7 @@ _BY_VERB: dict[tuple[str, str], Callable[[BoundTask, Stage], Goal]] = {
     ("levers", "off"): lambda task, stage: StateIs(stage.target, "water_on", value=False),
     ("pick_place", "pick"): lambda task, stage: Grasped(stage.object),
     ("pick_place", "place"): _placed,
+    ("pick_place", "place_upside_down"): _upside_down,
 }
 
 

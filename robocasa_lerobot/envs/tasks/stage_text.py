@@ -208,6 +208,7 @@ _BY_VERB: dict[tuple[str, str], _Wording] = {
     ("levers", "turn"): _turned,
     ("pick_place", "pick"): _parted("pick up the {object}"),
     ("pick_place", "place"): _parted("put the {object} {placed}"),
+    ("pick_place", "place_upside_down"): _parted("put the {object} {placed} upside down"),
     ("pick_place", "hold"): _held,
     ("pick_place", "rinse"): _parted("rinse the {object} under the faucet of the {target} and put it down"),
     ("pick_place", "cover"): _parted("put the lid on the {target}"),

@@ -28,19 +28,33 @@ SMALL_RAD = np.deg2rad(21.0)
 
 def from_the_side(env: KitchenEnv, obj: Graspable, approach: Array) -> list[GraspPose]:
     """Grasps across the body where the hand comes level and the object stands; else of whatever kind there is."""
-    turn = env.data.body(obj.name).xmat.reshape(3, 3).copy()
+    return across_body(env, obj, approach) if stands_for(env, obj, approach) else grasps(env, obj, approach)
+
+
+def stands_for(env: KitchenEnv, obj: Graspable, approach: Array) -> bool:
+    """Whether an object is a vessel that stands, and a hand that comes along `approach` is nearly level."""
     level = np.hypot(approach[0], approach[1]) > np.cos(LEVEL_RAD)
-    if level and obj.item is not None and obj.item.interior is not None and turn[2, 2] > UPRIGHT_COS:
-        return _across(env, obj, approach, float(min(obj.item.size[:2])) / 2, obj.item.interior.center)
-    return grasps(env, obj, approach)
+    vessel = obj.item is not None and obj.item.interior is not None
+    return bool(level and vessel and env.data.body(obj.name).xmat[8] > UPRIGHT_COS)
 
 
-def _across(
-    env: KitchenEnv, obj: Graspable, approach: Array, radius: float, center: tuple[float, float, float]
+def across_body(
+    env: KitchenEnv,
+    obj: Graspable,
+    approach: Array,
+    heights: tuple[float, ...] = HEIGHTS_M,
+    askew: float = ASKEW,
 ) -> list[GraspPose]:
+    """Grasps across the body of a vessel that stands, by a level hand, at heights above its foot, metres.
+
+    A radian between the hand and the base's heading, beyond a small one, lowers the score by `askew`.
+    """
+    assert obj.item is not None
+    assert obj.item.interior is not None
+    radius = float(min(obj.item.size[:2])) / 2
     body = env.data.body(obj.name)
     turn = body.xmat.reshape(3, 3)
-    middle = np.array([*center[:2], 0.0])
+    middle = np.array([*obj.item.interior.center[:2], 0.0])
     away = obj.cloud - middle
     if 2 * radius > WIDEST_M:
         return []
@@ -56,10 +70,10 @@ def _across(
     # As deep as the palm lets it.
     short = max(radius - env.robot.gripper.palm_above_grip, 0.0)
     foot = body.xpos + turn @ middle - obj.below(turn) * UP
-    score = min(behind, 0.6) - ASKEW * max(float(np.arccos(np.clip(ahead @ ahead_of(env), -1, 1))) - SMALL_RAD, 0.0)
+    score = min(behind, 0.6) - askew * max(float(np.arccos(np.clip(ahead @ ahead_of(env), -1, 1))) - SMALL_RAD, 0.0)
     return [
         GraspPose(foot + height * UP - short * approach, rotation, 2 * radius, score - UPPER * index)
-        for index, height in enumerate(HEIGHTS_M)
+        for index, height in enumerate(heights)
     ]
 
 

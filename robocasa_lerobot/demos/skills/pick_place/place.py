@@ -27,6 +27,7 @@ from robocasa_lerobot.demos.skills.pick_place.carrying.level import level_hand, 
 from robocasa_lerobot.demos.skills.pick_place.grasp_strategy import FROM_ABOVE, GraspStrategy, ahead_of, entry, steep
 from robocasa_lerobot.demos.skills.pick_place.graspable import Graspable
 from robocasa_lerobot.demos.skills.pick_place.pick import INTEGRAL_GAIN
+from robocasa_lerobot.demos.skills.pick_place.turn_over import turned_hand
 from robocasa_lerobot.demos.skills.reaching import (
     Held,
     MotionPlan,
@@ -82,6 +83,7 @@ class PlaceStrategy:
         turns: of a leaning hand to the left, radians.
         exact: the object must come to within a few millimetres of the place pose.
         falls: the fingers are to open side by side, so that the object falls from between them.
+        upwards: which way the object's own z axis points in the end, world, where it is turned over in between.
         narrow: whether the hand keeps to a straight line in and out also where that is steep.
         fit: cost of the object's origin (3,) and rotation (3, 3) in the end, by what they leave of the room there.
     """
@@ -95,6 +97,7 @@ class PlaceStrategy:
     turns: tuple[float, ...] = (0.0,)
     exact: bool = False
     falls: bool = False
+    upwards: Array | None = None
     narrow: bool = False
     fit: Callable[[Array, Array], float] | None = None
 
@@ -216,7 +219,7 @@ def _paths(
 ) -> list[WaypointPath]:
     ahead = ahead_of(env)
     left = np.cross(UP, ahead)
-    present = level_hand(env, obj)
+    present = level_hand(env, obj) if strategy.upwards is None else turned_hand(env, obj, strategy.upwards)
     leaning = LOADED_LEANING if obj.contents else LEANING
     level = float(present[:, 2] @ UP) > -0.85  # a hand that looks ahead keeps doing so
     found = []
@@ -234,7 +237,7 @@ def _paths(
             origin = pose.point + (obj.below(object_turn) + strategy.gap_m) * UP
             low = origin - rotation @ held.position
             again = AGAIN * sum(np.linalg.norm(low - other) < AGAIN_M for other in failed)
-            cost = pose.extra + float(again) + leaning * lean + SLOPE * slope + 0.08 * min(yaw, 2 * np.pi - yaw)
+            cost = pose.extra + float(again) + leaning * abs(lean) + SLOPE * slope + 0.08 * min(yaw, 2 * np.pi - yaw)
             if strategy.fit is not None:
                 cost += strategy.fit(origin, object_turn)
             for name in strategy.entries:

@@ -50,6 +50,7 @@ from robocasa_lerobot.demos.skills.pick_place.poses.plate_poses import is_flat, 
 from robocasa_lerobot.demos.skills.pick_place.poses.turned_poses import as_turned
 from robocasa_lerobot.demos.skills.pick_place.reach_in import OUT_OF_A_MICROWAVE, OUT_OF_A_TOASTER_OVEN
 from robocasa_lerobot.demos.skills.pick_place.turn_across import lies_across, turn_across
+from robocasa_lerobot.demos.skills.pick_place.turn_over import LEANS, TO_TURN, which_way_up
 from robocasa_lerobot.demos.skills.racks import pull
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.kitchens.appliances.kinds.blender import Blender
@@ -154,7 +155,8 @@ def in_the_open(place: Location) -> bool:
 def place_strategy(env: KitchenEnv, stage: Stage, obj: Graspable) -> PlaceStrategy:
     """How the stage's object is put down at the stage's target: an object, or a part of the fixture of a role.
 
-    An object that holds others is kept level, or nearly so where it is deep.
+    An object that holds others is kept level, or nearly so where it is deep; one that is to stand otherwise than it
+    does is turned over.
     """
     strategy = _by_target(env, stage, obj)
     fit = as_turned(env, stage, strategy.fit)
@@ -162,6 +164,9 @@ def place_strategy(env: KitchenEnv, stage: Stage, obj: Graspable) -> PlaceStrate
     turned = fit is not strategy.fit and "out" in strategy.entries
     grasp = FROM_THE_SIDE if turned else strategy.grasp
     strategy = replace(strategy, poses=at_distances(env, stage, obj, strategy.poses), fit=fit, grasp=grasp)
+    upwards = which_way_up(env, stage, obj)
+    if upwards is not None:
+        return replace(strategy, upwards=upwards, leans=LEANS, entries=("up", "across", "out"), grasp=TO_TURN)
     if not obj.contents:
         return strategy
     steepest = DEEP_LEAN if _is_deep(obj) else 0.0

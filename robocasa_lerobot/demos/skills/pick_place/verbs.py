@@ -38,6 +38,7 @@ BY_USE = {
     **dict.fromkeys(("stir", "press_with"), TOOL_BY_THE_HANDLE),
     **dict.fromkeys(("pour", "shake", "tilt", "turn"), PAN_BY_THE_HANDLE),
 }
+PLACING = ("place", "place_upside_down")
 MOST_PLACES = 3  # that an object is reached for from
 OTHER_SIDE_RAD = 0.7  # between the robot's headings at two sides of a counter, at least
 
@@ -192,5 +193,4 @@ def _placing(env: KitchenEnv, stage: Stage) -> Stage | None:
     """The next stage that puts a stage's object down."""
     stages = env.declaration.stages
     later = stages[stages.index(stage) + 1 :] if stage in stages else ()
-    wanted = ("pick_place", "place", stage.object)
-    return next((each for each in later if (each.skill, each.verb, each.object) == wanted), None)
+    return next((e for e in later if e.skill == "pick_place" and e.verb in PLACING and e.object == stage.object), None)
