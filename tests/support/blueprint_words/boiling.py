@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from blueprint_words.ours import IN_SAUCEPAN, LIT_SAUCEPAN, ON_SAUCEPAN, Ours, away
+from blueprint_words.ours import IN_SAUCEPAN, LEVEL, LIT_SAUCEPAN, ON_SAUCEPAN, Ours, away
 from robocasa_lerobot.envs.predicates import (
     AllOf,
     GripperFar,
@@ -38,6 +38,7 @@ OURS = {
             "saucepan holds water (visual liquid)": "saucepan",
         },
         called={"lid": "saucepan_auxiliary"},
+        besides=LEVEL,
         turned={"saucepan": HANDLE_TO_FRONT},
     ),
     "BoilEggs": Ours(
@@ -108,6 +109,7 @@ OURS = {
             "saucepan holds water (visual liquid)": "saucepan",
         },
         called={"lid": "saucepan_auxiliary"},
+        besides=LEVEL,
         turned={"saucepan": HANDLE_TO_FRONT},
     ),
     "StartElectricKettle": Ours(

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from robocasa_lerobot.envs.predicates import Goal, GripperFar, ObjectOn, OnBurner
+from robocasa_lerobot.envs.predicates import Goal, GripperFar, ObjectOn, ObjectUpright, OnBurner
 from robocasa_lerobot.envs.scene.scene_spec import InitialState
 from robocasa_lerobot.envs.scene.spec import Placement
 
@@ -29,6 +29,7 @@ ON_SAUCEPAN: dict[str, Goal] = {
         "saucepan_auxiliary", "saucepan", within=0.02
     )
 }
+LEVEL = frozenset({ObjectUpright("saucepan_auxiliary")})
 IN_SAUCEPAN = "{} in saucepan (contact; centre xy < 0.7*saucepan radius)"
 
 

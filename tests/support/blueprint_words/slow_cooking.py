@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from blueprint_words.ours import IN_SAUCEPAN, LIT_SAUCEPAN, ON_SAUCEPAN, Ours, away
+from blueprint_words.ours import IN_SAUCEPAN, LEVEL, LIT_SAUCEPAN, ON_SAUCEPAN, Ours, away
 from robocasa_lerobot.envs.predicates import BurnerLevel, ObjectOn, ObjectTouchesAnyCounter, StateIs
 from robocasa_lerobot.envs.scene.initial_states import BurnerAt
 
@@ -32,11 +32,13 @@ OURS = {
             "broccoli": None,
         },
         called=TAKEN_OFF,
+        besides=LEVEL,
     ),
     "BeginSlowCooking": Ours(
         goal={**LIT_SAUCEPAN, **LOW, **ON_SAUCEPAN, **away("saucepan_auxiliary")},
         initial={**CHOSEN, "all burners off": None, **BROTH},
         called=TAKEN_OFF,
+        besides=LEVEL,
     ),
     "StopSlowCooking": Ours(
         goal={

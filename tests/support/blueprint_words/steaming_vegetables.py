@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from blueprint_words.ours import Ours, away
+from blueprint_words.ours import LEVEL, Ours, away
 from robocasa_lerobot.envs.predicates import (
     AllOf,
     NearFixture,
@@ -77,5 +77,6 @@ OURS = {
             "saucepan shows water": "saucepan",
             "saucepan lid off, on counter": "saucepan_auxiliary",
         },
+        besides=LEVEL,
     ),
 }

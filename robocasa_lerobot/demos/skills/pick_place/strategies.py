@@ -31,6 +31,14 @@ from robocasa_lerobot.demos.skills.pick_place.poses.basin_poses import below_spo
 from robocasa_lerobot.demos.skills.pick_place.poses.counter_poses import NEAR_M, on_counter
 from robocasa_lerobot.demos.skills.pick_place.poses.distance_poses import at_distances, distance_terms, near_to
 from robocasa_lerobot.demos.skills.pick_place.poses.drawer_poses import fits_in_drawer, in_drawer
+from robocasa_lerobot.demos.skills.pick_place.poses.lid_poses import (
+    between_walls,
+    is_covered_later,
+    is_lid,
+    is_lid_of,
+    on_rim,
+    under_lid,
+)
 from robocasa_lerobot.demos.skills.pick_place.poses.place_poses import (
     COLUMNS,
     DROPS_M,
@@ -38,9 +46,7 @@ from robocasa_lerobot.demos.skills.pick_place.poses.place_poses import (
     at_site,
     in_basin,
     in_regions,
-    is_lid_of,
     on_object,
-    on_rim,
     over_bowl,
     over_burners,
     over_jug,
@@ -155,8 +161,8 @@ def in_the_open(place: Location) -> bool:
 def place_strategy(env: KitchenEnv, stage: Stage, obj: Graspable) -> PlaceStrategy:
     """How the stage's object is put down at the stage's target: an object, or a part of the fixture of a role.
 
-    An object that holds others is kept level, or nearly so where it is deep; one that is to stand otherwise than it
-    does is turned over.
+    An object that holds others is kept level, or nearly so where it is deep; a lid level; what is to stand otherwise
+    than it does is turned over.
     """
     strategy = _by_target(env, stage, obj)
     fit = as_turned(env, stage, strategy.fit)
@@ -164,6 +170,8 @@ def place_strategy(env: KitchenEnv, stage: Stage, obj: Graspable) -> PlaceStrate
     turned = fit is not strategy.fit and "out" in strategy.entries
     grasp = FROM_THE_SIDE if turned else strategy.grasp
     strategy = replace(strategy, poses=at_distances(env, stage, obj, strategy.poses), fit=fit, grasp=grasp)
+    if is_lid(obj):
+        return replace(strategy, upwards=UP, leans=(0.0,))
     upwards = which_way_up(env, stage, obj)
     if upwards is not None:
         return replace(strategy, upwards=upwards, leans=LEANS, entries=("up", "across", "out"), grasp=TO_TURN)
@@ -193,6 +201,11 @@ def _by_target(env: KitchenEnv, stage: Stage, obj: Graspable) -> PlaceStrategy:
                 on_rim(env, holder), entries=("up", "across"), grasp=ANY_APPROACH, gap_m=LID_GAP_M, exact=True
             )
         more = _more_comes(env, stage)
+        if is_covered_later(env, stage, holder):
+            return PlaceStrategy(
+                between_walls(env, obj, holder), leans=_OPEN_LEANS, entries=("up", "across"), grasp=ANY_APPROACH,
+                fit=under_lid(env, obj, holder, more=more),
+            )  # fmt: skip
         poses = on_object(env, obj, holder, more=more)
         fit = side_by_side(env, obj, holder, reach_on(env, holder), more=more) if is_flat(env, holder) else None
         if in_the_open(locate(env, holder)) and not _looks_ahead(env) and in_the_open(locate(env, obj.name)):

@@ -54,24 +54,6 @@ def reach_on(env: KitchenEnv, holder: str) -> float:
     return COUNTS_SHARE * RECEPTACLE_SHARE * radius(env.scene, holder)
 
 
-def is_lid_of(env: KitchenEnv, obj: Graspable, holder: str) -> bool:
-    """Whether an object is made to lie on the rim of another one."""
-    return obj.item is not None and env.scene.objects[holder].item.category.auxiliary == obj.item.category.name
-
-
-def on_rim(env: KitchenEnv, holder: str) -> PlacePoses:
-    """On the rim of a vessel, in the middle."""
-    data, placed = env.data, env.scene.objects[holder]
-
-    def poses() -> list[PlacePose]:
-        body, inside = data.body(placed.name), placed.item.interior
-        assert inside is not None
-        top = np.array([*inside.center[:2], inside.center[2] + inside.half[2]])
-        return [PlacePose(body.xpos + body.xmat.reshape(3, 3) @ top)]
-
-    return poses
-
-
 def on_object(env: KitchenEnv, obj: Graspable, holder: str, *, more: bool = False) -> PlacePoses:
     """In or on another object: its middle, or beside what lies there already, or is to come where there is `more`."""
     data, placed = env.data, env.scene.objects[holder]

@@ -10,6 +10,7 @@ import numpy as np
 from robocasa_lerobot.demos.motion import Array
 from robocasa_lerobot.demos.skills.pick_place.graspable import Graspable, contents_of, filled, graspable
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
+from robocasa_lerobot.envs.predicates.objects import middle_of
 
 FLAT_M = 0.035  # greatest height of what counts as a plate
 SHARES, DIRECTIONS = (0.5, 0.9), 8  # of how far from the middle an object may come, and to which sides
@@ -41,12 +42,12 @@ def side_by_side(
         most_m: how far from its middle an object counts, metres.
         more: whether other objects come there later.
     """
-    middle = env.data.body(holder).xpos[:2].copy()
+    middle = middle_of(env.scene, env.data, holder)[:2].copy()
     others = _outlines(env, [name for name in contents_of(env, holder) if name != obj.name])
     half = np.abs(obj.cloud).max(axis=0)
-    long = int(np.argmax(half))
 
     def cost(origin: Array, turn: Array) -> float:
+        long = int(np.argmax(half * np.linalg.norm(turn[:2], axis=0)))  # of its axes, as it lies then
         along = turn[:2, long] / max(float(np.linalg.norm(turn[:2, long])), 1e-6)
         across = np.array([-along[1], along[0]])
         found = 0.0

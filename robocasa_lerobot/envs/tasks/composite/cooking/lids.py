@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from robocasa_lerobot.envs.predicates import AllOf, GripperFar, ObjectOn, ObjectTouches, OnBurner
+from robocasa_lerobot.envs.predicates import AllOf, GripperFar, ObjectOn, ObjectTouches, ObjectUpright, OnBurner
 from robocasa_lerobot.envs.scene.spec import Choice, FixtureSpec, ObjectSpec, Placement, SampleRegion
 from robocasa_lerobot.envs.tasks.atomic.common import HANDLE_TURN, counter_near
 from robocasa_lerobot.envs.tasks.task import Stage, Task
@@ -14,7 +14,8 @@ ON_THE_PAN_M = 0.02  # of the lid's middle from the saucepan's
 FRONT_BURNER = Choice("knob", of="stove", beginning="front")
 STOVE_AND_COUNTER = (FixtureSpec("stove", "stove"), counter_near("stove"))
 ON_LIT_BURNER = OnBurner(PAN, "stove", burner="{knob}", lit=True, within=0.08)
-COVERED = AllOf(ObjectOn(LID, PAN, within=ON_THE_PAN_M), GripperFar(LID))
+# It lies level: one that leans in the saucepan covers nothing.
+COVERED = AllOf(ObjectOn(LID, PAN, within=ON_THE_PAN_M), ObjectUpright(LID), GripperFar(LID))
 COVERS = Stage("pick_place", "place", PAN, object=LID, until=COVERED)
 UNCOVERS = Stage(
     "pick_place",
