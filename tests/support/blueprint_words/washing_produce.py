@@ -12,6 +12,7 @@ from robocasa_lerobot.envs.predicates import (
     ObjectInBasin,
     ObjectInside,
     ObjectOn,
+    ObjectTouches,
     StateIs,
     StepsWhile,
     UnderWater,
@@ -86,6 +87,13 @@ OURS = {
         },
         order=RINSED,
         turned={"receptacle": (0.0, 0.0)},
+    ),
+    "ClearSinkSpace": Ours(
+        goal={
+            "every obj{i} touches counter (contact)": ForEach("obj", lambda name: ObjectTouches(name, "counter")),
+            "gripper > 0.25 m from every obj{i}": ForEach("obj", lambda name: GripperFar(name, 0.25)),
+        },
+        initial={"number of sink objects 1 or 2 at random": None},
     ),
     "WashFruitColander": Ours(
         goal={

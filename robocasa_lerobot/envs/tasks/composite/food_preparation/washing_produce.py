@@ -15,12 +15,13 @@ from robocasa_lerobot.envs.predicates import (
     ObjectInBasin,
     ObjectInside,
     ObjectOn,
+    ObjectTouches,
     StateIs,
     StepsWhile,
     UnderWater,
 )
 from robocasa_lerobot.envs.scene.initial_states import Water
-from robocasa_lerobot.envs.scene.spec import FixtureSpec, ObjectSpec, Placement, RobotStart
+from robocasa_lerobot.envs.scene.spec import FixtureSpec, ObjectSpec, Placement, RobotStart, SampleRegion
 from robocasa_lerobot.envs.tasks.atomic.common import counter_near, on_counter
 from robocasa_lerobot.envs.tasks.task import EachStage, Stage, Task
 
@@ -169,6 +170,49 @@ AIR_DRY_FRUIT = Task(
 )
 
 
+CLEAR_SINK_SPACE = Task(
+    name="ClearSinkSpace",
+    summary="What was in the sink stands on the counter, the gripper away from it.",
+    fixtures=(FixtureSpec("sink", "sink"), counter_near("sink")),
+    robot_start=RobotStart("sink"),
+    objects=(
+        ObjectSpec(
+            "obj",
+            ("any",),
+            _in_basin((0.4, 0.3)),
+            count=(1, 2),
+            graspable=True,
+            properties=("washable",),
+            max_size=(0.2, 0.2, 0.16),
+            exclude=("food",),
+        ),
+        ObjectSpec(
+            "food_item",
+            ("fruit", "vegetable"),
+            # Beside the sink: the strips before and behind it are the nearest, but no place for food.
+            Placement(
+                "counter",
+                region=SampleRegion(ref="sink", loc="nn", top_size=(0.35, 0.35)),
+                size=(0.35, 0.35),
+                pos=("ref", 0.0),
+            ),
+            count=(2, 2),
+            graspable=True,
+            properties=("washable",),
+        ),
+    ),
+    goal=AllOf(ForEach("obj", lambda name: ObjectTouches(name, "counter")), ForEach("obj", GripperFar)),
+    stages=(EachStage("obj", lambda name: (Stage("pick_place", "place", "counter", object=name),)),),
+    instruction="Make room for washing: put {obj} from the sink on the counter.",
+    paraphrases=(
+        "The sink should be empty; the counter takes {obj}.",
+        "Clear the basin of {obj}, onto the counter.",
+        "Before the food is washed, {obj} must be out of the sink.",
+        "Take {obj} out of the sink and set everything down on the counter.",
+    ),
+)
+
+
 @functools.cache
 def _washable() -> tuple[str, ...]:
     return tuple(category.name for category in pool(("any",), properties=("washable",)))
@@ -273,4 +317,4 @@ DRAIN_VEGGIES = Task(
     ),
 )
 
-TASKS = (DRAIN_VEGGIES, AFTERWASH_SORTING, AIR_DRY_FRUIT, CLEAR_CLUTTER, WASH_FRUIT_COLANDER)
+TASKS = (DRAIN_VEGGIES, AFTERWASH_SORTING, AIR_DRY_FRUIT, CLEAR_CLUTTER, CLEAR_SINK_SPACE, WASH_FRUIT_COLANDER)
