@@ -28,6 +28,22 @@ OURS = {
         besides=frozenset({DoorsClosed("microwave")}),  # it would also run while the door is ajar
         same={"distractor_counter": "counter"},
     ),
+    "DefrostByCategory": Ours(
+        goal={
+            "obj0 inside sink (bbox, margin 0.05 m)": ObjectInside("obj0", "sink", margin=0.05),
+            "obj1 inside sink (bbox, margin 0.05 m)": ObjectInside("obj1", "sink", margin=0.05),
+            "obj2 in container (contact; xy dist < 0.7 x container radius)": ObjectOn("obj2", "container"),
+            "obj3 in container (contact; xy dist < 0.7 x container radius)": ObjectOn("obj3", "container"),
+            "gripper > 0.25 m from obj0": GripperFar("obj0", 0.25),
+            "gripper > 0.25 m from obj1": GripperFar("obj1", 0.25),
+            "gripper > 0.25 m from obj2": GripperFar("obj2", 0.25),
+            "gripper > 0.25 m from obj3": GripperFar("obj3", 0.25),
+        },
+        initial={
+            "bowl on random side (left or right) of sink, food on the other side": "container",
+            "faucet not set by the task (default off)": Water("sink", on=True),
+        },
+    ),
     "MicrowaveThawingFridge": Ours(
         goal={
             "meat inside microwave (bbox, margin 0.05 m)": ObjectInside("meat", "microwave", margin=0.05),

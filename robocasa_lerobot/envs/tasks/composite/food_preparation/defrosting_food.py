@@ -90,6 +90,45 @@ MOVE_TO_COUNTER = Task(
 
 _FRUITS, _VEGETABLES = ("obj0", "obj1"), ("obj2", "obj3")
 
+# The food takes all of its place up to the edges: with the usual margin most draws have no room for the fourth.
+DEFROST_BY_CATEGORY = Task(
+    name="DefrostByCategory",
+    summary="Both fruits are in the sink, both vegetables in the bowl, the gripper away from all four.",
+    fixtures=(FixtureSpec("sink", "sink"), counter_near("sink", size=(0.5, 0.5))),
+    robot_start=RobotStart("sink"),
+    choices=(Choice("bowl_side", {"left": {"_food_side": "right"}, "right": {"_food_side": "left"}}),),
+    objects=(
+        *(
+            ObjectSpec(
+                name,
+                ("fruit" if name in _FRUITS else "vegetable",),
+                on_counter("sink", (0.3, 0.4), loc="{_food_side}", margin=0.0),
+                graspable=True,
+                repeats=True,
+            )
+            for name in (*_FRUITS, *_VEGETABLES)
+        ),
+        ObjectSpec("container", ("bowl",), on_counter("sink", (0.3, 0.4), loc="{bowl_side}")),
+    ),
+    initial=(Water("sink", on=True),),
+    goal=AllOf(
+        *(ObjectInside(name, "sink") for name in _FRUITS),
+        *(ObjectOn(name, "container") for name in _VEGETABLES),
+        *map(GripperFar, (*_FRUITS, *_VEGETABLES)),
+    ),
+    stages=(
+        *(Stage("pick_place", "place", "sink", object=name) for name in _FRUITS),
+        *(Stage("pick_place", "place", "container", object=name) for name in _VEGETABLES),
+    ),
+    instruction="Put the fruits, {obj0+obj1}, into the running sink, and the vegetables, {obj2+obj3}, into the bowl.",
+    paraphrases=(
+        "Fruits thaw in the sink, where water runs; vegetables go into the bowl on its other side.",
+        "Sort what is frozen: {obj0+obj1} into the basin, {obj2+obj3} into the bowl.",
+        "Only fruits belong under the running water; put the vegetables into the bowl.",
+        "Divide the food beside the sink: the bowl is for vegetables, the sink for fruits.",
+    ),
+)
+
 _THERE = AllOf(ObjectInside("meat", "microwave"), GripperFar("meat"))
 
 MICROWAVE_THAWING_FRIDGE = Task(
@@ -195,4 +234,4 @@ THAW_IN_SINK = Task(
     ),
 )
 
-TASKS = (MICROWAVE_THAWING, MICROWAVE_THAWING_FRIDGE, MOVE_TO_COUNTER, QUICK_THAW, THAW_IN_SINK)
+TASKS = (DEFROST_BY_CATEGORY, MICROWAVE_THAWING, MICROWAVE_THAWING_FRIDGE, MOVE_TO_COUNTER, QUICK_THAW, THAW_IN_SINK)
