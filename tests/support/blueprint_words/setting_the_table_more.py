@@ -31,8 +31,26 @@ EACH_ITS_OWN = AnyOf(
 )
 
 EACH_ITS_STOOL = BeforeStools(("bowl1", "bowl2"), across=0.15, along=0.3)
+WARM_IN_BOWL, OLD_IN_BOWL = ObjectOn("toaster_oven_bread", "bowl"), ObjectOn("bowl_bread", "bowl")
 
 OURS = {
+    "ArrangeBreadBowl": Ours(
+        goal={
+            "at least one bread in bowl (contact AND xy centre distance < 0.7 x bowl horizontal radius)": AnyOf(
+                WARM_IN_BOWL, OLD_IN_BOWL
+            ),
+            "the other bread likewise in bowl OR touching the bread that is": AnyOf(
+                AllOf(WARM_IN_BOWL, OLD_IN_BOWL), ObjectTouches("toaster_oven_bread", "bowl_bread")
+            ),
+            "bowl touching dining_counter (contact)": ObjectTouches("bowl", "dining_counter"),
+            "gripper > 0.25 m from bowl": GripperFar("bowl", 0.25),
+        },
+        initial={
+            "toaster_oven door open (1.0)": InitialOpenness("toaster_oven", 1.0, 1.0),
+            "rack level: top if two levels, else the only one": "toaster_oven_bread",
+        },
+        scales={"bowl": (1.25, 1.25, 1.25)},  # room for fingers beside the bread
+    ),
     "ArrangeDrinkware": Ours(
         goal={
             "pitcher touching dining_counter (contact)": ObjectTouches("pitcher", "dining_counter"),

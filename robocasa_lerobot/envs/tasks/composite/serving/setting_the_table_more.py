@@ -15,6 +15,7 @@ from robocasa_lerobot.envs.predicates import (
 )
 from robocasa_lerobot.envs.scene.drawn import Drawn
 from robocasa_lerobot.envs.scene.spec import (
+    Choice,
     FixtureSpec,
     InitialOpenness,
     ObjectSpec,
@@ -273,4 +274,68 @@ SETUP_BOWLS = Task(
     ),
 )
 
-TASKS = (ARRANGE_DRINKWARE, BEVERAGE_ORGANIZATION, SETUP_BOWLS, SETUP_BUTTER_PLATE, SETUP_WINE_GLASSES)
+_WARM, _OLD = "toaster_oven_bread", "bowl_bread"
+
+ARRANGE_BREAD_BOWL = Task(
+    name="ArrangeBreadBowl",
+    summary="Both kinds of bread lie in the bowl, or one on the other; it stands on the dining counter, let go.",
+    fixtures=(
+        FixtureSpec("toaster_oven", "toaster_oven"),
+        counter_near("toaster_oven"),
+        FixtureSpec("dining_counter", "dining_counter"),
+    ),
+    needs=("dining_counter",),
+    robot_start=RobotStart("toaster_oven"),
+    choices=(Choice("rack", of="toaster_oven", last=True),),
+    objects=(
+        ObjectSpec(
+            _WARM,
+            ("bread_food",),
+            Placement("toaster_oven", region=SampleRegion(name="{rack}"), size=(0.5, 0.3), pos=(0.0, -1.0)),
+            graspable=True,
+            exclude=("hotdog_bun", "baguette"),
+        ),
+        ObjectSpec(
+            "bowl",
+            ("bowl",),
+            on_counter("toaster_oven", (0.5, 0.3), loc="left_right"),
+            graspable=True,
+            scale=(1.25, 1.25, 1.25),
+        ),
+        ObjectSpec(_OLD, ("bread_food",), Placement(object="bowl"), exclude=("hotdog_bun",)),
+    ),
+    initial=(InitialOpenness("toaster_oven", 1.0, 1.0),),
+    goal=AllOf(
+        AnyOf(ObjectOn(_WARM, "bowl"), ObjectOn(_OLD, "bowl")),
+        AnyOf(AllOf(ObjectOn(_WARM, "bowl"), ObjectOn(_OLD, "bowl")), ObjectTouches(_WARM, _OLD)),
+        ObjectTouches("bowl", "dining_counter"),
+        GripperFar("bowl"),
+    ),
+    stages=(
+        Stage("racks", "pull", "toaster_oven", part="{rack}"),
+        Stage(
+            "pick_place",
+            "place",
+            "bowl",
+            object=_WARM,
+            until=AllOf(AnyOf(ObjectOn(_WARM, "bowl"), ObjectTouches(_WARM, _OLD)), GripperFar(_WARM)),
+        ),
+        *fetch("bowl", "counter", "dining_counter"),
+    ),
+    instruction="Put the {toaster_oven_bread} from the toaster oven into the bowl, and the bowl on the dining counter.",
+    paraphrases=(
+        "The bread bowl takes the warm {toaster_oven_bread} from the toaster oven; then serve it where people eat.",
+        "Pull out the rack, lay the {toaster_oven_bread} in the bowl beside, carry all to the dining counter.",
+        "On the dining counter should stand the bowl with both the {toaster_oven_bread} and the {bowl_bread}.",
+        "Fill up the bowl with the toaster oven's {toaster_oven_bread} and bring it to the dining counter.",
+    ),
+)
+
+TASKS = (
+    ARRANGE_BREAD_BOWL,
+    ARRANGE_DRINKWARE,
+    BEVERAGE_ORGANIZATION,
+    SETUP_BOWLS,
+    SETUP_BUTTER_PLATE,
+    SETUP_WINE_GLASSES,
+)
