@@ -11,6 +11,7 @@ from predicate_scenes import SINK, Change, check_hits_and_misses, shift, state
 from robocasa_lerobot.envs.kitchens.fixtures.base import Fixture
 from robocasa_lerobot.envs.predicates import (
     BeforeStools,
+    Behind,
     Beside,
     Goal,
     HandlePoints,
@@ -104,6 +105,11 @@ CASES: dict[str, tuple[Goal, list[Change], list[Change]]] = {
         Beside("obj", "distr_sink", "sink", across=0.25, along=0.1),
         [seen_beside(-0.249, 0.0), seen_beside(0.249, 0.0)],
         [seen_beside(0.0, -0.101)],
+    ),
+    "behind": (
+        Behind("obj", "distr_sink", "sink", by=0.1),
+        [seen_beside(0.0, 0.101), seen_beside(-0.5, 0.4)],
+        [seen_beside(0.0, 0.099), seen_beside(0.3, -0.2)],
     ),
     "rests on": (
         RestsOn("distr_counter", "obj"),

@@ -21,6 +21,7 @@ from robocasa_lerobot.envs.predicates import (
     AllOf,
     AnyOf,
     BeforeStools,
+    Behind,
     Beside,
     BurnerLevel,
     DoorsClosed,
@@ -279,7 +280,7 @@ def _beside(goal: Beside, scene: Scene, data: mujoco.MjData) -> None:
     fixture = scene.fixture(goal.fixture)
     right = np.array([np.cos(fixture.yaw), np.sin(fixture.yaw), 0.0])
     to_left = (scene.fill(goal.side) == "left") != (scene.layout.types[fixture.name] == "stool")
-    aside = (-0.9 if to_left else 0.9) * goal.across * right
+    aside = (-0.9 if to_left else 0.9) * min(goal.across, 0.3) * right
     data.joint(f"{scene.fill(goal.object)}_joint0").qpos[:3] = data.body(scene.fill(goal.other)).xpos + aside
 
 
@@ -297,6 +298,13 @@ def _handle(goal: HandlePoints, scene: Scene, data: mujoco.MjData) -> None:
     side = {"right": 0.0, "back": 0.5, "left": 1.0, "front": -0.5}[goal.to] * np.pi
     yaw = scene.fixture(goal.fixture).yaw + side + 0.9 * goal.within - np.arctan2(along[1], along[0])
     data.joint(f"{name}_joint0").qpos[3:] = [np.cos(yaw / 2), 0.0, 0.0, np.sin(yaw / 2)]
+
+
+@write.register
+def _behind(goal: Behind, scene: Scene, data: mujoco.MjData) -> None:
+    yaw = scene.fixture(goal.fixture).yaw
+    back = (1.1 * goal.by + 0.01) * np.array([-np.sin(yaw), np.cos(yaw), 0.0])
+    data.joint(f"{scene.fill(goal.object)}_joint0").qpos[:3] = data.body(scene.fill(goal.other)).xpos + back
 
 
 @write.register

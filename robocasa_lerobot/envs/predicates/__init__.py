@@ -26,7 +26,15 @@ from robocasa_lerobot.envs.predicates.objects import (
     ObjectUpright,
     OverBasin,
 )
-from robocasa_lerobot.envs.predicates.placed_by import BeforeStools, Beside, HandlePoints, Higher, NearFixture, RestsOn
+from robocasa_lerobot.envs.predicates.placed_by import (
+    BeforeStools,
+    Behind,
+    Beside,
+    HandlePoints,
+    Higher,
+    NearFixture,
+    RestsOn,
+)
 from robocasa_lerobot.envs.predicates.robot import (
     Grasped,
     GripperFar,
@@ -42,6 +50,7 @@ __all__ = [
     "AllOf",
     "AnyOf",
     "BeforeStools",
+    "Behind",
     "Beside",
     "BurnerLevel",
     "DoorsClosed",

@@ -165,6 +165,33 @@ class HandlePoints(Term):
 
 
 @dataclass(frozen=True)
+class Behind(Term):
+    """An object is farther from the front of a fixture than another one, as seen by who stands before that.
+
+    Attributes:
+        object, other: names.
+        fixture: role.
+        by: bound of the distance of the origins to the back, which is not allowed itself.
+    """
+
+    object: str
+    other: str
+    fixture: str
+    by: float = 0.0
+
+    @property
+    def name(self) -> str:
+        """E.g. `new_can_behind_old_can`."""
+        return plain(f"{self.object}_behind_{self.other}")
+
+    def holds(self, scene: Scene, data: mujoco.MjData) -> bool:
+        """Compare the distance with the bound."""
+        origins = (data.body(scene.fill(name)).xpos for name in (self.object, self.other))
+        first, second = (_seen_from(scene.fixture(self.fixture), origin) for origin in origins)
+        return float((first - second)[1]) > self.by
+
+
+@dataclass(frozen=True)
 class RestsOn(Term):
     """An object stands on another one: they touch, it is over it, and higher.
 

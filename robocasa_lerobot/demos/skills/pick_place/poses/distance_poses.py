@@ -16,7 +16,7 @@ from robocasa_lerobot.demos.skills.pick_place.poses.place_poses import PlacePose
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.predicates.logic import Goal, Not
 from robocasa_lerobot.envs.predicates.near import Near, NearerThan, OnOneSide
-from robocasa_lerobot.envs.predicates.placed_by import BeforeStools, Beside, NearFixture
+from robocasa_lerobot.envs.predicates.placed_by import BeforeStools, Behind, Beside, NearFixture
 from robocasa_lerobot.envs.tasks.conditions import stage_condition
 from robocasa_lerobot.envs.tasks.task import Stage
 
@@ -33,7 +33,7 @@ def distance_terms(env: KitchenEnv, stage: Stage) -> tuple[Goal, ...]:
         match term:
             case Not(part=Near() as near) if name == env.scene.fill(near.object):
                 found.append(term)
-            case Near() | Beside() | NearFixture() if name == env.scene.fill(term.object):
+            case Near() | Behind() | Beside() | NearFixture() if name == env.scene.fill(term.object):
                 found.append(term)
             case NearerThan() | OnOneSide() | BeforeStools() if name in _names(env, term.objects):
                 found.append(term)
