@@ -12,7 +12,9 @@ from robocasa_lerobot.demos.motion import Array
 from robocasa_lerobot.demos.recorder import Recording, record_episode
 from robocasa_lerobot.demos.skills import arc_motion
 from robocasa_lerobot.demos.skills.articulated_part import ArticulatedPart
+from robocasa_lerobot.demos.skills.knobs import raise_knob
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
+from robocasa_lerobot.envs.kitchens.appliances.base import Appliance
 
 
 def demonstration(task: str, split: str, seed: int) -> Recording:
@@ -93,3 +95,15 @@ def test_a_hand_that_knocks_a_door_back_goes_no_farther(monkeypatch: pytest.Monk
     assert led == []
     assert list(arc_motion.push_arc(env, part, [], [], 0.0)) == []  # shut: it was knocked on its way
     assert len(led) == 1
+
+
+def test_a_knob_at_the_side_of_a_mixer_is_turned_from_its_front() -> None:
+    env = KitchenEnv("MakeCheesecakeFilling", split="target", cameras=(), terminate_on_success=False)
+    env.render_observations = False
+    try:
+        env.reset(seed=140_001)
+        for action in raise_knob(env, env.declaration.stages[-1]):
+            env.step(action.astype("float32"))
+        assert env.scene.fixture("stand_mixer", Appliance).share(env.data, "knob_speed") > 0.2
+    finally:
+        env.close()

@@ -40,7 +40,11 @@ TURN_AT_ONCE_RAD = 1.7
 LEAST_TURN_RAD = 0.15  # by which a grasp turns the knob, or the next one is another
 LEAD_RAD = 0.35  # that the hand's goal is ahead of the hand
 TILTS = tuple(np.deg2rad((0.0, 15.0)))
+# Of the hand at a knob that faces to the right: from its axis towards straight ahead, and about it.
+FRONT_TURNS = tuple(np.deg2rad((0.0, 30.0, 50.0, 70.0)))
+FRONT_ROLLS = tuple(np.deg2rad((0.0, 25.0, -25.0, 50.0, -50.0, 80.0, -80.0)))
 SHIFTS = ((0.0, 0.0), (-0.15, 0.0), (-0.15, -0.25), (-0.15, 0.25), (-0.3, 0.0), (-0.3, -0.3), (-0.3, 0.3), (-0.45, 0.0))
+BESIDE_SHIFTS = ((0.0, 0.0), (0.0, -0.3), (-0.15, -0.4), (-0.15, 0.0), (-0.3, -0.3), (0.0, -0.5), (-0.15, 0.25))
 DONE_RAD = 0.06
 # Where burners' knobs are turned to, radians; shares of the range for ovens.
 BURNER_ON_RAD, BURNER_MEDIUM_RAD, BURNER_LOW_RAD = 1.5, 1.5, 0.87
@@ -114,6 +118,7 @@ def _turn_to(env: KitchenEnv, stage: Stage, goal: float) -> Iterator[Array]:
     body = data.body(f"{fixture.name}_{part}")
     allowed = frozenset({int(body.id)})
     inwards = data.joint(fixture.joint(part)).xaxis.copy()
+    shifts = BESIDE_SHIFTS if _faces_aside(body.xmat.reshape(3, 3), inwards) else SHIFTS
     tried: list[Array] = []
     for _ in range(GRASPS):
         left_over = goal - fixture.position(data, part)
@@ -121,7 +126,7 @@ def _turn_to(env: KitchenEnv, stage: Stage, goal: float) -> Iterator[Array]:
         face = body.xpos - inwards * _length(env, int(body.id), inwards)
         grip = face + inwards * DEPTH_M
         rows = [_row(grip, rotation, inwards, turn) for rotation in _rotations(body.xmat.reshape(3, 3), inwards)]
-        plan = plan_near(env, rows, SHIFTS, allowed=allowed, tried=tried)
+        plan = plan_near(env, rows, shifts, allowed=allowed, tried=tried)
         yield from shift_base(env, plan.shift, OPEN)
         yield from follow_joint_path(env, plan.joints, OPEN)
         before, at, _ = plan.targets
@@ -177,12 +182,29 @@ def _rotations(knob: Array, inwards: Array) -> list[Array]:
 
     The bar runs upwards in the knob's frame (or away, for a knob on top), so that fingers close along its x.
     """
+    if _faces_aside(knob, inwards):
+        return _from_the_front(knob[:, 1], inwards)
     lean = -UP if abs(inwards[2]) < 0.7 else knob[:, 1]
     out = []
     for tilt in TILTS:
         approach = np.cos(tilt) * inwards + np.sin(tilt) * lean
         for roll in np.deg2rad((0.0, 180.0, 90.0, -90.0, 45.0, -45.0, 135.0, -135.0)):
             out.append(frame(approach, rotation_about(inwards, float(roll)) @ knob[:, 0]))
+    return out
+
+
+def _faces_aside(knob: Array, inwards: Array) -> bool:
+    return abs(float(inwards @ knob[:, 0])) > 0.7
+
+
+def _from_the_front(ahead: Array, inwards: Array) -> list[Array]:
+    """The same for a round knob at the side of its fixture: from beside it, or as far from its front as need be."""
+    out = []
+    for turn in FRONT_TURNS:
+        approach = np.cos(turn) * inwards + np.sin(turn) * ahead
+        for side in (UP, -UP):
+            level = frame(approach, side)
+            out += [rotation_about(inwards, float(roll)) @ level for roll in FRONT_ROLLS]
     return out
 
 

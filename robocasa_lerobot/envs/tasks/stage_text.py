@@ -19,6 +19,7 @@ _DEEP_M = 0.04  # an object is put into deeper receptacles, not on them
 _PARTS = {
     "knob_temp": "temperature knob",
     "knob_time": "timer knob",
+    "knob_speed": "speed knob",
     "handle_temp": "handle",
     "rack": "rack",
     "receptacle": "dispenser",
