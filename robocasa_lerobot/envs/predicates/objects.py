@@ -106,10 +106,7 @@ class ObjectInside(Term):
         if not around:
             return False
         corners = object_corners(scene, data, self.object)
-        return any(
-            bool(np.all(np.abs(region.all_local(data, corners)) <= np.asarray(region.half) + self.margin))
-            for region in around
-        )
+        return any(region.encloses(data, corners, self.margin) for region in around)
 
     def _usable(self, data: mujoco.MjData, region: Region) -> bool:
         low, high, least = self.height

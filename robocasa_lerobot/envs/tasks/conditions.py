@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 
@@ -19,10 +20,12 @@ from robocasa_lerobot.envs.predicates import (
     MovedSince,
     Never,
     ObjectInBasin,
+    ObjectInside,
     ObjectOn,
     ObjectTilt,
     ObjectTouches,
     OnBurner,
+    OnShelf,
     PartWithin,
     StandsBefore,
     StandsNear,
@@ -50,7 +53,7 @@ def _placed(task: BoundTask, stage: Stage) -> AllOf:
     elif kind.startswith("stove") and stage.part not in IN_RANGE:
         where = OnBurner(stage.object, stage.target, burner=stage.part)
     else:
-        where = inside(stage.object, stage.target, stage.part)
+        where = _as_exact(task.goal, inside(stage.object, stage.target, stage.part))
     return AllOf(where, GripperFar(stage.object))
 
 
@@ -58,6 +61,15 @@ def _upside_down(task: BoundTask, stage: Stage) -> Goal:
     """Where the object belongs, let go, and on its head."""
     over = ObjectTilt(stage.object, low=UPSIDE_DOWN_RAD, label="upside_down")
     return AllOf(*_placed(task, stage).parts, over)
+
+
+def _as_exact(goal: Goal, where: ObjectInside) -> ObjectInside:
+    """With no more margin than the goal gives to the same object there: else the stage would be done before it is."""
+    if isinstance(where, OnShelf):
+        return where
+    parts = goal.parts if isinstance(goal, AllOf) else (goal,)
+    margins = [part.margin for part in parts if isinstance(part, ObjectInside) and part.name == where.name]
+    return replace(where, margin=min([where.margin, *margins]))
 
 
 def _driven(task: BoundTask, stage: Stage) -> Goal:

@@ -42,7 +42,9 @@ from robocasa_lerobot.envs.scene.robot_poses import RobotPose
 RELEASE_STEPS = 9
 GAP_M = 0.012  # of the underside above the place pose when the hand opens
 EXACT_M = 0.003  # of the hand from where it is to let go, where that matters
-BLOCKED_M = 0.08  # a hand as far as this from where it is to let go is blocked, and keeps what it holds
+# A hand as far as this from where it is to let go is blocked, and keeps what it holds; where that is to fall into
+# something narrow, what it holds is not as far.
+BLOCKED_M, ASIDE_M = 0.08, 0.025
 CLEAR_M = 0.06  # along the hand, out of what it held, before it leaves
 AWAY_M = 0.26
 MOST_SLIP_M = 0.03  # in the hand that is made up for
@@ -50,7 +52,8 @@ GONE_M = 0.27  # of the grip site from the object's origin: tasks ask for 25 cm
 YAWS = 12
 UP_RISE_M, RISES_M, LOW_COST = 0.06, (0.035, 0.010), 0.05  # over where it is let go, on the path in
 LEVEL_RISE_M, LEVEL_COST = 0.004, 0.1
-BAND_M, POOR = 0.05, 1.2  # of heights that are planned for together, where the best plan of all costs more
+# Of heights that are planned for together, or of the sine of the hand's tilt, where the best plan of all costs more.
+BAND_M, TILT_BAND, POOR = 0.05, 0.15, 1.2
 AGAIN, AGAIN_M = 0.5, 0.02  # cost of a hand that goes where it went without success, as near as this
 LEANING, LOADED_LEANING = 0.35, 1.0  # cost of a radian that the object is tilted, and of one with others in it
 LEVEL_FINGERS, SLOPE = 0.35, 0.5  # sine of the slope of the line between the fingers, and what that costs
@@ -149,8 +152,11 @@ def put(env: KitchenEnv, obj: Graspable, strategy: PlaceStrategy, failed: list[A
     low = HandTarget(low.position + np.clip(slipped, -MOST_SLIP_M, MOST_SLIP_M), low.rotation)
     tolerance = EXACT_M if strategy.exact else 0.008
     yield from move_hand(data, low, CLOSED, speed=0.5, tolerance=tolerance, max_steps=60, integral_gain=INTEGRAL_GAIN)
-    if pose_error(data, low).position > BLOCKED_M:
+    aside = float(np.linalg.norm((data.body(obj.name).xpos - _origin(low, Held.now(data, obj.name)))[:2]))
+    if pose_error(data, low).position > BLOCKED_M or (strategy.falls and aside > ASIDE_M):
         yield from move_hand(data, above, CLOSED, speed=0.6, tolerance=0.03, max_steps=30)
+        if inwards:  # a way round begins before the front
+            yield from move_hand(data, far, CLOSED, tolerance=0.03, max_steps=60, start=above.position)
         return
     at = HandTarget(grip_position(data), hand_rotation(data))
     yield from hold_hand(data, at, OPEN, RELEASE_STEPS)
@@ -184,17 +190,20 @@ def _planner(
     def plan(blocked: Sequence[RobotPose]) -> MotionPlan:
         found = best(paths, blocked, drives=may_drive)
         if not found or found[0].cost > POOR:  # too many low ones, all of them in the way of something
-            found += [choice for some in _by_height(paths) for choice in best(some, blocked, drives=False)]
+            groups = _in_groups(paths, by_tilt=strategy.falls)
+            found += [choice for some in groups for choice in best(some, blocked, drives=False)]
         return min(found, key=lambda choice: choice.cost)
 
     return plan
 
 
-def _by_height(paths: list[WaypointPath]) -> list[list[WaypointPath]]:
-    """Paths in groups of about the same height where the hand lets go, if there is more than one such group."""
+def _in_groups(paths: list[WaypointPath], *, by_tilt: bool) -> list[list[WaypointPath]]:
+    """Paths in groups of about the same height, or tilt, of the hand that lets go, if there is more than one group."""
     groups: dict[int, list[WaypointPath]] = {}
     for path in paths:
-        groups.setdefault(int(path.targets[2].position[2] / BAND_M), []).append(path)
+        low = path.targets[2]
+        band = low.rotation[2, 2] / TILT_BAND if by_tilt else low.position[2] / BAND_M
+        groups.setdefault(int(np.floor(band)), []).append(path)
     return list(groups.values()) if len(groups) > 1 else []
 
 

@@ -106,9 +106,9 @@ LEVEL_HAND = -0.85  # of the hand's approach along the vertical: above it, the h
 _SMALL, _STEEP, _LEANT, _STEEPEST = np.deg2rad(25.0), np.deg2rad(30.0), np.deg2rad(45.0), np.deg2rad(55.0)
 _OPEN_LEANS, _CLOSED_LEANS = (0.0, _SMALL), (0.0, _STEEP, _STEEPEST)
 _DRAWER_LEANS, _BOWL_LEANS = (0.0, _STEEP, np.deg2rad(50.0)), (*_CLOSED_LEANS, np.deg2rad(80.0))
-# A jug stands below a wall cabinet: the hand comes level, from any side, and lets go over the rim.
-_JUG_LEANS = (np.deg2rad(72.0), np.deg2rad(85.0))
-_JUG_TURNS = tuple(float(np.deg2rad(turn)) for turn in (0.0, 30.0, -30.0, 60.0, -60.0))
+# A jug stands below a wall cabinet: the hand comes about level, from any side, and lets go over the rim.
+_JUG_LEANS = tuple(np.deg2rad((60.0, 72.0, 85.0, 97.0)))
+_JUG_TURNS = tuple(float(np.deg2rad(turn)) for turn in (0.0, 30.0, -30.0, 60.0, -60.0, 85.0, -85.0))
 
 
 def grasp_strategy(env: KitchenEnv, obj: Graspable, free: GraspStrategy, *, kept: bool = False) -> GraspStrategy:

@@ -39,8 +39,11 @@ class Blender(Appliance):
         """Inside of the jug."""
         low, top, radius = self._jug()
         half = radius / np.sqrt(2) if self.record["jug"] == "round" else radius * 0.94
-        middle = (low + 0.008 + top) / 2
-        return {"jug": Region(self.name, (0.0, self._y(), middle), (half, half, (top - low - 0.008) / 2))}
+        floor = low + 0.008
+        middle = (0.0, self._y(), (floor + top) / 2)
+        beside = np.sqrt(3) * radius - half  # a corner of the box of a ball that just fits, however it has rolled
+        beyond = (beside, beside, floor + self.height / 2)
+        return {"jug": Region(self.name, middle, (half, half, (top - floor) / 2), beyond)}
 
     @property
     def lid(self) -> str:
