@@ -21,6 +21,7 @@ from robocasa_lerobot.envs.kitchens.fixtures.cabinets import HingeCabinet
 from robocasa_lerobot.envs.kitchens.fixtures.regions import ANY_LEVEL, LEVELS, USABLE_SHELF, region_names
 from robocasa_lerobot.envs.kitchens.footprints import PlacementError
 from robocasa_lerobot.envs.kitchens.layout import Layout, layout_ids, load_layout
+from robocasa_lerobot.envs.kitchens.materials import MaterialPalette, load_style
 from robocasa_lerobot.envs.kitchens.splits import EXCLUDED
 from robocasa_lerobot.envs.predicates import AllOf, DoorsClosed, DoorsOpen, GripperFar, OnShelf
 from robocasa_lerobot.envs.scene.build import build_scene
@@ -36,8 +37,9 @@ from robocasa_lerobot.envs.scene.spec import (
     SampleRegion,
 )
 from robocasa_lerobot.envs.tasks.conditions import stage_condition
+from robocasa_lerobot.envs.tasks.registry import get_task
 from robocasa_lerobot.envs.tasks.task import Stage, Task
-from robocasa_lerobot.errors import UnknownNameError
+from robocasa_lerobot.errors import UnknownNameError, UserError
 
 PARTS = ("fridge", "freezer")
 
@@ -327,3 +329,32 @@ def test_a_stage_that_names_a_level_is_done_on_that_shelf() -> None:
 @pytest.fixture(scope="module")
 def layouts() -> dict[int, Layout]:
     return {number: load_layout(number) for number in layout_ids()}
+
+
+@pytest.mark.parametrize("model", [record.model_id for record in models_of("fridge_side_by_side")])
+def test_a_freezer_is_fitted_with_drawers_for_the_tasks_that_ask_for_them(model: str) -> None:
+    usual, fitted = (cast(Fridge, build_appliance(model, "fridge", (0.0, 0.0, 0.0))) for _ in range(2))
+    assert not any("freezer_drawer" in name for name in usual.regions)
+    fitted.fit("freezer_drawers")
+    spec = mujoco.MjSpec()
+    fitted.build(spec, MaterialPalette(spec, load_style(1), textures=False))
+    built = spec.compile()
+    data = mujoco.MjData(built)
+    upper = fitted.regions["freezer_drawer1"]
+    for share in (0.0, 1.0):
+        fitted.set_share(data, "freezer_drawer1", share)
+        mujoco.mj_kinematics(built, data)
+        floor = upper.world(data, (0.0, 0.0, -upper.half[2]))
+        assert 0.5 <= floor[2] + fitted.height / 2 <= 1.05
+    assert -fitted.depth / 2 - floor[1] + upper.half[1] > 0.2, "it comes out before the front"
+    assert not set(fitted.usable_shelves("freezer")) & {"freezer_drawer0", "freezer_drawer1"}
+    with pytest.raises(UserError, match="cannot be fitted"):
+        fitted.fit("ovens")
+
+
+def test_no_other_scene_has_drawers_in_its_freezer() -> None:
+    with_drawers = build_scene(get_task("MoveToFreezerDrawer"), "target", 0)
+    pair = with_drawers.layout_id, with_drawers.style_id
+    other = build_scene(get_task("MoveFridgeToFreezer"), "target", 0, kitchens=(pair,))
+    assert with_drawers.fixture("fridge", Fridge).freezer_drawers
+    assert not other.fixture("fridge", Fridge).freezer_drawers

@@ -182,6 +182,9 @@ def arrange(
         PlacementError: the layout has not what the task needs, or not the room for it.
     """
     roles = cast_roles(rng, task.fixtures, layout)
+    for wanted in task.fixtures:
+        if wanted.fitted:
+            layout.fixtures[roles[wanted.role]].fit(wanted.fitted)
     choices = draw_choices(rng, task, layout.fixtures, roles)
     pose: RobotPose | None = None
     start, shape = task.robot_start, robot.shape

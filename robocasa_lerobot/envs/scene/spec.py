@@ -24,6 +24,7 @@ class FixtureSpec:
         apart_m: least distance on the floor from the fixtures of `other_than`, metres.
         side: of the fixture of `near`, "left" or "right" as seen from before it: it stands in one row with that, and
             reaches beyond it there, as does a counter that the other is let into; any side if empty.
+        fitted: with what it is fitted in this task alone, such as "freezer_drawers"; as it is everywhere if empty.
     """
 
     role: str
@@ -33,6 +34,7 @@ class FixtureSpec:
     size: tuple[float, float] = (0.0, 0.0)
     apart_m: float = 0.0
     side: str = ""
+    fitted: str = ""
 
 
 @dataclass(frozen=True)

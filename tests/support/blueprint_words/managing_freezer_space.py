@@ -5,6 +5,7 @@ from __future__ import annotations
 from blueprint_words.ours import NEAR_THE_MIDDLE, Ours
 from robocasa_lerobot.envs.predicates import DoorsClosed, GripperFar, ObjectOn, ObjectTouches, OnShelf
 from robocasa_lerobot.envs.scene.spec import InitialOpenness
+from robocasa_lerobot.envs.tasks.registry import get_task
 
 ON_A_SHELF = "bbox in region (tol 0.05), origin z within lower 90% of region"
 
@@ -72,6 +73,26 @@ OURS = {
             "freezer door open (0.90-1.0)": FREEZER,
         },
         scales={"ice_tray": (1.0, 0.75, 1.0)},
+    ),
+    "MaximizeFreezerSpace": Ours(
+        goal={
+            "item1 inside target rack (up: highest freezer shelf; down: second highest): bbox in region "
+            "(tol 0.05), origin z within lower 90% of region": OnShelf("item1", "fridge", "{_to}", "freezer"),
+            "item2 inside target rack (up: highest freezer shelf; down: second highest): bbox in region "
+            "(tol 0.05), origin z within lower 90% of region": OnShelf("item2", "fridge", "{_to}", "freezer"),
+            "item3 inside target rack (up: highest freezer shelf; down: second highest): bbox in region "
+            "(tol 0.05), origin z within lower 90% of region": OnShelf("item3", "fridge", "{_to}", "freezer"),
+            "item4 inside target rack (up: highest freezer shelf; down: second highest): bbox in region "
+            "(tol 0.05), origin z within lower 90% of region": OnShelf("item4", "fridge", "{_to}", "freezer"),
+            "freezer door closed (every joint <= 0.005 of range)": SHUT,
+        },
+        initial={
+            "freezer door open (0.90-1.0)": FREEZER,
+            "direction up or down at random: up = source second highest rack, target highest; down = reverse": None,
+        },
+        placed={
+            each.name: each.start for each in get_task("MaximizeFreezerSpace").objects
+        },  # the halves of our freezers' fronts
     ),
     "MoveFridgeToFreezer": Ours(
         goal={

@@ -4,12 +4,9 @@ from __future__ import annotations
 
 from robocasa_lerobot.envs.kitchens.appliances.kind_record import Kind
 from robocasa_lerobot.envs.kitchens.appliances.kinds.dishwasher import Dishwasher
-from robocasa_lerobot.envs.kitchens.appliances.kinds.fridge import (
-    BottomFreezerFridge,
-    FrenchDoorFridge,
-    SideBySideFridge,
-)
+from robocasa_lerobot.envs.kitchens.appliances.kinds.fridge import BottomFreezerFridge, FrenchDoorFridge
 from robocasa_lerobot.envs.kitchens.appliances.kinds.oven import Oven
+from robocasa_lerobot.envs.kitchens.appliances.kinds.side_by_side_fridge import SideBySideFridge
 from robocasa_lerobot.envs.kitchens.appliances.kinds.sink import Sink
 from robocasa_lerobot.envs.kitchens.appliances.kinds.stove import Stove, Stovetop
 from robocasa_lerobot.envs.kitchens.appliances.records import Family

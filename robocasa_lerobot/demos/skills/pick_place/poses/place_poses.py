@@ -38,6 +38,8 @@ BASIN_DROPS = ((-0.07, 0.0), (-0.03, 0.2), (0.02, 0.5))
 COLUMNS, MANY_COLUMNS = 5, 13  # points across a region; where its place among others matters
 REGION_EDGE_M = 0.015  # kept from a region's sides
 INWARDS = (0.0, 0.05, 0.10)  # from the front of a region, metres
+# The same, behind others: where so many lie less far than this from the front.
+BEHIND, FRONT_M, FULL = (0.17, 0.24), 0.20, 2
 DROPS_M = (0.0, 0.04, 0.08, 0.12)  # over the floor of receptacles that are open above
 DROP_COST, DEEP_COST, ASIDE_COST = 2.0, 2.0, 0.5  # for each metre
 HIGH_COST = 0.5  # for each metre that a shelf is above the lowest one
@@ -156,10 +158,11 @@ def in_regions(
             wide, deep, tall = region.half
             room_x, room_y = max(wide - across - REGION_EDGE_M, 0.0), max(deep - across - REGION_EDGE_M, 0.0)
             own = float(np.clip(region.local(data, base)[0], -room_x, room_x))
+            inside = INWARDS + BEHIND if _full_in_front(env, obj, region) else INWARDS
             across_it = {round(x, 3) for x in (own, *np.linspace(-room_x, room_x, columns).tolist())}
             rise = float(region.world(data, (0, 0, -tall))[2]) - lowest
             for x in sorted(across_it, key=lambda x: abs(x - own))[:columns]:
-                for inwards in INWARDS:
+                for inwards in inside:
                     y = min(-room_y + inwards, room_y)
                     for drop in drops:
                         point = region.world(data, (x, y, -tall + drop))
@@ -168,6 +171,14 @@ def in_regions(
         return found
 
     return poses
+
+
+def _full_in_front(env: KitchenEnv, obj: Graspable, region: Region) -> bool:
+    """Whether several other objects lie at the front of a region."""
+    points = [env.data.body(name).xpos for name in env.scene.objects if name not in (obj.name, *obj.contents)]
+    inside = [point for point in points if region.contains(env.data, point)]
+    at_front = [float(region.local(env.data, point)[1]) + region.half[1] < FRONT_M for point in inside]
+    return sum(at_front) >= FULL
 
 
 def over_jug(env: KitchenEnv, jug: Region) -> PlacePoses:

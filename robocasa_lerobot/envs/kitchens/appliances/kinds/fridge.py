@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -18,6 +19,9 @@ DOOR_M, _FOOT_M = 0.060, 0.035
 _WALL_M, _BACK_M = 0.035, 0.06
 _CRISPER_M = 0.19  # height of a crisper drawer
 _SHELF_M = 0.010
+# Drawers in a freezer: their height; what a door that is nearly open takes of the compartment at its hinge, and a gap
+# at the other side.
+_FREEZER_DRAWER_M, _DOOR_SIDE_M, _OTHER_SIDE_M = 0.17, 0.036, 0.008
 # Of the crisper drawers above the floor of a fridge that reaches down to its feet: the arm, whose shoulder is a metre
 # high, does not reach farther down than 0.4 m. Below them is an open room for bottles.
 _BOTTLES_M = 0.42
@@ -52,9 +56,15 @@ class Fridge(Appliance):
         return {drawer: {} for drawer in self.drawers}
 
     @property
+    def freezer_drawers(self) -> tuple[str, ...]:
+        """Drawers on shelves of the freezer, from below; most fridges have none."""
+        return ()
+
+    @property
     def sliding(self) -> tuple[str, ...]:
         """Every drawer."""
-        return (*self.drawers, *(("freezer_drawer",) if self.record.kind == "fridge_french_door" else ()))
+        behind_front = ("freezer_drawer",) if self.record.kind == "fridge_french_door" else ()
+        return (*self.drawers, *self.freezer_drawers, *behind_front)
 
     @property
     def regions(self) -> dict[str, Region]:
@@ -64,7 +74,7 @@ class Fridge(Appliance):
             (low, high), levels = self._room(part), self._levels(part)
             tops = [*[level - _SHELF_M for level in levels[1:]], float(high[2])]
             for index, (bottom, top) in enumerate(zip(levels, tops, strict=True)):
-                if part == "freezer" and "freezer_drawer" in self.sliding:
+                if part == "freezer" and ("freezer_drawer" in self.sliding or index in self._drawer_levels()):
                     continue
                 found[f"{part}_shelf{index}"] = Region.between(
                     self.name, (low[0] + 0.01, low[1] + 0.03, bottom), (high[0] - 0.01, high[1] - 0.01, top - 0.005)
@@ -130,6 +140,10 @@ class Fridge(Appliance):
         count = min(count, int((high[2] - first) / (USABLE_SHELF[2] + _SHELF_M + 0.012)))
         return [float(z) for z in np.linspace(first, high[2], count + 1)[:-1]]
 
+    def _drawer_levels(self) -> tuple[int, ...]:
+        """Numbers of the freezer's levels that drawers stand on, from below."""
+        return ()
+
     def _crisper_floor(self) -> float:
         """Height of what the crisper drawers slide on, in the fixture's frame."""
         low, _ = self._room("fridge")
@@ -141,6 +155,12 @@ class Fridge(Appliance):
             low, high = self._room("freezer")
             size = high - low - np.array([0.03, 0.05, 0.10])
             return (low + high) / 2 + np.array([0.0, -0.02, -0.04]), size
+        if part in self.freezer_drawers:
+            low, high = self._room("freezer")
+            low, high = low + np.array([_DOOR_SIDE_M, 0.0, 0.0]), high - np.array([_OTHER_SIDE_M, 0.0, 0.0])
+            size = np.array([high[0] - low[0], (high[1] - low[1]) * 0.86, _FREEZER_DRAWER_M])
+            level = self._levels("freezer")[self._drawer_levels()[int(part[-1])]]
+            return np.array([(low[0] + high[0]) / 2, low[1] + 0.055 + size[1] / 2, level + 0.004 + size[2] / 2]), size
         low, high = self._room("fridge")
         count = len(self.drawers)
         pitch = (high[0] - low[0]) / count
@@ -207,7 +227,7 @@ class Fridge(Appliance):
                 parts.span(root, *shelf, "shelf_glass")
                 lip = ((room_low[0], room_low[1] + 0.025, level - 0.014), (room_high[0], room_low[1] + 0.033, level))
                 parts.span(root, *lip, "silver", collide=False)
-        for part in self.drawers:
+        for part in (*self.drawers, *self.freezer_drawers):
             self._add_crisper(parts, root, part)
         if "freezer_drawer" in self.sliding:
             self._add_freezer_drawer(parts, root)
@@ -292,7 +312,9 @@ class Fridge(Appliance):
             parts.box(door, (middle, -DOOR_M / 2 - 0.001, 0), (width - 0.002, DOOR_M - 0.006, height - 0.002), finish)
         parts.box(door, (middle, -0.003, 0), (width - 0.03, 0.005, height - 0.02), "lining", collide=False)
         low, high = self._room("freezer" if name.startswith("freezer") else "fridge")
-        self._add_bins(parts, door, middle, min(width, float(high[0] - low[0])) - 0.10, height)
+        drawers = [self._drawer(drawer) for drawer in self.freezer_drawers if name.startswith("freezer")]
+        taken = [(at[2] - size[2] / 2 - (z0 + z1) / 2, at[2] + size[2] / 2 - (z0 + z1) / 2) for at, size in drawers]
+        self._add_bins(parts, door, middle, min(width, float(high[0] - low[0])) - 0.10, height, taken)
         metal = self._metal()
         length = min(0.55, height * 0.62)
         # Near the free edge, and near the robot's reach: low on an upper door, high on a lower one.
@@ -313,12 +335,25 @@ class Fridge(Appliance):
             parts.box(door, (spot[0], spot[1] - 0.004, spot[2] + 0.11), (0.13, 0.004, 0.05), "screen", collide=False)
             parts.box(door, (spot[0], spot[1] - 0.012, spot[2] - 0.145), (0.15, 0.02, 0.01), "silver", collide=False)
 
-    def _add_bins(self, parts: Parts, door: mujoco.MjsBody, middle: float, width: float, height: float) -> None:
-        """Shelves on the inside of the door, in front of the ones in the case when it is shut."""
+    def _add_bins(
+        self,
+        parts: Parts,
+        door: mujoco.MjsBody,
+        middle: float,
+        width: float,
+        height: float,
+        taken: Sequence[tuple[float, float]],
+    ) -> None:
+        """Shelves on the inside of the door, in front of the ones in the case when it is shut; none before drawers.
+
+        Heights `taken` by drawers are from the door's middle, metres.
+        """
         count = 3 if height > 0.9 else (2 if height > 0.55 else 1)
         deep = 0.055
         for share in np.linspace(-0.36, 0.22, count) if count > 1 else (-0.30,):
             z = float(share) * height
+            if any(low - 0.08 < z < high + 0.02 for low, high in taken):
+                continue
             parts.box(door, (middle, deep / 2, z), (width, deep, 0.008), "lining")
             parts.box(door, (middle, deep - 0.004, z + 0.035), (width, 0.008, 0.07), "crisper")
 
@@ -333,13 +368,6 @@ class FrenchDoorFridge(Fridge):
         "closed": {},
         "open": {"fridge_left_door": 1.0, "fridge_right_door": 1.0, "freezer_drawer": 0.6, "fridge_drawer0": 0.4},
     }
-
-
-@dataclass
-class SideBySideFridge(Fridge):
-    """The freezer at the left, the fridge at the right."""
-
-    looks: ClassVar = {"closed": {}, "open": {"fridge_door": 1.0, "freezer_door": 1.0, "fridge_drawer0": 0.5}}
 
 
 @dataclass

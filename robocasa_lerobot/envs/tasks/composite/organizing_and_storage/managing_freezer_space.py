@@ -4,6 +4,7 @@ import numpy as np
 
 from robocasa_lerobot.envs.predicates import AllOf, DoorsClosed, GripperFar, ObjectOn, ObjectTouches, OnShelf
 from robocasa_lerobot.envs.scene.spec import (
+    Choice,
     FixtureSpec,
     InitialOpenness,
     ObjectSpec,
@@ -196,16 +197,62 @@ FREEZE_ICE_TRAY = Task(
 )
 
 
-def _on_rack(name: str, x: float, rack: str, exclude: tuple[str, ...] = ()) -> ObjectSpec:
+# Two things lie side by side in a freezer, which is 27 to 33 cm wide inside, and two more behind them in the end: each
+# starts in its own half of the front, and is no longer than that.
+_HALF = (0.15, 0.2)
+_SMALL = (0.13, 0.08, 0.09)
+
+
+def _on_rack(name: str, side: float, rack: str, exclude: tuple[str, ...] = ()) -> ObjectSpec:
     return ObjectSpec(
         name,
         ("meat", "vegetable", "fruit"),
-        on_shelf(rack, (0.3, 0.2), (x, -1.0), compartment="freezer"),
+        on_shelf(rack, _HALF, (side, -1.0), compartment="freezer", margin=0.01),
         graspable=True,
         properties=("freezable",),
         exclude=exclude,
+        max_size=_SMALL,
     )
 
+
+MAXIMIZE_FREEZER_SPACE = Task(
+    name="MaximizeFreezerSpace",
+    summary="All four things are on the one shelf of the freezer, which is shut.",
+    fixtures=(FixtureSpec("fridge", "fridge_with_freezer"), counter_near("fridge")),
+    needs=("freezer",),
+    robot_start=RobotStart("fridge"),
+    choices=(
+        Choice(
+            "direction",
+            {
+                "up": {"_from": "second_highest", "_to": "highest", "source": "second highest", "level": "highest"},
+                "down": {"_from": "highest", "_to": "second_highest", "source": "highest", "level": "second highest"},
+            },
+        ),
+    ),
+    objects=(
+        _on_rack("item1", -1.0, "{_from}"),
+        _on_rack("item2", 1.0, "{_from}"),
+        _on_rack("item3", -1.0, "{_to}", exclude=("shrimp",)),
+        _on_rack("item4", 1.0, "{_to}", exclude=("shrimp",)),
+    ),
+    initial=(_FREEZER_OPEN,),
+    goal=AllOf(*(OnShelf(name, "fridge", "{_to}", "freezer") for name in (*_ITEMS, "item4")), _FREEZER_SHUT),
+    stages=(
+        *(Stage("pick_place", "place", "fridge", object=name, part="freezer_shelf:{_to}") for name in _ITEMS[:2]),
+        _SHUT_FREEZER,
+    ),
+    instruction=(
+        "Move {item1} and {item2} from the {source} shelf of the freezer to the {level} one, to the {item3} and "
+        "the {item4}, and close the freezer."
+    ),
+    paraphrases=(
+        "Make room in the freezer: everything belongs on its {level} shelf. Shut it then.",
+        "The freezer's {source} shelf should be empty; put {item1} and {item2} on the {level} one and close the door.",
+        "Gather the freezer's four things on the {level} shelf, then close it.",
+        "Shift {item1} and {item2} to the shelf of {item3} and {item4}, and leave the freezer shut.",
+    ),
+)
 
 MOVE_FRIDGE_TO_FREEZER = Task(
     name="MoveFridgeToFreezer",
@@ -300,6 +347,7 @@ TASKS = (
     CLEAR_FREEZER,
     FREEZE_BOTTLED_WATERS,
     FREEZE_ICE_TRAY,
+    MAXIMIZE_FREEZER_SPACE,
     MOVE_FRIDGE_TO_FREEZER,
     REORGANIZE_FROZEN_VEGETABLES,
     SEPARATE_FREEZER_RACK,
