@@ -4,13 +4,23 @@ from __future__ import annotations
 
 import numpy as np
 
-from blueprint_words.ours import Ours
-from robocasa_lerobot.envs.predicates import GripperFar, HandlePoints, ObjectInside, ObjectOn
+from blueprint_words.ours import Ours, away
+from robocasa_lerobot.envs.predicates import DoorsClosed, GripperFar, HandlePoints, ObjectInside, ObjectOn
 from robocasa_lerobot.envs.scene.spec import InitialOpenness
+from robocasa_lerobot.envs.tasks.registry import get_task
 
 IN_A_REGION = "(all bbox corners within one interior region, tol 0.05)"
 
 OURS = {
+    "EmptyDishRack": Ours(
+        goal={
+            f"mug inside cabinet {IN_A_REGION}": ObjectInside("mug", "cabinet", margin=0.05),
+            "cabinet doors closed (<= 0.005 of range)": DoorsClosed("cabinet"),
+            **away("mug"),
+        },
+        initial={"cabinet doors open": InitialOpenness("cabinet", 0.9, 1.0)},
+        placed={"mug": get_task("EmptyDishRack").objects[-1].start},  # beside the rods
+    ),
     "StackBowlsCabinet": Ours(
         goal={
             f"bowl1 inside cabinet {IN_A_REGION}": ObjectInside("bowl1", "cabinet", margin=0.05),

@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from robocasa_lerobot.envs.predicates import AllOf, GripperFar, HandlePoints, ObjectInside, ObjectOn
+from robocasa_lerobot.envs.predicates import AllOf, DoorsClosed, GripperFar, HandlePoints, ObjectInside, ObjectOn
 from robocasa_lerobot.envs.scene.spec import FixtureSpec, InitialOpenness, ObjectSpec, Placement, RobotStart
-from robocasa_lerobot.envs.tasks.atomic.common import counter_near, on_counter
+from robocasa_lerobot.envs.tasks.atomic.common import counter_near, in_cabinet, on_counter
 from robocasa_lerobot.envs.tasks.task import Stage, Task
 
 _SIZE = (1.0, 0.6)  # metres
@@ -91,4 +91,40 @@ ORGANIZE_MUGS_BY_HANDLE = Task(
     ),
 )
 
-TASKS = (ORGANIZE_MUGS_BY_HANDLE, STACK_BOWLS_CABINET)
+# The rack's rods hold plates; the mug dries beside them.
+_BESIDE_RODS = Placement("dish_rack", size=(0.14, 1.0), pos=(1.0, 0.0), margin=0.005)
+
+EMPTY_DISH_RACK = Task(
+    name="EmptyDishRack",
+    summary="The mug is in the cabinet, which is shut, the gripper away from it.",
+    fixtures=(FixtureSpec("dish_rack", "dish_rack"), FixtureSpec("cabinet", "cabinet_with_door", near="dish_rack")),
+    robot_start=RobotStart("dish_rack"),
+    objects=(
+        *(
+            ObjectSpec(name, ("mug",), in_cabinet("cabinet", (0.4, 0.2), pos=(x, -1.0)), repeats=True)
+            for name, x in (("cabinet_mug1", -0.9), ("cabinet_mug2", 0.0))
+        ),
+        ObjectSpec("mug", ("mug",), _BESIDE_RODS, graspable=True, scale=0.95, repeats=True),
+    ),
+    initial=(InitialOpenness("cabinet", 0.9, 1.0),),
+    goal=AllOf(ObjectInside("mug", "cabinet"), DoorsClosed("cabinet"), GripperFar("mug")),
+    stages=(
+        Stage(
+            "pick_place",
+            "place",
+            "cabinet",
+            object="mug",
+            until=AllOf(ObjectInside("mug", "cabinet"), GripperFar("mug")),
+        ),
+        Stage("doors", "close", "cabinet"),
+    ),
+    instruction="Put the mug from the dish rack into the cabinet, to the other mugs, and close that.",
+    paraphrases=(
+        "The mug is dry: take it off the dish rack into the cabinet where the other two are, and shut the cabinet.",
+        "Empty the dish rack; its mug belongs in the cabinet, which is closed in the end.",
+        "In the open cabinet stand two mugs. Add the one from the rack, then close the cabinet.",
+        "Store the mug that is in the rack with the others, behind a closed cabinet.",
+    ),
+)
+
+TASKS = (EMPTY_DISH_RACK, ORGANIZE_MUGS_BY_HANDLE, STACK_BOWLS_CABINET)
