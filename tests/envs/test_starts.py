@@ -43,6 +43,14 @@ def test_no_robot_starts_in_a_drawer_that_stands_open() -> None:
     assert not touches(scene, data, "robot0_base", drawer.name)
 
 
+@pytest.mark.parametrize("split", ["target", "pretrain"])
+def test_no_robot_pushes_a_drawer_that_is_partly_out(split: str) -> None:
+    scene = build_scene(get_task("ClusterUtensilsInDrawer"), split, 150_002)
+    data, _ = scene.initial_data(np.random.default_rng(150_002))
+    drawer = scene.fixture("drawer", Drawer)
+    assert drawer.openness(data) == pytest.approx(scene.openness[drawer.name, ""], abs=0.01)
+
+
 def test_a_door_that_moves_by_itself_is_found() -> None:
     scene = scene_in("PickPlaceDrawerToCounter", 40, 21)
     data, _ = scene.initial_data(np.random.default_rng(0))

@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robocasa_lerobot.envs.kitchens.appliances.kinds.blender import Blender
-from robocasa_lerobot.envs.kitchens.fixtures.base import of_kind
+from robocasa_lerobot.envs.kitchens.fixtures.base import Fixture, of_kind
+from robocasa_lerobot.envs.kitchens.fixtures.cabinets import Drawer
 from robocasa_lerobot.envs.kitchens.footprints import PlacementError, place
 from robocasa_lerobot.envs.kitchens.layout import Layout, load_layout
 from robocasa_lerobot.envs.kitchens.splits import Pairs, benchmark_split, scene_ids, without
@@ -190,7 +191,7 @@ def arrange(
     start, shape = task.robot_start, robot.shape
     at_object = filled(start.at_object, choices.values)
     start = replace(start, fixture=filled(start.fixture, choices.values), at_object=at_object)
-    opened = [layout.fixtures[roles[role]] for role in _opened(task)]
+    opened = _opened(task, layout, roles)
     if not start.at_object:
         pose = robot_pose(rng, layout, start, layout.fixtures[roles[start.fixture]], shape, opened=opened)
     openness = {
@@ -233,9 +234,16 @@ def _shares(initial: tuple[tuple[Initial, float], ...], roles: dict[str, str], c
     return dict(found)
 
 
-def _opened(task: SceneSpec) -> list[str]:
-    """Roles of the fixtures whose doors start wide open."""
-    return [entry.fixture for entry in task.initial if isinstance(entry, InitialOpenness) and entry.low > 0.5]
+def _opened(task: SceneSpec, layout: Layout, roles: dict[str, str]) -> list[tuple[Fixture, float]]:
+    """What the robot must not stand in: doors that start wide open, and drawers as far as they are out at most."""
+    found = []
+    for entry in (entry for entry in task.initial if isinstance(entry, InitialOpenness)):
+        fixture = layout.fixtures[roles[entry.fixture]]
+        if entry.low > 0.5:
+            found.append((fixture, 1.0))
+        elif isinstance(fixture, Drawer):
+            found.append((fixture, entry.high))
+    return found
 
 
 def _lids(task: SceneSpec, roles: dict[str, str]) -> dict[str, bool]:

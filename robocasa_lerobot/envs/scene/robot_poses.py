@@ -111,12 +111,13 @@ def robot_pose(
     fixture: Fixture,
     shape: StandingShape,
     at: tuple[float, float] | None = None,
-    opened: Iterable[Fixture] = (),
+    opened: Iterable[tuple[Fixture, float]] = (),
 ) -> RobotPose:
     """A free pose facing a fixture, by RoboCasa's rules, with the start's uniform deviation to all sides.
 
     `shape` is what the robot takes up, `at` a point of the room to stand in line with, instead of the fixture's
-    middle. The robot does not stand in the open doors and drawers of those `opened`.
+    middle. The robot does not stand in the open doors and drawers of those `opened`, by a share of
+    their full travel.
 
     Raises:
         PlacementError: no pose was free.
@@ -157,7 +158,9 @@ def _turned(point: tuple[float, float], angle: float) -> tuple[float, float]:
 class Obstacles:
     """What a robot may meet where it stands: at the height of its base, of the column above it, and of its hand."""
 
-    def __init__(self, fixtures: Mapping[str, Fixture], shape: StandingShape, opened: Iterable[Fixture] = ()) -> None:
+    def __init__(
+        self, fixtures: Mapping[str, Fixture], shape: StandingShape, opened: Iterable[tuple[Fixture, float]] = ()
+    ) -> None:
         doors = _opened(opened)
         base, column = (_standing(fixtures, doors, top) for top in (shape.base_top, shape.column_top))
         low, high = shape.hand_z
@@ -204,11 +207,11 @@ def _standing(fixtures: Mapping[str, Fixture], doors: list[_Door], top: float) -
     return Footprints([*marks, *(door.footprint for door in doors if door.low < top)])
 
 
-def _opened(fixtures: Iterable[Fixture]) -> list[_Door]:
+def _opened(fixtures: Iterable[tuple[Fixture, float]]) -> list[_Door]:
     """The open doors and the pulled-out drawers of some fixtures."""
     found = []
-    for fixture in fixtures:
-        for box in fixture.swept_areas():
+    for fixture, share in fixtures:
+        for box in fixture.swept_at(share):
             low = float(fixture.to_world((0.0, 0.0, box.low))[2])
             found.append(_Door(_footprint_of(fixture, box), low, low + box.height))
     return found
