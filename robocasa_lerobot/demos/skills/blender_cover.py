@@ -24,6 +24,7 @@ from robocasa_lerobot.demos.motion import (
     hand_rotation,
     rotation_about,
 )
+from robocasa_lerobot.demos.planning.base_path import base_now
 from robocasa_lerobot.demos.planning.base_room import wrap
 from robocasa_lerobot.demos.planning.follow import follow_joint_path
 from robocasa_lerobot.demos.skills.blender_lid import (
@@ -55,6 +56,8 @@ ABOVE_M = 0.10  # over a lid on the counter, where the hand comes from
 IN_M = 0.15  # length of the path in
 SINKS, SINK = 3, ((0.010, 0.3, 0.003), (DROP_M, 0.3, 0.003))  # heights, speeds and tolerances of the path down
 NOT_OVER_M = 0.03  # of a lid that is aside of its place
+# Places to stand from where the arm got stuck that are kept off, and how far.
+MOST_STUCK, ELSEWHERE_M = 2, 0.10
 SEATED_M, LEVEL_COS = 0.007, float(np.cos(np.deg2rad(4.0)))  # of a lid that is let go at once
 TOGETHER = 1.0  # cost up to which the lid is taken from where it can be brought to the jug, too
 ROUND_TURNS = tuple(float(turn) for turn in np.deg2rad((0.0, 30.0, -30.0, 60.0, -60.0, 90.0, -90.0)))
@@ -70,13 +73,14 @@ def cover(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
     """
     blender = the_blender(env, stage)
     tried: list[Array] = []
+    stuck: list[RobotPose] = []
     for _ in range(ATTEMPTS):
         place = env.data.body(blender.lid).xpos.copy()
         yield from _take(env, blender, tried)
         if _holds(env, blender):
-            yield from _lay(env, blender, blender.lid_pose[0], LAYS)
+            yield from _lay(env, blender, blender.lid_pose[0], LAYS, stuck)
             if _holds(env, blender) and _aside(env, blender, blender.lid_pose[0]) > NOT_OVER_M:
-                yield from _lay(env, blender, place, 1)  # rather than let it fall
+                yield from _lay(env, blender, place, 1, [])  # rather than let it fall
         at = HandTarget(grip_position(env.data), hand_rotation(env.data))
         yield from hold_hand(env.data, at, OPEN, RELEASE_STEPS)
         away = HandTarget(at.position - AWAY_M * at.rotation[:, 2], at.rotation)
@@ -104,8 +108,11 @@ def _take(env: KitchenEnv, blender: Blender, tried: list[Array]) -> Iterator[Arr
         yield from hold_hand(data, HandTarget(grip_position(data), hand_rotation(data)), OPEN, RELEASE_STEPS)
 
 
-def _lay(env: KitchenEnv, blender: Blender, place: Array, tries: int) -> Iterator[Array]:
-    """Bring the lid over a place of its origin and down; it is still in the hand afterwards."""
+def _lay(env: KitchenEnv, blender: Blender, place: Array, tries: int, stuck: list[RobotPose]) -> Iterator[Array]:
+    """Bring the lid over a place of its origin and down; it is still in the hand afterwards.
+
+    Where the arm did not get over the place from is noted in `stuck`: it leans on a wall cabinet there.
+    """
     data = env.data
     failed: list[Array] = []
     for _ in range(tries):
@@ -113,7 +120,11 @@ def _lay(env: KitchenEnv, blender: Blender, place: Array, tries: int) -> Iterato
         def plan(blocked: Sequence[RobotPose]) -> MotionPlan:
             held, lid = Held.now(data, blender.lid), _lid(env, blender)
             paths = _lays(env, blender, held, hand_rotation(data) @ held.rotation, place, failed)
-            return plan_reach(env, paths, place, key=2, held=held, loaded=3, allowed=lid, blocked=blocked)[0]
+            off, here = stuck[-MOST_STUCK:], base_now(data)
+            stays = all(np.hypot(each.x - here.x, each.y - here.y) > ELSEWHERE_M for each in off)
+            return plan_reach(
+                env, paths, place, key=2, held=held, loaded=3, allowed=lid, blocked=[*off, *blocked], may_stay=stays
+            )[0]
 
         choice = yield from approach(env, plan, CLOSED)
         if not _holds(env, blender):
@@ -146,6 +157,8 @@ def _lay(env: KitchenEnv, blender: Blender, place: Array, tries: int) -> Iterato
             if _away(env, blender, place) < SEATED_M and _level(env, blender):
                 return
             if _aside(env, blender, place) > NOT_OVER_M:
+                stuck.append(base_now(data))
+                yield from move_hand(data, far, CLOSED, speed=0.7, tolerance=0.03, max_steps=40)
                 break
 
 

@@ -52,6 +52,7 @@ def plan_reach(
     allowed: frozenset[int] = frozenset(),
     blocked: Sequence[RobotPose] = (),
     may_drive: bool = True,
+    may_stay: bool = True,
 ) -> list[MotionPlan]:
     """The paths that cost least, best first, from where the robot stands or from where it could.
 
@@ -65,16 +66,18 @@ def plan_reach(
         allowed: bodies that the robot may touch.
         blocked: places that the base did not get to; after `MOST_DRIVES` of them it stays where it is.
         may_drive: whether the base may go elsewhere at all.
+        may_stay: whether it may stay where it is, if there is another place.
     """
     if not paths:
         return []
     planner = MotionPlanner(env, paths, key, held=held, loaded=loaded, allowed=allowed)
     found = planner.best([None])
-    good = bool(found) and found[0].cost <= GOOD_ENOUGH
+    good = may_stay and bool(found) and found[0].cost <= GOOD_ENOUGH
     if may_drive and not good and len(blocked) < MOST_DRIVES:
         others = free_stands(env, point)
         stands = [s for s in others if all(np.hypot(s.x - b.x, s.y - b.y) > BLOCKED_M for b in blocked)]
-        found = sorted(found + planner.best(stands, folded=not is_full(held)), key=lambda plan: plan.cost)
+        elsewhere = planner.best(stands, folded=not is_full(held))
+        found = sorted((found if may_stay or not elsewhere else []) + elsewhere, key=lambda plan: plan.cost)
     return found
 
 
