@@ -4,7 +4,7 @@ A demonstration has a speed, a side to which its free paths bow, and a preferenc
 about equally good: grasps, rolls and approaches. Where a hand waits before it goes straight to a handle is drawn too:
 a policy that is trained on it has seen how a hand comes back from beside its goal, which one that always waits at the
 same place has not. speed and bow change the free paths of any skill; the preference is asked for by skills that choose
-among candidates (`motion_style_of(env).bonus`), and so is the place (`motion_style_of(env).beside`).
+among candidates (`motion_style_of(env).bonuses`), and so is the place (`motion_style_of(env).beside`).
 """
 
 from __future__ import annotations
@@ -72,11 +72,12 @@ class MotionStyle:
         sideways = sideways / length if length > 1e-6 else np.array([1.0, 0.0, 0.0])
         return across * sideways + up * np.cross(sideways, approach) + along * approach
 
-    def bonus(self, rotation: Array) -> float:
-        """What a hand rotation (3, 3) gains over others by being preferred, in [0, weight]."""
+    def bonuses(self, rotations: Array) -> Array:
+        """What hand rotations (N, 3, 3) gain over others by being preferred, in [0, weight], (N,)."""
         if not self.weight:
-            return 0.0
-        return self.weight * (float(np.trace(self._hand.T @ rotation)) + 1.0) / 4.0
+            return np.zeros(len(rotations))
+        gained: Array = self.weight * (np.trace(self._hand.T @ rotations, axis1=1, axis2=2) + 1.0) / 4.0
+        return gained
 
     @functools.cached_property
     def _hand(self) -> Array:

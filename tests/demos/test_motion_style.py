@@ -32,10 +32,9 @@ def test_draws_follow_from_the_generator_and_stay_in_their_ranges() -> None:
 def test_the_preference_is_greatest_for_the_hand_that_is_preferred() -> None:
     quarter = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
     style = MotionStyle(weight=0.2)
-    assert style.bonus(np.eye(3)) == pytest.approx(0.2)
-    assert style.bonus(quarter) == pytest.approx(0.1)
-    assert style.bonus(np.diag([-1.0, -1.0, 1.0])) == pytest.approx(0.0)
-    assert PLAIN.bonus(np.eye(3)) == 0.0
+    turns = np.array([np.eye(3), quarter, np.diag([-1.0, -1.0, 1.0])])
+    assert style.bonuses(turns) == pytest.approx([0.2, 0.1, 0.0])
+    assert not PLAIN.bonuses(turns).any()
 
 
 def test_fast_commands_are_slowed_and_bowed_and_fine_ones_stay() -> None:

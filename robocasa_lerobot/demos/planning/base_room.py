@@ -51,6 +51,10 @@ class Room:
         inside: NDArray[np.bool_] = (bounds["x_min"] < x) & (x < bounds["x_max"]) & (bounds["y_min"] < y) & (y < 0.0)
         return inside & self._obstacles.leave_free_at(poses)
 
+    def free_all_along(self, poses: Array) -> bool:
+        """Whether N poses are all free."""
+        return bool(self.free_at(poses).all())
+
     def all_free(self, poses: Sequence[RobotPose]) -> NDArray[np.bool_]:
         """The same of poses as they are named elsewhere, (N,)."""
         return self.free_at(np.array([(pose.x, pose.y, pose.yaw) for pose in poses]).reshape(-1, 3))
@@ -70,11 +74,11 @@ class Room:
 
     def straight(self, start: RobotPose, goal: RobotPose) -> bool:
         """Whether the robot can move and turn at once from one pose to another."""
-        return bool(self.free_at(rows_between(start, goal, STEP_M, STEP_RAD)).all())
+        return self.free_all_along(rows_between(start, goal, STEP_M, STEP_RAD))
 
     def closely(self, one: RobotPose, other: RobotPose) -> bool:
         """The same with poses tested that lie no farther apart than a handle is wide."""
-        return bool(self.free_at(rows_between(one, other, CLOSE_STEP_M, CLOSE_STEP_RAD)).all())
+        return self.free_all_along(rows_between(one, other, CLOSE_STEP_M, CLOSE_STEP_RAD))
 
 
 class Space(Room):
@@ -118,23 +122,41 @@ class Space(Room):
         """
         free = super().free_at(poses)
         places = np.flatnonzero(free)
-        if not len(places):
-            return free
-        mine = poses[places]
-        leaving = np.hypot(mine[:, 0] - self._start.x, mine[:, 1] - self._start.y) < LEAVING_M
-        close = leaving | (np.hypot(mine[:, 0] - self._goal.x, mine[:, 1] - self._goal.y) < COMING_M)
-        if not close.all():
-            far = ~close
-            free[places[far]] = self._touched(mine[far], 1, self.margin_m).counts == 0
-        if close.any():
-            found = self._touched(mine[close], _MOST_NEAR, self._close)
-            meant = np.arange(_MOST_NEAR) < found.counts[:, None]
-            pardoned = leaving[close][:, None] & self._leaning[found.bodies]
-            free[places[close]] = ~(meant & ~pardoned).any(axis=1)
+        if len(places):
+            mine = poses[places]
+            leaving, close = self._near_ends(mine)
+            if not close.all():
+                far = ~close
+                free[places[far]] = self._touched(mine[far], 1, self.margin_m).counts == 0
+            if close.any():
+                free[places[close]] = self._free_close(mine[close], leaving[close])
         return free
 
-    def _touched(self, poses: Array, most: int, margin_m: float) -> Touched:
-        return self._checker.touched(poses, self._joints, held=self._held, margin_m=margin_m, most=most)
+    def free_all_along(self, poses: Array) -> bool:
+        """Whether N poses are all free; what comes after one that is not is not looked at."""
+        if not super().free_at(poses).all():
+            return False
+        leaving, close = self._near_ends(poses)
+        if close.any() and not self._free_close(poses[close], leaving[close]).all():
+            return False
+        far = poses[~close]
+        return not len(far) or not self._touched(far, 1, self.margin_m, until_one=True).counts.any()
+
+    def _near_ends(self, poses: Array) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+        """Whether each of N poses is near the start, and whether it is near that or the goal."""
+        leaving = np.hypot(poses[:, 0] - self._start.x, poses[:, 1] - self._start.y) < LEAVING_M
+        return leaving, leaving | (np.hypot(poses[:, 0] - self._goal.x, poses[:, 1] - self._goal.y) < COMING_M)
+
+    def _free_close(self, poses: Array, leaving: NDArray[np.bool_]) -> NDArray[np.bool_]:
+        found = self._touched(poses, _MOST_NEAR, self._close)
+        meant = np.arange(_MOST_NEAR) < found.counts[:, None]
+        pardoned = leaving[:, None] & self._leaning[found.bodies]
+        return np.asarray((pardoned | ~meant).all(axis=1))
+
+    def _touched(self, poses: Array, most: int, margin_m: float, *, until_one: bool = False) -> Touched:
+        return self._checker.touched(
+            poses, self._joints, held=self._held, margin_m=margin_m, most=most, until_one=until_one
+        )
 
 
 def rows_between(start: RobotPose, goal: RobotPose, step_m: float, step_rad: float) -> Array:

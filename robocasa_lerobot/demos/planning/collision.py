@@ -195,6 +195,7 @@ class CollisionChecker:
         margin_m: float = 0.0,
         most: int = MOST_TOUCHED,
         links: tuple[int, ...] | None = None,
+        until_one: bool = False,
     ) -> Touched:
         """The bodies that are touched at N configurations.
 
@@ -209,6 +210,7 @@ class CollisionChecker:
             margin_m: distance below which two shapes touch.
             most: bodies of each configuration after which no more are looked for.
             links: of the robot that are looked at (0 for the base, 1 to 7); None takes all.
+            until_one: whether configurations after the first that touches something are left out, as if free.
         """
         joints, frames = np.asarray(joints, dtype=np.float64).reshape(-1, 7), self._frames_at(bases)
         count = max(len(joints), len(frames))
@@ -236,6 +238,7 @@ class CollisionChecker:
             np.zeros(count, dtype=np.int64) if states is None else np.asarray(states, dtype=np.int64),
             np.zeros(count, dtype=np.bool_) if hand_may is None else np.asarray(hand_may, dtype=np.bool_),
             margin_m,
+            until_one,
             bodies,
             counts,
         )

@@ -402,6 +402,7 @@ def touched(
     states: Indices,
     hand_may: Flags,
     margin: float,
+    until_one: bool,
     bodies: Indices,
     counts: Indices,
 ) -> None:
@@ -424,6 +425,7 @@ def touched(
         states: (N,) of the part.
         hand_may: (N,) whether the hand may touch what it alone may touch.
         margin: distance in metres below which two geoms touch.
+        until_one: whether configurations after the first that touches something are left out.
         bodies: (N, most) written.
         counts: (N,) written.
     """
@@ -459,3 +461,5 @@ def touched(
             model, data, moving, low, high, moving, low, high, every, many,
             pardons, hand_may[n], True, margin, n, bodies, counts,
         )  # fmt: skip
+        if until_one and counts[n]:
+            return

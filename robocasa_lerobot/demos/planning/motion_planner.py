@@ -151,7 +151,7 @@ class MotionPlanner:
         self._positions = np.array([[t.position for t in path.targets] for path in paths])
         self._rotations = np.array([[t.rotation for t in path.targets] for path in paths])
         style, which = motion_style_of(env), key if preferred is None else preferred
-        self._extra = np.array([path.extra - style.bonus(path.targets[which].rotation) for path in paths])
+        self._extra = np.array([path.extra for path in paths]) - style.bonuses(self._rotations[:, which])
         keys = np.column_stack([self._positions[:, key], self._rotations[:, key].reshape(len(paths), 9)])
         self._same = np.unique(keys.round(4), axis=0, return_inverse=True)[1].reshape(-1)
         self._drives: dict[tuple[float, float, float], float] = {}

@@ -136,7 +136,7 @@ class Instance:
         """Name of the model, e.g. `apple_3`."""
         return f"{self.category.name}_{self.index}"
 
-    @property
+    @functools.cached_property
     def size(self) -> Size:
         """Full extents x, y, z as it is put down, scaled and turned, metres."""
         x, y, z = (s * k for s, k in zip(self.own_size, self.scale, strict=True))
@@ -167,7 +167,7 @@ class Instance:
         """Height of its top relative to its origin, metres."""
         return self.size[2] / 2
 
-    @property
+    @functools.cached_property
     def interior(self) -> Interior | None:
         """Its interior in the frame of its body; None if it holds no other objects, or was turned upright."""
         inside = model_of(self).interior

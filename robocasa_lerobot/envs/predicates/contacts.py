@@ -6,6 +6,8 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from robocasa_lerobot.envs.scene.bodies import near_pairs
+
 # Two sleeping bodies count as touching when their collision geoms are this near, metres; MuJoCo lists no contact
 # between them, and contacts at rest penetrate by a little.
 ASLEEP_TOUCH_M = 0.001
@@ -45,31 +47,20 @@ def pushes(
 def _touching_asleep(
     model: mujoco.MjModel, data: mujoco.MjData, first: NDArray[np.bool_], second: NDArray[np.bool_]
 ) -> bool:
-    still = _still(model, data)
-    ours = np.flatnonzero((first & still)[model.geom_bodyid] & (model.geom_contype | model.geom_conaffinity > 0))
-    theirs = np.flatnonzero((second & still)[model.geom_bodyid] & (model.geom_contype | model.geom_conaffinity > 0))
-    sizes = model.geom_rbound
-    # A plane has no bounding sphere.
-    reach = np.where(sizes == 0, np.inf, sizes)
-    apart = np.linalg.norm(data.geom_xpos[theirs][None] - data.geom_xpos[ours][:, None], axis=2)
-    near = apart <= reach[theirs] + reach[ours][:, None] + ASLEEP_TOUCH_M
-    for geom, others in zip(ours, near, strict=True):
-        for other in theirs[others]:
-            if not _may_collide(model, int(geom), int(other)):
-                continue
-            if mujoco.mj_geomDistance(model, data, int(geom), int(other), 2 * ASLEEP_TOUCH_M, None) <= ASLEEP_TOUCH_M:
-                return True
-    return False
-
-
-def _still(model: mujoco.MjModel, data: mujoco.MjData) -> NDArray[np.bool_]:
-    """For each body whether it is static or asleep, (nbody,)."""
-    tree = model.body_treeid
-    asleep = np.append(data.tree_asleep >= 0, True)  # -1 is the world's, which is static
-    still: NDArray[np.bool_] = asleep[tree]
-    return still
-
-
-def _may_collide(model: mujoco.MjModel, first: int, second: int) -> bool:
-    a, b = model.geom_contype, model.geom_conaffinity
-    return bool((a[first] & b[second]) or (a[second] & b[first]))
+    asleep = np.append(data.tree_asleep >= 0, True)  # the last is the world's tree, -1, which is static
+    pairs = near_pairs(
+        first,
+        second,
+        asleep,
+        model.body_treeid,
+        model.geom_bodyid,
+        model.geom_contype,
+        model.geom_conaffinity,
+        model.geom_rbound,
+        data.geom_xpos,
+        ASLEEP_TOUCH_M,
+    )
+    return any(
+        mujoco.mj_geomDistance(model, data, geom, other, 2 * ASLEEP_TOUCH_M, None) <= ASLEEP_TOUCH_M
+        for geom, other in pairs.tolist()
+    )
