@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from blueprint_words.ours import Ours, away
-from robocasa_lerobot.envs.predicates import AllOf, DoorsClosed, GripperFar, Not, ObjectOn, OnShelf, When
+from blueprint_words.ours import Ours, away, together
+from robocasa_lerobot.envs.predicates import AllOf, DoorsClosed, GripperFar, Not, OnShelf, When
 from robocasa_lerobot.envs.scene.spec import InitialOpenness
 
 IN_BOWLS = {"vegetable1": "veg_bowl", "vegetable2": "veg_bowl", "meat1": "meat_bowl", "meat2": "meat_bowl"}
+OTHERS = {"vegetable1": "vegetable2", "vegetable2": "vegetable1", "meat1": "meat2", "meat2": "meat1"}
 ON_A_SHELF = "(bbox inside region, margin 0.05 m; height <= 90% of region)"
 
 OPEN = InitialOpenness("fridge", 0.9, 1.0, part="fridge")
@@ -16,7 +17,7 @@ OURS = {
     "LoadFridgeByType": Ours(
         goal={
             **{
-                f"{name} in {bowl} (contact; xy dist < 0.7 x {bowl} radius)": ObjectOn(name, bowl)
+                f"{name} in {bowl} (contact; xy dist < 0.7 x {bowl} radius)": together(name, OTHERS[name], bowl)
                 for name, bowl in IN_BOWLS.items()
             },
             f"veg_bowl on fridge {{veg_shelf}} {ON_A_SHELF}": OnShelf("veg_bowl", "fridge", "{veg_shelf}"),

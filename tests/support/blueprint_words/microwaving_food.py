@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-from blueprint_words.ours import Ours, away
+from blueprint_words.ours import Ours, away, together
 from robocasa_lerobot.envs.predicates import (
-    AllOf,
-    AnyOf,
     DoorsClosed,
     Goal,
     GripperFar,
@@ -31,10 +29,6 @@ MEALS = ("0", "1")
 
 def inside(name: str) -> dict[str, Goal]:
     return {INSIDE.format(name): ObjectInside(name, "microwave", margin=0.05)}
-
-
-def together(name: str, other: str, vessel: str) -> Goal:
-    return AnyOf(ObjectOn(name, vessel), AllOf(ObjectTouches(name, other), ObjectOn(other, vessel)))
 
 
 def held(name: str, receptacle: str, other: str = "") -> dict[str, Goal]:

@@ -5,7 +5,16 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from robocasa_lerobot.envs.predicates import Goal, GripperFar, ObjectOn, ObjectUpright, OnBurner
+from robocasa_lerobot.envs.predicates import (
+    AllOf,
+    AnyOf,
+    Goal,
+    GripperFar,
+    ObjectOn,
+    ObjectTouches,
+    ObjectUpright,
+    OnBurner,
+)
 from robocasa_lerobot.envs.scene.scene_spec import InitialState
 from robocasa_lerobot.envs.scene.spec import Placement
 
@@ -73,3 +82,8 @@ class Ours:
 def away(*names: str, metres: float = 0.25) -> dict[str, Goal]:
     """What every blueprint says of the gripper at the end."""
     return {f"gripper > {metres} m from {name}": GripperFar(name, metres) for name in names}
+
+
+def together(name: str, other: str, vessel: str) -> Goal:
+    """In a vessel that is too narrow for two of our things side by side, or on the other thing in it."""
+    return AnyOf(ObjectOn(name, vessel), AllOf(ObjectTouches(name, other), ObjectOn(other, vessel)))

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from blueprint_words.ours import ON_ITS_MIDDLE, Ours, away
+from blueprint_words.ours import ON_ITS_MIDDLE, Ours, away, together
 from robocasa_lerobot.envs.predicates import (
     NearFixture,
     Not,
     ObjectInside,
-    ObjectOn,
     ObjectTouches,
     ObjectTouchesAnyCounter,
     OnShelf,
@@ -61,8 +60,8 @@ OURS = {
             "NOT utensil touching any counter": Not(ObjectTouchesAnyCounter("utensil")),
             f"receptacle inside cabinet {IN_A_REGION}": ObjectInside("receptacle", "cabinet", margin=0.05),
             **{
-                f"{name} in food_bowl {ON_ITS_MIDDLE.format('food_bowl')}": ObjectOn(name, "food_bowl")
-                for name in ("food1", "food2")
+                f"{name} in food_bowl {ON_ITS_MIDDLE.format('food_bowl')}": together(name, other, "food_bowl")
+                for name, other in (("food1", "food2"), ("food2", "food1"))
             },
             "food_bowl inside a fridge-compartment shelf (8 bbox corners in region, slack 0.05; centre height within "
             "lower 90 % of shelf height)": OnShelf("food_bowl", "fridge"),

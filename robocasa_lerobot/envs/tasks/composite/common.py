@@ -4,7 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 
-from robocasa_lerobot.envs.predicates import AllOf, Goal, GripperFar, GripperFarFromPart, StateIs
+from robocasa_lerobot.envs.predicates import (
+    AllOf,
+    AnyOf,
+    Goal,
+    GripperFar,
+    GripperFarFromPart,
+    ObjectOn,
+    ObjectTouches,
+    StateIs,
+)
 from robocasa_lerobot.envs.scene.spec import Placement, SampleRegion
 from robocasa_lerobot.envs.tasks.task import Stage, Task
 
@@ -95,3 +104,13 @@ def on_shelf(
     """On a usable shelf of the role "fridge", by its level (`predicates.shelves`), by default at its front."""
     region = SampleRegion(name=f"{compartment}_shelf:{level}")
     return Placement("fridge", region=region, size=size, pos=pos, **more)  # type: ignore[arg-type]
+
+
+def together(name: str, other: str, vessel: str) -> Goal:
+    """In a vessel that is too narrow for two things side by side: in touch with it, or with the other one that is."""
+    return AnyOf(ObjectOn(name, vessel), AllOf(ObjectTouches(name, other), ObjectOn(other, vessel)))
+
+
+def both_together(first: str, second: str, vessel: str) -> tuple[Goal, Goal]:
+    """Both of two things are in such a vessel."""
+    return together(first, second, vessel), together(second, first, vessel)

@@ -8,7 +8,6 @@ from robocasa_lerobot.envs.predicates import (
     NearFixture,
     Not,
     ObjectInside,
-    ObjectOn,
     ObjectTouches,
     ObjectTouchesAnyCounter,
     OnShelf,
@@ -23,7 +22,7 @@ from robocasa_lerobot.envs.scene.spec import (
     SampleRegion,
 )
 from robocasa_lerobot.envs.tasks.atomic.common import counter_near, in_cabinet, on_counter
-from robocasa_lerobot.envs.tasks.composite.common import fetch
+from robocasa_lerobot.envs.tasks.composite.common import both_together, fetch
 from robocasa_lerobot.envs.tasks.task import Stage, Task
 
 _CABINET_OPEN = InitialOpenness("cabinet", 0.9, 1.0)
@@ -174,8 +173,7 @@ COUNTERTOP_CLEANUP = Task(
     goal=AllOf(
         *_PUT_AWAY.parts,
         ObjectInside("receptacle", "cabinet"),
-        ObjectOn("food1", "food_bowl"),
-        ObjectOn("food2", "food_bowl"),
+        *both_together("food1", "food2", "food_bowl"),
         OnShelf("food_bowl", "fridge"),
         GripperFar("receptacle"),
         GripperFar("food_bowl"),

@@ -4,7 +4,6 @@ import numpy as np
 
 from robocasa_lerobot.envs.predicates import (
     AllOf,
-    AnyOf,
     DoorsClosed,
     Goal,
     GripperFar,
@@ -25,7 +24,7 @@ from robocasa_lerobot.envs.scene.spec import (
     SampleRegion,
 )
 from robocasa_lerobot.envs.tasks.atomic.common import counter_near, on_counter
-from robocasa_lerobot.envs.tasks.composite.common import fetch
+from robocasa_lerobot.envs.tasks.composite.common import both_together, fetch, together
 from robocasa_lerobot.envs.tasks.task import Stage, Task
 
 _MICROWAVE = FixtureSpec("microwave", "microwave")
@@ -37,15 +36,6 @@ _START = (
     Stage("doors", "close", "microwave"),
     Stage("buttons", "press", "microwave", part="start_button", until=_RUNS),
 )
-
-
-def _together(name: str, other: str, vessel: str) -> Goal:
-    """In a vessel that is too narrow for two things side by side: in touch with it, or with the other one that is."""
-    return AnyOf(ObjectOn(name, vessel), AllOf(ObjectTouches(name, other), ObjectOn(other, vessel)))
-
-
-def _both(first: str, second: str, vessel: str) -> tuple[Goal, Goal]:
-    return _together(first, second, vessel), _together(second, first, vessel)
 
 
 FILTER_MICROWAVABLE_ITEM = Task(
@@ -105,7 +95,7 @@ def _meal(number: str, start: Placement, *, repeats: bool = False) -> tuple[Obje
 def _in_bowl(food: str, other: str) -> Goal:
     return When(
         "target",
-        {number: _together(f"{food}_bowl{number}", f"{other}_bowl{number}", f"bowl{number}") for number in _MEALS},
+        {number: together(f"{food}_bowl{number}", f"{other}_bowl{number}", f"bowl{number}") for number in _MEALS},
     )
 
 
@@ -246,7 +236,7 @@ REHEAT_MEAL = Task(
     initial=(InitialOpenness("fridge", 0.9, 1.0, part="fridge"), _OPEN),
     goal=AllOf(
         ObjectInside("tupperware", "microwave"),
-        *_both("meat", "vegetable", "tupperware"),
+        *both_together("meat", "vegetable", "tupperware"),
         _SHUT,
         _RUNS,
         GripperFar("tupperware"),
@@ -277,7 +267,7 @@ RETURN_HEATED_FOOD = Task(
     ),
     goal=AllOf(
         ObjectTouches("bowl", "dining_counter"),
-        *_both("meat", "vegetable", "bowl"),
+        *both_together("meat", "vegetable", "bowl"),
         GripperFar("bowl"),
     ),
     stages=(Stage("doors", "open", "microwave"), *fetch("bowl", "microwave", "dining_counter")),

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from robocasa_lerobot.envs.predicates import AllOf, DoorsClosed, GripperFar, Not, ObjectOn, OnShelf, When
+from robocasa_lerobot.envs.predicates import AllOf, DoorsClosed, GripperFar, Not, OnShelf, When
 from robocasa_lerobot.envs.scene.spec import (
     Choice,
     FixtureSpec,
@@ -13,7 +13,7 @@ from robocasa_lerobot.envs.scene.spec import (
     SampleRegion,
 )
 from robocasa_lerobot.envs.tasks.atomic.common import counter_near, on_counter
-from robocasa_lerobot.envs.tasks.composite.common import fetch, on_shelf
+from robocasa_lerobot.envs.tasks.composite.common import both_together, fetch, on_shelf
 from robocasa_lerobot.envs.tasks.task import Stage, StagesWhen, Task
 
 _IN_BOWLS = {"vegetable1": "veg_bowl", "vegetable2": "veg_bowl", "meat1": "meat_bowl", "meat2": "meat_bowl"}
@@ -59,7 +59,8 @@ LOAD_FRIDGE_BY_TYPE = Task(
     ),
     initial=(InitialOpenness("fridge", 0.9, 1.0, part="fridge"),),
     goal=AllOf(
-        *(ObjectOn(name, bowl) for name, bowl in _IN_BOWLS.items()),
+        *both_together("vegetable1", "vegetable2", "veg_bowl"),
+        *both_together("meat1", "meat2", "meat_bowl"),
         OnShelf("veg_bowl", "fridge", "{veg_shelf}"),
         OnShelf("meat_bowl", "fridge", "{_meat_shelf}"),
         GripperFar("veg_bowl"),
