@@ -12,7 +12,7 @@ from robocasa_lerobot.demos.planning.base_path import base_now, wrap
 from robocasa_lerobot.demos.skills.common import SkillError, hold_hand, stage_done
 from robocasa_lerobot.demos.skills.fold import fold_arm
 from robocasa_lerobot.demos.skills.navigation import drive_to
-from robocasa_lerobot.demos.skills.pick_place.by_handle import PAN_BY_THE_HANDLE, TOOL_BY_THE_HANDLE
+from robocasa_lerobot.demos.skills.pick_place.by_handle import PAN_BY_THE_HANDLE, TOOL_BY_THE_HANDLE, has_handle
 from robocasa_lerobot.demos.skills.pick_place.carrying.carry import carry_to, go_to_object, in_reach, standing_pose_for
 from robocasa_lerobot.demos.skills.pick_place.grasp_strategy import ANY_APPROACH, GraspStrategy
 from robocasa_lerobot.demos.skills.pick_place.graspable import Graspable, graspable
@@ -169,7 +169,7 @@ def _around_door(env: KitchenEnv, fixture: Fixture | None) -> Iterator[Array]:
 def _free_grasp(env: KitchenEnv, stage: Stage) -> GraspStrategy:
     """How an object that stands free is grasped best for where it goes next."""
     use = _next_use(env, stage)
-    if use in BY_USE:
+    if use in BY_USE and (use != "pour" or has_handle(graspable(env, stage.object))):
         return BY_USE[use]
     following = _placing(env, stage)
     return ANY_APPROACH if following is None else place_strategy(env, following, graspable(env, stage.object)).grasp
