@@ -21,6 +21,7 @@ from robocasa_lerobot.demos.motion import (
 )
 from robocasa_lerobot.demos.motion_style import motion_style_of
 from robocasa_lerobot.demos.skills.common import SkillError, hold_hand, move_hand, require_near
+from robocasa_lerobot.demos.skills.fold import fold_arm
 from robocasa_lerobot.demos.skills.navigation import Room, drive_to
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.kitchens.fixtures.cabinets import Drawer
@@ -41,6 +42,7 @@ PULL_SPEED = 0.55
 OPEN_GOAL, CLOSED_GOAL = 1.15, 0.0
 # A robot that stands less far beside a drawer is in its way; where it goes then, from the drawer's side.
 LEAST_ASIDE_M, ASIDES_M = 0.03, (0.20, 0.28, 0.12, 0.36, 0.06)
+LEAST_TO_PUSH_M = 0.15  # the same of one that could not be pushed shut: its front is too near to push at
 # Of a drawer that is dragged: how far it is in before it is worth while, and what the hand needs of it.
 PUSHED_IN_M, HAND_ROOM_M = 0.03, 0.08
 # The hand comes from over the front's upper edge, goes below it close behind it, and is led beyond where it ends.
@@ -82,12 +84,15 @@ def open_drawer(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
     raise SkillError(f"{drawer.name} is {drawer.openness(data):.0%} open after {ATTEMPTS} attempts")
 
 
-def _drive_beside(env: KitchenEnv, role: str, drawer: Drawer) -> Iterator[Array]:
-    """Drive out of the way of a drawer that is to be opened: to the nearer side of it that is free, if there is one."""
+def _drive_beside(env: KitchenEnv, role: str, drawer: Drawer, least_m: float = LEAST_ASIDE_M) -> Iterator[Array]:
+    """Drive out of the way of a drawer that is to be moved: to the nearer side of it that is free, if there is one.
+
+    Nothing is done from `least_m` beside it on.
+    """
     base, _ = base_pose(env.data)
     rightwards = np.cross(_inwards(drawer), UP)
     aside = float((base - np.asarray(drawer.pos)) @ rightwards)
-    if abs(aside) > drawer.width / 2 + LEAST_ASIDE_M:
+    if abs(aside) > drawer.width / 2 + least_m:
         return
     before, room = env.scene.standing_pose(role), Room(env.scene)
     ways = (1.0, -1.0) if aside >= 0.0 else (-1.0, 1.0)
@@ -144,7 +149,11 @@ def close_drawer(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
     rotation = _facing(env, drawer, inwards)
     sideways = np.cross(inwards, UP)
     base, _ = base_pose(data)
-    for _ in range(ATTEMPTS):
+    for attempt in range(ATTEMPTS):
+        if attempt > 0:
+            yield from fold_arm(env)
+            yield from _drive_beside(env, stage.target, drawer, LEAST_TO_PUSH_M)
+            rotation, (base, _) = _facing(env, drawer, inwards), base_pose(data)
         front = data.geom(f"{drawer.name}_front").xpos.copy()
         # Between the handle and the edge, on the side of the robot.
         side = float(np.sign((base - front) @ sideways))
