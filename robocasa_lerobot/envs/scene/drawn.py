@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
+
+from robocasa_lerobot.envs.kitchens.fixtures.base import yaw_quat
 from robocasa_lerobot.envs.kitchens.footprints import Footprint
 from robocasa_lerobot.envs.objects.catalogue import Instance
 from robocasa_lerobot.envs.scene.words import numbered
@@ -11,18 +14,30 @@ from robocasa_lerobot.envs.scene.words import numbered
 
 @dataclass(frozen=True)
 class PlacedObject:
-    """An object of a scene: its model, and where it starts (centre in metres, yaw in radians)."""
+    """An object of a scene: its model, and where it starts (centre in metres, yaw in radians).
+
+    One that is `lying` was turned by a quarter about its own x axis before.
+    """
 
     name: str
     item: Instance
     pos: tuple[float, float, float]
     yaw: float
+    lying: bool = False
 
     @property
     def footprint(self) -> Footprint:
         """Its bounding box on the floor plan."""
-        width, depth, _ = self.item.size
+        width, depth, height = self.item.size
+        depth = height if self.lying else depth
         return Footprint(self.pos[0], self.pos[1], self.yaw, (width / 2, depth / 2))
+
+    @property
+    def quat(self) -> tuple[float, float, float, float]:
+        """How it is turned at the start, (w, x, y, z)."""
+        w, x, y, z = map(float, yaw_quat(self.yaw))
+        half = float(np.sqrt(0.5))
+        return (half * w, half * w, half * z, half * z) if self.lying else (w, x, y, z)
 
 
 @dataclass(kw_only=True)

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from robocasa_lerobot.contract import ACTION_SIZE
 from robocasa_lerobot.envs.kitchens.appliances.acting import ActingAppliances
 from robocasa_lerobot.envs.kitchens.appliances.kinds.blender import Blender
-from robocasa_lerobot.envs.kitchens.fixtures.base import Fixture, Region, of_kind, yaw_quat
+from robocasa_lerobot.envs.kitchens.fixtures.base import Fixture, Region, of_kind
 from robocasa_lerobot.envs.kitchens.fixtures.regions import region_names, regions_of
 from robocasa_lerobot.envs.kitchens.layout import Layout
 from robocasa_lerobot.envs.kitchens.splits import benchmark_split
@@ -164,7 +164,7 @@ class Scene(Drawn):
         for entry, drawn in self.initial:
             entry.apply(self, data, drawn)
         for placed in self.objects.values():
-            data.joint(f"{placed.name}_joint0").qpos[:] = [*placed.pos, *yaw_quat(placed.yaw)]
+            data.joint(f"{placed.name}_joint0").qpos[:] = [*placed.pos, *placed.quat]
         mujoco.mj_forward(self.model, data)
         controller = self.robot.controller(self.model, data)
         controller.reset()

@@ -145,10 +145,12 @@ class Placement:
         offset: shift to the right and to the back, metres.
         margin: kept from the rectangle's edges, metres.
         rotation: bounds of the turn, radians.
+        other_rotation: other bounds, which are as likely, where there are some.
         try_to_place_in: object group: what can be in a container stands in one of that group, `<name>_container`.
         reuse_region_from: name of an object whose part of the fixture is taken again.
         ensure_inside: the whole footprint lies in the rectangle, not its middle alone.
         slot: it stands along the longer side of the part, and out of its top, as bread does in a toaster.
+        lying: on a fixture, it lies on its side: turned by a quarter about its own x axis.
         heaped: on an object, it may lie on what is there already, as low as possible.
     """
 
@@ -160,10 +162,12 @@ class Placement:
     offset: tuple[float, float] = (0.0, 0.0)
     margin: float = 0.04
     rotation: tuple[float, float] = (-0.7853981633974483, 0.7853981633974483)
+    other_rotation: tuple[float, float] | None = None
     try_to_place_in: str = ""
     reuse_region_from: str = ""
     ensure_inside: bool = True
     slot: bool = False
+    lying: bool = False
     heaped: bool = False
 
 

@@ -133,8 +133,10 @@ def start_of(
         region = replace(region, name="" if name == "any" else name, level=level)
     region = replace(region, ref=filled(region.ref, choices), loc=filled(region.loc, choices))
     across, along = start.pos
+    other_way = start.other_rotation is not None and rng.integers(2)
     return replace(
         start,
+        rotation=start.other_rotation if other_way and start.other_rotation else start.rotation,
         region=region,
         fixture=filled(start.fixture, choices),
         object=filled(start.object, choices),

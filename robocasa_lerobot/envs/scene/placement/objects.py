@@ -113,7 +113,7 @@ def _put(
         if fixture.holds_all_of_it and start.ensure_inside:
             # Of other compartments an object may stick out, as the handle of a mug does under a spout.
             rooms = [part.area for part in table.parts[name]]
-    _put_down(rng, table, name, item, areas, standing, rooms)
+    _put_down(rng, table, name, item, areas, standing, rooms, lying=isinstance(start, Placement) and start.lying)
 
 
 def _in_slot(area: Area, item: catalogue.Instance) -> Area:
@@ -159,9 +159,13 @@ def _put_down(
     areas: list[Area],
     standing: list[Footprint],
     rooms: Sequence[Area] = (),
+    *,
+    lying: bool = False,
 ) -> None:
     """Put an object onto one of the areas; if basins are given as `rooms`, so that it is wholly in one."""
     width, depth, height = item.size
+    if lying:
+        depth, height = height, depth
     high = [area for area in areas if area.height > height + PLACEMENT_GAP_M]
     what = f"{name} ({item.model})"
     if not high:
@@ -189,7 +193,7 @@ def _put_down(
         )
     table.taken.append((footprint, area.z))
     z = area.z + height / 2 + PLACEMENT_GAP_M
-    table.placed[name] = PlacedObject(name, item, (footprint.x, footprint.y, z), footprint.yaw)
+    table.placed[name] = PlacedObject(name, item, (footprint.x, footprint.y, z), footprint.yaw, lying)
 
 
 def _put_on(
