@@ -9,7 +9,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from robocasa_lerobot.envs.checks.soundness import moved
+from robocasa_lerobot.envs.checks.soundness import fell, moved, sunk_in
 from robocasa_lerobot.envs.kitchens.appliances.kinds.stove import Hob
 from robocasa_lerobot.envs.kitchens.fixtures.cabinets import Drawer
 from robocasa_lerobot.envs.kitchens.footprints import Area, Footprint
@@ -132,6 +132,38 @@ def test_a_bowl_is_not_thrown_off_by_what_is_too_wide_for_it(split: Literal["tar
     bowl = data.body("waffle_container").xpos
     assert np.linalg.norm(bowl - scene.objects["waffle_container"].pos) < 0.03
     assert ObjectOn("waffle", "waffle_container").holds(scene, data)
+
+
+@pytest.mark.parametrize(
+    ("task", "split", "seed"),
+    [
+        ("LoadFridgeByType", "pretrain", 1),  # a fish and a beet, each longer than its bowl is wide, others on them
+        ("MicrowaveCorrectMeal", "pretrain", 2),  # a lobster, skewers
+        ("ReturnHeatedFood", "pretrain", 0),
+        ("CountertopCleanup", "pretrain", 2),
+        ("MeatSkewerAssembly", "target", 11),  # the rim of the plate threw the skewers off
+        ("HeatKebabSandwich", "pretrain", 12),
+    ],
+)
+def test_what_does_not_fit_into_a_vessel_lies_on_its_rim_and_not_in_its_walls(
+    task: str, split: Literal["target", "pretrain"], seed: int
+) -> None:
+    scene = build_scene(get_task(task), split, seed)
+    data, _ = scene.initial_data(np.random.default_rng(seed))
+    assert sunk_in(scene.model, data) == []
+    holders = {
+        wanted.name: wanted.start.object for wanted in scene_objects(task) if wanted.start.object in scene.objects
+    }
+    assert holders
+    for name, holder in holders.items():
+        aside = data.body(name).xpos - data.body(holder).xpos
+        assert np.hypot(*aside[:2]) < max(scene.objects[holder].item.size[:2]) / 2 + 0.03  # it leans on the rim
+        assert aside[2] > -scene.objects[holder].item.size[2] / 2
+    assert not {name: by for name, by in fell(scene, data).items() if by > 0.02}
+
+
+def scene_objects(task: str) -> list[ObjectSpec]:
+    return [wanted for wanted in get_task(task).objects if isinstance(wanted.start, Placement)]
 
 
 def test_a_scale_of_two_factors_is_refused() -> None:

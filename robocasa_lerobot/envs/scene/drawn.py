@@ -17,6 +17,7 @@ class PlacedObject:
     """An object of a scene: its model, and where it starts (centre in metres, yaw in radians).
 
     One that is `lying` was turned by a quarter about its own x axis before.
+    `let_down_m` is how far above the floor of a vessel it starts: it may come down by that while it settles.
     """
 
     name: str
@@ -24,6 +25,7 @@ class PlacedObject:
     pos: tuple[float, float, float]
     yaw: float
     lying: bool = False
+    let_down_m: float = 0.0
 
     @property
     def footprint(self) -> Footprint:

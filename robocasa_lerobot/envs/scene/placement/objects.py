@@ -21,6 +21,7 @@ from robocasa_lerobot.envs.scene.task_parameters import item_of, name_of, number
 from robocasa_lerobot.envs.scene.words import numbered
 
 PLACEMENT_GAP_M = 0.004  # objects start this far above their surface and settle
+SHALLOW_M = 0.025  # vessels up to this deep are plates: what lies within their edge starts on their floor
 _TURNS = 20  # how often a place is drawn for what hardly fits into a compartment
 IN_CONTAINER = "in_container"  # object group of what may stand in a container
 
@@ -204,10 +205,7 @@ def _put_on(
     holder: PlacedObject,
     start: Placement,
 ) -> None:
-    """Put an object into, or onto, one that was placed: on the floor of its inside, on its rim, or on its top.
-
-    On the rim and in the middle, where it is too wide for the inside of a vessel deeper than itself.
-    """
+    """Put an object into, or onto, one that was placed: on the floor of its inside, on its rim, or on its top."""
     x, y, z = holder.pos
     inside = getattr(holder.item, "interior", None)
     if inside is not None:
@@ -220,10 +218,13 @@ def _put_on(
     area = replace(area, rotation=start.rotation, inside=start.ensure_inside)
     width, depth, height = item.size
     what = f"{name} ({item.model})"
+    rim = z + holder.item.size[2] / 2 if inside is not None else floor
     if start.heaped:
-        footprint, floor = _on_heap(rng, table, area, (width / 2, depth / 2), holder, what)
-        at = (footprint.x, footprint.y, floor + height / 2 + PLACEMENT_GAP_M)
-        table.placed[name] = PlacedObject(name, item, at, footprint.yaw)
+        footprint, top = _on_heap(rng, table, area, (width / 2, depth / 2), holder, what)
+        footprint, lowest = _let_down(table, footprint, area, holder, rim, height)
+        top = max(top, lowest)
+        at = (footprint.x, footprint.y, top + height / 2 + PLACEMENT_GAP_M)
+        table.placed[name] = PlacedObject(name, item, at, footprint.yaw, let_down_m=top - floor)
         return
     others = [
         p.footprint
@@ -231,27 +232,45 @@ def _put_on(
         if other != holder.name and abs(p.pos[2] - p.item.size[2] / 2 - floor) < 0.03
     ]
     footprint, _ = place(rng, [area], (width / 2, depth / 2), others, margin=0.002, what=what)
-    rim = z + holder.item.size[2] / 2
-    if inside is not None and rim > floor + height and not area.holds(footprint):
-        # It would start within the walls of a bowl, which throw it out: it is let down on them from the rim.
-        footprint = replace(footprint, x=area.middle[0], y=area.middle[1])
-        floor = rim
-    at = (footprint.x, footprint.y, floor + height / 2 + PLACEMENT_GAP_M)
-    table.placed[name] = PlacedObject(name, item, at, footprint.yaw)
-    table.taken.append((footprint, floor))
+    footprint, lowest = _let_down(table, footprint, area, holder, rim, height)
+    at = (footprint.x, footprint.y, lowest + height / 2 + PLACEMENT_GAP_M)
+    table.placed[name] = PlacedObject(name, item, at, footprint.yaw, let_down_m=lowest - floor)
+    table.taken.append((footprint, lowest))
+
+
+def _let_down(
+    table: _Table, footprint: Footprint, area: Area, holder: PlacedObject, rim: float, height: float
+) -> tuple[Footprint, float]:
+    """Where an object of a height is let go over a vessel's inside, and from how high in the room, metres.
+
+    On the floor, where it lies within the walls. They would throw it out or keep it wedged where it lies across them:
+    then from the rim, or what lies there already, and in the middle of a vessel that is no plate.
+    """
+    if area.holds(footprint):
+        return footprint, area.z
+    if rim > area.z + min(height, SHALLOW_M):
+        x, y = area.middle
+        footprint = replace(footprint, x=x, y=y)
+        return footprint, max([rim, *_tops_under(table, footprint, area, holder)])
+    far = np.hypot(*(footprint.corners() - holder.pos[:2]).T).max()
+    return footprint, rim if far > min(holder.item.size[:2]) / 2 else area.z
 
 
 def _on_heap(
     rng: np.random.Generator, table: _Table, area: Area, half: tuple[float, float], holder: PlacedObject, what: str
 ) -> tuple[Footprint, float]:
     """The lowest of several places on what a holder has in it already, and the height there, metres."""
-    others = [other for other in table.placed.values() if other is not holder and other.pos[2] > area.z]
     best: tuple[Footprint, float] | None = None
     for _ in range(_TURNS):
         footprint, _ = place(rng, [area], half, [], what=what)
-        tops = [other.pos[2] + other.item.size[2] / 2 for other in others if other.footprint.overlaps(footprint)]
-        floor = max([area.z, *tops])
+        floor = max([area.z, *_tops_under(table, footprint, area, holder)])
         if best is None or floor < best[1]:
             best = footprint, floor
     assert best is not None
     return best
+
+
+def _tops_under(table: _Table, footprint: Footprint, area: Area, holder: PlacedObject) -> list[float]:
+    """Heights in the room of what a holder has in it already, where a footprint lies over it, metres."""
+    others = [other for other in table.placed.values() if other is not holder and other.pos[2] > area.z]
+    return [other.pos[2] + other.item.size[2] / 2 for other in others if other.footprint.overlaps(footprint)]
