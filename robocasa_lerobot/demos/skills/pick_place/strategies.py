@@ -75,6 +75,7 @@ from robocasa_lerobot.envs.kitchens.fixtures.regions import regions_of
 from robocasa_lerobot.envs.predicates.heat_and_water import OnBurner
 from robocasa_lerobot.envs.predicates.logic import Not, every_goal_in
 from robocasa_lerobot.envs.predicates.objects import ObjectAtSite, ObjectInside
+from robocasa_lerobot.envs.predicates.placed_by import Behind
 from robocasa_lerobot.envs.tasks.conditions import IN_RANGE, stage_condition
 from robocasa_lerobot.envs.tasks.task import Stage
 
@@ -230,8 +231,9 @@ def _by_target(env: KitchenEnv, stage: Stage, obj: Graspable) -> PlaceStrategy:
         return PlaceStrategy(over_burners(env, obj, fixture, burners), entries=("up", "across"))
     named = [(name, region) for name, region in regions_of(fixture) if name.startswith(part)]
     regions = [region for _, region in named if _counts(env, stage, region)]
-    columns = MANY_COLUMNS if distance_terms(env, stage) else COLUMNS
-    return _into_regions(env, obj, fixture, part, regions, columns)
+    terms = distance_terms(env, stage)
+    columns, behind = MANY_COLUMNS if terms else COLUMNS, any(isinstance(term, Behind) for term in terms)
+    return _into_regions(env, obj, fixture, part, regions, columns, behind=behind)
 
 
 def _unwanted_burners(env: KitchenEnv, stage: Stage) -> set[str]:
@@ -266,7 +268,7 @@ def _into_sink(env: KitchenEnv, stage: Stage, obj: Graspable, sink: Sink) -> Pla
 
 
 def _into_regions(
-    env: KitchenEnv, obj: Graspable, fixture: Fixture, part: str, regions: list[Region], columns: int
+    env: KitchenEnv, obj: Graspable, fixture: Fixture, part: str, regions: list[Region], columns: int, *, behind: bool
 ) -> PlaceStrategy:
     match fixture:
         case Blender():
@@ -296,8 +298,8 @@ def _into_regions(
             # Past the edge of what it came from, a shelf's or a drawer's, in a straight line.
             narrow = "drawer" in locate(env, obj.name).region
             return PlaceStrategy(
-                in_regions(env, obj, regions, (0.0,), columns), leans=_CLOSED_LEANS, entries=("up", "across", "out"),
-                grasp=ANY_APPROACH, in_m=0.28, narrow=narrow,
+                in_regions(env, obj, regions, (0.0,), columns, behind=behind), leans=_CLOSED_LEANS,
+                entries=("up", "across", "out"), grasp=ANY_APPROACH, in_m=0.28, narrow=narrow,
             )  # fmt: skip
 
 

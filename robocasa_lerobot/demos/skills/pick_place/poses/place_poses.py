@@ -140,11 +140,18 @@ def in_basin(env: KitchenEnv, basin: Region) -> PlacePoses:
 
 
 def in_regions(
-    env: KitchenEnv, obj: Graspable, regions: list[Region], drops: tuple[float, ...], columns: int = COLUMNS
+    env: KitchenEnv,
+    obj: Graspable,
+    regions: list[Region],
+    drops: tuple[float, ...],
+    columns: int = COLUMNS,
+    *,
+    behind: bool = False,
 ) -> PlacePoses:
     """On the floors of regions, near their fronts, or let fall from heights `drops` above, metres.
 
-    Of the points across a region, so many are taken that are nearest to the robot.
+    Of the points across a region, so many are taken that are nearest to the robot. With `behind`, or where the front is
+    full, places farther back are among them.
     """
     data = env.data
 
@@ -158,7 +165,7 @@ def in_regions(
             wide, deep, tall = region.half
             room_x, room_y = max(wide - across - REGION_EDGE_M, 0.0), max(deep - across - REGION_EDGE_M, 0.0)
             own = float(np.clip(region.local(data, base)[0], -room_x, room_x))
-            inside = INWARDS + BEHIND if _full_in_front(env, obj, region) else INWARDS
+            inside = INWARDS + BEHIND if behind or _full_in_front(env, obj, region) else INWARDS
             across_it = {round(x, 3) for x in (own, *np.linspace(-room_x, room_x, columns).tolist())}
             rise = float(region.world(data, (0, 0, -tall))[2]) - lowest
             for x in sorted(across_it, key=lambda x: abs(x - own))[:columns]:
