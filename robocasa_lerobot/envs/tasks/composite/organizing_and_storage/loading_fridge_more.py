@@ -76,6 +76,7 @@ _COOKED = ("meat_in_tupperware", "veg_in_tupperware")
 _EXISTING = ("existing_item1_top", "existing_item2_top", "existing_item1_second", "existing_item2_second")
 _THIRD = "target_rack_third_item"
 _SMALL_M = (0.12, 0.12, 0.2)
+_IN_BOX_M = (0.18, 0.12, None)  # a whole lobster would lie on its rim
 
 
 def _existing(name: str, start: Placement) -> ObjectSpec:
@@ -102,8 +103,10 @@ LOAD_PREPARED_FOOD = Task(
             graspable=True,
             scale=(1.3, 1.3, 1.2),
         ),
-        ObjectSpec("meat_in_tupperware", ("meat",), Placement(object="tupperware")),
-        ObjectSpec("veg_in_tupperware", ("vegetable",), Placement(object="tupperware", heaped=True)),
+        ObjectSpec("meat_in_tupperware", ("meat",), Placement(object="tupperware"), max_size=_IN_BOX_M),
+        ObjectSpec(
+            "veg_in_tupperware", ("vegetable",), Placement(object="tupperware", heaped=True), max_size=_IN_BOX_M
+        ),
         *map(_at_side, _EXISTING),
         _existing(_THIRD, on_shelf("{shelf}", (0.3, 0.15), (0.0, 1.0), margin=0.01)),
     ),
