@@ -9,12 +9,13 @@ from typing import Any
 
 import numpy as np
 
-from robocasa_lerobot.demos.motion import Array, action, base_pose
+from robocasa_lerobot.demos.motion import OPEN, Array, action, base_pose
 from robocasa_lerobot.demos.planning.base_room import wrap
 from robocasa_lerobot.demos.skills import SKILLS, Skill, SkillError
 from robocasa_lerobot.demos.skills.common import stage_done, wait_for_stage
 from robocasa_lerobot.demos.skills.fold import fold_arm
 from robocasa_lerobot.demos.skills.navigation import drive_to
+from robocasa_lerobot.demos.skills.pick_place.carrying.torso import move_torso
 from robocasa_lerobot.demos.skills.pick_place.heaps import uppermost
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.predicates.logic import terms_by_name
@@ -102,6 +103,7 @@ def carry_out(env: KitchenEnv, log: StageLog, skills: Mapping[tuple[str, str], S
             continue
         if len(stages) > 1 and stages[index].skill not in _AS_IT_IS:
             yield from fold_arm(env)
+            yield from move_torso(env, 0.0, OPEN)
             yield from _stand_before(env, stages[index], FAR_OFF_M[min(outcome.attempts, 1)])
         turn = uppermost(env, stages, index)
         if log.outcomes[turn].attempts >= ATTEMPTS:
@@ -129,7 +131,7 @@ def _stand_before(env: KitchenEnv, stage: Stage, most_m: float) -> Iterator[Arra
     """
     if not stage.target or stage.target not in env.scene.roles:
         return
-    stand, (base, yaw) = env.scene.standing_pose(stage.target), base_pose(env.data)
+    stand, (base, yaw) = env.scene.place_before(stage.target), base_pose(env.data)
     turned = abs(wrap(stand.yaw - yaw))
     if np.hypot(stand.x - base[0], stand.y - base[1]) > most_m or turned > FAR_OFF_RAD:
         with contextlib.suppress(SkillError):

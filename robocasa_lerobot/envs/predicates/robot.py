@@ -100,9 +100,15 @@ class Grasped(Term):
 
 @dataclass(frozen=True)
 class StandsBefore(Term):
-    """The base stands in front of a fixture as if an episode started there: within 0.20 m, turned to it."""
+    """The base stands in front of a fixture as if an episode started there: within 0.20 m, turned to it.
+
+    Attributes:
+        fixture: its role.
+        free: whether the nearest place where a robot can stand counts instead, where it cannot stand there.
+    """
 
     fixture: str
+    free: bool = False
 
     @property
     def name(self) -> str:
@@ -111,7 +117,7 @@ class StandsBefore(Term):
 
     def holds(self, scene: Scene, data: mujoco.MjData) -> bool:
         """Compare place and heading with the standing pose."""
-        goal = scene.standing_pose(self.fixture)
+        goal = scene.place_before(self.fixture) if self.free else scene.standing_pose(self.fixture)
         site = data.site(scene.robot.names.base_center_site)
         apart = float(np.hypot(site.xpos[0] - goal.x, site.xpos[1] - goal.y))
         rotation = site.xmat.reshape(3, 3)

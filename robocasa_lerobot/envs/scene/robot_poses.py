@@ -24,6 +24,8 @@ SPAWN_TRIES, SPAWN_ROUNDS = 50, 4
 SPAWN_WIDENING_M = (0.10, 0.05)
 FEW_TRIES = 8  # of a round, one by one: nearly always enough; the others are looked at together, which is faster
 SPAWN_MARGIN_M = 0.02
+# How far off the nearest free place is looked for where a robot cannot stand before a fixture: in a corner.
+NEAREST_M, NEAREST_STEP_M = 0.75, 0.05
 
 
 @dataclass(frozen=True)
@@ -79,6 +81,17 @@ def standing_pose(layout: Layout, fixture: Fixture, shape: StandingShape) -> Rob
     ground = ground_fixture(layout, fixture)
     face = faces(layout, ground, fixture)[0]
     return _pose_at(layout, ground, face, fixture.pos[:2], (0.0, 0.0), 0.0, "", shape)
+
+
+def nearest_free(pose: RobotPose, layout: Layout, shape: StandingShape) -> RobotPose:
+    """A pose, or the free one of its heading that is nearest to it with all doors shut; itself where there is none."""
+    reach = np.arange(-NEAREST_M, NEAREST_M + 1e-9, NEAREST_STEP_M)
+    shifts = sorted(((float(x), float(y)) for x in reach for y in reach), key=lambda shift: float(np.hypot(*shift)))
+    poses = [pose, *(RobotPose(pose.x + x, pose.y + y, pose.yaw, pose.side) for x, y in shifts)]
+    bounds = layout.room
+    inside = [bounds["x_min"] < at.x < bounds["x_max"] and bounds["y_min"] < at.y < 0.0 for at in poses]
+    free = np.array(inside) & Obstacles(layout.fixtures, shape).leave_free(poses)
+    return poses[int(np.argmax(free))]
 
 
 def _standoff(ground: Fixture, shape: StandingShape) -> float:

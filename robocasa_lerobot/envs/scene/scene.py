@@ -22,7 +22,7 @@ from robocasa_lerobot.envs.robots.robot import Controller, Robot
 from robocasa_lerobot.envs.scene.bodies import subtree
 from robocasa_lerobot.envs.scene.drawn import Drawn
 from robocasa_lerobot.envs.scene.memory import Memory
-from robocasa_lerobot.envs.scene.robot_poses import RobotPose, standing_pose
+from robocasa_lerobot.envs.scene.robot_poses import RobotPose, nearest_free, standing_pose
 from robocasa_lerobot.envs.scene.words import Words
 
 SETTLE_STEPS = 10  # control steps without a command after placing everything (docs/robocasa.md, section 1)
@@ -96,6 +96,7 @@ class Scene(Drawn):
     memory: Memory = field(default_factory=Memory)
     _subtrees: dict[tuple[str, ...], NDArray[np.bool_]] = field(default_factory=dict, init=False, repr=False)
     _regions: dict[tuple[str, str], tuple[Region, ...]] = field(default_factory=dict, init=False, repr=False)
+    _places: dict[str, RobotPose] = field(default_factory=dict, init=False, repr=False)
     _acting: ActingAppliances | None = field(default=None, init=False, repr=False)
 
     @property
@@ -146,6 +147,12 @@ class Scene(Drawn):
     def standing_pose(self, role: str) -> RobotPose:
         """Where a robot stands that is to use the fixture of a role, without deviation."""
         return standing_pose(self.layout, self.fixture(role), self.robot.shape)
+
+    def place_before(self, role: str) -> RobotPose:
+        """The standing pose, or the nearest where a robot can stand: before what is in a corner, beside it; kept."""
+        if role not in self._places:
+            self._places[role] = nearest_free(self.standing_pose(role), self.layout, self.robot.shape)
+        return self._places[role]
 
     def lay_lid(self, role: str, data: mujoco.MjData, turn: float, *, gone: bool) -> None:
         """Lay the lid of a blender on the counter, turned by a share of a full turn; not if it is `gone`."""

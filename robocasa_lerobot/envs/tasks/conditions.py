@@ -75,7 +75,7 @@ def _as_exact(goal: Goal, where: ObjectInside) -> ObjectInside:
 def _driven(task: BoundTask, stage: Stage) -> Goal:
     """Before a fixture or an object, and with the carried object, if any, in the hand."""
     roles = {fixture.role for fixture in task.fixtures}
-    there = StandsBefore(stage.target) if stage.target in roles else StandsNear(stage.target)
+    there = StandsBefore(stage.target, free=True) if stage.target in roles else StandsNear(stage.target)
     return AllOf(there, Grasped(stage.object)) if stage.object else there
 
 

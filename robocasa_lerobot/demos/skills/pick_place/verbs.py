@@ -9,11 +9,13 @@ import numpy as np
 
 from robocasa_lerobot.demos.motion import CLOSED, OPEN, Array, HandTarget, grip_position, hand_rotation
 from robocasa_lerobot.demos.planning.base_path import base_now, wrap
+from robocasa_lerobot.demos.planning.collision import Held
 from robocasa_lerobot.demos.skills.common import SkillError, hold_hand, stage_done
 from robocasa_lerobot.demos.skills.fold import fold_arm
 from robocasa_lerobot.demos.skills.navigation import drive_to
 from robocasa_lerobot.demos.skills.pick_place.by_handle import PAN_BY_THE_HANDLE, TOOL_BY_THE_HANDLE, has_handle
 from robocasa_lerobot.demos.skills.pick_place.carrying.carry import carry_to, go_to_object, in_reach, standing_pose_for
+from robocasa_lerobot.demos.skills.pick_place.carrying.torso import move_torso, torso_for
 from robocasa_lerobot.demos.skills.pick_place.grasp_strategy import ANY_APPROACH, GraspStrategy
 from robocasa_lerobot.demos.skills.pick_place.graspable import Graspable, graspable
 from robocasa_lerobot.demos.skills.pick_place.location import locate
@@ -29,6 +31,7 @@ from robocasa_lerobot.demos.skills.pick_place.strategies import (
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.kitchens.appliances.kinds.microwave import Microwave
 from robocasa_lerobot.envs.kitchens.fixtures.base import Fixture
+from robocasa_lerobot.envs.kitchens.fixtures.cabinets import HingeCabinet
 from robocasa_lerobot.envs.scene.robot_poses import RobotPose
 from robocasa_lerobot.envs.tasks.task import Stage
 
@@ -69,6 +72,7 @@ def place_object(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
             towards = env.data.body(holder).xpos.copy() if holder else None
             yield from take(env, obj, strategy.grasp, towards=towards)
         yield from _bring(env, stage, obj, strategy)
+        yield from move_torso(env, 0.0, CLOSED, Held.now(env.data, obj.name, obj.contents))
         yield from put(env, obj, strategy, failed)
         for _ in range(SETTLE_STEPS):
             if stage_done(env, stage):
@@ -97,11 +101,12 @@ def drive(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
             raise SkillError(f"{holder} stands nowhere that a robot can drive to")
         stand = standing_pose_for(env, fixture, env.data.body(holder).xpos)
     else:
-        stand = env.scene.standing_pose(stage.target)
+        stand = env.scene.place_before(stage.target)
     if obj is not None:
         yield from carry_to(env, obj, stand, _next_place(env, stage, obj))
     else:
         yield from fold_arm(env)  # it may still reach into what it has put something into
+        yield from move_torso(env, 0.0, OPEN)
         yield from drive_to(env, stand.x, stand.y, stand.yaw)
 
 
@@ -123,10 +128,13 @@ def take(
     been: list[RobotPose] = []
     while True:
         yield from go_to_object(env, obj.name, been, towards)
-        yield from _around_door(env, locate(env, obj.name).fixture)
+        fixture = locate(env, obj.name).fixture
+        yield from _around_door(env, fixture)
+        yield from _rise_to(env, fixture, env.data.body(obj.name).xpos.copy())
         try:
             elsewhere = partial(_has_other_side, env, obj.name) if not been else lambda: False
             yield from pick(env, obj, grasp_strategy(env, obj, free, kept=kept), elsewhere)
+            yield from move_torso(env, 0.0, CLOSED, Held.now(env.data, obj.name, obj.contents))
             return
         except SkillError:
             if len(been) == MOST_PLACES - 1:
@@ -159,6 +167,15 @@ def _bring(env: KitchenEnv, stage: Stage, obj: Graspable, strategy: PlaceStrateg
 def _target_fixture(env: KitchenEnv, stage: Stage) -> Fixture | None:
     holder = target_object(env, stage)
     return locate(env, holder).fixture if holder else env.scene.fixture(stage.target)
+
+
+def _rise_to(env: KitchenEnv, fixture: Fixture | None, point: Array) -> Iterator[Array]:
+    """Bring the torso up before a shelf of a wall cabinet, from which the empty hand is to take something; else down.
+
+    What goes in there is in the hand, which goes level: it needs no more height than the arm has.
+    """
+    high = isinstance(fixture, HingeCabinet)
+    yield from move_torso(env, torso_for(float(point[2])) if high else 0.0, OPEN)
 
 
 def _around_door(env: KitchenEnv, fixture: Fixture | None) -> Iterator[Array]:

@@ -21,6 +21,7 @@ from robocasa_lerobot.demos.skills.common import SkillError
 from robocasa_lerobot.demos.skills.fold import fold_arm
 from robocasa_lerobot.demos.skills.navigation import drive_to
 from robocasa_lerobot.demos.skills.pick_place.carrying.fold_held import fold_with
+from robocasa_lerobot.demos.skills.pick_place.carrying.torso import move_torso
 from robocasa_lerobot.demos.skills.pick_place.graspable import Graspable
 from robocasa_lerobot.demos.skills.pick_place.location import locate
 from robocasa_lerobot.demos.skills.reaching import free_stands
@@ -136,6 +137,7 @@ def carry_to(env: KitchenEnv, obj: Graspable, stand: RobotPose, towards: Array |
     Raises:
         SkillError: there is no path, or the base got stuck.
     """
+    yield from move_torso(env, 0.0, CLOSED, Held.now(env.data, obj.name, obj.contents))
     yield from fold_with(env, obj, stand, towards)
     held = Held.now(env.data, obj.name, obj.contents)
     yield from drive_to(env, stand.x, stand.y, stand.yaw, gripper=CLOSED, held=held)
