@@ -157,9 +157,13 @@ ORGANIZE_MEASURING_CUPS = Task(
         *(GripperFar(name, _AWAY_M) for name in _CUPS),
     ),
     stages=(
-        _line_up(_SMALL, _beside(_SMALL, _MEDIUM, "left"), "put the small cup to the left of the medium one"),
-        _line_up(_MEDIUM, _beside(_MEDIUM, _SMALL, "right"), "put the medium cup to the right of the small one"),
-        _line_up(_LARGE, _beside(_LARGE, _MEDIUM, "right"), "put the large cup to the right of the medium one"),
+        _line_up(_SMALL, _beside(_SMALL, _MEDIUM, "left"), "put the small measuring cup to the left of the medium one"),
+        _line_up(
+            _MEDIUM, _beside(_MEDIUM, _SMALL, "right"), "put the medium measuring cup to the right of the small one"
+        ),
+        _line_up(
+            _LARGE, _beside(_LARGE, _MEDIUM, "right"), "put the large measuring cup to the right of the medium one"
+        ),
     ),
     instruction="Put the three measuring cups in a row from small, at the left, to large, all handles to the front.",
     paraphrases=(
