@@ -56,7 +56,7 @@ from robocasa_lerobot.demos.skills.pick_place.poses.plate_poses import is_flat, 
 from robocasa_lerobot.demos.skills.pick_place.poses.turned_poses import as_turned
 from robocasa_lerobot.demos.skills.pick_place.reach_in import OUT_OF_A_MICROWAVE, OUT_OF_A_TOASTER_OVEN
 from robocasa_lerobot.demos.skills.pick_place.turn_across import lies_across, turn_across
-from robocasa_lerobot.demos.skills.pick_place.turn_over import LEANS, TO_TURN, which_way_up
+from robocasa_lerobot.demos.skills.pick_place.turn_over import LEANS, TO_TURN, tilted_leans, which_way_up
 from robocasa_lerobot.demos.skills.racks import pull
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.kitchens.appliances.kinds.blender import Blender
@@ -177,7 +177,8 @@ def place_strategy(env: KitchenEnv, stage: Stage, obj: Graspable) -> PlaceStrate
     if upwards is not None:
         return replace(strategy, upwards=upwards, leans=LEANS, entries=("up", "across", "out"), grasp=TO_TURN)
     if not obj.contents:
-        return strategy
+        tilts = tilted_leans(env, stage, obj)
+        return replace(strategy, leans=tilts, entries=("up", "across", "out")) if tilts else strategy
     steepest = DEEP_LEAN if _is_deep(obj) else 0.0
     leans = tuple(lean for lean in (0.0, DEEP_LEAN / 2, DEEP_LEAN) if lean <= max(steepest, 0.0))
     grasp = LEANING_GRASP if strategy.grasp is ANY_APPROACH and "out" in strategy.entries else strategy.grasp

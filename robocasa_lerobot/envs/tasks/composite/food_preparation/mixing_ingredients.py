@@ -273,8 +273,8 @@ MAKE_CHOCOLATE_MILK = Task(
             "pick_place",
             "place",
             "glass_milk",
-            object="chocolate1",
-            until=AllOf(_leans_in("chocolate1"), GripperFar("glass_milk")),
+            object="chocolate2",  # lies on the other one
+            until=AllOf(_leans_in("chocolate2"), GripperFar("glass_milk")),
         ),
         Stage("pick_place", "place", "glass_milk", object="sugar_cube"),
     ),
