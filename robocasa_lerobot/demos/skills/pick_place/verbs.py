@@ -30,6 +30,7 @@ from robocasa_lerobot.demos.skills.pick_place.strategies import (
 )
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.kitchens.appliances.kinds.microwave import Microwave
+from robocasa_lerobot.envs.kitchens.appliances.kinds.stove import Hob
 from robocasa_lerobot.envs.kitchens.fixtures.base import Fixture
 from robocasa_lerobot.envs.kitchens.fixtures.cabinets import HingeCabinet
 from robocasa_lerobot.envs.scene.robot_poses import RobotPose
@@ -185,11 +186,13 @@ def _around_door(env: KitchenEnv, fixture: Fixture | None) -> Iterator[Array]:
 
 def _free_grasp(env: KitchenEnv, stage: Stage) -> GraspStrategy:
     """How an object that stands free is grasped best for where it goes next."""
-    use = _next_use(env, stage)
-    if use in BY_USE and (use != "pour" or has_handle(graspable(env, stage.object))):
+    use, obj = _next_use(env, stage), graspable(env, stage.object)
+    if use in BY_USE and (use != "pour" or has_handle(obj)):
         return BY_USE[use]
+    if has_handle(obj) and isinstance(locate(env, obj.name).fixture, Hob):
+        return PAN_BY_THE_HANDLE  # a hand at its rim has knobs and other pans beside it, and the weight turns it
     following = _placing(env, stage)
-    return ANY_APPROACH if following is None else place_strategy(env, following, graspable(env, stage.object)).grasp
+    return ANY_APPROACH if following is None else place_strategy(env, following, obj).grasp
 
 
 def _next_use(env: KitchenEnv, stage: Stage) -> str:
