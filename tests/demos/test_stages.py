@@ -122,6 +122,7 @@ Skill = Callable[[Made, Stage], Iterator[np.ndarray]]
 def made(monkeypatch: pytest.MonkeyPatch, skills: dict[str, Skill]) -> Made:
     monkeypatch.setattr(module, "SKILLS", {("made", name): skill for name, skill in skills.items()})
     monkeypatch.setattr(module, "fold_arm", lambda env: iter(()))  # there is no arm
+    monkeypatch.setattr(module, "move_torso", lambda env, wanted_m, gripper: iter(()))  # nor a torso
     stages = tuple(Stage("made", name, "", until=Flag(name)) for name in skills)
     goal: Goal = AllOf(*(Flag(name) for name in skills))
     return Made(SimpleNamespace(name="made", stages=stages, goal=goal))
