@@ -266,7 +266,7 @@ _LARGE, _COBS = 1.15, ("corn1", "corn2")
 
 BOIL_CORN = Task(
     name="BoilCorn",
-    summary="Both cobs are in the saucepan over its lit burner, its lid is on it, the gripper away from the lid.",
+    summary="Both cobs are in the saucepan over its lit burner, its lid lies level on it, the gripper far from it.",
     fixtures=STOVE_AND_COUNTER,
     robot_start=RobotStart("stove"),
     choices=(FRONT_BURNER,),
@@ -297,7 +297,7 @@ BOIL_CORN = Task(
 
 PLACE_LID_TO_BOIL = Task(
     name="PlaceLidToBoil",
-    summary="The lid is on the saucepan, which stands on its lit burner; the gripper is away from the lid.",
+    summary="The lid lies level on the saucepan, which stands on its lit burner; the gripper is away from the lid.",
     fixtures=(FixtureSpec("stove", "stove"), FixtureSpec("cabinet", "cabinet")),
     robot_start=RobotStart("cabinet"),
     choices=(FRONT_BURNER,),

@@ -33,8 +33,8 @@ _ADDED = ("vegetable1", "vegetable2")
 ADD_TO_SOUP_POT = Task(
     name="AddToSoupPot",
     summary=(
-        "Both vegetables are in the saucepan, its lid is on it, it stands on its burner, which is on low, and the "
-        "gripper is away from the lid."
+        "Both vegetables are in the saucepan, its lid lies level on it, it stands on its burner, which is on low, and "
+        "the gripper is away from the lid."
     ),
     fixtures=STOVE_AND_COUNTER,
     robot_start=RobotStart("stove"),
@@ -67,8 +67,8 @@ ADD_TO_SOUP_POT = Task(
 BEGIN_SLOW_COOKING = Task(
     name="BeginSlowCooking",
     summary=(
-        "The burner under the saucepan is on low, and the lid is on the saucepan, which stands on its burner; the "
-        "gripper is away from the lid."
+        "The burner under the saucepan is on low, and the lid lies level on the saucepan, which stands on its burner; "
+        "the gripper is away from the lid."
     ),
     fixtures=STOVE_AND_COUNTER,
     robot_start=RobotStart("stove"),

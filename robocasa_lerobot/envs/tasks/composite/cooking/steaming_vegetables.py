@@ -161,8 +161,8 @@ _TO_STEAM = ("vegetable1", "vegetable2")
 STEAM_VEGGIES_WITH_WATER = Task(
     name="SteamVeggiesWithWater",
     summary=(
-        "Both vegetables are in the saucepan over its lit burner, the lid is on the saucepan, the gripper away from "
-        "the lid."
+        "Both vegetables are in the saucepan over its lit burner, the lid lies level on the saucepan, the gripper away "
+        "from the lid."
     ),
     fixtures=STOVE_AND_COUNTER,
     robot_start=RobotStart("counter", at_object="vegetable_plate"),
