@@ -14,7 +14,8 @@ from robocasa_lerobot.demos.skills.pick_place.poses.plate_poses import offsets, 
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.tasks.task import Stage
 
-DROPS = ((0.0, 0.0), (0.3, 0.15), (0.6, 0.4), (1.1, 0.8))  # shares of a vessel's depth, with their costs
+# Shares of a vessel's depth, with their costs: fingers that open low in it brace against its walls.
+DROPS = ((0.3, 0.5), (0.7, 0.0), (1.0, 0.1))
 ROUND_SHARE = 1.3  # of a round vessel's inside as objects have it, a square within its walls: the radius between these
 WALL_COST, BESIDE_COST = 40.0, 1.0  # for each metre that something stands out beyond the walls; beside the middle
 
