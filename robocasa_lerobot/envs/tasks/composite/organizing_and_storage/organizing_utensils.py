@@ -107,7 +107,7 @@ def _on_top(name: str, kind: str) -> ObjectSpec:
 
 
 def _to_twin(name: str, kind: str) -> Stage:
-    text = f"put the {kind} into the drawer, to the other {kind}"
+    text = f"put the {kind} to the other {kind} in the drawer"
     return Stage("pick_place", "place", "drawer", object=name, until=_with_twin(name), text=text)
 
 
