@@ -17,6 +17,7 @@ from robocasa_lerobot.envs.kitchens.fixtures.counters import Counter
 
 GRID_M, EDGE_M, NEAR_M = 0.07, 0.02, 0.75
 MOST_POSES = 14
+FARTHER_M = 1.5  # of a free place from the base, where there is none near it
 BESIDE_M, MOST_BESIDE = 0.32, 40  # of places that it is to come beside
 FAR_COST = 0.8  # for each metre
 
@@ -27,9 +28,13 @@ def on_counter(
     """Points on a counter's top, near the robot, where an object as it is turned now meets nothing.
 
     With places `beside` which it is to come, world, metres, each (3,), points near these, wherever the robot is.
+    Where there is no room near the robot, points farther off, to which it drives.
     """
 
     def poses() -> list[PlacePose]:
+        return free_within(within_m) or ([] if beside else free_within(FARTHER_M))
+
+    def free_within(within_m: float) -> list[PlacePose]:
         body = env.data.body(obj.name)
         turn = body.xmat.reshape(3, 3).copy()
         edge = float(max(obj.half_extents(turn)[:2])) + EDGE_M
