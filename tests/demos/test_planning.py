@@ -29,6 +29,7 @@ from robocasa_lerobot.demos.skills.common import SkillError
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.robots.panda_omron.names import HAND, MOBILE_BASE
 from robocasa_lerobot.envs.robots.panda_omron.robot import PANDA_OMRON
+from robocasa_lerobot.envs.scene.bodies import is_loose
 from robocasa_lerobot.envs.scene.robot_poses import RobotPose
 
 
@@ -126,6 +127,29 @@ def test_allowed_bodies_and_margins_and_links(dishwasher: KitchenEnv) -> None:
     pardoned = checker.touched(bases, joints, most=12, hand_may=np.ones(100, dtype=np.bool_))
     assert 0 < pardoned.counts.sum() < plain.counts.sum()
     assert np.array_equal(checker.touched(bases, joints, most=12).counts, plain.counts)
+
+
+def test_what_the_arm_leans_on_is_no_obstacle_as_it_leaves_but_is_not_gone_through(cabinet: KitchenEnv) -> None:
+    model, data = cabinet.model, copy.copy(cabinet.data)
+    checker = CollisionChecker(cabinet.scene, cabinet.data)
+    bases, joints = random_configurations(checker, 150)
+    found = checker.touched(bases, joints, most=60)
+    base = checker.touched(bases, joints, most=60, links=(0,))
+    robot, passes = cabinet.scene.subtree(MOBILE_BASE), 0
+    for row in np.flatnonzero((found.counts > 0) & (found.counts <= 2) & (base.counts == 0))[:12]:
+        leant_on = frozenset(found.bodies[row, : found.counts[row]].tolist())
+        if any(is_loose(model, body) for body in leant_on) or any(robot[body] for body in leant_on):
+            continue
+        data.qpos[:] = cabinet.data.qpos
+        data.qpos[checker.arm.addresses] = joints[row]
+        PANDA_OMRON.place_base(model, data, *bases[row].tolist())
+        mujoco.mj_kinematics(model, data)
+        leaning = CollisionChecker(cabinet.scene, data)
+        assert leaning.touched(leaning.present_base, leaning.present_joints).all() == leant_on
+        leaning.allow_present()
+        assert not leaning.touched(leaning.present_base, leaning.present_joints).all()
+        passes += bool(leaning.touched(bases, joints, most=60).all() & leant_on)
+    assert passes > 2
 
 
 LOW, HIGH = np.full(2, -2.0), np.full(2, 2.0)

@@ -19,10 +19,12 @@ from numpy.typing import NDArray
 from robocasa_lerobot.demos.motion import Array, base_pose, grip_position, hand_rotation, rotation_about
 from robocasa_lerobot.demos.planning import kernel
 from robocasa_lerobot.demos.planning.kinematics import Arm
-from robocasa_lerobot.envs.scene.bodies import subtree
+from robocasa_lerobot.envs.scene.bodies import is_loose, subtree
 from robocasa_lerobot.envs.scene.scene import Scene
 
 MOST_TOUCHED = 3  # bodies that are told apart
+MOST_LEANT_ON = 8
+LEAN_M = 0.01  # that the arm may go further into what it leans on, as it leaves
 FLOOR = "floor"
 _NO_POSITIONS, _NO_ROTATIONS = np.zeros((1, 0, 3)), np.zeros((1, 0, 3, 3))
 
@@ -142,6 +144,7 @@ class CollisionChecker:
         if floor >= 0:
             self._pardons[floor] = 3  # wheels stand on it, the hand may not
         self._pardons[list(allowed)] = 1
+        self._leans = np.zeros(model.ngeom)
         self._movers: dict[tuple[int, tuple[int, ...] | None], kernel.Shapes] = {}
         self._robots: dict[tuple[int, ...] | None, kernel.Shapes] = {}
         self._keep: list[Held | None] = []
@@ -155,6 +158,27 @@ class CollisionChecker:
     def allow(self, bodies: Iterable[int]) -> None:
         """Let more bodies be touched."""
         self._pardons[list(bodies)] = 1
+
+    def allow_present(self) -> None:
+        """Let be touched what the robot leans on already: that is no reason not to go.
+
+        What the base touches (an open drawer before it) may be touched anywhere, and so may loose objects. Of other
+        things only the geoms that the arm touches, and hardly deeper than now: a fridge with its shelves is one body.
+        """
+        here, joints, model, shapes = self.present_base, self.present_joints, self._model, self._all
+        every = self.touched(here, joints, most=MOST_LEANT_ON).all()
+        base = self.touched(here, joints, most=MOST_LEANT_ON, links=(0,)).all() if every else every
+        anywhere = {body for body in every if body in base or is_loose(model, body)}
+        self.allow(anywhere)
+        mine = self._robot[shapes.bodies]
+        for other in np.flatnonzero(np.isin(shapes.bodies, list(every - anywhere))):
+            near = mine & ((shapes.low <= shapes.high[other]) & (shapes.high >= shapes.low[other])).all(axis=1)
+            geom = int(shapes.geoms[other])
+            apart = [
+                mujoco.mj_geomDistance(model, self._data, g, geom, 1e-3, None) for g in shapes.geoms[near].tolist()
+            ]
+            if min(apart, default=0.0) < 0.0:
+                self._leans[geom] = LEAN_M - min(apart)
 
     def allow_hand(self, body: int) -> None:
         """Let the hand alone touch a body, at configurations with `hand_may`."""
@@ -233,6 +257,7 @@ class CollisionChecker:
             part.positions if part is not None else _NO_POSITIONS,
             part.rotations if part is not None else _NO_ROTATIONS,
             self._pardons,
+            self._leans,
             frames,
             joints,
             np.zeros(count, dtype=np.int64) if states is None else np.asarray(states, dtype=np.int64),

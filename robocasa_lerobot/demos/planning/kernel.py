@@ -341,6 +341,7 @@ def _meet(
     near: Indices,
     count: int,
     pardons: Indices,
+    leans: Array,
     hand_may: bool,
     on_own_base: bool,
     margin: float,
@@ -378,7 +379,8 @@ def _meet(
                 or not ((contype[g] & other_conaffinity[e]) | (other_contype[e] & conaffinity[g]))
             ):
                 continue
-            if _geom_distance(model, data, mine[g], its[e], within, 0) < margin:
+            least = -leans[its[e]] if leans[its[e]] > 0.0 else margin
+            if _geom_distance(model, data, mine[g], its[e], within, 0) < least:
                 bodies[n, counts[n]] = owners[e]
                 counts[n] += 1
                 break
@@ -397,6 +399,7 @@ def touched(
     part_positions: Array,
     part_rotations: Array,
     pardons: Indices,
+    leans: Array,
     bases: Array,
     joints: Array,
     states: Indices,
@@ -420,6 +423,7 @@ def touched(
         part_positions: (S, p, 3) of the part's geoms in each of its states.
         part_rotations: (S, p, 3, 3) of them.
         pardons: (nbody,) 1 for bodies that may be touched, 2 for those that the hand alone, 3 that the base alone may.
+        leans: (ngeom,) metres that shapes may go into geoms which are leant on already, whatever the margin; else 0.
         bases: (N, 4) x, y, z in metres and heading in radians of the arm's frame.
         joints: (N, 7) radians.
         states: (N,) of the part.
@@ -449,17 +453,17 @@ def touched(
         _place(moving.geoms, every, many, positions, rotations, xpos, xmat)
         _meet(
             model, data, moving, low, high, part, part_low, part_high, every, parts,
-            pardons, hand_may[n], False, margin, n, bodies, counts,
+            pardons, leans, hand_may[n], False, margin, n, bodies, counts,
         )  # fmt: skip
         count = _near(low, high, still.low, still.high, margin, near)
         _place_once(still.geoms, near, count, placed, still.positions, still.rotations, xpos, xmat)
         _meet(
             model, data, moving, low, high, still, still.low, still.high, near, count,
-            pardons, hand_may[n], False, margin, n, bodies, counts,
+            pardons, leans, hand_may[n], False, margin, n, bodies, counts,
         )  # fmt: skip
         _meet(  # the hand, or what it holds, on the robot's own base
             model, data, moving, low, high, moving, low, high, every, many,
-            pardons, hand_may[n], True, margin, n, bodies, counts,
+            pardons, leans, hand_may[n], True, margin, n, bodies, counts,
         )  # fmt: skip
         if until_one and counts[n]:
             return

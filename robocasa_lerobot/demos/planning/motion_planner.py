@@ -145,8 +145,7 @@ class MotionPlanner:
         self._more = LOADED_MORE if loaded and is_full(held) else 1
         self._checker = CollisionChecker(env.scene, env.data, allowed=allowed)
         self._arm, self._here = self._checker.arm, self._checker.present_base
-        # What it leans on already is no reason not to go: an open drawer before the base, for one.
-        self._checker.allow(self._checker.touched(self._here, self._checker.present_joints, most=8).all())
+        self._checker.allow_present()
         # (paths, poses, 3) and (paths, poses, 3, 3)
         self._positions = np.array([[t.position for t in path.targets] for path in paths])
         self._rotations = np.array([[t.rotation for t in path.targets] for path in paths])

@@ -1,4 +1,4 @@
-"""Which bodies of a model belong together, and which that sleep may touch each other."""
+"""Which bodies of a model belong together, which are loose, and which that sleep may touch each other."""
 
 from __future__ import annotations
 
@@ -22,6 +22,12 @@ def subtree(model: mujoco.MjModel, *roots: str) -> NDArray[np.bool_]:
         outside = np.flatnonzero(model.body_parentid[root + 1 :] < root)
         inside[root : root + 1 + int(outside[0]) if len(outside) else model.nbody] = True
     return inside
+
+
+def is_loose(model: mujoco.MjModel, body: int) -> bool:
+    """Whether a body, with what it hangs on, goes where it is pushed."""
+    joint = int(model.body_jntadr[model.body_rootid[body]])
+    return joint >= 0 and bool(model.jnt_type[joint] == mujoco.mjtJoint.mjJNT_FREE)
 
 
 @compiled
