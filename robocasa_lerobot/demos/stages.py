@@ -11,6 +11,7 @@ import numpy as np
 
 from robocasa_lerobot.demos.motion import OPEN, Array, action, base_pose
 from robocasa_lerobot.demos.planning.base_room import wrap
+from robocasa_lerobot.demos.planning.errors import LostError
 from robocasa_lerobot.demos.skills import SKILLS, Skill, SkillError
 from robocasa_lerobot.demos.skills.common import stage_done, wait_for_stage
 from robocasa_lerobot.demos.skills.fold import fold_arm
@@ -141,7 +142,12 @@ def _stand_before(env: KitchenEnv, stage: Stage, most_m: float) -> Iterator[Arra
 def _attempt(
     env: KitchenEnv, stage: Stage, outcome: StageOutcome, skills: Mapping[tuple[str, str], Skill]
 ) -> Iterator[Array]:
-    """One go at a stage with its skill, and a while of standing still after it; a failure is noted."""
+    """One go at a stage with its skill, and a while of standing still after it; a failure is noted.
+
+    Raises:
+        UnknownNameError: it needs a skill that does not exist.
+        LostError: what it needs lies where the robot cannot get it.
+    """
     key = (stage.skill, stage.verb)
     if key not in skills:
         raise UnknownNameError("skill", " ".join(key), (" ".join(k) for k in skills))
@@ -152,6 +158,9 @@ def _attempt(
         for step in skills[key](env, stage):
             gripper = float(step[-1])
             yield step
+    except LostError as error:
+        outcome.reason = str(error)
+        raise
     except SkillError as error:
         outcome.reason = str(error)
     yield from wait_for_stage(env, stage, lambda: action(gripper=gripper), PATIENCE_STEPS)

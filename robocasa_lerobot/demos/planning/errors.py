@@ -13,3 +13,11 @@ class NoPlanError(SkillError):
 
 class ShutInError(NoPlanError):
     """There is no plan, and little had to be looked at to know: all around the goal is taken."""
+
+
+class LostError(SkillError):
+    """Something has come to where the robot can do nothing about it any more: no attempt after this one is of use."""
+
+
+class SlippedError(SkillError):
+    """What was carried has left the hand, and may lie where it can be picked up again."""

@@ -27,6 +27,7 @@ from robocasa_lerobot.demos.planning.follow import follow_joint_path
 from robocasa_lerobot.demos.planning.grasps import GraspPose
 from robocasa_lerobot.demos.skills.common import SkillError, close_fingers, draw_back, hold_hand, move_hand
 from robocasa_lerobot.demos.skills.pick_place.carrying.finger_watch import FingerWatch, finger_gap
+from robocasa_lerobot.demos.skills.pick_place.carrying.loss import hangs, require_off_floor
 from robocasa_lerobot.demos.skills.pick_place.grasp_strategy import (
     LIFT_M,
     GraspStrategy,
@@ -73,7 +74,12 @@ ASKEW_RAD, ASKEW_M, ASKEW_ATTEMPTS = float(np.deg2rad(8.0)), 0.010, 2
 
 
 def pick(
-    env: KitchenEnv, obj: Graspable, strategy: GraspStrategy, elsewhere: Callable[[], bool] = lambda: False
+    env: KitchenEnv,
+    obj: Graspable,
+    strategy: GraspStrategy,
+    elsewhere: Callable[[], bool] = lambda: False,
+    *,
+    firm: bool = False,
 ) -> Iterator[Array]:
     """Grasp an object, and lift it or draw it out; the gripper stays closed.
 
@@ -82,13 +88,16 @@ def pick(
         obj: to be grasped.
         strategy: how.
         elsewhere: whether it could be reached for from another side: then poor grasps are not tried after a failure.
+        firm: whether it must be between the fingers in the end: what only hangs from one is put back in any case.
 
     Raises:
         SkillError: it is not in the gripper after all attempts.
+        LostError: it fell to the floor.
     """
     data = env.data
     tried: list[HandTarget] = []
     for attempt in range(ATTEMPTS):
+        require_off_floor(env, obj)
         if strategy.first is not None:
             yield from strategy.first(env)
         body = data.body(obj.name)
@@ -149,7 +158,7 @@ def pick(
         if (rise > ROSE_SHARE * lift and _stays(env, obj, inside)) or is_held(env, obj.name):
             yield from watch.over(_draw_out(env, lifted, out, strategy.narrow))
             stays, held = _stays(env, obj, inside), is_held(env, obj.name)
-            loose = not held and attempt < HANG_ATTEMPTS
+            loose = not held and (firm or attempt < HANG_ATTEMPTS)
             poor = stays and (loose or (slippery and watch.creeps()))
             if poor or (not (stays or held) and hangs(env, obj)):
                 yield from _put_back(env, at, lifted)
@@ -169,17 +178,6 @@ def _put_back(env: KitchenEnv, at: HandTarget, lifted: HandTarget) -> Iterator[A
 def is_held(env: KitchenEnv, name: str) -> bool:
     """Whether an object is between the fingers."""
     return Grasped(name).holds(env.scene, env.data)
-
-
-def hangs(env: KitchenEnv, obj: Graspable) -> bool:
-    """Whether an object touches the hand, and nothing else but what lies in it: it falls when the fingers open."""
-    hand = env.scene.subtree(env.scene.robot.names.hand)
-    mine = np.zeros(env.model.nbody, dtype=np.bool_)
-    mine[list(obj.bodies | obj.carried)] = True
-    pairs = env.model.geom_bodyid[env.data.contact.geom].reshape(-1, 2)
-    sides = np.concatenate([pairs, pairs[:, ::-1]])
-    met = sides[mine[sides[:, 0]] & ~mine[sides[:, 1]], 1]
-    return len(met) > 0 and bool(hand[met].all())
 
 
 def _stays(env: KitchenEnv, obj: Graspable, inside: Array) -> bool:

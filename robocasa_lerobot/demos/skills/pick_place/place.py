@@ -23,6 +23,7 @@ from robocasa_lerobot.demos.motion import (
 )
 from robocasa_lerobot.demos.skills.common import SkillError, hold_hand, move_hand
 from robocasa_lerobot.demos.skills.navigation import drive_to
+from robocasa_lerobot.demos.skills.pick_place.carrying.letting_go import caught, set_down
 from robocasa_lerobot.demos.skills.pick_place.carrying.level import level_hand, level_out
 from robocasa_lerobot.demos.skills.pick_place.grasp_strategy import FROM_ABOVE, GraspStrategy, ahead_of, entry, steep
 from robocasa_lerobot.demos.skills.pick_place.graspable import Graspable
@@ -160,7 +161,14 @@ def put(env: KitchenEnv, obj: Graspable, strategy: PlaceStrategy, failed: list[A
         return
     at = HandTarget(grip_position(data), hand_rotation(data))
     yield from hold_hand(data, at, OPEN, RELEASE_STEPS)
+    lower = yield from set_down(env, obj)
+    clear, away = (HandTarget(pose.position - lower * UP, pose.rotation) for pose in (clear, away))
     yield from move_hand(data, clear, OPEN, speed=0.6, tolerance=0.02, max_steps=30)
+    if (yield from caught(env, obj, HandTarget(at.position - lower * UP, at.rotation), clear)):
+        yield from move_hand(data, above, CLOSED, speed=0.6, tolerance=0.03, max_steps=30)
+        if inwards:
+            yield from move_hand(data, far, CLOSED, tolerance=0.03, max_steps=60, start=above.position)
+        return
     line = clear.position if inwards else None
     yield from move_hand(data, away, OPEN, tolerance=0.03, max_steps=60, start=line)
     yield from leave(env, obj)

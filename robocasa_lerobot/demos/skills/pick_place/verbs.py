@@ -10,16 +10,18 @@ import numpy as np
 from robocasa_lerobot.demos.motion import CLOSED, OPEN, Array, HandTarget, grip_position, hand_rotation
 from robocasa_lerobot.demos.planning.base_path import base_now, wrap
 from robocasa_lerobot.demos.planning.collision import Held
+from robocasa_lerobot.demos.planning.errors import LostError, SlippedError
 from robocasa_lerobot.demos.skills.common import SkillError, hold_hand, stage_done
 from robocasa_lerobot.demos.skills.fold import fold_arm
 from robocasa_lerobot.demos.skills.navigation import drive_to
 from robocasa_lerobot.demos.skills.pick_place.by_handle import PAN_BY_THE_HANDLE, TOOL_BY_THE_HANDLE, has_handle
 from robocasa_lerobot.demos.skills.pick_place.carrying.carry import carry_to, go_to_object, in_reach, standing_pose_for
+from robocasa_lerobot.demos.skills.pick_place.carrying.loss import hangs, require_off_floor
 from robocasa_lerobot.demos.skills.pick_place.carrying.torso import move_torso, torso_for
 from robocasa_lerobot.demos.skills.pick_place.grasp_strategy import ANY_APPROACH, GraspStrategy
 from robocasa_lerobot.demos.skills.pick_place.graspable import Graspable, graspable
 from robocasa_lerobot.demos.skills.pick_place.location import locate
-from robocasa_lerobot.demos.skills.pick_place.pick import hangs, is_held, pick
+from robocasa_lerobot.demos.skills.pick_place.pick import is_held, pick
 from robocasa_lerobot.demos.skills.pick_place.place import PlaceStrategy, put
 from robocasa_lerobot.demos.skills.pick_place.reach_in import drive_around_open_door
 from robocasa_lerobot.demos.skills.pick_place.strategies import (
@@ -72,7 +74,10 @@ def place_object(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
             holder = target_object(env, stage)
             towards = env.data.body(holder).xpos.copy() if holder else None
             yield from take(env, obj, strategy.grasp, towards=towards)
-        yield from _bring(env, stage, obj, strategy)
+        try:
+            yield from _bring(env, stage, obj, strategy)
+        except SlippedError:
+            continue  # it is picked up where it lies
         yield from move_torso(env, 0.0, CLOSED, Held.now(env.data, obj.name, obj.contents))
         yield from put(env, obj, strategy, failed)
         for _ in range(SETTLE_STEPS):
@@ -125,18 +130,22 @@ def take(
 
     Raises:
         SkillError: it is not in the gripper after all attempts.
+        LostError: it fell to the floor.
     """
     been: list[RobotPose] = []
     while True:
+        require_off_floor(env, obj)
         yield from go_to_object(env, obj.name, been, towards)
         fixture = locate(env, obj.name).fixture
         yield from _around_door(env, fixture)
         yield from _rise_to(env, fixture, env.data.body(obj.name).xpos.copy())
         try:
             elsewhere = partial(_has_other_side, env, obj.name) if not been else lambda: False
-            yield from pick(env, obj, grasp_strategy(env, obj, free, kept=kept), elsewhere)
+            yield from pick(env, obj, grasp_strategy(env, obj, free, kept=kept), elsewhere, firm=kept)
             yield from move_torso(env, 0.0, CLOSED, Held.now(env.data, obj.name, obj.contents))
             return
+        except LostError:
+            raise
         except SkillError:
             if len(been) == MOST_PLACES - 1:
                 raise

@@ -21,6 +21,7 @@ from robocasa_lerobot.demos.skills.common import SkillError
 from robocasa_lerobot.demos.skills.fold import fold_arm
 from robocasa_lerobot.demos.skills.navigation import drive_to
 from robocasa_lerobot.demos.skills.pick_place.carrying.fold_held import fold_with
+from robocasa_lerobot.demos.skills.pick_place.carrying.loss import unless_lost
 from robocasa_lerobot.demos.skills.pick_place.carrying.torso import move_torso
 from robocasa_lerobot.demos.skills.pick_place.graspable import Graspable
 from robocasa_lerobot.demos.skills.pick_place.location import locate
@@ -135,9 +136,9 @@ def carry_to(env: KitchenEnv, obj: Graspable, stand: RobotPose, towards: Array |
         towards: where the object is to go from there, world, metres; None where that is not known.
 
     Raises:
-        SkillError: there is no path, or the base got stuck.
+        SkillError: there is no path, the base got stuck, or it slipped out of the hand.
     """
     yield from move_torso(env, 0.0, CLOSED, Held.now(env.data, obj.name, obj.contents))
-    yield from fold_with(env, obj, stand, towards)
+    yield from unless_lost(env, obj, fold_with(env, obj, stand, towards))
     held = Held.now(env.data, obj.name, obj.contents)
-    yield from drive_to(env, stand.x, stand.y, stand.yaw, gripper=CLOSED, held=held)
+    yield from unless_lost(env, obj, drive_to(env, stand.x, stand.y, stand.yaw, gripper=CLOSED, held=held))
