@@ -26,6 +26,8 @@ ALLOWED: dict[tuple[str, str], int] = {
     # What a tool is used on: the whole top of the one, the basin of the other.
     ("demos/skills/pick_place/tools/surfaces.py", "Counter"): 1,
     ("demos/skills/pick_place/tools/surfaces.py", "Sink"): 1,
+    # What a drawer is built in under, and comes out from.
+    ("demos/skills/pick_place/poses/drawer_poses.py", "Counter"): 1,
     # What a place at a fixture is called: under a spout, on a burner.
     ("envs/tasks/stage_text.py", "CoffeeMachine"): 1,
     ("envs/tasks/stage_text.py", "Hob"): 1,

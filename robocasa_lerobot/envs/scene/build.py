@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 
 from robocasa_lerobot.envs.kitchens.appliances.kinds.blender import Blender
 from robocasa_lerobot.envs.kitchens.fixtures.base import Fixture, of_kind
-from robocasa_lerobot.envs.kitchens.fixtures.cabinets import Drawer
 from robocasa_lerobot.envs.kitchens.footprints import PlacementError, place
 from robocasa_lerobot.envs.kitchens.layout import Layout, load_layout
 from robocasa_lerobot.envs.kitchens.splits import Pairs, benchmark_split, scene_ids, without
@@ -241,7 +240,7 @@ def _opened(task: SceneSpec, layout: Layout, roles: dict[str, str]) -> list[tupl
         fixture = layout.fixtures[roles[entry.fixture]]
         if entry.low > 0.5:
             found.append((fixture, 1.0))
-        elif isinstance(fixture, Drawer):
+        elif fixture.slides_out:
             found.append((fixture, entry.high))
     return found
 
