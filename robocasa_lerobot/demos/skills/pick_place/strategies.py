@@ -159,6 +159,16 @@ def in_the_open(place: Location) -> bool:
     return isinstance(place.fixture, Counter | Sink | StandMixer)
 
 
+def is_reached_up_into(fixture: Fixture | None) -> bool:
+    """Whether the torso goes up before something is taken from there: out of wall cabinets."""
+    return isinstance(fixture, HingeCabinet)
+
+
+def is_on_stove(place: Location) -> bool:
+    """Whether something stands on burners: knobs and other pans are beside it."""
+    return isinstance(place.fixture, Hob)
+
+
 def place_strategy(env: KitchenEnv, stage: Stage, obj: Graspable) -> PlaceStrategy:
     """How the stage's object is put down at the stage's target: an object, or a part of the fixture of a role.
 

@@ -27,14 +27,14 @@ from robocasa_lerobot.demos.skills.pick_place.reach_in import drive_around_open_
 from robocasa_lerobot.demos.skills.pick_place.strategies import (
     grasp_strategy,
     in_the_open,
+    is_on_stove,
+    is_reached_up_into,
     place_strategy,
     target_object,
 )
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.kitchens.appliances.kinds.microwave import Microwave
-from robocasa_lerobot.envs.kitchens.appliances.kinds.stove import Hob
 from robocasa_lerobot.envs.kitchens.fixtures.base import Fixture
-from robocasa_lerobot.envs.kitchens.fixtures.cabinets import HingeCabinet
 from robocasa_lerobot.envs.scene.robot_poses import RobotPose
 from robocasa_lerobot.envs.tasks.task import Stage
 
@@ -184,8 +184,7 @@ def _rise_to(env: KitchenEnv, fixture: Fixture | None, point: Array) -> Iterator
 
     What goes in there is in the hand, which goes level: it needs no more height than the arm has.
     """
-    high = isinstance(fixture, HingeCabinet)
-    yield from move_torso(env, torso_for(float(point[2])) if high else 0.0, OPEN)
+    yield from move_torso(env, torso_for(float(point[2])) if is_reached_up_into(fixture) else 0.0, OPEN)
 
 
 def _around_door(env: KitchenEnv, fixture: Fixture | None) -> Iterator[Array]:
@@ -198,7 +197,7 @@ def _free_grasp(env: KitchenEnv, stage: Stage) -> GraspStrategy:
     use, obj = _next_use(env, stage), graspable(env, stage.object)
     if use in BY_USE and (use != "pour" or has_handle(obj)):
         return BY_USE[use]
-    if has_handle(obj) and isinstance(locate(env, obj.name).fixture, Hob):
+    if has_handle(obj) and is_on_stove(locate(env, obj.name)):
         return PAN_BY_THE_HANDLE  # a hand at its rim has knobs and other pans beside it, and the weight turns it
     following = _placing(env, stage)
     return ANY_APPROACH if following is None else place_strategy(env, following, obj).grasp

@@ -23,7 +23,7 @@ UNCOVERS = Stage(
     "counter",
     object=LID,
     until=AllOf(ObjectTouches(LID, "counter"), GripperFar(LID)),
-    text="take the lid off the saucepan and lay it on the counter",
+    text="take the saucepan lid off its pan and lay it on the counter",
 )
 
 
