@@ -32,6 +32,7 @@ from robocasa_lerobot.envs.kitchens.splits import scene_ids, without
 from robocasa_lerobot.envs.scene.build import build_scene
 from robocasa_lerobot.envs.tasks.registry import get_task, task_names
 from robocasa_lerobot.errors import UserError
+from robocasa_lerobot.jsonl import read_whole_lines
 from robocasa_lerobot.progress import Bar
 
 OUTPUT = common.RESULTS / "kitchen_tasks.json"
@@ -128,7 +129,9 @@ def missing(
 def sweep(pairs: Sequence[Pair], names: Sequence[str], parts: Path, workers: int, least: int = LEAST) -> list[Row]:
     """Arrange what has not been, until every task has so many kitchens, and return the rows of all that have."""
     tasks_of = suited(pairs, names)
-    rows = [row for row in _read(parts) if (row["layout"], row["style"]) in tasks_of and row["task"] in names]
+    rows = [
+        row for row in read_whole_lines(parts) if (row["layout"], row["style"]) in tasks_of and row["task"] in names
+    ]
     begun = {(row["layout"], row["style"]) for row in rows if not row.get("extra")}
     mixed = [pairs[index] for index in np.random.default_rng(0).permutation(len(pairs))]
     order = orders(tasks_of)
@@ -156,13 +159,6 @@ def _work(function: Callable[[Any], list[Row]], jobs: list[Any], workers: int) -
         return
     with multiprocessing.get_context("forkserver").Pool(workers) as pool:
         yield from pool.imap_unordered(function, jobs, chunksize=2)
-
-
-def _read(parts: Path) -> list[Row]:
-    if not parts.exists():
-        return []
-    lines = parts.read_text(encoding="utf-8").splitlines(keepends=True)
-    return [json.loads(line) for line in lines if line.endswith("\n")]  # the last one may be cut off
 
 
 def is_sound(row: Row) -> bool:

@@ -34,6 +34,7 @@ from robocasa_lerobot.envs.scene.scene import Scene
 from robocasa_lerobot.envs.tasks.registry import get_task, task_names
 from robocasa_lerobot.envs.tasks.task import Task
 from robocasa_lerobot.errors import UserError
+from robocasa_lerobot.jsonl import read_whole_lines
 from robocasa_lerobot.progress import Bar
 
 OUTPUT = common.RESULTS / "kitchens.json"
@@ -113,7 +114,7 @@ def is_sound(row: dict[str, Any]) -> bool:
 
 def sweep(pairs: list[tuple[int, int]], workers: int, limit: int | None) -> list[dict[str, Any]]:
     """Examine the kitchens that have not been, and return the rows of all that have."""
-    rows = {(row["layout"], row["style"]): row for row in _read()}
+    rows = {(row["layout"], row["style"]): row for row in read_whole_lines(PARTS)}
     mixed = [pairs[index] for index in np.random.default_rng(0).permutation(len(pairs))]
     todo = [pair for pair in mixed if pair not in rows][:limit]
     PARTS.parent.mkdir(parents=True, exist_ok=True)
@@ -131,13 +132,6 @@ def _work(pairs: list[tuple[int, int]], workers: int) -> Iterator[dict[str, Any]
         return
     with multiprocessing.get_context("forkserver").Pool(workers) as pool:
         yield from pool.imap_unordered(examine, pairs, chunksize=4)
-
-
-def _read() -> list[dict[str, Any]]:
-    if not PARTS.exists():
-        return []
-    lines = PARTS.read_text(encoding="utf-8").splitlines(keepends=True)
-    return [json.loads(line) for line in lines if line.endswith("\n")]  # the last one may be cut off
 
 
 def timings(count: int) -> dict[str, Any]:

@@ -17,3 +17,17 @@ def read_jsonl(path: Path) -> list[dict[str, Any]]:
     """The JSON objects of a file with one on each line."""
     # Not `splitlines`, which also breaks at other characters that instructions may hold.
     return [json.loads(line) for line in path.read_text(encoding="utf-8").split("\n") if line.strip()]
+
+
+def read_whole_lines(path: Path) -> list[dict[str, Any]]:
+    """The JSON objects of a file that grows line by line; none where there is no file.
+
+    A last line that a kill has cut off is removed, so that what is appended next stands on a line of its own.
+    """
+    if not path.exists():
+        return []
+    content = path.read_bytes()
+    whole = content[: content.rfind(b"\n") + 1]
+    if len(whole) < len(content):
+        path.write_bytes(whole)
+    return [json.loads(line) for line in whole.decode("utf-8").split("\n") if line]

@@ -12,8 +12,8 @@ from robocasa_lerobot.demos.recorder import record_episode
 from robocasa_lerobot.envs.checks.tasks import CHECK_SEEDS, check_task
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.tasks.registry import get_task
-from robocasa_lerobot.files import write_text
 from robocasa_lerobot.jobs.as_completed import as_they_end
+from robocasa_lerobot.jsonl import read_whole_lines
 
 
 @dataclass(frozen=True)
@@ -85,15 +85,8 @@ def check_all(
 
 def _logged(log: Path, seeds: Sequence[int]) -> list[Checked]:
     log.parent.mkdir(parents=True, exist_ok=True)
-    if not log.exists():
-        return []
-    lines = log.read_text(encoding="utf-8").splitlines(keepends=True)
-    whole = [line for line in lines if line.endswith("\n")]  # the last one may be cut off
-    if len(whole) < len(lines):
-        write_text(log, "".join(whole))
-    rows = [json.loads(line) for line in whole]
     return [
         Checked(row["task"], row["split"], tuple(row["faults"]), row["solved"], tuple(row["failed"]))
-        for row in rows
+        for row in read_whole_lines(log)
         if row["seeds"] == list(seeds)
     ]
