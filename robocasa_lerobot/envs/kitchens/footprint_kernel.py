@@ -37,18 +37,7 @@ def overlapping(
             mine[corner, 0] = x + (along * cos - across * sin)
             mine[corner, 1] = y + (along * sin + across * cos)
         for mark in range(len(corners)):
-            apart = False
-            for axis in range(2):
-                first, last = _span(mine, own[axis])
-                start, end = _span(corners[mark], own[axis])
-                if end + margin < first or last + margin < start:
-                    apart = True
-                    break
-                first, last = _span(mine, axes[mark, axis])
-                if high[mark, axis] + margin < first or last + margin < low[mark, axis]:
-                    apart = True
-                    break
-            if not apart:
+            if not _apart(mine, own, corners[mark], axes[mark], low[mark], high[mark], margin):
                 found[index] = True
                 break
     return found
@@ -100,23 +89,26 @@ def clear(
                 away_x, away_y = middles[mark, 0] - x, middles[mark, 1] - y
                 if away_x * away_x + away_y * away_y > (reach + reaches[mark]) ** 2:
                     continue
-                apart = False
-                for axis in range(2):
-                    first, last = _span(mine, own[axis])
-                    start, end = _span(corners[mark], own[axis])
-                    if end + margin < first or last + margin < start:
-                        apart = True
-                        break
-                    first, last = _span(mine, axes[mark, axis])
-                    if high[mark, axis] + margin < first or last + margin < low[mark, axis]:
-                        apart = True
-                        break
-                if not apart:
+                if not _apart(mine, own, corners[mark], axes[mark], low[mark], high[mark], margin):
                     found[index] = False
                     break
             if not found[index]:
                 break
     return found
+
+
+@compiled
+def _apart(mine: Array, own: Array, corners: Array, axes: Array, low: Array, high: Array, margin: float) -> bool:
+    """Whether a footprint, by corners and axes, keeps a margin to one mark: some edge of either lies between them."""
+    for axis in range(2):
+        first, last = _span(mine, own[axis])
+        start, end = _span(corners, own[axis])
+        if end + margin < first or last + margin < start:
+            return True
+        first, last = _span(mine, axes[axis])
+        if high[axis] + margin < first or last + margin < low[axis]:
+            return True
+    return False
 
 
 @compiled
