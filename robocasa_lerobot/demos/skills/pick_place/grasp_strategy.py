@@ -1,9 +1,9 @@
-"""How the hand may come to an object, grasp it and leave with it: which tilts, which entries, which grasps."""
+"""How the hand may come to an object, grasp it and leave with it; and which grasps of it have failed."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -17,6 +17,9 @@ LIFT_M, HOVER_M = 0.12, 0.12
 LIFTS_M = (0.035, 0.010)  # before it is drawn out of a front
 WORSE_GRASP = 0.45
 STEEP = 0.5  # sine of a slope
+TRIED, ALIKE_M = 1.2, 0.015  # cost of a grasp like one that has failed: its place in the object is as near as this
+ALIKE_COS = float(np.cos(np.deg2rad(25.0)))  # of the angle between hands that hold alike
+FLIPPED = np.diag([-1.0, -1.0, 1.0])  # a gripper is the same after half a turn about its approach
 
 
 @dataclass(frozen=True)
@@ -104,3 +107,43 @@ def entry(env: KitchenEnv, name: str) -> Array:
     out = {"up": UP, "out": 0.1 * UP - ahead, "across": UP - ahead, "level": -ahead}[name]
     unit: Array = out / np.linalg.norm(out)
     return unit
+
+
+@dataclass(frozen=True)
+class _Grasp:
+    """A pose of the hand in an object's axes, metres; `slid` where the object slid out, which others there may hold."""
+
+    position: Array
+    rotation: Array
+    slid: bool = False
+
+
+@dataclass
+class TriedGrasps:
+    """What has failed with one object."""
+
+    _grasps: list[_Grasp] = field(default_factory=list)
+
+    def note(self, grasp: _Grasp, *, slid: bool = False) -> None:
+        """Keep a grasp as `in_object` gave it."""
+        self._grasps.append(_Grasp(grasp.position, grasp.rotation, slid))
+
+    def cost(self, env: KitchenEnv, obj: Graspable, hand: HandTarget) -> float:
+        """What a hand at a pose costs for the ones that it is like."""
+        return TRIED * sum(_alike(in_object(env, obj, hand), other) for other in self._grasps) if self._grasps else 0.0
+
+
+def in_object(env: KitchenEnv, obj: Graspable, hand: HandTarget) -> _Grasp:
+    """Where a hand is in an object's axes."""
+    body = env.data.body(obj.name)
+    back = body.xmat.reshape(3, 3).T
+    return _Grasp(back @ (hand.position - body.xpos), back @ hand.rotation)
+
+
+def _alike(grasp: _Grasp, other: _Grasp) -> bool:
+    if np.linalg.norm(grasp.position - other.position) >= ALIKE_M:
+        return False
+    if not other.slid:
+        return True
+    turn = grasp.rotation.T @ other.rotation
+    return bool((max(np.trace(turn), np.trace(turn @ FLIPPED)) - 1) / 2 > ALIKE_COS)

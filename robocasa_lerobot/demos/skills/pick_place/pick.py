@@ -6,7 +6,7 @@ drive where the arm falls short. A grasp that fails is followed by another one.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cache, partial
 
@@ -27,12 +27,15 @@ from robocasa_lerobot.demos.planning.follow import follow_joint_path
 from robocasa_lerobot.demos.planning.grasps import GraspPose
 from robocasa_lerobot.demos.skills.common import SkillError, close_fingers, draw_back, hold_hand, move_hand
 from robocasa_lerobot.demos.skills.pick_place.carrying.finger_watch import FingerWatch, finger_gap
+from robocasa_lerobot.demos.skills.pick_place.carrying.letting_go import caught, freed
 from robocasa_lerobot.demos.skills.pick_place.carrying.loss import hangs, require_off_floor
 from robocasa_lerobot.demos.skills.pick_place.grasp_strategy import (
     LIFT_M,
     GraspStrategy,
+    TriedGrasps,
     ahead_of,
     entry,
+    in_object,
     steep,
 )
 from robocasa_lerobot.demos.skills.pick_place.graspable import Graspable, contents_of, graspable, holder_of
@@ -58,14 +61,14 @@ BLOCKED_M, BACK_M = 0.05, 0.08  # a hand as far as this from where the grasp beg
 HELD_UP_M, LOWER_M = 0.08, 0.03
 LEVEL_LIFT_M, LEVEL_COST = 0.004, 0.1  # before it is drawn out level
 CROWDED, JOSTLE_COST, BESIDE_M = 1.5, 0.5, 0.12  # of a path that meets what lies beside; how far that is, at most
-TRIED, ALIKE_M = 1.2, 0.015  # cost of a grasp like one that has failed: its place in the object is as near as this
 # An object that is held is nearer than this to where it was in the hand when that closed, and has risen by this share
 # of the lift.
 HELD_M, ROSE_SHARE = 0.05, 0.25
 # Fingers that come closer together than what is between them is wide hold the edge of it, from which they slip off.
 SHALLOW_M = 0.007
-# What slides out of the fingers (`carrying/finger_watch.py`) would be lost on its way; at a vessel's wall they settle.
-CREEP_ATTEMPTS = 2
+# What slides out of the fingers (`carrying/finger_watch.py`) would be lost on its way; at a vessel's wall, less far
+# apart than this, they settle.
+CREEP_ATTEMPTS, FAR_ATTEMPTS, WALL_M = 2, 3, 0.02
 # What is not between the fingers, but hangs from one of them, is put back; a wall that slopes is held so, in the end.
 HANG_ATTEMPTS = 2
 # Fingers that close askew to the wall of a vessel with others in it turn it as much, or stay apart by as much more than
@@ -80,6 +83,7 @@ def pick(
     elsewhere: Callable[[], bool] = lambda: False,
     *,
     firm: bool = False,
+    long_way: bool = False,
 ) -> Iterator[Array]:
     """Grasp an object, and lift it or draw it out; the gripper stays closed.
 
@@ -89,13 +93,14 @@ def pick(
         strategy: how.
         elsewhere: whether it could be reached for from another side: then poor grasps are not tried after a failure.
         firm: whether it must be between the fingers in the end: what only hangs from one is put back in any case.
+        long_way: whether it goes far then, on which it has the time to slide out.
 
     Raises:
         SkillError: it is not in the gripper after all attempts.
         LostError: it fell to the floor.
     """
     data = env.data
-    tried: list[HandTarget] = []
+    tried = TriedGrasps()
     for attempt in range(ATTEMPTS):
         require_off_floor(env, obj)
         if strategy.first is not None:
@@ -106,7 +111,7 @@ def pick(
         if choice.cost > HOPELESS or (attempt and choice.cost > POOR and elsewhere()):
             raise SkillError(f"{obj.title} is out of reach from here, or too near to other things")
         far, before, at, lifted, out = choice.path.targets
-        planned = _in_object(env, obj, at)  # which grasp this was, wherever the hand gets to
+        planned = in_object(env, obj, at)  # which grasp this was, wherever the hand gets to
         yield from follow_joint_path(env, choice.joints, OPEN)
         # All poses move with the object, should it have been touched meanwhile.
         moved = data.body(obj.name).xpos - start
@@ -117,7 +122,7 @@ def pick(
         )
         moved = data.body(obj.name).xpos - start
         if pose_error(data, _shifted(before, moved)).position > BLOCKED_M:
-            tried.append(planned)
+            tried.note(planned)
             yield from _leave_as_it_came(env, far, before)
             continue
         at = _shifted(at, moved)
@@ -132,7 +137,9 @@ def pick(
         turned, wide = abs(_uprightness(env, obj) - upright), finger_gap(env) - _width(choice)
         askew = bool(obj.contents) and (turned > ASKEW_RAD or wide > ASKEW_M)
         if attempt < ASKEW_ATTEMPTS and (askew or wide < -SHALLOW_M):
-            yield from _let_go(env, tried, planned)
+            tried.note(planned)
+            if (yield from _let_go(env, obj)):
+                return
             continue
         inside = _inside(env, obj)
         lift = float(lifted.position[2] - choice.path.targets[2].position[2])
@@ -149,22 +156,35 @@ def pick(
                 integral_gain=INTEGRAL_GAIN,
             )
         )
-        slippery = attempt < CREEP_ATTEMPTS and (obj.item is None or obj.item.interior is None)
+        vessel = obj.item is not None and obj.item.interior is not None
+        if long_way:
+            slippery = attempt < FAR_ATTEMPTS and not (vessel and finger_gap(env) < WALL_M)
+        else:
+            slippery = attempt < CREEP_ATTEMPTS and not vessel
         if slippery and watch.creeps() and _stays(env, obj, inside):
+            tried.note(planned, slid=True)
             yield from move_hand(data, at, CLOSED, speed=0.7, tolerance=0.01, max_steps=30)
-            yield from _let_go(env, tried, planned)
+            if (yield from _let_go(env, obj)):
+                return
             continue
         rise = data.body(obj.name).xpos[2] - start[2] - moved[2]
         if (rise > ROSE_SHARE * lift and _stays(env, obj, inside)) or is_held(env, obj.name):
             yield from watch.over(_draw_out(env, lifted, out, strategy.narrow))
+            if long_way and slippery:
+                yield from watch.go_on()
+            slid = slippery and watch.creeps(long=long_way)
             stays, held = _stays(env, obj, inside), is_held(env, obj.name)
             loose = not held and (firm or attempt < HANG_ATTEMPTS)
-            poor = stays and (loose or (slippery and watch.creeps()))
+            poor = stays and (loose or slid)
             if poor or (not (stays or held) and hangs(env, obj)):
                 yield from _put_back(env, at, lifted)
             elif stays or held:
                 return
-        yield from _let_go(env, tried, planned)
+            tried.note(planned, slid=slid)
+        else:
+            tried.note(planned)
+        if (yield from _let_go(env, obj)):
+            return
     raise SkillError(f"{obj.title} was not lifted in {ATTEMPTS} attempts")
 
 
@@ -191,12 +211,15 @@ def _leave_as_it_came(env: KitchenEnv, far: HandTarget, before: HandTarget) -> I
     yield from move_hand(env.data, at, OPEN, tolerance=0.03, max_steps=40)
 
 
-def _let_go(env: KitchenEnv, tried: list[HandTarget], planned: HandTarget) -> Iterator[Array]:
-    """Open the fingers and draw back from a grasp that has failed; it is noted."""
+def _let_go(env: KitchenEnv, obj: Graspable) -> Generator[Array, None, bool]:
+    """Open the fingers and draw back from a grasp that has failed; whether it cannot be got rid of, and is kept."""
     data = env.data
-    tried.append(planned)
-    yield from hold_hand(data, HandTarget(grip_position(data), hand_rotation(data)), OPEN, RELEASE_STEPS)
+    at = HandTarget(grip_position(data), hand_rotation(data))
+    yield from hold_hand(data, at, OPEN, RELEASE_STEPS)
     yield from draw_back(data, OPEN, BACK_M)
+    clear = HandTarget(grip_position(data), hand_rotation(data))
+    yield from freed(env, obj, at, clear)
+    return (yield from caught(env, obj, at, clear))
 
 
 def _uprightness(env: KitchenEnv, obj: Graspable) -> float:
@@ -233,14 +256,14 @@ def best_grasp(env: KitchenEnv, obj: Graspable, strategy: GraspStrategy) -> Moti
     Raises:
         SkillError: no pose of the gripper fits.
     """
-    return _best(env, obj, strategy, [], [])
+    return _best(env, obj, strategy, TriedGrasps(), [])
 
 
 def _best(
     env: KitchenEnv,
     obj: Graspable,
     strategy: GraspStrategy,
-    tried: list[HandTarget],
+    tried: TriedGrasps,
     blocked: Sequence[RobotPose],
 ) -> MotionPlan:
     """The best path that meets nothing; where there is none, one that may jostle what lies in the same vessel.
@@ -277,7 +300,7 @@ def _best_of_tilts(
     env: KitchenEnv,
     obj: Graspable,
     strategy: GraspStrategy,
-    tried: list[HandTarget],
+    tried: TriedGrasps,
     blocked: Sequence[RobotPose],
     yielding: frozenset[int] = frozenset(),
 ) -> MotionPlan:
@@ -305,18 +328,16 @@ def _paths(
     env: KitchenEnv,
     obj: Graspable,
     strategy: GraspStrategy,
-    tried: list[HandTarget],
+    tried: TriedGrasps,
     poses: list[GraspPose],
     extra: float,
     best: float,
 ) -> list[WaypointPath]:
     """Paths to grasps and away; what a grasp's score is below the best one's costs."""
-    body = env.data.body(obj.name)
     found: list[WaypointPath] = []
     for pose in poses:
-        local = body.xmat.reshape(3, 3).T @ (pose.position - body.xpos)
-        alike = sum(np.linalg.norm(local - other.position) < ALIKE_M for other in tried)
-        cost = extra + strategy.worse_grasp * (best - pose.score) + TRIED * float(alike)
+        again = tried.cost(env, obj, HandTarget(pose.position, pose.rotation))
+        cost = extra + strategy.worse_grasp * (best - pose.score) + again
         for turn in (pose.rotation, pose.rotation @ np.diag([-1.0, -1.0, 1.0])):
             takes = _taken(env, obj, HandTarget(pose.position, turn))
             for name in strategy.entries:
@@ -354,12 +375,6 @@ def _poses(
         far, lifted = before + strategy.out_m * out, position + lift * UP
         last = lifted + strategy.out_m * out
     return tuple(HandTarget(p, rotation) for p in (far, before, position, lifted, last))
-
-
-def _in_object(env: KitchenEnv, obj: Graspable, hand: HandTarget) -> HandTarget:
-    """Where a hand is in an object's axes, metres; the rotation stays the room's."""
-    body = env.data.body(obj.name)
-    return HandTarget(body.xmat.reshape(3, 3).T @ (hand.position - body.xpos), hand.rotation)
 
 
 def _inside(env: KitchenEnv, obj: Graspable) -> Array:

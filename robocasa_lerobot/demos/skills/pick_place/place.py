@@ -23,7 +23,7 @@ from robocasa_lerobot.demos.motion import (
 )
 from robocasa_lerobot.demos.skills.common import SkillError, hold_hand, move_hand
 from robocasa_lerobot.demos.skills.navigation import drive_to
-from robocasa_lerobot.demos.skills.pick_place.carrying.letting_go import caught, set_down
+from robocasa_lerobot.demos.skills.pick_place.carrying.letting_go import caught, freed, set_down
 from robocasa_lerobot.demos.skills.pick_place.carrying.level import level_hand, level_out
 from robocasa_lerobot.demos.skills.pick_place.grasp_strategy import FROM_ABOVE, GraspStrategy, ahead_of, entry, steep
 from robocasa_lerobot.demos.skills.pick_place.graspable import Graspable
@@ -57,6 +57,8 @@ LEVEL_RISE_M, LEVEL_COST = 0.004, 0.1
 BAND_M, TILT_BAND, POOR = 0.05, 0.15, 1.2
 AGAIN, AGAIN_M = 0.5, 0.02  # cost of a hand that goes where it went without success, as near as this
 LEANING, LOADED_LEANING = 0.35, 1.0  # cost of a radian that the object is tilted, and of one with others in it
+# Of what stands on so narrow a foot that it would fall over, if it were let go with that lean.
+TOPPLING, FOOT_M, STANDS_SHARE = 1.5, 0.01, 0.8
 LEVEL_FINGERS, SLOPE = 0.35, 0.5  # sine of the slope of the line between the fingers, and what that costs
 
 
@@ -164,7 +166,9 @@ def put(env: KitchenEnv, obj: Graspable, strategy: PlaceStrategy, failed: list[A
     lower = yield from set_down(env, obj)
     clear, away = (HandTarget(pose.position - lower * UP, pose.rotation) for pose in (clear, away))
     yield from move_hand(data, clear, OPEN, speed=0.6, tolerance=0.02, max_steps=30)
-    if (yield from caught(env, obj, HandTarget(at.position - lower * UP, at.rotation), clear)):
+    at = HandTarget(at.position - lower * UP, at.rotation)
+    yield from freed(env, obj, at, clear)
+    if (yield from caught(env, obj, at, clear)):
         yield from move_hand(data, above, CLOSED, speed=0.6, tolerance=0.03, max_steps=30)
         if inwards:
             yield from move_hand(data, far, CLOSED, tolerance=0.03, max_steps=60, start=above.position)
@@ -238,6 +242,7 @@ def _paths(
     left = np.cross(UP, ahead)
     present = level_hand(env, obj) if strategy.upwards is None else turned_hand(env, obj, strategy.upwards)
     leaning = LOADED_LEANING if obj.contents else LEANING
+    steepest = _stands_up_to(obj, present @ held.rotation)
     level = float(present[:, 2] @ UP) > -0.85  # a hand that looks ahead keeps doing so
     found = []
     for index in range(YAWS):
@@ -255,6 +260,7 @@ def _paths(
             low = origin - rotation @ held.position
             again = AGAIN * sum(np.linalg.norm(low - other) < AGAIN_M for other in failed)
             cost = pose.extra + float(again) + leaning * abs(lean) + SLOPE * slope + 0.08 * min(yaw, 2 * np.pi - yaw)
+            cost += TOPPLING * (abs(lean) > steepest)
             if strategy.fit is not None:
                 cost += strategy.fit(origin, object_turn)
             for name in strategy.entries:
@@ -262,6 +268,15 @@ def _paths(
                     extra = cost + (LEVEL_COST if name == "level" else LOW_COST if rise == min(RISES_M) else 0.0)
                     found.append(_path(low, rotation, entry(env, name), name, strategy.in_m, rise, extra))
     return found
+
+
+def _stands_up_to(obj: Graspable, turn: Array) -> float:
+    """By how much an object may lean from the rotation (3, 3) in which it stands, and come upright again, radians."""
+    points = obj.cloud @ turn.T
+    foot = points[points[:, 2] < points[:, 2].min() + FOOT_M, :2]
+    middle = (points.min(axis=0) + points.max(axis=0)) / 2
+    half = float(np.ptp(foot, axis=0).min()) / 2
+    return STANDS_SHARE * float(np.arctan2(half, middle[2] - points[:, 2].min()))
 
 
 def _path(low: Array, rotation: Array, out: Array, name: str, in_m: float, rise: float, cost: float) -> WaypointPath:

@@ -46,6 +46,7 @@ BY_USE = {
 }
 PLACING = ("place", "place_upside_down")
 MOST_PLACES = 3  # that an object is reached for from
+FAR_M = 2.0  # from where an object is to where it goes: what creeps in the fingers slips out on a longer way
 OTHER_SIDE_RAD = 0.7  # between the robot's headings at two sides of a counter, at least
 
 
@@ -55,7 +56,9 @@ def pick_object(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
     Raises:
         SkillError: it is not in the gripper after all attempts.
     """
-    yield from take(env, graspable(env, stage.object), _free_grasp(env, stage), kept=True)
+    obj, following = graspable(env, stage.object), _placing(env, stage)
+    far = following is None or _goes_far(env, following, obj, place_strategy(env, following, obj))
+    yield from take(env, obj, _free_grasp(env, stage), kept=True, far=far)
 
 
 def place_object(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
@@ -73,7 +76,7 @@ def place_object(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
                 yield from _around_door(env, _target_fixture(env, stage))
             holder = target_object(env, stage)
             towards = env.data.body(holder).xpos.copy() if holder else None
-            yield from take(env, obj, strategy.grasp, towards=towards)
+            yield from take(env, obj, strategy.grasp, towards=towards, far=_goes_far(env, stage, obj, strategy))
         try:
             yield from _bring(env, stage, obj, strategy)
         except SlippedError:
@@ -100,7 +103,7 @@ def drive(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
     holder = target_object(env, stage)
     obj = graspable(env, stage.object) if stage.object else None
     if obj is not None and not is_held(env, obj.name):
-        yield from take(env, obj, _free_grasp(env, stage), kept=True)
+        yield from take(env, obj, _free_grasp(env, stage), kept=True, far=True)
     if holder:
         fixture = locate(env, holder).fixture
         if fixture is None:
@@ -117,7 +120,13 @@ def drive(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
 
 
 def take(
-    env: KitchenEnv, obj: Graspable, free: GraspStrategy, *, kept: bool = False, towards: Array | None = None
+    env: KitchenEnv,
+    obj: Graspable,
+    free: GraspStrategy,
+    *,
+    kept: bool = False,
+    towards: Array | None = None,
+    far: bool = False,
 ) -> Iterator[Array]:
     """Drive to an object where it is out of reach, and pick it in the manner of its place.
 
@@ -127,6 +136,7 @@ def take(
         free: how it is grasped where it stands in the open.
         kept: whether it stays in the hand for a later stage.
         towards: where it goes then, world, metres: the robot rather stands on that side of it.
+        far: whether that is a long way off.
 
     Raises:
         SkillError: it is not in the gripper after all attempts.
@@ -141,7 +151,7 @@ def take(
         yield from _rise_to(env, fixture, env.data.body(obj.name).xpos.copy())
         try:
             elsewhere = partial(_has_other_side, env, obj.name) if not been else lambda: False
-            yield from pick(env, obj, grasp_strategy(env, obj, free, kept=kept), elsewhere, firm=kept)
+            yield from pick(env, obj, grasp_strategy(env, obj, free, kept=kept), elsewhere, firm=kept, long_way=far)
             yield from move_torso(env, 0.0, CLOSED, Held.now(env.data, obj.name, obj.contents))
             return
         except LostError:
@@ -172,6 +182,15 @@ def _bring(env: KitchenEnv, stage: Stage, obj: Graspable, strategy: PlaceStrateg
         return
     middle = np.mean(poses, axis=0) if poses else np.asarray(fixture.pos)
     yield from carry_to(env, obj, standing_pose_for(env, fixture, middle), middle)
+
+
+def _goes_far(env: KitchenEnv, stage: Stage, obj: Graspable, strategy: PlaceStrategy) -> bool:
+    """Whether it is a long drive from where an object is to where a stage puts it down."""
+    fixture, poses = _target_fixture(env, stage), [pose.point for pose in strategy.poses()]
+    if fixture is None and not poses:
+        return False
+    middle = np.mean(poses, axis=0) if poses or fixture is None else np.asarray(fixture.pos)
+    return float(np.linalg.norm((middle - env.data.body(obj.name).xpos)[:2])) > FAR_M
 
 
 def _target_fixture(env: KitchenEnv, stage: Stage) -> Fixture | None:

@@ -4,10 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from robocasa_lerobot.demos.motion import Array
+from robocasa_lerobot.demos.motion import CLOSED, Array, HandTarget, grip_position, hand_rotation
+from robocasa_lerobot.demos.skills.common import hold_hand
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 
 CREEP_M, CREEP_STEPS = 0.0005, 12  # closer by this in so many steps, at the end of a move
+# What goes a long way in the hand, which takes ten times as many steps, may creep half as fast.
+LONG_CREEP_M = 0.00025
+DOUBTFUL_STEPS, DOUBTFUL_M = 4, 0.00003  # closer by more than this in the last steps: the watch goes on
 
 
 class FingerWatch:
@@ -29,10 +33,22 @@ class FingerWatch:
             yield step
         self._gaps.append(finger_gap(self._env))
 
-    def creeps(self) -> bool:
-        """Whether the fingers still came closer together at the end of it."""
-        last = self._gaps[-CREEP_STEPS - 1 :]
-        return len(last) > CREEP_STEPS and last[0] - last[-1] > CREEP_M
+    def go_on(self) -> Iterator[Array]:
+        """Hold still after a short move until there are steps enough to tell; if nothing stirs, not a step."""
+        hand = HandTarget(grip_position(self._env.data), hand_rotation(self._env.data))
+        while len(self._gaps) <= CREEP_STEPS and self._closed_in(DOUBTFUL_STEPS) > DOUBTFUL_M:
+            yield from hold_hand(self._env.data, hand, CLOSED, 1)
+            self._gaps.append(finger_gap(self._env))
+
+    def creeps(self, *, long: bool = False) -> bool:
+        """Whether the fingers still came closer together at the end of it; `long` where what they hold goes far."""
+        enough = len(self._gaps) > CREEP_STEPS
+        return enough and self._closed_in(CREEP_STEPS) > (LONG_CREEP_M if long else CREEP_M)
+
+    def _closed_in(self, steps: int) -> float:
+        """How much closer together the fingers came in the last steps, metres."""
+        last = self._gaps[-steps - 1 :]
+        return last[0] - last[-1]
 
 
 def finger_gap(env: KitchenEnv) -> float:
