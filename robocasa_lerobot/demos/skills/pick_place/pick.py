@@ -26,7 +26,13 @@ from robocasa_lerobot.demos.motion import (
 from robocasa_lerobot.demos.planning.follow import follow_joint_path
 from robocasa_lerobot.demos.planning.grasps import GraspPose
 from robocasa_lerobot.demos.skills.common import SkillError, close_fingers, draw_back, hold_hand, move_hand
-from robocasa_lerobot.demos.skills.pick_place.carrying.finger_watch import FingerWatch, finger_gap
+from robocasa_lerobot.demos.skills.pick_place.carrying.finger_watch import (
+    CREEP_M,
+    LONG_CREEP_M,
+    NEAR_CREEP_M,
+    FingerWatch,
+    finger_gap,
+)
 from robocasa_lerobot.demos.skills.pick_place.carrying.letting_go import caught, freed
 from robocasa_lerobot.demos.skills.pick_place.carrying.loss import hangs, require_off_floor
 from robocasa_lerobot.demos.skills.pick_place.grasp_strategy import (
@@ -101,6 +107,7 @@ def pick(
     """
     data = env.data
     tried = TriedGrasps()
+    creep_m = CREEP_M if firm or long_way else NEAR_CREEP_M
     for attempt in range(ATTEMPTS):
         require_off_floor(env, obj)
         if strategy.first is not None:
@@ -161,7 +168,7 @@ def pick(
             slippery = attempt < FAR_ATTEMPTS and not (vessel and finger_gap(env) < WALL_M)
         else:
             slippery = attempt < CREEP_ATTEMPTS and not vessel
-        if slippery and watch.creeps() and _stays(env, obj, inside):
+        if slippery and watch.creeps(creep_m) and _stays(env, obj, inside):
             tried.note(planned, slid=True)
             yield from move_hand(data, at, CLOSED, speed=0.7, tolerance=0.01, max_steps=30)
             if (yield from _let_go(env, obj)):
@@ -172,7 +179,7 @@ def pick(
             yield from watch.over(_draw_out(env, lifted, out, strategy.narrow))
             if long_way and slippery:
                 yield from watch.go_on()
-            slid = slippery and watch.creeps(long=long_way)
+            slid = slippery and watch.creeps(LONG_CREEP_M if long_way else creep_m)
             stays, held = _stays(env, obj, inside), is_held(env, obj.name)
             loose = not held and (firm or attempt < HANG_ATTEMPTS)
             poor = stays and (loose or slid)

@@ -8,9 +8,11 @@ from robocasa_lerobot.demos.motion import CLOSED, Array, HandTarget, grip_positi
 from robocasa_lerobot.demos.skills.common import hold_hand
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 
-CREEP_M, CREEP_STEPS = 0.0005, 12  # closer by this in so many steps, at the end of a move
-# What goes a long way in the hand, which takes ten times as many steps, may creep half as fast.
-LONG_CREEP_M = 0.00025
+CREEP_STEPS = 12  # at the end of a move, in which what the fingers come closer by is asked, metres
+# Between a place and the next one nothing was lost that crept by less than this.
+NEAR_CREEP_M = 0.0022
+# What goes along on a drive may creep less fast, and half as fast on a long way, which takes ten times as many steps.
+CREEP_M, LONG_CREEP_M = 0.0005, 0.00025
 DOUBTFUL_STEPS, DOUBTFUL_M = 4, 0.00003  # closer by more than this in the last steps: the watch goes on
 
 
@@ -40,10 +42,9 @@ class FingerWatch:
             yield from hold_hand(self._env.data, hand, CLOSED, 1)
             self._gaps.append(finger_gap(self._env))
 
-    def creeps(self, *, long: bool = False) -> bool:
-        """Whether the fingers still came closer together at the end of it; `long` where what they hold goes far."""
-        enough = len(self._gaps) > CREEP_STEPS
-        return enough and self._closed_in(CREEP_STEPS) > (LONG_CREEP_M if long else CREEP_M)
+    def creeps(self, most_m: float) -> bool:
+        """Whether the fingers still came closer together at the end of it, by more than `most_m` in `CREEP_STEPS`."""
+        return len(self._gaps) > CREEP_STEPS and self._closed_in(CREEP_STEPS) > most_m
 
     def _closed_in(self, steps: int) -> float:
         """How much closer together the fingers came in the last steps, metres."""
