@@ -5,7 +5,7 @@ The jug stands under a wall cabinet: where the arm does not get under it without
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
@@ -21,19 +21,18 @@ from robocasa_lerobot.demos.motion import (
     hand_rotation,
 )
 from robocasa_lerobot.demos.planning.follow import follow_joint_path
-from robocasa_lerobot.demos.planning.motion_planner import plan_near
-from robocasa_lerobot.demos.skills.base_shift import shift_base
 from robocasa_lerobot.demos.skills.common import SkillError, hold_hand, move_hand, stage_done
+from robocasa_lerobot.demos.skills.reaching import Held, MotionPlan, WaypointPath, approach, plan_reach
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.kitchens.appliances.kinds.blender import Blender
 from robocasa_lerobot.envs.kitchens.footprints import Area, Footprint
 from robocasa_lerobot.envs.scene.placement.counter_areas import counter_areas
-from robocasa_lerobot.envs.scene.robot_poses import footprint
+from robocasa_lerobot.envs.scene.robot_poses import RobotPose, footprint
 from robocasa_lerobot.envs.scene.spec import OnCounter
 from robocasa_lerobot.envs.tasks.task import Stage
 
 ATTEMPTS = 4
-GRASP_STEPS, RELEASE_STEPS = 12, 10
+GRASP_STEPS, RELEASE_STEPS, PUT_STEPS = 12, 10, 90
 HOVER_M, LIFT_M, DROP_M = 0.08, 0.05, 0.003
 ABOVE_M, BEFORE_M = 0.12, 0.10  # the wrist turns this high over the hover, or this far before it
 AWAY_M = 0.20  # after the release; tasks ask for 15 cm
@@ -42,8 +41,8 @@ PLUG_M = 0.016  # of the lid's lowest point below its origin
 # The hand points down and forwards by these angles, and to the sides by those, radians.
 TILTS = tuple(np.deg2rad((8.0, 20.0, 35.0, 55.0, 85.0)))
 TURNS = tuple(np.deg2rad((0.0, 25.0, -25.0, 50.0, -50.0)))
-SHIFTS = ((0.0, 0.0), (-0.12, 0.0), (0.0, 0.2), (0.0, -0.2), (-0.25, 0.0), (-0.15, 0.25), (-0.15, -0.25))
-NEARLY_AS_GOOD = 0.6  # cost by which another grasp may be worse than the best
+TRIED, ALIKE = 0.6, 2.5  # cost of a hand held as one that has failed; trace of the turn between the two
+FARTHER = 0.02  # cost of each place for the lid before which there is a nearer one
 ROSE_M = 0.01  # of a lid that is held
 LOST_M = 0.05  # a lid farther than this from the hand is no longer held
 SPOTS, SPOT_STEP_M, SPOT_MARGIN_M = 6, 0.06, 0.02
@@ -72,19 +71,26 @@ def _carry(env: KitchenEnv, stage: Stage, blender: Blender, spots: list[Array]) 
         raise SkillError(f"no room on the counter for the lid of {blender.name}")
     tried: list[Array] = []
     for _ in range(ATTEMPTS):
-        at = data.body(blender.lid).xpos + UP * HOLD_M
         start = float(data.body(blender.lid).xpos[2])
-        rows = [
-            _row(at, spot + UP * (HOLD_M + DROP_M), rotation, blender) for spot in spots for rotation in grasps(env)
-        ]
-        allowed = frozenset({int(env.model.body(blender.lid).id)})
-        plan = plan_near(env, rows, SHIFTS, allowed=allowed)
-        another = plan_near(env, rows, SHIFTS, allowed=allowed, tried=tried) if tried else plan
-        plan = another if another.cost < plan.cost + NEARLY_AS_GOOD else plan
-        tried.append(plan.targets[-1].rotation)
-        yield from shift_base(env, plan.shift, OPEN)
-        yield from follow_joint_path(env, plan.joints, OPEN)
-        hover, grasp, lifted, over, put = plan.targets
+
+        def plan(blocked: Sequence[RobotPose]) -> MotionPlan:
+            lid, at = data.body(blender.lid), data.body(blender.lid).xpos + UP * HOLD_M
+            paths = [
+                WaypointPath(
+                    _row(at, spot + UP * (HOLD_M + DROP_M), rotation, blender),
+                    TRIED * sum(float(np.trace(rotation.T @ other)) > ALIKE for other in tried) + FARTHER * number,
+                    Held(blender.lid, rotation.T @ (lid.xpos - at), rotation.T @ lid.xmat.reshape(3, 3)),
+                )
+                for number, spot in enumerate(spots)
+                for rotation in grasps(env)
+            ]
+            allowed = frozenset({int(env.model.body(blender.lid).id)})
+            return plan_reach(env, paths, at, key=1, allowed=allowed, blocked=blocked)[0]
+
+        choice = yield from approach(env, plan, OPEN)
+        tried.append(choice.targets[1].rotation)
+        yield from follow_joint_path(env, choice.joints, OPEN)
+        hover, grasp, lifted, over, put = choice.targets
         yield from move_hand(data, hover, OPEN, tolerance=0.015)
         yield from move_hand(data, grasp, OPEN, speed=0.6, tolerance=0.006, max_steps=50)
         yield from hold_hand(data, grasp, CLOSED, GRASP_STEPS)
@@ -92,9 +98,9 @@ def _carry(env: KitchenEnv, stage: Stage, blender: Blender, spots: list[Array]) 
         if np.linalg.norm(_held_off(env, blender)) < LOST_M and data.body(blender.lid).xpos[2] > start + ROSE_M:
             yield from move_hand(data, over, CLOSED, tolerance=0.015, max_steps=110)
             # The lid has its place, not the hand: it may have slipped between the fingers.
-            for goal, speed in ((over, 0.6), (put, 0.4)):
+            for goal, steps in ((over, 50), (put, PUT_STEPS)):
                 exact = HandTarget(goal.position + _held_off(env, blender), goal.rotation)
-                yield from move_hand(data, exact, CLOSED, speed=speed, tolerance=0.004, max_steps=50)
+                yield from move_hand(data, exact, CLOSED, speed=0.6, tolerance=0.004, max_steps=steps)
         rest = HandTarget(grip_position(data), hand_rotation(data))
         yield from hold_hand(data, rest, OPEN, RELEASE_STEPS)
         away = HandTarget(rest.position - AWAY_M * rest.rotation[:, 2], rest.rotation)
