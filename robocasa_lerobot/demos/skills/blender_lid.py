@@ -19,6 +19,7 @@ from robocasa_lerobot.demos.motion import (
     frame,
     grip_position,
     hand_rotation,
+    pose_error,
 )
 from robocasa_lerobot.demos.planning.follow import follow_joint_path
 from robocasa_lerobot.demos.skills.common import SkillError, hold_hand, move_hand, stage_done
@@ -71,7 +72,6 @@ def _carry(env: KitchenEnv, stage: Stage, blender: Blender, spots: list[Array]) 
         raise SkillError(f"no room on the counter for the lid of {blender.name}")
     tried: list[Array] = []
     for _ in range(ATTEMPTS):
-        start = float(data.body(blender.lid).xpos[2])
 
         def plan(blocked: Sequence[RobotPose]) -> MotionPlan:
             lid, at = data.body(blender.lid), data.body(blender.lid).xpos + UP * HOLD_M
@@ -93,14 +93,8 @@ def _carry(env: KitchenEnv, stage: Stage, blender: Blender, spots: list[Array]) 
         hover, grasp, lifted, over, put = choice.targets
         yield from move_hand(data, hover, OPEN, tolerance=0.015)
         yield from move_hand(data, grasp, OPEN, speed=0.6, tolerance=0.006, max_steps=50)
-        yield from hold_hand(data, grasp, CLOSED, GRASP_STEPS)
-        yield from move_hand(data, lifted, CLOSED, speed=0.8, tolerance=0.02)
-        if np.linalg.norm(_held_off(env, blender)) < LOST_M and data.body(blender.lid).xpos[2] > start + ROSE_M:
-            yield from move_hand(data, over, CLOSED, tolerance=0.015, max_steps=110)
-            # The lid has its place, not the hand: it may have slipped between the fingers.
-            for goal, steps in ((over, 50), (put, PUT_STEPS)):
-                exact = HandTarget(goal.position + _held_off(env, blender), goal.rotation)
-                yield from move_hand(data, exact, CLOSED, speed=0.6, tolerance=0.004, max_steps=steps)
+        if pose_error(data, grasp).position < LOST_M:  # else it is blocked, and there is nothing to close on
+            yield from _take_over(env, blender, grasp, lifted, over, put)
         rest = HandTarget(grip_position(data), hand_rotation(data))
         yield from hold_hand(data, rest, OPEN, RELEASE_STEPS)
         away = HandTarget(rest.position - AWAY_M * rest.rotation[:, 2], rest.rotation)
@@ -108,6 +102,22 @@ def _carry(env: KitchenEnv, stage: Stage, blender: Blender, spots: list[Array]) 
         if stage_done(env, stage):
             return
     raise SkillError(f"the lid of {blender.name} is not where it belongs after {ATTEMPTS} attempts")
+
+
+def _take_over(
+    env: KitchenEnv, blender: Blender, grasp: HandTarget, lifted: HandTarget, over: HandTarget, put: HandTarget
+) -> Iterator[Array]:
+    """Close on the knob, lift the lid and bring it to where it goes, if it is held."""
+    data = env.data
+    start = float(data.body(blender.lid).xpos[2])
+    yield from hold_hand(data, grasp, CLOSED, GRASP_STEPS)
+    yield from move_hand(data, lifted, CLOSED, speed=0.8, tolerance=0.02)
+    if np.linalg.norm(_held_off(env, blender)) < LOST_M and data.body(blender.lid).xpos[2] > start + ROSE_M:
+        yield from move_hand(data, over, CLOSED, tolerance=0.015, max_steps=110)
+        # The lid has its place, not the hand: it may have slipped between the fingers.
+        for goal, steps in ((over, 50), (put, PUT_STEPS)):
+            exact = HandTarget(goal.position + _held_off(env, blender), goal.rotation)
+            yield from move_hand(data, exact, CLOSED, speed=0.6, tolerance=0.004, max_steps=steps)
 
 
 def _held_off(env: KitchenEnv, blender: Blender) -> Array:
