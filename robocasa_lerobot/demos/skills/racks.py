@@ -92,8 +92,10 @@ def push(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
     raise SkillError(f"{part.name} is still {part.share:.0%} out after {ATTEMPTS} attempts")
 
 
-def pull(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
+def pull(env: KitchenEnv, stage: Stage, enough: float = OUT_GOAL) -> Iterator[Array]:
     """Hold the edge of a rack or drawer, one finger before or above it and one behind or below, and pull.
+
+    It is pulled all the way; after an attempt that came at least to the share `enough` there is no other one.
 
     Raises:
         SkillError: it is not out after three attempts.
@@ -123,7 +125,7 @@ def pull(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
             yield from hold_hand(data, held, CLOSED, GRASP_STEPS)
         goal = HandTarget(end.position - part.inwards * BEYOND_M, end.rotation)
         yield from move_hand(data, goal, CLOSED, speed=SPEED, max_steps=130, until=lambda: part.share >= OUT_GOAL)
-        if part.share >= OUT_GOAL:
+        if part.share >= enough:
             return
         yield from hold_hand(data, HandTarget(grip_position(data), hand_rotation(data)), OPEN, GRASP_STEPS)
         yield from move_hand(data, _off(env, -held.rotation[:, 2]), OPEN, max_steps=25)

@@ -53,6 +53,7 @@ from robocasa_lerobot.demos.skills.pick_place.poses.place_poses import (
     reach_on,
 )
 from robocasa_lerobot.demos.skills.pick_place.poses.plate_poses import is_flat, side_by_side
+from robocasa_lerobot.demos.skills.pick_place.poses.shelf_rest import stays_on_shelf
 from robocasa_lerobot.demos.skills.pick_place.poses.turned_poses import as_turned
 from robocasa_lerobot.demos.skills.pick_place.reach_in import OUT_OF_A_MICROWAVE, OUT_OF_A_TOASTER_OVEN
 from robocasa_lerobot.demos.skills.pick_place.turn_across import lies_across, turn_across
@@ -87,6 +88,7 @@ OUT_OF_FRIDGE = OUT_OF_CABINET
 BEFORE_FRONT_M, MOST_OUT_M = 0.03, 0.45
 HARD = 1.0  # cost of taking something out of a drawer, from which on it is pulled out first
 BEYOND_COST, FLAT_COST = 50.0, 8.0  # for each metre that something stands out beyond a rack, and is too high on it
+REACHABLE = 0.9  # share of a drawer that is far enough out to take something out of it
 MOST_TURNS = 2  # of what lies across behind a front
 FARTHER_OUT_M = 0.12  # how far
 FARTHER_M = 1.1  # of a free place on a counter from the base, where an open drawer keeps the robot off
@@ -311,6 +313,7 @@ def _into_regions(
             return PlaceStrategy(
                 in_regions(env, obj, regions, (0.0,), columns, behind=behind), leans=_CLOSED_LEANS,
                 entries=("up", "across", "out"), grasp=ANY_APPROACH, in_m=0.28, narrow=narrow,
+                fit=stays_on_shelf(env, obj, regions),
             )  # fmt: skip
 
 
@@ -371,7 +374,7 @@ def _pull_out_first(obj: Graspable, place: Location) -> Callable[[KitchenEnv], I
             return
         done = True
         with contextlib.suppress(SkillError):
-            yield from pull(env, Stage("racks", "pull", roles[0], part=place.region))
+            yield from pull(env, Stage("racks", "pull", roles[0], part=place.region), enough=REACHABLE)
         data = env.data
         at = HandTarget(grip_position(data), hand_rotation(data))
         yield from hold_hand(data, at, OPEN, RELEASE_STEPS)
