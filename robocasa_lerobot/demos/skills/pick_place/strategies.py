@@ -224,8 +224,11 @@ def _by_target(env: KitchenEnv, stage: Stage, obj: Graspable) -> PlaceStrategy:
         fit = side_by_side(env, obj, holder, reach_on(env, holder), more=more) if is_flat(env, holder) else None
         if in_the_open(locate(env, holder)) and not _looks_ahead(env) and in_the_open(locate(env, obj.name)):
             return PlaceStrategy(poses, leans=_OPEN_LEANS, fit=fit)
+        # What is stacked on another thing slides off if it comes there at a lean.
+        stacked = env.scene.objects[holder].item.interior is None and not is_flat(env, holder)
+        leans = (0.0,) if stacked else _CLOSED_LEANS
         return PlaceStrategy(
-            poses, leans=_CLOSED_LEANS, entries=("up", "across", "out"), grasp=ANY_APPROACH, in_m=0.25, fit=fit
+            poses, leans=leans, entries=("up", "across", "out"), grasp=ANY_APPROACH, in_m=0.25, fit=fit
         )
     fixture, part = env.scene.fixture(stage.target), env.scene.part(stage.target, stage.part)
     match fixture:
