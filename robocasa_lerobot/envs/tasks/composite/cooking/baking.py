@@ -12,6 +12,7 @@ from robocasa_lerobot.envs.predicates import (
     ObjectTouches,
     ObjectTouchesAnyCounter,
     PartWithin,
+    StandsNear,
 )
 from robocasa_lerobot.envs.scene.initial_states import PartAt
 from robocasa_lerobot.envs.scene.spec import (
@@ -279,7 +280,8 @@ COOL_BAKED_CAKE = Task(
         Stage("doors", "open", "oven"),
         Stage("racks", "pull", "oven", part="rack0"),
         *fetch("cake", "oven", "container"),
-        Stage("navigation", "drive", "oven"),
+        # The open door is where a robot stands before the oven.
+        Stage("navigation", "drive", "oven", until=StandsNear("{oven}_rack0")),
         Stage("racks", "push", "oven", part="rack0"),
         Stage("doors", "lift_shut", "oven"),
     ),
