@@ -92,6 +92,8 @@ def carry_out(env: KitchenEnv, log: StageLog, skills: Mapping[tuple[str, str], S
     index = 0
     while True:
         if index == len(stages):
+            if _only_the_hand_is_near(env):
+                yield from fold_arm(env)
             undone = _undone(env)
             if undone is None:
                 return
@@ -186,6 +188,14 @@ def _check_attempts(env: KitchenEnv, index: int, outcome: StageOutcome, cause: s
 def _still_holds(env: KitchenEnv, index: int) -> bool:
     condition = without_gripper(stage_condition(env.declaration, env.declaration.stages[index]))
     return condition.evaluate(env.scene, env.data, {})
+
+
+def _only_the_hand_is_near(env: KitchenEnv) -> bool:
+    """Whether all that the goal still asks for is that the hand goes away: from what lies beside the last object."""
+    goal = env.declaration.goal
+    several = len(env.declaration.stages) > 1  # a single stage's skill has gone away as far as it can
+    done = without_gripper(goal).evaluate(env.scene, env.data, {})
+    return several and done and not goal.evaluate(env.scene, env.data, {})
 
 
 def _undone(env: KitchenEnv) -> int | None:

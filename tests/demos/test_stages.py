@@ -194,6 +194,34 @@ def test_what_was_put_down_and_moved_since_comes_again_though_the_goal_has_anoth
     assert [(o.attempts, o.done) for o in log.outcomes] == [(2, True), (1, True)]
 
 
+class HandAway(GripperFar):
+    """A flag for where the hand is."""
+
+    def holds(self, scene: Any, data: Any) -> bool:
+        return bool(data.get("away"))
+
+
+def test_a_hand_that_is_near_what_it_put_down_before_goes_away_in_the_end(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A knife comes to lie beside the butter, which is put down already, and from which the hand is to be far."""
+    env = made(monkeypatch, {"butter": does({"butter": True, "away": True}), "knife": does({"knife": True})})
+    near = does({"knife": True, "away": False})
+    monkeypatch.setitem(module.SKILLS, ("made", "knife"), near)
+
+    def fold(env: Made) -> Iterator[np.ndarray]:
+        yield np.zeros(12)
+        env.flags["away"] = True
+
+    monkeypatch.setattr(module, "fold_arm", fold)
+    butter = Stage("made", "butter", "", until=AllOf(Flag("butter"), HandAway("butter")))
+    stages = (butter, Stage("made", "knife", "", until=Flag("knife")))
+    goal = AllOf(Flag("butter"), Flag("knife"), HandAway("butter"))
+    env.declaration = SimpleNamespace(name="made", stages=stages, goal=goal)
+    log = StageLog()
+    list(carry_out(env, log))
+    assert env.flags["away"]
+    assert [(o.attempts, o.done) for o in log.outcomes] == [(1, True), (1, True)]
+
+
 def test_it_gives_up_with_the_skills_own_words(monkeypatch: pytest.MonkeyPatch) -> None:
     env = made(monkeypatch, {"a": does(*[SkillError("the lid is stuck")] * ATTEMPTS), "b": does({"b": True})})
     log = StageLog()
