@@ -92,6 +92,7 @@ class PlaceStrategy:
         upwards: which way the object's own z axis points in the end, world, where it is turned over in between.
         narrow: whether the hand keeps to a straight line in and out also where that is steep.
         fit: cost of the object's origin (3,) and rotation (3, 3) in the end, by what they leave of the room there.
+        falls_off: whether an object would fall to the floor from such an origin and rotation: it is not let go there.
     """
 
     poses: Callable[[], Sequence[PlacePose]]
@@ -106,6 +107,7 @@ class PlaceStrategy:
     upwards: Array | None = None
     narrow: bool = False
     fit: Callable[[Array, Array], float] | None = None
+    falls_off: Callable[[Array, Array], bool] | None = None
 
 
 def put(env: KitchenEnv, obj: Graspable, strategy: PlaceStrategy, failed: list[Array]) -> Iterator[Array]:
@@ -156,7 +158,9 @@ def put(env: KitchenEnv, obj: Graspable, strategy: PlaceStrategy, failed: list[A
     tolerance = EXACT_M if strategy.exact else 0.008
     yield from move_hand(data, low, CLOSED, speed=0.5, tolerance=tolerance, max_steps=60, integral_gain=INTEGRAL_GAIN)
     aside = float(np.linalg.norm((data.body(obj.name).xpos - _origin(low, Held.now(data, obj.name)))[:2]))
-    if pose_error(data, low).position > BLOCKED_M or (strategy.falls and aside > ASIDE_M):
+    body = data.body(obj.name)
+    before = strategy.falls_off is not None and strategy.falls_off(body.xpos, body.xmat.reshape(3, 3))
+    if pose_error(data, low).position > BLOCKED_M or (strategy.falls and aside > ASIDE_M) or before:
         yield from move_hand(data, above, CLOSED, speed=0.6, tolerance=0.03, max_steps=30)
         if inwards:  # a way round begins before the front
             yield from move_hand(data, far, CLOSED, tolerance=0.03, max_steps=60, start=above.position)

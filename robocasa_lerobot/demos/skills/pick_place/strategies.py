@@ -53,7 +53,7 @@ from robocasa_lerobot.demos.skills.pick_place.poses.place_poses import (
     reach_on,
 )
 from robocasa_lerobot.demos.skills.pick_place.poses.plate_poses import is_flat, side_by_side
-from robocasa_lerobot.demos.skills.pick_place.poses.shelf_rest import stays_on_shelf
+from robocasa_lerobot.demos.skills.pick_place.poses.shelf_rest import ShelfRest
 from robocasa_lerobot.demos.skills.pick_place.poses.turned_poses import as_turned
 from robocasa_lerobot.demos.skills.pick_place.reach_in import OUT_OF_A_MICROWAVE, OUT_OF_A_TOASTER_OVEN
 from robocasa_lerobot.demos.skills.pick_place.turn_across import lies_across, turn_across
@@ -313,10 +313,11 @@ def _into_regions(
         case _:
             # Past the edge of what it came from, a shelf's or a drawer's, in a straight line.
             narrow = "drawer" in locate(env, obj.name).region
+            rest = ShelfRest(env, obj, regions)
             return PlaceStrategy(
                 in_regions(env, obj, regions, (0.0,), columns, behind=behind), leans=_CLOSED_LEANS,
                 entries=("up", "across", "out"), grasp=ANY_APPROACH, in_m=0.28, narrow=narrow,
-                fit=stays_on_shelf(env, obj, regions),
+                fit=rest.cost, falls_off=rest.falls_off,
             )  # fmt: skip
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -14,31 +14,51 @@ from robocasa_lerobot.envs.kitchens.fixtures.base import Region
 STEP_RAD, MOST_STEPS = float(np.deg2rad(5.0)), 36  # of an object that topples
 GROUND_M = 0.003  # points as low as this over the lowest one carry an object
 LEVEL_M, DROP_M = 0.002, 2e-4  # of its middle beside what carries it, and of its fall in a step: less is rest
+BELOW = np.array([0.1, 0.1, 1.0])  # of the shelves that one is meant which is nearest so, each axis weighed
 EDGE_M = 0.01  # that it is to come to rest behind the front
 # For each metre that it stands out over the front, or that its middle falls as it topples; its middle over the edge.
 OUT_COST, FALL_COST, OFF_COST = 20.0, 6.0, 4.0
 
 
-def stays_on_shelf(env: KitchenEnv, obj: Graspable, regions: Sequence[Region]) -> Callable[[Array, Array], float]:
-    """The cost of an object that is let go on one of several shelves, by its origin (3,) and rotation (3, 3)."""
-    mass = np.array(env.model.body(obj.name).ipos)
-    floors = [region.world(env.data, (0.0, 0.0, -region.half[2])) for region in regions]
-    turns = [env.data.body(region.body).xmat.reshape(3, 3).copy() for region in regions]
-    rests: dict[bytes, tuple[Array, Array, float]] = {}
+class ShelfRest:
+    """Where an object comes to rest that is let go on one of several shelves.
 
-    def cost(origin: Array, turn: Array) -> float:
+    Args:
+        env: the kitchen.
+        obj: that is let go.
+        regions: over the shelves.
+    """
+
+    def __init__(self, env: KitchenEnv, obj: Graspable, regions: Sequence[Region]) -> None:
+        self._cloud, self._mass = obj.cloud, np.array(env.model.body(obj.name).ipos)
+        self._regions = regions
+        self._floors = [region.world(env.data, (0.0, 0.0, -region.half[2])) for region in regions]
+        self._inwards = [env.data.body(region.body).xmat.reshape(3, 3)[:, 1].copy() for region in regions]
+        self._rests: dict[bytes, tuple[Array, Array, float]] = {}
+
+    def cost(self, origin: Array, turn: Array) -> float:
+        """Of letting it go with its origin (3,) and rotation (3, 3) there."""
+        points, _, fall = self._rest(turn)
+        inwards, front = self._front(origin)
+        out = max(front + EDGE_M - float((points @ inwards).min()), 0.0)
+        return OUT_COST * out + FALL_COST * fall + (OFF_COST if self.falls_off(origin, turn) else 0.0)
+
+    def falls_off(self, origin: Array, turn: Array) -> bool:
+        """Whether its middle comes to be before the front of the shelf."""
+        inwards, front = self._front(origin)
+        return front > float(self._rest(turn)[1] @ inwards)
+
+    def _rest(self, turn: Array) -> tuple[Array, Array, float]:
         key = np.round(turn, 4).tobytes()
-        if key not in rests:
-            rests[key] = rest_of(obj.cloud @ turn.T, turn @ mass)
-        points, middle, fall = rests[key]
-        index = min(range(len(regions)), key=lambda i: float(np.abs(origin - floors[i]) @ [0.1, 0.1, 1.0]))
-        inwards = turns[index][:, 1]
-        front = float((floors[index] - origin) @ inwards) - regions[index].half[1] + EDGE_M
-        out = max(front - float((points @ inwards).min()), 0.0)
-        off = front - EDGE_M > float(middle @ inwards)
-        return OUT_COST * out + FALL_COST * fall + (OFF_COST if off else 0.0)
+        if key not in self._rests:
+            self._rests[key] = rest_of(self._cloud @ turn.T, turn @ self._mass)
+        return self._rests[key]
 
-    return cost
+    def _front(self, origin: Array) -> tuple[Array, float]:
+        """The way inwards (3,) on the shelf below an origin, and how far from this its front edge is along it."""
+        nearest = min(range(len(self._floors)), key=lambda i: float(np.abs(origin - self._floors[i]) @ BELOW))
+        inwards = self._inwards[nearest]
+        return inwards, float((self._floors[nearest] - origin) @ inwards) - self._regions[nearest].half[1]
 
 
 def rest_of(points: Array, middle: Array) -> tuple[Array, Array, float]:
