@@ -171,3 +171,16 @@ def test_a_scale_of_two_factors_is_refused() -> None:
     item = ObjectSpec("item", ("bowl",), OnCounter("cab"), scale=(1.5, 1.5))  # type: ignore[arg-type]
     with pytest.raises(UserError, match="three of them"):
         build_scene(dataclasses.replace(base, objects=(item,)), "target", 0)
+
+
+def test_what_starts_in_a_drawer_lies_in_it_altogether(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A knife as long as the drawer is deep was turned into its wall; another angle, or another knife, is drawn."""
+
+    def in_walls() -> bool:
+        scene = build_scene(get_task("SetUpCuttingStation"), "pretrain", 3)
+        data, _ = scene.initial_data(np.random.default_rng(0))
+        return any("knife" in pair for pair in sunk_in(scene.model, data))
+
+    assert not in_walls()
+    monkeypatch.setattr(Drawer, "holds_all_of_it", False)
+    assert in_walls()
