@@ -26,6 +26,7 @@ Array = NDArray[np.float64]
 
 OPEN, CLOSED = -1.0, 1.0
 UP = np.array([0.0, 0.0, 1.0])
+HALF_TURN = np.diag([-1.0, -1.0, 1.0])  # of a gripper about its approach, after which it is the same
 # Control mode: the arm's goal starts from the pose that is achieved, or from the pose that was wanted last.
 FROM_ACHIEVED, FROM_DESIRED = -1.0, 1.0
 
@@ -165,8 +166,8 @@ def turned_up(rotation: Array, direction: Array) -> Array:
 
 
 def nearer_turn(rotation: Array, present: Array) -> Array:
-    """A gripper is the same after half a turn about its approach: choose the turn nearer to the present one."""
-    flipped = rotation @ np.diag([-1.0, -1.0, 1.0])
+    """Of the two rotations of a gripper that are the same, the one nearer to the present one."""
+    flipped = rotation @ HALF_TURN
     return rotation if np.trace(rotation.T @ present) >= np.trace(flipped.T @ present) else flipped
 
 

@@ -203,9 +203,8 @@ class HandAway(GripperFar):
 
 def test_a_hand_that_is_near_what_it_put_down_before_goes_away_in_the_end(monkeypatch: pytest.MonkeyPatch) -> None:
     """A knife comes to lie beside the butter, which is put down already, and from which the hand is to be far."""
-    env = made(monkeypatch, {"butter": does({"butter": True, "away": True}), "knife": does({"knife": True})})
     near = does({"knife": True, "away": False})
-    monkeypatch.setitem(module.SKILLS, ("made", "knife"), near)
+    env = made(monkeypatch, {"butter": does({"butter": True, "away": True}), "knife": near})
 
     def fold(env: Made) -> Iterator[np.ndarray]:
         yield np.zeros(12)

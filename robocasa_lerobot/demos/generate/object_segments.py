@@ -19,7 +19,17 @@ from robocasa_lerobot.demos.generate.select import narrowed
 from robocasa_lerobot.demos.generate.sources.segments import PICK, PLACE
 from robocasa_lerobot.demos.generate.sources.source import Piece, pieces_for
 from robocasa_lerobot.demos.generate.sources.transform import heading, inverse, make_pose, yaw_pose
-from robocasa_lerobot.demos.motion import CLOSED, OPEN, UP, Array, axis_angle, base_pose, hand_rotation, rotation_about
+from robocasa_lerobot.demos.motion import (
+    CLOSED,
+    HALF_TURN,
+    OPEN,
+    UP,
+    Array,
+    axis_angle,
+    base_pose,
+    hand_rotation,
+    rotation_about,
+)
 from robocasa_lerobot.demos.planning.grasps import GraspPose
 from robocasa_lerobot.demos.skills.common import SkillError, draw_back, hold_hand, stage_done
 from robocasa_lerobot.demos.skills.pick_place.grasp_strategy import ANY_APPROACH, GraspStrategy
@@ -159,7 +169,7 @@ def _pick_ways(
                 )
                 extra = WORSE_GRASP * (best - pose.score) + TRIED_COST * again + 0.1 * abs(turn)
                 extra += float(course.bias[piece.source.number])
-                for rotation in (pose.rotation, pose.rotation @ np.diag([-1.0, -1.0, 1.0])):
+                for rotation in (pose.rotation, pose.rotation @ HALF_TURN):
                     way = _pick_way(piece, pose.position, rotation, extra)
                     if way is not None:
                         ways.append(way)

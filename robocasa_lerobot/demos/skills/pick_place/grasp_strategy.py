@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from robocasa_lerobot.demos.motion import UP, Array, HandTarget, base_pose
+from robocasa_lerobot.demos.motion import UP, Array, HandTarget, base_pose, nearer_turn
 from robocasa_lerobot.demos.planning.grasps import GraspPose
 from robocasa_lerobot.demos.skills.pick_place.graspable import Graspable, grasps
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
@@ -19,7 +19,6 @@ WORSE_GRASP = 0.45
 STEEP = 0.5  # sine of a slope
 TRIED, ALIKE_M = 1.2, 0.015  # cost of a grasp like one that has failed: its place in the object is as near as this
 ALIKE_COS = float(np.cos(np.deg2rad(25.0)))  # of the angle between hands that hold alike
-FLIPPED = np.diag([-1.0, -1.0, 1.0])  # a gripper is the same after half a turn about its approach
 
 
 @dataclass(frozen=True)
@@ -145,5 +144,5 @@ def _alike(grasp: _Grasp, other: _Grasp) -> bool:
         return False
     if not other.slid:
         return True
-    turn = grasp.rotation.T @ other.rotation
-    return bool((max(np.trace(turn), np.trace(turn @ FLIPPED)) - 1) / 2 > ALIKE_COS)
+    turn = nearer_turn(grasp.rotation, other.rotation).T @ other.rotation
+    return bool((np.trace(turn) - 1) / 2 > ALIKE_COS)

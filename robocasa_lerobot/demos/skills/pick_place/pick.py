@@ -14,6 +14,7 @@ import numpy as np
 
 from robocasa_lerobot.demos.motion import (
     CLOSED,
+    HALF_TURN,
     OPEN,
     UP,
     Array,
@@ -163,11 +164,7 @@ def pick(
                 integral_gain=INTEGRAL_GAIN,
             )
         )
-        vessel = obj.item is not None and obj.item.interior is not None
-        if long_way:
-            slippery = attempt < FAR_ATTEMPTS and not (vessel and finger_gap(env) < WALL_M)
-        else:
-            slippery = attempt < CREEP_ATTEMPTS and not vessel
+        slippery = attempt < (FAR_ATTEMPTS if long_way else CREEP_ATTEMPTS) and not _settles(env, obj, long_way)
         if slippery and watch.creeps(creep_m) and _stays(env, obj, inside):
             tried.note(planned, slid=True)
             yield from move_hand(data, at, CLOSED, speed=0.7, tolerance=0.01, max_steps=30)
@@ -193,6 +190,12 @@ def pick(
         if (yield from _let_go(env, obj)):
             return
     raise SkillError(f"{obj.title} was not lifted in {ATTEMPTS} attempts")
+
+
+def _settles(env: KitchenEnv, obj: Graspable, long_way: bool) -> bool:
+    """Whether what creeps now comes to rest in the fingers: at the wall of a vessel; on a long way, at a thin one."""
+    vessel = obj.item is not None and obj.item.interior is not None
+    return vessel and (not long_way or finger_gap(env) < WALL_M)
 
 
 def _put_back(env: KitchenEnv, at: HandTarget, lifted: HandTarget) -> Iterator[Array]:
@@ -345,7 +348,7 @@ def _paths(
     for pose in poses:
         again = tried.cost(env, obj, HandTarget(pose.position, pose.rotation))
         cost = extra + strategy.worse_grasp * (best - pose.score) + again
-        for turn in (pose.rotation, pose.rotation @ np.diag([-1.0, -1.0, 1.0])):
+        for turn in (pose.rotation, pose.rotation @ HALF_TURN):
             takes = _taken(env, obj, HandTarget(pose.position, turn))
             for name in strategy.entries:
                 for lift in {"up": (strategy.lift_m,), "level": (LEVEL_LIFT_M,)}.get(name, strategy.lifts):

@@ -157,13 +157,11 @@ def put(env: KitchenEnv, obj: Graspable, strategy: PlaceStrategy, failed: list[A
     low = HandTarget(low.position + np.clip(slipped, -MOST_SLIP_M, MOST_SLIP_M), low.rotation)
     tolerance = EXACT_M if strategy.exact else 0.008
     yield from move_hand(data, low, CLOSED, speed=0.5, tolerance=tolerance, max_steps=60, integral_gain=INTEGRAL_GAIN)
-    aside = float(np.linalg.norm((data.body(obj.name).xpos - _origin(low, Held.now(data, obj.name)))[:2]))
     body = data.body(obj.name)
+    aside = float(np.linalg.norm((body.xpos - _origin(low, Held.now(data, obj.name)))[:2]))
     before = strategy.falls_off is not None and strategy.falls_off(body.xpos, body.xmat.reshape(3, 3))
     if pose_error(data, low).position > BLOCKED_M or (strategy.falls and aside > ASIDE_M) or before:
-        yield from move_hand(data, above, CLOSED, speed=0.6, tolerance=0.03, max_steps=30)
-        if inwards:  # a way round begins before the front
-            yield from move_hand(data, far, CLOSED, tolerance=0.03, max_steps=60, start=above.position)
+        yield from _draw_off(env, above, far, inwards)
         return
     at = HandTarget(grip_position(data), hand_rotation(data))
     yield from hold_hand(data, at, OPEN, RELEASE_STEPS)
@@ -173,13 +171,18 @@ def put(env: KitchenEnv, obj: Graspable, strategy: PlaceStrategy, failed: list[A
     at = HandTarget(at.position - lower * UP, at.rotation)
     yield from freed(env, obj, at, clear)
     if (yield from caught(env, obj, at, clear)):
-        yield from move_hand(data, above, CLOSED, speed=0.6, tolerance=0.03, max_steps=30)
-        if inwards:
-            yield from move_hand(data, far, CLOSED, tolerance=0.03, max_steps=60, start=above.position)
+        yield from _draw_off(env, above, far, inwards)
         return
     line = clear.position if inwards else None
     yield from move_hand(data, away, OPEN, tolerance=0.03, max_steps=60, start=line)
     yield from leave(env, obj)
+
+
+def _draw_off(env: KitchenEnv, above: HandTarget, far: HandTarget, inwards: bool) -> Iterator[Array]:
+    """Go back with what stays in the hand, for another place: out through the front that it came in by."""
+    yield from move_hand(env.data, above, CLOSED, speed=0.6, tolerance=0.03, max_steps=30)
+    if inwards:  # a way round begins before the front
+        yield from move_hand(env.data, far, CLOSED, tolerance=0.03, max_steps=60, start=above.position)
 
 
 def _planner(

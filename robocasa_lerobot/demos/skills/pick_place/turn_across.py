@@ -10,7 +10,7 @@ from collections.abc import Generator, Sequence
 
 import numpy as np
 
-from robocasa_lerobot.demos.motion import CLOSED, OPEN, UP, Array, HandTarget, frame, rotation_about
+from robocasa_lerobot.demos.motion import CLOSED, HALF_TURN, OPEN, UP, Array, HandTarget, frame, rotation_about
 from robocasa_lerobot.demos.planning.follow import follow_joint_path
 from robocasa_lerobot.demos.skills.common import close_fingers, move_hand
 from robocasa_lerobot.demos.skills.pick_place.grasp_strategy import ahead_of, entry, in_radians
@@ -96,7 +96,7 @@ def _pushes(env: KitchenEnv, obj: Graspable) -> list[WaypointPath]:
             cost = extra + LESS_COST * (PUSH_SHARES[0] - length) + 0.2 * abs(yaw) + 10.0 * rise
             far = before + IN_M * entry(env, name)
             pushed = at + length * long * ahead
-            for flip in (rotation, rotation @ np.diag([-1.0, -1.0, 1.0])):
+            for flip in (rotation, rotation @ HALF_TURN):
                 found.append(WaypointPath(tuple(HandTarget(p, flip) for p in (far, before, pushed, far)), cost))
     return found
 

@@ -176,21 +176,28 @@ def _has_other_side(env: KitchenEnv, name: str) -> bool:
 
 def _bring(env: KitchenEnv, stage: Stage, obj: Graspable, strategy: PlaceStrategy) -> Iterator[Array]:
     """Carry the held object to before the stage's target, where that is out of reach."""
-    poses = [pose.point for pose in strategy.poses()]
-    fixture = _target_fixture(env, stage)
-    if fixture is None or (poses and in_reach(env, np.mean(poses, axis=0))):
+    middle, fixture = _middle(strategy), _target_fixture(env, stage)
+    if fixture is None or (middle is not None and in_reach(env, middle)):
         return
-    middle = np.mean(poses, axis=0) if poses else np.asarray(fixture.pos)
+    middle = np.asarray(fixture.pos) if middle is None else middle
     yield from carry_to(env, obj, standing_pose_for(env, fixture, middle), middle)
 
 
 def _goes_far(env: KitchenEnv, stage: Stage, obj: Graspable, strategy: PlaceStrategy) -> bool:
     """Whether it is a long drive from where an object is to where a stage puts it down."""
-    fixture, poses = _target_fixture(env, stage), [pose.point for pose in strategy.poses()]
-    if fixture is None and not poses:
-        return False
-    middle = np.mean(poses, axis=0) if poses or fixture is None else np.asarray(fixture.pos)
-    return float(np.linalg.norm((middle - env.data.body(obj.name).xpos)[:2])) > FAR_M
+    goal = _middle(strategy)
+    if goal is None:
+        fixture = _target_fixture(env, stage)
+        if fixture is None:
+            return False
+        goal = np.asarray(fixture.pos)
+    return float(np.linalg.norm((goal - env.data.body(obj.name).xpos)[:2])) > FAR_M
+
+
+def _middle(strategy: PlaceStrategy) -> Array | None:
+    """The middle of where an object may be put down, world, metres; None where that is nowhere."""
+    poses = [pose.point for pose in strategy.poses()]
+    return np.mean(poses, axis=0) if poses else None
 
 
 def _target_fixture(env: KitchenEnv, stage: Stage) -> Fixture | None:
@@ -232,8 +239,7 @@ def _next_use(env: KitchenEnv, stage: Stage) -> str:
 def _next_place(env: KitchenEnv, stage: Stage, obj: Graspable) -> Array | None:
     """The middle of where a later stage puts a stage's object down, world, metres."""
     following = _placing(env, stage)
-    poses = [] if following is None else place_strategy(env, following, obj).poses()
-    return np.mean([pose.point for pose in poses], axis=0) if poses else None
+    return None if following is None else _middle(place_strategy(env, following, obj))
 
 
 def _placing(env: KitchenEnv, stage: Stage) -> Stage | None:

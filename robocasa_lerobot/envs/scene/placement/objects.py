@@ -163,7 +163,7 @@ def _put_down(
     *,
     lying: bool = False,
 ) -> None:
-    """Put an object onto one of the areas; if basins are given as `rooms`, so that it is wholly in one."""
+    """Put an object onto one of the areas; if basins or drawers are given as `rooms`, so that it is wholly in one."""
     width, depth, height = item.size
     if lying:
         depth, height = height, depth
