@@ -8,9 +8,10 @@ import pytest
 from scipy.spatial import ConvexHull
 
 from robocasa_lerobot.demos.motion import grip_position, hand_rotation
-from robocasa_lerobot.demos.planning.grasps import GraspPose, grasp_poses, pieces
+from robocasa_lerobot.demos.planning.grasps import GraspPose, grasp_poses, grasp_poses_of, pieces
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.objects.catalogue import CATEGORIES, INSTANCES_PER_CATEGORY, Instance, instance
+from robocasa_lerobot.envs.objects.solids import Solid
 from robocasa_lerobot.envs.robots.panda_omron.robot import PANDA_OMRON
 
 FINGERS = ("leftfinger", "rightfinger", "finger_joint1_tip", "finger_joint2_tip")
@@ -44,6 +45,27 @@ def test_the_pads_corner_is_what_is_lowest_of_a_tipped_hand() -> None:
             assert lowest == pytest.approx(reach * np.cos(tilt) + half_width * np.sin(tilt), abs=5e-4)
     assert len(points) > 16
     env.close()
+
+
+def test_a_hand_that_leans_over_what_lies_across_keeps_its_open_fingers_over_the_floor() -> None:
+    loaf = Solid("box", (0.15, 0.03, 0.025))
+    tilt = np.deg2rad(40.0)
+    approach_to_down = np.array(
+        [[1.0, 0.0, 0.0], [0.0, np.cos(tilt), np.sin(tilt)], [0.0, -np.sin(tilt), np.cos(tilt)]]
+    )
+    up = approach_to_down @ [0.0, 0.0, 1.0]
+    gripper = PANDA_OMRON.gripper
+    free = grasp_poses_of([loaf], approach_to_down, gripper)
+    over = grasp_poses_of([loaf], approach_to_down, gripper, floor=(up, 0.025))
+
+    def lowest(pose: GraspPose) -> float:
+        fingers = [pose.position + side * gripper.finger_outer * pose.rotation[:, 1] for side in (-1.0, 1.0)]
+        tips = [finger + gripper.pad_corner[1] * pose.rotation[:, 2] for finger in fingers]
+        return min(float(up @ tip) for tip in tips) + 0.025
+
+    assert over
+    assert min(map(lowest, free)) < -0.005
+    assert min(map(lowest, over)) > 0.0
 
 
 def spans_a_hole(item: Instance, pose: GraspPose) -> bool:

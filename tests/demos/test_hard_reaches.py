@@ -11,9 +11,15 @@ import pytest
 from robocasa_lerobot.demos.motion import Array, base_pose, floor_axes
 from robocasa_lerobot.demos.planning.kinematics import Arm
 from robocasa_lerobot.demos.skills.pick_place.graspable import graspable
-from robocasa_lerobot.demos.skills.pick_place.pick import best_grasp
-from robocasa_lerobot.demos.skills.pick_place.strategies import OUT_OF_CABINET
-from robocasa_lerobot.demos.skills.pick_place.turn_across import ACROSS_COS, lies_across, long_axis, turn_across
+from robocasa_lerobot.demos.skills.pick_place.pick import best_grasp, is_held, pick
+from robocasa_lerobot.demos.skills.pick_place.strategies import grasp_strategy
+from robocasa_lerobot.demos.skills.pick_place.turn_across import (
+    ACROSS_COS,
+    OUT_OF_CABINET,
+    lies_across,
+    long_axis,
+    turn_across,
+)
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.robots.panda_omron.names import ARM_JOINTS
 from robocasa_lerobot.envs.robots.panda_omron.robot import PANDA_OMRON
@@ -77,4 +83,25 @@ def test_a_low_object_deep_in_a_cabinet_is_grasped_without_meeting_the_shelf() -
     assert obj.item.size[2] < 0.04
     # A path that touches nothing costs less than 1; with the tilts of any approach it was 2.2.
     assert best_grasp(env, obj, OUT_OF_CABINET).cost < 1.0
+    env.close()
+
+
+def test_what_lies_deep_across_a_shelf_is_brought_to_its_front_before_it_is_held() -> None:
+    env = KitchenEnv("PrepareSandwichStation", split="pretrain", cameras=(), terminate_on_success=False)
+    env.reset(seed=150_002)
+    obj = graspable(env, "baguette")
+    _, yaw = base_pose(env.data)
+    ahead = floor_axes(yaw)[0]
+    deep = float(env.data.body(obj.name).xpos @ ahead)
+    assert lies_across(env, obj)
+    strategy = grasp_strategy(env, obj, OUT_OF_CABINET)
+    assert strategy.nearer is not None
+    assert strategy.nearer(env) > DEEPER_M
+    placed = deep
+    for action in pick(env, obj, strategy):
+        env.step(action.astype(np.float32))
+        if action[-1] < 0.0 and not is_held(env, obj.name):
+            placed = float(env.data.body(obj.name).xpos @ ahead)
+    assert is_held(env, obj.name)
+    assert placed < deep - DEEPER_M
     env.close()

@@ -11,6 +11,7 @@ import itertools
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from robocasa_lerobot.demos.planning.grasp_kernel import Faces, Hand, candidates, chosen
 from robocasa_lerobot.envs.objects.catalogue import Instance, model_of
@@ -21,6 +22,7 @@ from robocasa_lerobot.envs.robots.robot import GripperGeometry
 _TABLE_GAP = 0.0025  # between finger tips and what the object stands on
 _ANGLES = np.pi * np.arange(8) / 8  # of the line that the fingers open along
 _FLAT_M = 0.030  # rings and the like that are lower are held across their holes as well
+_FINE_M = 0.004  # between the heights that are tried of a hand that leans over a floor, which leaves few of them
 _MOST_JUDGED, _MOST_POSES = 1200, 24
 
 
@@ -64,12 +66,15 @@ def grasp_poses_of(
     count: int = 16,
     *,
     beyond: tuple[Array, float] | None = None,
+    floor: tuple[Array, float] | None = None,
 ) -> tuple[GraspPose, ...]:
     """The same for any body made of convex pieces, in its own frame, that was turned by the rotation matrix `turn`.
 
-    With `beyond` only those grasps that lie farther than so many metres from its origin along a direction in its frame.
+    With `beyond` only those grasps that lie farther than so many metres from its origin along a direction in its frame;
+    with `floor` only those whose open fingers stay over a floor: its normal in the turned axes, and how far it is
+    below the origin, metres.
     """
-    return _plan(solids, turn, gripper, None if beyond is None else (turn @ beyond[0], beyond[1]))[:count]
+    return _plan(solids, turn, gripper, None if beyond is None else (turn @ beyond[0], beyond[1]), floor)[:count]
 
 
 @functools.lru_cache(maxsize=512)
@@ -113,7 +118,11 @@ def _faces_of(points: Array) -> Array:
 
 
 def _plan(
-    solids: list[Solid], turn: Array, gripper: GripperGeometry, beyond: tuple[Array, float] | None = None
+    solids: list[Solid],
+    turn: Array,
+    gripper: GripperGeometry,
+    beyond: tuple[Array, float] | None = None,
+    floor: tuple[Array, float] | None = None,
 ) -> tuple[GraspPose, ...]:
     clouds = [s.cloud() @ turn.T for s in solids]
     faces = _faces(clouds)
@@ -124,10 +133,14 @@ def _plan(
     bottom, top = float(cloud[:, 2].min()), float(cloud[:, 2].max())
     lowest = bottom + gripper.tips_below_grip + _TABLE_GAP
     heights = {lowest, *np.linspace(bottom, top, 7)[1:-1], top - 0.028, top - 0.018, top - 0.010, top - 0.002}
+    if floor is not None:
+        heights |= set(np.arange(lowest, top, _FINE_M))
     levels = np.array(sorted({round(max(h, lowest), 3) for h in heights} | {round(lowest, 4)}))
     found = candidates(faces, cloud, center, _ANGLES, levels, gripper.opening, top - bottom < _FLAT_M)
     if beyond is not None:
         found = found[_positions(found) @ beyond[0] > beyond[1]]
+    if floor is not None:
+        found = found[_over_floor(found, gripper, *floor)]
     # Best first, but such that the first ones differ; whether there is room is asked of those that count only. Round
     # objects have equals, whose last bits must not decide.
     found = found[np.argsort(-np.round(found[:, 0], 9), kind="stable")][:_MOST_JUDGED]
@@ -149,6 +162,16 @@ def _positions(rows: Array) -> Array:
     middle, row, angle = (rows[:, 1] + rows[:, 2]) / 2, rows[:, 3], rows[:, 5]
     cosine, sine = np.cos(angle), np.sin(angle)
     return np.column_stack([middle * cosine - row * sine, middle * sine + row * cosine, rows[:, 4]])
+
+
+def _over_floor(rows: Array, gripper: GripperGeometry, normal: Array, below: float) -> NDArray[np.bool_]:
+    """Of which rows of `candidates` the open fingers stay over a floor (n,)."""
+    half_width, reach = gripper.pad_corner
+    cosine, sine = np.cos(rows[:, 5]), np.sin(rows[:, 5])
+    along, across = np.abs(cosine * normal[0] + sine * normal[1]), np.abs(cosine * normal[1] - sine * normal[0])
+    lowest = gripper.finger_outer * along + half_width * across + reach * abs(float(normal[2]))
+    above: NDArray[np.bool_] = _positions(rows) @ normal + below > lowest
+    return above
 
 
 def _pose(candidate: Array, position: Array) -> GraspPose:

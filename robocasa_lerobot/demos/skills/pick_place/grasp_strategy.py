@@ -39,6 +39,7 @@ class GraspStrategy:
             after an object that it moves by its coming: in a drawer, which yields.
         poses: grasps of an object by a hand that comes along an approach.
         first: done before each attempt.
+        nearer: how far an object may be put down again nearer to the robot than it lies, metres.
     """
 
     tilts: tuple[tuple[float, float], ...] = ((0.0, 0.0),)
@@ -53,6 +54,7 @@ class GraspStrategy:
     narrow: bool = False
     poses: Callable[[KitchenEnv, Graspable, Array], list[GraspPose]] = grasps
     first: Callable[[KitchenEnv], Iterator[Array]] | None = None
+    nearer: Callable[[KitchenEnv], float] | None = None
 
 
 def in_radians(*tilts: tuple[float, float]) -> tuple[tuple[float, float], ...]:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import mujoco
 import numpy as np
 
-from robocasa_lerobot.demos.motion import Array, rotation_about
+from robocasa_lerobot.demos.motion import UP, Array, rotation_about
 from robocasa_lerobot.demos.planning.grasps import GraspPose, grasp_poses, grasp_poses_of, pieces
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.objects.catalogue import Instance
@@ -92,11 +92,17 @@ def holder_of(env: KitchenEnv, name: str) -> str:
 
 
 def grasps(
-    env: KitchenEnv, obj: Graspable, approach: Array, beyond: tuple[Array, float] | None = None
+    env: KitchenEnv,
+    obj: Graspable,
+    approach: Array,
+    beyond: tuple[Array, float] | None = None,
+    *,
+    over_floor: bool = False,
 ) -> list[GraspPose]:
     """Grasp poses in the room for an object as it lies now, by a hand that comes along `approach` (unit vector).
 
-    With `beyond` only those that lie farther than so many metres from its origin along a direction in its axes.
+    With `beyond` only those that lie farther than so many metres from its origin along a direction in its axes; with
+    `over_floor` only those by which a hand that leans keeps its lower finger over what the object lies on.
     """
     body = env.data.body(obj.name)
     turn = body.xmat.reshape(3, 3).copy()
@@ -109,7 +115,8 @@ def grasps(
         tip = np.eye(3)
     else:
         tip = _to_down(approach)
-    poses = grasp_poses_of(list(obj.solids), tip @ turn, env.robot.gripper, beyond=beyond)
+    floor = (tip @ UP, obj.below(turn)) if over_floor else None
+    poses = grasp_poses_of(list(obj.solids), tip @ turn, env.robot.gripper, beyond=beyond, floor=floor)
     back = tip.T
     return [GraspPose(body.xpos + back @ pose.position, back @ pose.rotation, pose.width, pose.score) for pose in poses]
 

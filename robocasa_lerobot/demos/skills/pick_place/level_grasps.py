@@ -48,4 +48,4 @@ def level_grasps(env: KitchenEnv, obj: Graspable, approach: Array) -> list[Grasp
         ):
             continue
         found.append(GraspPose(position, rotation, pose.width, pose.score))
-    return found + grasps(env, obj, approach)
+    return found + grasps(env, obj, approach, over_floor=True)

@@ -63,10 +63,10 @@ INTEGRAL_GAIN = 0.12
 GRASP_STEPS, RELEASE_STEPS = 11, 8
 STANDOFF_M = 0.06
 HOPELESS, POOR = 3.5, 1.5  # cost of a path from which on it is not tried, or not before one from another side
-LOW_COST = 0.05
+DOUBTFUL, WORTH_M = 1.3, 0.02  # cost from which on it is rather put down nearer to the robot, if by as much as this
 BLOCKED_M, BACK_M = 0.05, 0.08  # a hand as far as this from where the grasp begins is blocked: another grasp is next
 HELD_UP_M, LOWER_M = 0.08, 0.03
-LEVEL_LIFT_M, LEVEL_COST = 0.004, 0.1  # before it is drawn out level
+LEVEL_LIFT_M, LEVEL_COST, LOW_COST = 0.004, 0.1, 0.05  # before it is drawn out level, or nearly so
 CROWDED, JOSTLE_COST, BESIDE_M = 1.5, 0.5, 0.12  # of a path that meets what lies beside; how far that is, at most
 # An object that is held is nearer than this to where it was in the hand when that closed, and has risen by this share
 # of the lift.
@@ -119,6 +119,7 @@ def pick(
         if choice.cost > HOPELESS or (attempt and choice.cost > POOR and elsewhere()):
             raise SkillError(f"{obj.title} is out of reach from here, or too near to other things")
         far, before, at, lifted, out = choice.path.targets
+        nearer = strategy.nearer(env) * entry(env, "level") if strategy.nearer is not None else np.zeros(3)
         planned = in_object(env, obj, at)  # which grasp this was, wherever the hand gets to
         yield from follow_joint_path(env, choice.joints, OPEN)
         # All poses move with the object, should it have been touched meanwhile.
@@ -172,7 +173,9 @@ def pick(
                 return
             continue
         rise = data.body(obj.name).xpos[2] - start[2] - moved[2]
-        if (rise > ROSE_SHARE * lift and _stays(env, obj, inside)) or is_held(env, obj.name):
+        if choice.cost > DOUBTFUL and np.linalg.norm(nearer) > WORTH_M:
+            yield from _put_back(env, at, lifted, nearer)
+        elif (rise > ROSE_SHARE * lift and _stays(env, obj, inside)) or is_held(env, obj.name):
             yield from watch.over(_draw_out(env, lifted, out, strategy.narrow))
             if long_way and slippery:
                 yield from watch.go_on()
@@ -181,7 +184,7 @@ def pick(
             loose = not held and (firm or attempt < HANG_ATTEMPTS)
             poor = stays and (loose or slid)
             if poor or (not (stays or held) and hangs(env, obj)):
-                yield from _put_back(env, at, lifted)
+                yield from _put_back(env, at, lifted, nearer)
             elif stays or held:
                 return
             tried.note(planned, slid=slid)
@@ -198,11 +201,11 @@ def _settles(env: KitchenEnv, obj: Graspable, long_way: bool) -> bool:
     return vessel and (not long_way or finger_gap(env) < WALL_M)
 
 
-def _put_back(env: KitchenEnv, at: HandTarget, lifted: HandTarget) -> Iterator[Array]:
-    """Bring an object that slides out of the hand back to where it was grasped, the way that it came out."""
+def _put_back(env: KitchenEnv, at: HandTarget, lifted: HandTarget, nearer: Array) -> Iterator[Array]:
+    """Bring an object that is held poorly back to where it lay, or `nearer`, metres, the way that it comes out."""
     start = grip_position(env.data)
-    yield from move_hand(env.data, lifted, CLOSED, speed=0.8, tolerance=0.01, start=start)
-    yield from move_hand(env.data, at, CLOSED, speed=0.7, tolerance=0.01, max_steps=30)
+    yield from move_hand(env.data, _shifted(lifted, nearer), CLOSED, speed=0.8, tolerance=0.01, start=start)
+    yield from move_hand(env.data, _shifted(at, nearer), CLOSED, speed=0.7, tolerance=0.01, max_steps=30)
 
 
 def is_held(env: KitchenEnv, name: str) -> bool:

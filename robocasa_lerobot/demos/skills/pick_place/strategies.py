@@ -22,10 +22,9 @@ from robocasa_lerobot.demos.skills.pick_place.grasp_strategy import (
     in_radians,
 )
 from robocasa_lerobot.demos.skills.pick_place.graspable import Graspable
-from robocasa_lerobot.demos.skills.pick_place.level_grasps import level_grasps
 from robocasa_lerobot.demos.skills.pick_place.location import Location, locate
 from robocasa_lerobot.demos.skills.pick_place.mugs import FROM_THE_SIDE, UNDER_A_SPOUT
-from robocasa_lerobot.demos.skills.pick_place.pick import HOPELESS, RELEASE_STEPS, best_grasp
+from robocasa_lerobot.demos.skills.pick_place.pick import RELEASE_STEPS, best_grasp
 from robocasa_lerobot.demos.skills.pick_place.place import PlaceStrategy
 from robocasa_lerobot.demos.skills.pick_place.poses.basin_poses import below_spout, is_large, on_floor, room_in
 from robocasa_lerobot.demos.skills.pick_place.poses.counter_poses import NEAR_M, on_counter
@@ -56,7 +55,7 @@ from robocasa_lerobot.demos.skills.pick_place.poses.plate_poses import is_flat, 
 from robocasa_lerobot.demos.skills.pick_place.poses.shelf_rest import ShelfRest
 from robocasa_lerobot.demos.skills.pick_place.poses.turned_poses import as_turned
 from robocasa_lerobot.demos.skills.pick_place.reach_in import OUT_OF_A_MICROWAVE, OUT_OF_A_TOASTER_OVEN
-from robocasa_lerobot.demos.skills.pick_place.turn_across import lies_across, turn_across
+from robocasa_lerobot.demos.skills.pick_place.turn_across import OUT_OF_CABINET, between_shelves, turn_first
 from robocasa_lerobot.demos.skills.pick_place.turn_over import LEANS, TO_TURN, tilted_leans, which_way_up
 from robocasa_lerobot.demos.skills.racks import pull
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
@@ -80,16 +79,10 @@ from robocasa_lerobot.envs.predicates.placed_by import Behind
 from robocasa_lerobot.envs.tasks.conditions import IN_RANGE, stage_condition
 from robocasa_lerobot.envs.tasks.task import Stage
 
-# Between the two steep and the two flat ones of any approach: a palm that is level meets the shelf before low objects.
-_CABINET_TILTS = in_radians((0, 0.0), (35, 0.1), (42, 0.1), (50, 0.15), (65, 0.2), (88, 0.3))
-OUT_OF_CABINET = replace(ANY_APPROACH, tilts=_CABINET_TILTS, narrow=True, poses=level_grasps)
-# Rooms between a fridge's shelves are as low as those of cabinets, and what lies in them is as low.
-OUT_OF_FRIDGE = OUT_OF_CABINET
 BEFORE_FRONT_M, MOST_OUT_M = 0.03, 0.45
 HARD = 1.0  # cost of taking something out of a drawer, from which on it is pulled out first
 BEYOND_COST, FLAT_COST = 50.0, 8.0  # for each metre that something stands out beyond a rack, and is too high on it
 REACHABLE = 0.9  # share of a drawer that is far enough out to take something out of it
-MOST_TURNS = 2  # of what lies across behind a front
 FARTHER_OUT_M = 0.12  # how far
 FARTHER_M = 1.1  # of a free place on a counter from the base, where an open drawer keeps the robot off
 LID_GAP_M = 0.005  # of a lid over the rim when the hand opens
@@ -122,9 +115,9 @@ def grasp_strategy(env: KitchenEnv, obj: Graspable, free: GraspStrategy, *, kept
     place = locate(env, obj.name)
     match place.fixture:
         case Microwave():
-            return replace(OUT_OF_A_MICROWAVE, first=_turn_first(obj, OUT_OF_A_MICROWAVE))
+            return replace(OUT_OF_A_MICROWAVE, first=turn_first(obj, OUT_OF_A_MICROWAVE))
         case ToasterOven():
-            return replace(OUT_OF_A_TOASTER_OVEN, first=_turn_first(obj, OUT_OF_A_TOASTER_OVEN))
+            return replace(OUT_OF_A_TOASTER_OVEN, first=turn_first(obj, OUT_OF_A_TOASTER_OVEN))
         case Toaster() if obj.item is not None and obj.item.upright_axis is not None:
             return FROM_A_SLOT
         case CoffeeMachine():
@@ -134,14 +127,14 @@ def grasp_strategy(env: KitchenEnv, obj: Graspable, free: GraspStrategy, *, kept
         case HingeCabinet() if has_handle(obj):
             return replace(OUT_OF_CABINET, poses=PAN_BY_THE_HANDLE.poses)
         case HingeCabinet():
-            return replace(OUT_OF_CABINET, first=_turn_first(obj, OUT_OF_CABINET))
+            return between_shelves(env, obj, place)
         case _ if "drawer" in place.region:
             return replace(FROM_CRISPER, first=_pull_out_first(obj, place))
         case _ if in_the_open(place):
             return free
         case Fridge() as fridge if place.region:
             out_m = _way_out(env, obj, fridge.regions[place.region]) if kept else OUT_M
-            return replace(OUT_OF_FRIDGE, out_m=out_m, first=_turn_first(obj, OUT_OF_FRIDGE))
+            return replace(between_shelves(env, obj, place), out_m=out_m)
         case _:
             return ANY_APPROACH
 
@@ -344,23 +337,6 @@ def _clear_of_counter(obj: Graspable, drawer: Drawer) -> Callable[[KitchenEnv], 
         if again or best_grasp(env, obj, OUT_OF_DRAWER).cost > HARD:
             yield from drag_open(env, drawer, 1.0 + FARTHER_OUT_M / drawer.full_travel)
         again = True
-
-    return first
-
-
-def _turn_first(obj: Graspable, strategy: GraspStrategy) -> Callable[[KitchenEnv], Iterator[Array]]:
-    """Before a grasp through a front: turn what lies across where no grasp is worth a try.
-
-    Where one has failed, another one is tried first: a push takes as long as two grasps.
-    """
-    left = MOST_TURNS
-
-    def first(env: KitchenEnv) -> Iterator[Array]:
-        nonlocal left
-        while left and lies_across(env, obj) and best_grasp(env, obj, strategy).cost > HOPELESS:
-            left -= 1
-            if not (yield from turn_across(env, obj)):
-                break
 
     return first
 

@@ -1,22 +1,34 @@
-"""Turn a long object that lies across behind a front: no hand that comes through the front fits round it as it lies.
+"""What is long and lies across behind a front, where hardly a hand that comes through the front fits round it.
 
-Closed fingers push its farther end on, until the hand can close on both of its sides from in front.
+It is held about its middle, or, where that cannot be reached, brought nearer by whatever hold there is; at last, closed
+fingers push its farther end on, until the hand can close on both of its sides from in front.
 """
 
 from __future__ import annotations
 
 import itertools
-from collections.abc import Generator, Sequence
+from collections.abc import Callable, Generator, Iterator, Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from robocasa_lerobot.demos.motion import CLOSED, HALF_TURN, OPEN, UP, Array, HandTarget, frame, rotation_about
 from robocasa_lerobot.demos.planning.follow import follow_joint_path
 from robocasa_lerobot.demos.skills.common import close_fingers, move_hand
-from robocasa_lerobot.demos.skills.pick_place.grasp_strategy import ahead_of, entry, in_radians
+from robocasa_lerobot.demos.skills.pick_place.grasp_strategy import (
+    ANY_APPROACH,
+    GraspStrategy,
+    ahead_of,
+    entry,
+    in_radians,
+)
 from robocasa_lerobot.demos.skills.pick_place.graspable import Graspable, filled
+from robocasa_lerobot.demos.skills.pick_place.level_grasps import level_grasps
+from robocasa_lerobot.demos.skills.pick_place.location import Location
+from robocasa_lerobot.demos.skills.pick_place.pick import HOPELESS, best_grasp
 from robocasa_lerobot.demos.skills.reaching import MotionPlan, WaypointPath, approach, plan_reach
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
+from robocasa_lerobot.envs.kitchens.fixtures.base import Region
 from robocasa_lerobot.envs.scene.robot_poses import RobotPose
 
 LONG, ACROSS_COS = 1.25, 0.8  # long by wide; cosine of the long axis and the heading, above which it lies well enough
@@ -26,8 +38,57 @@ LESS_COST = 0.5
 TILTS = in_radians((65, 0.0), (78, 0.05), (52, 0.05))
 TURNS = tuple(float(np.deg2rad(turn)) for turn in (0.0, 20.0, -20.0))
 BEFORE_M, IN_M, RISES_M = 0.03, 0.25, (0.004, 0.012)
-HOPELESS = 2.5  # cost of a push from which on it is not tried
+HOPELESS_PUSH = 2.5  # cost from which on it is not tried
 PUSH_STEPS = 45
+
+# Between the two steep and the two flat ones of any approach: a palm that is level meets the shelf before low objects.
+_CABINET_TILTS = in_radians((0, 0.0), (35, 0.1), (42, 0.1), (50, 0.15), (65, 0.2), (88, 0.3))
+OUT_OF_CABINET = replace(ANY_APPROACH, tilts=_CABINET_TILTS, narrow=True, poses=level_grasps)
+# Rooms between a fridge's shelves are as low as those of cabinets, and what lies in them is as low.
+# What is long and lies across has to be held near its middle: its end, which is easier to reach, turns out of the hand.
+ACROSS_OUT_OF_CABINET = replace(
+    OUT_OF_CABINET, tilts=(_CABINET_TILTS[0], *in_radians((27, 0.1)), *_CABINET_TILTS[1:]), among_tilts=True
+)
+BEHIND_FRONT_M, MOST_NEARER_M = 0.02, 0.15
+MOST_TURNS = 2  # of what lies across behind a front
+
+
+def between_shelves(env: KitchenEnv, obj: Graspable, place: Location) -> GraspStrategy:
+    """How an object is grasped between shelves as it lies."""
+    if not lies_across(env, obj):
+        return replace(OUT_OF_CABINET, first=turn_first(obj, OUT_OF_CABINET))
+    region = place.fixture.regions.get(place.region) if place.fixture is not None else None
+    nearer = None if region is None else _to_front(obj, region)
+    return replace(ACROSS_OUT_OF_CABINET, first=turn_first(obj, ACROSS_OUT_OF_CABINET), nearer=nearer)
+
+
+def _to_front(obj: Graspable, region: Region) -> Callable[[KitchenEnv], float]:
+    """How far an object lies behind where it is easiest to grasp, just behind a region's front, metres."""
+
+    def nearer(env: KitchenEnv) -> float:
+        body = env.data.body(obj.name)
+        points = body.xpos + obj.cloud @ body.xmat.reshape(3, 3).T
+        before = float(region.all_local(env.data, points)[:, 1].min()) + region.half[1]
+        return float(np.clip(before - BEHIND_FRONT_M, 0.0, MOST_NEARER_M))
+
+    return nearer
+
+
+def turn_first(obj: Graspable, strategy: GraspStrategy) -> Callable[[KitchenEnv], Iterator[Array]]:
+    """Before a grasp through a front: turn what lies across where no grasp is worth a try.
+
+    Where one has failed, another one is tried first: a push takes as long as two grasps.
+    """
+    left = MOST_TURNS
+
+    def first(env: KitchenEnv) -> Iterator[Array]:
+        nonlocal left
+        while left and lies_across(env, obj) and best_grasp(env, obj, strategy).cost > HOPELESS:
+            left -= 1
+            if not (yield from turn_across(env, obj)):
+                break
+
+    return first
 
 
 def turn_across(env: KitchenEnv, obj: Graspable) -> Generator[Array, None, bool]:
@@ -40,7 +101,7 @@ def turn_across(env: KitchenEnv, obj: Graspable) -> Generator[Array, None, bool]
         return plan_reach(env, _pushes(env, obj), point, key=1, allowed=obj.bodies, blocked=blocked)[0]
 
     choice = yield from approach(env, plan, OPEN)
-    if choice.cost > HOPELESS:
+    if choice.cost > HOPELESS_PUSH:
         return False
     data = env.data
     far, before, pushed, away = choice.path.targets
