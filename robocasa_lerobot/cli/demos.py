@@ -56,6 +56,13 @@ def add_kitchen_options(parser: argparse.ArgumentParser) -> None:
         help="standard deviation of noise on arm commands, 1 is a full command; 0.05 is a good one (default: none)",
     )
     parser.add_argument(
+        "--start-within",
+        type=float,
+        default=0.0,
+        metavar="METRES",
+        help="the robot starts anywhere as far from the task's own start, at any heading (default: the task's own)",
+    )
+    parser.add_argument(
         "--images", action="store_true", help="store camera pictures too (the converter can render them)"
     )
     parser.add_argument("--image-size", type=int, default=256, help="height and width of stored pictures (default 256)")
@@ -84,6 +91,7 @@ def run(args: argparse.Namespace) -> int:
             split=args.split,
             seed=args.seed,
             action_noise=args.action_noise,
+            start_within_m=args.start_within,
             images=args.images,
             image_size=args.image_size,
             layouts=args.layouts,

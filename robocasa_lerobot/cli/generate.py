@@ -71,6 +71,7 @@ def run(args: argparse.Namespace) -> int:
             split=args.split,
             seed=args.seed,
             action_noise=args.action_noise,
+            start_within_m=args.start_within,
             images=args.images,
             image_size=args.image_size,
             layouts=args.layouts,

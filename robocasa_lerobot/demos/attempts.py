@@ -26,6 +26,7 @@ from robocasa_lerobot.demos.motion_style import MotionStyle
 from robocasa_lerobot.demos.recorder import Actor, Recording, record_episode
 from robocasa_lerobot.demos.stages import StageLog
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
+from robocasa_lerobot.envs.scene.reset_noise import InitialNoise
 from robocasa_lerobot.files import write_text
 from robocasa_lerobot.gl import NoOpenGLError
 from robocasa_lerobot.jobs.pool import exit_if_orphaned
@@ -51,6 +52,7 @@ class RecordingSettings:
         layouts: ids of layouts or of groups of them; None takes the split's own.
         styles: the same for styles.
         varied: whether each demonstration has a style of its own (`demos.motion_style`).
+        start_within_m: the robot starts anywhere within so many metres of the task's own start, at any heading.
     """
 
     task: str
@@ -63,6 +65,7 @@ class RecordingSettings:
     layouts: tuple[int, ...] | None = None
     styles: tuple[int, ...] | None = None
     varied: bool = True
+    start_within_m: float = 0.0
 
     def env_kwargs(self) -> dict[str, Any]:
         """Arguments of the env, for the file's `env_args`."""
@@ -104,7 +107,8 @@ class RecordingSettings:
     def make_env(self) -> KitchenEnv:
         """The env that attempts are made in; it renders nothing unless pictures are stored."""
         kwargs = self.env_kwargs() if self.images else {**self.env_kwargs(), "cameras": ()}
-        return KitchenEnv(self.task, terminate_on_success=False, **kwargs)
+        noise = InitialNoise(base_within_m=self.start_within_m) if self.start_within_m else None
+        return KitchenEnv(self.task, terminate_on_success=False, initial_noise=noise, **kwargs)
 
 
 @dataclass(frozen=True)

@@ -199,9 +199,10 @@ def stage_rows(env: KitchenEnv, log: StageLog) -> list[dict[str, Any]]:
 
 
 def _kitchens(env: KitchenEnv) -> dict[str, Any]:
-    """What the env was restricted to: with the seed, it decides the scene."""
+    """What the env was restricted to, and how the robot's start was spread: with the seed, it decides the scene."""
     asked = {"layouts": env.layouts, "styles": env.styles}
-    return {key: list(ids) for key, ids in asked.items() if ids is not None}
+    noise = {} if env.initial_noise is None else {"initial_noise": asdict(env.initial_noise)}
+    return {key: list(ids) for key, ids in asked.items() if ids is not None} | noise
 
 
 def _with_noise(rng: np.random.Generator, action: Array, noise: float) -> Array:

@@ -20,6 +20,7 @@ from robocasa_lerobot import contract
 from robocasa_lerobot.demos.recorder import SUCCESS_HOLD_STEPS
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.predicates import parts_with_memory
+from robocasa_lerobot.envs.scene.reset_noise import InitialNoise
 from robocasa_lerobot.envs.tasks.task import Task
 from robocasa_lerobot.errors import UserError
 from robocasa_lerobot.jobs.as_completed import as_they_end
@@ -166,6 +167,7 @@ def replay(path: Path, demo: str, declaration: Task | None = None) -> Replayed:
 
 def kitchen_of(recorded: Demonstration, declaration: Task | None = None) -> KitchenEnv:
     """An env that makes the kitchen of a demonstration when it is reset with its seed; without cameras."""
+    noise = recorded.meta.get("initial_noise")
     return KitchenEnv(
         declaration or recorded.task,
         split=recorded.split,
@@ -173,6 +175,7 @@ def kitchen_of(recorded: Demonstration, declaration: Task | None = None) -> Kitc
         terminate_on_success=False,
         layouts=recorded.meta.get("layouts"),
         styles=recorded.meta.get("styles"),
+        initial_noise=InitialNoise(**noise) if noise else None,
     )
 
 

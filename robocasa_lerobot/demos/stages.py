@@ -88,6 +88,8 @@ def carry_out(env: KitchenEnv, log: StageLog, skills: Mapping[tuple[str, str], S
         SkillError: a stage is not done after all its attempts, or something has happened that never must.
     """
     stages = env.declaration.stages
+    # A task of one stage begins where it is done, unless that has been changed.
+    led_away = len(stages) > 1 or (env.initial_noise is not None and env.initial_noise.moves_base)
     log.outcomes = [StageOutcome() for _ in stages]
     index = 0
     while True:
@@ -104,7 +106,7 @@ def carry_out(env: KitchenEnv, log: StageLog, skills: Mapping[tuple[str, str], S
             outcome.skipped, outcome.done = outcome.attempts == 0, True
             index += 1
             continue
-        if len(stages) > 1 and stages[index].skill not in _AS_IT_IS:
+        if led_away and stages[index].skill not in _AS_IT_IS:
             yield from fold_arm(env)
             yield from move_torso(env, 0.0, OPEN)
             yield from _stand_before(env, stages[index], FAR_OFF_M[min(outcome.attempts, 1)])

@@ -17,6 +17,7 @@ from robocasa_lerobot import cli
 from robocasa_lerobot.demos.film_strip import STRIP_PICTURES, STRIP_SIZE
 from robocasa_lerobot.demos.recording import RecordingSettings, record_tasks
 from robocasa_lerobot.demos.replay import Replayed, demonstrations, replay
+from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.errors import UserError
 
 
@@ -37,6 +38,22 @@ def test_all_of_them_replay_bit_for_bit(folder: Path, capsys: pytest.CaptureFixt
     for one in found["demonstrations"]:
         assert one["same_start"]
         assert one["deviation"] == 0.0
+
+
+@pytest.mark.slow
+def test_a_robot_that_starts_elsewhere_drives_there_and_is_replayed_from_there(tmp_path: Path) -> None:
+    command = f"demos --tasks OpenDrawer --episodes 1 --seed 3 --start-within 1.5 --workers 1 --out {tmp_path}"
+    assert cli.main(command.split()) == 0
+    found = replay(tmp_path / "OpenDrawer.hdf5", "demo_0")
+    assert found.actions
+    assert found.same_start
+    with h5py.File(tmp_path / "OpenDrawer.hdf5") as file:
+        meta = json.loads(file["data/demo_0"].attrs["ep_meta"])
+    assert meta["initial_noise"]["base_within_m"] == 1.5
+    env = KitchenEnv("OpenDrawer", cameras=())
+    env.reset(seed=meta["seed"])
+    own, drawn = env.scene.robot_pose, meta["init_robot_base_pos"]
+    assert 0.05 < np.hypot(own.x - drawn[0], own.y - drawn[1]) <= 1.5
 
 
 @pytest.mark.slow

@@ -68,19 +68,20 @@ def test_sources_are_selected_as_asked() -> None:
 
 
 def test_sources_that_are_not_drawn_cost_more_and_all_are_drawn_alike() -> None:
-    numbers = [4, 0, 7, 1, 2, 3, 5, 9, 8, 6]
+    tasks = ["CloseDrawer"] * 6 + ["OpenDrawer"] * 10 + ["CloseDrawer"] * 4
 
     def drawn(seed: int, cap: float) -> set[int]:
-        costs = source_costs(numbers, np.random.default_rng(seed), 0.3, cap)
+        costs = source_costs(tasks, np.random.default_rng(seed), 0.3, cap)
         assert costs.min() >= 0.0
-        return {number for number in numbers if costs[number] <= 0.3}
+        return {number for number, cost in enumerate(costs) if cost <= 0.3}
 
     times = Counter(number for seed in range(600) for number in drawn(seed, 0.2))
-    assert sum(times.values()) == 1200
-    assert set(times) == set(numbers)
+    assert sum(times.values()) == 2400  # two of each task's ten
+    assert set(times) == set(range(20))
     assert max(times.values()) < 160  # about 120 each
-    assert drawn(3, 1.0) == set(numbers)
-    assert len(drawn(3, 0.01)) == 1
+    assert all(Counter(tasks[number] for number in drawn(seed, 0.2)).most_common(1)[0][1] == 2 for seed in range(20))
+    assert drawn(3, 1.0) == set(range(20))
+    assert len(drawn(3, 0.01)) == 2
 
 
 def test_the_distance_of_poses_counts_metres_and_radians() -> None:

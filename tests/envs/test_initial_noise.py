@@ -45,6 +45,16 @@ def test_each_noise_moves_what_it_names() -> None:
     assert 2.0 < np.rad2deg(np.abs(shifts[:, 2])).mean() < 25.0
 
 
+def test_the_base_starts_anywhere_within_a_distance_and_at_any_heading() -> None:
+    plain, within = starts(), starts(initial_noise=InitialNoise(base_within_m=1.5))
+    shifts = np.array([moved[0] - one[0] for one, moved in zip(plain, within, strict=True)])
+    far = np.hypot(*shifts[:, :2].T)
+    assert far.max() <= 1.5
+    assert far.mean() > 0.5
+    assert np.abs(np.sin(shifts[:, 2])).max() > 0.8
+    assert np.cos(shifts[:, 2]).min() < 0.0
+
+
 @pytest.mark.parametrize("task", every_task())
 def test_novel_language_is_one_of_the_tasks_other_wordings(task: str) -> None:
     plain, novel = KitchenEnv(task, cameras=()), KitchenEnv(task, cameras=(), novel_language=True)

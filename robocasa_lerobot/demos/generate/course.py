@@ -11,8 +11,12 @@ import numpy as np
 from robocasa_lerobot.demos.generate.select import Manner
 from robocasa_lerobot.demos.generate.sources.source import Piece, Source
 from robocasa_lerobot.demos.motion import Array
+from robocasa_lerobot.envs.kitchen_env import KitchenEnv
+from robocasa_lerobot.envs.tasks.task import Stage
 
 FREE, CONTACT, BRIDGE, DRIVE, SETTLE = range(5)  # kinds of steps
+MOST_SOURCES = 24  # that are asked for a stage: more than one task usually has
+OTHER_KIND_COST = 0.15  # of a segment from a stage that puts things into another kind of fixture, or onto an object
 NOT_DRAWN_COST = 1.0  # as of a hand that touches something: see `planning/costs.py`
 AT_REST = (-1, BRIDGE, -1)  # label of steps in which it is waited
 KINDS = ("free", "contact", "bridge", "drive", "settle")
@@ -45,7 +49,23 @@ class Course:
     rest: dict[str, Array] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        self.bias = source_costs([one.number for one in self.sources], self.rng, self.spread, self.cap)
+        self.bias = source_costs([one.task for one in self.sources], self.rng, self.spread, self.cap)
+
+    def most_alike(self, pieces: Sequence[Piece], env: KitchenEnv, stage: Stage) -> list[Piece]:
+        """Those segments that are asked whether they fit a stage, where there are many, as of many tasks.
+
+        Those of drawn sources come first, and those of stages about the same kind of fixture.
+        """
+        fixture = env.scene.roles.get(stage.target)
+        wanted = type(env.scene.fixtures[fixture]).__name__ if fixture else ""
+
+        def cost(piece: Piece) -> float:
+            own = piece.data.about["fixtures"].get(piece.words["target"], {}).get("kind", "")
+            return float(self.bias[piece.source.number]) + OTHER_KIND_COST * (own != wanted)
+
+        numbers = dict.fromkeys(piece.source.number for piece in sorted(pieces, key=cost))
+        asked = set(list(numbers)[:MOST_SOURCES])
+        return [piece for piece in pieces if piece.source.number in asked]
 
     def begin(self, piece: Piece, **about: Any) -> dict[str, Any]:
         """Note that a segment is about to be carried out; what comes of it can be added to what is returned."""
@@ -84,14 +104,21 @@ class Course:
             yield step
 
 
-def source_costs(numbers: Sequence[int], rng: np.random.Generator, spread: float, cap: float) -> Array:
+def source_costs(tasks: Sequence[str], rng: np.random.Generator, spread: float, cap: float) -> Array:
     """What it costs in an episode to take a segment of each source, by its number.
 
-    An episode is a function of its seed and knows nothing of the others: so that none of N sources has more than its
-    share, `cap` times N of them are drawn, and the others are only for what these cannot do.
+    An episode is a function of its seed and knows nothing of the others: so that none of a task's N sources has more
+    than its share, `cap` times N of them are drawn, and the others are only for what these cannot do.
+
+    Args:
+        tasks: that the sources solve, by their numbers.
+        rng: of the draw.
+        spread: cost that each has at random, at most.
+        cap: share that is drawn.
     """
-    bias: Array = rng.uniform(0.0, spread, size=max(numbers, default=0) + 1)
-    drawn = rng.permutation(np.array(numbers, dtype=np.int64))[: max(1, int(np.floor(cap * len(numbers) + 1e-9)))]
-    others = np.ones(len(bias), dtype=np.bool_)
-    others[drawn] = False
-    return bias + NOT_DRAWN_COST * others
+    bias: Array = rng.uniform(0.0, spread, size=len(tasks))
+    for task in dict.fromkeys(tasks):
+        mine = np.array([number for number, other in enumerate(tasks) if other == task], dtype=np.int64)
+        left_out = rng.permutation(mine)[max(1, int(np.floor(cap * len(mine) + 1e-9))) :]
+        bias[left_out] += NOT_DRAWN_COST
+    return bias

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from robocasa_lerobot.demos.generate.course import Course
 from robocasa_lerobot.demos.generate.sources.frames import HANDLE, REST, Part, anchor, anchored, parts_of, shares_of
 from robocasa_lerobot.demos.generate.sources.rules import rules_for
 from robocasa_lerobot.demos.generate.sources.segments import PART
-from robocasa_lerobot.demos.generate.sources.source import Piece, Source, pieces_for
+from robocasa_lerobot.demos.generate.sources.source import Piece, pieces_for
 from robocasa_lerobot.demos.generate.sources.transform import inverse, make_pose, mirrored
 from robocasa_lerobot.demos.motion import Array, rotation_about
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
@@ -115,10 +115,10 @@ class Fit:
         return float(self.part.range[0] + share * self.part.span)
 
 
-def fits_of(env: KitchenEnv, stage: Stage, sources: Sequence[Source]) -> list[Fit]:
+def fits_of(env: KitchenEnv, stage: Stage, course: Course) -> list[Fit]:
     """Segments that lead the stage's parts on from where they stand."""
     drawn = env.scene.fill(stage.to)
-    pieces = pieces_for(sources, stage, PART, drawn)
+    pieces = course.most_alike(pieces_for(course.sources, stage, PART, drawn), env, stage)
     found = []
     for part in parts_of(env, stage):
         for piece in pieces:

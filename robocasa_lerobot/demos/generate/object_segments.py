@@ -91,7 +91,7 @@ def object_stage(env: KitchenEnv, stage: Stage, course: Course) -> Iterator[Arra
 
 
 def _pick(env: KitchenEnv, stage: Stage, obj: Graspable, course: Course, tried: list[Array]) -> Iterator[Array]:
-    pieces = pieces_for(course.sources, stage, PICK)
+    pieces = course.most_alike(pieces_for(course.sources, stage, PICK), env, stage)
     if not pieces:
         raise SkillError("no source picks anything up")
     free = place_strategy(env, stage, obj).grasp if stage.verb == "place" else ANY_APPROACH
@@ -220,7 +220,7 @@ def _pick_way(piece: Piece, position: Array, rotation: Array, extra: float) -> _
 
 
 def _place(env: KitchenEnv, stage: Stage, obj: Graspable, course: Course, put_down: list[Array]) -> Iterator[Array]:
-    pieces = pieces_for(course.sources, stage, PLACE)
+    pieces = course.most_alike(pieces_for(course.sources, stage, PLACE), env, stage)
     if not pieces:
         raise SkillError("no source puts anything down")
     strategy = place_strategy(env, stage, obj)

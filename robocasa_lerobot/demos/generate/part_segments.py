@@ -46,7 +46,7 @@ def part_stage(env: KitchenEnv, stage: Stage, course: Course) -> Iterator[Array]
     for number in range(MOST_SEGMENTS):
         if stage_done(env, stage):
             return
-        fits = fits_of(env, stage, course.sources)
+        fits = fits_of(env, stage, course)
         if not fits:
             raise SkillError(
                 f"{stage.target}: no source shows how to go on from here"

@@ -17,20 +17,27 @@ _TRIES = 100
 
 @dataclass(frozen=True)
 class InitialNoise:
-    """Standard deviations of Gaussian noise on the robot's start.
+    """How the robot's start is spread: by Gaussian noise, or anywhere round the task's own.
 
     Args:
-        arm_rad: on each arm joint, radians; RoboCasa's own episodes have 0.02.
-        base_position_m: on the base's position along x and y, metres, on top of the task's own spread.
-        base_yaw_deg: on its heading, degrees.
+        arm_rad: standard deviation on each arm joint, radians; RoboCasa's own episodes have 0.02.
+        base_position_m: the same on the base's position along x and y, metres, on top of the task's own spread.
+        base_yaw_deg: the same on its heading, degrees.
+        base_within_m: the base starts anywhere within so many metres, at any heading: alike over the disc.
 
     Raises:
-        UserError: a negative or infinite deviation.
+        UserError: one is negative or infinite.
     """
 
     arm_rad: float = 0.02
     base_position_m: float = 0.0
     base_yaw_deg: float = 0.0
+    base_within_m: float = 0.0
+
+    @property
+    def moves_base(self) -> bool:
+        """Whether the base starts elsewhere than the task has it."""
+        return max(self.base_position_m, self.base_yaw_deg, self.base_within_m) > 0.0
 
     def __post_init__(self) -> None:
         for field in dataclasses.fields(self):
@@ -45,13 +52,17 @@ def add_initial_noise(scene: Scene, noise: InitialNoise) -> None:
     A base pose that would stand in a fixture is drawn again; where none of 100 is free, the base stays.
     """
     scene.arm_noise_rad = noise.arm_rad
-    if noise.base_position_m == 0.0 and noise.base_yaw_deg == 0.0:
+    if not noise.moves_base:
         return
     rng = np.random.default_rng([scene.seed, _BASE_NOISE_STREAM])
     start = scene.robot_pose
     for _ in range(_TRIES):
         shift = rng.normal(0.0, noise.base_position_m, 2)
         turn = np.deg2rad(rng.normal(0.0, noise.base_yaw_deg))
+        if noise.base_within_m > 0.0:
+            bearing, turn = rng.uniform(-np.pi, np.pi), turn + rng.uniform(-np.pi, np.pi)
+            far = noise.base_within_m * np.sqrt(rng.uniform())
+            shift = shift + far * np.array([np.cos(bearing), np.sin(bearing)])
         pose = RobotPose(start.x + float(shift[0]), start.y + float(shift[1]), start.yaw + float(turn), start.side)
         if is_free(scene.fixtures, pose, scene.robot.shape):
             scene.robot_pose = pose
