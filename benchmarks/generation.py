@@ -1,50 +1,73 @@
-"""Generation: how often attempts succeed in kitchens that the sources are not from, task by task.
+"""Generation: how often attempts succeed in kitchens that the sources are not from, and what that is worth an hour.
 
-Sources are prepared demonstrations (`robocasa-lerobot demos`, then `prepare`). Every attempt is a line of the trials'
-file, so that a run can be stopped and continued; nothing is left out of a rate, and an attempt that raises has failed.
-The first tries alone are counted beside: what a single pass over the segments comes to.
+Sources are prepared demonstrations (`robocasa-lerobot demos`, then `prepare`). Every task and seed is tried by each of
+the arms in turn, in one run, so that their times compare:
 
-    python benchmarks/generation.py --source sources/ --tasks OpenDrawer,CloseDrawer --attempts 10
-    python benchmarks/generation.py --source sources/ --own              # in the sources' own kitchens
-    python benchmarks/generation.py --source sources/ --select random --bridge line --base fixed
+    ours       `generate` as it is
+    mimicgen   plain MimicGen, see generation_plain.py
+    scripted   the demonstrator itself, which needs no sources
+    far        ours, the base starting up to 1.5 m away and at any heading; of tasks whose published data does not drive
+    one        ours with one source of each task
+    own        ours in the sources' own scenes
+
+    python benchmarks/generation.py --source sources/ --attempts 100
+    python benchmarks/generation.py --source sources/ --tasks KettleBoiling,ButterOnPan --arms ours --attempts 20
+
+Every attempt is a line of the trials' file, so that a run can be stopped and continued; nothing is left out of a rate,
+and an attempt that raises has failed. The first tries alone are counted beside: what a single pass over the segments
+comes to.
 """
 
 from __future__ import annotations
 
 import argparse
 import json
+import multiprocessing
+import os
 import time
-from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
 import common
+from generation_plain import plain_attempt
+from generation_report import Trial, ratios, summary, text
 
 from robocasa_lerobot.demos.choose import expand_names
-from robocasa_lerobot.demos.generate.select import BASES, BRIDGES, SELECTIONS
 from robocasa_lerobot.demos.generate.settings import GenerationSettings
 from robocasa_lerobot.demos.generate.sources.source import sources_of
-from robocasa_lerobot.evaluation.statistics.rates import wilson_interval
+from robocasa_lerobot.demos.recorder import Recording, record_episode
+from robocasa_lerobot.envs.kitchen_env import KitchenEnv
+from robocasa_lerobot.files import write_text
 from robocasa_lerobot.progress import Bar
+from robocasa_lerobot.provenance import utc_now
 
 FIRST_SEED = 100_500  # development's; sources are from 100,000 on
+FAR_M = 1.5
+ARMS = ("ours", "mimicgen", "scripted", "far", "one", "own")
+# Of the 60 tasks: those of which the benchmark's own data drives, which are not asked of the arm `far`.
+DRIVING = (
+    "CloseBlenderLid", "CloseMicrowave", "CloseStandMixerHead", "OpenFridgeDrawer", "OpenMicrowave",
+    "PickPlaceCounterToMicrowave", "PickPlaceCounterToOven", "PickPlaceDrawerToCounter",
+    "PickPlaceMicrowaveToCounter", "TurnOnStove", "TurnOffStove",
+)  # fmt: skip
+OUTPUT = common.RESULTS / "generation.json"
 
 
 @dataclass(frozen=True)
-class Trial:
-    """An attempt: `manner` says how it was made, `segments` the contacts it took, `sources` whose they were."""
+class Job:
+    """An attempt to be made: a task, a seed, an arm, and the folder of its sources."""
 
     task: str
     seed: int
-    manner: str
-    success: bool
-    steps: int
-    seconds: float
-    segments: int
-    sources: tuple[int, ...]
-    first_try: bool
-    reason: str
+    arm: str
+    source: Path
+
+    @property
+    def key(self) -> tuple[str, int, str]:
+        """What makes it one attempt."""
+        return self.task, self.seed, self.arm
 
 
 def parse(arguments: Sequence[str] | None = None) -> argparse.Namespace:
@@ -52,37 +75,51 @@ def parse(arguments: Sequence[str] | None = None) -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--source", type=Path, required=True, help="folder of prepared demonstrations")
     parser.add_argument("--tasks", default="", help="names or sets (default: those that have a file there)")
+    parser.add_argument("--arms", default="ours,mimicgen,scripted", help=f"of {', '.join(ARMS)} (default %(default)s)")
     parser.add_argument("--attempts", type=int, default=10, help="of each task (default 10)")
     parser.add_argument("--first-seed", type=int, default=FIRST_SEED, help=f"default {FIRST_SEED}")
-    parser.add_argument("--own", action="store_true", help="in the sources' own scenes, once each")
-    parser.add_argument("--select", choices=SELECTIONS, default="feasible")
-    parser.add_argument("--base", choices=BASES, default="replan")
-    parser.add_argument("--bridge", choices=BRIDGES, default="plan")
-    parser.add_argument("--cap", type=float, default=0.2, help="as of `generate` (default 0.2)")
+    parser.add_argument("--workers", type=int, default=os.cpu_count() or 1, help="processes (default: all cores)")
     parser.add_argument("--trials", type=Path, default=common.REPOSITORY / "outputs" / "generation.jsonl")
-    parser.add_argument("--out", type=Path, default=common.RESULTS / "generation.md")
+    parser.add_argument("--out", type=Path, default=OUTPUT, help="result; a page lies beside it")
     return parser.parse_args(arguments)
 
 
-def attempt(settings: GenerationSettings, seed: int, manner: str) -> Trial:
+def settings_of(job: Job) -> GenerationSettings:
+    """Of an attempt."""
+    return GenerationSettings(
+        job.task, 1, split="pretrain", varied=False, source=str(job.source),
+        start_within_m=FAR_M if job.arm == "far" else 0.0,
+        first_sources=1 if job.arm == "one" else 0,
+    )  # fmt: skip
+
+
+def record(job: Job, settings: GenerationSettings, env: KitchenEnv) -> Recording:
+    """Make an attempt in the way of its arm."""
+    if job.arm == "scripted":
+        return record_episode(env, job.seed, varied=True)
+    if job.arm == "mimicgen":
+        return plain_attempt(settings, env, job.seed)
+    return settings.record(env, job.seed)
+
+
+def attempt(job: Job) -> Trial:
     """Make one attempt. Nothing that goes wrong ends the benchmark: it counts as a failure."""
-    env, started = settings.make_env(), time.perf_counter()
+    settings, started = settings_of(job), time.perf_counter()
+    env = settings.make_env()
     try:
-        recording = settings.record(env, seed)
+        recording = record(job, settings, env)
     except Exception as error:
         reason = f"{type(error).__name__}: {error}"
-        return Trial(settings.task, seed, manner, False, 0, time.perf_counter() - started, 0, (), False, reason)
+        return Trial(*job.key, False, 0, round(time.perf_counter() - started, 3), 0, (), False, reason)
     finally:
         env.close()
-    rows = recording.ep_meta["generation"]["segments"]
+    rows = recording.ep_meta.get("generation", {}).get("segments", [])
     told = [(row["kind"], row.get("part", row["ref"])) for row in rows]
     return Trial(
-        task=settings.task,
-        seed=seed,
-        manner=manner,
+        *job.key,
         success=recording.success,
         steps=len(recording.actions),
-        seconds=time.perf_counter() - started,
+        seconds=round(time.perf_counter() - started, 3),
         segments=len(rows),
         sources=tuple(row["demo"] for row in rows),
         first_try=recording.success and len(set(told)) == len(told),
@@ -90,58 +127,70 @@ def attempt(settings: GenerationSettings, seed: int, manner: str) -> Trial:
     )
 
 
-def table(trials: Sequence[Trial], source: Path) -> str:
-    """Markdown: one line for each task, and one for all."""
-    lines = [
-        "| task | sources | kept | rate | 95 % | first try | s an attempt | most used source |",
-        "|---|--:|--:|--:|---|--:|--:|--:|",
-    ]
-    for name in [*dict.fromkeys(trial.task for trial in trials), "all"]:
-        mine = [trial for trial in trials if name in (trial.task, "all")]
-        kept = [trial for trial in mine if trial.success]
-        low, high = wilson_interval(len(kept), len(mine))
-        used = Counter(number for trial in kept for number in trial.sources)
-        most = f"{max(used.values()) / sum(used.values()):.0%}" if used and name != "all" else ""
-        count = len(sources_of(source, name)) if name != "all" else ""
-        lines.append(
-            f"| {name} | {count} | {len(kept)} of {len(mine)} | {len(kept) / len(mine):.0%} | "
-            f"{low:.0%} to {high:.0%} | {sum(trial.first_try for trial in mine) / len(mine):.0%} | "
-            f"{sum(trial.seconds for trial in mine) / len(mine):.1f} | {most} |"
-        )
-    return "\n".join(lines)
+def jobs_of(args: argparse.Namespace, names: Iterable[str], arms: Sequence[str]) -> list[Job]:
+    """All attempts, seed by seed, so that a run that is stopped has seen all tasks about equally often."""
+    jobs = []
+    for number in range(args.attempts):
+        for name in names:
+            own = [one.seed for one in sources_of(args.source, name)]
+            for arm in arms:
+                if (arm == "far" and name in DRIVING) or (arm == "own" and number >= len(own)):
+                    continue
+                seed = own[number] if arm == "own" else args.first_seed + number
+                jobs.append(Job(name, seed, arm, args.source))
+    return jobs
+
+
+def run(jobs: Sequence[Job], path: Path, workers: int) -> None:
+    """Make attempts, and write each down when it has ended."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    context = multiprocessing.get_context("forkserver")
+    context.set_forkserver_preload(["robocasa_lerobot.demos.generate.settings"])
+    with ProcessPoolExecutor(workers, mp_context=context) as pool, path.open("a", encoding="utf-8") as file:
+        futures = [pool.submit(attempt, job) for job in jobs]
+        try:
+            for future in Bar(as_completed(futures), total=len(futures), unit="attempt"):
+                file.write(json.dumps(asdict(future.result())) + "\n")
+                file.flush()
+        except BaseException:
+            pool.shutdown(wait=False, cancel_futures=True)
+            raise
+
+
+def read(path: Path) -> dict[tuple[str, int, str], Trial]:
+    """Finished attempts; a line that was cut off does not count."""
+    lines = path.read_text(encoding="utf-8").splitlines(keepends=True) if path.exists() else []
+    found = (json.loads(line) for line in lines if line.endswith("\n"))
+    trials = (Trial(**values | {"sources": tuple(values["sources"])}) for values in found)
+    return {(trial.task, trial.seed, trial.arm): trial for trial in trials}
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
-    """Make the missing attempts, and write the table."""
+    """Make the missing attempts, and write the result."""
     args = parse(arguments)
+    arms = [arm.strip() for arm in args.arms.split(",")]
+    for arm in arms:
+        if arm not in ARMS:
+            raise SystemExit(f"no arm {arm!r}: there are {', '.join(ARMS)}")
     names = expand_names(args.tasks) if args.tasks else tuple(sorted(path.stem for path in args.source.glob("*.hdf5")))
-    manner = f"{args.select} {args.base} {args.bridge} cap {args.cap:g}" + (" own" if args.own else "")
-    lines = args.trials.read_text().splitlines() if args.trials.exists() else []
-    done = [Trial(**json.loads(line) | {"sources": tuple(json.loads(line)["sources"])}) for line in lines]
-    known = {(trial.task, trial.seed, trial.manner): trial for trial in done}
-    wanted = []
-    for name in names:
-        settings = GenerationSettings(
-            name, 1, split="pretrain", varied=False, source=str(args.source),
-            select=args.select, base=args.base, bridge=args.bridge, cap=args.cap,
-        )  # fmt: skip
-        own = [one.seed for one in sources_of(args.source, name)]
-        seeds = own if args.own else range(args.first_seed, args.first_seed + args.attempts)
-        wanted += [(settings, seed) for seed in seeds]
-    args.trials.parent.mkdir(parents=True, exist_ok=True)
-    with args.trials.open("a") as file:
-        for settings, seed in Bar(
-            [one for one in wanted if (one[0].task, one[1], manner) not in known], unit="attempt"
-        ):
-            trial = attempt(settings, seed, manner)
-            known[trial.task, trial.seed, manner] = trial
-            file.write(json.dumps(asdict(trial)) + "\n")
-            file.flush()
-    chosen = [known[settings.task, seed, manner] for settings, seed in wanted]
-    where = "the sources' own scenes" if args.own else f"seeds from {args.first_seed} on"
-    text = f"# Generated attempts: {manner}\n\nPretraining kitchens, {where}.\n\n{table(chosen, args.source)}\n"
-    args.out.write_text(text)
-    print(text)
+    jobs = jobs_of(args, names, arms)
+    done = read(args.trials)
+    if todo := [job for job in jobs if job.key not in done]:
+        run(todo, args.trials, args.workers)
+        done = read(args.trials)
+    trials = [done[job.key] for job in jobs]
+    body = {
+        "ratios": ratios(trials, args.workers),
+        "arms": {arm: summary([trial for trial in trials if trial.arm == arm]) for arm in arms},
+        "settings": {"attempts": args.attempts, "first_seed": args.first_seed, "split": "pretrain"},
+        "machine": common.machine(),
+        "versions": common.versions("mujoco", "numpy"),
+        "date": utc_now(),
+    }
+    write_text(args.out, json.dumps(body, indent=1) + "\n")
+    page = text(trials, f"`benchmarks/generation.py`, pretraining kitchens, seeds from {args.first_seed} on.")
+    write_text(args.out.with_suffix(".md"), page)
+    print(page)
 
 
 if __name__ == "__main__":

@@ -46,6 +46,13 @@ def configure(parser: argparse.ArgumentParser) -> None:
         help="of the segments that one source should have at most; 1 takes whichever fits best (default: %(default)s)",
     )
     parser.add_argument(
+        "--first-sources",
+        type=int,
+        default=0,
+        metavar="N",
+        help="of each task take only the first N sources (default: all)",
+    )
+    parser.add_argument(
         "--rules", type=Path, metavar="YAML", help="how verbs are cut into segments, where that is not to be derived"
     )
     add_options(parser)
@@ -82,6 +89,7 @@ def run(args: argparse.Namespace) -> int:
             select=args.select,
             spread=args.spread,
             cap=args.cap,
+            first_sources=args.first_sources,
             rules=rules,
         )
         for name in expand_names(args.tasks)

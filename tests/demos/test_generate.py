@@ -168,6 +168,22 @@ def test_a_source_succeeds_in_its_own_scene(sources: Path) -> None:
 
 
 @pytest.mark.slow
+def test_a_composite_task_is_generated_from_sources_of_atomic_ones(tmp_path: Path) -> None:
+    known = {"split": "pretrain", "seed": 100_000}
+    atomic = ("PickPlaceCounterToStove", "TurnOnStove", "CloseDrawer")
+    record_tasks([RecordingSettings(task, 2, **known) for task in atomic], tmp_path / "sources", show_progress=False)
+    assert not any(outcome.dropped for outcome in prepare_files([tmp_path / "sources"]))
+    arguments = f"--source {tmp_path / 'sources'} --tasks ButterOnPan --episodes 1 --split pretrain --seed 200500"
+    assert cli.main(["generate", *arguments.split(), "--workers", "1", "--out", str(tmp_path / "made")]) == 0
+    found = replay(tmp_path / "made" / "ButterOnPan.hdf5", "demo_0")
+    assert found.actions
+    with h5py.File(tmp_path / "made" / "ButterOnPan.hdf5") as file:
+        segments = json.loads(file["data/demo_0"].attrs["ep_meta"])["generation"]["segments"]
+    assert {row["source"].partition("/")[0] for row in segments} == set(atomic[:2])
+    assert [row["kind"] for row in segments][:2] == ["pick", "place"]
+
+
+@pytest.mark.slow
 def test_nothing_is_generated_in_a_sources_own_scene(sources: Path) -> None:
     with pytest.raises(UserError, match="own scene"):
         GenerationSettings.of(sources, task=TASK, episodes=2, split="pretrain", seed=99_999)

@@ -87,16 +87,9 @@ class Fit:
         end = self._here((first + far - low) / (high - low), sign)
         return begin, end
 
-    @property
-    def springs(self) -> bool:
-        """Whether the part goes back by itself when it is let go."""
-        path = self.piece.data.joints[self.piece.segment.ref][self.piece.segment.contact : self.piece.segment.end]
-        far = np.abs(path - path[0])
-        return bool(far[-1] < 0.5 * far.max())
-
     def apart(self, position: float) -> float:
         """How far a part is from where it stood when the segment began, as a share of its range."""
-        return 0.0 if self.words_relative or self.springs else abs(position - self.way()[0]) / self.part.span
+        return 0.0 if self.words_relative or self.piece.springs else abs(position - self.way()[0]) / self.part.span
 
     @property
     def words_relative(self) -> bool:
@@ -129,7 +122,7 @@ def fits_of(env: KitchenEnv, stage: Stage, course: Course) -> list[Fit]:
             begin, end = fit.way()
             now, ahead = part.position(env.data), float(np.sign(end - begin))
             near = (begin - now) * ahead < APART_SHARE * part.span
-            if stage.verb in RELATIVE or fit.springs or (near and (end - now) * ahead > LEFT_SHARE * part.span):
+            if stage.verb in RELATIVE or piece.springs or (near and (end - now) * ahead > LEFT_SHARE * part.span):
                 spins = (0.0, begin - now) if stage.skill == "knobs" and abs(begin - now) > LEAST_SPIN_RAD else (0.0,)
                 found += [Fit.of(piece, part, flip=flip, spin=spin) for flip in (False, True) for spin in spins]
     return found

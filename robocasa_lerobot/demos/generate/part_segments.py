@@ -262,9 +262,9 @@ def _carried(env: KitchenEnv, fit: Fit) -> Carried:
         fit.piece,
         lambda step: frame(step) @ fit.local(data.target[step], step),
         lambda step: frame(step) @ fit.local(data.eef[step], step),
-        (lambda step: False) if fit.springs else late,
+        (lambda step: False) if fit.piece.springs else late,
         base,
         lambda: abs(part.position(env.data) - start) > MET_SHARE * part.span,
         lambda: part.position(env.data) / part.span,
-        0 if fit.springs else enter,
+        0 if fit.piece.springs else enter,
     )

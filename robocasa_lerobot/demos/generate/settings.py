@@ -11,7 +11,7 @@ import numpy as np
 from robocasa_lerobot.demos.attempts import RecordingSettings
 from robocasa_lerobot.demos.generate.course import KINDS, Course
 from robocasa_lerobot.demos.generate.select import Manner
-from robocasa_lerobot.demos.generate.sources.source import digest_of, sources_of
+from robocasa_lerobot.demos.generate.sources.source import Source, digest_of, first_of_each_task, sources_of
 from robocasa_lerobot.demos.generate.stage import generated
 from robocasa_lerobot.demos.recorder import Recording
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
@@ -30,6 +30,7 @@ class GenerationSettings(RecordingSettings):
         select, base, bridge: see `Manner`.
         rules: how stages are cut, where that is not derived: JSON of what `rules.rules_from` takes.
         spread: cost that each source has at random in an attempt: the greater, the more evenly they are used.
+        first_sources: of each task only so many, the first ones; 0 takes all.
         cap: share of all segments that one source should have at most; 1 takes whichever fits best.
     """
 
@@ -41,6 +42,7 @@ class GenerationSettings(RecordingSettings):
     rules: str = "{}"
     spread: float = 0.3
     cap: float = 0.2
+    first_sources: int = 0
 
     @classmethod
     def of(cls, source: Path, **values: Any) -> GenerationSettings:
@@ -50,7 +52,7 @@ class GenerationSettings(RecordingSettings):
             UserError: none is prepared, or they are seeds of the attempts.
         """
         settings = cls(source=str(source), **values)
-        found = sources_of(source, settings.task, settings.rules)
+        found = settings.read()
         clash = sorted(one.seed for one in found if 0 <= one.seed - settings.seed < settings.limit)
         if clash and values.get("split") is not None:
             raise UserError(
@@ -59,13 +61,23 @@ class GenerationSettings(RecordingSettings):
             )
         return cls(source=str(source), sources=digest_of(found), **values)
 
+    def read(self) -> list[Source]:
+        """The sources."""
+        found = sources_of(self.folder, self.task, self.rules)
+        return first_of_each_task(found, self.first_sources) if self.first_sources else found
+
+    @property
+    def folder(self) -> Path:
+        """That the sources lie in, or the file."""
+        return Path(self.source)
+
     def identity(self) -> dict[str, Any]:
         """What attempts depend on: the sources themselves, wherever they lie."""
         return {key: value for key, value in super().identity().items() if key != "source"}
 
     def record(self, env: KitchenEnv, seed: int) -> Recording:
         """Make the attempt of a seed."""
-        sources = sources_of(Path(self.source), self.task, self.rules)
+        sources = self.read()
         manner = Manner(self.select, self.base, self.bridge)
         course = Course(sources, np.random.default_rng([seed, _CHOICE_STREAM]), manner, self.spread, self.cap)
         recording = self.labelled_episode(env, seed, lambda env, style, log: generated(env, style, log, course))

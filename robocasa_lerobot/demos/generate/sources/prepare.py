@@ -235,7 +235,8 @@ class _Watcher:
             "parts": {name: _described(part) for name, part in self._parts.items()},
             "objects": {name: self._size(name) for name in self._objects},
             "fixtures": {
-                role: {"kind": type(fixture).__name__, "yaw": fixture.yaw} for role, fixture in self._roles.items()
+                role: {"kind": type(fixture).__name__, "pos": list(fixture.pos), "yaw": fixture.yaw}
+                for role, fixture in self._roles.items()
             },
         }
         return Prepared(

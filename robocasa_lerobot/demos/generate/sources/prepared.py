@@ -19,7 +19,7 @@ from robocasa_lerobot.demos.motion import Array
 
 GROUP = "datagen_info"
 OURS = "kitchen"
-VERSION = 1  # of this layout: files of another one are prepared again
+VERSION = 2  # of this layout: files of another one are prepared again
 INTERFACE, INTERFACE_TYPE = "MG_KitchenEnv", "robocasa_lerobot"
 _SERIES = ("joints", "touching", "contact_points", "undersides")
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
 
@@ -67,12 +67,25 @@ class Piece:
 
         A part that springs back, as a button, got to where it was pressed to.
         """
+        start, last, most = self._moves()
+        return start, most if self.springs else last
+
+    @property
+    def springs(self) -> bool:
+        """Whether the part goes back by itself when it is let go."""
+        _, last, most = self._moves()
+        return abs(last) < 0.5 * abs(most)
+
+    def _moves(self) -> tuple[float, float, float]:
+        """Where the part stood before it was touched, how far from there it was left, and how far it got.
+
+        A button may be down already in the first state in which it is touched.
+        """
         assert self.segment.kind == PART
-        path = self.data.joints[self.segment.ref][self.segment.contact : self.segment.end + 1]
+        before = max(self.segment.contact - 1, self.segment.lead)
+        path = self.data.joints[self.segment.ref][before : self.segment.end + 1]
         far = path - path[0]
-        last = float(far[-1])
-        most = float(far[np.argmax(np.abs(far))])
-        return float(path[0]), last if abs(last) > 0.5 * abs(most) else most
+        return float(path[0]), float(far[-1]), float(far[np.argmax(np.abs(far))])
 
 
 def sources_of(folder: Path, task: str, rules: str = "{}") -> list[Source]:
@@ -94,6 +107,17 @@ def sources_of(folder: Path, task: str, rules: str = "{}") -> list[Source]:
             f"`robocasa-lerobot prepare {folder}` makes them ready."
         )
     return list(found)
+
+
+def first_of_each_task(sources: Sequence[Source], count: int) -> list[Source]:
+    """So many sources of each task, numbered anew."""
+    seen: dict[str, int] = {}
+    found: list[Source] = []
+    for source in sources:
+        seen[source.task] = seen.get(source.task, 0) + 1
+        if seen[source.task] <= count:
+            found.append(replace(source, number=len(found)))
+    return found
 
 
 def digest_of(sources: Sequence[Source]) -> str:
