@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.spatial import ConvexHull
 
-from robocasa_lerobot.demos.motion import grip_position, hand_rotation
+from robocasa_lerobot.demos.motion import grip_position, hand_rotation, rotation_about
 from robocasa_lerobot.demos.planning.grasps import GraspPose, grasp_poses, grasp_poses_of, pieces
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.objects.catalogue import CATEGORIES, INSTANCES_PER_CATEGORY, Instance, instance
@@ -88,6 +88,19 @@ def test_flat_rings_are_held_across_their_holes(name: str) -> None:
     items = [instance(CATEGORIES[name], index) for index in range(INSTANCES_PER_CATEGORY)]
     across = [any(spans_a_hole(item, pose) for pose in grasp_poses(item, PANDA_OMRON.gripper)) for item in items]
     assert sum(across) >= 0.8 * len(items)
+
+
+def test_what_only_the_tips_touch_askew_counts_for_less_than_what_is_flat() -> None:
+    """A tub's wall: the fingers may lean as much as walls of bowls do, and not by half a right angle."""
+    wall = [Solid("box", (0.10, 0.004, 0.035))]
+
+    def best(lean: float) -> float:
+        turn = rotation_about(np.array([1.0, 0.0, 0.0]), np.deg2rad(lean))
+        return max(pose.score for pose in grasp_poses_of(wall, turn, PANDA_OMRON.gripper))
+
+    flat, bowl, slant = best(0.0), best(15.0), best(46.0)
+    assert flat - 0.7 < bowl < flat
+    assert slant < flat - 1.8
 
 
 def test_what_is_held_is_filled_and_the_open_hand_meets_nothing() -> None:

@@ -27,6 +27,9 @@ PALM_STEP_M, FINGERS_ABOVE_M, TIPS_CLEAR_M = 0.012, 0.02, 0.001
 # The pads press from 12 mm below the grip site to 9 mm above; three rows and three heights stand for their faces.
 PAD_ROW_M, PAD_LOW_M, PAD_MIDDLE_M, PAD_HIGH_M = 0.006, -0.010, -0.002, 0.006
 PAD_LINES, LOWER_LINE, MIDDLE_LINE = 9, 3, 4
+# What is askew to the pads costs little up to 20 degrees, as walls of bowls lean: in units of slope, for the square of
+# the tangent. Points whose distances along a line differ less than by that are met at once.
+ASKEW, MOST_SLOPE, TIE_M = 5.0, 4.0, 1e-6
 
 
 class Faces(NamedTuple):
@@ -58,17 +61,23 @@ class Hand(NamedTuple):
 
 @compiled
 def _crossed(faces: Faces, start: Array, direction: Array, parts: Array) -> None:
-    """Write the parts (pieces, 2) of a line start + t * direction inside each piece; (inf, -inf) where none is."""
+    """Write the parts (pieces, 4) of a line start + t * direction inside each piece; (inf, -inf) where none is.
+
+    After where it enters and leaves, the numbers of the faces there.
+    """
     for piece in range(len(faces.counts)):
         low, high, missed = -np.inf, np.inf, False
+        into, out_of = 0, 0
         for face in range(faces.counts[piece]):
             normal = faces.normals[piece, face]
             rate = normal[0] * direction[0] + normal[1] * direction[1] + normal[2] * direction[2]
             room = faces.offsets[piece, face] - (normal[0] * start[0] + normal[1] * start[1] + normal[2] * start[2])
             if rate > PARALLEL:
-                high = min(high, room / rate)
+                if room / rate < high:
+                    high, out_of = room / rate, face
             elif rate < -PARALLEL:
-                low = max(low, room / rate)
+                if room / rate > low:
+                    low, into = room / rate, face
             elif room < 0:
                 missed = True
             if missed or low >= high:
@@ -76,15 +85,19 @@ def _crossed(faces: Faces, start: Array, direction: Array, parts: Array) -> None
                 break
         parts[piece, 0] = np.inf if missed else low
         parts[piece, 1] = -np.inf if missed else high
+        parts[piece, 2], parts[piece, 3] = into, out_of
 
 
 @compiled
 def _merged(parts: Array, out: Array) -> int:
-    """Write the union of intervals (n, 2) as disjoint ones, rising, and return how many; small gaps are closed."""
+    """Write the union of intervals, in the first two columns, as disjoint ones that rise, and return how many.
+
+    Small gaps are closed.
+    """
     order = np.argsort(parts[:, 0])
     count = 0
     for index in order:
-        low, high = parts[index]
+        low, high = parts[index, 0], parts[index, 1]
         if not np.isfinite(low):
             break
         if count and low <= out[count - 1, 1] + GAP_M:
@@ -119,6 +132,13 @@ def _spread(values: Array, count: int) -> float:
 
 
 @compiled
+def _askew(normal: Array, u: Array) -> float:
+    """Tangent, squared, of the angle between a unit normal and the line that the fingers open on."""
+    along = normal[0] * u[0] + normal[1] * u[1] + normal[2] * u[2]
+    return float(1.0 / max(along * along, 1e-6) - 1.0)
+
+
+@compiled
 def candidates(
     faces: Faces, cloud: Array, center: Array, angles: Array, levels: Array, opening: float, span: bool
 ) -> Array:
@@ -137,7 +157,7 @@ def candidates(
         span: whether what has holes is held across them as well.
     """
     pieces = len(faces.counts)
-    parts = np.empty((PAD_LINES, pieces, 2))
+    parts = np.empty((PAD_LINES, pieces, 4))
     found = np.empty((pieces + 1, 2))
     lows, highs = np.empty(PAD_LINES), np.empty(PAD_LINES)
     out: Array = np.empty((1024, 6))
@@ -169,16 +189,27 @@ def candidates(
                     if not THINNEST_M < high - low < opening:
                         continue
                     touched = 0
+                    lowest, highest, low_askew, high_askew = np.inf, -np.inf, 0.0, 0.0
                     for line in range(PAD_LINES):
                         first, last = np.inf, -np.inf
+                        left, right = 0, 0
                         for piece in range(pieces):
                             if parts[line, piece, 0] < high + PRESSED_M and parts[line, piece, 1] > low - PRESSED_M:
-                                first, last = min(first, parts[line, piece, 0]), max(last, parts[line, piece, 1])
+                                if parts[line, piece, 0] < first:
+                                    first, left = parts[line, piece, 0], piece
+                                if parts[line, piece, 1] > last:
+                                    last, right = parts[line, piece, 1], piece
                         if first < np.inf:
                             lows[touched], highs[touched] = first, last
                             touched += 1
-                    # Higher for large and flat faces, near the centre of mass, with room between the fingers.
+                            if first < lowest - TIE_M:
+                                lowest, low_askew = first, _askew(faces.normals[left, int(parts[line, left, 2])], u)
+                            if last > highest + TIE_M:
+                                highest, high_askew = last, _askew(faces.normals[right, int(parts[line, right, 3])], u)
+                    # Higher for large and flat faces, near the centre of mass, with room between the fingers. What is
+                    # askew where the pads touch first turns in them, though they meet no more of it than that.
                     slope = (_spread(lows, touched) + _spread(highs, touched)) / 2 / 0.004 if touched > 1 else 1.0
+                    slope = max(slope, min(ASKEW * (low_askew + high_askew) / 2, MOST_SLOPE))
                     x = (low + high) / 2 * u[0] + row * w[0] - center[0]
                     y = (low + high) / 2 * u[1] + row * w[1] - center[1]
                     lever, above = np.sqrt(x * x + y * y) / 0.05, abs(z - center[2]) / 0.06
@@ -198,7 +229,7 @@ def has_room(faces: Faces, candidate: Array, top: float, hand: Hand) -> bool:
     middle, row, z, angle = (candidate[1] + candidate[2]) / 2, candidate[3], candidate[4], candidate[5]
     u = np.array([np.cos(angle), np.sin(angle), 0.0])
     w = np.array([-np.sin(angle), np.cos(angle), 0.0])
-    parts = np.empty((len(faces.counts), 2))
+    parts = np.empty((len(faces.counts), 4))
     # The fingers, from their tips to the palm, and nothing beside the object to be held.
     for side in (-hand.finger_half_width, 0.0, hand.finger_half_width):
         for rise in (TIPS_CLEAR_M - hand.tips_below_grip, 0.0, FINGERS_ABOVE_M):
