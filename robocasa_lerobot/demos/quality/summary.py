@@ -1,0 +1,162 @@
+"""Measures of a task's demonstrations together: which starts they cover, how they differ, how sources are used."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from robocasa_lerobot.demos.hdf5 import read_summary
+from robocasa_lerobot.demos.motion import Array
+from robocasa_lerobot.demos.quality.measure import Measures, Start, measure, start_of
+from robocasa_lerobot.demos.replay import demonstrations
+from robocasa_lerobot.envs.kitchen_env import KitchenEnv
+from robocasa_lerobot.envs.scene.reset_noise import InitialNoise
+from robocasa_lerobot.jobs.as_completed import as_they_end
+
+BIN_M = 0.2  # sides of the squares of the floor that starts are counted in
+
+
+@dataclass(frozen=True)
+class Quality:
+    """Of the demonstrations of a task.
+
+    Attributes:
+        task: name.
+        kept: measures of those that were kept.
+        failed: starts of the attempts that were not.
+    """
+
+    task: str
+    kept: tuple[Measures, ...]
+    failed: tuple[Start, ...]
+
+    @property
+    def rate(self) -> float:
+        """Of attempts, that were kept."""
+        return len(self.kept) / max(len(self.kept) + len(self.failed), 1)
+
+    @property
+    def covered(self) -> float:
+        """Share of the squares in which an attempt began, in which one began that was kept."""
+        kept = {_square(one.start) for one in self.kept}
+        return len(kept) / max(len(kept | {_square(start) for start in self.failed}), 1)
+
+    @property
+    def most_used_source(self) -> float | None:
+        """Share of all segments that come from the source that most come from; None where none was generated."""
+        used = Counter(source for one in self.kept for source in one.sources)
+        return max(used.values()) / used.total() if used else None
+
+    @property
+    def path_spread_m(self) -> float:
+        """Root mean square distance of two demonstrations' hands, at the same share of their time."""
+        return float(np.mean(self._path_distances())) if len(self.kept) > 1 else 0.0
+
+    @property
+    def most_alike_m(self) -> float:
+        """The same of the two that are most alike."""
+        return float(np.min(self._path_distances())) if len(self.kept) > 1 else 0.0
+
+    @property
+    def stand_spread_m(self) -> float:
+        """Standard deviation of where the base stands at the end, before what the first stage is about."""
+        return float(np.hypot(*np.std([one.stand[:2] for one in self.kept], axis=0))) if self.kept else 0.0
+
+    @property
+    def stand_spread_rad(self) -> float:
+        """The same of its heading, relative to that at the beginning."""
+        return float(np.std([one.stand[2] for one in self.kept])) if self.kept else 0.0
+
+    def mean(self, name: str) -> float:
+        """Of a measure."""
+        return float(np.mean([getattr(one, name) for one in self.kept])) if self.kept else 0.0
+
+    @property
+    def seconds_spread(self) -> float:
+        """Standard deviation of how long they take."""
+        return float(np.std([one.seconds for one in self.kept])) if self.kept else 0.0
+
+    def as_json(self) -> dict[str, Any]:
+        """All of it in plain values."""
+        names = ("rate", "covered", "most_used_source", "path_spread_m", "most_alike_m", "stand_spread_m")
+        means = ("seconds", "jerk", "idle", "saturated", "other_contacts", "in_view")
+        own = {name: getattr(self, name) for name in (*names, "stand_spread_rad", "seconds_spread")}
+        return {"task": self.task, "kept": len(self.kept), **own, **{name: self.mean(name) for name in means}}
+
+    def _path_distances(self) -> Array:
+        paths = np.array([one.path for one in self.kept])
+        away = paths[:, None] - paths[None]
+        distances = np.sqrt((away**2).sum(axis=-1).mean(axis=-1))
+        found: Array = distances[np.triu_indices(len(paths), k=1)]
+        return found
+
+
+def _square(start: Start) -> tuple[int, int]:
+    return int(np.floor(start.ahead_m / BIN_M)), int(np.floor(start.left_m / BIN_M))
+
+
+@dataclass(frozen=True)
+class Part:
+    """What came of looking at one attempt of a file."""
+
+    path: Path
+    kept: Measures | None = None
+    failed: Start | None = None
+
+
+def attempts_in(paths: Sequence[Path]) -> list[tuple[Path, str | int]]:
+    """All attempts of files or folders: the names of those that were kept, the seeds of those that failed.
+
+    Raises:
+        UserError: there are no demonstrations.
+    """
+    kept = demonstrations(paths)
+    found: list[tuple[Path, str | int]] = list(kept)
+    for path in dict.fromkeys(path for path, _ in kept):
+        found += [(path, failure.seed) for failure in read_summary(path).failures]
+    return found
+
+
+def look_at(attempts: Sequence[tuple[Path, str | int]], workers: int = 1) -> Iterator[Part]:
+    """Look at attempts, as they end."""
+    yield from as_they_end(_look, attempts, workers)
+
+
+def _look(path: Path, which: str | int) -> Part:
+    if isinstance(which, str):
+        return Part(path, kept=measure(path, which))
+    settings = read_summary(path).settings or {}
+    within = float(settings.get("start_within_m", 0.0))
+    env = KitchenEnv(
+        settings.get("task", path.stem),
+        split=settings.get("split", "target"),
+        cameras=(),
+        layouts=settings.get("layouts"),
+        styles=settings.get("styles"),
+        initial_noise=InitialNoise(base_within_m=within) if within else None,
+    )
+    try:
+        env.reset(seed=which)
+        return Part(path, failed=start_of(env))
+    finally:
+        env.close()
+
+
+def qualities(parts: Iterable[Part]) -> list[Quality]:
+    """What was looked at, task by task."""
+    found: dict[str, tuple[list[Measures], list[Start]]] = {}
+    for part in parts:
+        kept, failed = found.setdefault(part.path.stem, ([], []))
+        if part.kept is not None:
+            kept.append(part.kept)
+        if part.failed is not None:
+            failed.append(part.failed)
+    return [
+        Quality(task, tuple(sorted(kept, key=lambda one: one.start.seed)), tuple(failed))
+        for task, (kept, failed) in sorted(found.items())
+    ]

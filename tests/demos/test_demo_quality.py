@@ -1,0 +1,64 @@
+"""What demonstrations are worth: measures of known motions, and the page of real ones."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from robocasa_lerobot import cli, contract
+from robocasa_lerobot.demos.quality.measure import Measures, Start, _idle, _jerk, _saturated
+from robocasa_lerobot.demos.quality.summary import BIN_M, Quality
+from robocasa_lerobot.demos.recording import RecordingSettings, record_tasks
+
+
+def one(seed: int, ahead: float, *, path: float = 0.0, sources: tuple[int, ...] = ()) -> Measures:
+    """A demonstration whose hand keeps at a distance from a line."""
+    line = np.full((20, 3), [path, 0.0, 0.0])
+    return Measures(Start(seed, ahead, 0.0), 10.0, 1.0, 0.0, 0.0, 0.0, 1.0, line, np.zeros(3), sources)
+
+
+def test_a_set_of_demonstrations() -> None:
+    kept = (one(0, 0.1, sources=(0, 1)), one(1, 0.1 + BIN_M, path=0.3, sources=(0, 0)), one(2, 0.15, path=0.1))
+    found = Quality("OpenDrawer", kept, (Start(3, 0.12, 0.0), Start(4, 0.1, 5 * BIN_M)))
+    assert found.rate == pytest.approx(3 / 5)
+    assert found.covered == pytest.approx(2 / 3)
+    assert found.most_used_source == pytest.approx(3 / 4)
+    assert found.path_spread_m == pytest.approx((0.3 + 0.1 + 0.2) / 3)
+    assert found.most_alike_m == pytest.approx(0.1)
+    assert Quality("OpenDrawer", kept[2:], ()).most_used_source is None
+
+
+def test_motion() -> None:
+    seconds = np.arange(60) / contract.CONTROL_HZ
+    cubic = np.column_stack([seconds**3, np.zeros(60), np.zeros(60)])
+    assert _jerk(cubic) == pytest.approx(6.0, rel=1e-6)  # the third derivative of t^3
+    base = np.zeros((60, 3))
+    assert _idle(np.zeros((60, 3)), base) == 1.0
+    assert _idle(np.column_stack([seconds, seconds, seconds]), base) == 0.0
+    base[:, 0] = seconds
+    assert _idle(np.zeros((60, 3)), base) == 0.0
+    actions = np.zeros((4, 12))
+    actions[1, contract.ACTION_SLICES["end_effector_rotation"]] = [0.0, -1.0, 0.0]
+    actions[2, contract.ACTION_SLICES["base_motion"]] = 1.0
+    assert _saturated(actions) == 0.25
+
+
+@pytest.mark.slow
+def test_the_command_measures_files(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    record_tasks([RecordingSettings("CloseDrawer", 2, seed=2)], tmp_path, show_progress=False)
+    page = tmp_path / "worth.html"
+    command = ["inspect", str(tmp_path), "--worth", "--beside", str(tmp_path), "--workers", "1", "--out", str(page)]
+    assert cli.main(["inspect", str(tmp_path), "--beside", str(tmp_path)]) == 2
+    assert "--worth" in capsys.readouterr().err
+    assert cli.main(command) == 0
+    assert "target in view" in capsys.readouterr().out
+    assert "Paths, stands, lengths" in page.read_text()
+    assert cli.main([*command[:-2], "--report", "json"]) == 0
+    found = json.loads(capsys.readouterr().out)[str(tmp_path)][0]
+    assert (found["task"], found["kept"], found["rate"], found["covered"]) == ("CloseDrawer", 2, 1.0, 1.0)
+    assert 0.0 < found["in_view"] <= 1.0
+    assert 0.0 <= found["other_contacts"] < 0.5
+    assert found["path_spread_m"] > 0.01
