@@ -12,7 +12,7 @@ from robocasa_lerobot.envs.kitchens.layout import load_layout
 from robocasa_lerobot.envs.robots.panda_omron.robot import PANDA_OMRON
 from robocasa_lerobot.envs.scene.placement.objects import place_objects
 from robocasa_lerobot.envs.scene.placement.regions import choose_parts, parts_of, rectangle_in
-from robocasa_lerobot.envs.scene.robot_poses import faces, is_free, robot_pose
+from robocasa_lerobot.envs.scene.robot_poses import faces, is_free, open_doors_of, robot_pose
 from robocasa_lerobot.envs.scene.roles import candidates, cast_roles, ground_fixture
 from robocasa_lerobot.envs.scene.spec import FixtureSpec, ObjectSpec, Placement, RobotStart, SampleRegion
 from robocasa_lerobot.envs.tasks.registry import get_task
@@ -84,6 +84,33 @@ def test_food_stands_in_its_container_and_regions_are_taken_again() -> None:
         assert plate.item.category.name == "plate"
         assert np.hypot(obj.pos[0] - plate.pos[0], obj.pos[1] - plate.pos[1]) < max(plate.item.size[:2]) / 2
         assert obj.pos[2] > plate.pos[2]
+
+
+def test_nothing_starts_in_a_door_that_is_open() -> None:
+    layout = load_layout(10)  # whose microwave stands on the counter
+    microwave = candidates(layout, "microwave")[0]
+    region = SampleRegion("microwave", "nn")
+    start = Placement("counter", region=region, size=(1.0, 0.5), pos=("ref", -1.0))
+    fixtures = (FixtureSpec("microwave", "microwave"), FixtureSpec("counter", "counter", near="microwave"))
+    task = replace(get_task("OpenMicrowave"), fixtures=fixtures, objects=(ObjectSpec("plate", ("plate",), start),))
+    (door,) = open_doors_of([(microwave, 1.0)])
+    footprints = {}
+    for named, doors in (("without", []), ("with", [door]), ("above", [replace(door, low=3.0, high=4.0)])):
+        met = []
+        for seed in range(40):
+            rng = np.random.default_rng(seed)
+            roles = cast_roles(rng, task.fixtures, layout)
+            try:
+                plate = place_objects(rng, task, "target", layout, roles, {}, doors=doors)["plate"]
+            except PlacementError:
+                continue
+            mark = Footprint(*plate.pos[:2], plate.yaw, (plate.item.size[0] / 2, plate.item.size[1] / 2))
+            met.append(mark.overlaps(door.footprint))
+        footprints[named] = met
+    assert any(footprints["without"])
+    assert footprints["without"] == footprints["above"]
+    assert len(footprints["with"]) > 20
+    assert not any(footprints["with"])
 
 
 @pytest.mark.parametrize("style_id", [29, 11])  # slots from front to back, and along the front

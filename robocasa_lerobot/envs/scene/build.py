@@ -24,7 +24,7 @@ from robocasa_lerobot.envs.scene.memory import Memory, add_memory
 from robocasa_lerobot.envs.scene.placement.counter_areas import counter_areas
 from robocasa_lerobot.envs.scene.placement.objects import place_objects
 from robocasa_lerobot.envs.scene.placement.regions import Shares
-from robocasa_lerobot.envs.scene.robot_poses import RobotPose, robot_pose
+from robocasa_lerobot.envs.scene.robot_poses import RobotPose, open_doors_of, robot_pose
 from robocasa_lerobot.envs.scene.roles import cast_roles, counter_of
 from robocasa_lerobot.envs.scene.scene import Scene
 from robocasa_lerobot.envs.scene.scene_spec import SceneSpec
@@ -205,7 +205,7 @@ def arrange(
         of_kind(layout.fixtures[roles[role]], Blender).with_lid = not gone
     places: dict[str, float | Shares] = {name: share for (name, part), share in openness.items() if not part}
     places |= _shares(initial, roles, choices)
-    objects = place_objects(rng, task, split, layout, roles, places, choices.values)
+    objects = place_objects(rng, task, split, layout, roles, places, choices.values, open_doors_of(opened))
     if pose is None:
         at = objects[start.at_object].pos[:2]
         pose = robot_pose(rng, layout, start, layout.fixtures[roles[start.fixture]], shape, at, opened)

@@ -174,7 +174,7 @@ class Obstacles:
     def __init__(
         self, fixtures: Mapping[str, Fixture], shape: StandingShape, opened: Iterable[tuple[Fixture, float]] = ()
     ) -> None:
-        doors = _opened(opened)
+        doors = open_doors_of(opened)
         base, column = (_standing(fixtures, doors, top) for top in (shape.base_top, shape.column_top))
         low, high = shape.hand_z
         tall = [f for f in fixtures.values() if f.pos[2] - f.height / 2 < high and f.pos[2] + f.height / 2 > low]
@@ -205,7 +205,7 @@ def _half(along: tuple[float, float], across: float) -> tuple[float, float]:
 
 
 @dataclass(frozen=True)
-class _Door:
+class OpenDoor:
     """Where an open door or a pulled-out drawer is: on the floor plan, and from which height to which, metres."""
 
     footprint: Footprint
@@ -213,20 +213,20 @@ class _Door:
     high: float
 
 
-def _standing(fixtures: Mapping[str, Fixture], doors: list[_Door], top: float) -> Footprints:
+def _standing(fixtures: Mapping[str, Fixture], doors: list[OpenDoor], top: float) -> Footprints:
     """Fixtures but the floor, and doors, that begin below a height, metres; and handles that stand out of them."""
     standing = [f for f in fixtures.values() if f.pos[2] - f.height / 2 < top and f.name != "floor"]
     marks = [mark for f in standing for mark in (footprint(f), *_handles(f, top))]
     return Footprints([*marks, *(door.footprint for door in doors if door.low < top)])
 
 
-def _opened(fixtures: Iterable[tuple[Fixture, float]]) -> list[_Door]:
-    """The open doors and the pulled-out drawers of some fixtures."""
+def open_doors_of(fixtures: Iterable[tuple[Fixture, float]]) -> list[OpenDoor]:
+    """The open doors and the pulled-out drawers of some fixtures, each with its share of full travel."""
     found = []
     for fixture, share in fixtures:
         for box in fixture.swept_at(share):
             low = float(fixture.to_world((0.0, 0.0, box.low))[2])
-            found.append(_Door(_footprint_of(fixture, box), low, low + box.height))
+            found.append(OpenDoor(_footprint_of(fixture, box), low, low + box.height))
     return found
 
 

@@ -15,6 +15,7 @@ from robocasa_lerobot.envs.objects import catalogue
 from robocasa_lerobot.envs.scene.drawn import PlacedObject
 from robocasa_lerobot.envs.scene.placement.counter_areas import counter_areas, inside_area, standing_on
 from robocasa_lerobot.envs.scene.placement.regions import Part, Shares, choose_parts, rectangle_in
+from robocasa_lerobot.envs.scene.robot_poses import OpenDoor
 from robocasa_lerobot.envs.scene.scene_spec import SceneSpec
 from robocasa_lerobot.envs.scene.spec import ObjectSpec, OnCounter, Placement
 from robocasa_lerobot.envs.scene.task_parameters import item_of, name_of, number_of, start_of
@@ -55,8 +56,9 @@ def place_objects(
     roles: dict[str, str],
     openness: Mapping[str, float | Shares],
     choices: Mapping[str, str] = MappingProxyType({}),
+    doors: Sequence[OpenDoor] = (),
 ) -> dict[str, PlacedObject]:
-    """Draw the objects of a task and put them down, in the order in which they are declared.
+    """Draw the objects of a task and put them down, in the order in which they are declared; not in open `doors`.
 
     Raises:
         PlacementError: something has no free place.
@@ -67,7 +69,8 @@ def place_objects(
             items = {name: placed.item for name, placed in table.placed.items() if name not in table.holders}
             item = item_of(rng, wanted, index, split, items, choices)
             start = start_of(rng, wanted, choices)
-            _put(rng, table, replace(wanted, start=start), name_of(wanted, index), item, split, layout, roles, openness)
+            asked, name = replace(wanted, start=start), name_of(wanted, index)
+            _put(rng, table, asked, name, item, split, layout, roles, openness, doors)
     return table.placed
 
 
@@ -81,12 +84,14 @@ def _put(
     layout: Layout,
     roles: dict[str, str],
     openness: Mapping[str, float | Shares],
+    doors: Sequence[OpenDoor],
 ) -> None:
     start = wanted.start
     standing: list[Footprint] = []
     rooms: list[Area] = []
     if isinstance(start, OnCounter):
         areas, standing = counter_areas(layout, start, layout.fixtures[roles[start.near]])
+        standing = [*standing, *_in_the_air(doors, areas[0].z, item)]
     elif not isinstance(start, Placement):
         fixture = layout.fixtures[roles[start.fixture]]
         share = openness.get(fixture.name, 0.0)
@@ -102,7 +107,7 @@ def _put(
             areas = [_in_slot(area, item) for area in areas]
         # What stands around a compartment is not in it.
         inside = any(part.name for part in table.parts[name])
-        standing = [] if inside else standing_on(layout, fixture, areas[0].z)
+        standing = [] if inside else [*standing_on(layout, fixture, areas[0].z), *_in_the_air(doors, areas[0].z, item)]
         if start.try_to_place_in and IN_CONTAINER in _groups_of(item):
             container = catalogue.sample(rng, (start.try_to_place_in,), split)
             holder = f"{name}_container"
@@ -115,6 +120,11 @@ def _put(
             # Of other compartments an object may stick out, as the handle of a mug does under a spout.
             rooms = [part.area for part in table.parts[name]]
     _put_down(rng, table, name, item, areas, standing, rooms, lying=isinstance(start, Placement) and start.lying)
+
+
+def _in_the_air(doors: Sequence[OpenDoor], z: float, item: catalogue.Instance) -> list[Footprint]:
+    """Open doors that something of an item's height would meet, if it stood at a height (metres)."""
+    return [door.footprint for door in doors if door.low < z + max(item.size) and door.high > z]
 
 
 def _in_slot(area: Area, item: catalogue.Instance) -> Area:
