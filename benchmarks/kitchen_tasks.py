@@ -109,6 +109,21 @@ def fill(job: tuple[Pair, Sequence[str], int]) -> list[Row]:
     return rows
 
 
+def begun(
+    rows: Iterable[Row], pairs: Sequence[Pair], order: dict[Pair, list[str]]
+) -> list[tuple[Pair, Sequence[str], int]]:
+    """What is left of each kitchen's own tasks: a sweep may have been stopped in the midst of one."""
+    arranged: Counter[Pair] = Counter()
+    tried: dict[Pair, set[str]] = defaultdict(set)
+    for row in rows:
+        if not row.get("extra"):
+            pair = (row["layout"], row["style"])
+            arranged[pair] += "refused" not in row
+            tried[pair].add(row["task"])
+    left = {pair: [name for name in order[pair] if name not in tried[pair]] for pair in pairs}
+    return [(pair, left[pair], IN_EACH - arranged[pair]) for pair in pairs if left[pair] and arranged[pair] < IN_EACH]
+
+
 def missing(
     rows: Iterable[Row], tasks_of: dict[Pair, list[str]], least: int = LEAST
 ) -> list[tuple[Pair, Sequence[str], int]]:
@@ -132,10 +147,8 @@ def sweep(pairs: Sequence[Pair], names: Sequence[str], parts: Path, workers: int
     rows = [
         row for row in read_whole_lines(parts) if (row["layout"], row["style"]) in tasks_of and row["task"] in names
     ]
-    begun = {(row["layout"], row["style"]) for row in rows if not row.get("extra")}
     mixed = [pairs[index] for index in np.random.default_rng(0).permutation(len(pairs))]
-    order = orders(tasks_of)
-    rows += _run([(pair, order[pair], IN_EACH) for pair in mixed if pair not in begun], parts, workers, extra=False)
+    rows += _run(begun(rows, mixed, orders(tasks_of)), parts, workers, extra=False)
     while jobs := missing(rows, tasks_of, least):
         rows += _run(jobs, parts, workers, extra=True)
     return rows

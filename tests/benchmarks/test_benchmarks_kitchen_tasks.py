@@ -55,6 +55,19 @@ def test_it_goes_on_and_gives_every_task_its_kitchens(
     assert Counter(row["task"] for row in again if "refused" not in row) >= Counter(dict.fromkeys(names, 15))
 
 
+def test_a_kitchen_of_which_half_was_written_is_finished(sweep: ModuleType) -> None:
+    def row(pair: tuple[int, int], task: str, **more: object) -> dict[str, Any]:
+        return {"layout": pair[0], "style": pair[1], "task": task, "extra": False, **more}
+
+    new, half, done, hopeless = (1, 1), (1, 2), (1, 3), (1, 4)
+    names = ["A", "B", "C", "D", "E", "F"]
+    rows = [row(half, "A"), row(half, "B", refused="no room"), row(new, "A", extra=True)]
+    rows += [row(done, name) for name in names[:5]] + [row(hopeless, name, refused="no room") for name in names]
+    order = dict.fromkeys((new, half, done, hopeless), names)
+    found = sweep.begun(rows, list(order), order)
+    assert found == [(new, names, 5), (half, ["C", "D", "E", "F"], 4)]
+
+
 @pytest.mark.parametrize("fault", ["error", "fell", "moved", "sunk", "blocked"])
 def test_every_fault_counts(sweep: ModuleType, fault: str) -> None:
     good = {"layout": 1, "style": 1, "task": "A", "fell": {}, "moved": {}, "sunk": [], "blocked": []}
