@@ -31,7 +31,14 @@ OUT_OF_A_MICROWAVE = GraspStrategy(
 )
 
 
-OUT_OF_A_TOASTER_OVEN = replace(OUT_OF_A_MICROWAVE, narrow=True)  # between two racks
+# What lies on a rack that is pulled out may have a roof over it, or the next rack, or neither.
+OUT_OF_A_TOASTER_OVEN = replace(
+    OUT_OF_A_MICROWAVE,
+    tilts=in_radians((48, 0.0), (35, 0.0), (60, 0.05), (20, 0.05), (72, 0.1), (86, 0.2)),
+    entries=("across", "out", "up"),
+    narrow=True,
+    among_tilts=True,
+)
 
 
 def drive_around_open_door(env: KitchenEnv, oven: Microwave, gripper: float = OPEN) -> Iterator[Array]:
