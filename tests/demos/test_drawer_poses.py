@@ -1,4 +1,4 @@
-"""Putting things into a drawer that is partly open: only what has no counter over it is used, as they fit there."""
+"""A drawer that is partly open: only what has no counter over it is used, as things fit there; its front is dragged."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from robocasa_lerobot.demos.motion import rotation_about
+from robocasa_lerobot.demos.skills.drawers import drag_open
 from robocasa_lerobot.demos.skills.pick_place.graspable import graspable
 from robocasa_lerobot.demos.skills.pick_place.poses.drawer_poses import fits_in_drawer, in_drawer, open_part
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
@@ -50,3 +51,13 @@ def test_what_is_long_goes_in_across_and_flat(env: KitchenEnv) -> None:
         else rotation_about(np.array([1.0, 0.0, 0.0]), np.pi / 2)
     )
     assert fit(middle, turns[across] @ upright) > costs[across] + 0.2
+
+
+def test_a_drawer_is_dragged_farther_out_by_the_edge_of_its_front() -> None:
+    env = KitchenEnv("PlaceStraw", split="target", cameras=(), terminate_on_success=False)
+    env.reset(seed=2)
+    drawer = env.scene.fixture("drawer", Drawer)
+    assert drawer.openness(env.data) < 0.6
+    for action in drag_open(env, drawer):
+        env.step(action)
+    assert drawer.openness(env.data) > 0.95

@@ -115,9 +115,10 @@ def drag_open(env: KitchenEnv, drawer: Drawer, openness: float = 1.0) -> Iterato
     if missing < PUSHED_IN_M or drawer.openness(data) * drawer.full_travel < HAND_ROOM_M:
         return
     inwards = _inwards(drawer)
-    front = env.model.geom(f"{drawer.name}_front")
-    middle = data.geom(front.id).xpos
-    edge = middle + front.size[2] * UP + (front.size[1] + BEHIND_M) * inwards
+    front = env.model.geom(f"{drawer.name}_front").id
+    half = data.geom_xmat[front].reshape(3, 3) * env.model.geom_size[front]  # its half axes as columns, world
+    tall, thick = (float(np.abs(way @ half).max()) for way in (UP, inwards))
+    edge = data.geom_xpos[front] + tall * UP + (thick + BEHIND_M) * inwards
     rotation = frame(
         -UP, np.cross(inwards, UP) * (1.0 if hand_rotation(data)[:, 1] @ np.cross(inwards, UP) > 0 else -1.0)
     )
