@@ -15,6 +15,7 @@ import numpy as np
 from robocasa_lerobot.demos.generate.bridge import bridged
 from robocasa_lerobot.demos.generate.course import BRIDGE, DRIVE, Course
 from robocasa_lerobot.demos.generate.execute import Carried, as_target, carry_out_segment, hand_now
+from robocasa_lerobot.demos.generate.lid_places import COVER, LID_VERBS, knob_grasps, lid_strategy, lid_turns
 from robocasa_lerobot.demos.generate.select import narrowed
 from robocasa_lerobot.demos.generate.sources.segments import PICK, PLACE
 from robocasa_lerobot.demos.generate.sources.source import Piece, pieces_for
@@ -94,12 +95,12 @@ def _pick(env: KitchenEnv, stage: Stage, obj: Graspable, course: Course, tried: 
     pieces = course.most_alike(pieces_for(course.sources, stage, PICK), env, stage)
     if not pieces:
         raise SkillError("no source picks anything up")
-    free = place_strategy(env, stage, obj).grasp if stage.verb == "place" else ANY_APPROACH
+    free = _strategy(env, stage, obj).grasp if stage.verb == "place" else ANY_APPROACH
     strategy = grasp_strategy(env, obj, free, kept=stage.verb == "pick")
     if strategy.first is not None:
         yield from course.labelled(strategy.first(env), BRIDGE)
     origin = env.data.body(obj.name).xpos.copy()
-    ways = _pick_ways(env, obj, strategy, pieces, course, tried)
+    ways = _pick_ways(env, obj, strategy, pieces, course, tried, lid=stage.verb in LID_VERBS)
     if not ways:
         raise SkillError(f"{obj.title}: no source's grasp fits it")
 
@@ -146,8 +147,10 @@ def _pick_ways(
     pieces: list[Piece],
     course: Course,
     tried: list[Array],
+    *,
+    lid: bool,
 ) -> list[_Way]:
-    """The segments brought to grasps of the object."""
+    """The segments brought to grasps of the object; of a lid, of its knob."""
     _, yaw = base_pose(env.data)
     known: dict[tuple[float, ...], list[GraspPose]] = {}
     ways: list[_Way] = []
@@ -160,7 +163,7 @@ def _pick_ways(
             comes = -UP if tilt < STEEP_RAD else about @ source[:, 2]
             key = tuple(np.round(comes, 2).tolist())
             if key not in known:
-                known[key] = strategy.poses(env, obj, comes)
+                known[key] = knob_grasps(env, obj, comes) if lid else strategy.poses(env, obj, comes)
             best = max((pose.score for pose in known[key]), default=0.0)
             for pose in known[key][:MOST_GRASPS]:
                 again = sum(
@@ -223,11 +226,11 @@ def _place(env: KitchenEnv, stage: Stage, obj: Graspable, course: Course, put_do
     pieces = course.most_alike(pieces_for(course.sources, stage, PLACE), env, stage)
     if not pieces:
         raise SkillError("no source puts anything down")
-    strategy = place_strategy(env, stage, obj)
+    strategy = _strategy(env, stage, obj)
     held = Held.now(env.data, obj.name, obj.contents)
 
     def ways() -> list[_Way]:
-        return _place_ways(env, obj, held, strategy, pieces, course, put_down)
+        return _place_ways(env, stage, obj, held, strategy, pieces, course, put_down)
 
     found = ways()
     if not found:
@@ -259,8 +262,21 @@ def _place(env: KitchenEnv, stage: Stage, obj: Graspable, course: Course, put_do
     yield from course.labelled(leave(env, obj), BRIDGE)
 
 
+def _strategy(env: KitchenEnv, stage: Stage, obj: Graspable) -> PlaceStrategy:
+    return lid_strategy(env, stage, obj) if stage.verb in LID_VERBS else place_strategy(env, stage, obj)
+
+
+def _turns(env: KitchenEnv, stage: Stage, held: Held, rest: Array) -> list[float]:
+    """Turns about the vertical, radians, of an object from how it is held now."""
+    if stage.verb != COVER:
+        return [2 * np.pi * number / YAWS for number in range(YAWS)]
+    now = rotation_about(UP, heading(hand_rotation(env.data) @ held.rotation @ rest.T)) @ rest
+    return lid_turns(env, stage, heading(now))
+
+
 def _place_ways(
     env: KitchenEnv,
+    stage: Stage,
     obj: Graspable,
     held: Held,
     strategy: PlaceStrategy,
@@ -274,9 +290,10 @@ def _place_ways(
     spots = sorted(strategy.poses(), key=lambda pose: pose.extra)[:MOST_SPOTS]
     ways = []
     present = hand_rotation(env.data)
-    for piece, spot, number in itertools.product(pieces, spots, range(YAWS)):
+    turns = _turns(env, stage, held, rest)
+    for piece, spot, turn in itertools.product(pieces, spots, turns):
         about = rotation_about(UP, yaw - float(piece.data.base[piece.segment.contact, 2]))
-        way = _place_way(obj, held, rest, present, piece, spot, strategy, about, 2 * np.pi * number / YAWS)
+        way = _place_way(obj, held, rest, present, piece, spot, strategy, about, turn)
         again = sum(float(np.linalg.norm(way.targets[2].position - other)) < AGAIN_M for other in put_down)
         extra = way.extra + AGAIN_COST * again + float(course.bias[piece.source.number])
         ways.append(_Way(way.targets, extra, None, piece, way.targets_here, way.hands_here))

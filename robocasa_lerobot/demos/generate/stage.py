@@ -7,6 +7,7 @@ from functools import partial
 
 from robocasa_lerobot.demos.demonstrator import demonstrate
 from robocasa_lerobot.demos.generate.course import AT_REST, DRIVE, Course
+from robocasa_lerobot.demos.generate.lid_places import LID_VERBS
 from robocasa_lerobot.demos.generate.object_segments import object_stage
 from robocasa_lerobot.demos.generate.part_segments import part_stage
 from robocasa_lerobot.demos.generate.sources.frames import JOINTED
@@ -18,7 +19,7 @@ from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.tasks.task import Stage, Task
 from robocasa_lerobot.envs.tasks.typical import stages_of
 
-OBJECT_VERBS = ("pick", "place")
+OBJECT_VERBS = ("pick", "place", *LID_VERBS)
 
 
 def can_generate(task: Task) -> bool:

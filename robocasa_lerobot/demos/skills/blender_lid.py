@@ -56,7 +56,7 @@ def uncover(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
         SkillError: it does not lie there after four attempts.
     """
     blender = the_blender(env, stage)
-    spots = [spot + UP * PLUG_M for spot in _free_spots(env, blender)]
+    spots = [spot + UP * PLUG_M for spot in free_spots(env, blender)]
     yield from _carry(env, stage, blender, spots)
 
 
@@ -151,7 +151,7 @@ def grasps(env: KitchenEnv) -> list[Array]:
     return out
 
 
-def _free_spots(env: KitchenEnv, blender: Blender) -> list[Array]:
+def free_spots(env: KitchenEnv, blender: Blender) -> list[Array]:
     """Points of the counter beside the blender with room for the lid, those nearest to the robot's path first."""
     layout = env.scene.layout
     areas, standing = counter_areas(layout, OnCounter("", "left_right", size=(0.45, 0.40)), blender)
