@@ -4,7 +4,7 @@ Sources are prepared demonstrations (`robocasa-lerobot demos`, then `prepare`). 
 the arms in turn, in one run, so that their times compare:
 
     ours       `generate` as it is
-    mimicgen   plain MimicGen, see generation_plain.py
+    mimicgen   `generate --method mimicgen`: whole subtasks, joined by lines, the base at rest
     scripted   the demonstrator itself, which needs no sources
     far        ours, the base starting up to 1.5 m away and at any heading; of tasks whose published data does not drive
     one        ours with one source of each task
@@ -31,7 +31,6 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 
 import common
-from generation_plain import plain_attempt
 from generation_report import Trial, ratios, summary, text
 
 from robocasa_lerobot.demos.choose import expand_names
@@ -90,6 +89,7 @@ def settings_of(job: Job) -> GenerationSettings:
         job.task, 1, split="pretrain", varied=False, source=str(job.source),
         start_within_m=FAR_M if job.arm == "far" else 0.0,
         first_sources=1 if job.arm == "one" else 0,
+        method="mimicgen" if job.arm == "mimicgen" else "contacts",
     )  # fmt: skip
 
 
@@ -97,8 +97,6 @@ def record(job: Job, settings: GenerationSettings, env: KitchenEnv) -> Recording
     """Make an attempt in the way of its arm."""
     if job.arm == "scripted":
         return record_episode(env, job.seed, varied=True)
-    if job.arm == "mimicgen":
-        return plain_attempt(settings, env, job.seed)
     return settings.record(env, job.seed)
 
 

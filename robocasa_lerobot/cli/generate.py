@@ -24,6 +24,16 @@ def configure(parser: argparse.ArgumentParser) -> None:
         "--source", type=Path, required=True, help="prepared demonstrations (see `prepare`): a folder, or one file"
     )
     add_kitchen_options(parser)
+    parser.add_argument(
+        "--method",
+        choices=("contacts", "mimicgen"),
+        default="contacts",
+        help="contacts: they are carried over, and the rest is planned (default); mimicgen: whole subtasks, joined by "
+        "lines, with a base at rest, as published",
+    )
+    parser.add_argument(
+        "--template", type=Path, metavar="JSON", help="of --method mimicgen: one of its templates (default: derived)"
+    )
     parser.add_argument("--base", choices=("replan", "copy", "fixed"), default="replan", help="where the robot stands")
     parser.add_argument("--bridge", choices=("plan", "line"), default="plan", help="how segments are joined")
     parser.add_argument(
@@ -62,14 +72,19 @@ def run(args: argparse.Namespace) -> int:
     """Generate for every task and print a table; status 1 if one had to be given up."""
     from robocasa_lerobot.demos.choose import expand_names
     from robocasa_lerobot.demos.distributed import record_distributed
+    from robocasa_lerobot.demos.generate.mimicgen.template import read_json_template
     from robocasa_lerobot.demos.generate.settings import GenerationSettings
     from robocasa_lerobot.demos.generate.sources.rules import read_rules
     from robocasa_lerobot.demos.recording import record_tasks
     from robocasa_lerobot.demos.summary import print_summary
+    from robocasa_lerobot.errors import UserError
     from robocasa_lerobot.jobs.executors import execution_of
 
     execution = execution_of(args)
     rules = json.dumps({verb: asdict(rule) for verb, rule in read_rules(args.rules).items()} if args.rules else {})
+    if args.template and args.method != "mimicgen":
+        raise UserError("--template says what MimicGen's subtasks are: give --method mimicgen too.")
+    template = json.dumps(read_json_template(args.template)) if args.template else ""
     settings = [
         GenerationSettings.of(
             args.source,
@@ -84,6 +99,8 @@ def run(args: argparse.Namespace) -> int:
             layouts=args.layouts,
             styles=args.styles,
             varied=False,
+            method=args.method,
+            template=template,
             base=args.base,
             bridge=args.bridge,
             select=args.select,

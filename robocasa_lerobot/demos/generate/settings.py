@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -10,13 +11,23 @@ import numpy as np
 
 from robocasa_lerobot.demos.attempts import RecordingSettings
 from robocasa_lerobot.demos.generate.course import KINDS, Course
+from robocasa_lerobot.demos.generate.mimicgen.plain import Sources, plain_episode, read_sources
+from robocasa_lerobot.demos.generate.mimicgen.subtasks import digest_of_infos
+from robocasa_lerobot.demos.generate.mimicgen.template import derived_template, template_from
 from robocasa_lerobot.demos.generate.select import Manner
-from robocasa_lerobot.demos.generate.sources.source import Source, digest_of, first_of_each_task, sources_of
+from robocasa_lerobot.demos.generate.sources.source import (
+    Source,
+    digest_of,
+    first_of_each_task,
+    place_of,
+    sources_of,
+)
 from robocasa_lerobot.demos.generate.stage import generated
 from robocasa_lerobot.demos.recorder import Recording
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.errors import UserError
 
+METHODS = CONTACTS, MIMICGEN = ("contacts", "mimicgen")
 _CHOICE_STREAM = 7  # of the choices among sources, apart from those of scene, arm, noise and style
 
 
@@ -27,7 +38,10 @@ class GenerationSettings(RecordingSettings):
     Attributes:
         source: file or folder of prepared demonstrations.
         sources: what they are, as `digest_of` says it.
-        select, base, bridge: see `Manner`.
+        method: `contacts` carries contacts over and plans the rest; `mimicgen` carries whole subtasks over, joined by
+            lines, the base at rest.
+        template: of `mimicgen`, what its subtasks are: JSON of one of MimicGen's templates; empty derives them.
+        select, base, bridge: see `Manner`; of `contacts`.
         rules: how stages are cut, where that is not derived: JSON of what `rules.rules_from` takes.
         spread: cost that each source has at random in an attempt: the greater, the more evenly they are used.
         first_sources: of each task only so many, the first ones; 0 takes all.
@@ -36,6 +50,8 @@ class GenerationSettings(RecordingSettings):
 
     source: str = ""
     sources: str = ""
+    method: str = "contacts"
+    template: str = ""
     select: str = "feasible"
     base: str = "replan"
     bridge: str = "plan"
@@ -52,6 +68,8 @@ class GenerationSettings(RecordingSettings):
             UserError: none is prepared, or they are seeds of the attempts.
         """
         settings = cls(source=str(source), **values)
+        if settings.method == MIMICGEN and settings.template:  # of files that others have prepared
+            return cls(source=str(source), sources=digest_of_infos(settings.subtasks().infos), **values)
         found = settings.read()
         clash = sorted(one.seed for one in found if 0 <= one.seed - settings.seed < settings.limit)
         if clash and values.get("split") is not None:
@@ -66,6 +84,14 @@ class GenerationSettings(RecordingSettings):
         found = sources_of(self.folder, self.task, self.rules)
         return first_of_each_task(found, self.first_sources) if self.first_sources else found
 
+    def subtasks(self) -> Sources:
+        """The sources as MimicGen reads them."""
+        place = place_of(self.folder, self.task)
+        if self.template:
+            return read_sources(place, template_from(json.loads(self.template)))
+        template, alike = derived_template(self.read())
+        return read_sources(place, template, tuple(source.name for source in alike))
+
     @property
     def folder(self) -> Path:
         """That the sources lie in, or the file."""
@@ -77,9 +103,16 @@ class GenerationSettings(RecordingSettings):
 
     def record(self, env: KitchenEnv, seed: int) -> Recording:
         """Make the attempt of a seed."""
-        sources = self.read()
-        manner = Manner(self.select, self.base, self.bridge)
-        course = Course(sources, np.random.default_rng([seed, _CHOICE_STREAM]), manner, self.spread, self.cap)
+        rng = np.random.default_rng([seed, _CHOICE_STREAM])
+        if self.method == MIMICGEN:
+            subtasks, course = self.subtasks(), Course([], rng, Manner("random", "fixed", "line"), self.spread)
+            return labelled(
+                self.labelled_episode(
+                    env, seed, lambda env, style, log: course.counted(plain_episode(env, log, subtasks, course))
+                ),
+                course,
+            )
+        course = Course(self.read(), rng, Manner(self.select, self.base, self.bridge), self.spread, self.cap)
         recording = self.labelled_episode(env, seed, lambda env, style, log: generated(env, style, log, course))
         return labelled(recording, course)
 

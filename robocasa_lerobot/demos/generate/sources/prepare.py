@@ -19,7 +19,7 @@ import numpy as np
 from robocasa_lerobot.demos.generate.sources.frames import HANDLE, Part, body_pose, parts_of
 from robocasa_lerobot.demos.generate.sources.prepared import GROUP, Prepared, is_prepared, world_pose, write_prepared
 from robocasa_lerobot.demos.generate.sources.segments import cut, signals_of
-from robocasa_lerobot.demos.generate.sources.transform import inverse, make_pose
+from robocasa_lerobot.demos.generate.sources.transform import inverse, make_pose, yaw_pose
 from robocasa_lerobot.demos.motion import Array, base_pose, grip_position, hand_rotation
 from robocasa_lerobot.demos.recorder import SUCCESS_HOLD_STEPS
 from robocasa_lerobot.demos.replay import Demonstration, demonstrations, kitchen_of, put_state, read_demonstration
@@ -235,20 +235,25 @@ class _Watcher:
             "parts": {name: _described(part) for name, part in self._parts.items()},
             "objects": {name: self._size(name) for name in self._objects},
             "fixtures": {
-                role: {"kind": type(fixture).__name__, "pos": list(fixture.pos), "yaw": fixture.yaw}
-                for role, fixture in self._roles.items()
+                role: {"kind": type(fixture).__name__, "yaw": fixture.yaw} for role, fixture in self._roles.items()
             },
         }
         return Prepared(
             **{key: np.array(self._rows[key], dtype=np.float64) for key in ("eef", "target", "gripper", "base", "gap")},
             stage=self._stage.astype(np.int64),
-            poses=series("poses"),
+            poses=self._fixture_poses() | series("poses"),
             joints=series("joints"),
             touching=series("touching"),
             contact_points=series("contact_points"),
             undersides=series("undersides"),
             about=about,
         )
+
+    def _fixture_poses(self) -> dict[str, Array]:
+        """The same at every step: what MimicGen's subtasks may be relative to."""
+        steps = len(self._rows["eef"])
+        poses = {role: yaw_pose(*fixture.pos[:2], fixture.yaw, fixture.pos[2]) for role, fixture in self._roles.items()}
+        return {role: np.repeat(pose[None], steps, axis=0) for role, pose in poses.items()}
 
     def _size(self, name: str) -> list[float]:
         cloud = self._objects[name].cloud

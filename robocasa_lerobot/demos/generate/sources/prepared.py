@@ -35,7 +35,7 @@ class Prepared:
         base: (T, 3) of the base centre: x, y in metres, heading in radians.
         stage: (T,) number of the stage.
         gap: (T,) between the fingers, metres.
-        poses: (T, 4, 4) of each object and part.
+        poses: (T, 4, 4) of each object and part, and of fixtures, which stand still, by their roles.
         joints: (T,) position of each part's joint, metres or radians.
         touching: (T,) of each object and part what of it the hand touches: 0 nothing, 1 its handle, 2 the rest.
         contact_points: (T, 3) of each part, the middle of what is touched, in its axes, metres.

@@ -99,14 +99,19 @@ def sources_of(folder: Path, task: str, rules: str = "{}") -> list[Source]:
     Raises:
         UserError: nothing there has been prepared.
     """
-    own = folder / f"{task}.hdf5"
-    found = _read(own if folder.is_dir() and own.exists() else folder, _stamp(folder), rules)
+    found = _read(place_of(folder, task), _stamp(folder), rules)
     if not found:
         raise UserError(
             f"{folder}: no demonstration there has been prepared, or none replays. "
             f"`robocasa-lerobot prepare {folder}` makes them ready."
         )
     return list(found)
+
+
+def place_of(folder: Path, task: str) -> Path:
+    """The file of a task's own demonstrations in a folder, or else the folder; or the one file that is given."""
+    own = folder / f"{task}.hdf5"
+    return own if folder.is_dir() and own.exists() else folder
 
 
 def first_of_each_task(sources: Sequence[Source], count: int) -> list[Source]:

@@ -1,0 +1,160 @@
+"""A prepared demonstration as MimicGen reads it, cut into a template's subtasks, and one of them carried over."""
+
+from __future__ import annotations
+
+import hashlib
+import itertools
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import h5py
+import numpy as np
+from numpy.typing import NDArray
+
+from robocasa_lerobot.demos.generate.mimicgen.template import (
+    NEAREST,
+    OBJECT,
+    RANDOM,
+    Subtask,
+    Template,
+)
+from robocasa_lerobot.demos.generate.select import pose_distance
+from robocasa_lerobot.demos.generate.sources.transform import carried_over
+from robocasa_lerobot.demos.motion import Array
+from robocasa_lerobot.errors import UnknownNameError, UserError
+
+
+@dataclass(frozen=True, eq=False)
+class DatagenInfo:
+    """What MimicGen's `datagen_info` holds of a demonstration of T steps; see `Prepared`.
+
+    Attributes:
+        number: among the sources.
+        name: file and demonstration.
+        eef: (T, 4, 4).
+        target: (T, 4, 4).
+        gripper: (T,).
+        objects: (T, 4, 4) by name.
+        signals: (T,) by name.
+    """
+
+    number: int
+    name: str
+    eef: Array
+    target: Array
+    gripper: Array
+    objects: dict[str, Array]
+    signals: dict[str, NDArray[np.int64]]
+
+
+def read_datagen(number: int, name: str, group: h5py.Group) -> DatagenInfo:
+    """Read a group `datagen_info`, MimicGen's or ours.
+
+    Raises:
+        UserError: something that MimicGen writes is not there.
+    """
+    needed = ("eef_pose", "target_pose", "gripper_action", "object_poses", "subtask_term_signals")
+    if lacking := [key for key in needed if key not in group]:
+        raise UserError(f"{name}: its datagen_info has no {', '.join(lacking)}; prepare it again.")
+    return DatagenInfo(
+        number,
+        name,
+        eef=group["eef_pose"][()],
+        target=group["target_pose"][()],
+        gripper=group["gripper_action"][()][:, 0],
+        objects={key: poses[()] for key, poses in group["object_poses"].items()},
+        signals={key: values[()] for key, values in group["subtask_term_signals"].items()},
+    )
+
+
+def digest_of_infos(infos: Sequence[DatagenInfo]) -> str:
+    """What tells one set of sources from another."""
+    digest = hashlib.sha256()
+    for info in infos:
+        digest.update(f"{info.name} {len(info.eef)}".encode())
+        digest.update(np.ascontiguousarray(info.target).tobytes())
+    return digest.hexdigest()[:16]
+
+
+def boundaries(info: DatagenInfo, template: Template) -> list[int]:
+    """Where its subtasks end: after the first rise of each signal from the end before on; the last with it.
+
+    Raises:
+        UnknownNameError: it has no such signal.
+        UserError: a signal never rises.
+    """
+    ends: list[int] = []
+    for subtask in template.subtasks[:-1]:
+        signal = subtask.signal or ""
+        if signal not in info.signals:
+            raise UnknownNameError("subtask_term_signal", signal, info.signals)
+        begin = ends[-1] if ends else 0
+        rises = np.flatnonzero(np.diff(info.signals[signal][begin:].astype(np.int64)) > 0)
+        if not len(rises):
+            raise UserError(f"{info.name}: the signal {signal} does not rise after step {begin}.")
+        ends.append(begin + int(rises[0]) + 1)
+    return [*ends, len(info.eef)]
+
+
+def with_offsets(ends: Sequence[int], template: Template, rng: np.random.Generator) -> list[tuple[int, int]]:
+    """First and last step of each subtask, its end put off by as many steps as its template has drawn.
+
+    Raises:
+        UserError: one would end before it begins.
+    """
+    put_off = [end + int(rng.integers(low, high + 1)) for end, (low, high) in _but_the_last(ends, template)]
+    edges = [0, *put_off, ends[-1]]
+    if any(later <= earlier for earlier, later in itertools.pairwise(edges)):
+        raise UserError(f"subtasks end at steps {edges[1:]}, one of them before it begins; take smaller offsets.")
+    return list(itertools.pairwise(edges))
+
+
+def _but_the_last(ends: Sequence[int], template: Template) -> list[tuple[int, tuple[int, int]]]:
+    return [(end, one.offsets) for end, one in zip(ends, template.subtasks, strict=True)][:-1]
+
+
+def selected(
+    subtask: Subtask,
+    sources: Sequence[DatagenInfo],
+    spans: Sequence[tuple[int, int]],
+    now: Array | None,
+    hand: Array,
+    rng: np.random.Generator,
+) -> int:
+    """Number (in the list) of the source that a subtask is taken from.
+
+    Args:
+        subtask: that is to be carried over.
+        sources: to choose among.
+        spans: first and last step of it in each.
+        now: pose (4, 4) of its object.
+        hand: pose (4, 4) of the hand.
+        rng: of the draw.
+    """
+    if subtask.selection == RANDOM or now is None or subtask.object_ref is None:
+        return int(rng.integers(len(sources)))
+    far = []
+    for info, (begin, _) in zip(sources, spans, strict=True):
+        then = info.objects[subtask.object_ref][begin]
+        if subtask.selection == OBJECT:
+            far.append(pose_distance(now, then))
+        else:
+            far.append(pose_distance(hand, carried_over(now, then, info.eef[begin : begin + 1])[0]))
+    nearest = np.argsort(far, kind="stable")[: subtask.neighbours or NEAREST[subtask.selection]]
+    return int(rng.choice(nearest))
+
+
+def carried(
+    info: DatagenInfo, subtask: Subtask, span: tuple[int, int], now: Array | None, *, first: bool
+) -> tuple[Array, Array]:
+    """Targets (n, 4, 4) and gripper commands (n,) of a subtask, relative to where its object is now.
+
+    With `first` the pose that the hand had when it began comes before its targets.
+    """
+    begin, end = span
+    poses, gripper = info.target[begin:end], info.gripper[begin:end]
+    if first:
+        poses, gripper = np.concatenate([info.eef[begin : begin + 1], poses]), np.concatenate([gripper[:1], gripper])
+    if subtask.object_ref is None or now is None:
+        return poses, gripper
+    return carried_over(now, info.objects[subtask.object_ref][begin], poses), gripper

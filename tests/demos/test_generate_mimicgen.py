@@ -1,0 +1,190 @@
+"""MimicGen's own way: its templates, where subtasks end, how they are chosen and carried over, and files."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+import pytest
+
+from robocasa_lerobot import cli
+from robocasa_lerobot.demos.generate.mimicgen.subtasks import (
+    DatagenInfo,
+    boundaries,
+    carried,
+    read_datagen,
+    selected,
+    with_offsets,
+)
+from robocasa_lerobot.demos.generate.mimicgen.template import (
+    INTERPOLATION,
+    OBJECT,
+    RANDOM,
+    ROBOT,
+    Subtask,
+    derived_template,
+    read_json_template,
+    template_from,
+)
+from robocasa_lerobot.demos.generate.sources.prepare import prepare_files
+from robocasa_lerobot.demos.generate.sources.prepared import GROUP
+from robocasa_lerobot.demos.generate.sources.source import sources_of
+from robocasa_lerobot.demos.generate.sources.transform import inverse, yaw_pose
+from robocasa_lerobot.demos.motion import Array
+from robocasa_lerobot.demos.recording import RecordingSettings, record_tasks
+from robocasa_lerobot.demos.replay import replay
+from robocasa_lerobot.errors import UserError
+
+STACK: dict[str, Any] = {
+    "name": "stack",
+    "type": "robosuite",
+    "experiment": {"generation": {"select_src_per_subtask": True, "transform_first_robot_pose": False}},
+    "task": {
+        "task_spec": {
+            "subtask_1": {
+                "object_ref": "cube",
+                "subtask_term_signal": "grasp",
+                "subtask_term_offset_range": [2, 4],
+                "selection_strategy": OBJECT,
+                "selection_strategy_kwargs": {"nn_k": 2},
+                "action_noise": 0.05,
+                "num_interpolation_steps": 5,
+            },
+            "subtask_2": {"object_ref": "bin", "subtask_term_signal": None, "selection_strategy": RANDOM},
+        }
+    },
+}
+STEPS, GRASP = 20, 8
+
+
+def still(pose: Array) -> Array:
+    """The same at every step."""
+    return np.repeat(pose[None], STEPS, axis=0)
+
+
+def info(number: int, at: float) -> DatagenInfo:
+    """A demonstration along x whose cube lies at `at`, and is grasped."""
+    path = np.array([yaw_pose(0.1 * step, 0.0, 0.0, 1.0) for step in range(STEPS)])
+    steps = np.arange(STEPS)
+    return DatagenInfo(
+        number,
+        f"demo_{number}",
+        eef=path,
+        target=path @ yaw_pose(0.05, 0.0, 0.1),
+        gripper=np.where(steps < GRASP, -1.0, 1.0),
+        objects={"cube": still(yaw_pose(at, 0.0, 0.3)), "bin": still(yaw_pose(1.0, 1.0, 0.0))},
+        signals={"grasp": (steps >= GRASP).astype(np.int64)},
+    )
+
+
+def test_a_template_says_what_it_says_and_the_rest_is_the_librarys() -> None:
+    template = template_from(STACK)
+    first, last = template.subtasks
+    assert first == Subtask("cube", "grasp", (2, 4), OBJECT, 2, 0.05)
+    assert (last.signal, last.offsets, last.interpolation_steps, last.action_noise) == (None, (0, 0), 5, 0.0)
+    assert (template.per_subtask, template.first_pose, template.from_last_target) == (True, False, True)
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ({"subtask_term_signal": None}, "every subtask but the last"),
+        ({"selection_strategy": "nearest_neighbour_object"}, OBJECT),
+        ({"subtask_term_offset_range": [4, 2]}, "two rising numbers"),
+        ({"object_ref": None}, "at random"),
+    ],
+)
+def test_what_a_template_cannot_say(tmp_path: Path, change: dict[str, Any], said: str) -> None:
+    asked = json.loads(json.dumps(STACK))
+    asked["task"]["task_spec"]["subtask_1"] |= change
+    path = tmp_path / "stack.json"
+    path.write_text(json.dumps(asked))
+    with pytest.raises(UserError, match=said):
+        read_json_template(path)
+    path.write_text(json.dumps({"task": {"task_spec": {"stage_1": {}, "stage_2": {}}}}))
+    with pytest.raises(UserError, match="RoboCasa"):
+        read_json_template(path)
+    path.write_text("{")
+    with pytest.raises(UserError, match="JSON"):
+        read_json_template(path)
+
+
+def test_subtasks_end_after_their_signal_and_put_off_by_what_is_drawn() -> None:
+    template, source = template_from(STACK), info(0, 0.8)
+    assert boundaries(source, template) == [GRASP, STEPS]
+    drawn = [with_offsets([GRASP, STEPS], template, np.random.default_rng(seed)) for seed in range(40)]
+    assert {first for first, _ in drawn} == {(0, 10), (0, 11), (0, 12)}
+    assert all(last == (first[1], STEPS) for first, last in drawn)
+    source.signals["grasp"][:] = 1
+    with pytest.raises(UserError, match="does not rise"):
+        boundaries(source, template)
+    del source.signals["grasp"]
+    with pytest.raises(UserError, match="grasp"):
+        boundaries(source, template)
+
+
+def test_the_nearest_sources_come_into_question() -> None:
+    sources = [info(number, at) for number, at in enumerate((0.2, 0.9, 0.8, 0.3))]
+    spans, now, hand = [(0, GRASP)] * 4, yaw_pose(0.85, 0.0, 0.3), np.eye(4)
+
+    def drawn(selection: str, neighbours: int) -> set[int]:
+        subtask = Subtask("cube", "grasp", selection=selection, neighbours=neighbours)
+        return {selected(subtask, sources, spans, now, hand, np.random.default_rng(seed)) for seed in range(40)}
+
+    assert drawn(OBJECT, 2) == {1, 2}
+    assert drawn(OBJECT, 0) == {1, 2, 3}  # three, where nothing is said
+    assert drawn(RANDOM, 0) == {0, 1, 2, 3}
+    # The hand begins where it was in the source, less how far the cube lay from there: nearest for the nearest cube.
+    assert drawn(ROBOT, 1) == drawn(INTERPOLATION, 0) <= {1, 2}
+
+
+def test_a_subtask_is_carried_over_by_its_object() -> None:
+    source, now = info(0, 0.8), yaw_pose(-1.0, 2.0, -0.7)
+    subtask = Subtask("cube", "grasp")
+    poses, gripper = carried(source, subtask, (2, 9), now, first=False)
+    then = source.objects["cube"][2]
+    np.testing.assert_allclose(inverse(now) @ poses, inverse(then) @ source.target[2:9], atol=1e-9)
+    np.testing.assert_array_equal(gripper, source.gripper[2:9])
+    led, commands = carried(source, subtask, (2, 9), now, first=True)
+    np.testing.assert_allclose(inverse(now) @ led[0], inverse(then) @ source.eef[2], atol=1e-9)
+    assert len(led) == len(commands) == 8
+    alone, _ = carried(source, Subtask(None, "grasp"), (2, 9), None, first=False)
+    np.testing.assert_array_equal(alone, source.target[2:9])
+
+
+@pytest.mark.slow
+def test_files_are_generated_as_published_and_with_a_template(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    task, sources = "PickPlaceCounterToSink", tmp_path / "sources"
+    record_tasks([RecordingSettings(task, 3, split="pretrain", seed=100_000)], sources, show_progress=False)
+    assert not any(outcome.dropped for outcome in prepare_files([sources]))
+    found, alike = derived_template(sources_of(sources, task))
+    assert [subtask.object_ref for subtask in found.subtasks] == ["obj", "sink"]
+    assert len(alike) >= 2
+    with h5py.File(sources / f"{task}.hdf5") as file:
+        one = read_datagen(0, "one", file["data/demo_0"][GROUP])
+    end, last = boundaries(one, found)
+    assert 0 < end < last == len(one.eef)
+    command = f"generate --source {sources} --tasks {task} --episodes 1 --split pretrain --seed 200500 --workers 1"
+    assert cli.main([*command.split(), "--method", "mimicgen", "--out", str(tmp_path / "made")]) == 0
+    made = tmp_path / "made" / f"{task}.hdf5"
+    assert replay(made, "demo_0").actions
+    with h5py.File(made) as file:
+        group = file["data/demo_0"]
+        segments = json.loads(group.attrs["ep_meta"])["generation"]["segments"]
+        labels, base = group["src_demo_labels"][:, 0], group["actions"][:, 7:11]
+    assert [row["ref"] for row in segments] == ["obj", "sink"]
+    assert set(labels) <= {-1, *(row["demo"] for row in segments)}
+    assert not base.any()
+    signal = found.subtasks[0].signal
+    spec = {"subtask_1": {"object_ref": "obj", "subtask_term_signal": signal}, "subtask_2": {"object_ref": "sink"}}
+    path = tmp_path / "template.json"
+    path.write_text(json.dumps({"task": {"task_spec": spec}}))
+    more = [*command.split(), "--template", str(path), "--out", str(tmp_path / "more")]
+    assert cli.main(more) == 2
+    assert "--method mimicgen" in capsys.readouterr().err
+    assert cli.main([*more, "--method", "mimicgen"]) == 0
