@@ -106,19 +106,20 @@ def carry_out_segment(env: KitchenEnv, course: Course, carried: Carried, stop: C
         env.data, as_target(carried.hand(step)), float(data.gripper[step]), tolerance=ARRIVED_M, integral_gain=GAIN
     )
     stalled, before = 0, carried.position()
-    grasps = data.gripper[segment.lead] < 0
+    grasps, settled = data.gripper[segment.lead] < 0, -1
     while step < segment.end and not stop():
         if step < segment.contact and carried.met():
             step = segment.contact
         gripper = float(data.gripper[step])
-        if step > segment.lead and gripper != data.gripper[step - 1]:
+        if step > max(segment.lead, settled) and gripper != data.gripper[step - 1]:
+            settled, pose = step, as_target(carried.hand(step))  # the part may swing while the hand comes to rest
             for _ in range(SETTLE_STEPS):
-                pose = as_target(carried.hand(step))
                 error = pose_error(env.data, pose)
                 if error.position < SETTLED_M and error.rotation < SETTLED_RAD:
                     break
                 course.label = (number, SETTLE, step)
                 yield arm_action(env.data, pose, float(data.gripper[step - 1]))
+        lets_go = grasps and gripper < 0
         in_contact = segment.contact <= step < segment.release
         course.label = (number, CONTACT if in_contact else FREE, step)
         base = None if carried.base is None else base_command(env, carried.base(step))
@@ -127,7 +128,7 @@ def carry_out_segment(env: KitchenEnv, course: Course, carried: Carried, stop: C
             return
         now = carried.position()
         stalled, before = (stalled + 1 if abs(now - before) < MOVING_SHARE else 0), now
-        if in_contact and late and carried.late(step):
+        if in_contact and late and not lets_go and carried.late(step):
             late -= 1
             continue
         stalled = 0

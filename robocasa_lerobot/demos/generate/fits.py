@@ -18,6 +18,7 @@ from robocasa_lerobot.envs.tasks.task import Stage
 
 APART_SHARE = 0.12  # of its range: a part may stand as far before where it stood in the source
 LEAST_SPIN_RAD = 0.1  # of a knob from where it stood in the source
+NEARLY_DONE = 0.3  # of what the part with the most left to go has left
 LEFT_SHARE = 0.003  # of its range that a segment must still have to go
 HALF_TURN = np.diag([-1.0, -1.0, 1.0, 1.0])
 RELATIVE = ("turn",)  # verbs whose goal is counted from where the part stood
@@ -113,6 +114,7 @@ def fits_of(env: KitchenEnv, stage: Stage, course: Course) -> list[Fit]:
     drawn = env.scene.fill(stage.to)
     pieces = course.most_alike(pieces_for(course.sources, stage, PART, drawn), env, stage)
     found = []
+    left: dict[str, float] = {}
     for part in parts_of(env, stage):
         for piece in pieces:
             own = piece.data.about["parts"][piece.segment.ref]
@@ -123,6 +125,8 @@ def fits_of(env: KitchenEnv, stage: Stage, course: Course) -> list[Fit]:
             now, ahead = part.position(env.data), float(np.sign(end - begin))
             near = (begin - now) * ahead < APART_SHARE * part.span
             if stage.verb in RELATIVE or piece.springs or (near and (end - now) * ahead > LEFT_SHARE * part.span):
+                left[part.name] = max(left.get(part.name, 0.0), abs(end - now) / part.span)
                 spins = (0.0, begin - now) if stage.skill == "knobs" and abs(begin - now) > LEAST_SPIN_RAD else (0.0,)
                 found += [Fit.of(piece, part, flip=flip, spin=spin) for flip in (False, True) for spin in spins]
-    return found
+    # Of several parts, as two doors, those that have hardly any way left come last.
+    return [fit for fit in found if left[fit.part.name] > NEARLY_DONE * max(left.values())]

@@ -219,6 +219,13 @@ def _stand(env: KitchenEnv, fit: Fit) -> RobotPose:
     return RobotPose(x, y, yaw)
 
 
+def _lets_go(fit: Fit) -> int:
+    """The step at which the fingers open on what they held; of a push, where the contact ends."""
+    segment, gripper = fit.piece.segment, fit.piece.data.gripper
+    held = range(segment.contact + 1, segment.release)
+    return next((step for step in held if gripper[step] < 0 < gripper[step - 1]), segment.release)
+
+
 def _carried(env: KitchenEnv, fit: Fit) -> Carried:
     """The segment with its frame on the part as it moves, the base going along where it did in the source."""
     segment, data, part = fit.piece.segment, fit.piece.data, fit.part
@@ -237,9 +244,18 @@ def _carried(env: KitchenEnv, fit: Fit) -> Carried:
         return (part.position(env.data) - begin) / (end - begin)
 
     before = anchored(body_pose(env.data, part.body), fit.point)
+    lets_go = _lets_go(fit)
+    left: list[Array] = []
 
     def frame(step: int) -> Array:
-        return before if step < segment.contact else anchored(body_pose(env.data, part.body), fit.point)
+        """The part's, as it moves; at rest before it is touched, and from where the hand lets it go."""
+        if step < segment.contact:
+            return before
+        now = anchored(body_pose(env.data, part.body), fit.point)
+        if step < lets_go:
+            return now
+        left[:] = left or [now]
+        return left[0]
 
     def late(step: int) -> bool:
         soon = min(share(min(step + AHEAD_STEPS, segment.release - 1)), 1.0)
