@@ -16,7 +16,7 @@ from robocasa_lerobot.demos.skills.drawers import open_drawer
 from robocasa_lerobot.demos.skills.pick_place.graspable import graspable
 from robocasa_lerobot.demos.skills.pick_place.pick import HOPELESS, best_grasp
 from robocasa_lerobot.demos.skills.pick_place.poses.distance_poses import distance_terms, near_to
-from robocasa_lerobot.demos.skills.pick_place.strategies import grasp_strategy, place_strategy
+from robocasa_lerobot.demos.skills.pick_place.strategies import MOST_OUT_M, grasp_strategy, place_strategy
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.kitchens.fixtures.cabinets import Drawer
 
@@ -83,6 +83,16 @@ def test_the_way_out_of_a_fridge_ends_before_its_front(name: str) -> None:
         strategy = grasp_strategy(env, obj, free, kept=True)
         _, y = fridge.to_local(env.data.body(obj.name).xpos)
         assert strategy.out_m > y + fridge.depth / 2 - 0.1
+
+
+def test_the_way_out_of_a_wall_cabinet_ends_before_its_front() -> None:
+    for env in made("PickPlaceCabinetToCounter"):
+        stage = env.declaration.stages[0]
+        obj = graspable(env, stage.object)
+        cabinet = env.scene.fixture("cab")
+        _, y = cabinet.to_local(env.data.body(obj.name).xpos)
+        strategy = grasp_strategy(env, obj, place_strategy(env, stage, obj).grasp)
+        assert strategy.out_m >= min(y + cabinet.depth / 2, MOST_OUT_M)
 
 
 def test_a_drawer_is_opened_from_beside_by_a_robot_that_stood_before_it() -> None:

@@ -110,7 +110,8 @@ _JUG_TURNS = tuple(float(np.deg2rad(turn)) for turn in (0.0, 30.0, -30.0, 60.0, 
 def grasp_strategy(env: KitchenEnv, obj: Graspable, free: GraspStrategy, *, kept: bool = False) -> GraspStrategy:
     """How an object is grasped where it is; `free` where it stands in the open.
 
-    What is `kept` in the hand, rather than put down from there, is drawn out of a fridge altogether.
+    What comes out of a cabinet is drawn out altogether; out of a fridge, what is `kept` in the hand, rather than put
+    down from there.
     """
     place = locate(env, obj.name)
     match place.fixture:
@@ -126,8 +127,8 @@ def grasp_strategy(env: KitchenEnv, obj: Graspable, free: GraspStrategy, *, kept
             return replace(OUT_OF_DRAWER, first=_clear_of_counter(obj, drawer))
         case HingeCabinet() if has_handle(obj):
             return replace(OUT_OF_CABINET, poses=PAN_BY_THE_HANDLE.poses)
-        case HingeCabinet():
-            return between_shelves(env, obj, place)
+        case HingeCabinet() as cabinet:  # the torso, which is up before a wall cabinet, goes down again
+            return replace(between_shelves(env, obj, place), out_m=_way_out(env, obj, cabinet.regions[place.region]))
         case _ if "drawer" in place.region:
             return replace(FROM_CRISPER, first=_pull_out_first(obj, place))
         case _ if in_the_open(place):
