@@ -10,6 +10,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.stamp
 COMPANION := companion/lerobot_policy_robocasa
+GENERATION := outputs/generation/sources
 
 # Without bytecode every start of LeRobot takes twice as long.
 unexport PYTHONDONTWRITEBYTECODE
@@ -18,7 +19,7 @@ export PYTHONUNBUFFERED := 1
 export UV_HTTP_TIMEOUT ?= 300
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
-.PHONY: help setup demo study test test-slow walk lint format lock docs doctor bench bench-convert bench-training bench-evaluation bench-grasps bench-demonstrators bench-demo bench-kitchens bench-kitchen-tasks clean
+.PHONY: help setup demo study test test-slow walk lint format lock docs doctor bench bench-convert bench-training bench-evaluation bench-grasps bench-demonstrators bench-demo bench-kitchens bench-kitchen-tasks bench-generation clean
 
 help:  ## this list
 	@sed -n 's/^\([a-z-]*\):.*  ## /\1\t/p' Makefile | awk -F '\t' '{printf "  make %-20s %s\n", $$1, $$2}'
@@ -116,6 +117,13 @@ lock: $(STAMP)  ## pin pyproject.toml's dependencies in requirements.lock
 # About an hour and a half on two cores; goes on where it was stopped, BENCH_ARGS='--every 50' takes a sample.
 bench-kitchen-tasks: $(STAMP)  ## five composite tasks in each of the 2,510 kitchens: nothing falls, overlaps or blocks
 	$(BIN)/python benchmarks/kitchen_tasks.py $(BENCH_ARGS)
+
+# Hours; goes on where it was stopped. Ten sources of each of the 60 tasks are recorded and prepared first.
+bench-generation: $(STAMP)  ## generated demonstrations beside MimicGen's way and the demonstrators
+	$(BIN)/robocasa-lerobot demos --tasks mimicgen60 --episodes 10 --split pretrain --seed 100000 --out $(GENERATION)
+	$(BIN)/robocasa-lerobot prepare $(GENERATION)
+	$(BIN)/python benchmarks/generation.py --source $(GENERATION) --first-seed 300000 \
+	    --arms ours=100,mimicgen=20,scripted=20,far=20,one=20 $(BENCH_ARGS)
 
 clean:  ## remove .venv and everything that the demo wrote
 	rm -rf $(VENV) outputs

@@ -10,7 +10,7 @@ the arms in turn, in one run, so that their times compare:
     one        ours with one source of each task
     own        ours in the sources' own scenes
 
-    python benchmarks/generation.py --source sources/ --attempts 100
+    python benchmarks/generation.py --source sources/ --arms ours=100,mimicgen=20,scripted=20,far=20
     python benchmarks/generation.py --source sources/ --tasks KettleBoiling,ButterOnPan --arms ours --attempts 20
 
 Every attempt is a line of the trials' file, so that a run can be stopped and continued; nothing is left out of a rate,
@@ -25,7 +25,7 @@ import json
 import multiprocessing
 import os
 import time
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -39,6 +39,7 @@ from robocasa_lerobot.demos.generate.sources.source import sources_of
 from robocasa_lerobot.demos.recorder import Recording, record_episode
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.files import write_text
+from robocasa_lerobot.jsonl import read_whole_lines
 from robocasa_lerobot.progress import Bar
 from robocasa_lerobot.provenance import utc_now
 
@@ -74,8 +75,12 @@ def parse(arguments: Sequence[str] | None = None) -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--source", type=Path, required=True, help="folder of prepared demonstrations")
     parser.add_argument("--tasks", default="", help="names or sets (default: those that have a file there)")
-    parser.add_argument("--arms", default="ours,mimicgen,scripted", help=f"of {', '.join(ARMS)} (default %(default)s)")
-    parser.add_argument("--attempts", type=int, default=10, help="of each task (default 10)")
+    parser.add_argument(
+        "--arms",
+        default="ours,mimicgen,scripted",
+        help=f"of {', '.join(ARMS)}; ours=100 for other attempts (default %(default)s)",
+    )
+    parser.add_argument("--attempts", type=int, default=10, help="of each task, where an arm does not say (default 10)")
     parser.add_argument("--first-seed", type=int, default=FIRST_SEED, help=f"default {FIRST_SEED}")
     parser.add_argument("--workers", type=int, default=os.cpu_count() or 1, help="processes (default: all cores)")
     parser.add_argument("--trials", type=Path, default=common.REPOSITORY / "outputs" / "generation.jsonl")
@@ -125,14 +130,25 @@ def attempt(job: Job) -> Trial:
     )
 
 
-def jobs_of(args: argparse.Namespace, names: Iterable[str], arms: Sequence[str]) -> list[Job]:
+def arms_of(text: str, attempts: int) -> dict[str, int]:
+    """Attempts at each task, by arm, from `ours=100,mimicgen`."""
+    found = {}
+    for word in text.split(","):
+        arm, _, number = (part.strip() for part in word.partition("="))
+        if arm not in ARMS or not (number or "1").isdigit():
+            raise SystemExit(f"--arms {word}: expected one of {', '.join(ARMS)}, or as ours=100.")
+        found[arm] = int(number or attempts)
+    return found
+
+
+def jobs_of(args: argparse.Namespace, names: Iterable[str], arms: Mapping[str, int]) -> list[Job]:
     """All attempts, seed by seed, so that a run that is stopped has seen all tasks about equally often."""
     jobs = []
-    for number in range(args.attempts):
+    for number in range(max(arms.values())):
         for name in names:
             own = [one.seed for one in sources_of(args.source, name)]
-            for arm in arms:
-                if (arm == "far" and name in DRIVING) or (arm == "own" and number >= len(own)):
+            for arm, attempts in arms.items():
+                if number >= attempts or (arm == "far" and name in DRIVING) or (arm == "own" and number >= len(own)):
                     continue
                 seed = own[number] if arm == "own" else args.first_seed + number
                 jobs.append(Job(name, seed, arm, args.source))
@@ -156,20 +172,15 @@ def run(jobs: Sequence[Job], path: Path, workers: int) -> None:
 
 
 def read(path: Path) -> dict[tuple[str, int, str], Trial]:
-    """Finished attempts; a line that was cut off does not count."""
-    lines = path.read_text(encoding="utf-8").splitlines(keepends=True) if path.exists() else []
-    found = (json.loads(line) for line in lines if line.endswith("\n"))
-    trials = (Trial(**values | {"sources": tuple(values["sources"])}) for values in found)
+    """Finished attempts; a line that a kill has cut off is made anew."""
+    trials = (Trial(**values | {"sources": tuple(values["sources"])}) for values in read_whole_lines(path))
     return {(trial.task, trial.seed, trial.arm): trial for trial in trials}
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Make the missing attempts, and write the result."""
     args = parse(arguments)
-    arms = [arm.strip() for arm in args.arms.split(",")]
-    for arm in arms:
-        if arm not in ARMS:
-            raise SystemExit(f"no arm {arm!r}: there are {', '.join(ARMS)}")
+    arms = arms_of(args.arms, args.attempts)
     names = expand_names(args.tasks) if args.tasks else tuple(sorted(path.stem for path in args.source.glob("*.hdf5")))
     jobs = jobs_of(args, names, arms)
     done = read(args.trials)
@@ -180,7 +191,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     body = {
         "ratios": ratios(trials, args.workers),
         "arms": {arm: summary([trial for trial in trials if trial.arm == arm]) for arm in arms},
-        "settings": {"attempts": args.attempts, "first_seed": args.first_seed, "split": "pretrain"},
+        "settings": {"attempts": arms, "first_seed": args.first_seed, "split": "pretrain"},
         "machine": common.machine(),
         "versions": common.versions("mujoco", "numpy"),
         "date": utc_now(),
