@@ -15,7 +15,7 @@ from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 OUT_M = 0.25
 LIFT_M, HOVER_M = 0.12, 0.12
 LIFTS_M = (0.035, 0.010)  # before it is drawn out of a front
-WORSE_GRASP = 0.45
+WORSE_GRASP, DOUBTFUL = 0.45, 1.3
 STEEP = 0.5  # sine of a slope
 TRIED, ALIKE_M = 1.2, 0.015  # cost of a grasp like one that has failed: its place in the object is as near as this
 ALIKE_COS = float(np.cos(np.deg2rad(25.0)))  # of the angle between hands that hold alike
@@ -40,6 +40,7 @@ class GraspStrategy:
         poses: grasps of an object by a hand that comes along an approach.
         first: done before each attempt.
         nearer: how far an object may be put down again nearer to the robot than it lies, metres.
+        doubtful: cost of a path from which on it rather is, though it is held.
     """
 
     tilts: tuple[tuple[float, float], ...] = ((0.0, 0.0),)
@@ -55,6 +56,7 @@ class GraspStrategy:
     poses: Callable[[KitchenEnv, Graspable, Array], list[GraspPose]] = grasps
     first: Callable[[KitchenEnv], Iterator[Array]] | None = None
     nearer: Callable[[KitchenEnv], float] | None = None
+    doubtful: float = DOUBTFUL
 
 
 def in_radians(*tilts: tuple[float, float]) -> tuple[tuple[float, float], ...]:

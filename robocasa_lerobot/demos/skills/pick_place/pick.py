@@ -63,7 +63,7 @@ INTEGRAL_GAIN = 0.12
 GRASP_STEPS, RELEASE_STEPS = 11, 8
 STANDOFF_M = 0.06
 HOPELESS, POOR = 3.5, 1.5  # cost of a path from which on it is not tried, or not before one from another side
-DOUBTFUL, WORTH_M = 1.3, 0.02  # cost from which on it is rather put down nearer to the robot, if by as much as this
+WORTH_M = 0.02  # by less than this, what is held is not put down nearer to the robot
 BLOCKED_M, BACK_M = 0.05, 0.08  # a hand as far as this from where the grasp begins is blocked: another grasp is next
 HELD_UP_M, LOWER_M = 0.08, 0.03
 LEVEL_LIFT_M, LEVEL_COST, LOW_COST = 0.004, 0.1, 0.05  # before it is drawn out level, or nearly so
@@ -173,7 +173,7 @@ def pick(
                 return
             continue
         rise = data.body(obj.name).xpos[2] - start[2] - moved[2]
-        if choice.cost > DOUBTFUL and np.linalg.norm(nearer) > WORTH_M:
+        if choice.cost > strategy.doubtful and np.linalg.norm(nearer) > WORTH_M:
             yield from _put_back(env, at, lifted, nearer)
         elif (rise > ROSE_SHARE * lift and _stays(env, obj, inside)) or is_held(env, obj.name):
             yield from watch.over(_draw_out(env, lifted, out, strategy.narrow))

@@ -38,6 +38,7 @@ OUT_OF_A_TOASTER_OVEN = replace(
     entries=("across", "out", "up"),
     narrow=True,
     among_tilts=True,
+    doubtful=np.inf,
 )
 
 

@@ -55,7 +55,7 @@ from robocasa_lerobot.demos.skills.pick_place.poses.plate_poses import is_flat, 
 from robocasa_lerobot.demos.skills.pick_place.poses.shelf_rest import ShelfRest
 from robocasa_lerobot.demos.skills.pick_place.poses.turned_poses import as_turned
 from robocasa_lerobot.demos.skills.pick_place.reach_in import OUT_OF_A_MICROWAVE, OUT_OF_A_TOASTER_OVEN
-from robocasa_lerobot.demos.skills.pick_place.turn_across import OUT_OF_CABINET, between_shelves, turn_first
+from robocasa_lerobot.demos.skills.pick_place.turn_across import OUT_OF_CABINET, between_shelves, to_front, turn_first
 from robocasa_lerobot.demos.skills.pick_place.turn_over import LEANS, TO_TURN, tilted_leans, which_way_up
 from robocasa_lerobot.demos.skills.racks import pull
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
@@ -118,7 +118,8 @@ def grasp_strategy(env: KitchenEnv, obj: Graspable, free: GraspStrategy, *, kept
         case Microwave():
             return replace(OUT_OF_A_MICROWAVE, first=turn_first(obj, OUT_OF_A_MICROWAVE))
         case ToasterOven():
-            return replace(OUT_OF_A_TOASTER_OVEN, first=turn_first(obj, OUT_OF_A_TOASTER_OVEN))
+            first = turn_first(obj, OUT_OF_A_TOASTER_OVEN)
+            return replace(OUT_OF_A_TOASTER_OVEN, first=first, nearer=to_front(obj, place))
         case Toaster() if obj.item is not None and obj.item.upright_axis is not None:
             return FROM_A_SLOT
         case CoffeeMachine():

@@ -28,7 +28,6 @@ from robocasa_lerobot.demos.skills.pick_place.location import Location
 from robocasa_lerobot.demos.skills.pick_place.pick import HOPELESS, best_grasp
 from robocasa_lerobot.demos.skills.reaching import MotionPlan, WaypointPath, approach, plan_reach
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
-from robocasa_lerobot.envs.kitchens.fixtures.base import Region
 from robocasa_lerobot.envs.scene.robot_poses import RobotPose
 
 LONG, ACROSS_COS = 1.25, 0.8  # long by wide; cosine of the long axis and the heading, above which it lies well enough
@@ -57,13 +56,14 @@ def between_shelves(env: KitchenEnv, obj: Graspable, place: Location) -> GraspSt
     """How an object is grasped between shelves as it lies."""
     if not lies_across(env, obj):
         return replace(OUT_OF_CABINET, first=turn_first(obj, OUT_OF_CABINET))
+    return replace(ACROSS_OUT_OF_CABINET, first=turn_first(obj, ACROSS_OUT_OF_CABINET), nearer=to_front(obj, place))
+
+
+def to_front(obj: Graspable, place: Location) -> Callable[[KitchenEnv], float] | None:
+    """How far an object lies behind where it is easiest to grasp, just behind its region's front, metres."""
     region = place.fixture.regions.get(place.region) if place.fixture is not None else None
-    nearer = None if region is None else _to_front(obj, region)
-    return replace(ACROSS_OUT_OF_CABINET, first=turn_first(obj, ACROSS_OUT_OF_CABINET), nearer=nearer)
-
-
-def _to_front(obj: Graspable, region: Region) -> Callable[[KitchenEnv], float]:
-    """How far an object lies behind where it is easiest to grasp, just behind a region's front, metres."""
+    if region is None:
+        return None
 
     def nearer(env: KitchenEnv) -> float:
         body = env.data.body(obj.name)
