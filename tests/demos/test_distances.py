@@ -16,7 +16,12 @@ from robocasa_lerobot.demos.skills.drawers import open_drawer
 from robocasa_lerobot.demos.skills.pick_place.graspable import graspable
 from robocasa_lerobot.demos.skills.pick_place.pick import HOPELESS, best_grasp
 from robocasa_lerobot.demos.skills.pick_place.poses.distance_poses import distance_terms, near_to
-from robocasa_lerobot.demos.skills.pick_place.strategies import MOST_OUT_M, grasp_strategy, place_strategy
+from robocasa_lerobot.demos.skills.pick_place.strategies import (
+    FOR_A_TIGHT_SHELF,
+    MOST_OUT_M,
+    grasp_strategy,
+    place_strategy,
+)
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.kitchens.fixtures.cabinets import Drawer
 
@@ -93,6 +98,13 @@ def test_the_way_out_of_a_wall_cabinet_ends_before_its_front() -> None:
         _, y = cabinet.to_local(env.data.body(obj.name).xpos)
         strategy = grasp_strategy(env, obj, place_strategy(env, stage, obj).grasp)
         assert strategy.out_m >= min(y + cabinet.depth / 2, MOST_OUT_M)
+
+
+def test_what_fills_the_room_between_shelves_is_not_grasped_from_above_it() -> None:
+    for env in made("RearrangeFridgeItems"):
+        stage = next(stage for stage in env.declaration.stages if stage.object == "pitcher")
+        pitcher = graspable(env, "pitcher")
+        assert place_strategy(env, stage, pitcher).grasp is FOR_A_TIGHT_SHELF
 
 
 def test_a_drawer_is_opened_from_beside_by_a_robot_that_stood_before_it() -> None:

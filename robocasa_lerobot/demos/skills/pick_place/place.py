@@ -53,12 +53,13 @@ GONE_M = 0.27  # of the grip site from the object's origin: tasks ask for 25 cm
 YAWS = 12
 UP_RISE_M, RISES_M, LOW_COST = 0.06, (0.035, 0.010), 0.05  # over where it is let go, on the path in
 LEVEL_RISE_M, LEVEL_COST = 0.004, 0.1
-# Of heights that are planned for together, or of the sine of the hand's tilt, where the best plan of all costs more.
+# Of heights that are planned for together, and of the sine of the hand's tilt, where the best plan of all costs more.
 BAND_M, TILT_BAND, POOR = 0.05, 0.15, 1.2
 AGAIN, AGAIN_M = 0.5, 0.02  # cost of a hand that goes where it went without success, as near as this
 LEANING, LOADED_LEANING = 0.35, 1.0  # cost of a radian that the object is tilted, and of one with others in it
 # Of what stands on so narrow a foot that it would fall over, if it were let go with that lean.
-TOPPLING, FOOT_M, STANDS_SHARE = 1.5, 0.01, 0.8
+# What is as low, to its middle, does so to no harm.
+TOPPLING, FOOT_M, STANDS_SHARE, LOW_M = 1.5, 0.01, 0.8, 0.035
 LEVEL_FINGERS, SLOPE = 0.35, 0.5  # sine of the slope of the line between the fingers, and what that costs
 
 
@@ -209,7 +210,8 @@ def _planner(
     def plan(blocked: Sequence[RobotPose]) -> MotionPlan:
         found = best(paths, blocked, drives=may_drive)
         if not found or found[0].cost > POOR:  # too many low ones, all of them in the way of something
-            groups = _in_groups(paths, by_tilt=strategy.falls)
+            tilted, high = (_in_groups(paths, by_tilt=by_tilt) for by_tilt in (True, False))
+            groups = tilted if strategy.falls else high + tilted
             found += [choice for some in groups for choice in best(some, blocked, drives=False)]
         return min(found, key=lambda choice: choice.cost)
 
@@ -278,12 +280,12 @@ def _paths(
 
 
 def _stands_up_to(obj: Graspable, turn: Array) -> float:
-    """By how much an object may lean from the rotation (3, 3) in which it stands, and come upright again, radians."""
+    """By how much an object may lean from the rotation (3, 3) in which it stands, to come to rest well, radians."""
     points = obj.cloud @ turn.T
     foot = points[points[:, 2] < points[:, 2].min() + FOOT_M, :2]
     middle = (points.min(axis=0) + points.max(axis=0)) / 2
-    half = float(np.ptp(foot, axis=0).min()) / 2
-    return STANDS_SHARE * float(np.arctan2(half, middle[2] - points[:, 2].min()))
+    half, height = float(np.ptp(foot, axis=0).min()) / 2, float(middle[2] - points[:, 2].min())
+    return np.pi if height < LOW_M else STANDS_SHARE * float(np.arctan2(half, height))
 
 
 def _path(low: Array, rotation: Array, out: Array, name: str, in_m: float, rise: float, cost: float) -> WaypointPath:

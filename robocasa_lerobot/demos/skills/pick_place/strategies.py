@@ -98,6 +98,10 @@ LEANING_GRASP = replace(
     worse_grasp=1.0,
     among_tilts=True,
 )
+# Of what is about as high as the room between a fridge's shelves: a hand over it would meet the one above.
+TIGHT_M = 0.06
+_TIGHT_TILTS = in_radians((50, 0.0), (65, 0.0), (40, 0.1), (80, 0.1), (25, 0.3), (0, 0.6))
+FOR_A_TIGHT_SHELF = replace(ANY_APPROACH, tilts=_TIGHT_TILTS, among_tilts=True)
 LEVEL_HAND = -0.85  # of the hand's approach along the vertical: above it, the hand looks ahead rather than down
 _SMALL, _STEEP, _LEANT, _STEEPEST = np.deg2rad(25.0), np.deg2rad(30.0), np.deg2rad(45.0), np.deg2rad(55.0)
 _OPEN_LEANS, _CLOSED_LEANS = (0.0, _SMALL), (0.0, _STEEP, _STEEPEST)
@@ -309,11 +313,18 @@ def _into_regions(
             # Past the edge of what it came from, a shelf's or a drawer's, in a straight line.
             narrow = "drawer" in locate(env, obj.name).region
             rest = ShelfRest(env, obj, regions)
+            tight = isinstance(fixture, Fridge) and all(_is_tight(env, obj, region) for region in regions)
             return PlaceStrategy(
                 in_regions(env, obj, regions, (0.0,), columns, behind=behind), leans=_CLOSED_LEANS,
-                entries=("up", "across", "out"), grasp=ANY_APPROACH, in_m=0.28, narrow=narrow,
-                fit=rest.cost, falls_off=rest.falls_off,
+                entries=("up", "across", "out"), grasp=FOR_A_TIGHT_SHELF if tight else ANY_APPROACH, in_m=0.28,
+                narrow=narrow, fit=rest.cost, falls_off=rest.falls_off,
             )  # fmt: skip
+
+
+def _is_tight(env: KitchenEnv, obj: Graspable, region: Region) -> bool:
+    """Whether a region is hardly higher than an object as it stands."""
+    height = 2 * float(obj.half_extents(env.data.body(obj.name).xmat.reshape(3, 3))[2])
+    return 2 * float(region.half[2]) - height < TIGHT_M
 
 
 def _looks_ahead(env: KitchenEnv) -> bool:
