@@ -6,13 +6,29 @@ import argparse
 import os
 from pathlib import Path
 
-EXAMPLE = "robocasa-lerobot prepare demos/"
+EXAMPLE = (
+    "robocasa-lerobot prepare demos/\n  robocasa-lerobot prepare lift.hdf5 --bodies cube_main --asset-root assets/"
+)
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
     """Add the arguments."""
     parser.add_argument("paths", nargs="+", type=Path, metavar="PATH", help="files of demonstrations, or folders")
     parser.add_argument("--workers", type=int, default=os.cpu_count() or 1, help="processes (default: all cores)")
+    parser.add_argument(
+        "--bodies",
+        metavar="NAMES",
+        help="of robosuite's or robomimic's files with a Panda on a stand: bodies that subtasks are relative to, "
+        "separated by commas; the signal `grasp` is about the first",
+    )
+    parser.add_argument(
+        "--asset-root",
+        type=Path,
+        action="append",
+        default=[],
+        metavar="DIR",
+        help="where their meshes lie",
+    )
     parser.add_argument("--fresh", action="store_true", help="prepare again what is prepared already")
 
 
@@ -23,6 +39,8 @@ def run(args: argparse.Namespace) -> int:
     from robocasa_lerobot.progress import Bar
 
     total = len(demonstrations(args.paths))
+    if args.bodies:
+        return _prepare_foreign(args, total)
     outcomes = list(Bar(prepare_files(args.paths, workers=args.workers, fresh=args.fresh), total=total, unit="demo"))
     for outcome in outcomes:
         if outcome.dropped:
@@ -30,3 +48,15 @@ def run(args: argparse.Namespace) -> int:
     ready = sum(not outcome.dropped for outcome in outcomes)
     print(f"{ready} of {total} demonstrations are sources now")
     return 0 if ready else 1
+
+
+def _prepare_foreign(args: argparse.Namespace, total: int) -> int:
+    from robocasa_lerobot.making.foreign_sources import prepare_foreign
+    from robocasa_lerobot.progress import Bar
+
+    bodies = [name.strip() for name in args.bodies.split(",")]
+    files = sorted({file for path in args.paths for file in (path.glob("*.hdf5") if path.is_dir() else [path])})
+    infos = (info for file in files for info in prepare_foreign(file, bodies, args.asset_root))
+    ready = sum(1 for _ in Bar(infos, total=total, unit="demo"))
+    print(f"{ready} of {total} demonstrations are sources now, for `generate --method mimicgen --template JSON`")
+    return 0

@@ -67,6 +67,20 @@ def read_datagen(number: int, name: str, group: h5py.Group) -> DatagenInfo:
     )
 
 
+def write_datagen(group: h5py.Group, info: DatagenInfo, env_name: str) -> None:
+    """Write an empty group `datagen_info` for MimicGen's reader, and ours with a template."""
+    group.attrs.update({"env_interface_name": f"MG_{env_name}", "env_interface_type": "robosuite"})
+    arrays = {
+        "eef_pose": info.eef,
+        "target_pose": info.target,
+        "gripper_action": info.gripper[:, None],
+        **{f"object_poses/{name}": poses for name, poses in info.objects.items()},
+        **{f"subtask_term_signals/{name}": values for name, values in info.signals.items()},
+    }
+    for key, values in arrays.items():
+        group.create_dataset(key, data=values, compression="gzip")
+
+
 def digest_of_infos(infos: Sequence[DatagenInfo]) -> str:
     """What tells one set of sources from another."""
     digest = hashlib.sha256()
