@@ -119,3 +119,15 @@ def test_what_lies_on_the_rack_of_a_toaster_oven_is_held_by_the_first_grasp() ->
         closed = bool(action[-1] > 0.0)
     assert is_held(env, obj.name)
     env.close()
+
+
+def test_what_is_long_is_so_along_its_sides_not_along_its_diagonal() -> None:
+    env = KitchenEnv("PickPlaceToasterOvenToCounter", split="target", cameras=(), terminate_on_success=False)
+    env.reset(seed=180_004)
+    obj = graspable(env, "obj")
+    assert obj.item is not None
+    axis, long, wide = long_axis(env, obj)
+    assert (2 * long, 2 * wide) == pytest.approx(obj.item.size[:2], abs=0.01)
+    sides = env.data.body(obj.name).xmat.reshape(3, 3)
+    assert abs(float(axis @ sides[:, 0])) > 0.99
+    env.close()

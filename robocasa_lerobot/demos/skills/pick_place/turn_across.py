@@ -122,12 +122,15 @@ def lies_across(env: KitchenEnv, obj: Graspable) -> bool:
 
 
 def long_axis(env: KitchenEnv, obj: Graspable) -> tuple[Array, float, float]:
-    """The horizontal direction (3,) that an object is longest along, and half its extents along and across that."""
+    """The horizontal direction (3,) across which an object is narrowest, and half its extents along and across that.
+
+    A loaf is longer along its diagonal, across which it is nearly as wide.
+    """
     points = (obj.cloud @ env.data.body(obj.name).xmat.reshape(3, 3).T)[:, :2]
     angles = np.linspace(0.0, np.pi, 24, endpoint=False)
     reach = points @ np.array([np.cos(angles), np.sin(angles)])
     half = (reach.max(axis=0) - reach.min(axis=0)) / 2
-    best = int(np.argmax(half))
+    best = int(np.argmin(half)) - 12
     return np.array([np.cos(angles[best]), np.sin(angles[best]), 0.0]), float(half[best]), float(half[best - 12])
 
 
