@@ -18,6 +18,7 @@ END_SHARE = 0.25  # of the length, at each end, by whose width the working end i
 TIP_SHARE = 0.06
 LONG = 1.5  # of a vessel with a handle, by its width
 TOOL_SHARE, PAN_SHARE = 0.48, 0.60  # of the length, that a grasp is away from the tip at least
+END_M = 0.02  # least distance of a grasp near an end from the middle
 TOOL_SCORE, PAN_SCORE = 12.0, -12.0  # of a metre that it is farther away
 
 
@@ -78,6 +79,16 @@ def by_the_handle(
     return sorted(found, key=lambda pose: -pose.score)
 
 
+def by_one_end(env: KitchenEnv, obj: Graspable, approach: Array) -> list[GraspPose]:
+    """Grasps off the middle of an object, to either end; any, where there are none."""
+    found, axis = grasps(env, obj, approach), working_end(obj).axis
+    body = env.data.body(obj.name)
+    along = body.xmat.reshape(3, 3) @ axis
+    return [pose for pose in found if abs(float((pose.position - body.xpos) @ along)) > END_M] or found
+
+
 # A tool is held far from its working end, which reaches into something; a pan near it, since it hangs on that.
 TOOL_BY_THE_HANDLE = replace(ANY_APPROACH, poses=partial(by_the_handle, share=TOOL_SHARE, farther_score=TOOL_SCORE))
 PAN_BY_THE_HANDLE = replace(ANY_APPROACH, poses=partial(by_the_handle, share=PAN_SHARE, farther_score=PAN_SCORE))
+# What goes into a vessel with one end first is held near the other one: the palm stays over the rim.
+BY_ONE_END = replace(ANY_APPROACH, poses=by_one_end)

@@ -4,8 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import numpy as np
+
 from robocasa_lerobot.demos.skills.common import stage_done
-from robocasa_lerobot.demos.skills.pick_place.graspable import holder_of
+from robocasa_lerobot.demos.skills.pick_place.graspable import filled, graspable, holder_of
+from robocasa_lerobot.demos.skills.pick_place.poses.plate_poses import is_flat
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.tasks.task import Stage
 
@@ -28,7 +31,9 @@ def uppermost(env: KitchenEnv, stages: Sequence[Stage], index: int) -> int:
         if not _places(stages[later]):
             break
         other = env.scene.fill(stages[later].object)
-        if _height(env, other) > highest and _vessel(env, other) == vessel and not stage_done(env, stages[later]):
+        over = _height(env, other) > highest and _vessel(env, other) == vessel
+        over = over and (not is_flat(env, vessel) or _overlap(env, name, other))
+        if over and not stage_done(env, stages[later]):
             first, highest = later, _height(env, other)
     return first
 
@@ -43,6 +48,15 @@ def _vessel(env: KitchenEnv, name: str) -> str:
     while (holder := holder_of(env, passed[-1])) and holder not in passed:
         passed.append(holder)
     return passed[-1] if len(passed) > 1 else ""
+
+
+def _overlap(env: KitchenEnv, lower: str, upper: str) -> bool:
+    """Whether an object reaches over another one, seen from above: beside it, on a plate, it keeps no hand off it."""
+    turn, body = env.data.body(lower).xmat.reshape(3, 3), env.data.body(upper)
+    half = float(graspable(env, lower).half_extents(turn)[:2].min())
+    points = np.concatenate([filled(solid.cloud()) for solid in graspable(env, upper).solids])
+    away = points @ body.xmat.reshape(3, 3).T + body.xpos - env.data.body(lower).xpos
+    return float(np.linalg.norm(away[:, :2], axis=1).min()) < half
 
 
 def _height(env: KitchenEnv, name: str) -> float:

@@ -93,6 +93,7 @@ class PlaceStrategy:
         upwards: which way the object's own z axis points in the end, world, where it is turned over in between.
         narrow: whether the hand keeps to a straight line in and out also where that is steep.
         fit: cost of the object's origin (3,) and rotation (3, 3) in the end, by what they leave of the room there.
+        upended: what lies in the hand comes to stand on end: a lean about the line between the fingers costs nothing.
         falls_off: whether an object would fall to the floor from such an origin and rotation: it is not let go there.
     """
 
@@ -108,6 +109,7 @@ class PlaceStrategy:
     upwards: Array | None = None
     narrow: bool = False
     fit: Callable[[Array, Array], float] | None = None
+    upended: bool = False
     falls_off: Callable[[Array, Array], bool] | None = None
 
 
@@ -134,23 +136,24 @@ def put(env: KitchenEnv, obj: Graspable, strategy: PlaceStrategy, failed: list[A
     if not _holds(env, held):
         return
     far, above, low, clear, away = choice.path.targets
-    # A path in through a front is kept from its beginning on.
+    # A path in through a front, or into a mouth, is kept from its beginning on.
     inwards = strategy.narrow or not steep(far, above)
-    line = far.position if inwards else None
+    kept = inwards or strategy.exact
+    line = far.position if kept else None
     yield from move_hand(
         data,
         far,
         CLOSED,
-        tolerance=0.01 if inwards else 0.04,
+        tolerance=0.01 if kept else 0.04,
         max_steps=110,
-        integral_gain=INTEGRAL_GAIN if inwards else 0.0,
+        integral_gain=INTEGRAL_GAIN if kept else 0.0,
     )
     if not _holds(env, held):
         return
     if obj.contents:  # it goes in as was planned, however it has turned and slipped in the hand until now
         above, low = (_as_it_lies(env, pose, held) for pose in (above, low))
         held = Held.now(data, obj.name, obj.contents)
-    yield from move_hand(data, above, CLOSED, speed=0.7 if inwards else 1.0, max_steps=90, start=line)
+    yield from move_hand(data, above, CLOSED, speed=0.7 if kept else 1.0, max_steps=90, start=line)
     if not _holds(env, held):
         return
     # What has slipped in the hand goes to the place pose, not the hand.
@@ -250,12 +253,11 @@ def _paths(
     ahead = ahead_of(env)
     left = np.cross(UP, ahead)
     present = level_hand(env, obj) if strategy.upwards is None else turned_hand(env, obj, strategy.upwards)
-    leaning = LOADED_LEANING if obj.contents else LEANING
-    steepest = _stands_up_to(obj, present @ held.rotation)
+    leaning = LOADED_LEANING if obj.contents else 0.0 if strategy.upended else LEANING
+    steepest = np.inf if strategy.upended else _stands_up_to(obj, present @ held.rotation)
     level = float(present[:, 2] @ UP) > -0.85  # a hand that looks ahead keeps doing so
     found = []
-    for index in range(YAWS):
-        yaw = 2 * np.pi * index / YAWS
+    for yaw in upending_yaws(present, left) if strategy.upended else 2 * np.pi * np.arange(YAWS) / YAWS:
         turned = rotation_about(UP, yaw) @ present
         if level and float(turned[:, 2] @ ahead) < 0.35:
             continue
@@ -277,6 +279,14 @@ def _paths(
                     extra = cost + (LEVEL_COST if name == "level" else LOW_COST if rise == min(RISES_M) else 0.0)
                     found.append(_path(low, rotation, entry(env, name), name, strategy.in_m, rise, extra))
     return found
+
+
+def upending_yaws(present: Array, left: Array) -> Array:
+    """Turns of the hand about the vertical, 0 to 2 pi, by which it leans about the line between its fingers alone."""
+    opens = present[:, 1]
+    off = np.arctan2(np.cross(opens, left)[2], (opens * left)[:2].sum())
+    turns: Array = np.mod([off, off + np.pi], 2 * np.pi)
+    return turns
 
 
 def _stands_up_to(obj: Graspable, turn: Array) -> float:

@@ -11,7 +11,7 @@ import numpy as np
 from robocasa_lerobot.demos.motion import OPEN, UP, Array, HandTarget, grip_position, hand_rotation
 from robocasa_lerobot.demos.skills.common import SkillError, hold_hand, move_hand
 from robocasa_lerobot.demos.skills.drawers import drag_open
-from robocasa_lerobot.demos.skills.pick_place.by_handle import PAN_BY_THE_HANDLE, has_handle
+from robocasa_lerobot.demos.skills.pick_place.by_handle import BY_ONE_END, PAN_BY_THE_HANDLE, has_handle
 from robocasa_lerobot.demos.skills.pick_place.grasp_strategy import (
     ANY_APPROACH,
     FROM_A_SLOT,
@@ -30,6 +30,7 @@ from robocasa_lerobot.demos.skills.pick_place.poses.basin_poses import below_spo
 from robocasa_lerobot.demos.skills.pick_place.poses.counter_poses import NEAR_M, on_counter
 from robocasa_lerobot.demos.skills.pick_place.poses.distance_poses import at_distances, distance_terms, near_to
 from robocasa_lerobot.demos.skills.pick_place.poses.drawer_poses import fits_in_drawer, in_drawer
+from robocasa_lerobot.demos.skills.pick_place.poses.end_first import into_mouth, within_mouth
 from robocasa_lerobot.demos.skills.pick_place.poses.lid_poses import (
     between_walls,
     is_covered_later,
@@ -56,7 +57,7 @@ from robocasa_lerobot.demos.skills.pick_place.poses.shelf_rest import ShelfRest
 from robocasa_lerobot.demos.skills.pick_place.poses.turned_poses import as_turned
 from robocasa_lerobot.demos.skills.pick_place.reach_in import OUT_OF_A_MICROWAVE, OUT_OF_A_TOASTER_OVEN
 from robocasa_lerobot.demos.skills.pick_place.turn_across import OUT_OF_CABINET, between_shelves, to_front, turn_first
-from robocasa_lerobot.demos.skills.pick_place.turn_over import LEANS, TO_TURN, tilted_leans, which_way_up
+from robocasa_lerobot.demos.skills.pick_place.turn_over import END_FIRST, LEANS, TO_TURN, stands_askew, which_way_up
 from robocasa_lerobot.demos.skills.racks import pull
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.kitchens.appliances.kinds.blender import Blender
@@ -188,12 +189,21 @@ def place_strategy(env: KitchenEnv, stage: Stage, obj: Graspable) -> PlaceStrate
     if upwards is not None:
         return replace(strategy, upwards=upwards, leans=LEANS, entries=("up", "across", "out"), grasp=TO_TURN)
     if not obj.contents:
-        tilts = tilted_leans(env, stage, obj)
-        return replace(strategy, leans=tilts, entries=("up", "across", "out")) if tilts else strategy
+        return _end_first(env, stage, obj, strategy) if stands_askew(env, stage, obj) else strategy
     steepest = DEEP_LEAN if _is_deep(obj) else 0.0
     leans = tuple(lean for lean in (0.0, DEEP_LEAN / 2, DEEP_LEAN) if lean <= max(steepest, 0.0))
     grasp = LEANING_GRASP if strategy.grasp is ANY_APPROACH and "out" in strategy.entries else strategy.grasp
     return replace(strategy, leans=leans, grasp=grasp)
+
+
+def _end_first(env: KitchenEnv, stage: Stage, obj: Graspable, strategy: PlaceStrategy) -> PlaceStrategy:
+    holder = target_object(env, stage)
+    if not holder or env.scene.objects[holder].item.interior is None:
+        return strategy
+    return replace(
+        strategy, leans=END_FIRST, entries=("up", "across", "out"), poses=into_mouth(env, holder),
+        fit=within_mouth(env, obj, holder), exact=True, upended=True, grasp=BY_ONE_END,
+    )  # fmt: skip
 
 
 def _is_deep(obj: Graspable) -> bool:

@@ -23,7 +23,7 @@ OVER_RAD = float(np.deg2rad(50.0))  # from how it is to stand, from which on an 
 HEIGHTS_M = (0.045, 0.052, 0.038)  # of a level hand above the foot of a vessel
 ASKEW = 0.5  # what a score loses by a radian between the hand and the base's heading
 SWINGS_M = 0.02  # of the line between the fingers beside an object's centre of mass: farther off it would swing
-BEYOND_RAD = tuple(float(np.deg2rad(more)) for more in (45.0, 60.0))  # the least tilt: a flat thing would fall back
+END_FIRST = tuple(float(np.deg2rad(lean)) for lean in (90.0, 83.0, 97.0))  # of the hand, of what lies flat in it
 # Of what comes to stand on its rim: the hand may be level, or lower than that, since it settles by itself.
 LEANS = tuple(float(np.deg2rad(lean)) for lean in (0.0, -10.0, -20.0))
 
@@ -67,14 +67,12 @@ def which_way_up(env: KitchenEnv, stage: Stage, obj: Graspable) -> Array | None:
     return None
 
 
-def tilted_leans(env: KitchenEnv, stage: Stage, obj: Graspable) -> tuple[float, ...]:
-    """Leans of the hand, radians, with which an object falls over that is to lie askew or on its side; else none."""
-    low = [
-        term.low
+def stands_askew(env: KitchenEnv, stage: Stage, obj: Graspable) -> bool:
+    """Whether an object is to be tilted from how it lies by its stage, but not turned over."""
+    return any(
+        isinstance(term, ObjectTilt) and env.scene.fill(term.object) == obj.name and 0.0 < term.low < np.pi / 2
         for term in every_goal_in(stage_condition(env.declaration, stage))
-        if isinstance(term, ObjectTilt) and env.scene.fill(term.object) == obj.name and 0.0 < term.low < np.pi / 2
-    ]
-    return tuple(max(low) + more for more in BEYOND_RAD) if low else ()
+    )
 
 
 def turned_hand(env: KitchenEnv, obj: Graspable, wanted: Array) -> Array:
