@@ -20,6 +20,7 @@ from robocasa_lerobot.demos.skills.pick_place.carrying.torso import move_torso
 from robocasa_lerobot.demos.skills.pick_place.heaps import uppermost
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.predicates.logic import terms_by_name
+from robocasa_lerobot.envs.predicates.objects import ObjectOn
 from robocasa_lerobot.envs.tasks.conditions import must_never, stage_condition, without_gripper
 from robocasa_lerobot.envs.tasks.task import Stage
 from robocasa_lerobot.errors import UnknownNameError
@@ -75,7 +76,8 @@ def carry_out(env: KitchenEnv, log: StageLog, skills: Mapping[tuple[str, str], S
 
     A stage that is done already is left out. One that fails is tried again; if the one before it has come undone
     meanwhile (an object has slipped off), that one comes first. Where the task's goal does not hold in the end, it goes
-    on with the first stage that has to do with the terms that fail. Of what lies heaped in a vessel, the upper is taken
+    on with the first stage that has to do with the terms that fail; what was knocked out of a vessel, which no stage is
+    about, is put back. Of what lies heaped in a vessel, the upper is taken
     first.
 
     Args:
@@ -91,6 +93,7 @@ def carry_out(env: KitchenEnv, log: StageLog, skills: Mapping[tuple[str, str], S
     # A task of one stage begins where it is done, unless that has been changed.
     led_away = len(stages) > 1 or (env.initial_noise is not None and env.initial_noise.moves_base)
     log.outcomes = [StageOutcome() for _ in stages]
+    back_in = StageOutcome()
     index = 0
     while True:
         if index == len(stages):
@@ -98,7 +101,12 @@ def carry_out(env: KitchenEnv, log: StageLog, skills: Mapping[tuple[str, str], S
                 yield from fold_arm(env)
             undone = _undone(env)
             if undone is None:
-                return
+                fallen_out = _fallen_out(env)
+                if fallen_out is None or back_in.attempts >= ATTEMPTS:
+                    return
+                log.current = len(stages) - 1
+                yield from _attempt(env, fallen_out, back_in, SKILLS if skills is None else skills)
+                continue
             index = undone
             _check_attempts(env, index, log.outcomes[index])
         log.current, outcome = index, log.outcomes[index]
@@ -198,6 +206,19 @@ def _only_the_hand_is_near(env: KitchenEnv) -> bool:
     several = len(env.declaration.stages) > 1  # a single stage's skill has gone away as far as it can
     done = without_gripper(goal).evaluate(env.scene, env.data, {})
     return several and done and not goal.evaluate(env.scene, env.data, {})
+
+
+def _fallen_out(env: KitchenEnv) -> Stage | None:
+    """A stage that puts back what the goal wants in or on an object where no stage puts it: it was there at first."""
+    task = env.declaration
+    wanted: dict[str, bool] = {}
+    if len(task.stages) == 1 or task.goal.evaluate(env.scene, env.data, wanted):
+        return None
+    failing = (term for name, terms in terms_by_name(task.goal).items() if wanted.get(name) is False for term in terms)
+    fallen = next((term for term in failing if isinstance(term, ObjectOn)), None)
+    return (
+        None if fallen is None else Stage("pick_place", "place", fallen.receptacle, object=fallen.object, until=fallen)
+    )
 
 
 def _undone(env: KitchenEnv) -> int | None:

@@ -221,6 +221,35 @@ def test_a_hand_that_is_near_what_it_put_down_before_goes_away_in_the_end(monkey
     assert [(o.attempts, o.done) for o in log.outcomes] == [(1, True), (1, True)]
 
 
+class InBowl(ObjectOn):
+    """A flag for what lies in the bowl from the start."""
+
+    def holds(self, scene: Any, data: Any) -> bool:
+        return bool(data.get("in_bowl"))
+
+
+@pytest.mark.parametrize("tries", [2, ATTEMPTS + 1])
+def test_what_was_knocked_out_of_its_bowl_is_put_back(monkeypatch: pytest.MonkeyPatch, tries: int) -> None:
+    env = made(monkeypatch, {"a": does({"a": True}), "b": does({"b": True, "in_bowl": False})})
+    asked: list[Stage] = []
+
+    def put_back(env: Made, stage: Stage) -> Iterator[np.ndarray]:
+        asked.append(stage)
+        yield np.zeros(12)
+        env.flags["in_bowl"] = len(asked) == tries
+
+    monkeypatch.setitem(module.SKILLS, ("pick_place", "place"), put_back)
+    env.flags["in_bowl"] = True
+    goal = AllOf(Flag("a"), Flag("b"), InBowl("food", "bowl"))
+    env.declaration = SimpleNamespace(name="made", stages=env.declaration.stages, goal=goal)
+    log = StageLog()
+    list(carry_out(env, log))
+    assert len(asked) == min(tries, ATTEMPTS)
+    assert {(stage.verb, stage.target, stage.object) for stage in asked} == {("place", "bowl", "food")}
+    assert env.flags["in_bowl"] == (tries <= ATTEMPTS)
+    assert [(o.attempts, o.done) for o in log.outcomes] == [(1, True), (1, True)]
+
+
 def test_it_gives_up_with_the_skills_own_words(monkeypatch: pytest.MonkeyPatch) -> None:
     env = made(monkeypatch, {"a": does(*[SkillError("the lid is stuck")] * ATTEMPTS), "b": does({"b": True})})
     log = StageLog()

@@ -15,6 +15,7 @@ from robocasa_lerobot.demos.motion import (
     Array,
     HandTarget,
     base_pose,
+    floor_axes,
     frame,
     grip_position,
     hand_rotation,
@@ -45,6 +46,9 @@ LEAST_ASIDE_M, ASIDES_M = 0.03, (0.20, 0.28, 0.12, 0.36, 0.06)
 LEAST_TO_PUSH_M = 0.15  # the same of one that could not be pushed shut: its front is too near to push at
 # Of a drawer that is dragged: how far it is in before it is worth while, and what the hand needs of it.
 PUSHED_IN_M, HAND_ROOM_M = 0.03, 0.08
+LEAST_OPEN_M = 0.15  # tasks that put something into an open drawer begin with more
+# Of a drawer's handle from the base, ahead and in all, for its front to be in reach.
+LEAST_TO_DRAG_M, MOST_TO_DRAG_M = -0.05, 0.75
 # The hand comes from over the front's upper edge, goes below it close behind it, and is led beyond where it ends.
 OVER_M, INTO_M, BEHIND_M, DRAG_FARTHER_M = 0.10, 0.035, 0.025, 0.04
 
@@ -103,6 +107,15 @@ def _drive_beside(env: KitchenEnv, role: str, drawer: Drawer, least_m: float = L
             with contextlib.suppress(SkillError):
                 yield from drive_to(env, beside.x, beside.y, beside.yaw)
             return
+
+
+def make_room(env: KitchenEnv, drawer: Drawer, again: bool) -> Iterator[Array]:
+    """With an empty hand, drag a drawer near the robot farther out that has been pushed in, or has had no room."""
+    if again or drawer.openness(env.data) * drawer.full_travel < LEAST_OPEN_M:
+        base, yaw = base_pose(env.data)
+        ahead, left = floor_axes(yaw) @ (env.data.geom(drawer.handle_geom).xpos - base)
+        if ahead > LEAST_TO_DRAG_M and np.hypot(ahead, left) < MOST_TO_DRAG_M:
+            yield from drag_open(env, drawer)
 
 
 def drag_open(env: KitchenEnv, drawer: Drawer, openness: float = 1.0) -> Iterator[Array]:

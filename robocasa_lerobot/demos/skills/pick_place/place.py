@@ -94,6 +94,7 @@ class PlaceStrategy:
         narrow: whether the hand keeps to a straight line in and out also where that is steep.
         fit: cost of the object's origin (3,) and rotation (3, 3) in the end, by what they leave of the room there.
         upended: what lies in the hand comes to stand on end: a lean about the line between the fingers costs nothing.
+        make_room: before an object is fetched, makes room for it with an empty hand; told whether it had none before.
         falls_off: whether an object would fall to the floor from such an origin and rotation: it is not let go there.
     """
 
@@ -111,6 +112,7 @@ class PlaceStrategy:
     fit: Callable[[Array, Array], float] | None = None
     upended: bool = False
     falls_off: Callable[[Array, Array], bool] | None = None
+    make_room: Callable[[KitchenEnv, bool], Iterator[Array]] | None = None
 
 
 def put(env: KitchenEnv, obj: Graspable, strategy: PlaceStrategy, failed: list[Array]) -> Iterator[Array]:

@@ -10,7 +10,7 @@ import numpy as np
 
 from robocasa_lerobot.demos.motion import OPEN, UP, Array, HandTarget, grip_position, hand_rotation
 from robocasa_lerobot.demos.skills.common import SkillError, hold_hand, move_hand
-from robocasa_lerobot.demos.skills.drawers import drag_open
+from robocasa_lerobot.demos.skills.drawers import drag_open, make_room
 from robocasa_lerobot.demos.skills.pick_place.by_handle import BY_ONE_END, PAN_BY_THE_HANDLE, has_handle
 from robocasa_lerobot.demos.skills.pick_place.grasp_strategy import (
     ANY_APPROACH,
@@ -306,8 +306,11 @@ def _into_regions(
                 over_bowl(env, regions[0]), leans=_BOWL_LEANS, entries=("up", "across", "out"), in_m=0.2, falls=True
             )
         case Drawer() as drawer:
-            fit = fits_in_drawer(env, obj, drawer)
-            return PlaceStrategy(in_drawer(env, drawer), leans=_DRAWER_LEANS, entries=("up", "across"), fit=fit)
+            return PlaceStrategy(
+                in_drawer(env, drawer), leans=_DRAWER_LEANS, entries=("up", "across"),
+                fit=fits_in_drawer(env, obj, drawer),
+                make_room=lambda env, again: make_room(env, drawer, again),
+            )  # fmt: skip
         case ToasterOven() if len(regions) == 1:  # what stands out over the edge of its rack meets the door
             return PlaceStrategy(
                 on_floor(env, regions[0]), leans=_CLOSED_LEANS, entries=("up", "across", "out"),

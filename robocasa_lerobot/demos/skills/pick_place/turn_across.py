@@ -43,7 +43,6 @@ PUSH_STEPS = 45
 # Between the two steep and the two flat ones of any approach: a palm that is level meets the shelf before low objects.
 _CABINET_TILTS = in_radians((0, 0.0), (35, 0.1), (42, 0.1), (50, 0.15), (65, 0.2), (88, 0.3))
 OUT_OF_CABINET = replace(ANY_APPROACH, tilts=_CABINET_TILTS, narrow=True, poses=level_grasps)
-# Rooms between a fridge's shelves are as low as those of cabinets, and what lies in them is as low.
 # What is long and lies across has to be held near its middle: its end, which is easier to reach, turns out of the hand.
 ACROSS_OUT_OF_CABINET = replace(
     OUT_OF_CABINET, tilts=(_CABINET_TILTS[0], *in_radians((27, 0.1)), *_CABINET_TILTS[1:]), among_tilts=True

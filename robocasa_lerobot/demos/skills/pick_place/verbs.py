@@ -12,8 +12,6 @@ from robocasa_lerobot.demos.motion import (
     OPEN,
     Array,
     HandTarget,
-    base_pose,
-    floor_axes,
     grip_position,
     hand_rotation,
 )
@@ -21,7 +19,6 @@ from robocasa_lerobot.demos.planning.base_path import base_now, wrap
 from robocasa_lerobot.demos.planning.collision import Held
 from robocasa_lerobot.demos.planning.errors import LostError, SlippedError
 from robocasa_lerobot.demos.skills.common import SkillError, hold_hand, stage_done
-from robocasa_lerobot.demos.skills.drawers import drag_open
 from robocasa_lerobot.demos.skills.fold import fold_arm
 from robocasa_lerobot.demos.skills.navigation import drive_to
 from robocasa_lerobot.demos.skills.pick_place.by_handle import PAN_BY_THE_HANDLE, TOOL_BY_THE_HANDLE, has_handle
@@ -45,7 +42,6 @@ from robocasa_lerobot.demos.skills.pick_place.strategies import (
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.kitchens.appliances.kinds.microwave import Microwave
 from robocasa_lerobot.envs.kitchens.fixtures.base import Fixture
-from robocasa_lerobot.envs.kitchens.fixtures.cabinets import Drawer
 from robocasa_lerobot.envs.scene.robot_poses import RobotPose
 from robocasa_lerobot.envs.tasks.task import Stage
 
@@ -58,10 +54,6 @@ BY_USE = {
 PLACING = ("place", "place_upside_down")
 MOST_PLACES = 3  # that an object is reached for from
 FAR_M = 2.0  # from where an object is to where it goes: what creeps in the fingers slips out on a longer way
-# A drawer that is less far open than this has been pushed in: tasks begin with more.
-PUSHED_IN_M = 0.15
-# Of a drawer's handle from the base, ahead and in all, for its front to be in reach.
-LEAST_TO_DRAG_M, MOST_TO_DRAG_M = -0.05, 0.75
 OTHER_SIDE_RAD = 0.7  # between the robot's headings at two sides of a counter, at least
 
 
@@ -89,7 +81,8 @@ def place_object(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
         if not is_held(env, obj.name) and not hangs(env, obj):
             if attempt == 0:
                 yield from _around_door(env, _target_fixture(env, stage))
-            yield from _make_room(env, _target_fixture(env, stage), again=attempt > 0)
+            if strategy.make_room is not None:
+                yield from strategy.make_room(env, attempt > 0)
             holder = target_object(env, stage)
             towards = env.data.body(holder).xpos.copy() if holder else None
             yield from take(env, obj, strategy.grasp, towards=towards, far=_goes_far(env, stage, obj, strategy))
@@ -227,15 +220,6 @@ def _rise_to(env: KitchenEnv, fixture: Fixture | None, point: Array) -> Iterator
     What goes in there is in the hand, which goes level: it needs no more height than the arm has.
     """
     yield from move_torso(env, torso_for(float(point[2])) if is_reached_up_into(fixture) else 0.0, OPEN)
-
-
-def _make_room(env: KitchenEnv, fixture: Fixture | None, *, again: bool) -> Iterator[Array]:
-    """With an empty hand, drag a drawer near the robot farther out that has been pushed in, or has had no room."""
-    if isinstance(fixture, Drawer) and (again or fixture.openness(env.data) * fixture.full_travel < PUSHED_IN_M):
-        base, yaw = base_pose(env.data)
-        ahead, left = floor_axes(yaw) @ (env.data.geom(fixture.handle_geom).xpos - base)
-        if ahead > LEAST_TO_DRAG_M and np.hypot(ahead, left) < MOST_TO_DRAG_M:
-            yield from drag_open(env, fixture)
 
 
 def _around_door(env: KitchenEnv, fixture: Fixture | None) -> Iterator[Array]:
