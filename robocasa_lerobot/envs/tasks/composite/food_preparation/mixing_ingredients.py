@@ -269,7 +269,6 @@ MAKE_CHOCOLATE_MILK = Task(
         Exactly(1, *map(_leans_in, _CHOCOLATES)), ObjectOn("sugar_cube", "glass_milk"), GripperFar("glass_milk")
     ),
     stages=(
-        Stage("pick_place", "place", "glass_milk", object="sugar_cube"),
         Stage(
             "pick_place",
             "place",
@@ -277,6 +276,7 @@ MAKE_CHOCOLATE_MILK = Task(
             object="chocolate2",  # lies on the other one
             until=AllOf(_leans_in("chocolate2"), GripperFar("glass_milk")),
         ),
+        Stage("pick_place", "place", "glass_milk", object="sugar_cube"),
     ),
     instruction="Put one of the two chocolates and the sugar cube from the plate into the glass of milk.",
     paraphrases=(
