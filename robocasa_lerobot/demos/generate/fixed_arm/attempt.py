@@ -10,10 +10,10 @@ import numpy as np
 
 from robocasa_lerobot.demos.generate.fixed_arm.osc import ArmController
 from robocasa_lerobot.demos.generate.fixed_arm.prepare import put_state
-from robocasa_lerobot.demos.generate.mimicgen.subtasks import DatagenInfo, boundaries, carried, selected, with_offsets
-from robocasa_lerobot.demos.generate.mimicgen.template import Subtask, Template
+from robocasa_lerobot.demos.generate.mimicgen.subtasks import DatagenInfo, targets
+from robocasa_lerobot.demos.generate.mimicgen.template import Template
 from robocasa_lerobot.demos.generate.sources.frames import body_pose
-from robocasa_lerobot.demos.generate.sources.transform import command_to, interpolated
+from robocasa_lerobot.demos.generate.sources.transform import command_to
 from robocasa_lerobot.demos.motion import Array
 from robocasa_lerobot.demos.recorder import SUCCESS_HOLD_STEPS
 
@@ -94,38 +94,18 @@ def _actions(
     rng: np.random.Generator,
     used: list[int],
 ) -> Iterator[Array]:
-    spans = [with_offsets(boundaries(info, template), template, rng) for info in infos]
-    gripper, last, chosen = -1.0, None, -1
-    for number, subtask in enumerate(template.subtasks):
-        ref = subtask.object_ref
-        now = None if ref is None else body_pose(data, model.body(ref).id)
-        if template.per_subtask or chosen < 0:
-            chosen = selected(subtask, infos, [span[number] for span in spans], now, controller.hand(), rng)
-        used.append(infos[chosen].number)
-        first = template.first_pose or number == 0
-        poses, commands = carried(infos[chosen], subtask, spans[chosen][number], now, first=first)
-        start = last if last is not None and template.from_last_target else controller.hand()
-        line = interpolated(start, poses[0], subtask.interpolation_steps)
-        for pose in [*line[:-1], *[poses[0]] * subtask.fixed_steps]:
-            yield _command(controller, pose, gripper, subtask, rng, on_the_line=True)
-        for pose, gripper in zip(poses, commands.tolist(), strict=True):
-            yield _command(controller, pose, gripper, subtask, rng, on_the_line=False)
-        last = poses[-1]
+    gripper = -1.0
+    wanted = targets(
+        infos,
+        template,
+        rng,
+        pose_of=lambda ref: body_pose(data, model.body(ref).id),
+        hand=controller.hand,
+        begin=lambda info, subtask, span: used.append(info.number),
+    )
+    for target in wanted:
+        gripper = target.gripper
+        arm = np.concatenate(command_to(target.pose, controller.hand())) + target.noise(rng)
+        yield np.array([*np.clip(arm, -1.0, 1.0), gripper])
     for _ in range(STILL_STEPS):
         yield np.array([0.0] * 6 + [gripper])
-
-
-def _command(
-    controller: ArmController,
-    pose: Array,
-    gripper: float,
-    subtask: Subtask,
-    rng: np.random.Generator,
-    *,
-    on_the_line: bool,
-) -> Array:
-    move, turn = command_to(pose, controller.hand())
-    arm = np.concatenate([move, turn])
-    if subtask.action_noise > 0.0 and (subtask.noise_on_the_line or not on_the_line):
-        arm = arm + rng.normal(0.0, subtask.action_noise, 6)
-    return np.array([*np.clip(arm, -1.0, 1.0), gripper])

@@ -16,15 +16,13 @@ from robocasa_lerobot.demos.generate.execute import hand_now, pose_command
 from robocasa_lerobot.demos.generate.mimicgen.subtasks import (
     DatagenInfo,
     boundaries,
-    carried,
     read_datagen,
-    selected,
-    with_offsets,
+    targets,
 )
 from robocasa_lerobot.demos.generate.mimicgen.template import Subtask, Template
 from robocasa_lerobot.demos.generate.sources.frames import body_pose
 from robocasa_lerobot.demos.generate.sources.prepared import GROUP
-from robocasa_lerobot.demos.generate.sources.transform import interpolated, yaw_pose
+from robocasa_lerobot.demos.generate.sources.transform import yaw_pose
 from robocasa_lerobot.demos.motion import Array, action
 from robocasa_lerobot.demos.replay import demonstrations
 from robocasa_lerobot.demos.skills.common import SkillError
@@ -38,11 +36,10 @@ _ARM = [contract.ACTION_SLICES[f"end_effector_{what}"] for what in ("position", 
 
 @dataclass(frozen=True)
 class Sources:
-    """Prepared demonstrations, where the subtasks of each end, and how they are taken."""
+    """Prepared demonstrations, and how they are taken."""
 
     template: Template
     infos: tuple[DatagenInfo, ...]
-    ends: tuple[tuple[int, ...], ...]
 
 
 @lru_cache(maxsize=4)
@@ -66,7 +63,9 @@ def read_sources(path: Path, template: Template, names: tuple[str, ...] = ()) ->
                 infos.append(read_datagen(len(infos), name, group[GROUP]))
     if not infos:
         raise UserError(f"{path}: no demonstration there has a {GROUP}. `robocasa-lerobot prepare {path}` writes it.")
-    return Sources(template, tuple(infos), tuple(tuple(boundaries(info, template)) for info in infos))
+    for info in infos:
+        boundaries(info, template)  # before anything is made of them
+    return Sources(template, tuple(infos))
 
 
 def plain_episode(env: KitchenEnv, log: StageLog, sources: Sources, course: Course) -> Iterator[Array]:
@@ -77,39 +76,32 @@ def plain_episode(env: KitchenEnv, log: StageLog, sources: Sources, course: Cour
         UnknownNameError: the scene has nothing of a subtask's object_ref.
     """
     log.outcomes = [StageOutcome() for _ in env.declaration.stages]
-    template, rng = sources.template, course.rng
-    spans = [with_offsets(ends, template, rng) for ends in sources.ends]
-    gripper, last, chosen = -1.0, None, -1
-    for number, subtask in enumerate(template.subtasks):
-        now = None if subtask.object_ref is None else pose_of(env, subtask.object_ref)
-        if template.per_subtask or chosen < 0:
-            own = [span[number] for span in spans]
-            chosen = selected(subtask, sources.infos, own, now, hand_now(env), rng)
-        info, span = sources.infos[chosen], spans[chosen][number]
+
+    def begin(info: DatagenInfo, subtask: Subtask, span: tuple[int, int]) -> None:
         row = {"source": info.name, "demo": info.number, "kind": "subtask", "ref": subtask.object_ref}
         course.used.append(row | {"steps": list(span)})
-        first = template.first_pose or number == 0
-        poses, commands = carried(info, subtask, span, now, first=first)
-        start = last if last is not None and template.from_last_target else hand_now(env)
-        line = interpolated(start, poses[0], subtask.interpolation_steps)
-        course.label = (-1, BRIDGE, -1)
-        for pose in [*line[:-1], *[poses[0]] * subtask.fixed_steps]:
-            yield _noised(pose_command(env, pose, gripper), subtask, rng, on_the_line=True)
-        for step, (pose, gripper) in enumerate(zip(poses, commands.tolist(), strict=True)):
-            course.label = (info.number, CONTACT, span[0] + max(0, step - first))
-            yield _noised(pose_command(env, pose, gripper), subtask, rng, on_the_line=False)
-        last = poses[-1]
+
+    gripper = -1.0
+    wanted = targets(
+        sources.infos,
+        sources.template,
+        course.rng,
+        pose_of=lambda ref: pose_of(env, ref),
+        hand=lambda: hand_now(env),
+        begin=begin,
+    )
+    for target in wanted:
+        gripper = target.gripper
+        course.label = (target.source, BRIDGE if target.source < 0 else CONTACT, target.step)
+        command = pose_command(env, target.pose, gripper)
+        noise = target.noise(course.rng)
+        for where, part in zip(_ARM, (noise[:3], noise[3:]), strict=True):
+            command[where] = np.clip(command[where] + part, -1.0, 1.0)
+        yield command
     course.label = (-1, BRIDGE, -1)
     for _ in range(STILL_STEPS):
         yield action(gripper=gripper)
     raise SkillError("the subtasks are over")
-
-
-def _noised(command: Array, subtask: Subtask, rng: np.random.Generator, *, on_the_line: bool) -> Array:
-    if subtask.action_noise > 0.0 and (subtask.noise_on_the_line or not on_the_line):
-        for where in _ARM:
-            command[where] = np.clip(command[where] + rng.normal(0.0, subtask.action_noise, 3), -1.0, 1.0)
-    return command
 
 
 def pose_of(env: KitchenEnv, ref: str) -> Array:

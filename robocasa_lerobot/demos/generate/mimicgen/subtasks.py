@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import itertools
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 import h5py
@@ -19,7 +19,7 @@ from robocasa_lerobot.demos.generate.mimicgen.template import (
     Template,
 )
 from robocasa_lerobot.demos.generate.select import pose_distance
-from robocasa_lerobot.demos.generate.sources.transform import carried_over
+from robocasa_lerobot.demos.generate.sources.transform import carried_over, interpolated
 from robocasa_lerobot.demos.motion import Array
 from robocasa_lerobot.errors import UnknownNameError, UserError
 
@@ -172,3 +172,69 @@ def carried(
     if subtask.object_ref is None or now is None:
         return poses, gripper
     return carried_over(now, info.objects[subtask.object_ref][begin], poses), gripper
+
+
+@dataclass(frozen=True)
+class Target:
+    """What is wanted of a control step.
+
+    Attributes:
+        pose: of the hand, (4, 4).
+        gripper: command.
+        subtask: that it belongs to.
+        source: number of the demonstration that it comes from; -1 on the line to a subtask's first pose.
+        step: of that demonstration; -1 on the line.
+    """
+
+    pose: Array
+    gripper: float
+    subtask: Subtask
+    source: int = -1
+    step: int = -1
+
+    def noise(self, rng: np.random.Generator) -> Array:
+        """On the six commands of the arm."""
+        if self.source < 0 and not self.subtask.noise_on_the_line:
+            return np.zeros(6)
+        return rng.normal(0.0, self.subtask.action_noise, 6) if self.subtask.action_noise > 0.0 else np.zeros(6)
+
+
+def targets(
+    infos: Sequence[DatagenInfo],
+    template: Template,
+    rng: np.random.Generator,
+    *,
+    pose_of: Callable[[str], Array],
+    hand: Callable[[], Array],
+    begin: Callable[[DatagenInfo, Subtask, tuple[int, int]], None],
+) -> Iterator[Target]:
+    """An episode: a template's subtasks one after the other, each carried over from a source that is selected for it.
+
+    Args:
+        infos: sources.
+        template: of their task.
+        rng: of offsets and choices.
+        pose_of: present pose (4, 4) of an object_ref.
+        hand: present pose (4, 4) of the hand.
+        begin: is told of each subtask that is about to begin, with its source and its first and last step there.
+
+    Raises:
+        UserError: a source does not suit the template.
+    """
+    spans = [with_offsets(boundaries(info, template), template, rng) for info in infos]
+    gripper, last, chosen = -1.0, None, -1
+    for number, subtask in enumerate(template.subtasks):
+        now = None if subtask.object_ref is None else pose_of(subtask.object_ref)
+        if template.per_subtask or chosen < 0:
+            chosen = selected(subtask, infos, [span[number] for span in spans], now, hand(), rng)
+        info, span = infos[chosen], spans[chosen][number]
+        begin(info, subtask, span)
+        first = template.first_pose or number == 0
+        poses, commands = carried(info, subtask, span, now, first=first)
+        start = last if last is not None and template.from_last_target else hand()
+        line = interpolated(start, poses[0], subtask.interpolation_steps)
+        for pose in [*line[:-1], *[poses[0]] * subtask.fixed_steps]:
+            yield Target(pose, gripper, subtask)
+        for step, (pose, gripper) in enumerate(zip(poses, commands.tolist(), strict=True)):
+            yield Target(pose, gripper, subtask, info.number, span[0] + max(0, step - first))
+        last = poses[-1]
