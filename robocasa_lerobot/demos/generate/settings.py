@@ -27,7 +27,7 @@ from robocasa_lerobot.demos.recorder import Recording
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.errors import UserError
 
-METHODS = CONTACTS, MIMICGEN = ("contacts", "mimicgen")
+MIMICGEN = "mimicgen"
 _CHOICE_STREAM = 7  # of the choices among sources, apart from those of scene, arm, noise and style
 
 

@@ -14,7 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robocasa_lerobot import contract
-from robocasa_lerobot.demos.motion import Array, base_pose, grip_position
+from robocasa_lerobot.demos.motion import UP, Array, base_pose, floor_axes, grip_position, rotation_about
+from robocasa_lerobot.demos.planning.base_room import wrap
 from robocasa_lerobot.demos.replay import Demonstration, kitchen_of, read_demonstration
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.predicates.objects import middle_of
@@ -68,9 +69,8 @@ class Measures:
 
 def start_of(env: KitchenEnv) -> Start:
     """Of the episode that an env was reset to."""
-    (x, y, _), yaw = base_pose(env.data)
-    away = _about(env, env.declaration.stages[0])[:2] - [x, y]
-    ahead, left = np.array([[np.cos(yaw), np.sin(yaw)], [-np.sin(yaw), np.cos(yaw)]]) @ away
+    base, yaw = base_pose(env.data)
+    ahead, left = floor_axes(yaw) @ (_about(env, env.data, env.declaration.stages[0]) - base)
     return Start(env.scene.seed, float(ahead), float(left))
 
 
@@ -94,9 +94,9 @@ def measure(path: Path, demo: str) -> Measures:
 
 def _measured(env: KitchenEnv, recorded: Demonstration, sources: tuple[int, ...]) -> Measures:
     data = mujoco.MjData(env.model)
-    start, origin = start_of(env), _about(env, env.declaration.stages[0])
+    start, origin = start_of(env), _about(env, env.data, env.declaration.stages[0])
     heading = base_pose(env.data)[1]
-    axes = _axes(heading)
+    axes = rotation_about(UP, heading)
     hands, bases = np.empty((len(recorded.states), 3)), np.empty((len(recorded.states), 3))
     touches, views = [], []
     stages = np.zeros(len(recorded.states), dtype=np.int64) if recorded.stage is None else recorded.stage
@@ -116,7 +116,7 @@ def _measured(env: KitchenEnv, recorded: Demonstration, sources: tuple[int, ...]
     evenly = np.linspace(0, len(local) - 1, PATH_POINTS)
     path = np.column_stack([np.interp(evenly, np.arange(len(local)), local[:, axis]) for axis in range(3)])
     end = (np.array([*bases[-1, :2], origin[2]]) - origin) @ axes
-    turn = float(np.arctan2(np.sin(bases[-1, 2] - heading), np.cos(bases[-1, 2] - heading)))
+    turn = wrap(float(bases[-1, 2]) - heading)
     return Measures(
         start=start,
         seconds=len(recorded.actions) / contract.CONTROL_HZ,
@@ -129,10 +129,6 @@ def _measured(env: KitchenEnv, recorded: Demonstration, sources: tuple[int, ...]
         stand=np.array([end[0], end[1], turn]),
         sources=sources,
     )
-
-
-def _axes(heading: float) -> Array:
-    return np.array([[np.cos(heading), -np.sin(heading), 0.0], [np.sin(heading), np.cos(heading), 0.0], [0, 0, 1.0]])
 
 
 def _jerk(hands: Array) -> float:
@@ -151,12 +147,8 @@ def _saturated(actions: Array) -> float:
     return float((np.abs(arm) > FULL).any(axis=1).mean())
 
 
-def _about(env: KitchenEnv, stage: Stage) -> Array:
+def _about(env: KitchenEnv, data: mujoco.MjData, stage: Stage) -> Array:
     """Middle of what a stage is about, (3,): its object, or else its fixture."""
-    return _about_in(env, env.data, stage)
-
-
-def _about_in(env: KitchenEnv, data: mujoco.MjData, stage: Stage) -> Array:
     name = env.scene.fill(stage.object)
     if name in env.scene.objects:
         return np.array(middle_of(env.scene, data, name))
@@ -165,7 +157,7 @@ def _about_in(env: KitchenEnv, data: mujoco.MjData, stage: Stage) -> Array:
 
 def _seen(env: KitchenEnv, data: mujoco.MjData, stage: Stage) -> bool:
     """Whether the middle of what a stage is about is in one of the cameras' pictures, whatever stands before it."""
-    point = _about_in(env, data, stage)
+    point = _about(env, data, stage)
     for camera in contract.CAMERAS:
         intrinsics, pose = camera_matrix(env.model, data, camera, contract.IMAGE_SIZE)
         pixel, depth = project(point, intrinsics, pose)

@@ -10,12 +10,11 @@ from typing import Any
 
 import numpy as np
 
+from robocasa_lerobot.demos.attempts import RecordingSettings
 from robocasa_lerobot.demos.hdf5 import read_summary
 from robocasa_lerobot.demos.motion import Array
 from robocasa_lerobot.demos.quality.measure import Measures, Start, measure, start_of
 from robocasa_lerobot.demos.replay import demonstrations
-from robocasa_lerobot.envs.kitchen_env import KitchenEnv
-from robocasa_lerobot.envs.scene.reset_noise import InitialNoise
 from robocasa_lerobot.jobs.as_completed import as_they_end
 
 BIN_M = 0.2  # sides of the squares of the floor that starts are counted in
@@ -131,15 +130,14 @@ def _look(path: Path, which: str | int) -> Part:
     if isinstance(which, str):
         return Part(path, kept=measure(path, which))
     settings = read_summary(path).settings or {}
-    within = float(settings.get("start_within_m", 0.0))
-    env = KitchenEnv(
+    env = RecordingSettings(
         settings.get("task", path.stem),
+        episodes=1,
         split=settings.get("split", "target"),
-        cameras=(),
         layouts=settings.get("layouts"),
         styles=settings.get("styles"),
-        initial_noise=InitialNoise(base_within_m=within) if within else None,
-    )
+        start_within_m=float(settings.get("start_within_m", 0.0)),
+    ).make_env()
     try:
         env.reset(seed=which)
         return Part(path, failed=start_of(env))
