@@ -3,12 +3,7 @@
 from __future__ import annotations
 
 import json
-import os
 import random
-import signal
-import subprocess
-import sys
-import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -16,6 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 from cluster_work import hdf5_content
+from killed_runs import run_killed
 from slurm_support import stand_in
 
 from robocasa_lerobot import cli
@@ -193,31 +189,8 @@ def test_a_recording_that_is_killed_again_and_again_is_that_of_an_uninterrupted_
     rng = random.Random(chance)
     settings = [RecordingSettings(task, 8, seed=40, action_noise=0.1) for task in QUICK]
     record_tasks(settings, tmp_path / "whole", show_progress=False)
-    kills = 0
-    deadline = time.monotonic() + 600
-    while True:
-        command = [
-            sys.executable, "-m", "robocasa_lerobot.cli", "demos", "--tasks", ",".join(QUICK), "--episodes", "8",
-            "--workers", str(rng.choice((1, 2, 3))), "--seed", "40", "--action-noise", "0.1",
-            "--out", str(tmp_path / "killed"),
-        ]  # fmt: skip
-        process = subprocess.Popen(
-            command, stderr=subprocess.DEVNULL, stdout=subprocess.DEVNULL, start_new_session=True
-        )
-        try:
-            # Longer each time, so that a slow machine gets on as well.
-            process.wait(rng.uniform(3.5, 9.0) * (1 + 0.2 * kills))
-            assert process.returncode == 0
-            break
-        except subprocess.TimeoutExpired:
-            kills += 1
-            if rng.random() < 0.5:
-                os.killpg(process.pid, signal.SIGKILL)
-            else:
-                process.kill()
-            process.wait()
-        assert time.monotonic() < deadline
-    assert kills > 0
+    words = ["demos", "--tasks", ",".join(QUICK), "--episodes", "8", "--seed", "40", "--action-noise", "0.1"]
+    assert run_killed([*words, "--out", str(tmp_path / "killed")], rng) > 0
     for one in settings:
         whole, killed = (hdf5_content(tmp_path / place / f"{one.task}.hdf5") for place in ("whole", "killed"))
         assert list(whole) == list(killed)

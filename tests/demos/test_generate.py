@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import random
 import shutil
 from collections import Counter
 from pathlib import Path
@@ -11,6 +12,7 @@ import h5py
 import numpy as np
 import pytest
 from cluster_work import hdf5_content
+from killed_runs import run_killed
 
 from robocasa_lerobot import cli
 from robocasa_lerobot.demos.attempts import RecordingSettings
@@ -155,6 +157,21 @@ def test_generated_files_replay_and_say_where_each_step_comes_from(sources: Path
     here, there = hdf5_content(path), hdf5_content(other / f"{TASK}.hdf5")
     assert here.keys() == there.keys()
     assert all(np.array_equal(value, there[key]) for key, value in here.items())
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(900)
+def test_ten_kills_change_nothing(sources: Path, tmp_path: Path) -> None:
+    words = (
+        f"generate --source {sources} --tasks {TASK} --episodes 24 --split pretrain --seed 100600 --action-noise 0.05"
+    )
+    assert cli.main([*words.split(), "--workers", "2", "--out", str(tmp_path / "whole")]) == 0
+    killed = tmp_path / "killed"
+    assert run_killed([*words.split(), "--out", str(killed)], random.Random(0), at_least=10) >= 10
+    here, there = (hdf5_content(place / f"{TASK}.hdf5") for place in (tmp_path / "whole", killed))
+    assert list(here) == list(there)
+    assert all(np.array_equal(value, there[key]) for key, value in here.items())
+    assert [path.name for path in killed.iterdir()] == [f"{TASK}.hdf5"]
 
 
 @pytest.mark.slow
