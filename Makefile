@@ -19,7 +19,7 @@ export PYTHONUNBUFFERED := 1
 export UV_HTTP_TIMEOUT ?= 300
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
-.PHONY: help setup demo study test test-slow walk lint format lock docs doctor bench bench-convert bench-training bench-evaluation bench-grasps bench-demonstrators bench-demo bench-kitchens bench-kitchen-tasks bench-generation clean
+.PHONY: help setup demo study test test-slow walk lint format lock docs doctor bench bench-convert bench-training bench-evaluation bench-grasps bench-demonstrators bench-demo bench-kitchens bench-kitchen-tasks bench-generation every-task clean
 
 help:  ## this list
 	@sed -n 's/^\([a-z-]*\):.*  ## /\1\t/p' Makefile | awk -F '\t' '{printf "  make %-20s %s\n", $$1, $$2}'
@@ -117,6 +117,10 @@ lock: $(STAMP)  ## pin pyproject.toml's dependencies in requirements.lock
 # About an hour and a half on two cores; goes on where it was stopped, BENCH_ARGS='--every 50' takes a sample.
 bench-kitchen-tasks: $(STAMP)  ## five composite tasks in each of the 2,510 kitchens: nothing falls, overlaps or blocks
 	$(BIN)/python benchmarks/kitchen_tasks.py $(BENCH_ARGS)
+
+# About two hours on two cores; goes on where it was stopped. BENCH_ARGS='--tasks atomic_seen' takes some, `--strips 40` draws strips.
+every-task: $(STAMP)  ## one demonstration of each of the 365 tasks: recorded, converted, verified, replayed
+	$(BIN)/python benchmarks/every_task.py $(BENCH_ARGS)
 
 # Hours; goes on where it was stopped. Ten sources of each of the 60 tasks are recorded and prepared first.
 bench-generation: $(STAMP)  ## generated demonstrations beside MimicGen's way and the demonstrators
