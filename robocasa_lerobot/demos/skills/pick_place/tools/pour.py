@@ -38,6 +38,7 @@ HIGH_COST, TURN_COST = 4.0, 0.08
 SHORT_SHARE = 0.35  # of the vessel's radius, by which its edge ends short of the middle: what slides off goes on
 TILT_STEPS, WAIT_STEPS, SHAKES = 45, 12, 3
 SHAKE_M = 0.02
+DONE_STEPS = 6  # on end, for which a stage is done before the vessel turns back: what hops in it lies in it again
 AGAIN, AGAIN_M = 0.4, 0.03  # cost of a hand that goes where it went without success, as near as this
 
 
@@ -100,18 +101,20 @@ def pour(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
 
 def _tilt(env: KitchenEnv, stage: Stage, level: HandTarget, tilting: Tilting) -> Iterator[Array]:
     """Tilt slowly, until the stage is done; shake what does not come off; turn back."""
-    share = 0.0
+    share, done = 0.0, 0
     for step in range(TILT_STEPS):
-        if stage_done(env, stage):
+        done = done + 1 if stage_done(env, stage) else 0
+        if done == DONE_STEPS:
             break
         share = (step + 1) / TILT_STEPS
         yield arm_action(env.data, tilting.after(level, share), CLOSED)
     steep = tilting.after(level, share)
     for step in range(WAIT_STEPS * (1 + SHAKES)):
-        if stage_done(env, stage):
+        if done == DONE_STEPS:
             break
         shaken = SHAKE_M * np.sin(2 * np.pi * step / WAIT_STEPS) if step >= WAIT_STEPS else 0.0
         yield arm_action(env.data, HandTarget(steep.position + shaken * UP, steep.rotation), CLOSED)
+        done = done + 1 if stage_done(env, stage) else 0
     for step in range(TILT_STEPS // 2):
         yield arm_action(env.data, tilting.after(level, share * (1 - (step + 1) / (TILT_STEPS // 2))), CLOSED)
 
