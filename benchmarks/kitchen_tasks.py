@@ -26,10 +26,10 @@ import common
 import numpy as np
 from kitchens import unrest
 
-from robocasa_lerobot.envs.checks.soundness import robot_touches, sunk_in
 from robocasa_lerobot.envs.kitchens.materials import split_of
 from robocasa_lerobot.envs.kitchens.splits import scene_ids, without
 from robocasa_lerobot.envs.scene.build import build_scene
+from robocasa_lerobot.envs.scene.placement.overlaps import robot_touches, sunk_in
 from robocasa_lerobot.envs.tasks.registry import get_task, task_names
 from robocasa_lerobot.errors import UserError
 from robocasa_lerobot.jsonl import read_whole_lines

@@ -9,14 +9,16 @@ import mujoco
 import numpy as np
 import pytest
 
-from robocasa_lerobot.envs.checks.soundness import fell, moved, sunk_in
+from robocasa_lerobot.envs.checks.soundness import fell, moved
 from robocasa_lerobot.envs.kitchens.appliances.kinds.stove import Hob
 from robocasa_lerobot.envs.kitchens.fixtures.cabinets import Drawer
 from robocasa_lerobot.envs.kitchens.footprints import Area, Footprint
 from robocasa_lerobot.envs.kitchens.layout import load_layout
 from robocasa_lerobot.envs.predicates import ObjectOn
+from robocasa_lerobot.envs.scene import build
 from robocasa_lerobot.envs.scene.build import build_scene
 from robocasa_lerobot.envs.scene.placement.counter_areas import standing_on
+from robocasa_lerobot.envs.scene.placement.overlaps import robot_touches, sunk_in
 from robocasa_lerobot.envs.scene.scene import Scene
 from robocasa_lerobot.envs.scene.spec import ObjectSpec, OnCounter, Placement
 from robocasa_lerobot.envs.tasks.registry import get_task
@@ -183,4 +185,39 @@ def test_what_starts_in_a_drawer_lies_in_it_altogether(monkeypatch: pytest.Monke
 
     assert not in_walls()
     monkeypatch.setattr(Drawer, "holds_all_of_it", False)
+    monkeypatch.setattr(Area, "pushed_in", lambda *_: None)  # nor is it mended in the two ways that other things are
+    monkeypatch.setattr(build, "ask_for_room", lambda _: None)
     assert in_walls()
+
+
+@pytest.mark.parametrize(
+    ("task", "layout", "style"),
+    [
+        ("ScalePortioning", 33, 49),  # an open door of the freezer, drawn where the base stands
+        ("DistributeChicken", 19, 11),  # the handle of a pan
+        ("CandleCleanup", 58, 31),  # a placemat in a cabinet that is too narrow for it
+        ("TransportCookware", 14, 25),  # a pan in an oven's door
+    ],
+)
+def test_what_would_start_in_something_else_is_drawn_again(task: str, layout: int, style: int) -> None:
+    scene = scene_in(task, layout, style)
+    data, _ = scene.initial_data(np.random.default_rng(100 * layout + style))
+    assert sunk_in(scene.model, data) == []
+    assert robot_touches(scene, data) == []
+
+
+def test_a_tray_lies_on_its_rack_and_not_in_the_door_of_the_oven() -> None:
+    scene = scene_in("CoolBakedCookies", 34, 34)
+    (rack,) = scene.regions("oven", "{rack}")
+    oven = scene.fixture("oven")
+    corners = np.array([oven.to_local(corner) for corner in scene.objects["oven_tray"].footprint.corners()])
+    # The rack itself is 7 mm before the middle of the oven.
+    assert (np.abs(corners - rack.center[:2]).max(axis=0) <= np.array(rack.half[:2]) + 0.008).all()
+
+
+def test_footprints_are_pushed_in_by_as_little_as_it_takes() -> None:
+    area = Area(-0.2, 0.2, -0.1, 0.1, (1.0, 2.0), np.pi / 2, 0.0)
+    pushed = area.pushed_in(Footprint(1.15, 2.0, 0.0, (0.05, 0.05)))
+    assert pushed is not None
+    assert (pushed.x, pushed.y) == pytest.approx((1.05, 2.0))
+    assert area.pushed_in(Footprint(1.0, 2.0, 0.0, (0.11, 0.05))) is None

@@ -18,7 +18,6 @@ from robocasa_lerobot.envs.scene.scene import Scene
 PENETRATION_M = 0.002  # that fixtures may have
 WALKWAY_M = 1.0  # free before everything that opens
 SETTLE_S, MOVED_M = 1.0, 0.01
-SUNK_M = 0.006  # that resting things may reach into each other; food on a plate settles by a tenth of a millimetre
 _PROBE_M = 0.05  # thickness of the slices that walkways are looked through in
 _OPENING = ("drawer", "hinge_cabinet", "single_cabinet", "oven", "stovetop")  # besides what stands on the floor
 _BELOW_M = 0.9  # what begins above it obstructs no robot
@@ -52,36 +51,6 @@ def overlaps(model: mujoco.MjModel, data: mujoco.MjData, fixtures: dict[str, Fix
                 first, second = sorted((int(owner[geom]), int(owner[other])))
                 deepest[first, second] = min(deepest.get((first, second), 0.0), float(distance))
     return [Overlap(names[a], names[b], round(-depth, 5)) for (a, b), depth in sorted(deepest.items())]
-
-
-def sunk_in(model: mujoco.MjModel, data: mujoco.MjData, deeper_m: float = SUNK_M) -> list[tuple[str, str, float]]:
-    """Pairs of bodies in contact deeper than allowed, with the depth in metres, the deepest first.
-
-    What sleeps has no contacts in `data`: they are looked for anew from its positions, which stay as they are.
-    """
-    awake = _awake(model, data)
-    deepest: dict[tuple[str, str], float] = {}
-    for geoms, distance in zip(awake.contact.geom, awake.contact.dist, strict=True):
-        if distance < -deeper_m:
-            one, other = (str(model.body(model.geom_bodyid[geom]).name) for geom in geoms)
-            deepest[one, other] = max(deepest.get((one, other), 0.0), -float(distance))
-    return sorted(((*pair, depth) for pair, depth in deepest.items()), key=lambda found: -found[2])
-
-
-def robot_touches(scene: Scene, data: mujoco.MjData) -> list[str]:
-    """Names of the bodies that the robot touches: where an episode begins, it stands free."""
-    robot = scene.subtree("robot0_base")
-    sides = scene.model.geom_bodyid[_awake(scene.model, data).contact.geom].reshape(-1, 2)
-    others = [side for pair in sides for side in pair if robot[pair].sum() == 1 and not robot[side]]
-    return sorted({scene.model.body(other).name for other in others} - {"floor"})
-
-
-def _awake(model: mujoco.MjModel, data: mujoco.MjData) -> mujoco.MjData:
-    """A state of its own at the same positions, in which nothing sleeps and contacts are there."""
-    awake = mujoco.MjData(model)
-    awake.qpos[:], awake.mocap_pos[:], awake.mocap_quat[:] = data.qpos, data.mocap_pos, data.mocap_quat
-    mujoco.mj_fwdPosition(model, awake)
-    return awake
 
 
 def _owners(model: mujoco.MjModel, fixtures: dict[str, Fixture]) -> NDArray[np.intp]:

@@ -7,8 +7,8 @@ from collections.abc import Iterable, Iterator
 import numpy as np
 
 from robocasa_lerobot import contract
-from robocasa_lerobot.envs.checks.soundness import sunk_in
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
+from robocasa_lerobot.envs.scene.placement.overlaps import sunk_in
 
 CHECK_SEEDS = range(10)
 IDLE_SECONDS = 5.0  # of simulated time without an action, in which the goal must not come to hold

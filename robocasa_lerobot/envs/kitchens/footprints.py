@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -170,9 +170,26 @@ class Area:
 
     def holds(self, footprint: Footprint) -> bool:
         """Whether all corners of a footprint lie in the rectangle."""
+        x, y = self._in_own_frame(footprint)
+        return bool(self.x0 <= x.min() and x.max() <= self.x1 and self.y0 <= y.min() and y.max() <= self.y1)
+
+    def pushed_in(self, footprint: Footprint) -> Footprint | None:
+        """A footprint shifted by as little as brings all its corners into the rectangle; None if it is too large."""
+        x, y = self._in_own_frame(footprint)
+        shifts = []
+        for along, low, high in ((x, self.x0, self.x1), (y, self.y0, self.y1)):
+            if along.max() - along.min() > high - low:
+                return None
+            shifts.append(max(low - along.min(), 0.0) + min(high - along.max(), 0.0))
+        axes = Footprint(0.0, 0.0, self.yaw, (0.0, 0.0)).axes()
+        shift_x, shift_y = (np.array(shifts) @ axes).tolist()
+        return replace(footprint, x=footprint.x + shift_x, y=footprint.y + shift_y)
+
+    def _in_own_frame(self, footprint: Footprint) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """The corners of a footprint in the fixture's frame, x and y, metres."""
         axes = Footprint(0.0, 0.0, self.yaw, (0.0, 0.0)).axes()
         x, y = ((footprint.corners() - self.origin) @ axes.T).T
-        return bool(self.x0 <= x.min() and x.max() <= self.x1 and self.y0 <= y.min() and y.max() <= self.y1)
+        return x, y
 
     @property
     def middle(self) -> tuple[float, float]:

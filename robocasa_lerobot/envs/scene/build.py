@@ -23,6 +23,7 @@ from robocasa_lerobot.envs.scene.kept_kitchens import kitchen
 from robocasa_lerobot.envs.scene.memory import Memory, add_memory
 from robocasa_lerobot.envs.scene.placement.counter_areas import counter_areas
 from robocasa_lerobot.envs.scene.placement.objects import place_objects
+from robocasa_lerobot.envs.scene.placement.overlaps import ask_for_room
 from robocasa_lerobot.envs.scene.placement.regions import Shares
 from robocasa_lerobot.envs.scene.robot_poses import RobotPose, open_doors_of, robot_pose
 from robocasa_lerobot.envs.scene.roles import cast_roles, counter_of
@@ -149,7 +150,7 @@ def _attempt(
     words = words_of(layout, roles, categories, [wanted.name for wanted in task.objects if wanted.count != (1, 1)])
     # A choice's words may name objects: "the {food}" of the bowl that was drawn.
     words.update({"side": pose.side} | {name: said(word, words) for name, word in choices.words.items()})
-    return Scene(
+    scene = Scene(
         split=split,
         seed=seed,
         layout_id=layout_id,
@@ -171,6 +172,8 @@ def _attempt(
         remembering=remembering,
         memory=Memory.of(model, kept),
     )
+    ask_for_room(scene)
+    return scene
 
 
 def arrange(

@@ -160,8 +160,8 @@ class Scene(Drawn):
         if not gone:
             blender.set_lid(data, self.lid_spots[role], 2 * np.pi * turn)
 
-    def initial_data(self, rng: np.random.Generator) -> tuple[mujoco.MjData, Controller]:
-        """State at the start of an episode: everything placed, then settled without commands."""
+    def placed_data(self, rng: np.random.Generator | None = None) -> mujoco.MjData:
+        """Everything where it was put, before it settles; without `rng` the arm has no noise."""
         data = mujoco.MjData(self.model)
         pose = self.robot_pose
         self.robot.place_base(self.model, data, pose.x, pose.y, pose.yaw)
@@ -172,6 +172,11 @@ class Scene(Drawn):
             entry.apply(self, data, drawn)
         for placed in self.objects.values():
             data.joint(f"{placed.name}_joint0").qpos[:] = [*placed.pos, *placed.quat]
+        return data
+
+    def initial_data(self, rng: np.random.Generator) -> tuple[mujoco.MjData, Controller]:
+        """State at the start of an episode: everything placed, then settled without commands."""
+        data = self.placed_data(rng)
         mujoco.mj_forward(self.model, data)
         controller = self.robot.controller(self.model, data)
         controller.reset()

@@ -89,6 +89,7 @@ def _put(
     start = wanted.start
     standing: list[Footprint] = []
     rooms: list[Area] = []
+    must = False
     if isinstance(start, OnCounter):
         areas, standing = counter_areas(layout, start, layout.fixtures[roles[start.near]])
         standing = [*standing, *_in_the_air(doors, areas[0].z, item)]
@@ -116,10 +117,12 @@ def _put(
             # What may stick out is the container: an object across its rim would tip over.
             _put_on(rng, table, name, item, table.placed[holder], replace(start, ensure_inside=True))
             return
-        if fixture.holds_all_of_it and start.ensure_inside:
-            # Of other compartments an object may stick out, as the handle of a mug does under a spout.
+        must = fixture.holds_all_of_it and start.ensure_inside
+        # Of open compartments an object may stick out, as the handle of a mug does under a spout.
+        if must or (inside and fixture.door_names and start.ensure_inside and not start.slot):
             rooms = [part.area for part in table.parts[name]]
-    _put_down(rng, table, name, item, areas, standing, rooms, lying=isinstance(start, Placement) and start.lying)
+    lying = isinstance(start, Placement) and start.lying
+    _put_down(rng, table, name, item, areas, standing, rooms, must=must, lying=lying)
 
 
 def _in_the_air(doors: Sequence[OpenDoor], z: float, item: catalogue.Instance) -> list[Footprint]:
@@ -171,9 +174,13 @@ def _put_down(
     standing: list[Footprint],
     rooms: Sequence[Area] = (),
     *,
+    must: bool = False,
     lying: bool = False,
 ) -> None:
-    """Put an object onto one of the areas; if basins or drawers are given as `rooms`, so that it is wholly in one."""
+    """Put an object onto one of the areas; if `rooms` are given, so that it is wholly in one, which it `must` or can.
+
+    It must in basins and drawers. In a compartment behind a door it is pushed in where it would stick out.
+    """
     width, depth, height = item.size
     if lying:
         depth, height = height, depth
@@ -197,14 +204,27 @@ def _put_down(
         footprint, area = place(rng, high, half, occupied, what=what, middle=middle)
         if not rooms or any(room.holds(footprint) for room in rooms):
             break
+        if not must and (pushed := _pushed_in(footprint, area, rooms, occupied(area))):
+            footprint = pushed
+            break
     else:
-        raise PlacementError(
-            f"{what} of {width:.2f} x {depth:.2f} m does not lie in {rooms[0].name} without touching its walls. "
-            "Ask for a smaller object, or for another fixture."
-        )
+        if must:
+            raise PlacementError(
+                f"{what} of {width:.2f} x {depth:.2f} m does not lie in {rooms[0].name} without touching its walls. "
+                "Ask for a smaller object, or for another fixture."
+            )
     table.taken.append((footprint, area.z))
     z = area.z + height / 2 + PLACEMENT_GAP_M
     table.placed[name] = PlacedObject(name, item, (footprint.x, footprint.y, z), footprint.yaw, lying)
+
+
+def _pushed_in(
+    footprint: Footprint, area: Area, rooms: Sequence[Area], occupied: Sequence[Footprint]
+) -> Footprint | None:
+    """A footprint drawn in an area, shifted so that it lies in the room of the area; None if that is not free."""
+    room = next(room for room in rooms if room.name == area.name)
+    inside = room.pushed_in(footprint)
+    return None if inside is None or any(inside.overlaps(other, 0.01) for other in occupied) else inside
 
 
 def _put_on(
