@@ -32,6 +32,7 @@ COUNTS_SHARE = 0.85  # of the distance from the middle at which goals count an o
 # In a vessel an object goes to where others heap up least, so that it comes to touch the vessel: cost for each metre,
 # and factors of how far it is from the middle.
 HEAP_COST, BESIDE_SHARES = 8.0, (1.0, 1.4)
+ON_EDGE_SHARE, OVER_EDGE_M = 2.4, 0.01  # such a factor, where others reach so far over the edge: one leans on that
 BASIN_AHEAD_M, BASIN_ASIDE_M = 0.09, 0.08  # from the basin's middle: before the faucet, whose spout reaches over it
 # Heights of the underside over the basin's rim at which an object is let go, metres, with their costs.
 BASIN_DROPS = ((-0.07, 0.0), (-0.03, 0.2), (0.02, 0.5))
@@ -84,7 +85,11 @@ def on_object(env: KitchenEnv, obj: Graspable, holder: str, *, more: bool = Fals
                 found += [PlacePose(floor + UP * deep * drop, cost + extra) for drop, extra in DROPS]
             return found
         sides, heaped = (0.0, -1.0, 1.0), bool(others) and deep > SHALLOW_M
-        for i, j, share in itertools.product(sides, sides, BESIDE_SHARES if heaped else BESIDE_SHARES[:1]):
+        shares: tuple[float, ...] = BESIDE_SHARES if heaped else BESIDE_SHARES[:1]
+        edge = body.xpos[2] + middle[2] + half[2]
+        if heaped and tops[:, 2].max() > edge + OVER_EDGE_M:
+            shares += (ON_EDGE_SHARE,)
+        for i, j, share in itertools.product(sides, sides, shares):
             if (i, j) != (0.0, 0.0) and room.max() <= LEAST_ROOM_M:
                 continue
             beside = np.array([i, j]) * share * room
