@@ -26,10 +26,11 @@ import common
 import mujoco
 import numpy as np
 
-from robocasa_lerobot.envs.checks.soundness import MOVED_M, blocked_walkways, fell, moved, overlaps
+from robocasa_lerobot.envs.checks.soundness import MOVED_M, blocked_walkways, moved, overlaps
 from robocasa_lerobot.envs.kitchens.materials import split_of
 from robocasa_lerobot.envs.kitchens.splits import scene_ids, without
 from robocasa_lerobot.envs.scene.build import build_scene
+from robocasa_lerobot.envs.scene.placement.at_rest import fell
 from robocasa_lerobot.envs.scene.scene import Scene
 from robocasa_lerobot.envs.tasks.registry import get_task, task_names
 from robocasa_lerobot.envs.tasks.task import Task

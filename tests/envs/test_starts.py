@@ -9,7 +9,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from robocasa_lerobot.envs.checks.soundness import fell, moved
+from robocasa_lerobot.envs.checks.soundness import moved
 from robocasa_lerobot.envs.kitchens.appliances.kinds.stove import Hob
 from robocasa_lerobot.envs.kitchens.fixtures.cabinets import Drawer
 from robocasa_lerobot.envs.kitchens.footprints import Area, Footprint
@@ -17,6 +17,7 @@ from robocasa_lerobot.envs.kitchens.layout import load_layout
 from robocasa_lerobot.envs.predicates import ObjectOn
 from robocasa_lerobot.envs.scene import build
 from robocasa_lerobot.envs.scene.build import build_scene
+from robocasa_lerobot.envs.scene.placement.at_rest import ask_for_rest, fell
 from robocasa_lerobot.envs.scene.placement.counter_areas import standing_on
 from robocasa_lerobot.envs.scene.placement.overlaps import robot_touches, sunk_in
 from robocasa_lerobot.envs.scene.scene import Scene
@@ -221,3 +222,21 @@ def test_footprints_are_pushed_in_by_as_little_as_it_takes() -> None:
     assert pushed is not None
     assert (pushed.x, pushed.y) == pytest.approx((1.05, 2.0))
     assert area.pushed_in(Footprint(1.0, 2.0, 0.0, (0.11, 0.05))) is None
+
+
+@pytest.mark.parametrize(
+    ("task", "layout", "style"),
+    [("PortionHotDogs", 22, 31), ("LoadFridgeByType", 28, 15), ("SteamVeggiesWithWater", 42, 41)],
+)
+def test_what_rolls_off_a_heap_is_drawn_again(task: str, layout: int, style: int) -> None:
+    scene = scene_in(task, layout, style)
+    data, _ = scene.initial_data(np.random.default_rng(100 * layout + style))
+    assert max(fell(scene, data).values()) <= 0.02
+    assert max(moved(scene, data)[name] for name in scene.objects) <= 0.01
+
+
+def test_only_what_was_piled_up_is_watched(monkeypatch: pytest.MonkeyPatch) -> None:
+    """An apple beside a bowl rests where it was put down: its scene costs no simulation."""
+    scene = scene_in("PickPlaceCounterToSink", 22, 31)
+    monkeypatch.setattr(Scene, "placed_data", None)
+    ask_for_rest(scene)

@@ -126,12 +126,3 @@ def _moving_parts(model: mujoco.MjModel, scene: Scene) -> NDArray[np.intp]:
         [b for b in range(1, model.nbody) if model.body_weldid[b] and b in solid and model.body_rootid[b] not in own],
         dtype=np.intp,
     )
-
-
-def fell(scene: Scene, data: mujoco.MjData) -> dict[str, float]:
-    """Metres that each object has left the place where it was put down, along z; `data` is the episode's start.
-
-    What is let down on what lies in a vessel, or on its rim, may come down to the vessel's floor.
-    """
-    rose = {name: float(data.body(name).xpos[2] - placed.pos[2]) for name, placed in scene.objects.items()}
-    return {name: max(by, -by - scene.objects[name].let_down_m, 0.0) for name, by in rose.items()}

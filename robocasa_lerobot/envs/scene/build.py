@@ -21,6 +21,7 @@ from robocasa_lerobot.envs.scene.drawn import Drawn, PlacedObject
 from robocasa_lerobot.envs.scene.initial_states import Initial, LidAside, PartAt
 from robocasa_lerobot.envs.scene.kept_kitchens import kitchen
 from robocasa_lerobot.envs.scene.memory import Memory, add_memory
+from robocasa_lerobot.envs.scene.placement.at_rest import ask_for_rest
 from robocasa_lerobot.envs.scene.placement.counter_areas import counter_areas
 from robocasa_lerobot.envs.scene.placement.objects import place_objects
 from robocasa_lerobot.envs.scene.placement.overlaps import ask_for_room
@@ -173,6 +174,7 @@ def _attempt(
         memory=Memory.of(model, kept),
     )
     ask_for_room(scene)
+    ask_for_rest(scene)
     return scene
 
 
