@@ -25,6 +25,7 @@ def test_it_counts_in_the_jug_however_it_lies_there(split: str) -> None:
     (wide, _, tall), joint = jug.half, data.joint("marinade_veg1_joint0")
     places = {
         (0.0, 0.0, half - tall): True,
+        (1.2 * wide, 0.0, half - tall): jug.across > 0.0,  # at the wall of a round one
         (0.0, 0.0, tall + half): False,  # on the rim
         (wide + half + 0.02, 0.0, half - tall): False,  # leans at the jug from outside
     }

@@ -115,7 +115,8 @@ class ObjectInside(Term):
 
     def _has(self, data: mujoco.MjData, region: Region, origin: NDArray[np.float64]) -> bool:
         middle = region.local(data, origin)
-        inside = np.all(np.abs(middle) <= region.half)
+        in_box = np.abs(middle) <= region.half
+        inside = in_box[2] and (in_box[:2].all() or np.linalg.norm(middle[:2]) <= region.across)
         return bool(inside) and float(middle[2]) <= (2 * self.lower - 1) * region.half[2]
 
 

@@ -20,6 +20,7 @@ LID_NEAR_M, LID_TILT_RAD = 0.04, float(np.radians(7.0))
 _WALL_M, _PLUG_M, _FLANGE_M = 0.005, 0.016, 0.008
 _KNOB_M, _KNOB_RADIUS_M = 0.036, 0.019
 _SIDES = 8
+_ROUND_SHARE = 0.9  # of a round jug's radius, from which on what has an origin there is outside, or is the wall's
 
 
 @dataclass
@@ -38,12 +39,13 @@ class Blender(Appliance):
     def regions(self) -> dict[str, Region]:
         """Inside of the jug."""
         low, top, radius = self._jug()
-        half = radius / np.sqrt(2) if self.record["jug"] == "round" else radius * 0.94
+        round_ = self.record["jug"] == "round"
+        half, across = (radius / np.sqrt(2), _ROUND_SHARE * radius) if round_ else (radius * 0.94, 0.0)
         floor = low + 0.008
         middle = (0.0, self._y(), (floor + top) / 2)
         beside = np.sqrt(3) * radius - half  # a corner of the box of a ball that just fits, however it has rolled
         beyond = (beside, beside, floor + self.height / 2)
-        return {"jug": Region(self.name, middle, (half, half, (top - floor) / 2), beyond)}
+        return {"jug": Region(self.name, middle, (half, half, (top - floor) / 2), beyond, across)}
 
     @property
     def lid(self) -> str:
