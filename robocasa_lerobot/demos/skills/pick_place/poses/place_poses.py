@@ -27,6 +27,7 @@ POT_DROPS = ((0.0, 1.3), (0.5, 1.1), (1.1, 0.3), (1.4, 0.4))
 POT_DEEP_M, POT_HALF_M = 0.08, (0.04, 0.075)  # least depth; half of its width inside
 EDGE_M, OFF_SHARE, BESIDE_COST = 0.005, 0.5, 3.0  # beside the middle, with a cost for each metre
 ASIDE_SHARE, ON_OTHERS_COST = 0.4, 8.0  # beside what lies there, with a gain for each metre from it
+NARROW_SHARE = 0.7  # the same in what is narrow: what stands there is as high in its middle as anywhere
 LEAST_ROOM_M, SHALLOW_M = 0.01, 0.02
 COUNTS_SHARE = 0.85  # of the distance from the middle at which goals count an object as in or on another one
 # In a vessel an object goes to where others heap up least, so that it comes to touch the vessel: cost for each metre,
@@ -75,8 +76,9 @@ def on_object(env: KitchenEnv, obj: Graspable, holder: str, *, more: bool = Fals
         width = float(np.sort(obj.half_extents(data.body(obj.name).xmat.reshape(3, 3))[:2])[0])
         room = np.maximum(half[:2] - obj.half_extents(np.eye(3))[:2].max() - EDGE_M, 0.0)
         room = np.minimum(room, OFF_SHARE * half[:2])
+        narrow = deep > SHALLOW_M and half[:2].min() < NARROW_M
         if others:  # beside them, though it may then lean on the wall
-            room = np.maximum(room, ASIDE_SHARE * half[:2])
+            room = np.maximum(room, (NARROW_SHARE if narrow else ASIDE_SHARE) * half[:2])
         found = []
         if (others or more) and is_flat(env, placed.name):
             for beside in offsets(most):
@@ -99,7 +101,6 @@ def on_object(env: KitchenEnv, obj: Graspable, holder: str, *, more: bool = Fals
             if heaped:
                 cost += HEAP_COST * _height_at(tops, floor, width)
             cost -= ON_OTHERS_COST * min((float(np.linalg.norm(floor[:2] - other)) for other in others), default=0.0)
-            narrow = deep > SHALLOW_M and half[:2].min() < NARROW_M
             found += [
                 PlacePose(floor + UP * deep * drop, cost + (extra if deep > SHALLOW_M else 0.0))
                 for drop, extra in (OVER_RIM if narrow else POT_DROPS if _jams(half) else DROPS)
