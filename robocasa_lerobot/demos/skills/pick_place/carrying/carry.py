@@ -37,7 +37,7 @@ STAND_FAR_M, DIRECTIONS = (0.58, 0.52, 0.64, 0.70, 0.76, 0.82), 16
 FAR_COST, ASKEW_COST = 4.0, 0.5
 # Of the point to the robot's left; to its side only where there is no room straight before it: by an open oven's door,
 # and farther still before what is in a corner.
-ASIDES_M = ((0.0,), (0.15, -0.15, 0.3, -0.3), (0.45, -0.45, 0.6, -0.6))
+ASIDES_M = ((0.0,), (0.15, -0.15, 0.3, -0.3), (0.45, -0.45, 0.6, -0.6), (0.67, -0.67))
 OTHER_M, OTHER_RAD = 0.25, 0.35  # places nearer than this to each other, and turned less, count as the same
 
 
