@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Generator, Iterator
 from functools import partial
 
 import numpy as np
@@ -43,6 +43,7 @@ from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.kitchens.appliances.kinds.microwave import Microwave
 from robocasa_lerobot.envs.kitchens.fixtures.base import Fixture
 from robocasa_lerobot.envs.scene.robot_poses import RobotPose
+from robocasa_lerobot.envs.tasks.conditions import stage_condition, without_gripper
 from robocasa_lerobot.envs.tasks.task import Stage
 
 ATTEMPTS = 4
@@ -76,7 +77,7 @@ def place_object(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
     """
     failed: list[Array] = []
     for attempt in range(ATTEMPTS):
-        obj = graspable(env, stage.object)
+        obj, there = graspable(env, stage.object), False
         strategy = place_strategy(env, stage, obj)
         if not is_held(env, obj.name) and not hangs(env, obj):
             if attempt == 0:
@@ -85,13 +86,15 @@ def place_object(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
                 yield from strategy.make_room(env, attempt > 0)
             holder = target_object(env, stage)
             towards = env.data.body(holder).xpos.copy() if holder else None
-            yield from take(env, obj, strategy.grasp, towards=towards, far=_goes_far(env, stage, obj, strategy))
-        try:
-            yield from _bring(env, stage, obj, strategy)
-        except SlippedError:
-            continue  # it is picked up where it lies
-        yield from move_torso(env, 0.0, CLOSED, Held.now(env.data, obj.name, obj.contents))
-        yield from put(env, obj, strategy, failed)
+            far = _goes_far(env, stage, obj, strategy)
+            there = yield from _unless_there(env, stage, take(env, obj, strategy.grasp, towards=towards, far=far))
+        if not there:
+            try:
+                yield from _bring(env, stage, obj, strategy)
+            except SlippedError:
+                continue  # it is picked up where it lies
+            yield from move_torso(env, 0.0, CLOSED, Held.now(env.data, obj.name, obj.contents))
+            yield from put(env, obj, strategy, failed)
         for _ in range(SETTLE_STEPS):
             if stage_done(env, stage):
                 return
@@ -99,6 +102,21 @@ def place_object(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
             fingers = CLOSED if is_held(env, obj.name) or hangs(env, obj) else OPEN
             yield from hold_hand(env.data, HandTarget(grip_position(env.data), hand_rotation(env.data)), fingers, 1)
     raise SkillError(f"{graspable(env, stage.object).title} is not where it belongs after {ATTEMPTS} attempts")
+
+
+def _unless_there(env: KitchenEnv, stage: Stage, taking: Iterator[Array]) -> Generator[Array, None, bool]:
+    """Pick an object up, unless it comes to be where it belongs before: then the hand goes. Whether it has come there.
+
+    What rests on others in a bowl sinks among them when it is touched.
+    """
+    there, steps = without_gripper(stage_condition(env.declaration, stage)), 0
+    for action in taking:
+        steps = steps + 1 if action[-1] == OPEN and there.evaluate(env.scene, env.data, {}) else 0
+        if steps > SETTLE_STEPS:
+            yield from fold_arm(env)
+            return True
+        yield action
+    return False
 
 
 def drive(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
