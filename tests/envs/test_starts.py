@@ -75,6 +75,14 @@ def test_a_pan_stands_with_its_round_part_on_the_burner() -> None:
     assert min(np.hypot(*(np.array(pan.pos[:2]) - at)) for at in burners) > 0.02
 
 
+@pytest.mark.parametrize(("task", "layout", "style"), [("SweetenHotChocolate", 52, 22), ("TransportCookware", 46, 43)])
+def test_no_pan_tips_over_the_edge_of_a_grate(task: str, layout: int, style: int) -> None:
+    scene = scene_in(task, layout, style)
+    data, _ = scene.initial_data(np.random.default_rng(0))
+    assert scene.fixture("stove", Hob).record["hob"] == "gas"
+    assert data.body("saucepan" if task == "SweetenHotChocolate" else "pan").xmat[8] > 0.985
+
+
 def test_middles_are_drawn_into_areas_that_hold_no_whole_footprints() -> None:
     area = Area(-0.01, 0.01, -0.01, 0.01, (2.0, 1.0), 0.7, 0.9, inside=False)
     rng = np.random.default_rng(0)

@@ -23,6 +23,7 @@ from robocasa_lerobot.envs.scene.words import numbered
 
 PLACEMENT_GAP_M = 0.004  # objects start this far above their surface and settle
 SHALLOW_M = 0.025  # vessels up to this deep are plates: what lies within their edge starts on their floor
+_HANDLE_SHARE = 0.4  # of the way from the middle of a pan's inside to that of its length, where its weight is
 _TURNS = 20  # how often a place is drawn for what hardly fits into a compartment
 IN_CONTAINER = "in_container"  # object group of what may stand in a container
 
@@ -89,7 +90,7 @@ def _put(
     start = wanted.start
     standing: list[Footprint] = []
     rooms: list[Area] = []
-    must = False
+    must, below = False, None
     if isinstance(start, OnCounter):
         areas, standing = counter_areas(layout, start, layout.fixtures[roles[start.near]])
         standing = [*standing, *_in_the_air(doors, areas[0].z, item)]
@@ -102,7 +103,7 @@ def _put(
         _put_on(rng, table, name, item, table.placed[start.object], start)
         return
     else:
-        fixture = layout.fixtures[roles[start.fixture]]
+        fixture = below = layout.fixtures[roles[start.fixture]]
         areas = _areas(table, name, start, fixture, layout, roles, openness)
         if start.slot:
             areas = [_in_slot(area, item) for area in areas]
@@ -113,7 +114,7 @@ def _put(
             container = catalogue.sample(rng, (start.try_to_place_in,), split)
             holder = f"{name}_container"
             table.holders.add(holder)
-            _put_down(rng, table, holder, container, areas, standing)
+            _put_down(rng, table, holder, container, areas, standing, below=below)
             # What may stick out is the container: an object across its rim would tip over.
             _put_on(rng, table, name, item, table.placed[holder], replace(start, ensure_inside=True))
             return
@@ -122,7 +123,7 @@ def _put(
         if must or (inside and fixture.door_names and start.ensure_inside and not start.slot):
             rooms = [part.area for part in table.parts[name]]
     lying = isinstance(start, Placement) and start.lying
-    _put_down(rng, table, name, item, areas, standing, rooms, must=must, lying=lying)
+    _put_down(rng, table, name, item, areas, standing, rooms, must=must, lying=lying, below=below)
 
 
 def _in_the_air(doors: Sequence[OpenDoor], z: float, item: catalogue.Instance) -> list[Footprint]:
@@ -176,10 +177,12 @@ def _put_down(
     *,
     must: bool = False,
     lying: bool = False,
+    below: Fixture | None = None,
 ) -> None:
     """Put an object onto one of the areas; if `rooms` are given, so that it is wholly in one, which it `must` or can.
 
-    It must in basins and drawers. In a compartment behind a door it is pushed in where it would stick out.
+    It must in basins and drawers. In a compartment behind a door it is pushed in where it would stick out. It stands
+    without tipping on the fixture `below`, if it can.
     """
     width, depth, height = item.size
     if lying:
@@ -202,6 +205,8 @@ def _put_down(
     middle = (0.0, 0.0) if item.interior is None else item.interior.center[:2]
     for _ in range(_TURNS):
         footprint, area = place(rng, high, half, occupied, what=what, middle=middle)
+        if below is not None and not below.bears(*below.to_local(_weight_of(footprint, middle))):
+            continue
         if not rooms or any(room.holds(footprint) for room in rooms):
             break
         if not must and (pushed := _pushed_in(footprint, area, rooms, occupied(area))):
@@ -216,6 +221,12 @@ def _put_down(
     table.taken.append((footprint, area.z))
     z = area.z + height / 2 + PLACEMENT_GAP_M
     table.placed[name] = PlacedObject(name, item, (footprint.x, footprint.y, z), footprint.yaw, lying)
+
+
+def _weight_of(footprint: Footprint, middle: tuple[float, float]) -> tuple[float, float]:
+    """About where the middle of mass of a vessel is, in the room: its handle draws it off the middle of its inside."""
+    x, y = np.array([footprint.x, footprint.y]) + (1 - _HANDLE_SHARE) * np.array(middle) @ footprint.axes()
+    return float(x), float(y)
 
 
 def _pushed_in(

@@ -22,6 +22,7 @@ KNOB_MAX = 1.5 * np.pi
 _PANEL_M, _KICK_M, _HOB_M = 0.115, 0.08, 0.014
 _GRATE_M = 0.036  # top of the grates above the hob
 _SURFACE_M = {"gas": _GRATE_M, "coil": 0.010}  # what pans stand on, above the hob; else its plate
+_GRATE_REACH = 1.18  # length of a grate's bars from its middle, in radii of its burner
 _PAN_REACH_M, _PAN_ROOM_M = 0.11, 0.10  # half sizes of the room of a pan on a burner
 _LEVELS = {"off": 0.0, "low": 0.62, "high": 1.0}  # how far a flame or ring is shown
 
@@ -66,6 +67,22 @@ class Hob(Appliance):
             )
             for location, (x, y) in self.burners.items()
         }
+
+    def bears(self, x: float, y: float) -> bool:
+        """A grate has four bars crosswise: a pan tips over that has its weight beside what they reach round."""
+        if self.record["hob"] != "gas":
+            return True
+        width, depth, _ = self.size
+        return any(
+            abs(x - at_x * width) + abs(y - at_y * depth) <= _GRATE_REACH * self._radius(location)
+            for location, (at_x, at_y) in self.burners.items()
+        )
+
+    def _radius(self, location: str) -> float:
+        """Of a burner, metres."""
+        width, depth, _ = self.size
+        radius = 0.092 if location in ("front_right", "center", "rear_left") else 0.080
+        return min(radius, 0.135 * width, 0.17 * depth)
 
     def state(self, data: mujoco.MjData) -> dict[str, float | bool]:
         """Shares of doors; by burner the knob's angle in radians and whether it is on (`<location>_on`)."""
@@ -117,8 +134,7 @@ class Hob(Appliance):
         kind = self.record["hob"]
         for location, (share_x, share_y) in self.burners.items():
             x, y = share_x * width, share_y * depth
-            radius = 0.092 if location in ("front_right", "center", "rear_left") else 0.080
-            radius = min(radius, 0.135 * width, 0.17 * depth)
+            radius = self._radius(location)
             lamp = parts.lamp(root, f"burner_{location}", (x, y, top - 0.03), (x, y, top))
             if kind == "gas":
                 parts.tube(root, (x, y, top + 0.006), radius * 0.62, 0.012, "steel_plain", bevel=0.003, collide=False)
@@ -147,7 +163,7 @@ class Hob(Appliance):
 
     def _add_grate(self, parts: Parts, root: mujoco.MjsBody, middle: tuple[float, float, float], radius: float) -> None:
         x, y, top = middle
-        reach, bar = radius * 1.18, 0.010
+        reach, bar = radius * _GRATE_REACH, 0.010
         z = top + _GRATE_M - bar / 2
         for dx, dy in ((1, 0), (0, 1)):
             for sign in (-1, 1):
