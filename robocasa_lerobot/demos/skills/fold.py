@@ -1,4 +1,4 @@
-"""Fold the empty arm as at the start of an episode, round obstacles: where most skills begin from."""
+"""Fold the arm as at the start of an episode, round obstacles: where most skills begin from, and drives too."""
 
 from __future__ import annotations
 
@@ -7,10 +7,10 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from robocasa_lerobot.demos.motion import OPEN, Array, HandTarget, grip_position, hand_rotation
+from robocasa_lerobot.demos.motion import CLOSED, OPEN, Array, HandTarget, grip_position, hand_rotation
 from robocasa_lerobot.demos.planning.approach import Approach
 from robocasa_lerobot.demos.planning.base_path import carried
-from robocasa_lerobot.demos.planning.collision import CollisionChecker
+from robocasa_lerobot.demos.planning.collision import CollisionChecker, Held
 from robocasa_lerobot.demos.planning.costs import REACHING
 from robocasa_lerobot.demos.planning.follow import follow_joint_path
 from robocasa_lerobot.demos.skills.common import draw_back, hold_hand
@@ -18,6 +18,21 @@ from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 
 FOLDED_RAD = 0.35  # of each joint from its angle at the start
 LET_GO_STEPS, OFF_M = 6, 0.08  # of a hand that has just used a handle, which would take the part along
+
+
+def fold_holding(env: KitchenEnv, held: Held) -> Iterator[Array]:
+    """Lead the arm home with an object in the hand: round obstacles where there is a way, else straight."""
+    mine = env.scene.subtree(*held.names)
+    checker = CollisionChecker(env.scene, env.data, allowed=np.flatnonzero(mine).tolist())
+    base, present, home = checker.present_base, checker.present_joints, checker.arm.home
+    checker.allow_present()
+
+    def counts(joints: Array, margin_m: float) -> NDArray[np.int64]:
+        return checker.touched(base, joints, held=held, margin_m=margin_m).counts
+
+    paths = Approach(checker.arm, counts, REACHING)
+    detour = None if paths.straight(present, home) < REACHING.hit else paths.detour(present, home, base)
+    yield from follow_joint_path(env, home if detour is None else detour[0], CLOSED)
 
 
 def fold_arm(env: KitchenEnv) -> Iterator[Array]:

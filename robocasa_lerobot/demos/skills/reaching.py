@@ -18,7 +18,7 @@ from robocasa_lerobot.demos.planning.follow import GENTLY, follow_joint_path
 from robocasa_lerobot.demos.planning.kinematics import Arm
 from robocasa_lerobot.demos.planning.motion_planner import MotionPlan, MotionPlanner, WaypointPath
 from robocasa_lerobot.demos.skills.common import SkillError
-from robocasa_lerobot.demos.skills.fold import FOLDED_RAD, fold_arm
+from robocasa_lerobot.demos.skills.fold import FOLDED_RAD, fold_arm, fold_holding
 from robocasa_lerobot.demos.skills.navigation import drive_to
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.scene.robot_poses import RobotPose
@@ -119,7 +119,7 @@ def go_to(env: KitchenEnv, stand: RobotPose, gripper: float, held: Held | None =
     arm = Arm(env.model, env.data, env.scene.robot)
     full = is_full(held)
     if not full and np.abs(env.data.qpos[arm.addresses] - arm.home).max() > FOLDED_RAD:
-        yield from follow_joint_path(env, arm.home, gripper)
+        yield from follow_joint_path(env, arm.home, gripper) if held is None else fold_holding(env, held)
     with contextlib.suppress(SkillError):
         yield from drive_to(
             env, stand.x, stand.y, stand.yaw, gripper=gripper, held=held if full else None, tolerance_m=0.025
