@@ -90,6 +90,7 @@ class PlaceStrategy:
         turns: of a leaning hand to the left, radians.
         exact: the object must come to within a few millimetres of the place pose.
         falls: the fingers are to open side by side, so that the object falls from between them.
+        aside_m: by how much it may fall beside the place pose then, metres.
         upwards: which way the object's own z axis points in the end, world, where it is turned over in between.
         narrow: whether the hand keeps to a straight line in and out also where that is steep.
         fit: cost of the object's origin (3,) and rotation (3, 3) in the end, by what they leave of the room there.
@@ -107,6 +108,7 @@ class PlaceStrategy:
     turns: tuple[float, ...] = (0.0,)
     exact: bool = False
     falls: bool = False
+    aside_m: float = ASIDE_M
     upwards: Array | None = None
     narrow: bool = False
     fit: Callable[[Array, Array], float] | None = None
@@ -166,7 +168,10 @@ def put(env: KitchenEnv, obj: Graspable, strategy: PlaceStrategy, failed: list[A
     body = data.body(obj.name)
     aside = float(np.linalg.norm((body.xpos - _origin(low, Held.now(data, obj.name)))[:2]))
     before = strategy.falls_off is not None and strategy.falls_off(body.xpos, body.xmat.reshape(3, 3))
-    if pose_error(data, low).position > BLOCKED_M or (strategy.falls and aside > ASIDE_M) or before:
+    blocked = pose_error(data, low).position > BLOCKED_M
+    if blocked or (strategy.falls and aside > strategy.aside_m) or before:
+        if blocked:  # what is in its way stays there: it counts twice
+            failed.append(choice.path.targets[2].position)
         yield from _draw_off(env, above, far, inwards)
         return
     at = HandTarget(grip_position(data), hand_rotation(data))

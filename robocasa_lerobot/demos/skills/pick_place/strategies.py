@@ -25,7 +25,7 @@ from robocasa_lerobot.demos.skills.pick_place.graspable import Graspable
 from robocasa_lerobot.demos.skills.pick_place.location import Location, locate
 from robocasa_lerobot.demos.skills.pick_place.mugs import FROM_THE_SIDE, UNDER_A_SPOUT
 from robocasa_lerobot.demos.skills.pick_place.pick import RELEASE_STEPS, best_grasp
-from robocasa_lerobot.demos.skills.pick_place.place import PlaceStrategy
+from robocasa_lerobot.demos.skills.pick_place.place import ASIDE_M, PlaceStrategy
 from robocasa_lerobot.demos.skills.pick_place.poses.basin_poses import below_spout, is_large, on_floor, room_in
 from robocasa_lerobot.demos.skills.pick_place.poses.counter_poses import NEAR_M, on_counter
 from robocasa_lerobot.demos.skills.pick_place.poses.distance_poses import at_distances, distance_terms, near_to
@@ -88,6 +88,7 @@ FARTHER_OUT_M = 0.12  # how far
 FARTHER_M = 1.1  # of a free place on a counter from the base, where an open drawer keeps the robot off
 LID_GAP_M = 0.005  # of a lid over the rim when the hand opens
 OFF_M = 0.10  # of the hand from what it has let go
+RIM_ROOM_M = 0.015  # between what falls into a mouth and the mouth's edge
 # A vessel as deep as this keeps what it holds when it is tilted by this much as it goes in, metres, radians.
 DEEP_M, DEEP_LEAN = 0.035, float(np.deg2rad(30.0))
 # Of a vessel at its rim, that is to go through a front: the hand is tilted so that it fits under the edge above, yet
@@ -299,12 +300,13 @@ def _into_regions(
         case Blender():
             return PlaceStrategy(
                 over_jug(env, regions[0]), leans=_JUG_LEANS, entries=("out", "across"), in_m=0.2, turns=_JUG_TURNS,
-                falls=True,
+                falls=True, aside_m=_room_beside(obj, regions[0]),
             )  # fmt: skip
         case StandMixer():
             return PlaceStrategy(
-                over_bowl(env, regions[0]), leans=_BOWL_LEANS, entries=("up", "across", "out"), in_m=0.2, falls=True
-            )
+                over_bowl(env, regions[0]), leans=_BOWL_LEANS, entries=("up", "across", "out"), in_m=0.2, falls=True,
+                aside_m=_room_beside(obj, regions[0]),
+            )  # fmt: skip
         case Drawer() as drawer:
             return PlaceStrategy(
                 in_drawer(env, drawer), leans=_DRAWER_LEANS, entries=("up", "across"),
@@ -332,6 +334,12 @@ def _into_regions(
                 entries=("up", "across", "out"), grasp=FOR_A_TIGHT_SHELF if tight else ANY_APPROACH, in_m=0.28,
                 narrow=narrow, fit=rest.cost, falls_off=rest.falls_off,
             )  # fmt: skip
+
+
+def _room_beside(obj: Graspable, mouth: Region) -> float:
+    """By how much an object may fall beside the middle of a mouth, metres: more where that is wide."""
+    widest = float(obj.half_extents(np.eye(3)).max())
+    return max(ASIDE_M, min(mouth.half[:2]) - widest - RIM_ROOM_M)
 
 
 def _is_tight(env: KitchenEnv, obj: Graspable, region: Region) -> bool:
