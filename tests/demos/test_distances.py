@@ -14,6 +14,7 @@ from robocasa_lerobot.demos.planning.base_path import RobotPose
 from robocasa_lerobot.demos.planning.base_room import between
 from robocasa_lerobot.demos.skills.drawers import open_drawer
 from robocasa_lerobot.demos.skills.pick_place.graspable import graspable
+from robocasa_lerobot.demos.skills.pick_place.heaps import uppermost
 from robocasa_lerobot.demos.skills.pick_place.pick import HOPELESS, best_grasp
 from robocasa_lerobot.demos.skills.pick_place.poses.distance_poses import distance_terms, near_to
 from robocasa_lerobot.demos.skills.pick_place.strategies import (
@@ -72,11 +73,13 @@ def test_a_stage_is_not_led_to_what_it_asks_to_keep_away_from() -> None:
         assert near_to(env, away) == []
 
 
-def test_what_lies_between_others_in_a_bowl_can_be_grasped() -> None:
+def test_what_comes_first_of_a_heap_in_a_bowl_can_be_grasped() -> None:
     for env in made("PortionHotDogs"):
-        bun = graspable(env, "hotdog_bun1")
-        strategy = place_strategy(env, env.declaration.stages[0], bun)
-        assert best_grasp(env, bun, grasp_strategy(env, bun, strategy.grasp)).cost < HOPELESS
+        stages = env.declaration.stages
+        stage = stages[uppermost(env, stages, 0)]
+        obj = graspable(env, stage.object)
+        strategy = place_strategy(env, stage, obj)
+        assert best_grasp(env, obj, grasp_strategy(env, obj, strategy.grasp)).cost < HOPELESS
 
 
 @pytest.mark.parametrize("name", ["GarnishPancake", "PackIdenticalLunches"])

@@ -30,6 +30,7 @@ def test_of_what_is_heaped_in_a_bowl_the_uppermost_comes_first() -> None:
         before = [joint.qpos.copy() for joint in (asked, *others)]
         for number, joint in enumerate((asked, *others)):  # all in the bowl, each on those before
             joint.qpos[:3] = bowl + (0.5 + number) * 2 * HIGHER_M * UP
+            joint.qpos[3:7] = (1, 0, 0, 0)  # lying, however they had come to rest
         mujoco.mj_kinematics(env.model, env.data)
         assert uppermost(env, stages, 0) == len(stages) - 1
         asked.qpos[2] = bowl[2] + 8 * HIGHER_M

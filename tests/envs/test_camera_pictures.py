@@ -45,7 +45,7 @@ class Shown:
             depth=True,
             segmentation=True,
         )
-        self.observation, _ = self.env.reset(seed=3)
+        self.observation, _ = self.env.reset(seed=4)
         self.owners = np.array(self.env.segmentation_names)
 
     def owner(self, camera: str) -> np.ndarray:

@@ -119,6 +119,7 @@ def hold(goal: Goal, scene: Scene, data: mujoco.MjData) -> dict[str, bool] | Non
 
 def put_object(scene: Scene, data: mujoco.MjData, name: str, middle: NDArray[np.float64]) -> None:
     """Move the middle of an object, or of where it holds things, to a point of the room, as it is turned."""
+    mujoco.mj_kinematics(scene.model, data)  # it may have been moved before
     free = data.joint(f"{name}_joint0")
     free.qpos[:3] += middle - middle_of(scene, data, name)
     free.qvel[:] = 0.0
@@ -218,9 +219,12 @@ def _under_water(goal: UnderWater, scene: Scene, data: mujoco.MjData) -> None:
 
 @write.register
 def _on_burner(goal: OnBurner, scene: Scene, data: mujoco.MjData) -> None:
+    """On the burner asked for, on the one that it has been put on already, or on the first that is off."""
     hob, name = scene.fixture(goal.fixture, Hob), scene.fill(goal.object)
+    mujoco.mj_kinematics(scene.model, data)
+    nearest, apart = hob.nearest_burner(data, middle_of(scene, data, name))
     others = [location for location in hob.burners if hob.burner_level(data, location) == "off"]
-    burner = scene.fill(goal.burner) or others[0]
+    burner = scene.fill(goal.burner) or (nearest if apart < 0.01 else others[0])
     top = data.site(f"{hob.name}_burner_on_{burner}").xpos
     put_object(scene, data, name, np.array([*top[:2], 0.0]))
     # A hair into the grate, so that they touch.
