@@ -176,7 +176,12 @@ def close_drawer(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
         before = HandTarget(point - inwards * 0.09, rotation)
         yield from move_hand(data, over, CLOSED, tolerance=0.05)
         yield from move_hand(data, before, CLOSED, tolerance=0.02)
-        require_near(data, before, 0.10, f"in front of {drawer.name}")
+        try:
+            require_near(data, before, 0.10, f"in front of {drawer.name}")
+        except SkillError:
+            if attempt + 1 < ATTEMPTS:
+                continue  # a robot that stands before the front has no room to come to it
+            raise
         goal = HandTarget(point + inwards * (drawer.openness(data) * drawer.full_travel + 0.06), rotation)
         yield from move_hand(
             data, goal, CLOSED, speed=PULL_SPEED, max_steps=130, until=lambda: drawer.openness(data) <= CLOSED_GOAL
