@@ -14,6 +14,8 @@ from robocasa_lerobot.demos.skills.drawers import drag_open, make_room
 from robocasa_lerobot.demos.skills.pick_place.by_handle import BY_ONE_END, PAN_BY_THE_HANDLE, has_handle
 from robocasa_lerobot.demos.skills.pick_place.grasp_strategy import (
     ANY_APPROACH,
+    FOR_A_STACK,
+    FOR_A_TIGHT_SHELF,
     FROM_A_SLOT,
     FROM_CRISPER,
     OUT_M,
@@ -100,10 +102,7 @@ LEANING_GRASP = replace(
     worse_grasp=1.0,
     among_tilts=True,
 )
-# Of what is about as high as the room between a fridge's shelves: a hand over it would meet the one above.
-TIGHT_M = 0.06
-_TIGHT_TILTS = in_radians((50, 0.0), (65, 0.0), (40, 0.1), (80, 0.1), (25, 0.3), (0, 0.6))
-FOR_A_TIGHT_SHELF = replace(ANY_APPROACH, tilts=_TIGHT_TILTS, among_tilts=True)
+TIGHT_M = 0.06  # over what stands between shelves: less is a tight one
 LEVEL_HAND = -0.85  # of the hand's approach along the vertical: above it, the hand looks ahead rather than down
 _SMALL, _STEEP, _LEANT, _STEEPEST = np.deg2rad(25.0), np.deg2rad(30.0), np.deg2rad(45.0), np.deg2rad(55.0)
 _OPEN_LEANS, _CLOSED_LEANS = (0.0, _SMALL), (0.0, _STEEP, _STEEPEST)
@@ -135,7 +134,8 @@ def grasp_strategy(env: KitchenEnv, obj: Graspable, free: GraspStrategy, *, kept
         case HingeCabinet() if has_handle(obj):
             return replace(OUT_OF_CABINET, poses=PAN_BY_THE_HANDLE.poses)
         case HingeCabinet() as cabinet:  # the torso, which is up before a wall cabinet, goes down again
-            return replace(between_shelves(env, obj, place), out_m=_way_out(env, obj, cabinet.regions[place.region]))
+            inside = FOR_A_STACK if free is FOR_A_STACK else between_shelves(env, obj, place)
+            return replace(inside, out_m=_way_out(env, obj, cabinet.regions[place.region]))
         case _ if "drawer" in place.region:
             return replace(FROM_CRISPER, first=_pull_out_first(obj, place))
         case _ if in_the_open(place):
@@ -238,8 +238,9 @@ def _by_target(env: KitchenEnv, stage: Stage, obj: Graspable) -> PlaceStrategy:
         stacked = env.scene.objects[holder].item.interior is None and not is_flat(env, holder)
         leans = (0.0,) if stacked else _CLOSED_LEANS
         return PlaceStrategy(
-            poses, leans=leans, entries=("up", "across", "out"), grasp=ANY_APPROACH, in_m=0.25, fit=fit
-        )
+            poses, leans=leans, entries=("up", "across", "out"), grasp=FOR_A_STACK if stacked else ANY_APPROACH,
+            in_m=0.25, fit=fit,
+        )  # fmt: skip
     fixture, part = env.scene.fixture(stage.target), env.scene.part(stage.target, stage.part)
     match fixture:
         case Counter():
