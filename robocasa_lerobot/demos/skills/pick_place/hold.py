@@ -41,6 +41,8 @@ ENTRIES, IN_M = ("up", "across", "out"), 0.22
 # Under a stream: of the highest object below the spout's tip, with costs; shares of the radius beside the stream.
 BELOW_M = ((0.03, 0.0), (0.06, 0.02), (0.10, 0.05), (0.15, 0.1))
 ASIDE_SHARES, ASIDE_COST = (0.0, 0.5), 0.3
+# How far what nothing lies in leans with the hand, so that this reaches under a spout from before it; with costs.
+LEANS_RAD = tuple((float(np.deg2rad(angle)), cost) for angle, cost in ((0.0, 0.0), (35.0, 0.1), (65.0, 0.2)))
 AGAIN, AGAIN_M = 0.5, 0.03  # cost of a hand that goes where it went without success, as near as this
 MOST_SLIP_M = 0.04
 
@@ -163,7 +165,7 @@ def _top(env: KitchenEnv, obj: Graspable) -> float:
 def _choose(
     env: KitchenEnv, stage: Stage, obj: Graspable, failed: list[Array], *, may_drive: bool = True
 ) -> MotionPlan:
-    """The path in that the arm takes best, in all directions that the object may be turned to.
+    """The path in that the arm takes best, in all directions that the object may be turned to, and leant.
 
     Raises:
         SkillError: there is none.
@@ -173,13 +175,19 @@ def _choose(
     level = levelled(data.body(obj.name).xmat.reshape(3, 3))
     poses = hold_poses(env, stage, obj)
     paths = []
-    for pose, index in itertools.product(poses, range(YAWS)):
+    _, left = floor_axes(base_pose(data)[1])
+    for pose, index, (lean, less) in itertools.product(
+        poses, range(YAWS), LEANS_RAD[:1] if obj.contents else LEANS_RAD
+    ):
         yaw = 2 * np.pi * index / YAWS
-        turn = rotation_about(UP, yaw) @ level
+        upright = rotation_about(UP, yaw) @ level
+        turn = rotation_about(-left, lean) @ upright  # a hand that looks down looks ahead then
+        higher = float((obj.cloud @ turn[2]).max() - turn[2] @ pose.local)
+        higher -= float((obj.cloud @ upright[2]).max() - upright[2] @ pose.local)
         rotation = turn @ held.rotation.T
-        at = pose.point - turn @ pose.local - rotation @ held.position
+        at = pose.point - higher * UP - turn @ pose.local - rotation @ held.position
         again = sum(np.linalg.norm(at - other) < AGAIN_M for other in failed)
-        cost = pose.extra + AGAIN * float(again) + 0.08 * min(yaw, 2 * np.pi - yaw)
+        cost = pose.extra + less + AGAIN * float(again) + 0.08 * min(yaw, 2 * np.pi - yaw)
         for name in ENTRIES:
             far = at + IN_M * entry(env, name)
             paths.append(WaypointPath((HandTarget(far, rotation), HandTarget(at, rotation)), cost))
