@@ -46,7 +46,7 @@ LEAST_ASIDE_M, ASIDES_M = 0.03, (0.20, 0.28, 0.12, 0.36, 0.06)
 LEAST_TO_PUSH_M = 0.15  # the same of one that could not be pushed shut: its front is too near to push at
 # Of a drawer that is dragged: how far it is in before it is worth while, and what the hand needs of it.
 PUSHED_IN_M, HAND_ROOM_M = 0.03, 0.08
-LEAST_OPEN_M = 0.15  # tasks that put something into an open drawer begin with more
+LEAST_OPEN_M = 0.20  # a hand with something long in it wants more than half of most drawers
 # Of a drawer's handle from the base, ahead and in all, for its front to be in reach.
 LEAST_TO_DRAG_M, MOST_TO_DRAG_M = -0.05, 0.75
 # The hand comes from over the front's upper edge, goes below it close behind it, and is led beyond where it ends.
