@@ -24,15 +24,9 @@ def fold_holding(env: KitchenEnv, held: Held) -> Iterator[Array]:
     """Lead the arm home with an object in the hand: round obstacles where there is a way, else straight."""
     mine = env.scene.subtree(*held.names)
     checker = CollisionChecker(env.scene, env.data, allowed=np.flatnonzero(mine).tolist())
-    base, present, home = checker.present_base, checker.present_joints, checker.arm.home
     checker.allow_present()
-
-    def counts(joints: Array, margin_m: float) -> NDArray[np.int64]:
-        return checker.touched(base, joints, held=held, margin_m=margin_m).counts
-
-    paths = Approach(checker.arm, counts, REACHING)
-    detour = None if paths.straight(present, home) < REACHING.hit else paths.detour(present, home, base)
-    yield from follow_joint_path(env, home if detour is None else detour[0], CLOSED)
+    way = _way_home(checker, held)
+    yield from follow_joint_path(env, checker.arm.home if way is None else way, CLOSED)
 
 
 def fold_arm(env: KitchenEnv) -> Iterator[Array]:
@@ -53,14 +47,20 @@ def fold_arm(env: KitchenEnv) -> Iterator[Array]:
         base, present = checker.present_base, checker.present_joints
     # What it leans on already is no reason to stay there.
     checker.allow(checker.touched(base[None], present[None]).all())
+    way = _way_home(checker)
+    if way is not None:
+        yield from follow_joint_path(env, way, OPEN)
+
+
+def _way_home(checker: CollisionChecker, held: Held | None = None) -> Array | None:
+    """Joint angles home, straight (7,) or round obstacles (k, 7), that meet nothing new; None where there is no way."""
+    base, present, home = checker.present_base, checker.present_joints, checker.arm.home
 
     def counts(joints: Array, margin_m: float) -> NDArray[np.int64]:
-        return checker.touched(np.tile(base, (len(joints), 1)), joints, margin_m=margin_m).counts
+        return checker.touched(np.tile(base, (len(joints), 1)), joints, held=held, margin_m=margin_m).counts
 
     paths = Approach(checker.arm, counts, REACHING)
     if paths.straight(present, home) < REACHING.hit:
-        yield from follow_joint_path(env, home, OPEN)
-        return
+        return home
     detour = paths.detour(present, home, base)
-    if detour is not None:
-        yield from follow_joint_path(env, detour[0], OPEN)
+    return None if detour is None else detour[0]
