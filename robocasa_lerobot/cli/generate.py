@@ -26,10 +26,10 @@ def configure(parser: argparse.ArgumentParser) -> None:
     add_kitchen_options(parser)
     parser.add_argument(
         "--method",
-        choices=("contacts", "mimicgen"),
+        choices=("contacts", "mimicgen", "replay"),
         default="contacts",
         help="contacts: they are carried over, and the rest is planned (default); mimicgen: whole subtasks, joined by "
-        "lines, with a base at rest, as published",
+        "lines, with a base at rest, as published; replay: the sources' own actions in their own scenes, with noise",
     )
     parser.add_argument(
         "--template", type=Path, metavar="JSON", help="of --method mimicgen: one of its templates (default: derived)"

@@ -88,7 +88,7 @@ class RecordingSettings:
         """Make the attempt of a seed."""
         return self.labelled_episode(env, seed, demonstrate)
 
-    def labelled_episode(self, env: KitchenEnv, seed: int, actor: Actor) -> Recording:
+    def labelled_episode(self, env: KitchenEnv, seed: int, actor: Actor, noise_seed: int | None = None) -> Recording:
         """An episode of an actor's; where noise comes to its actions, what it wanted is kept beside them."""
         clean: list[Array] = []
 
@@ -98,7 +98,13 @@ class RecordingSettings:
                 yield wanted
 
         recording = record_episode(
-            env, seed, action_noise=self.action_noise, images=self.images, varied=self.varied, actor=noted
+            env,
+            seed,
+            action_noise=self.action_noise,
+            images=self.images,
+            varied=self.varied,
+            actor=noted,
+            noise_seed=noise_seed,
         )
         if self.action_noise > 0.0:
             recording.per_step[CLEAN_ACTION] = np.array(clean)[: len(recording.actions)]

@@ -146,6 +146,7 @@ def record_episode(
     images: bool = False,
     varied: bool = False,
     actor: Actor = demonstrate,
+    noise_seed: int | None = None,
 ) -> Recording:
     """Attempt a demonstration of the env's task in the scene of `seed`.
 
@@ -157,10 +158,11 @@ def record_episode(
         images: also keep the camera pictures.
         varied: draw how the demonstration is carried out (`MotionStyle`) from the seed; else as the skills have it.
         actor: what acts; it is asked for an action at a time, each of which is carried out before the next.
+        noise_seed: of the action noise, where the same scene is recorded several times.
     """
     assert not env.terminate_on_success, "the recorder decides when an episode ends"
     env.render_observations = False
-    rng = np.random.default_rng([seed, _NOISE_STREAM])
+    rng = np.random.default_rng([seed if noise_seed is None else noise_seed, _NOISE_STREAM])
     style = MotionStyle.draw(np.random.default_rng([seed, _STYLE_STREAM])) if varied else PLAIN
     _, info = env.reset(seed=seed)
     model_file = env.scene.spec.to_xml()

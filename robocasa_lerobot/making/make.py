@@ -108,21 +108,24 @@ class MadeDataset:
 
     def _settings(self, workers: int) -> RecordingSettings:
         """What is recorded, or generated from sources that are recorded before."""
+        from robocasa_lerobot.demos.generate.replays import REPLAY
         from robocasa_lerobot.demos.generate.settings import GenerationSettings
         from robocasa_lerobot.demos.generate.sources.prepare import prepare_files
         from robocasa_lerobot.demos.generate.stage import can_generate
         from robocasa_lerobot.demos.recording import record_task
         from robocasa_lerobot.envs.tasks.registry import get_task
 
-        settings, number = recording_settings(self.need), _recipe(self.need).sources
-        if number is None or not can_generate(get_task(settings.task)):
+        settings, recipe = recording_settings(self.need), _recipe(self.need)
+        number, repeats = recipe.sources, recipe.method == REPLAY
+        if number is None or not (repeats or can_generate(get_task(settings.task))):
             return settings
-        # In kitchens of the same kind; of other seeds, since nothing is generated in a source's own scene.
+        # In kitchens of the same kind; of other seeds, since nothing but replays is made in a source's own scene.
         own = replace(settings, episodes=number, seed=settings.seed + SOURCE_SEEDS, action_noise=0.0)
         sources = record_task(own, self.work / SOURCES, workers=workers, show_progress=False)
-        deque(prepare_files([sources.path], workers=workers), maxlen=0)
+        if not repeats:
+            deque(prepare_files([sources.path], workers=workers), maxlen=0)
         values = {entry.name: getattr(settings, entry.name) for entry in fields(settings)}
-        return GenerationSettings.of(sources.path.parent, **values | {"varied": False})
+        return GenerationSettings.of(sources.path.parent, **values | {"varied": False, "method": recipe.method})
 
     def _draw_again(self, need: Need, workers: int) -> None:
         from robocasa_lerobot.convert.rerender.camera_configs import camera_set

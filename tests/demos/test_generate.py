@@ -14,8 +14,8 @@ import pytest
 from cluster_work import hdf5_content
 from killed_runs import run_killed
 
-from robocasa_lerobot import cli
-from robocasa_lerobot.demos.attempts import RecordingSettings
+from robocasa_lerobot import cli, contract
+from robocasa_lerobot.demos.attempts import CLEAN_ACTION, RecordingSettings
 from robocasa_lerobot.demos.generate.course import KINDS, source_costs
 from robocasa_lerobot.demos.generate.select import NEAREST, Manner, narrowed, pose_distance
 from robocasa_lerobot.demos.generate.settings import GenerationSettings
@@ -25,7 +25,7 @@ from robocasa_lerobot.demos.generate.sources.rules import CutRules, read_rules, 
 from robocasa_lerobot.demos.generate.sources.source import digest_of, sources_of
 from robocasa_lerobot.demos.generate.sources.transform import make_pose, yaw_pose
 from robocasa_lerobot.demos.recording import record_tasks
-from robocasa_lerobot.demos.replay import replay
+from robocasa_lerobot.demos.replay import read_demonstration, replay
 from robocasa_lerobot.errors import UserError
 
 TASK = "CloseDrawer"
@@ -182,6 +182,38 @@ def test_a_source_succeeds_in_its_own_scene(sources: Path) -> None:
         recording = settings.record(env, source.seed)
         env.close()
         assert recording.success, recording.reason
+
+
+@pytest.mark.slow
+def test_replays_with_noise_repeat_each_source_in_its_own_scene(
+    sources: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    words = f"generate --source {sources} --tasks {TASK} --episodes 4 --seed 100900 --workers 1 --method replay".split()
+    assert cli.main([*words, "--split", "pretrain", "--out", str(tmp_path)]) == 2
+    assert "--action-noise" in capsys.readouterr().err
+    noise = ("--action-noise", "0.02")
+    assert cli.main([*words, *noise, "--split", "target", "--out", str(tmp_path)]) == 2
+    assert "split of one of them is pretrain" in capsys.readouterr().err
+    assert cli.main([*words, *noise, "--split", "pretrain", "--out", str(tmp_path)]) == 0
+    own = [read_demonstration(sources / f"{TASK}.hdf5", f"demo_{number}") for number in range(2)]
+    path = tmp_path / f"{TASK}.hdf5"
+    executed = []
+    for number in range(4):
+        made = read_demonstration(path, f"demo_{number}")
+        with h5py.File(path) as file:
+            group = file[f"data/demo_{number}"]
+            source = own[int(group["src_demo_inds"][0])]
+            wanted = contract.hdf5_to_stored(group[CLEAN_ACTION][()])
+        assert made.seed == source.seed
+        np.testing.assert_array_equal(made.states[0], source.states[0])
+        common = min(len(wanted), len(source.actions))
+        np.testing.assert_allclose(wanted[:common], source.actions[:common], atol=1e-6)
+        assert 0.0 < np.abs(made.actions[:common] - source.actions[:common]).std() < 0.03
+        assert replay(path, f"demo_{number}").actions
+        executed.append(made.actions.tobytes())
+    assert len(set(executed)) == 4, "noise follows from the attempt, not from the scene"
+    assert cli.main(["convert", str(path), "--out", str(tmp_path / "data"), "--image-size", "64"]) == 0
+    assert cli.main(["verify", str(tmp_path / "data")]) == 0
 
 
 @pytest.mark.slow

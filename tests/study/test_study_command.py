@@ -16,7 +16,9 @@ from robocasa_lerobot.study.settings import load_study
 from robocasa_lerobot.study.stored import ABOUT, is_stored, stored_folder
 from robocasa_lerobot.training.config.experiment import load_experiment
 
-TINY = ("--scale=tiny", "--episodes=pretrain=1,target=1,few=1", "--seeds=1", "--measure=0")
+TINY = ("--scale=tiny", "--seeds=1", "--measure=0")
+STUDIES = {"study.yaml": "pretrain=1,target=1,few=1", "study_generation.yaml": "sources=1,made=1"}  # and demonstrations
+PARTS = [(file, part) for file in STUDIES for part in load_study(configs_folder() / file).parts]
 
 
 def study(folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
@@ -96,19 +98,22 @@ def test_a_trial_of_the_study_does_not_stand_for_it(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 @pytest.mark.render
-@pytest.mark.parametrize("part", load_study().parts)
-def test_a_part_runs_from_data_to_its_table(part: str, tmp_path: Path) -> None:
-    done = study(tmp_path, part, *TINY)
+@pytest.mark.parametrize(("file", "part"), PARTS)
+def test_a_part_runs_from_data_to_its_table(file: str, part: str, tmp_path: Path) -> None:
+    path = configs_folder() / file
+    words = (part, f"--config_path={path}", f"--episodes={STUDIES[file]}", *TINY)
+    done = study(tmp_path, *words)
     assert done.returncode == 0, done.stderr[-3000:]
-    results = tmp_path / "outputs/study_tiny/results"
+    whole = load_study(path, seeds=1)
+    results = tmp_path / f"{whole.root}_tiny" / "results"
     page = (results / "results.md").read_text(encoding="utf-8")
     assert "these numbers mean nothing" in page
-    config = load_study(seeds=1).parts[part]
+    config = whole.parts[part]
     for experiment in config.experiments:
         about = json.loads((results / experiment / "seed_0/about.json").read_text(encoding="utf-8"))
         assert about["scale"]
     for row in config.rows:
         assert f"|{row}|" in page, "every row has trials"
-    again = study(tmp_path, part, *TINY)
+    again = study(tmp_path, *words)
     assert again.returncode == 0
     assert "==" not in again.stdout, "what has ended is not run again"

@@ -10,26 +10,32 @@ import yaml
 from robocasa_lerobot.config_files import config_names, configs_folder
 from robocasa_lerobot.data.registry.registry import open_registry
 from robocasa_lerobot.errors import UnknownNameError, UserError
-from robocasa_lerobot.study.settings import EXPERIMENTS, load_study
+from robocasa_lerobot.study.settings import EXPERIMENTS, StudyConfig, load_study
 from robocasa_lerobot.training.config.experiment import load_experiment
 from robocasa_lerobot.training.planning.evaluations import phase_evaluations
 
 STUDY = load_study()
-ROWS = [(part, row) for part, config in STUDY.parts.items() for row in config.rows]
+GENERATION = load_study(configs_folder() / "study_generation.yaml")
+PARTS = [(study, part) for study in (STUDY, GENERATION) for part in study.parts]
+ROWS = [(study, part, row) for study, part in PARTS for row in study.parts[part].rows]
 
 
-@pytest.mark.parametrize(("part", "row"), ROWS, ids=lambda value: value.replace(" ", "_"))
-def test_a_row_is_a_phase_with_its_evaluation(part: str, row: str) -> None:
-    wanted = STUDY.parts[part].rows[row]
+def name_of(value: object) -> str:
+    return value.replace(" ", "_") if isinstance(value, str) else ""
+
+
+@pytest.mark.parametrize(("study", "part", "row"), ROWS, ids=name_of)
+def test_a_row_is_a_phase_with_its_evaluation(study: StudyConfig, part: str, row: str) -> None:
+    wanted = study.parts[part].rows[row]
     experiment = load_experiment(configs_folder() / "experiments" / EXPERIMENTS / f"{wanted.experiment}.yaml")
     names = [evaluation.name for evaluation in phase_evaluations(experiment.phase(wanted.phase))]
     assert wanted.evaluation in names
 
 
-@pytest.mark.parametrize("part", STUDY.parts)
-def test_the_evaluations_of_a_part_try_the_tasks_of_its_columns(part: str) -> None:
-    sets = open_registry(str(configs_folder() / STUDY.registry)).task_sets
-    config = STUDY.parts[part]
+@pytest.mark.parametrize(("study", "part"), PARTS, ids=name_of)
+def test_the_evaluations_of_a_part_try_the_tasks_of_its_columns(study: StudyConfig, part: str) -> None:
+    sets = open_registry(str(configs_folder() / study.registry)).task_sets
+    config = study.parts[part]
     tried: dict[str, set[str]] = {}
     for row, wanted in config.rows.items():
         experiment = load_experiment(configs_folder() / "experiments" / EXPERIMENTS / f"{wanted.experiment}.yaml")
@@ -45,8 +51,8 @@ def test_the_evaluations_of_a_part_try_the_tasks_of_its_columns(part: str) -> No
         assert {row for row, own in tried.items() if columns <= own} == set(config.rows)
 
 
-def test_every_experiment_of_the_study_is_in_it() -> None:
-    named = {experiment for part in STUDY.parts.values() for experiment in part.experiments}
+def test_every_experiment_of_a_study_is_in_one() -> None:
+    named = {experiment for study, part in PARTS for experiment in study.parts[part].experiments}
     start = f"{EXPERIMENTS}/"
     there = {name.removeprefix(start) for name in config_names("experiments") if name.startswith(start)}
     assert named == there

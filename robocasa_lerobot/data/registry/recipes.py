@@ -10,10 +10,11 @@ import sys
 from dataclasses import dataclass
 from pathlib import Path
 
-from robocasa_lerobot.errors import UserError
+from robocasa_lerobot.errors import UnknownNameError, UserError
 
 _NAMES = "robocasa_lerobot.demos.names"
 IMAGE_SIZE = 128  # pixels: what the policies of the small experiments look at
+METHODS = ("contacts", "mimicgen", "replay")  # see `demos.generate.settings`
 
 
 @dataclass
@@ -30,6 +31,7 @@ class RecipeConfig:
         image_size: height and width of the pictures, pixels.
         sources: so many demonstrations are recorded, and multiplied to as many as asked for, as `generate` does; null
             records all of them. A task that cannot be generated yet is recorded, too.
+        method: how sources are multiplied, as `generate --method`; `replay` repeats them with `action_noise`.
         redraw: instead of recording: `path` of the registry's dataset whose episodes are drawn again.
         camera_set: of the cameras that `redraw` draws with, as `render --camera-set`.
     """
@@ -42,6 +44,7 @@ class RecipeConfig:
     varied: bool = True
     image_size: int = IMAGE_SIZE
     sources: int | None = None
+    method: str = METHODS[0]
     redraw: str | None = None
     camera_set: str | None = None
 
@@ -50,6 +53,10 @@ class RecipeConfig:
             raise UserError("recipe of a dataset: `redraw` and `camera_set` go together; one of them is missing.")
         if self.sources is not None and self.sources < 1:
             raise UserError(f"recipe of a dataset: `sources` is {self.sources}; it takes one at least, or null.")
+        if self.method not in METHODS:
+            raise UnknownNameError("method of a dataset's recipe", self.method, METHODS)
+        if self.method != METHODS[0] and self.sources is None:
+            raise UserError(f"recipe of a dataset: method {self.method} multiplies `sources`; say how many.")
 
 
 @functools.cache

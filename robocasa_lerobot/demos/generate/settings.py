@@ -14,6 +14,14 @@ from robocasa_lerobot.demos.generate.course import KINDS, Course
 from robocasa_lerobot.demos.generate.mimicgen.plain import Sources, plain_episode, read_sources
 from robocasa_lerobot.demos.generate.mimicgen.subtasks import digest_of_infos
 from robocasa_lerobot.demos.generate.mimicgen.template import derived_template, template_from
+from robocasa_lerobot.demos.generate.replays import (
+    REPLAY,
+    check_scenes,
+    digest_of_actions,
+    recorded,
+    replayed,
+    segment_of,
+)
 from robocasa_lerobot.demos.generate.select import Manner
 from robocasa_lerobot.demos.generate.sources.source import (
     Source,
@@ -24,6 +32,7 @@ from robocasa_lerobot.demos.generate.sources.source import (
 )
 from robocasa_lerobot.demos.generate.stage import generated
 from robocasa_lerobot.demos.recorder import Recording
+from robocasa_lerobot.demos.replay import Demonstration
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.errors import UserError
 
@@ -39,7 +48,8 @@ class GenerationSettings(RecordingSettings):
         source: file or folder of prepared demonstrations.
         sources: what they are, as `digest_of` says it.
         method: `contacts` carries contacts over and plans the rest; `mimicgen` carries whole subtasks over, joined by
-            lines, the base at rest.
+            lines, the base at rest; `replay` repeats the sources' own actions in their own scenes, one after the other,
+            with the noise of the attempt's seed.
         template: of `mimicgen`, what its subtasks are: JSON of one of MimicGen's templates; empty derives them.
         select, base, bridge: see `Manner`; of `contacts`.
         rules: how stages are cut, where that is not derived: JSON of what `rules.rules_from` takes.
@@ -65,9 +75,13 @@ class GenerationSettings(RecordingSettings):
         """With the sources looked at.
 
         Raises:
-            UserError: none is prepared, or they are seeds of the attempts.
+            UserError: none is prepared, they are seeds of the attempts, or their scenes are not made again.
         """
         settings = cls(source=str(source), **values)
+        if settings.method == REPLAY:
+            own = [one for _, one in settings.recorded()]
+            check_scenes(own, settings)
+            return cls(source=str(source), sources=digest_of_actions(own), **values)
         if settings.method == MIMICGEN and settings.template:  # of files that others have prepared
             return cls(source=str(source), sources=digest_of_infos(settings.subtasks().infos), **values)
         found = settings.read()
@@ -92,6 +106,12 @@ class GenerationSettings(RecordingSettings):
         template, alike = derived_template(self.read())
         return read_sources(place, template, tuple(source.name for source in alike))
 
+    def recorded(self) -> list[tuple[str, Demonstration]]:
+        """The task's own demonstrations as they were recorded, by their names."""
+        place = place_of(self.folder, self.task)
+        found = list(recorded(place, place.stat().st_mtime if place.exists() else 0.0))
+        return found[: self.first_sources] if self.first_sources else found
+
     @property
     def folder(self) -> Path:
         """That the sources lie in, or the file."""
@@ -112,8 +132,21 @@ class GenerationSettings(RecordingSettings):
                 ),
                 course,
             )
+        if self.method == REPLAY:
+            return self._replayed(env, seed, Course([], rng, Manner(), self.spread))
         course = Course(self.read(), rng, Manner(self.select, self.base, self.bridge), self.spread, self.cap)
         recording = self.labelled_episode(env, seed, lambda env, style, log: generated(env, style, log, course))
+        return labelled(recording, course)
+
+    def _replayed(self, env: KitchenEnv, seed: int, course: Course) -> Recording:
+        """The attempt of a seed at repeating a source, each of which has its turn."""
+        found = self.recorded()
+        number = (seed - self.seed) % len(found)
+        name, source = found[number]
+        course.used.append(segment_of(name, number, source))
+        recording = self.labelled_episode(
+            env, source.seed, lambda env, _, log: course.counted(replayed(env, log, source, number, course)), seed
+        )
         return labelled(recording, course)
 
 
