@@ -248,3 +248,13 @@ def test_only_what_was_piled_up_is_watched(monkeypatch: pytest.MonkeyPatch) -> N
     scene = scene_in("PickPlaceCounterToSink", 22, 31)
     monkeypatch.setattr(Scene, "placed_data", None)
     ask_for_rest(scene)
+
+
+def test_noise_that_leads_the_arm_into_a_handle_is_drawn_again() -> None:
+    task = get_task("PrepFridgeForCleaning")
+    scene = build_scene(task, "pretrain", 3_458, kitchens=[(34, 58)])
+    first = scene.placed_data(np.random.default_rng(3_458))
+    mujoco.mj_forward(scene.model, first)
+    assert scene.robot_touches(first) == ["fridge_fridge_right_door"]
+    data, _ = scene.initial_data(np.random.default_rng(3_458))
+    assert not robot_touches(scene, data)

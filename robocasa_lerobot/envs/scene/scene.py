@@ -26,6 +26,7 @@ from robocasa_lerobot.envs.scene.robot_poses import RobotPose, nearest_free, sta
 from robocasa_lerobot.envs.scene.words import Words
 
 SETTLE_STEPS = 10  # control steps without a command after placing everything (docs/robocasa.md, section 1)
+_NOISE_TRIES = 10  # of the arm's start, until it touches nothing
 
 
 class FirstState(Protocol):
@@ -139,6 +140,13 @@ class Scene(Drawn):
             self._subtrees[bodies] = subtree(self.model, *bodies)
         return self._subtrees[bodies]
 
+    def robot_touches(self, data: mujoco.MjData) -> list[str]:
+        """Names of the bodies, but for the floor, that the robot is in contact with in a state."""
+        robot = self.subtree("robot0_base")
+        sides = self.model.geom_bodyid[data.contact.geom].reshape(-1, 2)
+        others = sides[robot[sides].sum(axis=1) == 1]
+        return sorted({self.model.body(side).name for side in others[~robot[others]]} - {"floor"})
+
     def fingers(self) -> tuple[NDArray[np.bool_], ...]:
         """For each finger of the gripper, which bodies of the model belong to it, (nbody,) each."""
         names = (self.model.body(self.model.joint(joint).bodyid[0]).name for joint in self.robot.names.finger_joints)
@@ -175,9 +183,15 @@ class Scene(Drawn):
         return data
 
     def initial_data(self, rng: np.random.Generator) -> tuple[mujoco.MjData, Controller]:
-        """State at the start of an episode: everything placed, then settled without commands."""
-        data = self.placed_data(rng)
-        mujoco.mj_forward(self.model, data)
+        """State at the start of an episode: everything placed, then settled without commands.
+
+        Noise that would lead the arm into something, as the handle before which it stands, is drawn again.
+        """
+        for _ in range(_NOISE_TRIES):
+            data = self.placed_data(rng)
+            mujoco.mj_forward(self.model, data)
+            if not self.robot_touches(data):
+                break
         controller = self.robot.controller(self.model, data)
         controller.reset()
         hold = np.zeros(ACTION_SIZE)

@@ -26,7 +26,7 @@ def ask_for_room(scene: Scene) -> None:
     for one, other, depth in _deeper(scene.model, data, SUNK_M):
         if objects[scene.model.body(one).id] or objects[scene.model.body(other).id]:
             raise PlacementError(f"{one} reaches {depth:.3f} m into {other}")
-    if touched := _touched(scene, data):
+    if touched := scene.robot_touches(data):
         raise PlacementError(f"the robot touches {', '.join(touched)}")
 
 
@@ -49,14 +49,7 @@ def _deeper(model: mujoco.MjModel, awake: mujoco.MjData, deeper_m: float) -> lis
 
 def robot_touches(scene: Scene, data: mujoco.MjData) -> list[str]:
     """Names of the bodies that the robot touches: where an episode begins, it stands free."""
-    return _touched(scene, _awake(scene.model, data))
-
-
-def _touched(scene: Scene, awake: mujoco.MjData) -> list[str]:
-    robot = scene.subtree("robot0_base")
-    sides = scene.model.geom_bodyid[awake.contact.geom].reshape(-1, 2)
-    others = [side for pair in sides for side in pair if robot[pair].sum() == 1 and not robot[side]]
-    return sorted({scene.model.body(other).name for other in others} - {"floor"})
+    return scene.robot_touches(_awake(scene.model, data))
 
 
 def _awake(model: mujoco.MjModel, data: mujoco.MjData) -> mujoco.MjData:
