@@ -18,6 +18,7 @@ EXAMPLE = (
 
 def configure(parser: argparse.ArgumentParser) -> None:
     """Add the arguments."""
+    from robocasa_lerobot.data.registry.recipes import METHODS
     from robocasa_lerobot.jobs.executors import add_options
 
     parser.add_argument(
@@ -26,8 +27,8 @@ def configure(parser: argparse.ArgumentParser) -> None:
     add_kitchen_options(parser)
     parser.add_argument(
         "--method",
-        choices=("contacts", "mimicgen", "replay"),
-        default="contacts",
+        choices=METHODS,
+        default=METHODS[0],
         help="contacts: they are carried over, and the rest is planned (default); mimicgen: whole subtasks, joined by "
         "lines, with a base at rest, as published; replay: the sources' own actions in their own scenes, with noise",
     )
