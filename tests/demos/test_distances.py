@@ -110,6 +110,12 @@ def test_what_fills_the_room_between_shelves_is_not_grasped_from_above_it() -> N
         assert place_strategy(env, stage, pitcher).grasp is FOR_A_TIGHT_SHELF
 
 
+def test_what_goes_behind_others_on_a_shelf_is_not_grasped_from_above_it() -> None:
+    for env in made("LoadFridgeFifo"):
+        stage = next(stage for stage in env.declaration.stages if stage.verb == "place")
+        assert place_strategy(env, stage, graspable(env, stage.object)).grasp is FOR_A_TIGHT_SHELF
+
+
 def test_a_drawer_is_opened_from_beside_by_a_robot_that_stood_before_it() -> None:
     for env in made("DeliverStraw"):
         drawer = env.scene.fixture("drawer", Drawer)

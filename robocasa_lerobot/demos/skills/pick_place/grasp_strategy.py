@@ -68,7 +68,8 @@ FROM_ABOVE = GraspStrategy(((0.0, 0.0), (np.deg2rad(30.0), 0.25)))
 ANY_APPROACH = GraspStrategy(
     ((0.0, 0.0), (np.deg2rad(35.0), 0.1), (np.deg2rad(65.0), 0.2), (np.deg2rad(88.0), 0.3)), ("up", "across", "out")
 )
-# Of what is about as high as the room between a fridge's shelves: a hand over it would meet the one above.
+# Of what is about as high as the room between a fridge's shelves, or goes far in: a hand over it would meet the one
+# above.
 _TIGHT_TILTS = in_radians((50, 0.0), (65, 0.0), (40, 0.1), (80, 0.1), (25, 0.3), (0, 0.6))
 FOR_A_TIGHT_SHELF = replace(ANY_APPROACH, tilts=_TIGHT_TILTS, among_tilts=True)
 # Of what is stacked between shelves, where it may not lean: the lower the hand behind it, the better.

@@ -329,7 +329,8 @@ def _into_regions(
             # Past the edge of what it came from, a shelf's or a drawer's, in a straight line.
             narrow = "drawer" in locate(env, obj.name).region
             rest = ShelfRest(env, obj, regions)
-            tight = isinstance(fixture, Fridge) and all(_is_tight(env, obj, region) for region in regions)
+            # Far in, the hand and not only its fingers is below the shelf above.
+            tight = isinstance(fixture, Fridge) and (behind or all(_is_tight(env, obj, region) for region in regions))
             return PlaceStrategy(
                 in_regions(env, obj, regions, (0.0,), columns, behind=behind), leans=_CLOSED_LEANS,
                 entries=("up", "across", "out"), grasp=FOR_A_TIGHT_SHELF if tight else ANY_APPROACH, in_m=0.28,
