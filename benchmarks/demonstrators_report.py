@@ -21,6 +21,7 @@ AIM_MEAN, AIM_TASK, AIM_TIMES_HUMAN = 0.94, 0.70, 1.5
 AIM_MEAN_COMPOSITE, AIM_COMPOSITE = 0.80, 0.40
 _SPLITS = {"target": "#1f77b4", "pretrain": "#ff7f0e"}
 _REASONS = 3
+_WORST = 20  # tasks whose failures are told by stage
 
 
 def summary(trials: Sequence[Trial], able: Mapping[str, bool]) -> dict[str, Any]:
@@ -46,6 +47,7 @@ def summary(trials: Sequence[Trial], able: Mapping[str, bool]) -> dict[str, Any]
             }
             entry |= _seconds([trial for trial in mine if trial.success], human)
             entry["failures"] = dict(Counter(_kind(t) for t in mine if not t.success).most_common(_REASONS))
+            entry["failed_at"] = dict(Counter(_place_of(t) for t in mine if not t.success).most_common())
             entry["stages"] = _stages(mine)
             entry["failed_seeds"] = sorted([t.split, t.seed] for t in mine if not t.success)
         out[name] = entry
@@ -121,9 +123,24 @@ def page(body: Mapping[str, Any], picture: str) -> str:
         *("|".join(["", *row, ""]) for row in _rows(body)),
         "",
         "`s`: median of the simulated seconds of the demonstrations that succeeded; `human s`: of human ones.",
+        *_worst_page(body),
         *_stages_page(body),
     ]
     return "\n".join(lines) + "\n"
+
+
+def _worst_page(body: Mapping[str, Any]) -> list[str]:
+    """Where the tasks with the lowest rates fail, and why; those that always succeed are left out."""
+    tried = [(task["success_rate"], name) for name, task in body["tasks"].items() if task.get("failed_at")]
+    rows = [
+        f"|{name}|{place}|{count}|"
+        for _, name in sorted(tried)[:_WORST]
+        for place, count in body["tasks"][name]["failed_at"].items()
+    ]
+    if not rows:
+        return []
+    head = ["|task|first stage that was not done, and the reason|failures|", "|---|---|--:|"]
+    return ["", f"## Where the worst {min(len(tried), _WORST)} fail", "", *head, *rows]
 
 
 def _stages_page(body: Mapping[str, Any]) -> list[str]:
@@ -264,6 +281,12 @@ def _seconds(solved: Sequence[Trial], human: float | None) -> dict[str, Any]:
         "seconds_max": round(max(seconds), 2),
         "times_human": round(median / human, 3) if human else None,
     }
+
+
+def _place_of(trial: Trial) -> str:
+    """The first stage that a failed trial had not done, counted from 1, and the kind of its failure."""
+    undone = (f"{i} {stage}: " for i, (stage, _, done, _) in enumerate(trial.stages, start=1) if not done)
+    return next(undone, "all stages done: " if trial.stages else "") + _kind(trial)
 
 
 def _kind(trial: Trial) -> str:

@@ -61,11 +61,30 @@ def test_rates_times_and_reasons_are_counted(bench: ModuleType, tmp_path: Path) 
     assert found["mean_success_counting_missing_as_0"] == pytest.approx(0.5 / 3)
     assert found["tasks_with_demonstrator"] == pytest.approx(2 / 3)
     assert bench.per_hour(trials) == {"one_process": 900.0, "all_processes": 1800.0}
+    assert drawer["failed_at"] == {"the hand stayed # cm away": 3}  # of trials that do not say their stages
     body = {"tasks": tasks, "ratios": found, "demonstrations_per_hour": bench.per_hour(trials)}
     assert "OpenDrawer" in report.text(body)
     assert "no demonstrator: OpenFridge" in report.text(body)
     report.draw(tasks, tmp_path / "rates.png")
     assert (tmp_path / "rates.png").stat().st_size > 10_000
+
+
+def test_the_worst_tasks_are_told_where_they_fail(bench: ModuleType) -> None:
+    report = importlib.import_module("demonstrators_report")
+    first, second = ("doors open", 1, True, False), ("doors close", 2, False, False)
+    trials = [_trial(bench, "OpenDrawer", "target", seed, False, stages=(first, second)) for seed in range(2)]
+    trials += [_trial(bench, "OpenDrawer", "target", 2, False, stages=(first, (*second[:2], True, False)))]
+    trials += [_trial(bench, "CloseDrawer", "target", 0, True, stages=(first, second))]
+    tasks = report.summary(trials, dict.fromkeys(("OpenDrawer", "CloseDrawer"), True))
+    assert "\n".join(report._worst_page({"tasks": tasks})).splitlines()[1:] == [
+        "## Where the worst 1 fail",
+        "",
+        "|task|first stage that was not done, and the reason|failures|",
+        "|---|---|--:|",
+        "|OpenDrawer|2 doors close: the hand stayed # cm away|2|",
+        "|OpenDrawer|all stages done: the hand stayed # cm away|1|",
+    ]
+    assert report._worst_page({"tasks": {"CloseDrawer": tasks["CloseDrawer"]}}) == []
 
 
 def test_finished_trials_are_kept_replaced_and_forgotten(
