@@ -14,12 +14,21 @@ from robocasa_lerobot.demos.demonstrator import can_demonstrate
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.kitchens.appliances.kinds.sink import Sink
 from robocasa_lerobot.envs.kitchens.fixtures.cabinets import HingeCabinet
-from robocasa_lerobot.envs.objects.catalogue import auxiliary
+from robocasa_lerobot.envs.objects.catalogue import Instance, auxiliary
 from robocasa_lerobot.envs.predicates import AllOf, ForEach, ObjectOn, StateIs
 from robocasa_lerobot.envs.scene.build import build_scene
 from robocasa_lerobot.envs.scene.scene import Scene
-from robocasa_lerobot.envs.scene.spec import Choice, FixtureSpec, ObjectSpec, Placement, RobotStart, SampleRegion
-from robocasa_lerobot.envs.tasks.registry import get_task
+from robocasa_lerobot.envs.scene.spec import (
+    Choice,
+    FixtureSpec,
+    ObjectSpec,
+    OnCounter,
+    Placement,
+    RobotStart,
+    SampleRegion,
+)
+from robocasa_lerobot.envs.scene.task_parameters import draw_choices, item_of, name_of, number_of
+from robocasa_lerobot.envs.tasks.registry import get_task, task_names
 from robocasa_lerobot.envs.tasks.stage_text import stage_text
 from robocasa_lerobot.envs.tasks.task import BoundTask, Stage, StagesWhen, Task
 from robocasa_lerobot.envs.tasks.typical import goal_of, stages_of
@@ -332,3 +341,31 @@ def test_lists() -> None:
     ):
         assert plural(word) == several
     assert number_word(12) == "12"
+
+
+def test_no_object_takes_the_last_category_of_one_that_is_drawn_later() -> None:
+    """A tool in the drawer that was a bowl left SnackSorting none for the counter, in one scene of forty."""
+    for name in task_names():
+        task = get_task(name)
+        drawn_freely = replace(task, choices=tuple(choice for choice in task.choices if not choice.of))
+        for seed in range(40):
+            rng = np.random.default_rng(seed)
+            choices = draw_choices(rng, drawn_freely, {}, {}).values
+            items: dict[str, Instance] = {}
+            for number, wanted in enumerate(task.objects, start=1):
+                for index in range(number_of(rng, wanted, choices)):
+                    later = task.objects[number:]
+                    items[name_of(wanted, index)] = item_of(rng, wanted, index, "target", items, choices, later)
+
+
+def test_a_category_is_left_to_the_only_one_that_it_suits() -> None:
+    start = OnCounter("counter")
+    first, second = ObjectSpec("first", ("apple", "bowl"), start), ObjectSpec("second", ("bowl",), start)
+    rng = np.random.default_rng(0)
+    drawn = {
+        later: {item_of(rng, first, 0, "target", {}, {}, later).category.name for _ in range(30)}
+        for later in ((), (second,), (replace(second, repeats=True),))
+    }
+    assert list(drawn.values()) == [{"apple", "bowl"}, {"apple"}, {"apple", "bowl"}]
+    # An object that only this category suits takes it, and the later one says what it misses.
+    assert item_of(rng, second, 0, "target", {}, {}, (second,)).category.name == "bowl"

@@ -4,7 +4,8 @@ object there are, which model each of them is, and where it starts, by what was 
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import functools
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -60,8 +61,14 @@ def number_of(rng: np.random.Generator, wanted: ObjectSpec, choices: Mapping[str
         UserError: what a choice says is no number.
     """
     if isinstance(wanted.count, str):
-        return int(_number(wanted.count, choices, f"count of {wanted.name}"))
+        return _most(wanted, choices)
     return int(rng.integers(wanted.count[0], wanted.count[1] + 1))
+
+
+def _most(wanted: ObjectSpec, choices: Mapping[str, str]) -> int:
+    if isinstance(wanted.count, str):
+        return int(_number(wanted.count, choices, f"count of {wanted.name}"))
+    return wanted.count[1]
 
 
 def name_of(wanted: ObjectSpec, index: int) -> str:
@@ -76,8 +83,11 @@ def item_of(
     split: str,
     items: Mapping[str, catalogue.Instance],
     choices: Mapping[str, str],
+    later: Sequence[ObjectSpec] = (),
 ) -> catalogue.Instance:
     """Draw the model of one of the wanted objects.
+
+    A category that an object declared later cannot do without is left to that one.
 
     Args:
         rng: generator that is advanced.
@@ -86,6 +96,7 @@ def item_of(
         split: of object models.
         items: of the objects that the scene has already, by name.
         choices: what was drawn for the task's choices.
+        later: the objects that are drawn after it.
 
     Raises:
         UserError: no category is left, or it is to be like an object, or the part of one, that is not there.
@@ -100,6 +111,8 @@ def item_of(
     groups = tuple(filled(group, choices) for group in wanted.groups) if like is None else (like.category.name,)
     # An instruction names one object of the scene.
     used = frozenset(() if wanted.repeats or like is not None else (item.category.name for item in items.values()))
+    if like is None and (kept := _kept_for(later, items, choices)) and _categories(wanted, choices) - used - kept:
+        used |= kept
     drawn = catalogue.sample(
         rng,
         groups,
@@ -116,6 +129,41 @@ def item_of(
     if wanted.stained is None and not wanted.face_down:
         return drawn
     return replace(drawn, stained=wanted.stained, face_down=wanted.face_down)
+
+
+def _kept_for(
+    later: Sequence[ObjectSpec], items: Mapping[str, catalogue.Instance], choices: Mapping[str, str]
+) -> frozenset[str]:
+    """The categories that are the last ones left for objects that are drawn later."""
+    used = {item.category.name for item in items.values()}
+    kept: set[str] = set()
+    for wanted in later:
+        if wanted.repeats or wanted.part_of or wanted.same_category_as not in ("", wanted.name):
+            continue
+        left = _categories(wanted, choices) - used
+        if len(left) <= (1 if wanted.same_category_as else _most(wanted, choices)):
+            kept |= left
+    return frozenset(kept)
+
+
+def _categories(wanted: ObjectSpec, choices: Mapping[str, str]) -> frozenset[str]:
+    """Names of the categories that suit an object, whatever else is in the scene."""
+    groups = tuple(filled(group, choices) for group in wanted.groups)
+    properties = (*wanted.properties, *("graspable",) * wanted.graspable, *("washable",) * wanted.washable)
+    bounds = wanted.max_size if wanted.max_size is not None else (None, None, wanted.max_height)
+    return _pool(groups, properties, wanted.exclude, bounds, _factors(wanted, 0, choices))
+
+
+@functools.cache
+def _pool(
+    groups: tuple[str, ...],
+    properties: tuple[str, ...],
+    exclude: tuple[str, ...],
+    bounds: tuple[float | None, float | None, float | None],
+    factors: float | tuple[float, float, float],
+) -> frozenset[str]:
+    found = catalogue.pool(groups, properties=properties, exclude=exclude, max_size=bounds, scale=factors)
+    return frozenset(category.name for category in found)
 
 
 def start_of(

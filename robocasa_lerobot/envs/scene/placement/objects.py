@@ -65,10 +65,10 @@ def place_objects(
         PlacementError: something has no free place.
     """
     table = _Table()
-    for wanted in task.objects:
+    for number, wanted in enumerate(task.objects, start=1):
         for index in range(number_of(rng, wanted, choices)):
             items = {name: placed.item for name, placed in table.placed.items() if name not in table.holders}
-            item = item_of(rng, wanted, index, split, items, choices)
+            item = item_of(rng, wanted, index, split, items, choices, task.objects[number:])
             start = start_of(rng, wanted, choices)
             asked, name = replace(wanted, start=start), name_of(wanted, index)
             _put(rng, table, asked, name, item, split, layout, roles, openness, doors)
