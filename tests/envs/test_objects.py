@@ -215,10 +215,8 @@ def test_a_sample_has_what_was_asked_for():
             rng,
             ("food", "drink"),
             "target",
-            graspable=True,
-            washable=True,
             exclude=frozenset({"meat", "apple"}),
-            properties=("fridgable",),
+            properties=("graspable", "washable", "fridgable"),
             max_size=(0.2, None, 0.1),
         )
         assert {"graspable", "washable", "fridgable"} <= item.category.properties

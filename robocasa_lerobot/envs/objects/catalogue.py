@@ -341,12 +341,9 @@ def sample(
     groups: tuple[str, ...],
     split: str,
     *,
-    graspable: bool = False,
-    washable: bool = False,
-    max_height: float | None = None,
     exclude: frozenset[str] = frozenset(),
     properties: Iterable[str] = (),
-    max_size: tuple[float | None, float | None, float | None] | None = None,
+    max_size: tuple[float | None, float | None, float | None] = (None, None, None),
     object_scale: float | Iterable[float] = 1.0,
     rotate_upright: bool = False,
 ) -> Instance:
@@ -358,11 +355,8 @@ def sample(
         rng: generator that is advanced.
         groups: names of groups; their categories are united.
         split: "pretrain" or "target".
-        graspable: ask for the property.
-        washable: ask for the property.
-        max_height: bound of the size along z, metres.
         exclude: names of groups or categories that are not wanted.
-        properties: further ones asked for, of PROPERTIES.
+        properties: of PROPERTIES, all asked for.
         max_size: bounds of the full extents along x, y, z, metres; None leaves an axis free.
         object_scale: factor of its size, or three.
         rotate_upright: turn its longest axis up.
@@ -371,13 +365,12 @@ def sample(
         UnknownNameError: no such group, property or split.
         UserError: no category is left.
     """
-    wanted = [*properties, *(["graspable"] if graspable else []), *(["washable"] if washable else [])]
-    bounds = max_size if max_size is not None else (None, None, max_height)
+    wanted = tuple(properties)
     factors = object_scale if isinstance(object_scale, int | float) else tuple(object_scale)
-    categories = pool(groups, properties=wanted, exclude=exclude, max_size=bounds, scale=factors)
+    categories = pool(groups, properties=wanted, exclude=exclude, max_size=max_size, scale=factors)
     if not categories:
         raise UserError(
-            f"no object category of groups {tuple(groups)} has the properties {sorted(wanted)} within {bounds} m, "
+            f"no object category of groups {tuple(groups)} has the properties {sorted(wanted)} within {max_size} m, "
             f"without {sorted(exclude)}; widen the groups or the bounds."
         )
     category = categories[int(rng.integers(len(categories)))]

@@ -7,6 +7,7 @@ from __future__ import annotations
 import functools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -103,32 +104,54 @@ def item_of(
     """
     if wanted.part_of:
         return _part(wanted, items)
-    factors = _factors(wanted, index, choices)
+    asked = _asked(wanted, index, choices)
     like = _like(wanted, index, items)
     if like is not None and wanted.same_model:
-        item = catalogue.scaled(catalogue.instance(like.category, like.index), factors)
+        item = catalogue.scaled(catalogue.instance(like.category, like.index), asked.scale)
         return replace(item, upright=wanted.upright, stained=wanted.stained)
-    groups = tuple(filled(group, choices) for group in wanted.groups) if like is None else (like.category.name,)
+    groups = asked.groups if like is None else (like.category.name,)
     # An instruction names one object of the scene.
     used = frozenset(() if wanted.repeats or like is not None else (item.category.name for item in items.values()))
-    if like is None and (kept := _kept_for(later, items, choices)) and _categories(wanted, choices) - used - kept:
+    if like is None and (kept := _kept_for(later, items, choices)) and _categories(asked) - used - kept:
         used |= kept
     drawn = catalogue.sample(
         rng,
         groups,
         split,
-        graspable=wanted.graspable,
-        washable=wanted.washable,
-        max_height=wanted.max_height,
-        exclude=used | frozenset(wanted.exclude),
-        properties=wanted.properties,
-        max_size=wanted.max_size,
-        object_scale=factors,
+        exclude=used | frozenset(asked.exclude),
+        properties=asked.properties,
+        max_size=asked.max_size,
+        object_scale=asked.scale,
         rotate_upright=wanted.upright,
     )
     if wanted.stained is None and not wanted.face_down:
         return drawn
     return replace(drawn, stained=wanted.stained, face_down=wanted.face_down)
+
+
+class _Asked(NamedTuple):
+    """What of the catalogue suits an object, whatever else is in the scene; arguments of `catalogue.pool`."""
+
+    groups: tuple[str, ...]
+    properties: tuple[str, ...]
+    exclude: tuple[str, ...]
+    max_size: tuple[float | None, float | None, float | None]
+    scale: float | tuple[float, float, float]
+
+
+def _asked(wanted: ObjectSpec, index: int, choices: Mapping[str, str]) -> _Asked:
+    return _Asked(
+        tuple(filled(group, choices) for group in wanted.groups),
+        (*wanted.properties, *("graspable",) * wanted.graspable, *("washable",) * wanted.washable),
+        wanted.exclude,
+        (None, None, wanted.max_height) if wanted.max_size is None else wanted.max_size,
+        _factors(wanted, index, choices),
+    )
+
+
+@functools.cache
+def _categories(asked: _Asked) -> frozenset[str]:
+    return frozenset(category.name for category in catalogue.pool(**asked._asdict()))
 
 
 def _kept_for(
@@ -140,30 +163,10 @@ def _kept_for(
     for wanted in later:
         if wanted.repeats or wanted.part_of or wanted.same_category_as not in ("", wanted.name):
             continue
-        left = _categories(wanted, choices) - used
+        left = _categories(_asked(wanted, 0, choices)) - used
         if len(left) <= (1 if wanted.same_category_as else _most(wanted, choices)):
             kept |= left
     return frozenset(kept)
-
-
-def _categories(wanted: ObjectSpec, choices: Mapping[str, str]) -> frozenset[str]:
-    """Names of the categories that suit an object, whatever else is in the scene."""
-    groups = tuple(filled(group, choices) for group in wanted.groups)
-    properties = (*wanted.properties, *("graspable",) * wanted.graspable, *("washable",) * wanted.washable)
-    bounds = wanted.max_size if wanted.max_size is not None else (None, None, wanted.max_height)
-    return _pool(groups, properties, wanted.exclude, bounds, _factors(wanted, 0, choices))
-
-
-@functools.cache
-def _pool(
-    groups: tuple[str, ...],
-    properties: tuple[str, ...],
-    exclude: tuple[str, ...],
-    bounds: tuple[float | None, float | None, float | None],
-    factors: float | tuple[float, float, float],
-) -> frozenset[str]:
-    found = catalogue.pool(groups, properties=properties, exclude=exclude, max_size=bounds, scale=factors)
-    return frozenset(category.name for category in found)
 
 
 def start_of(
