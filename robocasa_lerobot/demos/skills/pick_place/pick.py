@@ -155,20 +155,15 @@ def pick(
         lifted, out = _shifted(lifted, moved), _shifted(out, moved)
         watch = FingerWatch(env)
         yield from watch.over(
-            move_hand(
-                data,
-                lifted,
-                CLOSED,
-                speed=0.7,
-                tolerance=0.4 * lift,
-                max_steps=50,
-                integral_gain=INTEGRAL_GAIN,
-            )
+            move_hand(data, lifted, CLOSED, speed=0.7, tolerance=0.4 * lift, max_steps=50, integral_gain=INTEGRAL_GAIN)
         )
         slippery = attempt < (FAR_ATTEMPTS if long_way else CREEP_ATTEMPTS) and not _settles(env, obj, long_way)
         if slippery and watch.creeps(creep_m) and _stays(env, obj, inside):
             tried.note(planned, slid=True)
-            yield from move_hand(data, at, CLOSED, speed=0.7, tolerance=0.01, max_steps=30)
+            if np.linalg.norm(nearer) > WORTH_M:  # what is between the fingers comes along
+                yield from _put_back(env, at, lifted, nearer)
+            else:
+                yield from move_hand(data, at, CLOSED, speed=0.7, tolerance=0.01, max_steps=30)
             if (yield from _let_go(env, obj)):
                 return
             continue

@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-import contextlib
-from collections.abc import Callable, Iterator
 from dataclasses import replace
 
 import numpy as np
 
-from robocasa_lerobot.demos.motion import OPEN, UP, Array, HandTarget, grip_position, hand_rotation
-from robocasa_lerobot.demos.skills.common import SkillError, hold_hand, move_hand
-from robocasa_lerobot.demos.skills.drawers import drag_open, make_room
+from robocasa_lerobot.demos.motion import UP, hand_rotation
+from robocasa_lerobot.demos.skills.drawers import make_room
 from robocasa_lerobot.demos.skills.pick_place.by_handle import BY_ONE_END, PAN_BY_THE_HANDLE, has_handle
 from robocasa_lerobot.demos.skills.pick_place.grasp_strategy import (
     ANY_APPROACH,
@@ -26,7 +23,6 @@ from robocasa_lerobot.demos.skills.pick_place.grasp_strategy import (
 from robocasa_lerobot.demos.skills.pick_place.graspable import Graspable
 from robocasa_lerobot.demos.skills.pick_place.location import Location, locate
 from robocasa_lerobot.demos.skills.pick_place.mugs import FROM_THE_SIDE, UNDER_A_SPOUT
-from robocasa_lerobot.demos.skills.pick_place.pick import RELEASE_STEPS, best_grasp
 from robocasa_lerobot.demos.skills.pick_place.place import ASIDE_M, PlaceStrategy
 from robocasa_lerobot.demos.skills.pick_place.poses.basin_poses import below_spout, is_large, on_floor, room_in
 from robocasa_lerobot.demos.skills.pick_place.poses.counter_poses import NEAR_M, on_counter
@@ -57,10 +53,14 @@ from robocasa_lerobot.demos.skills.pick_place.poses.place_poses import (
 from robocasa_lerobot.demos.skills.pick_place.poses.plate_poses import is_flat, side_by_side
 from robocasa_lerobot.demos.skills.pick_place.poses.shelf_rest import ShelfRest
 from robocasa_lerobot.demos.skills.pick_place.poses.turned_poses import as_turned
-from robocasa_lerobot.demos.skills.pick_place.reach_in import OUT_OF_A_MICROWAVE, OUT_OF_A_TOASTER_OVEN
+from robocasa_lerobot.demos.skills.pick_place.reach_in import (
+    OUT_OF_A_MICROWAVE,
+    OUT_OF_A_TOASTER_OVEN,
+    clear_of_counter,
+    pull_out_first,
+)
 from robocasa_lerobot.demos.skills.pick_place.turn_across import OUT_OF_CABINET, between_shelves, to_front, turn_first
 from robocasa_lerobot.demos.skills.pick_place.turn_over import END_FIRST, LEANS, TO_TURN, stands_askew, which_way_up
-from robocasa_lerobot.demos.skills.racks import pull
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.kitchens.appliances.kinds.blender import Blender
 from robocasa_lerobot.envs.kitchens.appliances.kinds.coffee_machine import CoffeeMachine
@@ -83,13 +83,9 @@ from robocasa_lerobot.envs.tasks.conditions import IN_RANGE, stage_condition
 from robocasa_lerobot.envs.tasks.task import Stage
 
 BEFORE_FRONT_M, MOST_OUT_M = 0.03, 0.45
-HARD = 1.0  # cost of taking something out of a drawer, from which on it is pulled out first
 BEYOND_COST, FLAT_COST = 50.0, 8.0  # for each metre that something stands out beyond a rack, and is too high on it
-REACHABLE = 0.9  # share of a drawer that is far enough out to take something out of it
-FARTHER_OUT_M = 0.12  # how far
 FARTHER_M = 1.1  # of a free place on a counter from the base, where an open drawer keeps the robot off
 LID_GAP_M = 0.005  # of a lid over the rim when the hand opens
-OFF_M = 0.10  # of the hand from what it has let go
 RIM_ROOM_M = 0.015  # between what falls into a mouth and the mouth's edge
 # A vessel as deep as this keeps what it holds when it is tilted by this much as it goes in, metres, radians.
 DEEP_M, DEEP_LEAN = 0.035, float(np.deg2rad(30.0))
@@ -130,14 +126,14 @@ def grasp_strategy(env: KitchenEnv, obj: Graspable, free: GraspStrategy, *, kept
         case CoffeeMachine():
             return UNDER_A_SPOUT
         case Drawer() as drawer:
-            return replace(OUT_OF_DRAWER, first=_clear_of_counter(obj, drawer))
+            return replace(OUT_OF_DRAWER, first=clear_of_counter(obj, drawer))
         case HingeCabinet() if has_handle(obj):
             return replace(OUT_OF_CABINET, poses=PAN_BY_THE_HANDLE.poses)
         case HingeCabinet() as cabinet:  # the torso, which is up before a wall cabinet, goes down again
             inside = FOR_A_STACK if free is FOR_A_STACK else between_shelves(env, obj, place)
             return replace(inside, out_m=_way_out(env, obj, cabinet.regions[place.region]))
         case _ if "drawer" in place.region:
-            return replace(FROM_CRISPER, first=_pull_out_first(obj, place))
+            return replace(FROM_CRISPER, first=pull_out_first(obj, place))
         case _ if in_the_open(place):
             return free
         case Fridge() as fridge if place.region:
@@ -362,39 +358,3 @@ def _counts(env: KitchenEnv, stage: Stage, region: Region) -> bool:
             low, high, least = term.height
             return low <= floor <= high and 2 * region.half[2] >= least
     return True
-
-
-def _clear_of_counter(obj: Graspable, drawer: Drawer) -> Callable[[KitchenEnv], Iterator[Array]]:
-    """Before a grasp: pull the drawer farther out where the counter over it blocks the hand, or a grasp failed."""
-    again = False
-
-    def first(env: KitchenEnv) -> Iterator[Array]:
-        nonlocal again
-        if again or best_grasp(env, obj, OUT_OF_DRAWER).cost > HARD:
-            yield from drag_open(env, drawer, 1.0 + FARTHER_OUT_M / drawer.full_travel)
-        again = True
-
-    return first
-
-
-def _pull_out_first(obj: Graspable, place: Location) -> Callable[[KitchenEnv], Iterator[Array]]:
-    """Before the first grasp in a drawer of an appliance: pull it fully out where the object is hard to reach."""
-    done = False
-
-    def first(env: KitchenEnv) -> Iterator[Array]:
-        nonlocal done
-        fixture = place.fixture
-        roles = [role for role, name in env.scene.roles.items() if fixture is not None and name == fixture.name]
-        if done or not roles or best_grasp(env, obj, FROM_CRISPER).cost <= HARD:
-            done = True
-            return
-        done = True
-        with contextlib.suppress(SkillError):
-            yield from pull(env, Stage("racks", "pull", roles[0], part=place.region), enough=REACHABLE)
-        data = env.data
-        at = HandTarget(grip_position(data), hand_rotation(data))
-        yield from hold_hand(data, at, OPEN, RELEASE_STEPS)
-        off = HandTarget(at.position - OFF_M * at.rotation[:, 2], at.rotation)
-        yield from move_hand(data, off, OPEN, tolerance=0.03, max_steps=20)
-
-    return first
