@@ -36,6 +36,7 @@ class Course:
         labels: of all actions so far.
         used: the segments that were carried out, in plain values.
         rest: rotation (3, 3) of each object before it was touched.
+        lay: upright pose (4, 4) of where each object lay before it was taken last; see `sources.uses`.
     """
 
     sources: list[Source]
@@ -47,6 +48,7 @@ class Course:
     labels: list[tuple[int, int, int]] = field(default_factory=list)
     used: list[dict[str, Any]] = field(default_factory=list)
     rest: dict[str, Array] = field(default_factory=dict)
+    lay: dict[str, Array] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         self.bias = source_costs([one.task for one in self.sources], self.rng, self.spread, self.cap)

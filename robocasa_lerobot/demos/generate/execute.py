@@ -52,7 +52,7 @@ class Carried:
         late: whether what the hand moves is behind what it was at that step.
         base: where the base belongs at that step: x, y, heading; None keeps it at rest.
         met: whether what the hand goes to has moved already, so that the contact has begun.
-        position: of what the hand moves, as a share of its range.
+        position: of what the hand moves, as a share of its range; it is pushed the harder the longer it has stalled.
         enter: step of the contact that is gone on with, since what the hand moves has come as far already.
     """
 
@@ -62,7 +62,7 @@ class Carried:
     late: Callable[[int], bool] = lambda step: False
     base: Callable[[int], Array] | None = None
     met: Callable[[], bool] = lambda: False
-    position: Callable[[], float] = lambda: 0.0
+    position: Callable[[], float] | None = None
     enter: int = 0
 
 
@@ -105,7 +105,7 @@ def carry_out_segment(env: KitchenEnv, course: Course, carried: Carried, stop: C
     yield from move_hand(
         env.data, as_target(carried.hand(step)), float(data.gripper[step]), tolerance=ARRIVED_M, integral_gain=GAIN
     )
-    stalled, before = 0, carried.position()
+    stalled, before = 0, 0.0 if carried.position is None else carried.position()
     grasps, settled = data.gripper[segment.lead] < 0, -1
     while step < segment.end and not stop():
         if step < segment.contact and carried.met():
@@ -126,8 +126,9 @@ def carry_out_segment(env: KitchenEnv, course: Course, carried: Carried, stop: C
         yield pose_command(env, _firmer(carried.target(step), carried.hand(step), stalled), gripper, base)
         if grasps and in_contact and gripper > 0 and _lost(env, carried.hand(step)):
             return
-        now = carried.position()
-        stalled, before = (stalled + 1 if abs(now - before) < MOVING_SHARE else 0), now
+        if carried.position is not None:
+            now = carried.position()
+            stalled, before = (stalled + 1 if abs(now - before) < MOVING_SHARE else 0), now
         if in_contact and late and not lets_go and carried.late(step):
             late -= 1
             continue

@@ -8,18 +8,25 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from robocasa_lerobot.demos.generate.bridge import bridged
 from robocasa_lerobot.demos.generate.course import BRIDGE, DRIVE, Course
-from robocasa_lerobot.demos.generate.execute import Carried, as_target, carry_out_segment, hand_now
+from robocasa_lerobot.demos.generate.execute import as_target, carry_out_segment, hand_now
 from robocasa_lerobot.demos.generate.lid_places import COVER, LID_VERBS, knob_grasps, lid_strategy, lid_turns
-from robocasa_lerobot.demos.generate.select import narrowed
+from robocasa_lerobot.demos.generate.segment_paths import (
+    STEEP_RAD,
+    SegmentPath,
+    after_letting_go,
+    along,
+    cheapest,
+)
 from robocasa_lerobot.demos.generate.sources.segments import PICK, PLACE
 from robocasa_lerobot.demos.generate.sources.source import Piece, pieces_for
-from robocasa_lerobot.demos.generate.sources.transform import heading, inverse, make_pose, yaw_pose
+from robocasa_lerobot.demos.generate.sources.transform import heading, make_pose
+from robocasa_lerobot.demos.generate.sources.uses import USES, where_it_lay
+from robocasa_lerobot.demos.generate.use_segments import use
 from robocasa_lerobot.demos.motion import (
     CLOSED,
     HALF_TURN,
@@ -38,41 +45,38 @@ from robocasa_lerobot.demos.skills.pick_place.graspable import Graspable, graspa
 from robocasa_lerobot.demos.skills.pick_place.pick import is_held
 from robocasa_lerobot.demos.skills.pick_place.place import PlacePose, PlaceStrategy, leave
 from robocasa_lerobot.demos.skills.pick_place.strategies import grasp_strategy, place_strategy
-from robocasa_lerobot.demos.skills.reaching import Held, MotionPlan, WaypointPath, approach, plan_reach
+from robocasa_lerobot.demos.skills.pick_place.tools.rinse import parts_of_rinsing
+from robocasa_lerobot.demos.skills.pick_place.verbs import BY_USE, free_grasp
+from robocasa_lerobot.demos.skills.reaching import Held, MotionPlan, approach, plan_reach
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.scene.robot_poses import RobotPose
 from robocasa_lerobot.envs.tasks.task import Stage
 
 TRIES = 5  # of picking up and putting down together
-STEEP_RAD = np.deg2rad(15.0)  # of a hand from straight down, up to which it may come turned in any way
 TURNS = tuple(np.deg2rad((0.0, 30.0, -30.0, 60.0, -60.0)))  # of a flatter one, to the sides
 MOST_ASKEW_RAD = 0.45  # of a grasp from the source's, beside a turn about the vertical
 ASKEW_COST, WORSE_GRASP, TRIED_COST, ALIKE_M = 0.3, 0.45, 1.2, 0.015
-MOST_PATHS, MOST_GRASPS, MOST_SPOTS, YAWS = 200, 10, 12, 8
+MOST_GRASPS, MOST_SPOTS, YAWS = 10, 12, 8
 TURN_COST, LEANING_COST, AGAIN_COST, AGAIN_M = 0.08, 0.35, 0.5, 0.03  # a radian of turn, of tilt, ...
 RELEASE_STEPS = 8
 
 
-@dataclass(frozen=True)
-class _Way(WaypointPath):
-    """A segment in this scene: `hands` are the hand's poses here at the steps from its lead to its end."""
-
-    piece: Piece | None = None
-    targets_here: tuple[Array, ...] = ()
-    hands_here: tuple[Array, ...] = ()
-
-
 def object_stage(env: KitchenEnv, stage: Stage, course: Course) -> Iterator[Array]:
-    """Take hold of the stage's object, and put it down if the stage says so, with segments of sources.
+    """Take hold of the stage's object, and use it or put it down if the stage says so, with segments of sources.
 
     Raises:
         SkillError: no source has such segments, none is within reach, or it is not done after all tries.
     """
+    if stage.verb == "rinse":
+        for part in parts_of_rinsing(env, stage):
+            yield from object_stage(env, part, course)
+        return
     name = graspable(env, stage.object).name
     if name not in course.rest:
         course.rest[name] = env.data.body(name).xmat.reshape(3, 3).copy()
     tried: list[Array] = []
     put_down: list[Array] = []
+    in_vain: dict[int, int] = {}
     for _ in range(TRIES):
         if stage_done(env, stage):
             return
@@ -83,20 +87,23 @@ def object_stage(env: KitchenEnv, stage: Stage, course: Course) -> Iterator[Arra
                 continue
         if stage.verb == "pick":
             return
-        yield from _place(env, stage, obj, course, put_down)
+        if stage.verb in USES:
+            yield from use(env, stage, obj, course, in_vain)
+        else:
+            yield from _place(env, stage, obj, course, put_down)
         for _ in range(15):
             if stage_done(env, stage):
                 return
             yield from hold_hand(env.data, as_target(hand_now(env)), CLOSED if is_held(env, obj.name) else OPEN, 1)
-    raise SkillError(f"{graspable(env, stage.object).title} is not where it belongs after {TRIES} tries")
+    what = "was used in vain" if stage.verb in USES else "is not where it belongs"
+    raise SkillError(f"{graspable(env, stage.object).title} {what} after {TRIES} tries")
 
 
 def _pick(env: KitchenEnv, stage: Stage, obj: Graspable, course: Course, tried: list[Array]) -> Iterator[Array]:
     pieces = course.most_alike(pieces_for(course.sources, stage, PICK), env, stage)
     if not pieces:
         raise SkillError("no source picks anything up")
-    free = _strategy(env, stage, obj).grasp if stage.verb == "place" else ANY_APPROACH
-    strategy = grasp_strategy(env, obj, free, kept=stage.verb == "pick")
+    strategy = grasp_strategy(env, obj, _free_grasp(env, stage, obj), kept=stage.verb == "pick" or stage.verb in USES)
     if strategy.first is not None:
         yield from course.labelled(strategy.first(env), BRIDGE)
     origin = env.data.body(obj.name).xpos.copy()
@@ -113,13 +120,15 @@ def _pick(env: KitchenEnv, stage: Stage, obj: Graspable, course: Course, tried: 
 
     choice = yield from course.choosing(approach(env, plan, OPEN), DRIVE)
     way = choice.path
-    assert isinstance(way, _Way)
+    assert isinstance(way, SegmentPath)
     assert way.piece is not None
     tried.append(way.targets[2].position - origin)
     yield from course.labelled(bridged(env, course.manner, choice, way.hands_here[0], OPEN), BRIDGE)
-    start = env.data.body(obj.name).xpos.copy()
+    body = env.data.body(obj.name)
+    start, turn = body.xpos.copy(), body.xmat.reshape(3, 3).copy()
+    course.lay[obj.name] = where_it_lay(make_pose(start, turn), float(start[2]) - obj.below(turn))
     row = course.begin(way.piece, cost=round(choice.cost, 3))
-    yield from carry_out_segment(env, course, _along(way, start - origin), lambda: False)
+    yield from carry_out_segment(env, course, along(way, lambda: start - origin), lambda: False)
     row["held"] = is_held(env, obj.name)
     if not row["held"]:
         at = as_target(hand_now(env))
@@ -127,17 +136,13 @@ def _pick(env: KitchenEnv, stage: Stage, obj: Graspable, course: Course, tried: 
         yield from course.labelled(draw_back(env.data, OPEN, 0.08), BRIDGE)
 
 
-def _along(way: _Way, moved: Array) -> Carried:
-    """The segment along a way, moved by metres (3,) with what it is about."""
-    assert way.piece is not None
-    lead, count = way.piece.segment.lead, len(way.hands_here)
-    shift = make_pose(moved, np.eye(3))
-
-    def at(poses: tuple[Array, ...], step: int) -> Array:
-        found: Array = shift @ poses[min(step - lead, count - 1)]
-        return found
-
-    return Carried(way.piece, lambda step: at(way.targets_here, step), lambda step: at(way.hands_here, step))
+def _free_grasp(env: KitchenEnv, stage: Stage, obj: Graspable) -> GraspStrategy:
+    """How an object that stands free is grasped best for its stage."""
+    if stage.verb in LID_VERBS:
+        return ANY_APPROACH
+    if stage.verb in USES:
+        return BY_USE.get(stage.verb, ANY_APPROACH)
+    return free_grasp(env, stage) if stage.verb == "pick" else _strategy(env, stage, obj).grasp
 
 
 def _pick_ways(
@@ -149,11 +154,11 @@ def _pick_ways(
     tried: list[Array],
     *,
     lid: bool,
-) -> list[_Way]:
+) -> list[SegmentPath]:
     """The segments brought to grasps of the object; of a lid, of its knob."""
     _, yaw = base_pose(env.data)
     known: dict[tuple[float, ...], list[GraspPose]] = {}
-    ways: list[_Way] = []
+    ways: list[SegmentPath] = []
     for piece in pieces:
         segment, data = piece.segment, piece.data
         source = data.eef[segment.contact][:3, :3]
@@ -176,32 +181,10 @@ def _pick_ways(
                     way = _pick_way(piece, pose.position, rotation, extra)
                     if way is not None:
                         ways.append(way)
-    return _cheapest(env, ways, course)
+    return cheapest(env, ways, course)
 
 
-def _cheapest(env: KitchenEnv, ways: list[_Way], course: Course) -> list[_Way]:
-    """The ways that are planned for: those of the sources that are selected, the cheapest of them."""
-
-    def change(way: _Way) -> Array:
-        assert way.piece is not None
-        segment, data = way.piece.segment, way.piece.data
-        position, yaw = base_pose(env.data)
-        here = inverse(yaw_pose(float(position[0]), float(position[1]), yaw)) @ way.hands_here[-1]
-        return inverse(inverse(data.base_pose(segment.begin)) @ data.eef[segment.end - 1]) @ here
-
-    ways = narrowed(
-        ways,
-        course.manner,
-        course.rng,
-        source=lambda way: -1 if way.piece is None else way.piece.source.number,
-        object_change=change,
-        first_pose=lambda way: way.hands_here[0],
-        hand=hand_now(env),
-    )
-    return sorted(ways, key=lambda way: way.extra)[:MOST_PATHS]
-
-
-def _pick_way(piece: Piece, position: Array, rotation: Array, extra: float) -> _Way | None:
+def _pick_way(piece: Piece, position: Array, rotation: Array, extra: float) -> SegmentPath | None:
     """A segment brought to a grasp; None where that would tip the hand over."""
     segment, data = piece.segment, piece.data
     source = data.eef[segment.contact]
@@ -219,7 +202,9 @@ def _pick_way(piece: Piece, position: Array, rotation: Array, extra: float) -> _
     targets = tuple(here(data.target[step]) for step in steps)
     at = segment.contact - segment.lead
     chosen = [hands[0], hands[at // 2], hands[min(at, len(hands) - 1)], hands[-1]]
-    return _Way(tuple(as_target(pose) for pose in chosen), extra + ASKEW_COST * askew, None, piece, targets, hands)
+    return SegmentPath(
+        tuple(as_target(pose) for pose in chosen), extra + ASKEW_COST * askew, None, piece, targets, hands
+    )
 
 
 def _place(env: KitchenEnv, stage: Stage, obj: Graspable, course: Course, put_down: list[Array]) -> Iterator[Array]:
@@ -229,7 +214,7 @@ def _place(env: KitchenEnv, stage: Stage, obj: Graspable, course: Course, put_do
     strategy = _strategy(env, stage, obj)
     held = Held.now(env.data, obj.name, obj.contents)
 
-    def ways() -> list[_Way]:
+    def ways() -> list[SegmentPath]:
         return _place_ways(env, stage, obj, held, strategy, pieces, course, put_down)
 
     found = ways()
@@ -251,14 +236,14 @@ def _place(env: KitchenEnv, stage: Stage, obj: Graspable, course: Course, put_do
     if not is_held(env, obj.name):
         return
     way = choice.path
-    assert isinstance(way, _Way)
+    assert isinstance(way, SegmentPath)
     assert way.piece is not None
     yield from course.labelled(bridged(env, course.manner, choice, way.hands_here[0], CLOSED, held), BRIDGE)
     if not is_held(env, obj.name):
         return
     put_down.append(way.targets[2].position)
     course.begin(way.piece, cost=round(choice.cost, 3))
-    yield from carry_out_segment(env, course, _along(way, np.zeros(3)), lambda: False)
+    yield from carry_out_segment(env, course, along(way, lambda: np.zeros(3)), lambda: False)
     yield from course.labelled(leave(env, obj), BRIDGE)
 
 
@@ -283,7 +268,7 @@ def _place_ways(
     pieces: list[Piece],
     course: Course,
     put_down: list[Array],
-) -> list[_Way]:
+) -> list[SegmentPath]:
     """The segments brought to the places where the object may come to lie, turned about the vertical."""
     _, yaw = base_pose(env.data)
     rest = course.rest[obj.name]
@@ -296,8 +281,8 @@ def _place_ways(
         way = _place_way(obj, held, rest, present, piece, spot, strategy, about, turn)
         again = sum(float(np.linalg.norm(way.targets[2].position - other)) < AGAIN_M for other in put_down)
         extra = way.extra + AGAIN_COST * again + float(course.bias[piece.source.number])
-        ways.append(_Way(way.targets, extra, None, piece, way.targets_here, way.hands_here))
-    return _cheapest(env, ways, course)
+        ways.append(SegmentPath(way.targets, extra, None, piece, way.targets_here, way.hands_here))
+    return cheapest(env, ways, course)
 
 
 def _place_way(
@@ -310,7 +295,7 @@ def _place_way(
     strategy: PlaceStrategy,
     about: Array,
     yaw: float,
-) -> _Way:
+) -> SegmentPath:
     """A segment that puts an object down at a spot, turned by `yaw` radians from how it is held now."""
     segment, data = piece.segment, piece.data
     poses, low = data.poses[segment.ref], data.undersides[segment.ref]
@@ -334,7 +319,7 @@ def _place_way(
             let_go = hands[-1]
         else:
             assert let_go is not None
-            hands.append(_after(let_go, last, data.eef[step], about))
+            hands.append(after_letting_go(let_go, last, data.eef[step], about))
         # The controller was led ahead of the hand by so much.
         ahead = about @ (data.target[step][:3, 3] - data.eef[step][:3, 3])
         twist = hands[-1][:3, :3] @ data.eef[step][:3, :3].T @ data.target[step][:3, :3]
@@ -346,15 +331,7 @@ def _place_way(
     if strategy.fit is not None:
         let = hands[min(at, len(hands) - 1)]
         cost += strategy.fit(let[:3, 3] + let[:3, :3] @ held.position, let[:3, :3] @ held.rotation)
-    return _Way(tuple(as_target(p) for p in chosen), cost, None, piece, tuple(targets), tuple(hands))
-
-
-def _after(let_go: Array, last: Array, pose: Array, about: Array) -> Array:
-    """A hand's pose after it has let go: away as in the source, out along its own fingers where it is flat."""
-    turn = let_go[:3, :3] @ last[:3, :3].T
-    flat = np.arccos(np.clip(-last[2, 2], -1.0, 1.0)) > STEEP_RAD
-    way = rotation_about(UP, heading(turn)) if flat else about
-    return make_pose(let_go[:3, 3] + way @ (pose[:3, 3] - last[:3, 3]), turn @ pose[:3, :3])
+    return SegmentPath(tuple(as_target(p) for p in chosen), cost, None, piece, tuple(targets), tuple(hands))
 
 
 def _rest_step(piece: Piece) -> int:

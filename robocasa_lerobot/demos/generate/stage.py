@@ -6,11 +6,12 @@ from collections.abc import Callable, Iterator
 from functools import partial
 
 from robocasa_lerobot.demos.demonstrator import demonstrate
-from robocasa_lerobot.demos.generate.course import AT_REST, DRIVE, Course
+from robocasa_lerobot.demos.generate.course import AT_REST, BRIDGE, DRIVE, Course
 from robocasa_lerobot.demos.generate.lid_places import LID_VERBS
 from robocasa_lerobot.demos.generate.object_segments import object_stage
 from robocasa_lerobot.demos.generate.part_segments import part_stage
 from robocasa_lerobot.demos.generate.sources.frames import JOINTED
+from robocasa_lerobot.demos.generate.sources.uses import USES
 from robocasa_lerobot.demos.motion import Array
 from robocasa_lerobot.demos.motion_style import MotionStyle
 from robocasa_lerobot.demos.skills import SKILLS, Skill
@@ -19,7 +20,8 @@ from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.tasks.task import Stage, Task
 from robocasa_lerobot.envs.tasks.typical import stages_of
 
-OBJECT_VERBS = ("pick", "place", *LID_VERBS)
+PLANNED = (("navigation", "drive"), ("knobs", "wait"))  # without a contact that a source could show
+OBJECT_VERBS = ("pick", "place", "place_upside_down", *LID_VERBS, *USES)
 
 
 def can_generate(task: Task) -> bool:
@@ -28,7 +30,7 @@ def can_generate(task: Task) -> bool:
 
 
 def _is_generated(skill: str, verb: str) -> bool:
-    return skill in JOINTED or skill == "navigation" or (skill == "pick_place" and verb in OBJECT_VERBS)
+    return skill in JOINTED or (skill, verb) in PLANNED or (skill == "pick_place" and verb in OBJECT_VERBS)
 
 
 def generated(env: KitchenEnv, style: MotionStyle, log: StageLog, course: Course) -> Iterator[Array]:
@@ -42,13 +44,14 @@ def generated(env: KitchenEnv, style: MotionStyle, log: StageLog, course: Course
 
 
 def skills_with(course: Course) -> dict[tuple[str, str], Skill]:
-    """What carries out stages with the sources of an episode; drives between fixtures are planned."""
+    """What carries out stages with the sources of an episode; drives between fixtures, and waits, are planned."""
     skills: dict[tuple[str, str], Skill] = {}
     for skill, verb in SKILLS:
         if not _is_generated(skill, verb):
             continue
-        if skill == "navigation":
-            skills[skill, verb] = partial(_driven, course, SKILLS[skill, verb])
+        if (skill, verb) in PLANNED:
+            kind = DRIVE if skill == "navigation" else BRIDGE
+            skills[skill, verb] = partial(_planned, course, SKILLS[skill, verb], kind)
         else:
             skills[skill, verb] = _bound(part_stage if skill in JOINTED else object_stage, course)
     return skills
@@ -64,5 +67,5 @@ def _bound(carry_out: Callable[[KitchenEnv, Stage, Course], Iterator[Array]], co
     return skill
 
 
-def _driven(course: Course, skill: Skill, env: KitchenEnv, stage: Stage) -> Iterator[Array]:
-    yield from course.labelled(skill(env, stage), DRIVE)
+def _planned(course: Course, skill: Skill, kind: int, env: KitchenEnv, stage: Stage) -> Iterator[Array]:
+    yield from course.labelled(skill(env, stage), kind)

@@ -20,11 +20,13 @@ from robocasa_lerobot.demos.generate.sources.frames import HANDLE, Part, body_po
 from robocasa_lerobot.demos.generate.sources.prepared import GROUP, Prepared, is_prepared, world_pose, write_prepared
 from robocasa_lerobot.demos.generate.sources.segments import cut, signals_of
 from robocasa_lerobot.demos.generate.sources.transform import inverse, make_pose, yaw_pose
+from robocasa_lerobot.demos.generate.sources.uses import USES, is_about_itself, use_frame, use_key, working_point
 from robocasa_lerobot.demos.motion import Array, base_pose, grip_position, hand_rotation
 from robocasa_lerobot.demos.recorder import SUCCESS_HOLD_STEPS
 from robocasa_lerobot.demos.replay import Demonstration, demonstrations, kitchen_of, put_state, read_demonstration
 from robocasa_lerobot.demos.skills.pick_place.graspable import Graspable, graspable
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
+from robocasa_lerobot.envs.tasks.task import Stage
 from robocasa_lerobot.errors import UserError
 from robocasa_lerobot.files import write_text, written_aside
 from robocasa_lerobot.jobs.as_completed import as_they_end
@@ -154,6 +156,7 @@ class _Watcher:
             words["drawn_to"] = env.scene.fill(stage.to)
             words["thing"] = env.scene.fill(stage.object)
             words["place"] = env.scene.fill(stage.target)
+            words["about_itself"] = is_about_itself(env, stage)
             self._parts |= {part.name: part for part in own}
         loose = {*env.scene.objects, *(w["thing"] for w in self._words if w["thing"])}
         self._objects: dict[str, Graspable] = {name: graspable(env, name) for name in sorted(loose)}
@@ -196,6 +199,17 @@ class _Watcher:
             else:
                 low = data.xpos[body][2] - self._objects[name].below(data.xmat[body].reshape(3, 3))
                 self._note(f"undersides/{name}", [*data.xpos[body][:2], low])
+        for number, stage in enumerate(self._stages):
+            if stage.verb in USES:
+                self._before_use(number, stage)
+
+    def _before_use(self, number: int, stage: Stage) -> None:
+        """Note where a stage uses its object, and the point of it that counts."""
+        thing, words = self._objects[self._words[number]["thing"]], self._words[number]
+        if not words["about_itself"]:
+            self._note(f"poses/{use_key(number)}", use_frame(self._env, stage))
+        turn = self._env.data.body(thing.name).xmat.reshape(3, 3)
+        self._note(f"working_points/{use_key(number)}", working_point(thing, stage.verb, turn))
 
     def after(self, gripper: float) -> None:
         """Note what the controller was told."""
@@ -246,6 +260,7 @@ class _Watcher:
             touching=series("touching"),
             contact_points=series("contact_points"),
             undersides=series("undersides"),
+            working_points=series("working_points"),
             about=about,
         )
 

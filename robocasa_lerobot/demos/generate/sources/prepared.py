@@ -19,9 +19,9 @@ from robocasa_lerobot.demos.motion import Array
 
 GROUP = "datagen_info"
 OURS = "kitchen"
-VERSION = 2  # of this layout: files of another one are prepared again
+VERSION = 3  # of this layout: files of another one are prepared again
 INTERFACE, INTERFACE_TYPE = "MG_KitchenEnv", "robocasa_lerobot"
-_SERIES = ("joints", "touching", "contact_points", "undersides")
+_SERIES = ("joints", "touching", "contact_points", "undersides", "working_points")
 
 
 @dataclass(frozen=True)
@@ -35,11 +35,13 @@ class Prepared:
         base: (T, 3) of the base centre: x, y in metres, heading in radians.
         stage: (T,) number of the stage.
         gap: (T,) between the fingers, metres.
-        poses: (T, 4, 4) of each object and part, and of fixtures, which stand still, by their roles.
+        poses: (T, 4, 4) of each object and part, of fixtures, which stand still, by their roles, and of where a stage
+            uses what is held, by `uses.use_key`.
         joints: (T,) position of each part's joint, metres or radians.
         touching: (T,) of each object and part what of it the hand touches: 0 nothing, 1 its handle, 2 the rest.
         contact_points: (T, 3) of each part, the middle of what is touched, in its axes, metres.
         undersides: (T, 3) of each object, the point below its origin at the height of its underside, metres.
+        working_points: (T, 3) of each stage that uses what is held, the point of it that counts, in its axes, metres.
         about: what else is known: `stages`, `parts`, `objects`, `fixtures`.
     """
 
@@ -54,6 +56,7 @@ class Prepared:
     touching: dict[str, NDArray[np.int64]]
     contact_points: dict[str, Array]
     undersides: dict[str, Array]
+    working_points: dict[str, Array]
     about: dict[str, Any]
 
     def __len__(self) -> int:

@@ -25,6 +25,7 @@ class CutRules:
     Attributes:
         near_m: a segment begins where the hand is as near as this to where it touches or grasps.
         place_near_m: the same to where it lets go.
+        use_near_m: a use begins and ends where what is held is farther by this than it comes to where it is used.
         far_steps: so many control steps before that at most.
         gap_steps: a touch that is lost for no longer goes on.
         moved_share: of its range that a part must move by, or touching it is no segment.
@@ -33,6 +34,7 @@ class CutRules:
 
     near_m: float = 0.14
     place_near_m: float = 0.20
+    use_near_m: float = 0.12
     far_steps: int = 45
     gap_steps: int = 12
     moved_share: float = 0.04

@@ -1,13 +1,14 @@
 """Segments: the pieces of a demonstration in which the hand works on one thing, found from what preparing noted.
 
 A stage about a part of a fixture has a segment for every time that the hand touches the part and moves it. A stage
-that moves an object has one that takes hold of it and one that puts it down. What lies between, the free motion, is
-planned anew or bridged; MimicGen's own subtasks, which cover all of a demonstration, end where the contact ends.
+that moves an object has one that takes hold of it and one that puts it down; one that uses an object, as to pour or to
+wipe, has one that does so. What lies between, the free motion, is planned anew or bridged; MimicGen's own subtasks,
+which cover all of a demonstration, end where the contact ends.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -17,12 +18,16 @@ from numpy.typing import NDArray
 from robocasa_lerobot.demos.generate.sources.frames import JOINTED
 from robocasa_lerobot.demos.generate.sources.prepared import Prepared
 from robocasa_lerobot.demos.generate.sources.rules import DERIVED, CutRules, rules_for
+from robocasa_lerobot.demos.generate.sources.uses import UNDER_WATER, USES, use_key, where_it_lay
+from robocasa_lerobot.demos.motion import Array
 
-PART, PICK, PLACE = "part", "pick", "place"
+PART, PICK, PLACE, USE = "part", "pick", "place", "use"
 LEAVING_M = 0.12  # of the hand from where the contact ends: the retreat
 DRIVES_M, TURNS_RAD = 0.10, 0.10  # of the base, which stays about where it is during an approach
 LIFTED_M, MOVED_M = 0.04, 0.06  # an object that has risen, or gone, as far is in the hand
 FIRM_STEPS = 10  # of fingers that close
+AT_M = 0.03  # farther from where it is used than it ever comes, an object is about there
+RINSE = "rinse"  # what is put down when it has been used
 
 
 @dataclass(frozen=True)
@@ -30,12 +35,13 @@ class Segment:
     """A piece of a demonstration; steps are counted from its beginning.
 
     Attributes:
-        kind: PART, PICK or PLACE.
+        kind: PART, PICK, PLACE or USE.
         stage: number of its stage.
-        ref: what it is relative to: a part's or an object's name; of PLACE the object that is put down.
+        ref: what it is relative to: a part's or an object's name; of PLACE and USE the object that is in the hand.
         begin: where the subtask begins, with the free motion before it.
         lead: where the hand comes near what it is about to touch, and goes straight to it from then on.
-        contact: of a part, when it is touched first; of an object, when the fingers begin to close, or to open.
+        contact: of a part, when it is touched first; of an object, when the fingers begin to close, or to open; of a
+            use, when it comes as near to where it is used as it does at all.
         release: when that ends.
         end: where the segment ends: the hand is off.
         signal: name of the signal that says so.
@@ -72,7 +78,7 @@ def cut(found: Prepared, rules: Mapping[str, CutRules] = DERIVED) -> list[Segmen
         if words["skill"] in JOINTED:
             raw += _part_segments(found, stage)
         elif words["skill"] == "pick_place":
-            raw += _object_segments(found, stage)
+            raw += _object_segments(found, stage, raw)
     raw.sort(key=lambda one: one.contact)
     return list(_apart(found, raw))
 
@@ -111,25 +117,62 @@ def _part_segments(found: Prepared, stage: _Stage) -> Iterator[Segment]:
                 yield Segment(PART, stage.number, name, first, lead, begin, end, last)
 
 
-def _object_segments(found: Prepared, stage: _Stage) -> Iterator[Segment]:
+def _object_segments(found: Prepared, stage: _Stage, before: list[Segment]) -> Iterator[Segment]:
     rules, first, last, name = stage.rules, stage.first, stage.last, stage.words["thing"]
-    touched = found.touching[name] > 0
-    # Commands to close that bring the object into the hand; the last one counts, and what was let go after it.
+    verb, touched = stage.words["verb"], found.touching[name] > 0
+    # Commands to close that bring the object into the hand; the last one counts, and what was let go after it. What is
+    # used may have been there before, and hardly move.
     holds = []
     for start, stop in runs(found.gripper[first:last] > 0, 0):
         begin, end = first + start, first + stop
-        if end - begin > FIRM_STEPS and touched[begin:end].mean() > 0.5 and _carried(found, name, begin, end):
+        moved = (verb in USES and begin == first) or _carried(found, name, begin, end)
+        if end - begin > FIRM_STEPS and touched[begin:end].mean() > 0.5 and moved:
             holds.append((begin, end))
     if not holds:
         return
     close, opened = holds[-1]
+    lay, lifted = rest_step(before, name), close
     if close > first:
-        lifted = _when_lifted(found, name, close, opened)
+        lay, lifted = close, _when_lifted(found, name, close, opened)
         lead = _lead(found, close, first, rules.near_m, rules.far_steps)
         yield Segment(PICK, stage.number, name, first, lead, close, lifted, lifted)
-    if stage.words["verb"] != "pick" and opened < last:
+    if verb in USES:
+        yield from _use_segments(found, stage, lifted, opened, lay)
+    if verb != "pick" and (verb not in USES or verb == RINSE) and opened < last:
         lead = _lead(found, opened, close, rules.place_near_m, rules.far_steps)
         yield Segment(PLACE, stage.number, name, close, lead, opened, opened, last)
+
+
+def _use_segments(found: Prepared, stage: _Stage, lifted: int, opened: int, lay: int) -> Iterator[Segment]:
+    """The last time that a held object is about where it is used."""
+    rules, name, last = stage.rules, stage.words["thing"], stage.last
+    away = found.poses[name][:, :3, 3] - use_frames(found, stage.number, lay)[:, :3, 3]
+    path = np.linalg.norm(away, axis=1)[lifted:opened]
+    at = path < path.min() + AT_M
+    about = runs(path < path.min() + rules.use_near_m, rules.gap_steps)
+    start, stop = next(one for one in reversed(about) if at[slice(*one)].any())
+    there = np.flatnonzero(at[start:stop]) + start
+    if stage.words["verb"] in UNDER_WATER:
+        stop = int(there[-1]) + 1  # no need to go back as it came
+    contact, end = lifted + int(there[0]), lifted + stop
+    lead = _lead(found, contact, lifted + start, np.inf, len(found))
+    yield Segment(USE, stage.number, name, lifted, lead, contact, end, last if end == opened else end)
+
+
+def use_frames(found: Prepared, stage: int, lay: int) -> Array:
+    """Where a stage uses its object, (T, 4, 4); `lay` is the step at which that was taken from where it lay."""
+    words = found.about["stages"][stage]
+    if not words["about_itself"]:
+        return found.poses[use_key(stage)]
+    name = words["thing"]
+    frame = where_it_lay(found.poses[name][lay], float(found.undersides[name][lay, 2]))
+    return np.repeat(frame[None], len(found), axis=0)
+
+
+def rest_step(segments: Sequence[Segment], name: str, before: int | None = None) -> int:
+    """The last step at which an object lay where it was taken from, before a step if one is given; else the first."""
+    taken = [one.contact for one in segments if one.kind == PICK and one.ref == name]
+    return max((step for step in taken if before is None or step <= before), default=0)
 
 
 def _carried(found: Prepared, name: str, begin: int, end: int) -> bool:

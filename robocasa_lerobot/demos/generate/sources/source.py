@@ -15,7 +15,8 @@ import numpy as np
 from robocasa_lerobot.demos.generate.sources.frames import JOINTED
 from robocasa_lerobot.demos.generate.sources.prepared import GROUP, VERSION, Prepared, is_prepared, read_prepared
 from robocasa_lerobot.demos.generate.sources.rules import CutRules, rules_from
-from robocasa_lerobot.demos.generate.sources.segments import PART, Segment, cut
+from robocasa_lerobot.demos.generate.sources.segments import PART, USE, Segment, cut
+from robocasa_lerobot.demos.generate.sources.uses import UNDER_WATER
 from robocasa_lerobot.demos.replay import demonstrations
 from robocasa_lerobot.envs.tasks.task import Stage
 from robocasa_lerobot.errors import UserError
@@ -135,7 +136,7 @@ def digest_of(sources: Sequence[Source]) -> str:
 
 
 def pieces_for(sources: Sequence[Source], stage: Stage, kind: str, drawn_to: str = "") -> list[Piece]:
-    """The segments of a kind from stages like one: of its skill, verb and direction."""
+    """The segments of a kind from stages like one: of its skill, and of its verb and direction where these matter."""
     found = []
     for source in sources:
         for segment in source.segments:
@@ -144,8 +145,15 @@ def pieces_for(sources: Sequence[Source], stage: Stage, kind: str, drawn_to: str
                 continue
             if stage.skill in JOINTED and (words["verb"] != stage.verb or words["drawn_to"] != drawn_to):
                 continue
+            if kind == USE and not _alike(str(words["verb"]), stage.verb):
+                continue
             found.append(Piece(source, segment))
     return found
+
+
+def _alike(one: str, other: str) -> bool:
+    """Whether two verbs use what is held in the same way."""
+    return one == other or (one in UNDER_WATER and other in UNDER_WATER)
 
 
 def _stamp(folder: Path) -> float:

@@ -66,7 +66,7 @@ def pick_object(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
     """
     obj, following = graspable(env, stage.object), _placing(env, stage)
     far = following is None or _goes_far(env, following, obj, place_strategy(env, following, obj))
-    yield from take(env, obj, _free_grasp(env, stage), kept=True, far=far)
+    yield from take(env, obj, free_grasp(env, stage), kept=True, far=far)
 
 
 def place_object(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
@@ -130,7 +130,7 @@ def drive(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
     holder = target_object(env, stage)
     obj = graspable(env, stage.object) if stage.object else None
     if obj is not None and not is_held(env, obj.name):
-        yield from take(env, obj, _free_grasp(env, stage), kept=True, far=True)
+        yield from take(env, obj, free_grasp(env, stage), kept=True, far=True)
     if holder:
         fixture = locate(env, holder).fixture
         if fixture is None:
@@ -245,7 +245,7 @@ def _around_door(env: KitchenEnv, fixture: Fixture | None) -> Iterator[Array]:
         yield from drive_around_open_door(env, fixture)
 
 
-def _free_grasp(env: KitchenEnv, stage: Stage) -> GraspStrategy:
+def free_grasp(env: KitchenEnv, stage: Stage) -> GraspStrategy:
     """How an object that stands free is grasped best for where it goes next."""
     use, obj = _next_use(env, stage), graspable(env, stage.object)
     if use in BY_USE and (use != "pour" or has_handle(obj)):

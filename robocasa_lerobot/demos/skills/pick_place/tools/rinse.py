@@ -21,11 +21,16 @@ def rinse(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
     Raises:
         SkillError: it was not under water long enough, or is not where it belongs after all attempts.
     """
+    held, placed = parts_of_rinsing(env, stage)
+    if not stage_done(env, held):
+        yield from hold_object(env, held)
+    yield from place_object(env, placed)
+
+
+def parts_of_rinsing(env: KitchenEnv, stage: Stage) -> tuple[Stage, Stage]:
+    """What a stage that rinses consists of: to hold its object under water, and to put it down."""
     condition = stage_condition(env.declaration, stage)
     parts: tuple[Goal, ...] = condition.parts if isinstance(condition, AllOf) else (condition,)
     counted = [part for part in parts if isinstance(part, StepsWhile)]
-    held = replace(stage, verb="hold", until=AllOf(*counted))
-    if not stage_done(env, held):
-        yield from hold_object(env, held)
-    placed = AllOf(*(part for part in parts if part not in counted))
-    yield from place_object(env, replace(stage, verb="place", until=placed))
+    rest = AllOf(*(part for part in parts if part not in counted))
+    return replace(stage, verb="hold", until=AllOf(*counted)), replace(stage, verb="place", until=rest)
