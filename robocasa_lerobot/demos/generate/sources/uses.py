@@ -11,12 +11,10 @@ import numpy as np
 
 from robocasa_lerobot.demos.generate.sources.transform import heading, yaw_pose
 from robocasa_lerobot.demos.motion import UP, Array
-from robocasa_lerobot.demos.skills.common import SkillError
 from robocasa_lerobot.demos.skills.pick_place.graspable import Graspable
 from robocasa_lerobot.demos.skills.pick_place.tools.surfaces import surface_of
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.kitchens.appliances.kinds.sink import Sink
-from robocasa_lerobot.envs.kitchens.fixtures.counters import Counter
 from robocasa_lerobot.envs.predicates.objects import object_corners
 from robocasa_lerobot.envs.tasks.task import Stage
 
@@ -33,14 +31,15 @@ def use_key(stage: int) -> str:
 
 def is_about_itself(env: KitchenEnv, stage: Stage) -> bool:
     """Whether a stage uses its object about where that lay before it was taken."""
-    if stage.verb == "wipe":
-        return isinstance(env.scene.fixtures.get(env.scene.roles.get(stage.target, "")), Counter)
+    target = env.scene.fill(stage.target)
+    if stage.verb == "wipe" and target not in env.scene.objects:  # a counter goes on and on
+        return bool(np.isinf(surface_of(env, target, np.zeros(3)).size[0]))
     return stage.verb in BY_ITSELF
 
 
 def has_heading(env: KitchenEnv, stage: Stage) -> bool:
     """Whether the frame of a use points anywhere: round things do not, whose headings mean nothing."""
-    return is_about_itself(env, stage) or stage.verb == "wipe" or stage.target not in env.scene.objects
+    return is_about_itself(env, stage) or stage.verb == "wipe" or env.scene.fill(stage.target) not in env.scene.objects
 
 
 def where_it_lay(pose: Array, underside_m: float) -> Array:
@@ -52,18 +51,17 @@ def use_frame(env: KitchenEnv, stage: Stage) -> Array:
     """Upright pose (4, 4) of where a stage uses its object at present, unless that is where it lay.
 
     Raises:
-        SkillError: the stage's target is nothing that an object is used on so.
+        SkillError: the target is nothing that a tool is used on.
+        UserError: it is no sink, where a sink is needed.
     """
     target, data = env.scene.fill(stage.target), env.data
     if target not in env.scene.objects:
-        fixture = env.scene.fixture(target)
         if stage.verb == "wipe":
-            return _at(surface_of(env, target, np.zeros(3)).middle, fixture.yaw)
-        if not isinstance(fixture, Sink):
-            raise SkillError(f"{target} is nothing that is used with `{stage.verb}`")
-        basin = fixture.basin
-        spout = data.site(f"{fixture.name}_water").xpos
-        return _at(spout if stage.verb in UNDER_WATER else basin.world(data, (0.0, 0.0, basin.half[2])), fixture.yaw)
+            return _at(surface_of(env, target, np.zeros(3)).middle, env.scene.fixture(target).yaw)
+        sink = env.scene.fixture(target, Sink)
+        spout = data.site(f"{sink.name}_water").xpos
+        edge = sink.basin.world(data, (0.0, 0.0, sink.basin.half[2]))
+        return _at(spout if stage.verb in UNDER_WATER else edge, sink.yaw)
     body, item = data.body(target), env.scene.objects[target].item
     at = np.array(body.xpos)
     yaw = 0.0
