@@ -191,13 +191,16 @@ def _carry_out(env: KitchenEnv, states: Array, actions: Array) -> tuple[bool, fl
 
 
 def _goal_held_at_the_end(env: KitchenEnv, recorded: Demonstration) -> tuple[bool, str]:
-    """Whether the goal holds in the last recorded state, set into a simulation of its own; nothing sleeps in it.
+    """Whether the goal holds in the last recorded state, set into a simulation of its own.
+
+    What has no velocity at all in it slept, and counts as touching what slept beside it as it did then: nearly.
 
     What a goal remembers is in the state, as positions of joints that only the recording vouches for: nothing in the
     state itself shows how it came about. The terms that were recorded at the time must say the same.
     """
     data = mujoco.MjData(env.model)
     put_state(env, data, recorded.states[-1])
+    _put_to_sleep(env.model, data)
     found: dict[str, bool] = {}
     holds = bool(env.declaration.goal.evaluate(env.scene, data, found))
     # Of one that reads another, as of steps in which something moves, the outer alone is a term of the goal.
@@ -207,6 +210,13 @@ def _goal_held_at_the_end(env: KitchenEnv, recorded: Demonstration) -> tuple[boo
             said = "was not recorded" if then is None else f"was recorded as {then}"
             return False, f"`{name}` is {now} in the last state, but {said}"
     return holds, ""
+
+
+def _put_to_sleep(model: mujoco.MjModel, data: mujoco.MjData) -> None:
+    """Mark what has no velocity as asleep, each tree by itself, for predicates to read."""
+    for tree, (first, count) in enumerate(zip(model.tree_dofadr, model.tree_dofnum, strict=True)):
+        if not data.qvel[first : first + count].any():
+            data.tree_asleep[tree] = tree
 
 
 def put_state(env: KitchenEnv, data: mujoco.MjData, state: Array) -> None:

@@ -26,6 +26,7 @@ from robocasa_lerobot.envs.predicates import (
     MovedSince,
     Never,
     Not,
+    ObjectTouches,
     Once,
     StateIs,
     StepsWhile,
@@ -141,6 +142,20 @@ def test_of_what_is_remembered_about_what_is_remembered_the_outer_was_recorded()
     assert _goal_held_at_the_end(env, Demonstration("", {}, states, np.zeros((1, 12)), {name: True})) == (True, "")
     _, said = _goal_held_at_the_end(env, Demonstration("", {}, states, np.zeros((1, 12)), {name: False}))
     assert said == f"`{name}` is True in the last state, but was recorded as False"
+
+
+@pytest.mark.parametrize(
+    ("lifted_m", "speed", "touches"), [(0.0, 0.0, True), (8e-4, 0.0, True), (8e-4, 0.01, False), (3e-3, 0.0, False)]
+)
+def test_what_slept_a_hair_over_what_it_lay_on_touches_it(lifted_m: float, speed: float, touches: bool) -> None:
+    env = KitchenEnv(by_the_sink(ObjectTouches("obj", "sink")), cameras=(), terminate_on_success=False)
+    env.reset(seed=SEED)
+    joint = env.model.body("obj").jntadr[0]
+    qpos, qvel = env.data.qpos.copy(), np.zeros(env.model.nv)
+    qpos[env.model.jnt_qposadr[joint] + 2] += lifted_m
+    qvel[env.model.jnt_dofadr[joint] + 2] = speed
+    states = np.concatenate([[env.data.time], qpos, qvel])[None]
+    assert _goal_held_at_the_end(env, Demonstration("", {}, states, np.zeros((1, 12)))) == (touches, "")
 
 
 def test_what_cannot_be_made_good_ends_the_attempt() -> None:
