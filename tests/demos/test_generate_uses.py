@@ -11,19 +11,21 @@ import pytest
 from robocasa_lerobot import cli
 from robocasa_lerobot.demos.attempts import RecordingSettings
 from robocasa_lerobot.demos.generate.settings import GenerationSettings
-from robocasa_lerobot.demos.generate.sources.prepare import prepare_files
+from robocasa_lerobot.demos.generate.sources.prepare import _Watcher, prepare_files
 from robocasa_lerobot.demos.generate.sources.segments import PICK, USE, rest_step, use_frames
 from robocasa_lerobot.demos.generate.sources.source import Piece, Source, sources_of
 from robocasa_lerobot.demos.generate.sources.transform import inverse, yaw_pose
-from robocasa_lerobot.demos.generate.sources.uses import USES, use_key, where_it_lay, working_point
+from robocasa_lerobot.demos.generate.sources.uses import USES, is_use, use_key, where_it_lay, working_point
 from robocasa_lerobot.demos.generate.stage import can_generate
 from robocasa_lerobot.demos.generate.use_segments import use_path
 from robocasa_lerobot.demos.planning.collision import Held
 from robocasa_lerobot.demos.recording import record_tasks
-from robocasa_lerobot.demos.replay import replay
+from robocasa_lerobot.demos.replay import Demonstration, replay
 from robocasa_lerobot.demos.skills import SKILLS
 from robocasa_lerobot.demos.skills.pick_place.graspable import Graspable, graspable
+from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.tasks.registry import get_task, task_names
+from robocasa_lerobot.envs.tasks.typical import stages_of
 
 TASKS = ("WipeTable", "TiltPan", "FillBlenderJug")  # about where it lay, let go; about itself, kept; under water
 VERBS = ("wipe", "tilt", "hold")
@@ -34,6 +36,31 @@ def test_every_task_can_be_generated() -> None:
     assert len(names) == 365
     assert [name for name in names if not can_generate(get_task(name))] == []
     assert {("pick_place", verb) for verb in USES} <= set(SKILLS)
+
+
+def _tasks_with_every_verb() -> list[str]:
+    """Tasks that have a stage of every skill and verb among them, few of them."""
+    verbs = {name: {(stage.skill, stage.verb) for stage in stages_of(get_task(name))} for name in task_names()}
+    missing, chosen = set().union(*verbs.values()), []
+    while missing:
+        chosen.append(max(verbs, key=lambda name: len(verbs[name] & missing)))
+        missing -= verbs[chosen[-1]]
+    return chosen
+
+
+def test_a_step_of_every_verb_can_be_noted() -> None:
+    """Buttons are pressed and knobs turned, too: nothing is in the hand there that could be used."""
+    for name in _tasks_with_every_verb():
+        env = KitchenEnv(name, split="pretrain", cameras=(), terminate_on_success=False)
+        env.reset(seed=100_000)
+        watcher = _Watcher(env, Demonstration(name, {}, np.zeros((1, 1)), np.zeros((1, 12))))
+        watcher.before()
+        watcher.after(-1.0)
+        found = watcher.prepared()
+        uses = {use_key(number) for number, stage in enumerate(env.declaration.stages) if is_use(stage)}
+        assert found.working_points.keys() == uses, name
+        assert {key for key in found.poses if key.startswith("use.")} <= uses, name
+        env.close()
 
 
 def test_the_point_that_counts_is_the_lowest_or_over_the_middle_under_water() -> None:

@@ -20,7 +20,7 @@ from robocasa_lerobot.demos.generate.sources.frames import HANDLE, Part, body_po
 from robocasa_lerobot.demos.generate.sources.prepared import GROUP, Prepared, is_prepared, world_pose, write_prepared
 from robocasa_lerobot.demos.generate.sources.segments import cut, signals_of
 from robocasa_lerobot.demos.generate.sources.transform import inverse, make_pose, yaw_pose
-from robocasa_lerobot.demos.generate.sources.uses import USES, is_about_itself, use_frame, use_key, working_point
+from robocasa_lerobot.demos.generate.sources.uses import is_about_itself, is_use, use_frame, use_key, working_point
 from robocasa_lerobot.demos.motion import Array, base_pose, grip_position, hand_rotation
 from robocasa_lerobot.demos.recorder import SUCCESS_HOLD_STEPS
 from robocasa_lerobot.demos.replay import Demonstration, demonstrations, kitchen_of, put_state, read_demonstration
@@ -156,7 +156,7 @@ class _Watcher:
             words["drawn_to"] = env.scene.fill(stage.to)
             words["thing"] = env.scene.fill(stage.object)
             words["place"] = env.scene.fill(stage.target)
-            words["about_itself"] = is_about_itself(env, stage)
+            words["about_itself"] = is_use(stage) and is_about_itself(env, stage)
             self._parts |= {part.name: part for part in own}
         loose = {*env.scene.objects, *(w["thing"] for w in self._words if w["thing"])}
         self._objects: dict[str, Graspable] = {name: graspable(env, name) for name in sorted(loose)}
@@ -200,7 +200,7 @@ class _Watcher:
                 low = data.xpos[body][2] - self._objects[name].below(data.xmat[body].reshape(3, 3))
                 self._note(f"undersides/{name}", [*data.xpos[body][:2], low])
         for number, stage in enumerate(self._stages):
-            if stage.verb in USES:
+            if is_use(stage):
                 self._before_use(number, stage)
 
     def _before_use(self, number: int, stage: Stage) -> None:

@@ -29,6 +29,11 @@ def use_key(stage: int) -> str:
     return f"use.{stage}"
 
 
+def is_use(stage: Stage) -> bool:
+    """Whether a stage uses what is in the hand: knobs are turned and buttons pressed, too, but not held."""
+    return stage.skill == "pick_place" and stage.verb in USES
+
+
 def is_about_itself(env: KitchenEnv, stage: Stage) -> bool:
     """Whether a stage uses its object about where that lay before it was taken."""
     target = env.scene.fill(stage.target)
