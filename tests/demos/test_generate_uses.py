@@ -17,7 +17,7 @@ from robocasa_lerobot.demos.generate.sources.source import Piece, Source, source
 from robocasa_lerobot.demos.generate.sources.transform import inverse, yaw_pose
 from robocasa_lerobot.demos.generate.sources.uses import USES, is_use, use_key, where_it_lay, working_point
 from robocasa_lerobot.demos.generate.stage import can_generate
-from robocasa_lerobot.demos.generate.use_segments import use_path
+from robocasa_lerobot.demos.generate.use_segments import ShownUse, use_path
 from robocasa_lerobot.demos.planning.collision import Held
 from robocasa_lerobot.demos.recording import record_tasks
 from robocasa_lerobot.demos.replay import Demonstration, replay
@@ -126,13 +126,13 @@ def test_a_use_in_its_own_scene_is_the_sources_own(sources: Path, task: str) -> 
     assert np.ptp(frames, axis=0).max() < 0.01  # nothing pushes it about
     in_hand = inverse(data.eef[segment.lead]) @ data.poses[segment.ref][segment.lead]
     held = Held(obj.name, in_hand[:3, 3], in_hand[:3, :3])
-    path = use_path(stage, obj, held, frames[0], piece, np.eye(3), 0.0, 0.0)
+    path = use_path(stage, obj, held, frames[0], ShownUse.of(piece), np.eye(3), 0.0, 0.0)
     env.close()
     point = working_point(obj, stage.verb, data.poses[segment.ref][segment.release - 1][:3, :3])
     kept = data.working_points[use_key(segment.stage)][segment.release - 1]
     np.testing.assert_allclose(point, kept, atol=1e-3)
     for step in range(segment.lead, segment.release):
-        pose = path.hands_here[step - segment.lead] @ in_hand
+        pose = path.hand(step) @ in_hand
         there = data.poses[segment.ref][step]
         np.testing.assert_allclose(pose[:3, :3], there[:3, :3], atol=1e-9)
         moved = frames[step][:3, 3] - frames[0][:3, 3]

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -21,11 +22,13 @@ from robocasa_lerobot.demos.generate.segment_paths import (
     after_letting_go,
     along,
     cheapest,
+    led_ahead,
+    poses_at,
 )
 from robocasa_lerobot.demos.generate.sources.segments import PICK, PLACE
 from robocasa_lerobot.demos.generate.sources.source import Piece, pieces_for
 from robocasa_lerobot.demos.generate.sources.transform import heading, make_pose
-from robocasa_lerobot.demos.generate.sources.uses import USES, where_it_lay
+from robocasa_lerobot.demos.generate.sources.uses import RINSE, USES, where_it_lay
 from robocasa_lerobot.demos.generate.use_segments import use
 from robocasa_lerobot.demos.motion import (
     CLOSED,
@@ -67,7 +70,7 @@ def object_stage(env: KitchenEnv, stage: Stage, course: Course) -> Iterator[Arra
     Raises:
         SkillError: no source has such segments, none is within reach, or it is not done after all tries.
     """
-    if stage.verb == "rinse":
+    if stage.verb == RINSE:
         for part in parts_of_rinsing(env, stage):
             yield from object_stage(env, part, course)
         return
@@ -121,9 +124,8 @@ def _pick(env: KitchenEnv, stage: Stage, obj: Graspable, course: Course, tried: 
     choice = yield from course.choosing(approach(env, plan, OPEN), DRIVE)
     way = choice.path
     assert isinstance(way, SegmentPath)
-    assert way.piece is not None
     tried.append(way.targets[2].position - origin)
-    yield from course.labelled(bridged(env, course.manner, choice, way.hands_here[0], OPEN), BRIDGE)
+    yield from course.labelled(bridged(env, course.manner, choice, way.first, OPEN), BRIDGE)
     body = env.data.body(obj.name)
     start, turn = body.xpos.copy(), body.xmat.reshape(3, 3).copy()
     course.lay[obj.name] = where_it_lay(make_pose(start, turn), float(start[2]) - obj.below(turn))
@@ -197,14 +199,13 @@ def _pick_way(piece: Piece, position: Array, rotation: Array, extra: float) -> S
     def here(pose: Array) -> Array:
         return make_pose(position + level @ (pose[:3, 3] - source[:3, 3]), turn @ pose[:3, :3])
 
-    steps = range(segment.lead, segment.end)
-    hands = tuple(here(data.eef[step]) for step in steps)
-    targets = tuple(here(data.target[step]) for step in steps)
-    at = segment.contact - segment.lead
-    chosen = [hands[0], hands[at // 2], hands[min(at, len(hands) - 1)], hands[-1]]
-    return SegmentPath(
-        tuple(as_target(pose) for pose in chosen), extra + ASKEW_COST * askew, None, piece, targets, hands
-    )
+    def hand(step: int) -> Array:
+        return here(data.eef[step])
+
+    lead, contact = segment.lead, segment.contact
+    chosen = poses_at(piece, hand, (lead, lead + (contact - lead) // 2, contact, segment.end))
+    extra += ASKEW_COST * askew
+    return SegmentPath(chosen, extra, piece=piece, hand=hand, target=lambda step: here(data.target[step]))
 
 
 def _place(env: KitchenEnv, stage: Stage, obj: Graspable, course: Course, put_down: list[Array]) -> Iterator[Array]:
@@ -237,13 +238,12 @@ def _place(env: KitchenEnv, stage: Stage, obj: Graspable, course: Course, put_do
         return
     way = choice.path
     assert isinstance(way, SegmentPath)
-    assert way.piece is not None
-    yield from course.labelled(bridged(env, course.manner, choice, way.hands_here[0], CLOSED, held), BRIDGE)
+    yield from course.labelled(bridged(env, course.manner, choice, way.first, CLOSED, held), BRIDGE)
     if not is_held(env, obj.name):
         return
     put_down.append(way.targets[2].position)
     course.begin(way.piece, cost=round(choice.cost, 3))
-    yield from carry_out_segment(env, course, along(way, lambda: np.zeros(3)), lambda: False)
+    yield from carry_out_segment(env, course, along(way), lambda: False)
     yield from course.labelled(leave(env, obj), BRIDGE)
 
 
@@ -281,7 +281,7 @@ def _place_ways(
         way = _place_way(obj, held, rest, present, piece, spot, strategy, about, turn)
         again = sum(float(np.linalg.norm(way.targets[2].position - other)) < AGAIN_M for other in put_down)
         extra = way.extra + AGAIN_COST * again + float(course.bias[piece.source.number])
-        ways.append(SegmentPath(way.targets, extra, None, piece, way.targets_here, way.hands_here))
+        ways.append(replace(way, extra=extra))
     return cheapest(env, ways, course)
 
 
@@ -306,32 +306,29 @@ def _place_way(
     lean = rotation_about(UP, -heading(lean)) @ lean
     turned = spin @ rest
     end = spot.point + strategy.gap_m * UP
-    last = data.eef[segment.contact]
-    hands, targets = [], []
-    let_go: Array | None = None
-    for step in range(segment.lead, segment.end):
-        if step <= segment.contact:
-            turn = about @ poses[step][:3, :3] @ poses[segment.contact][:3, :3].T @ about.T @ lean @ turned
-            under = end + about @ (low[step] - low[segment.contact])
-            hand_turn = turn @ held.rotation.T
-            at = under + obj.below(turn) * UP - hand_turn @ held.position
-            hands.append(make_pose(at, hand_turn))
-            let_go = hands[-1]
-        else:
-            assert let_go is not None
-            hands.append(after_letting_go(let_go, last, data.eef[step], about))
-        # The controller was led ahead of the hand by so much.
-        ahead = about @ (data.target[step][:3, 3] - data.eef[step][:3, 3])
-        twist = hands[-1][:3, :3] @ data.eef[step][:3, :3].T @ data.target[step][:3, :3]
-        targets.append(make_pose(hands[-1][:3, 3] + ahead, twist))
-    at = segment.contact - segment.lead
-    chosen = [hands[0], hands[at // 2], hands[min(at, len(hands) - 1)], hands[min(at + 12, len(hands) - 1)], hands[-1]]
+
+    def hand(step: int) -> Array:
+        if step > segment.contact:
+            return after_letting_go(hand(segment.contact), data.eef[segment.contact], data.eef[step], about)
+        turn = about @ poses[step][:3, :3] @ poses[segment.contact][:3, :3].T @ about.T @ lean @ turned
+        under = end + about @ (low[step] - low[segment.contact])
+        hand_turn = turn @ held.rotation.T
+        return make_pose(under + obj.below(turn) * UP - hand_turn @ held.position, hand_turn)
+
+    lead, contact = segment.lead, segment.contact
+    steps = (lead, lead + (contact - lead) // 2, contact, contact + 12, segment.end)
     tilt = float(np.arccos(np.clip(lean[2, 2], -1.0, 1.0)))
     cost = spot.extra + TURN_COST * min(yaw, 2 * np.pi - yaw) + LEANING_COST * tilt
     if strategy.fit is not None:
-        let = hands[min(at, len(hands) - 1)]
+        let = hand(min(contact, segment.end - 1))
         cost += strategy.fit(let[:3, 3] + let[:3, :3] @ held.position, let[:3, :3] @ held.rotation)
-    return SegmentPath(tuple(as_target(p) for p in chosen), cost, None, piece, tuple(targets), tuple(hands))
+    return SegmentPath(
+        poses_at(piece, hand, steps),
+        cost,
+        piece=piece,
+        hand=hand,
+        target=lambda step: led_ahead(piece, hand(step), about, step),
+    )
 
 
 def _rest_step(piece: Piece) -> int:

@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from robocasa_lerobot.demos.generate.course import Course
-from robocasa_lerobot.demos.generate.execute import Carried, hand_now
+from robocasa_lerobot.demos.generate.execute import Carried, as_target, hand_now
 from robocasa_lerobot.demos.generate.select import narrowed
 from robocasa_lerobot.demos.generate.sources.source import Piece
 from robocasa_lerobot.demos.generate.sources.transform import heading, inverse, make_pose, yaw_pose
-from robocasa_lerobot.demos.motion import UP, Array, base_pose, rotation_about
+from robocasa_lerobot.demos.motion import UP, Array, HandTarget, base_pose, rotation_about
 from robocasa_lerobot.demos.skills.reaching import WaypointPath
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 
@@ -20,44 +20,69 @@ STEEP_RAD = np.deg2rad(15.0)  # of a hand from straight down, up to which it may
 MOST_PATHS = 200  # that are planned for
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class SegmentPath(WaypointPath):
-    """A segment in this scene: `hands` are the hand's poses here at the steps from its lead to its end."""
+    """A segment in this scene.
 
-    piece: Piece | None = None
-    targets_here: tuple[Array, ...] = ()
-    hands_here: tuple[Array, ...] = ()
+    Attributes:
+        piece: the segment.
+        hand: pose (4, 4) of the hand here at a step of the source, from the segment's lead to before its end.
+        target: the same of where the controller is led to.
+    """
+
+    piece: Piece
+    hand: Callable[[int], Array]
+    target: Callable[[int], Array]
+
+    @property
+    def first(self) -> Array:
+        """The hand's pose (4, 4) that it begins with."""
+        return self.hand(self.piece.segment.lead)
 
 
-def along(path: SegmentPath, moved: Callable[[], Array], late: Callable[[int], bool] = lambda step: False) -> Carried:
+def poses_at(piece: Piece, hand: Callable[[int], Array], steps: Iterable[int]) -> tuple[HandTarget, ...]:
+    """The hand's poses at steps of a segment, or at its last one, for a planner."""
+    return tuple(as_target(hand(min(step, piece.segment.end - 1))) for step in steps)
+
+
+def led_ahead(piece: Piece, hand: Array, about: Array, step: int) -> Array:
+    """Where the controller is led to (4, 4): as far ahead of the hand (4, 4) as in the source, turned by `about`."""
+    eef, target = piece.data.eef[step], piece.data.target[step]
+    ahead = about @ (target[:3, 3] - eef[:3, 3])
+    return make_pose(hand[:3, 3] + ahead, hand[:3, :3] @ eef[:3, :3].T @ target[:3, :3])
+
+
+def along(
+    path: SegmentPath,
+    moved: Callable[[], Array] = lambda: np.zeros(3),
+    late: Callable[[int], bool] = lambda step: False,
+) -> Carried:
     """The segment along a path, moved by metres (3,) as what it is about has moved by then; see `Carried.late`."""
-    assert path.piece is not None
-    lead, count = path.piece.segment.lead, len(path.hands_here)
+    last = path.piece.segment.end - 1
 
-    def at(poses: tuple[Array, ...], step: int) -> Array:
-        found: Array = make_pose(moved(), np.eye(3)) @ poses[min(step - lead, count - 1)]
+    def at(pose: Callable[[int], Array], step: int) -> Array:
+        found: Array = make_pose(moved(), np.eye(3)) @ pose(min(step, last))
         return found
 
-    return Carried(path.piece, lambda step: at(path.targets_here, step), lambda step: at(path.hands_here, step), late)
+    return Carried(path.piece, lambda step: at(path.target, step), lambda step: at(path.hand, step), late)
 
 
 def cheapest[P: SegmentPath](env: KitchenEnv, paths: Sequence[P], course: Course) -> list[P]:
     """The paths that are planned for: those of the sources that are selected, the cheapest of them."""
 
     def change(path: P) -> Array:
-        assert path.piece is not None
         segment, data = path.piece.segment, path.piece.data
         position, yaw = base_pose(env.data)
-        here = inverse(yaw_pose(float(position[0]), float(position[1]), yaw)) @ path.hands_here[-1]
+        here = inverse(yaw_pose(float(position[0]), float(position[1]), yaw)) @ path.hand(segment.end - 1)
         return inverse(inverse(data.base_pose(segment.begin)) @ data.eef[segment.end - 1]) @ here
 
     selected = narrowed(
         paths,
         course.manner,
         course.rng,
-        source=lambda path: -1 if path.piece is None else path.piece.source.number,
+        source=lambda path: path.piece.source.number,
         object_change=change,
-        first_pose=lambda path: path.hands_here[0],
+        first_pose=lambda path: path.first,
         hand=hand_now(env),
     )
     return sorted(selected, key=lambda path: path.extra)[:MOST_PATHS]

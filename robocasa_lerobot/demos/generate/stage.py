@@ -20,7 +20,8 @@ from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.tasks.task import Stage, Task
 from robocasa_lerobot.envs.tasks.typical import stages_of
 
-PLANNED = (("navigation", "drive"), ("knobs", "wait"))  # without a contact that a source could show
+# Without a contact that a source could show, and of which kind their steps are.
+PLANNED = {("navigation", "drive"): DRIVE, ("knobs", "wait"): BRIDGE}
 OBJECT_VERBS = ("pick", "place", "place_upside_down", *LID_VERBS, *USES)
 
 
@@ -50,8 +51,7 @@ def skills_with(course: Course) -> dict[tuple[str, str], Skill]:
         if not _is_generated(skill, verb):
             continue
         if (skill, verb) in PLANNED:
-            kind = DRIVE if skill == "navigation" else BRIDGE
-            skills[skill, verb] = partial(_planned, course, SKILLS[skill, verb], kind)
+            skills[skill, verb] = partial(_planned, course, SKILLS[skill, verb], PLANNED[skill, verb])
         else:
             skills[skill, verb] = _bound(part_stage if skill in JOINTED else object_stage, course)
     return skills

@@ -15,8 +15,15 @@ import numpy as np
 
 from robocasa_lerobot.demos.generate.bridge import bridged
 from robocasa_lerobot.demos.generate.course import BRIDGE, DRIVE, Course
-from robocasa_lerobot.demos.generate.execute import as_target, carry_out_segment
-from robocasa_lerobot.demos.generate.segment_paths import SegmentPath, after_letting_go, along, cheapest
+from robocasa_lerobot.demos.generate.execute import carry_out_segment
+from robocasa_lerobot.demos.generate.segment_paths import (
+    SegmentPath,
+    after_letting_go,
+    along,
+    cheapest,
+    led_ahead,
+    poses_at,
+)
 from robocasa_lerobot.demos.generate.sources.segments import USE, rest_step, use_frames
 from robocasa_lerobot.demos.generate.sources.source import Piece, pieces_for
 from robocasa_lerobot.demos.generate.sources.transform import heading, make_pose
@@ -48,17 +55,51 @@ TURN_COST, SPIN_COST, TRIED_COST = 0.08, 0.12, 0.6  # of a radian, ...; of a sou
 TILTS_RAD = 0.3  # from how it came, from which on an object is tilted by its use
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
+class ShownUse:
+    """What a source shows of a use.
+
+    Attributes:
+        piece: the segment.
+        frames: (T, 4, 4) of where the source used its object.
+        stays: the step at which a use goes on until it is done: tilted farthest, or else at its end.
+        opens: the step at which the fingers open on the object; None where they never do.
+    """
+
+    piece: Piece
+    frames: Array
+    stays: int
+    opens: int | None
+
+    @classmethod
+    def of(cls, piece: Piece) -> ShownUse:
+        """Found from what preparing noted."""
+        segment, data = piece.segment, piece.data
+        lay = rest_step(piece.source.segments, segment.ref, segment.contact)
+        opened = np.flatnonzero(data.gripper[segment.contact : segment.end] < 0)
+        opens = segment.contact + int(opened[0]) if len(opened) else None
+        ups = data.poses[segment.ref][segment.contact : segment.release, :3, 2]
+        tilts = np.arccos(np.clip(ups @ ups[0], -1.0, 1.0))
+        if tilts.max() > TILTS_RAD:
+            stays = segment.contact + int(np.argmax(tilts))
+        else:
+            stays = segment.release - 1 if opens is None else min(opens, segment.release - 1)
+        return cls(piece, use_frames(data, segment.stage, lay), stays, opens)
+
+
+@dataclass(frozen=True, kw_only=True)
 class _UsePath(SegmentPath):
     """A use in this scene.
 
     Attributes:
+        shown: by its source.
         about: turn (3, 3) of the whole path about where it is used.
         spin: turn of the object about the vertical before, radians.
     """
 
-    about: Array | None = None
-    spin: float = 0.0
+    shown: ShownUse
+    about: Array
+    spin: float
 
 
 def use(env: KitchenEnv, stage: Stage, obj: Graspable, course: Course, failed: dict[int, int]) -> Iterator[Array]:
@@ -103,22 +144,20 @@ def use(env: KitchenEnv, stage: Stage, obj: Graspable, course: Course, failed: d
     choice = yield from course.choosing(approach(env, plan, CLOSED, held), DRIVE)
     path = choice.path
     assert isinstance(path, _UsePath)
-    piece, about = path.piece, path.about
-    assert piece is not None
-    assert about is not None
-    yield from course.labelled(bridged(env, course.manner, choice, path.hands_here[0], CLOSED, held), BRIDGE)
+    piece, stays = path.piece, path.shown.stays
+    yield from course.labelled(bridged(env, course.manner, choice, path.first, CLOSED, held), BRIDGE)
     if not is_held(env, obj.name):
         return
     held = Held.now(env.data, obj.name, obj.contents)  # it may have slipped a little
     carried = along(
-        use_path(stage, obj, held, frame, piece, about, path.spin, path.extra),
+        use_path(stage, obj, held, frame, path.shown, path.about, path.spin, path.extra),
         lambda: _frame(env, stage, course)[:3, 3] - frame[:3, 3],
         lambda step: step == stays and touched_by_hand(env, obj)[0] and not stage_done(env, stage),
     )
-    row, stays = course.begin(piece, cost=round(choice.cost, 3)), _stays_until_done(piece)
+    row = course.begin(piece, cost=round(choice.cost, 3))
     yield from carry_out_segment(env, course, carried, lambda: False)
     row["done"] = stage_done(env, stage)
-    if _lets_go(piece):
+    if path.shown.opens is not None:
         yield from course.labelled(leave(env, obj), BRIDGE)
     if not row["done"]:
         failed[piece.source.number] = failed.get(piece.source.number, 0) + 1
@@ -152,9 +191,9 @@ def _paths(
     sided = has_heading(env, stage)
     turns = (0.0,) if is_about_itself(env, stage) else QUARTERS if sided else ROUND
     found = []
-    for piece, turn in itertools.product(pieces, turns):
-        segment, data = piece.segment, piece.data
-        there = _frames_there(piece)[segment.contact]
+    for shown, turn in itertools.product(map(ShownUse.of, pieces), turns):
+        segment, data, source = shown.piece.segment, shown.piece.data, shown.piece.source.number
+        there = shown.frames[segment.contact]
         from_there = heading(frame[:3, :3]) - heading(there[:3, :3]) if sided else yaw - data.base[segment.contact, 2]
         about = rotation_about(UP, float(from_there) + turn)
         # How far the object is turned for the hand to be as the source's was, when it comes near.
@@ -162,9 +201,9 @@ def _paths(
         own = about @ data.poses[segment.ref][segment.lead][:3, :3] @ held.rotation.T
         alike = _about_vertical(hand @ own.T)
         for spin in SPINS:
-            cost = float(course.bias[piece.source.number]) + TRIED_COST * failed.get(piece.source.number, 0)
+            cost = float(course.bias[source]) + TRIED_COST * failed.get(source, 0)
             cost += TURN_COST * abs(turn) + SPIN_COST * min(abs(spin), np.pi - abs(spin))
-            found.append(use_path(stage, obj, held, frame, piece, about, alike + spin, cost))
+            found.append(use_path(stage, obj, held, frame, shown, about, alike + spin, cost))
     return cheapest(env, found, course)
 
 
@@ -174,66 +213,40 @@ def _about_vertical(turn: Array) -> float:
 
 
 def use_path(
-    stage: Stage, obj: Graspable, held: Held, frame: Array, piece: Piece, about: Array, spin: float, cost: float
+    stage: Stage, obj: Graspable, held: Held, frame: Array, shown: ShownUse, about: Array, spin: float, cost: float
 ) -> _UsePath:
     """A source's use, with the object as it is held here."""
+    piece, opens = shown.piece, shown.opens
     segment, data = piece.segment, piece.data
-    poses, frames = data.poses[segment.ref], _frames_there(piece)
-    points = data.working_points[use_key(segment.stage)]
-    stays = _stays_until_done(piece)
-    opens = _opens(piece)
+    poses, came = data.poses[segment.ref], data.poses[segment.ref][segment.lead][:3, :3]
+    point = data.working_points[use_key(segment.stage)][shown.stays]
     turned = rotation_about(UP, spin)
 
     def turn(step: int) -> Array:
         """The object's rotation at a step: turned as the source's has been since it came near."""
-        since = poses[step][:3, :3] @ poses[segment.lead][:3, :3].T
-        out: Array = about @ since @ about.T @ turned @ about @ poses[segment.lead][:3, :3]
+        out: Array = about @ (poses[step][:3, :3] @ came.T) @ about.T @ turned @ about @ came
         return out
 
-    local = working_point(obj, stage.verb, turn(stays))
-    hands: list[Array] = []
-    targets: list[Array] = []
-    for step in range(segment.lead, segment.end):
-        if step <= opens:
-            there = poses[step][:3, 3] + poses[step][:3, :3] @ points[stays] - frames[step][:3, 3]
-            rotation = turn(step)
-            origin = frame[:3, 3] + about @ there - rotation @ local
-            hand = rotation @ held.rotation.T
-            hands.append(make_pose(origin - hand @ held.position, hand))
-        else:
-            hands.append(after_letting_go(hands[opens - segment.lead], data.eef[opens], data.eef[step], about))
-        ahead = about @ (data.target[step][:3, 3] - data.eef[step][:3, 3])  # what the controller was led ahead by
-        twist = hands[-1][:3, :3] @ data.eef[step][:3, :3].T @ data.target[step][:3, :3]
-        targets.append(make_pose(hands[-1][:3, 3] + ahead, twist))
-    steps = np.linspace(segment.contact, max(segment.release - 1, segment.contact), SAMPLES).astype(int) - segment.lead
-    chosen = [hands[0], hands[stays - segment.lead], *(hands[step] for step in steps)]
+    local = working_point(obj, stage.verb, turn(shown.stays))
+
+    def hand(step: int) -> Array:
+        if opens is not None and step > opens:
+            return after_letting_go(hand(opens), data.eef[opens], data.eef[step], about)
+        there = poses[step][:3, 3] + poses[step][:3, :3] @ point - shown.frames[step][:3, 3]
+        rotation = turn(step)
+        origin = frame[:3, 3] + about @ there - rotation @ local
+        hand_turn = rotation @ held.rotation.T
+        return make_pose(origin - hand_turn @ held.position, hand_turn)
+
+    last = max(segment.release - 1, segment.contact)
+    steps = (segment.lead, shown.stays, *np.linspace(segment.contact, last, SAMPLES).astype(int).tolist())
     return _UsePath(
-        tuple(as_target(pose) for pose in chosen), cost, None, piece, tuple(targets), tuple(hands), about, spin
+        poses_at(piece, hand, steps),
+        cost,
+        piece=piece,
+        hand=hand,
+        target=lambda step: led_ahead(piece, hand(step), about, step),
+        shown=shown,
+        about=about,
+        spin=spin,
     )
-
-
-def _frames_there(piece: Piece) -> Array:
-    """Where the source used its object, (T, 4, 4)."""
-    segment = piece.segment
-    return use_frames(piece.data, segment.stage, rest_step(piece.source.segments, segment.ref, segment.contact))
-
-
-def _stays_until_done(piece: Piece) -> int:
-    """The step at which a use goes on until it is done: tilted farthest, or else at its end."""
-    segment = piece.segment
-    ups = piece.data.poses[segment.ref][segment.contact : segment.release, :3, 2]
-    tilts = np.arccos(np.clip(ups @ ups[0], -1.0, 1.0))
-    if tilts.max() > TILTS_RAD:
-        return segment.contact + int(np.argmax(tilts))
-    return min(_opens(piece), segment.release - 1)
-
-
-def _opens(piece: Piece) -> int:
-    """The last step at which the fingers hold the object: the one before they open, or the last of all."""
-    segment = piece.segment
-    opened = np.flatnonzero(piece.data.gripper[segment.contact : segment.end] < 0)
-    return segment.contact + int(opened[0]) if len(opened) else segment.end - 1
-
-
-def _lets_go(piece: Piece) -> bool:
-    return bool((piece.data.gripper[piece.segment.contact : piece.segment.end] < 0).any())

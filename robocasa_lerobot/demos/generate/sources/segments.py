@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from robocasa_lerobot.demos.generate.sources.frames import JOINTED
 from robocasa_lerobot.demos.generate.sources.prepared import Prepared
 from robocasa_lerobot.demos.generate.sources.rules import DERIVED, CutRules, rules_for
-from robocasa_lerobot.demos.generate.sources.uses import UNDER_WATER, USES, use_key, where_it_lay
+from robocasa_lerobot.demos.generate.sources.uses import RINSE, UNDER_WATER, USES, use_key, where_it_lay
 from robocasa_lerobot.demos.motion import Array
 
 PART, PICK, PLACE, USE = "part", "pick", "place", "use"
@@ -27,7 +27,6 @@ DRIVES_M, TURNS_RAD = 0.10, 0.10  # of the base, which stays about where it is d
 LIFTED_M, MOVED_M = 0.04, 0.06  # an object that has risen, or gone, as far is in the hand
 FIRM_STEPS = 10  # of fingers that close
 AT_M = 0.03  # farther from where it is used than it ever comes, an object is about there
-RINSE = "rinse"  # what is put down when it has been used
 
 
 @dataclass(frozen=True)
@@ -131,7 +130,7 @@ def _object_segments(found: Prepared, stage: _Stage, before: list[Segment]) -> I
     if not holds:
         return
     close, opened = holds[-1]
-    lay, lifted = rest_step(before, name), close
+    lay, lifted = rest_step(before, name, close), close
     if close > first:
         lay, lifted = close, _when_lifted(found, name, close, opened)
         lead = _lead(found, close, first, rules.near_m, rules.far_steps)
@@ -169,10 +168,10 @@ def use_frames(found: Prepared, stage: int, lay: int) -> Array:
     return np.repeat(frame[None], len(found), axis=0)
 
 
-def rest_step(segments: Sequence[Segment], name: str, before: int | None = None) -> int:
-    """The last step at which an object lay where it was taken from, before a step if one is given; else the first."""
-    taken = [one.contact for one in segments if one.kind == PICK and one.ref == name]
-    return max((step for step in taken if before is None or step <= before), default=0)
+def rest_step(segments: Sequence[Segment], name: str, before: int) -> int:
+    """The last step up to one at which an object lay where it was taken from; the first of all where it never was."""
+    taken = (one.contact for one in segments if one.kind == PICK and one.ref == name and one.contact <= before)
+    return max(taken, default=0)
 
 
 def _carried(found: Prepared, name: str, begin: int, end: int) -> bool:

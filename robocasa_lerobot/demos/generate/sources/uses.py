@@ -18,7 +18,8 @@ from robocasa_lerobot.envs.kitchens.appliances.kinds.sink import Sink
 from robocasa_lerobot.envs.predicates.objects import object_corners
 from robocasa_lerobot.envs.tasks.task import Stage
 
-UNDER_WATER = ("hold", "rinse")
+RINSE = "rinse"  # what is put down when it has been used
+UNDER_WATER = ("hold", RINSE)
 BY_ITSELF = ("shake", "tilt", "turn")
 USES = (*UNDER_WATER, *BY_ITSELF, "pour", "press", "press_with", "stir", "wipe")
 FLAT_M = 0.003  # over the lowest point of an object: what else it stands on
