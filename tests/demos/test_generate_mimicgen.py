@@ -160,7 +160,7 @@ def test_files_are_generated_as_published_and_with_a_template(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     task, sources = "PickPlaceCounterToSink", tmp_path / "sources"
-    record_tasks([RecordingSettings(task, 3, split="pretrain", seed=100_000)], sources, show_progress=False)
+    record_tasks([RecordingSettings(task, 10, split="pretrain", seed=100_000)], sources, show_progress=False)
     assert not any(outcome.dropped for outcome in prepare_files([sources]))
     found, alike = derived_template(sources_of(sources, task))
     assert [subtask.object_ref for subtask in found.subtasks] == ["obj", "sink"]

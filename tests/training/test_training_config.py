@@ -52,6 +52,8 @@ def test_phases_name_what_they_change(path: Path) -> None:
         (["--phases.finetune.mixture.alpha=1"], "phases.finetune.mixture.alpha", 1.0),
         (["--loader.cache_frames=false"], "loader.cache_frames", False),
         (["--output_dir=other"], "output_dir", "other"),
+        (["--mixed_precision=no"], "mixed_precision", "no"),
+        (["--mixed_precision=bf16"], "mixed_precision", "bf16"),
         (["--phases.0.policy={dim_model: 32}"], "phases.pretrain.policy.dim_model", 32),
     ],
 )
