@@ -7,7 +7,8 @@ import os
 from pathlib import Path
 
 EXAMPLE = (
-    "robocasa-lerobot gallery --show tasks --rates benchmarks/results/demonstrators.json --out gallery/\n  "
+    "robocasa-lerobot gallery --show tasks --out gallery/ "
+    "--rates benchmarks/results/demonstrators.json,benchmarks/results/demonstrators_300.json\n  "
     "robocasa-lerobot gallery --tasks OpenDrawer --seeds 0,1 --preset quality --out gallery/\n"
     "  robocasa-lerobot gallery --show layouts,styles,appliances,objects --split target --out gallery/"
 )
@@ -27,7 +28,11 @@ def configure(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--split", help="target or pretrain (default: target for tasks, else both)")
     parser.add_argument("--category", help="plans, fixture types, object categories or groups, separated by commas")
-    parser.add_argument("--rates", type=Path, help="of the page of tasks: a result of benchmarks/demonstrators.py")
+    parser.add_argument(
+        "--rates",
+        help="of the page of tasks: results of benchmarks/demonstrators.py, separated by commas; of a task that is in "
+        "several the last one counts",
+    )
     parser.add_argument(
         "--workers", type=int, default=os.cpu_count() or 1, help="of the page of tasks: processes (default: all cores)"
     )
@@ -68,7 +73,12 @@ def _tasks(args: argparse.Namespace) -> None:
     from robocasa_lerobot.jobs.as_completed import as_they_end
     from robocasa_lerobot.progress import Bar
 
-    rates = read_rates(args.rates) if args.rates else None
+    rates = {
+        name: rate
+        for path in (args.rates or "").split(",")
+        if path.strip()
+        for name, rate in read_rates(Path(path.strip())).items()
+    }
     names, (seed, *_), split = _names(args), _seeds(args), args.split or "target"
     folder = args.out / "tasks"
     todo = [(name, split, seed, folder) for name in names if read(name, split, seed, folder) is None]

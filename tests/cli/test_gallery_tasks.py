@@ -93,6 +93,12 @@ def test_the_command_makes_what_is_missing(tmp_path: Path, capsys: pytest.Captur
     assert main(command) == 0
     assert {path: path.stat().st_mtime_ns for path in (tmp_path / "tasks").iterdir()} == before
     assert "tasks.html" in capsys.readouterr().out
+    row = {"successes": 3, "trials": 4, "low": 0.3, "high": 0.95}
+    for name, tasks in (("atomic", {"CloseDrawer": row}), ("more", {"AddIceCubes": row | {"successes": 2}})):
+        (tmp_path / f"{name}.json").write_text(json.dumps({"tasks": tasks}))
+    assert main([*command, f"--rates={tmp_path / 'atomic.json'},{tmp_path / 'more.json'}"]) == 0
+    rated = (tmp_path / "tasks.html").read_text()
+    assert [f"{count} of 4 trials" in text for text in (page, rated) for count in (2, 3)] == [False, False, True, True]
     for wrong in (["--tasks=CloseDraw"], ["--seeds=a"], ["--rates=none.json"], ["--show=task"]):
         assert main([*command, *wrong]) == 2
 
