@@ -113,7 +113,7 @@ def attempt(job: Job) -> Trial:
         recording = record(job, settings, env)
     except Exception as error:
         reason = f"{type(error).__name__}: {error}"
-        return Trial(*job.key, False, 0, round(time.perf_counter() - started, 3), 0, (), False, reason)
+        return Trial(*job.key, False, False, 0, round(time.perf_counter() - started, 3), 0, (), False, reason)
     finally:
         env.close()
     rows = recording.ep_meta.get("generation", {}).get("segments", [])
@@ -121,6 +121,7 @@ def attempt(job: Job) -> Trial:
     return Trial(
         *job.key,
         success=recording.success,
+        ever=recording.success or bool(recording.rewards.any()),
         steps=len(recording.actions),
         seconds=round(time.perf_counter() - started, 3),
         segments=len(rows),

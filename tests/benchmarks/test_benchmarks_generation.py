@@ -41,8 +41,8 @@ def test_every_task_belongs_to_a_class(report: ModuleType) -> None:
 
 def test_rates_and_ratios(report: ModuleType) -> None:
     def trial(task: str, seed: int, arm: str, success: bool, seconds: float, *sources: int) -> object:
-        reason = "" if success else "late"
-        return report.Trial(task, seed, arm, success, 100, seconds, len(sources), sources, success, reason)
+        held, reason = success or seed == 1, "" if success else "late"
+        return report.Trial(task, seed, arm, success, held, 100, seconds, len(sources), sources, success, reason)
 
     trials = [trial("OpenDrawer", seed, "ours", seed != 0, 1.0, seed % 2, 1) for seed in range(4)]
     trials += [trial("TurnOnStove", seed, "ours", True, 3.0, 5) for seed in range(4)]
@@ -50,6 +50,8 @@ def test_rates_and_ratios(report: ModuleType) -> None:
     trials += [trial("TurnOnStove", seed, "mimicgen", seed == 0, 0.5, 0) for seed in range(4)]
     ours = report.summary(trials[:8])
     assert ours["mean"] == pytest.approx((0.75 + 1.0) / 2)
+    assert ours["mean_ever"] == ours["mean"]
+    assert report.summary(trials[8:])["mean_ever"] == 2 * report.summary(trials[8:])["mean"] == 0.5
     assert ours["tasks"]["OpenDrawer"]["most_used_source"] == pytest.approx(5 / 6)
     assert ours["tasks"]["OpenDrawer"]["failures"] == {"late": 1}
     assert ours["classes"]["knobs, levers"] == {"tasks": 1, "mean": 1.0, "worst": 1.0}
