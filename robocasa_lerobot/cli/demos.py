@@ -31,7 +31,9 @@ def configure(parser: argparse.ArgumentParser) -> None:
 def add_kitchen_options(parser: argparse.ArgumentParser) -> None:
     """Add what every recording of attempts asks for: tasks, episodes, kitchens, seeds, noise and pictures."""
     parser.add_argument(
-        "--tasks", required=True, help="names and sets (atomic_seen, ...) separated by commas, or `all`; see `tasks`"
+        "--tasks",
+        required=True,
+        help="names and sets (atomic_seen, ...) separated by commas, `atomic`, `composite` or `all`; see `tasks`",
     )
     parser.add_argument("--episodes", type=int, default=20, help="successful episodes per task (default 20)")
     parser.add_argument(

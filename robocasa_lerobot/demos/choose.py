@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from robocasa_lerobot.benchmark.tasks import task_facts
 from robocasa_lerobot.demos.demonstrator import can_demonstrate, check_demonstrable
 from robocasa_lerobot.envs.tasks.registry import get_task, task_names, task_set, task_sets
 from robocasa_lerobot.errors import UnknownNameError, UserError
 
 ALL = "all"
+KINDS = ("atomic", "composite")  # of tasks: the 65 and the 300
 
 
 @dataclass(frozen=True)
@@ -20,7 +22,7 @@ class Chosen:
 
 
 def expand_names(text: str) -> tuple[str, ...]:
-    """Tasks named in a comma-separated list of names, sets (`atomic_seen`, ...) and `all`, each once.
+    """Tasks named in a comma-separated list of names, sets (`atomic_seen`, ...), kinds and `all`, each once.
 
     Raises:
         UnknownNameError: neither a task nor a set.
@@ -30,12 +32,14 @@ def expand_names(text: str) -> tuple[str, ...]:
     for word in (part.strip() for part in text.split(",")):
         if word == ALL:
             found += task_names()
+        elif word in KINDS:
+            found += [name for name in task_names() if task_facts()[name].kind == word]
         elif word in task_sets():
             found += task_set(word)
         elif word in task_names():
             found.append(word)
         elif word:
-            known = [*task_names(), *task_sets(), ALL]
+            known = [*task_names(), *task_sets(), *KINDS, ALL]
             raise UnknownNameError("task or task set", word, known, "`robocasa-lerobot tasks` lists them.")
     if not found:
         raise UserError(f"no task in {text!r}: give names or sets separated by commas, or `{ALL}`.")

@@ -42,6 +42,8 @@ def test_tasks_are_chosen_by_name_set_or_all(monkeypatch: pytest.MonkeyPatch) ->
     assert all(can_demonstrate(get_task(name)) for name in everything.names)
     assert not any(can_demonstrate(get_task(name)) for name in everything.left_out)
     assert set(expand_names("atomic_seen")) == set(task_set("atomic_seen"))
+    assert [len(expand_names(kind)) for kind in ("atomic", "composite", "all")] == [65, 300, 365]
+    assert set(expand_names("composite,atomic")) == set(expand_names("all"))
     assert expand_names("OpenDrawer, CloseDrawer,OpenDrawer") == ("OpenDrawer", "CloseDrawer")
     with pytest.raises(UnknownNameError, match="atomic_seen"):
         expand_names("atomic_sen")
