@@ -13,11 +13,14 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 from robocasa_lerobot.benchmark.tasks import task_facts
+from robocasa_lerobot.data.registry.recipes import METHODS
 from robocasa_lerobot.making.needs import Need
 
 # Of one core, failed attempts included; and the mean of the tasks' medians of steps, of 50 ms each.
 SECONDS_PER_DEMONSTRATION: Mapping[str, float] = {"atomic": 0.71, "composite": 7.6}
 STEPS_PER_DEMONSTRATION: Mapping[str, int] = {"atomic": 165, "composite": 950}
+# Of one core: a source is carried out again, and what it touches is noted (18 demonstrations of three tasks).
+PREPARING_SECONDS_PER_STEP = 0.003
 STEPS_PER_SECOND = 53.0  # of one core, with three cameras
 BYTES_PER_STEP = 6_000
 BYTES_PER_EPISODE = 500_000  # scene, textures and states, kept so that it can be drawn again
@@ -48,7 +51,7 @@ def cores_here() -> int:
 
 
 def estimate(needs: Iterable[Need], cores: int) -> Estimate:
-    """What making the datasets takes; those that are drawn again are not recorded."""
+    """What making the datasets takes, their sources among it; those that are drawn again are not recorded."""
     facts = task_facts()
     demonstrations = frames = 0
     recording_seconds = 0.0
@@ -57,7 +60,8 @@ def estimate(needs: Iterable[Need], cores: int) -> Estimate:
         kind = facts[need.task].kind if need.task in facts else "atomic"  # of somebody's own tasks nothing is known
         demonstrations += count
         frames += count * STEPS_PER_DEMONSTRATION[kind]
-        recording_seconds += count * SECONDS_PER_DEMONSTRATION[kind] if need.redrawn is None else 0.0
+        if need.redrawn is None:
+            recording_seconds += count * SECONDS_PER_DEMONSTRATION[kind] + _seconds_of_sources(need, kind)
     return Estimate(
         demonstrations,
         frames,
@@ -66,6 +70,15 @@ def estimate(needs: Iterable[Need], cores: int) -> Estimate:
         frames * BYTES_PER_STEP + demonstrations * BYTES_PER_EPISODE,
         cores,
     )
+
+
+def _seconds_of_sources(need: Need, kind: str) -> float:
+    """Of one core: to record what is multiplied, and to prepare it unless it is only repeated."""
+    recipe = None if need.made is None else need.made.make
+    if recipe is None or recipe.sources is None:
+        return 0.0
+    steps = 0 if recipe.method == METHODS[2] else STEPS_PER_DEMONSTRATION[kind]
+    return recipe.sources * (SECONDS_PER_DEMONSTRATION[kind] + PREPARING_SECONDS_PER_STEP * steps)
 
 
 def published_hours(needs: Iterable[Need]) -> float:

@@ -74,12 +74,24 @@ def test_hours_and_disk_come_first_and_check_says_it_with_its_status(capsys: pyt
     assert cli.main(["data", file, "--workers", "2", "--episodes", "human=100,mg=10000,target=500"]) == 0
     lines = capsys.readouterr().out.splitlines()
     assert lines[0] == "experiment small_foundation: 143 dataset(s), 0 there (0 MB)"
-    assert "615,500 demonstrations in 143 dataset(s), about 60.7 h of recording and 266.1 h" in lines[1]
+    assert "615,500 demonstrations in 143 dataset(s), about 60.8 h of recording and 266.1 h" in lines[1]
     assert any(line.startswith("pretrain/mg/{task}") and "600,000" in line for line in lines)
     assert any("composite_seen_10 is left out" in line for line in lines)
     assert f"robocasa-lerobot data {file} --make --episodes human=100,mg=10000,target=500" in lines[-1]
     assert cli.main(["data", file, "--check"]) == 1
     assert not Path("datasets").exists()
+
+
+@pytest.mark.usefixtures("atomic_only")
+def test_hours_count_the_sources_of_what_is_multiplied() -> None:
+    needs = needs_of(load_experiment(EXPERIMENTS / "small/foundation.yaml"), {"human": 1, "mg": 1, "target": 1})[0]
+    mg, others = [need for need in needs if need.source == "mg"], [need for need in needs if need.source != "mg"]
+    alone = estimate.SECONDS_PER_DEMONSTRATION["atomic"]
+    steps = estimate.STEPS_PER_DEMONSTRATION["atomic"]
+    ten = 10 * (alone + estimate.PREPARING_SECONDS_PER_STEP * steps)
+    assert len(mg) == 60
+    assert estimate.estimate(mg, 1).recording_hours == pytest.approx(60 * (alone + ten) / 3600)
+    assert estimate.estimate(others, 1).recording_hours == pytest.approx(len(others) * alone / 3600)
 
 
 def test_published_data_name_their_command_and_page(capsys: pytest.CaptureFixture[str]) -> None:
