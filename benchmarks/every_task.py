@@ -82,7 +82,7 @@ def walk(args: argparse.Namespace, steps: Steps) -> dict[str, Any]:
     # Status 1 says that tasks were given up: they are missing from the result, the others go on.
     steps.run("demos", ["demos", *wanted, *workers, "--out", str(demos)], accepted=(0, 1))
     files = sorted(demos.glob("*.hdf5"))
-    # As many processes as it takes by itself: a worker is two, so that more of them than half the cores are slower.
+    # By as many processes as it chooses: each of its workers is two, so that `--workers` would not mean the same.
     steps.run("convert", ["convert", *map(str, files), "--overwrite", "--out", str(dataset)])
     verified = steps.run("verify", ["verify", str(dataset), *workers, "--report", "json"], accepted=(0, 1))
     replayed = json.loads(steps.run("replay", ["replay", str(demos), *workers, "--json"], accepted=(0, 1)))

@@ -70,8 +70,8 @@ def summary(trials: Sequence[Trial]) -> dict[str, Any]:
         rates = [by_task[name]["rate"] for name in tasks if class_of(name) == group]
         if rates:
             by_class[group] = {"tasks": len(rates), "mean": statistics.mean(rates), "worst": min(rates)}
-    ever = statistics.mean(row["ever"] for row in by_task.values()) if by_task else None
-    return {"mean": _mean(by_task), "mean_ever": ever, "classes": by_class, "tasks": by_task}
+    means = {"mean": _mean(by_task, "rate"), "mean_ever": _mean(by_task, "ever")}
+    return {**means, "classes": by_class, "tasks": by_task}
 
 
 def _rate(trials: Sequence[Trial]) -> dict[str, Any]:
@@ -92,8 +92,8 @@ def _rate(trials: Sequence[Trial]) -> dict[str, Any]:
     }
 
 
-def _mean(by_task: dict[str, Any]) -> float | None:
-    return statistics.mean(row["rate"] for row in by_task.values()) if by_task else None
+def _mean(by_task: dict[str, Any], share: str) -> float | None:
+    return statistics.mean(row[share] for row in by_task.values()) if by_task else None
 
 
 def ratios(trials: Sequence[Trial], workers: int) -> dict[str, float]:

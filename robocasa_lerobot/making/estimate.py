@@ -13,7 +13,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 from robocasa_lerobot.benchmark.tasks import task_facts
-from robocasa_lerobot.data.registry.recipes import METHODS
+from robocasa_lerobot.data.registry.recipes import REPLAY
 from robocasa_lerobot.making.needs import Need
 
 # Of one core, failed attempts included; and the mean of the tasks' medians of steps, of 50 ms each.
@@ -77,7 +77,7 @@ def _seconds_of_sources(need: Need, kind: str) -> float:
     recipe = None if need.made is None else need.made.make
     if recipe is None or recipe.sources is None:
         return 0.0
-    steps = 0 if recipe.method == METHODS[2] else STEPS_PER_DEMONSTRATION[kind]
+    steps = 0 if recipe.method == REPLAY else STEPS_PER_DEMONSTRATION[kind]
     return recipe.sources * (SECONDS_PER_DEMONSTRATION[kind] + PREPARING_SECONDS_PER_STEP * steps)
 
 

@@ -12,7 +12,7 @@ from dataclasses import dataclass, fields, replace
 from pathlib import Path
 
 from robocasa_lerobot.data.registry.published import dataset_version
-from robocasa_lerobot.data.registry.recipes import RecipeConfig
+from robocasa_lerobot.data.registry.recipes import REPLAY, RecipeConfig
 from robocasa_lerobot.demos.attempts import Parts, RecordingSettings
 from robocasa_lerobot.errors import UserError
 from robocasa_lerobot.jobs.executors import Execution
@@ -108,7 +108,6 @@ class MadeDataset:
 
     def _settings(self, workers: int) -> RecordingSettings:
         """What is recorded, or generated from sources that are recorded before."""
-        from robocasa_lerobot.demos.generate.replays import REPLAY
         from robocasa_lerobot.demos.generate.settings import GenerationSettings
         from robocasa_lerobot.demos.generate.sources.prepare import prepare_files
         from robocasa_lerobot.demos.generate.stage import can_generate

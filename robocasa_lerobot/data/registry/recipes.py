@@ -14,7 +14,8 @@ from robocasa_lerobot.errors import UnknownNameError, UserError
 
 _NAMES = "robocasa_lerobot.demos.names"
 IMAGE_SIZE = 128  # pixels: what the policies of the small experiments look at
-METHODS = ("contacts", "mimicgen", "replay")  # see `demos.generate.settings`
+REPLAY = "replay"
+METHODS = ("contacts", "mimicgen", REPLAY)  # see `demos.generate.settings`
 
 
 @dataclass
