@@ -10,6 +10,10 @@ class UserError(ValueError):
     """A mistake in what the user asked for or handed in; the command line prints it without a traceback."""
 
 
+class LackingMachineError(UserError):
+    """Something that this machine lacks, such as a package: no other attempt, seed or kitchen would go better."""
+
+
 class UnknownNameError(UserError):
     """A name that no registry entry has; the message names the closest ones."""
 

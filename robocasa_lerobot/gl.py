@@ -19,7 +19,7 @@ from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
-from robocasa_lerobot.errors import UserError
+from robocasa_lerobot.errors import LackingMachineError, UserError
 
 VARIABLE = "MUJOCO_GL"
 DEVICE_VARIABLE = "MUJOCO_EGL_DEVICE_ID"
@@ -79,7 +79,7 @@ _announced: set[str] = set()
 _used_renderer: str | None = None
 
 
-class NoOpenGLError(UserError):
+class NoOpenGLError(LackingMachineError):
     """No OpenGL context can be created on this machine."""
 
 

@@ -27,8 +27,8 @@ from robocasa_lerobot.demos.recorder import Actor, Recording, record_episode
 from robocasa_lerobot.demos.stages import StageLog
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.scene.reset_noise import InitialNoise
+from robocasa_lerobot.errors import LackingMachineError
 from robocasa_lerobot.files import write_text
-from robocasa_lerobot.gl import NoOpenGLError
 from robocasa_lerobot.jobs.pool import exit_if_orphaned
 
 # Give up when this many attempts per wanted episode were not enough, or when none of the first ones has succeeded.
@@ -220,7 +220,7 @@ class Parts:
         recording: Recording | None = None
         try:
             recording = settings.record(env, seed)
-        except (OSError, MemoryError, NoOpenGLError):
+        except (OSError, MemoryError, LackingMachineError):
             raise
         except Exception as error:
             failure = Failure(seed, f"{type(error).__name__}: {error}")

@@ -27,8 +27,9 @@ from robocasa_lerobot.demos.skills import SKILLS, SkillError
 from robocasa_lerobot.demos.stages import ATTEMPTS, PATIENCE_STEPS
 from robocasa_lerobot.demos.summary import print_summary
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
+from robocasa_lerobot.envs.robots.panda_omron import model as panda_model
 from robocasa_lerobot.envs.tasks.registry import get_task, task_names, task_set
-from robocasa_lerobot.errors import UnknownNameError, UserError
+from robocasa_lerobot.errors import LackingMachineError, UnknownNameError, UserError
 from robocasa_lerobot.video import frames_and_rate
 
 QUICK = ("CloseDrawer", "OpenDrawer")
@@ -160,6 +161,19 @@ def test_what_a_skill_should_not_raise_is_a_failure_of_its_attempt(
     result = record_tasks([RecordingSettings("CloseDrawer", 1)], tmp_path, show_progress=False)[0]
     assert result.failures == [Failure(0, "IndexError: list index out of range")]
     assert result.gave_up
+
+
+def test_what_the_machine_lacks_ends_the_recording_and_counts_as_no_attempt(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(panda_model, "find_spec", lambda name: None)
+    panda_model.mesh_bytes.cache_clear()
+    settings = RecordingSettings("CloseDrawer", 1)
+    with pytest.raises(LackingMachineError, match="gymnasium-robotics"):
+        record_tasks([settings], tmp_path, show_progress=False)
+    assert Parts(tmp_path, settings).tally().done == {}  # once it is mended, the same command starts afresh
+    monkeypatch.undo()
+    panda_model.mesh_bytes.cache_clear()
 
 
 @pytest.mark.slow

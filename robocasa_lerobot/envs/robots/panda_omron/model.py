@@ -18,7 +18,7 @@ from robocasa_lerobot.envs.robots.cameras import CameraSpec, add_cameras
 from robocasa_lerobot.envs.robots.panda_omron import names
 from robocasa_lerobot.envs.robots.panda_omron.bodies import BODIES, BodySpec, JointSpec
 from robocasa_lerobot.envs.robots.panda_omron.shapes import add_shapes
-from robocasa_lerobot.errors import UnknownNameError, UserError
+from robocasa_lerobot.errors import LackingMachineError, UnknownNameError
 
 QUALITIES = ("fast", "quality")
 SPAWN_POSITION = (10.0, 10.0, 0.0)  # of the model; the base joints then carry it to its place, as in RoboCasa's files
@@ -68,13 +68,13 @@ def mesh_bytes(quality: str) -> dict[str, bytes]:
     """The Franka mesh files of one look ("fast" or "quality"), by their portable names.
 
     Raises:
-        UserError: gymnasium-robotics is not installed.
+        LackingMachineError: gymnasium-robotics is not installed.
     """
     folder = "collision" if quality == "fast" else "visual"
     # Found without importing it: its import takes longer than compiling a kitchen.
     package = find_spec("gymnasium_robotics")
     if package is None or package.origin is None:
-        raise UserError(
+        raise LackingMachineError(
             "the Franka meshes come with the package gymnasium-robotics, which is not installed. Install it."
         )
     root = Path(package.origin).parent / _MESH_FOLDER / folder
