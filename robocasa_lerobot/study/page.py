@@ -9,6 +9,7 @@ from robocasa_lerobot.evaluation.statistics.averages import Estimate, linear_com
 from robocasa_lerobot.evaluation.statistics.lifelong import Lifelong
 from robocasa_lerobot.files import write_text
 from robocasa_lerobot.study.figures import draw_curves, draw_rates
+from robocasa_lerobot.study.runs import CPU
 from robocasa_lerobot.study.settings import PartConfig, RowConfig, StudyConfig
 from robocasa_lerobot.study.stored import FILMED_SEED, StoredRun, StoredTrial, stored_folder, strips_name
 from robocasa_lerobot.study.tables import (
@@ -152,8 +153,10 @@ def _circumstances(part: PartConfig, stored: Iterable[StoredRun]) -> list[str]:
     commits = sorted({_short_commit(str(run.about["commit"])) for run in runs})
     machines = sorted({f"{run.about['machine']['processor']}, {run.about['machine']['cores']} cores" for run in runs})
     versions = sorted({f"{name} {number}" for run in runs for name, number in run.about["versions"].items()})
+    devices = ", ".join(sorted({str(run.about["device"]) for run in runs} - {CPU}))
     text = (
-        f"{len(runs)} of {wanted} trainings, {training:.1f} hours of training and {trying:.1f} process-hours of trials "
+        f"{len(runs)} of {wanted} trainings, {training:.1f} hours of training"
+        f"{f' (on {devices})' if devices else ''} and {trying:.1f} process-hours of trials "
         f"on {'; '.join(machines)}; commits {', '.join(commits)}; {', '.join(versions)}."
     )
     scales = sorted({str(run.about["scale"]) for run in runs if run.about["scale"]})

@@ -21,6 +21,7 @@ from robocasa_lerobot.study.strips import write_strips
 from robocasa_lerobot.training.config.experiment import load_experiment
 from robocasa_lerobot.training.metrics import METRICS, read_lines
 from robocasa_lerobot.training.planning.evaluations import FOLDER
+from robocasa_lerobot.training.records import PHASE_FILE
 
 TRIALS, CURVES, ABOUT = "trials.csv.gz", "curves.csv", "about.json"
 FILMED_SEED = 0  # whose film strips are kept
@@ -83,6 +84,7 @@ def store(run: Run, results: Path) -> Path:
     trials: list[StoredTrial] = []
     curves: list[tuple[str, int, float]] = []
     training = trying = 0.0
+    devices: list[str] = []
     for phase in experiment.phases:
         folder = run.folder / phase.name
         lines = read_lines(folder / METRICS)
@@ -98,6 +100,7 @@ def store(run: Run, results: Path) -> Path:
             trying += sum(record.seconds.total for record in records)
             if run.seed == FILMED_SEED:
                 write_strips(folder / FOLDER / name, records, out / strips_name(phase.name, name))
+        devices.append(json.loads((folder / PHASE_FILE).read_text(encoding="utf-8"))["device"])
     out.mkdir(parents=True, exist_ok=True)
     _write_trials(out / TRIALS, trials)
     rows = ["phase,step,loss", *(f"{phase},{step},{loss:.6g}" for phase, step, loss in curves)]
@@ -110,7 +113,7 @@ def store(run: Run, results: Path) -> Path:
         "commit": git_commit(),
         "versions": versions("lerobot", "torch", "mujoco"),
         "machine": machine(),
-        "device": experiment.device,
+        "device": ", ".join(dict.fromkeys(devices)),
         "steps": {phase.name: phase.steps for phase in experiment.phases},
         "training_hours": round(training / 3600, 3),
         "trial_hours_of_one_process": round(trying / 3600, 3),

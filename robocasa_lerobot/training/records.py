@@ -59,9 +59,15 @@ def describe_phase(
         "data_fingerprint": dataset.fingerprint,
         "parameters": sum(p.numel() for p in policy.parameters()),
         "trainable_parameters": sum(p.numel() for p in policy.parameters() if p.requires_grad),
+        "device": _device_name(next(policy.parameters()).device),
         "versions": versions(*PACKAGES),
         "git_commit": git_commit(),
     }
+
+
+def _device_name(device: torch.device) -> str:
+    """A GPU's own name; otherwise `cpu` or `mps`."""
+    return torch.cuda.get_device_name(device) if device.type == "cuda" else device.type
 
 
 def write_records(folder: Path, about: dict[str, Any], experiment: ExperimentConfig, phase: PhaseConfig) -> None:

@@ -112,6 +112,7 @@ def test_a_part_runs_from_data_to_its_table(file: str, part: str, tmp_path: Path
     for experiment in config.experiments:
         about = json.loads((results / experiment / "seed_0/about.json").read_text(encoding="utf-8"))
         assert about["scale"]
+        assert about["device"] == "cpu"
     for row in config.rows:
         assert f"|{row}|" in page, "every row has trials"
     again = study(tmp_path, *words)

@@ -19,6 +19,7 @@ ABOUT = {
     "commit": "0123456789abcdef-dirty",
     "versions": {"torch": "1"},
     "machine": {"processor": "P", "cores": "2"},
+    "device": "NVIDIA H200",
     "scale": None,
     "training_hours": 1.5,
     "trial_hours_of_one_process": 0.25,
@@ -109,7 +110,7 @@ def test_the_page_has_rates_differences_and_circumstances(tmp_path: Path) -> Non
     assert "|many|62 % (" in text
     assert "|75, 50|+44 (" in text
     assert "|B|0 % (0 to 32)|38 % (" in text
-    assert "4 of 4 trainings, 6.0 hours of training" in text
+    assert "4 of 4 trainings, 6.0 hours of training (on NVIDIA H200) and" in text
     assert "0123456789ab-dirty" in text
     assert "Not run yet: `robocasa-lerobot study later`." in text
     for figure in ("amount_rates.svg", "amount_curves.svg"):
