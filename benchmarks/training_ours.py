@@ -1,16 +1,18 @@
 """Our loop as a process: an experiment file, trained as `train.py` does, or on the batches of LeRobot's loader.
 
-python benchmarks/training_ours.py experiment.yaml [--lerobot-loader]
+python benchmarks/training_ours.py experiment.yaml [--lerobot-loader] [--memory FILE]
 """
 
 from __future__ import annotations
 
 import argparse
 import dataclasses
+import json
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, cast
 
+import torch
 from accelerate import Accelerator
 from lerobot.datasets.factory import resolve_delta_timestamps
 from training_loaders import LeRobotBatches, lerobot_dataset
@@ -27,10 +29,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("experiment", type=Path)
     parser.add_argument("--lerobot-loader", action="store_true")
+    parser.add_argument("--memory", type=Path, help="JSON file for the most GPU memory that was taken")
     options = parser.parse_args(arguments)
     experiment = load_experiment(options.experiment)
     if not options.lerobot_loader:
         run_experiment(experiment)
+        if options.memory is not None:
+            options.memory.write_text(json.dumps({"peak_gib": torch.cuda.max_memory_allocated() / 2**30}))
         return 0
     (phase,) = experiment.phases
     device = builders.best_device(experiment.device)
