@@ -13,7 +13,6 @@ from the same seed.
 from __future__ import annotations
 
 import argparse
-import dataclasses
 import json
 import os
 import subprocess
@@ -26,19 +25,23 @@ from pathlib import Path
 from typing import Any
 
 import common
+import training_data
 import training_sides
 import yaml
+from training_report import CACHED
 
-from robocasa_lerobot.data.fake import write_fake_dataset
+from robocasa_lerobot import contract
 from robocasa_lerobot.errors import UserError
 from robocasa_lerobot.progress import Bar
+from robocasa_lerobot.training.setup.builders import device_name
 
 OUTPUT = common.RESULTS / "gpu_training.json"
 PRESETS = ("demo", "compact")
 SMALL, LARGE = 64, 512  # samples a step
-EPISODES, FRAMES = 12, 120
+EPISODES = 12
 WINDOW, WINDOWS = 50, 3  # steps of a line of metrics, and lines that count; the one before them warms up
 FLOAT32, BF16 = "no", "bf16"
+LOADER_WORKERS = 2
 
 
 @dataclass(frozen=True)
@@ -63,9 +66,9 @@ class Variant:
     def name(self) -> str:
         """Its key in the result."""
         words = [self.preset, str(self.batch_size), "float32" if self.precision == FLOAT32 else self.precision]
-        return "_".join(
-            [*words, *(["compiled"] * self.compiled), *([f"x{self.together}"] if self.together > 1 else [])]
-        )
+        words += ["compiled"] * self.compiled
+        words += [f"x{self.together}"] * (self.together > 1)
+        return "_".join(words)
 
 
 def variants(presets: Sequence[str]) -> list[Variant]:
@@ -77,41 +80,32 @@ def variants(presets: Sequence[str]) -> list[Variant]:
     return found + [Variant(preset, batch, BF16, compiled=True) for preset in presets for batch in (SMALL, LARGE)]
 
 
-def experiment(variant: Variant, dataset: Path, cache: Path, output: Path, device: str, window: int) -> dict[str, Any]:
-    """An experiment of one phase."""
-    return {
-        "name": "gpu_training",
-        "output_dir": str(output),
-        "policy": training_sides.policy_settings(variant.preset),
-        "device": device,
-        "mixed_precision": variant.precision,
-        "loader": {"workers": 2, "cache_frames": True, "cache_dir": str(cache)},
-        "phases": [
-            {
-                "name": "train",
-                "mixture": {"members": [{"root": str(dataset)}]},
-                "steps": window * (1 + WINDOWS),
-                "batch_size": variant.batch_size,
-                "log_every": window,
-                "save_every": 0,
-                "compile": variant.compiled,
-            }
-        ],
-    }
+def experiment(variant: Variant, job: training_sides.Job, output: Path) -> dict[str, Any]:
+    """The experiment of `training_speed.py` on cached frames, with the moving average that is the default."""
+    settings = training_sides.our_settings(training_sides.Side(CACHED, LOADER_WORKERS), job, output)
+    settings["mixed_precision"] = variant.precision
+    (phase,) = settings["phases"]
+    del phase["ema"]
+    phase |= {"save_every": 0, "compile": variant.compiled}
+    return settings
 
 
-def measure(variant: Variant, dataset: Path, work: Path, device: str, window: int) -> dict[str, Any]:
+def measure(variant: Variant, work: Path, device: str, window: int) -> dict[str, Any]:
     """Seconds a step, samples a second of all trainings together, share of waiting for data, memory, and the loss.
 
     Raises:
         UserError: a training failed; the message ends with what it said last.
     """
+    settings = training_sides.policy_settings(variant.preset)
+    size, *_ = settings.get("image_size") or [contract.IMAGE_SIZE]
+    dataset = training_data.fake(work, EPISODES, size)
     processes = []
     for number in range(variant.together):
-        folder = work / variant.name / str(number)
-        folder.mkdir(parents=True)
+        folder = work / f"{variant.name}-{number}"
+        folder.mkdir()
+        job = training_sides.Job(settings, dataset, device, variant.batch_size, window, WINDOWS, folder)
         file = folder / "experiment.yaml"
-        file.write_text(yaml.safe_dump(experiment(variant, dataset, work / "frames", folder / "run", device, window)))
+        file.write_text(yaml.safe_dump(experiment(variant, job, folder / "run")))
         command = [sys.executable, str(Path(__file__).with_name("training_ours.py")), str(file)]
         command += ["--memory", str(folder / "memory.json")]
         with (folder / "log.txt").open("w") as log:
@@ -188,43 +182,28 @@ def main(arguments: Sequence[str] | None = None) -> int:
             print(f"gpu_training: no variant {unknown}; there are: {[v.name for v in wanted]}", file=sys.stderr)
             return 2
         wanted = [variant for variant in wanted if variant.name in names]
+    about = {
+        "machine": common.machine(),
+        "device": device_name(options.device),
+        "versions": common.versions("robocasa-lerobot", "lerobot", "torch", "accelerate"),
+        "effort": {"window": options.window, "windows": WINDOWS, "loader_workers": LOADER_WORKERS},
+    }
     with tempfile.TemporaryDirectory(prefix="gpu_training_") as folder, Bar(total=len(wanted), unit="variant") as bar:
-        work = Path(folder)
         for variant in wanted:
             if time.monotonic() - began > 60 * options.limit_minutes:
                 failed[variant.name] = "not begun: the time was over"
-                continue
-            settings = training_sides.policy_settings(variant.preset)
-            size = int((settings.get("image_size") or [64])[0])
-            dataset = work / f"demonstrations_{size}"
-            if not dataset.exists():
-                write_fake_dataset(dataset, EPISODES, FRAMES, size)
-            try:
-                measured[variant.name] = measure(variant, dataset, work, options.device, options.window)
-            except UserError as error:  # a card may lack memory for one, and the others are worth having
-                failed[variant.name] = str(error)
+            else:
+                try:
+                    measured[variant.name] = measure(variant, Path(folder), options.device, options.window)
+                except UserError as error:  # a card may lack memory for one, and the others are worth having
+                    failed[variant.name] = str(error)
             bar.update(1)
-            body = {
-                "machine": common.machine(),
-                "device": _device_name(options.device),
-                "versions": common.versions("robocasa-lerobot", "lerobot", "torch", "accelerate"),
-                "ratios": ratios(measured),
-                "variants": measured,
-                "failed": failed,
-                "effort": {"window": options.window, "windows": WINDOWS, "loader_workers": 2},
-                "settings": [dataclasses.asdict(one) for one in wanted],
-            }
+            body = {**about, "ratios": ratios(measured), "variants": measured, "failed": failed}
             common.write_result(options.output, "gpu_training", body)
     print(common.table(["variant", "ms a step", "samples/s", "waiting", "GiB", "loss"], rows(measured)))
     for name, reason in failed.items():
         print(f"{name}: {reason}", file=sys.stderr)
     return 0 if measured else 1
-
-
-def _device_name(device: str) -> str:
-    import torch
-
-    return torch.cuda.get_device_name() if device == "cuda" else device
 
 
 if __name__ == "__main__":

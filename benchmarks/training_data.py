@@ -24,13 +24,13 @@ def converted(folder: Path, episodes: int, workers: int) -> Path:
     return root
 
 
-def fake(folder: Path, episodes: int, image_size: int = contract.IMAGE_SIZE) -> Path:
+def fake(folder: Path, episodes: int, image_size: int = contract.IMAGE_SIZE, frames: int = FAKE_FRAMES) -> Path:
     """A dataset of smooth made-up pictures, which decode faster than real ones; made once."""
     from robocasa_lerobot.data.fake import write_fake_dataset
 
     root = folder / f"fake-{episodes}-{image_size}"
     if not root.exists():
-        write_fake_dataset(root, episodes, FAKE_FRAMES if image_size == contract.IMAGE_SIZE else 16, image_size)
+        write_fake_dataset(root, episodes, frames, image_size)
     return root
 
 

@@ -17,7 +17,7 @@ from accelerate import Accelerator
 from lerobot.datasets.factory import resolve_delta_timestamps
 from training_loaders import LeRobotBatches, lerobot_dataset
 
-from robocasa_lerobot.training.config.experiment import load_experiment
+from robocasa_lerobot.training.config.experiment import ExperimentConfig, load_experiment
 from robocasa_lerobot.training.loop import train_phase
 from robocasa_lerobot.training.phases import run_experiment
 from robocasa_lerobot.training.setup import builders
@@ -32,11 +32,17 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--memory", type=Path, help="JSON file for the most GPU memory that was taken")
     options = parser.parse_args(arguments)
     experiment = load_experiment(options.experiment)
-    if not options.lerobot_loader:
+    if options.lerobot_loader:
+        train_on_theirs(experiment)
+    else:
         run_experiment(experiment)
-        if options.memory is not None:
-            options.memory.write_text(json.dumps({"peak_gib": torch.cuda.max_memory_allocated() / 2**30}))
-        return 0
+    if options.memory is not None:
+        options.memory.write_text(json.dumps({"peak_gib": torch.cuda.max_memory_allocated() / 2**30}))
+    return 0
+
+
+def train_on_theirs(experiment: ExperimentConfig) -> None:
+    """Train an experiment's only phase on the batches of LeRobot's loader."""
     (phase,) = experiment.phases
     device = builders.best_device(experiment.device)
     accelerator = Accelerator(cpu=device == "cpu", mixed_precision=experiment.mixed_precision)
@@ -47,7 +53,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
     batches = LeRobotBatches(dataset, phase.batch_size, getattr(policy, "drop_n_last_frames", None) or 0)
     # The loop asks for batches by their number and looks at nothing else.
     train_phase(dataclasses.replace(run, batches=cast(Any, batches)), accelerator)
-    return 0
 
 
 if __name__ == "__main__":

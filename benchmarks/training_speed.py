@@ -26,6 +26,7 @@ import training_sides
 
 from robocasa_lerobot.errors import UserError
 from robocasa_lerobot.progress import Bar
+from robocasa_lerobot.training.setup.builders import device_name
 
 OUTPUT = common.RESULTS / "training_speed.json"
 WORK = common.REPOSITORY / "outputs" / "training_speed"
@@ -174,7 +175,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     body = {
         "mode": "quick" if options.quick else "full",
         "machine": machine,
-        "device": _device_name(device),
+        "device": device_name(device),
         "versions": common.versions("robocasa-lerobot", "lerobot", "torch", "torchcodec", "av", "accelerate"),
         "dataset": describe_dataset(dataset, kind),
         "ratios": training_report.ratios(training, loaders),
@@ -195,12 +196,6 @@ def _best_device() -> str:
     import torch
 
     return "cuda" if torch.cuda.is_available() else "cpu"
-
-
-def _device_name(device: str) -> str:
-    import torch
-
-    return torch.cuda.get_device_name() if device == "cuda" else device
 
 
 def _made(folder: Path) -> Path:

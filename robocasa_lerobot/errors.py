@@ -14,6 +14,10 @@ class LackingMachineError(UserError):
     """Something that this machine lacks, such as a package: no other attempt, seed or kitchen would go better."""
 
 
+# What no other attempt would mend either: a loop over attempts or kitchens lets these through.
+OF_THE_MACHINE = (OSError, MemoryError, LackingMachineError)
+
+
 class UnknownNameError(UserError):
     """A name that no registry entry has; the message names the closest ones."""
 

@@ -27,7 +27,7 @@ from robocasa_lerobot.demos.recorder import Actor, Recording, record_episode
 from robocasa_lerobot.demos.stages import StageLog
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.scene.reset_noise import InitialNoise
-from robocasa_lerobot.errors import LackingMachineError
+from robocasa_lerobot.errors import OF_THE_MACHINE
 from robocasa_lerobot.files import write_text
 from robocasa_lerobot.jobs.pool import exit_if_orphaned
 
@@ -220,7 +220,7 @@ class Parts:
         recording: Recording | None = None
         try:
             recording = settings.record(env, seed)
-        except (OSError, MemoryError, LackingMachineError):
+        except OF_THE_MACHINE:
             raise
         except Exception as error:
             failure = Failure(seed, f"{type(error).__name__}: {error}")

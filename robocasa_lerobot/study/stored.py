@@ -100,7 +100,8 @@ def store(run: Run, results: Path) -> Path:
             trying += sum(record.seconds.total for record in records)
             if run.seed == FILMED_SEED:
                 write_strips(folder / FOLDER / name, records, out / strips_name(phase.name, name))
-        devices.append(json.loads((folder / PHASE_FILE).read_text(encoding="utf-8"))["device"])
+        about_phase = json.loads((folder / PHASE_FILE).read_text(encoding="utf-8"))
+        devices.append(str(about_phase.get("device", experiment.device)))  # those of before did not note it
     out.mkdir(parents=True, exist_ok=True)
     _write_trials(out / TRIALS, trials)
     rows = ["phase,step,loss", *(f"{phase},{step},{loss:.6g}" for phase, step, loss in curves)]

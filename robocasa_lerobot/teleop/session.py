@@ -13,7 +13,7 @@ from typing import Any
 from robocasa_lerobot import contract
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.robots.control_step import DivergedError
-from robocasa_lerobot.errors import LackingMachineError
+from robocasa_lerobot.errors import OF_THE_MACHINE
 from robocasa_lerobot.provenance import git_commit
 from robocasa_lerobot.teleop.driving.driver import Driver
 from robocasa_lerobot.teleop.driving.pilot import AUTONOMOUS, Pilot
@@ -215,7 +215,7 @@ class Session:
                 self._views.open(self.env)
                 self.map = kitchen_map(self.env)
             self._unmade = 0
-        except (OSError, MemoryError, LackingMachineError):
+        except OF_THE_MACHINE:
             raise
         except Exception as error:  # as for demonstrators: one kitchen that cannot be made ends no session
             self.episode, self._unmade = None, self._unmade + 1

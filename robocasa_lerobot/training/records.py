@@ -48,8 +48,9 @@ def describe_phase(
     dataset: MixtureDataset,
     policy: torch.nn.Module,
     init: Path | None,
+    device: str,
 ) -> dict[str, Any]:
-    """The content of `phase.json`."""
+    """The content of `phase.json`; `device` is what it is called."""
     return {
         "experiment": experiment.name,
         "phase": phase.name,
@@ -59,15 +60,10 @@ def describe_phase(
         "data_fingerprint": dataset.fingerprint,
         "parameters": sum(p.numel() for p in policy.parameters()),
         "trainable_parameters": sum(p.numel() for p in policy.parameters() if p.requires_grad),
-        "device": _device_name(next(policy.parameters()).device),
+        "device": device,
         "versions": versions(*PACKAGES),
         "git_commit": git_commit(),
     }
-
-
-def _device_name(device: torch.device) -> str:
-    """A GPU's own name; otherwise `cpu` or `mps`."""
-    return torch.cuda.get_device_name(device) if device.type == "cuda" else device.type
 
 
 def write_records(folder: Path, about: dict[str, Any], experiment: ExperimentConfig, phase: PhaseConfig) -> None:

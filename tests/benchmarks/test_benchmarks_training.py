@@ -30,7 +30,7 @@ def programs_on_path(monkeypatch: pytest.MonkeyPatch) -> None:
 def dataset(tmp_path_factory: pytest.TempPathFactory) -> Path:
     with pytest.MonkeyPatch.context() as patch:
         patch.syspath_prepend(BENCHMARKS)
-        return module("training_data").fake(tmp_path_factory.mktemp("data"), episodes=2, image_size=32)
+        return module("training_data").fake(tmp_path_factory.mktemp("data"), episodes=2, image_size=32, frames=16)
 
 
 def module(name: str) -> ModuleType:

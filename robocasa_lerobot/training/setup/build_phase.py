@@ -81,7 +81,7 @@ def prepare_phase(
     optimizer, scheduler, clip = builders.make_optimizer(policy, phase, masters)
     ema = Ema(policy, phase.ema, masters=masters) if phase.ema.enabled else None
     state = TrainingState(policy, pre, post, optimizer, scheduler, ema, masters, low_rank=phase.lora is not None)
-    about = records.describe_phase(experiment, phase, dataset, policy, init)
+    about = records.describe_phase(experiment, phase, dataset, policy, init, builders.device_name(device))
     if last is not None:
         records.check_same_data(folder, about)
         restore(last, state)

@@ -55,6 +55,11 @@ def best_device(wanted: str | None) -> str:
     return wanted
 
 
+def device_name(device: str) -> str:
+    """What a device that PyTorch knows as `cuda`, `cuda:1`, `cpu` or `mps` is called: a GPU by its own name."""
+    return torch.cuda.get_device_name(device) if device.startswith("cuda") else device
+
+
 def policy_config(settings: Mapping[str, Any], checkpoint: Path | None, device: str) -> PreTrainedConfig:
     """A LeRobot policy configuration from `type` and fields, or from a checkpoint's and the fields to change.
 
