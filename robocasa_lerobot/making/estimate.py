@@ -75,10 +75,11 @@ def estimate(needs: Iterable[Need], cores: int) -> Estimate:
 def _seconds_of_sources(need: Need, kind: str) -> float:
     """Of one core: to record what is multiplied, and to prepare it unless it is only repeated."""
     recipe = None if need.made is None else need.made.make
-    if recipe is None or recipe.sources is None:
+    if recipe is None:
         return 0.0
     steps = 0 if recipe.method == REPLAY else STEPS_PER_DEMONSTRATION[kind]
-    return recipe.sources * (SECONDS_PER_DEMONSTRATION[kind] + PREPARING_SECONDS_PER_STEP * steps)
+    each = SECONDS_PER_DEMONSTRATION[kind] + PREPARING_SECONDS_PER_STEP * steps
+    return recipe.sources_for(need.demonstrations or 1) * each
 
 
 def published_hours(needs: Iterable[Need]) -> float:

@@ -115,8 +115,8 @@ class MadeDataset:
         from robocasa_lerobot.envs.tasks.registry import get_task
 
         settings, recipe = recording_settings(self.need), _recipe(self.need)
-        number, repeats = recipe.sources, recipe.method == REPLAY
-        if number is None or not (repeats or can_generate(get_task(settings.task))):
+        number, repeats = recipe.sources_for(settings.episodes), recipe.method == REPLAY
+        if not number or not (repeats or can_generate(get_task(settings.task))):
             return settings
         # In kitchens of the same kind; of other seeds, since nothing but replays is made in a source's own scene.
         own = replace(settings, episodes=number, seed=settings.seed + SOURCE_SEEDS, action_noise=0.0)

@@ -84,14 +84,16 @@ def test_hours_and_disk_come_first_and_check_says_it_with_its_status(capsys: pyt
 
 @pytest.mark.usefixtures("atomic_only")
 def test_hours_count_the_sources_of_what_is_multiplied() -> None:
-    needs = needs_of(load_experiment(EXPERIMENTS / "small/foundation.yaml"), {"human": 1, "mg": 1, "target": 1})[0]
-    mg, others = [need for need in needs if need.source == "mg"], [need for need in needs if need.source != "mg"]
+    experiment = load_experiment(EXPERIMENTS / "small/foundation.yaml")
     alone = estimate.SECONDS_PER_DEMONSTRATION["atomic"]
-    steps = estimate.STEPS_PER_DEMONSTRATION["atomic"]
-    ten = 10 * (alone + estimate.PREPARING_SECONDS_PER_STEP * steps)
-    assert len(mg) == 60
-    assert estimate.estimate(mg, 1).recording_hours == pytest.approx(60 * (alone + ten) / 3600)
-    assert estimate.estimate(others, 1).recording_hours == pytest.approx(len(others) * alone / 3600)
+    source = alone + estimate.PREPARING_SECONDS_PER_STEP * estimate.STEPS_PER_DEMONSTRATION["atomic"]
+    for asked, sources in ((40, 10), (3, 3)):  # ten, but no more than what is to come of them
+        needs = needs_of(experiment, {"human": 1, "mg": asked, "target": 1})[0]
+        mg, others = [need for need in needs if need.source == "mg"], [need for need in needs if need.source != "mg"]
+        assert len(mg) == 60
+        seconds = 60 * (asked * alone + sources * source)
+        assert estimate.estimate(mg, 1).recording_hours == pytest.approx(seconds / 3600)
+        assert estimate.estimate(others, 1).recording_hours == pytest.approx(len(others) * alone / 3600)
 
 
 def test_published_data_name_their_command_and_page(capsys: pytest.CaptureFixture[str]) -> None:

@@ -30,8 +30,8 @@ class RecipeConfig:
         action_noise: standard deviation of noise on arm commands, as `demos --action-noise`.
         varied: each demonstration in a style of its own, as `demos` without `--plain`.
         image_size: height and width of the pictures, pixels.
-        sources: so many demonstrations are recorded, and multiplied to as many as asked for, as `generate` does; null
-            records all of them. A task that cannot be generated yet is recorded, too.
+        sources: so many demonstrations are recorded (no more than are asked for), and multiplied to as many as asked
+            for, as `generate` does; null records all of them. A task that cannot be generated yet is recorded, too.
         method: how sources are multiplied, as `generate --method`; `replay` repeats them with `action_noise`.
         redraw: instead of recording: `path` of the registry's dataset whose episodes are drawn again.
         camera_set: of the cameras that `redraw` draws with, as `render --camera-set`.
@@ -58,6 +58,10 @@ class RecipeConfig:
             raise UnknownNameError("method of a dataset's recipe", self.method, METHODS)
         if self.method != METHODS[0] and self.sources is None:
             raise UserError(f"recipe of a dataset: method {self.method} multiplies `sources`; say how many.")
+
+    def sources_for(self, demonstrations: int) -> int:
+        """How many are recorded to make so many of them; 0 where none is multiplied."""
+        return 0 if self.sources is None else min(self.sources, demonstrations)
 
 
 @functools.cache
