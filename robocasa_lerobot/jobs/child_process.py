@@ -1,8 +1,9 @@
-"""A further Python process that serves this one, and ends when this one's end of its pipe is closed."""
+"""Further Python processes: one that serves this one until its end of their pipe is closed, or a command of ours."""
 
 from __future__ import annotations
 
 import os
+import signal
 import subprocess
 import sys
 from collections.abc import Sequence
@@ -23,6 +24,25 @@ def start_serving(module: str, descriptors: Sequence[int], **environment: str) -
         stdin=subprocess.DEVNULL,
         env=environment_of_python() | environment,
     )
+
+
+def run_command(*arguments: str) -> int:
+    """Run a command of `robocasa-lerobot` to its end and return its status, negative where a signal ended it.
+
+    What asks this process to end (SIGTERM, and SIGUSR1, which Slurm can be told to send) is passed on to the command,
+    which would otherwise go on alone.
+    """
+    with subprocess.Popen([sys.executable, "-m", "robocasa_lerobot.cli", *arguments]) as child:
+
+        def pass_on(number: int, _frame: object) -> None:
+            child.send_signal(number)
+
+        before = {number: signal.signal(number, pass_on) for number in (signal.SIGTERM, signal.SIGUSR1)}
+        try:
+            return child.wait()
+        finally:
+            for number, handler in before.items():
+                signal.signal(number, handler)
 
 
 def environment_of_python() -> dict[str, str]:

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import shutil
-import subprocess
-import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,6 +13,7 @@ import yaml
 from robocasa_lerobot.config_files import configs_folder
 from robocasa_lerobot.errors import UserError
 from robocasa_lerobot.files import write_text
+from robocasa_lerobot.jobs.child_process import run_command
 from robocasa_lerobot.settings import load_yaml
 from robocasa_lerobot.study.settings import EXPERIMENTS, PartConfig, StudyConfig
 from robocasa_lerobot.training.config.experiment import load_experiment
@@ -98,10 +97,10 @@ class Run:
         """
         self.write_file()
         for command in self.commands(workers):
-            done = subprocess.run([sys.executable, "-m", "robocasa_lerobot.cli", *command], check=False)
-            if done.returncode:
+            status = run_command(*command)
+            if status:
                 raise StoppedError(
-                    f"{self.name}: `robocasa-lerobot {' '.join(command)}` ended with status {done.returncode}; "
+                    f"{self.name}: `robocasa-lerobot {' '.join(command)}` ended with status {status}; "
                     "the same study goes on there."
                 )
 

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import json
 import os
+import signal
 import subprocess
 import sys
+import time
 from pathlib import Path
 
+import psutil
 import pytest
 
 from robocasa_lerobot.config_files import configs_folder
@@ -21,10 +24,14 @@ STUDIES = {"study.yaml": "pretrain=1,target=1,few=1", "study_generation.yaml": "
 PARTS = [(file, part) for file in STUDIES for part in load_study(configs_folder() / file).parts]
 
 
+COMMAND = [sys.executable, "-m", "robocasa_lerobot.cli", "study"]
+
+
 def study(folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
-    command = [sys.executable, "-m", "robocasa_lerobot.cli", "study", *arguments]
     environment = {**os.environ, "HF_HUB_OFFLINE": "1"}
-    return subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True, check=False)
+    return subprocess.run(
+        [*COMMAND, *arguments], cwd=folder, env=environment, capture_output=True, text=True, check=False
+    )
 
 
 def test_the_plan_tells_what_each_part_takes(tmp_path: Path) -> None:
@@ -94,6 +101,24 @@ def test_a_trial_of_the_study_does_not_stand_for_it(tmp_path: Path) -> None:
     assert "--replace" in asked.commands(None)[0], "its data neither"
     roots = [root_for(whole, *case) for case in (("cpu", None), ("cpu", "tiny"), ("cuda", None))]
     assert [str(root) for root in roots] == ["outputs/study", "outputs/study_tiny", "outputs/study_cuda"]
+
+
+def test_nothing_goes_on_alone_when_the_study_is_told_to_end(tmp_path: Path) -> None:
+    words = ("multitask", "--episodes=pretrain=100", *TINY)
+    with subprocess.Popen([*COMMAND, *words], cwd=tmp_path, stderr=subprocess.PIPE, text=True) as process:
+        deadline = time.monotonic() + 120
+        while not list(tmp_path.glob("datasets/study/.making/**/log.txt")):  # recordings have begun
+            assert process.poll() is None
+            assert time.monotonic() < deadline
+            time.sleep(0.2)
+        others = psutil.Process(process.pid).children(recursive=True)
+        assert others
+        process.send_signal(signal.SIGTERM)
+        assert process.wait(60) == 2
+        assert process.stderr is not None
+        assert "the same study goes on there" in process.stderr.read()
+    _, alive = psutil.wait_procs(others, timeout=60)
+    assert not alive
 
 
 @pytest.mark.slow
