@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from robocasa_lerobot import __version__, contract
 from robocasa_lerobot.convert.lerobot_v3 import EXTRA_PREFIX, ExportedDataset, ExportedEpisode
-from robocasa_lerobot.convert.reading.demo_file import ASSETS_GROUP, IMAGE_SUFFIX
+from robocasa_lerobot.convert.reading.demo_file import ASSETS_GROUP, IMAGE_SUFFIX, DemoFile
 from robocasa_lerobot.convert.reading.stages import STAGE_DATASET
 from robocasa_lerobot.errors import UnknownNameError, UserError
 from robocasa_lerobot.files import written_aside
@@ -29,6 +29,7 @@ from robocasa_lerobot.progress import Bar
 COMPRESSIONS = ("gzip", "lzf", "none")
 _GZIP_LEVEL = 1  # pictures hardly get smaller with more, only slower
 _BLOCK_FRAMES = 32  # decoded frames held at a time
+EXPORTED_BY = "exported_by"  # attribute of `data`
 _ROBOSUITE_ENV = 1  # robomimic's number for environments of robosuite
 # Names of the state's components of arms with a fixed base, an arm's name before each where there are several, and
 # what robosuite calls the observation that they are of.
@@ -131,7 +132,7 @@ def _write(
     notes += [f"{what} of {count} episodes are not in the dataset: left out" for what, count in lacking.items()]
     data.attrs.update(_attributes(dataset, episodes))
     data.attrs["total"] = num_frames
-    _copy_assets(file, dataset, notes)
+    _copy_assets(file, dataset, episodes, notes)
     return num_frames
 
 
@@ -148,18 +149,22 @@ def _write_vectors(
         observations |= _observations(dataset, columns.pop(contract.STATE_KEY))
     for key, values in observations.items():
         group.create_dataset(f"obs/{key}", data=values, **compression)
-    for key, values in columns.items():
-        if key.startswith(EXTRA_PREFIX):
-            group.create_dataset(key.removeprefix(EXTRA_PREFIX).replace(".", "/"), data=values, **compression)
+    # Copies of what the file had, which may be what is written anyway.
+    further = {
+        k.removeprefix(EXTRA_PREFIX).replace(".", "/"): v for k, v in columns.items() if k.startswith(EXTRA_PREFIX)
+    }
     if contract.STAGE_KEY in columns:
-        group.create_dataset(STAGE_DATASET, data=columns[contract.STAGE_KEY].astype(np.int32))
-    lacking = []
+        further.setdefault(STAGE_DATASET, columns[contract.STAGE_KEY].astype(np.int32))
     if "next.reward" in columns:
-        group.create_dataset("rewards", data=columns["next.reward"].reshape(-1).astype(np.float64))
+        further.setdefault("rewards", columns["next.reward"].reshape(-1).astype(np.float64))
     dones = np.zeros(episode.length, np.int64)
     dones[-1] = 1  # robomimic's done mode 1: the last step of a demonstration
     dones = columns["next.done"].reshape(-1).astype(np.int64) if "next.done" in columns else dones
-    group.create_dataset("dones", data=dones)
+    further.setdefault("dones", dones)
+    for key, values in further.items():
+        if key not in group and key != "states":
+            group.create_dataset(key, data=values, **compression)
+    lacking = []
     folder = dataset.extras(episode)
     states = folder / "states.npz"
     if states.is_file():
@@ -176,6 +181,8 @@ def _write_vectors(
     meta = json.loads(meta_file.read_text(encoding="utf-8")) if meta_file.is_file() else {}
     # What training has as its language; it is recorded here even where it came from elsewhere.
     group.attrs["ep_meta"] = json.dumps(meta | {"lang": dataset.instruction(episode)})
+    if isinstance(meta.get("seed"), int):
+        group.attrs["seed"] = meta["seed"]
     group.attrs["num_samples"] = episode.length
     return lacking
 
@@ -248,20 +255,38 @@ def _attributes(dataset: ExportedDataset, episodes: Sequence[ExportedEpisode]) -
         {"env_name": name, "type": _ROBOSUITE_ENV} | env_args | {"env_kwargs": defaults | info | kwargs}
     )
     recorded.setdefault("env", name)
-    recorded["robocasa_lerobot_version"] = __version__
+    recorded[EXPORTED_BY] = f"robocasa_lerobot {__version__}"
     return {key: value for key, value in recorded.items() if isinstance(value, str | int | float | bool)}
 
 
-def _copy_assets(file: h5py.File, dataset: ExportedDataset, notes: list[str]) -> None:
-    """Files that the scenes name and that the source files hold themselves, where these are still to be found."""
-    for path in dataset.source_files():
+def _copy_assets(
+    file: h5py.File, dataset: ExportedDataset, episodes: Sequence[ExportedEpisode], notes: list[str]
+) -> None:
+    """Files that the scenes name and that the source files held: the dataset keeps them; of an older one, they do."""
+    folders = dataset.assets(episodes)
+    for name, content in _kept(folders) if folders else _stored(dataset, episodes, notes):
+        place = f"{ASSETS_GROUP}/{name}"
+        if place not in file:
+            file.create_dataset(place, data=np.frombuffer(content, np.uint8))
+        elif file[place][()].tobytes() != content:
+            notes.append(f"sources differ in {name}: the first one's is taken; export the files' episodes apart")
+
+
+def _kept(folders: Sequence[Path]) -> Iterator[tuple[str, bytes]]:
+    for folder in folders:
+        for path in sorted(folder.rglob("*")):
+            if path.is_file():
+                yield path.relative_to(folder).as_posix(), path.read_bytes()
+
+
+def _stored(
+    dataset: ExportedDataset, episodes: Sequence[ExportedEpisode], notes: list[str]
+) -> Iterator[tuple[str, bytes]]:
+    for path in dataset.source_files(episodes):
         try:
-            with h5py.File(path, "r") as source:
-                for place in (ASSETS_GROUP, f"data/{ASSETS_GROUP}"):
-                    group = source.get(place)
-                    if isinstance(group, h5py.Group) and ASSETS_GROUP not in file:
-                        source.copy(group, file, name=ASSETS_GROUP)
-        except OSError as error:
+            with DemoFile(path) as source:
+                yield from source.assets()
+        except (OSError, UserError) as error:
             notes.append(f"textures stored in {path} could not be taken over ({error})")
 
 

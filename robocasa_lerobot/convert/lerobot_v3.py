@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import io
 import json
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from robocasa_lerobot import contract
 from robocasa_lerobot.convert.mapping.robot_mapping import EXTRA_PREFIX
-from robocasa_lerobot.convert.record_files import EPISODES_FILE, EXTRAS, episode_folder
+from robocasa_lerobot.convert.record_files import EPISODES_FILE, EXTRAS, episode_folder, kept_assets
 from robocasa_lerobot.convert.writing.statistics import column_of
 from robocasa_lerobot.errors import UserError
 from robocasa_lerobot.jsonl import read_jsonl
@@ -155,10 +155,20 @@ class ExportedDataset:
                 return dict(source["attributes"])
         return {}
 
-    def source_files(self) -> list[Path]:
-        """HDF5 files that the dataset was made from, those that are still there."""
-        places = [[Path(source["file"]), self.root / source["relative_to_dataset"]] for source in self._sources]
+    def assets(self, episodes: Sequence[ExportedEpisode]) -> list[Path]:
+        """Folders with the meshes and textures that the HDF5 files of episodes held, where the dataset keeps them."""
+        folders = [self.root / EXTRAS / kept_assets(str(source.get("sha256"))) for source in self._sources_of(episodes)]
+        return [folder for folder in folders if folder.is_dir()]
+
+    def source_files(self, episodes: Sequence[ExportedEpisode]) -> list[Path]:
+        """HDF5 files that episodes came from, those that are still there."""
+        sources = self._sources_of(episodes)
+        places = [[Path(source["file"]), self.root / source["relative_to_dataset"]] for source in sources]
         return [next(path for path in paths if path.is_file()) for paths in places if any(p.is_file() for p in paths)]
+
+    def _sources_of(self, episodes: Sequence[ExportedEpisode]) -> list[dict[str, Any]]:
+        files = {episode.source_file for episode in episodes}
+        return [source for source in self._sources if source["file"] in files]
 
     @cached_property
     def _sources(self) -> list[dict[str, Any]]:

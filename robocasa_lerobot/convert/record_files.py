@@ -3,7 +3,7 @@
 META_FOLDER = "meta/robocasa"
 CONVERSION_FILE = "conversion.json"
 ACTIONS_OUT_OF_RANGE = "actions_out_of_range"  # in it
-DATASET, EXTRAS = "dataset", "extras"
+DATASET, EXTRAS, ASSETS = "dataset", "extras", "assets"
 EPISODES_FILE, REJECTED_FILE, HISTOGRAMS_FILE = "episodes.jsonl", "rejected.jsonl", "histograms.npz"
 
 
@@ -14,4 +14,4 @@ def episode_folder(index: int) -> str:
 
 def kept_assets(sha256: str) -> str:
     """Folder under `extras` with the meshes and textures that a source file held itself."""
-    return f"assets/{sha256[:12]}"
+    return f"{ASSETS}/{sha256[:12]}"

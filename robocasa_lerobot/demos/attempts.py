@@ -9,6 +9,7 @@ from __future__ import annotations
 import dataclasses
 import json
 import math
+import os
 import shutil
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -153,6 +154,8 @@ class Parts:
         self.settings = settings
         self.films = films
 
+        self._failures: dict[str, Failure] = {}  # notes that have been read: there may be thousands of them
+
     def prepare(self) -> None:
         """Make the folder, dropping one that was recorded with other settings."""
         note = self.folder / "settings.json"
@@ -168,11 +171,17 @@ class Parts:
 
     def tally(self) -> Tally:
         """Read what there is. A failure that is to be kept counts only when it has been."""
-        found: dict[int, Failure | None] = {int(file.stem): None for file in self.folder.glob("[0-9]*.hdf5")}
-        for file in self.folder.glob("[0-9]*.json"):
-            failure = Failure.of(json.loads(file.read_text()))
-            if self.films is None or film_of(self.films, failure.seed).exists():
-                found[int(file.stem)] = failure
+        found: dict[int, Failure | None] = {}
+        for name in os.listdir(self.folder) if self.folder.is_dir() else ():  # noqa: PTH208 names, of thousands of files
+            stem, _, kind = name.partition(".")
+            if not stem.isdecimal():
+                continue
+            if kind == "hdf5":
+                found[int(stem)] = None
+            elif kind == "json":
+                failure = self._failure(name)
+                if self.films is None or film_of(self.films, failure.seed).exists():
+                    found.setdefault(int(stem), failure)
         chosen: list[int] = []
         failures: list[Failure] = []
         attempt = 0
@@ -184,6 +193,11 @@ class Parts:
                 failures.append(failed)
             attempt += 1
         return Tally(chosen, attempt, failures, {number: failed is None for number, failed in found.items()})
+
+    def _failure(self, name: str) -> Failure:
+        if name not in self._failures:
+            self._failures[name] = Failure.of(json.loads((self.folder / name).read_text()))
+        return self._failures[name]
 
     def wanted(self, tally: Tally) -> list[int]:
         """The attempts to make next: those that were jumped over, and as many as may be needed beyond."""
@@ -228,7 +242,8 @@ class Parts:
             if recording.success:
                 write_part(self.episode(number), recording)
                 return
-            failure = Failure(seed, recording.reason, recording.false_terms)
+            scene = None if recording.seed == seed else recording.seed
+            failure = Failure(seed, recording.reason, recording.false_terms, scene)
         if self.films is not None:
             keep_failure(self.films, env, failure, recording)
         note = self.folder / f"{number:06d}.json"

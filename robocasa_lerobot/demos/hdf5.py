@@ -25,16 +25,30 @@ ASSETS_GROUP = "assets"
 
 @dataclass(frozen=True)
 class Failure:
-    """An attempt that did not succeed: its seed, why, and the goal's terms that did not hold at the end."""
+    """An attempt that did not succeed.
+
+    Attributes:
+        seed: of the attempt.
+        reason: why.
+        false_terms: the goal's terms that did not hold at the end.
+        scene: seed of the kitchen, where that is another one: a replay happens in its source's.
+    """
 
     seed: int
     reason: str
     false_terms: tuple[str, ...] = ()
+    scene: int | None = None
+
+    @property
+    def scene_seed(self) -> int:
+        """Of the kitchen."""
+        return self.seed if self.scene is None else self.scene
 
     @classmethod
     def of(cls, values: dict[str, Any]) -> Failure:
         """Read what `asdict` gave, as JSON keeps it."""
-        return cls(int(values["seed"]), str(values["reason"]), tuple(values.get("false_terms", ())))
+        terms = tuple(values.get("false_terms", ()))
+        return cls(int(values["seed"]), str(values["reason"]), terms, values.get("scene"))
 
 
 def write_part(path: Path, recording: Recording) -> None:

@@ -6,6 +6,7 @@ The kitchen is made again from the task, split and seed in the file (and the lay
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -26,6 +27,8 @@ from robocasa_lerobot.errors import UserError
 from robocasa_lerobot.jobs.as_completed import as_they_end
 
 Array = NDArray[np.float64]
+_CHOICES = ("layouts", "styles", "initial_noise")  # in `ep_meta`: what kitchens were restricted to, or moved by
+_NUMBERED = re.compile(r"demo_(\d+)")
 
 
 @dataclass(frozen=True)
@@ -54,24 +57,16 @@ class Replayed:
 
 
 @dataclass(frozen=True)
-class Demonstration:
-    """What a file holds of a demonstration of T steps.
+class Kitchen:
+    """What a demonstration's kitchen is made from.
 
     Attributes:
         task: name.
-        meta: its `ep_meta`.
-        states: (T, 1 + nq + nv) time, positions, velocities.
-        actions: (T, 12) in stored order.
-        last_terms: whether each of the goal's terms held in the last state, by name; empty where that is not recorded.
-        stage: (T,) number of the stage of each step; None where that is not recorded.
+        meta: the demonstration's `ep_meta`.
     """
 
     task: str
     meta: dict[str, Any]
-    states: Array
-    actions: Array
-    last_terms: dict[str, bool] = field(default_factory=dict)
-    stage: NDArray[np.int64] | None = None
 
     @property
     def seed(self) -> int:
@@ -84,9 +79,31 @@ class Demonstration:
         return str(self.meta["split"])
 
     @property
+    def kind(self) -> str:
+        """The same for kitchens that one env makes, each from its own seed."""
+        return json.dumps([self.task, self.split, *(self.meta.get(key) for key in _CHOICES)], sort_keys=True)
+
+    @property
     def instruction(self) -> str:
         """What was to be done."""
         return str(self.meta["lang"])
+
+
+@dataclass(frozen=True)
+class Demonstration(Kitchen):
+    """What a file holds of a demonstration of T steps.
+
+    Attributes:
+        states: (T, 1 + nq + nv) time, positions, velocities.
+        actions: (T, 12) in stored order.
+        last_terms: whether each of the goal's terms held in the last state, by name; empty where that is not recorded.
+        stage: (T,) number of the stage of each step; None where that is not recorded.
+    """
+
+    states: Array
+    actions: Array
+    last_terms: dict[str, bool] = field(default_factory=dict)
+    stage: NDArray[np.int64] | None = None
 
 
 def demonstrations(paths: Iterable[Path]) -> list[tuple[Path, str]]:
@@ -103,10 +120,11 @@ def demonstrations(paths: Iterable[Path]) -> list[tuple[Path, str]]:
                 raise UserError(f"{file}: no such file or folder; `robocasa-lerobot demos` records demonstrations.")
             try:
                 with h5py.File(file) as opened:
-                    names = [name for name in opened.get("data", ()) if name.startswith("demo_")]
+                    numbers = {name: _NUMBERED.fullmatch(name) for name in opened.get("data", ())}
             except OSError as error:
                 raise UserError(f"{file} is no HDF5 file ({error}).") from error
-            found += [(file, name) for name in sorted(names, key=lambda name: int(name.removeprefix("demo_")))]
+            numbered = sorted((int(match[1]), name) for name, match in numbers.items() if match)
+            found += [(file, name) for _, name in numbered]
     if not found:
         raise UserError("no demonstrations: give files or folders that `robocasa-lerobot demos` wrote.")
     return found
@@ -117,22 +135,33 @@ def replay_all(chosen: Sequence[tuple[Path, str]], workers: int = 1) -> Iterator
     yield from as_they_end(replay, chosen, workers)
 
 
+def read_kitchen(path: Path, demo: str) -> Kitchen:
+    """The kitchen of a demonstration that `demos` recorded.
+
+    Raises:
+        UserError: other software recorded it.
+    """
+    with h5py.File(path) as file:
+        task = file["data"].attrs.get("env")
+        meta = json.loads(file[f"data/{demo}"].attrs.get("ep_meta", "{}"))
+    if task is None or not isinstance(meta, dict) or not {"seed", "split"} <= meta.keys():
+        raise UserError(f"{path}, {demo}: its ep_meta has no scene seed and split; it was recorded by other software.")
+    return Kitchen(str(task), meta)
+
+
 def read_demonstration(path: Path, demo: str) -> Demonstration:
     """A demonstration that `demos` recorded.
 
     Raises:
         UserError: other software recorded it.
     """
+    kitchen = read_kitchen(path, demo)
     with h5py.File(path) as file:
         group = file[f"data/{demo}"]
-        task = str(file["data"].attrs["env"])
-        meta = json.loads(group.attrs["ep_meta"])
         states, actions = group["states"][()], contract.hdf5_to_stored(group["actions"][()])
         terms = _last_terms(group)
         stage = np.asarray(group["stage"][()], dtype=np.int64) if "stage" in group else None
-    if "seed" not in meta or "split" not in meta:
-        raise UserError(f"{path}, {demo}: its ep_meta has no scene seed and split; it was recorded by other software.")
-    return Demonstration(task, meta, states, actions, terms, stage)
+    return Demonstration(kitchen.task, kitchen.meta, states, actions, terms, stage)
 
 
 def _last_terms(group: h5py.Group) -> dict[str, bool]:
@@ -165,17 +194,20 @@ def replay(path: Path, demo: str, declaration: Task | None = None) -> Replayed:
     return Replayed(path, demo, task, done, final, same, deviation, note)
 
 
-def kitchen_of(recorded: Demonstration, declaration: Task | None = None) -> KitchenEnv:
-    """An env that makes the kitchen of a demonstration when it is reset with its seed; without cameras."""
-    noise = recorded.meta.get("initial_noise")
+def kitchen_of(kitchen: Kitchen, declaration: Task | None = None, **drawn: Any) -> KitchenEnv:
+    """An env that makes the kitchen of a demonstration when it is reset with its seed.
+
+    It has no cameras, unless `drawn` says how it is drawn, as KitchenEnv takes it.
+    """
+    noise = kitchen.meta.get("initial_noise")
     return KitchenEnv(
-        declaration or recorded.task,
-        split=recorded.split,
-        cameras=(),
+        declaration or kitchen.task,
+        split=kitchen.split,
         terminate_on_success=False,
-        layouts=recorded.meta.get("layouts"),
-        styles=recorded.meta.get("styles"),
+        layouts=kitchen.meta.get("layouts"),
+        styles=kitchen.meta.get("styles"),
         initial_noise=InitialNoise(**noise) if noise else None,
+        **(drawn or {"cameras": ()}),
     )
 
 

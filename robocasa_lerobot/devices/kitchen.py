@@ -13,7 +13,7 @@ import numpy as np
 from lerobot.robots.robot import Robot
 
 from robocasa_lerobot import contract
-from robocasa_lerobot.demos.replay import Demonstration, demonstrations, read_demonstration
+from robocasa_lerobot.demos.replay import Kitchen, demonstrations, kitchen_of, read_kitchen
 from robocasa_lerobot.devices.announcements import Announcements
 from robocasa_lerobot.devices.config_kitchen import RobocasaKitchenConfig
 from robocasa_lerobot.devices.translation import NAMES, HandTranslator
@@ -42,14 +42,11 @@ class RobocasaKitchen(Robot):
         self.config = config
         self._recorded = _kitchens_of(config)
         first = self._recorded[0] if self._recorded else None
-        self._env = KitchenEnv(
-            first.task if first else config.task,
-            split=first.split if first else config.split,
-            render_preset=config.render_preset,
-            image_size=config.image_size,
-            terminate_on_success=False,
-            layouts=first.meta.get("layouts") if first else None,
-            styles=first.meta.get("styles") if first else None,
+        drawn: dict[str, Any] = {"render_preset": config.render_preset, "image_size": config.image_size}
+        self._env = (
+            kitchen_of(first, **drawn)
+            if first
+            else KitchenEnv(config.task, split=config.split, terminate_on_success=False, **drawn)
         )
         self.cameras: dict[str, None] = dict.fromkeys(contract.CAMERAS)  # LeRobot counts them
         self._states = tuple(name + config.suffix for name in _STATES)
@@ -166,15 +163,16 @@ class RobocasaKitchen(Robot):
         self._due = max(now, self._due) + _STEP_S
 
 
-def _kitchens_of(config: RobocasaKitchenConfig) -> list[Demonstration]:
-    """The demonstrations whose kitchens are wanted, all of one task and split."""
+def _kitchens_of(config: RobocasaKitchenConfig) -> list[Kitchen]:
+    """The kitchens of demonstrations, all of one task and split, and drawn in the same manner."""
     if config.demos is None:
         return []
-    found = [read_demonstration(path, demo) for path, demo in demonstrations([config.demos])]
-    kinds = {(d.task, d.split, str(d.meta.get("layouts")), str(d.meta.get("styles"))) for d in found}
+    found = [read_kitchen(path, demo) for path, demo in demonstrations([config.demos])]
+    kinds = {kitchen.kind for kitchen in found}
     if len(kinds) > 1:
         raise UserError(
-            f"robot.demos: found demonstrations of {len(kinds)} tasks or splits, expected one: give one file."
+            f"robot.demos: found demonstrations of {len(kinds)} tasks, splits or ways to start, expected one: "
+            "give one file."
         )
     return found
 

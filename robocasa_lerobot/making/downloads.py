@@ -45,14 +45,15 @@ class Download:
         """Whether it is converted."""
         return float(dataset_version(self.out) == "v3.0")
 
-    def make(self, workers: int) -> None:
-        """Convert it."""
+    def make(self, workers: int) -> str:
+        """Convert it; there is nothing to tell."""
         from robocasa_lerobot.convert.pipeline import convert
         from robocasa_lerobot.convert.settings import ConversionSettings
 
         if not self.done():
             self.out.parent.mkdir(parents=True, exist_ok=True)
             convert([self.source], self.out, ConversionSettings(), workers)
+        return ""
 
 
 def find_downloads(folder: Path, to: Path | None = None, needs: Sequence[Need] | None = None) -> list[Download]:

@@ -4,23 +4,29 @@ from __future__ import annotations
 
 import contextlib
 import json
+import os
 import shutil
-import sys
 from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from robocasa_lerobot.data.registry.published import dataset_version
 from robocasa_lerobot.data.registry.recipes import REPLAY, RecipeConfig
 from robocasa_lerobot.demos.attempts import Parts, RecordingSettings
 from robocasa_lerobot.errors import UserError
+from robocasa_lerobot.files import write_text
 from robocasa_lerobot.jobs.executors import Execution
 from robocasa_lerobot.making.needs import WORK, Need
 from robocasa_lerobot.making.pieces import Outcome, run_pieces
 
+if TYPE_CHECKING:
+    from robocasa_lerobot.demos.generate.settings import GenerationSettings
+
 _PRELOAD = ("robocasa_lerobot.envs.kitchen_env", "robocasa_lerobot.convert.shard")
 SOURCES, SOURCE_SEEDS = "sources", 50_000_000  # folder of those that are multiplied, and how far off their seeds are
+_REASON = "reason.txt"
 _HALF = 0.5  # of the work on a dataset is recording, half drawing and encoding
 
 
@@ -61,13 +67,18 @@ class MadeDataset:
         if not self._lacks(self.need):
             return count
         settings = recording_settings(self.need)
-        if (self.work / f"{settings.task}.hdf5").exists():
+        folder = self._instead if self._instead.exists() else self.work
+        if (folder / f"{settings.task}.hdf5").exists():
             return _HALF * settings.episodes
-        recorded = sum(1 for _ in Parts(self.work, settings).folder.glob("[0-9]*.hdf5"))
+        try:
+            names = os.listdir(Parts(folder, settings).folder)  # noqa: PTH208 names will do, and there may be thousands
+        except FileNotFoundError:
+            return 0.0
+        recorded = sum(name.endswith(".hdf5") for name in names)
         return _HALF * min(recorded, settings.episodes)
 
-    def make(self, workers: int) -> None:
-        """Record, convert, and draw again; files that are there are left alone.
+    def make(self, workers: int) -> str:
+        """Record, convert, and draw again; files that are there are left alone. Returns what people should be told.
 
         Raises:
             UserError: too many attempts failed, or a dataset of other making is already there.
@@ -77,6 +88,13 @@ class MadeDataset:
         for need in self.drawn:
             if self._lacks(need):
                 self._draw_again(need, workers)
+        note = self._instead / _REASON
+        return note.read_text(encoding="utf-8") if note.is_file() else ""
+
+    @property
+    def _instead(self) -> Path:
+        """Folder of what is recorded because nothing could be generated, with the reason."""
+        return self.work / "recorded"
 
     def _lacks(self, need: Need) -> bool:
         if dataset_version(need.root) != "v3.0":
@@ -89,42 +107,54 @@ class MadeDataset:
     def _record_and_convert(self, workers: int) -> None:
         from robocasa_lerobot.convert.pipeline import convert
         from robocasa_lerobot.convert.settings import ConversionSettings
-        from robocasa_lerobot.demos.recording import record_task
 
-        settings = recording_settings(self.need)
-        try:
-            made = record_task(self._settings(workers), self.work, workers=workers, show_progress=False)
-        except UserError as error:
-            if _recipe(self.need).sources is None:
-                raise
-            print(f"{settings.task} is recorded, since generating it came to nothing: {error}", file=sys.stderr)
-            made = record_task(settings, self.work, workers=workers, show_progress=False)
+        made = self._record(workers)
         self.need.root.parent.mkdir(parents=True, exist_ok=True)
         conversion = ConversionSettings(image_size=_recipe(self.need).image_size)
-        convert([made.path], self.need.root, conversion, workers, overwrite=self.replace)
+        convert([made], self.need.root, conversion, workers, overwrite=self.replace)
         if self.keep:
             kept = self.need.root.with_name(f"{self.need.root.name}.hdf5")
-            shutil.move(made.path, kept)
+            shutil.move(made, kept)
 
-    def _settings(self, workers: int) -> RecordingSettings:
-        """What is recorded, or generated from sources that are recorded before."""
-        from robocasa_lerobot.demos.generate.settings import GenerationSettings
-        from robocasa_lerobot.demos.generate.sources.prepare import prepare_files
+    def _record(self, workers: int) -> Path:
+        """The file of demonstrations: generated where the recipe has sources and it can be done, else recorded."""
         from robocasa_lerobot.demos.generate.stage import can_generate
-        from robocasa_lerobot.demos.recording import record_task
+        from robocasa_lerobot.demos.recording import record_task, record_tasks
         from robocasa_lerobot.envs.tasks.registry import get_task
 
         settings, recipe = recording_settings(self.need), _recipe(self.need)
-        number, repeats = recipe.sources_for(settings.episodes), recipe.method == REPLAY
-        if not number or not (repeats or can_generate(get_task(settings.task))):
-            return settings
+        if self._instead.exists():  # of a run before
+            return record_task(settings, self._instead, workers=workers, show_progress=False).path
+        number = recipe.sources_for(settings.episodes)
+        if not number or not (recipe.method == REPLAY or can_generate(get_task(settings.task))):
+            return record_task(settings, self.work, workers=workers, show_progress=False).path
         # In kitchens of the same kind; of other seeds, since nothing but replays is made in a source's own scene.
         own = replace(settings, episodes=number, seed=settings.seed + SOURCE_SEEDS, action_noise=0.0)
-        sources = record_task(own, self.work / SOURCES, workers=workers, show_progress=False)
-        if not repeats:
-            deque(prepare_files([sources.path], workers=workers), maxlen=0)
+        sources = record_task(own, self.work / SOURCES, workers=workers, show_progress=False).path
+        try:
+            generation = self._generation(sources, workers)
+        except UserError as error:  # not one of the sources could be prepared
+            reason = str(error)
+        else:
+            made = record_tasks([generation], self.work, workers=workers, show_progress=False)[0]
+            if not made.gave_up:
+                return made.path
+            reason = made.gave_up
+        self._instead.mkdir(parents=True)
+        write_text(self._instead / _REASON, f"recorded, since generating it came to nothing: {reason}")
+        return record_task(settings, self._instead, workers=workers, show_progress=False).path
+
+    def _generation(self, sources: Path, workers: int) -> GenerationSettings:
+        """What is generated from recorded sources, which are prepared unless they are only repeated."""
+        from robocasa_lerobot.demos.generate.settings import GenerationSettings
+        from robocasa_lerobot.demos.generate.sources.prepare import prepare_files
+
+        recipe = _recipe(self.need)
+        if recipe.method != REPLAY:
+            deque(prepare_files([sources], workers=workers), maxlen=0)
+        settings = recording_settings(self.need)
         values = {entry.name: getattr(settings, entry.name) for entry in fields(settings)}
-        return GenerationSettings.of(sources.path.parent, **values | {"varied": False, "method": recipe.method})
+        return GenerationSettings.of(sources.parent, **values | {"varied": False, "method": recipe.method})
 
     def _draw_again(self, need: Need, workers: int) -> None:
         from robocasa_lerobot.convert.rerender.camera_configs import camera_set

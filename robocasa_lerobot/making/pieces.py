@@ -11,7 +11,7 @@ import hashlib
 import os
 import shutil
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 from typing import Any, Protocol
@@ -24,7 +24,7 @@ from robocasa_lerobot.jobs.ray import run_with_ray
 from robocasa_lerobot.progress import Bar
 
 FAILED, LOG = "failed.txt", "log.txt"
-_LOGS = "slurm"
+_LOGS, _REMARK = "slurm", ".remark.txt"
 
 
 class Piece(Protocol):
@@ -49,20 +49,29 @@ class Piece(Protocol):
         """How much of `size` has been done."""
         ...
 
-    def make(self, workers: int) -> None:
-        """Do it, or the missing part of it."""
+    def make(self, workers: int) -> str:
+        """Do it, or the missing part of it; what people should be told of it, or ""."""
         ...
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """What came of the pieces: the failed ones with their reasons; `submitted` where nothing was waited for."""
+    """What came of the pieces.
+
+    Attributes:
+        failed: those that could not be made, with their reasons.
+        remarks: what people should be told of others.
+        submitted: a line instead, where nothing was waited for.
+    """
 
     failed: dict[str, str]
+    remarks: dict[str, str] = field(default_factory=dict)
     submitted: str = ""
 
 
-def run_piece(data: Any, rank: int = 0, world_size: int = 1, *, pieces: Sequence[Piece], workers: int) -> None:
+def run_piece(
+    data: Any, rank: int = 0, world_size: int = 1, *, pieces: Sequence[Piece], logs: Path, workers: int
+) -> None:
     """Make one of the pieces, in datatrove's calling convention; what it prints goes to its log."""
     piece = pieces[rank]
     piece.work.mkdir(parents=True, exist_ok=True)
@@ -70,10 +79,12 @@ def run_piece(data: Any, rank: int = 0, world_size: int = 1, *, pieces: Sequence
     note.unlink(missing_ok=True)
     with (piece.work / LOG).open("a", encoding="utf-8") as log, contextlib.redirect_stderr(log):
         try:
-            piece.make(workers)
+            remark = piece.make(workers)
         except UserError as error:
             write_text(note, str(error))
             return
+    if remark:
+        write_text(logs / f"{rank}{_REMARK}", remark)
     shutil.rmtree(piece.work, ignore_errors=True)
 
 
@@ -104,16 +115,16 @@ def run_pieces(
     logs = folder / hashlib.sha256(names.encode()).hexdigest()[:12]
     logs.mkdir(parents=True, exist_ok=True)
     if execution.kind == "slurm":
-        step = partial(run_piece, pieces=pieces, workers=execution.slurm.cpus)
+        step = partial(run_piece, pieces=pieces, logs=logs, workers=execution.slurm.cpus)
         last = partial(_summed_up, pieces, logs)
         array, final = submit_to_slurm(step, last, len(pieces), logs, folder / _LOGS, execution.slurm)
         line = (
             f"submitted to Slurm: {len(pieces)} pieces in job {array}, summed up by job {final}; see {folder / _LOGS}"
         )
-        return Outcome({}, line)
+        return Outcome({}, submitted=line)
     with _progress(pieces, what, unit):
         if execution.kind == "ray":
-            step = partial(run_piece, pieces=pieces, workers=execution.ray.cpus)
+            step = partial(run_piece, pieces=pieces, logs=logs, workers=execution.ray.cpus)
             run_with_ray(step, len(pieces), logs, execution.ray)
         else:
             _run_here(pieces, logs, cores, preload)
@@ -123,10 +134,10 @@ def run_pieces(
 def _run_here(pieces: Sequence[Piece], logs: Path, cores: int, preload: Sequence[str]) -> None:
     if len(pieces) < cores or cores == 1:
         for rank in range(len(pieces)):
-            run_piece(None, rank, pieces=pieces, workers=cores)
+            run_piece(None, rank, pieces=pieces, logs=logs, workers=cores)
         return
     PoolExecutor(
-        pipeline=[partial(run_piece, pieces=pieces, workers=1)],
+        pipeline=[partial(run_piece, pieces=pieces, logs=logs, workers=1)],
         tasks=len(pieces),
         workers=cores,
         skip_completed=False,  # the datasets are the markers
@@ -138,8 +149,12 @@ def _run_here(pieces: Sequence[Piece], logs: Path, cores: int, preload: Sequence
 def _outcome(pieces: Sequence[Piece], logs: Path) -> Outcome:
     notes = {piece.name: piece.work / FAILED for piece in pieces}
     failed = {name: note.read_text(encoding="utf-8") for name, note in notes.items() if note.is_file()}
+    unmade = "it ended without a word, and is not done; see the log in " + str(logs.parent)
+    failed |= {piece.name: unmade for piece in pieces if piece.name not in failed and piece.done() < piece.size}
+    said = {rank: logs / f"{rank}{_REMARK}" for rank in range(len(pieces))}
+    remarks = {pieces[rank].name: note.read_text(encoding="utf-8") for rank, note in said.items() if note.is_file()}
     shutil.rmtree(logs, ignore_errors=True)
-    return Outcome(failed)
+    return Outcome(failed, remarks)
 
 
 def _summed_up(pieces: Sequence[Piece], logs: Path) -> None:
@@ -152,7 +167,10 @@ def outcome_lines(outcome: Outcome) -> list[str]:
     """For people."""
     if outcome.submitted:
         return [outcome.submitted]
-    return [f"not made: {name}: {reason}" for name, reason in outcome.failed.items()]
+    return [
+        *(f"note: {name}: {remark}" for name, remark in outcome.remarks.items()),
+        *(f"not made: {name}: {reason}" for name, reason in outcome.failed.items()),
+    ]
 
 
 @contextlib.contextmanager

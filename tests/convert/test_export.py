@@ -151,6 +151,37 @@ def test_arms_get_their_observations_names(tmp_path: Path) -> None:
     assert "data/demo_0/obs/state" not in found
 
 
+def test_textures_come_from_the_dataset_itself_once_the_recording_is_gone(tmp_path: Path) -> None:
+    source = write_demos(tmp_path / "OpenDrawer.hdf5", (4,), images=16)
+    root = convert([source], tmp_path / "data", SETTINGS, workers=1).root
+    before = {name: value.tobytes() for name, value in items(source).items() if name.startswith("assets/")}
+    source.unlink()
+    result = export(root, tmp_path / "again.hdf5", ExportSettings(images=False))
+    after = {name: value.tobytes() for name, value in items(result.path).items() if name.startswith("assets/")}
+    assert before
+    assert after == before
+    assert not result.notes
+    assert convert([result.path], tmp_path / "drawn", SETTINGS, workers=1).num_episodes == 1
+
+
+def test_columns_that_were_kept_beside_the_data_are_written_once(tmp_path: Path) -> None:
+    source = write_demos(tmp_path / "OpenDrawer.hdf5", (4,), images=16)
+    columns = ("dones", "obs/robot0_gripper_qpos")
+    with h5py.File(source, "r+") as file:
+        file["data/demo_0/dones"] = np.array([0, 1, 0, 1])  # not what the export would say by itself
+    root = convert([source], tmp_path / "data", ConversionSettings(extra_columns=columns), workers=1).root
+    found, true = items(export(root, tmp_path / "again.hdf5").path), items(source)
+    for name in columns:
+        np.testing.assert_array_equal(found[f"data/demo_0/{name}"], true[f"data/demo_0/{name}"])
+
+
+def test_an_export_says_nothing_of_a_licence_that_it_does_not_know(tmp_path: Path) -> None:
+    source = write_demos(tmp_path / "OpenDrawer.hdf5", (4,), images=16)
+    exported = export(convert([source], tmp_path / "data", SETTINGS, workers=1).root, tmp_path / "again.hdf5").path
+    again = convert([exported], tmp_path / "again", SETTINGS, workers=1).root
+    assert "license: other" in (again / "README.md").read_text(encoding="utf-8")
+
+
 def test_datasets_of_several_tasks_are_exported_one_by_one(tmp_path: Path) -> None:
     files = [
         write_demos(tmp_path / f"{name}.hdf5", (4,), images=16, env_name=name, seed=seed)

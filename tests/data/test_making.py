@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
 import signal
 import subprocess
 import sys
 import time
 from pathlib import Path
+from typing import Any
 
 import h5py
 import pytest
@@ -19,6 +21,9 @@ from slurm_support import stand_in
 from robocasa_lerobot import cli
 from robocasa_lerobot.data.fake import write_fake_dataset
 from robocasa_lerobot.data.registry.published import dataset_version
+from robocasa_lerobot.demos.generate.settings import GenerationSettings
+from robocasa_lerobot.demos.recording import RecordingResult, RecordingSettings, record_tasks
+from robocasa_lerobot.jobs.pool import WorkerDiedError
 from robocasa_lerobot.making import estimate
 from robocasa_lerobot.making.needs import WORK, needs_of, parse_episodes
 from robocasa_lerobot.training.config.experiment import load_experiment
@@ -221,6 +226,38 @@ def test_a_few_recorded_ones_are_multiplied_where_a_recipe_says_so(tmp_path: Pat
             assert row["mimicgen"]["source_demos"] == demo["src_demo_inds"][:].tolist()
             assert {*row["mimicgen"]["source_demos"]} <= {*range(10)}
             assert json.loads(demo.attrs["ep_meta"])["generation"]["segments"]
+
+
+@pytest.mark.slow
+@pytest.mark.render
+def test_what_nothing_can_be_generated_of_is_recorded_and_people_are_told(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    asked: list[Path] = []
+
+    def without_luck(settings: list[RecordingSettings], out: Path, **options: Any) -> list[RecordingResult]:
+        if isinstance(settings[0], GenerationSettings):
+            asked.append(out)
+            return [RecordingResult(out / "none.hdf5", 0, 0, 20, [], "not one of 20 attempts succeeded")]
+        if not out.joinpath("stop").exists():
+            return record_tasks(settings, out, **options)
+        raise WorkerDiedError("killed")
+
+    monkeypatch.setattr("robocasa_lerobot.demos.recording.record_tasks", without_luck)
+    file = experiment_on(tmp_path, {**HUMAN, "task_set": "mimicgen60", "source": "mg"})
+    command = ["data", str(file), "--make", "--episodes", "mg=1", "--workers", "1"]
+    work = Path("datasets/kitchens", WORK, "pretrain/mg/CloseDrawer")
+    stop = work / "recorded" / "stop"  # what is recorded instead is ended from outside ...
+    stop.parent.mkdir(parents=True)
+    stop.touch()
+    assert cli.main(command) == 1
+    assert "not made: datasets/kitchens/pretrain/mg/CloseDrawer: killed" in capsys.readouterr().out
+    stop.unlink()
+    shutil.rmtree(work)
+    assert cli.main(command) == 0
+    assert "note: datasets/kitchens/pretrain/mg/CloseDrawer: recorded, since generating" in capsys.readouterr().out
+    assert len(asked) == 1, "generating is not tried again where recording was begun"
+    assert dataset_version(Path("datasets/kitchens/pretrain/mg/CloseDrawer")) == "v3.0"
 
 
 @pytest.mark.slow

@@ -16,7 +16,7 @@ from PIL import Image
 from robocasa_lerobot import cli
 from robocasa_lerobot.demos.film_strip import STRIP_PICTURES, STRIP_SIZE
 from robocasa_lerobot.demos.recording import RecordingSettings, record_tasks
-from robocasa_lerobot.demos.replay import Replayed, demonstrations, replay
+from robocasa_lerobot.demos.replay import Replayed, demonstrations, read_demonstration, replay
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.errors import UserError
 
@@ -115,6 +115,13 @@ def test_mistakes_are_named(tmp_path: Path) -> None:
         demonstrations([tmp_path / "none.hdf5"])
     with pytest.raises(UserError, match="no demonstrations"):
         demonstrations([tmp_path])
+    with h5py.File(tmp_path / "lift.hdf5", "w") as file:  # as robomimic writes them
+        for name in ("demo_2", "demo_10", "demo_1_old", "mask"):
+            file.create_dataset(f"data/{name}/actions", data=np.zeros((3, 7)))
+    found = demonstrations([tmp_path])
+    assert [name for _, name in found] == ["demo_2", "demo_10"]
+    with pytest.raises(UserError, match="other software"):
+        read_demonstration(*found[0])
     (tmp_path / "text.hdf5").write_text("text")
     with pytest.raises(UserError, match="no HDF5 file"):
         demonstrations([tmp_path])

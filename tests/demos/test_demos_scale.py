@@ -6,7 +6,8 @@ import json
 import random
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
+from types import SimpleNamespace
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -22,6 +23,7 @@ from robocasa_lerobot.demos.demonstrator import can_demonstrate
 from robocasa_lerobot.demos.hdf5 import Failure, read_summary
 from robocasa_lerobot.demos.motion import Array, action
 from robocasa_lerobot.demos.progress import Board
+from robocasa_lerobot.demos.recorder import Recording
 from robocasa_lerobot.demos.recording import FAILURES_FOLDER, record_task, record_tasks
 from robocasa_lerobot.demos.skills import SKILLS, SkillError
 from robocasa_lerobot.demos.stages import ATTEMPTS, PATIENCE_STEPS
@@ -99,6 +101,25 @@ def test_attempts_that_are_made_next() -> None:
     ):
         tally, settings = _tally(outcomes, episodes)
         assert bool(Parts(Path("out"), settings).gave_up(tally)) == given_up
+
+
+class Elsewhere(RecordingSettings):
+    """Attempts that fail in the kitchen of another seed, as replays do."""
+
+    def record(self, env: KitchenEnv, seed: int) -> Recording:
+        """Say so."""
+        return cast(Recording, SimpleNamespace(success=False, seed=7, reason="it fell", false_terms=()))
+
+
+def test_a_failure_says_in_which_kitchen_it_was(tmp_path: Path) -> None:
+    parts = Parts(tmp_path, Elsewhere("CloseDrawer", 1, seed=100))
+    parts.prepare()
+    for number in range(2):
+        parts.attempt(number, cast(KitchenEnv, None))
+    failures = parts.tally().failures
+    assert [(one.seed, one.scene_seed) for one in failures] == [(100, 7), (101, 7)]
+    assert Failure(3, "it fell").scene_seed == 3
+    assert Parts(tmp_path, parts.settings).tally() == parts.tally()
 
 
 def test_time_left_follows_from_what_this_run_has_done(capsys: pytest.CaptureFixture[str]) -> None:

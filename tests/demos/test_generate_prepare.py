@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from robocasa_lerobot import cli, contract
-from robocasa_lerobot.demos.generate.sources.prepare import DROPPED, prepare_files, prepare_one
+from robocasa_lerobot.demos.generate.sources.prepare import DROPPED, FILE, file_identity, prepare_files, prepare_one
 from robocasa_lerobot.demos.generate.sources.prepared import GROUP, read_prepared
 from robocasa_lerobot.demos.generate.sources.segments import PART, cut, runs
 from robocasa_lerobot.demos.generate.sources.transform import (
@@ -149,6 +149,7 @@ def test_a_file_is_prepared_and_what_was_recorded_stays(
     # One of them was prepared before a kill.
     parts = tmp_path / ".CloseDrawer.prepare"
     parts.mkdir()
+    (parts / FILE).write_text(json.dumps(file_identity(path)))
     prepare_one(path, "demo_0", parts)
     stamp = (parts / "demo_0.hdf5").stat().st_mtime_ns
     assert prepare_one(path, "demo_0", parts).dropped == ""
@@ -181,6 +182,17 @@ def test_a_file_is_prepared_and_what_was_recorded_stays(
     ahead = np.linalg.norm(found.target[:, :3, 3] - found.eef[:, :3, 3], axis=1)
     assert ahead.max() < 0.05 * np.sqrt(3) + 1e-3
     assert list(prepare_files([path])) == list(prepare_files([path]))  # done already
+
+
+@pytest.mark.slow
+def test_what_was_prepared_of_another_recording_is_not_taken(recorded: Path, tmp_path: Path) -> None:
+    path = Path(shutil.copy(recorded, tmp_path))
+    parts = tmp_path / ".CloseDrawer.prepare"
+    parts.mkdir()
+    (parts / FILE).write_text(json.dumps(file_identity(path)))
+    (parts / "demo_0.json").write_text('"of the recording that had this name"')
+    path.touch()
+    assert [one.dropped for one in prepare_files([path])] == ["", ""]
 
 
 def test_floor_poses() -> None:

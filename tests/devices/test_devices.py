@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import inspect
+import json
 import logging
 import time
 from collections.abc import Iterator
+from pathlib import Path
 
+import h5py
 import numpy as np
 import pytest
 from lerobot.robots.config import RobotConfig
@@ -18,12 +21,15 @@ from scipy.spatial.transform import Rotation
 
 import robocasa_lerobot.plugins  # noqa: F401
 from robocasa_lerobot import contract
+from robocasa_lerobot.demos.motion import base_pose
 from robocasa_lerobot.devices.announcements import AGAIN, BEGIN, Announcements
 from robocasa_lerobot.devices.config_hand import RobocasaHandConfig
 from robocasa_lerobot.devices.config_kitchen import RobocasaKitchenConfig
 from robocasa_lerobot.devices.hand import RobocasaHand, _phone_step
 from robocasa_lerobot.devices.kitchen import RobocasaKitchen, _check_rate
 from robocasa_lerobot.devices.translation import NAMES, HandTranslator
+from robocasa_lerobot.envs.kitchen_env import KitchenEnv
+from robocasa_lerobot.envs.scene.reset_noise import InitialNoise
 from robocasa_lerobot.errors import UserError
 
 STAY, CLOSE, OPEN = 1, 0, 2
@@ -54,6 +60,23 @@ def phone(position: list[float], rotation: list[float] | None = None, enabled: b
 def test_lerobot_knows_the_types() -> None:
     assert "robocasa_kitchen" in RobotConfig.get_known_choices()
     assert {"robocasa_hand", "robocasa_replay", "gamepad", "phone"} <= set(TeleoperatorConfig.get_known_choices())
+
+
+@pytest.mark.render
+def test_kitchens_of_demonstrations_start_as_those_did(tmp_path: Path) -> None:
+    meta = {"seed": 5, "split": "target", "lang": "", "initial_noise": {"base_within_m": 1.0}}
+    with h5py.File(tmp_path / "OpenDrawer.hdf5", "w") as file:
+        file.create_group("data/demo_0").attrs["ep_meta"] = json.dumps(meta)
+        file["data"].attrs["env"] = "OpenDrawer"
+    env = KitchenEnv("OpenDrawer", cameras=(), initial_noise=InitialNoise(base_within_m=1.0))
+    env.reset(seed=5)
+    made = make_robot_from_config(RobocasaKitchenConfig(demos=tmp_path, image_size=32, realtime=False))
+    made.connect()
+    seen = made.get_observation()
+    found = [seen[name] for name in contract.component_names(contract.STATE_PARTS)[:2]]
+    np.testing.assert_allclose(found, base_pose(env.data)[0][:2], atol=1e-6)
+    made.disconnect()
+    env.close()
 
 
 @pytest.mark.render

@@ -5,10 +5,12 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from scipy.spatial.distance import pdist
 
 from robocasa_lerobot.demos.attempts import RecordingSettings
 from robocasa_lerobot.demos.hdf5 import read_summary
@@ -54,12 +56,12 @@ class Quality:
     @property
     def path_spread_m(self) -> float:
         """Root mean square distance of two demonstrations' hands, at the same share of their time."""
-        return float(np.mean(self._path_distances())) if len(self.kept) > 1 else 0.0
+        return float(np.mean(self._path_distances)) if len(self.kept) > 1 else 0.0
 
     @property
     def most_alike_m(self) -> float:
         """The same of the two that are most alike."""
-        return float(np.min(self._path_distances())) if len(self.kept) > 1 else 0.0
+        return float(np.min(self._path_distances)) if len(self.kept) > 1 else 0.0
 
     @property
     def stand_spread_m(self) -> float:
@@ -87,11 +89,11 @@ class Quality:
         own = {name: getattr(self, name) for name in (*names, "stand_spread_rad", "seconds_spread")}
         return {"task": self.task, "kept": len(self.kept), **own, **{name: self.mean(name) for name in means}}
 
+    @cached_property
     def _path_distances(self) -> Array:
+        """(n (n - 1) / 2,) of all pairs, metres."""
         paths = np.array([one.path for one in self.kept])
-        away = paths[:, None] - paths[None]
-        distances = np.sqrt((away**2).sum(axis=-1).mean(axis=-1))
-        found: Array = distances[np.triu_indices(len(paths), k=1)]
+        found: Array = pdist(paths.reshape(len(paths), -1)) / np.sqrt(paths.shape[1])
         return found
 
 
@@ -117,7 +119,7 @@ def attempts_in(paths: Sequence[Path]) -> list[tuple[Path, str | int]]:
     kept = demonstrations(paths)
     found: list[tuple[Path, str | int]] = list(kept)
     for path in dict.fromkeys(path for path, _ in kept):
-        found += [(path, failure.seed) for failure in read_summary(path).failures]
+        found += [(path, failure.scene_seed) for failure in read_summary(path).failures]
     return found
 
 

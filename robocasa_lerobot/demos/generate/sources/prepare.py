@@ -6,6 +6,7 @@ as it was. Each demonstration leaves a small file of its own meanwhile, so that 
 
 from __future__ import annotations
 
+import contextlib
 import json
 import shutil
 from collections.abc import Iterable, Iterator
@@ -30,8 +31,10 @@ from robocasa_lerobot.envs.tasks.task import Stage
 from robocasa_lerobot.errors import UserError
 from robocasa_lerobot.files import write_text, written_aside
 from robocasa_lerobot.jobs.as_completed import as_they_end
+from robocasa_lerobot.jobs.publish import held_folder
 
 DROPPED = "datagen_dropped"  # attribute of `data`: demonstrations that do not replay, and why
+FILE = "file.json"  # in the folder of what is being prepared: which file that is of
 _STAGE_WORDS = ("skill", "verb", "target", "object", "part", "to")
 
 
@@ -63,14 +66,30 @@ def prepare_files(paths: Iterable[Path], *, workers: int = 1, fresh: bool = Fals
         if all(demo in known for demo in demos):
             yield from known.values()
             continue
-        folder = path.with_name(f".{path.stem}.prepare")
-        if fresh and folder.exists():
+        yield from _prepared_aside(path, demos, workers, fresh)
+
+
+def _prepared_aside(path: Path, demos: list[str], workers: int, fresh: bool) -> Iterator[Outcome]:
+    folder = path.with_name(f".{path.stem}.prepare")
+    lock = path.with_name(f".{path.stem}.prepare.lock")
+    with contextlib.ExitStack() as stack:
+        stack.enter_context(held_folder(lock))
+        stack.callback(shutil.rmtree, lock, ignore_errors=True)  # before it is released
+        note, identity = folder / FILE, file_identity(path)
+        # What a killed run left may be of another recording that had the file's name then.
+        if folder.exists() and (fresh or not note.exists() or json.loads(note.read_text()) != identity):
             shutil.rmtree(folder)
         folder.mkdir(exist_ok=True)
-        jobs = [(path, demo, folder) for demo in demos]
-        yield from as_they_end(prepare_one, jobs, workers)
+        write_text(note, json.dumps(identity))
+        yield from as_they_end(prepare_one, [(path, demo, folder) for demo in demos], workers)
         _publish(path, demos, folder)
         shutil.rmtree(folder)
+
+
+def file_identity(path: Path) -> dict[str, int]:
+    """What tells a file from another that had its place."""
+    status = path.stat()
+    return {"size": status.st_size, "modified_ns": status.st_mtime_ns}
 
 
 def known_outcomes(path: Path) -> dict[str, Outcome]:
