@@ -52,7 +52,7 @@ class Cost:
 def costs(
     study: StudyConfig, runs: Mapping[str, list[Run]], configs: Path, cores: int, measured_steps: int
 ) -> dict[str, Cost]:
-    """What each part takes; `runs` are those of each part that no earlier part has.
+    """What each part takes; `runs` are those of each part that no earlier part has and that have not ended.
 
     Raises:
         UserError: a mistake in an experiment.
@@ -65,13 +65,17 @@ def costs(
     out: dict[str, Cost] = {}
     for part, own in runs.items():
         needs: list[Need] = []
+        mine: list[_Plan] = []
         for run in own:
-            if run.experiment not in plans:  # other seeds need the same data and take as long
-                plans[run.experiment] = _planned(run, pixels, measured_steps, measured)
-            needs += [need for need in plans[run.experiment].needs if need.root not in recorded]
+            # Other seeds need the same data and take as long, where they have not begun.
+            kind = run.name if run.folder.exists() else run.experiment
+            if kind not in plans:
+                plans[kind] = _planned(run, pixels, measured_steps, measured)
+            mine.append(plan := plans[kind])
+            needs += [need for need in plan.needs if need.root not in recorded]
             recorded |= {need.root for need in needs}
-        data, mine = estimate(needs, cores), [plans[run.experiment] for run in own]
-        phases = [phase for plan in mine for phase in plan.phases]
+        data = estimate(needs, cores)
+        phases = [phase for plan in mine for phase in plan.phases if phase.done < phase.phase.steps]
         hours = [phase.hours for phase in phases if phase.hours is not None]
         known = len(hours) == len(phases)
         out[part] = Cost(

@@ -21,6 +21,7 @@ from robocasa_lerobot.training.config.experiment import load_experiment
 CPU, CUDA = "cpu", "cuda"
 DEVICES = (CPU, CUDA)
 _GPU_PIXELS = 2  # times as many each way in the pictures of a GPU
+_GPU_POLICIES = {"flow_vla_demo.yaml": "flow_vla_compact.yaml"}  # in the place of those that experiments name
 _POLICY, _GPU_POLICY = "study_policy.yaml", "study_gpu.yaml"  # in configs/experiments/parts
 
 
@@ -131,7 +132,8 @@ def configs_for(device: str, study: StudyConfig, root: Path) -> Path:
     """The folder of configuration files for a device: the package's own, or for a GPU a copy in `root`.
 
     In the copy the larger policy stands in the place of the small one, and recorded pictures have twice as many pixels
-    each way, in a dataset folder of their own; so have those of experiments that name a size.
+    each way, in a dataset folder of their own; so have those of experiments that name a size, and experiments that name
+    a policy's file have the larger one's.
     """
     configs = configs_folder()
     if device == CPU:
@@ -149,6 +151,9 @@ def configs_for(device: str, study: StudyConfig, root: Path) -> Path:
     for file in sorted((copy / "experiments" / EXPERIMENTS).glob("*.yaml")):
         experiment: dict[str, Any] = load_yaml(file)
         policy = experiment.get("policy")
+        if isinstance(policy, str) and Path(policy).name in _GPU_POLICIES:
+            experiment["policy"] = str(Path(policy).with_name(_GPU_POLICIES[Path(policy).name]))
+            write_text(file, yaml.safe_dump(experiment, sort_keys=False))
         if isinstance(policy, dict) and "image_size" in policy:
             policy["image_size"] = [pixels * _GPU_PIXELS for pixels in policy["image_size"]]
             write_text(file, yaml.safe_dump(experiment, sort_keys=False))

@@ -44,6 +44,18 @@ def test_the_plan_tells_what_each_part_takes(tmp_path: Path) -> None:
     assert not (tmp_path / "datasets").exists()
 
 
+def test_the_plan_leaves_out_what_has_ended(tmp_path: Path) -> None:
+    whole = load_study()
+    for run in runs_of([whole.parts["multitask"]], tmp_path, configs_folder())[:2]:
+        folder = stored_folder(tmp_path / "kept", run.experiment, run.seed)
+        folder.mkdir(parents=True)
+        (folder / ABOUT).write_text(json.dumps({"scale": None, "episodes": None}))
+    done = study(tmp_path, "--plan", "--measure=0", "--results=kept", "multitask")
+    line = next(line.split() for line in done.stdout.splitlines() if line.startswith("multitask"))
+    assert line[1] == "1"
+    assert line[5] == "480", "its trials"
+
+
 def test_a_misspelt_part_is_told(tmp_path: Path) -> None:
     done = study(tmp_path, "multitsk")
     assert done.returncode == 2
@@ -76,6 +88,16 @@ def test_on_a_gpu_every_experiment_has_the_larger_policy_and_pictures(tmp_path: 
         assert (experiment.device, experiment.mixed_precision) == ("cuda", "bf16")
         registry = Path(str(experiment.registry))
         assert registry.is_relative_to(tmp_path)
+        if run.experiment != "recipe_act":
+            policy = experiment.policy
+            assert "demo" not in str(policy), "the larger one"
+            assert policy["image_size"][0] >= 128
+    reference, *others = (
+        load_experiment(configs / "experiments/study" / f"{name}.yaml").policy
+        for name in ("quality_varied", "recipe_executed_8", "recipe_history_2")
+    )
+    changed = [{key for key in other if other[key] != reference[key]} for other in others]
+    assert changed == [{"n_action_steps"}, {"n_obs_steps", "horizon"}], "and nothing else"
     text = (configs / whole.registry).read_text(encoding="utf-8")
     assert "image_size: 64" not in text
     assert "root: datasets/study_cuda" in text
