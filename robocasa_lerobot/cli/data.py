@@ -61,7 +61,7 @@ def run(args: argparse.Namespace) -> int:
     """List, make or convert; status 1 if `--check` finds something missing or something could not be made."""
     from robocasa_lerobot.config_files import find_config
     from robocasa_lerobot.jobs.executors import execution_of
-    from robocasa_lerobot.making.estimate import cores_here
+    from robocasa_lerobot.jobs.workers import cores_here
     from robocasa_lerobot.making.listing import listing
     from robocasa_lerobot.making.needs import needs_of, parse_episodes
     from robocasa_lerobot.training.config.experiment import load_experiment

@@ -64,7 +64,7 @@ def run(args: argparse.Namespace) -> int:
     from robocasa_lerobot.evaluation.run.engine import evaluate, prepare
     from robocasa_lerobot.evaluation.run.merging import merge
     from robocasa_lerobot.evaluation.run.outputs import write_outputs
-    from robocasa_lerobot.gl import announce_backend, check_device, ensure_gl
+    from robocasa_lerobot.gl import announce_backend, ensure_gl
 
     given = [f"--{key.removeprefix('set:')}={value}" for key, value in vars(args).items() if key.startswith("set:")]
     path = [f"--config_path={args.config_path}"] if args.config_path else []
@@ -74,13 +74,11 @@ def run(args: argparse.Namespace) -> int:
 
         print("\n".join(lines(config, planned(config))))
         return 0
-    for device in config.env.render_devices:
-        check_device(device)
     if args.executor != "local":
         return _run_elsewhere(config, args)
     if args.shards is not None:
         raise UserError("--shards is for --executor slurm or ray; here give --shard=I/N, and --merge at the end.")
-    evaluation = prepare(config, ask=not args.merge)
+    evaluation = prepare(config, ask=not args.merge, here=not args.merge)
     header = evaluation.header
     partial = partial_sentence(header.task_sets, header.missing_tasks, header.missing_by_set)
     if partial is not None:

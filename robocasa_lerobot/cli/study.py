@@ -43,7 +43,7 @@ def run(args: argparse.Namespace) -> int:
     """Plan, or run what has not ended yet and write the page after each run."""
     from robocasa_lerobot.data.registry.registry import open_registry
     from robocasa_lerobot.errors import UserError
-    from robocasa_lerobot.making.estimate import cores_here
+    from robocasa_lerobot.jobs.workers import cores_here
     from robocasa_lerobot.study.costs import cost_lines, costs
     from robocasa_lerobot.study.page import write_page
     from robocasa_lerobot.study.runs import configs_for, root_for, runs_of
@@ -63,8 +63,9 @@ def run(args: argparse.Namespace) -> int:
     if args.plan:
         runs, planned = {}, set[str]()
         for name, part in parts.items():
-            runs[name] = [run for run in runs_of([part], root, configs, *asked) if run.name not in planned]
-            planned |= {run.name for run in runs[name]}
+            own = [run for run in runs_of([part], root, configs, *asked) if run.name not in planned]
+            planned |= {run.name for run in own}
+            runs[name] = [run for run in own if not is_stored(run, results)]
         cores = args.workers or cores_here()
         found = costs(study, runs, configs, cores, args.measure)
         print("\n".join(cost_lines(parts, found, cores, args.device)))

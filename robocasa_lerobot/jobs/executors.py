@@ -35,7 +35,7 @@ class SlurmSettings:
     jobs: int = field(default=-1, metadata={"help": "how many pieces may run at a time; -1 for no limit"})
     cpus: int = field(default=2, metadata={"help": "cores of a piece: one to read or render, one to encode"})
     mem_per_cpu_gb: int = field(default=4, metadata={"help": "memory for each core, GB"})
-    gpus: int = field(default=0, metadata={"help": "GPUs of a piece, for rendering"})
+    gpus: int = field(default=0, metadata={"help": "GPUs of a piece, for rendering and policies"})
     account: str | None = field(default=None, metadata={"help": "account to charge"})
     qos: str | None = field(default=None, metadata={"help": "quality of service"})
     env_command: str | None = field(
@@ -51,6 +51,7 @@ class RaySettings:
     jobs: int = field(default=-1, metadata={"help": "how many pieces may run at a time; -1 for no limit"})
     cpus: int = field(default=2, metadata={"help": "cores of a piece"})
     mem_per_cpu_gb: int = field(default=4, metadata={"help": "memory for each core, GB"})
+    gpus: int = field(default=0, metadata={"help": "GPUs of a piece, for rendering and policies"})
 
 
 @dataclass(frozen=True)
@@ -85,6 +86,12 @@ class Execution:
                 f"({sys.prefix}) with `pip install ray`, or leave --executor out to run here."
             )
 
+    @property
+    def cpus(self) -> int:
+        """Cores of a piece on Slurm or Ray."""
+        assert self.kind != "local", "pieces on this machine have no cores of their own"
+        return self.ray.cpus if self.kind == "ray" else self.slurm.cpus
+
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Add `--executor` and the options of each."""
@@ -113,7 +120,14 @@ def execution_of(args: argparse.Namespace) -> Execution:
 
 
 def submit_to_slurm(
-    step: Callable[..., None], finish: Callable[[], object], pieces: int, folder: Path, logs: Path, slurm: SlurmSettings
+    step: Callable[..., None],
+    finish: Callable[[], object],
+    pieces: int,
+    folder: Path,
+    logs: Path,
+    slurm: SlurmSettings,
+    *,
+    skip_complete: bool = True,
 ) -> tuple[str | None, str]:
     """Submit the pieces that are not complete, and a job that calls `finish` when all of them have succeeded.
 
@@ -124,6 +138,7 @@ def submit_to_slurm(
         folder: for completion markers and the pickled pipeline, on a file system that the nodes share.
         logs: folder for what the jobs print, and the record of them.
         slurm: what to ask Slurm for.
+        skip_complete: False submits all pieces, for steps that find out themselves what is left of theirs.
 
     Returns:
         Numbers of the array of jobs (None where all pieces are complete) and of the last job.
@@ -147,6 +162,7 @@ def submit_to_slurm(
         pipeline=[step],
         tasks=pieces,
         logging_dir=str(folder),
+        skip_completed=skip_complete,
         slurm_logs_folder=str(logs),
         time=slurm.time,
         partition=slurm.partition,

@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import contextlib
 import os
-from collections.abc import Callable
+import socket
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +21,9 @@ _GIB = 2**30
 _SHOWN = 3
 
 
-def run_with_ray(step: Callable[..., None], pieces: int, folder: Path, settings: RaySettings) -> None:
+def run_with_ray(
+    step: Callable[..., None], pieces: int, folder: Path, settings: RaySettings, *, skip_complete: bool = True
+) -> None:
     """Run all pieces that are not complete, and wait for them; one that fails does not keep the others from ending.
 
     The cluster is the one at `RAY_ADDRESS`, or one that runs on this machine; where there is neither, Ray is started
@@ -31,13 +34,16 @@ def run_with_ray(step: Callable[..., None], pieces: int, folder: Path, settings:
         pieces: their number.
         folder: for completion markers, on a file system that the nodes share.
         settings: what a piece asks for, and how many may run at a time.
+        skip_complete: False runs all pieces, for steps that find out themselves what is left of theirs.
 
     Raises:
         UserError: pieces failed, or ask for more than any node has; the causes are named.
     """
     import ray
 
-    executor = PoolExecutor(pipeline=[step], tasks=pieces, workers=1, logging_dir=str(folder))
+    executor = PoolExecutor(
+        pipeline=[step], tasks=pieces, workers=1, logging_dir=str(folder), skip_completed=skip_complete
+    )
     waiting = list(executor.get_incomplete_ranks())
     if not waiting:
         return
@@ -45,14 +51,15 @@ def run_with_ray(step: Callable[..., None], pieces: int, folder: Path, settings:
     memory = settings.cpus * settings.mem_per_cpu_gb * _GIB
     _check_node(settings, memory)
     # A new worker process for each piece: OpenGL, torch and the pieces' own processes are not handed on.
-    remote = ray.remote(num_cpus=settings.cpus, memory=memory, max_calls=1, max_retries=0)(_run_piece)
-    shared = ray.put(executor)
+    asked = {"num_cpus": settings.cpus, "num_gpus": settings.gpus, "memory": memory}
+    remote = ray.remote(**asked, max_calls=1, max_retries=0)(_run_piece)
+    shared, here = ray.put(executor), str(Path.cwd())
     running: dict[Any, int] = {}
     failed: dict[int, str] = {}
     while waiting or running:
         while waiting and (settings.jobs < 1 or len(running) < settings.jobs):
             rank = waiting.pop(0)
-            running[remote.options(name=f"piece {rank}").remote(shared, rank)] = rank
+            running[remote.options(name=f"piece {rank}").remote(shared, rank, here)] = rank
         for reference in ray.wait(list(running), num_returns=1)[0]:
             rank = running.pop(reference)
             try:
@@ -64,7 +71,15 @@ def run_with_ray(step: Callable[..., None], pieces: int, folder: Path, settings:
         raise UserError(f"{len(failed)} of {pieces} pieces failed with Ray; the same command runs them again.\n{shown}")
 
 
-def _run_piece(executor: PoolExecutor, rank: int) -> None:
+def _run_piece(executor: PoolExecutor, rank: int, folder: str) -> None:
+    """Run a piece in the folder in which the command was given: that of a cluster is where Ray was started."""
+    try:
+        os.chdir(folder)
+    except OSError as error:
+        raise UserError(
+            f"the node {socket.gethostname()} has no folder {folder} ({error.strerror}): give the command in a folder "
+            "that all nodes share."
+        ) from None
     executor.run_rank(rank)
 
 
@@ -88,11 +103,17 @@ def _check_node(settings: RaySettings, memory: int) -> None:
     """Ray waits for ever where no node is large enough."""
     import ray
 
+    asked = {"CPU": settings.cpus, "memory": memory, "GPU": settings.gpus}
     nodes = [node["Resources"] for node in ray.nodes() if node["Alive"]]
-    if any(node.get("CPU", 0) >= settings.cpus and node.get("memory", 0) >= memory for node in nodes):
+    if any(all(node.get(name, 0) >= amount for name, amount in asked.items()) for node in nodes):
         return
-    found = "; ".join(f"{node.get('CPU', 0):g} cores and {node.get('memory', 0) / _GIB:.1f} GiB" for node in nodes)
     raise UserError(
-        f"no node of the Ray cluster is large enough for a piece: it asks for {settings.cpus} cores and "
-        f"{memory / _GIB:.0f} GiB, found {found}. Give fewer --ray.cpus, or less --ray.mem_per_cpu_gb."
+        f"no node of the Ray cluster is large enough for a piece: it asks for {_in_words(asked)}, found "
+        f"{'; '.join(map(_in_words, nodes))}. Give fewer --ray.cpus or --ray.gpus, or less --ray.mem_per_cpu_gb."
     )
+
+
+def _in_words(resources: Mapping[str, float]) -> str:
+    """What a piece asks for or a node has, in Ray's names."""
+    cores, gpus, memory = (resources.get(name, 0) for name in ("CPU", "GPU", "memory"))
+    return f"{cores:g} cores and {memory / _GIB:.4g} GiB" + (f" and {gpus:g} GPU(s)" if gpus else "")

@@ -1,4 +1,4 @@
-"""How many processes of this machine a conversion, a rendering or a verification takes."""
+"""How many processes of this machine a piece of work takes."""
 
 from __future__ import annotations
 
@@ -9,9 +9,14 @@ from robocasa_lerobot.errors import UserError
 _MAX_AUTOMATIC_WORKERS = 8
 
 
+def cores_here() -> int:
+    """Cores that this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
 def automatic_workers(pieces: int, work: int, least_work: int) -> int:
     """By cores, number of pieces, and the least work that pays for starting a process; `work` is all there is."""
-    return max(1, min(os.cpu_count() or 1, _MAX_AUTOMATIC_WORKERS, pieces, work // least_work))
+    return max(1, min(cores_here(), _MAX_AUTOMATIC_WORKERS, pieces, work // least_work))
 
 
 def check_workers(asked: int | None) -> None:

@@ -8,7 +8,6 @@ tasks' datasets at 128 pixels that `robocasa-lerobot data --make` made.
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
@@ -43,11 +42,6 @@ class Estimate:
     converting_hours: float
     size: int
     cores: int
-
-
-def cores_here() -> int:
-    """Cores that this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def estimate(needs: Iterable[Need], cores: int) -> Estimate:

@@ -10,8 +10,10 @@ from __future__ import annotations
 
 import asyncio
 import logging
+import time
 from collections import OrderedDict
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -28,10 +30,21 @@ from robocasa_lerobot.wire.codec import decode, encode
 _log = logging.getLogger(__name__)
 _OPTIONS = ("seed", "number", "reset")
 _UNAUTHORIZED = "Unauthorized: Invalid API token"  # their words, which clients look for
+# Clients leave without a word, and may simulate for minutes between two requests.
+_SILENT_SECONDS = 3600.0
+_KNOWN = 16  # times as many clients as are served at a time are known at most, however often they ask
+
+
+@dataclass
+class _Client:
+    """Sessions, one for each row of its batches, and when it asked last, seconds of the monotonic clock."""
+
+    sessions: list[Session] = field(default_factory=list)
+    asked: float = 0.0
 
 
 class GrootServer:
-    """Answers the requests of all clients, each of them one at a time.
+    """Answers the requests of all clients, each of them one at a time; beyond the limit requests wait for their turn.
 
     Args:
         host: the policy.
@@ -44,7 +57,7 @@ class GrootServer:
     def __init__(self, host: Host, access: Access, limits: Limits, version: str, allow_kill: bool) -> None:
         self._host, self._access, self._limits = host, access, limits
         self._version, self._allow_kill = version, allow_kill
-        self._clients: OrderedDict[bytes, list[Session]] = OrderedDict()
+        self._clients: OrderedDict[bytes, _Client] = OrderedDict()  # who asked last stands last
         self._busy: set[bytes] = set()
         self._stop = asyncio.Event()
 
@@ -75,6 +88,9 @@ class GrootServer:
             ready(int(socket.getsockopt_string(zmq.LAST_ENDPOINT).rpartition(":")[2]))
             ending = asyncio.ensure_future(stop.wait())
             while not stop.is_set():
+                if len(tasks) >= self._limits.clients:  # the other requests wait in ZeroMQ's queues
+                    await asyncio.wait({ending, *tasks}, return_when=asyncio.FIRST_COMPLETED)
+                    continue
                 arriving = asyncio.ensure_future(socket.recv_multipart())
                 await asyncio.wait({arriving, ending}, return_when=asyncio.FIRST_COMPLETED)
                 if not arriving.done():
@@ -94,7 +110,7 @@ class GrootServer:
         if len(parts) > 3 or (len(parts) == 3 and parts[1]):
             await socket.send_multipart([*envelope[:2], _error("a request is one message part")])
             return
-        if client in self._busy or len(self._busy) >= self._limits.clients:
+        if client in self._busy:
             await socket.send_multipart([*envelope, _error("busy: one request of a client at a time")])
             return
         self._busy.add(client)
@@ -157,14 +173,23 @@ class GrootServer:
         return [actions, {"number": [reply.number for reply in replies]}]
 
     def _sessions(self, client: bytes, count: int) -> list[Session]:
-        """A client's sessions, one for each row of its batches; who has not asked for longest is forgotten."""
-        own = self._clients.setdefault(client, [])
+        """A client's sessions, one for each row of its batches."""
+        own = self._clients.setdefault(client, _Client())
+        own.asked = time.monotonic()
         self._clients.move_to_end(client)
-        while len(own) < count:
-            own.append(self._host.session())
-        while len(self._clients) > self._limits.clients:
-            self._clients.popitem(last=False)
-        return own
+        while len(own.sessions) < count:
+            own.sessions.append(self._host.session())
+        self._forget(own.asked)
+        return own.sessions
+
+    def _forget(self, now: float) -> None:
+        """Forget clients that are more than the limit and have probably left."""
+        most = self._limits.clients
+        for client, known in list(self._clients.items())[:-most]:
+            if now - known.asked < _SILENT_SECONDS and len(self._clients) <= _KNOWN * most:
+                return
+            if client not in self._busy:
+                del self._clients[client]
 
 
 def _row_options(options: Mapping[Any, Any], row: int) -> dict[str, Any]:

@@ -61,7 +61,8 @@ async def serve_websockets(
         if address.path in closed_pages:
             return _page(connection, *closed_pages[address.path](parse_qs(address.query)))
         if len(clients) >= limits.clients:
-            return connection.respond(HTTPStatus.SERVICE_UNAVAILABLE, f"{limits.clients} clients are served already\n")
+            full = f"{limits.clients} clients are served already: give a larger --max-clients, or use fewer workers"
+            return connection.respond(HTTPStatus.SERVICE_UNAVAILABLE, full + "\n")
         return None
 
     async def counted(connection: ServerConnection) -> None:

@@ -28,6 +28,7 @@ from robocasa_lerobot.evaluation.records.results import TrialRecord
 from robocasa_lerobot.evaluation.run import engine
 from robocasa_lerobot.evaluation.run.film import FILM_EVERY, FILM_FPS, Film
 from robocasa_lerobot.evaluation.run.rollout import RolloutError, run_trial
+from robocasa_lerobot.evaluation.run.worker_pool import WorkerPool
 from robocasa_lerobot.video import frames_and_rate
 
 ROOT = Path(__file__).parents[2]
@@ -259,3 +260,19 @@ def test_what_no_film_shows_is_run_again_and_must_go_the_same_way(
     assert [r.success for r in again] == [r.success for r in plain]
     assert {r.video for r in again} == {None}
     assert not list(other.rglob("*.mp4"))
+
+
+def test_films_that_are_asked_for_later_have_all_workers(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    arguments: dict[str, Any] = {"policy.path": "zero", "trials": 6, "workers": 2}
+    evaluate(tmp_path / "out", **arguments)
+    started = []
+    start = WorkerPool._start
+
+    def counted(pool: WorkerPool) -> Any:
+        started.append(1)
+        return start(pool)
+
+    monkeypatch.setattr(WorkerPool, "_start", counted)
+    filmed = evaluate(tmp_path / "out", videos=1, **arguments)
+    assert len([record for record in filmed if record.video]) == 2
+    assert len(started) == 2

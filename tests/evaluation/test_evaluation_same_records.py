@@ -12,7 +12,9 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+import broken_gpu
 import pytest
+import yaml
 from tiny_checkpoint import SIZE
 from trial_faults import REASONS, assert_faults_cost_only_their_trials
 
@@ -21,7 +23,7 @@ from robocasa_lerobot.errors import UserError
 from robocasa_lerobot.evaluation.config.evaluation import EvaluationConfig
 from robocasa_lerobot.evaluation.config.loader import load_config
 from robocasa_lerobot.evaluation.records.results import TRIALS_FILE, TrialRecord, read_results
-from robocasa_lerobot.evaluation.run import engine
+from robocasa_lerobot.evaluation.run import engine, policy_servers
 from robocasa_lerobot.evaluation.run.merging import merge
 
 ROOT = Path(__file__).parents[2]
@@ -140,6 +142,20 @@ def test_workers_policy_servers_and_their_number_change_nothing(
         evaluate(tmp_path / "b", **own, executed_steps=4)
 
 
+def test_a_gpu_that_is_of_no_use_any_more_costs_its_process_and_an_attempt(
+    tmp_path: Path, checkpoint: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    processes = tmp_path / "processes"
+    processes.mkdir()
+    monkeypatch.setenv(broken_gpu.FOLDER, str(processes))
+    monkeypatch.setattr(policy_servers, "server_main", broken_gpu.server_main)
+    servers = {"policy.placement": "servers", "policy.devices": "cuda:0"}
+    records = evaluate(tmp_path / "out", policy=checkpoint, trials=3, **{"env.tasks": "Slide", **servers})
+    assert [record.error for record in records] == [None] * 3
+    assert sorted(record.attempts for record in records) == [1, 1, 2]
+    assert len(list(processes.iterdir())) == 2
+
+
 def test_slurm_runs_the_shards_and_joins_them(
     tmp_path: Path,
     slurm: Path,
@@ -148,10 +164,16 @@ def test_slurm_runs_the_shards_and_joins_them(
 ) -> None:
     out = tmp_path / "out"
     monkeypatch.setenv("PYTHONPATH", TESTS)
-    command = ["eval", *arguments(out), "--executor", "slurm", "--slurm.partition", "cpu", "--slurm.time", "00:10:00"]
+    asked = ["--executor", "slurm", "--slurm.partition", "cpu", "--slurm.time", "00:10:00", "--slurm.cpus", "1"]
+    command = ["eval", *arguments(out, workers=0), *asked]
     assert main([*command, "--shards", "2"]) == 0
     assert comparable(read_results(out).trials) == plain
     assert "array=0-1" in (slurm / "1.script").read_text()
+    assert yaml.safe_load((out / "shards/1-of-2" / engine.CONFIG_FILE).read_text())["workers"] == 1
+    # Given again, every shard is submitted: what is left is in its records, not in a marker.
+    (slurm / "sbatch").write_text((slurm / "sbatch").read_text().replace("if failed:", "if True:"))  # nothing runs
+    assert main([*command, "--shards", "2"]) == 0
+    assert "array=0-1" in (slurm / "3.script").read_text()
     assert main(command) == 2, "the number of shards is needed"
 
 

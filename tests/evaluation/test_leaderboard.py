@@ -76,10 +76,9 @@ def test_a_run_by_the_protocol_becomes_a_submission(
             {"success": False, "first_success_step": None, "outcome": "hung", "error": "hung"},
             "trials ended in an error",
         ),
-        (
-            {"policies": {"p": synthetic_runs.policy("p", path="demonstrator")}},
-            {},
-            "reference policy",
+        *(
+            ({"policies": {"p": synthetic_runs.policy("p", path=path, type=kind)}}, {}, f"reference policy ({path})")
+            for kind, path in (("demonstrator", "demonstrator"), ("replay", "replay:demos.hdf5"))
         ),
     ],
 )

@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
+import threading
 from pathlib import Path
 from typing import Any
 
 import pytest
-from serving_support import serving
+from serving_support import blocked_host, serving
 
 from robocasa_lerobot.cli import main
 from robocasa_lerobot.evaluation.actors.checkpoint import read_source
 from robocasa_lerobot.evaluation.records.results import read_results
+from robocasa_lerobot.evaluation.remote.client import Timeouts
+from robocasa_lerobot.evaluation.remote.connect import connect
+from robocasa_lerobot.evaluation.remote.failures import LostError
 from robocasa_lerobot.serving.host import Host
+from robocasa_lerobot.serving.limits import Limits
 from robocasa_lerobot.serving.policy import load_served
 
 
@@ -54,3 +59,17 @@ def test_pictures_that_the_policy_was_not_trained_at_are_an_error(
         arguments = ["--env.factory=evaluation_env:SlideEnv", "--env.tasks=Slide", f"--out={tmp_path / 'out'}"]
         assert main(["eval", policy, *arguments, "--env.image_size=48"]) == 2
     assert "found pictures of 48x48, expected 32x32" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("protocol", ["openpi", "vla_eval"])
+def test_a_client_too_many_waits_until_another_has_left(protocol: str) -> None:
+    go = threading.Event()
+    with serving(blocked_host(go, go), protocol, limits=Limits(clients=1)) as port:
+        url = f"{protocol}://127.0.0.1:{port}"
+        first = connect(url)
+        with pytest.raises(LostError, match=r"1 clients are served already: give a larger --max-clients"):
+            connect(url, Timeouts(connect=0.6))
+        threading.Timer(0.5, first.close).start()
+        second = connect(url, Timeouts(connect=30.0))
+        assert second.metadata["policy"]["label"] == "blocked"
+        second.close()

@@ -256,6 +256,26 @@ def test_a_handshake_that_is_refused_says_what_to_do(status: int, message: str) 
         server.shutdown()
 
 
+def test_a_server_that_has_no_place_is_asked_again() -> None:
+    full = threading.Event()
+    full.set()
+    tries: list[int] = []
+
+    def send_away(connection: Any, request: Any) -> Any:
+        tries.append(1)
+        return connection.respond(503, "2 clients are served already\n") if full.is_set() else None
+
+    with serve(lambda ws: ws.send(b"\x80"), "127.0.0.1", 0, process_request=send_away) as server:
+        threading.Thread(target=server.serve_forever, daemon=True).start()
+        url = url_of("openpi", server.socket.getsockname()[1])
+        with pytest.raises(LostError, match=r"no place, HTTP 503 \(2 clients are served already\); tried for 0\.6 s"):
+            connect(url, HASTY)
+        assert len(tries) > 1
+        threading.Timer(0.5, full.clear).start()
+        connect(url, SHORT).close()
+        server.shutdown()
+
+
 @pytest.mark.parametrize(
     ("text", "parsed"),
     [

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import csv
 import dataclasses
 import io
 import os
@@ -75,6 +76,10 @@ def test_an_env_with_nothing_but_numpy(tmp_path: Path, capsys: pytest.CaptureFix
     assert {r.steps for r in by_policy["zero"]} == {20}
     assert len({r.trajectory for r in by_policy["random"]}) == 6
     assert {r.instruction for r in results.trials} == {"slide it", "push it"}
+    steps = [r.steps for r in by_policy["demonstrator"] if r.task == "Slide"]
+    with (out / "report.csv").open() as file:
+        rows = {(row["policy"], row["task"]): row["median_seconds_to_success"] for row in csv.DictReader(file)}
+    assert float(rows["demonstrator", "Slide"]) == pytest.approx(np.median(steps) / 7)  # its own 7 Hz
     films = [out / r.video for r in by_policy["zero"] if r.video]
     assert [frames_and_rate(film) for film in films] == [(11, 4.0)] * 2  # half of its own 7 Hz, rounded
     assert "another simulator's own scenes" in (out / "report.md").read_text()

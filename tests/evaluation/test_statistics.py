@@ -249,6 +249,10 @@ def test_lifelong_summaries_of_the_published_matrix() -> None:
     assert ahead.backward_transfer is not None
     assert ahead.backward_transfer.value == pytest.approx(0.1)
     assert lifelong({1: {1: [(0, 1)]}}).backward_transfer is None
+    # The mean of some phases is not that of all.
+    one = [(5, 10)]
+    some = lifelong({1: {1: one}, 2: {1: one, 2: one}, 3: {2: one, 3: one}})
+    assert (set(some.average), set(some.forgetting), some.backward_transfer) == ({1, 2}, {2}, None)
     with pytest.raises(UserError):
         lifelong({1: {1: [(0, 0)]}})
 

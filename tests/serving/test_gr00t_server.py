@@ -16,7 +16,9 @@ from robocasa_lerobot import contract
 from robocasa_lerobot.evaluation.actors.actor import ChunkRequest, Observation
 from robocasa_lerobot.evaluation.actors.checkpoint import read_source
 from robocasa_lerobot.evaluation.actors.chunk_policy import ChunkPolicy
+from robocasa_lerobot.serving import gr00t
 from robocasa_lerobot.serving.host import Host
+from robocasa_lerobot.serving.limits import Limits
 from robocasa_lerobot.serving.policy import load_served
 
 INSTRUCTION = "open the left drawer"
@@ -172,19 +174,19 @@ def test_wrong_tokens_are_told_in_their_words(checkpoint: Path) -> None:
         client.close()
 
 
+def ask_blocked(client: GrootClient, found: list[Any]) -> None:
+    """Ask the policy of `blocked_host`, and append its answer."""
+    state = {name: value[None] for name, value in contract.split_state(np.zeros((1, 16))).items()}
+    message = {"video": {}, "state": state, "language": {"annotation.human.task_description": [["x"]]}}
+    found.append(client.call("get_action", {"observation": message, "options": None}))
+
+
 def test_ping_is_answered_while_the_policy_computes() -> None:
     begun, go = threading.Event(), threading.Event()
     with serving(blocked_host(begun, go), "gr00t") as port:
         found: list[Any] = []
-
-        def ask() -> None:
-            client = GrootClient(port)
-            state = {name: value[None] for name, value in contract.split_state(np.zeros((1, 16))).items()}
-            message = {"video": {}, "state": state, "language": {"annotation.human.task_description": [["x"]]}}
-            found.append(client.call("get_action", {"observation": message, "options": None}))
-            client.close()
-
-        asking = threading.Thread(target=ask)
+        slow = GrootClient(port)
+        asking = threading.Thread(target=ask_blocked, args=(slow, found))
         asking.start()
         assert begun.wait(30)
         client = GrootClient(port)
@@ -193,7 +195,61 @@ def test_ping_is_answered_while_the_policy_computes() -> None:
         go.set()
         asking.join(30)
         client.close()
+        slow.close()
     assert found[0][0]["gripper_close"].shape == (1, 1, 1)
+
+
+def test_more_clients_than_the_limit_wait_for_their_turn() -> None:
+    begun, go = threading.Event(), threading.Event()
+    with serving(blocked_host(begun, go), "gr00t", limits=Limits(clients=2)) as port:
+        found: list[Any] = []
+        clients = [GrootClient(port) for _ in range(5)]
+        threads = [threading.Thread(target=ask_blocked, args=(client, found)) for client in clients]
+        for thread in threads:
+            thread.start()
+        assert begun.wait(30)
+        threads[-1].join(0.5)
+        assert found == []  # nobody is sent away
+        go.set()
+        for thread, client in zip(threads, clients, strict=True):
+            thread.join(30)
+            client.close()
+    assert [action["gripper_close"].shape for action, _ in found] == [(1, 1, 1)] * 5
+
+
+def test_sessions_outlive_the_limit_until_their_clients_are_silent_for_long(monkeypatch: pytest.MonkeyPatch) -> None:
+    begun, go = threading.Event(), threading.Event()
+    go.set()
+    with serving(blocked_host(begun, go), "gr00t", limits=Limits(clients=2)) as port:
+        clients = [GrootClient(port) for _ in range(4)]
+
+        def numbers(*asking: GrootClient) -> list[int]:
+            found: list[Any] = []
+            for client in asking:
+                ask_blocked(client, found)
+            return [info["number"][0] for _, info in found]
+
+        assert numbers(*clients, *clients) == [0, 0, 0, 0, 1, 1, 1, 1]
+        monkeypatch.setattr(gr00t, "_SILENT_SECONDS", 0.0)
+        # Who asks last is known, and so is who is being answered, however long ago it asked.
+        assert numbers(clients[3]) == [2]
+        begun.clear()
+        go.clear()
+        late: list[Any] = []
+        asking = threading.Thread(target=ask_blocked, args=(clients[3], late))
+        asking.start()
+        assert begun.wait(30)
+        for client in (*clients[:3], *clients[:3]):
+            assert client.call("reset", {"options": None}) == {}
+        go.set()
+        asking.join(30)
+        assert late[0][1]["number"] == [3]
+        assert numbers(clients[3], clients[0]) == [4, 0]
+        monkeypatch.undo()
+        monkeypatch.setattr(gr00t, "_KNOWN", 1)
+        assert numbers(*clients, *clients)[4:] == [0, 0, 0, 0]
+        for client in clients:
+            client.close()
 
 
 def test_kill_ends_the_server_where_it_may() -> None:

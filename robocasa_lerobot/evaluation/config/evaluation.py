@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import os
 from collections.abc import Iterable
 from dataclasses import dataclass, field, fields
 from pathlib import Path
@@ -12,6 +11,7 @@ from typing import Any
 from robocasa_lerobot.errors import UnknownNameError, UserError
 from robocasa_lerobot.evaluation.records.results import file_name
 from robocasa_lerobot.evaluation.remote.address import is_address
+from robocasa_lerobot.jobs.workers import cores_here
 
 KITCHEN_ENV_FACTORY = "robocasa_lerobot.envs.kitchen_env:KitchenEnv"
 SPLITS = ("target", "pretrain", "pretrain_train", "pretrain_val")
@@ -170,7 +170,8 @@ class EvaluationConfig:
     seed: fixes scenes, starts and the policy's sampling noise of all trials.
     executed_steps: executed steps of each predicted action chunk; default: the policy's own.
     lifelong: each policy runs the first policy.lifelong_phase of the task sets only.
-    workers: parallel processes; 0: one for each CPU core. Outcomes do not depend on it.
+    workers: parallel processes; 0: one for each CPU core that it may use, on Slurm and Ray for each core of a shard.
+        Outcomes do not depend on it.
     shard: I/N: only the I-th of N parts of the plan, in shards/I-of-N of the output folder; `merge` joins them.
     videos: how many trials of each policy on each task are filmed: the first ones, and where these show no success or
         no failure, the first such trial is run once more for its film. 0: no films.
@@ -283,7 +284,7 @@ class EvaluationConfig:
 
     def worker_count(self, trials: int) -> int:
         """Processes to start for `trials` trials."""
-        return max(1, min(self.workers or os.cpu_count() or 1, trials))
+        return max(1, min(self.workers or cores_here(), trials))
 
 
 def check_factory(factory: str) -> None:

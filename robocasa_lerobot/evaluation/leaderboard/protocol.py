@@ -6,7 +6,7 @@ import collections
 
 from robocasa_lerobot.benchmark import published
 from robocasa_lerobot.evaluation.records.results import UNPERTURBED, TrialRecord
-from robocasa_lerobot.evaluation.report.policies import REFERENCES, PolicyResult
+from robocasa_lerobot.evaluation.report.policies import PolicyResult, is_reference
 
 SPLIT = "pretrain"
 TRIALS_PER_TASK = 50
@@ -20,7 +20,7 @@ def reasons(policy: PolicyResult) -> list[str]:
     horizon, success at any step of the trial, every trial run to its end.
     """
     found: list[str] = []
-    if policy.info.path in REFERENCES:
+    if is_reference(policy):
         found.append(f"{policy.label} is a reference policy ({policy.info.path}), not a learned one")
     if any(header.settings.get("synthetic") for header in policy.headers):
         found.append("its trials are synthetic: they were made to show a report and never run")

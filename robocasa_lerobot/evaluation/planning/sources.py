@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
@@ -11,7 +11,7 @@ from typing import Any
 from robocasa_lerobot.errors import UserError
 from robocasa_lerobot.evaluation.actors.checkpoint import PolicySource, common_image_size, read_source
 from robocasa_lerobot.evaluation.config.evaluation import EvaluationConfig, RemoteSettings, output_folder
-from robocasa_lerobot.evaluation.records.results import TRIALS_FILE, read_results
+from robocasa_lerobot.evaluation.records.results import TRIALS_FILE, RunHeader, read_results
 from robocasa_lerobot.evaluation.remote.address import Address, is_address, parse_address
 from robocasa_lerobot.evaluation.remote.client import Timeouts
 from robocasa_lerobot.evaluation.remote.introduction import Introduction, RemotePolicy
@@ -76,13 +76,22 @@ def _labels(config: EvaluationConfig) -> list[str]:
     ]
 
 
+def recorded_device(out: Path) -> str | None:
+    """What the policies of the results in a folder, or of its shards, computed on; None where there are no results."""
+    return next((header.device for header in _recorded_headers(out)), None)
+
+
 def _recorded_remotes(out: Path) -> dict[str, Described]:
     """What the headers in a results folder and in those of its shards say of policies behind sockets, by address."""
     found: dict[str, Described] = {}
-    for file in sorted(out.glob(f"**/{TRIALS_FILE}")):
-        for header in read_results(file).headers.values():
-            found |= {info.path: info.remote for info in header.policies.values() if info.remote is not None}
+    for header in _recorded_headers(out):
+        found |= {info.path: info.remote for info in header.policies.values() if info.remote is not None}
     return found
+
+
+def _recorded_headers(out: Path) -> Iterator[RunHeader]:
+    for file in sorted(out.glob(f"**/{TRIALS_FILE}")):  # shards come first
+        yield from read_results(file).headers.values()
 
 
 def _recorded(address: Address, recorded: Mapping[str, Described]) -> RemotePolicy:

@@ -199,7 +199,7 @@ class RunHeader:
 class TrialRecord:
     """What happened in one trial.
 
-    Steps are control steps at 20 Hz; the first one is number 1.
+    Steps are control steps, in our kitchens at 20 Hz; the first one is number 1.
 
     Args:
         run: id of the header.
@@ -225,6 +225,7 @@ class TrialRecord:
         video: path relative to the results folder.
         seconds: wall time.
         finished: UTC, ISO 8601.
+        fps: control steps a second of another simulator; None where it does not say, and in our kitchens.
     """
 
     run: str
@@ -255,6 +256,8 @@ class TrialRecord:
     video: str | None
     seconds: Seconds
     finished: str
+    # Left out of the line where there is none, as results of earlier versions have none either.
+    fps: float | None = field(default=None, metadata=OPTIONAL)
     schema: int = field(default=SCHEMA_VERSION)
 
     @property
@@ -263,15 +266,21 @@ class TrialRecord:
         return (self.label, self.task, self.perturbation, self.trial)
 
     def comparable(self) -> dict[str, Any]:
-        """The record without what may differ between two runs of one plan: times, machine, retries and films."""
+        """The record without what may differ between two runs of one plan: times, machine, retries and films.
+
+        And without `fps`, which decides nothing and older records do not have.
+        """
         values = dataclasses.asdict(self)
-        for name in ("run", "seconds", "finished", "video", "attempts", "first_outcome", "first_error"):
+        for name in ("run", "seconds", "finished", "video", "attempts", "first_outcome", "first_error", "fps"):
             del values[name]
         return values
 
     def to_line(self) -> str:
         """The JSON line of this record, without its newline."""
-        return _dump({"kind": "trial", **dataclasses.asdict(self)})
+        values = dataclasses.asdict(self)
+        if self.fps is None:
+            del values["fps"]
+        return _dump({"kind": "trial", **values})
 
 
 @dataclass(frozen=True)

@@ -18,6 +18,8 @@ from robocasa_lerobot.wire.codec import MAX_MESSAGE_BYTES
 _HANDSHAKE_SECONDS = 20.0  # of one try: a server that computes in its event loop lets newcomers wait
 _RETRY_SECONDS = 0.25
 _UNAUTHORIZED = (401, 403)
+_NO_PLACE = 503  # others are served, or what the server needs is not there yet
+_SHOWN = 200  # characters of what an answer says; a proxy sends whole pages
 
 
 class WebSocket:
@@ -27,12 +29,12 @@ class WebSocket:
 
     Args:
         address: of the server.
-        seconds: for how long it is tried again while nobody listens.
+        seconds: for how long it is tried again while nobody listens, or the server has no place.
         waiting: called every now and then.
         token: sent as `Authorization: Api-Key ...`; None sends nothing.
 
     Raises:
-        LostError: nobody listened or answered the handshake in time.
+        LostError: nobody listened or answered the handshake in time, or the server had no place.
         UserError: the server wants a token, or is no websocket server.
     """
 
@@ -95,9 +97,9 @@ class WebSocket:
                 )
             except socket.gaierror as error:
                 raise LostError(f"{self._address.text}: unknown host ({error})") from error
-            except InvalidStatus as error:
-                raise self._unwanted(error) from error
             except (OSError, TimeoutError, WebSocketException) as error:
+                if isinstance(error, InvalidStatus) and error.response.status_code != _NO_PLACE:
+                    raise self._unwanted(error) from error
                 self._waiting()
                 if _now() + _RETRY_SECONDS >= deadline:
                     raise LostError(f"{self._address.text}: {_why(error)}; tried for {seconds:g} s") from error
@@ -128,6 +130,9 @@ def _why(error: Exception) -> str:
         return "refused, nobody listens there"
     if isinstance(error, TimeoutError):
         return "timed out, the handshake was not answered"
+    if isinstance(error, InvalidStatus):
+        said = (error.response.body or b"").decode(errors="replace").strip()[:_SHOWN]
+        return f"the server has no place, HTTP {error.response.status_code}" + (f" ({said})" if said else "")
     if isinstance(error, InvalidHandshake):
         return f"what listens there is no websocket server ({error})"
     return f"cannot connect ({error})"

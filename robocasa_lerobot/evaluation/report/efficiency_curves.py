@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from robocasa_lerobot.benchmark import published
+from robocasa_lerobot.evaluation.records.results import UNPERTURBED
 from robocasa_lerobot.evaluation.report.policies import GROUP_LABELS, PolicyResult, ReportData
 from robocasa_lerobot.evaluation.report.published_cells import AVERAGE, tasks_of
 from robocasa_lerobot.evaluation.statistics.averages import Counts
@@ -70,7 +71,7 @@ def all_curves(data: ReportData) -> list[Curve]:
     """Every curve, without and with pretraining, the one that stands in the published table and the longest first."""
     found: dict[Hashable, Curve] = {}
     for policy in data.policies:
-        if policy.info.demo_fraction is None:
+        if policy.info.demo_fraction is None or policy.condition != UNPERTURBED:
             continue
         place = next((one for one in policy.places if one.table == "foundation"), None)
         pretrained = _is_pretrained(policy)

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from robocasa_lerobot import contract
 from robocasa_lerobot.errors import UserError
+from robocasa_lerobot.evaluation.config.evaluation import KITCHEN_ENV_FACTORY
 from robocasa_lerobot.evaluation.records.results import (
     TRIALS_FILE,
     UNPERTURBED,
@@ -18,7 +19,14 @@ from robocasa_lerobot.evaluation.records.results import (
     read_results,
 )
 from robocasa_lerobot.evaluation.report.joining import join
-from robocasa_lerobot.evaluation.report.policies import REFERENCES, PolicyResult, ReportData, TaskResult, TermCount
+from robocasa_lerobot.evaluation.report.policies import (
+    PolicyResult,
+    ReportData,
+    TaskResult,
+    TermCount,
+    is_reference,
+    label_under,
+)
 from robocasa_lerobot.evaluation.statistics import success_rate
 from robocasa_lerobot.evaluation.statistics.horizon import time_to_success
 
@@ -34,12 +42,14 @@ def gather(results: Sequence[Path], title: str | None = None) -> ReportData:
         UserError: a folder without results, an empty results file, or a file that cannot be read.
     """
     once = {run.resolve(): run for folder in results for run in runs_in(folder)}  # one that is named twice is one
-    policies = tuple(policy for folder in once.values() for policy in _read_policies(folder))
+    runs = {folder: read_results(folder) for folder in once.values()}
+    policies = tuple(policy for folder, run in runs.items() for policy in _policies(folder, run))
     if not policies:
         raise UserError(f"no trials in {', '.join(map(str, results))}: run `robocasa-lerobot eval` first.")
     policies = _with_distinct_labels(join(_with_distinct_labels(policies)))
     names = tuple(dict.fromkeys(result.task for policy in policies for result in policy.tasks))
-    return ReportData(title or _title(policies, names), policies, names)
+    not_begun = tuple(label for run in runs.values() for label in _not_begun(run))
+    return ReportData(title or _title(policies, names), policies, names, not_begun)
 
 
 def runs_in(folder: Path) -> list[Path]:
@@ -50,10 +60,14 @@ def runs_in(folder: Path) -> list[Path]:
     return [path.parent for path in found] or [folder]
 
 
-def summarize(task: str, trials: Sequence[TrialRecord]) -> TaskResult:
-    """The result of one policy on one task; a trial that ended in an error counts as a failure."""
+def summarize(task: str, trials: Sequence[TrialRecord], fps: float | None = contract.CONTROL_HZ) -> TaskResult:
+    """The result of one policy on one task; a trial that ended in an error counts as a failure.
+
+    `fps` is control steps a second where a record does not say, None where nobody does.
+    """
     ordered = tuple(sorted(trials, key=lambda record: record.trial))
-    times = time_to_success([r.first_success_step for r in ordered])
+    seconds = _seconds(ordered, fps)
+    times = None if seconds is None else time_to_success(seconds)
     failed = [r for r in ordered if not r.success and r.error is None]
     names = dict.fromkeys(name for record in failed for name in record.terms)
     terms = []
@@ -66,14 +80,28 @@ def summarize(task: str, trials: Sequence[TrialRecord]) -> TaskResult:
         trials=ordered,
         rate=success_rate(sum(r.success for r in ordered), len(ordered)),
         errors=sum(r.error is not None for r in ordered),
-        median_seconds=None if times is None else times.median / contract.CONTROL_HZ,
+        seconds=seconds,
+        median_seconds=None if times is None else times.median,
         failed=len(failed),
         terms=tuple(sorted(terms, key=lambda term: (-term.never, -term.lost))),
     )
 
 
-def _read_policies(folder: Path) -> list[PolicyResult]:
-    results = read_results(folder)
+def _seconds(trials: Sequence[TrialRecord], fps: float | None) -> tuple[float | None, ...] | None:
+    """Simulated time to success of each trial; None where a solved one does not tell it."""
+    out: list[float | None] = []
+    for record in trials:
+        rate = record.fps or fps
+        if record.first_success_step is None:
+            out.append(None)
+        elif rate is None:
+            return None
+        else:
+            out.append(record.first_success_step / rate)
+    return tuple(out)
+
+
+def _policies(folder: Path, results: Results) -> list[PolicyResult]:
     by_label: dict[str, dict[str, dict[str, list[TrialRecord]]]] = {}
     for record in results.trials:
         conditions = by_label.setdefault(record.label, {})
@@ -81,9 +109,39 @@ def _read_policies(folder: Path) -> list[PolicyResult]:
     out = []
     for label, conditions in by_label.items():
         names = sorted(conditions, key=lambda name: name != UNPERTURBED)
-        tasks = {name: tuple(summarize(*item) for item in conditions[name].items()) for name in names}
-        out.append(PolicyResult(label, folder, _info(results, tasks), _headers(results, tasks), tasks))
+        fps = _own_fps(next(iter(results.headers.values())))
+        tasks = {name: tuple(summarize(*item, fps) for item in conditions[name].items()) for name in names}
+        info, headers, planned = _info(results, tasks), _headers(results, tasks), _planned(results, label)
+        out.append(PolicyResult(label_under(label, names[0]), folder, info, headers, tasks, planned=planned))
     return sorted(out, key=_training_order)
+
+
+def _own_fps(header: RunHeader) -> float | None:
+    """Control steps a second in our kitchens; None in another env, whose records say it, if it does."""
+    kitchens = header.settings.get("factory", KITCHEN_ENV_FACTORY) == KITCHEN_ENV_FACTORY
+    return contract.CONTROL_HZ if kitchens else None
+
+
+def _planned(results: Results, label: str) -> dict[tuple[str, str], int]:
+    """Trials that a file's runs planned for a policy, by perturbation and task; of each the last run counts."""
+    tried = {record.task for record in results.trials if record.label == label}
+    out: dict[tuple[str, str], int] = {}
+    for header in results.headers.values():
+        if label in header.policies:
+            phase = header.policies[label].lifelong_phase or 0
+            first = {task for tasks in list(header.task_sets.values())[:phase] for task in tasks}
+            # No header says whether the phase left the policy the tasks of its phases, or was a label alone: other
+            # tasks, which are the longest and so run first, tell.
+            tasks = [task for task in header.tasks if task in first] if tried <= first else header.tasks
+            out |= {(name, task): header.trials for name in header.perturbations for task in tasks}
+    return out
+
+
+def _not_begun(results: Results) -> list[str]:
+    """Labels of policies that a file's runs planned, and of which it has no trial."""
+    planned = dict.fromkeys(label for header in results.headers.values() for label in header.policies)
+    begun = {record.label for record in results.trials}
+    return [label for label in planned if label not in begun]
 
 
 def _headers(results: Results, conditions: Mapping[str, Sequence[TaskResult]]) -> tuple[RunHeader, ...]:
@@ -97,7 +155,7 @@ def _info(results: Results, conditions: Mapping[str, Sequence[TaskResult]]) -> P
 
 def _training_order(policy: PolicyResult) -> tuple[bool, int]:
     # Reference policies first, then the untrained one; sorting is stable, so the rest keeps its order.
-    return (policy.info.path not in REFERENCES, -1 if policy.info.step == 0 else 0)
+    return (not is_reference(policy), -1 if policy.info.step == 0 else 0)
 
 
 def _with_distinct_labels(policies: tuple[PolicyResult, ...]) -> tuple[PolicyResult, ...]:

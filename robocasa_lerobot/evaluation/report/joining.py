@@ -13,7 +13,7 @@ from collections.abc import Hashable, Sequence
 from pathlib import Path
 
 from robocasa_lerobot.evaluation.report.places import tables
-from robocasa_lerobot.evaluation.report.policies import PolicyResult, TaskResult
+from robocasa_lerobot.evaluation.report.policies import PolicyResult, TaskResult, label_under
 
 _RULES = (
     "protocol",
@@ -87,7 +87,13 @@ def _joined(group: Sequence[PolicyResult]) -> PolicyResult:
     info = dataclasses.replace(group[0].info, label=_label(group), phase=None, step=None, fingerprint="")
     headers = tuple({header.id: header for policy in group for header in policy.headers}.values())
     return dataclasses.replace(
-        group[0], label=info.label, info=info, headers=headers, conditions=conditions, parts=tuple(group)
+        group[0],
+        label=label_under(info.label, group[0].condition),
+        info=info,
+        headers=headers,
+        conditions=conditions,
+        parts=tuple(group),
+        planned={trials: count for policy in group for trials, count in policy.planned.items()},
     )
 
 

@@ -1,4 +1,4 @@
-"""What the runs of a report lack: tasks that were not run, and phases and evaluations that a training left out."""
+"""What the runs of a report lack: tasks and trials that were not run, and what a training left out."""
 
 from __future__ import annotations
 
@@ -17,19 +17,37 @@ _SHOWN = 3
 
 
 def is_partial(policy: PolicyResult) -> bool:
-    """Whether any of a policy's runs lacks tasks that its protocol names."""
-    return any(header.missing_tasks or header.missing_by_set for header in policy.headers)
+    """Whether any of a policy's runs lacks tasks that its protocol names, or trials that it planned."""
+    lacks_tasks = any(header.missing_tasks or header.missing_by_set for header in policy.headers)
+    return lacks_tasks or any(_unfinished(part) is not None for part in policy.parts or (policy,))
 
 
 def partial_runs(data: ReportData) -> str | None:
-    """Which policies were not run on all tasks of their protocols, and what they lack."""
+    """Which policies were not run on all tasks of their protocols or in all planned trials, and what they lack."""
     labels: dict[str, list[str]] = {}
     for policy in data.single:
-        for header in policy.headers:
-            said = partial_sentence(header.task_sets, header.missing_tasks, header.missing_by_set)
-            if said is not None and policy.label not in labels.setdefault(said, []):
-                labels[said].append(policy.label)
-    return " ".join(f"{_some(names)}: {said}" for said, names in labels.items()) or None
+        said = [partial_sentence(h.task_sets, h.missing_tasks, h.missing_by_set) for h in policy.headers]
+        for sentence in dict.fromkeys((*said, _unfinished(policy))):
+            if sentence is not None:
+                labels.setdefault(sentence, []).append(policy.label)
+    if data.not_begun:
+        labels["planned, and none of its trials is recorded."] = list(data.not_begun)
+    return " ".join(f"{_some(names)}: {sentence}" for sentence, names in labels.items()) or None
+
+
+def _unfinished(policy: PolicyResult) -> str | None:
+    """How many of the planned trials of a run that was killed, or still goes on, are recorded; None where all are."""
+    recorded = {(name, r.task): r.trials for name, results in policy.conditions.items() for r in results}
+    done = {key: sum(r.trial < count for r in recorded.get(key, ())) for key, count in policy.planned.items()}
+    planned, tasks = sum(policy.planned.values()), {task for _, task in policy.planned}
+    if sum(done.values()) == planned:
+        return None
+    none = len(tasks - {task for (_, task), count in done.items() if count})
+    without = f", and {none} of {fmt.count(len(tasks), 'task')} {'has' if none == 1 else 'have'} none" if none else ""
+    return (
+        f"unfinished: {sum(done.values()):,} of {fmt.count(planned, 'planned trial')} are recorded{without}; the "
+        "command that made it goes on where it stopped."
+    )
 
 
 def sentence(data: ReportData) -> str | None:

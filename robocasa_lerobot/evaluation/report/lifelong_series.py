@@ -5,10 +5,18 @@ from __future__ import annotations
 import re
 from collections.abc import Hashable
 from dataclasses import dataclass
+from functools import cached_property
 
 from robocasa_lerobot.evaluation.report import numbers as fmt
 from robocasa_lerobot.evaluation.report.joining import training_folder
-from robocasa_lerobot.evaluation.report.policies import GROUP_LABELS, LIFELONG_SETS, PolicyResult, ReportData
+from robocasa_lerobot.evaluation.report.policies import (
+    GROUP_LABELS,
+    LIFELONG_SETS,
+    PolicyResult,
+    ReportData,
+    TaskResult,
+    label_under,
+)
 from robocasa_lerobot.evaluation.report.published_cells import tasks_of
 from robocasa_lerobot.evaluation.statistics.lifelong import Lifelong, lifelong
 
@@ -34,9 +42,44 @@ class LifelongSeries:
         return f"Phase {phase} ({fmt.count(number, 'other task')})"
 
     def tasks(self, phase: int) -> frozenset[str]:
-        """The tasks of a phase that were run."""
-        name = self.sets[phase]
-        return frozenset(result.task for policy in self.policies.values() for result in policy.group(name))
+        """The tasks of a phase that its cells are over."""
+        rows = [row[phase] for row in self.cells.values() if phase in row]
+        return frozenset(result.task for result in rows[0]) if rows else frozenset()
+
+    @cached_property
+    def cells(self) -> dict[int, dict[int, tuple[TaskResult, ...]]]:
+        """Phase trained -> phase evaluated -> results, those of a column all on the same tasks.
+
+        A policy that lacks planned tasks of a phase, or some that the policies with the most of them have, has no cell
+        there: trials begin with the longest tasks, so that of a run that was killed the others would be missing.
+        """
+        out: dict[int, dict[int, tuple[TaskResult, ...]]] = {k: {} for k in self.policies}
+        for j, name in self.sets.items():
+            ran = {k: policy.group(name) for k, policy in self.policies.items()}
+            names = {
+                k: frozenset(result.task for result in results)
+                for k, results in ran.items()
+                if results and not _lacking(self.policies[k], name)
+            }
+            most = max(map(len, names.values()), default=0)
+            widest = [own for own in names.values() if len(own) == most]
+            common = frozenset.intersection(*widest) if widest else frozenset()
+            for k, own in names.items():
+                if common and common <= own:
+                    out[k][j] = tuple(result for result in ran[k] if result.task in common)
+        return out
+
+    @property
+    def left_out(self) -> list[str]:
+        """The cells that are not there because their policies lack tasks, in words."""
+        out = []
+        for k, policy in self.policies.items():
+            for j, name in self.sets.items():
+                ran, lacking = len(policy.group(name)), len(_lacking(policy, name))
+                if j not in self.cells[k] and (ran or lacking):
+                    of = max(ran + lacking, len(self.tasks(j)))
+                    out.append(f"phase {k} on the tasks of phase {j} ({ran} of {of} were run)")
+        return out
 
     @property
     def other_tasks(self) -> bool:
@@ -45,14 +88,7 @@ class LifelongSeries:
 
     def matrix(self) -> Lifelong | None:
         """The matrix and its summaries; None where fewer than two phases were evaluated."""
-        counts = {
-            phase: {
-                j: [result.counts for result in policy.group(name)]
-                for j, name in self.sets.items()
-                if policy.group(name)
-            }
-            for phase, policy in self.policies.items()
-        }
+        counts = {k: {j: [r.counts for r in cell] for j, cell in row.items()} for k, row in self.cells.items()}
         start = counts.pop(0, {})
         counts = {phase: row for phase, row in counts.items() if row}
         return lifelong(counts, start) if len(counts) > 1 else None
@@ -65,7 +101,7 @@ def all_series(data: ReportData) -> list[LifelongSeries]:
         phase, number = policy.info.lifelong_phase, 0
         if phase is None:
             continue
-        key = (policy.info.experiment, training_folder(policy.info.path))
+        key = (policy.info.experiment, training_folder(policy.info.path), policy.condition)
         while phase in found.get((*key, number), {}):
             number += 1
         found.setdefault((*key, number), {})[phase] = policy
@@ -80,7 +116,13 @@ def all_series(data: ReportData) -> list[LifelongSeries]:
 
 def _label(policies: dict[int, PolicyResult]) -> str:
     last = policies[max(policies)]
-    return last.info.experiment or "lifelong"
+    return label_under(last.info.experiment or "lifelong", last.condition)
+
+
+def _lacking(policy: PolicyResult, name: str) -> set[str]:
+    """The tasks of a set that a policy's runs planned, and of which it has no trial."""
+    members = {task for header in policy.headers for task in header.task_sets.get(name, ())}
+    return {task for _, task in policy.planned if task in members} - {result.task for result in policy.tasks}
 
 
 def _sets(policies: list[PolicyResult]) -> dict[int, str]:

@@ -18,7 +18,9 @@ def print_rates(results: Sequence[Path]) -> None:
     rows = [("policy", "task", "success", "95 % interval", "trials", "errors")]
     for policy in gather(results).single:
         for condition, tasks in policy.conditions.items():
-            label = policy.label if condition == UNPERTURBED else f"{policy.label} ({condition})"
+            # The label of a policy without unperturbed trials names the perturbation itself.
+            plain = condition in (UNPERTURBED, policy.condition)
+            label = policy.label if plain else f"{policy.label} ({condition})"
             for result in tasks:
                 rate = result.rate
                 counts = (f"{rate.successes}/{rate.trials}", str(result.errors))

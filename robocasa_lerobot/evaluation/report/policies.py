@@ -3,20 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 
 import numpy as np
 
 from robocasa_lerobot.benchmark import published
-from robocasa_lerobot.evaluation.records.results import PolicyInfo, RunHeader, TrialRecord
+from robocasa_lerobot.evaluation.records.results import UNPERTURBED, PolicyInfo, RunHeader, TrialRecord
 from robocasa_lerobot.evaluation.report.places import PERTURBATIONS, Place, places, tables
 from robocasa_lerobot.evaluation.statistics import Estimate, Rate, average_over_tasks
 from robocasa_lerobot.evaluation.statistics.paired import Outcomes
 from robocasa_lerobot.evaluation.statistics.progress import mean_progress
 
-REFERENCES = {
+REFERENCES = {  # by type: the path of one that is replayed names its file too
     "random": "reference: actions drawn uniformly from [-1, 1] at each step",
     "zero": "reference: every action component zero",
     "demonstrator": "reference: the scripted demonstrator, which sees the simulator's state",
@@ -47,12 +47,17 @@ class TermCount:
 
 @dataclass(frozen=True)
 class TaskResult:
-    """The trials of one policy on one task under one perturbation; `median_seconds` is simulated time to success."""
+    """The trials of one policy on one task under one perturbation.
+
+    `seconds` is the simulated time to success of each trial, None of one without; as a whole None, like their median,
+    where the env does not say how long a step is.
+    """
 
     task: str
     trials: tuple[TrialRecord, ...]
     rate: Rate
     errors: int
+    seconds: tuple[float | None, ...] | None
     median_seconds: float | None
     failed: int
     terms: tuple[TermCount, ...]
@@ -81,7 +86,8 @@ class PolicyResult:
     """All trials of one policy in one run; `folder` is where they and their videos lie.
 
     `conditions` has the tasks under each perturbation, the unperturbed ones (where there are any) first. One that was
-    joined of several policies (`joining`) has these in `parts`; `folder` is then that of the first.
+    joined of several policies (`joining`) has these in `parts`; `folder` is then that of the first. `planned` has the
+    trials that its runs planned, by perturbation and task; of a run that was killed not all of them are there.
     """
 
     label: str
@@ -90,14 +96,18 @@ class PolicyResult:
     headers: tuple[RunHeader, ...]
     conditions: dict[str, tuple[TaskResult, ...]]
     parts: tuple[PolicyResult, ...] = ()
+    planned: Mapping[tuple[str, str], int] = field(default_factory=dict)
 
     @cached_property
     def places(self) -> tuple[Place, ...]:
-        """Where the policy stands in the published tables."""
+        """Where the policy stands in the published tables, which are of unperturbed trials but for one."""
         one = self.parts[0] if self.parts else self
-        perturbed = len(one.conditions) > 1
-        found = places(one.info, one.header)
-        return tuple(p for p in found if perturbed or tables()[p.table].get("columns_are") != PERTURBATIONS)
+
+        def stands(place: Place) -> bool:
+            of_perturbations = tables()[place.table].get("columns_are") == PERTURBATIONS
+            return len(one.conditions) > 1 if of_perturbations else UNPERTURBED in one.conditions
+
+        return tuple(filter(stands, places(one.info, one.header)))
 
     @property
     def header(self) -> RunHeader:
@@ -148,11 +158,15 @@ class PolicyResult:
 
 @dataclass(frozen=True)
 class ReportData:
-    """The policies that a report compares, in its order, and the names of their tasks; joined ones count once."""
+    """The policies that a report compares, in its order, and the names of their tasks; joined ones count once.
+
+    `not_begun` are labels of policies that the runs planned, and of which no trial is recorded.
+    """
 
     title: str
     policies: tuple[PolicyResult, ...]
     task_names: tuple[str, ...]
+    not_begun: tuple[str, ...] = ()
 
     @property
     def single(self) -> tuple[PolicyResult, ...]:
@@ -181,12 +195,20 @@ def average_of(tasks: Iterable[TaskResult]) -> Estimate:
 def same_trials(
     a: PolicyResult, b: PolicyResult, condition_a: str | None = None, condition_b: str | None = None
 ) -> Mapping[str, tuple[Outcomes, Outcomes]]:
-    """Task -> successes of A and of B on the trials that both ran: same seed, kitchens, horizon and rules."""
+    """Task -> successes of A and of B on the trials that both ran: same seed, kitchens, horizon and rules.
+
+    Under the same perturbation too, each policy's own, unless both are named.
+    """
     if any(getattr(a.header, rule) != getattr(b.header, rule) for rule in _SAME_RULES):
         return {}
+    one, two = condition_a or a.condition, condition_b or b.condition
+    if one != two and (condition_a is None or condition_b is None):
+        return {}
+    if one == two and a.header.perturbations.get(one) != b.header.perturbations.get(two):
+        return {}
     out = {}
-    for result in a.conditions.get(condition_a or a.condition, ()):
-        other = b.task(result.task, condition_b)
+    for result in a.conditions.get(one, ()):
+        other = b.task(result.task, two)
         if other is None:
             continue
         theirs = {_start(record): record.success for record in other.trials}
@@ -201,11 +223,21 @@ def _start(record: TrialRecord) -> tuple[object, ...]:
     return (record.task, record.trial, record.seed, record.split, record.horizon)
 
 
+def is_reference(policy: PolicyResult) -> bool:
+    """Whether a policy was not learned, but is one of those that others are measured by."""
+    return policy.info.type in REFERENCES
+
+
+def label_under(label: str, condition: str) -> str:
+    """A policy's label, with the perturbation of its trials where there is one: it stands wherever they are shown."""
+    return label if condition == UNPERTURBED else f"{label} (perturbed: {condition})"
+
+
 def describe_policy(policy: PolicyResult) -> str:
     """What a policy is, in a phrase."""
     info = policy.info
-    if info.path in REFERENCES:
-        return REFERENCES[info.path]
+    if is_reference(policy):
+        return REFERENCES[info.type]
     facts = [info.type]
     if info.remote is not None:
         facts = [f"behind a socket ({info.remote['address']}, key map {info.remote['keys']}), weights unknown"]

@@ -64,13 +64,13 @@ def _cells(policy: PolicyResult, place: Place) -> list[OurCell]:
     for column in [place.column] if place.column is not None else [one.key for one in table.columns]:
         for row in [place.row] if place.row is not None else [one.key for one in table.rows]:
             wanted = spec.get("tasks") or (row if place.row is None else column)
-            condition = column if perturbed else None
+            condition = column if perturbed else UNPERTURBED
             if perturbed and column not in policy.conditions:
                 continue
             whole = tasks_of(wanted)
             tasks = policy.group(wanted, condition)
             if "tasks" in spec:  # no set that an evaluation names
-                tasks = tuple(result for result in policy.tasks if result.task in whole)
+                tasks = tuple(r for r in policy.conditions.get(condition, ()) if r.task in whole)
             # A registry may give a set of its own the benchmark's name: other tasks are no part of the published ones.
             if tasks and {result.task for result in tasks} <= whole:
                 value = table.value(row, column)

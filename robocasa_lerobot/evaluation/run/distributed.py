@@ -27,7 +27,7 @@ def finish(config: EvaluationConfig) -> None:
     from robocasa_lerobot.evaluation.run.merging import merge
     from robocasa_lerobot.evaluation.run.outputs import write_outputs
 
-    evaluation = prepare(config, ask=False)
+    evaluation = prepare(config, ask=False, here=False)
     merge(evaluation)
     write_outputs(evaluation)
 
@@ -44,15 +44,17 @@ def run_distributed(config: EvaluationConfig, shards: int, execution: Execution)
         raise UserError(f"--shards: found {shards}, expected at least 1.")
     if config.shard is not None:
         raise UserError("--executor runs all shards: leave --shard out.")
-    evaluation = prepare(config)  # mistakes come up here, not in the first job
+    evaluation = prepare(config, here=False)  # mistakes come up here, not in the first job
     out = evaluation.out
-    step = partial(run_shard, config=config)
-    folder = out / _FOLDER / f"{evaluation.header.id}-{shards}"  # markers hold for these settings and shards only
+    # A node shows cores that are not the shard's.
+    config = dataclasses.replace(config, workers=config.workers or execution.cpus)
+    step, last_step = partial(run_shard, config=config), partial(finish, config)
+    folder = out / _FOLDER / f"{evaluation.header.id}-{shards}"
     folder.mkdir(parents=True, exist_ok=True)
+    # Every shard runs: its records say what is left, which retry_errors and videos decide as well.
     if execution.kind == "ray":
-        run_with_ray(step, shards, folder, execution.ray)
-        finish(config)
+        run_with_ray(step, shards, folder, execution.ray, skip_complete=False)
+        last_step()
         return None
-    array, last = submit_to_slurm(step, partial(finish, config), shards, folder, out / _LOGS, execution.slurm)
-    first = f"shards in job {array}, " if array else "all shards are complete; "
-    return f"submitted to Slurm: {first}joined by job {last}. What they print is in {out / _LOGS}."
+    array, last = submit_to_slurm(step, last_step, shards, folder, out / _LOGS, execution.slurm, skip_complete=False)
+    return f"submitted to Slurm: shards in job {array}, joined by job {last}. What they print is in {out / _LOGS}."

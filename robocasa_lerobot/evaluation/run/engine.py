@@ -16,7 +16,7 @@ from robocasa_lerobot.errors import UserError
 from robocasa_lerobot.evaluation.actors.checkpoint import REPLAY, PolicySource
 from robocasa_lerobot.evaluation.config.evaluation import EvaluationConfig, check_factory, output_folder
 from robocasa_lerobot.evaluation.planning import run_header as resolve
-from robocasa_lerobot.evaluation.planning.sources import open_sources
+from robocasa_lerobot.evaluation.planning.sources import open_sources, recorded_device
 from robocasa_lerobot.evaluation.planning.trials import Shard, TrialSpec, make_plan, running_order, to_film
 from robocasa_lerobot.evaluation.records.results import (
     TRIALS_FILE,
@@ -38,6 +38,7 @@ from robocasa_lerobot.evaluation.simulators.foreign_env import FACTORY
 from robocasa_lerobot.evaluation.simulators.planning import plan_simulator
 from robocasa_lerobot.evaluation.simulators.simulator import env_arguments, simulator_of
 from robocasa_lerobot.files import write_text
+from robocasa_lerobot.gl import check_device
 from robocasa_lerobot.jobs.locks import LockHeldError, locked
 from robocasa_lerobot.progress import Bar
 from robocasa_lerobot.provenance import utc_now
@@ -61,15 +62,19 @@ class Evaluation:
     out: Path
 
 
-def prepare(config: EvaluationConfig, ask: bool = True) -> Evaluation:
+def prepare(config: EvaluationConfig, ask: bool = True, here: bool = True) -> Evaluation:
     """Check everything that the user named, and fix the plan.
 
     Policies behind a socket are asked once; without `ask`, what the results in the output folder say of them counts.
+    Without `here` the trials run or ran on other machines: this one need not have their devices, and where the
+    settings leave the choice of one, that of the results in the output folder counts.
 
     Raises:
         UserError: an unknown task, a folder that is no checkpoint, a server that does not answer as it should, two
-            policies with one label, ...
+            policies with one label, a device that this machine does not have, ...
     """
+    for number in config.env.render_devices if here else ():
+        check_device(number)
     check_factory(config.env.factory)
     tasks = resolve.plan_tasks(config.env, config.first_sets)
     simulator = simulator_of(config.env.python, config.env.type, config.env.factory, config.env.options)
@@ -84,8 +89,8 @@ def prepare(config: EvaluationConfig, ask: bool = True) -> Evaluation:
             )
         by_label[source.label] = source
     _check_folders(by_label)
-    needs_torch = any(source.is_checkpoint for source in sources)
-    device = resolve.resolve_device(config.policy.device, needs_torch)
+    out = output_folder(config, list(by_label))
+    device = _device(config.policy.device, any(source.is_checkpoint for source in sources), out, here)
     kinds = [source.type for source in sources if source.is_checkpoint]
     settings = resolve.outcome_settings(config, image_size, device, kinds)
     seeds = _stored_seeds(sources, config, settings, list(tasks.horizons))
@@ -97,11 +102,17 @@ def prepare(config: EvaluationConfig, ask: bool = True) -> Evaluation:
         own_tasks, tasks.horizons, config.trials, config.seed, config.videos, config.perturbation.names, seeds
     )
     header = resolve.run_header(config, _describe(sources, config), tasks, settings)
-    out = output_folder(config, list(by_label))
     if config.shard is None:
         return Evaluation(config, by_label, header, plan, plan, out)
     shard = Shard.parse(config.shard)
     return Evaluation(config, by_label, header, plan, shard.of(plan), shard_folder(out, shard))
+
+
+def _device(asked: str, needs_torch: bool, out: Path, here: bool) -> str:
+    """What the policies compute on: a device of this machine, or of those where the trials run."""
+    if here or not needs_torch:
+        return resolve.resolve_device(asked, needs_torch)
+    return asked if asked != "auto" else recorded_device(out) or asked
 
 
 def _check_folders(labels: Iterable[str]) -> None:
@@ -256,7 +267,7 @@ def _run(
         open_servers(settings, config) as servers,
         Bar(total=total, initial=total - len(todo), unit="trial", desc="trials", dynamic_ncols=True) as bar,
     ):
-        pool = WorkerPool(settings, config.worker_count(max(1, len(todo))), config.stall_seconds, servers)
+        pool = WorkerPool(settings, config.worker_count(total), config.stall_seconds, servers)
 
         def more() -> list[TrialSpec]:
             specs = showcase(evaluation.todo_plan, records, never)
@@ -328,6 +339,7 @@ def _record(completed: Completed, header: RunHeader) -> TrialRecord:
         video=result.video,
         seconds=Seconds(**{name: round(value, 4) for name, value in dataclasses.asdict(seconds).items()}),
         finished=utc_now(),
+        fps=outcome.fps,
     )
 
 

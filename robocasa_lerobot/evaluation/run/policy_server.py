@@ -108,6 +108,9 @@ class _Server:
         except Exception:
             if len(requests) > 1:  # only the one that is at fault is to fail
                 return [self._predict(label, [request])[0] for request in requests]
+            if _is_broken(self._settings.device):
+                traceback.print_exc()
+                os._exit(1)  # no later request would fare better; the engine starts another process
             return [Failed(traceback.format_exc())]
 
     def _policy_of(self, label: str) -> ChunkPolicy:
@@ -139,6 +142,19 @@ class _Server:
         if time.monotonic() - self._last_sign > _POLL_SECONDS:
             self._last_sign = time.monotonic()
             self._parent.send(Alive())
+
+
+def _is_broken(device: str) -> bool:
+    """Whether a GPU has failed in a way that this process keeps, as after an illegal memory access."""
+    if not device.startswith("cuda"):
+        return False
+    import torch
+
+    try:
+        torch.cuda.synchronize(device)
+    except RuntimeError:
+        return True
+    return False
 
 
 class PolicyConnection:

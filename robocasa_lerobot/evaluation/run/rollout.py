@@ -55,8 +55,9 @@ class DivergedError(RolloutError):
 
 @dataclass
 class Outcome:
-    """What a trial gave; `steps` are control steps at 20 Hz, the first step is number 1.
+    """What a trial gave; `steps` are control steps, the first step is number 1.
 
+    `fps` is how many of them are a second, where the env has an attribute that says it: our kitchens' are 20.
     `stages` is how far it came in the task's stages, None for an env that has none.
     `trajectory` is a SHA-256 over all actions and proprioception: two trials with the same one took the same course.
     """
@@ -70,6 +71,7 @@ class Outcome:
     layout_id: int | None = None
     style_id: int | None = None
     trajectory: str | None = None
+    fps: float | None = None
     warnings: dict[str, int] = field(default_factory=dict)
     seconds: Seconds = field(default=Seconds(0.0), compare=False)
 
@@ -103,6 +105,7 @@ def run_trial(
         instruction=str(info.get("instruction") or getattr(base, "task_description", "")),
         layout_id=scene.get("layout_id"),
         style_id=scene.get("style_id"),
+        fps=None if (fps := getattr(base, "fps", None)) is None else float(fps),
     )
     limit = horizon_of(env, spec)
     decided = rule or SuccessRule()

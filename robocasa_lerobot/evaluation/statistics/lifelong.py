@@ -14,7 +14,8 @@ class Lifelong:
     """The matrix R[k][j], success on the tasks of phase j after training phase k (both from 1), and its summaries.
 
     average: after phase k, the mean of R[k][j] over j <= k (average accuracy of D. Lopez-Paz and M. Ranzato, "Gradient
-        episodic memory for continual learning", NeurIPS 2017).
+        episodic memory for continual learning", NeurIPS 2017). Like forgetting and backward transfer there only where
+        row k has all of these phases that any row has: the mean of some is another number.
     forgetting: after phase k, the mean over j < k of (the best of R[l][j] over j <= l < k) - R[k][j]; positive is loss
         (A. Chaudhry et al., "Riemannian walk for incremental learning", ECCV 2018). The interval takes the best earlier
         phase as given.
@@ -51,15 +52,18 @@ def lifelong(counts: Mapping[int, Mapping[int, Counts]], untrained: Mapping[int,
     if not matrix:
         raise UserError("a lifelong evaluation without trials: expected the results of at least one phase.")
     average, forgetting = {}, {}
+    columns = {j for row in matrix.values() for j in row}
     for k, row in matrix.items():
         seen = [row[j] for j in row if j <= k]
-        if seen:
+        if seen and all(j in row for j in columns if j <= k):
             average[k] = _mean(seen)
         lost = _losses(matrix, k)
-        if lost:
+        if lost and all(j in row for j in columns if j < k):
             forgetting[k] = _mean_of_differences(lost)
     last = max(matrix)
     backward = [(matrix[last][j], matrix[j][j]) for j in matrix[last] if j < last and j in matrix.get(j, {})]
+    if any(j not in matrix[last] for j in columns if j < last):
+        backward = []
     start = {j: average_over_tasks(tasks) for j, tasks in (untrained or {}).items() if any(n for _, n in tasks)}
     forward = [(matrix[j - 1][j], start[j]) for j in start if j > 1 and j in matrix.get(j - 1, {})]
     return Lifelong(

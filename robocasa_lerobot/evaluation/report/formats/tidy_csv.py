@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from robocasa_lerobot.benchmark import published
+from robocasa_lerobot.evaluation.records.results import UNPERTURBED
 from robocasa_lerobot.evaluation.report.formats.csv_text import csv_text
 from robocasa_lerobot.evaluation.report.policies import PolicyResult, ReportData, average_of
 from robocasa_lerobot.evaluation.statistics import Estimate
@@ -47,7 +48,8 @@ def _rows(data: ReportData) -> Iterator[dict[str, object]]:
                 "synthetic": int(bool(policy.header.settings.get("synthetic"))),
             }
             for result in tasks:
-                rate, progress, known = result.rate, result.progress, published.per_task_rates().get(result.task)
+                rate, progress = result.rate, result.progress
+                known = published.per_task_rates().get(result.task) if condition == UNPERTURBED else None
                 yield {
                     **common,
                     "task": result.task,

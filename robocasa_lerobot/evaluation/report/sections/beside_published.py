@@ -7,6 +7,7 @@ from typing import Any
 
 from robocasa_lerobot.benchmark import published
 from robocasa_lerobot.benchmark.published import Entry, PublishedTable
+from robocasa_lerobot.evaluation.records.results import UNPERTURBED
 from robocasa_lerobot.evaluation.report import numbers as fmt
 from robocasa_lerobot.evaluation.report.joining import same_training
 from robocasa_lerobot.evaluation.report.model import Cell, Column, Section, Table
@@ -149,7 +150,7 @@ def _table(data: ReportData, policies: list[PolicyResult], table: PublishedTable
     for policy in policies:
         cells = [Cell(policy.label, series=data.series(policy))]
         for row in table.rows:
-            tasks = policy.group(row.key)
+            tasks = policy.group(row.key, UNPERTURBED)
             cells.append(
                 our_cell(OurCell(table.name, row.key, "", None, policy, tasks, group_size(row.key)))
                 if tasks
@@ -179,7 +180,7 @@ def _published_row(table: PublishedTable, column: Entry) -> tuple[Cell, ...]:
 
 
 def _covers_a_group(policy: PolicyResult) -> bool:
-    return any(len(policy.group(group)) == size for group, size in published.GROUPS.items())
+    return any(len(policy.group(group, UNPERTURBED)) == size for group, size in published.GROUPS.items())
 
 
 def group_size(key: str) -> int:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from robocasa_lerobot.evaluation.report import numbers as fmt
 from robocasa_lerobot.evaluation.report.model import Cell, Column, Section, Table
-from robocasa_lerobot.evaluation.report.policies import REFERENCES, PolicyResult, ReportData, same_trials
+from robocasa_lerobot.evaluation.report.policies import PolicyResult, ReportData, is_reference, same_trials
 from robocasa_lerobot.evaluation.statistics.paired import Comparison, Paired, compare
 from robocasa_lerobot.evaluation.statistics.power import POWER, smallest_difference
 
@@ -32,7 +32,8 @@ def section(data: ReportData) -> Section | None:
         return None
     main = next((pair for pair in pairs if _is_main(data, pair)), pairs[0])
     text = (
-        "Only policies on the same trials are compared: the same kitchen, start, instruction and horizon for both. "
+        "Only policies on the same trials are compared: the same kitchen, start, instruction, horizon and perturbation "
+        "for both. "
         "Trials that both solve or both fail say nothing about which is better; the rest decide (exact McNemar test). "
         f"The last column is the true difference that so many trials would find with {100 * POWER:.0f} % probability.",
     )
@@ -63,7 +64,7 @@ def make_pair(a: PolicyResult, b: PolicyResult) -> Pair | None:
 
 def main_pair(data: ReportData) -> Pair | None:
     """The last policy against the one before it that is no reference, if there are two."""
-    learned = [policy for policy in data.policies if policy.info.path not in REFERENCES]
+    learned = [policy for policy in data.policies if not is_reference(policy)]
     policies = learned if len(learned) > 1 else list(data.policies)
     return make_pair(policies[-2], policies[-1]) if len(policies) > 1 else None
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from robocasa_lerobot.benchmark import published
+from robocasa_lerobot.evaluation.records.results import UNPERTURBED
 from robocasa_lerobot.evaluation.report import numbers as fmt
 from robocasa_lerobot.evaluation.report.efficiency_curves import (
     AVERAGE,
@@ -83,6 +84,9 @@ def _said(data: ReportData, found: list[GroupCurves]) -> list[str]:
             f"The curves are those of {fmt.listed([curve.label for curve in shown])}. Further policies with their "
             f"demonstrations per task are in the other tables: {fmt.listed(names, 12)}."
         )
+    perturbed = [p.label for p in data.policies if p.info.demo_fraction is not None and p.condition != UNPERTURBED]
+    if perturbed:
+        out.append(f"Without {fmt.listed(perturbed)}, all of whose trials are perturbed.")
     for group in found:
         if group.left_out:
             out.append(f"{group.label}: without {fmt.listed(list(group.left_out))}, which lack some of these tasks.")

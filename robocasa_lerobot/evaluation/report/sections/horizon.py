@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from robocasa_lerobot import contract
 from robocasa_lerobot.evaluation.report import numbers as fmt
 from robocasa_lerobot.evaluation.report.formats.charts import Line, line_chart
 from robocasa_lerobot.evaluation.report.model import Cell, Column, Figure, Section, Series, Table
@@ -42,9 +41,8 @@ def section(data: ReportData) -> Section | None:
                 tuple(100 * high[index]),
             )
         )
-        quartiles = time_to_success(
-            [r.first_success_step / contract.CONTROL_HZ if r.first_success_step else None for r in _records(policy)]
-        )
+        seconds = _seconds(policy)
+        quartiles = None if seconds is None else time_to_success(seconds)
         times = [fmt.NONE] * 3
         if quartiles is not None:
             times = [fmt.seconds(t) for t in (quartiles.first_quartile, quartiles.median, quartiles.third_quartile)]
@@ -77,7 +75,7 @@ def section(data: ReportData) -> Section | None:
             Column("third quartile", numeric=True),
         ),
         tuple(rows),
-        notes=("Seconds are simulated, over solved trials only.",),
+        notes=("Seconds are simulated, over solved trials only; none where the env does not say how long a step is.",),
     )
     figure = Figure(
         "horizon-figure",
@@ -95,6 +93,16 @@ def section(data: ReportData) -> Section | None:
 
 def _records(policy: PolicyResult) -> list:
     return [r for result in policy.tasks for r in result.trials if r.horizon]
+
+
+def _seconds(policy: PolicyResult) -> list[float | None] | None:
+    """Time to success of each trial; None where the env does not say how long a step is."""
+    out: list[float | None] = []
+    for result in policy.tasks:
+        if result.seconds is None:
+            return None
+        out += [seconds for r, seconds in zip(result.trials, result.seconds, strict=True) if r.horizon]
+    return out
 
 
 def _times(policy: PolicyResult) -> tuple[list[float | None], list[float]]:

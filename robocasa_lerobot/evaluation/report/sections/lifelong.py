@@ -41,6 +41,11 @@ def section(data: ReportData) -> Section | None:
         for one in found
         if one.sets and one.other_tasks
     ]
+    text += [
+        f"Left out of the matrix of {one.label}, since a column compares the same tasks: {fmt.listed(one.left_out)}."
+        for one in found
+        if one.left_out
+    ]
     return Section("lifelong", "Lifelong learning", tuple(text), parts=tuple(parts))
 
 
@@ -53,9 +58,9 @@ def matrix(data: ReportData) -> Lifelong | None:
 def sentence(data: ReportData) -> str | None:
     """What was kept and what was lost in the last training, in plain words."""
     result = matrix(data)
-    if result is None:
+    if result is None or not result.average:
         return None
-    last, found = max(result.matrix), _with_matrix(data)
+    last, found = max(result.average), _with_matrix(data)
     who = f"the policy of {found[-1].label}" if len(found) > 1 else "the policy"
     text = f"After phase {last} {who} solves {_with_interval(result.average[last])} averaged over the phases"
     if last in result.forgetting:
@@ -64,7 +69,8 @@ def sentence(data: ReportData) -> str | None:
             f"; of what earlier phases had reached, {100 * lost.value:.1f} points are forgotten (95 % interval "
             f"{100 * lost.low:.1f} to {100 * lost.high:.1f})"
         )
-    return text + "."
+    later = max(found[-1].policies)
+    return text + (f"; phase {later} was not evaluated on all tasks." if later > last else ".")
 
 
 def _heat_map(result: Lifelong, series: LifelongSeries, end: str, of: str) -> Table:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from robocasa_lerobot.evaluation.records.results import TRIALS_FILE, PolicyInfo
+from robocasa_lerobot.evaluation.records.results import TRIALS_FILE, UNPERTURBED, PolicyInfo
 from robocasa_lerobot.evaluation.report.model import Block, Listing, Section
 from robocasa_lerobot.evaluation.report.policies import PolicyResult, ReportData, describe_policy
 from robocasa_lerobot.evaluation.report.sections.beside_published import horizon_phrase, success_phrase
@@ -74,6 +74,8 @@ def common_settings(policies: Sequence[PolicyResult]) -> list[tuple[str, str]]:
     rows = []
     for name, phrase in (("a trial lasts", horizon_phrase), ("a trial is solved", success_phrase)):
         rows.append((name, _same_or_each([phrase(policy) for policy in policies], policies)))
+    if any(name != UNPERTURBED for policy in policies for name in policy.conditions):
+        rows.append(("perturbations", _same_or_each([", ".join(policy.conditions) for policy in policies], policies)))
     heads = (
         "protocol",
         "split",

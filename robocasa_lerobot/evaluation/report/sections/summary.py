@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from robocasa_lerobot.benchmark import published
+from robocasa_lerobot.evaluation.records.results import UNPERTURBED
 from robocasa_lerobot.evaluation.report import left_out
 from robocasa_lerobot.evaluation.report import numbers as fmt
 from robocasa_lerobot.evaluation.report.model import Bar, Card, Cell, Column, Section, Table
@@ -53,7 +54,7 @@ def headline(data: ReportData) -> str:
     """The result in a sentence, about the last policy and what it is compared with."""
     special = special_sentence(data)
     if special is not None:
-        return special
+        return special + " Some of the runs are partial." * any(map(left_out.is_partial, data.policies))
     last, before = data.policies[-1], data.policies[:-1]
     text = (
         f"{last.label} solves {fmt.percent(last.average.value)} of trials (95 % interval {fmt.interval(last.average)})"
@@ -76,10 +77,14 @@ def what_was_run(data: ReportData) -> str:
     splits = fmt.listed(sorted({beside_published.SPLITS.get(p.header.split, p.header.split) for p in policies}))
     rules = fmt.listed(sorted({beside_published.horizon_phrase(p) for p in policies}))
     success = fmt.listed(sorted({beside_published.success_phrase(p) for p in policies}))
-    return (
+    text = (
         f"{fmt.count(len(policies), 'policy', 'policies')}, {fmt.count(len(data.task_names), 'task')}, {each} trials "
         f"of each: {fmt.count(trials, 'trial')} in {splits}. A trial lasts up to {rules} and is solved {success}."
     )
+    conditions = list(dict.fromkeys(name for policy in policies for name in policy.conditions))
+    if conditions != [UNPERTURBED]:
+        text += f" Perturbations: {fmt.listed([robustness.spelled(name) for name in conditions])}."
+    return text
 
 
 def how_sure(data: ReportData) -> str:
@@ -95,7 +100,7 @@ def how_sure(data: ReportData) -> str:
 
 def beside(data: ReportData) -> str | None:
     """The published numbers that stand in the tables, and that the kitchens differ."""
-    if not any(policy.group("average") or policy.places for policy in data.policies):
+    if not any(policy.group("average", UNPERTURBED) or policy.places for policy in data.policies):
         return None
     return f"Published results stand beside ours in the tables. {published.DIFFERENT_KITCHENS}"
 

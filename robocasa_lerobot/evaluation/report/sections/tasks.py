@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from robocasa_lerobot.benchmark import published
 from robocasa_lerobot.benchmark.tasks import TaskFacts, task_facts
-from robocasa_lerobot.evaluation.records.results import TrialRecord
+from robocasa_lerobot.evaluation.records.results import UNPERTURBED, TrialRecord
 from robocasa_lerobot.evaluation.report import numbers as fmt
 from robocasa_lerobot.evaluation.report.model import Bar, Cell, Column, Section, Series, Table
 from robocasa_lerobot.evaluation.report.policies import PolicyResult, ReportData, TaskResult, trial_title
@@ -21,7 +21,10 @@ def section(data: ReportData) -> Section:
         result.rate.trials <= MAX_MARKS for policy in data.policies for result in policy.tasks
     )
     roomy = len(data.policies) <= MAX_MARKED_POLICIES
-    known = {task: rate for task, rate in published.per_task_rates().items() if task in data.task_names}
+    # Published rates are of unperturbed trials, and stand beside no others.
+    plain = [policy for policy in data.policies if policy.condition == UNPERTURBED]
+    tried = {result.task for policy in plain for result in policy.tasks}
+    known = {task: rate for task, rate in published.per_task_rates().items() if task in tried}
     facts = {task: one for task, one in task_facts().items() if task in data.task_names}
     columns = [Column("task")]
     columns += [Column("stages", numeric=True), Column("mobile")] if facts else []
@@ -33,7 +36,8 @@ def section(data: ReportData) -> Section:
         cells = [Cell(task, code=True)]
         cells += _facts(facts.get(task)) if facts else []
         for policy in data.policies:
-            cells.append(_cell(data, policy, policy.task(task), known.get(task), marks))
+            beside = known.get(task) if policy in plain else None
+            cells.append(_cell(data, policy, policy.task(task), beside, marks))
         if known:
             value = known.get(task)
             cells.append(Cell(fmt.NONE) if value is None else Cell(f"{value:.0f}{fmt.NBSP}%", value / 100))
@@ -51,7 +55,7 @@ def section(data: ReportData) -> Section:
         tuple(columns),
         tuple(rows),
         notes=tuple(notes),
-        warnings=(published.DIFFERENT_KITCHENS_SHORT, *differences(data.policies, protocol)) if known else (),
+        warnings=(published.DIFFERENT_KITCHENS_SHORT, *differences(plain, protocol)) if known else (),
         cards=True,
     )
     series = tuple(Series(policy.label, data.series(policy)) for policy in data.policies)
