@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -26,6 +26,7 @@ from robocasa_lerobot.training.augment import augment
 from robocasa_lerobot.training.config.phase import PhaseConfig
 from robocasa_lerobot.training.cpu_tuning import keep_freed_memory
 from robocasa_lerobot.training.held_out import HeldOut
+from robocasa_lerobot.training.loading import load_batches
 from robocasa_lerobot.training.metrics import HELD_OUT, METRICS, append_line, draw_curve, track
 from robocasa_lerobot.training.shared_noise import SharedNoise
 from robocasa_lerobot.training.weights.checkpoint import TrainingState, prune, save_checkpoint
@@ -41,7 +42,8 @@ class PhaseRun:
 
     `batches` holds parts of a batch (`gradient_accumulation` of them make one), `stop` is asked after each step
     whether to save and end early, `always_eval` are modules that keep out of training mode, `train_config` goes into
-    the checkpoints for LeRobot, and without `save` there are no checkpoints.
+    the checkpoints for LeRobot, `earlier_steps` are those of the phases before, and without `save` there are no
+    checkpoints.
     """
 
     config: PhaseConfig
@@ -56,6 +58,7 @@ class PhaseRun:
     stop: Callable[[], bool]
     held_out: HeldOut | None = None
     always_eval: list[torch.nn.Module] = field(default_factory=list)
+    earlier_steps: int = 0
     save: bool = True
 
 
@@ -72,7 +75,7 @@ def train_phase(run: PhaseRun, accelerator: Accelerator) -> bool:
     if config.compile:
         state.policy.compile()
     _set_training(run)
-    batches = _loader(run, first=state.step * parts, end=config.steps * parts)
+    batches = load_batches(run.batches, state.step * parts, config.steps * parts, run.workers)
     if state.step == 0 and config.save_initial:
         _save(run, accelerator)
     progress = Bar(
@@ -120,7 +123,7 @@ def train_phase(run: PhaseRun, accelerator: Accelerator) -> bool:
             progress.set_postfix(loss=f"{line['loss']:.4f}", lr=f"{learning_rate:.1e}", refresh=False)
             if accelerator.is_main_process:
                 append_line(run.folder / METRICS, line)
-            track(accelerator, config.name, line)
+            track(accelerator, config.name, line, run.earlier_steps)
         if run.held_out is not None and run.held_out.due(state.step, config.steps):
             _measure_held_out(run, run.held_out, accelerator)
             began = time.perf_counter()
@@ -133,19 +136,6 @@ def train_phase(run: PhaseRun, accelerator: Accelerator) -> bool:
     if accelerator.is_main_process:
         draw_curve(run.folder)
     return state.step >= config.steps
-
-
-def _loader(run: PhaseRun, first: int, end: int) -> Iterator[dict[str, Any]]:
-    loader = torch.utils.data.DataLoader(
-        run.batches,
-        batch_size=None,  # an item is a whole batch
-        sampler=range(first, end),
-        num_workers=run.workers,
-        prefetch_factor=2 if run.workers else None,
-        multiprocessing_context="spawn" if run.workers else None,  # forked video decoders can hang
-        pin_memory=torch.cuda.is_available(),
-    )
-    return iter(loader)
 
 
 def _prepare(run: PhaseRun, batch: dict[str, Any], accelerator: Accelerator, part: int | None = None) -> dict[str, Any]:
@@ -237,7 +227,8 @@ def _measure_held_out(run: PhaseRun, held_out: HeldOut, accelerator: Accelerator
     line = {"step": state.step, "loss": sum(losses.values()) / len(losses), "tasks": losses}
     if accelerator.is_main_process:
         append_line(run.folder / HELD_OUT, line)
-    track(accelerator, run.config.name, {**line, "held_out_loss": line["loss"], "loss": None})
+    tracked = {**line, "held_out_loss": line["loss"], "loss": None}
+    track(accelerator, run.config.name, tracked, run.earlier_steps)
 
 
 def _set_training(run: PhaseRun) -> None:

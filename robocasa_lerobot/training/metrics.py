@@ -91,9 +91,13 @@ def start_trackers(accelerator: Accelerator, name: str, settings: dict[str, Any]
         accelerator.init_trackers(name, config=plain)
 
 
-def track(accelerator: Accelerator, phase: str, line: dict[str, Any]) -> None:
-    """Send a line of metrics to the trackers, each under the phase's name since steps count anew in each phase."""
+def track(accelerator: Accelerator, phase: str, line: dict[str, Any], earlier_steps: int) -> None:
+    """Send a line of metrics to the trackers, each number under the phase's name, its `step` among them.
+
+    The trackers' own steps go on from phase to phase (`earlier_steps` are those of the phases before): wandb drops
+    what comes with a smaller step than it has had.
+    """
     if accelerator.log_with:
         values = {f"{phase}/{key}": value for key, value in line.items() if isinstance(value, int | float)}
         values |= {f"{phase}/held_out/{task}": value for task, value in line.get("tasks", {}).items()}
-        accelerator.log(values, step=line["step"])
+        accelerator.log(values, step=earlier_steps + line["step"])

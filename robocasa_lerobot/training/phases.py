@@ -85,10 +85,10 @@ def run_experiment(
     metrics.start_trackers(accelerator, experiment.name, {"seed": experiment.seed, "policy": experiment.policy})
     try:
         with interrupts.listening():
-            finished = _run(experiment, phases, device, accelerator, interrupts, evaluations)
+            finished = _run(experiment, phases, device, accelerator, interrupts, evaluations, force)
     finally:
         accelerator.end_training()
-    if evaluations is not None:
+    if finished and evaluations is not None:  # else the same command goes on, and runs those that failed again
         evaluations.check_none_failed()
     return finished
 
@@ -128,6 +128,7 @@ def _run(
     accelerator: Accelerator,
     interrupts: Interrupts,
     evaluations: Evaluations | None,
+    force: bool,
 ) -> bool:
     output = Path(experiment.output_dir)
     for phase in phases:
@@ -136,7 +137,7 @@ def _run(
             if accelerator.is_main_process:
                 tidy(output / phase.name)
         else:
-            run = prepare_phase(experiment, phase, device, accelerator, interrupts.stop)
+            run = prepare_phase(experiment, phase, device, accelerator, interrupts.stop, force)
             finished = train_phase(run, accelerator)
             step = run.state.step
             del run  # its policy and optimiser need not stay in memory beside the next phase's

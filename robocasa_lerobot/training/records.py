@@ -25,6 +25,8 @@ FREE_SETTINGS = (
     *("loader.workers", "loader.cache", "device", "trackers", "save_every", "keep_last", "keep_every", "log_every"),
     *("held_out.every", "held_out.samples", "evaluations", "scale"),
 )
+# Settings of what a phase makes when it begins: its checkpoints hold the statistics that inputs are normalised with.
+AS_IT_BEGAN = ("statistics", "image_statistics")
 
 
 def write_experiment(output: Path, experiment: ExperimentConfig) -> None:
@@ -79,22 +81,30 @@ def check_unchanged(experiment: ExperimentConfig, output: Path, force: bool) -> 
     """Check that what has begun in `output` is continued as it began.
 
     Raises:
-        UserError: a setting that matters is different; all of them are listed.
+        UserError: a setting that matters is different; all of them are listed. With `force`, one that a begun phase
+            cannot change any more.
     """
     path = output / EXPERIMENT_FILE
-    if not path.is_file() or force:
+    if not path.is_file():
         return
     begun = {phase.name for phase in experiment.phases if last_checkpoint(output / phase.name)}
     old = overlay.flatten(yaml.safe_load(path.read_text(encoding="utf-8")))
     new = overlay.flatten(yaml.safe_load(to_yaml(experiment)))
-    lines = [
-        f"  {key}: {old.get(key, '(not set)')} -> {new.get(key, '(not set)')}"
+    changed = {
+        key: f"\n  {key}: {old.get(key, '(not set)')} -> {new.get(key, '(not set)')}"
         for key in sorted(old.keys() | new.keys())
         if old.get(key) != new.get(key) and begun and not _may_change(key, begun)
-    ]
-    if lines:
+    }
+    fixed = [f"phases.{name}.{setting}" for name in sorted(begun) for setting in AS_IT_BEGAN]
+    lines = [changed[key] for key in fixed if key in changed]
+    if lines and force:
         raise UserError(
-            f"{output} holds the same experiment with other settings:\n" + "\n".join(lines) + "\nGive another "
+            f"{output} holds phases that have begun with other settings, which they keep:" + "".join(lines) + "\nPut "
+            "them back, give another `--output_dir`, or remove the phase's folder to begin it anew."
+        )
+    if changed and not force:
+        raise UserError(
+            f"{output} holds the same experiment with other settings:" + "".join(changed.values()) + "\nGive another "
             "`--output_dir`, remove the folder, or pass `--resume=force` to go on with the new settings."
         )
 

@@ -6,6 +6,8 @@ import json
 import pickle
 import shutil
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -174,23 +176,29 @@ def test_dataset_travels_to_worker_processes(root: Path, tmp_path: Path) -> None
     assert torch.equal(copy[2][contract.IMAGE_KEYS[0]], dataset[2][contract.IMAGE_KEYS[0]])
 
 
+def kill_filling(source: DatasetSource, folder: Path, videos: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Begin a cache that is killed after so many videos of episodes."""
+    real, decoded = frame_cache._decode, list[str]()
+
+    def counting(source: DatasetSource, key: str, *rest: Any) -> torch.Tensor:
+        if len(decoded) >= videos:
+            raise KeyboardInterrupt
+        decoded.append(key)
+        return real(source, key, *rest)
+
+    with monkeypatch.context() as patched:
+        patched.setattr(frame_cache, "_decode", counting)
+        with pytest.raises(KeyboardInterrupt):
+            frame_cache.open_or_build(source, list(contract.IMAGE_KEYS), (32, 32), folder)
+
+
 def test_cache_is_reused_continued_and_tied_to_the_data(
     root: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     source, keys, decoded = DatasetSource(root), list(contract.IMAGE_KEYS), []
     real = frame_cache._decode
-
-    def counting(source: DatasetSource, key: str, episode: int, *rest: object) -> torch.Tensor:
-        if len(decoded) >= 6:
-            raise KeyboardInterrupt
-        decoded.append(episode)
-        return real(source, key, episode, *rest)  # type: ignore[arg-type]
-
-    monkeypatch.setattr(frame_cache, "_decode", counting)
-    with pytest.raises(KeyboardInterrupt):
-        frame_cache.open_or_build(source, keys, (32, 32), tmp_path / "c")
+    kill_filling(source, tmp_path / "c", 6, monkeypatch)
     assert not [p for p in (tmp_path / "c").iterdir() if p.is_dir() and not p.name.endswith(".partial")]
-    decoded.clear()
     monkeypatch.setattr(frame_cache, "_decode", lambda s, k, e, *r: decoded.append(e) or real(s, k, e, *r))
     cache = frame_cache.open_or_build(source, keys, (32, 32), tmp_path / "c")
     assert set(decoded) == {2, 3}  # the first two episodes were kept
@@ -202,6 +210,18 @@ def test_cache_is_reused_continued_and_tied_to_the_data(
     other = write_fake_dataset(tmp_path / "fake", episodes=2, length=4, image_size=32, seed=1)
     frame_cache.open_or_build(DatasetSource(other), keys, (32, 32), tmp_path / "c")
     assert decoded
+
+
+def test_a_killed_filling_needs_no_disk_for_what_it_has_already(
+    root: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    source, keys, size = DatasetSource(root), list(contract.IMAGE_KEYS), (32, 32)
+    kill_filling(source, tmp_path, 9, monkeypatch)  # three of four episodes
+    free = SimpleNamespace(free=frame_cache.cache_bytes(source, keys, size) // 2)
+    monkeypatch.setattr(shutil, "disk_usage", lambda _: free)
+    with pytest.raises(UserError, match=r"the frame cache needs .* GB but"):
+        frame_cache.open_or_build(source, keys, size, tmp_path / "other")
+    frame_cache.open_or_build(source, keys, size, tmp_path)
 
 
 def test_cache_that_does_not_fit_is_left_out(root: Path, tmp_path: Path) -> None:

@@ -56,6 +56,20 @@ def test_a_recording_follows_weights_that_change_in_place() -> None:
         assert torch.equal(traced(*given), module(*given))
 
 
+def test_autocast_and_recordings_leave_each_other_alone() -> None:
+    module = denoiser()
+    traced, given, found = Traced(module), inputs(1), []
+    for autocast in (True, False, True, False):
+        with torch.inference_mode(), torch.autocast("cpu", torch.bfloat16, enabled=autocast):
+            found.append(traced(*given))
+            assert torch.equal(found[-1], module(*given))
+        with torch.no_grad():
+            for parameter in module.parameters():
+                parameter.mul_(1.1)
+    assert not torch.equal(found[0], found[2])
+    assert recordings(traced) == [True]
+
+
 def test_gradients_and_dropout_come_from_the_module() -> None:
     module = denoiser()
     traced, given = Traced(module), inputs(2)

@@ -129,7 +129,43 @@ def test_changed_settings_of_a_begun_run_are_listed(tmp_path: Path, data: Path) 
     for text in ("seed: 0 -> 1", "phases.pretrain.batch_size: 4 -> 2", "policy.width: 16 -> 32", "--resume=force"):
         assert text in str(caught.value)
     later = tiny(tmp_path, data, overrides=["--phases.finetune.batch_size=2", "--phases.pretrain.log_every=2"])
-    assert run_experiment(later, stop_after=6) is True  # a phase that has not begun may change, and what is only shown
+    assert not run_experiment(later, stop_after=5)  # a phase that has not begun may change, and what is only shown
+    # Statistics are computed when a phase begins.
+    again = tiny(tmp_path, data, overrides=["--phases.finetune.statistics=replace", "--phases.finetune.batch_size=2"])
+    with pytest.raises(UserError, match=r"which they keep:\n  phases.finetune.statistics: keep -> replace\nPut them"):
+        run_experiment(again, force=True)
+
+
+def test_forced_settings_of_optimiser_and_policy_are_used(tmp_path: Path, data: Path, finished: Path) -> None:
+    """Moments and the place in the schedule are those of before, everything else is what the settings say now."""
+    assert not run_experiment(tiny(tmp_path, data), stop_after=2)
+    lower = ["--phases.pretrain.learning_rate=1e-5", "--phases.pretrain.optimizer.weight_decay=0"]
+    policy = ["--policy.dropout=0", "--policy.num_inference_steps=5"]
+    assert not run_experiment(tiny(tmp_path, data, overrides=[*lower, *policy]), stop_after=1, force=True)
+    constant = ["--phases.pretrain.learning_rate=2e-5", "--phases.pretrain.scheduler={type: none}", *policy]
+    assert not run_experiment(tiny(tmp_path, data, overrides=constant), stop_after=1, force=True)
+    plain = [line["learning_rate"] for line in metrics(finished, "pretrain")]
+    rates = [line["learning_rate"] for line in metrics(tmp_path, "pretrain")]
+    assert rates == pytest.approx([*plain[:2], plain[2] * 1e-5 / 1e-3, 2e-5])
+    for step, decay in (("000003", 0), ("000004", weight_decay(finished, "000004"))):
+        assert weight_decay(tmp_path, step) == decay
+    config = json.loads((tmp_path / "out/pretrain/checkpoints/000004/pretrained_model/config.json").read_text())
+    assert (config["dropout"], config["num_inference_steps"]) == (0, 5)
+    with pytest.raises(UserError, match="do not fit the policy's settings"):
+        run_experiment(tiny(tmp_path, data, overrides=["--phases.pretrain.steps=5", "--policy.width=32"]), force=True)
+
+
+def weight_decay(folder: Path, step: str) -> float:
+    path = folder / f"out/pretrain/checkpoints/{step}/training_state/optimizer_param_groups.json"
+    return float(json.loads(path.read_text())[0]["weight_decay"])
+
+
+def test_forced_without_changes_gives_the_same_losses(tmp_path: Path, data: Path, finished: Path) -> None:
+    experiment = tiny(tmp_path, data)
+    assert not run_experiment(experiment, stop_after=3)
+    assert run_experiment(experiment, force=True)
+    for phase in ("pretrain", "finetune"):
+        assert losses(tmp_path, phase) == losses(finished, phase)
 
 
 def test_changed_data_are_told(tmp_path: Path) -> None:
@@ -219,6 +255,7 @@ def test_loss_falls(tmp_path: Path, data: Path) -> None:
         (["--policy.vision_encoder=resnet"], "resnet18"),
         (["--phases.finetune.policy={horizn: 4}"], "Did you mean 'horizon'"),
         (["--device=cude"], "Did you mean 'cuda'"),
+        (["--device=cuda:1"], "set `device: cuda`, and choose the GPU before the command: `CUDA_VISIBLE_DEVICES=1`"),
         (["--phases.finetune.mixture.members=[{root: nowhere}]"], "no dataset at nowhere"),
         (["--phases.pretrain.mixture.members=[{root: nowhere}]"], "no dataset at nowhere"),
     ],

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import fcntl
 import os
+import signal
 import subprocess
 import sys
 import time
 from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
+from typing import Any
 
 import pytest
 import torch
@@ -17,10 +19,14 @@ from training_support import ROOT, experiment_file
 
 from robocasa_lerobot.benchmark.tasks import published_task_sets, published_tasks
 from robocasa_lerobot.cli import main
+from robocasa_lerobot.cli.eval import describe_settings
 from robocasa_lerobot.data.fake import write_fake_dataset
 from robocasa_lerobot.envs.tasks.registry import task_names
+from robocasa_lerobot.evaluation.config.evaluation import EvaluationConfig
+from robocasa_lerobot.evaluation.planning.check import check
 from robocasa_lerobot.evaluation.records.results import read_results
 from robocasa_lerobot.training.config.experiment import load_experiment
+from robocasa_lerobot.training.interrupts import STOPPED, Interrupts
 from robocasa_lerobot.training.planning import evaluations, skipped
 from robocasa_lerobot.training.weights.checkpoint import checkpoint_step, last_checkpoint
 
@@ -152,3 +158,119 @@ def test_nothing_of_a_killed_training_goes_on_evaluating(tmp_path: Path, monkeyp
 def test_a_signal_ends_a_running_evaluation() -> None:
     command = [sys.executable, "-c", "import time; time.sleep(600)"]
     assert evaluations._run(command, lambda: True) is None
+
+
+def planned(name: str, arguments: Sequence[str] = ()) -> evaluations.PlannedEvaluation:
+    file = evaluations.PhaseEvaluation(Path(f"{name}.yaml"), ())
+    return evaluations.PlannedEvaluation("example", file, tuple(arguments), None, None, 1, 1, 1, "plan")
+
+
+def test_a_signal_to_all_processes_is_no_failure_of_the_running_evaluation(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It dies of it, sooner than this process looks; nothing is booked, and the next one is not begun."""
+    (tmp_path / "checkpoints/000004").mkdir(parents=True)
+    popen, started = subprocess.Popen, []
+    told = Interrupts()
+
+    def dies(command: list[str], **kwargs: Any) -> subprocess.Popen[bytes]:
+        started.append(command)
+        process = popen([sys.executable, "-c", "import os, signal; os.kill(os.getpid(), signal.SIGTERM)"], **kwargs)
+        process.wait()
+        os.kill(os.getpid(), signal.SIGTERM)
+        return process
+
+    monkeypatch.setattr(subprocess, "Popen", dies)
+    with told.listening():
+        found = evaluations.run_evaluations([planned("one"), planned("two")], tmp_path, lambda: told.signalled)
+    assert found == []
+    assert len(started) == 1
+    assert not list(tmp_path.rglob("finished"))
+
+
+def test_a_failed_evaluation_does_not_hide_that_a_run_was_stopped(
+    tmp_path: Path, data: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(evaluations, "_run", lambda *_: 1)
+    path = experiment_file(tmp_path, data, defaults={"steps": 2})
+    words = ["--evaluate", *evaluations_of(path, pretrain=["quick"])]
+    assert train(path, "--stop_after=3", *words) == STOPPED
+    assert train(path, *words) == 2
+
+
+def test_an_evaluation_whose_file_has_changed_runs_again(
+    tmp_path: Path, data: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    commands: list[list[str]] = []
+    monkeypatch.setattr(evaluations, "_run", lambda command, _: commands.append(command) or 0)
+    path, file = experiment_file(tmp_path, data, defaults={"steps": 1}), tmp_path / "own.yaml"
+    texts = ["--phase=pretrain", *evaluations_of(path, pretrain=[str(file)])]
+    for settings, runs in (("seed: 0\nworkers: 2", 1), ("seed: 0\nworkers: 3", 1), ("seed: 1", 2)):
+        file.write_text(f"env: {{tasks: [OpenDrawer]}}\n{settings}\n")
+        assert train(path, "--evaluate", *texts) == 0
+        assert len(commands) == runs
+    marker = tmp_path / "out/pretrain/evaluations/own/finished"
+    before = marker.read_text()
+    marker.write_text("000001 0123456789ab")  # as it was written before all settings counted
+    assert train(path, "--evaluate", *texts) == 0
+    assert len(commands) == 3
+    assert marker.read_text() == before
+
+
+# Another value for each setting of an evaluation.
+OTHER_SETTINGS = {
+    "policy.path": "random", "policy.label": "other", "policy.device": "cpu", "policy.devices": "cuda:1",
+    "policy.placement": "workers", "policy.batch_width": 2, "policy.threads": 2, "policy.lifelong_phase": 1,
+    "policy.demo_fraction": 0.5, "policy.training_data": "other", "remote.connect_seconds": 1,
+    "remote.answer_seconds": 1, "remote.first_answer_seconds": 1, "env.tasks": "CloseDrawer",
+    "env.task_sets": "atomic_seen", "env.registry": "configs/experiments/parts/kitchens.yaml", "env.tasks_per_set": 1,
+    "env.allow_missing_tasks": False, "env.split": "pretrain", "env.render_preset": "quality", "env.image_size": 64,
+    "env.horizon": 9, "env.horizon_multiplier": 2, "env.render_devices": 1, "success.rule": "at_end",
+    "perturbation.names": "camera", "perturbation.camera_position_m": 1, "perturbation.camera_angle_deg": 1,
+    "perturbation.wrist_position_m": 1, "perturbation.wrist_angle_deg": 1, "perturbation.joint_rad": 1,
+    "perturbation.base_position_m": 1, "perturbation.base_yaw_deg": 1, "protocol": "other", "trials": 3, "seed": 1,
+    "executed_steps": 2, "workers": 3, "shard": "1/2", "videos": 0, "out": "elsewhere", "retry_errors": True,
+    "stall_seconds": 9, "report": False, "scale": "other",
+}  # fmt: skip
+# Those that need others beside them: of policies behind sockets, of other simulators, of task sets, of `hold`.
+TOGETHER = {
+    "policy.keys", "env.factory", "env.python", "env.type", "env.options", "success.hold_steps", "lifelong",
+}  # fmt: skip
+
+
+def test_the_name_of_a_planned_evaluation_changes_with_what_its_results_depend_on() -> None:
+    assert OTHER_SETTINGS.keys() | TOGETHER == {name for name, _, _ in describe_settings(EvaluationConfig)}
+    common = ["--policy.path=zero", "--env.tasks=OpenDrawer", "--trials=2"]
+    plain = check(common)
+    same = set()
+    for name, value in OTHER_SETTINGS.items():
+        other = check([*common, f"--{name}={value}"])
+        assert other.mistake is None, other
+        same |= {name} if other.plan == plain.plan else set()
+    assert same == {
+        "policy.path", "policy.devices", "policy.placement", "env.render_devices", "remote.connect_seconds",
+        "remote.answer_seconds", "remote.first_answer_seconds", "out", "workers", "shard", "stall_seconds",
+    }  # fmt: skip
+
+
+@pytest.mark.slow
+def test_what_is_evaluated_again_keeps_its_trials_or_says_why_not(
+    tmp_path: Path, data: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("PYTHONPATH", f"{ROOT / 'tests' / 'support'}{os.pathsep}{ROOT}")
+    path, file = experiment_file(tmp_path, data, defaults={"steps": 1}), tmp_path / "slide.yaml"
+    own = "env: {factory: 'evaluation_env:SlideEnv', tasks: [Slide], horizon: 4}\ntrials: 1\nvideos: 0\nworkers: 1\n"
+    file.write_text(own)
+    words = ["--evaluate", "--phase=pretrain", *evaluations_of(path, pretrain=[str(file)])]
+    assert train(path, *words) == 0
+    results = tmp_path / "out/pretrain/evaluations/slide"
+    trials = (results / "trials.jsonl").read_bytes()
+    (results / "finished").write_text("000001 0123456789ab")  # as it was written before all settings counted
+    assert train(path, *words) == 0
+    assert (results / "trials.jsonl").read_bytes() == trials
+    file.write_text(f"{own}seed: 1\n")
+    assert train(path, *words) == 2
+    assert f"put the results of before, {results}, elsewhere" in capsys.readouterr().err
+    results.rename(tmp_path / "before")
+    assert train(path, *words) == 0
+    assert (results / "trials.jsonl").read_bytes() != trials

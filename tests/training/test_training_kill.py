@@ -26,6 +26,7 @@ from robocasa_lerobot.training.weights.checkpoint import (
     checkpoint_step,
     last_checkpoint,
     prune,
+    restore,
     save_checkpoint,
     tidy,
 )
@@ -247,6 +248,23 @@ def state_at(step: int) -> TrainingState:
     ema = Ema(policy, EmaConfig())
     parts = (policy, Written("pre.json"), Written("post.json"), optimizer, None, ema, MasterWeights(policy))
     return TrainingState(*parts, step=step)
+
+
+def test_a_schedule_that_goes_from_rate_to_rate_goes_on(tmp_path: Path) -> None:
+    """LeRobot's own are functions of the step; a package's may not be."""
+    state, again = state_at(0), state_at(0)
+    for each in (state, again):
+        each.scheduler = torch.optim.lr_scheduler.ExponentialLR(each.optimizer, gamma=0.5)
+    for _ in range(3):
+        state.optimizer.step()
+        state.scheduler.step()
+    state.step = 3
+    restore(save_checkpoint(tmp_path / "example", state, Written("train_config.json")), again)
+    assert again.step == 3
+    assert again.optimizer.param_groups[0]["lr"] == 0.1 / 8
+    again.optimizer.step()
+    again.scheduler.step()
+    assert again.optimizer.param_groups[0]["lr"] == 0.1 / 16
 
 
 def files_of(checkpoint: Path) -> list[str]:

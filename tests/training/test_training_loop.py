@@ -6,15 +6,19 @@ import importlib.util
 import json
 import os
 import signal
+import subprocess
+import sys
 import threading
 import time
+from multiprocessing import active_children
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 import torch
-from training_support import experiment_file, losses, metrics, tiny
+from accelerate import Accelerator
+from training_support import ROOT, experiment_file, losses, metrics, tiny
 
 from robocasa_lerobot import contract
 from robocasa_lerobot.cli import main
@@ -24,8 +28,10 @@ from robocasa_lerobot.training import metrics as module
 from robocasa_lerobot.training.augment import augment
 from robocasa_lerobot.training.config.experiment import TRACKERS
 from robocasa_lerobot.training.config.phase import AugmentConfig
-from robocasa_lerobot.training.interrupts import REQUEUE
+from robocasa_lerobot.training.interrupts import REQUEUE, SIGNALS
+from robocasa_lerobot.training.loading import load_batches
 from robocasa_lerobot.training.phases import run_experiment
+from robocasa_lerobot.training.setup.build_phase import prepare_phase
 from robocasa_lerobot.training.setup.builders import frame_size, policy_config
 from robocasa_lerobot.training.shared_noise import SharedNoise
 from robocasa_lerobot.training.weights.checkpoint import CHECKPOINTS, last_checkpoint, prune, tidy
@@ -120,6 +126,46 @@ def test_signal_saves_and_asks_for_another_turn(tmp_path: Path, data: Path) -> N
     assert int(last.name) == metrics(tmp_path, "pretrain")[-1]["step"] < 100000
 
 
+def test_loader_processes_outlive_what_asks_the_run_to_end(tmp_path: Path, data: Path) -> None:
+    """From their first moment on; and one that hangs is ended all the same when nobody needs it any more."""
+    experiment = tiny(tmp_path, data)
+    run = prepare_phase(experiment, experiment.phases[0], "cpu", Accelerator(cpu=True))
+    wanted = load_batches(run.batches, first=1, end=3, workers=0)
+    found = load_batches(run.batches, first=1, end=3, workers=1)
+    (process,) = active_children()
+    for batch in wanted:
+        for number in SIGNALS:
+            os.kill(process.pid or 0, number)
+        assert torch.equal(next(found)["index"], batch["index"])
+    assert signal.pthread_sigmask(signal.SIG_BLOCK, ()) == set()
+    os.kill(process.pid or 0, signal.SIGSTOP)
+    del found
+    process.join()
+    assert process.exitcode == -signal.SIGKILL
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("number", SIGNALS)
+def test_signal_to_all_processes_saves_and_asks_for_another_turn(
+    tmp_path: Path, data: Path, number: signal.Signals
+) -> None:
+    """As `timeout 23h python train.py ...` sends it."""
+    path = experiment_file(tmp_path, data, defaults={"steps": 100000, "save_every": 2}, loader={"workers": 2})
+    command = [sys.executable, str(ROOT / "train.py"), "--config_path", str(path)]
+    with subprocess.Popen(command, start_new_session=True) as process:
+        try:
+            while not (tmp_path / "out/pretrain/checkpoints/000002").is_dir():
+                assert process.poll() is None
+                time.sleep(0.05)
+            os.killpg(process.pid, number)
+            assert process.wait() == REQUEUE
+        finally:
+            process.kill()
+    last = last_checkpoint(tmp_path / "out/pretrain")
+    assert last is not None
+    assert int(last.name) == metrics(tmp_path, "pretrain")[-1]["step"]
+
+
 def pictures(count: int = 4) -> dict[str, torch.Tensor]:
     return {CAMERA: torch.rand(count, 2, 3, 16, 16, generator=torch.Generator().manual_seed(0))}
 
@@ -207,9 +253,12 @@ def test_trackers_get_the_metrics(tmp_path: Path, data: Path, monkeypatch: pytes
     sent: list[dict[str, Any]] = []
     monkeypatch.setattr(Accelerator, "log", lambda _, values, step=None, **__: sent.append({**values, "step": step}))
     monkeypatch.chdir(tmp_path)
-    run_experiment(tiny(tmp_path, data, overrides=[f"--trackers=[{tracker}]"]), stop_after=2)
-    assert [values["step"] for values in sent] == [1, 2]
+    run_experiment(tiny(tmp_path, data, overrides=[f"--trackers=[{tracker}]"]), stop_after=6)
+    # Steps that begin again would be dropped by wandb.
+    assert [values["step"] for values in sent] == [1, 2, 3, 4, 5, 6]
     assert sent[1]["pretrain/loss"] == metrics(tmp_path, "pretrain")[1]["loss"]
+    assert sent[5]["finetune/loss"] == metrics(tmp_path, "finetune")[1]["loss"]
+    assert sent[5]["finetune/step"] == 2
 
 
 def test_shared_noise_is_that_of_one_process() -> None:

@@ -28,6 +28,7 @@ from robocasa_lerobot.training.setup import builders
 from robocasa_lerobot.training.setup import phase_data as joining
 from robocasa_lerobot.training.setup.build_phase import prepare_phase
 from robocasa_lerobot.training.weights.adapters import apply_training_scope, merged_state
+from robocasa_lerobot.training.weights.checkpoint import save_checkpoint
 
 FROZEN = "observation_encoder"
 
@@ -255,6 +256,7 @@ def test_plan_tells_what_would_be_done(tmp_path: Path, data: Path) -> None:
     assert (pretrain.depth, finetune.depth) == (0, 1)
     assert (pretrain.samples, pretrain.frames, pretrain.missing) == (16, 96, [])
     assert pretrain.kept == 3  # the newest two and the initial one
+    assert (pretrain.aside, finetune.aside) == (1, 0)  # before one is removed there is the one that takes its place
     assert pretrain.parameters is not None
     assert finetune.parameters is not None
     assert pretrain.parameters[0] == pretrain.parameters[1]
@@ -263,6 +265,7 @@ def test_plan_tells_what_would_be_done(tmp_path: Path, data: Path) -> None:
     assert pretrain.seconds is not None
     assert pretrain.seconds > 0
     text = render_plan(experiment, [pretrain, finetune], "cpu")
+    assert "3 checkpoint(s) of 0.00 GB and one more while it is written" in text
     for part in ("finetune <- pretrain (to do)", "missing datasets: 18", "statistics: keep", "hours by measurement"):
         assert part in text
     assert run_experiment(tiny(tmp_path, data, overrides=overrides), only="pretrain")
@@ -271,6 +274,26 @@ def test_plan_tells_what_would_be_done(tmp_path: Path, data: Path) -> None:
     sizes = sum(tensor.nbytes for path in files for tensor in load_file(path).values())
     assert pretrain.checkpoint_bytes == pytest.approx(sizes, rel=0.05)
     assert plan_experiment(experiment, only="pretrain", measured_steps=0)[0].done == 4
+
+
+@pytest.mark.parametrize("lora", [None, {"rank": 2}])
+def test_plan_counts_the_float32_weights_of_a_policy_in_half_precision(
+    tmp_path: Path, data: Path, monkeypatch: pytest.MonkeyPatch, lora: dict[str, int] | None
+) -> None:
+    made = builders.make_phase_policy
+    monkeypatch.setattr(builders, "make_phase_policy", lambda *given: made(*given).to(torch.bfloat16))
+    experiment = tiny(tmp_path, data, overrides=[f"--defaults.lora={json.dumps(lora)}"])
+    (plan,) = plan_experiment(experiment, "pretrain", measured_steps=0)
+    run = prepare_phase(experiment, experiment.phases[0], "cpu", Accelerator(cpu=True))
+    for parameter in run.state.policy.parameters():
+        parameter.grad = torch.ones_like(parameter)
+    run.state.optimizer.step()
+    folder = save_checkpoint(tmp_path / "saved", run.state, run.train_config)
+    files = [*folder.glob("training_state/*.safetensors"), folder / "pretrained_model/model.safetensors"]
+    sizes = {path.stem: sum(tensor.nbytes for tensor in load_file(path).values()) for path in files}
+    assert {"master_weights", "average", "optimizer_state", "raw_model", "model"} <= sizes.keys()
+    del sizes["rng_state"]
+    assert plan.checkpoint_bytes == pytest.approx(sum(sizes.values()), rel=0.05)
 
 
 def test_optimizer_and_schedule_of_a_phase(tmp_path: Path, data: Path) -> None:

@@ -3,17 +3,24 @@
 from __future__ import annotations
 
 import os
+import re
+import signal
 import socket
 import subprocess
 import sys
+import time
+from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
+import psutil
 import pytest
 import torch
 from training_support import ROOT, experiment_file, losses
 
 from robocasa_lerobot.data.fake import write_fake_dataset
+from robocasa_lerobot.training.weights.checkpoint import checkpoint_step, last_checkpoint
 
 # Without dropout, whose masks belong to processes; everything else that is random belongs to samples.
 CALM = {
@@ -72,6 +79,44 @@ def test_two_processes_train_as_one_does(tmp_path: Path, data: Path, kind: str) 
     for phase in ("pretrain", "finetune"):
         ours, theirs = losses(tmp_path / "two", phase), losses(tmp_path / "one", phase)
         np.testing.assert_allclose(ours, theirs, rtol=1e-5)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("send", [os.kill, os.killpg])
+def test_the_slurm_recipe_passes_the_signal_on_to_the_trainers(
+    tmp_path: Path, data: Path, send: Callable[[int, int], None]
+) -> None:
+    """What the documentation has a node run; Slurm tells bash alone, or with `proctrack/pgid` its whole group."""
+    found = re.search(r"srun [^\n]* bash -c '\n(.*?)' &\n", (ROOT / "docs/training.md").read_text(), re.DOTALL)
+    assert found is not None
+    script, path = found[1], experiment_file(tmp_path, data, defaults={"steps": 100000, "save_every": 2})
+    for theirs, ours in (
+        ("configs/experiments/robocasa365/foundation.yaml", str(path)), (" * 8", " * 2"), ("29500", "0")
+    ):  # fmt: skip
+        assert theirs in script
+        script = script.replace(theirs, ours)
+    places = {"PATH": f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}", "MASTER": "127.0.0.1"}
+    own, log = environment(**places, SLURM_NNODES="1", SLURM_NODEID="0"), tmp_path / "log"
+    with log.open("w") as file:
+        node = subprocess.Popen(
+            ["bash", "-c", script], env=own, cwd=ROOT, stdout=file, stderr=file, start_new_session=True
+        )
+    processes = [psutil.Process(node.pid)]
+    try:
+        while not (tmp_path / "out/pretrain/checkpoints/000002").is_dir():
+            assert node.poll() is None, log.read_text()[-3000:]
+            time.sleep(0.05)
+        processes += processes[0].children(recursive=True)  # in sessions of their own, which outlive the others
+        send(node.pid, signal.SIGUSR1)
+        assert node.wait(timeout=120) == 1  # as the launcher calls each failure
+    finally:
+        for process in processes:
+            with suppress(psutil.NoSuchProcess):
+                process.kill()
+    last = last_checkpoint(tmp_path / "out/pretrain")
+    assert last is not None
+    assert 2 <= checkpoint_step(last) == losses(tmp_path, "pretrain")[-1][0] < 100000, log.read_text()[-3000:]
+    assert "the same command goes on" in log.read_text()
 
 
 WAITING = """

@@ -29,6 +29,7 @@ from robocasa_lerobot.jobs.locks import locked
 from robocasa_lerobot.progress import Bar
 
 FORMAT = 1  # counted up when the content of a cache changes
+_BLOCK = 512  # bytes of the unit of `st_blocks`, whatever the file system's own is
 _TOLERANCE_S = 1e-4  # LeRobot's tolerance between the asked and the decoded timestamp
 
 
@@ -81,10 +82,16 @@ def open_or_build(source: DatasetSource, keys: Sequence[str], size: tuple[int, i
     with locked(cache_dir / f"{name}.lock", wait=True):
         if not folder.is_dir():
             remedy = ", a smaller `loader.image_size`, or `loader.cache_frames: false`"
-            check_disk(cache_bytes(source, keys, size), cache_dir, "the frame cache", remedy)
+            needed = cache_bytes(source, keys, size) - _allocated(partial)
+            check_disk(needed, cache_dir, "the frame cache", remedy)
             _fill(source, sorted(keys), size, partial)
             partial.rename(folder)
     return FrameCache(folder)
+
+
+def _allocated(folder: Path) -> int:
+    """Bytes that the files of a folder take on the disk: those of a filling that was killed have holes."""
+    return sum(path.stat().st_blocks * _BLOCK for path in folder.glob("*.npy"))
 
 
 def _fill(source: DatasetSource, keys: list[str], size: tuple[int, int], folder: Path) -> None:

@@ -28,6 +28,13 @@ from robocasa_lerobot.evaluation.planning.run_header import (
     plan_tasks,
 )
 
+# Settings that leave results as they are: where they lie, where and how patiently trials run. Which policy it is, is
+# not said by the place of a checkpoint, where a later one lies in its turn.
+_NOT_OF_THE_RUN = (
+    *("out", "workers", "shard", "stall_seconds", "remote"),
+    *("policy.path", "policy.devices", "policy.placement", "env.render_devices"),
+)
+
 
 @dataclass(frozen=True)
 class Checked:
@@ -40,7 +47,7 @@ class Checked:
         tasks: that it runs.
         trials: of all policies, tasks and perturbations together.
         steps: control steps of all trials, if none is solved before its horizon; 0 where the env decides.
-        plan: a name of the planned run, the same as long as that is.
+        plan: a name of the planned run, the same as long as its tasks, their horizons and its settings are.
     """
 
     mistake: str | None = None
@@ -82,14 +89,21 @@ def describe(config: EvaluationConfig, tasks: PlannedTasks) -> Checked:
     phases: list[int | None] = [*config.policy.lifelong_phase] if config.lifelong else [None] * len(config.policy.path)
     each = config.trials * len(config.perturbation.names)
     own = [task for phase in phases for task in tasks.of_policy(phase)]
-    what = json.dumps([tasks.horizons, config.trials, config.perturbation.names, phases])
     return Checked(
         partial=partial_sentence(tasks.sets, tasks.missing, tasks.missing_by_set),
         tasks=len(tasks.horizons),
         trials=each * len(own),
         steps=each * sum(tasks.horizons[task] or 0 for task in own),
-        plan=hashlib.sha256(what.encode()).hexdigest()[:12],
+        plan=_name(config, tasks),
     )
+
+
+def _name(config: EvaluationConfig, tasks: PlannedTasks) -> str:
+    settings = dataclasses.asdict(config)
+    for key in _NOT_OF_THE_RUN:
+        group, _, name = key.rpartition(".")
+        del (settings[group] if group else settings)[name]
+    return hashlib.sha256(json.dumps([tasks.horizons, settings], default=str).encode()).hexdigest()[:12]
 
 
 def lines(config: EvaluationConfig, tasks: PlannedTasks) -> list[str]:

@@ -22,8 +22,8 @@ class Traced:
     """A module as a function of tensors: the same bits as the module's, sooner.
 
     On a CPU, without gradients and outside training, its kernels are recorded by TorchScript for each shape of its
-    inputs; anywhere else, and where the module has hooks, it is called. Of modules inside it, hooks count that are
-    there at the first call. Recordings use the module's own parameters, so that they follow whatever
+    inputs; anywhere else, under autocast, and where the module has hooks, it is called. Of modules inside it, hooks
+    count that are there at the first call. Recordings use the module's own parameters, so that they follow whatever
     changes these in place. A recording that does not give what the module gives, to the bit, is not used: so do
     modules whose course depends on values, if those of the first call show it. Copies and pickles hold none.
 
@@ -39,7 +39,8 @@ class Traced:
         """What the module gives for these inputs."""
         out: Tensor
         changes = torch.is_grad_enabled() or self._module.training or _has_hooks(self._module)
-        if changes or any(x.device.type != "cpu" for x in inputs):
+        # A recording has the types of its first call, whether autocast chose them or not.
+        if changes or torch.is_autocast_enabled("cpu") or any(x.device.type != "cpu" for x in inputs):
             out = self._module(*inputs)
             return out
         key = tuple((x.shape, x.dtype) for x in inputs)

@@ -58,7 +58,7 @@ class PlannedEvaluation:
         tasks: that it runs.
         trials: on all of them.
         steps: control steps of all trials, if none is solved before its horizon; 0 where the env decides.
-        plan: a name of the planned run, the same as long as that is.
+        plan: a name of the planned run, the same as long as its tasks, their horizons and its settings are.
     """
 
     phase: str
@@ -177,11 +177,13 @@ def run_evaluations(
             continue
         command = [sys.executable, "-m", "robocasa_lerobot.cli", "eval", "--end-with-input", *item.arguments]
         status = _run(command, stop)
-        if status is None:
+        if status is None or (status and stop()):  # a signal to all processes ends it as well, and is no failure
             break
         if status:
             again = shlex.join(["robocasa-lerobot", "eval", *item.arguments])
             reason = f"it ended with status {status}. Its own message stands in the log; alone it runs with `{again}`"
+            if done.is_file():
+                reason += f". If its settings have changed, put the results of before, {done.parent}, elsewhere"
             failed.append(Skipped(EVALUATION, item.phase, item.evaluation.name, reason))
             print(failed[-1], file=sys.stderr, flush=True)
             continue

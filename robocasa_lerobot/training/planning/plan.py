@@ -31,7 +31,9 @@ from robocasa_lerobot.training.planning.unavailable import runnable
 from robocasa_lerobot.training.setup import builders
 from robocasa_lerobot.training.setup import phase_data as joining
 from robocasa_lerobot.training.setup.build_phase import planned_policy, prepare_phase
+from robocasa_lerobot.training.weights.adapters import apply_training_scope
 from robocasa_lerobot.training.weights.checkpoint import checkpoint_step, last_checkpoint
+from robocasa_lerobot.training.weights.master_weights import half_parameters
 
 MEASURED_STEPS = 20
 _LARGEST_ON_CPU = 2e8  # parameters; 20 steps of more take hours without an accelerator
@@ -49,7 +51,8 @@ class PhasePlan:
         frames: of its data, or None where some are missing.
         missing: its datasets that are not there, each with how to get it.
         parameters: of its policy, and those of them that are trained; None where it cannot be built here.
-        checkpoint_bytes: size of a checkpoint, and `kept` how many stay.
+        checkpoint_bytes: size of a checkpoint; `kept` of them stay, and for a moment there are `aside` more: a new
+            one is whole before an old one is removed.
         cache_bytes: decoded frames on disk.
         seconds: per optimiser step on this device, without waiting for data; None where not measured.
         notes: what keeps it from running, or was left out.
@@ -65,6 +68,7 @@ class PhasePlan:
     parameters: tuple[int, int] | None = None
     checkpoint_bytes: int | None = None
     kept: int = 1
+    aside: int = 0
     cache_bytes: int = 0
     seconds: float | None = None
     notes: list[str] = field(default_factory=list)
@@ -169,30 +173,31 @@ def _plan_policy(config: Any, phase: PhaseConfig, plan: PhasePlan) -> None:
     finally:
         config.device = device
     total = sum(p.numel() for p in policy.parameters())
-    trained = total
-    if phase.freeze or phase.lora is not None:
-        trained = _trained(policy, phase)
-    plan.parameters = (total, trained)
-    bytes_ = sum(p.numel() * p.element_size() for p in policy.parameters())
-    two_states = 8 * trained  # Adam's, float32
-    raw = bytes_ if phase.ema.enabled or phase.lora is not None else 0
-    plan.checkpoint_bytes = bytes_ + raw + two_states
-    plan.kept = _checkpoints_kept(phase)
-
-
-def _trained(policy: torch.nn.Module, phase: PhaseConfig) -> int:
-    from robocasa_lerobot.training.weights.adapters import apply_training_scope
-
     apply_training_scope(policy, phase, seed=0)
-    return sum(p.numel() for p in policy.parameters() if p.requires_grad)
+    plan.parameters = (total, sum(p.numel() for p in policy.parameters() if p.requires_grad))
+    plan.checkpoint_bytes = _checkpoint_bytes(policy, phase)
+    plan.kept, plan.aside = _checkpoints_kept(phase)
 
 
-def _checkpoints_kept(phase: PhaseConfig) -> int:
+def _checkpoint_bytes(policy: torch.nn.Module, phase: PhaseConfig) -> int:
+    """What `save_checkpoint` writes, without what is small beside it."""
+    trained = sum(p.numel() for p in policy.parameters() if p.requires_grad)
+    half = sum(p.numel() for p in half_parameters(policy))
+    weights = sum(p.numel() * p.element_size() for p in policy.parameters())
+    low_rank = phase.lora is not None
+    twice = phase.ema.enabled or low_rank  # averaged or merged ones beside those that are trained
+    average = phase.ema.enabled and (low_rank or half > 0)
+    return weights * (1 + twice) + 4 * half + 4 * trained * average + 8 * trained  # float32; two are Adam's
+
+
+def _checkpoints_kept(phase: PhaseConfig) -> tuple[int, int]:
+    """How many stay, and how many more there are while one is written."""
     steps = {phase.steps, *(range(phase.save_every, phase.steps, phase.save_every) if phase.save_every else ())}
+    kept = steps
     if phase.keep_last:
         always = {s for s in steps if phase.keep_every and s % phase.keep_every == 0}
-        steps = always | set(sorted(steps)[-phase.keep_last :])
-    return len(steps) + phase.save_initial
+        kept = always | set(sorted(steps)[-phase.keep_last :])
+    return len(kept) + phase.save_initial, int(len(kept) < len(steps))
 
 
 def _what_a_step_is(experiment: ExperimentConfig, phase: PhaseConfig) -> str:

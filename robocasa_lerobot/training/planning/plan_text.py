@@ -55,7 +55,9 @@ def _phase_lines(experiment: ExperimentConfig, plan: PhasePlan) -> list[str]:
     lines += [f"  {'; '.join(details)}"] if details else []
     if plan.checkpoint_bytes is not None:
         size = f"{plan.checkpoint_bytes / 1e9:,.2f} GB"
-        lines.append(f"  disk: {plan.kept} checkpoint(s) of {size}, frame cache {plan.cache_bytes / 1e9:,.2f} GB")
+        aside = " and one more while it is written" if plan.aside else ""
+        cache = f"frame cache {plan.cache_bytes / 1e9:,.2f} GB"
+        lines.append(f"  disk: {plan.kept} checkpoint(s) of {size}{aside}, {cache}")
     if plan.hours is not None and plan.seconds is not None:
         lines.append(f"  time: {plan.seconds:.3f} s per step, {plan.hours:,.1f} h to go")
     return [lines[0], *(indent + line for line in lines[1:])]
@@ -75,6 +77,7 @@ def _evaluation_lines(evaluations: Sequence[PlannedEvaluation]) -> list[str]:
 
 def _sums(plans: Sequence[PhasePlan], device: str) -> list[str]:
     disk = sum((p.checkpoint_bytes or 0) * p.kept + p.cache_bytes for p in plans)
+    disk += max(((p.checkpoint_bytes or 0) * p.aside for p in plans), default=0)  # phases take turns
     unknown = [p.phase.name for p in plans if p.checkpoint_bytes is None and not p.left_out]
     without = f" (without {', '.join(unknown)})" if unknown else ""
     lines = [f"samples: {sum(p.samples for p in plans):,}", f"disk: {disk / 1e9:,.1f} GB{without}"]

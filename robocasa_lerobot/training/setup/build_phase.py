@@ -22,6 +22,7 @@ from robocasa_lerobot.training.loop import PhaseRun
 from robocasa_lerobot.training.metrics import truncate_metrics
 from robocasa_lerobot.training.setup import builders
 from robocasa_lerobot.training.setup import phase_data as joining
+from robocasa_lerobot.training.setup.features import LEAVE_OUT, RENAME
 from robocasa_lerobot.training.weights.adapters import apply_training_scope
 from robocasa_lerobot.training.weights.checkpoint import TrainingState, last_checkpoint, pretrained_model, restore, tidy
 from robocasa_lerobot.training.weights.ema import Ema
@@ -34,15 +35,20 @@ def prepare_phase(
     device: str,
     accelerator: Accelerator,
     stop: Callable[[], bool] = lambda: False,
+    force: bool = False,
 ) -> PhaseRun:
     """Data, policy, processors and optimiser of a phase, continued from its last checkpoint if it has one.
+
+    With `force` it is continued with the policy's settings as they are now, and not as they were when it began.
 
     Raises:
         UserError: data, start and settings do not fit each other, or the phase was begun with other data.
     """
     folder = Path(experiment.output_dir) / phase.name
     init, last = start_of(experiment, phase), last_checkpoint(folder)
-    settings = {} if last is not None else policy_settings(experiment, phase)
+    settings = policy_settings(experiment, phase) if last is None else {}
+    if last is not None and force:
+        settings = _forced_settings(experiment, phase)
     config = builders.policy_config(settings, pretrained_model(last) if last is not None else init, device)
     seed = phase_seed(experiment.seed, phase.name)
     dataset, apart = joining.open_phase_data(experiment, phase), None
@@ -113,6 +119,7 @@ def prepare_phase(
         stop=stop,
         held_out=held_out,
         always_eval=always_eval,
+        earlier_steps=sum(other.steps for other in experiment.phases[: experiment.phases.index(phase)]),
     )
 
 
@@ -138,6 +145,12 @@ def policy_settings(experiment: ExperimentConfig, phase: PhaseConfig) -> dict[st
         if "type" not in settings:
             raise UserError(f"phase {phase.name!r} starts {FROM_SCRATCH}, so `policy` needs a `type`.")
     return settings
+
+
+def _forced_settings(experiment: ExperimentConfig, phase: PhaseConfig) -> dict[str, Any]:
+    """What a begun phase's policy has now, to be laid over its own checkpoint, whose inputs are the data's already."""
+    settings, _ = planned_policy(experiment, phase)
+    return {key: value for key, value in settings.items() if key not in (RENAME, LEAVE_OUT)}
 
 
 def planned_policy(

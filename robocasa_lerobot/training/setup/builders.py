@@ -43,16 +43,20 @@ def best_device(wanted: str | None) -> str:
     """The device asked for, or the best one of this machine.
 
     Raises:
-        UserError: the device asked for is not there.
+        UserError: the device asked for is not there, or is one of several by its number.
     """
     available = {"cpu": True, "cuda": torch.cuda.is_available(), "mps": torch.backends.mps.is_available()}
     if wanted is None:
         return next(name for name in ("cuda", "mps", "cpu") if available[name])
-    if wanted.split(":")[0] not in available:
+    kind, _, number = wanted.partition(":")
+    if kind not in available:
         raise UnknownNameError("device", wanted, available)
-    if not available[wanted.split(":")[0]]:
+    if number:  # Accelerate takes the first one of those that the process sees, whatever stands here
+        remedy = f", and choose the GPU before the command: `CUDA_VISIBLE_DEVICES={number}`" if kind == "cuda" else ""
+        raise UserError(f"device {wanted!r}: found a number, expected a kind of device; set `device: {kind}`{remedy}.")
+    if not available[kind]:
         raise UserError(f"device {wanted!r} is not there; set `device: null` for the best one, or `cpu`.")
-    return wanted
+    return kind
 
 
 def device_name(device: str) -> str:

@@ -19,8 +19,10 @@ from typing import Any
 
 import torch
 from lerobot.common.train_utils import load_training_state, save_training_state
+from lerobot.optim import load_optimizer_state_dict, load_scheduler_state
 from lerobot.policies.pretrained import PreTrainedPolicy
 from safetensors.torch import load_file, load_model, save_file, save_model
+from torch.optim.lr_scheduler import LambdaLR, LRScheduler
 
 from robocasa_lerobot.errors import UserError
 from robocasa_lerobot.policies.origin import Origin, experiment_of
@@ -43,7 +45,7 @@ class TrainingState:
     preprocessor: Any
     postprocessor: Any
     optimizer: torch.optim.Optimizer
-    scheduler: torch.optim.lr_scheduler.LRScheduler | None
+    scheduler: LRScheduler | None
     ema: Ema | None
     masters: MasterWeights
     low_rank: bool = False
@@ -147,6 +149,8 @@ def save_checkpoint(phase_dir: Path, state: TrainingState, train_config: Any) ->
 def restore(checkpoint: Path, state: TrainingState) -> None:
     """Continue from a checkpoint whose `pretrained_model` weights the policy (and its average) already has.
 
+    Optimiser and schedule keep the settings that they were made with, which may be others than those of before.
+
     Raises:
         UserError: the checkpoint has no training state, or one of another optimiser or policy.
     """
@@ -168,9 +172,42 @@ def restore(checkpoint: Path, state: TrainingState) -> None:
     except (RuntimeError, OSError) as error:
         raise UserError(f"{folder} does not fit the phase's policy: {error}") from error
     try:
-        state.step, _, _ = load_training_state(checkpoint, state.optimizer, state.scheduler)
-    except (KeyError, ValueError, TypeError) as error:
+        state.step, _, _ = load_training_state(checkpoint, state.optimizer, None, load_optimizer=False)
+        _load_optimizer(folder, state.optimizer)
+        if state.scheduler is not None:
+            _load_schedule(folder, state.scheduler, state.step)
+    except (KeyError, ValueError, TypeError, OSError) as error:
         raise UserError(f"{folder} does not fit the phase's optimiser: {error}") from error
     state.log_window = json.loads((folder / LOG_WINDOW).read_text())
     if state.ema is not None:
         state.ema.step = state.step
+
+
+def _load_optimizer(folder: Path, optimizer: torch.optim.Optimizer) -> None:
+    """The moments of the weights, and nothing else: what a group has beside them are settings.
+
+    Raises:
+        ValueError: it was another type of optimiser, or one of other weights.
+    """
+    saved, own = load_optimizer_state_dict(folder), optimizer.state_dict()["param_groups"]
+    if list(map(_kind, saved["param_groups"])) != list(map(_kind, own)):
+        raise ValueError("it is of another type, or has other weights")
+    moments = {int(number): values for number, values in saved["state"].items()}
+    optimizer.load_state_dict({"state": moments, "param_groups": own})
+
+
+def _kind(group: dict[str, Any]) -> tuple[int, set[str]]:
+    """Of a group of weights: their number, and what the optimiser calls its settings."""
+    return len(group["params"]), group.keys() - {"params", "initial_lr"}  # the latter is a schedule's
+
+
+def _load_schedule(folder: Path, scheduler: LRScheduler, step: int) -> None:
+    """The rates after so many steps: from the schedule's own settings if it follows from them, as LeRobot's all do."""
+    if isinstance(scheduler, LambdaLR):
+        scheduler.last_epoch = step
+        factors = [factor(step) for factor in scheduler.lr_lambdas]
+        rates = [base * factor for base, factor in zip(scheduler.base_lrs, factors, strict=True)]
+    else:
+        rates = load_scheduler_state(scheduler, folder).get_last_lr()
+    for group, rate in zip(scheduler.optimizer.param_groups, rates, strict=True):
+        group["lr"] = rate
