@@ -41,20 +41,23 @@ def configure(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Plan, or run what has not ended yet and write the page after each run."""
-    from robocasa_lerobot.data.registry.registry import open_registry
     from robocasa_lerobot.errors import UserError
-    from robocasa_lerobot.jobs.workers import cores_here
-    from robocasa_lerobot.study.costs import cost_lines, costs
-    from robocasa_lerobot.study.page import write_page
-    from robocasa_lerobot.study.runs import configs_for, root_for, runs_of
     from robocasa_lerobot.study.settings import load_study
-    from robocasa_lerobot.study.stored import is_stored, read_stored, store
 
     for name in ("seeds", "workers"):
         if getattr(args, name) is not None and getattr(args, name) < 1:
             raise UserError(f"--{name} is {getattr(args, name)}, expected at least 1.")
     study = load_study(args.config_path, args.seeds)
     parts = study.chosen(args.parts)
+
+    # After the mistakes: these take seconds.
+    from robocasa_lerobot.data.registry.registry import open_registry
+    from robocasa_lerobot.jobs.workers import cores_here
+    from robocasa_lerobot.study.costs import cost_lines, costs
+    from robocasa_lerobot.study.page import write_page
+    from robocasa_lerobot.study.runs import configs_for, root_for, runs_of
+    from robocasa_lerobot.study.stored import is_stored, read_stored, store
+
     root = args.root or root_for(study, args.device, args.scale)
     results = args.results or root / "results"
     asked = (args.scale, args.episodes)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import dataclasses
 from pathlib import Path
 from typing import Any
 
@@ -43,6 +44,17 @@ def make_report(*runs: Path) -> dict[str, str]:
 
 def rows(text: str) -> list[dict[str, str]]:
     return list(csv.DictReader(text.splitlines()))
+
+
+def test_perturbations_that_change_nothing_are_said_to_change_nothing(tmp_path: Path) -> None:
+    data = gather([make_run(tmp_path / "run", "none", "camera", "joint")])
+    same = [
+        dataclasses.replace(policy, conditions=dict.fromkeys(policy.conditions, policy.conditions["none"]))
+        for policy in data.policies
+    ]
+    said = robustness.sentence(dataclasses.replace(data, policies=tuple(same)))
+    assert said == "None of 2 perturbations changes the success of checkpoint."
+    assert "most" in str(robustness.sentence(data))
 
 
 def test_a_perturbation_alone_is_named_and_stands_beside_no_published_number(tmp_path: Path) -> None:

@@ -209,6 +209,24 @@ def test_the_curve_has_all_tasks_at_each_point_and_the_worth_of_each_split(
     assert "on the average over 50 tasks" in str(data_efficiency.sentence(data))
 
 
+def test_other_data_than_the_benchmarks_are_counted_in_shares(foundation: tuple[Path, list[Path]]) -> None:
+    data = gather(foundation[1])
+    assert "as if 100 %" not in " ".join(data_efficiency.section(data).text)  # type: ignore[union-attr]
+    assert str(data_efficiency.sentence(data)).startswith("With 50 target demonstrations per task")
+    own = [
+        dataclasses.replace(
+            policy,
+            headers=tuple(dataclasses.replace(header, registry="parts/kitchens.yaml") for header in policy.headers),
+        )
+        for policy in data.policies
+    ]
+    data = dataclasses.replace(data, policies=tuple(own))
+    assert "as if 100 % were 500 of each task" in " ".join(data_efficiency.section(data).text)  # type: ignore[union-attr]
+    said = str(data_efficiency.sentence(data))
+    assert said.startswith("With 10 % of the target demonstrations the pretrained policy does as well as")
+    assert "50 target" not in said
+
+
 def test_two_trainings_of_one_experiment_stay_apart_and_are_both_shown(
     foundation: tuple[Path, list[Path]], tmp_path: Path
 ) -> None:

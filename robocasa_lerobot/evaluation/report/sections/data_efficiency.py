@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 from robocasa_lerobot.benchmark import published
 from robocasa_lerobot.evaluation.records.results import UNPERTURBED
 from robocasa_lerobot.evaluation.report import numbers as fmt
 from robocasa_lerobot.evaluation.report.efficiency_curves import (
+    ALL_DEMOS,
     AVERAGE,
     Curve,
     GroupCurves,
@@ -48,10 +51,17 @@ def sentence(data: ReportData) -> str | None:
         for one in group.worth():
             if one.demos > 0:
                 bound = f"{one.bound} " if one.bound else ""
-                return (
+                before = (
                     f"With {one.demos} target demonstrations per task the pretrained policy does as well as {bound}"
-                    f"{one.equal_demos:.0f} without pretraining{_range(one)}, on {_which(group)}: pretraining is worth "
-                    f"{bound}{one.factor:.1f} times the target data."
+                )
+                before += f"{one.equal_demos:.0f} without pretraining{_range(one)}"
+                if _others_data(data):
+                    before = (
+                        f"With {_share(one.demos)} of the target demonstrations the pretrained policy does as well as "
+                    )
+                    before += f"{bound}{_share(one.equal_demos)} without pretraining"
+                return (
+                    f"{before}, on {_which(group)}: pretraining is worth {bound}{one.factor:.1f} times the target data."
                 )
     return None
 
@@ -73,11 +83,29 @@ def _which(group: GroupCurves) -> str:
     return f"{fmt.count(group.tasks, 'task')} ({group.label.lower()})"
 
 
+def _others_data(data: ReportData) -> list[str]:
+    """Registries of the policies on the curves that are not the benchmark's."""
+    policies = [policy for side in curves(data) for policy in side.values()]
+    files = [header.registry for policy in policies for header in policy.headers if header.registry is not None]
+    return sorted({Path(file).name for file in files})
+
+
+def _share(demos: float) -> str:
+    return f"{100 * demos / ALL_DEMOS:.0f} %"
+
+
 def _said(data: ReportData, found: list[GroupCurves]) -> list[str]:
     """Which policies are on no curve or not on every one, so that none is left out in silence."""
     shown = [curve for curve in _chosen(data) if curve is not None]
     rest = [curve for curve in all_curves(data) if curve not in shown]
     out = []
+    files = _others_data(data)
+    if files:
+        out.append(
+            f"Demonstrations are counted as if 100 % were {ALL_DEMOS} of each task, as in the benchmark. These policies "
+            f"had data of another registry ({fmt.listed(files)}), which may hold other numbers of them: read the "
+            "shares, and not the numbers."
+        )
     if rest:
         names = [f"{curve.label} ({', '.join(f'{demos}' for demos in curve.points)})" for curve in rest]
         out.append(

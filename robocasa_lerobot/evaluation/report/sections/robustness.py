@@ -37,6 +37,8 @@ def sentence(data: ReportData) -> str | None:
     drops = {name: drop for name in policy.conditions if (drop := _drop(policy, name)) is not None}
     if not drops:
         return None
+    if not any(drop.difference.value for drop in drops.values()):
+        return f"None of {fmt.count(len(drops), 'perturbation')} changes the success of {policy.label}."
     name, worst = min(drops.items(), key=lambda item: item[1].difference.value)
     return (
         f"Of {fmt.count(len(drops), 'perturbation')}, {spelled(name)} changes the success of {policy.label} most: "
