@@ -47,9 +47,11 @@ def configure(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Write the report and print the rates."""
+    from robocasa_lerobot.evaluation.report.formats.render import check_ending
     from robocasa_lerobot.evaluation.report.output import print_rates, write_report
 
     out = args.out or args.results[0] / "report.html"
+    check_ending(out)
     print_rates(args.results)
     write_report(args.results, args.training, args.demos, out, args.title, videos=not args.no_videos)
     return 0

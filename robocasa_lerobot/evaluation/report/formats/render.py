@@ -17,16 +17,19 @@ from robocasa_lerobot.evaluation.report.policies import ReportData
 from robocasa_lerobot.files import write_text
 
 
+def check_ending(out: Path) -> None:
+    """Raise UserError if `out` does not end in .html; what is written beside it has other endings."""
+    if out.suffix != ".html":
+        raise UserError(f"--out {out}: found the ending {out.suffix!r}, expected .html; other formats come beside it.")
+
+
 def write_report(document: Document, data: ReportData, out: Path) -> list[Path]:
     """Write `out` (HTML) and its Markdown, LaTeX and CSV files beside it; returns all paths.
 
     Raises:
         UserError: `out` does not end in .html.
     """
-    if out.suffix != ".html":
-        raise UserError(
-            f"--out {out}: found the ending {out.suffix!r}, expected .html; .md, .tex and .csv are written beside it."
-        )
+    check_ending(out)
     out.parent.mkdir(parents=True, exist_ok=True)
     texts = {
         out: html(document),
@@ -46,8 +49,7 @@ def write_page(document: Document, out: Path) -> None:
     Raises:
         UserError: `out` does not end in .html.
     """
-    if out.suffix != ".html":
-        raise UserError(f"--out {out}: found the ending {out.suffix!r}, expected .html.")
+    check_ending(out)
     out.parent.mkdir(parents=True, exist_ok=True)
     write_text(out, html(document))
 

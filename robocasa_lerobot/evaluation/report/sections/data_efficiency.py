@@ -102,9 +102,9 @@ def _said(data: ReportData, found: list[GroupCurves]) -> list[str]:
     files = _others_data(data)
     if files:
         out.append(
-            f"Demonstrations are counted as if 100 % were {ALL_DEMOS} of each task, as in the benchmark. These policies "
-            f"had data of another registry ({fmt.listed(files)}), which may hold other numbers of them: read the "
-            "shares, and not the numbers."
+            f"Demonstrations are counted as if 100 % were {ALL_DEMOS} of each task, as in the benchmark. The data of "
+            f"these policies are of another registry ({fmt.listed(files)}), which may hold other numbers of them: "
+            "read the shares, and not the numbers."
         )
     if rest:
         names = [f"{curve.label} ({', '.join(f'{demos}' for demos in curve.points)})" for curve in rest]
