@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 from pathlib import Path
 from typing import Any
@@ -274,6 +275,15 @@ def test_plan_tells_what_would_be_done(tmp_path: Path, data: Path) -> None:
     sizes = sum(tensor.nbytes for path in files for tensor in load_file(path).values())
     assert pretrain.checkpoint_bytes == pytest.approx(sizes, rel=0.05)
     assert plan_experiment(experiment, only="pretrain", measured_steps=0)[0].done == 4
+
+
+def test_plan_counts_frames_once_that_phases_share(tmp_path: Path, data: Path) -> None:
+    experiment = tiny(tmp_path, data, overrides=["--loader.cache_frames=true"])
+    plans = plan_experiment(experiment, measured_steps=0)
+    assert plans[0].cached
+    assert plans[0].cached == plans[1].cached
+    large = [dataclasses.replace(plan, cached=dict.fromkeys(plan.cached, 5_000_000_000)) for plan in plans]
+    assert "\ndisk: 5.0 GB" in render_plan(experiment, large, "cpu")
 
 
 @pytest.mark.parametrize("lora", [None, {"rank": 2}])

@@ -53,7 +53,7 @@ class PhasePlan:
         parameters: of its policy, and those of them that are trained; None where it cannot be built here.
         checkpoint_bytes: size of a checkpoint; `kept` of them stay, and for a moment there are `aside` more: a new
             one is whole before an old one is removed.
-        cache_bytes: decoded frames on disk.
+        cached: bytes of decoded frames on disk, by dataset: phases share them.
         seconds: per optimiser step on this device, without waiting for data; None where not measured.
         notes: what keeps it from running, or was left out.
         left_out: why the phase will not run at all, or "".
@@ -69,10 +69,15 @@ class PhasePlan:
     checkpoint_bytes: int | None = None
     kept: int = 1
     aside: int = 0
-    cache_bytes: int = 0
+    cached: dict[Path, int] = field(default_factory=dict)
     seconds: float | None = None
     notes: list[str] = field(default_factory=list)
     left_out: str = ""
+
+    @property
+    def cache_bytes(self) -> int:
+        """Decoded frames on disk."""
+        return sum(self.cached.values())
 
     @property
     def samples(self) -> int:
@@ -155,10 +160,10 @@ def _plan_data(experiment: ExperimentConfig, phase: PhaseConfig, plan: PhasePlan
     plan.frames = dataset.meta.total_frames
     loader = experiment.loader
     size = dataset.meta.features[dataset.meta.camera_keys[0]]["shape"][:2] if dataset.meta.camera_keys else (0, 0)
-    cache = sum(s.total_frames for s in dataset.sources.values()) * len(dataset.meta.camera_keys) * 3
-    cache *= int(size[0]) * int(size[1])
-    fits = cache <= loader.cache_budget_gb * 1e9
-    plan.cache_bytes = cache if loader.cache_frames or (loader.cache_frames is None and fits) else 0
+    each = len(dataset.meta.camera_keys) * 3 * int(size[0]) * int(size[1])
+    cached = {root.absolute(): each * source.total_frames for root, source in dataset.sources.items()}
+    fits = sum(cached.values()) <= loader.cache_budget_gb * 1e9
+    plan.cached = cached if loader.cache_frames or (loader.cache_frames is None and fits) else {}
 
 
 def _plan_policy(config: Any, phase: PhaseConfig, plan: PhasePlan) -> None:

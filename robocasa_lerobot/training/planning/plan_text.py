@@ -76,7 +76,8 @@ def _evaluation_lines(evaluations: Sequence[PlannedEvaluation]) -> list[str]:
 
 
 def _sums(plans: Sequence[PhasePlan], device: str) -> list[str]:
-    disk = sum((p.checkpoint_bytes or 0) * p.kept + p.cache_bytes for p in plans)
+    disk = sum((p.checkpoint_bytes or 0) * p.kept for p in plans)
+    disk += sum({root: size for p in plans for root, size in p.cached.items()}.values())
     disk += max(((p.checkpoint_bytes or 0) * p.aside for p in plans), default=0)  # phases take turns
     unknown = [p.phase.name for p in plans if p.checkpoint_bytes is None and not p.left_out]
     without = f" (without {', '.join(unknown)})" if unknown else ""
