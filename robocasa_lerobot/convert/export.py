@@ -29,7 +29,7 @@ from robocasa_lerobot.progress import Bar
 COMPRESSIONS = ("gzip", "lzf", "none")
 _GZIP_LEVEL = 1  # pictures hardly get smaller with more, only slower
 _BLOCK_FRAMES = 32  # decoded frames held at a time
-EXPORTED_BY = "exported_by"  # attribute of `data`
+_EXPORTED_BY = "exported_by"  # attribute of `data`
 _ROBOSUITE_ENV = 1  # robomimic's number for environments of robosuite
 # Names of the state's components of arms with a fixed base, an arm's name before each where there are several, and
 # what robosuite calls the observation that they are of.
@@ -161,9 +161,6 @@ def _write_vectors(
     dones[-1] = 1  # robomimic's done mode 1: the last step of a demonstration
     dones = columns["next.done"].reshape(-1).astype(np.int64) if "next.done" in columns else dones
     further.setdefault("dones", dones)
-    for key, values in further.items():
-        if key not in group and key != "states":
-            group.create_dataset(key, data=values, **compression)
     lacking = []
     folder = dataset.extras(episode)
     states = folder / "states.npz"
@@ -172,6 +169,9 @@ def _write_vectors(
             group.create_dataset("states", data=arrays["states"], **compression)
     else:
         lacking.append("simulator states")
+    for key, values in further.items():
+        if key not in group:
+            group.create_dataset(key, data=values, **compression)
     model = folder / "model.xml.gz"
     if model.is_file():
         group.attrs["model_file"] = gzip.decompress(model.read_bytes()).decode("utf-8")
@@ -255,7 +255,7 @@ def _attributes(dataset: ExportedDataset, episodes: Sequence[ExportedEpisode]) -
         {"env_name": name, "type": _ROBOSUITE_ENV} | env_args | {"env_kwargs": defaults | info | kwargs}
     )
     recorded.setdefault("env", name)
-    recorded[EXPORTED_BY] = f"robocasa_lerobot {__version__}"
+    recorded[_EXPORTED_BY] = f"robocasa_lerobot {__version__}"
     return {key: value for key, value in recorded.items() if isinstance(value, str | int | float | bool)}
 
 

@@ -153,7 +153,6 @@ class Parts:
         self.folder = out / f".{settings.task}.parts"
         self.settings = settings
         self.films = films
-
         self._failures: dict[str, Failure] = {}  # notes that have been read: there may be thousands of them
 
     def prepare(self) -> None:

@@ -51,8 +51,7 @@ def record_distributed(
     asked = json.dumps([dataclasses.asdict(one) for one in settings])
     folder = out / _FOLDER / hashlib.sha256(asked.encode()).hexdigest()[:12]  # markers hold for these settings only
     folder.mkdir(parents=True, exist_ok=True)
-    cpus = execution.ray.cpus if execution.kind == "ray" else execution.slurm.cpus
-    step = partial(record_one, settings=settings, out=out, workers=cpus, keep_failures=keep_failures)
+    step = partial(record_one, settings=settings, out=out, workers=execution.cpus, keep_failures=keep_failures)
     last = partial(finish, settings, out, keep_failures)
     if execution.kind == "ray":
         run_with_ray(step, len(settings), folder, execution.ray)

@@ -18,7 +18,7 @@ from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.errors import UserError
 from robocasa_lerobot.gl import ensure_gl
 from robocasa_lerobot.jobs.pool import PoolExecutor, polled
-from robocasa_lerobot.jobs.publish import held_folder
+from robocasa_lerobot.jobs.publish import held_lock
 
 __all__ = ["FAILURES_FOLDER", "RecordingResult", "RecordingSettings", "record_task", "record_tasks"]
 
@@ -111,9 +111,7 @@ def record_tasks(
             waiting.append(Parts(out, settings, out / FAILURES_FOLDER / settings.task if keep_failures else None))
     with contextlib.ExitStack() as stack:
         for parts in waiting:
-            lock = _lock(parts)
-            stack.enter_context(held_folder(lock))
-            stack.callback(shutil.rmtree, lock, ignore_errors=True)  # before it is released
+            stack.enter_context(held_lock(_lock(parts)))
             parts.prepare()
         board = stack.enter_context(Board([parts.settings for parts in waiting], show=show_progress))
         for result in _record(waiting, out, workers, board):
@@ -174,9 +172,8 @@ def _clear_away(parts: Parts) -> None:
     """Remove what a run left that was killed after the task's file had appeared."""
     lock = _lock(parts)
     if lock.exists() or parts.folder.exists():
-        with contextlib.suppress(UserError), held_folder(lock):  # held by another run, which is about to do it
+        with contextlib.suppress(UserError), held_lock(lock):  # held by another run, which is about to do it
             shutil.rmtree(parts.folder, ignore_errors=True)
-            shutil.rmtree(lock, ignore_errors=True)
 
 
 def _lock(parts: Parts) -> Path:

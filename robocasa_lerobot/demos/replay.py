@@ -142,10 +142,16 @@ def read_kitchen(path: Path, demo: str) -> Kitchen:
         UserError: other software recorded it.
     """
     with h5py.File(path) as file:
-        task = file["data"].attrs.get("env")
-        meta = json.loads(file[f"data/{demo}"].attrs.get("ep_meta", "{}"))
+        return _kitchen_in(file, demo)
+
+
+def _kitchen_in(file: h5py.File, demo: str) -> Kitchen:
+    task = file["data"].attrs.get("env")
+    meta = json.loads(file[f"data/{demo}"].attrs.get("ep_meta", "{}"))
     if task is None or not isinstance(meta, dict) or not {"seed", "split"} <= meta.keys():
-        raise UserError(f"{path}, {demo}: its ep_meta has no scene seed and split; it was recorded by other software.")
+        raise UserError(
+            f"{file.filename}, {demo}: its ep_meta has no scene seed and split; it was recorded by other software."
+        )
     return Kitchen(str(task), meta)
 
 
@@ -155,8 +161,8 @@ def read_demonstration(path: Path, demo: str) -> Demonstration:
     Raises:
         UserError: other software recorded it.
     """
-    kitchen = read_kitchen(path, demo)
     with h5py.File(path) as file:
+        kitchen = _kitchen_in(file, demo)
         group = file[f"data/{demo}"]
         states, actions = group["states"][()], contract.hdf5_to_stored(group["actions"][()])
         terms = _last_terms(group)

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import multiprocessing
-import os
-import threading
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from typing import Any
+
+from robocasa_lerobot.jobs.parent import end_with
 
 
 def as_they_end[Result](
@@ -32,12 +32,5 @@ def as_they_end[Result](
 
 
 def _end_with_parent() -> None:
-    """End this worker when the process that started it has been killed; by itself it would wait for jobs for ever."""
-    parent = multiprocessing.parent_process()
-    assert parent is not None
-
-    def wait() -> None:
-        parent.join()
-        os._exit(1)
-
-    threading.Thread(target=wait, daemon=True).start()
+    """A worker whose parent was killed would wait for jobs for ever."""
+    end_with(multiprocessing.parent_process())

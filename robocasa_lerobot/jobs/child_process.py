@@ -9,6 +9,7 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
+STOP_SIGNALS = (signal.SIGTERM, signal.SIGUSR1)  # Slurm sends the one it is told to before the time is over
 # Not `-m`: the module would be there twice, and so would the classes of its messages.
 _PROGRAM = "import sys; from {module} import serve; serve(*map(int, sys.argv[1:]))"
 
@@ -29,15 +30,14 @@ def start_serving(module: str, descriptors: Sequence[int], **environment: str) -
 def run_command(*arguments: str) -> int:
     """Run a command of `robocasa-lerobot` to its end and return its status, negative where a signal ended it.
 
-    What asks this process to end (SIGTERM, and SIGUSR1, which Slurm can be told to send) is passed on to the command,
-    which would otherwise go on alone.
+    What asks this process to end is passed on to the command, which would otherwise go on alone.
     """
     with subprocess.Popen([sys.executable, "-m", "robocasa_lerobot.cli", *arguments]) as child:
 
         def pass_on(number: int, _frame: object) -> None:
             child.send_signal(number)
 
-        before = {number: signal.signal(number, pass_on) for number in (signal.SIGTERM, signal.SIGUSR1)}
+        before = {number: signal.signal(number, pass_on) for number in STOP_SIGNALS}
         try:
             return child.wait()
         finally:

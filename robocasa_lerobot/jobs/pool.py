@@ -14,6 +14,7 @@ from datatrove.executor.local import LocalPipelineExecutor
 from datatrove.utils.logging import logger as datatrove_logger
 
 from robocasa_lerobot.errors import UserError
+from robocasa_lerobot.jobs.parent import end_with
 
 POLL_SECONDS = 0.3
 
@@ -86,12 +87,6 @@ def exit_if_orphaned() -> None:
         os._exit(1)
 
 
-def _end_with(parent: Any) -> None:
-    """Wait for the process that started this one, and end with it, in the middle of whatever is being done."""
-    parent.join()
-    os._exit(1)
-
-
 @contextlib.contextmanager
 def polled(show: Callable[[], None]) -> Iterator[None]:
     """Call `show` from a thread while the body runs: progress of workers that leave files."""
@@ -114,6 +109,6 @@ def _start_worker(initializer: Callable[[], None] | None) -> None:
     datatrove_logger.disable("datatrove")
     parent = multiprocess.parent_process()
     if parent is not None:
-        threading.Thread(target=_end_with, args=(parent,), daemon=True).start()
+        end_with(parent)
     if initializer is not None:
         initializer()

@@ -53,6 +53,16 @@ def held_folder(partial: Path) -> Iterator[None]:
 
 
 @contextlib.contextmanager
+def held_lock(folder: Path) -> Iterator[None]:
+    """Make the folder, which holds nothing but a lock, keep others out, and remove it at the end; see `held_folder`."""
+    with held_folder(folder):
+        try:
+            yield
+        finally:
+            shutil.rmtree(folder, ignore_errors=True)  # before it is released
+
+
+@contextlib.contextmanager
 def failures_explained(out: Path, partial: Path) -> Iterator[None]:
     """Turn errors of the file system, such as a full disk, into ones that name the kept files and a remedy."""
     try:

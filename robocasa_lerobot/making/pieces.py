@@ -114,8 +114,9 @@ def run_pieces(
     names = "\n".join(piece.name for piece in pieces)
     logs = folder / hashlib.sha256(names.encode()).hexdigest()[:12]
     logs.mkdir(parents=True, exist_ok=True)
+    cpus = cores if execution.kind == "local" else execution.cpus
+    step = partial(run_piece, pieces=pieces, logs=logs, workers=cpus)
     if execution.kind == "slurm":
-        step = partial(run_piece, pieces=pieces, logs=logs, workers=execution.slurm.cpus)
         last = partial(_summed_up, pieces, logs)
         array, final = submit_to_slurm(step, last, len(pieces), logs, folder / _LOGS, execution.slurm)
         line = (
@@ -124,7 +125,6 @@ def run_pieces(
         return Outcome({}, submitted=line)
     with _progress(pieces, what, unit):
         if execution.kind == "ray":
-            step = partial(run_piece, pieces=pieces, logs=logs, workers=execution.ray.cpus)
             run_with_ray(step, len(pieces), logs, execution.ray)
         else:
             _run_here(pieces, logs, cores, preload)
@@ -149,8 +149,12 @@ def _run_here(pieces: Sequence[Piece], logs: Path, cores: int, preload: Sequence
 def _outcome(pieces: Sequence[Piece], logs: Path) -> Outcome:
     notes = {piece.name: piece.work / FAILED for piece in pieces}
     failed = {name: note.read_text(encoding="utf-8") for name, note in notes.items() if note.is_file()}
-    unmade = "it ended without a word, and is not done; see the log in " + str(logs.parent)
-    failed |= {piece.name: unmade for piece in pieces if piece.name not in failed and piece.done() < piece.size}
+    for piece in pieces:
+        if piece.name not in failed and piece.done() < piece.size:
+            killed = piece.work.is_dir()  # who comes to an end removes it
+            failed[piece.name] = (
+                f"it ended without a word; see {piece.work / LOG}" if killed else "it has fewer than were asked for"
+            )
     said = {rank: logs / f"{rank}{_REMARK}" for rank in range(len(pieces))}
     remarks = {pieces[rank].name: note.read_text(encoding="utf-8") for rank, note in said.items() if note.is_file()}
     shutil.rmtree(logs, ignore_errors=True)

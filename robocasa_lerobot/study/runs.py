@@ -153,8 +153,9 @@ def configs_for(device: str, study: StudyConfig, root: Path) -> Path:
         policy = experiment.get("policy")
         if isinstance(policy, str) and Path(policy).name in _GPU_POLICIES:
             experiment["policy"] = str(Path(policy).with_name(_GPU_POLICIES[Path(policy).name]))
-            write_text(file, yaml.safe_dump(experiment, sort_keys=False))
-        if isinstance(policy, dict) and "image_size" in policy:
+        elif isinstance(policy, dict) and "image_size" in policy:
             policy["image_size"] = [pixels * _GPU_PIXELS for pixels in policy["image_size"]]
-            write_text(file, yaml.safe_dump(experiment, sort_keys=False))
+        else:
+            continue
+        write_text(file, yaml.safe_dump(experiment, sort_keys=False))
     return copy

@@ -6,7 +6,8 @@ import signal
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-SIGNALS = (signal.SIGTERM, signal.SIGUSR1)  # Slurm sends the one it is told to before the time is over
+from robocasa_lerobot.jobs.child_process import STOP_SIGNALS
+
 REQUEUE = 75  # exit status "try again later" (EX_TEMPFAIL of sysexits.h): saved on a signal
 STOPPED = 3  # exit status: saved after the number of steps that was asked for
 
@@ -30,7 +31,7 @@ class Interrupts:
             self.signalled = True
 
         try:
-            before = {number: signal.signal(number, on_signal) for number in SIGNALS}
+            before = {number: signal.signal(number, on_signal) for number in STOP_SIGNALS}
         except ValueError:  # not in the main thread: signals are not ours to handle
             yield
             return

@@ -12,7 +12,7 @@ from typing import Any
 import torch
 
 from robocasa_lerobot.data.mixture import StepBatches
-from robocasa_lerobot.training.interrupts import SIGNALS
+from robocasa_lerobot.jobs.child_process import STOP_SIGNALS
 
 
 def load_batches(batches: StepBatches, first: int, end: int, workers: int) -> Iterator[dict[str, Any]]:
@@ -39,10 +39,10 @@ def load_batches(batches: StepBatches, first: int, end: int, workers: int) -> It
 @contextmanager
 def _deaf_children() -> Iterator[None]:
     """Processes that are started inside do not take our signals: blocked ones are, from their first moment on."""
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, SIGNALS)
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, STOP_SIGNALS)
     try:
         resource_tracker.ensure_running()  # multiprocessing's own, which unblocks SIGTERM here as it starts
-        signal.pthread_sigmask(signal.SIG_BLOCK, SIGNALS)
+        signal.pthread_sigmask(signal.SIG_BLOCK, STOP_SIGNALS)
         yield
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)

@@ -7,6 +7,7 @@ import csv
 import dataclasses
 import fnmatch
 import json
+import re
 from pathlib import Path
 from typing import Any
 
@@ -225,6 +226,9 @@ def test_other_data_than_the_benchmarks_are_counted_in_shares(foundation: tuple[
     said = str(data_efficiency.sentence(data))
     assert said.startswith("With 10 % of the target demonstrations the pretrained policy does as well as")
     assert "50 target" not in said
+    interval = re.search(r"\(95 % interval (.*?)\)", said)
+    assert interval is not None, "in shares, too"
+    assert interval[1].endswith(" %")
 
 
 def test_two_trainings_of_one_experiment_stay_apart_and_are_both_shown(

@@ -107,9 +107,9 @@ def _policies(folder: Path, results: Results) -> list[PolicyResult]:
         conditions = by_label.setdefault(record.label, {})
         conditions.setdefault(record.perturbation, {}).setdefault(record.task, []).append(record)
     out = []
+    fps = _own_fps(next(iter(results.headers.values()))) if by_label else None
     for label, conditions in by_label.items():
         names = sorted(conditions, key=lambda name: name != UNPERTURBED)
-        fps = _own_fps(next(iter(results.headers.values())))
         tasks = {name: tuple(summarize(*item, fps) for item in conditions[name].items()) for name in names}
         info, headers, planned = _info(results, tasks), _headers(results, tasks), _planned(results, label)
         out.append(PolicyResult(label_under(label, names[0]), folder, info, headers, tasks, planned=planned))

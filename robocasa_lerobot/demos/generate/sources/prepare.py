@@ -6,7 +6,6 @@ as it was. Each demonstration leaves a small file of its own meanwhile, so that 
 
 from __future__ import annotations
 
-import contextlib
 import json
 import shutil
 from collections.abc import Iterable, Iterator
@@ -31,7 +30,7 @@ from robocasa_lerobot.envs.tasks.task import Stage
 from robocasa_lerobot.errors import UserError
 from robocasa_lerobot.files import write_text, written_aside
 from robocasa_lerobot.jobs.as_completed import as_they_end
-from robocasa_lerobot.jobs.publish import held_folder
+from robocasa_lerobot.jobs.publish import held_lock
 
 DROPPED = "datagen_dropped"  # attribute of `data`: demonstrations that do not replay, and why
 FILE = "file.json"  # in the folder of what is being prepared: which file that is of
@@ -71,10 +70,7 @@ def prepare_files(paths: Iterable[Path], *, workers: int = 1, fresh: bool = Fals
 
 def _prepared_aside(path: Path, demos: list[str], workers: int, fresh: bool) -> Iterator[Outcome]:
     folder = path.with_name(f".{path.stem}.prepare")
-    lock = path.with_name(f".{path.stem}.prepare.lock")
-    with contextlib.ExitStack() as stack:
-        stack.enter_context(held_folder(lock))
-        stack.callback(shutil.rmtree, lock, ignore_errors=True)  # before it is released
+    with held_lock(path.with_name(f".{path.stem}.prepare.lock")):
         note, identity = folder / FILE, file_identity(path)
         # What a killed run left may be of another recording that had the file's name then.
         if folder.exists() and (fresh or not note.exists() or json.loads(note.read_text()) != identity):

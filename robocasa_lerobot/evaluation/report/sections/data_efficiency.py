@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 from robocasa_lerobot.benchmark import published
@@ -47,21 +48,17 @@ def curves(data: ReportData) -> tuple[dict[int, PolicyResult], dict[int, PolicyR
 
 def sentence(data: ReportData) -> str | None:
     """The worth at the smallest amount of target data, in plain words, for the average where there is one."""
+    what, amount = "target demonstrations per task", _number
+    if _others_data(data):
+        what, amount = "of the target demonstrations", _share
     for group in _groups(data):
         for one in group.worth():
             if one.demos > 0:
                 bound = f"{one.bound} " if one.bound else ""
-                before = (
-                    f"With {one.demos} target demonstrations per task the pretrained policy does as well as {bound}"
-                )
-                before += f"{one.equal_demos:.0f} without pretraining{_range(one)}"
-                if _others_data(data):
-                    before = (
-                        f"With {_share(one.demos)} of the target demonstrations the pretrained policy does as well as "
-                    )
-                    before += f"{bound}{_share(one.equal_demos)} without pretraining"
                 return (
-                    f"{before}, on {_which(group)}: pretraining is worth {bound}{one.factor:.1f} times the target data."
+                    f"With {amount(one.demos)} {what} the pretrained policy does as well as {bound}"
+                    f"{amount(one.equal_demos)} without pretraining{_range(one, amount)}, on {_which(group)}: "
+                    f"pretraining is worth {bound}{one.factor:.1f} times the target data."
                 )
     return None
 
@@ -88,6 +85,10 @@ def _others_data(data: ReportData) -> list[str]:
     policies = [policy for side in curves(data) for policy in side.values()]
     files = [header.registry for policy in policies for header in policy.headers if header.registry is not None]
     return sorted({Path(file).name for file in files})
+
+
+def _number(demos: float) -> str:
+    return f"{demos:.0f}"
 
 
 def _share(demos: float) -> str:
@@ -240,12 +241,12 @@ def _bound(bound: str | None) -> str:
     return {"at least": "≥ ", "at most": "≤ "}.get(bound or "", "")
 
 
-def _ends(one: DataWorth) -> str:
+def _ends(one: DataWorth, amount: Callable[[float], str] = _number) -> str:
     if one.low is None or one.high is None:
         return ""
-    low, high = f"{_bound(one.low_bound)}{one.low:.0f}", f"{_bound(one.high_bound)}{one.high:.0f}"
+    low, high = f"{_bound(one.low_bound)}{amount(one.low)}", f"{_bound(one.high_bound)}{amount(one.high)}"
     return "" if low == high and one.bound else f"{low} to {high}"
 
 
-def _range(one: DataWorth) -> str:
-    return f" (95 % interval {ends})" if (ends := _ends(one)) else ""
+def _range(one: DataWorth, amount: Callable[[float], str]) -> str:
+    return f" (95 % interval {ends})" if (ends := _ends(one, amount)) else ""
