@@ -24,11 +24,12 @@ from robocasa_lerobot import contract
 from robocasa_lerobot.cli import main
 from robocasa_lerobot.data.fake import write_fake_dataset
 from robocasa_lerobot.errors import UserError
+from robocasa_lerobot.jobs.child_process import STOP_SIGNALS
 from robocasa_lerobot.training import metrics as module
 from robocasa_lerobot.training.augment import augment
 from robocasa_lerobot.training.config.experiment import TRACKERS
 from robocasa_lerobot.training.config.phase import AugmentConfig
-from robocasa_lerobot.training.interrupts import REQUEUE, SIGNALS
+from robocasa_lerobot.training.interrupts import REQUEUE
 from robocasa_lerobot.training.loading import load_batches
 from robocasa_lerobot.training.phases import run_experiment
 from robocasa_lerobot.training.setup.build_phase import prepare_phase
@@ -134,7 +135,7 @@ def test_loader_processes_outlive_what_asks_the_run_to_end(tmp_path: Path, data:
     found = load_batches(run.batches, first=1, end=3, workers=1)
     (process,) = active_children()
     for batch in wanted:
-        for number in SIGNALS:
+        for number in STOP_SIGNALS:
             os.kill(process.pid or 0, number)
         assert torch.equal(next(found)["index"], batch["index"])
     assert signal.pthread_sigmask(signal.SIG_BLOCK, ()) == set()
@@ -145,7 +146,7 @@ def test_loader_processes_outlive_what_asks_the_run_to_end(tmp_path: Path, data:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("number", SIGNALS)
+@pytest.mark.parametrize("number", STOP_SIGNALS)
 def test_signal_to_all_processes_saves_and_asks_for_another_turn(
     tmp_path: Path, data: Path, number: signal.Signals
 ) -> None:
