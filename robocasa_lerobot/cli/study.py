@@ -40,7 +40,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Plan, or run what has not ended yet and write the page after each run."""
+    """Plan, or run what has not ended yet; keep each phase that ends, and write the page anew."""
     from robocasa_lerobot.errors import UserError
     from robocasa_lerobot.study.settings import load_study
 
@@ -56,7 +56,7 @@ def run(args: argparse.Namespace) -> int:
     from robocasa_lerobot.study.costs import cost_lines, costs
     from robocasa_lerobot.study.page import write_page
     from robocasa_lerobot.study.runs import configs_for, root_for, runs_of
-    from robocasa_lerobot.study.stored import is_stored, read_stored, store
+    from robocasa_lerobot.study.stored import is_stored, read_stored, stands_for, store
 
     root = args.root or root_for(study, args.device, args.scale)
     results = args.results or root / "results"
@@ -76,8 +76,8 @@ def run(args: argparse.Namespace) -> int:
     whole = runs_of(list(study.parts.values()), root, configs, *asked)
 
     def report() -> None:
-        there = [read_stored(results, run.experiment, run.seed) for run in whole]
-        stored = {(one.experiment, one.seed): one for one in there if one is not None}
+        there = [(run, read_stored(results, run.experiment, run.seed)) for run in whole]
+        stored = {(run.experiment, run.seed): one for run, one in there if one and stands_for(one.about, run)}
         write_page(study, stored, sets, results, args.page or results / "results.md")
 
     wanted = [] if args.report else runs_of(list(parts.values()), root, configs, *asked)
@@ -85,9 +85,10 @@ def run(args: argparse.Namespace) -> int:
         if is_stored(run, results):
             continue
         print(f"== {number} of {len(wanted)}: {run.name}", flush=True)
-        run.carry_out(args.workers)
-        print(f"kept: {store(run, results)}", flush=True)
-        report()
+        for number_of_command, _ in enumerate(run.carry_out(args.workers)):
+            if number_of_command:  # after the data: a phase has ended
+                print(f"kept: {store(run, results)}", flush=True)
+                report()
     report()
     print(f"written: {args.page or results / 'results.md'}")
     return 0

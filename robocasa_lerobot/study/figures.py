@@ -33,7 +33,7 @@ def draw_curves(runs: Iterable[StoredRun], path: Path) -> None:
     figure, axes = _figure(3.6)
     colours: dict[str, str] = {}
     for run in runs:
-        for phase in dict.fromkeys(row[0] for row in run.curves):
+        for phase in run.phases:
             points = [(step, loss) for name, step, loss in run.curves if name == phase]
             label = f"{run.experiment}, {phase}"
             first = label not in colours

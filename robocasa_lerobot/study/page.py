@@ -72,8 +72,8 @@ def _part(name: str, part: PartConfig, stored: Stored, sets: Sets, results: Path
             rates[row] = first
         line = [row, *map(_shown, cells), str(len(trials)), _seeds(first)]
         if part.reference:
-            apart = part.reference in there and row != part.reference
-            points = difference(trials, there[part.reference], sets[part.sets[0]]) if apart else None
+            compared = part.reference in there and row != part.reference
+            points = difference(trials, there[part.reference], sets[part.sets[0]]) if compared else None
             line.append(_points(points))
         table.append(line)
     lifelong = summaries(part, stored, sets) if part.matrix else {}
@@ -93,9 +93,12 @@ def _part(name: str, part: PartConfig, stored: Stored, sets: Sets, results: Path
         lines += [f"![Rates]({folder}/{figures[0]})", ""]
     draw_curves(stored.values(), results / figures[1])
     lines += [f"![Losses]({folder}/{figures[1]})", ""]
+    apart: dict[RowConfig, str] = {}  # rows may share a phase
     for row in there:
-        lines += _strips(part.rows[row], row, results, folder)
-    terms = failure_terms(trial for trials in there.values() for trial in trials)
+        apart.setdefault(part.rows[row], row)
+    for config, row in apart.items():
+        lines += _strips(config, row, results, folder)
+    terms = failure_terms(trial for row in apart.values() for trial in there[row])
     if terms:
         listed = "; ".join(f"{task}: `{term}` ({count})" for task, term, count in terms)
         lines += [f"What most often did not hold at the end of a failed trial: {listed}.", ""]
@@ -147,7 +150,8 @@ def _strips(row: RowConfig, label: str, results: Path, folder: str) -> list[str]
 
 def _circumstances(part: PartConfig, stored: Iterable[StoredRun]) -> list[str]:
     runs = list(stored)
-    wanted = len(part.experiments) * part.seeds
+    wanted = {(row.experiment, row.phase) for row in part.rows.values()}
+    ended = sum((run.experiment, phase) in wanted for run in runs for phase in run.phases)
     training = sum(float(run.about["training_hours"]) for run in runs)
     trying = sum(float(run.about["trial_hours_of_one_process"]) for run in runs)
     commits = sorted({_short_commit(str(run.about["commit"])) for run in runs})
@@ -155,7 +159,7 @@ def _circumstances(part: PartConfig, stored: Iterable[StoredRun]) -> list[str]:
     versions = sorted({f"{name} {number}" for run in runs for name, number in run.about["versions"].items()})
     devices = ", ".join(sorted({str(run.about["device"]) for run in runs} - {CPU}))
     text = (
-        f"{len(runs)} of {wanted} trainings, {training:.1f} hours of training"
+        f"{ended} of {len(wanted) * part.seeds} trainings, {training:.1f} hours of training"
         f"{f' (on {devices})' if devices else ''} and {trying:.1f} process-hours of trials "
         f"on {'; '.join(machines)}; commits {', '.join(commits)}; {', '.join(versions)}."
     )

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import shutil
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +17,7 @@ from robocasa_lerobot.files import write_text
 from robocasa_lerobot.jobs.child_process import run_command
 from robocasa_lerobot.settings import load_yaml
 from robocasa_lerobot.study.settings import EXPERIMENTS, PartConfig, StudyConfig
-from robocasa_lerobot.training.config.experiment import load_experiment
+from robocasa_lerobot.training.config.experiment import PhaseConfig, load_experiment
 
 CPU, CUDA = "cpu", "cuda"
 DEVICES = (CPU, CUDA)
@@ -64,34 +65,51 @@ class Run:
         """Its experiment file, which `train` and `data` take."""
         return self.root / "experiments" / f"{self.experiment}-seed_{self.seed}.yaml"
 
+    @property
+    def base(self) -> Path:
+        """The experiment's file, of which its own adds the seed."""
+        return self.configs / "experiments" / EXPERIMENTS / f"{self.experiment}.yaml"
+
+    @cached_property
+    def phases(self) -> tuple[PhaseConfig, ...]:
+        """Its trainings, in their order."""
+        if not self.base.is_file():
+            raise UserError(f"the study names the experiment {self.experiment!r}; there is no {self.base}.")
+        return tuple(load_experiment(self.base, scale=self.scale).phases)
+
     def write_file(self) -> Path:
         """Write that file and return its path."""
-        base = self.configs / "experiments" / EXPERIMENTS / f"{self.experiment}.yaml"
-        if not base.is_file():
-            raise UserError(f"the study names the experiment {self.experiment!r}; there is no {base}.")
         # Other trials with each seed: three trainings tried in the same kitchens would say less.
         phases = [
             {"name": phase.name, "evaluations": [f"{text} --seed={self.seed}" for text in phase.evaluations]}
-            for phase in load_experiment(base).phases
+            for phase in self.phases
         ]
-        content = {"base": str(base.absolute()), "seed": self.seed, "output_dir": str(self.folder), "phases": phases}
+        content = {
+            "base": str(self.base.absolute()),
+            "seed": self.seed,
+            "output_dir": str(self.folder),
+            "phases": phases,
+        }
         self.file.parent.mkdir(parents=True, exist_ok=True)
         write_text(self.file, yaml.safe_dump(content, sort_keys=False))
         return self.file
 
     def commands(self, workers: int | None) -> list[list[str]]:
-        """Arguments of `robocasa-lerobot` that make its data, train it, and try what it has learnt."""
+        """Arguments of `robocasa-lerobot` that make its data, and then train each phase and try what it has learnt."""
         scale = [] if self.scale is None else [f"--scale={self.scale}"]
         made = [] if workers is None else [f"--workers={workers}"]
         made += [] if self.episodes is None else [f"--episodes={self.episodes}"]
         return [
             # What a trial with fewer demonstrations has left does not stand for them.
             ["data", str(self.file), "--make", "--replace", *made, *scale],
-            ["train", f"--config_path={self.file}", "--evaluate", *scale],
+            *(
+                ["train", f"--config_path={self.file}", f"--phase={phase.name}", "--evaluate", *scale]
+                for phase in self.phases
+            ),
         ]
 
-    def carry_out(self, workers: int | None) -> None:
-        """Run its commands; what is finished takes seconds.
+    def carry_out(self, workers: int | None) -> Iterator[None]:
+        """Run its commands, and come back after each; what is finished takes seconds.
 
         Raises:
             StoppedError: one did not end well; its own message stands above.
@@ -104,6 +122,7 @@ class Run:
                     f"{self.name}: `robocasa-lerobot {' '.join(command)}` ended with status {status}; "
                     "the same study goes on there."
                 )
+            yield
 
 
 def runs_of(

@@ -7,7 +7,7 @@ import dataclasses
 import gzip
 import io
 import json
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -18,7 +18,7 @@ from robocasa_lerobot.files import write_text, written_aside
 from robocasa_lerobot.provenance import git_commit, machine, utc_now, versions
 from robocasa_lerobot.study.runs import Run
 from robocasa_lerobot.study.strips import write_strips
-from robocasa_lerobot.training.config.experiment import load_experiment
+from robocasa_lerobot.training.config.experiment import PhaseConfig, load_experiment
 from robocasa_lerobot.training.metrics import METRICS, read_lines
 from robocasa_lerobot.training.planning.evaluations import FOLDER
 from robocasa_lerobot.training.records import PHASE_FILE
@@ -47,12 +47,12 @@ class StoredTrial:
 
 @dataclass(frozen=True)
 class StoredRun:
-    """A run that has ended.
+    """A run, as far as its phases have ended.
 
     Attributes:
         experiment, seed: which one.
-        trials: of all its evaluations.
-        about: commit, versions, machine, hours.
+        trials: of all evaluations of those phases.
+        about: their steps; commit, versions, machine, hours.
         curves: rows of phase, step and loss.
     """
 
@@ -61,6 +61,11 @@ class StoredRun:
     trials: tuple[StoredTrial, ...]
     about: dict[str, Any]
     curves: tuple[tuple[str, int, float], ...]
+
+    @property
+    def phases(self) -> tuple[str, ...]:
+        """The phases that have ended."""
+        return tuple(dict.fromkeys(phase for phase, _, _ in self.curves))
 
 
 def stored_folder(results: Path, experiment: str, seed: int) -> Path:
@@ -74,18 +79,21 @@ def strips_name(phase: str, evaluation: str) -> str:
 
 
 def store(run: Run, results: Path) -> Path:
-    """Keep a run that has ended; its folder. The last file written is `about.json`: with it, all are there.
+    """Keep the phases of a run that have ended; its folder. `about.json` is written last: with it, all are there.
 
     Raises:
-        UserError: a phase has no finished evaluation that its experiment asks for.
+        UserError: none has all evaluations that the experiment asks for.
     """
     experiment = load_experiment(run.file, scale=run.scale)
+    ended = [phase for phase in experiment.phases if _has_ended(run.folder / phase.name, phase)]
+    if not ended:
+        raise UserError(f"{run.name}: none of its phases has ended and has all its evaluations.")
     out = stored_folder(results, run.experiment, run.seed)
     trials: list[StoredTrial] = []
     curves: list[tuple[str, int, float]] = []
     training = trying = 0.0
     devices: list[str] = []
-    for phase in experiment.phases:
+    for phase in ended:
         folder = run.folder / phase.name
         lines = read_lines(folder / METRICS)
         training += sum(_seconds(lines))
@@ -93,8 +101,6 @@ def store(run: Run, results: Path) -> Path:
         curves += [(phase.name, int(line["step"]), float(line["loss"])) for line in thinned]
         for text in phase.evaluations:
             name = text.split()[0]
-            if not (folder / FOLDER / name / "finished").is_file():
-                raise UserError(f"{run.name}: the evaluation {name} of phase {phase.name} is not finished.")
             records = read_results(folder / FOLDER / name).trials
             trials += [_short(phase.name, name, record) for record in records]
             trying += sum(record.seconds.total for record in records)
@@ -115,7 +121,7 @@ def store(run: Run, results: Path) -> Path:
         "versions": versions("lerobot", "torch", "mujoco"),
         "machine": machine(),
         "device": ", ".join(dict.fromkeys(devices)),
-        "steps": {phase.name: phase.steps for phase in experiment.phases},
+        "steps": {phase.name: phase.steps for phase in ended},
         "training_hours": round(training / 3600, 3),
         "trial_hours_of_one_process": round(trying / 3600, 3),
         "ended": utc_now(),
@@ -125,16 +131,27 @@ def store(run: Run, results: Path) -> Path:
 
 
 def is_stored(run: Run, results: Path) -> bool:
-    """Whether a run was kept that had the same scale and demonstrations: a trial of the study does not stand for it."""
+    """Whether all phases of a run were kept."""
     file = stored_folder(results, run.experiment, run.seed) / ABOUT
     if not file.is_file():
         return False
     about = json.loads(file.read_text(encoding="utf-8"))
-    return (about["scale"], about["episodes"]) == (run.scale, run.episodes)
+    return stands_for(about, run) and len(about["steps"]) == len(run.phases)
+
+
+def stands_for(about: Mapping[str, Any], run: Run) -> bool:
+    """Whether what was kept is of this run as it is now; a trial of the study, or shorter phases, do not stand for it.
+
+    Args:
+        about: the content of `about.json`.
+        run: as the study has it.
+    """
+    steps = {phase.name: phase.steps for phase in run.phases}
+    return (about["scale"], about["episodes"]) == (run.scale, run.episodes) and about["steps"].items() <= steps.items()
 
 
 def read_stored(results: Path, experiment: str, seed: int) -> StoredRun | None:
-    """A run that was kept; None where none was."""
+    """What was kept of a run; None where nothing was."""
     folder = stored_folder(results, experiment, seed)
     if not (folder / ABOUT).is_file():
         return None
@@ -144,6 +161,14 @@ def read_stored(results: Path, experiment: str, seed: int) -> StoredRun | None:
     with (folder / CURVES).open(encoding="utf-8", newline="") as file:
         curves = tuple((row["phase"], int(row["step"]), float(row["loss"])) for row in csv.DictReader(file))
     return StoredRun(experiment, seed, trials, about, curves)
+
+
+def _has_ended(folder: Path, phase: PhaseConfig) -> bool:
+    """Whether a phase was trained to its end and has all its evaluations."""
+    lines = read_lines(folder / METRICS)
+    names = (text.split()[0] for text in phase.evaluations)
+    trained = bool(lines) and int(lines[-1]["step"]) >= phase.steps
+    return trained and all((folder / FOLDER / name / "finished").is_file() for name in names)
 
 
 def _seconds(lines: Iterable[dict[str, Any]]) -> Iterable[float]:

@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import dataclasses
+import json
 from pathlib import Path
 
 import pytest
+from evaluation_records import write_results
 
+from robocasa_lerobot.config_files import configs_folder
 from robocasa_lerobot.errors import UserError
 from robocasa_lerobot.study import stored as files
 from robocasa_lerobot.study.page import write_page
@@ -137,11 +140,34 @@ def test_the_table_of_phases(tmp_path: Path) -> None:
     assert "|plain|38 % (" in text
 
 
-def test_an_unfinished_evaluation_is_not_stored(tmp_path: Path) -> None:
-    from robocasa_lerobot.config_files import configs_folder
-    from robocasa_lerobot.study.runs import Run
+def phase_with_trials(folder: Path, steps: int, evaluation: str, finished: bool = True) -> None:
+    """What a training leaves of a phase that has ended, with an evaluation of one trial."""
+    line = {"step": steps, "loss": 0.5, "seconds_per_step": 0.1}
+    out = folder / "evaluations" / evaluation
+    write_results(out, [{"trial": 3}])
+    (folder / "metrics.jsonl").write_text(json.dumps(line) + "\n")
+    (folder / "phase.json").write_text(json.dumps({"device": "cpu"}))
+    if finished:
+        (out / "finished").touch()
 
-    one = Run("multitask", 0, tmp_path, configs_folder())
-    one.write_file()
-    with pytest.raises(UserError, match="study_target of phase multitask is not finished"):
-        files.store(one, tmp_path / "results")
+
+def test_phases_are_stored_as_they_end(tmp_path: Path) -> None:
+    run = files.Run("lifelong", 0, tmp_path, configs_folder())
+    run.write_file()
+    results = tmp_path / "results"
+    with pytest.raises(UserError, match="lifelong/seed_0: none of its phases has ended"):
+        files.store(run, results)
+    steps = run.phases[0].steps
+    phase_with_trials(run.folder / "phase1", steps, "study_validation")
+    phase_with_trials(run.folder / "phase2", steps, "study_validation", finished=False)
+    phase_with_trials(run.folder / "phase3", steps - 1, "study_validation")
+    files.store(run, results)
+    found = read_stored(results, "lifelong", 0)
+    assert found is not None
+    assert found.about["steps"] == {"phase1": steps}
+    assert found.phases == ("phase1",)
+    assert [(one.phase, one.trial) for one in found.trials] == [("phase1", 3)]
+    assert files.stands_for(found.about, run)
+    assert not files.is_stored(run, results), "the others are still to be trained"
+    assert not files.stands_for({**found.about, "steps": {"phase1": steps - 1}}, run), "of other lengths"
+    assert not files.stands_for({**found.about, "scale": "tiny"}, run)
