@@ -47,7 +47,7 @@ demo: $(STAMP)  ## demonstrations, dataset, two training phases, evaluation and 
 	PYTHON=$(BIN)/python sh scripts/demo.sh
 
 # About a day on two idle cores; goes on where it was stopped. PARTS="multitask lifelong" runs some,
-# STUDY_ARGS=--plan tells hours and disk, STUDY_ARGS="--device cuda" is for one GPU.
+# STUDY_ARGS=--plan tells hours and disk, STUDY_ARGS="--device cuda --results docs/results_cuda --page docs/results_cuda.md" is for one GPU.
 study: $(STAMP)  ## what small policies learn: trainings from data to trials, and docs/results.md
 	$(BIN)/robocasa-lerobot study $(PARTS) --results docs/results --page docs/results.md $(STUDY_ARGS)
 
@@ -118,7 +118,7 @@ lock: $(STAMP)  ## pin pyproject.toml's dependencies in requirements.lock
 bench-kitchen-tasks: $(STAMP)  ## five composite tasks in each of the 2,510 kitchens: nothing falls, overlaps or blocks
 	$(BIN)/python benchmarks/kitchen_tasks.py $(BENCH_ARGS)
 
-# About two hours on two cores; goes on where it was stopped. BENCH_ARGS='--tasks atomic_seen' takes some, `--strips 40` draws strips.
+# 82 minutes on two cores; goes on where it was stopped. BENCH_ARGS='--tasks atomic_seen' takes some, `--strips 40` draws strips.
 every-task: $(STAMP)  ## one demonstration of each of the 365 tasks: recorded, converted, verified, replayed
 	$(BIN)/python benchmarks/every_task.py $(BENCH_ARGS)
 
@@ -129,5 +129,5 @@ bench-generation: $(STAMP)  ## generated demonstrations beside MimicGen's way an
 	$(BIN)/python benchmarks/generation.py --source $(GENERATION) --first-seed 300000 \
 	    --arms ours=100,mimicgen=20,scripted=20,far=20,one=20 $(BENCH_ARGS)
 
-clean:  ## remove .venv and everything that the demo wrote
+clean:  ## remove .venv and outputs/: every training, evaluation and study, not only the demo's
 	rm -rf $(VENV) outputs

@@ -3,7 +3,7 @@
 The same as `robocasa-lerobot eval`. A YAML file of settings comes in with `--config_path`, for example
 configs/evaluations/quick.yaml, and every setting can be given on the command line by its dotted name. Results go to
 `--out`: trials.jsonl (one line for each trial, appended as it ends; the same command after a kill runs the missing
-trials), videos/, report.html and report.md.
+trials), videos/, and the report: report.html, .md, .tex and two .csv.
 """
 
 from __future__ import annotations

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
+from typing import Any
 
 
 class UserError(ValueError):
@@ -35,3 +36,10 @@ def suggest(name: str, known: Iterable[str]) -> str:
         return "Did you mean " + " or ".join(repr(c) for c in close) + "?"
     shown = ", ".join(names[:20]) + (f", ... ({len(names)} in all)" if len(names) > 20 else "")
     return f"Known: {shown or 'none'}."
+
+
+def differing(found: Mapping[str, Any], now: Mapping[str, Any]) -> str:
+    """Those settings of `now` that were others, `seed: 1, now 2`; empty where there are none."""
+    return ", ".join(
+        f"{key}: {found.get(key)!r}, now {value!r}" for key, value in now.items() if found.get(key) != value
+    )

@@ -128,7 +128,8 @@ def check_disk(folder: Path | None = None, free_bytes: int | None = None) -> Fin
     free_gib = (shutil.disk_usage(folder).free if free_bytes is None else free_bytes) / 2**30
     found = f"{free_gib:.0f} GiB free in the working folder"
     if free_gib < FREE_DISK_GIB:
-        return Finding("disk", "fault", f"{found}, needs {FREE_DISK_GIB:.0f}", "make clean  (or work on another disk)")
+        remedy = "rm -r outputs/demo  (or work on another disk)"
+        return Finding("disk", "fault", f"{found}, needs {FREE_DISK_GIB:.0f}", remedy)
     return Finding("disk", "ok", found)
 
 

@@ -19,8 +19,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robocasa_lerobot import __version__, contract
+from robocasa_lerobot.contract import Part
 from robocasa_lerobot.convert.lerobot_v3 import EXTRA_PREFIX, ExportedDataset, ExportedEpisode
+from robocasa_lerobot.convert.mapping.robots import ABSOLUTE_ACTION_PARTS
 from robocasa_lerobot.convert.reading.demo_file import ASSETS_GROUP, IMAGE_SUFFIX, DemoFile
+from robocasa_lerobot.convert.reading.layout import ABSOLUTE_ACTIONS, ACTIONS
 from robocasa_lerobot.convert.reading.stages import STAGE_DATASET
 from robocasa_lerobot.errors import UnknownNameError, UserError
 from robocasa_lerobot.files import written_aside
@@ -142,8 +145,10 @@ def _write_vectors(
     """Everything but pictures; gives what the dataset lacks."""
     columns = dataset.columns(episode)
     actions = columns.pop(contract.ACTION_KEY)
-    mobile = dataset.features[contract.ACTION_KEY].get("names") == contract.component_names(contract.ACTION_PARTS)
-    group.create_dataset("actions", data=contract.stored_to_hdf5(actions) if mobile else actions, **compression)
+    absolute = dataset.features[contract.ACTION_KEY].get("names") == contract.component_names(ABSOLUTE_ACTION_PARTS)
+    if absolute or _has_parts(dataset, contract.ACTION_KEY, contract.ACTION_PARTS):
+        actions = contract.stored_to_hdf5(actions)
+    group.create_dataset(ABSOLUTE_ACTIONS if absolute else ACTIONS, data=actions, **compression)
     observations: dict[str, NDArray[Any]] = {}
     if contract.STATE_KEY in columns:
         observations |= _observations(dataset, columns.pop(contract.STATE_KEY))
@@ -187,9 +192,17 @@ def _write_vectors(
     return lacking
 
 
+def _has_parts(dataset: ExportedDataset, key: str, parts: Sequence[Part]) -> bool:
+    """Whether a vector is the contract's, by its names; where it has none, as others' datasets, by robot and size."""
+    feature, names = dataset.features[key], contract.component_names(parts)
+    if feature.get("names") is None:
+        return dataset.robot_type == contract.ROBOT_TYPE and list(feature["shape"]) == [len(names)]
+    return bool(feature["names"] == names)
+
+
 def _observations(dataset: ExportedDataset, states: NDArray[Any]) -> dict[str, NDArray[Any]]:
     """The state's parts under robosuite's names where they are known, else the whole under `state`."""
-    if dataset.features[contract.STATE_KEY].get("names") == contract.component_names(contract.STATE_PARTS):
+    if _has_parts(dataset, contract.STATE_KEY, contract.STATE_PARTS):
         return {contract.STATE_PART_HDF5_KEYS[name]: states[:, where] for name, where in contract.STATE_SLICES.items()}
     observations: dict[str, NDArray[Any]] = {}
     for key, where in _arm_observations(dataset.features[contract.STATE_KEY].get("names") or []).items():

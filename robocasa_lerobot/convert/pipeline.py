@@ -50,8 +50,10 @@ from robocasa_lerobot.jobs.executors import Execution
 from robocasa_lerobot.jobs.pieces import report_frames, require_complete, run_pieces, submit_pieces
 from robocasa_lerobot.jobs.publish import (
     check_output,
+    clear_away,
     failures_explained,
     held_folder,
+    is_done,
     make_piece,
     partial_folder,
     publish,
@@ -64,6 +66,7 @@ from robocasa_lerobot.quiet import quiet_libraries
 # Starting a worker imports LeRobot and MuJoCo (about 6 s of CPU time); below this much work that does not pay: 3,150
 # frames took as long with two workers as with one.
 _MIN_FRAMES_PER_WORKER = 2000
+_MERGED = "merged"  # in the working folder
 
 
 @dataclass(frozen=True)
@@ -118,7 +121,10 @@ def _convert(
 ) -> ConversionResult:
     plan, partial, out = _prepared(files, out, settings, overwrite)
     if out.exists() and not overwrite and _left_behind(out) == partial:
-        shutil.rmtree(partial)  # an earlier run was killed after its dataset had appeared, while clearing away
+        with held_folder(partial):
+            if not is_done(partial / _MERGED):  # a run with --overwrite was killed, which may go on
+                check_output(out, overwrite)
+            clear_away(partial)  # a run was killed after its dataset had appeared, while clearing away
         return _recorded_result(plan, out)
     with held_folder(partial), failures_explained(out, partial):
         processes = num_workers(workers, len(plan.shards), plan.num_frames, _MIN_FRAMES_PER_WORKER)
@@ -196,7 +202,7 @@ def _prepared(
 
 
 def _left_behind(out: Path) -> Path | None:
-    """The working folder of the conversion that made the dataset at `out`, where it is still there."""
+    """The working folder of the conversion that made the dataset at `out`, or makes it again, where it is there."""
     try:
         record = json.loads((out / META_FOLDER / CONVERSION_FILE).read_text(encoding="utf-8"))
         folder = partial_folder(out, str(record["fingerprint"]))
@@ -232,9 +238,9 @@ def _completed(plan: Plan, partial: Path, out: Path) -> ConversionResult:
     """Join the shards, let the dataset appear, and clear away the rest."""
     result = _join(plan, partial, out)
     if result is not None:
-        publish(partial / "merged", out, partial / "replaced")
+        publish(partial / _MERGED, out, partial / "replaced")
     rejected = result.rejected if result is not None else _rejected(plan, partial)
-    shutil.rmtree(partial)
+    clear_away(partial)
     if result is None:
         lines = "".join(f"\n  {r['source_file']} {r['source_demo']}: {r['reason']}" for r in rejected[:5])
         raise UserError(f"no episode could be converted ({len(rejected)} rejected), nothing was written:{lines}")
@@ -285,13 +291,13 @@ def _rejected(plan: Plan, partial: Path) -> list[dict[str, Any]]:
 
 
 def _join(plan: Plan, partial: Path, out: Path) -> ConversionResult | None:
-    """Join the shards in `<partial>/merged`; None where no shard has an episode."""
+    """Join the shards in a folder of `partial`; None where no shard has an episode."""
     from lerobot.datasets.io_utils import write_stats
 
     from robocasa_lerobot.convert.writing.joining import copy_tree, join_datasets
     from robocasa_lerobot.convert.writing.statistics import column, dataset_statistics
 
-    merged = partial / "merged"
+    merged = partial / _MERGED
     shutil.rmtree(merged, ignore_errors=True)  # an earlier try may have been killed here
     folders = [shard_folder(partial, rank) for rank in range(len(plan.shards))]
     full = [folder for folder in folders if (folder / DATASET).exists()]

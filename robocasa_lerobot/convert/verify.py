@@ -43,7 +43,7 @@ def verify(
 
     Args:
         root: folder of the dataset.
-        sources: the source files where they are not at their recorded places any more.
+        sources: those of the source files that are not at their recorded places any more.
         asset_roots: folders with meshes and textures, besides the recorded ones.
         pictures_per_episode: evenly spaced steps whose pictures are decoded and compared; None takes all.
         min_psnr_db: the least that a decoded picture must reach.
@@ -153,7 +153,7 @@ def _find_sources(root: Path, recorded: list[dict[str, Any]], given: Sequence[Pa
         source = SourceRecord(**fields)
         same_name = [path for path in given if path.name == Path(source.file).name]
         places = [Path(source.file), root / entry["relative_to_dataset"]]
-        candidates = [by_sha[source.sha256]] if source.sha256 in by_sha else [*same_name, *([] if given else places)]
+        candidates = [by_sha[source.sha256]] if source.sha256 in by_sha else [*same_name, *places]
         path = next((place for place in candidates if place.exists()), None)
         if path is None:
             raise UserError(

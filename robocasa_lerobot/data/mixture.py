@@ -8,7 +8,7 @@ from __future__ import annotations
 import functools
 import hashlib
 from collections import OrderedDict
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -105,8 +105,9 @@ class MixtureDataset(torch.utils.data.Dataset[Item]):
             if root not in opened:
                 opened[root] = DatasetSource(root)
         self.sources = {root: opened[root] for root in roots}
-        _check_alike(list(self.sources.values()), any_image_size=image_size is not None)
-        self._unseen = _unseen(next(iter(self.sources.values())).features, loader.cameras)
+        every = {key: feature for source in self.sources.values() for key, feature in source.features.items()}
+        self._unseen = _unseen(every, loader.cameras)
+        _check_alike(list(self.sources.values()), self._unseen, any_image_size=image_size is not None)
         # Whether the numbers of all datasets stay on disk, mapped into memory as they are used.
         self._mapped = sum(s.column_bytes for s in self.sources.values()) > loader.cache_columns_above_gb * 1e9
         tasks = sorted({text for source in self.sources.values() for text in source.instructions})
@@ -209,16 +210,21 @@ class MixtureDataset(torch.utils.data.Dataset[Item]):
             False where it was left out, because the frames take more than the budget or are no video.
         """
         self._cache_dir = self._cache_dir or cache_dir
-        keys = [key for key, f in self.meta.features.items() if f["dtype"] == "video"]
-        if keys != self.meta.camera_keys or not keys:
+        needed = self.cached_bytes()
+        if not needed or (budget_bytes is not None and sum(needed.values()) > budget_bytes):
             return False
-        size = self._picture_size or self._feature_size()
-        needed = sum(cache_bytes(source, keys, size) for source in self.sources.values())
-        if budget_bytes is not None and needed > budget_bytes:
-            return False
+        keys, size = self.meta.camera_keys, self._picture_size or self._feature_size()
         for root, source in self.sources.items():
             self._caches[root] = open_or_build(self._use(source), keys, size, cache_dir)
         return True
+
+    def cached_bytes(self) -> dict[Path, int]:
+        """Bytes on disk of each dataset's pictures, once they are decoded; none where they are no video."""
+        keys = self.meta.camera_keys
+        if any(self.meta.features[key]["dtype"] != "video" for key in keys) or not keys:
+            return {}
+        size = self._picture_size or self._feature_size()
+        return {root: cache_bytes(source, keys, size) for root, source in self.sources.items()}
 
     def _feature_size(self) -> tuple[int, int]:
         """Height and width of the pictures; cameras of different sizes cannot be handed out together."""
@@ -363,13 +369,13 @@ def _unseen(features: Mapping[str, Mapping[str, Any]], cameras: Sequence[str] | 
     return frozenset(key for key, camera in found.items() if camera not in cameras)
 
 
-def _check_alike(sources: Sequence[DatasetSource], any_image_size: bool) -> None:
+def _check_alike(sources: Sequence[DatasetSource], unseen: Collection[str], any_image_size: bool) -> None:
     """All datasets must have the same columns and rate: a policy cannot tell which one a batch came from."""
     first = sources[0]
     for other in sources[1:]:
         if other.fps != first.fps:
             raise UserError(f"{other.root} has {other.fps} frames/s, {first.root} {first.fps}.")
-        for key in sorted(first.features.keys() | other.features.keys()):
+        for key in sorted((first.features.keys() | other.features.keys()) - set(unseen)):
             ours, theirs = first.features.get(key), other.features.get(key)
             if ours is None or theirs is None:
                 raise UserError(f"feature {key!r} is missing in {(first if ours is None else other).root}.")

@@ -76,7 +76,7 @@ class SelectionConfig:
         tasks: names of tasks, instead of a set or beside it.
         tasks_per_set: so many tasks of the set, the first of which there are data; None is all.
         split: `pretrain` or `target`; None is both.
-        source: `human`, `mg` and so on; None is all.
+        source: `human`, `mg` and so on; None is all that are there or can be downloaded.
         views: `lerobot`, or `lerobot_cotraining_cams` for pictures from the real cameras' views.
         demos: so many of each dataset, as for a member.
         weight: of each of the datasets, as for a member.
@@ -148,7 +148,8 @@ class LoaderConfig:
         cache_budget_gb: what "if they fit" means, in 10^9 bytes for all datasets of a phase together.
         cache_dir: where frames, statistics and columns are kept; null is `<output_dir>/frame_cache`.
         image_size: height and width in pixels handed to the policy; null is the dataset's own size.
-        cameras: whose pictures the policy gets, such as `robot0_eye_in_hand`; null is all of the data.
+        cameras: whose pictures the policy gets, such as `robot0_eye_in_hand`; null is all of the data. Datasets of a
+            mixture may differ in the others.
         cache_columns_above_gb: states, actions and other numbers of larger mixtures stay in memory-mapped files in
             the cache folder instead of memory (10^9 bytes for all datasets of a phase, in each loader process).
         cache_open_files: videos, and datasets' memory-mapped numbers, that a loader process keeps open at once.

@@ -63,6 +63,7 @@ def pooled_statistics(parts: Sequence[Part], images: bool = True) -> Statistics:
     all frames by weight (inverse of the distribution function), each of shape (dim,). Images, unless left out: mean,
     standard deviation and extremes pooled from the statistics that the dataset holds for each episode, shape
     (3, 1, 1), values in [0, 1]; they have no quantiles, because those of a union do not follow from those of its parts.
+    Of a camera that not all datasets have there are none: nothing is seen of it.
 
     Raises:
         UserError: a dataset has no statistics of its images, or a number that is not finite.
@@ -71,7 +72,7 @@ def pooled_statistics(parts: Sequence[Part], images: bool = True) -> Statistics:
     columns: dict[str, _Column] = {}
     for key, feature in parts[0].source.features.items():
         if feature["dtype"] in ("video", "image"):
-            if images:
+            if images and all(key in part.source.features for part in parts):
                 out[key] = _image_statistics(key, parts)
         elif has_statistics(key, feature):
             columns[key] = _Column(int(np.prod(feature["shape"])), str(feature["dtype"]))

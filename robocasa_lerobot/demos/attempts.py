@@ -28,7 +28,7 @@ from robocasa_lerobot.demos.recorder import Actor, Recording, record_episode
 from robocasa_lerobot.demos.stages import StageLog
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.scene.reset_noise import InitialNoise
-from robocasa_lerobot.errors import OF_THE_MACHINE
+from robocasa_lerobot.errors import OF_THE_MACHINE, UserError, differing
 from robocasa_lerobot.files import write_text
 from robocasa_lerobot.jobs.pool import exit_if_orphaned
 
@@ -156,10 +156,21 @@ class Parts:
         self._failures: dict[str, Failure] = {}  # notes that have been read: there may be thousands of them
 
     def prepare(self) -> None:
-        """Make the folder, dropping one that was recorded with other settings."""
+        """Make the folder, dropping one of other settings in which nothing has succeeded.
+
+        Raises:
+            UserError: it holds demonstrations that were recorded with other settings.
+        """
         note = self.folder / "settings.json"
         identity = self.settings.identity()
-        if self.folder.exists() and (not note.exists() or json.loads(note.read_text()) != identity):
+        others = differing(json.loads(note.read_text()) if note.exists() else {}, identity)
+        if self.folder.exists() and others:
+            kept = len(list(self.folder.glob("[0-9]*.hdf5")))
+            if kept:
+                raise UserError(
+                    f"{self.folder} holds {kept} demonstration(s) of an interrupted recording with other settings "
+                    f"({others}). Give those to go on with it, remove the folder, or choose another --out."
+                )
             shutil.rmtree(self.folder)
         self.folder.mkdir(parents=True, exist_ok=True)
         write_text(note, json.dumps(identity))

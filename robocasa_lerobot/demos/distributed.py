@@ -49,13 +49,15 @@ def record_distributed(
     for one in settings:
         one.make_env()  # mistakes come up here, not in the first job
     asked = json.dumps([dataclasses.asdict(one) for one in settings])
-    folder = out / _FOLDER / hashlib.sha256(asked.encode()).hexdigest()[:12]  # markers hold for these settings only
+    folder = out / _FOLDER / hashlib.sha256(asked.encode()).hexdigest()[:12]  # for these settings only
     folder.mkdir(parents=True, exist_ok=True)
     step = partial(record_one, settings=settings, out=out, workers=execution.cpus, keep_failures=keep_failures)
     last = partial(finish, settings, out, keep_failures)
+    # Every task runs: markers outlive a file that is removed, and one that is there is left alone.
     if execution.kind == "ray":
-        run_with_ray(step, len(settings), folder, execution.ray)
+        run_with_ray(step, len(settings), folder, execution.ray, skip_complete=False)
         return "", last()
-    array, final = submit_to_slurm(step, last, len(settings), folder, out / _LOGS, execution.slurm)
-    first = f"{len(settings)} tasks in job {array}, " if array else "all tasks are complete; "
-    return f"submitted to Slurm: {first}summed up by job {final}. What they print is in {out / _LOGS}.", 0
+    logs = out / _LOGS
+    array, final = submit_to_slurm(step, last, len(settings), folder, logs, execution.slurm, skip_complete=False)
+    told = f"submitted to Slurm: {len(settings)} tasks in job {array}, summed up by job {final}."
+    return f"{told} What they print is in {logs}.", 0

@@ -15,7 +15,7 @@ from robocasa_lerobot.demos.failures import remove_others
 from robocasa_lerobot.demos.hdf5 import Failure, merge_parts, read_summary
 from robocasa_lerobot.demos.progress import Board
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
-from robocasa_lerobot.errors import UserError
+from robocasa_lerobot.errors import UserError, differing
 from robocasa_lerobot.gl import ensure_gl
 from robocasa_lerobot.jobs.pool import PoolExecutor, polled
 from robocasa_lerobot.jobs.publish import held_lock
@@ -92,8 +92,8 @@ def record_tasks(
 
     Raises:
         UnknownNameError: no such task, split, layout or style.
-        UserError: a file exists that was recorded with other settings, the same recording is running already, or
-            episodes or workers below 1.
+        UserError: a file, or what an interrupted recording left, has other settings, the same recording is running
+            already, or episodes or workers below 1.
     """
     for settings in all_settings:
         settings.make_env()  # checks the names before any process starts
@@ -191,12 +191,10 @@ def _recorded(path: Path, settings: RecordingSettings) -> RecordingResult:
         UserError: it was recorded with others.
     """
     summary = read_summary(path)
-    found = summary.settings or {}
-    wanted = {**settings.identity(), "episodes": settings.episodes}
-    differing = ", ".join(f"{k}: {found.get(k)!r}, now {v!r}" for k, v in wanted.items() if found.get(k) != v)
-    if differing:
+    others = differing(summary.settings or {}, {**settings.identity(), "episodes": settings.episodes})
+    if others:
         raise UserError(
-            f"{path} exists and was recorded with other settings ({differing}). Remove it, or choose another --out."
+            f"{path} exists and was recorded with other settings ({others}). Remove it, or choose another --out."
         )
     return RecordingResult(path, summary.episodes, summary.steps, summary.tried, summary.failures)
 

@@ -12,7 +12,7 @@ from pathlib import Path
 from robocasa_lerobot.errors import UserError
 from robocasa_lerobot.jobs.locks import LockHeldError, locked
 
-_LOCK = "lock"
+_LOCK, _DONE = "lock", "done"
 
 
 def check_output(out: Path, overwrite: bool) -> None:
@@ -75,11 +75,30 @@ def failures_explained(out: Path, partial: Path) -> Iterator[None]:
 
 
 def publish(merged: Path, out: Path, replaced: Path) -> None:
-    """Let the finished dataset appear at `out` by a rename, after moving an old one aside."""
+    """Let the finished dataset appear at `out` by a rename, after moving an old one aside; see `is_done`."""
+    (merged.parent / _DONE).touch()
     if out.exists():
         shutil.rmtree(replaced, ignore_errors=True)
         out.rename(replaced)
     merged.rename(out)
+
+
+def is_done(merged: Path) -> bool:
+    """Whether nothing is left to do in the held folder in which `merged` was made: it has appeared at its place."""
+    names = {path.name for path in merged.parent.iterdir()} - {_LOCK}
+    return merged.name not in names and (_DONE in names or not names)
+
+
+def clear_away(folder: Path) -> None:
+    """Remove the held folder of a work that is done; what says so goes last, in case of a kill meanwhile."""
+    for path in folder.iterdir():
+        if path.is_dir():
+            shutil.rmtree(path)
+        elif path.name not in (_LOCK, _DONE):
+            path.unlink(missing_ok=True)
+    for name in (_LOCK, _DONE):
+        (folder / name).unlink(missing_ok=True)
+    folder.rmdir()
 
 
 def make_piece(folder: Path, make: Callable[[Path], object]) -> None:

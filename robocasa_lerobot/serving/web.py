@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
+import socket
 from collections.abc import Awaitable, Callable
 from contextlib import suppress
 from http import HTTPStatus
@@ -20,6 +21,8 @@ from robocasa_lerobot.serving.limits import Limits
 Handler = Callable[[ServerConnection], Awaitable[None]]
 Page = Callable[[dict[str, list[str]]], tuple[HTTPStatus, str]]  # of the address's query
 _CLOSE_SECONDS = 10.0
+# The system asks a silent client's machine whether it is there after so many seconds, this often, so many times.
+_KEEP_ALIVE = {"TCP_KEEPIDLE": 600, "TCP_KEEPINTVL": 60, "TCP_KEEPCNT": 5}
 
 
 async def serve_websockets(
@@ -68,6 +71,7 @@ async def serve_websockets(
     async def counted(connection: ServerConnection) -> None:
         clients.add(connection)
         try:
+            _keep_alive(connection)
             with suppress(ConnectionClosed):  # the client went away; nobody else is concerned
                 await handler(connection)
         finally:
@@ -94,6 +98,15 @@ async def serve_websockets(
     server.close()
     with suppress(TimeoutError):  # a computation may go on; the process ends all the same
         await asyncio.wait_for(server.wait_closed(), _CLOSE_SECONDS)
+
+
+def _keep_alive(connection: ServerConnection) -> None:
+    """End the connection of a client that is gone without a word: nothing else would ever free its place."""
+    own = connection.transport.get_extra_info("socket")
+    own.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
+    for name, value in _KEEP_ALIVE.items():
+        if hasattr(socket, name):  # not on every system; its own are hours
+            own.setsockopt(socket.IPPROTO_TCP, getattr(socket, name), value)
 
 
 def _page(connection: ServerConnection, status: HTTPStatus, body: str) -> Response:

@@ -27,7 +27,7 @@ Sets = Mapping[str, Sequence[str]]
 _HEAD = """# Results
 
 What small policies learn in our kitchens, and what helps them. Written by `robocasa-lerobot study` from the trials,
-curves and circumstances that are kept in [`{folder}`]({folder}). `make study` makes them again, part by part, from
+curves and circumstances that are kept in {folder}. `make study` makes them again, part by part, from
 nothing but seeds (`configs/study.yaml`). Intervals are 95 % and cover the drawing of trials: what another training
 would change, the seeds beside each other show. Trials of one seed are the same in all rows of a table, and differences
 are computed from these pairs. Published numbers are of policies a thousand times as large, of human demonstrations and
@@ -46,7 +46,8 @@ def write_page(study: StudyConfig, stored: Stored, sets: Sets, results: Path, pa
         page: Markdown file.
     """
     folder = _relative(results, page)
-    lines = [_HEAD.format(folder=folder)]
+    link = f"[`{folder}`]({folder})" if results.is_dir() else f"`{folder}`"
+    lines = [_HEAD.format(folder=link)]
     for name, part in study.parts.items():
         own = {key: run for key, run in stored.items() if key[0] in part.experiments and key[1] < part.seeds}
         lines += [f"## {part.asks}", ""]

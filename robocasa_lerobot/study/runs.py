@@ -17,7 +17,7 @@ from robocasa_lerobot.files import write_text
 from robocasa_lerobot.jobs.child_process import run_command
 from robocasa_lerobot.settings import load_yaml
 from robocasa_lerobot.study.settings import EXPERIMENTS, PartConfig, StudyConfig
-from robocasa_lerobot.training.config.experiment import PhaseConfig, load_experiment
+from robocasa_lerobot.training.config.experiment import ExperimentConfig, load_experiment
 
 CPU, CUDA = "cpu", "cuda"
 DEVICES = (CPU, CUDA)
@@ -71,18 +71,18 @@ class Run:
         return self.configs / "experiments" / EXPERIMENTS / f"{self.experiment}.yaml"
 
     @cached_property
-    def phases(self) -> tuple[PhaseConfig, ...]:
-        """Its trainings, in their order."""
+    def config(self) -> ExperimentConfig:
+        """The experiment, without its seed and folder."""
         if not self.base.is_file():
             raise UserError(f"the study names the experiment {self.experiment!r}; there is no {self.base}.")
-        return tuple(load_experiment(self.base, scale=self.scale).phases)
+        return load_experiment(self.base, scale=self.scale)
 
     def write_file(self) -> Path:
         """Write that file and return its path."""
         # Other trials with each seed: three trainings tried in the same kitchens would say less.
         phases = [
             {"name": phase.name, "evaluations": [f"{text} --seed={self.seed}" for text in phase.evaluations]}
-            for phase in self.phases
+            for phase in self.config.phases
         ]
         content = {
             "base": str(self.base.absolute()),
@@ -104,7 +104,7 @@ class Run:
             ["data", str(self.file), "--make", "--replace", *made, *scale],
             *(
                 ["train", f"--config_path={self.file}", f"--phase={phase.name}", "--evaluate", *scale]
-                for phase in self.phases
+                for phase in self.config.phases
             ),
         ]
 

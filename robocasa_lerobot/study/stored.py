@@ -16,7 +16,7 @@ from robocasa_lerobot.errors import UserError
 from robocasa_lerobot.evaluation.records.results import TrialRecord, read_results
 from robocasa_lerobot.files import write_text, written_aside
 from robocasa_lerobot.provenance import git_commit, machine, utc_now, versions
-from robocasa_lerobot.study.runs import Run
+from robocasa_lerobot.study.runs import CPU, Run
 from robocasa_lerobot.study.strips import write_strips
 from robocasa_lerobot.training.config.experiment import PhaseConfig, load_experiment
 from robocasa_lerobot.training.metrics import METRICS, read_lines
@@ -136,18 +136,22 @@ def is_stored(run: Run, results: Path) -> bool:
     if not file.is_file():
         return False
     about = json.loads(file.read_text(encoding="utf-8"))
-    return stands_for(about, run) and len(about["steps"]) == len(run.phases)
+    return stands_for(about, run) and len(about["steps"]) == len(run.config.phases)
 
 
 def stands_for(about: Mapping[str, Any], run: Run) -> bool:
-    """Whether what was kept is of this run as it is now; a trial of the study, or shorter phases, do not stand for it.
+    """Whether what was kept is of this run as it is now; a trial of it, shorter phases, or a CPU for a GPU are not.
 
     Args:
         about: the content of `about.json`.
         run: as the study has it.
     """
-    steps = {phase.name: phase.steps for phase in run.phases}
-    return (about["scale"], about["episodes"]) == (run.scale, run.episodes) and about["steps"].items() <= steps.items()
+    steps = {phase.name: phase.steps for phase in run.config.phases}
+    return (
+        (about["scale"], about["episodes"]) == (run.scale, run.episodes)
+        and about["steps"].items() <= steps.items()
+        and (about["device"] == CPU) == (run.config.device == CPU)
+    )
 
 
 def read_stored(results: Path, experiment: str, seed: int) -> StoredRun | None:

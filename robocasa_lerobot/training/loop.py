@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 import torch
 from accelerate import Accelerator
+from lerobot.configs.policies import PreTrainedConfig
 
 from robocasa_lerobot.data.mixture import StepBatches
 from robocasa_lerobot.errors import UserError
@@ -32,8 +33,10 @@ from robocasa_lerobot.training.shared_noise import SharedNoise
 from robocasa_lerobot.training.weights.checkpoint import TrainingState, prune, save_checkpoint
 
 BAD_BATCH = "bad_batch"
-# Policies whose loss is a mean over the actions inside the episode, of which parts of a batch have different numbers.
-MEAN_OF_INSIDE = ("act",)
+# Policies whose loss is a mean over the actions inside the episode, of which parts of a batch have different numbers;
+# and the setting with which that of LeRobot's diffusion and multi_task_dit is one, too.
+MEAN_OF_INSIDE = ("act", "groot", "smolvla")
+MASKS_PADDING = "do_mask_loss_for_padding"
 
 
 @dataclass
@@ -92,7 +95,7 @@ def train_phase(run: PhaseRun, accelerator: Accelerator) -> bool:
         asked = time.perf_counter()
         loaded = [next(batches) for _ in range(parts)]
         waited = time.perf_counter() - asked
-        shares = _shares(loaded, state.policy.config.type, accelerator)
+        shares = part_shares(loaded, state.policy.config, accelerator)
         loss_sum = torch.zeros((), device=accelerator.device)
         for part, (batch, share) in enumerate(zip(loaded, shares, strict=True)):
             prepared = _prepare(run, batch, accelerator, part)
@@ -169,14 +172,15 @@ def step_seed(seed: int, step: int, part: int, process: int) -> int:
     return int(np.random.SeedSequence((seed, step, part, process)).generate_state(1, np.uint64)[0] >> np.uint64(1))
 
 
-def _shares(loaded: list[dict[str, Any]], kind: str, accelerator: Accelerator) -> list[float]:
+def part_shares(loaded: list[dict[str, Any]], config: PreTrainedConfig, accelerator: Accelerator) -> list[float]:
     """What each part's loss counts, so that parts and processes add up to the loss of the whole batch.
 
     Gradients are averaged over the processes afterwards, so the shares of all processes sum to their number.
     """
     equal = [1 / len(loaded)] * len(loaded)
     processes = accelerator.num_processes
-    if kind not in MEAN_OF_INSIDE or len(loaded) * processes == 1 or "action_is_pad" not in loaded[0]:
+    counts = config.type in MEAN_OF_INSIDE or getattr(config, MASKS_PADDING, False)
+    if not counts or len(loaded) * processes == 1 or "action_is_pad" not in loaded[0]:
         return equal
     inside = torch.stack([(~batch["action_is_pad"]).sum() for batch in loaded]).double()
     total = float(accelerator.reduce(inside.sum().float().to(accelerator.device), reduction="sum"))

@@ -9,7 +9,7 @@ from accelerate import Accelerator, DistributedDataParallelKwargs, InitProcessGr
 
 from robocasa_lerobot.data.registry.hub import fetch_missing
 from robocasa_lerobot.training import metrics, records
-from robocasa_lerobot.training.config.experiment import HUB, ExperimentConfig, PhaseConfig
+from robocasa_lerobot.training.config.experiment import FROM_SCRATCH, HUB, ExperimentConfig, PhaseConfig
 from robocasa_lerobot.training.interrupts import Interrupts
 from robocasa_lerobot.training.loop import train_phase
 from robocasa_lerobot.training.planning import skipped
@@ -18,6 +18,7 @@ from robocasa_lerobot.training.planning.unavailable import runnable
 from robocasa_lerobot.training.setup import builders, features
 from robocasa_lerobot.training.setup import phase_data as joining
 from robocasa_lerobot.training.setup.build_phase import planned_policy, prepare_phase, start_of
+from robocasa_lerobot.training.setup.kept import check_kept_settings
 from robocasa_lerobot.training.waiting import BARRIER, first_process_works
 from robocasa_lerobot.training.weights.checkpoint import checkpoint_step, last_checkpoint, tidy
 
@@ -66,7 +67,8 @@ def run_experiment(
     # A mistake in the last phase should not wait for the first to finish. The first process makes fake datasets.
     with accelerator.main_process_first():
         if accelerator.is_local_main_process:
-            fetch_missing(phase.mixture for phase in phases if not is_finished(output, phase))
+            todo = [phase for phase in phases if not is_finished(output, phase)]
+            fetch_missing(mixture for phase in todo for mixture in joining.needed_mixtures(experiment, phase))
         for phase in phases:
             if not is_finished(output, phase):
                 check_phase(experiment, phase, device, only is not None)
@@ -114,8 +116,13 @@ def check_phase(experiment: ExperimentConfig, phase: PhaseConfig, device: str, a
         features.check_features(config, meta)
         if phase.statistics == "keep" and experiment.parent(phase) is None:
             features.check_kept_statistics(builders.read_config(checkpoint), meta)
-    if experiment.parent(phase) is None and last_checkpoint(Path(experiment.output_dir) / phase.name) is None:
-        builders.check_processors(config, meta)
+    if last_checkpoint(Path(experiment.output_dir) / phase.name) is None:
+        parent = experiment.parent(phase)
+        if parent is None:
+            builders.check_processors(config, meta)
+        if phase.statistics == "keep" and experiment.init_of(phase) != FROM_SCRATCH:
+            before = planned_policy(experiment, parent) if parent is not None else ({}, checkpoint)
+            check_kept_settings(config, builders.policy_config(*before, device), phase.name)
     phase_evaluations(phase)
     if alone:
         start_of(experiment, phase)

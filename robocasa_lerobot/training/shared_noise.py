@@ -41,7 +41,7 @@ class SharedNoise(TorchFunctionMode):
             if size is None:
                 size = args[0] if isinstance(args[0], Sequence) else args
             return self._draw(func, (), tuple(size), kwargs)
-        if func is torch.randint:
+        if func is torch.randint or (func is torch.normal and (len(args) == 3 or "size" in kwargs)):
             first, size = (args, kwargs.pop("size")) if "size" in kwargs else (args[:-1], args[-1])
             return self._draw(func, first, tuple(size), kwargs)
         if func is torch._sample_dirichlet:  # what a Beta distribution draws from

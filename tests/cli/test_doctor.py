@@ -40,7 +40,7 @@ def _no_choice_of_backend(monkeypatch: pytest.MonkeyPatch) -> None:
 
 FORCED: dict[str, tuple[Finding, str, str]] = {
     "old Python": (doctor.check_python((3, 11, 9)), "fault", "make PYTHON="),
-    "full disk": (doctor.check_disk(free_bytes=2**30), "fault", "make clean"),
+    "full disk": (doctor.check_disk(free_bytes=2**30), "fault", "outputs/demo"),
     "little memory": (doctor.check_memory(total_bytes=2 * 2**30), "warning", "batch sizes"),
     "old LeRobot": (doctor.check_lerobot("0.4.0"), "fault", "make setup"),
     "no ffmpeg": (doctor.check_torchcodec(no_torchcodec), "warning", "apt-get install --yes ffmpeg"),

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import json
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -22,9 +23,11 @@ from robocasa_lerobot.errors import UserError
 
 pytest.importorskip("lerobot.datasets")
 
+from robocasa_lerobot.convert import pipeline
 from robocasa_lerobot.convert.pipeline import convert
 from robocasa_lerobot.convert.record_files import META_FOLDER
 from robocasa_lerobot.convert.settings import ConversionSettings
+from robocasa_lerobot.jobs.publish import held_folder, partial_folder
 
 EPISODES = 60
 RECORD = f"{META_FOLDER}/conversion.json"  # names the output's place
@@ -176,13 +179,22 @@ def test_twenty_kills(source: Path, expected: dict[str, str], tmp_path: Path) ->
     assert running >= 15, "most of the kills must meet a running conversion"
 
 
-def test_a_kill_while_clearing_away_is_made_good(source: Path, expected: dict[str, str], tmp_path: Path) -> None:
+def test_a_kill_while_clearing_away_is_made_good(
+    source: Path, expected: dict[str, str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """The last thing that can be left: the dataset is there, and the working folder is, too."""
     out = tmp_path / "out"
-    convert([source], out, ConversionSettings(), workers=1)
-    record = json.loads((out / RECORD).read_text())
-    left = tmp_path / f"out.partial-{record['fingerprint']}"
-    (left / "shards" / "00000").mkdir(parents=True)
+
+    def killed(folder: Path) -> None:
+        shutil.rmtree(folder / "shards" / "00000")
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patch:
+        patch.setattr(pipeline, "clear_away", killed)
+        with pytest.raises(KeyboardInterrupt):
+            convert([source], out, ConversionSettings(), workers=1)
+    left = _working_folder(out)
+    assert leftovers(out) == ["out", left.name]
     result = convert([source], out, ConversionSettings(), workers=1)
     assert (result.num_episodes, result.rejected) == (EPISODES, [])
     assert _content(out) == expected
@@ -193,3 +205,19 @@ def test_a_kill_while_clearing_away_is_made_good(source: Path, expected: dict[st
     with pytest.raises(UserError, match="--overwrite"):  # nor by another command
         convert([source], out, ConversionSettings(image_size=32), workers=1)
     assert _content(out) == expected
+
+
+def test_what_is_made_again_is_not_taken_for_what_was_left(source: Path, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    convert([source], out, ConversionSettings(), workers=1)
+    done = _working_folder(out) / "shards" / "00000"  # as a run with --overwrite leaves it
+    done.mkdir(parents=True)
+    with held_folder(_working_folder(out)), pytest.raises(UserError, match="running already"):
+        convert([source], out, ConversionSettings(), workers=1)
+    with pytest.raises(UserError, match="--overwrite"):
+        convert([source], out, ConversionSettings(), workers=1)
+    assert done.is_dir()
+
+
+def _working_folder(out: Path) -> Path:
+    return partial_folder(out, json.loads((out / RECORD).read_text())["fingerprint"])

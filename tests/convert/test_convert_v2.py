@@ -276,6 +276,26 @@ def test_several_datasets_become_one_with_one_table_of_tasks(source: Path, tmp_p
     assert report.passed, report.as_json()
 
 
+def test_rows_of_texts_are_renumbered_and_numbers_of_stages_are_not(tmp_path: Path) -> None:
+    """As RoboCasa's annotations of subtasks have them; its `modality.json` declares neither."""
+    columns = {"annotation.human.subtask_name": np.zeros(6, int), "annotation.human.subtask_stage": np.arange(6) % 2}
+    feature = {"dtype": "int64", "shape": [1], "names": None}
+    folders = [tmp_path / name for name in ("one", "other")]
+    for seed, folder in enumerate(folders):
+        v2.write_dataset(folder, (6,), cameras=contract.CAMERAS[:1], extras=False, seed=seed)
+        v2.edit_json(folder / "meta/info.json", lambda info: info["features"].update(dict.fromkeys(columns, feature)))
+        v2.edit_table(folder, 0, lambda stored: stored.update(columns))
+    tasks = folders[1] / "meta" / "tasks.jsonl"
+    tasks.write_text(tasks.read_text(encoding="utf-8").replace(v2.INSTRUCTIONS[0], "wave"), encoding="utf-8")
+    root = convert(folders, tmp_path / "out", SETTINGS, workers=1).root
+    tasks_there = dict(LeRobotDataset("local/test", root=root, video_backend="pyav").meta.tasks["task_index"])
+    assert tasks_there == {v2.INSTRUCTIONS[0]: 0, v2.TASK_NAME: 1, "wave": 2}
+    assert column(root, "annotation.human.subtask_name").tolist() == [0] * 6 + [2] * 6
+    assert column(root, "annotation.human.subtask_stage").tolist() == [0, 1] * 6
+    assert column(root, "annotation.human.task_name").tolist() == [1] * 12
+    assert verify(root).passed
+
+
 def test_moved_source_is_found_by_option(source: Path, converted: Path, tmp_path: Path) -> None:
     moved = v2.clone(source, tmp_path / "elsewhere")
     copy = Path(shutil.copytree(converted, tmp_path / "copy"))

@@ -177,6 +177,15 @@ def test_undamaged_copy_passes_with_its_source_moved(damaged: Path) -> None:
     assert verify(damaged / "data", [moved], pictures_per_episode=None).passed
 
 
+def test_one_source_that_was_moved_leaves_the_others_where_they_are(tmp_path: Path) -> None:
+    files = [write_demos(tmp_path / name, (4,), images=64, seed=seed) for seed, name in enumerate(("a.hdf5", "b.hdf5"))]
+    root = convert(files, tmp_path / "data", ConversionSettings(), workers=1).root
+    moved = files[1].rename(tmp_path / "elsewhere.hdf5")
+    assert verify(root, [moved]).passed
+    with pytest.raises(UserError, match=r"b\.hdf5 is not there any more"):
+        verify(root, [files[0]])
+
+
 def test_exit_status_and_outputs(damaged: Path, capsys: pytest.CaptureFixture[str]) -> None:
     command = ["verify", str(damaged / "data"), "--source", str(damaged / "demos.hdf5"), "--pictures-per-episode"]
     assert cli.main([*command, "3", "--workers", "2"]) == 0

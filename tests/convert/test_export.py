@@ -11,6 +11,7 @@ import h5py
 import numpy as np
 import pytest
 import v2_support as v2
+from convert_layouts import write_robocasa_v01
 from convert_support import INSTRUCTION, write_demos
 
 from robocasa_lerobot import cli, contract
@@ -100,6 +101,30 @@ def test_export_without_images_renders_again(ours: tuple[Path, Path, Path], tmp_
     for key in ("action", "observation.state"):
         assert column(again, key).tobytes() == column(ours[1], key).tobytes()
     assert verify(again, pictures_per_episode=2).passed
+
+
+def test_absolute_actions_come_back_under_their_own_key(tmp_path: Path) -> None:
+    source, settings = write_robocasa_v01(tmp_path / "in.hdf5", size=32), ConversionSettings(action_key="actions_abs")
+    root = convert([source], tmp_path / "data", settings, workers=1).root
+    path = export(root, tmp_path / "out.hdf5").path
+    true, found = items(source), items(path)
+    assert found["data/demo_1/actions_abs"].tobytes() == true["data/demo_1/actions_abs"].tobytes()
+    assert "data/demo_1/actions" not in found  # which are steps, and not poses to reach
+    again = convert([path], tmp_path / "again", settings, workers=1).root
+    assert column(again, "action").tobytes() == column(root, "action").tobytes()
+
+
+def test_vectors_of_a_panda_omron_need_no_names(ours: tuple[Path, Path, Path], tmp_path: Path) -> None:
+    copy = Path(shutil.copytree(ours[1], tmp_path / "copy"))
+
+    def forget(info: dict[str, Any]) -> None:
+        for key in (contract.ACTION_KEY, contract.STATE_KEY):
+            info["features"][key]["names"] = None
+
+    v2.edit_json(copy / "meta" / "info.json", forget)
+    true, found = items(ours[2]), items(export(copy, tmp_path / "out.hdf5", ExportSettings(images=False)).path)
+    assert found["data/demo_0/actions"].tobytes() == true["data/demo_0/actions"].tobytes()
+    assert {name for name in true if not name.endswith("_image")} == found.keys()
 
 
 def test_robocasas_own_data_becomes_hdf5_and_comes_back(tmp_path: Path) -> None:

@@ -106,6 +106,9 @@ def test_moved_cameras_stay_moved_when_rendered_once_more(converted: Path, tmp_p
         pictures[folder] = dataset[5][contract.image_key(name)].numpy().astype(int)
     assert np.array_equal(pictures["one"], pictures["two"])
     assert np.abs(pictures["one"] - pictures["plain"]).mean() > 5
+    wider = _settings(configs={name: {"camera_attribs": {"fovy": 110}}})  # which says nothing of where it is
+    merged = json.loads(make_render_plan(tmp_path / "one", wider).settings.cam_configs)
+    assert merged == {name: {"pos": [-0.3, 0.1, 1.2], "camera_attribs": {"fovy": [110.0]}}}
 
 
 @pytest.mark.render

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import json
 import pickle
 import shutil
 from pathlib import Path
 
 import numpy as np
+import pyarrow.parquet as pq
 import pytest
 import torch
 from lerobot.datasets.lerobot_dataset import LeRobotDataset
@@ -214,3 +216,25 @@ def test_pictures_of_some_cameras_only(root: Path, tmp_path: Path) -> None:
         open_many([root], cameras=["robot0_eye_in_hnad"])
     with pytest.raises(UserError, match="cameras"):
         LoaderConfig(cameras=[])
+
+
+def test_datasets_with_different_cameras_go_together_in_those_that_both_have(root: Path, tmp_path: Path) -> None:
+    left = contract.IMAGE_KEYS[0]
+    other = Path(shutil.copytree(root, tmp_path / "other"))
+    info = json.loads((other / "meta/info.json").read_text())
+    del info["features"][left]
+    (other / "meta/info.json").write_text(json.dumps(info))
+    for path in other.glob("meta/episodes/*/*.parquet"):
+        table = pq.read_table(path)
+        pq.write_table(table.drop_columns([name for name in table.column_names if left in name]), path)
+    for roots in ([root, other], [other, root]):
+        with pytest.raises(UserError, match=f"feature '{left}' is missing in {other}"):
+            open_many(roots)
+        with pytest.raises(UserError, match=f"feature '{left}' is missing in {other}"):
+            open_many(roots, cameras=[contract.CAMERAS[0]])
+        both = open_many(roots, cameras=list(contract.CAMERAS[1:]))
+        assert both.meta.camera_keys == list(contract.IMAGE_KEYS[1:])
+        assert set(both.statistics()) & set(contract.IMAGE_KEYS) == set(contract.IMAGE_KEYS[1:])
+        batch = both.batch(np.array([0, 1]), np.array([3, 3]))
+        assert torch.equal(*batch[contract.IMAGE_KEYS[2]])
+        assert left not in batch

@@ -29,6 +29,7 @@ from robocasa_lerobot.data.registry.registry import (
 )
 from robocasa_lerobot.envs.tasks import registry as envs
 from robocasa_lerobot.errors import UnknownNameError, UserError
+from robocasa_lerobot.jsonl import read_jsonl, write_jsonl
 from robocasa_lerobot.settings import decode, load_yaml
 
 
@@ -116,14 +117,25 @@ def test_published_folders_are_found_newest_first_and_old_formats_say_how_to_con
     assert published.find(["ArrangeTea"], "pretrain", None, "lerobot") == []
 
 
+def test_any_source_is_what_is_there_or_can_be_downloaded(tmp_path: Path) -> None:
+    task = min(published_task_sets()["diversity17"])
+    dated = tmp_path / "pretrain" / published_tasks()[task][0] / task / "20250101"
+    info(dated / "mg_5x1/demo/2025-04-01/lerobot", "v2.1")
+    published = PublishedDatasets(tmp_path)
+    assert [entry.source for entry in published.find([task], "pretrain", None, "lerobot")] == ["human", "mg", "mg_5x1"]
+    (asked,) = published.find([task], "pretrain", "mg_5x5", "lerobot")
+    assert "no download of mg_5x5 is known" in str(asked.missing)
+
+
 @pytest.mark.parametrize(
     ("task_set", "split", "source", "count"),
     [
         ("pretrain300", "pretrain", "human", 300),
-        ("lifelong_phase1", "pretrain", None, 65 + 60 + 17 + 17),
+        ("lifelong_phase1", "pretrain", None, 65 + 60),  # of the two reduced sets no download is known
+        ("lifelong_phase1", "pretrain", "mg_5x1", 17),
         ("lifelong_phase1", "pretrain", "mg", 60),
         ("atomic_seen", "target", None, 18),
-        (None, None, None, 300 + 60 + 17 + 17 + 50),
+        (None, None, None, 300 + 60 + 50),
     ],
 )
 def test_selections_list_what_is_published(
@@ -261,8 +273,10 @@ def test_episodes_are_chosen_by_kitchen(fake: Path, tmp_path: Path) -> None:
     without = tmp_path / "without"
     shutil.copytree(fake, without)
     table = without / "meta/robocasa/episodes.jsonl"
-    rows = [json.loads(line) for line in table.read_text().splitlines()]
-    table.write_text("".join(json.dumps({**row, "layout_id": None}) + "\n" for row in rows))
+    rows = read_jsonl(table)
+    write_jsonl(table, ({**row, "instruction": "open\u2028the\x85drawer"} for row in rows))  # ends of lines elsewhere
+    assert DatasetSource(without).select(MemberConfig("-", layouts=[11])).tolist() == chosen(layouts=[11])
+    write_jsonl(table, ({**row, "layout_id": None} for row in rows))
     with pytest.raises(UserError, match="no layout_id of episode 0, which `layouts` needs"):
         DatasetSource(without).select(MemberConfig("-", layouts=[11]))
 

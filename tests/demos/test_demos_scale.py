@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import random
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 from types import SimpleNamespace
@@ -13,6 +15,7 @@ import numpy as np
 import pytest
 from cluster_work import hdf5_content
 from killed_runs import run_killed
+from ray_support import StandIn
 from slurm_support import stand_in
 
 from robocasa_lerobot import cli
@@ -20,6 +23,7 @@ from robocasa_lerobot.cli.demos import EXAMPLE
 from robocasa_lerobot.demos.attempts import HOPELESS, Parts, RecordingSettings, Tally
 from robocasa_lerobot.demos.choose import choose_tasks, expand_names
 from robocasa_lerobot.demos.demonstrator import can_demonstrate
+from robocasa_lerobot.demos.distributed import record_distributed
 from robocasa_lerobot.demos.hdf5 import Failure, read_summary
 from robocasa_lerobot.demos.motion import Array, action
 from robocasa_lerobot.demos.progress import Board
@@ -32,6 +36,7 @@ from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.robots.panda_omron import model as panda_model
 from robocasa_lerobot.envs.tasks.registry import get_task, task_names, task_set
 from robocasa_lerobot.errors import LackingMachineError, UnknownNameError, UserError
+from robocasa_lerobot.jobs.executors import Execution, RaySettings
 from robocasa_lerobot.video import frames_and_rate
 
 QUICK = ("CloseDrawer", "OpenDrawer")
@@ -122,6 +127,22 @@ def test_a_failure_says_in_which_kitchen_it_was(tmp_path: Path) -> None:
     assert Parts(tmp_path, parts.settings).tally() == parts.tally()
 
 
+def test_a_changed_option_throws_nothing_away(tmp_path: Path) -> None:
+    settings = RecordingSettings("CloseDrawer", 2, seed=1)
+    noisy = dataclasses.replace(settings, action_noise=0.1)
+    parts = Parts(tmp_path, settings)
+    parts.prepare()
+    parts.episode(1).touch()
+    with pytest.raises(UserError, match=r"holds 1 demonstration.* \(action_noise: 0\.0, now 0\.1\)\. Give those"):
+        record_tasks([noisy], tmp_path, show_progress=False)
+    assert [path.name for path in tmp_path.iterdir()] == [parts.folder.name]
+    Parts(tmp_path, dataclasses.replace(settings, episodes=3)).prepare()  # more of the same are no other settings
+    assert parts.tally().done == {1: True}
+    parts.episode(1).rename(parts.folder / "000001.json")  # where nothing has succeeded, nothing is lost
+    Parts(tmp_path, noisy).prepare()
+    assert not (parts.folder / "000001.json").exists()
+
+
 def test_time_left_follows_from_what_this_run_has_done(capsys: pytest.CaptureFixture[str]) -> None:
     now = [0.0]
     settings = RecordingSettings("CloseDrawer", 10)
@@ -193,6 +214,19 @@ def test_what_the_machine_lacks_ends_the_recording_and_counts_as_no_attempt(
     with pytest.raises(LackingMachineError, match="gymnasium-robotics"):
         record_tasks([settings], tmp_path, show_progress=False)
     assert Parts(tmp_path, settings).tally().done == {}  # once it is mended, the same command starts afresh
+
+
+def test_a_file_that_was_removed_is_a_piece_of_the_cluster_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    ray = StandIn()
+    monkeypatch.setitem(sys.modules, "ray", ray)
+    settings = [RecordingSettings("CloseDrawer", 1, seed=1)]
+    execution = Execution("ray", ray=RaySettings(cpus=1))
+    for times in (1, 2):  # of which the second finds the markers of the first
+        assert record_distributed(settings, tmp_path, execution, keep_failures=False) == ("", 0)
+        assert len(ray.asked) == times
+        (tmp_path / "CloseDrawer.hdf5").unlink()
 
 
 @pytest.mark.slow

@@ -18,6 +18,7 @@ from robocasa_lerobot.demos.generate.mimicgen.subtasks import (
     read_datagen,
     selected,
     with_offsets,
+    write_datagen,
 )
 from robocasa_lerobot.demos.generate.mimicgen.template import (
     INTERPOLATION,
@@ -25,12 +26,15 @@ from robocasa_lerobot.demos.generate.mimicgen.template import (
     RANDOM,
     ROBOT,
     Subtask,
+    Template,
     derived_template,
     read_json_template,
     template_from,
 )
+from robocasa_lerobot.demos.generate.settings import GenerationSettings
 from robocasa_lerobot.demos.generate.sources.prepare import prepare_files
-from robocasa_lerobot.demos.generate.sources.prepared import GROUP
+from robocasa_lerobot.demos.generate.sources.prepared import GROUP, Prepared, write_prepared
+from robocasa_lerobot.demos.generate.sources.segments import cut, signals_of
 from robocasa_lerobot.demos.generate.sources.source import sources_of
 from robocasa_lerobot.demos.generate.sources.transform import inverse, yaw_pose
 from robocasa_lerobot.demos.motion import Array
@@ -80,6 +84,73 @@ def info(number: int, at: float) -> DatagenInfo:
     )
 
 
+def written(path: Path, seeds: list[int]) -> Path:
+    """A file that MimicGen might have prepared, with a demonstration of each seed."""
+    with h5py.File(path, "w") as file:
+        for number, seed in enumerate(seeds):
+            demo = file.create_group(f"data/demo_{number}")
+            demo.attrs["seed"] = seed
+            write_datagen(demo.create_group(GROUP), info(number, 0.8), "Stack")
+    return path
+
+
+def opened(path: Path, *touches: slice) -> Path:
+    """A file as `prepare` writes it, with one demonstration in which a drawer is touched and moved so often."""
+    still_there, touched = still(np.eye(4)), np.zeros(STEPS, np.int64)
+    for steps in touches:
+        touched[steps] = 1
+    name = "drawer.box"
+    found = Prepared(
+        eef=still_there,
+        target=still_there,
+        gripper=-np.ones(STEPS),
+        base=np.zeros((STEPS, 3)),
+        stage=np.zeros(STEPS, np.int64),
+        gap=np.zeros(STEPS),
+        poses={name: still_there},
+        joints={name: np.linspace(0.0, 1.0, STEPS)},
+        touching={name: touched},
+        contact_points={name: np.zeros((STEPS, 3))},
+        undersides={},
+        working_points={},
+        about={"stages": [{"skill": "drawers", "verb": "open", "parts": [name]}], "parts": {name: {"range": [0, 1]}}},
+    )
+    with h5py.File(path, "w") as file:
+        demo = file.create_group("data/demo_0")
+        file["data"].attrs["env"] = "OpenDrawer"
+        write_prepared(demo, found, signals_of(cut(found), STEPS))
+    return path
+
+
+def settings_of(path: Path, **values: Any) -> GenerationSettings:
+    given: dict[str, Any] = {
+        "task": "OpenDrawer",
+        "episodes": 1,
+        "split": "pretrain",
+        "seed": 100,
+        "method": "mimicgen",
+    }
+    return GenerationSettings.of(path, **(given | values))
+
+
+def test_a_templates_sources_are_the_first_ones_and_not_of_the_attempts_own_scenes(tmp_path: Path) -> None:
+    path, template = written(tmp_path / "stack.hdf5", [5, 6, 7]), json.dumps(STACK)
+    first = settings_of(path, template=template, first_sources=2)
+    assert [one.seed for one in first.subtasks().infos] == [5, 6]
+    with pytest.raises(UserError, match=r"sources come from seeds \[7\]"):
+        settings_of(path, template=template, seed=7)
+    settings_of(path, template=template, seed=7, first_sources=2)
+
+
+def test_subtasks_are_derived_by_the_rules_that_are_given(tmp_path: Path) -> None:
+    path = opened(tmp_path / "OpenDrawer.hdf5", slice(2, 6), slice(12, 18))
+    whole, apart = (settings_of(path, rules=rules).subtasks() for rules in ("{}", '{"drawers open": {"gap_steps": 2}}'))
+    assert [len(one.template.subtasks) for one in (whole, apart)] == [1, 2]
+    assert boundaries(apart.infos[0], apart.template) == [7, STEPS]  # where the first touch has ended
+    with pytest.raises(UserError, match=r"no subtasks to carry over\. Choose another --method"):
+        settings_of(opened(tmp_path / "none.hdf5"))
+
+
 def test_a_template_says_what_it_says_and_the_rest_is_the_librarys() -> None:
     template = template_from(STACK)
     first, last = template.subtasks
@@ -114,10 +185,14 @@ def test_what_a_template_cannot_say(tmp_path: Path, change: dict[str, Any], said
 
 def test_subtasks_end_after_their_signal_and_put_off_by_what_is_drawn() -> None:
     template, source = template_from(STACK), info(0, 0.8)
-    assert boundaries(source, template) == [GRASP, STEPS]
-    drawn = [with_offsets([GRASP, STEPS], template, np.random.default_rng(seed)) for seed in range(40)]
-    assert {first for first, _ in drawn} == {(0, 10), (0, 11), (0, 12)}
+    ends = boundaries(source, template)
+    assert ends == [GRASP + 1, STEPS]  # the step in which it has risen belongs to it
+    drawn = [with_offsets(ends, template, np.random.default_rng(seed)) for seed in range(40)]
+    assert {first for first, _ in drawn} == {(0, 11), (0, 12), (0, 13)}
     assert all(last == (first[1], STEPS) for first, last in drawn)
+    source.signals["lift"] = (np.arange(STEPS) > GRASP).astype(np.int64)  # just when the subtask before has ended
+    three = Template((Subtask("cube", "grasp"), Subtask("cube", "lift"), Subtask("bin", None)))
+    assert boundaries(source, three) == [GRASP + 1, GRASP + 2, STEPS]
     source.signals["grasp"][:] = 1
     with pytest.raises(UserError, match="does not rise"):
         boundaries(source, template)

@@ -215,6 +215,8 @@ def test_other_mistakes_say_what_to_do():
 
 def test_task_sets():
     assert "OpenDrawer" in task_set("atomic_seen")
+    assert len(task_set("target50")) == 50
+    assert len(task_set("diversity17")) == 17
     assert "CloseDrawer" not in task_set("atomic_seen")
     assert set(task_set("lifelong_phase1")) == {name for name in task_names() if get_task(name).facts.kind == "atomic"}
     assert "mimicgen60" in task_sets()

@@ -9,7 +9,7 @@ from task_selection import every_task
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.robots.panda_omron.robot import PANDA_OMRON
 from robocasa_lerobot.envs.scene.reset_noise import InitialNoise
-from robocasa_lerobot.envs.scene.robot_poses import is_free
+from robocasa_lerobot.envs.scene.robot_poses import RobotPose, is_free
 from robocasa_lerobot.errors import UserError
 
 SEEDS = range(6)
@@ -22,7 +22,7 @@ def starts(**kwargs: object) -> list[tuple[np.ndarray, np.ndarray, str]]:
     for seed in SEEDS:
         env.reset(seed=seed)
         robot = env.scene.robot_pose
-        assert is_free(env.scene.fixtures, robot, PANDA_OMRON.shape)
+        assert is_free(env.scene.layout, robot, PANDA_OMRON.shape)
         arm = np.array([env.data.joint(f"robot0_joint{i}").qpos[0] for i in range(1, 8)])
         out.append((np.array([robot.x, robot.y, robot.yaw]), arm, env.scene.instruction))
     return out
@@ -53,6 +53,25 @@ def test_the_base_starts_anywhere_within_a_distance_and_at_any_heading() -> None
     assert far.mean() > 0.5
     assert np.abs(np.sin(shifts[:, 2])).max() > 0.8
     assert np.cos(shifts[:, 2]).min() < 0.0
+
+
+def test_the_base_starts_in_no_open_door_and_within_the_room() -> None:
+    env = KitchenEnv("CloseFridge", cameras=(), initial_noise=InitialNoise(base_within_m=1.5))
+    moved = 0
+    for seed in range(12):
+        env.reset(seed=seed)
+        scene = env.scene
+        opened = [(scene.fixtures[name], 1.0) for (name, _), share in scene.openness.items() if share > 0.5]
+        assert opened
+        assert is_free(scene.layout, scene.robot_pose, PANDA_OMRON.shape, opened)
+        moved += scene.robot_pose != env_start(env, seed)
+    assert moved > 6
+
+
+def env_start(env: KitchenEnv, seed: int) -> RobotPose:
+    plain = KitchenEnv(env.task, cameras=())
+    plain.reset(seed=seed)
+    return plain.scene.robot_pose
 
 
 @pytest.mark.parametrize("task", every_task())

@@ -174,6 +174,18 @@ def test_moved_since_the_reset(goal: MovedSince, move: tuple[float, ...], turn: 
     assert (hold(goal, env.scene, env.data) is None) == held
 
 
+@pytest.mark.parametrize(("axis", "held"), [(0, False), (1, False), (2, True)])
+def test_tipping_is_no_turn_about_the_vertical(axis: int, held: bool) -> None:
+    goal = MovedSince("obj", "reset", by_rad=0.3, about_vertical=True)
+    env = make(goal)
+    steps(env, 3)
+    free = env.data.joint("obj_joint0")
+    turn = np.zeros(4)
+    turn[[0, 1 + axis]] = np.cos(0.2), np.sin(0.2)  # 0.4 rad
+    mujoco.mju_mulQuat(free.qpos[3:], turn, free.qpos[3:].copy())
+    assert (hold(goal, env.scene, env.data) is None) == held
+
+
 def rub(env: KitchenEnv, places: list[tuple[float, float]], *, held: bool = True, touching: bool = True) -> bool:
     """Hold the sponge in the gripper and rub it over the lettuce, at places (metres) in the frame of the lettuce."""
     scene, data, goal = env.scene, env.data, env.declaration.goal

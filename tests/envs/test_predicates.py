@@ -23,6 +23,7 @@ from robocasa_lerobot.envs.predicates import (
     Near,
     NearerThan,
     Not,
+    ObjectInBasin,
     ObjectOnRack,
     OnBurner,
     OnOneSide,
@@ -237,6 +238,22 @@ def test_it_holds_in_its_state_and_in_no_near_miss(case: str, scenes: dict[str, 
 def test_every_predicate_that_can_be_missed_by_little_is_among_the_cases() -> None:
     kinds = {type(part) for _, goal, _, _ in CASES.values() for part in every_goal_in(goal)}
     assert {UnderWater, ObjectOnRack, OnBurner, OverBasin, Grasped, GripperTouches, Near, NearerThan} <= kinds
+
+
+@pytest.mark.parametrize(
+    ("place", "inside"),
+    [
+        (over_basin("basin0", 0.9), True),
+        (over_basin("basin1", 0.9), True),
+        (over_basin("basin0", -1.5), False),
+        (over_basin("basin1", 0.0, up_m=0.5), False),
+    ],
+)
+def test_a_sink_with_two_basins_is_both_of_them(place: Change, inside: bool, scenes: dict[str, Scene]) -> None:
+    scene = scenes["basins"]
+    data = state(scene)
+    place(scene, data)
+    assert (hold(ObjectInBasin("left_obj", "sink"), scene, data) is None) == inside
 
 
 def test_groups_are_compared_by_their_farthest(scenes: dict[str, Scene]) -> None:

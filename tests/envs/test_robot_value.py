@@ -42,7 +42,7 @@ def test_scenes_are_made_for_the_robot_that_is_in_them(task: str) -> None:
         env.reset(seed=seed)
         scene = env.scene
         assert scene.robot is VARIANT
-        assert is_free(scene.fixtures, scene.robot_pose, VARIANT.shape)
+        assert is_free(scene.layout, scene.robot_pose, VARIANT.shape)
         arm = [float(env.data.joint(name).qpos[0]) for name in VARIANT.names.arm_joints]
         assert np.abs(np.array(arm) - VARIANT.home.arm).max() < 0.12  # noise of 0.02 rad, then settled
         base = env.data.site(VARIANT.names.base_center_site).xpos

@@ -167,7 +167,7 @@ def test_robots_stand_before_stools_islands_fridges_and_towers(layout_id: int) -
                 assert kind == "cabinet", fixture.name  # beside a corner there may be no room: the builder draws again
                 continue
             found += 1
-            assert is_free(layout.fixtures, pose, PANDA_OMRON.shape)
+            assert is_free(layout, pose, PANDA_OMRON.shape)
             ground = ground_fixture(layout, fixture)
             facing = np.array([np.cos(pose.yaw), np.sin(pose.yaw)])
             away = np.array([pose.x, pose.y]) - ground.pos[:2]

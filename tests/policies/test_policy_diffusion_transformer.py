@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 import torch
 from lerobot.configs import PreTrainedConfig
+from lerobot.configs.types import NormalizationMode
 from lerobot.policies.factory import make_pre_post_processors
 from policy_support import (
     batch_for,
@@ -29,6 +30,7 @@ from robocasa_lerobot.policies.diffusion_transformer.configuration_diffusion_tra
 )
 from robocasa_lerobot.policies.diffusion_transformer.modeling_diffusion_transformer import DiffusionTransformerPolicy
 from robocasa_lerobot.policies.diffusion_transformer.network import DenoisingTransformer, causal_mask, memory_mask
+from robocasa_lerobot.training.setup import builders
 
 VARIANTS: dict[str, dict[str, Any]] = {
     "default": {},
@@ -232,6 +234,16 @@ def test_saved_and_loaded_policy_gives_the_same_actions(scheduler: str, tmp_path
     assert torch.equal(before, after)
 
 
+def test_frames_to_drop_follow_from_the_lengths_of_a_later_phase(tmp_path: Path) -> None:
+    """Unless they were said, they are those of each phase: config.json does not hold what followed in one before."""
+    tiny_config(horizon=10, n_action_steps=8).save_pretrained(tmp_path / "followed")
+    tiny_config(horizon=10, n_action_steps=8, drop_n_last_frames=0).save_pretrained(tmp_path / "said")
+    for name, wanted in (("followed", {8: 1, 4: 5}), ("said", {8: 0, 4: 0})):
+        for steps, dropped in wanted.items():
+            config: Any = builders.policy_config({"n_action_steps": steps}, tmp_path / name, "cpu")
+            assert config.drop_n_last_frames == dropped
+
+
 @pytest.mark.parametrize("scheduler", ["DDPM", "DDIM"])
 def test_actions_depend_on_the_samples_generator_and_not_on_its_batch(scheduler: str) -> None:
     config = tiny_config(noise_scheduler=scheduler)
@@ -307,6 +319,7 @@ def test_select_action_steps_through_chunks_of_the_true_history(offsets: list[in
         ({"vision_grid": 0}, "vision_grid is 0"),
         ({"vision_stem": 0}, "vision_stem is 0"),
         ({"vision_keypoints": 0}, "vision_keypoints is 0"),
+        ({"normalization_mapping": {"ACTION": NormalizationMode.MEAN_STD}}, "clip_sample is true"),
     ],
 )
 def test_wrong_fields_are_explained(overrides: dict[str, Any], message: str) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 import os
 import subprocess
@@ -35,6 +36,7 @@ from robocasa_lerobot.training.config.experiment import load_experiment
 from robocasa_lerobot.training.phases import run_experiment
 from robocasa_lerobot.training.setup import build_phase as prepare
 from robocasa_lerobot.training.setup import builders
+from robocasa_lerobot.training.setup.kept import IN_PROCESSORS
 
 FOLDER = Path(__file__).parents[2] / "configs/policies"
 FILES = sorted(FOLDER.glob("*.yaml"))
@@ -144,6 +146,16 @@ def test_published_settings(kind: str, published: dict[str, Any]) -> None:
     if kind in ("pi0", "pi05"):
         assert config.normalization_mapping["STATE"] == config.normalization_mapping["ACTION"]
         assert config.normalization_mapping["ACTION"] == NormalizationMode.MEAN_STD
+
+
+def test_settings_that_processors_keep_are_those_of_the_policies() -> None:
+    assert IN_PROCESSORS.keys() == {*OURS, *LEROBOTS} - {"act", "diffusion"}  # which have normalisation alone
+    for kind, names in IN_PROCESSORS.items():
+        assert {"normalization_mapping", *names} <= {field.name for field in dataclasses.fields(config_of_type(kind))}
+
+
+def config_of_type(kind: str) -> Any:
+    return builders.policy_config({"type": kind}, None, "cpu")
 
 
 def experiment_file(folder: Path, data: Path, kind: str, models: Path) -> Path:

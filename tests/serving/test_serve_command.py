@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import os
 import re
 import signal
@@ -17,10 +18,15 @@ from typing import Any
 
 import numpy as np
 import pytest
+from websockets.asyncio.client import connect as connect_async
+from websockets.asyncio.server import ServerConnection
 from websockets.exceptions import InvalidStatus
 from websockets.sync.client import connect
 
 from robocasa_lerobot import cli
+from robocasa_lerobot.serving.access import Access
+from robocasa_lerobot.serving.limits import Limits
+from robocasa_lerobot.serving.web import serve_websockets
 from robocasa_lerobot.wire.codec import decode, encode
 
 TOKEN = "0123456789abcdef-token"
@@ -90,6 +96,29 @@ def test_more_clients_than_allowed_are_sent_away() -> None:
         connection.recv(timeout=30)
         with pytest.raises(InvalidStatus, match="503"), connect(f"ws://127.0.0.1:{port}"):
             pass
+
+
+def test_a_client_that_is_gone_without_a_word_does_not_hold_its_place_for_ever() -> None:
+    found: dict[str, int] = {}
+
+    async def look(connection: ServerConnection) -> None:
+        own = connection.transport.get_extra_info("socket")
+        found["alive"] = own.getsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE)
+        for name in ("TCP_KEEPIDLE", "TCP_KEEPINTVL", "TCP_KEEPCNT"):
+            found[name] = own.getsockopt(socket.IPPROTO_TCP, getattr(socket, name))
+
+    async def run() -> None:
+        stop, ports = asyncio.Event(), asyncio.Queue[int]()
+        access = Access("127.0.0.1", 0, None)
+        server = asyncio.create_task(serve_websockets(look, {}, {}, access, Limits(), stop, ports.put_nowait))
+        async with connect_async(f"ws://127.0.0.1:{await ports.get()}") as connection:
+            await connection.wait_closed()
+        stop.set()
+        await server
+
+    asyncio.run(run())
+    assert found["alive"]
+    assert found["TCP_KEEPIDLE"] + found["TCP_KEEPINTVL"] * found["TCP_KEEPCNT"] <= 15 * 60  # not the system's hours
 
 
 @pytest.mark.parametrize(

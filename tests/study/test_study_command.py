@@ -49,8 +49,8 @@ def test_the_plan_leaves_out_what_has_ended(tmp_path: Path) -> None:
     for run in runs_of([whole.parts["multitask"]], tmp_path, configs_folder())[:2]:
         folder = stored_folder(tmp_path / "kept", run.experiment, run.seed)
         folder.mkdir(parents=True)
-        steps = {phase.name: phase.steps for phase in run.phases}
-        (folder / ABOUT).write_text(json.dumps({"scale": None, "episodes": None, "steps": steps}))
+        steps = {phase.name: phase.steps for phase in run.config.phases}
+        (folder / ABOUT).write_text(json.dumps({"scale": None, "episodes": None, "steps": steps, "device": "cpu"}))
     done = study(tmp_path, "--plan", "--measure=0", "--results=kept", "multitask")
     line = next(line.split() for line in done.stdout.splitlines() if line.startswith("multitask"))
     assert line[1] == "1"
@@ -118,9 +118,11 @@ def test_a_trial_of_the_study_does_not_stand_for_it(tmp_path: Path) -> None:
     )
     folder = stored_folder(tmp_path, tried.experiment, tried.seed)
     folder.mkdir(parents=True)
-    steps = {phase.name: phase.steps for phase in tried.phases}
+    steps = {phase.name: phase.steps for phase in tried.config.phases}
     assert steps["multitask"] < 100
-    (folder / ABOUT).write_text(json.dumps({"scale": tried.scale, "episodes": tried.episodes, "steps": steps}))
+    (folder / ABOUT).write_text(
+        json.dumps({"scale": tried.scale, "episodes": tried.episodes, "steps": steps, "device": "cpu"})
+    )
     assert is_stored(tried, tmp_path)
     assert not is_stored(asked, tmp_path)
     assert "--replace" in asked.commands(None)[0], "its data neither"
@@ -150,7 +152,7 @@ def test_each_phase_is_a_command_of_its_own(tmp_path: Path) -> None:
     run = runs_of([load_study().parts["lifelong"]], tmp_path, configs_folder(), "tiny")[0]
     data, *trainings = run.commands(2)
     assert data[:2] == ["data", str(run.file)]
-    assert [words[2] for words in trainings] == [f"--phase={phase.name}" for phase in run.phases]
+    assert [words[2] for words in trainings] == [f"--phase={phase.name}" for phase in run.config.phases]
     assert len(trainings) == 13
     assert all("--evaluate" in words and "--scale=tiny" in words for words in trainings)
 

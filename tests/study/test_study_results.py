@@ -157,7 +157,7 @@ def test_phases_are_stored_as_they_end(tmp_path: Path) -> None:
     results = tmp_path / "results"
     with pytest.raises(UserError, match="lifelong/seed_0: none of its phases has ended"):
         files.store(run, results)
-    steps = run.phases[0].steps
+    steps = run.config.phases[0].steps
     phase_with_trials(run.folder / "phase1", steps, "study_validation")
     phase_with_trials(run.folder / "phase2", steps, "study_validation", finished=False)
     phase_with_trials(run.folder / "phase3", steps - 1, "study_validation")
@@ -171,3 +171,4 @@ def test_phases_are_stored_as_they_end(tmp_path: Path) -> None:
     assert not files.is_stored(run, results), "the others are still to be trained"
     assert not files.stands_for({**found.about, "steps": {"phase1": steps - 1}}, run), "of other lengths"
     assert not files.stands_for({**found.about, "scale": "tiny"}, run)
+    assert not files.stands_for({**found.about, "device": "NVIDIA H200"}, run)

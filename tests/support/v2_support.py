@@ -196,10 +196,8 @@ def _write_modality(root: Path, cameras: Sequence[str]) -> None:
             "state": parts(contract.STATE_SLICES, "observation.state"),
             "action": parts(contract.ACTION_SLICES, "action"),
             "video": {camera: {"original_key": contract.image_key(camera)} for camera in cameras},
-            "annotation": {
-                f"human.{name}": {"original_key": f"annotation.human.{name}"}
-                for name in ("task_description", "task_name")
-            },
+            # RoboCasa365's own: the task's name is not declared.
+            "annotation": {"human.task_description": {"original_key": "annotation.human.task_description"}},
         },
     )
 

@@ -22,6 +22,7 @@ from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.errors import UserError
 from robocasa_lerobot.teleop.client import TeleopClient
 from robocasa_lerobot.teleop.driving.pilot import load_pilot
+from robocasa_lerobot.teleop.telling import header
 
 pytestmark = pytest.mark.render
 
@@ -135,8 +136,9 @@ def test_a_checkpoint_acts_as_it_does_elsewhere_and_anew_after_a_correction(tmp_
 
 
 def push(request: Any) -> dict[str, Any]:
-    """A policy behind a socket that lifts the hand."""
+    """A policy behind a socket that lifts the hand, closed."""
     actions = np.zeros((50, 12), np.float32)
+    actions[:, contract.ACTION_SLICES_HDF5["gripper_close"]] = 1.0
     actions[:, contract.ACTION_SLICES_HDF5["end_effector_position"]] = (0.0, 0.0, 0.5)
     return {"actions": actions}
 
@@ -156,9 +158,12 @@ def test_a_policy_behind_a_socket_drives_and_its_end_is_no_end(tmp_path: Path) -
             assert (table.session.phase, pilot.state) == ("paused", "CORRECTING")
             assert "the policy failed" in table.notes()[-1]
             steps = len(table.session.driven)
+            assert header(table.session, 1, table.now)["gripper"] == "closed"
             table.say("resume")
             table.hold(2, arm=[1, 0, 0, 0, 0, 0])
             assert len(table.session.driven) == steps + 2
+            gripper = contract.ACTION_SLICES["gripper_close"]
+            assert (table.session.driven.actions()[:, gripper] == 1.0).all()  # what the policy held is not let go
             with OpenpiServer(push, port=server.port):
                 table.say("give_back")
                 table.tick(3)

@@ -14,10 +14,11 @@ import yaml
 from evaluation_env import SlideEnv
 from lerobot.configs.policies import PreTrainedConfig
 from lerobot.configs.types import FeatureType, PolicyFeature
-from lerobot.policies.factory import get_policy_class
+from lerobot.policies.factory import get_policy_class, make_pre_post_processors
 from lerobot.policies.utils import validate_visual_features_consistency
 from lerobot.utils.feature_utils import dataset_to_policy_features
 from policy_models_support import tiny_settings
+from policy_support import unit_stats
 from training_support import losses
 
 from robocasa_lerobot import contract
@@ -209,3 +210,34 @@ def test_a_published_policy_trains_goes_on_and_acts_in_our_kitchen(kind: str, tm
     assert action.shape == (contract.ACTION_SIZE,)
     assert np.isfinite(action).all()
     assert run_trial(SlideEnv("Slide", image_size=SIZE, horizon=6), actor, trial).steps <= 6
+
+
+def test_kept_statistics_of_renamed_cameras_are_used(tmp_path: Path, data: Path) -> None:
+    """A checkpoint that normalises pictures of cameras with other names: ours in their places are the same inputs."""
+    start, names = tmp_path / "start", dict(zip((LEFT, RIGHT, WRIST), ("one", "two", "three"), strict=True))
+    rename = {ours: contract.IMAGE_PREFIX + name for ours, name in names.items()}
+    path = experiment_file(tmp_path / "run", data, "act", start, statistics="keep")
+    content = yaml.safe_load(path.read_text())
+    content["policy"]["rename"] = rename
+    path.write_text(yaml.safe_dump(content))
+    found = dataset_to_policy_features(meta(SIZE).features)
+    settings = {**preset("act"), **tiny_settings("act", tmp_path / "models")}
+    config: Any = builders.policy_config(settings, None, "cpu")
+    config.output_features = {contract.ACTION_KEY: found.pop(contract.ACTION_KEY)}
+    config.input_features = {rename.get(key, key): feature for key, feature in found.items()}
+    get_policy_class("act")(config).save_pretrained(start)
+    pictures = {
+        key: {"mean": np.full((3, 1, 1), 0.1 * i), "std": np.full((3, 1, 1), 0.5)}
+        for i, key in enumerate(rename.values(), 1)
+    }
+    pre, post = make_pre_post_processors(config, dataset_stats={**unit_stats(), **pictures})
+    pre.save_pretrained(start)
+    post.save_pretrained(start)
+    assert run_experiment(load_experiment(path))
+    for phase in ("train", "further"):
+        checkpoint = tmp_path / f"run/out/{phase}/checkpoints/000002/pretrained_model"
+        preprocessor, _ = make_pre_post_processors(PreTrainedConfig.from_pretrained(checkpoint), str(checkpoint))
+        batch = {key: torch.full((1, 3, SIZE, SIZE), 0.7) for key in rename}
+        inputs = preprocessor({**batch, contract.STATE_KEY: torch.zeros(1, contract.STATE_SIZE)})
+        for i, key in enumerate(rename, 1):
+            torch.testing.assert_close(inputs[key], (batch[key] - 0.1 * i) / 0.5)

@@ -31,6 +31,7 @@ from robocasa_lerobot.training.config.experiment import TRACKERS
 from robocasa_lerobot.training.config.phase import AugmentConfig
 from robocasa_lerobot.training.interrupts import REQUEUE
 from robocasa_lerobot.training.loading import load_batches
+from robocasa_lerobot.training.loop import part_shares
 from robocasa_lerobot.training.phases import run_experiment
 from robocasa_lerobot.training.setup.build_phase import prepare_phase
 from robocasa_lerobot.training.setup.builders import frame_size, policy_config
@@ -267,7 +268,10 @@ def test_shared_noise_is_that_of_one_process() -> None:
         times = torch.distributions.Beta(torch.tensor(1.5), torch.tensor(1.0)).sample((draws.rows,))  # type: ignore[attr-defined]
         like = torch.zeros(draws.rows * 2, 5)  # type: ignore[attr-defined]
         steps = torch.randint(low=0, high=100, size=(draws.rows,))  # type: ignore[attr-defined]
-        return [torch.randn(draws.rows, 3), torch.randn_like(like), steps, times, torch.rand(1)]  # type: ignore[attr-defined]
+        flow = torch.normal(mean=0.0, std=1.0, size=(draws.rows, 3), dtype=torch.float32)  # type: ignore[attr-defined]
+        placed = torch.normal(0.0, 1.0, (draws.rows, 3))  # type: ignore[attr-defined]
+        noise = [torch.randn(draws.rows, 3), torch.randn_like(like), flow, placed]  # type: ignore[attr-defined]
+        return [*noise, steps, times, torch.rand(1)]
 
     draws.rows = 8  # type: ignore[attr-defined]
     torch.manual_seed(3)
@@ -277,9 +281,30 @@ def test_shared_noise_is_that_of_one_process() -> None:
     for rank in range(2):
         with SharedNoise(4, rank, 2, seed=3):
             parts.append(draws())
-    for number in range(4):
+    for number in range(6):
         assert torch.equal(torch.cat([part[number] for part in parts]), whole[number])
-    assert torch.equal(parts[0][4], parts[1][4])
+    assert torch.equal(parts[0][6], parts[1][6])
+
+
+@pytest.mark.parametrize(
+    ("settings", "by_actions"),
+    [
+        ({"type": "act"}, True),
+        ({"type": "smolvla"}, True),
+        ({"type": "groot"}, True),
+        ({"type": "diffusion"}, False),
+        ({"type": "diffusion", "do_mask_loss_for_padding": True}, True),
+        ({"type": "multi_task_dit"}, False),
+        ({"type": "multi_task_dit", "do_mask_loss_for_padding": True}, True),
+        ({"type": "diffusion_transformer"}, False),  # a mean over samples
+        ({"type": "pi0"}, False),  # a mean over all actions
+    ],
+)
+def test_parts_count_as_their_losses_are_means(settings: dict[str, Any], by_actions: bool) -> None:
+    padded = [torch.tensor([[False, False, False, True]]), torch.tensor([[False, True, True, True]])]
+    loaded = [{"action_is_pad": part} for part in padded]
+    shares = part_shares(loaded, policy_config(settings, None, "cpu"), Accelerator(cpu=True))
+    assert shares == ([0.75, 0.25] if by_actions else [0.5, 0.5])
 
 
 def test_lines_of_metrics_are_json(tmp_path: Path, data: Path) -> None:

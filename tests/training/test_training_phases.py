@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-import dataclasses
 import json
+import shutil
 from pathlib import Path
 from typing import Any
 
+import huggingface_hub
 import numpy as np
+import pyarrow.parquet as pq
 import pytest
 import torch
 import yaml
@@ -15,6 +17,7 @@ from accelerate import Accelerator
 from safetensors.torch import load_file
 from training_support import experiment_file, losses, metrics, tiny, weights
 
+from robocasa_lerobot import contract
 from robocasa_lerobot.data.fake import write_fake_dataset
 from robocasa_lerobot.data.mixture import open_mixture
 from robocasa_lerobot.data.reading.source import DatasetSource
@@ -23,13 +26,10 @@ from robocasa_lerobot.training.config.experiment import load_experiment
 from robocasa_lerobot.training.config.phase import LoraConfig, PhaseConfig
 from robocasa_lerobot.training.phases import run_experiment
 from robocasa_lerobot.training.planning import evaluations
-from robocasa_lerobot.training.planning.plan import plan_experiment
-from robocasa_lerobot.training.planning.plan_text import render_plan
 from robocasa_lerobot.training.setup import builders
 from robocasa_lerobot.training.setup import phase_data as joining
 from robocasa_lerobot.training.setup.build_phase import prepare_phase
 from robocasa_lerobot.training.weights.adapters import apply_training_scope, merged_state
-from robocasa_lerobot.training.weights.checkpoint import save_checkpoint
 
 FROZEN = "observation_encoder"
 
@@ -130,6 +130,20 @@ def test_pooled_statistics_are_those_of_both_phases_samples(tmp_path: Path, data
     np.testing.assert_array_equal(found["max"], np.maximum(parts[0]["max"], parts[1]["max"]))
 
 
+def test_imagenet_statistics_of_pictures_need_none_of_the_data(tmp_path: Path, data: Path) -> None:
+    bare = shutil.copytree(data, tmp_path / "bare")
+    for path in bare.glob("meta/episodes/*/*.parquet"):
+        table = pq.read_table(path)
+        pictures = [name for name in table.column_names if name.startswith(f"stats/{contract.IMAGE_PREFIX}")]
+        pq.write_table(table.drop_columns(pictures), path)
+    overrides = ["--defaults.steps=1", "--phases.finetune.statistics=pool"]
+    with pytest.raises(UserError, match=r"no statistics of .*`image_statistics: imagenet`"):
+        run_experiment(tiny(tmp_path / "dataset", bare, overrides=overrides))
+    assert run_experiment(
+        tiny(tmp_path / "imagenet", bare, overrides=[*overrides, "--defaults.image_statistics=imagenet"])
+    )
+
+
 def test_pool_needs_the_earlier_data(tmp_path: Path, data: Path, pretrained: Path) -> None:
     with pytest.raises(UserError, match="no phase of this experiment"):
         run_experiment(load_experiment(from_there(tmp_path, data, pretrained, statistics="pool")))
@@ -148,6 +162,34 @@ def test_replay_draws_its_share_from_earlier_phases(tmp_path: Path, data: Path, 
         tiny(tmp_path, data, overrides=["--phases.pretrain.replay.share=0.25"])
     with pytest.raises(UserError, match="Did you mean 'pretrain'"):
         tiny(tmp_path, data, overrides=["--phases.finetune.replay={phases: [pretran]}"])
+
+
+@pytest.mark.parametrize("change", [{"replay": {"phases": ["pretrain"]}}, {"statistics": "pool", "init": "pretrain"}])
+def test_data_of_the_hub_are_fetched_for_the_phases_that_see_them_again(
+    tmp_path: Path, data: Path, pretrained: Path, monkeypatch: pytest.MonkeyPatch, change: dict[str, Any]
+) -> None:
+    """Of a phase that is not run itself, or was before its data were removed."""
+    monkeypatch.chdir(tmp_path)
+    asked = []
+
+    def download(name: str, *, local_dir: str, **_: str) -> str:
+        asked.append(name)
+        shutil.copytree(data, local_dir, dirs_exist_ok=True)
+        return local_dir
+
+    monkeypatch.setattr(huggingface_hub, "snapshot_download", download)
+    path = experiment_file(tmp_path, data, defaults={"steps": 1})
+    content = yaml.safe_load(path.read_text())
+    content["phases"][0]["mixture"] = {"members": [{"repo_id": "owner/name"}]}
+    content["phases"][1] |= {"init": str(pretrained), **change}
+    path.write_text(yaml.safe_dump(content))
+    experiment = load_experiment(path)
+    if change.get("init") == "pretrain":
+        assert run_experiment(experiment, only="pretrain")
+        shutil.rmtree(tmp_path / "datasets")
+        asked.clear()
+    assert run_experiment(experiment, only="finetune")
+    assert asked == ["owner/name"]
 
 
 def test_datasets_of_several_phases_are_opened_once(
@@ -245,65 +287,6 @@ def test_low_rank_change_starts_at_nothing() -> None:
     phase.lora = LoraConfig(targets=["b"])
     with pytest.raises(UserError, match="unknown layer 'b'"):
         apply_training_scope(torch.nn.Sequential(torch.nn.Linear(2, 2)), phase, 0)
-
-
-def test_plan_tells_what_would_be_done(tmp_path: Path, data: Path) -> None:
-    overrides = ["--phases.pretrain.save_every=1", "--phases.pretrain.keep_last=2", "--phases.finetune.lora.rank=2"]
-    overrides.append("--loader.image_size=32")
-    mixture = "--phases.finetune.mixture={select: [{task_set: atomic_seen, split: target}]}"
-    experiment = tiny(tmp_path, data, overrides=[*overrides, mixture])
-    pretrain, finetune = plan_experiment(experiment, measured_steps=4)
-    assert not (tmp_path / "out").exists()
-    assert (pretrain.depth, finetune.depth) == (0, 1)
-    assert (pretrain.samples, pretrain.frames, pretrain.missing) == (16, 96, [])
-    assert pretrain.kept == 3  # the newest two and the initial one
-    assert (pretrain.aside, finetune.aside) == (1, 0)  # before one is removed there is the one that takes its place
-    assert pretrain.parameters is not None
-    assert finetune.parameters is not None
-    assert pretrain.parameters[0] == pretrain.parameters[1]
-    assert finetune.parameters[1] < finetune.parameters[0]
-    assert len(finetune.missing) == 18
-    assert pretrain.seconds is not None
-    assert pretrain.seconds > 0
-    text = render_plan(experiment, [pretrain, finetune], "cpu")
-    assert "3 checkpoint(s) of 0.00 GB and one more while it is written" in text
-    for part in ("finetune <- pretrain (to do)", "missing datasets: 18", "statistics: keep", "hours by measurement"):
-        assert part in text
-    assert run_experiment(tiny(tmp_path, data, overrides=overrides), only="pretrain")
-    names = ("pretrained_model/model", "training_state/raw_model", "training_state/optimizer_state")
-    files = [tmp_path / f"out/pretrain/checkpoints/000004/{name}.safetensors" for name in names]
-    sizes = sum(tensor.nbytes for path in files for tensor in load_file(path).values())
-    assert pretrain.checkpoint_bytes == pytest.approx(sizes, rel=0.05)
-    assert plan_experiment(experiment, only="pretrain", measured_steps=0)[0].done == 4
-
-
-def test_plan_counts_frames_once_that_phases_share(tmp_path: Path, data: Path) -> None:
-    experiment = tiny(tmp_path, data, overrides=["--loader.cache_frames=true"])
-    plans = plan_experiment(experiment, measured_steps=0)
-    assert plans[0].cached
-    assert plans[0].cached == plans[1].cached
-    large = [dataclasses.replace(plan, cached=dict.fromkeys(plan.cached, 5_000_000_000)) for plan in plans]
-    assert "\ndisk: 5.0 GB" in render_plan(experiment, large, "cpu")
-
-
-@pytest.mark.parametrize("lora", [None, {"rank": 2}])
-def test_plan_counts_the_float32_weights_of_a_policy_in_half_precision(
-    tmp_path: Path, data: Path, monkeypatch: pytest.MonkeyPatch, lora: dict[str, int] | None
-) -> None:
-    made = builders.make_phase_policy
-    monkeypatch.setattr(builders, "make_phase_policy", lambda *given: made(*given).to(torch.bfloat16))
-    experiment = tiny(tmp_path, data, overrides=[f"--defaults.lora={json.dumps(lora)}"])
-    (plan,) = plan_experiment(experiment, "pretrain", measured_steps=0)
-    run = prepare_phase(experiment, experiment.phases[0], "cpu", Accelerator(cpu=True))
-    for parameter in run.state.policy.parameters():
-        parameter.grad = torch.ones_like(parameter)
-    run.state.optimizer.step()
-    folder = save_checkpoint(tmp_path / "saved", run.state, run.train_config)
-    files = [*folder.glob("training_state/*.safetensors"), folder / "pretrained_model/model.safetensors"]
-    sizes = {path.stem: sum(tensor.nbytes for tensor in load_file(path).values()) for path in files}
-    assert {"master_weights", "average", "optimizer_state", "raw_model", "model"} <= sizes.keys()
-    del sizes["rng_state"]
-    assert plan.checkpoint_bytes == pytest.approx(sum(sizes.values()), rel=0.05)
 
 
 def test_optimizer_and_schedule_of_a_phase(tmp_path: Path, data: Path) -> None:

@@ -25,7 +25,8 @@ from robocasa_lerobot.training.weights.checkpoint import checkpoint_step, last_c
 # Without dropout, whose masks belong to processes; everything else that is random belongs to samples.
 CALM = {
     "diffusion_transformer": {"dropout": 0.0},
-    "act": {"dropout": 0.0, "use_vae": False},
+    "act": {"dropout": 0.0, "use_vae": False, "chunk_size": 8},
+    "diffusion": {"do_mask_loss_for_padding": True, "drop_n_last_frames": 0, "use_group_norm": True},
     "flow_vla": {},
 }
 

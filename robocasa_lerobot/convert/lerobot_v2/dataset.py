@@ -23,6 +23,8 @@ VERSIONS = ("v2.0", "v2.1")
 EXTRAS = "extras"
 # The only fields that a path template may hold, with at most two digits of width: a template is input like any other.
 _FIELD = re.compile(r"\{(?:episode_chunk|episode_index|video_key)(?::0?\d{1,2}d)?\}")
+# What annotation columns with a text's row end in; others, such as a stage's number, may be numbers of another kind.
+_TEXTS = ("task_description", "task_name", "subtask", "subtask_name")
 # Written anew for the dataset that is made; LeRobot adds them to every dataset.
 INDEX_COLUMNS = ("timestamp", "frame_index", "episode_index", "index", "task_index")
 
@@ -100,14 +102,19 @@ class V2Dataset:
 
     @cached_property
     def annotation_columns(self) -> tuple[str, ...]:
-        """Columns whose numbers are rows of `tasks.jsonl`, as `modality.json` or else their name says."""
-        declared = self.modality.get("annotation")
-        names = [f"annotation.{name}" for name in declared] if isinstance(declared, dict) else list(self.features)
-        return tuple(
+        """Columns whose numbers are rows of `tasks.jsonl`, as `modality.json` or their name says."""
+        numbers = [
             name
-            for name in names
-            if name.startswith("annotation.") and self.features.get(name, {}).get("dtype") == "int64"
-        )
+            for name, feature in self.features.items()
+            if name.startswith("annotation.") and feature["dtype"] == "int64"
+        ]
+        declared = self.modality.get("annotation")
+        if not isinstance(declared, dict):
+            return tuple(numbers)
+        # RoboCasa's own declares the description alone, and the other texts are rows of the same table.
+        texts = [name for name in numbers if name.rpartition(".")[2] in _TEXTS]
+        named = dict.fromkeys([*(f"annotation.{name}" for name in declared), *texts])
+        return tuple(name for name in named if name in numbers)
 
     @cached_property
     def instruction_column(self) -> str:

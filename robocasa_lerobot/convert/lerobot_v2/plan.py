@@ -32,6 +32,7 @@ from robocasa_lerobot.convert.writing.video import probe
 from robocasa_lerobot.errors import UnknownNameError, UserError
 
 SOURCE_FORMAT = "lerobot_v2"
+_FORMAT_VERSION = 1  # as that of `convert.settings`, for these sources alone
 # Copying is so fast that a shard can be longer than one of HDF5; each shard has video files of its own.
 SHARD_FRAMES = 2000
 _DTYPES = {pa.float32(): "float32", pa.float64(): "float64", pa.bool_(): "bool", pa.string(): "string"} | {
@@ -67,7 +68,7 @@ class V2Plan(Plan):
     @property
     def fingerprint(self) -> str:
         """The same for the same settings and the same untouched source files."""
-        return hashlib.sha256(f"{super().fingerprint}{self.stamp}".encode()).hexdigest()[:12]
+        return hashlib.sha256(f"{super().fingerprint}{_FORMAT_VERSION}{self.stamp}".encode()).hexdigest()[:12]
 
 
 def takes(files: Sequence[Path]) -> bool:

@@ -14,6 +14,7 @@ from robocasa_lerobot.convert.mapping.custom import custom_mapping
 from robocasa_lerobot.convert.mapping.robot_mapping import Arm, Columns, RobotMapping
 from robocasa_lerobot.convert.reading.demo import Demo, SourceError
 from robocasa_lerobot.convert.reading.demo_file import DemoFile
+from robocasa_lerobot.convert.reading.layout import ABSOLUTE_ACTIONS
 from robocasa_lerobot.convert.reading.mjcf import SceneNames, scene_names
 from robocasa_lerobot.errors import UnknownNameError
 
@@ -35,6 +36,19 @@ DEFAULT_CAMERAS = (
 )
 NUM_DEFAULT_CAMERAS = 3
 _ROBOT = re.compile(r"robot(\d+)_")
+
+
+def _absolute(part: Part) -> Part:
+    """The part of the same meaning that is a pose to reach, instead of a step towards it."""
+    components = {
+        "end_effector_position": ("eef_x", "eef_y", "eef_z"),
+        "end_effector_rotation": ("eef_ax", "eef_ay", "eef_az"),
+    }.get(part.name)
+    return part if components is None else Part(f"{part.name}_absolute", components)
+
+
+# Of a PandaOmron's `actions_abs`, in stored order.
+ABSOLUTE_ACTION_PARTS = tuple(_absolute(part) for part in contract.ACTION_PARTS)
 
 
 def choose_mapping(file: DemoFile, demo: Demo) -> RobotMapping:
@@ -86,7 +100,7 @@ def _panda_omron(file: DemoFile, demo: Demo, names: SceneNames) -> RobotMapping 
     return RobotMapping(
         robot_type=contract.ROBOT_TYPE,
         state_parts=contract.STATE_PARTS,
-        action_parts=tuple(_absolute(part) for part in parts) if action_key == "actions_abs" else parts,
+        action_parts=ABSOLUTE_ACTION_PARTS if action_key == ABSOLUTE_ACTIONS else parts,
         state_columns=tuple(Columns(f"obs/{key}", sizes[name], 0, sizes[name]) for name, key in keys.items()),
         action_columns=tuple(
             Columns(action_key, contract.ACTION_SIZE, where[part.name].start, where[part.name].stop) for part in parts
@@ -96,15 +110,6 @@ def _panda_omron(file: DemoFile, demo: Demo, names: SceneNames) -> RobotMapping 
         base_site=BASE_SITE,
         unit_commands=True,
     )
-
-
-def _absolute(part: Part) -> Part:
-    """The part of the same meaning that is a pose to reach, instead of a step towards it."""
-    components = {
-        "end_effector_position": ("eef_x", "eef_y", "eef_z"),
-        "end_effector_rotation": ("eef_ax", "eef_ay", "eef_az"),
-    }.get(part.name)
-    return part if components is None else Part(f"{part.name}_absolute", components)
 
 
 def _arms(file: DemoFile, demo: Demo, names: SceneNames) -> RobotMapping | None:
@@ -133,7 +138,7 @@ def _arms(file: DemoFile, demo: Demo, names: SceneNames) -> RobotMapping | None:
                 state_columns.append(Columns(f"obs/{arm.observations}{observation}", part.size, 0, part.size))
     size = demo.actions.shape[1]
     joints = _num_arm_joints(demo, names, len(arms))
-    absolute = file.layout.action_key == "actions_abs"
+    absolute = file.layout.action_key == ABSOLUTE_ACTIONS
     parts = action_parts(file.environment, [arm.name for arm in arms], num_fingers, joints, size, absolute)
     ends = [sum(part.size for part in parts[: i + 1]) for i in range(len(parts))]
     return RobotMapping(

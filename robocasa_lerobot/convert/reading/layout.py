@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 DEFAULT_EPISODES = "data/demo_*"
-ACTION_KEYS = ("actions", "actions_abs")
+ACTIONS, ABSOLUTE_ACTIONS = ACTION_KEYS = ("actions", "actions_abs")
 # How the stored rows and columns of a picture are turned to make it upright.
 FLIPS = ("none", "vertical", "horizontal", "both")
 

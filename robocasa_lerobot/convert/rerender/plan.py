@@ -100,9 +100,10 @@ def make_render_plan(source: Path, settings: RenderSettings) -> RenderPlan:
     """
     source = source.absolute()
     dataset = ExportedDataset(source)
-    # Cameras that an earlier rendering moved or added stay where it put them.
-    earlier = _record(source).get("settings", {}).get("cam_configs", {})
-    settings = replace(settings, cam_configs=json.dumps(earlier | json.loads(settings.cam_configs), sort_keys=True))
+    # Cameras that an earlier rendering moved or added stay where it put them, in all that is not said anew.
+    earlier, now = _record(source).get("settings", {}).get("cam_configs", {}), json.loads(settings.cam_configs)
+    merged = {name: earlier.get(name, {}) | now.get(name, {}) for name in earlier | now}
+    settings = replace(settings, cam_configs=json.dumps(merged, sort_keys=True))
     for episode in dataset.episodes:
         for name in ("model.xml.gz", "states.npz"):
             if not (dataset.extras(episode) / name).is_file():

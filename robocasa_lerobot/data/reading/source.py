@@ -18,6 +18,7 @@ from robocasa_lerobot import contract
 from robocasa_lerobot.data.mixture_config import MemberConfig, demo_count
 from robocasa_lerobot.data.reading.column_file import column_types, map_columns, read_columns
 from robocasa_lerobot.errors import UnknownNameError, UserError
+from robocasa_lerobot.jsonl import read_jsonl
 
 EPISODE_TABLE = "meta/robocasa/episodes.jsonl"
 # What a member can choose episodes by: columns of that table, and the member's fields.
@@ -115,8 +116,7 @@ class DatasetSource:
                 f"{self.root}: `{field}` needs {EPISODE_TABLE}, which `robocasa-lerobot convert` writes and this "
                 f"dataset lacks. Leave `{field}` out, or choose by `episodes`."
             )
-        rows = [json.loads(line) for line in path.read_text().splitlines() if line.strip()]
-        by_episode = {int(row["episode_index"]): row.get(name) for row in rows}
+        by_episode = {int(row["episode_index"]): row.get(name) for row in read_jsonl(path)}
         missing = set(range(len(self.starts))) - {index for index, value in by_episode.items() if value is not None}
         if missing:
             raise UserError(

@@ -71,17 +71,27 @@ class PublishedDatasets:
         self._base = root / VERSION_FOLDER if (root / VERSION_FOLDER).is_dir() else root
 
     def find(self, tasks: Sequence[str], split: str | None, source: str | None, views: str) -> list[DatasetEntry]:
-        """The published datasets of the tasks, in the order of the tasks, there or not."""
+        """The published datasets of the tasks, in the order of the tasks, there or not.
+
+        Those that nobody can download are left out where nothing of them is there, unless their source is asked for.
+        """
         wanted = [key for key in PUBLISHED if split in (None, key[0]) and source in (None, key[1])]
         found = []
         for task in tasks:
             for key in wanted:
                 if task in published_task_sets()[PUBLISHED[key]]:
-                    found.append(self._entry(task, *key, views))
+                    entry = self._entry(task, *key, views)
+                    nothing = entry.root == self._folder(task, key[0])
+                    if source is not None or key in DOWNLOADS or not nothing:
+                        found.append(entry)
         return found
 
+    def _folder(self, task: str, split: str) -> Path:
+        return self._base / split / published_tasks()[task][0] / task
+
     def _entry(self, task: str, split: str, source: str, views: str) -> DatasetEntry:
-        parent = self._base / split / published_tasks()[task][0] / task
+        """The newest dataset that there is; with the task's folder as its root where there is none."""
+        parent = self._folder(task, split)
         inner = "*" if source == "human" else f"*/{source}/demo/*"
         dated = sorted(path for path in parent.glob(inner) if path.is_dir())
         for folder in reversed(dated):

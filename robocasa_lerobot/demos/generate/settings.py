@@ -11,8 +11,8 @@ import numpy as np
 
 from robocasa_lerobot.demos.attempts import RecordingSettings
 from robocasa_lerobot.demos.generate.course import KINDS, Course
-from robocasa_lerobot.demos.generate.mimicgen.plain import Sources, plain_episode, read_sources
-from robocasa_lerobot.demos.generate.mimicgen.subtasks import digest_of_infos
+from robocasa_lerobot.demos.generate.mimicgen.plain import Sources, plain_episode, read_sources, suited
+from robocasa_lerobot.demos.generate.mimicgen.subtasks import datagen_of, digest_of_infos
 from robocasa_lerobot.demos.generate.mimicgen.template import derived_template, template_from
 from robocasa_lerobot.demos.generate.replays import (
     REPLAY,
@@ -75,23 +75,27 @@ class GenerationSettings(RecordingSettings):
         """With the sources looked at.
 
         Raises:
-            UserError: none is prepared, they are seeds of the attempts, or their scenes are not made again.
+            UserError: none is prepared, they are seeds of the attempts, their scenes are not made again, or they do not
+                suit the subtasks.
         """
         settings = cls(source=str(source), **values)
         if settings.method == REPLAY:
             own = [one for _, one in settings.recorded()]
             check_scenes(own, settings)
             return cls(source=str(source), sources=digest_of_actions(own), **values)
+        infos = settings.subtasks().infos if settings.method == MIMICGEN else ()  # mistakes come up here
         if settings.method == MIMICGEN and settings.template:  # of files that others have prepared
-            return cls(source=str(source), sources=digest_of_infos(settings.subtasks().infos), **values)
-        found = settings.read()
-        clash = sorted(one.seed for one in found if 0 <= one.seed - settings.seed < settings.limit)
+            seeds, digest = [one.seed for one in infos], digest_of_infos(infos)
+        else:
+            found = settings.read()
+            seeds, digest = [one.seed for one in found], digest_of(found)
+        clash = sorted(seed for seed in seeds if 0 <= seed - settings.seed < settings.limit)
         if clash and values.get("split") is not None:
             raise UserError(
                 f"{settings.task}: sources come from seeds {clash[:5]}, which are among the attempts' from "
                 f"{settings.seed} on. Choose another --seed, so that nothing is generated in a source's own scene."
             )
-        return cls(source=str(source), sources=digest_of(found), **values)
+        return cls(source=str(source), sources=digest, **values)
 
     def read(self) -> list[Source]:
         """The sources."""
@@ -99,12 +103,16 @@ class GenerationSettings(RecordingSettings):
         return first_of_each_task(found, self.first_sources) if self.first_sources else found
 
     def subtasks(self) -> Sources:
-        """The sources as MimicGen reads them."""
-        place = place_of(self.folder, self.task)
+        """The sources as MimicGen reads them.
+
+        Raises:
+            UserError: one does not suit the template, or none can be derived.
+        """
         if self.template:
-            return read_sources(place, template_from(json.loads(self.template)))
+            place = place_of(self.folder, self.task)
+            return read_sources(place, template_from(json.loads(self.template)), self.first_sources)
         template, alike = derived_template(self.read())
-        return read_sources(place, template, tuple(source.name for source in alike))
+        return suited(template, (datagen_of(number, source) for number, source in enumerate(alike)))
 
     def recorded(self) -> list[tuple[str, Demonstration]]:
         """The task's own demonstrations as they were recorded, by their names."""

@@ -28,7 +28,7 @@ UPRIGHT_RAD = np.deg2rad(15.0)
 
 @dataclass(frozen=True)
 class ObjectInBasin(Term):
-    """An object's centre is inside the basin of a sink."""
+    """An object's centre is inside a basin of a sink: either one, where it has two."""
 
     object: str
     fixture: str
@@ -39,8 +39,9 @@ class ObjectInBasin(Term):
         return f"{self.object}_in_{self.fixture}"
 
     def holds(self, scene: Scene, data: mujoco.MjData) -> bool:
-        """Test the body's origin against the basin's region."""
-        return scene.fixture(self.fixture, Sink).basin.contains(data, data.body(scene.fill(self.object)).xpos)
+        """Test the body's origin against the basins' regions."""
+        origin = data.body(scene.fill(self.object)).xpos
+        return any(basin.contains(data, origin) for basin in scene.fixture(self.fixture, Sink).regions.values())
 
 
 @dataclass(frozen=True)

@@ -31,6 +31,7 @@ class MovedSince(WithMemory):
         by_m: bound of the distance that its origin has moved, metres; None where that does not count.
         by_rad: bound of the angle that it has turned by, radians; None where that does not count.
         across: count the horizontal distance alone.
+        about_vertical: count the turn about the vertical alone, not that it tips.
     """
 
     object: str
@@ -38,6 +39,7 @@ class MovedSince(WithMemory):
     by_m: float | None = None
     by_rad: float | None = None
     across: bool = False
+    about_vertical: bool = False
 
     def __post_init__(self) -> None:
         if (self.by_m is None and self.by_rad is None) or self.since not in ("step", "reset"):
@@ -76,8 +78,14 @@ class MovedSince(WithMemory):
         axes = 2 if self.across else 3
         if self.by_m is not None and float(np.linalg.norm(now[:axes] - before[:axes])) > self.by_m:
             return True
-        alike = min(1.0, abs(float(before[3:] @ now[3:])))
-        return self.by_rad is not None and 2 * float(np.arccos(alike)) > self.by_rad
+        if self.by_rad is None:
+            return False
+        back, since = before[3:] * (1.0, -1.0, -1.0, -1.0), np.zeros(4)
+        mujoco.mju_mulQuat(since, now[3:], back)
+        w, x, y, z = since
+        if self.about_vertical:
+            return abs(float(np.arctan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z)))) > self.by_rad
+        return 2 * float(np.arccos(min(1.0, abs(w)))) > self.by_rad
 
     def _pose(self, scene: Scene, data: mujoco.MjData) -> Array:
         body = data.body(scene.fill(self.object))

@@ -26,7 +26,7 @@ from robocasa_lerobot.envs.scene.placement.counter_areas import counter_areas
 from robocasa_lerobot.envs.scene.placement.objects import place_objects
 from robocasa_lerobot.envs.scene.placement.overlaps import ask_for_room
 from robocasa_lerobot.envs.scene.placement.regions import Shares
-from robocasa_lerobot.envs.scene.robot_poses import RobotPose, open_doors_of, robot_pose
+from robocasa_lerobot.envs.scene.robot_poses import WIDE_OPEN, RobotPose, open_doors_of, robot_pose
 from robocasa_lerobot.envs.scene.roles import cast_roles, counter_of
 from robocasa_lerobot.envs.scene.scene import Scene
 from robocasa_lerobot.envs.scene.scene_spec import SceneSpec
@@ -243,7 +243,7 @@ def _opened(task: SceneSpec, layout: Layout, roles: dict[str, str]) -> list[tupl
     found = []
     for entry in (entry for entry in task.initial if isinstance(entry, InitialOpenness)):
         fixture = layout.fixtures[roles[entry.fixture]]
-        if entry.low > 0.5:
+        if entry.low > WIDE_OPEN:
             found.append((fixture, 1.0))
         elif fixture.slides_out:
             found.append((fixture, entry.high))

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from robocasa_lerobot.envs.scene.robot_poses import RobotPose, is_free
+from robocasa_lerobot.envs.kitchens.fixtures.base import Fixture
+from robocasa_lerobot.envs.scene.robot_poses import WIDE_OPEN, RobotPose, is_free
 from robocasa_lerobot.envs.scene.scene import Scene
 from robocasa_lerobot.errors import UserError
 
@@ -49,13 +50,14 @@ class InitialNoise:
 def add_initial_noise(scene: Scene, noise: InitialNoise) -> None:
     """Move the start of a scene's robot, before its `initial_data`; the noise follows from the scene's seed.
 
-    A base pose that would stand in a fixture is drawn again; where none of 100 is free, the base stays.
+    A base pose that would stand in a fixture, in an open door or drawer, or outside of the room is drawn again; where
+    none of 100 is free, the base stays.
     """
     scene.arm_noise_rad = noise.arm_rad
     if not noise.moves_base:
         return
     rng = np.random.default_rng([scene.seed, _BASE_NOISE_STREAM])
-    start = scene.robot_pose
+    start, opened = scene.robot_pose, _opened(scene)
     for _ in range(_TRIES):
         shift = rng.normal(0.0, noise.base_position_m, 2)
         turn = np.deg2rad(rng.normal(0.0, noise.base_yaw_deg))
@@ -64,6 +66,16 @@ def add_initial_noise(scene: Scene, noise: InitialNoise) -> None:
             far = noise.base_within_m * np.sqrt(rng.uniform())
             shift = shift + far * np.array([np.cos(bearing), np.sin(bearing)])
         pose = RobotPose(start.x + float(shift[0]), start.y + float(shift[1]), start.yaw + float(turn), start.side)
-        if is_free(scene.fixtures, pose, scene.robot.shape):
+        if is_free(scene.layout, pose, scene.robot.shape, opened):
             scene.robot_pose = pose
             return
+
+
+def _opened(scene: Scene) -> list[tuple[Fixture, float]]:
+    """What the robot must not stand in: doors that are wide open, and drawers as far as they are out."""
+    found = []
+    for (name, _), share in scene.openness.items():
+        fixture = scene.fixtures[name]
+        if share > WIDE_OPEN or fixture.slides_out:
+            found.append((fixture, share if fixture.slides_out else 1.0))
+    return found

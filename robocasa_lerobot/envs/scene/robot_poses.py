@@ -24,6 +24,7 @@ SPAWN_TRIES, SPAWN_ROUNDS = 50, 4
 SPAWN_WIDENING_M = (0.10, 0.05)
 FEW_TRIES = 8  # of a round, one by one: nearly always enough; the others are looked at together, which is faster
 SPAWN_MARGIN_M = 0.02
+WIDE_OPEN = 0.5  # share of full travel from which on a door is in a robot's place
 # How far off the nearest free place is looked for where a robot cannot stand before a fixture: in a corner.
 NEAREST_M, NEAREST_STEP_M = 0.75, 0.05
 
@@ -88,9 +89,7 @@ def nearest_free(pose: RobotPose, layout: Layout, shape: StandingShape) -> Robot
     reach = np.arange(-NEAREST_M, NEAREST_M + 1e-9, NEAREST_STEP_M)
     shifts = sorted(((float(x), float(y)) for x in reach for y in reach), key=lambda shift: float(np.hypot(*shift)))
     poses = [pose, *(RobotPose(pose.x + x, pose.y + y, pose.yaw, pose.side) for x, y in shifts)]
-    bounds = layout.room
-    inside = [bounds["x_min"] < at.x < bounds["x_max"] and bounds["y_min"] < at.y < 0.0 for at in poses]
-    free = np.array(inside) & Obstacles(layout.fixtures, shape).leave_free(poses)
+    free = np.array([in_room(layout, at) for at in poses]) & Obstacles(layout.fixtures, shape).leave_free(poses)
     return poses[int(np.argmax(free))]
 
 
@@ -235,9 +234,24 @@ def _footprint_of(fixture: Fixture, box: SweptBox) -> Footprint:
     return Footprint(x, y, fixture.yaw, box.half)
 
 
-def is_free(fixtures: Mapping[str, Fixture], pose: RobotPose, shape: StandingShape) -> bool:
-    """Whether a robot can stand at a pose without touching a fixture, its arm as at the start of an episode."""
-    return bool(Obstacles(fixtures, shape).leave_free([pose])[0])
+def is_free(
+    layout: Layout, pose: RobotPose, shape: StandingShape, opened: Iterable[tuple[Fixture, float]] = ()
+) -> bool:
+    """Whether a robot can stand at a pose in the room, its arm as at the start of an episode, and touches nothing.
+
+    Args:
+        layout: the kitchen.
+        pose: of the base.
+        shape: of the robot.
+        opened: fixtures whose doors or drawers are open, each with its share of full travel.
+    """
+    return in_room(layout, pose) and bool(Obstacles(layout.fixtures, shape, opened).leave_free([pose])[0])
+
+
+def in_room(layout: Layout, pose: RobotPose) -> bool:
+    """Whether a base stands between the walls; its extent does not count."""
+    bounds = layout.room
+    return bounds["x_min"] < pose.x < bounds["x_max"] and bounds["y_min"] < pose.y < 0.0
 
 
 def _handles(fixture: Fixture, top: float) -> list[Footprint]:

@@ -6,6 +6,7 @@ import functools
 import importlib
 import pkgutil
 
+from robocasa_lerobot.benchmark.tasks import published_task_sets
 from robocasa_lerobot.envs.tasks import atomic, composite
 from robocasa_lerobot.envs.tasks.task import Task
 from robocasa_lerobot.errors import UnknownNameError
@@ -41,17 +42,17 @@ def get_task(name: str) -> Task:
 
 
 def task_set(name: str) -> tuple[str, ...]:
-    """Names of the registered tasks of a set such as `atomic_seen` or `lifelong_phase1`.
+    """Names of the registered tasks of a set such as `atomic_seen`, `target50` or `lifelong_phase1`.
 
     Raises:
         UnknownNameError: no registered task belongs to such a set.
     """
-    members = tuple(task.name for task in _tasks().values() if name in task.facts.sets)
-    if not members:
+    if name not in task_sets():
         raise UnknownNameError("task set", name, task_sets())
-    return members
+    members = published_task_sets()[name]
+    return tuple(task for task in _tasks() if task in members)
 
 
 def task_sets() -> tuple[str, ...]:
     """Names of the sets that registered tasks belong to, sorted."""
-    return tuple(sorted({s for task in _tasks().values() for s in task.facts.sets}))
+    return tuple(name for name, members in published_task_sets().items() if not _tasks().keys().isdisjoint(members))

@@ -178,7 +178,7 @@ class EvaluationConfig:
     out: folder of trials.jsonl, videos and report; default: outputs/evaluations/<labels>.
     retry_errors: run trials again that are recorded with an error.
     stall_seconds: a worker that reports no progress for so long is ended, and its trial tried once more.
-    report: write report.html and report.md at the end.
+    report: write the report at the end: report.html, .md, .tex and two .csv.
     scale: name of the scale at which this is a trial of a larger experiment, for the results (training sets it).
     """
 

@@ -7,7 +7,9 @@ differs from what is right, the choice is a named field: the defaults are what i
 
 from __future__ import annotations
 
+import copy
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 from lerobot.configs import NormalizationMode, PreTrainedConfig
@@ -97,10 +99,18 @@ class DiffusionTransformerConfig(ActionChunkConfig):
         super().__post_init__()
         if self.observation_offsets is not None:
             self.n_obs_steps = self._number_of_offsets(self.observation_offsets)
+        self._drops_by_lengths = self.drop_n_last_frames is None
         if self.drop_n_last_frames is None:
             self.drop_n_last_frames = max(0, self.horizon - self.n_action_steps - self.n_obs_steps + 1)
         self._check_names()
         self._check_sizes()
+
+    def _save_pretrained(self, save_directory: Path) -> None:
+        """Write config.json; what follows from the lengths stays open in it, since a later phase may change them."""
+        saved = copy.copy(self)
+        if self._drops_by_lengths:
+            saved.drop_n_last_frames = None
+        super(DiffusionTransformerConfig, saved)._save_pretrained(save_directory)
 
     def _number_of_offsets(self, offsets: list[int]) -> int:
         default = type(self).__dataclass_fields__["n_obs_steps"].default
@@ -145,6 +155,13 @@ class DiffusionTransformerConfig(ActionChunkConfig):
             raise UserError(
                 f"num_inference_steps is {self.num_inference_steps}, expected 1 to num_train_timesteps "
                 f"({self.num_train_timesteps})."
+            )
+        mode = self.normalization_mapping.get("ACTION", NormalizationMode.IDENTITY)
+        if self.clip_sample and mode not in (NormalizationMode.MIN_MAX, NormalizationMode.IDENTITY):
+            raise UserError(
+                f"clip_sample is true and actions are normalised by {mode.value}: found actions beyond +-"
+                f"{self.clip_sample_range} in any data, which sampling would cut off. Set `clip_sample: false`, or "
+                "normalise ACTION by MIN_MAX."
             )
         if not (self.language_film or self.language_concat):
             raise UserError("language_film and language_concat are both false: the instruction would not be used.")

@@ -72,7 +72,7 @@ class Driver:
         if len(self._waiting) >= MOST_WAITING:
             return False
         action = np.array(message["action"])
-        self.steering.closed = bool(action[contract.ACTION_SLICES["gripper_close"]][0] >= contract.BINARY_THRESHOLD)
+        self.steering.closed = _closes(action)
         self._waiting.append(action)
         self.device = self.device or "script"
         self.answered = message["frame"]
@@ -127,6 +127,7 @@ class Driver:
                 return action, Origin(self.device, "", assisted=True, intervention=correcting)
         if self.pilot is not None and self.pilot.state == AUTONOMOUS:
             action = self.pilot.act(env, observation, env.scene.instruction)
+            self.steering.closed = _closes(action)  # who takes over keeps hold of what the policy holds
             return action, Origin("policy", "", policy_action=np.clip(action, -1.0, 1.0))
         return self._steered(env, NOTHING, correcting)
 
@@ -154,3 +155,8 @@ class Driver:
         self.assistance = None
         if self.pilot is not None:
             self.pilot.take_over()
+
+
+def _closes(action: Array) -> bool:
+    """Whether an action (12,), stored order, tells the gripper to close."""
+    return bool(action[contract.ACTION_SLICES["gripper_close"]][0] >= contract.BINARY_THRESHOLD)

@@ -21,7 +21,7 @@ import h5py
 
 from robocasa_lerobot.demos.hdf5 import Failure, merge_parts, read_summary, write_part
 from robocasa_lerobot.demos.recorder import Recording
-from robocasa_lerobot.errors import UserError
+from robocasa_lerobot.errors import UserError, differing
 from robocasa_lerobot.files import write_text
 from robocasa_lerobot.jobs.publish import held_folder
 from robocasa_lerobot.teleop.settings import TeleopSettings
@@ -192,12 +192,10 @@ class Store:
     def _check(self) -> None:
         note = self.folder / _SETTINGS
         if note.exists() and json.loads(note.read_text(encoding="utf-8")) != self.settings.identity():
-            found = json.loads(note.read_text(encoding="utf-8"))
-            now = self.settings.identity()
-            differing = ", ".join(f"{k}: {found.get(k)!r}, now {v!r}" for k, v in now.items() if found.get(k) != v)
+            others = differing(json.loads(note.read_text(encoding="utf-8")), self.settings.identity())
             raise UserError(
                 f"{self.settings.out} has episodes of {self.settings.task} that were recorded with other settings "
-                f"({differing}). Give those, or choose another --out."
+                f"({others}). Give those, or choose another --out."
             )
         if self.path.exists() and (not note.exists() or not self._is_ours()):
             raise UserError(

@@ -8,18 +8,19 @@ import io
 import json
 import statistics
 import tempfile
-from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import torch
 from accelerate import Accelerator
+from huggingface_hub.constants import SAFETENSORS_SINGLE_FILE
+from lerobot.configs.policies import PreTrainedConfig
 
 from robocasa_lerobot import contract
 from robocasa_lerobot.data.fake import write_fake_dataset
-from robocasa_lerobot.data.mixture import MixtureMeta
-from robocasa_lerobot.data.mixture_config import MemberConfig, MixtureConfig
+from robocasa_lerobot.data.mixture import MixtureDataset, MixtureMeta
+from robocasa_lerobot.data.mixture_config import LoaderConfig, MemberConfig, MixtureConfig
 from robocasa_lerobot.data.registry.registry import missing_datasets
 from robocasa_lerobot.errors import UserError
 from robocasa_lerobot.training.config.experiment import FROM_SCRATCH, ExperimentConfig, PhaseConfig
@@ -138,7 +139,10 @@ def _plan_phase(experiment: ExperimentConfig, phase: PhaseConfig, device: str) -
     done = min(checkpoint_step(last), phase.steps) if last is not None else 0
     plan = PhasePlan(phase, len(experiment.ancestors(phase)), experiment.init_of(phase), done)
     phase_evaluations(phase)
-    _plan_data(experiment, phase, plan)
+    missing = [e for mixture in joining.needed_mixtures(experiment, phase) for e in missing_datasets(mixture)]
+    plan.missing = list(dict.fromkeys(f"{e.task} ({e.split}, {e.source}): {e.missing}" for e in missing))
+    dataset = joining.open_phase_data(experiment, phase) if not missing else None
+    config: PreTrainedConfig | None = None
     try:
         settings, checkpoint = planned_policy(experiment, phase)
         config = builders.policy_config(settings, checkpoint, device)
@@ -146,32 +150,28 @@ def _plan_phase(experiment: ExperimentConfig, phase: PhaseConfig, device: str) -
         if not experiment.init_of(phase).startswith("hub:") and "hub" not in str(error):
             raise
         plan.notes.append(str(error))
-        return plan
-    _plan_policy(config, phase, plan)
+    if dataset is not None:
+        _plan_data(experiment.loader, dataset, builders.frame_size(config) if config is not None else None, plan)
+    if config is not None:
+        _plan_policy(config, dataset.meta if dataset is not None else _made_up_meta(experiment.loader), phase, plan)
     return plan
 
 
-def _plan_data(experiment: ExperimentConfig, phase: PhaseConfig, plan: PhasePlan) -> None:
-    for mixture in [phase.mixture, *(other.mixture for other in experiment.replayed(phase))]:
-        plan.missing += [f"{e.task} ({e.split}, {e.source}): {e.missing}" for e in missing_datasets(mixture)]
-    if plan.missing:
-        return
-    dataset = joining.open_phase_data(experiment, phase)
+def _plan_data(loader: LoaderConfig, dataset: MixtureDataset, size: tuple[int, int] | None, plan: PhasePlan) -> None:
+    """Frames, and the disk that their pictures take as the policy brings them to `size`."""
     plan.frames = dataset.meta.total_frames
-    loader = experiment.loader
-    size = dataset.meta.features[dataset.meta.camera_keys[0]]["shape"][:2] if dataset.meta.camera_keys else (0, 0)
-    each = len(dataset.meta.camera_keys) * 3 * int(size[0]) * int(size[1])
-    cached = {root.absolute(): each * source.total_frames for root, source in dataset.sources.items()}
+    dataset.set_picture_size(size)
+    cached = {root.absolute(): count for root, count in dataset.cached_bytes().items()}
     fits = sum(cached.values()) <= loader.cache_budget_gb * 1e9
     plan.cached = cached if loader.cache_frames or (loader.cache_frames is None and fits) else {}
 
 
-def _plan_policy(config: Any, phase: PhaseConfig, plan: PhasePlan) -> None:
+def _plan_policy(config: PreTrainedConfig, meta: MixtureMeta, phase: PhaseConfig, plan: PhasePlan) -> None:
     """Sizes of the policy, which is built without memory for its weights."""
     device, config.device = config.device, "meta"
     try:
         with torch.device("meta"):
-            policy = builders.make_phase_policy(config, _made_up_meta(_IMAGE_SIZE), None)
+            policy = builders.make_phase_policy(config, meta, None)
     except Exception as error:  # policies of LeRobot raise all kinds where weights or packages are missing
         plan.notes.append(f"the policy {config.type!r} cannot be built here: {_first_line(error)}")
         return
@@ -215,6 +215,8 @@ def _what_a_step_is(experiment: ExperimentConfig, phase: PhaseConfig) -> str:
 def _measure(experiment: ExperimentConfig, phase: PhaseConfig, device: str, steps: int) -> float | str:
     """Seconds per step, the median after the first quarter; or why there are none."""
     settings, checkpoint = planned_policy(experiment, phase)
+    if checkpoint is not None and not (checkpoint / SAFETENSORS_SINGLE_FILE).is_file():
+        return f"not measured: no weights in {checkpoint} yet, which a training downloads from the hub"
     with tempfile.TemporaryDirectory(prefix="plan_") as folder:
         size = experiment.loader.image_size or _IMAGE_SIZE
         data = write_fake_dataset(Path(folder) / "fake", episodes=2, length=64, image_size=size)
@@ -248,9 +250,14 @@ def _measure(experiment: ExperimentConfig, phase: PhaseConfig, device: str, step
     return statistics.median(times[len(times) // 4 :])
 
 
-def _made_up_meta(size: int) -> MixtureMeta:
-    features: Mapping[str, Any] = contract.dataset_features((size, size))
-    return MixtureMeta(dict(features), contract.VIDEO_FPS, contract.ROBOT_TYPE, ["-"], 1, 1)
+def _made_up_meta(loader: LoaderConfig) -> MixtureMeta:
+    """Of data that are not there, as if they were recorded in our kitchen."""
+    size = loader.image_size or _IMAGE_SIZE
+    features: dict[str, Any] = dict(contract.dataset_features((size, size)))
+    pictures = {key: features.pop(key) for key in contract.IMAGE_KEYS}
+    if loader.cameras is not None:
+        pictures = {contract.image_key(name): pictures[contract.IMAGE_KEYS[0]] for name in loader.cameras}
+    return MixtureMeta({**pictures, **features}, contract.VIDEO_FPS, contract.ROBOT_TYPE, ["-"], 1, 1)
 
 
 def _first_line(error: BaseException) -> str:

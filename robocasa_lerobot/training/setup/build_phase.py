@@ -20,9 +20,10 @@ from robocasa_lerobot.training.config.experiment import FROM_SCRATCH, HUB, Exper
 from robocasa_lerobot.training.held_out import HeldOut, held_out_frames, without_held_out
 from robocasa_lerobot.training.loop import PhaseRun
 from robocasa_lerobot.training.metrics import truncate_metrics
-from robocasa_lerobot.training.setup import builders
+from robocasa_lerobot.training.setup import builders, clipping
 from robocasa_lerobot.training.setup import phase_data as joining
 from robocasa_lerobot.training.setup.features import LEAVE_OUT, RENAME
+from robocasa_lerobot.training.setup.kept import check_kept_settings
 from robocasa_lerobot.training.weights.adapters import apply_training_scope
 from robocasa_lerobot.training.weights.checkpoint import TrainingState, last_checkpoint, pretrained_model, restore, tidy
 from robocasa_lerobot.training.weights.ema import Ema
@@ -49,7 +50,11 @@ def prepare_phase(
     settings = policy_settings(experiment, phase) if last is None else {}
     if last is not None and force:
         settings = _forced_settings(experiment, phase)
-    config = builders.policy_config(settings, pretrained_model(last) if last is not None else init, device)
+    start = pretrained_model(last) if last is not None else init
+    config = builders.policy_config(settings, start, device)
+    keep = init is not None and phase.statistics == "keep"
+    if start is not None and (keep or last is not None):
+        check_kept_settings(config, builders.policy_config({}, start, device), phase.name, begun=last is not None)
     seed = phase_seed(experiment.seed, phase.name)
     dataset, apart = joining.open_phase_data(experiment, phase), None
     if phase.held_out is not None:
@@ -59,7 +64,6 @@ def prepare_phase(
     for part in (dataset, apart) if apart is not None else (dataset,):
         builders.set_windows(part, config)
         part.set_picture_size(builders.frame_size(config))
-    keep = init is not None and phase.statistics == "keep"
     accelerator.print(f"phase {phase.name}: {phase.steps} steps from {init or 'scratch'} on")
     accelerator.print("  " + dataset.describe().replace("\n", "\n  "))
     if init is not None:
@@ -68,15 +72,21 @@ def prepare_phase(
         _cache_frames(experiment, part)
     if last is None and not keep:
         pool = init is not None and phase.statistics == "pool"
-        stats = joining.pooled(experiment, phase, dataset) if pool else dataset.statistics()
         imagenet = phase.image_statistics == "imagenet"
+        images = not imagenet
+        stats = joining.pooled(experiment, phase, dataset, images) if pool else dataset.statistics(images)
         cameras = dataset.meta.camera_keys
         dataset.meta.stats = builders.with_imagenet_statistics(stats, cameras) if imagenet else stats
 
     torch.manual_seed(seed)
-    start = pretrained_model(last) if last is not None else init
+    if keep and last is None and clipping.clips(config) and clipping.RANGE not in phase.policy:
+        known, _ = builders.make_processors(config, dataset.meta, start, keep_statistics=True)
+        reach = clipping.widen_clip_range(config, known, dataset.statistics(images=False))
+        if reach is not None:
+            accelerator.print(f"  actions reach {reach:.1f} times as far as the statistics know: so does sampling now")
     policy = builders.make_phase_policy(config, dataset.meta, start)
-    pre, post = builders.make_processors(config, dataset.meta, start, keep_statistics=keep or last is not None)
+    kept, rename = keep or last is not None, settings.get(RENAME)
+    pre, post = builders.make_processors(config, dataset.meta, start, keep_statistics=kept, rename=rename)
     always_eval = apply_training_scope(policy, phase, seed)
     masters = MasterWeights(policy)
     if len(masters) and experiment.mixed_precision == "fp16":

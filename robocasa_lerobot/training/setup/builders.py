@@ -30,8 +30,9 @@ from robocasa_lerobot.errors import UnknownNameError, UserError
 from robocasa_lerobot.policies.needs import explained
 from robocasa_lerobot.policies.registry import register_policies
 from robocasa_lerobot.training.config.phase import PhaseConfig
-from robocasa_lerobot.training.setup.features import LEAVE_OUT, RENAME, fit_features, renamed_inputs
+from robocasa_lerobot.training.setup.features import LEAVE_OUT, RENAME, fit_features, new_names, renamed_inputs
 from robocasa_lerobot.training.setup.features import check_features as _check_features
+from robocasa_lerobot.training.setup.kept import rename_kept
 from robocasa_lerobot.training.weights.master_weights import MasterWeights
 
 _NO_FIELDS = ("type", "path", RENAME, LEAVE_OUT)  # settings of a policy that are no fields of its configuration
@@ -152,9 +153,15 @@ def _load(config: PreTrainedConfig, meta: MixtureMeta, checkpoint: Path) -> PreT
 
 
 def make_processors(
-    config: PreTrainedConfig, meta: MixtureMeta, checkpoint: Path | None, keep_statistics: bool
+    config: PreTrainedConfig,
+    meta: MixtureMeta,
+    checkpoint: Path | None,
+    keep_statistics: bool,
+    rename: Mapping[str, str] | None = None,
 ) -> tuple[Any, Any]:
     """Pre- and postprocessor: the checkpoint's with its statistics, or new ones for the data.
+
+    `rename` is that of the policy's settings, for what the checkpoint's have of other names.
 
     Raises:
         UserError: something that they need is not there, such as a tokenizer.
@@ -165,9 +172,14 @@ def make_processors(
         overrides = {"device_processor": {"device": str(config.device)}}
         # With the dataset's metadata, some policies' processors (GR00T's) go on as those of a training: random crops,
         # dropout of the state. Without, LeRobot takes them for an evaluation's.
-        return make_pre_post_processors(
+        processors: tuple[Any, Any] = make_pre_post_processors(
             config, pretrained_path=str(checkpoint), preprocessor_overrides=overrides, dataset_meta=meta
         )
+        if rename:
+            names = new_names(read_config(checkpoint).get("input_features") or {}, rename)
+            for processor in processors:
+                rename_kept(processor, names)
+        return processors
 
 
 def check_processors(config: PreTrainedConfig, meta: MixtureMeta) -> None:

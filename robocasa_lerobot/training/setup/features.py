@@ -39,10 +39,9 @@ def renamed_inputs(
     Raises:
         UserError: an input that the checkpoint does not have, or two of the data for one of it.
     """
-    ours = {theirs: mine for mine, theirs in rename.items()}
-    if len(ours) < len(rename):
+    if len(set(rename.values())) < len(rename):
         raise UserError(f"`{RENAME}` of the policy gives two features to one of the checkpoint's: {dict(rename)}.")
-    new = [theirs for mine, theirs in rename.items() if mine not in inputs]
+    new = new_names(inputs, rename)
     for name in [*new, *(leave_out if new else ())]:
         if name not in inputs:
             raise UnknownNameError("input of the checkpoint", name, inputs, f"(in the policy's settings; {checkpoint})")
@@ -50,7 +49,12 @@ def renamed_inputs(
         if name in new:
             raise UserError(f"{name!r} is in `{RENAME}` and in `{LEAVE_OUT}` of the policy's settings; expected one.")
     kept = [name for name in inputs if name not in leave_out]
-    return {ours[name] if name in new else name: inputs[name] for name in kept}
+    return {new.get(name, name): inputs[name] for name in kept}
+
+
+def new_names(inputs: Mapping[str, Any], rename: Mapping[str, str]) -> dict[str, str]:
+    """The data's names of the checkpoint's inputs that get one, by the checkpoint's name."""
+    return {theirs: mine for mine, theirs in rename.items() if mine not in inputs}
 
 
 def check_features(config: PreTrainedConfig, meta: MixtureMeta) -> None:

@@ -12,6 +12,7 @@ from robocasa_lerobot.data.reading.source import DatasetSource
 from robocasa_lerobot.data.statistics import Statistics
 from robocasa_lerobot.errors import UserError
 from robocasa_lerobot.training.config.experiment import ExperimentConfig, PhaseConfig
+from robocasa_lerobot.training.weights.checkpoint import last_checkpoint
 
 type Opened = dict[Path, DatasetSource]
 
@@ -34,10 +35,20 @@ def open_phase_data(experiment: ExperimentConfig, phase: PhaseConfig, opened: Op
     return open_mixture(joined([own, *again], shares), experiment.data_loader, opened)
 
 
-def pooled(experiment: ExperimentConfig, phase: PhaseConfig, dataset: MixtureDataset) -> Statistics:
+def needed_mixtures(experiment: ExperimentConfig, phase: PhaseConfig) -> list[MixtureConfig]:
+    """The mixtures that a phase opens: its own and what it replays, and to pool statistics those of phases before."""
+    begun = last_checkpoint(Path(experiment.output_dir) / phase.name) is not None  # which has its statistics already
+    opened = [phase, *(experiment.ancestors(phase) if phase.statistics == "pool" and not begun else ())]
+    return [part.mixture for one in opened for part in (one, *experiment.replayed(one))]
+
+
+def pooled(
+    experiment: ExperimentConfig, phase: PhaseConfig, dataset: MixtureDataset, images: bool = True
+) -> Statistics:
     """Exact statistics over the frames of this phase's data and of those it builds on.
 
-    Each phase counts by the samples drawn in it, each frame in it as often as it is drawn.
+    Each phase counts by the samples drawn in it, each frame in it as often as it is drawn. Without `images`, of the
+    numbers alone.
 
     Raises:
         UserError: the phase builds on no phase of this experiment, so that there are no data to pool with.
@@ -52,7 +63,7 @@ def pooled(experiment: ExperimentConfig, phase: PhaseConfig, dataset: MixtureDat
     shares = [count / sum(samples) for count in samples]
     opened = dict(dataset.sources)
     before = [open_phase_data(experiment, other, opened) for other in earlier]
-    return open_mixture(joined([dataset, *before], shares), experiment.data_loader, opened).statistics()
+    return open_mixture(joined([dataset, *before], shares), experiment.data_loader, opened).statistics(images)
 
 
 def joined(datasets: Sequence[MixtureDataset], shares: Sequence[float]) -> MixtureConfig:

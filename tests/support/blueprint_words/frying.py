@@ -23,7 +23,8 @@ from robocasa_lerobot.envs.scene.initial_states import BurnerAt
 from robocasa_lerobot.envs.scene.spec import InitialOpenness
 from robocasa_lerobot.envs.tasks.atomic.common import HANDLE_TO_FRONT
 
-ROTATED = Once(MovedSince("meat_container", "reset", by_rad=math.radians(15.0)), label="pan_rotated")
+TURNED = MovedSince("meat_container", "reset", by_rad=math.radians(15.0), about_vertical=True)
+ROTATED = Once(TURNED, label="pan_rotated")
 PRESSED = StepsWhile(ObjectTouches("spatula", "chicken"), 25, consecutive=True, label="chicken_pressed")
 LIT = OnBurner("pan", "stove", burner="{burner}", lit=True, within=0.15)
 

@@ -17,7 +17,7 @@ OURS = {
         },
         initial={
             "burner under saucepan on (knob 0.50 to max); burner chosen at random among non-rear burners": BurnerAt(
-                "stove", "{burner}", "high"
+                "stove", "{burner}", "on"
             ),
             "saucepan filled with hot chocolate (visual liquid only)": "saucepan",
             "number of sugar cubes 1-3 at random": None,

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections import Counter
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -43,29 +44,40 @@ class Sources:
 
 
 @lru_cache(maxsize=4)
-def read_sources(path: Path, template: Template, names: tuple[str, ...] = ()) -> Sources:
+def read_sources(path: Path, template: Template, first: int = 0) -> Sources:
     """Read what MimicGen or `prepare` has written.
 
     Args:
         path: file or folder.
         template: of their task.
-        names: files and demonstrations that are wanted; none means all.
+        first: of each file only so many, the first ones; 0 takes all.
 
     Raises:
         UserError: none is prepared, or one does not suit the template.
     """
     infos: list[DatagenInfo] = []
+    taken: Counter[Path] = Counter()
     for file, demo in demonstrations([path]):
-        name = f"{file.stem}/{demo}"
         with h5py.File(file) as opened:
             group = opened[f"data/{demo}"]
-            if GROUP in group and (not names or name in names):
-                infos.append(read_datagen(len(infos), name, group[GROUP]))
+            if GROUP in group and (not first or taken[file] < first):
+                infos.append(read_datagen(len(infos), f"{file.stem}/{demo}", group[GROUP]))
+                taken[file] += 1
     if not infos:
         raise UserError(f"{path}: no demonstration there has a {GROUP}. `robocasa-lerobot prepare {path}` writes it.")
-    for info in infos:
+    return suited(template, infos)
+
+
+def suited(template: Template, infos: Iterable[DatagenInfo]) -> Sources:
+    """Demonstrations together with what they are taken by.
+
+    Raises:
+        UserError: one does not suit the template.
+    """
+    found = Sources(template, tuple(infos))
+    for info in found.infos:
         boundaries(info, template)  # before anything is made of them
-    return Sources(template, tuple(infos))
+    return found
 
 
 def plain_episode(env: KitchenEnv, log: StageLog, sources: Sources, course: Course) -> Iterator[Array]:

@@ -19,6 +19,8 @@ from robocasa_lerobot.demos.generate.mimicgen.template import (
     Template,
 )
 from robocasa_lerobot.demos.generate.select import pose_distance
+from robocasa_lerobot.demos.generate.sources.segments import signals_of
+from robocasa_lerobot.demos.generate.sources.source import Source
 from robocasa_lerobot.demos.generate.sources.transform import carried_over, interpolated
 from robocasa_lerobot.demos.motion import Array
 from robocasa_lerobot.errors import UnknownNameError, UserError
@@ -36,6 +38,7 @@ class DatagenInfo:
         gripper: (T,).
         objects: (T, 4, 4) by name.
         signals: (T,) by name.
+        seed: of its scene; -1 where the file does not say.
     """
 
     number: int
@@ -45,6 +48,7 @@ class DatagenInfo:
     gripper: Array
     objects: dict[str, Array]
     signals: dict[str, NDArray[np.int64]]
+    seed: int = -1
 
 
 def read_datagen(number: int, name: str, group: h5py.Group) -> DatagenInfo:
@@ -64,7 +68,15 @@ def read_datagen(number: int, name: str, group: h5py.Group) -> DatagenInfo:
         gripper=group["gripper_action"][()][:, 0],
         objects={key: poses[()] for key, poses in group["object_poses"].items()},
         signals={key: values[()] for key, values in group["subtask_term_signals"].items()},
+        seed=int(group.parent.attrs.get("seed", -1)),
     )
+
+
+def datagen_of(number: int, source: Source) -> DatagenInfo:
+    """The same of a source, with the signals of its segments: those in its file are of the common rules."""
+    data = source.data
+    signals = signals_of(list(source.segments), len(data))
+    return DatagenInfo(number, source.name, data.eef, data.target, data.gripper, data.poses, signals, source.seed)
 
 
 def write_datagen(group: h5py.Group, info: DatagenInfo, env_name: str) -> None:
@@ -91,7 +103,9 @@ def digest_of_infos(infos: Sequence[DatagenInfo]) -> str:
 
 
 def boundaries(info: DatagenInfo, template: Template) -> list[int]:
-    """Where its subtasks end: after the first rise of each signal from the end before on; the last with it.
+    """Where its subtasks end: after the step in which each signal has risen, from the end before on; the last with it.
+
+    That step is a subtask's own, as MimicGen's `parse_source_dataset` has it.
 
     Raises:
         UnknownNameError: it has no such signal.
@@ -103,10 +117,11 @@ def boundaries(info: DatagenInfo, template: Template) -> list[int]:
         if signal not in info.signals:
             raise UnknownNameError("subtask_term_signal", signal, info.signals)
         begin = ends[-1] if ends else 0
-        rises = np.flatnonzero(np.diff(info.signals[signal][begin:].astype(np.int64)) > 0)
-        if not len(rises):
-            raise UserError(f"{info.name}: the signal {signal} does not rise after step {begin}.")
-        ends.append(begin + int(rises[0]) + 1)
+        risen = np.flatnonzero(np.diff(info.signals[signal].astype(np.int64)) > 0) + 1
+        later = risen[risen >= begin]
+        if not len(later):
+            raise UserError(f"{info.name}: the signal {signal} does not rise from step {begin} on.")
+        ends.append(int(later[0]) + 1)
     return [*ends, len(info.eef)]
 
 
@@ -222,7 +237,7 @@ def targets(
         UserError: a source does not suit the template.
     """
     spans = [with_offsets(boundaries(info, template), template, rng) for info in infos]
-    gripper, last, chosen = -1.0, None, -1
+    last, chosen = None, -1
     for number, subtask in enumerate(template.subtasks):
         now = None if subtask.object_ref is None else pose_of(subtask.object_ref)
         if template.per_subtask or chosen < 0:
@@ -234,7 +249,7 @@ def targets(
         start = last if last is not None and template.from_last_target else hand()
         line = interpolated(start, poses[0], subtask.interpolation_steps)
         for pose in [*line[:-1], *[poses[0]] * subtask.fixed_steps]:
-            yield Target(pose, gripper, subtask)
+            yield Target(pose, float(commands[0]), subtask)  # the fingers are those of what comes
         for step, (pose, gripper) in enumerate(zip(poses, commands.tolist(), strict=True)):
             yield Target(pose, gripper, subtask, info.number, span[0] + max(0, step - first))
         last = poses[-1]

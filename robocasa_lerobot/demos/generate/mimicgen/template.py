@@ -141,12 +141,22 @@ def derived_template(sources: Sequence[Source]) -> tuple[Template, list[Source]]
 
     A subtask for each segment, relative to its part or object, or to what an object is put onto or into; of sources
     with other sequences of segments the most frequent one counts.
+
+    Raises:
+        UserError: no source has a segment.
     """
 
     def kinds(source: Source) -> tuple[tuple[str, str], ...]:
         return tuple((one.kind, one.ref) for one in source.segments)
 
-    usual, _ = Counter(kinds(source) for source in sources if source.segments).most_common(1)[0]
+    sequences = Counter(kinds(source) for source in sources if source.segments)
+    if not sequences:
+        tasks = ", ".join(sorted({source.task for source in sources}))
+        raise UserError(
+            f"in none of the {len(sources)} sources ({tasks}) the hand moves anything: there are no subtasks to carry "
+            "over. Choose another --method."
+        )
+    usual, _ = sequences.most_common(1)[0]
     alike = [source for source in sources if kinds(source) == usual]
     model = alike[0]
     subtasks = []

@@ -224,14 +224,14 @@ _AT_MUG_M, _CLEAR_M = 0.3, 0.15
 def _by_mug(name: str) -> AllOf:
     return AllOf(
         Near(name, "mug", _AT_MUG_M, in_space=True),
-        ObjectTouches(name, "coffee_machine_counter"),
+        ObjectTouches(name, "counter"),
         GripperFar(name, _CLEAR_M),
     )
 
 
 def _put_by_mug(name: str) -> Stage:
     text = f"put the {{{name}}} on the counter beside the mug"
-    return Stage("pick_place", "place", "coffee_machine_counter", object=name, until=_by_mug(name), text=text)
+    return Stage("pick_place", "place", "counter", object=name, until=_by_mug(name), text=text)
 
 
 ORGANIZE_COFFEE_CONDIMENTS = Task(

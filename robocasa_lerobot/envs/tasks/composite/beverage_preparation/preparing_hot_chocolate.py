@@ -78,7 +78,7 @@ SWEETEN_HOT_CHOCOLATE = Task(
             repeats=True,
         ),
     ),
-    initial=(BurnerAt("stove", "{burner}", "high"),),
+    initial=(BurnerAt("stove", "{burner}", "on"),),
     goal=AllOf(ForEach("sugar", _in_saucepan), GripperFar("saucepan")),
     stages=(
         EachStage(

@@ -293,7 +293,7 @@ COOL_BAKED_CAKE = Task(
         "Let the baked cake cool: out of the oven, onto the plate on the counter. Leave the oven shut.",
         "The cake on the oven's tray is done; serve it on the plate and close the oven again.",
         "Move the cake from the closed oven to the plate, then push rack and door back.",
-        "On the plate with the cake, which is on the lower rack of the oven, and shut that after.",
+        "On the plate with the cake, which is on the oven's rack, and shut that after.",
     ),
 )
 

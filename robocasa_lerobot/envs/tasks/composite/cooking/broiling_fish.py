@@ -123,7 +123,7 @@ REMOVE_BROILED_FISH = Task(
     instruction="Open the oven, pull its rack out and put the fish on the plate on the counter.",
     paraphrases=(
         "The fish in the oven is done: serve it on the plate.",
-        "Take the broiled fish off the lower rack of the closed oven and lay it on the plate.",
+        "Take the broiled fish off the rack of the closed oven and lay it on the plate.",
         "The plate on the counter waits for the fish that is in the oven.",
         "Get the fish out of the oven and onto the plate.",
     ),

@@ -270,7 +270,9 @@ SETUP_FRYING = Task(
     ),
 )
 
-_ROTATED = Once(MovedSince("meat_container", "reset", by_rad=math.radians(15.0)), label="pan_rotated")
+# Lifting it by its handle tips it: that alone is no turn.
+_TURNED = MovedSince("meat_container", "reset", by_rad=math.radians(15.0), about_vertical=True)
+_ROTATED = Once(_TURNED, label="pan_rotated")
 _ON_STOVE = AllOf(ObjectTouches("meat_container", "stove"), ObjectOn("meat", "meat_container"))
 
 ROTATE_PAN = Task(

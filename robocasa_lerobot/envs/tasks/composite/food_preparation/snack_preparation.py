@@ -78,7 +78,7 @@ CEREAL_AND_BOWL = Task(
     ),
     paraphrases=(
         "For breakfast, put the {cereal} and the bowl out by the milk, and leave the cabinet shut.",
-        "Milk is there; add the {cereal} and the bowl from the cabinet below it, then shut the doors.",
+        "Milk is there; add the {cereal} and the bowl from the cabinet above it, then shut the doors.",
         "Take {cereal} and bowl out of the closed cabinet down to the counter; shut it again.",
         "The counter should get the cabinet's {cereal} and its bowl. Close the doors after that.",
     ),
