@@ -85,10 +85,9 @@ def run(args: argparse.Namespace) -> int:
         if is_stored(run, results):
             continue
         print(f"== {number} of {len(wanted)}: {run.name}", flush=True)
-        for number_of_command, _ in enumerate(run.carry_out(args.workers)):
-            if number_of_command:  # after the data: a phase has ended
-                print(f"kept: {store(run, results)}", flush=True)
-                report()
+        for _ in run.carry_out(args.workers):
+            print(f"kept: {store(run, results)}", flush=True)
+            report()
     report()
     print(f"written: {args.page or results / 'results.md'}")
     return 0

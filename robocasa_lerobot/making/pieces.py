@@ -127,18 +127,18 @@ def run_pieces(
         if execution.kind == "ray":
             run_with_ray(step, len(pieces), logs, execution.ray)
         else:
-            _run_here(pieces, logs, cores, preload)
+            _run_here(step, len(pieces), logs, cores, preload)
     return _outcome(pieces, logs)
 
 
-def _run_here(pieces: Sequence[Piece], logs: Path, cores: int, preload: Sequence[str]) -> None:
-    if len(pieces) < cores or cores == 1:
-        for rank in range(len(pieces)):
-            run_piece(None, rank, pieces=pieces, logs=logs, workers=cores)
+def _run_here(step: partial[Any], number: int, logs: Path, cores: int, preload: Sequence[str]) -> None:
+    if number < cores or cores == 1:
+        for rank in range(number):
+            step(None, rank)
         return
     PoolExecutor(
-        pipeline=[partial(run_piece, pieces=pieces, logs=logs, workers=1)],
-        tasks=len(pieces),
+        pipeline=[partial(step, workers=1)],
+        tasks=number,
         workers=cores,
         skip_completed=False,  # the datasets are the markers
         logging_dir=str(logs),

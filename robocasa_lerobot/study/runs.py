@@ -109,20 +109,25 @@ class Run:
         ]
 
     def carry_out(self, workers: int | None) -> Iterator[None]:
-        """Run its commands, and come back after each; what is finished takes seconds.
+        """Make its data, then train and try phase by phase, and come back after each; what is finished takes seconds.
 
         Raises:
             StoppedError: one did not end well; its own message stands above.
         """
         self.write_file()
-        for command in self.commands(workers):
-            status = run_command(*command)
-            if status:
-                raise StoppedError(
-                    f"{self.name}: `robocasa-lerobot {' '.join(command)}` ended with status {status}; "
-                    "the same study goes on there."
-                )
+        data, *trainings = self.commands(workers)
+        self._run(data)
+        for training in trainings:
+            self._run(training)
             yield
+
+    def _run(self, command: Sequence[str]) -> None:
+        status = run_command(*command)
+        if status:
+            raise StoppedError(
+                f"{self.name}: `robocasa-lerobot {' '.join(command)}` ended with status {status}; "
+                "the same study goes on there."
+            )
 
 
 def runs_of(

@@ -80,9 +80,10 @@ class MovedSince(WithMemory):
             return True
         if self.by_rad is None:
             return False
-        back, since = before[3:] * (1.0, -1.0, -1.0, -1.0), np.zeros(4)
-        mujoco.mju_mulQuat(since, now[3:], back)
-        w, x, y, z = since
+        turn = np.zeros(4)  # since then
+        mujoco.mju_negQuat(turn, before[3:])
+        mujoco.mju_mulQuat(turn, now[3:], turn.copy())
+        w, x, y, z = turn
         if self.about_vertical:
             return abs(float(np.arctan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z)))) > self.by_rad
         return 2 * float(np.arccos(min(1.0, abs(w)))) > self.by_rad

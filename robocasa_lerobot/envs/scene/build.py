@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robocasa_lerobot.envs.kitchens.appliances.kinds.blender import Blender
-from robocasa_lerobot.envs.kitchens.fixtures.base import Fixture, of_kind
+from robocasa_lerobot.envs.kitchens.fixtures.base import of_kind
 from robocasa_lerobot.envs.kitchens.footprints import PlacementError, place
 from robocasa_lerobot.envs.kitchens.layout import Layout, load_layout
 from robocasa_lerobot.envs.kitchens.splits import Pairs, benchmark_split, scene_ids, without
@@ -26,7 +26,7 @@ from robocasa_lerobot.envs.scene.placement.counter_areas import counter_areas
 from robocasa_lerobot.envs.scene.placement.objects import place_objects
 from robocasa_lerobot.envs.scene.placement.overlaps import ask_for_room
 from robocasa_lerobot.envs.scene.placement.regions import Shares
-from robocasa_lerobot.envs.scene.robot_poses import WIDE_OPEN, RobotPose, open_doors_of, robot_pose
+from robocasa_lerobot.envs.scene.robot_poses import RobotPose, open_before, open_doors_of, robot_pose
 from robocasa_lerobot.envs.scene.roles import cast_roles, counter_of
 from robocasa_lerobot.envs.scene.scene import Scene
 from robocasa_lerobot.envs.scene.scene_spec import SceneSpec
@@ -195,13 +195,13 @@ def arrange(
     start, shape = task.robot_start, robot.shape
     at_object = filled(start.at_object, choices.values)
     start = replace(start, fixture=filled(start.fixture, choices.values), at_object=at_object)
-    opened = _opened(task, layout, roles)
+    openings = [entry for entry in task.initial if isinstance(entry, InitialOpenness)]
+    opened = open_before((layout.fixtures[roles[entry.fixture]], entry.low, entry.high) for entry in openings)
     if not start.at_object:
         pose = robot_pose(rng, layout, start, layout.fixtures[roles[start.fixture]], shape, opened=opened)
     openness = {
         (roles[entry.fixture], _part(layout, roles, entry)): float(rng.uniform(entry.low, entry.high))
-        for entry in task.initial
-        if isinstance(entry, InitialOpenness)
+        for entry in openings
     }
     further = [entry for entry in task.initial if isinstance(entry, Initial)]
     initial = tuple((entry, entry.draw(rng, choices.values)) for entry in further)
@@ -236,18 +236,6 @@ def _shares(initial: tuple[tuple[Initial, float], ...], roles: dict[str, str], c
         if isinstance(entry, PartAt):
             found.setdefault(roles[entry.fixture], {})[entry.part.format(**choices.values)] = share
     return dict(found)
-
-
-def _opened(task: SceneSpec, layout: Layout, roles: dict[str, str]) -> list[tuple[Fixture, float]]:
-    """What the robot must not stand in: doors that start wide open, and drawers as far as they are out at most."""
-    found = []
-    for entry in (entry for entry in task.initial if isinstance(entry, InitialOpenness)):
-        fixture = layout.fixtures[roles[entry.fixture]]
-        if entry.low > WIDE_OPEN:
-            found.append((fixture, 1.0))
-        elif fixture.slides_out:
-            found.append((fixture, entry.high))
-    return found
 
 
 def _lids(task: SceneSpec, roles: dict[str, str]) -> dict[str, bool]:

@@ -7,8 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from robocasa_lerobot.envs.kitchens.fixtures.base import Fixture
-from robocasa_lerobot.envs.scene.robot_poses import WIDE_OPEN, RobotPose, is_free
+from robocasa_lerobot.envs.scene.robot_poses import RobotPose, is_free, open_before
 from robocasa_lerobot.envs.scene.scene import Scene
 from robocasa_lerobot.errors import UserError
 
@@ -57,7 +56,8 @@ def add_initial_noise(scene: Scene, noise: InitialNoise) -> None:
     if not noise.moves_base:
         return
     rng = np.random.default_rng([scene.seed, _BASE_NOISE_STREAM])
-    start, opened = scene.robot_pose, _opened(scene)
+    start = scene.robot_pose
+    opened = open_before((scene.fixtures[name], share, share) for (name, _), share in scene.openness.items())
     for _ in range(_TRIES):
         shift = rng.normal(0.0, noise.base_position_m, 2)
         turn = np.deg2rad(rng.normal(0.0, noise.base_yaw_deg))
@@ -69,13 +69,3 @@ def add_initial_noise(scene: Scene, noise: InitialNoise) -> None:
         if is_free(scene.layout, pose, scene.robot.shape, opened):
             scene.robot_pose = pose
             return
-
-
-def _opened(scene: Scene) -> list[tuple[Fixture, float]]:
-    """What the robot must not stand in: doors that are wide open, and drawers as far as they are out."""
-    found = []
-    for (name, _), share in scene.openness.items():
-        fixture = scene.fixtures[name]
-        if share > WIDE_OPEN or fixture.slides_out:
-            found.append((fixture, share if fixture.slides_out else 1.0))
-    return found

@@ -24,7 +24,7 @@ SPAWN_TRIES, SPAWN_ROUNDS = 50, 4
 SPAWN_WIDENING_M = (0.10, 0.05)
 FEW_TRIES = 8  # of a round, one by one: nearly always enough; the others are looked at together, which is faster
 SPAWN_MARGIN_M = 0.02
-WIDE_OPEN = 0.5  # share of full travel from which on a door is in a robot's place
+_WIDE_OPEN = 0.5  # share of full travel from which on a door is in a robot's place
 # How far off the nearest free place is looked for where a robot cannot stand before a fixture: in a corner.
 NEAREST_M, NEAREST_STEP_M = 0.75, 0.05
 
@@ -246,6 +246,24 @@ def is_free(
         opened: fixtures whose doors or drawers are open, each with its share of full travel.
     """
     return in_room(layout, pose) and bool(Obstacles(layout.fixtures, shape, opened).leave_free([pose])[0])
+
+
+def open_before(places: Iterable[tuple[Fixture, float, float]]) -> list[tuple[Fixture, float]]:
+    """What the robot must not stand in: doors that are wide open, and drawers as far as they are out at most.
+
+    Args:
+        places: fixtures, each with the least and the greatest share of full travel by which it is open.
+
+    Returns:
+        Some of them, each with the share to leave room for.
+    """
+    found = []
+    for fixture, low, high in places:
+        if low > _WIDE_OPEN:
+            found.append((fixture, 1.0))
+        elif fixture.slides_out:
+            found.append((fixture, high))
+    return found
 
 
 def in_room(layout: Layout, pose: RobotPose) -> bool:

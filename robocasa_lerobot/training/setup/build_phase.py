@@ -52,7 +52,7 @@ def prepare_phase(
         settings = _forced_settings(experiment, phase)
     start = pretrained_model(last) if last is not None else init
     config = builders.policy_config(settings, start, device)
-    keep = init is not None and phase.statistics == "keep"
+    keep, rename = init is not None and phase.statistics == "keep", settings.get(RENAME)
     if start is not None and (keep or last is not None):
         check_kept_settings(config, builders.policy_config({}, start, device), phase.name, begun=last is not None)
     seed = phase_seed(experiment.seed, phase.name)
@@ -79,14 +79,16 @@ def prepare_phase(
         dataset.meta.stats = builders.with_imagenet_statistics(stats, cameras) if imagenet else stats
 
     torch.manual_seed(seed)
+    processors: tuple[Any, Any] | None = None
     if keep and last is None and clipping.clips(config) and clipping.RANGE not in phase.policy:
-        known, _ = builders.make_processors(config, dataset.meta, start, keep_statistics=True)
-        reach = clipping.widen_clip_range(config, known, dataset.statistics(images=False))
+        processors = builders.make_processors(config, dataset.meta, start, keep_statistics=True, rename=rename)
+        reach = clipping.widen_clip_range(config, processors[0], dataset.statistics(images=False))
         if reach is not None:
             accelerator.print(f"  actions reach {reach:.1f} times as far as the statistics know: so does sampling now")
     policy = builders.make_phase_policy(config, dataset.meta, start)
-    kept, rename = keep or last is not None, settings.get(RENAME)
-    pre, post = builders.make_processors(config, dataset.meta, start, keep_statistics=kept, rename=rename)
+    pre, post = processors or builders.make_processors(
+        config, dataset.meta, start, keep_statistics=keep or last is not None, rename=rename
+    )
     always_eval = apply_training_scope(policy, phase, seed)
     masters = MasterWeights(policy)
     if len(masters) and experiment.mixed_precision == "fp16":
