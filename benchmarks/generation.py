@@ -45,6 +45,7 @@ from robocasa_lerobot.provenance import utc_now
 
 FIRST_SEED = 100_500  # development's; sources are from 100,000 on
 FAR_M = 1.5
+BLOCK = 10  # seeds of a task that are tried before the next task's: its sources are read once for them
 ARMS = ("ours", "mimicgen", "scripted", "far", "one", "own")
 # Of the 60 tasks: those of which the benchmark's own data drives, which are not asked of the arm `far`.
 DRIVING = (
@@ -57,12 +58,13 @@ OUTPUT = common.RESULTS / "generation.json"
 
 @dataclass(frozen=True)
 class Job:
-    """An attempt to be made: a task, a seed, an arm, and the folder of its sources."""
+    """An attempt to be made: a task, a seed, an arm, the folder of its sources, and the commit that makes it."""
 
     task: str
     seed: int
     arm: str
     source: Path
+    commit: str = ""
 
     @property
     def key(self) -> tuple[str, int, str]:
@@ -107,13 +109,17 @@ def record(job: Job, settings: GenerationSettings, env: KitchenEnv) -> Recording
 
 def attempt(job: Job) -> Trial:
     """Make one attempt. Nothing that goes wrong ends the benchmark: it counts as a failure."""
-    settings, started = settings_of(job), time.perf_counter()
+    settings = settings_of(job)
+    if job.arm != "scripted":
+        settings.read()  # before the clock: `generate` reads a task's sources once
+    started = time.perf_counter()
     env = settings.make_env()
     try:
         recording = record(job, settings, env)
     except Exception as error:
         reason = f"{type(error).__name__}: {error}"
-        return Trial(*job.key, False, False, 0, round(time.perf_counter() - started, 3), 0, (), False, reason)
+        seconds = round(time.perf_counter() - started, 3)
+        return Trial(*job.key, False, False, 0, seconds, 0, (), False, reason, job.commit)
     finally:
         env.close()
     rows = recording.ep_meta.get("generation", {}).get("segments", [])
@@ -128,6 +134,7 @@ def attempt(job: Job) -> Trial:
         sources=tuple(row["demo"] for row in rows),
         first_try=recording.success and len(set(told)) == len(told),
         reason=recording.reason,
+        commit=job.commit,
     )
 
 
@@ -143,17 +150,40 @@ def arms_of(text: str, attempts: int) -> dict[str, int]:
 
 
 def jobs_of(args: argparse.Namespace, names: Iterable[str], arms: Mapping[str, int]) -> list[Job]:
-    """All attempts, seed by seed, so that a run that is stopped has seen all tasks about equally often."""
+    """All attempts, some seeds after others, so that a run that is stopped has seen all tasks about equally often.
+
+    A task without sources of its own has no scenes of its own either, for the arm `own`.
+    """
+    commit = common.versions()["commit"]
+    with_file = [name for name in names if (args.source / f"{name}.hdf5").exists()] if "own" in arms else []
+    own = {name: [one.seed for one in sources_of(args.source, name)] for name in with_file}
     jobs = []
-    for number in range(max(arms.values())):
+    for begin in range(0, max(arms.values()), BLOCK):
         for name in names:
-            own = [one.seed for one in sources_of(args.source, name)]
-            for arm, attempts in arms.items():
-                if number >= attempts or (arm == "far" and name in DRIVING) or (arm == "own" and number >= len(own)):
-                    continue
-                seed = own[number] if arm == "own" else args.first_seed + number
-                jobs.append(Job(name, seed, arm, args.source))
+            for number in range(begin, begin + BLOCK):
+                for arm, attempts in arms.items():
+                    known = own.get(name, [])
+                    if number >= (min(attempts, len(known)) if arm == "own" else attempts):
+                        continue
+                    if arm == "far" and name in DRIVING:
+                        continue
+                    seed = known[number] if arm == "own" else args.first_seed + number
+                    jobs.append(Job(name, seed, arm, args.source, commit))
     return jobs
+
+
+def keep_to_sources(folder: Path, trials: Path) -> None:
+    """Note which sources a file of trials is about; sources that were prepared anew are others.
+
+    Raises:
+        SystemExit: it is about others.
+    """
+    files = {path.name: [path.stat().st_size, path.stat().st_mtime_ns] for path in sorted(folder.glob("*.hdf5"))}
+    note = trials.with_suffix(".sources.json")
+    if trials.exists() and note.exists() and json.loads(note.read_text()) != files:
+        raise SystemExit(f"{trials} holds attempts with other sources than those in {folder} now. Remove it, or give "
+                         "another file by --trials.")  # fmt: skip
+    write_text(note, json.dumps(files))
 
 
 def run(jobs: Sequence[Job], path: Path, workers: int) -> None:
@@ -184,6 +214,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     arms = arms_of(args.arms, args.attempts)
     names = expand_names(args.tasks) if args.tasks else tuple(sorted(path.stem for path in args.source.glob("*.hdf5")))
     jobs = jobs_of(args, names, arms)
+    keep_to_sources(args.source, args.trials)
     done = read(args.trials)
     if todo := [job for job in jobs if job.key not in done]:
         run(todo, args.trials, args.workers)
@@ -193,6 +224,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         "ratios": ratios(trials, args.workers),
         "arms": {arm: summary([trial for trial in trials if trial.arm == arm]) for arm in arms},
         "settings": {"attempts": arms, "first_seed": args.first_seed, "split": "pretrain"},
+        "commits": sorted({trial.commit for trial in trials}),
         "machine": common.machine(),
         "versions": common.versions("mujoco", "numpy"),
         "date": utc_now(),

@@ -46,6 +46,7 @@ class Trial:
     sources: tuple[int, ...]
     first_try: bool
     reason: str
+    commit: str = ""
 
 
 def class_of(task: str) -> str:

@@ -58,5 +58,8 @@ def _prepare_foreign(args: argparse.Namespace, total: int) -> int:
     files = sorted({file for path in args.paths for file in (path.glob("*.hdf5") if path.is_dir() else [path])})
     infos = (info for file in files for info in prepare_foreign(file, bodies, args.asset_root))
     ready = sum(1 for _ in Bar(infos, total=total, unit="demo"))
-    print(f"{ready} of {total} demonstrations are sources now, for `generate --method mimicgen --template JSON`")
+    print(
+        f"{ready} of {total} demonstrations are sources now, for their own scene: "
+        "robocasa_lerobot.demos.generate.fixed_arm carries them over there; kitchens have none of their bodies."
+    )
     return 0

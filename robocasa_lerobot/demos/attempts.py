@@ -11,7 +11,7 @@ import json
 import math
 import os
 import shutil
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -21,7 +21,7 @@ import numpy as np
 from robocasa_lerobot import contract
 from robocasa_lerobot.demos.demonstrator import demonstrate
 from robocasa_lerobot.demos.failures import film_of, keep_failure
-from robocasa_lerobot.demos.hdf5 import Failure, write_part
+from robocasa_lerobot.demos.hdf5 import Failure, segments_of, write_part
 from robocasa_lerobot.demos.motion import Array
 from robocasa_lerobot.demos.motion_style import MotionStyle
 from robocasa_lerobot.demos.recorder import Actor, Recording, record_episode
@@ -95,7 +95,7 @@ class RecordingSettings:
 
         def noted(env: KitchenEnv, style: MotionStyle, log: StageLog) -> Iterator[Array]:
             for wanted in actor(env, style, log):
-                clean.append(contract.stored_to_hdf5(contract.binarize(np.clip(wanted, -1.0, 1.0))))
+                clean.append(wanted.copy())
                 yield wanted
 
         recording = record_episode(
@@ -108,7 +108,7 @@ class RecordingSettings:
             noise_seed=noise_seed,
         )
         if self.action_noise > 0.0:
-            recording.per_step[CLEAN_ACTION] = np.array(clean)[: len(recording.actions)]
+            recording.per_step[CLEAN_ACTION] = clean_labels(clean, len(recording.actions))
         return recording
 
     def make_env(self) -> KitchenEnv:
@@ -116,6 +116,11 @@ class RecordingSettings:
         kwargs = self.env_kwargs() if self.images else {**self.env_kwargs(), "cameras": ()}
         noise = InitialNoise(base_within_m=self.start_within_m) if self.start_within_m else None
         return KitchenEnv(self.task, terminate_on_success=False, initial_noise=noise, **kwargs)
+
+
+def clean_labels(wanted: Sequence[Array], steps: int) -> Array:
+    """What was wanted before noise came to it, as it would have been executed: (steps, 12), in the order of HDF5."""
+    return np.array([contract.stored_to_hdf5(contract.binarize(np.clip(one, -1.0, 1.0))) for one in wanted[:steps]])
 
 
 @dataclass(frozen=True)
@@ -253,7 +258,7 @@ class Parts:
                 write_part(self.episode(number), recording)
                 return
             scene = None if recording.seed == seed else recording.seed
-            failure = Failure(seed, recording.reason, recording.false_terms, scene)
+            failure = Failure(seed, recording.reason, recording.false_terms, scene, segments_of(recording.ep_meta))
         if self.films is not None:
             keep_failure(self.films, env, failure, recording)
         note = self.folder / f"{number:06d}.json"

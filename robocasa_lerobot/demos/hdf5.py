@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import datetime
 import json
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -32,12 +32,14 @@ class Failure:
         reason: why.
         false_terms: the goal's terms that did not hold at the end.
         scene: seed of the kitchen, where that is another one: a replay happens in its source's.
+        segments: of a generated one, each segment that it began: what that is about, and its source's name.
     """
 
     seed: int
     reason: str
     false_terms: tuple[str, ...] = ()
     scene: int | None = None
+    segments: tuple[tuple[str, str], ...] = ()
 
     @property
     def scene_seed(self) -> int:
@@ -48,7 +50,14 @@ class Failure:
     def of(cls, values: dict[str, Any]) -> Failure:
         """Read what `asdict` gave, as JSON keeps it."""
         terms = tuple(values.get("false_terms", ()))
-        return cls(int(values["seed"]), str(values["reason"]), terms, values.get("scene"))
+        segments = tuple((str(what), str(source)) for what, source in values.get("segments", ()))
+        return cls(int(values["seed"]), str(values["reason"]), terms, values.get("scene"), segments)
+
+
+def segments_of(meta: Mapping[str, Any]) -> tuple[tuple[str, str], ...]:
+    """What each segment of a generated episode is about, and its source's name, from its `ep_meta`."""
+    rows = meta.get("generation", {}).get("segments", ())
+    return tuple((f"{row['kind']} {row['ref']}".strip(), str(row["source"])) for row in rows)
 
 
 def write_part(path: Path, recording: Recording) -> None:

@@ -12,24 +12,27 @@ _REASONS = 3
 
 
 def print_summary(results: Sequence[RecordingResult]) -> int:
-    """Print a line for each task and the most frequent reasons of failures; 1 if a task was given up, else 0."""
+    """Print a line for each task and the most frequent reasons of failures; 1 if a task was given up, else 0.
+
+    Rates have 95 % intervals of their own; that of all tasks counts every attempt alike.
+    """
     width = max(len(result.task) for result in results)
-    header = f"{'task':<{width}}  episodes   steps  s/episode  attempts  succeeded  file"
+    header = f"{'task':<{width}}  episodes   steps  s/episode  attempts  succeeded           file"
     print(f"{header}\n{'-' * len(header)}")
     for result in results:
         length = f"{result.steps / contract.CONTROL_HZ / result.episodes:.1f}" if result.episodes else "-"
-        rate = f"{1 - len(result.failures) / result.tried:.0%}" if result.tried else "-"
+        rate = _rate(result.tried - len(result.failures), result.tried)
         where = "given up" if result.gave_up else str(result.path)
         print(
             f"{result.task:<{width}}  {result.episodes:>8}  {result.steps:>6}  {length:>9}  {result.tried:>8}  "
-            f"{rate:>9}  {where}"
+            f"{rate:<18}  {where}"
         )
     if len(results) > 1:
         tried = sum(result.tried for result in results)
         failed = sum(len(result.failures) for result in results)
         print(
             f"{'all':<{width}}  {sum(r.episodes for r in results):>8}  {sum(r.steps for r in results):>6}  {'':>9}  "
-            f"{tried:>8}  {1 - failed / max(tried, 1):>9.0%}"
+            f"{tried:>8}  {_rate(tried - failed, tried)}"
         )
     for result in results:
         if result.failures:
@@ -41,6 +44,16 @@ def print_summary(results: Sequence[RecordingResult]) -> int:
         if result.gave_up:
             print(f"\n{result.gave_up}")
     return 1 if any(result.gave_up for result in results) else 0
+
+
+def _rate(succeeded: int, tried: int) -> str:
+    """A rate with its Wilson 95 % interval."""
+    from statsmodels.stats.proportion import proportion_confint
+
+    if not tried:
+        return "-"
+    low, high = proportion_confint(succeeded, tried, method="wilson")
+    return f"{succeeded / tried:.0%} ({abs(low):.0%} to {high:.0%})"
 
 
 def _reasons(result: RecordingResult) -> list[tuple[str, list[int]]]:

@@ -225,6 +225,8 @@ def test_a_few_recorded_ones_are_multiplied_where_a_recipe_says_so(tmp_path: Pat
         for row, demo in zip(rows, recorded["data"].values(), strict=True):
             assert row["mimicgen"]["source_demos"] == demo["src_demo_inds"][:].tolist()
             assert {*row["mimicgen"]["source_demos"]} <= {*range(10)}
+            kinds = demo["segment_kind"][:]
+            assert [kind for kind, steps in row["mimicgen"]["segment_kinds"] for _ in range(steps)] == kinds.tolist()
             assert json.loads(demo.attrs["ep_meta"])["generation"]["segments"]
 
 

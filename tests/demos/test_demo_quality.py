@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from robocasa_lerobot import cli, contract
+from robocasa_lerobot.demos.hdf5 import segments_of
 from robocasa_lerobot.demos.quality.measure import Measures, Start, _idle, _jerk, _saturated
 from robocasa_lerobot.demos.quality.summary import BIN_M, Quality
 from robocasa_lerobot.demos.recording import RecordingSettings, record_tasks
+from robocasa_lerobot.evaluation.inventory import worth
 
 
 def one(seed: int, ahead: float, *, path: float = 0.0, sources: tuple[int, ...] = ()) -> Measures:
@@ -29,6 +32,25 @@ def test_a_set_of_demonstrations() -> None:
     assert found.path_spread_m == pytest.approx((0.3 + 0.1 + 0.2) / 3)
     assert found.most_alike_m == pytest.approx(0.1)
     assert Quality("OpenDrawer", kept[2:], ()).most_used_source is None
+
+
+def test_what_is_kept_by_segment_and_by_source() -> None:
+    pull, push = ("part drawer.box", "OpenDrawer/demo_0"), ("part drawer.box", "OpenDrawer/demo_1")
+    kept = (
+        replace(one(0, 0.1, sources=(0,)), segments=(pull,)),
+        replace(one(1, 0.1, sources=(0, 1)), segments=(pull, push)),
+    )
+    found = Quality("OpenDrawer", kept, (Start(2, 0.1, 0.0),), ((push, push),))
+    assert found.kept_with(0) == {"part drawer.box": (2, 3)}
+    assert found.kept_with(1) == {"OpenDrawer/demo_0": (2, 2), "OpenDrawer/demo_1": (1, 2)}
+    assert found.effective_sources == pytest.approx(1 / ((2 / 3) ** 2 + (1 / 3) ** 2))
+    printed = worth.text({"generated": [found]})
+    assert "Kept by segment" in printed
+    assert "OpenDrawer/demo_1" in printed
+    assert "Kept by source" not in worth.text({"scripted": [Quality("OpenDrawer", (one(0, 0.1),), ())]})
+    assert segments_of({"generation": {"segments": [{"kind": "part", "ref": "drawer.box", "source": "a"}]}}) == (
+        ("part drawer.box", "a"),
+    )
 
 
 def test_motion() -> None:

@@ -113,7 +113,7 @@ class Elsewhere(RecordingSettings):
 
     def record(self, env: KitchenEnv, seed: int) -> Recording:
         """Say so."""
-        return cast(Recording, SimpleNamespace(success=False, seed=7, reason="it fell", false_terms=()))
+        return cast(Recording, SimpleNamespace(success=False, seed=7, reason="it fell", false_terms=(), ep_meta={}))
 
 
 def test_a_failure_says_in_which_kitchen_it_was(tmp_path: Path) -> None:

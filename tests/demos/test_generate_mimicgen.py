@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -31,15 +32,23 @@ from robocasa_lerobot.demos.generate.mimicgen.template import (
     read_json_template,
     template_from,
 )
+from robocasa_lerobot.demos.generate.select import pose_distance
 from robocasa_lerobot.demos.generate.settings import GenerationSettings
 from robocasa_lerobot.demos.generate.sources.prepare import prepare_files
-from robocasa_lerobot.demos.generate.sources.prepared import GROUP, Prepared, write_prepared
+from robocasa_lerobot.demos.generate.sources.prepared import (
+    GROUP,
+    HAND_IN_SITE,
+    Prepared,
+    read_prepared,
+    write_prepared,
+)
 from robocasa_lerobot.demos.generate.sources.segments import cut, signals_of
 from robocasa_lerobot.demos.generate.sources.source import sources_of
 from robocasa_lerobot.demos.generate.sources.transform import inverse, yaw_pose
-from robocasa_lerobot.demos.motion import Array
+from robocasa_lerobot.demos.motion import Array, hand_rotation
 from robocasa_lerobot.demos.recording import RecordingSettings, record_tasks
 from robocasa_lerobot.demos.replay import replay
+from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.errors import UserError
 
 STACK: dict[str, Any] = {
@@ -94,9 +103,9 @@ def written(path: Path, seeds: list[int]) -> Path:
     return path
 
 
-def opened(path: Path, *touches: slice) -> Path:
+def opened(path: Path, *touches: slice, pose: Array | None = None) -> Path:
     """A file as `prepare` writes it, with one demonstration in which a drawer is touched and moved so often."""
-    still_there, touched = still(np.eye(4)), np.zeros(STEPS, np.int64)
+    still_there, touched = still(np.eye(4) if pose is None else pose), np.zeros(STEPS, np.int64)
     for steps in touches:
         touched[steps] = 1
     name = "drawer.box"
@@ -263,3 +272,68 @@ def test_files_are_generated_as_published_and_with_a_template(
     assert cli.main(more) == 2
     assert "--method mimicgen" in capsys.readouterr().err
     assert cli.main([*more, "--method", "mimicgen"]) == 0
+
+
+def test_poses_in_files_have_the_grip_sites_axes_as_mimicgens_have(tmp_path: Path) -> None:
+    env = KitchenEnv("CloseDrawer", cameras=())
+    try:
+        env.reset(seed=100)
+        site = env.data.site(env.scene.robot.names.grip_site).xmat.reshape(3, 3)
+        np.testing.assert_allclose(site @ HAND_IN_SITE[:3, :3], hand_rotation(env.data), atol=1e-9)
+    finally:
+        env.close()
+    hand = yaw_pose(0.3, 0.2, 0.7)
+    with h5py.File(opened(tmp_path / "OpenDrawer.hdf5", slice(2, 6), pose=hand)) as file:
+        group = file["data/demo_0"][GROUP]
+        np.testing.assert_allclose(group["eef_pose"][0] @ HAND_IN_SITE, hand, atol=1e-12)
+        np.testing.assert_array_equal(read_prepared(group).eef[0], hand)
+
+
+def test_a_templates_noise_has_clean_labels_beside_it(tmp_path: Path) -> None:
+    """Two subtasks with noise, carried over beside the drawer that they should open: the attempt fails, labelled."""
+    asked = json.loads(json.dumps(STACK))
+    spec = asked["task"]["task_spec"]
+    spec["subtask_1"] |= {"object_ref": "drawer", "selection_strategy": RANDOM, "selection_strategy_kwargs": None}
+    spec["subtask_2"] |= {"object_ref": "drawer"}
+    path = tmp_path / "OpenDrawer.hdf5"
+    with h5py.File(path, "w") as file:
+        demo = file.create_group("data/demo_0")
+        demo.attrs["seed"] = 5
+        one = info(0, 0.8)
+        write_datagen(demo.create_group(GROUP), replace(one, objects={"drawer": one.objects["cube"]}), "Stack")
+    settings = settings_of(path, template=json.dumps(asked))
+    env = settings.make_env()
+    try:
+        recording = settings.record(env, 100)
+    finally:
+        env.close()
+    clean, labels = recording.per_step["clean_action"], recording.per_step["src_demo_labels"][:, 0]
+    assert clean.shape == recording.actions.shape
+    away = np.abs(clean - recording.actions).max(axis=1)
+    noisy = (labels >= 0) & (np.arange(len(labels)) < GRASP)
+    assert away[noisy].min() > 1e-4
+    assert away[labels < 0].max() < 1e-6  # lines between subtasks have none
+
+
+def test_weights_of_a_template_count() -> None:
+    asked = json.loads(json.dumps(STACK))
+    chosen = asked["task"]["task_spec"]["subtask_1"]["selection_strategy_kwargs"]
+    chosen |= {"pos_weight": 0.0, "rot_weight": 2.0}
+    subtask = template_from(asked).subtasks[0]
+    assert subtask.weights == (0.0, 2.0)
+    here, there = yaw_pose(0.0, 0.0, 0.0), yaw_pose(3.0, 0.0, 0.4)
+    assert pose_distance(here, there, subtask.weights) == pytest.approx(0.8)
+    chosen["nn"] = 3
+    with pytest.raises(UserError, match="nn_k"):
+        template_from(asked)
+
+
+def test_a_number_that_cannot_be_is_said_so(tmp_path: Path) -> None:
+    path, template = written(tmp_path / "stack.hdf5", [5]), json.dumps(STACK)
+    for values, said in (
+        ({"cap": 20.0}, "--cap is 20"),
+        ({"spread": -1.0}, "--spread"),
+        ({"first_sources": -1}, "--first"),
+    ):
+        with pytest.raises(UserError, match=said):
+            settings_of(path, template=template, **values)

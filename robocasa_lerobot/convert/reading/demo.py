@@ -190,24 +190,29 @@ class Demo:
 
     @cached_property
     def provenance(self) -> dict[str, Any]:
-        """Which source demonstrations MimicGen made the episode from; empty for other episodes.
+        """Which source demonstrations an episode was generated from; empty for other episodes.
 
-        `source_demos` are their indices, one for each subtask; `segments` are runs [index, number of steps].
+        `source_demos` are their indices, one for each subtask; `segments` are runs [index, number of steps], and
+        `segment_kinds`, of our own generation, runs [kind, number of steps].
 
         Raises:
             RejectedEpisodeError: they are not numbers or cannot be read.
         """
         found: dict[str, Any] = {}
-        for key in ("src_demo_inds", "src_demo_labels"):
+        for key, name in (
+            ("src_demo_inds", "source_demos"),
+            ("src_demo_labels", "segments"),
+            ("segment_kind", "segment_kinds"),
+        ):
             if not isinstance(member(self._group, key), h5py.Dataset):
                 continue
             values = self._column(self._group, key, dimensions=None).ravel().astype(np.int64)
             if key == "src_demo_inds":
-                found["source_demos"] = values.tolist()
+                found[name] = values.tolist()
             else:
                 starts = np.flatnonzero(np.diff(values, prepend=values[:1] - 1))
                 runs = np.diff([*starts, len(values)])
-                found["segments"] = [[int(values[a]), int(n)] for a, n in zip(starts, runs, strict=True)]
+                found[name] = [[int(values[a]), int(n)] for a, n in zip(starts, runs, strict=True)]
         return found
 
     def shapes(self) -> dict[str, tuple[tuple[int, ...], str]]:

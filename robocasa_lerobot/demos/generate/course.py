@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from robocasa_lerobot import contract
 from robocasa_lerobot.demos.generate.select import Manner
 from robocasa_lerobot.demos.generate.sources.source import Piece, Source
 from robocasa_lerobot.demos.motion import Array
@@ -19,6 +20,7 @@ MOST_SOURCES = 24  # that are asked for a stage: more than one task usually has
 OTHER_KIND_COST = 0.15  # of a segment from a stage that puts things into another kind of fixture, or onto an object
 NOT_DRAWN_COST = 1.0  # as of a hand that touches something: see `planning/costs.py`
 AT_REST = (-1, BRIDGE, -1)  # label of steps in which it is waited
+_BASE = contract.ACTION_SLICES["base_motion"]
 KINDS = ("free", "contact", "bridge", "drive", "settle")
 
 
@@ -35,6 +37,7 @@ class Course:
         label: source, kind of step, and step in the source, of the action that comes next.
         labels: of all actions so far.
         used: the segments that were carried out, in plain values.
+        clean: actions before the noise of a template; of others empty.
         rest: rotation (3, 3) of each object before it was touched.
         lay: upright pose (4, 4) of where each object lay before it was taken last; see `sources.uses`.
     """
@@ -47,6 +50,7 @@ class Course:
     label: tuple[int, int, int] = AT_REST
     labels: list[tuple[int, int, int]] = field(default_factory=list)
     used: list[dict[str, Any]] = field(default_factory=list)
+    clean: list[Array] = field(default_factory=list)
     rest: dict[str, Array] = field(default_factory=dict)
     lay: dict[str, Array] = field(default_factory=dict)
 
@@ -100,9 +104,10 @@ class Course:
             yield step
 
     def counted(self, steps: Iterator[Array]) -> Iterator[Array]:
-        """All actions of the episode, each with its label kept."""
+        """All actions of the episode, each with its label kept; what drives between segments says so."""
         for step in steps:
-            self.labels.append(self.label)
+            drives = self.label == AT_REST and bool(np.any(step[_BASE]))
+            self.labels.append((-1, DRIVE, -1) if drives else self.label)
             yield step
 
 

@@ -77,7 +77,8 @@ def narrowed[T](
     return [option for option in options if source(option) == drawn]
 
 
-def pose_distance(one: Array, other: Array) -> float:
-    """Metres plus radians between two poses (4, 4): MimicGen's measure with its weights of 1."""
+def pose_distance(one: Array, other: Array, weights: tuple[float, float] = (1.0, 1.0)) -> float:
+    """Metres plus radians between two poses (4, 4), weighted: MimicGen's measure, whose own weights are 1."""
     change = inverse(one) @ other
-    return float(np.linalg.norm(change[:3, 3]) + np.linalg.norm(axis_angle(change[:3, :3])))
+    metres, radians = np.linalg.norm(change[:3, 3]), np.linalg.norm(axis_angle(change[:3, :3]))
+    return float(weights[0] * metres + weights[1] * radians)

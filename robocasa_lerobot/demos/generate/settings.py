@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from robocasa_lerobot.demos.attempts import RecordingSettings
+from robocasa_lerobot.demos.attempts import CLEAN_ACTION, RecordingSettings, clean_labels
 from robocasa_lerobot.demos.generate.course import KINDS, Course
 from robocasa_lerobot.demos.generate.mimicgen.plain import Sources, plain_episode, read_sources, suited
 from robocasa_lerobot.demos.generate.mimicgen.subtasks import datagen_of, digest_of_infos
@@ -76,9 +76,16 @@ class GenerationSettings(RecordingSettings):
 
         Raises:
             UserError: none is prepared, they are seeds of the attempts, their scenes are not made again, or they do not
-                suit the subtasks.
+                suit the subtasks; or a number is none that it could be.
         """
         settings = cls(source=str(source), **values)
+        for name, number, fits, expected in (
+            ("cap", settings.cap, 0.0 < settings.cap <= 1.0, "a share above 0 and up to 1, as 0.2"),
+            ("spread", settings.spread, settings.spread >= 0.0, "a cost of 0 or more"),
+            ("first-sources", settings.first_sources, settings.first_sources >= 0, "a number of sources, or 0 for all"),
+        ):
+            if not fits:
+                raise UserError(f"--{name} is {number}, expected {expected}.")
         if settings.method == REPLAY:
             own = [one for _, one in settings.recorded()]
             check_scenes(own, settings)
@@ -134,12 +141,12 @@ class GenerationSettings(RecordingSettings):
         rng = np.random.default_rng([seed, _CHOICE_STREAM])
         if self.method == MIMICGEN:
             subtasks, course = self.subtasks(), Course([], rng, Manner("random", "fixed", "line"), self.spread)
-            return labelled(
-                self.labelled_episode(
-                    env, seed, lambda env, style, log: course.counted(plain_episode(env, log, subtasks, course))
-                ),
-                course,
+            recording = self.labelled_episode(
+                env, seed, lambda env, style, log: course.counted(plain_episode(env, log, subtasks, course))
             )
+            if self.action_noise > 0.0 or any(one.action_noise > 0.0 for one in subtasks.template.subtasks):
+                recording.per_step[CLEAN_ACTION] = clean_labels(course.clean, len(recording.actions))
+            return labelled(recording, course)
         if self.method == REPLAY:
             return self._replayed(env, seed, Course([], rng, Manner(), self.spread))
         course = Course(self.read(), rng, Manner(self.select, self.base, self.bridge), self.spread, self.cap)

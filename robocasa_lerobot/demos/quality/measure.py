@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robocasa_lerobot import contract
+from robocasa_lerobot.demos.hdf5 import segments_of
 from robocasa_lerobot.demos.motion import UP, Array, base_pose, floor_axes, grip_position, rotation_about
 from robocasa_lerobot.demos.planning.base_room import wrap
 from robocasa_lerobot.demos.replay import Demonstration, kitchen_of, read_demonstration
@@ -53,6 +54,7 @@ class Measures:
             robot's base at the beginning.
         stand: (3,) where the base stands at the end, in the same frame: x and y in metres, heading in radians.
         sources: numbers of the sources that its segments come from; empty where it was not generated.
+        segments: what each segment is about, and its source's name; the same.
     """
 
     start: Start
@@ -65,6 +67,7 @@ class Measures:
     path: Array
     stand: Array
     sources: tuple[int, ...]
+    segments: tuple[tuple[str, str], ...] = ()
 
 
 def start_of(env: KitchenEnv) -> Start:
@@ -128,6 +131,7 @@ def _measured(env: KitchenEnv, recorded: Demonstration, sources: tuple[int, ...]
         path=path,
         stand=np.array([end[0], end[1], turn]),
         sources=sources,
+        segments=segments_of(recorded.meta),
     )
 
 

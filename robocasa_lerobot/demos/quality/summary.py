@@ -13,7 +13,7 @@ import numpy as np
 from scipy.spatial.distance import pdist
 
 from robocasa_lerobot.demos.attempts import RecordingSettings
-from robocasa_lerobot.demos.hdf5 import read_summary
+from robocasa_lerobot.demos.hdf5 import Failure, read_summary
 from robocasa_lerobot.demos.motion import Array
 from robocasa_lerobot.demos.quality.measure import Measures, Start, measure, start_of
 from robocasa_lerobot.demos.replay import demonstrations
@@ -30,11 +30,13 @@ class Quality:
         task: name.
         kept: measures of those that were kept.
         failed: starts of the attempts that were not.
+        in_vain: segments that each of these had begun, where they were generated.
     """
 
     task: str
     kept: tuple[Measures, ...]
     failed: tuple[Start, ...]
+    in_vain: tuple[tuple[tuple[str, str], ...], ...] = ()
 
     @property
     def rate(self) -> float:
@@ -52,6 +54,22 @@ class Quality:
         """Share of all segments that come from the source that most come from; None where none was generated."""
         used = Counter(source for one in self.kept for source in one.sources)
         return max(used.values()) / used.total() if used else None
+
+    @property
+    def effective_sources(self) -> float | None:
+        """Of how many evenly used sources the segments would be as mixed: one over the sum of squared shares."""
+        used = Counter(source for one in self.kept for source in one.sources)
+        return used.total() ** 2 / sum(count**2 for count in used.values()) if used else None
+
+    def kept_with(self, which: int) -> dict[str, tuple[int, int]]:
+        """Of the attempts that began a segment, how many were kept and how many there were.
+
+        Args:
+            which: 0 tells segments apart by what they are about, 1 by their source.
+        """
+        kept = Counter(name for one in self.kept for name in {segment[which] for segment in one.segments})
+        lost = Counter(name for segments in self.in_vain for name in {segment[which] for segment in segments})
+        return {name: (kept[name], kept[name] + lost[name]) for name in sorted({*kept, *lost})}
 
     @property
     def path_spread_m(self) -> float:
@@ -84,10 +102,12 @@ class Quality:
 
     def as_json(self) -> dict[str, Any]:
         """All of it in plain values."""
-        names = ("rate", "covered", "most_used_source", "path_spread_m", "most_alike_m", "stand_spread_m")
+        names = ("rate", "covered", "most_used_source", "effective_sources")
+        names += ("path_spread_m", "most_alike_m", "stand_spread_m")
         means = ("seconds", "jerk", "idle", "saturated", "other_contacts", "in_view")
         own = {name: getattr(self, name) for name in (*names, "stand_spread_rad", "seconds_spread")}
-        return {"task": self.task, "kept": len(self.kept), **own, **{name: self.mean(name) for name in means}}
+        rates = {"segments": self.kept_with(0), "sources": self.kept_with(1)}
+        return {"task": self.task, "kept": len(self.kept), **own, **{name: self.mean(name) for name in means}, **rates}
 
     @cached_property
     def _path_distances(self) -> Array:
@@ -108,27 +128,28 @@ class Part:
     path: Path
     kept: Measures | None = None
     failed: Start | None = None
+    in_vain: tuple[tuple[str, str], ...] = ()
 
 
-def attempts_in(paths: Sequence[Path]) -> list[tuple[Path, str | int]]:
-    """All attempts of files or folders: the names of those that were kept, the seeds of those that failed.
+def attempts_in(paths: Sequence[Path]) -> list[tuple[Path, str | Failure]]:
+    """All attempts of files or folders: the names of those that were kept, and those that failed.
 
     Raises:
         UserError: there are no demonstrations.
     """
     kept = demonstrations(paths)
-    found: list[tuple[Path, str | int]] = list(kept)
+    found: list[tuple[Path, str | Failure]] = list(kept)
     for path in dict.fromkeys(path for path, _ in kept):
-        found += [(path, failure.scene_seed) for failure in read_summary(path).failures]
+        found += [(path, failure) for failure in read_summary(path).failures]
     return found
 
 
-def look_at(attempts: Sequence[tuple[Path, str | int]], workers: int = 1) -> Iterator[Part]:
+def look_at(attempts: Sequence[tuple[Path, str | Failure]], workers: int = 1) -> Iterator[Part]:
     """Look at attempts, as they end."""
     yield from as_they_end(_look, attempts, workers)
 
 
-def _look(path: Path, which: str | int) -> Part:
+def _look(path: Path, which: str | Failure) -> Part:
     if isinstance(which, str):
         return Part(path, kept=measure(path, which))
     settings = read_summary(path).settings or {}
@@ -141,22 +162,23 @@ def _look(path: Path, which: str | int) -> Part:
         start_within_m=float(settings.get("start_within_m", 0.0)),
     ).make_env()
     try:
-        env.reset(seed=which)
-        return Part(path, failed=start_of(env))
+        env.reset(seed=which.scene_seed)
+        return Part(path, failed=start_of(env), in_vain=which.segments)
     finally:
         env.close()
 
 
 def qualities(parts: Iterable[Part]) -> list[Quality]:
     """What was looked at, task by task."""
-    found: dict[str, tuple[list[Measures], list[Start]]] = {}
+    found: dict[str, tuple[list[Measures], list[Start], list[tuple[tuple[str, str], ...]]]] = {}
     for part in parts:
-        kept, failed = found.setdefault(part.path.stem, ([], []))
+        kept, failed, in_vain = found.setdefault(part.path.stem, ([], [], []))
         if part.kept is not None:
             kept.append(part.kept)
         if part.failed is not None:
             failed.append(part.failed)
+            in_vain.append(part.in_vain)
     return [
-        Quality(task, tuple(sorted(kept, key=lambda one: one.start.seed)), tuple(failed))
-        for task, (kept, failed) in sorted(found.items())
+        Quality(task, tuple(sorted(kept, key=lambda one: one.start.seed)), tuple(failed), tuple(in_vain))
+        for task, (kept, failed, in_vain) in sorted(found.items())
     ]

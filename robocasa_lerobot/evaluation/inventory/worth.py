@@ -34,6 +34,7 @@ def _metres(value: float) -> str:
 COVERAGE = (
     Row("starts covered", lambda one: one.covered, _percent),
     Row("most used source", lambda one: one.most_used_source, _percent),
+    Row("as of so many sources", lambda one: one.effective_sources, lambda value: f"{value:.1f}"),
 )
 DIVERSITY = (
     Row("paths apart", lambda one: one.path_spread_m, _metres),
@@ -50,12 +51,19 @@ QUALITY = (
     Row("touches other things", lambda one: one.mean("other_contacts"), _percent),
     Row("target in view", lambda one: one.mean("in_view"), _percent),
 )
+_MEASURES = {"coverage": COVERAGE, "diversity": DIVERSITY, "quality": QUALITY}
 _NOTES = {
     "coverage": (
         "Starts: where the thing that the first stage is about lies before the robot, in squares of "
         f"{100 * BIN_M:.0f} cm; covered is the share of the squares in which an attempt began, in which one began that "
-        "was kept. Most used source: its share of all segments.",
+        "was kept. Most used source: its share of all segments. As of so many sources: of how many evenly used "
+        "ones the segments would be as mixed.",
     ),
+    "segments": (
+        "Of the attempts that began such a segment, those that were kept, whatever others failed for; several tries at "
+        "one segment count once.",
+    ),
+    "sources": ("The same by whose segments they are.",),
     "diversity": (
         "Paths: of the hand at the same shares of its time, in the frame of the thing that the first stage is about; "
         "root mean square distance of two demonstrations, on average and of the two that are most alike. Stands: where "
@@ -73,16 +81,16 @@ _NOTES = {
 def text(sets: Mapping[str, Sequence[Quality]]) -> str:
     """Tables for the terminal: a line for each task and set."""
     lines = []
-    for name, rows in (("coverage", COVERAGE), ("diversity", DIVERSITY), ("quality", QUALITY)):
-        table = _table(name, rows, sets)
-        shown = [[column.label for column in table.columns], *([cell.text for cell in row] for row in table.rows)]
-        widths = [max(len(row[column]) for row in shown) for column in range(len(shown[0]))]
-        lines += [
-            table.caption,
-            *("  ".join(c.ljust(w) for c, w in zip(r, widths, strict=True)).rstrip() for r in shown),
-        ]
-        lines.append("")
+    tables = [_table(name, rows, sets) for name, rows in _MEASURES.items()]
+    for table in (*tables[:1], *_parts_tables(sets), *tables[1:]):
+        lines += [*_shown(table), ""]
     return "\n".join(lines)
+
+
+def _shown(table: Table) -> list[str]:
+    shown = [[column.label for column in table.columns], *([cell.text for cell in row] for row in table.rows)]
+    widths = [max(len(row[column]) for row in shown) for column in range(len(shown[0]))]
+    return [table.caption, *("  ".join(c.ljust(w) for c, w in zip(r, widths, strict=True)).rstrip() for r in shown)]
 
 
 def page(sets: Mapping[str, Sequence[Quality]]) -> Document:
@@ -94,7 +102,9 @@ def page(sets: Mapping[str, Sequence[Quality]]) -> Document:
     count = sum(len(one.kept) for rows in sets.values() for one in rows)
     sections = [
         Section(
-            "coverage", "Which starts they cover, and where they come from", parts=(_table("coverage", COVERAGE, sets),)
+            "coverage",
+            "Which starts they cover, and where they come from",
+            parts=(_table("coverage", COVERAGE, sets), *_parts_tables(sets)),
         ),
         Section("diversity", "How they differ", parts=(_table("diversity", DIVERSITY, sets),)),
         Section("quality", "How they move", parts=(_table("quality", QUALITY, sets),)),
@@ -127,10 +137,33 @@ def _table(name: str, rows: Sequence[Row], sets: Mapping[str, Sequence[Quality]]
     return Table(f"{name}-table", captions[name], tuple(columns), tuple(body), _NOTES[name], cards=True)
 
 
+def _parts_tables(sets: Mapping[str, Sequence[Quality]]) -> list[Table]:
+    """Of generated demonstrations: what is kept of attempts by the segments that they began, and by their sources."""
+    tables = []
+    for which, (name, column) in enumerate((("segments", "segment"), ("sources", "source"))):
+        several = len(sets) > 1
+        head = [Column("task"), *([Column("set")] if several else []), Column(column)]
+        head += [Column("kept", numeric=True), Column("of attempts", numeric=True)]
+        body = [
+            (Cell(one.task), *([Cell(label)] if several else []), Cell(part), *_rated(kept, tried))
+            for label, found in sets.items()
+            for one in found
+            for part, (kept, tried) in one.kept_with(which).items()
+        ]
+        if body:
+            table = f"{name}-table"
+            tables.append(Table(table, f"Kept by {column}", tuple(head), tuple(body), _NOTES[name], cards=True))
+    return tables
+
+
 def _rate(one: Quality) -> list[Cell]:
-    kept, tried = len(one.kept), len(one.kept) + len(one.failed)
-    bar = Bar(Estimate(one.rate, *wilson_interval(kept, tried)))
-    return [Cell(f"{kept:,}", kept), Cell(f"{one.rate:.0%}", one.rate, bar=bar)]
+    return _rated(len(one.kept), len(one.kept) + len(one.failed))
+
+
+def _rated(kept: int, tried: int) -> list[Cell]:
+    rate = kept / max(tried, 1)
+    bar = Bar(Estimate(rate, *wilson_interval(kept, tried)))
+    return [Cell(f"{kept:,}", kept), Cell(f"{rate:.0%}", rate, bar=bar)]
 
 
 def _cell(row: Row, one: Quality) -> Cell:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
 
@@ -22,7 +22,7 @@ from robocasa_lerobot.demos.generate.mimicgen.subtasks import (
 )
 from robocasa_lerobot.demos.generate.mimicgen.template import Subtask, Template
 from robocasa_lerobot.demos.generate.sources.frames import body_pose
-from robocasa_lerobot.demos.generate.sources.prepared import GROUP
+from robocasa_lerobot.demos.generate.sources.prepared import GROUP, HAND_IN_SITE
 from robocasa_lerobot.demos.generate.sources.transform import yaw_pose
 from robocasa_lerobot.demos.motion import Array, action
 from robocasa_lerobot.demos.replay import demonstrations
@@ -61,11 +61,16 @@ def read_sources(path: Path, template: Template, first: int = 0) -> Sources:
         with h5py.File(file) as opened:
             group = opened[f"data/{demo}"]
             if GROUP in group and (not first or taken[file] < first):
-                infos.append(read_datagen(len(infos), f"{file.stem}/{demo}", group[GROUP]))
+                infos.append(_of_the_hand(read_datagen(len(infos), f"{file.stem}/{demo}", group[GROUP])))
                 taken[file] += 1
     if not infos:
         raise UserError(f"{path}: no demonstration there has a {GROUP}. `robocasa-lerobot prepare {path}` writes it.")
     return suited(template, infos)
+
+
+def _of_the_hand(info: DatagenInfo) -> DatagenInfo:
+    """The same with the axes of the hand body, in which this robot's poses are given; files have the grip site's."""
+    return replace(info, eef=info.eef @ HAND_IN_SITE, target=info.target @ HAND_IN_SITE)
 
 
 def suited(template: Template, infos: Iterable[DatagenInfo]) -> Sources:
@@ -90,6 +95,7 @@ def plain_episode(env: KitchenEnv, log: StageLog, sources: Sources, course: Cour
     log.outcomes = [StageOutcome() for _ in env.declaration.stages]
 
     def begin(info: DatagenInfo, subtask: Subtask, span: tuple[int, int]) -> None:
+        log.current = min(subtask.stage, len(log.outcomes) - 1)
         row = {"source": info.name, "demo": info.number, "kind": "subtask", "ref": subtask.object_ref}
         course.used.append(row | {"steps": list(span)})
 
@@ -106,12 +112,14 @@ def plain_episode(env: KitchenEnv, log: StageLog, sources: Sources, course: Cour
         gripper = target.gripper
         course.label = (target.source, BRIDGE if target.source < 0 else CONTACT, target.step)
         command = pose_command(env, target.pose, gripper)
+        course.clean.append(command.copy())
         noise = target.noise(course.rng)
         for where, part in zip(_ARM, (noise[:3], noise[3:]), strict=True):
             command[where] = np.clip(command[where] + part, -1.0, 1.0)
         yield command
     course.label = (-1, BRIDGE, -1)
     for _ in range(STILL_STEPS):
+        course.clean.append(action(gripper=gripper))
         yield action(gripper=gripper)
     raise SkillError("the subtasks are over")
 

@@ -166,9 +166,10 @@ def selected(
     for info, (begin, _) in zip(sources, spans, strict=True):
         then = info.objects[subtask.object_ref][begin]
         if subtask.selection == OBJECT:
-            far.append(pose_distance(now, then))
+            far.append(pose_distance(now, then, subtask.weights))
         else:
-            far.append(pose_distance(hand, carried_over(now, then, info.eef[begin : begin + 1])[0]))
+            first = carried_over(now, then, info.eef[begin : begin + 1])[0]
+            far.append(pose_distance(hand, first, subtask.weights))
     nearest = np.argsort(far, kind="stable")[: subtask.neighbours or NEAREST[subtask.selection]]
     return int(rng.choice(nearest))
 

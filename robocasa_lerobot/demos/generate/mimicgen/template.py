@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from robocasa_lerobot.demos.generate.sources.segments import PLACE
+from robocasa_lerobot.demos.generate.sources.segments import PLACE, USE
 from robocasa_lerobot.demos.generate.sources.source import Source
 from robocasa_lerobot.errors import UnknownNameError, UserError
 
@@ -41,6 +41,8 @@ class Subtask:
         interpolation_steps: on the line to its first pose.
         fixed_steps: that its first pose is held.
         noise_on_the_line: whether the noise is on these, too.
+        stage: number of the task's stage that it is part of; templates do not say it: the first is taken.
+        weights: of metres and of radians, where the nearest are looked for.
     """
 
     object_ref: str | None
@@ -52,6 +54,8 @@ class Subtask:
     interpolation_steps: int = 5
     fixed_steps: int = 0
     noise_on_the_line: bool = False
+    stage: int = 0
+    weights: tuple[float, float] = (1.0, 1.0)
 
 
 @dataclass(frozen=True)
@@ -123,24 +127,30 @@ def _subtask(where: str, spec: Mapping[str, Any], *, last: bool) -> Subtask:
     ref = spec.get("object_ref")
     if ref is None and selection != RANDOM:
         raise UserError(f"{where}: without an object_ref a source can only be chosen at random, not by {selection}.")
+    chosen = spec.get("selection_strategy_kwargs") or {}
+    if unknown := sorted(set(chosen) - {"nn_k", "pos_weight", "rot_weight"}):
+        raise UnknownNameError(f"{where}: selection_strategy_kwargs", unknown[0], ["nn_k", "pos_weight", "rot_weight"])
     return Subtask(
         object_ref=ref,
         signal=signal,
         offsets=(int(low_high[0]), int(low_high[1])),
         selection=selection,
-        neighbours=int((spec.get("selection_strategy_kwargs") or {}).get("nn_k", 0)),
+        neighbours=int(chosen.get("nn_k", 0)),
         action_noise=float(spec.get("action_noise", 0.0)),
         interpolation_steps=int(spec.get("num_interpolation_steps", 5)),
         fixed_steps=int(spec.get("num_fixed_steps", 0)),
         noise_on_the_line=bool(spec.get("apply_noise_during_interpolation", False)),
+        weights=(float(chosen.get("pos_weight", 1.0)), float(chosen.get("rot_weight", 1.0))),
     )
 
 
 def derived_template(sources: Sequence[Source]) -> tuple[Template, list[Source]]:
-    """As RoboCasa's tasks have it, from the segments of prepared sources, and those sources that it is for.
+    """What RoboCasa's tasks have, from the segments of prepared sources, and those sources that it is for.
 
-    A subtask for each segment, relative to its part or object, or to what an object is put onto or into; of sources
-    with other sequences of segments the most frequent one counts.
+    A subtask for each segment, relative to its part or object, or to what an object is put onto or into or used on; of
+    sources with other sequences of segments the most frequent one counts. Other than RoboCasa's, a subtask ends where
+    an object is lifted or a part let go, and not 5 to 20 steps after its first touch, a line begins where the hand is
+    and not at the last target, and there is no noise but what is asked for: all of which helps.
 
     Raises:
         UserError: no source has a segment.
@@ -163,7 +173,9 @@ def derived_template(sources: Sequence[Source]) -> tuple[Template, list[Source]]
     for number, one in enumerate(model.segments):
         words = model.data.about["stages"][one.stage]
         last = number == len(model.segments) - 1
-        ref = words["place"] if one.kind == PLACE else one.ref
         signal = None if last else f"{number}_{one.signal}"
-        subtasks.append(Subtask(ref, signal, selection=INTERPOLATION, neighbours=ROBOCASA_NEAREST))
+        ref = words["place"] if one.kind == PLACE else one.ref
+        if one.kind == USE and not words["about_itself"] and words["place"] in model.data.poses:
+            ref = words["place"]
+        subtasks.append(Subtask(ref, signal, selection=INTERPOLATION, neighbours=ROBOCASA_NEAREST, stage=one.stage))
     return Template(tuple(subtasks), per_subtask=True, first_pose=True, from_last_target=False), alike

@@ -27,7 +27,7 @@ from robocasa_lerobot.demos.replay import Demonstration, demonstrations, kitchen
 from robocasa_lerobot.demos.skills.pick_place.graspable import Graspable, graspable
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.tasks.task import Stage
-from robocasa_lerobot.errors import UserError
+from robocasa_lerobot.errors import OF_THE_MACHINE, UserError
 from robocasa_lerobot.files import write_text, written_aside
 from robocasa_lerobot.jobs.as_completed import as_they_end
 from robocasa_lerobot.jobs.publish import held_lock
@@ -104,12 +104,19 @@ def prepare_one(path: Path, demo: str, folder: Path) -> Outcome:
         return Outcome(path, demo)
     if note.exists():
         return Outcome(path, demo, json.loads(note.read_text()))
-    found = replayed(read_demonstration(path, demo))
+    recorded = read_demonstration(path, demo)  # a file of other software is not to be written to
+    try:
+        found = replayed(recorded)
+        signals = {} if isinstance(found, str) else signals_of(cut(found), len(found))
+    except OF_THE_MACHINE:
+        raise
+    except Exception as error:  # one that cannot be used must not keep the others of its file from being sources
+        found, signals = f"{type(error).__name__}: {error}", {}
     if isinstance(found, str):
         write_text(note, json.dumps(found))
         return Outcome(path, demo, found)
     with written_aside(part) as aside, h5py.File(aside, "w") as file:
-        write_prepared(file.create_group("demo"), found, signals_of(cut(found), len(found)))
+        write_prepared(file.create_group("demo"), found, signals)
     return Outcome(path, demo)
 
 
@@ -160,10 +167,8 @@ class _Watcher:
 
     def __init__(self, env: KitchenEnv, recorded: Demonstration) -> None:
         self._env, self._stages = env, env.declaration.stages
-        rows = recorded.meta.get("stages", [])
         self._stage = np.asarray(recorded.stage if recorded.stage is not None else np.zeros(len(recorded.actions)))
         self._words = [{word: getattr(stage, word) for word in _STAGE_WORDS} for stage in self._stages]
-        self._skipped = [bool(row.get("skipped")) for row in rows] or [False] * len(self._stages)
         self._parts: dict[str, Part] = {}
         for stage, words in zip(self._stages, self._words, strict=True):
             own = parts_of(env, stage)
@@ -260,7 +265,7 @@ class _Watcher:
             return {key.removeprefix(start): np.array(v) for key, v in self._rows.items() if key.startswith(start)}
 
         about = {
-            "stages": [w | {"skipped": s} for w, s in zip(self._words, self._skipped, strict=True)],
+            "stages": self._words,
             "parts": {name: _described(part) for name, part in self._parts.items()},
             "objects": {name: self._size(name) for name in self._objects},
             "fixtures": {

@@ -1,7 +1,8 @@
 """What preparing finds out about a demonstration, and how it lies in a file: `datagen_info`, in MimicGen's layout.
 
 `eef_pose`, `target_pose`, `gripper_action`, `object_poses/<name>`, `subtask_term_signals/<name>`, `base_pos` and
-`base_rot` are MimicGen's and RoboCasa's; what lies under `kitchen/` is ours.
+`base_rot` are MimicGen's and RoboCasa's, hand poses there with the axes of the grip site; what lies under `kitchen/` is
+ours.
 """
 
 from __future__ import annotations
@@ -19,8 +20,10 @@ from robocasa_lerobot.demos.motion import Array
 
 GROUP = "datagen_info"
 OURS = "kitchen"
-VERSION = 3  # of this layout: files of another one are prepared again
+VERSION = 4  # of this layout: files of another one are prepared again
 INTERFACE, INTERFACE_TYPE = "MG_KitchenEnv", "robocasa_lerobot"
+# The hand body's axes in those of the grip site, which MimicGen's poses have: a quarter turn about the approach.
+HAND_IN_SITE = np.array([[0.0, -1.0, 0.0, 0.0], [1.0, 0.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0], [0.0, 0.0, 0.0, 1.0]])
 _SERIES = ("joints", "touching", "contact_points", "undersides", "working_points")
 
 
@@ -75,8 +78,8 @@ def write_prepared(demo: h5py.Group, found: Prepared, signals: dict[str, NDArray
     group.attrs["about"] = json.dumps(found.about)
     upright = np.array([found.base_pose(step) for step in range(len(found))]).reshape(-1, 4, 4)
     arrays: dict[str, NDArray[Any]] = {
-        "eef_pose": found.eef,
-        "target_pose": found.target,
+        "eef_pose": found.eef @ HAND_IN_SITE.T,
+        "target_pose": found.target @ HAND_IN_SITE.T,
         "gripper_action": found.gripper[:, None],
         "base_pos": upright[:, :3, 3],
         "base_rot": upright[:, :3, :3],
@@ -99,8 +102,8 @@ def read_prepared(group: h5py.Group) -> Prepared:
     turns, places = group["base_rot"][()], group["base_pos"][()]
     yaws = [heading(turn) for turn in turns]
     return Prepared(
-        eef=group["eef_pose"][()],
-        target=group["target_pose"][()],
+        eef=group["eef_pose"][()] @ HAND_IN_SITE,
+        target=group["target_pose"][()] @ HAND_IN_SITE,
         gripper=group["gripper_action"][()][:, 0],
         base=np.column_stack([places[:, :2], yaws]),
         stage=ours["stage"][()],

@@ -20,6 +20,7 @@ from robocasa_lerobot.demos.generate.sources.prepared import Prepared
 from robocasa_lerobot.demos.generate.sources.rules import DERIVED, CutRules, rules_for
 from robocasa_lerobot.demos.generate.sources.uses import RINSE, UNDER_WATER, USES, use_key, where_it_lay
 from robocasa_lerobot.demos.motion import Array
+from robocasa_lerobot.demos.planning.base_room import wrap
 
 PART, PICK, PLACE, USE = "part", "pick", "place", "use"
 LEAVING_M = 0.12  # of the hand from where the contact ends: the retreat
@@ -191,7 +192,7 @@ def _lead(found: Prepared, contact: int, first: int, near_m: float, far_steps: i
     while lead > max(first, contact - far_steps):
         step = lead - 1
         drives = np.hypot(*(found.base[contact] - found.base[step])[:2]) > DRIVES_M
-        turns = abs(found.base[contact, 2] - found.base[step, 2]) > TURNS_RAD
+        turns = abs(wrap(found.base[contact, 2] - found.base[step, 2])) > TURNS_RAD
         if drives or turns or np.linalg.norm(found.eef[step][:3, 3] - at) > near_m:
             break
         if lead < contact and found.gripper[step] > found.gripper[lead]:  # it has let something go here
