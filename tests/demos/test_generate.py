@@ -17,18 +17,23 @@ from killed_runs import run_killed
 from robocasa_lerobot import cli, contract
 from robocasa_lerobot.demos.attempts import CLEAN_ACTION, RecordingSettings
 from robocasa_lerobot.demos.generate.course import KINDS, source_costs
+from robocasa_lerobot.demos.generate.fits import _turn_about
+from robocasa_lerobot.demos.generate.object_segments import lean_of
+from robocasa_lerobot.demos.generate.part_segments import _as_from
 from robocasa_lerobot.demos.generate.select import NEAREST, Manner, narrowed, pose_distance
 from robocasa_lerobot.demos.generate.settings import GenerationSettings
 from robocasa_lerobot.demos.generate.sources.frames import anchor, shares_of
 from robocasa_lerobot.demos.generate.sources.prepare import prepare_files
 from robocasa_lerobot.demos.generate.sources.rules import CutRules, read_rules, rules_for
 from robocasa_lerobot.demos.generate.sources.source import digest_of, sources_of
-from robocasa_lerobot.demos.generate.sources.transform import make_pose, yaw_pose
+from robocasa_lerobot.demos.generate.sources.transform import heading, inverse, make_pose, yaw_pose
+from robocasa_lerobot.demos.motion import UP, rotation_about
 from robocasa_lerobot.demos.recording import record_tasks
 from robocasa_lerobot.demos.replay import read_demonstration, replay
 from robocasa_lerobot.errors import UserError
 
 TASK = "CloseDrawer"
+BASE = contract.ACTION_SLICES["base_motion"]
 
 
 def test_a_frame_lies_at_the_same_share_of_another_box() -> None:
@@ -84,6 +89,32 @@ def test_sources_that_are_not_drawn_cost_more_and_all_are_drawn_alike() -> None:
     assert all(Counter(tasks[number] for number in drawn(seed, 0.2)).most_common(1)[0][1] == 2 for seed in range(20))
     assert drawn(3, 1.0) == set(range(20))
     assert len(drawn(3, 0.01)) == 2
+
+
+def test_what_is_put_down_leans_to_the_same_side_of_the_robot() -> None:
+    forwards = rotation_about(np.array([0.0, 1.0, 0.0]), 0.5)
+    lay, turned = rotation_about(UP, 0.3), rotation_about(UP, 1.7)
+    here = rotation_about(UP, -2.0)
+    np.testing.assert_allclose(lean_of(lay, forwards @ lay, np.eye(3)), forwards, atol=1e-9)
+    for turn in (np.eye(3), turned):  # however the object was turned on its way
+        lean = lean_of(lay, forwards @ turn @ lay, here)
+        np.testing.assert_allclose(lean @ UP, here @ forwards @ UP, atol=1e-9)
+    assert heading(lean_of(lay, turned @ lay, here)) == pytest.approx(0.0, abs=1e-9)
+
+
+def test_a_lever_is_held_where_it_points() -> None:
+    axis = np.array([0.0, 0.0, 1.0])
+    there, here = np.array([0.07, -0.02, 0.01]), np.array([0.02, -0.08, 0.03])
+    turned = rotation_about(axis, _turn_about(axis, there, here)) @ there
+    assert np.cross(turned[:2], here[:2]) == pytest.approx(0.0, abs=1e-12)
+    assert turned[:2] @ here[:2] > 0
+
+
+def test_poses_are_as_the_arm_sees_them_from_where_the_base_begins() -> None:
+    begins, later = np.array([1.0, 2.0, 0.4]), np.array([1.3, 2.1, 0.9])
+    pose = yaw_pose(2.0, 2.5, 1.0, 0.9)
+    seen = inverse(yaw_pose(*later.tolist())) @ pose
+    np.testing.assert_allclose(inverse(yaw_pose(*begins.tolist())) @ _as_from(later, begins) @ pose, seen, atol=1e-9)
 
 
 def test_the_distance_of_poses_counts_metres_and_radians() -> None:
@@ -157,6 +188,33 @@ def test_generated_files_replay_and_say_where_each_step_comes_from(sources: Path
     here, there = hdf5_content(path), hdf5_content(other / f"{TASK}.hdf5")
     assert here.keys() == there.keys()
     assert all(np.array_equal(value, there[key]) for key, value in here.items())
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "options",
+    [
+        "--base copy",
+        "--base fixed",
+        "--bridge line",
+        "--select random",
+        "--select nearest_object",
+        "--select nearest_robot",
+    ],
+)
+def test_other_ways_of_choosing_standing_and_joining(sources: Path, tmp_path: Path, options: str) -> None:
+    words = (
+        f"generate --source {sources} --tasks {TASK} --episodes 1 --split pretrain --seed 100700 --workers 1 {options}"
+    )
+    assert cli.main([*words.split(), "--out", str(tmp_path)]) == 0
+    path = tmp_path / f"{TASK}.hdf5"
+    assert replay(path, "demo_0").actions
+    with h5py.File(path) as file:
+        kinds = file["data/demo_0/segment_kind"][()]
+        drives = np.abs(contract.hdf5_to_stored(file["data/demo_0/actions"][()])[:, BASE]).any(axis=1)
+    if options == "--base fixed":
+        assert not (kinds == KINDS.index("drive")).any()
+    assert not drives[kinds == KINDS.index("bridge")].any()
 
 
 @pytest.mark.slow

@@ -103,7 +103,7 @@ def written(path: Path, seeds: list[int]) -> Path:
     return path
 
 
-def opened(path: Path, *touches: slice, pose: Array | None = None) -> Path:
+def opened(path: Path, *touches: slice, pose: Array | None = None, yaws: Array | float = 0.0) -> Path:
     """A file as `prepare` writes it, with one demonstration in which a drawer is touched and moved so often."""
     still_there, touched = still(np.eye(4) if pose is None else pose), np.zeros(STEPS, np.int64)
     for steps in touches:
@@ -113,7 +113,7 @@ def opened(path: Path, *touches: slice, pose: Array | None = None) -> Path:
         eef=still_there,
         target=still_there,
         gripper=-np.ones(STEPS),
-        base=np.zeros((STEPS, 3)),
+        base=np.column_stack([np.zeros((STEPS, 2)), np.broadcast_to(yaws, STEPS)]),
         stage=np.zeros(STEPS, np.int64),
         gap=np.zeros(STEPS),
         poses={name: still_there},
@@ -337,3 +337,10 @@ def test_a_number_that_cannot_be_is_said_so(tmp_path: Path) -> None:
     ):
         with pytest.raises(UserError, match=said):
             settings_of(path, template=template, **values)
+
+
+def test_a_base_that_faces_west_does_not_turn_by_facing_it_from_the_other_side(tmp_path: Path) -> None:
+    around = np.where(np.arange(STEPS) % 2, np.pi - 1e-6, -np.pi + 1e-6)
+    paths = [opened(tmp_path / f"{name}.hdf5", slice(8, 14), yaws=yaws) for name, yaws in (("a", 0.0), ("b", around))]
+    east, west = (sources_of(path, "OpenDrawer")[0].segments[0] for path in paths)
+    assert west.lead == east.lead < west.contact

@@ -8,10 +8,11 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from robocasa_lerobot.demos.generate.select import Manner
-from robocasa_lerobot.demos.motion import Array, base_pose
+from robocasa_lerobot.demos.motion import OPEN, Array, base_pose
 from robocasa_lerobot.demos.planning.base_path import Room
 from robocasa_lerobot.demos.planning.base_room import wrap
 from robocasa_lerobot.demos.skills.common import SkillError
+from robocasa_lerobot.demos.skills.fold import fold_arm
 from robocasa_lerobot.demos.skills.reaching import go_to
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.scene.robot_poses import RobotPose
@@ -59,5 +60,7 @@ def _alike(one: RobotPose, other: RobotPose, most_m: float, most_rad: float) -> 
 
 def go_near(env: KitchenEnv, stand: RobotPose, gripper: float) -> Iterator[Array]:
     """Drive to a stand, the arm folded on the way; where the base does not get there it stays as near as it came."""
+    if gripper != OPEN:
+        yield from fold_arm(env)  # round what it has just pushed, with open fingers; they close on the drive
     with contextlib.suppress(SkillError):
         yield from go_to(env, stand, gripper)

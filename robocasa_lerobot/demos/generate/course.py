@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Generator, Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -11,16 +12,16 @@ import numpy as np
 from robocasa_lerobot import contract
 from robocasa_lerobot.demos.generate.select import Manner
 from robocasa_lerobot.demos.generate.sources.source import Piece, Source
-from robocasa_lerobot.demos.motion import Array
+from robocasa_lerobot.demos.motion import OPEN, Array
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.tasks.task import Stage
 
 FREE, CONTACT, BRIDGE, DRIVE, SETTLE = range(5)  # kinds of steps
 MOST_SOURCES = 24  # that are asked for a stage: more than one task usually has
 OTHER_KIND_COST = 0.15  # of a segment from a stage that puts things into another kind of fixture, or onto an object
-NOT_DRAWN_COST = 1.0  # as of a hand that touches something: see `planning/costs.py`
+NOT_DRAWN_COST = 0.5  # as of a hand that touches something: see `planning/costs.py`
 AT_REST = (-1, BRIDGE, -1)  # label of steps in which it is waited
-_BASE = contract.ACTION_SLICES["base_motion"]
+_BASE, _GRIPPER = contract.ACTION_SLICES["base_motion"], contract.ACTION_SLICES["gripper_close"].start
 KINDS = ("free", "contact", "bridge", "drive", "settle")
 
 
@@ -36,8 +37,10 @@ class Course:
         cap: share of an average demonstration's segments that one source should have at most; see `source_costs`.
         label: source, kind of step, and step in the source, of the action that comes next.
         labels: of all actions so far.
+        fingers: their command in the last one.
         used: the segments that were carried out, in plain values.
         clean: actions before the noise of a template; of others empty.
+        failed: of the parts that stages are about, what has come to nothing so far, and how often.
         rest: rotation (3, 3) of each object before it was touched.
         lay: upright pose (4, 4) of where each object lay before it was taken last; see `sources.uses`.
     """
@@ -49,8 +52,10 @@ class Course:
     cap: float = 1.0
     label: tuple[int, int, int] = AT_REST
     labels: list[tuple[int, int, int]] = field(default_factory=list)
+    fingers: float = OPEN
     used: list[dict[str, Any]] = field(default_factory=list)
     clean: list[Array] = field(default_factory=list)
+    failed: dict[tuple[str, ...], Counter[Any]] = field(default_factory=dict)
     rest: dict[str, Array] = field(default_factory=dict)
     lay: dict[str, Array] = field(default_factory=dict)
 
@@ -108,6 +113,7 @@ class Course:
         for step in steps:
             drives = self.label == AT_REST and bool(np.any(step[_BASE]))
             self.labels.append((-1, DRIVE, -1) if drives else self.label)
+            self.fingers = float(step[_GRIPPER])
             yield step
 
 

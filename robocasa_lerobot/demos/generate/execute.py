@@ -31,11 +31,12 @@ from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 
 # The hand waits for itself where it is farther than this from where it was in the source; all waits together.
 BEHIND_M, BEHIND_RAD, MOST_WAITS = 0.02, 0.15, 40
-LOST_M = 0.09  # of a hand from where it would hold on to a handle
+LOST_M, OFF_M = 0.09, 0.15  # of a hand from where it would hold on to a handle, or push
 MOVING_SHARE = 0.002  # of its range in a step: a part that moves by less has stalled
 MOST_AHEAD_M = 0.15  # of a goal from the hand, from which on the next one starts from the hand again
 # Before the fingers move it comes as near as this, in so many steps at most.
 ARRIVED_M, GAIN = 0.012, 0.12  # of the hand at the segment's beginning
+BLOCKED_M = 0.08  # of a hand from where it should let go
 SETTLED_M, SETTLED_RAD, SETTLE_STEPS = 0.006, 0.08, 12
 LATE_WAITS, FIRMER = 90, 0.1  # steps that a part is waited for, and by how much more it is pushed after each
 BASE_NEAR_M, BASE_NEAR_RAD, BASE_GAIN, BASE_MOST = 0.012, 0.03, 3.0, 0.45
@@ -54,6 +55,8 @@ class Carried:
         met: whether what the hand goes to has moved already, so that the contact has begun.
         position: of what the hand moves, as a share of its range; it is pushed the harder the longer it has stalled.
         enter: step of the contact that is gone on with, since what the hand moves has come as far already.
+        leaves: step from which that is so: before it the fingers close, say.
+        keeps: whether a hand that is blocked on its way does not let go of what it holds.
     """
 
     piece: Piece
@@ -64,6 +67,8 @@ class Carried:
     met: Callable[[], bool] = lambda: False
     position: Callable[[], float] | None = None
     enter: int = 0
+    leaves: int = 0
+    keeps: bool = False
 
 
 def hand_now(env: KitchenEnv) -> Array:
@@ -96,8 +101,8 @@ def pose_command(env: KitchenEnv, pose: Array, gripper: float, base: Array | Non
     return action(position=limit(move, 1.0), rotation=limit(turn, 1.0), gripper=gripper, base=base, mode=mode)
 
 
-def carry_out_segment(env: KitchenEnv, course: Course, carried: Carried, stop: Callable[[], bool]) -> Iterator[Array]:
-    """Actions of a segment from its lead on; it ends early where `stop` says so."""
+def carry_out_segment(env: KitchenEnv, course: Course, carried: Carried) -> Iterator[Array]:
+    """Actions of a segment from its lead on; it ends early where the hand has lost what it moved, or may not let go."""
     segment, data = carried.piece.segment, carried.piece.data
     number = carried.piece.source.number
     step, waits, late = segment.lead, MOST_WAITS, LATE_WAITS
@@ -106,25 +111,28 @@ def carry_out_segment(env: KitchenEnv, course: Course, carried: Carried, stop: C
         env.data, as_target(carried.hand(step)), float(data.gripper[step]), tolerance=ARRIVED_M, integral_gain=GAIN
     )
     stalled, before = 0, 0.0 if carried.position is None else carried.position()
-    grasps, settled = data.gripper[segment.lead] < 0, -1
-    while step < segment.end and not stop():
+    grasps, settled, told = data.gripper[segment.lead] < 0, -1, float(data.gripper[segment.lead])
+    while step < segment.end:
         if step < segment.contact and carried.met():
             step = segment.contact
         gripper = float(data.gripper[step])
-        if step > max(segment.lead, settled) and gripper != data.gripper[step - 1]:
+        if step > settled and gripper != told:
             settled, pose = step, as_target(carried.hand(step))  # the part may swing while the hand comes to rest
             for _ in range(SETTLE_STEPS):
                 error = pose_error(env.data, pose)
                 if error.position < SETTLED_M and error.rotation < SETTLED_RAD:
                     break
                 course.label = (number, SETTLE, step)
-                yield arm_action(env.data, pose, float(data.gripper[step - 1]))
+                yield arm_action(env.data, pose, told)
+            if carried.keeps and gripper < 0 and pose_error(env.data, pose).position > BLOCKED_M:
+                return
+        told = gripper
         lets_go = grasps and gripper < 0
         in_contact = segment.contact <= step < segment.release
         course.label = (number, CONTACT if in_contact else FREE, step)
         base = None if carried.base is None else base_command(env, carried.base(step))
         yield pose_command(env, _firmer(carried.target(step), carried.hand(step), stalled), gripper, base)
-        if grasps and in_contact and gripper > 0 and _lost(env, carried.hand(step)):
+        if in_contact and _lost(env, carried.hand(step), LOST_M if grasps and gripper > 0 else OFF_M):
             return
         if carried.position is not None:
             now = carried.position()
@@ -133,9 +141,9 @@ def carry_out_segment(env: KitchenEnv, course: Course, carried: Carried, stop: C
             late -= 1
             continue
         stalled = 0
-        if step == segment.contact and carried.enter > step:
+        if step == carried.leaves and carried.enter > step:
             step = carried.enter
-        elif not in_contact and waits and _behind(env, carried.hand(min(step + 1, segment.end - 1))):
+        elif step < segment.contact and waits and _behind(env, carried.hand(min(step + 1, segment.end - 1))):
             waits -= 1
         else:
             step += 1
@@ -147,9 +155,9 @@ def _firmer(target: Array, hand: Array, stalled: int) -> Array:
     return make_pose(target[:3, 3] + more, target[:3, :3])
 
 
-def _lost(env: KitchenEnv, pose: Array) -> bool:
-    """Whether the hand has slipped off what it held."""
-    return pose_error(env.data, as_target(pose)).position > LOST_M
+def _lost(env: KitchenEnv, pose: Array, most_m: float) -> bool:
+    """Whether the hand has slipped off what it held, or pushed."""
+    return pose_error(env.data, as_target(pose)).position > most_m
 
 
 def _behind(env: KitchenEnv, pose: Array) -> bool:

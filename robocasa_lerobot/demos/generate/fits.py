@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,11 +18,14 @@ from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.tasks.task import Stage
 
 APART_SHARE = 0.12  # of its range: a part may stand as far before where it stood in the source
+OTHER_LEVER_RAD = 0.25  # between where levers point
+ALONG = 0.9  # cosine of a hinge to the part's x, the axis that a reflection leaves as it is
 LEAST_SPIN_RAD = 0.1  # of a knob from where it stood in the source
 NEARLY_DONE = 0.3  # of what the part with the most left to go has left
 LEFT_SHARE = 0.003  # of its range that a segment must still have to go
 HALF_TURN = np.diag([-1.0, -1.0, 1.0, 1.0])
 RELATIVE = ("turn",)  # verbs whose goal is counted from where the part stood
+ONE_WAY = ("doors", "drawers", "racks")  # skills whose parts go one way all the time
 
 
 @dataclass(frozen=True)
@@ -33,7 +37,8 @@ class Fit:
         part: of this scene.
         mirror: whether it is reflected, since the part hangs on the other side.
         flip: whether the hand has made half a turn about its fingers, which leaves a gripper as it was.
-        spin: turn about the part's axis in its frame, radians, so that a knob is held as it was in the source's room.
+        spin: turn about the part's axis in its frame, radians, so that a knob is held as it was in the source's room,
+            and a lever where it is.
         point: where its frame lies in the part, (3,) in the part's axes, metres.
         source_point: the same in the source.
     """
@@ -47,7 +52,7 @@ class Fit:
     source_point: Array
 
     @classmethod
-    def of(cls, piece: Piece, part: Part, *, flip: bool = False, spin: float = 0.0) -> Fit:
+    def of(cls, piece: Piece, part: Part, *, flip: bool = False, spin: float = 0.0, other_side: bool = False) -> Fit:
         """With the frame at the middle of what the hand touches first."""
         segment, data = piece.segment, piece.data
         about = data.about["parts"][segment.ref]
@@ -60,7 +65,11 @@ class Fit:
             group = next(iter(part.boxes))
         box = np.array(about["boxes"].get(group, next(iter(about["boxes"].values()))))
         shares = shares_of(points[known].mean(axis=0), box)
-        mirror = part.side * int(about["side"]) < 0
+        mirror = other_side or part.side * int(about["side"]) < 0
+        if part.lever is not None:
+            turn = _turn_about(part.axis, points[known].mean(axis=0), part.lever)
+            if abs(turn) > OTHER_LEVER_RAD:  # so is everything about the hinge
+                return cls(piece, part, mirror, flip, spin + turn, np.zeros(3), np.zeros(3))
         return cls(
             piece, part, mirror, flip, spin, anchor(part.boxes[group], shares, mirror=mirror), anchor(box, shares)
         )
@@ -109,6 +118,22 @@ class Fit:
         return float(self.part.range[0] + share * self.part.span)
 
 
+def _turn_about(axis: Array, one: Array, other: Array) -> float:
+    """By how much a point (3,) is turned about an axis through the origin to point as another one does, radians."""
+    one, other = (point - axis * float(axis @ point) for point in (one, other))
+    return float(np.arctan2(axis @ np.cross(one, other), one @ other))
+
+
+def _folds_down(part: Part) -> bool:
+    return not part.slides and abs(part.axis[0]) > ALONG
+
+
+def _goes_on(piece: Piece) -> bool:
+    """Whether a segment moves its part the way that its stage does, and does not knock it back."""
+    path = piece.data.joints[piece.segment.ref][piece.data.stage == piece.segment.stage]
+    return bool((path[-1] - path[0]) * piece.travel()[1] > 0)
+
+
 def fits_of(env: KitchenEnv, stage: Stage, course: Course) -> list[Fit]:
     """Segments that lead the stage's parts on from where they stand."""
     drawn = env.scene.fill(stage.to)
@@ -120,6 +145,8 @@ def fits_of(env: KitchenEnv, stage: Stage, course: Course) -> list[Fit]:
             own = piece.data.about["parts"][piece.segment.ref]
             if bool(own["slides"]) != part.slides or (own["side"] == 0) != (part.side == 0):
                 continue
+            if stage.skill in ONE_WAY and not _goes_on(piece):
+                continue
             fit = Fit.of(piece, part)
             begin, end = fit.way()
             now, ahead = part.position(env.data), float(np.sign(end - begin))
@@ -127,6 +154,11 @@ def fits_of(env: KitchenEnv, stage: Stage, course: Course) -> list[Fit]:
             if stage.verb in RELATIVE or piece.springs or (near and (end - now) * ahead > LEFT_SHARE * part.span):
                 left[part.name] = max(left.get(part.name, 0.0), abs(end - now) / part.span)
                 spins = (0.0, begin - now) if stage.skill == "knobs" and abs(begin - now) > LEAST_SPIN_RAD else (0.0,)
-                found += [Fit.of(piece, part, flip=flip, spin=spin) for flip in (False, True) for spin in spins]
+                # A door that folds down is the same from either side of it.
+                sides = (False, True) if stage.skill == "doors" and _folds_down(part) else (False,)
+                found += [
+                    Fit.of(piece, part, flip=flip, spin=spin, other_side=side)
+                    for flip, spin, side in itertools.product((False, True), spins, sides)
+                ]
     # Of several parts, as two doors, those that have hardly any way left come last.
     return [fit for fit in found if left[fit.part.name] > NEARLY_DONE * max(left.values())]

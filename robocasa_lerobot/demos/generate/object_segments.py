@@ -43,13 +43,14 @@ from robocasa_lerobot.demos.motion import (
 )
 from robocasa_lerobot.demos.planning.grasps import GraspPose
 from robocasa_lerobot.demos.skills.common import SkillError, draw_back, hold_hand, stage_done
+from robocasa_lerobot.demos.skills.pick_place.carrying.torso import move_torso
 from robocasa_lerobot.demos.skills.pick_place.grasp_strategy import ANY_APPROACH, GraspStrategy
 from robocasa_lerobot.demos.skills.pick_place.graspable import Graspable, graspable
 from robocasa_lerobot.demos.skills.pick_place.pick import is_held
 from robocasa_lerobot.demos.skills.pick_place.place import PlacePose, PlaceStrategy, leave
 from robocasa_lerobot.demos.skills.pick_place.strategies import grasp_strategy, place_strategy
 from robocasa_lerobot.demos.skills.pick_place.tools.rinse import parts_of_rinsing
-from robocasa_lerobot.demos.skills.pick_place.verbs import BY_USE, free_grasp
+from robocasa_lerobot.demos.skills.pick_place.verbs import BY_USE, bring, come_to, free_grasp
 from robocasa_lerobot.demos.skills.reaching import Held, MotionPlan, approach, plan_reach
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.scene.robot_poses import RobotPose
@@ -107,6 +108,8 @@ def _pick(env: KitchenEnv, stage: Stage, obj: Graspable, course: Course, tried: 
     if not pieces:
         raise SkillError("no source picks anything up")
     strategy = grasp_strategy(env, obj, _free_grasp(env, stage, obj), kept=stage.verb == "pick" or stage.verb in USES)
+    if course.manner.base != "fixed":
+        yield from course.labelled(come_to(env, obj), DRIVE)
     if strategy.first is not None:
         yield from course.labelled(strategy.first(env), BRIDGE)
     origin = env.data.body(obj.name).xpos.copy()
@@ -130,7 +133,7 @@ def _pick(env: KitchenEnv, stage: Stage, obj: Graspable, course: Course, tried: 
     start, turn = body.xpos.copy(), body.xmat.reshape(3, 3).copy()
     course.lay[obj.name] = where_it_lay(make_pose(start, turn), float(start[2]) - obj.below(turn))
     row = course.begin(way.piece, cost=round(choice.cost, 3))
-    yield from carry_out_segment(env, course, along(way, lambda: start - origin), lambda: False)
+    yield from carry_out_segment(env, course, along(way, lambda: start - origin))
     row["held"] = is_held(env, obj.name)
     if not row["held"]:
         at = as_target(hand_now(env))
@@ -165,7 +168,7 @@ def _pick_ways(
         segment, data = piece.segment, piece.data
         source = data.eef[segment.contact][:3, :3]
         tilt = float(np.arccos(np.clip(-source[2, 2], -1.0, 1.0)))
-        for turn in (0.0,) if tilt < STEEP_RAD else TURNS:
+        for turn in (0.0,) if tilt < STEEP_RAD else dict.fromkeys((*TURNS, *strategy.turns)):
             about = rotation_about(UP, yaw - float(data.base[segment.contact, 2]) + turn)
             comes = -UP if tilt < STEEP_RAD else about @ source[:, 2]
             key = tuple(np.round(comes, 2).tolist())
@@ -213,6 +216,9 @@ def _place(env: KitchenEnv, stage: Stage, obj: Graspable, course: Course, put_do
     if not pieces:
         raise SkillError("no source puts anything down")
     strategy = _strategy(env, stage, obj)
+    if course.manner.base != "fixed":
+        yield from course.labelled(bring(env, stage, obj, strategy), DRIVE)
+        yield from course.labelled(move_torso(env, 0.0, CLOSED, Held.now(env.data, obj.name, obj.contents)), DRIVE)
     held = Held.now(env.data, obj.name, obj.contents)
 
     def ways() -> list[SegmentPath]:
@@ -243,7 +249,9 @@ def _place(env: KitchenEnv, stage: Stage, obj: Graspable, course: Course, put_do
         return
     put_down.append(way.targets[2].position)
     course.begin(way.piece, cost=round(choice.cost, 3))
-    yield from carry_out_segment(env, course, along(way), lambda: False)
+    yield from carry_out_segment(env, course, replace(along(way), keeps=True))
+    if is_held(env, obj.name):
+        return
     yield from course.labelled(leave(env, obj), BRIDGE)
 
 
@@ -302,8 +310,7 @@ def _place_way(
     begin = _rest_step(piece)
     upright = rest @ held.rotation.T  # the hand's turn with the object as it lay
     spin = rotation_about(UP, yaw + heading(present @ upright.T))
-    lean = about @ (poses[segment.contact][:3, :3] @ poses[begin][:3, :3].T)
-    lean = rotation_about(UP, -heading(lean)) @ lean
+    lean = lean_of(poses[begin][:3, :3], poses[segment.contact][:3, :3], about)
     turned = spin @ rest
     end = spot.point + strategy.gap_m * UP
 
@@ -329,6 +336,21 @@ def _place_way(
         hand=hand,
         target=lambda step: led_ahead(piece, hand(step), about, step),
     )
+
+
+def lean_of(lay: Array, put: Array, about: Array) -> Array:
+    """How far an object leans where it is put down, (3, 3), without its turn about the vertical.
+
+    It leans to the same side of the robot as in the source, wherever it points itself.
+
+    Args:
+        lay: (3, 3) as it lay in the source.
+        put: (3, 3) as it was put down there.
+        about: (3, 3) turn about the vertical from the source's robot to this one.
+    """
+    change = put @ lay.T
+    leant: Array = about @ change @ rotation_about(UP, -heading(change)) @ about.T
+    return leant
 
 
 def _rest_step(piece: Piece) -> int:

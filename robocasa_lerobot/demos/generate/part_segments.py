@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator, Iterator
+from collections import Counter
+from collections.abc import Generator, Iterator, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -18,7 +20,9 @@ from robocasa_lerobot.demos.motion import OPEN, Array, base_pose, rotation_about
 from robocasa_lerobot.demos.planning.collision import CollisionChecker, MovingPart
 from robocasa_lerobot.demos.planning.motion_planner import MotionPlan, MotionPlanner, WaypointPath
 from robocasa_lerobot.demos.skills.common import SkillError, draw_back, hold_hand, stage_done
+from robocasa_lerobot.demos.skills.levers import turn_on_water
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
+from robocasa_lerobot.envs.kitchens.appliances.kinds.sink import Sink
 from robocasa_lerobot.envs.scene.robot_poses import RobotPose
 from robocasa_lerobot.envs.tasks.task import Stage
 
@@ -29,11 +33,15 @@ LATE_SHARE, END_SHARE = 0.06, 0.003
 AHEAD_STEPS = 3  # before it should be at the end, since the hand may draw back by then
 RELEASE_STEPS, BACK_M = 6, 0.08
 APART_COST, FLIP_COST = 0.8, 0.05  # of its whole range from where the segment began; of half a turn
+SHORT_COST = 0.5  # of a segment that moves its part not at all, where another one leads it on
 MOST_APPROACHES = 6  # of the best plans for a contact, whose ways there are planned
 MET_SHARE = 0.01  # of its range: a part that has moved as far has been touched
 SWEEP = 4  # positions of a part that the base must not be in the way of
 FRUITLESS_SHARE, FAILED_COST = 0.02, 1.0  # of its range; cost of a source that has come to nothing
+REST_STEPS = 6  # after which a stage must still be done
+SLIPPED_SHARE = 0.3  # of its way: a segment that gets a part less far has failed, too
 DRIVES_M = 0.03  # a base that goes farther in a segment drives
+ARRIVED_M, MOST_BLOCKED = 0.08, 2  # of a base from where it was to stand; stands that it did not get to
 
 
 def part_stage(env: KitchenEnv, stage: Stage, course: Course) -> Iterator[Array]:
@@ -42,9 +50,10 @@ def part_stage(env: KitchenEnv, stage: Stage, course: Course) -> Iterator[Array]
     Raises:
         SkillError: no source has a segment for it, or it is not done after all tries.
     """
-    failed: dict[int, int] = {}
+    key = (stage.target, stage.part, stage.verb)
+    again, failed = key in course.failed, course.failed.setdefault(key, Counter())
     for number in range(MOST_SEGMENTS):
-        if stage_done(env, stage):
+        if (yield from _stays_done(env, stage, course)):
             return
         fits = fits_of(env, stage, course)
         if not fits:
@@ -53,19 +62,40 @@ def part_stage(env: KitchenEnv, stage: Stage, course: Course) -> Iterator[Array]
                 if number
                 else f"{stage.target}: no source has a segment of `{stage.skill} {stage.verb}`"
             )
-        if number:
+        if number or again:
             yield from course.labelled(_let_go(env), BRIDGE)
-        fit, cost = yield from _approach(env, course, fits, failed)
-        before = fit.part.position(env.data)
+        fit, cost = yield from _approach(env, course, fits, failed, may_stay=number > 0)
+        before, runs = fit.part.position(env.data), _water_runs(env, stage)
         begin, end = fit.way()
         row = course.begin(fit.piece, part=fit.part.name, mirror=fit.mirror, cost=round(cost, 3))
-        yield from carry_out_segment(env, course, _carried(env, fit), lambda: False)
+        yield from carry_out_segment(env, course, _carried(env, fit))
+        if runs and not _water_runs(env, stage):  # the hand has leaned on the lever
+            yield from course.labelled(turn_on_water(env, stage), BRIDGE)
         moved = fit.part.position(env.data) - before
         row["moved"] = moved / fit.part.span
-        if moved * np.sign(end - begin) < FRUITLESS_SHARE * fit.part.span:
-            failed[fit.piece.source.number] = failed.get(fit.piece.source.number, 0) + 1
-    if not stage_done(env, stage):
+        if moved * np.sign(end - begin) < max(FRUITLESS_SHARE * fit.part.span, SLIPPED_SHARE * abs(end - before)):
+            failed[_trial(fit)] += 1
+            failed[fit.piece.source.number] += 1
+    if not (yield from _stays_done(env, stage, course)):
         raise SkillError(f"{stage.target}: not done after {MOST_SEGMENTS} segments")
+
+
+def _stays_done(env: KitchenEnv, stage: Stage, course: Course) -> Generator[Array, None, bool]:
+    """Whether a stage is done, and still is a moment later: a door that is hit shut may swing back."""
+    if not stage_done(env, stage):
+        return False
+    at = as_target(hand_now(env))
+    yield from course.labelled(hold_hand(env.data, at, course.fingers, REST_STEPS), BRIDGE)
+    return stage_done(env, stage)
+
+
+def _water_runs(env: KitchenEnv, stage: Stage) -> bool:
+    return (stage.skill, stage.verb) == ("levers", "turn") and env.scene.fixture(stage.target, Sink).water_on(env.data)
+
+
+def _trial(fit: Fit) -> tuple[Any, ...]:
+    """What tells one try from another."""
+    return fit.piece.source.number, fit.piece.segment.contact, fit.part.name, fit.mirror, fit.flip
 
 
 def _let_go(env: KitchenEnv) -> Iterator[Array]:
@@ -75,11 +105,11 @@ def _let_go(env: KitchenEnv) -> Iterator[Array]:
 
 
 def _approach(
-    env: KitchenEnv, course: Course, fits: list[Fit], failed: dict[int, int]
+    env: KitchenEnv, course: Course, fits: list[Fit], failed: Mapping[Any, int], *, may_stay: bool
 ) -> Generator[Array, None, tuple[Fit, float]]:
     """Choose a segment and a stand, go there, and bring the hand to where the segment begins.
 
-    Returns the segment, and what it costs.
+    With `may_stay` the robot may stay where it is, though no source stood there. Returns the segment and its cost.
     """
     fits = narrowed(
         fits,
@@ -90,12 +120,15 @@ def _approach(
         first_pose=lambda fit: _poses(env, fit)[0],
         hand=hand_now(env),
     )
+    most = {fit.part.name: max(_gain(env, other) for other in fits if other.part is fit.part) for fit in fits}
     paths = [
         WaypointPath(
             tuple(as_target(pose) for pose in _poses(env, fit)),
             float(course.bias[fit.piece.source.number])
-            + FAILED_COST * failed.get(fit.piece.source.number, 0)
+            + FAILED_COST * failed[_trial(fit)]
+            + FAILED_COST / 2 * failed[fit.piece.source.number]
             + APART_COST * fit.apart(fit.part.position(env.data))
+            + SHORT_COST * (1.0 - _gain(env, fit) / most[fit.part.name])
             + FLIP_COST * fit.flip,
         )
         for fit in fits
@@ -103,20 +136,45 @@ def _approach(
     allowed = frozenset(
         int(body) for fit in fits for body in np.flatnonzero(env.scene.subtree(env.model.body(fit.part.body).name))
     )
-    planner = MotionPlanner(env, paths, 1, allowed=allowed)
     stands = _beside(env, fits, stands_like(env, [_stand(env, fit) for fit in fits], course.manner))
-    plans = planner.best(stands)[:MOST_APPROACHES]
-    if not plans:
-        raise SkillError("no source's segment is within reach")
-    ways = [(plan, _free_way(env, plan, plan.base)) for plan in plans]
-    plan, _ = min(ways, key=lambda one: one[0].cost + one[1].cost)
-    fit = next(one for one, path in zip(fits, paths, strict=True) if path is plan.path)
-    gripper = float(fit.piece.data.gripper[fit.piece.segment.lead])
-    if plan.base is not None:
+    stands = [None, *stands] if may_stay and None not in stands else stands
+    blocked: list[RobotPose] = []
+    while True:
+        planner = MotionPlanner(env, paths, 1, allowed=allowed)
+        plans = planner.best([stand for stand in stands if not _is_one_of(stand, blocked)])[:MOST_APPROACHES]
+        if not plans:
+            raise SkillError("no source's segment is within reach")
+        ways = [(plan, _free_way(env, plan, plan.base)) for plan in plans]
+        plan, _ = min(ways, key=lambda one: one[0].cost + one[1].cost)
+        fit = next(one for one, path in zip(fits, paths, strict=True) if path is plan.path)
+        gripper = float(fit.piece.data.gripper[fit.piece.segment.lead])
+        if plan.base is None:
+            break
         yield from course.labelled(go_near(env, plan.base, gripper), DRIVE)
+        if _has_arrived(env, plan.base) or len(blocked) == MOST_BLOCKED:
+            break
+        # Something stood in the way: what can be done from elsewhere, and from here?
+        blocked.append(plan.base)
+        stands = [None, *stands] if None not in stands else stands
     way = _free_way(env, plan, None)
     yield from course.labelled(bridged(env, course.manner, way, _poses(env, fit)[0], gripper), BRIDGE)
     return fit, plan.cost + way.cost
+
+
+def _gain(env: KitchenEnv, fit: Fit) -> float:
+    """How far a segment leads its part on from where that is, metres or radians; the same for those that count anew."""
+    if fit.words_relative or fit.piece.springs:
+        return 1.0
+    return max(abs(fit.way()[1] - fit.part.position(env.data)), 1e-6)
+
+
+def _has_arrived(env: KitchenEnv, stand: RobotPose) -> bool:
+    position, _ = base_pose(env.data)
+    return bool(np.hypot(stand.x - position[0], stand.y - position[1]) < ARRIVED_M)
+
+
+def _is_one_of(stand: RobotPose | None, others: Sequence[RobotPose]) -> bool:
+    return stand is not None and any(np.hypot(stand.x - one.x, stand.y - one.y) < ARRIVED_M for one in others)
 
 
 def _free_way(env: KitchenEnv, plan: MotionPlan, base: RobotPose | None) -> MotionPlan:
@@ -160,7 +218,7 @@ def _beside(env: KitchenEnv, fits: list[Fit], stands: list[RobotPose | None]) ->
 def _poses(env: KitchenEnv, fit: Fit) -> list[Array]:
     """Hand poses of a segment here: where it begins, where it touches, and along the way of the part.
 
-    Those of a base that drives are as they look from where it begins.
+    Those of a base that drives are as the arm sees them from where it begins: what the base goes is taken off.
     """
     segment, data = fit.piece.segment, fit.piece.data
     steps = [segment.lead, segment.contact]
@@ -169,12 +227,31 @@ def _poses(env: KitchenEnv, fit: Fit) -> list[Array]:
     )
     _, end = fit.way()
     first, far = fit.piece.travel()
+    drives, floor = _drives(fit), _floor_map(env, fit)
     out = []
     for step in steps:
         share = 0.0 if far == 0.0 else (data.joints[segment.ref][step] - first) / far
         now = fit.part.position(env.data)
         at = now + float(np.clip(share, 0.0, 1.0)) * (end - now) if step > segment.contact else now
-        out.append(anchored(_part_pose_at(env, fit.part, at), fit.point) @ fit.local(data.eef[step], step))
+        pose = anchored(_part_pose_at(env, fit.part, at), fit.point) @ fit.local(data.eef[step], step)
+        if drives:
+            pose = _as_from(_base_like(fit, floor, step), _base_like(fit, floor, segment.lead)) @ pose
+        out.append(pose)
+    return out
+
+
+def _drives(fit: Fit) -> bool:
+    """Whether the base goes along in a segment."""
+    path = fit.piece.data.base[fit.piece.segment.lead : fit.piece.segment.end]
+    return len(path) > 0 and bool(np.hypot(*(path - path[0])[:, :2].T).max() > DRIVES_M)
+
+
+def _as_from(base: Array, other: Array) -> Array:
+    """The change (4, 4) of world poses after which they are before another place of the base (3,) as before one."""
+    x, y, yaw = other.tolist()
+    there = yaw_pose(x, y, yaw)
+    x, y, yaw = base.tolist()
+    out: Array = there @ inverse(yaw_pose(x, y, yaw))
     return out
 
 
@@ -263,10 +340,10 @@ def _carried(env: KitchenEnv, fit: Fit) -> Carried:
         return here() < wanted - LATE_SHARE * (1.0 - wanted) - END_SHARE
 
     steps = range(segment.contact, segment.release)
+    leaves = next((step for step in steps if share(step) > MET_SHARE), segment.contact)
     enter = next((step for step in steps if share(step) >= here()), segment.contact) if here() > LATE_SHARE else 0
     base = None
-    path = data.base[segment.lead : segment.end]
-    if len(path) and np.hypot(*(path - path[0])[:, :2].T).max() > DRIVES_M:
+    if _drives(fit):
         frames = _floor_map(env, fit)
         position, yaw = base_pose(env.data)
         off = np.array([position[0], position[1], yaw]) - _base_like(fit, frames, segment.lead)
@@ -283,4 +360,5 @@ def _carried(env: KitchenEnv, fit: Fit) -> Carried:
         lambda: abs(part.position(env.data) - start) > MET_SHARE * part.span,
         lambda: part.position(env.data) / part.span,
         0 if fit.piece.springs else enter,
+        leaves,
     )

@@ -155,7 +155,7 @@ def use(env: KitchenEnv, stage: Stage, obj: Graspable, course: Course, failed: d
         lambda step: step == stays and touched_by_hand(env, obj)[0] and not stage_done(env, stage),
     )
     row = course.begin(piece, cost=round(choice.cost, 3))
-    yield from carry_out_segment(env, course, carried, lambda: False)
+    yield from carry_out_segment(env, course, carried)
     row["done"] = stage_done(env, stage)
     if path.shown.opens is not None:
         yield from course.labelled(leave(env, obj), BRIDGE)

@@ -102,8 +102,10 @@ class Quality:
 
     def as_json(self) -> dict[str, Any]:
         """All of it in plain values."""
-        names = ("rate", "covered", "most_used_source", "effective_sources")
-        names += ("path_spread_m", "most_alike_m", "stand_spread_m")
+        names = (
+            *("rate", "covered", "most_used_source", "effective_sources"),
+            *("path_spread_m", "most_alike_m", "stand_spread_m"),
+        )
         means = ("seconds", "jerk", "idle", "saturated", "other_contacts", "in_view")
         own = {name: getattr(self, name) for name in (*names, "stand_spread_rad", "seconds_spread")}
         rates = {"segments": self.kept_with(0), "sources": self.kept_with(1)}

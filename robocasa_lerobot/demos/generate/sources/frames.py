@@ -43,6 +43,8 @@ class Part:
         slides: whether it is a slide.
         side: 1 if it reaches from a vertical hinge to the right, -1 to the left, 0 for all others.
         boxes: opposite corners (2, 3) of its handle and of the rest of it, in its own axes, metres.
+        lever: of one that has no solid shape but that of bodies fixed to it, the middle of that, (3,) in its axes; a
+            lever points elsewhere on another fixture. None of all others.
     """
 
     name: str
@@ -53,6 +55,7 @@ class Part:
     slides: bool
     side: int
     boxes: dict[str, Array]
+    lever: Array | None = None
 
     def position(self, data: mujoco.MjData) -> float:
         """Of its joint, metres or radians."""
@@ -110,7 +113,19 @@ def _part(env: KitchenEnv, role: str, fixture: Fixture, joint: str) -> Part:
         slides=slides,
         side=int(np.sign(reach)) if upright and "door" in joint else 0,
         boxes=boxes,
+        lever=_lever(env, body),
     )
+
+
+def _lever(env: KitchenEnv, body: int) -> Array | None:
+    """The middle of the solid shapes of bodies fixed to one, (3,) in its axes; None where it is solid itself."""
+    model, data = env.model, env.data
+    solid = (model.geom_contype != 0) | (model.geom_conaffinity != 0)
+    below = env.scene.subtree(model.body(body).name)
+    if solid[model.geom_bodyid == body].any() or not (mine := solid & below[model.geom_bodyid]).any():
+        return None
+    middle: Array = data.xmat[body].reshape(3, 3).T @ (data.geom_xpos[mine].mean(axis=0) - data.xpos[body])
+    return middle
 
 
 def solid_boxes(model: mujoco.MjModel, body: int) -> dict[str, Array]:

@@ -25,7 +25,7 @@ from robocasa_lerobot.demos.planning.base_room import wrap
 PART, PICK, PLACE, USE = "part", "pick", "place", "use"
 LEAVING_M = 0.12  # of the hand from where the contact ends: the retreat
 DRIVES_M, TURNS_RAD = 0.10, 0.10  # of the base, which stays about where it is during an approach
-LIFTED_M, MOVED_M = 0.04, 0.06  # an object that has risen, or gone, as far is in the hand
+LIFTED_M, MOVED_M = 0.07, 0.06  # an object that has risen, or gone, as far is in the hand, and out of a slot
 FIRM_STEPS = 10  # of fingers that close
 AT_M = 0.03  # farther from where it is used than it ever comes, an object is about there
 
@@ -207,8 +207,9 @@ def _apart(found: Prepared, segments: list[Segment]) -> Iterator[Segment]:
     for number, one in enumerate(segments):
         later = segments[number + 1] if number + 1 < len(segments) else None
         end = one.end
+        if one.kind == PART or later is not None:
+            end = _left(found, one, min(later.lead, one.end) if later is not None and one.kind == PART else one.end)
         if later is not None:
-            end = _left(found, one, min(later.lead, one.end) if one.kind == PART else one.end)
             end = min(max(end, one.release), max(later.lead, one.release), later.contact)
         lead = min(max(one.lead, begin), one.contact)
         yield Segment(one.kind, one.stage, one.ref, begin, lead, one.contact, min(one.release, end), end)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator, Iterator
+from collections.abc import Generator, Iterator, Sequence
 from functools import partial
 
 import numpy as np
@@ -90,7 +90,7 @@ def place_object(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
             there = yield from _unless_there(env, stage, take(env, obj, strategy.grasp, towards=towards, far=far))
         if not there:
             try:
-                yield from _bring(env, stage, obj, strategy)
+                yield from bring(env, stage, obj, strategy)
             except SlippedError:
                 continue  # it is picked up where it lies
             yield from move_torso(env, 0.0, CLOSED, Held.now(env.data, obj.name, obj.contents))
@@ -172,10 +172,7 @@ def take(
     been: list[RobotPose] = []
     while True:
         require_off_floor(env, obj)
-        yield from go_to_object(env, obj.name, been, towards)
-        fixture = locate(env, obj.name).fixture
-        yield from _around_door(env, fixture)
-        yield from _rise_to(env, fixture, env.data.body(obj.name).xpos.copy())
+        yield from come_to(env, obj, been, towards)
         try:
             elsewhere = partial(_has_other_side, env, obj.name) if not been else lambda: False
             yield from pick(env, obj, grasp_strategy(env, obj, free, kept=kept), elsewhere, firm=kept, long_way=far)
@@ -187,6 +184,20 @@ def take(
             if len(been) == MOST_PLACES - 1:
                 raise
         been.append(base_now(env.data))
+
+
+def come_to(
+    env: KitchenEnv, obj: Graspable, other_than: Sequence[RobotPose] = (), towards: Array | None = None
+) -> Iterator[Array]:
+    """Drive to an object where it is out of reach, or in any case to another place, and come up to its height.
+
+    Raises:
+        SkillError: there is no room, or no path.
+    """
+    yield from go_to_object(env, obj.name, other_than, towards)
+    fixture = locate(env, obj.name).fixture
+    yield from _around_door(env, fixture)
+    yield from _rise_to(env, fixture, env.data.body(obj.name).xpos.copy())
 
 
 def _has_other_side(env: KitchenEnv, name: str) -> bool:
@@ -201,8 +212,12 @@ def _has_other_side(env: KitchenEnv, name: str) -> bool:
     return abs(wrap(stand.yaw - here.yaw)) > OTHER_SIDE_RAD
 
 
-def _bring(env: KitchenEnv, stage: Stage, obj: Graspable, strategy: PlaceStrategy) -> Iterator[Array]:
-    """Carry the held object to before the stage's target, where that is out of reach."""
+def bring(env: KitchenEnv, stage: Stage, obj: Graspable, strategy: PlaceStrategy) -> Iterator[Array]:
+    """Carry the held object to before the stage's target, where that is out of reach.
+
+    Raises:
+        SkillError: there is no room or no path, or it slipped out of the hand.
+    """
     middle, fixture = _middle(strategy), _target_fixture(env, stage)
     if fixture is None or (middle is not None and in_reach(env, middle)):
         return
