@@ -21,6 +21,7 @@ comes to.
 from __future__ import annotations
 
 import argparse
+import contextlib
 import json
 import multiprocessing
 import os
@@ -109,19 +110,17 @@ def record(job: Job, settings: GenerationSettings, env: KitchenEnv) -> Recording
 
 def attempt(job: Job) -> Trial:
     """Make one attempt. Nothing that goes wrong ends the benchmark: it counts as a failure."""
-    settings = settings_of(job)
-    if job.arm != "scripted":
-        settings.read()  # before the clock: `generate` reads a task's sources once
-    started = time.perf_counter()
-    env = settings.make_env()
+    settings, started = settings_of(job), time.perf_counter()
     try:
-        recording = record(job, settings, env)
+        if job.arm != "scripted":
+            settings.read()  # before the clock: `generate` reads a task's sources once
+        started = time.perf_counter()
+        with contextlib.closing(settings.make_env()) as env:
+            recording = record(job, settings, env)
     except Exception as error:
         reason = f"{type(error).__name__}: {error}"
         seconds = round(time.perf_counter() - started, 3)
         return Trial(*job.key, False, False, 0, seconds, 0, (), False, reason, job.commit)
-    finally:
-        env.close()
     rows = recording.ep_meta.get("generation", {}).get("segments", [])
     told = [(row["kind"], row.get("part", row["ref"])) for row in rows]
     return Trial(
@@ -172,15 +171,18 @@ def jobs_of(args: argparse.Namespace, names: Iterable[str], arms: Mapping[str, i
     return jobs
 
 
-def keep_to_sources(folder: Path, trials: Path) -> None:
+def keep_to_sources(folder: Path, names: Sequence[str], trials: Path) -> None:
     """Note which sources a file of trials is about; sources that were prepared anew are others.
 
     Raises:
         SystemExit: it is about others.
     """
-    files = {path.name: [path.stat().st_size, path.stat().st_mtime_ns] for path in sorted(folder.glob("*.hdf5"))}
+    own = {folder / f"{name}.hdf5" for name in names} & set(folder.glob("*.hdf5"))
+    paths = own if len(own) == len(names) else folder.glob("*.hdf5")
+    files = {path.name: [path.stat().st_size, path.stat().st_mtime_ns] for path in sorted(paths)}
     note = trials.with_suffix(".sources.json")
-    if trials.exists() and note.exists() and json.loads(note.read_text()) != files:
+    note.parent.mkdir(parents=True, exist_ok=True)
+    if trials.exists() and (not note.exists() or json.loads(note.read_text()) != files):
         raise SystemExit(f"{trials} holds attempts with other sources than those in {folder} now. Remove it, or give "
                          "another file by --trials.")  # fmt: skip
     write_text(note, json.dumps(files))
@@ -214,7 +216,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     arms = arms_of(args.arms, args.attempts)
     names = expand_names(args.tasks) if args.tasks else tuple(sorted(path.stem for path in args.source.glob("*.hdf5")))
     jobs = jobs_of(args, names, arms)
-    keep_to_sources(args.source, args.trials)
+    keep_to_sources(args.source, names, args.trials)
     done = read(args.trials)
     if todo := [job for job in jobs if job.key not in done]:
         run(todo, args.trials, args.workers)

@@ -6,13 +6,14 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
+from robocasa_lerobot.evaluation.records.results import TRIALS_FILE
 from robocasa_lerobot.making.estimate import estimate
 from robocasa_lerobot.making.needs import Need, needs_of, parse_episodes
 from robocasa_lerobot.settings import load_yaml
 from robocasa_lerobot.study.runs import Run
 from robocasa_lerobot.study.settings import PartConfig, StudyConfig
 from robocasa_lerobot.training.config.experiment import load_experiment
-from robocasa_lerobot.training.planning.evaluations import plan_evaluations
+from robocasa_lerobot.training.planning.evaluations import FINISHED, FOLDER, PlannedEvaluation, plan_evaluations
 from robocasa_lerobot.training.planning.plan import PhasePlan, plan_experiment
 
 # Of one core, a small policy on the CPU, without films (`benchmarks/results/scaling.json`); and the part of their
@@ -106,12 +107,23 @@ def _planned(run: Run, pixels: int, measured_steps: int, measured: dict[str, flo
     needs, _ = needs_of(experiment, parse_episodes(run.episodes) if run.episodes else {})
     phases = plan_experiment(experiment, measured_steps=measured_steps, measured=measured)
     evaluations = plan_evaluations(experiment, [plan.phase for plan in phases if not plan.left_out])
+    left = [_share_left(run, item) for item in evaluations]
     return _Plan(
         [need for need in needs if need.missing],
         phases,
-        sum(item.trials for item in evaluations),
-        sum(item.steps for item in evaluations),
+        round(sum(item.trials * share for item, share in zip(evaluations, left, strict=True))),
+        round(sum(item.steps * share for item, share in zip(evaluations, left, strict=True))),
     )
+
+
+def _share_left(run: Run, item: PlannedEvaluation) -> float:
+    """Of an evaluation's trials, that have not ended yet."""
+    folder = run.folder / item.phase / FOLDER / item.evaluation.name
+    trials = folder / TRIALS_FILE
+    if (folder / FINISHED).is_file():
+        return 0.0
+    done = trials.read_bytes().count(b"\n") if trials.is_file() else 0
+    return max(0.0, 1.0 - done / max(item.trials, 1))
 
 
 def cost_lines(parts: Mapping[str, PartConfig], found: Mapping[str, Cost], cores: int, device: str) -> list[str]:

@@ -20,7 +20,7 @@ from robocasa_lerobot.study.runs import CPU, Run
 from robocasa_lerobot.study.strips import write_strips
 from robocasa_lerobot.training.config.experiment import PhaseConfig, load_experiment
 from robocasa_lerobot.training.metrics import METRICS, read_lines
-from robocasa_lerobot.training.planning.evaluations import FOLDER
+from robocasa_lerobot.training.planning.evaluations import FINISHED, FOLDER
 from robocasa_lerobot.training.records import PHASE_FILE
 
 TRIALS, CURVES, ABOUT = "trials.csv.gz", "curves.csv", "about.json"
@@ -172,7 +172,7 @@ def _has_ended(folder: Path, phase: PhaseConfig) -> bool:
     lines = read_lines(folder / METRICS)
     names = (text.split()[0] for text in phase.evaluations)
     trained = bool(lines) and int(lines[-1]["step"]) >= phase.steps
-    return trained and all((folder / FOLDER / name / "finished").is_file() for name in names)
+    return trained and all((folder / FOLDER / name / FINISHED).is_file() for name in names)
 
 
 def _seconds(lines: Iterable[dict[str, Any]]) -> Iterable[float]:

@@ -18,7 +18,7 @@ from robocasa_lerobot import cli, contract
 from robocasa_lerobot.demos.attempts import CLEAN_ACTION, RecordingSettings
 from robocasa_lerobot.demos.generate.course import KINDS, source_costs
 from robocasa_lerobot.demos.generate.fits import _turn_about
-from robocasa_lerobot.demos.generate.object_segments import lean_of
+from robocasa_lerobot.demos.generate.objects.place_segments import lean_of
 from robocasa_lerobot.demos.generate.part_segments import _as_from
 from robocasa_lerobot.demos.generate.select import NEAREST, Manner, narrowed, pose_distance
 from robocasa_lerobot.demos.generate.settings import GenerationSettings

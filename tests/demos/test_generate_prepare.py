@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import shutil
+from collections import Counter
 from pathlib import Path
 from typing import Any
 
@@ -193,6 +194,22 @@ def test_what_was_prepared_of_another_recording_is_not_taken(recorded: Path, tmp
     (parts / "demo_0.json").write_text('"of the recording that had this name"')
     path.touch()
     assert [one.dropped for one in prepare_files([path])] == ["", ""]
+
+
+@pytest.mark.slow
+def test_files_are_published_one_by_one_by_the_same_processes(recorded: Path, tmp_path: Path) -> None:
+    for name in ("one", "other"):
+        shutil.copy(recorded, tmp_path / f"{name}.hdf5")
+    found = []
+    for outcome in prepare_files([tmp_path], workers=2):
+        found.append(outcome)
+        ended = Counter(one.path for one in found[:-1])
+        for path in (path for path, number in ended.items() if number == 2 and path != outcome.path):
+            with h5py.File(path) as file:
+                assert all(GROUP in demo for demo in file["data"].values())
+    assert len(found) == 4
+    assert not any(one.dropped for one in found)
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["one.hdf5", "other.hdf5"]
 
 
 def test_floor_poses() -> None:

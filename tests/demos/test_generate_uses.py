@@ -10,6 +10,7 @@ import pytest
 
 from robocasa_lerobot import cli
 from robocasa_lerobot.demos.attempts import RecordingSettings
+from robocasa_lerobot.demos.generate.objects.use_segments import ShownUse, use_path
 from robocasa_lerobot.demos.generate.settings import GenerationSettings
 from robocasa_lerobot.demos.generate.sources.prepare import _Watcher, prepare_files
 from robocasa_lerobot.demos.generate.sources.segments import PICK, USE, rest_step, use_frames
@@ -17,7 +18,6 @@ from robocasa_lerobot.demos.generate.sources.source import Piece, Source, source
 from robocasa_lerobot.demos.generate.sources.transform import inverse, yaw_pose
 from robocasa_lerobot.demos.generate.sources.uses import USES, is_use, use_key, where_it_lay, working_point
 from robocasa_lerobot.demos.generate.stage import can_generate
-from robocasa_lerobot.demos.generate.use_segments import ShownUse, use_path
 from robocasa_lerobot.demos.planning.collision import Held
 from robocasa_lerobot.demos.recording import record_tasks
 from robocasa_lerobot.demos.replay import Demonstration, replay

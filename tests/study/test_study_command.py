@@ -55,6 +55,14 @@ def test_the_plan_leaves_out_what_has_ended(tmp_path: Path) -> None:
     line = next(line.split() for line in done.stdout.splitlines() if line.startswith("multitask"))
     assert line[1] == "1"
     assert line[5] == "480", "its trials"
+    started = tmp_path / "outputs" / "study" / "multitask" / "seed_2" / "multitask" / "evaluations"
+    for name in ("study_target", "study_validation"):
+        (started / name).mkdir(parents=True)
+    (started / "study_target" / "finished").touch()
+    (started / "study_validation" / "trials.jsonl").write_text("{}\n" * 100)
+    done = study(tmp_path, "--plan", "--measure=0", "--results=kept", "multitask")
+    line = next(line.split() for line in done.stdout.splitlines() if line.startswith("multitask"))
+    assert line[5] == "140", "240 have ended there, and 100 of the others"
 
 
 def test_a_misspelt_part_is_told(tmp_path: Path) -> None:

@@ -16,7 +16,7 @@ from robocasa_lerobot.demos.generate.fits import Fit, fits_of
 from robocasa_lerobot.demos.generate.select import narrowed
 from robocasa_lerobot.demos.generate.sources.frames import Part, anchored, body_pose
 from robocasa_lerobot.demos.generate.sources.transform import heading, inverse, make_pose, yaw_pose
-from robocasa_lerobot.demos.motion import OPEN, Array, base_pose, rotation_about
+from robocasa_lerobot.demos.motion import CLOSED, OPEN, Array, base_pose, rotation_about
 from robocasa_lerobot.demos.planning.collision import CollisionChecker, MovingPart
 from robocasa_lerobot.demos.planning.motion_planner import MotionPlan, MotionPlanner, WaypointPath
 from robocasa_lerobot.demos.skills.common import SkillError, draw_back, hold_hand, stage_done
@@ -50,11 +50,15 @@ def part_stage(env: KitchenEnv, stage: Stage, course: Course) -> Iterator[Array]
     Raises:
         SkillError: no source has a segment for it, or it is not done after all tries.
     """
-    key = (stage.target, stage.part, stage.verb)
+    key = (stage.target, stage.part, stage.verb, stage.object, stage.to)
     again, failed = key in course.failed, course.failed.setdefault(key, Counter())
     for number in range(MOST_SEGMENTS):
         if (yield from _stays_done(env, stage, course)):
             return
+        if number or (again and course.fingers == CLOSED):
+            yield from course.labelled(_let_go(env), BRIDGE)
+            if (yield from _stays_done(env, stage, course)):  # it was still moving
+                return
         fits = fits_of(env, stage, course)
         if not fits:
             raise SkillError(
@@ -62,13 +66,11 @@ def part_stage(env: KitchenEnv, stage: Stage, course: Course) -> Iterator[Array]
                 if number
                 else f"{stage.target}: no source has a segment of `{stage.skill} {stage.verb}`"
             )
-        if number or again:
-            yield from course.labelled(_let_go(env), BRIDGE)
         fit, cost = yield from _approach(env, course, fits, failed, may_stay=number > 0)
         before, runs = fit.part.position(env.data), _water_runs(env, stage)
         begin, end = fit.way()
         row = course.begin(fit.piece, part=fit.part.name, mirror=fit.mirror, cost=round(cost, 3))
-        yield from carry_out_segment(env, course, _carried(env, fit))
+        yield from carry_out_segment(env, course, _carried(env, stage, fit))
         if runs and not _water_runs(env, stage):  # the hand has leaned on the lever
             yield from course.labelled(turn_on_water(env, stage), BRIDGE)
         moved = fit.part.position(env.data) - before
@@ -136,8 +138,11 @@ def _approach(
     allowed = frozenset(
         int(body) for fit in fits for body in np.flatnonzero(env.scene.subtree(env.model.body(fit.part.body).name))
     )
-    stands = _beside(env, fits, stands_like(env, [_stand(env, fit) for fit in fits], course.manner))
-    stands = [None, *stands] if may_stay and None not in stands else stands
+    ordered = [fit for fit, _ in sorted(zip(fits, paths, strict=True), key=lambda pair: pair[1].extra)]
+    stands = stands_like(env, [_stand(env, fit) for fit in ordered], course.manner)
+    if may_stay and course.manner.base == "replan" and None not in stands:
+        stands = [None, *stands]
+    stands = _beside(env, fits, stands)
     blocked: list[RobotPose] = []
     while True:
         planner = MotionPlanner(env, paths, 1, allowed=allowed)
@@ -155,7 +160,8 @@ def _approach(
             break
         # Something stood in the way: what can be done from elsewhere, and from here?
         blocked.append(plan.base)
-        stands = [None, *stands] if None not in stands else stands
+        stands = [stand for stand in stands if stand is not None]
+        stands = _beside(env, fits, [None, *stands])
     way = _free_way(env, plan, None)
     yield from course.labelled(bridged(env, course.manner, way, _poses(env, fit)[0], gripper), BRIDGE)
     return fit, plan.cost + way.cost
@@ -303,7 +309,7 @@ def _lets_go(fit: Fit) -> int:
     return next((step for step in held if gripper[step] < 0 < gripper[step - 1]), segment.release)
 
 
-def _carried(env: KitchenEnv, fit: Fit) -> Carried:
+def _carried(env: KitchenEnv, stage: Stage, fit: Fit) -> Carried:
     """The segment with its frame on the part as it moves, the base going along where it did in the source."""
     segment, data, part = fit.piece.segment, fit.piece.data, fit.part
     begin, end = fit.way()
@@ -337,7 +343,8 @@ def _carried(env: KitchenEnv, fit: Fit) -> Carried:
     def late(step: int) -> bool:
         soon = min(share(min(step + AHEAD_STEPS, segment.release - 1)), 1.0)
         wanted = soon if soon > 1.0 - LATE_SHARE / 2 else share(step)
-        return here() < wanted - LATE_SHARE * (1.0 - wanted) - END_SHARE
+        behind = here() < wanted - LATE_SHARE * (1.0 - wanted) - END_SHARE
+        return behind and not stage_done(env, stage)
 
     steps = range(segment.contact, segment.release)
     leaves = next((step for step in steps if share(step) > MET_SHARE), segment.contact)
@@ -361,4 +368,5 @@ def _carried(env: KitchenEnv, fit: Fit) -> Carried:
         lambda: part.position(env.data) / part.span,
         0 if fit.piece.springs else enter,
         leaves,
+        twists=stage.skill == "knobs",
     )

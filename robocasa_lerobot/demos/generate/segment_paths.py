@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
@@ -17,7 +18,7 @@ from robocasa_lerobot.demos.skills.reaching import WaypointPath
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 
 STEEP_RAD = np.deg2rad(15.0)  # of a hand from straight down, up to which it may come turned in any way
-MOST_PATHS = 200  # that are planned for
+MOST_PATHS, EACH_PATHS = 200, 10  # that are planned for; of each source, the best ones, first
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -85,7 +86,15 @@ def cheapest[P: SegmentPath](env: KitchenEnv, paths: Sequence[P], course: Course
         first_pose=lambda path: path.first,
         hand=hand_now(env),
     )
-    return sorted(selected, key=lambda path: path.extra)[:MOST_PATHS]
+    ordered = sorted(selected, key=lambda path: path.extra)
+    # Some of every source: those that are not drawn are for what the others cannot do.
+    count: Counter[int] = Counter()
+    first: list[P] = []
+    rest: list[P] = []
+    for path in ordered:
+        count[path.piece.source.number] += 1
+        (first if count[path.piece.source.number] <= EACH_PATHS else rest).append(path)
+    return sorted((first + rest)[:MOST_PATHS], key=lambda path: path.extra)
 
 
 def after_letting_go(let_go: Array, last: Array, pose: Array, about: Array) -> Array:

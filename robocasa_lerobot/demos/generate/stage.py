@@ -7,8 +7,8 @@ from functools import partial
 
 from robocasa_lerobot.demos.demonstrator import demonstrate
 from robocasa_lerobot.demos.generate.course import AT_REST, BRIDGE, DRIVE, Course
-from robocasa_lerobot.demos.generate.lid_places import LID_VERBS
-from robocasa_lerobot.demos.generate.object_segments import object_stage
+from robocasa_lerobot.demos.generate.objects.lid_places import LID_VERBS
+from robocasa_lerobot.demos.generate.objects.object_segments import object_stage
 from robocasa_lerobot.demos.generate.part_segments import part_stage
 from robocasa_lerobot.demos.generate.sources.frames import JOINTED
 from robocasa_lerobot.demos.generate.sources.uses import USES

@@ -53,6 +53,7 @@ def plan_reach(
     blocked: Sequence[RobotPose] = (),
     may_drive: bool = True,
     may_stay: bool = True,
+    drawn: Callable[[WaypointPath], float] = lambda path: 0.0,
 ) -> list[MotionPlan]:
     """The paths that cost least, best first, from where the robot stands or from where it could.
 
@@ -67,12 +68,13 @@ def plan_reach(
         blocked: places that the base did not get to; after `MOST_DRIVES` of them it stays where it is.
         may_drive: whether the base may go elsewhere at all.
         may_stay: whether it may stay where it is, if there is another place.
+        drawn: what of a path's cost was drawn at random: no reason to go elsewhere.
     """
     if not paths:
         return []
     planner = MotionPlanner(env, paths, key, held=held, loaded=loaded, allowed=allowed)
     found = planner.best([None])
-    good = may_stay and bool(found) and found[0].cost <= GOOD_ENOUGH
+    good = may_stay and bool(found) and found[0].cost - drawn(found[0].path) <= GOOD_ENOUGH
     if may_drive and not good and len(blocked) < MOST_DRIVES:
         others = free_stands(env, point)
         stands = [s for s in others if all(np.hypot(s.x - b.x, s.y - b.y) > BLOCKED_M for b in blocked)]

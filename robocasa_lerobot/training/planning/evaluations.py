@@ -26,7 +26,7 @@ from robocasa_lerobot.training.planning import skipped
 from robocasa_lerobot.training.planning.skipped import EVALUATION, PARTIAL, Skipped
 from robocasa_lerobot.training.weights.checkpoint import LAST, PRETRAINED, last_checkpoint
 
-FOLDER = "evaluations"
+FOLDER, FINISHED = "evaluations", "finished"
 _LAUNCHER = ("RANK", "LOCAL_RANK", "WORLD_SIZE", "MASTER_ADDR", "MASTER_PORT", "ACCELERATE_", "TORCHELASTIC_")
 _POLL_SECONDS = 0.5
 _END_SECONDS = 30.0
@@ -171,7 +171,7 @@ def run_evaluations(
     last = last_checkpoint(folder)
     for item in planned if last is not None else ():
         assert last is not None
-        done = folder / FOLDER / item.evaluation.name / "finished"
+        done = folder / FOLDER / item.evaluation.name / FINISHED
         what = " ".join((last.name, item.plan, *item.evaluation.settings))
         if item.nothing is not None or (done.is_file() and done.read_text() == what):
             continue

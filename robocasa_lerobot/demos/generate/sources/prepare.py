@@ -6,6 +6,7 @@ as it was. Each demonstration leaves a small file of its own meanwhile, so that 
 
 from __future__ import annotations
 
+import contextlib
 import json
 import shutil
 from collections.abc import Iterable, Iterator
@@ -60,26 +61,61 @@ def prepare_files(paths: Iterable[Path], *, workers: int = 1, fresh: bool = Fals
     by_file: dict[Path, list[str]] = {}
     for path, demo in demonstrations(paths):
         by_file.setdefault(path, []).append(demo)
-    for path, demos in by_file.items():
-        known = {} if fresh else known_outcomes(path)
-        if all(demo in known for demo in demos):
-            yield from known.values()
-            continue
-        yield from _prepared_aside(path, demos, workers, fresh)
+    with contextlib.ExitStack() as locks:
+        begun: dict[Path, _Begun] = {}
+        for path, demos in by_file.items():
+            known = {} if fresh else known_outcomes(path)
+            if all(demo in known for demo in demos):
+                yield from known.values()
+            else:
+                begun[path] = _begin(path, demos, locks, fresh=fresh)
+        jobs = [(path, demo, one.folder) for path, one in begun.items() for demo in one.demos]
+        for outcome in as_they_end(prepare_one, jobs, workers):
+            yield outcome
+            if begun[outcome.path].is_last(outcome.demo):
+                begun[outcome.path].publish()
 
 
-def _prepared_aside(path: Path, demos: list[str], workers: int, fresh: bool) -> Iterator[Outcome]:
+@dataclass
+class _Begun:
+    """A file that is being prepared.
+
+    Attributes:
+        path, demos: it, and its demonstrations.
+        folder: of what has been found out of them.
+        lock: that is held meanwhile.
+        left: demonstrations that have not ended.
+    """
+
+    path: Path
+    demos: list[str]
+    folder: Path
+    lock: contextlib.ExitStack
+    left: set[str]
+
+    def is_last(self, demo: str) -> bool:
+        """Whether no other demonstration is left when this one has ended."""
+        self.left.discard(demo)
+        return not self.left
+
+    def publish(self) -> None:
+        """Replace the file, and let others at it."""
+        _publish(self.path, self.demos, self.folder)
+        shutil.rmtree(self.folder)
+        self.lock.close()
+
+
+def _begin(path: Path, demos: list[str], locks: contextlib.ExitStack, *, fresh: bool) -> _Begun:
+    lock = locks.enter_context(contextlib.ExitStack())
+    lock.enter_context(held_lock(path.with_name(f".{path.stem}.prepare.lock")))
     folder = path.with_name(f".{path.stem}.prepare")
-    with held_lock(path.with_name(f".{path.stem}.prepare.lock")):
-        note, identity = folder / FILE, file_identity(path)
-        # What a killed run left may be of another recording that had the file's name then.
-        if folder.exists() and (fresh or not note.exists() or json.loads(note.read_text()) != identity):
-            shutil.rmtree(folder)
-        folder.mkdir(exist_ok=True)
-        write_text(note, json.dumps(identity))
-        yield from as_they_end(prepare_one, [(path, demo, folder) for demo in demos], workers)
-        _publish(path, demos, folder)
+    note, identity = folder / FILE, file_identity(path)
+    # What a killed run left may be of another recording that had the file's name then.
+    if folder.exists() and (fresh or not note.exists() or json.loads(note.read_text()) != identity):
         shutil.rmtree(folder)
+    folder.mkdir(exist_ok=True)
+    write_text(note, json.dumps(identity))
+    return _Begun(path, demos, folder, lock, set(demos))
 
 
 def file_identity(path: Path) -> dict[str, int]:

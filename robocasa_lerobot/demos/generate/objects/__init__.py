@@ -1,0 +1,1 @@
+"""Segments about objects: taken hold of, used, and put down as in a source."""
