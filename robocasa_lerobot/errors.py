@@ -10,6 +10,15 @@ from typing import Any
 class UserError(ValueError):
     """A mistake in what the user asked for or handed in; the command line prints it without a traceback."""
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        # Subclasses are made from other things than their message, by which pickle would make them again; a process
+        # pool waits for ever for an answer that it cannot read.
+        return _again, (type(self), self.args), self.__dict__
+
+
+def _again(kind: type[UserError], args: tuple[Any, ...]) -> UserError:
+    return kind.__new__(kind, *args)
+
 
 class LackingMachineError(UserError):
     """Something that this machine lacks, such as a package: no other attempt, seed or kitchen would go better."""

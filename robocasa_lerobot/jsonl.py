@@ -1,16 +1,26 @@
-"""Files with one JSON object on each line."""
+"""JSON text, and files with one JSON object on each line."""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any
 
 
+def json_text(value: Any, indent: int | None = None, default: Callable[[Any], Any] | None = None) -> str:
+    """JSON in characters of any script; in ASCII where a text, such as a path that is no UTF-8, cannot be written."""
+    text = json.dumps(value, indent=indent, default=default, ensure_ascii=False)
+    try:
+        text.encode()
+    except UnicodeEncodeError:
+        return json.dumps(value, indent=indent, default=default)
+    return text
+
+
 def write_jsonl(path: Path, lines: Iterable[dict[str, Any]]) -> None:
     """Write one JSON object on each line."""
-    path.write_text("".join(json.dumps(line, ensure_ascii=False) + "\n" for line in lines), encoding="utf-8")
+    path.write_text("".join(json_text(line) + "\n" for line in lines), encoding="utf-8")
 
 
 def read_jsonl(path: Path) -> list[dict[str, Any]]:

@@ -15,7 +15,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
         nargs="+",
         type=Path,
         metavar="RUN",
-        help="folder with a trials.jsonl, or output of a training with evaluations",
+        help="folder with a trials.jsonl, that file, or output of a training with evaluations",
     )
     parser.add_argument(
         "--training",
@@ -47,11 +47,14 @@ def configure(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Write the report and print the rates."""
+    from robocasa_lerobot.evaluation.records.results import TRIALS_FILE
     from robocasa_lerobot.evaluation.report.formats.render import check_ending
     from robocasa_lerobot.evaluation.report.output import print_rates, write_report
 
-    out = args.out or args.results[0] / "report.html"
+    # Films and report lie beside the file.
+    results = [path.parent if path.name == TRIALS_FILE and path.is_file() else path for path in args.results]
+    out = args.out or results[0] / "report.html"
     check_ending(out)
-    print_rates(args.results)
-    write_report(args.results, args.training, args.demos, out, args.title, videos=not args.no_videos)
+    print_rates(results)
+    write_report(results, args.training, args.demos, out, args.title, videos=not args.no_videos)
     return 0

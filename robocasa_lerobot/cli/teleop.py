@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from robocasa_lerobot.teleop.server import TeleopServer
 
 EXAMPLE = (
-    "robocasa-lerobot teleop --task OpenDrawer --split pretrain --episodes 20 --out demos/\n"
+    "robocasa-lerobot teleop --task OpenDrawer --split pretrain --episodes 20 --out by_hand/\n"
     "  robocasa-lerobot teleop --task OpenDrawer --policy outputs/demo/finetune --episodes 10 --out corrections/"
 )
 
@@ -86,6 +86,8 @@ def _announce(server: TeleopServer, loop: ControlLoop) -> None:
     from robocasa_lerobot.serving.access import is_loopback
 
     print(f"open {server.address}", flush=True)
+    if server.host in ("0.0.0.0", "::"):
+        print(f"from another machine with the name or address of this one in place of {server.host}", flush=True)
     if not is_loopback(server.host):
         print("anybody who has this address can drive; nothing else is served", flush=True)
     elif "SSH_CONNECTION" in os.environ:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
@@ -16,8 +17,8 @@ FULL_COMMAND = 1.0
 FAR = 1.05
 
 
-def out_of_range(mapping: RobotMapping, actions: NDArray[Any]) -> dict[str, Any] | None:
-    """How many of the steps of `actions` (T, A) leave the range, as kept in `conversion.json`.
+def out_of_range(mapping: RobotMapping, actions: Iterable[NDArray[Any]]) -> dict[str, Any] | None:
+    """How many of the steps of `actions`, runs of (T, A), leave the range, as kept in `conversion.json`.
 
     Gives None for robots of which nothing is known about the unit of any component (those of mapping files, real ones).
     """
@@ -25,16 +26,20 @@ def out_of_range(mapping: RobotMapping, actions: NDArray[Any]) -> dict[str, Any]
     bounded = np.concatenate([np.full(part.size, _is_command(mapping, part)) for part in parts])
     if not bounded.any():
         return None
-    sizes = np.where(bounded, np.abs(actions.reshape(len(actions), -1)), 0.0)
-    outside = (sizes > FAR).any(axis=1)
-    largest = int(sizes.max(axis=0).argmax())
+    largest = np.zeros(len(bounded))
+    outside = steps = 0
+    for run in actions:
+        sizes = np.where(bounded, np.abs(run.reshape(len(run), -1)), 0.0)
+        outside += int((sizes > FAR).any(axis=1).sum())
+        steps += len(sizes)
+        largest = np.maximum(largest, sizes.max(axis=0, initial=0.0))
     return {
         "range": [-FULL_COMMAND, FULL_COMMAND],
         "counted_beyond": FAR,
-        "steps": int(outside.sum()),
-        "share": float(outside.mean()),
-        "largest": float(sizes.max()),
-        "component": contract.component_names(parts)[largest],
+        "steps": outside,
+        "share": outside / steps,
+        "largest": float(largest.max()),
+        "component": contract.component_names(parts)[int(largest.argmax())],
     }
 
 

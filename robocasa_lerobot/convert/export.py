@@ -133,6 +133,12 @@ def _write(
             num_frames += episode.length
             bar.update(episode.length)
     notes += [f"{what} of {count} episodes are not in the dataset: left out" for what, count in lacking.items()]
+    if dataset.placed_cameras:
+        placed = ", ".join(dataset.placed_cameras)
+        notes.append(
+            f"cameras {placed} were placed when the pictures were rendered again: model_file and cam_configs are those "
+            "of the recording, without that"
+        )
     data.attrs.update(_attributes(dataset, episodes))
     data.attrs["total"] = num_frames
     _copy_assets(file, dataset, episodes, notes)

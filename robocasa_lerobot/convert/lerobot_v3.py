@@ -170,10 +170,19 @@ class ExportedDataset:
         files = {episode.source_file for episode in episodes}
         return [source for source in self._sources if source["file"] in files]
 
-    @cached_property
+    @property
+    def placed_cameras(self) -> tuple[str, ...]:
+        """Cameras that were moved or added when the pictures were rendered again."""
+        return tuple(self._record.get("settings", {}).get("cam_configs", {}))
+
+    @property
     def _sources(self) -> list[dict[str, Any]]:
+        return list(self._record.get("sources", []))
+
+    @cached_property
+    def _record(self) -> dict[str, Any]:
         file = self.root / _OURS / "conversion.json"
-        return list(json.loads(file.read_text(encoding="utf-8"))["sources"]) if file.is_file() else []
+        return dict(json.loads(file.read_text(encoding="utf-8"))) if file.is_file() else {}
 
     @cached_property
     def _tasks(self) -> dict[int, str]:

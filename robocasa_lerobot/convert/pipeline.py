@@ -50,6 +50,7 @@ from robocasa_lerobot.jobs.executors import Execution
 from robocasa_lerobot.jobs.pieces import report_frames, require_complete, run_pieces, submit_pieces
 from robocasa_lerobot.jobs.publish import (
     check_output,
+    check_outside,
     clear_away,
     failures_explained,
     held_folder,
@@ -59,7 +60,7 @@ from robocasa_lerobot.jobs.publish import (
     publish,
 )
 from robocasa_lerobot.jobs.workers import check_workers, num_workers
-from robocasa_lerobot.jsonl import read_jsonl, write_jsonl
+from robocasa_lerobot.jsonl import json_text, read_jsonl, write_jsonl
 from robocasa_lerobot.quiet import quiet_libraries
 
 # Our part of a dataset's folder; LeRobot reads nothing in it.
@@ -194,7 +195,10 @@ def _prepared(
     left = _left_behind(out)
     if left is None:
         check_output(out, overwrite)
-    plan = make_v2_plan(files, settings) if takes(files) else make_plan(files, settings)
+    folders = takes(files)
+    for folder in files if folders else ():
+        check_outside(out, folder)
+    plan = make_v2_plan(files, settings) if folders else make_plan(files, settings)
     partial = partial_folder(out, plan.fingerprint)
     if left is not None and left != partial:
         check_output(out, overwrite)
@@ -295,7 +299,7 @@ def _join(plan: Plan, partial: Path, out: Path) -> ConversionResult | None:
     from lerobot.datasets.io_utils import write_stats
 
     from robocasa_lerobot.convert.writing.joining import copy_tree, join_datasets
-    from robocasa_lerobot.convert.writing.statistics import column, dataset_statistics
+    from robocasa_lerobot.convert.writing.statistics import column_batches, dataset_statistics
 
     merged = partial / _MERGED
     shutil.rmtree(merged, ignore_errors=True)  # an earlier try may have been killed here
@@ -330,15 +334,13 @@ def _join(plan: Plan, partial: Path, out: Path) -> ConversionResult | None:
     write_jsonl(ours / EPISODES_FILE, episodes)
     write_jsonl(ours / REJECTED_FILE, rejected)
     record = _conversion_record(plan, out)
-    record[ACTIONS_OUT_OF_RANGE] = out_of_range(plan.mapping, column(merged, contract.ACTION_KEY))
+    record[ACTIONS_OUT_OF_RANGE] = out_of_range(plan.mapping, column_batches(merged, contract.ACTION_KEY))
     if isinstance(plan, V2Plan):
         finish_dataset(plan, merged)
         record |= conversion_facts(plan, episodes)
     if not (merged / MODALITY_FILE).exists():
         write_modality(merged, modality(info["features"], plan.mapping.state_parts, plan.mapping.action_parts))
-    (ours / CONVERSION_FILE).write_text(
-        json.dumps(record, indent=2, ensure_ascii=False, default=str) + "\n", encoding="utf-8"
-    )
+    (ours / CONVERSION_FILE).write_text(json_text(record, indent=2, default=str) + "\n", encoding="utf-8")
     write_dataset_card(merged, [Path(source.file) for source in plan.sources])
     return _result(plan, out, episodes, rejected, record)
 

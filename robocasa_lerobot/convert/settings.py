@@ -129,6 +129,7 @@ class Shard:
     file: str
     demos: tuple[str, ...]
     rejected: tuple[tuple[str, str], ...] = ()  # those of them that are not to be opened, and why
+    mapping: RobotMapping | None = None  # of its own file: equal parts may stand elsewhere in another one
 
 
 @dataclass(frozen=True)
@@ -165,11 +166,7 @@ def make_plan(files: Sequence[Path], settings: ConversionSettings) -> Plan:
         UserError: a file is unreadable or holds no usable demo, files do not fit into one dataset, a camera is
             unknown, or meshes are missing. Nothing has been written then.
     """
-    if not files:
-        raise UserError("no files to convert were given.")
-    doubles = {file for file in files if files.count(file) > 1}
-    if doubles:
-        raise UserError(f"{min(doubles)} was given more than once.")
+    check_request(files, settings)
     roots = [Path(root) for root in settings.asset_roots]
     with ThreadPoolExecutor(1) as pool:
         hashes = [pool.submit(file_sha256, file) for file in files]  # meanwhile they are looked into
@@ -212,6 +209,22 @@ def make_plan(files: Sequence[Path], settings: ConversionSettings) -> Plan:
         num_frames,
         stages=any(look.stages for look in looks),
     )
+
+
+def check_request(files: Sequence[Path], settings: ConversionSettings) -> None:
+    """What can be said before any file is opened, of HDF5 files and dataset folders.
+
+    Raises:
+        UserError: there are no files, one was given twice, or there is no instruction to replace the recorded ones.
+    """
+    if not files:
+        raise UserError("no files to convert were given.")
+    doubles = {file for file in files if files.count(file) > 1}
+    if doubles:
+        raise UserError(f"{min(doubles)} was given more than once.")
+    robot = settings.layout.robot
+    if settings.replace_instruction and settings.instruction is None and (robot is None or not robot.instruction.text):
+        raise UserError("--replace-instruction has nothing to take instead: give --instruction TEXT, or leave it out.")
 
 
 def shard_frames(num_frames: int, most: int) -> int:
@@ -369,6 +382,6 @@ def _cut(look: _Look, target: int, copies: Mapping[tuple[Path, str], str]) -> li
         frames += length
         if frames >= target or position == len(look.demos):
             reasons = tuple((name, rejected[name]) for name in names if name in rejected)
-            shards.append(Shard(str(look.file), tuple(names), reasons))
+            shards.append(Shard(str(look.file), tuple(names), reasons, look.mapping))
             names, frames = [], 0
     return shards

@@ -6,7 +6,7 @@ import json
 import shutil
 import time
 from collections.abc import Callable
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from itertools import pairwise
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -65,6 +65,7 @@ def convert_shard(
     """
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir(parents=True)
+    plan = replace(plan, mapping=shard.mapping or plan.mapping)
     rejected: list[RejectedEpisode] = []
     report = _Throttled(progress)
     with shared_encoder.borrowed() as encoder, DemoFile(Path(shard.file), plan.settings.layout) as file:

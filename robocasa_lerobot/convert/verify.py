@@ -144,14 +144,17 @@ def _sha256(path: Path) -> str:
 
 
 def _find_sources(root: Path, recorded: list[dict[str, Any]], given: Sequence[Path]) -> Iterator[Source]:
-    by_sha = {_sha256(path): path for path in given if path.exists()}
+    shas = {path: _sha256(path) for path in given if path.exists()}
+    by_sha = {sha: path for path, sha in shas.items()}
     missing = [path for path in given if not path.exists()]
     if missing:
         raise UserError(f"--source {missing[0]} does not exist.")
+    recorded_shas = {entry["sha256"] for entry in recorded}
+    others = [path for path in given if shas[path] not in recorded_shas]  # the rest are known to be another source
     for entry in recorded:
         fields = {key: entry[key] for key in ("file", "sha256", "size_bytes")}
         source = SourceRecord(**fields)
-        same_name = [path for path in given if path.name == Path(source.file).name]
+        same_name = [path for path in others if path.name == Path(source.file).name]
         places = [Path(source.file), root / entry["relative_to_dataset"]]
         candidates = [by_sha[source.sha256]] if source.sha256 in by_sha else [*same_name, *places]
         path = next((place for place in candidates if place.exists()), None)

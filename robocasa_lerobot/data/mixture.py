@@ -97,6 +97,7 @@ class MixtureDataset(torch.utils.data.Dataset[Item]):
         self._caches: dict[Path, FrameCache] = {}
         self._pictures = PictureReader(loader.cache_open_files)
         self._recent: OrderedDict[Path, None] = OrderedDict()  # sources with mapped columns, the last used at the end
+        self._recent_caches: OrderedDict[Path, None] = OrderedDict()  # and those with mapped pictures
         self._max_open = loader.cache_open_files
         self._cache_dir = Path(loader.cache_dir) if loader.cache_dir else None
         roots = dict.fromkeys(Path(member.root) for member in config.members)
@@ -202,6 +203,7 @@ class MixtureDataset(torch.utils.data.Dataset[Item]):
         height, width = self._feature_size()
         self._picture_size = size if size is not None and size[0] * size[1] < height * width else None
         self._caches.clear()
+        self._recent_caches.clear()
 
     def cache_frames(self, cache_dir: Path, budget_bytes: float | None = None) -> bool:
         """Decode every picture once and read it from disk from then on; the pictures are the same.
@@ -278,6 +280,8 @@ class MixtureDataset(torch.utils.data.Dataset[Item]):
             return out
         episode = source.columns["episode_index"][frames]
         cache = self._caches.get(source.root)
+        if cache:
+            _use_one(source.root, self._recent_caches, self._caches, self._max_open)
         for key in keys:
             indices, padded = self._window(key, source, frames, episode)
             if cache:
@@ -301,10 +305,7 @@ class MixtureDataset(torch.utils.data.Dataset[Item]):
                 "`loader.cache_columns_above_gb` allows; set `loader.cache_dir` to a folder for files to map instead."
             )
         source.column_cache = self._cache_dir
-        self._recent[source.root] = None
-        self._recent.move_to_end(source.root)
-        while len(self._recent) > self._max_open:
-            self.sources[self._recent.popitem(last=False)[0]].close()
+        _use_one(source.root, self._recent, self.sources, self._max_open)
         return source
 
     def _window(
@@ -348,6 +349,16 @@ def open_mixture(
 
             write_fake_dataset(Path(member.root))
     return MixtureDataset(config, loader=loader, opened=opened)
+
+
+def _use_one(
+    root: Path, recent: OrderedDict[Path, None], files: Mapping[Path, DatasetSource | FrameCache], most: int
+) -> None:
+    """Note that the files of a dataset are used; beyond `most`, those that were not for longest are closed."""
+    recent[root] = None
+    recent.move_to_end(root)
+    while len(recent) > most:
+        files[recent.popitem(last=False)[0]].close()
 
 
 def _is_image(feature: Mapping[str, Any]) -> bool:

@@ -152,7 +152,8 @@ class LoaderConfig:
             mixture may differ in the others.
         cache_columns_above_gb: states, actions and other numbers of larger mixtures stay in memory-mapped files in
             the cache folder instead of memory (10^9 bytes for all datasets of a phase, in each loader process).
-        cache_open_files: videos, and datasets' memory-mapped numbers, that a loader process keeps open at once.
+        cache_open_files: videos, and datasets' memory-mapped numbers and pictures, that a loader process keeps open at
+            once.
     """
 
     workers: int = 0

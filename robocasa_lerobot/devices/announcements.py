@@ -10,18 +10,20 @@ from __future__ import annotations
 import logging
 from collections.abc import Callable
 
-BEGIN, AGAIN = "Recording episode ", "Re-record episode"
+BEGIN = "Recording episode "  # with its number, the same one again after "Re-record episode"
 
 
 class Announcements(logging.Handler):
-    """Calls `begin(again)` before an episode is recorded; `again` where the last one was thrown away.
+    """Calls `begin(number)` before an episode is recorded; it is that of the episode in the dataset.
+
+    So it goes on where a recording is resumed, and is said again where an episode was thrown away.
 
     Usage: `listen()` when the device connects, `close()` when it disconnects.
     """
 
-    def __init__(self, begin: Callable[[bool], None]) -> None:
+    def __init__(self, begin: Callable[[int], None]) -> None:
         super().__init__(logging.INFO)
-        self._begin, self._again = begin, False
+        self._begin = begin
 
     def listen(self) -> None:
         """Start."""
@@ -35,8 +37,6 @@ class Announcements(logging.Handler):
     def emit(self, record: logging.LogRecord) -> None:
         """Take an announcement; everything else is let through."""
         text = record.getMessage() if isinstance(record.msg, str) else ""
-        if text == AGAIN:
-            self._again = True
-        elif text.startswith(BEGIN):
-            again, self._again = self._again, False
-            self._begin(again)
+        number = text.removeprefix(BEGIN)
+        if number != text and number.isdecimal():
+            self._begin(int(number))

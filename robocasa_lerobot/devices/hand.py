@@ -21,7 +21,7 @@ class RobocasaHand(KitchenTeleoperator):
     name = "robocasa_hand"
 
     def __init__(self, config: RobocasaHandConfig) -> None:
-        super().__init__(config, lambda again: self._translator.reset())
+        super().__init__(config, lambda number: self._translator.reset())
         self.device = make_teleoperator_from_config(config.of_device())
         self._phone = _phone_step(config) if config.device == "phone" else None
         self._translator = HandTranslator(config.speed, keyboard_axes=config.device == "keyboard_ee")

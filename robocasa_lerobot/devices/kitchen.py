@@ -136,12 +136,12 @@ class RobocasaKitchen(Robot):
             raise UserError("the kitchen is not connected: call connect() first.")
         return self._observation
 
-    def _begin(self, again: bool) -> None:
+    def _begin(self, number: int) -> None:
         """An episode is to be recorded: from the beginning of a kitchen that nobody has touched."""
-        if self._steps == 0:
+        episode = number if self.config.next_kitchen else 0
+        if self._steps == 0 and episode == self._episode:
             return
-        if self.config.next_kitchen and not again:
-            self._episode += 1
+        self._episode = episode
         self._reset()
 
     def _reset(self) -> None:

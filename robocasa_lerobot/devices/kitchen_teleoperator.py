@@ -16,10 +16,10 @@ class KitchenTeleoperator(Teleoperator):
 
     Args:
         config: LeRobot's, of the device.
-        begin: called at the beginning of an episode, with whether it is the same one again.
+        begin: called at the beginning of an episode, with its number in the dataset.
     """
 
-    def __init__(self, config: Any, begin: Callable[[bool], None]) -> None:
+    def __init__(self, config: Any, begin: Callable[[int], None]) -> None:
         super().__init__(config)
         self._announcements = Announcements(begin)
         self._connected = False

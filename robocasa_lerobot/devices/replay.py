@@ -24,7 +24,7 @@ class RobocasaReplay(KitchenTeleoperator):
     def __init__(self, config: RobocasaReplayConfig) -> None:
         super().__init__(config, self._begin)
         self._chosen = demonstrations([config.demos])
-        self._episode, self._started = 0, False
+        self._episode = 0
         self._load()
 
     def get_action(self) -> dict[str, float]:
@@ -40,10 +40,8 @@ class RobocasaReplay(KitchenTeleoperator):
         self._step += 1
         return dict(zip(NAMES, action.tolist(), strict=True))
 
-    def _begin(self, again: bool) -> None:
-        if self._started and not again:
-            self._episode += 1
-        self._started = True
+    def _begin(self, number: int) -> None:
+        self._episode = number
         self._load()
 
     def _load(self) -> None:

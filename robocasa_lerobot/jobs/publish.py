@@ -27,6 +27,22 @@ def check_output(out: Path, overwrite: bool) -> None:
         raise UserError(f"{out} exists already. Choose another --out, or replace it with --overwrite.")
     if not (out / "meta" / "info.json").is_file():
         raise UserError(f"{out} is not a LeRobotDataset, so --overwrite leaves it alone. Choose another --out.")
+    if others := sorted(out.glob("*/meta/info.json")):
+        names = ", ".join(path.parents[1].name for path in others[:3])
+        raise UserError(
+            f"{out} holds other datasets beside its own ({names}), so --overwrite leaves it alone. Move them away, or "
+            "choose another --out."
+        )
+
+
+def check_outside(out: Path, source: Path) -> None:
+    """Whether a dataset may be made at `out` from the folder `source`.
+
+    Raises:
+        UserError: it would be inside, and copied into itself.
+    """
+    if source.resolve() in out.resolve().parents:
+        raise UserError(f"--out {out} is inside the dataset {source}. Choose a folder beside it.")
 
 
 def partial_folder(out: Path, fingerprint: str) -> Path:

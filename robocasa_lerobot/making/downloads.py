@@ -96,13 +96,18 @@ def convert_downloads(downloads: Sequence[Download], execution: Execution, cores
 
 
 def _datasets(folder: Path) -> Iterator[Path]:
-    """Folders with LeRobot's metadata, in order; nothing is looked for inside them."""
-    for place, inside, _ in os.walk(folder):
+    """Folders with LeRobot's metadata, in order; nothing is looked for inside them. Links are followed."""
+    for place, inside, _ in os.walk(folder, followlinks=True):
         if (Path(place) / "meta" / "info.json").is_file():
             inside.clear()
             yield Path(place)
         else:
-            inside[:] = sorted(name for name in inside if not name.startswith("."))
+            here = Path(place).resolve()
+            inside[:] = sorted(
+                name
+                for name in inside
+                if not name.startswith(".") and not here.is_relative_to((here / name).resolve())  # a link upwards
+            )
 
 
 def _what(source: Path) -> tuple[str, str, str] | None:

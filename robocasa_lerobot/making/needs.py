@@ -121,10 +121,15 @@ def _needs_of_entry(entry: DatasetEntry, registry: Registry, numbers: Mapping[st
     if dataset.make.redraw is None:
         return [need]
     source = _dataset_of_path(registry.config.datasets, dataset.make.redraw)
-    (before,) = registry.find([entry.task], source.split, source.source, source.views)
+    found = registry.find([entry.task], source.split, source.source, source.views)
+    before = [other for other in found if other.registered == source]  # others may hold the same kind of data
+    if not before:
+        raise UserError(
+            f"{dataset.path}: its recipe draws {source.path} again, which has no {entry.task}; give both the same."
+        )
     return [
-        *_needs_of_entry(before, registry, numbers),
-        dataclasses.replace(need, redrawn=before.root),
+        *_needs_of_entry(before[0], registry, numbers),
+        dataclasses.replace(need, redrawn=before[0].root),
     ]
 
 

@@ -46,7 +46,8 @@ def write_page(study: StudyConfig, stored: Stored, sets: Sets, results: Path, pa
         page: Markdown file.
     """
     folder = _relative(results, page)
-    link = f"[`{folder}`]({folder})" if results.is_dir() else f"`{folder}`"
+    kept = results.is_dir() and any(results.iterdir())
+    link = f"[`{folder}`]({folder})" if kept else f"`{folder}`"
     lines = [_HEAD.format(folder=link)]
     for name, part in study.parts.items():
         own = {key: run for key, run in stored.items() if key[0] in part.experiments and key[1] < part.seeds}

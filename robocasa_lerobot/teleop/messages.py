@@ -144,9 +144,10 @@ def _one_of(*names: str) -> Check:
 
 def _text(longest: int) -> Check:
     def check(value: Any) -> str:
-        if not isinstance(value, str) or len(value) > longest or not value.isprintable():
+        if not isinstance(value, str) or len(value) > longest:
             raise ProtocolError(f"expected a line of up to {longest} characters")
-        return value
+        # Spaces of any width become plain ones, and what joins or steers characters goes: people paste and dictate.
+        return " ".join("".join(one if one.isprintable() else " " for one in value).split())
 
     return check
 

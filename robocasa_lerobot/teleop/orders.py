@@ -43,14 +43,14 @@ def carry_out(session: Session, message: Message, now: float) -> None:
 def _input(session: Session, message: Message, now: float) -> None:
     if session.phase not in _DRIVEN:  # what is still held from before
         return
+    if session.phase == PAUSED and not session.resumes:  # nothing but "resume" goes on, and nothing is to take over
+        return
     camera = message.get("motion_camera", "")
     if camera and not _known(session, message, [camera], but=FREE):
         return
     asks = session.driver.hold(message, now)
     if asks and (session.phase == READY or session.resumes):
         session.run(now)
-    elif asks and session.phase == PAUSED:
-        session.driver.release()
 
 
 def _action(session: Session, message: Message, now: float) -> None:

@@ -138,7 +138,7 @@ class TeleopServer:
         asyncio.set_event_loop(self._loop)
         try:
             self._loop.run_until_complete(self._serve())
-        except OSError as error:
+        except (OSError, OverflowError, UnicodeError) as error:  # taken; no port; no name of a host
             self._failure = error
         finally:
             self._started.set()

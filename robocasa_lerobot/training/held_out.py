@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import random
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -26,12 +27,13 @@ Forward = Callable[[dict[str, Any]], tuple[torch.Tensor, Any]]
 def without_held_out(
     dataset: MixtureDataset, config: HeldOutConfig, loader: LoaderConfig, seed: int
 ) -> tuple[MixtureDataset, MixtureDataset | None]:
-    """The mixture without its held-out episodes, and one of those alone; None where no task has two episodes.
+    """The mixture without its held-out episodes, and one of those alone; None where tasks have too few episodes.
 
-    A dataset that is a member twice has the same ones held out.
+    Too few are fewer than those of which the share is one: of two demonstrations it would be half. A dataset that is
+    a member twice has the same ones held out.
 
     Raises:
-        UserError: a task has but one episode, so that nothing is left of it to train on.
+        UserError: a member has but episodes that are held out, so that nothing is left of it to train on.
     """
     used_of: dict[str, list[NDArray[np.int64]]] = {}
     for member in dataset.config.members:
@@ -54,7 +56,8 @@ def without_held_out(
             apart.append(dataclasses.replace(plain, episodes=held.tolist(), frames=None))
     if not apart:
         return dataset, None
-    return open_mixture(MixtureConfig(members=kept), loader), open_mixture(MixtureConfig(members=apart), loader)
+    parts = (MixtureConfig(members=kept), MixtureConfig(members=apart))
+    return open_mixture(parts[0], loader, dataset.sources), open_mixture(parts[1], loader, dataset.sources)
 
 
 @dataclasses.dataclass
@@ -84,6 +87,7 @@ class HeldOut:
             if number % accelerator.num_processes != accelerator.process_index:
                 continue
             torch.manual_seed(seed)
+            random.seed(seed)  # what GR00T's preprocessor draws from
             total = 0.0
             for part in np.array_split(chosen, max(1, round(len(chosen) / self.part))):
                 loss, _ = forward(self.dataset.batch(part[:, 0], part[:, 1]))
@@ -124,16 +128,19 @@ def task_names(source: DatasetSource) -> list[str]:
 def _held_out(source: DatasetSource, used: NDArray[np.int64], share: float, seed: int) -> NDArray[np.int64]:
     """Episodes that are held out: of each task its share of the whole dataset, so that phases agree, as far as used.
 
-    Where none of these is among the `used` ones it is one of them, and one of them is always left to train on.
+    Where none of these is among the `used` ones it is one of them, and one of them is always left to train on. Of a
+    task with fewer used episodes than those of which the share is one, none is held out.
     """
     names = np.array(task_names(source))
-    chosen = []
+    chosen: list[NDArray[np.int64]] = [np.zeros(0, dtype=np.int64)]
     for name in np.unique(names[used]):
         episodes = np.flatnonzero(names == name)
-        count = min(max(1, round(share * len(episodes))), len(episodes) - 1)
         generator = np.random.default_rng((seed, len(episodes), int(episodes[0])))
         order = generator.permutation(episodes)
         among = order[np.isin(order, used)]
+        if share * len(among) < 1 - 1e-9:  # for shares such as 1/49, which floats cannot hold
+            continue
+        count = min(max(1, round(share * len(episodes))), len(episodes) - 1)
         held = np.intersect1d(order[:count], used)
         held = held if len(held) else among[:1]
         chosen.append(held if len(held) < len(among) else among[:-1])

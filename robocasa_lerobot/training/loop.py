@@ -7,6 +7,7 @@ the step, and the samples follow from their position, so a run that was killed g
 from __future__ import annotations
 
 import math
+import random
 import time
 from collections.abc import Callable
 from contextlib import AbstractContextManager, nullcontext
@@ -149,10 +150,16 @@ def _prepare(run: PhaseRun, batch: dict[str, Any], accelerator: Accelerator, par
     batch = dict(batch)
     for key in run.camera_keys:
         batch[key] = batch[key].to(accelerator.device, non_blocking=True).float().div_(255)
-    if part is not None and run.config.augment is not None:
-        seed = step_seed(run.seed, run.state.step, part, 0)
+    if part is not None:
         rank, processes = accelerator.process_index, accelerator.num_processes
-        batch = augment(batch, run.camera_keys, run.config.augment, seed, rank, processes)
+        if run.config.augment is not None:
+            seed = step_seed(run.seed, run.state.step, part, 0)
+            batch = augment(batch, run.camera_keys, run.config.augment, seed, rank, processes)
+        # Some preprocessors draw: GR00T's crops come from `random`. A number of its own, beyond those of the parts,
+        # keeps this apart from the noise, which `_noise` seeds afterwards.
+        drawn = step_seed(run.seed, run.state.step, run.config.gradient_accumulation + part, rank)
+        random.seed(drawn)
+        torch.manual_seed(drawn)
     prepared: dict[str, Any] = run.state.preprocessor(batch)
     return prepared
 

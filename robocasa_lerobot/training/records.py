@@ -35,13 +35,23 @@ def write_experiment(output: Path, experiment: ExperimentConfig) -> None:
     So experiments of which one is a part of the other can take turns in a folder, and share the trained phases.
     """
     path, own = output / EXPERIMENT_FILE, dataclasses.asdict(experiment)
-    before = yaml.safe_load(path.read_text(encoding="utf-8"))["phases"] if path.is_file() else []
+    before = _with_starts(yaml.safe_load(path.read_text(encoding="utf-8")))["phases"] if path.is_file() else []
     names = {phase.name for phase in experiment.phases}
-    for number, phase in enumerate(before):
-        if phase["name"] not in names:
-            previous = before[number - 1]["name"] if number else None
-            own["phases"].append(phase | {"init": phase["init"] or previous})
+    own["phases"] += [phase for phase in before if phase["name"] not in names]
     write_text(path, yaml.safe_dump(own, sort_keys=False, width=120))
+
+
+def _with_starts(experiment: dict[str, Any]) -> dict[str, Any]:
+    """An experiment as data, in which each phase says where it starts.
+
+    What is not said depends on the phase before (`ExperimentConfig.init_of`), which another order changes.
+    """
+    start = str((experiment.get("policy") or {}).get("path", FROM_SCRATCH))
+    phases: list[dict[str, Any]] = []
+    for phase in experiment["phases"]:
+        phases.append({**phase, "init": phase["init"] or start})
+        start = phase["name"]
+    return {**experiment, "phases": phases}
 
 
 def describe_phase(
@@ -88,8 +98,8 @@ def check_unchanged(experiment: ExperimentConfig, output: Path, force: bool) -> 
     if not path.is_file():
         return
     begun = {phase.name for phase in experiment.phases if last_checkpoint(output / phase.name)}
-    old = overlay.flatten(yaml.safe_load(path.read_text(encoding="utf-8")))
-    new = overlay.flatten(yaml.safe_load(to_yaml(experiment)))
+    old = overlay.flatten(_with_starts(yaml.safe_load(path.read_text(encoding="utf-8"))))
+    new = overlay.flatten(_with_starts(yaml.safe_load(to_yaml(experiment))))
     changed = {
         key: f"\n  {key}: {old.get(key, '(not set)')} -> {new.get(key, '(not set)')}"
         for key in sorted(old.keys() | new.keys())

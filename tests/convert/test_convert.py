@@ -327,6 +327,13 @@ def test_existing_output_is_replaced_only_when_asked(tmp_path: Path, capsys: pyt
     assert "--overwrite" in capsys.readouterr().err
     assert tree_hashes(out) == before
     write_demos(source, (7,), images=16)
+    nested = out / "by_hand" / "meta"
+    nested.mkdir(parents=True)
+    (nested / "info.json").write_text("{}")
+    assert cli.main(["convert", str(source), "--out", str(out), "--overwrite"]) == 2
+    assert "by_hand" in capsys.readouterr().err
+    assert (nested / "info.json").exists()
+    shutil.rmtree(out / "by_hand")
     assert cli.main(["convert", str(source), "--out", str(out), "--overwrite"]) == 0
     assert len(column(out, "index")) == 7
     assert leftovers(out) == ["out"]

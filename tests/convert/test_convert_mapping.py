@@ -236,6 +236,7 @@ def test_a_changed_extra_column_is_noticed(v01: Path, tmp_path: Path) -> None:
         ({"action_key": "action_abs"}, "'actions_abs'"),
         ({"action_key": "actions_abs", "mapping": "{}"}, "exclude each other"),
         ({"instruction": "pick up the {object}", "replace_instruction": True}, "Did you mean 'obj'"),
+        ({"replace_instruction": True}, "nothing to take instead"),
         ({"instruction": "pick up the {obj"}, "expected"),
         ({"instruction": "{obj.__class__}"}, "a name in braces"),
         ({"instruction": "{obj!r}"}, "a name in braces"),

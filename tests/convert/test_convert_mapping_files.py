@@ -197,3 +197,58 @@ def test_constants_of_a_mapping_that_mean_nothing_are_refused(tmp_path: Path, pa
         _mapping(tmp_path, {**LIBERO, "state": {"base": part}})
     with pytest.raises(UserError, match="constants only"):
         _mapping(tmp_path, {**LIBERO, "action": {"base": {"constant": [0.0]}}})
+
+
+def _fixed_arm(path: Path) -> Path:
+    rng = np.random.default_rng(0)
+    with h5py.File(path, "w") as file:
+        demo = file.create_group("data/demo_0")
+        demo.attrs["task"] = "close the lid"
+        demo["actions"], demo["base"] = rng.uniform(-1, 1, (6, 7)), rng.uniform(-1, 1, (6, 4))
+        for name, size in {"eef_pos": 3, "eef_quat": 4, "gripper_qpos": 2}.items():
+            demo[f"obs/{name}"] = rng.normal(size=(6, size))
+        for camera in ("left", "right", "wrist"):
+            demo[f"obs/{camera}_image"] = moving_pictures(6, 32)
+    return path
+
+
+def test_parts_of_the_benchmarks_robot_come_in_the_contracts_order(tmp_path: Path) -> None:
+    path, content = _fixed_arm(tmp_path / "real.hdf5"), yaml.safe_load(FIXED_ARM_EXAMPLE)
+    content["action"]["base_motion"] = "base"  # a dataset of another width than that of the first part of the file
+    turned = content | {key: dict(reversed(content[key].items())) for key in ("state", "action")}
+    for name, each in (("as it is", content), ("turned", turned)):
+        root = convert([path], tmp_path / name, ConversionSettings(mapping=_mapping(tmp_path, each))).root
+        assert verify(root).passed
+    for key in ("action", "observation.state"):
+        assert np.array_equal(column(tmp_path / "turned", key), column(tmp_path / "as it is", key))
+        features = [LeRobotDataset("local/x", root=tmp_path / name).features[key] for name in ("as it is", "turned")]
+        assert features[0]["names"] == features[1]["names"]
+
+
+@pytest.mark.parametrize("where", ["state", "action"])
+def test_the_benchmarks_robot_lacks_nothing(tmp_path: Path, where: str) -> None:
+    path, content = _fixed_arm(tmp_path / "real.hdf5"), yaml.safe_load(FIXED_ARM_EXAMPLE)
+    name = next(iter(content[where]))
+    size = len(content[where][name]["constant"])
+    content[where][name] = {"constant": [0] * (size + 1)}
+    with pytest.raises(UserError, match=f"its {name} has {size + 1} components; PandaOmron has {name} of {size}"):
+        make_plan([path], ConversionSettings(mapping=_mapping(tmp_path, content)))
+    del content[where][name]
+    with pytest.raises(UserError, match=f"{where} of the mapping: it has no part '{name}'"):
+        make_plan([path], ConversionSettings(mapping=_mapping(tmp_path, content)))
+
+
+def test_each_file_is_read_as_it_is_itself(tmp_path: Path) -> None:
+    files = [write_libero(tmp_path / name) for name in ("a.hdf5", "b.hdf5")]
+    with h5py.File(files[1], "a") as file:
+        for name in ("demo_0", "demo_1"):  # wider, which a slice does not mind
+            values = np.random.default_rng(7).normal(size=(5, 8))
+            del file[f"data/{name}/obs/ee_states"]
+            file[f"data/{name}/obs/ee_states"] = values
+            file[f"data/{name}/actions"][...] += 1  # no copy of the other file's
+    content = _with(LIBERO, state={"eef": {"key": "obs/ee_states", "slice": [0, 6]}})
+    result = convert(files, tmp_path / "out", ConversionSettings(mapping=_mapping(tmp_path, content)), workers=1)
+    assert (result.num_episodes, result.rejected) == (4, [])
+    stored = column(tmp_path / "out", "observation.state")[10:15]
+    assert np.array_equal(stored, np.random.default_rng(7).normal(size=(5, 8))[:, :6])
+    assert verify(tmp_path / "out").passed

@@ -19,10 +19,13 @@ from robocasa_lerobot.errors import UserError
 
 pytest.importorskip("lerobot.datasets")
 
+from lerobot.datasets.dataset_metadata import CODEBASE_VERSION
+
 from robocasa_lerobot.convert import pipeline
 from robocasa_lerobot.convert.pipeline import convert
 from robocasa_lerobot.convert.settings import ConversionSettings
 from robocasa_lerobot.convert.verify import verify
+from robocasa_lerobot.convert.writing import card
 from robocasa_lerobot.convert.writing.encoding_process import EncodingProcess
 
 SETTINGS = ConversionSettings()
@@ -144,3 +147,17 @@ try:
 except WorkerDiedError as error:
     print(error)
 """
+
+
+def test_a_source_whose_name_is_no_utf_8(tmp_path: Path) -> None:
+    source = tmp_path / os.fsdecode(b"caf\xe9.hdf5")
+    write_demos(tmp_path / "a.hdf5", (3,), images=16).rename(source)
+    root = convert([source], tmp_path / "out", SETTINGS, workers=1).root
+    assert verify(root).passed
+    assert "caf\\udce9.hdf5" in (root / "README.md").read_text(encoding="utf-8")
+
+
+def test_publishing_tags_the_version_that_lerobot_asks_for() -> None:
+    command = f"hf repos tag create OWNER/NAME {CODEBASE_VERSION} --repo-type dataset"
+    assert command in (Path(__file__).parents[2] / "docs" / "data.md").read_text(encoding="utf-8")
+    assert command in (card.__doc__ or "")

@@ -16,6 +16,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from robocasa_lerobot import contract
+from robocasa_lerobot.convert.action_range import out_of_range
 from robocasa_lerobot.convert.mapping.robot_mapping import quaternion_xyzw
 from robocasa_lerobot.convert.mapping.robots import choose_mapping
 from robocasa_lerobot.convert.reading import mjcf
@@ -255,3 +256,14 @@ def test_scenes_that_are_named_by_file_are_found_under_the_asset_roots(tmp_path:
     assert verify(out).passed
     kept = gzip.decompress((out / "extras" / "episode_000000" / "model.xml.gz").read_bytes()).decode()
     assert kept == OLD_SCENE
+
+
+def test_actions_out_of_range_are_counted_the_same_in_any_runs(tmp_path: Path) -> None:
+    mapping = make_plan([write_demos(tmp_path / "a.hdf5", (3,), images=16)], ConversionSettings()).mapping
+    actions = np.random.default_rng(2).normal(size=(50, contract.ACTION_SIZE))
+    whole = out_of_range(mapping, [actions])
+    assert whole is not None
+    outside = (np.abs(actions) > 1.05).any(axis=1)
+    assert (whole["steps"], whole["share"]) == (int(outside.sum()), float(outside.mean()))
+    assert whole["largest"] == np.abs(actions).max()
+    assert out_of_range(mapping, np.split(actions, [1, 20, 33])) == whole

@@ -294,6 +294,16 @@ def test_folders_and_hdf5_files_do_not_mix_and_hdf5_options_are_refused(good: Pa
     assert leftovers(tmp_path / "out") == []
 
 
+def test_a_dataset_given_twice_and_an_output_inside_it_are_refused(good: Path, tmp_path: Path) -> None:
+    with pytest.raises(UserError, match="was given more than once"):
+        convert([good, good], tmp_path / "out", SETTINGS)
+    with pytest.raises(UserError, match="is inside the dataset"):
+        convert([good], good / "v3", SETTINGS)
+    with pytest.raises(UserError, match="nothing to take instead"):
+        convert([good], tmp_path / "out", ConversionSettings(replace_instruction=True))
+    assert leftovers(tmp_path / "out") == leftovers(good / "v3") == []
+
+
 def test_datasets_of_different_robots_do_not_fit_together(good: Path, tmp_path: Path) -> None:
     other = v2.clone(good, tmp_path / "in")
     info(robot_type="GR1")(other)

@@ -186,6 +186,13 @@ def test_one_source_that_was_moved_leaves_the_others_where_they_are(tmp_path: Pa
         verify(root, [files[0]])
 
 
+def test_given_sources_of_one_name_are_not_taken_for_each_other(tmp_path: Path) -> None:
+    files = [write_demos(tmp_path / name / "demo.hdf5", (4,), images=64, seed=i) for i, name in enumerate("ab")]
+    root = convert(files, tmp_path / "data", ConversionSettings(), workers=1).root
+    assert verify(root, [files[0]]).passed  # the other one is where it was
+    assert verify(root, files[::-1]).passed
+
+
 def test_exit_status_and_outputs(damaged: Path, capsys: pytest.CaptureFixture[str]) -> None:
     command = ["verify", str(damaged / "data"), "--source", str(damaged / "demos.hdf5"), "--pictures-per-episode"]
     assert cli.main([*command, "3", "--workers", "2"]) == 0

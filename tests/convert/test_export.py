@@ -262,6 +262,18 @@ def test_damaged_datasets_leave_nothing(ours: tuple[Path, Path, Path], tmp_path:
     attempt("is no LeRobot dataset")
 
 
+def test_cameras_that_were_placed_after_the_recording_are_told(ours: tuple[Path, Path, Path], tmp_path: Path) -> None:
+    assert not any("placed" in note for note in export(ours[1], tmp_path / "plain.hdf5").notes)
+    copy = Path(shutil.copytree(ours[1], tmp_path / "copy"))
+
+    def rendered_again(record: dict[str, Any]) -> None:  # what `render` writes
+        record["settings"] = {"cam_configs": {"above": {"pos": [1, 0, 3]}}}
+
+    v2.edit_json(copy / META_FOLDER / "conversion.json", rendered_again)
+    (note,) = export(copy, tmp_path / "again.hdf5").notes
+    assert "cameras above were placed when the pictures were rendered again" in note
+
+
 def test_pictures_are_decoded_one_by_one(ours: tuple[Path, Path, Path]) -> None:
     dataset = ExportedDataset(ours[1])
     pictures = dataset.pictures(dataset.episodes[2], contract.CAMERAS[1])

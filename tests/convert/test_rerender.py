@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gzip
 import json
 import shutil
 from pathlib import Path
@@ -164,8 +165,21 @@ def test_what_cannot_be_rendered_is_said_before_anything_is_written(converted: P
     refused("convert the recording again", source=copy)
     with pytest.raises(UserError, match="the dataset itself"):
         render_dataset(converted, converted, _settings(), workers=1, overwrite=True)
+    with pytest.raises(UserError, match="is inside the dataset"):
+        render_dataset(converted, converted / "again", _settings(), workers=1)
     with pytest.raises(UserError, match="even number"):
         RenderSettings(image_size=33)
+
+
+@pytest.mark.render
+def test_an_episode_whose_scene_lacks_a_camera_is_named(converted: Path, tmp_path: Path) -> None:
+    copy = Path(shutil.copytree(converted, tmp_path / "copy"))
+    file, camera = copy / "extras" / "episode_000002" / "model.xml.gz", contract.CAMERAS[1]
+    xml = gzip.decompress(file.read_bytes()).replace(camera.encode(), b"elsewhere")
+    file.write_bytes(gzip.compress(xml))
+    with pytest.raises(UserError, match=f"episode 2 of .* cannot be rendered: unknown camera '{camera}'"):
+        render_dataset(copy, tmp_path / "out", _settings(cameras=(camera,), image_size=32), workers=1)
+    assert not (tmp_path / "out").exists()
 
 
 @pytest.mark.render

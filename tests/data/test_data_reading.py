@@ -121,6 +121,17 @@ def test_open_files_are_bounded_and_samples_are_the_same(many: list[Path], tmp_p
     assert 1 <= open_files_under(many[0].parent) <= OPEN
 
 
+def test_open_frame_caches_are_bounded_and_pictures_are_the_same(many: list[Path], tmp_path: Path) -> None:
+    plain, bounded = open_many(many), open_many(many, cache_open_files=OPEN)
+    assert bounded.cache_frames(tmp_path)
+    for _ in range(2):  # what was closed is opened again
+        for number in range(COPIES):
+            wanted, item = plain[120 * number + 31], bounded[120 * number + 31]
+            assert all(torch.equal(item[key], wanted[key]) for key in contract.IMAGE_KEYS)
+            assert sum("_arrays" in cache.__dict__ for cache in bounded._caches.values()) <= OPEN
+            assert 1 <= open_files_under(tmp_path) <= OPEN * len(contract.IMAGE_KEYS)
+
+
 def test_workers_get_a_dataset_without_open_files(many: list[Path], tmp_path: Path) -> None:
     dataset = open_many(many, cache_open_files=OPEN, cache_columns_above_gb=0.0, cache_dir=str(tmp_path))
     first = dataset[31]

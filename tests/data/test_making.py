@@ -25,6 +25,7 @@ from robocasa_lerobot.demos.generate.settings import GenerationSettings
 from robocasa_lerobot.demos.recording import RecordingResult, RecordingSettings, record_tasks
 from robocasa_lerobot.jobs.pool import WorkerDiedError
 from robocasa_lerobot.making import estimate
+from robocasa_lerobot.making.downloads import find_downloads
 from robocasa_lerobot.making.needs import WORK, needs_of, parse_episodes
 from robocasa_lerobot.training.config.experiment import load_experiment
 
@@ -145,6 +146,17 @@ def test_what_is_there_is_counted(tmp_path: Path, capsys: pytest.CaptureFixture[
     assert parse_episodes("human=3, mg=4") == {"human": 3, "mg": 4}
     assert cli.main(["data", str(file), "--make", "--episodes", "human=3"]) == 0  # nothing to do
     assert sorted(path.name for path in Path("datasets/kitchens").iterdir()) == ["pretrain"]
+
+
+def test_downloads_behind_links_are_found(tmp_path: Path) -> None:
+    there = tmp_path / "disk/OpenDrawer/lerobot"
+    (there / "meta").mkdir(parents=True)
+    (there / "meta/info.json").write_text(json.dumps({"codebase_version": "v2.1"}))
+    folder = tmp_path / "datasets"
+    folder.mkdir()
+    (folder / "linked").symlink_to(tmp_path / "disk")
+    (tmp_path / "disk/up").symlink_to(tmp_path / "disk")  # and one in a circle
+    assert [download.source for download in find_downloads(folder)] == [folder / "linked/OpenDrawer/lerobot"]
 
 
 def test_downloads_are_converted_in_bulk(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

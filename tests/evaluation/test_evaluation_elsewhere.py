@@ -14,11 +14,13 @@ import yaml
 from ray_support import StandIn
 
 from robocasa_lerobot.cli import main
+from robocasa_lerobot.errors import UserError
 from robocasa_lerobot.evaluation.config.evaluation import EvaluationConfig
 from robocasa_lerobot.evaluation.config.loader import load_config
 from robocasa_lerobot.evaluation.records.results import TRIALS_FILE, read_results
 from robocasa_lerobot.evaluation.records.trials_file import append
-from robocasa_lerobot.evaluation.run import engine
+from robocasa_lerobot.evaluation.run import distributed, engine
+from robocasa_lerobot.jobs.executors import Execution
 
 NO_DEVICE = "--env.render_devices=977"
 
@@ -99,6 +101,35 @@ def test_the_same_command_runs_what_shards_lack_now(
     shutil.rmtree(out / "shards" / "2-of-2")
     assert main(words) == 0
     assert {record.key: record.comparable() for record in read_results(out).trials} == whole
+
+
+def test_shards_run_the_checkpoint_that_was_there_when_they_were_submitted(
+    tmp_path: Path, ray: StandIn, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    checkpoints = tmp_path / "demo/finetune/checkpoints"
+    for step, weights in (("000400", b"w"), ("000800", b"x")):
+        evaluation_records.make_checkpoint(checkpoints / step / "pretrained_model", weights=weights)
+    last = checkpoints / "last"
+    last.symlink_to("000400")
+    monkeypatch.chdir(tmp_path)
+    words = arguments(Path("unused"), f"{last / 'pretrained_model'},random")
+    config = dataclasses.replace(load_config(EvaluationConfig, words), out=None)
+    submitted = engine.prepare(config)
+    found: list[engine.Evaluation] = []
+
+    def later(step: Any, *_: Any, **__: Any) -> None:
+        last.unlink()
+        last.symlink_to("000800")
+        found.append(engine.prepare(step.keywords["config"]))
+        raise UserError("this far")
+
+    monkeypatch.setattr(distributed, "run_with_ray", later)
+    with pytest.raises(UserError, match="this far"):
+        distributed.run_distributed(config, 1, Execution("ray"))
+    (shard,) = found
+    assert list(submitted.sources) == ["finetune-000400", "random"]
+    assert (shard.sources, shard.out) == (submitted.sources, submitted.out)
+    assert engine.prepare(config).sources != submitted.sources
 
 
 def test_workers_are_as_many_as_the_cores_that_a_process_may_use(monkeypatch: pytest.MonkeyPatch) -> None:

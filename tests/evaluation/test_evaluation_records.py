@@ -163,6 +163,15 @@ def test_other_settings_weights_or_versions_are_refused_with_the_difference() ->
             check(Path("t"), [old], new)
 
 
+def test_trials_of_another_commit_are_mixed_with_a_warning(capsys: pytest.CaptureFixture[str]) -> None:
+    old = dataclasses.replace(header(), git_commit="aaa")
+    trials_file.check_same_run(Path("t"), [old], old)
+    assert capsys.readouterr().err == ""
+    trials_file.check_same_run(Path("t"), [old, old], dataclasses.replace(old, git_commit="bbb-dirty"))
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line.startswith("t holds trials made at commit aaa of this package, and it is now at bbb-dirty")
+
+
 def test_config_from_arguments_in_either_spelling() -> None:
     config = load_config(
         EvaluationConfig,
@@ -189,6 +198,12 @@ def test_config_from_arguments_in_either_spelling() -> None:
         (["--policy.path=zero", "--env.tasks=A", "--trials=0"], "trials: found 0, expected at least 1"),
         (["--policy.path=zero", "--env.tasks=A", "--env.split=traget"], "Did you mean 'target'"),
         (["--policy.path=zero", "--env.tasks=A,A"], "A given twice"),
+        (["--policy.path=zero", "--env.tasks=A", "--perturbation.names=none,none"], "none given twice"),
+        (["--policy.path=zero", "--env.tasks=A", "--policy.lifelong_phase=-1"], "expected at least 0"),
+        (
+            ["--policy.path=zero", "--env.task_sets=lifelong_phase1", "--lifelong=true", "--policy.lifelong_phase=0"],
+            "give --lifelong=false",
+        ),
         (["--policy.path=zero"], "no task: give --env.tasks"),
         (["--env.tasks=A"], "no policy: give --policy.path"),
         (["--env=A"], "env: found 'A', expected settings"),
@@ -240,6 +255,7 @@ def test_a_checkpoint_tells_its_label_size_and_fingerprint(tmp_path: Path) -> No
         400,
         (64, 64),
     )
+    assert source.path == str(folder.resolve())  # a later checkpoint becomes `last`, and is not this one
     # The phase's folder and the checkpoint's are understood as well.
     for place in (folder, folder.parent, tmp_path / "demo/finetune"):
         assert checkpoints.read_source(str(place)).fingerprint == source.fingerprint

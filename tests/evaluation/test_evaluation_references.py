@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import math
 from pathlib import Path
+from types import SimpleNamespace
 
+import h5py
 import pytest
 from task_selection import solvable
 
 from robocasa_lerobot.demos.recording import RecordingSettings, record_task
 from robocasa_lerobot.envs.tasks.registry import task_names
 from robocasa_lerobot.errors import UserError
-from robocasa_lerobot.evaluation.actors.stored_episodes import read_episodes
+from robocasa_lerobot.evaluation.actors.reference_policies import ReplayPolicy
+from robocasa_lerobot.evaluation.actors.stored_episodes import one_per_scene, read_episodes
 from robocasa_lerobot.evaluation.config.evaluation import EvaluationConfig
 from robocasa_lerobot.evaluation.config.loader import load_config
 from robocasa_lerobot.evaluation.records.results import TrialRecord
@@ -50,6 +54,45 @@ def test_replayed_demonstrations_solve_their_scenes_and_zeros_do_not(demos: Path
         evaluate(tmp_path / "other", f"--policy=replay:{demos}", "--env.tasks=OpenDrawer", "--trials=1")
     with pytest.raises(UserError, match="expected an HDF5"):
         evaluate(tmp_path / "none", "--policy=replay:nothing.hdf5", "--env.tasks=CloseDrawer")
+
+
+def test_a_scene_is_replayed_once_by_its_first_episode(demos: Path, tmp_path: Path) -> None:
+    file = tmp_path / "CloseDrawer.hdf5"
+    file.write_bytes(demos.read_bytes())
+    with h5py.File(file, "r+") as opened:
+        data = opened["data"]
+        for name in ("demo_3", "demo_4"):
+            data.copy("demo_0", name)
+            data[name]["actions"][:] = 0.0
+        meta = json.loads(data["demo_4"].attrs["ep_meta"])
+        data["demo_4"].attrs["ep_meta"] = json.dumps({**meta, "split": "pretrain"})
+    first, *others = read_episodes(demos)
+    same, elsewhere = read_episodes(file)[3:]
+    scenes = one_per_scene([first, *others, same, elsewhere])
+    assert list(scenes.values()) == [first, *others, elsewhere]
+    config = load_config(EvaluationConfig, [f"--policy=replay:{file}", "--env.tasks=CloseDrawer", "--trials=3"])
+    plan = engine.prepare(config).plan
+    assert [spec.seed for spec in plan] == [e.seed for e in (first, *others)]
+    with pytest.raises(UserError, match="3 episodes of CloseDrawer in target scenes, 4 trials"):
+        engine.prepare(dataclasses.replace(config, trials=4))
+    policy = ReplayPolicy(file)
+    for split, episode in (("target", first), ("pretrain", elsewhere)):
+        policy.reset(0, SimpleNamespace(task="CloseDrawer", split=split, scene=SimpleNamespace(seed=first.seed)))
+        assert (policy.act({}, "") == episode.actions[0]).all()
+
+
+def test_episodes_whose_robot_starts_elsewhere_are_refused(demos: Path, tmp_path: Path) -> None:
+    file = tmp_path / "CloseDrawer.hdf5"
+    file.write_bytes(demos.read_bytes())
+    noises: list[dict[str, float]] = [{}, {"base_within_m": 1.5}]
+    for noise in noises:
+        with h5py.File(file, "r+") as opened:
+            attributes = opened["data/demo_1"].attrs
+            attributes["ep_meta"] = json.dumps({**json.loads(attributes["ep_meta"]), "initial_noise": noise})
+        if not noise:
+            assert len(read_episodes(file)) == 3
+    with pytest.raises(UserError, match="demo_1: its ep_meta has initial_noise"):
+        read_episodes(file)
 
 
 @pytest.mark.slow

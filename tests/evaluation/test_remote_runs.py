@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import json
+import socket
 import subprocess
 import sys
 import threading
@@ -201,6 +202,21 @@ def test_a_server_that_is_killed_and_comes_back_costs_an_attempt(tmp_path: Path)
     (retried,) = [record for record in results.trials if record.attempts == 2]
     assert "LostError" in str(retried.first_error)
     assert "closed the connection" in str(retried.first_error)
+
+
+def test_a_lost_connection_takes_no_attempt_from_an_error(tmp_path: Path) -> None:
+    def lost(answer: dict[str, Any]) -> Any:
+        server.connections[-1].socket.shutdown(socket.SHUT_RDWR)
+        return answer
+
+    faults = [lost, raising]
+    with OpenpiServer(push) as server:
+        healthy = evaluate(server.url, tmp_path / "healthy")
+    fault = Faulty(lambda answer: faults.pop(0)(answer) if faults else answer, after=4, once=False)
+    with OpenpiServer(fault) as server:
+        results = evaluate(server.url, tmp_path / "out")
+    assert comparable(results) == comparable(healthy)
+    assert sorted(record.attempts for record in results.trials) == [1, 1, 1, 3]
 
 
 def test_a_server_that_stays_away_ends_the_run_and_the_same_command_goes_on(

@@ -130,6 +130,18 @@ def test_constant_components_keep_their_scale() -> None:
     np.testing.assert_allclose(left[contract.STATE_KEY]["std"], [0.5, 1e-10, 1.0])
 
 
+def test_quantiles_that_do_not_see_a_component_move_become_its_ends() -> None:
+    ends = {"min": [0.0, 0.7, 0.0], "max": [1.0, 0.7, 1.0]}
+    quantiles = {"q01": [0.1, 0.7, 0.0], "q99": [0.9, 0.7, 0.9], "q10": [0.2, 0.7, 0.0], "q90": [0.8, 0.7, 0.0]}
+    stats = {contract.ACTION_KEY: {name: np.array(values) for name, values in (ends | quantiles).items()}}
+    safe = widen_constant_components(stats, (contract.ACTION_KEY,), 1e-3)[contract.ACTION_KEY]
+    np.testing.assert_allclose(safe["q01"], [0.1, -0.3, 0.0])
+    np.testing.assert_allclose(safe["q99"], [0.9, 1.7, 0.9])
+    np.testing.assert_allclose(safe["q10"], [0.2, -0.3, 0.0])
+    np.testing.assert_allclose(safe["q90"], [0.8, 1.7, 1.0])  # the third: its end, where q10 is q90
+    np.testing.assert_allclose(safe["min"], [0.0, -0.3, 0.0])
+
+
 @pytest.mark.parametrize("mode", ["MIN_MAX", "MEAN_STD"])
 def test_constant_dimensions_do_not_explode(mode: str) -> None:
     mapping = {"VISUAL": "IDENTITY", "STATE": mode, "ACTION": mode}

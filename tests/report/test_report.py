@@ -275,6 +275,12 @@ def test_the_training_is_found_from_the_checkpoints_place(tmp_path: Path, traini
     assert [phase.name for phase in read_training(found[0]).phases] == ["pretrain", "finetune"]
 
 
+def test_the_results_file_stands_for_its_folder(folder: Path) -> None:
+    assert main(["report", str(folder / results.TRIALS_FILE)]) == 0
+    assert (folder / "report.html").is_file()
+    assert (folder / "report.md").is_file()
+
+
 def test_bad_input_is_a_clear_error(tmp_path: Path, folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["report", str(tmp_path / "nothing")]) == 2
     assert "no such file; expected the trials.jsonl" in capsys.readouterr().err

@@ -56,13 +56,18 @@ def test_every_message_that_the_page_tells_of_is_understood() -> None:
         ('{"type": "action", "frame": 1, "action": [0,0,0,0,0,0,0,0,0,0,0,2]}', "from -1 to 1"),
         ('{"type": "set", "mode": "fly"}', "one of arm, base, both"),
         ('{"type": "set", "mode": ["arm"]}', "one of arm, base, both"),
-        ('{"type": "discard", "reason": "a\\nb"}', "a line"),
+        ('{"type": "discard", "reason": 3}', "a line"),
         ("[" * 20000, "JSON object"),
     ],
 )
 def test_what_is_no_message_is_refused_with_a_reason(text: str, why: str) -> None:
     with pytest.raises(ProtocolError, match=re.escape(why)):
         parse(text)
+
+
+def test_a_reason_is_one_plain_line() -> None:
+    said = "cup\u00a0tipped\nover \U0001f469\u200d\U0001f373"
+    assert parse(json.dumps({"type": "discard", "reason": said}))["reason"] == "cup tipped over \U0001f469 \U0001f373"
 
 
 @given(kind=st.sampled_from(MESSAGE_TYPES), fields=st.dictionaries(st.text(max_size=8), JSON, max_size=4))

@@ -224,8 +224,9 @@ def test_what_is_held_expires_and_is_let_go_where_time_stops(tmp_path: Path, env
         table.say("input", frame=0, arm=[1, 0, 0, 0, 0, 0])
         table.say("focus", on=False)
         assert (table.session.phase, table.session.pause) == ("paused", "focus")
-        table.say("input", frame=0, arm=[1, 0, 0, 0, 0, 0])
+        table.say("input", frame=0, arm=[1, 0, 0, 0, 0, 0], gripper="closed")  # a key that is bumped
         assert table.session.phase == "paused"
+        assert not table.session.driver.steering.closed
         table.say("resume")
         table.tick()
         assert not table.session.driven.actions()[-1][arm].any()
@@ -281,6 +282,15 @@ def test_sessions_go_on_and_a_killed_one_loses_nothing(tmp_path: Path, env: Kitc
     (tmp_path / f".{TASK}.teleop").rename(tmp_path / "elsewhere")
     with pytest.raises(UserError, match="did not record it here"), Store(settings(tmp_path)).held():
         pass
+
+
+def test_a_folder_in_which_nothing_was_kept_takes_other_settings(tmp_path: Path) -> None:
+    with Store(settings(tmp_path)).held() as store:
+        store.discard(0, "too dark", steps=3, undos=0, wall_seconds=0.5)
+    with Store(settings(tmp_path)).held() as store:  # the same ones go on
+        assert store.next_number() == 1
+    with Store(settings(tmp_path, seed=SEED + 5)).held() as store:
+        assert store.next_number() == 0
 
 
 def test_a_full_disk_leaves_the_episode_to_be_saved_again(tmp_path: Path, env: KitchenEnv, shown: Recording) -> None:

@@ -165,3 +165,9 @@ def test_a_port_that_is_taken_is_a_mistake_with_a_remedy(tmp_path: Path) -> None
         server = TeleopServer(dataclasses.replace(settings(tmp_path)), Inbox(), port=taken.getsockname()[1])
         with pytest.raises(UserError, match=r"Choose another --port"):
             server.start()
+
+
+@pytest.mark.parametrize(("host", "port"), [("127.0.0.1", 70_000), ("127.0.0.1", -1), ("no host", 0)])
+def test_an_address_that_cannot_be_is_a_mistake_with_a_remedy(tmp_path: Path, host: str, port: int) -> None:
+    with pytest.raises(UserError, match=r"Choose another --port or --host"):
+        TeleopServer(dataclasses.replace(settings(tmp_path)), Inbox(), host=host, port=port).start()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import os
 import shutil
@@ -23,6 +24,7 @@ from robocasa_lerobot.errors import UserError
 from robocasa_lerobot.evaluation.actors.checkpoint import read_source
 from robocasa_lerobot.training.config.experiment import EmaConfig, load_experiment
 from robocasa_lerobot.training.phases import run_experiment
+from robocasa_lerobot.training.records import check_unchanged
 from robocasa_lerobot.training.setup import builders
 from robocasa_lerobot.training.weights.checkpoint import last_checkpoint, pretrained_model
 from robocasa_lerobot.training.weights.ema import Ema, ema_decay
@@ -134,6 +136,15 @@ def test_changed_settings_of_a_begun_run_are_listed(tmp_path: Path, data: Path) 
     again = tiny(tmp_path, data, overrides=["--phases.finetune.statistics=replace", "--phases.finetune.batch_size=2"])
     with pytest.raises(UserError, match=r"which they keep:\n  phases.finetune.statistics: keep -> replace\nPut them"):
         run_experiment(again, force=True)
+
+
+def test_a_begun_phase_that_would_start_elsewhere_is_told(tmp_path: Path, data: Path) -> None:
+    """`init` says nothing before and after, but another phase comes before it now."""
+    assert not run_experiment(tiny(tmp_path, data), stop_after=5)
+    between = tiny(tmp_path, data)
+    between.phases.insert(1, dataclasses.replace(between.phases[1], name="between"))
+    with pytest.raises(UserError, match=r"phases\.finetune\.init: pretrain -> between"):
+        check_unchanged(between, tmp_path / "out", force=False)
 
 
 def test_forced_settings_of_optimiser_and_policy_are_used(tmp_path: Path, data: Path, finished: Path) -> None:

@@ -14,6 +14,7 @@ import pytest
 import torch
 import yaml
 from accelerate import Accelerator
+from lerobot.processor import NormalizerProcessorStep
 from safetensors.torch import load_file
 from training_support import experiment_file, losses, metrics, tiny, weights
 
@@ -305,10 +306,29 @@ def test_optimizer_and_schedule_of_a_phase(tmp_path: Path, data: Path) -> None:
     )
     assert isinstance(optimizer, torch.optim.SGD)
     assert schedule is None
+    optimizer, _ = made("--phases.pretrain.optimizer={type: xvla-adamw}", "--phases.pretrain.lora={rank: 2}")
+    assert [group["name"] for group in optimizer.param_groups] == ["other"]  # it goes by names
+    cosine = "type: cosine_decay_with_warmup, num_decay_steps: 1000, peak_lr: 1.0, decay_lr: 0.1, num_warmup_steps: 3"
+    _, schedule = made(f"--phases.pretrain.scheduler={{{cosine}}}")  # a warm-up that was asked for is not shortened
+    assert [schedule.lr_lambdas[0](step) for step in range(3)] == pytest.approx([0.25, 0.5, 0.75])
     with pytest.raises(UserError, match="Did you mean 'weight_decay'"):
         made("--phases.pretrain.optimizer={weight_decy: 0.5}")
     with pytest.raises(UserError, match="type of optimizer"):
         made("--phases.pretrain.optimizer={type: sdg}")
+
+
+def test_constant_components_do_not_explode_in_lerobots_policies(tmp_path: Path, data: Path) -> None:
+    experiment = tiny(tmp_path, data, "act")
+    config = builders.policy_config(experiment.policy, None, "cpu")
+    dataset = open_mixture(experiment.phases[0].mixture, experiment.loader)
+    stats = dataset.statistics(images=False)
+    for name, value in (("min", 0.25), ("max", 0.25), ("mean", 0.25), ("std", 0.0)):
+        stats[contract.ACTION_KEY][name][0] = value
+    dataset.meta.stats = builders.with_imagenet_statistics(stats, dataset.meta.camera_keys)
+    builders.make_phase_policy(config, dataset.meta, None)
+    pre, _ = builders.make_processors(config, dataset.meta, None, keep_statistics=False)
+    (normalizer,) = [step for step in pre.steps if isinstance(step, NormalizerProcessorStep)]
+    assert float(normalizer.stats[contract.ACTION_KEY]["std"][0]) == 1.0
 
 
 def test_mistakes_in_phases_are_told(tmp_path: Path, data: Path) -> None:

@@ -9,9 +9,10 @@ from typing import Any
 
 import yaml
 
+from robocasa_lerobot import contract
 from robocasa_lerobot.contract import Part
 from robocasa_lerobot.convert.inspect.hdf5 import DatasetShape, FileReport, is_picture
-from robocasa_lerobot.convert.mapping.robot_mapping import Columns
+from robocasa_lerobot.convert.mapping.robot_mapping import Columns, RobotMapping
 from robocasa_lerobot.convert.mapping.robots import default_cameras
 from robocasa_lerobot.convert.reading.layout import DEFAULT_EPISODES
 from robocasa_lerobot.errors import UserError
@@ -61,12 +62,20 @@ def draft_mapping(report: FileReport) -> str:
 
 
 def _robot_type(report: FileReport) -> str:
-    return report.mapping.robot_type if report.mapping is not None else "unknown"
+    mapping = report.mapping
+    # A mapping that calls its robot as the benchmark's needs all parts of that robot.
+    if mapping is None or (mapping.robot_type == contract.ROBOT_TYPE and not _records_state(report, mapping)):
+        return "unknown"
+    return mapping.robot_type
+
+
+def _records_state(report: FileReport, mapping: RobotMapping) -> bool:
+    return all(columns.key in report.datasets for columns in mapping.state_columns)
 
 
 def _states(report: FileReport) -> dict[str, dict[str, Any]]:
     mapping = report.mapping
-    if mapping is not None and all(columns.key in report.datasets for columns in mapping.state_columns):
+    if mapping is not None and _records_state(report, mapping):
         return _mapped(mapping.state_parts, mapping.state_columns)
     found: dict[str, dict[str, Any]] = {}
     for key, shape in report.datasets.items():

@@ -27,7 +27,15 @@ from robocasa_lerobot.convert.lerobot_v2.episode import Column, V2Episode, given
 from robocasa_lerobot.convert.mapping.robot_mapping import RobotMapping
 from robocasa_lerobot.convert.reading.demo_file import RejectedEpisodeError, SourceError
 from robocasa_lerobot.convert.reading.selection import select
-from robocasa_lerobot.convert.settings import MAX_SHARDS, Camera, ConversionSettings, Plan, Shard, SourceRecord
+from robocasa_lerobot.convert.settings import (
+    MAX_SHARDS,
+    Camera,
+    ConversionSettings,
+    Plan,
+    Shard,
+    SourceRecord,
+    check_request,
+)
 from robocasa_lerobot.convert.writing.video import probe
 from robocasa_lerobot.errors import UnknownNameError, UserError
 
@@ -94,6 +102,7 @@ def make_v2_plan(folders: Sequence[Path], settings: ConversionSettings) -> V2Pla
             or declared without files. Nothing has been written then.
     """
     _check_settings(settings)
+    check_request(folders, settings)
     looks = [look_into(V2Dataset(folder), settings) for folder in folders]
     first = looks[0]
     for look in looks[1:]:

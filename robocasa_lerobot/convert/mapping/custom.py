@@ -63,6 +63,7 @@ cameras:
 instruction: {attribute: task}
 """
 RENDERED = "render"
+ABSOLUTE_SUFFIX = "_absolute"  # of the names of parts that are poses to reach
 _KEYS = ("robot_type", "fps", "episodes", "state", "action", "cameras", "instruction")
 _PART_KEYS = ("key", "slice", "components", "constant")
 _CAMERA_KEYS = ("key", "flip")
@@ -135,12 +136,13 @@ def custom_mapping(robot: CustomRobot, demo: Demo) -> RobotMapping:
     Raises:
         UnknownNameError: the demo has no dataset of a key.
         SourceError: a slice is longer than its dataset, or component names are not as many as components.
+        MappingError: the robot is called as the benchmark's and lacks one of its parts, or has it in another size.
     """
     state = [_resolved(part, demo, "state") for part in robot.state]
     action = [_resolved(part, demo, "action") for part in robot.action]
     if robot.robot_type == contract.ROBOT_TYPE:  # other data of this robot have these names: they go together then
-        state = [(_named(part, contract.STATE_PARTS), columns) for part, columns in state]
-        action = [(_named(part, contract.ACTION_PARTS), columns) for part, columns in action]
+        state = _as_contract(state, contract.STATE_PARTS, "state")
+        action = _as_contract(action, contract.ACTION_PARTS, "action")
     return RobotMapping(
         robot_type=robot.robot_type,
         state_parts=tuple(part for part, _ in state),
@@ -149,6 +151,29 @@ def custom_mapping(robot: CustomRobot, demo: Demo) -> RobotMapping:
         action_columns=tuple(columns for _, columns in action),
         default_cameras=robot.cameras,
     )
+
+
+def _as_contract(
+    parts: Sequence[tuple[Part, Columns]], known: Sequence[Part], where: str
+) -> list[tuple[Part, Columns]]:
+    """The parts with the contract's names of components, in its order where there are no others.
+
+    Raises:
+        MappingError: one of the contract is missing, or has another size.
+    """
+    # A pose to reach stands where the step towards it does.
+    found = {part.name.removesuffix(ABSOLUTE_SUFFIX): (_named(part, known), columns) for part, columns in parts}
+    for part in known:
+        size = found[part.name][0].size if part.name in found else 0
+        if size != part.size:
+            lack = f"its {part.name} has {size} components" if size else f"it has no part {part.name!r}"
+            raise MappingError(
+                f"{where} of the mapping: {lack}; {contract.ROBOT_TYPE} has {part.name} of {part.size}. Say what the "
+                "robot lacks as `constant`, or give another robot_type."
+            )
+    if len(parts) == len(known):
+        return [found[part.name] for part in known]
+    return [(_named(part, known), columns) for part, columns in parts]
 
 
 def _named(part: Part, known: Sequence[Part]) -> Part:

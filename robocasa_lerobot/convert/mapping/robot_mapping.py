@@ -92,7 +92,7 @@ class RobotMapping:
         Raises:
             RejectedEpisodeError: a column is missing or has not the width that this robot's has.
         """
-        first = next(columns.width for columns in self.action_columns if not columns.constant)
+        first = next(columns.width for columns in self.action_columns if columns.key == demo.layout.action_key)
         if demo.actions.shape[1] != first:
             raise RejectedEpisodeError(
                 f"its {demo.layout.action_key} have {demo.actions.shape[1]} numbers, expected {first} for "

@@ -10,7 +10,7 @@ from typing import Any
 from robocasa_lerobot import contract
 from robocasa_lerobot.contract import Part
 from robocasa_lerobot.convert.mapping.controllers import action_parts
-from robocasa_lerobot.convert.mapping.custom import custom_mapping
+from robocasa_lerobot.convert.mapping.custom import ABSOLUTE_SUFFIX, custom_mapping
 from robocasa_lerobot.convert.mapping.robot_mapping import Arm, Columns, RobotMapping
 from robocasa_lerobot.convert.reading.demo import Demo, SourceError
 from robocasa_lerobot.convert.reading.demo_file import DemoFile
@@ -44,7 +44,7 @@ def _absolute(part: Part) -> Part:
         "end_effector_position": ("eef_x", "eef_y", "eef_z"),
         "end_effector_rotation": ("eef_ax", "eef_ay", "eef_az"),
     }.get(part.name)
-    return part if components is None else Part(f"{part.name}_absolute", components)
+    return part if components is None else Part(f"{part.name}{ABSOLUTE_SUFFIX}", components)
 
 
 # Of a PandaOmron's `actions_abs`, in stored order.

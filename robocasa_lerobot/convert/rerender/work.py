@@ -44,11 +44,12 @@ from robocasa_lerobot.convert.writing.files import VIDEO_FILE_MB
 from robocasa_lerobot.convert.writing.modality import modality, read_modality, write_modality
 from robocasa_lerobot.convert.writing.statistics import picture_statistics
 from robocasa_lerobot.convert.writing.video import VideoFiles, probe
-from robocasa_lerobot.errors import UserError
+from robocasa_lerobot.errors import UnknownNameError, UserError
 from robocasa_lerobot.jobs.executors import Execution
 from robocasa_lerobot.jobs.pieces import report_frames, run_pieces, submit_pieces
 from robocasa_lerobot.jobs.publish import (
     check_output,
+    check_outside,
     failures_explained,
     held_folder,
     make_piece,
@@ -56,6 +57,7 @@ from robocasa_lerobot.jobs.publish import (
     publish,
 )
 from robocasa_lerobot.jobs.workers import check_workers, num_workers
+from robocasa_lerobot.jsonl import json_text
 from robocasa_lerobot.quiet import quiet_libraries
 
 _HISTOGRAMS = "histograms.npz"
@@ -99,6 +101,7 @@ def render_dataset(
     check_output(out, overwrite)
     if out == source.absolute():
         raise UserError(f"--out is the dataset itself: {out}. Choose another folder.")
+    check_outside(out, source)
     plan = make_render_plan(source, settings)
     partial = partial_folder(out, plan.fingerprint)
     step, last = _Piece(plan, str(partial)), _LastJob(plan, str(partial), str(out), overwrite)
@@ -171,7 +174,7 @@ def _render_episode(
                     report(done)
             encoder.end_episode()
             videos = encoder.finished()
-    except RejectedEpisodeError as error:
+    except (RejectedEpisodeError, UnknownNameError) as error:  # a camera that other scenes have
         raise UserError(f"episode {episode.index} of {plan.source} cannot be rendered: {error}") from None
     for key, video in videos.items():
         video.path.rename(place / f"{key}.mp4")
@@ -304,7 +307,7 @@ def _write_record(plan: RenderPlan, merged: Path, out: Path) -> None:
 
 
 def _write_json(file: Path, content: Any) -> None:
-    file.write_text(json.dumps(content, indent=4, ensure_ascii=False) + "\n", encoding="utf-8")
+    file.write_text(json_text(content, indent=4) + "\n", encoding="utf-8")
 
 
 def _piece_folder(partial: Path, rank: int) -> Path:

@@ -1,6 +1,7 @@
 """The card of a dataset, `README.md` in its folder: what it is, how it was made, licence, counts, how to load it.
 
-The hub shows it as the dataset's page: `hf upload OWNER/NAME FOLDER --repo-type dataset` publishes both.
+The hub shows it as the dataset's page: `hf upload OWNER/NAME FOLDER --repo-type dataset` publishes both, and
+`hf repos tag create OWNER/NAME v3.0 --repo-type dataset` says the version that LeRobot looks for.
 """
 
 from __future__ import annotations
@@ -35,7 +36,8 @@ def _write(root: Path, ours: bool) -> None:
     info = json.loads((root / "meta/info.json").read_text(encoding="utf-8"))
     record = json.loads((root / _RECORDS / "conversion.json").read_text(encoding="utf-8"))
     episodes = read_jsonl(root / _RECORDS / "episodes.jsonl")
-    (root / CARD).write_text(_card(info, record, episodes, ours), encoding="utf-8")
+    # Names of sources may hold bytes that are no UTF-8.
+    (root / CARD).write_text(_card(info, record, episodes, ours), encoding="utf-8", errors="backslashreplace")
 
 
 def renew_dataset_card(root: Path) -> None:

@@ -7,7 +7,7 @@ episodes differ; training with quantile normalization would see it.
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -26,6 +26,13 @@ def column(root: Path, key: str) -> NDArray[Any]:
     """A numeric column (N,) or (N, k) of all data files of a dataset, in file order, with its stored dtype."""
     tables = [pq.read_table(file, columns=[key]) for file in sorted((root / "data").glob("*/*.parquet"))]
     return column_of(pa.concat_tables(tables), key)
+
+
+def column_batches(root: Path, key: str) -> Iterator[NDArray[Any]]:
+    """A numeric column as `column` gives it, in runs of rows of which one is in memory at a time."""
+    for file in sorted((root / "data").glob("*/*.parquet")):
+        for batch in pq.ParquetFile(file).iter_batches(_ROWS, columns=[key]):
+            yield column_of(pa.Table.from_batches([batch]), key)
 
 
 def column_of(table: pa.Table, key: str) -> NDArray[Any]:
@@ -64,13 +71,12 @@ def _column_statistics(root: Path, key: str) -> dict[str, NDArray[Any]]:
     with tempfile.TemporaryFile(dir=root.parent) as scratch:
         components: np.memmap[Any, np.dtype[np.float64]] | None = None
         start = 0
-        for file in files:
-            for batch in pq.ParquetFile(file).iter_batches(_ROWS, columns=[key]):
-                rows = column_of(pa.Table.from_batches([batch]), key).astype(np.float64).reshape(len(batch), -1)
-                if components is None:
-                    components = np.memmap(scratch, np.float64, "w+", shape=(rows.shape[1], num_rows))
-                components[:, start : start + len(rows)] = rows.T
-                start += len(rows)
+        for batch in column_batches(root, key):
+            rows = batch.astype(np.float64).reshape(len(batch), -1)
+            if components is None:
+                components = np.memmap(scratch, np.float64, "w+", shape=(rows.shape[1], num_rows))
+            components[:, start : start + len(rows)] = rows.T
+            start += len(rows)
         assert components is not None
         each = [vector_statistics(np.array(component)) for component in components]
     joined = {name: np.concatenate([stats[name] for stats in each]) for name in each[0]}

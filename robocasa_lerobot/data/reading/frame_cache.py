@@ -62,6 +62,10 @@ class FrameCache:
         """Frames of a camera feature: uint8 (*indices.shape, 3, height, width)."""
         return torch.from_numpy(self._arrays[key][indices])
 
+    def close(self) -> None:
+        """Let go of the files until they are used again: a mapped file keeps its descriptor."""
+        self.__dict__.pop("_arrays", None)
+
     def __getstate__(self) -> dict[str, Any]:
         """A worker process maps the files itself; the arrays must not travel."""
         return {"folder": self.folder}

@@ -77,6 +77,12 @@ class PolicySource:
         )
 
 
+def _as_given(path: Path, folder: Path) -> Path:
+    """A resolved folder from the working folder on, where it was given so: results then hold no machine's paths."""
+    here = Path.cwd().resolve()
+    return folder.relative_to(here) if not path.is_absolute() and folder.is_relative_to(here) else folder
+
+
 def read_source(path: str, label: str | None = None, own_pictures: bool = False) -> PolicySource:
     """The policy at `path`, which is no address; `own_pictures` are another simulator's, whose names are not ours.
 
@@ -88,7 +94,8 @@ def read_source(path: str, label: str | None = None, own_pictures: bool = False)
     kind, colon, file = path.partition(":")
     if kind == REPLAY and colon:
         return PolicySource(label or REPLAY, path, REPLAY, fingerprint=stored_fingerprint(Path(file)))
-    folder = find_pretrained(Path(path))
+    # `checkpoints/last` is another folder after the next save: what is loaded later is what is described here.
+    folder = find_pretrained(Path(path)).resolve()
     try:
         config = json.loads((folder / "config.json").read_text(encoding="utf-8"))
         kind = config["type"]
@@ -96,8 +103,8 @@ def read_source(path: str, label: str | None = None, own_pictures: bool = False)
         raise CheckpointError(f"{folder / 'config.json'}: not the config of a LeRobot policy ({error!r}).") from error
     origin = read_origin(folder)
     return PolicySource(
-        label or default_label(origin, folder.resolve()),
-        str(folder),
+        label or default_label(origin, folder),
+        str(_as_given(Path(path), folder)),
         kind,
         fingerprint(folder),
         origin.phase,

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from robocasa_lerobot import contract
 from robocasa_lerobot.evaluation.actors.actor import ActingTime, Observation
-from robocasa_lerobot.evaluation.actors.stored_episodes import StoredEpisode, read_episodes
+from robocasa_lerobot.evaluation.actors.stored_episodes import one_per_scene, read_episodes
 
 
 def action_bounds(env: Any) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -115,12 +115,12 @@ class ReplayPolicy(_Blind):
 
     def __init__(self, path: Path) -> None:
         super().__init__()
-        self._episodes: dict[tuple[str, int], StoredEpisode] = {(e.task, e.seed): e for e in read_episodes(path)}
+        self._episodes = one_per_scene(read_episodes(path))
         self._actions: Iterator[NDArray[np.float32]] = iter(())
 
     def reset(self, seed: int, env: Any) -> None:
         """Find the episode of the env's task and scene."""
-        self._actions = iter(self._episodes[env.task, env.scene.seed].actions)
+        self._actions = iter(self._episodes[env.task, env.split, env.scene.seed].actions)
 
     def act(self, observation: Observation, instruction: str) -> NDArray[np.float32]:
         """The next stored action."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -28,9 +29,18 @@ def read_episodes(path: Path) -> list[StoredEpisode]:
     """All episodes of a file of demonstrations or a dataset whose scenes this project can make again.
 
     Raises:
-        UserError: neither, or an episode without the seed of its scene (recorded by other software).
+        UserError: neither, or an episode without the seed of its scene (recorded by other software), or in a scene
+            that the seed alone does not make again.
     """
     return _of_dataset(path) if path.is_dir() else _of_file(path)
+
+
+def one_per_scene(episodes: Iterable[StoredEpisode]) -> dict[tuple[str, str, int], StoredEpisode]:
+    """The first episode of each scene, by task, split and seed: replayed again, a scene would be no further trial."""
+    found: dict[tuple[str, str, int], StoredEpisode] = {}
+    for episode in episodes:
+        found.setdefault((episode.task, episode.split, episode.seed), episode)
+    return found
 
 
 def _of_file(path: Path) -> list[StoredEpisode]:
@@ -67,5 +77,10 @@ def _episode(where: str, task: str, meta: dict[str, Any], actions: NDArray[Any])
         raise UserError(
             f"{where}: recorded with --layouts or --styles, so that its seed is another kitchen here. "
             "`robocasa-lerobot replay` makes its own kitchen again."
+        )
+    if meta.get("initial_noise"):
+        raise UserError(
+            f"{where}: its ep_meta has initial_noise (recorded with --start-within), so that its robot starts "
+            "elsewhere here. `robocasa-lerobot replay` makes its own start again."
         )
     return StoredEpisode(task, str(meta["split"]), meta["seed"], np.asarray(actions, dtype=np.float32))

@@ -40,7 +40,8 @@ class PolicySettings:
         who shares a batch. 0: 8 on a GPU for policies that draw the noise of each observation by itself, else 1.
     threads: CPU threads of each policy. Fixed, not derived from the number of workers, because sums of floats depend
         on it, and a trial's outcome must not depend on how trials are spread over processes.
-    lifelong_phase: for each policy, the phase (from 1) that it was trained up to; a label, and what `lifelong` reads.
+    lifelong_phase: for each policy, the phase (from 1) that it was trained up to, 0 for the untrained one; a label, and
+        what `lifelong` reads.
     demo_fraction: for each policy, the share of the target demonstrations that it was trained on; a label.
     training_data: for each policy, what it was trained on, such as "target only"; a label.
     """
@@ -225,9 +226,19 @@ class EvaluationConfig:
             raise UserError("policy.keys is for policies behind a socket, such as openpi://HOST:PORT; there is none.")
         if self.lifelong and not (policy.lifelong_phase and env.task_sets):
             raise UserError("lifelong needs env.task_sets in the order of the phases and --policy.lifelong_phase=K.")
+        if self.lifelong and 0 in policy.lifelong_phase:
+            raise UserError(
+                "policy.lifelong_phase: found 0, the untrained policy, which has no task sets of its own: give "
+                "--lifelong=false, with which each policy runs all task sets."
+            )
         if any(not 0 <= share <= 1 for share in policy.demo_fraction):
             raise UserError(f"policy.demo_fraction: found {policy.demo_fraction}, expected shares between 0 and 1.")
-        for what, names in (("policy.label", policy.label), ("env.tasks", env.tasks), ("env.task_sets", env.task_sets)):
+        for what, names in (
+            ("policy.label", policy.label),
+            ("env.tasks", env.tasks),
+            ("env.task_sets", env.task_sets),
+            ("perturbation.names", self.perturbation.names),
+        ):
             twice = sorted({name for name in names if names.count(name) > 1})
             if twice:
                 raise UserError(f"{what}: {', '.join(twice)} given twice.")
@@ -263,7 +274,7 @@ class EvaluationConfig:
             "env.horizon": (env.horizon, 1),
             "env.tasks_per_set": (env.tasks_per_set, 1),
             "success.hold_steps": (self.success.hold_steps, 1),
-            **{f"policy.lifelong_phase[{i}]": (phase, 1) for i, phase in enumerate(policy.lifelong_phase)},
+            **{f"policy.lifelong_phase[{i}]": (phase, 0) for i, phase in enumerate(policy.lifelong_phase)},
         }
         for name, (number, low) in at_least.items():
             if number is not None and number < low:

@@ -218,7 +218,7 @@ class TrialRecord:
         stages: how far it came in the task's stages; None for an env without stages, and for a trial that broke.
         outcome: one of `OUTCOMES`.
         error: of a trial that did not finish: what happened, in its second attempt.
-        attempts: 1, or 2 if it was tried again.
+        attempts: 1, or more if it was tried again.
         first_outcome, first_error: those of the first attempt, where there was a second one.
         warnings: MuJoCo's warnings during the trial, with their counts.
         trajectory: SHA-256 over all actions and proprioception; equal for trials that took the same course.

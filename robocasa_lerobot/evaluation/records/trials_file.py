@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import sys
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
@@ -65,18 +66,27 @@ def _short(fingerprint: str) -> str:
 
 
 def check_same_run(path: Path, headers: Iterable[RunHeader], new: RunHeader) -> None:
-    """Refuse to mix trials of different settings or checkpoints in one results file.
+    """Refuse to mix trials of different settings or checkpoints in one results file; say it of different commits.
 
     Raises:
         ResultsError: a setting, a deciding version or a checkpoint differs; all differences are named.
     """
-    found = dict.fromkeys(line for old in headers for line in differences(old, new))
+    earlier = list(headers)
+    found = dict.fromkeys(line for old in earlier for line in differences(old, new))
     if found:
         raise ResultsError(
             f"{path} holds trials made with other settings:\n  " + "\n  ".join(found) + "\n"
             "Trials of different settings are never mixed: choose another --out (or --policy.label for another "
             "checkpoint), or go back to the settings of the file."
         )
+    # A warning only: most commits change no outcome, and which do nobody can tell from here.
+    for commit in dict.fromkeys(old.git_commit for old in earlier):
+        if commit != new.git_commit:
+            print(
+                f"{path} holds trials made at commit {commit or 'unknown'} of this package, and it is now at "
+                f"{new.git_commit or 'unknown'}: if trials take another course since, choose another --out.",
+                file=sys.stderr,
+            )
 
 
 def _flat(values: dict[str, Any], prefix: str = "") -> dict[str, Any]:

@@ -9,6 +9,7 @@ import numpy as np
 
 from robocasa_lerobot.benchmark import published
 from robocasa_lerobot.evaluation.records.results import UNPERTURBED
+from robocasa_lerobot.evaluation.report.joining import alike
 from robocasa_lerobot.evaluation.report.policies import GROUP_LABELS, PolicyResult, ReportData
 from robocasa_lerobot.evaluation.report.published_cells import AVERAGE, tasks_of
 from robocasa_lerobot.evaluation.statistics.averages import Counts
@@ -28,6 +29,11 @@ class Curve:
     pretrained: bool
     published: bool
     points: dict[int, PolicyResult] = field(default_factory=dict)
+
+    @property
+    def several(self) -> bool:
+        """Whether its points are of several experiments."""
+        return len({policy.info.experiment for policy in self.points.values()}) > 1
 
 
 @dataclass(frozen=True)
@@ -83,9 +89,10 @@ def all_curves(data: ReportData) -> list[Curve]:
         label = name or ("with pretraining" if pretrained else TARGET_ONLY)
         curve = found.setdefault((pretrained, name, number), Curve(label, pretrained, place is not None))
         curve.points[demos] = policy
-    for curve in found.values():
+    curves = _put_together(list(found.values()))
+    for curve in curves:
         curve.points = dict(sorted(curve.points.items()))
-    return sorted(found.values(), key=lambda curve: (curve.pretrained, not curve.published, -len(curve.points)))
+    return sorted(curves, key=lambda curve: (curve.pretrained, not curve.published, -len(curve.points)))
 
 
 def groups(only: Mapping[int, PolicyResult], pretrained: Mapping[int, PolicyResult]) -> list[GroupCurves]:
@@ -107,6 +114,29 @@ def published_percent(key: str, pretrained: bool, demos: int) -> float | None:
         if column.facts["pretrained"] is pretrained and column.facts["target_demos"] == demos:
             return table.value(key, column.key)
     return None
+
+
+def _put_together(curves: list[Curve]) -> list[Curve]:
+    """Single points of several experiments as one curve, where no experiment has several: alone they make none."""
+    out = [curve for curve in curves if len(curve.points) > 1]
+    sides = {curve.pretrained for curve in out}
+    for curve in curves:
+        if len(curve.points) > 1:
+            continue
+        ((demos, policy),) = curve.points.items()
+        fitting = (
+            other
+            for other in out
+            if curve.pretrained not in sides and other.pretrained == curve.pretrained and demos not in other.points
+            # What a policy without target data was trained on is called otherwise, whatever the others' is called.
+            if all(alike(policy, point, data=0 not in (demos, at)) for at, point in other.points.items())
+        )
+        if (found := next(fitting, None)) is None:
+            out.append(curve)
+        else:
+            found.points[demos] = policy
+            found.label, found.published = f"{found.label} + {curve.label}", found.published and curve.published
+    return out
 
 
 def _is_pretrained(policy: PolicyResult) -> bool:

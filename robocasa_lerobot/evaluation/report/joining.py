@@ -67,6 +67,16 @@ def same_training(a: PolicyResult, b: PolicyResult) -> bool:
     return one == other and one[0] is not None
 
 
+def alike(a: PolicyResult, b: PolicyResult, data: bool = True) -> bool:
+    """Whether policies of two trainings may be points of one curve: of one type, under the same rules and perturbation.
+
+    With `data` their `training_data` agree too.
+    """
+    rules = all(getattr(a.header, rule) == getattr(b.header, rule) for rule in _RULES if rule != "protocol")
+    same = (a.info.type, a.condition) == (b.info.type, b.condition)
+    return rules and same and (not data or a.info.training_data == b.info.training_data)
+
+
 def training_folder(path: str) -> Path | None:
     """The output folder of the training of a checkpoint `<folder>/<phase>/checkpoints/<step>/pretrained_model`."""
     above = Path(path).parents

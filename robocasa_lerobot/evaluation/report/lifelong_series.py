@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 from robocasa_lerobot.evaluation.report import numbers as fmt
-from robocasa_lerobot.evaluation.report.joining import training_folder
+from robocasa_lerobot.evaluation.report.joining import alike, training_folder
 from robocasa_lerobot.evaluation.report.policies import (
     GROUP_LABELS,
     LIFELONG_SETS,
@@ -86,6 +86,11 @@ class LifelongSeries:
         """Whether some phase's tasks are not those of the published phase."""
         return any(name not in LIFELONG_SETS or self.tasks(k) != tasks_of(name) for k, name in self.sets.items())
 
+    @property
+    def several(self) -> bool:
+        """Whether its phases are of several trainings."""
+        return len({(one.info.experiment, training_folder(one.info.path)) for one in self.policies.values()}) > 1
+
     def matrix(self) -> Lifelong | None:
         """The matrix and its summaries; None where fewer than two phases were evaluated."""
         counts = {k: {j: [r.counts for r in cell] for j, cell in row.items()} for k, row in self.cells.items()}
@@ -105,18 +110,43 @@ def all_series(data: ReportData) -> list[LifelongSeries]:
         while phase in found.get((*key, number), {}):
             number += 1
         found.setdefault((*key, number), {})[phase] = policy
-    labels = [_label(policies) for policies in found.values()]
+    series = _put_together(list(found.values()))
+    labels = [_label(policies) for policies in series]
     return [
         LifelongSeries(
             f"{label}, {number}" if labels.count(label) > 1 else label, policies, _sets(list(policies.values()))
         )
-        for number, (label, policies) in enumerate(zip(labels, found.values(), strict=True), start=1)
+        for number, (label, policies) in enumerate(zip(labels, series, strict=True), start=1)
     ]
 
 
+def _put_together(found: list[dict[int, PolicyResult]]) -> list[dict[int, PolicyResult]]:
+    """Single phases of several trainings as one series, where no training has several: alone they make no matrix.
+
+    An untrained policy, which is of no training, goes to the first series like it that lacks one.
+    """
+    out = [policies for policies in found if len(policies) > 1]
+    none_whole = not out
+    for policies in found:
+        if len(policies) > 1:
+            continue
+        ((phase, policy),) = policies.items()
+        fitting = (
+            other
+            for other in out
+            if (none_whole or phase == 0) and phase not in other
+            if all(alike(policy, one, data=0 not in (phase, at)) for at, one in other.items())
+        )
+        if (series := next(fitting, None)) is None:
+            out.append(policies)
+        else:
+            series[phase] = policy
+    return [dict(sorted(policies.items())) for policies in out]
+
+
 def _label(policies: dict[int, PolicyResult]) -> str:
-    last = policies[max(policies)]
-    return label_under(last.info.experiment or "lifelong", last.condition)
+    names = dict.fromkeys(one.info.experiment for phase, one in policies.items() if phase and one.info.experiment)
+    return label_under(" + ".join(names) or "lifelong", policies[max(policies)].condition)
 
 
 def _lacking(policy: PolicyResult, name: str) -> set[str]:

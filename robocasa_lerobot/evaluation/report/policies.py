@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from robocasa_lerobot.benchmark import published
+from robocasa_lerobot.evaluation.config.evaluation import KITCHEN_ENV_FACTORY
 from robocasa_lerobot.evaluation.records.results import UNPERTURBED, PolicyInfo, RunHeader, TrialRecord
 from robocasa_lerobot.evaluation.report.places import PERTURBATIONS, Place, places, tables
 from robocasa_lerobot.evaluation.statistics import Estimate, Rate, average_over_tasks
@@ -34,6 +35,8 @@ GROUP_LABELS = {
 }
 # What decides whether two trials had the same scene, start, wording and rules; the policy alone may differ.
 _SAME_RULES = ("render_preset", "success_rule", "success_hold_steps")
+# Settings of a run that say which simulator its trials ran in; results have only those that say something.
+_SIMULATOR = ("factory", "type", "simulator", "options")
 
 
 @dataclass(frozen=True)
@@ -195,11 +198,13 @@ def average_of(tasks: Iterable[TaskResult]) -> Estimate:
 def same_trials(
     a: PolicyResult, b: PolicyResult, condition_a: str | None = None, condition_b: str | None = None
 ) -> Mapping[str, tuple[Outcomes, Outcomes]]:
-    """Task -> successes of A and of B on the trials that both ran: same seed, kitchens, horizon and rules.
+    """Task -> successes of A and of B on the trials that both ran: same simulator, seed, kitchens, horizon and rules.
 
     Under the same perturbation too, each policy's own, unless both are named.
     """
     if any(getattr(a.header, rule) != getattr(b.header, rule) for rule in _SAME_RULES):
+        return {}
+    if _simulator(a.header) != _simulator(b.header):
         return {}
     one, two = condition_a or a.condition, condition_b or b.condition
     if one != two and (condition_a is None or condition_b is None):
@@ -211,8 +216,9 @@ def same_trials(
         other = b.task(result.task, two)
         if other is None:
             continue
-        theirs = {_start(record): record.success for record in other.trials}
-        pairs = [(r.success, theirs[_start(r)]) for r in result.trials if _start(r) in theirs]
+        theirs = {_start(record): record for record in other.trials}
+        found = [(record, theirs[_start(record)]) for record in result.trials if _start(record) in theirs]
+        pairs = [(one.success, their.success) for one, their in found if _may_share_kitchen(one, their)]
         if pairs:
             columns = np.array(pairs, dtype=bool)
             out[result.task] = (columns[:, 0], columns[:, 1])
@@ -221,6 +227,17 @@ def same_trials(
 
 def _start(record: TrialRecord) -> tuple[object, ...]:
     return (record.task, record.trial, record.seed, record.split, record.horizon)
+
+
+def _simulator(header: RunHeader) -> tuple[object, ...]:
+    settings = {"factory": KITCHEN_ENV_FACTORY, **header.settings}
+    return tuple(settings.get(name) or None for name in _SIMULATOR)
+
+
+def _may_share_kitchen(a: TrialRecord, b: TrialRecord) -> bool:
+    """False where both say their kitchens, and these differ: versions draw others from the same seed."""
+    one, two = (a.layout_id, a.style_id), (b.layout_id, b.style_id)
+    return None in one or None in two or one == two
 
 
 def is_reference(policy: PolicyResult) -> bool:
@@ -255,7 +272,9 @@ def describe_policy(policy: PolicyResult) -> str:
     if info.demo_fraction is not None:
         facts.append(f"{100 * info.demo_fraction:g} % of the target demonstrations")
     if info.lifelong_phase is not None:
-        facts.append(f"after lifelong phase {info.lifelong_phase}")
+        facts.append(
+            f"after lifelong phase {info.lifelong_phase}" if info.lifelong_phase else "before lifelong phase 1"
+        )
     return ", ".join(facts)
 
 

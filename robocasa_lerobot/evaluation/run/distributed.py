@@ -45,9 +45,11 @@ def run_distributed(config: EvaluationConfig, shards: int, execution: Execution)
     if config.shard is not None:
         raise UserError("--executor runs all shards: leave --shard out.")
     evaluation = prepare(config, here=False)  # mistakes come up here, not in the first job
-    out = evaluation.out
+    out, sources = evaluation.out, evaluation.sources
+    # Shards run what was there when they were submitted, whatever `checkpoints/last` is by then.
+    policy = dataclasses.replace(config.policy, path=[s.path for s in sources.values()], label=list(sources))
     # A node shows cores that are not the shard's.
-    config = dataclasses.replace(config, workers=config.workers or execution.cpus)
+    config = dataclasses.replace(config, policy=policy, out=str(out), workers=config.workers or execution.cpus)
     step, last_step = partial(run_shard, config=config), partial(finish, config)
     folder = out / _FOLDER / f"{evaluation.header.id}-{shards}"
     folder.mkdir(parents=True, exist_ok=True)

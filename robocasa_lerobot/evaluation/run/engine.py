@@ -151,18 +151,19 @@ def _stored_seeds(
         return {}
     if len(replays) > 1:
         raise UserError("one replay:FILE at a time: its scenes are the trials' scenes.")
-    from robocasa_lerobot.evaluation.actors.stored_episodes import read_episodes
+    from robocasa_lerobot.evaluation.actors.stored_episodes import one_per_scene, read_episodes
 
     file = Path(replays[0].path.partition(":")[2])
     seeds: dict[str, list[int]] = {}
-    for episode in read_episodes(file):
-        if episode.split == config.env.split:
-            seeds.setdefault(episode.task, []).append(episode.seed)
+    for task, split, seed in one_per_scene(read_episodes(file)):
+        if split == config.env.split:
+            seeds.setdefault(task, []).append(seed)
     for task in tasks:
         found = len(seeds.get(task, []))
         if found < config.trials:
             raise UserError(
-                f"{file}: {found} episodes of {task} in {config.env.split} scenes, {config.trials} trials: "
+                f"{file}: {found} episodes of {task} in {config.env.split} scenes, {config.trials} trials "
+                "(several episodes of one scene count once): "
                 f"use --trials={found} or fewer, other --env.tasks, or --env.split."
             )
     settings["scenes_of"] = replays[0].fingerprint

@@ -21,8 +21,9 @@ from robocasa_lerobot.evaluation.run.processes import cause_of_death, process_co
 from robocasa_lerobot.evaluation.run.rollout import Outcome
 from robocasa_lerobot.evaluation.run.worker import WorkerSettings, worker_main
 
+# That end with an error; lost connections are counted apart.
 MAX_ATTEMPTS = 2
-# Of a trial whose policy behind a socket is lost each time; then the run ends, because no other trial will fare better.
+# Of a trial whose policy behind a socket is lost so often; then the run ends, because no other trial will fare better.
 MAX_LOST = 3
 # A worker that dies before it is ready dies of its surroundings (imports, memory); trying for ever would not help.
 MAX_FAILED_STARTS = 3
@@ -33,12 +34,16 @@ _POLL_SECONDS = 0.5
 
 @dataclass(frozen=True)
 class Completed:
-    """A trial that will not be tried again."""
+    """An attempt that has ended; from `WorkerPool.run`, the last one at its trial.
+
+    `attempts`: made at the trial so far. `lost`: those among them that lost the connection to their policy.
+    """
 
     spec: TrialSpec
     result: Finished
     attempts: int
     earlier: Finished | None
+    lost: int = 0
 
 
 @dataclass
@@ -46,6 +51,11 @@ class _Attempt:
     spec: TrialSpec
     number: int = 1
     earlier: Finished | None = None
+    lost: int = 0
+
+    def ended(self, result: Finished) -> Completed:
+        """This attempt with its result."""
+        return Completed(self.spec, result, self.number, self.earlier, self.lost + (result.lost is not None))
 
 
 @dataclass
@@ -109,11 +119,11 @@ class WorkerPool:
                     if slot.ready and slot.attempt is None and pending and self._may_begin(pending[0].spec):
                         self._give(slot, pending.popleft())
                 for completed in self._collect():
-                    lost = completed.result.lost
-                    if lost is not None and completed.attempts >= MAX_LOST:
-                        raise UserError(_gave_up(completed, lost))
-                    if completed.result.error is not None and (lost is not None or completed.attempts < MAX_ATTEMPTS):
-                        pending.appendleft(_Attempt(completed.spec, completed.attempts + 1, completed.result))
+                    result, number, lost = completed.result, completed.attempts, completed.lost
+                    if result.lost is not None and lost >= MAX_LOST:
+                        raise UserError(_gave_up(completed, result.lost))
+                    if result.error is not None and (result.lost is not None or number - lost < MAX_ATTEMPTS):
+                        pending.appendleft(_Attempt(completed.spec, number + 1, result, lost))
                     else:
                         yield completed
             finished = True
@@ -145,7 +155,7 @@ class WorkerPool:
             elif isinstance(message, Finished):
                 attempt, slot.attempt = slot.attempt, None
                 assert attempt is not None, "a worker reported a trial that it was not given"
-                yield Completed(attempt.spec, message, attempt.number, attempt.earlier)
+                yield attempt.ended(message)
             else:
                 assert isinstance(message, Alive), message
         now = time.monotonic()
@@ -162,7 +172,7 @@ class WorkerPool:
         self._slots.remove(slot)
         if slot.attempt is not None:
             result = Finished(Outcome(), None, time.monotonic() - slot.given_at, cause, kind)
-            yield Completed(slot.attempt.spec, result, slot.attempt.number, slot.attempt.earlier)
+            yield slot.attempt.ended(result)
         elif not slot.ready:
             self._failed_starts += 1
             if self._failed_starts >= MAX_FAILED_STARTS:
@@ -221,6 +231,6 @@ class WorkerPool:
 def _gave_up(completed: Completed, why: str) -> str:
     spec = completed.spec
     return (
-        f"policy {spec.label!r} was lost {completed.attempts} times during {spec.task} trial {spec.trial}: {why}. What "
+        f"policy {spec.label!r} was lost {completed.lost} times during {spec.task} trial {spec.trial}: {why}. What "
         "has been recorded stays; start the server again, and the same command goes on."
     )

@@ -10,6 +10,7 @@ from lerobot.optim import AdamWConfig
 
 from robocasa_lerobot.contract import STATE_PARTS, STATE_SIZE, STATE_SLICES
 from robocasa_lerobot.errors import UserError
+from robocasa_lerobot.policies.common.statistics import CONSTANT_RANGE
 
 
 def state_without_base() -> list[int]:
@@ -46,7 +47,7 @@ class ActionChunkConfig(PreTrainedConfig):
     noise_draws: int = 1  # (time, noise) pairs per sample and step; pictures are read once for all of them
 
     # Normalisation. See `policies/common/statistics.py` for constant components.
-    constant_range: float = 1e-3  # a narrower component (max - min) counts as constant and keeps its scale
+    constant_range: float = CONSTANT_RANGE  # a narrower component (max - min) counts as constant and keeps its scale
 
     # AdamW and warm-up, used by training unless it says otherwise.
     optimizer_lr: float = 1e-4

@@ -7,6 +7,9 @@ from typing import Any
 
 import numpy as np
 
+CONSTANT_RANGE = 1e-3  # a component with less between its ends counts as constant, where a policy has no range itself
+_QUANTILES = (("q01", "q99"), ("q10", "q90"))
+
 
 def widen_constant_components(
     stats: Mapping[str, Mapping[str, Any]], keys: Iterable[str], constant_range: float
@@ -17,7 +20,8 @@ def widen_constant_components(
     moves, a base that stays put) this is division by nothing: a value that differs in the seventh digit becomes
     enormous, and so does the whole component in a later training phase that keeps the statistics. Diffusion
     Policy's rule is used instead: where the range is below `constant_range`, the range becomes 2 around its
-    middle (min-max then only subtracts the middle), and a standard deviation becomes 1.
+    middle (min-max then only subtracts the middle), and a standard deviation becomes 1. A component that moves, but
+    so seldom that a pair of quantiles does not see it, gets min and max in their places.
 
     Args:
         stats: LeRobot's statistics, feature -> name -> array of shape (components,). Left untouched.
@@ -34,6 +38,12 @@ def widen_constant_components(
         low = np.asarray(out[key]["min"], dtype=np.float64)
         high = np.asarray(out[key]["max"], dtype=np.float64)
         constant = (high - low) < constant_range
+        for lower, upper in _QUANTILES:
+            if lower in out[key] and upper in out[key]:
+                below, above = (np.asarray(out[key][name], dtype=np.float64) for name in (lower, upper))
+                narrow = (above - below) < constant_range
+                out[key][lower] = np.where(narrow, low, below)
+                out[key][upper] = np.where(narrow, high, above)
         middle = (low + high) / 2
         for names, offset in ((("min", "q01", "q10"), -1.0), (("max", "q99", "q90"), 1.0)):
             for name in names:

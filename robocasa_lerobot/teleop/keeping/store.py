@@ -191,8 +191,12 @@ class Store:
 
     def _check(self) -> None:
         note = self.folder / _SETTINGS
-        if note.exists() and json.loads(note.read_text(encoding="utf-8")) != self.settings.identity():
-            others = differing(json.loads(note.read_text(encoding="utf-8")), self.settings.identity())
+        before = json.loads(note.read_text(encoding="utf-8")) if note.exists() else self.settings.identity()
+        if before != self.settings.identity() and not self.path.exists() and not any(self.folder.glob("[0-9]*.hdf5")):
+            note.unlink()  # nothing was kept with other settings, and numbers of attempts stand for other kitchens
+            (self.folder / _ATTEMPTS).unlink(missing_ok=True)
+        elif before != self.settings.identity():
+            others = differing(before, self.settings.identity())
             raise UserError(
                 f"{self.settings.out} has episodes of {self.settings.task} that were recorded with other settings "
                 f"({others}). Give those, or choose another --out."

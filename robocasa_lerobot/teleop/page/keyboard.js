@@ -130,11 +130,19 @@ export class Keyboard {
   release() {
     const held = [...this.held];
     this.held.clear();
-    for (const name of held) if (name in COMMANDS) this.on.command(name, false);
+    for (const name of held) {
+      if (name in COMMANDS) this.on.command(name, false);
+      this.light(name, false);
+    }
   }
 
   down(event) {
     if (this.waiting) return this.assign(event);
+    if (event.metaKey && this.held.size) {
+      // While the command key of a Mac is down, no other key is said to have gone up.
+      this.release();
+      this.on.changed();
+    }
     const name = this.names.get(event.code);
     if (!name || event.ctrlKey || event.metaKey || event.altKey || document.querySelector("dialog[open]")) return;
     const target = event.target instanceof Element ? event.target : document.body;

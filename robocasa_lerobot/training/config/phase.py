@@ -77,7 +77,7 @@ class HeldOutConfig:
     """Episodes that are left out of the training, to measure the loss on them for each task.
 
     Attributes:
-        share: of the episodes of each task, at least one of two or more.
+        share: of the episodes of each task; none of a task with fewer than those of which this is one.
         every: optimiser steps between measurements; the last step always has one.
         samples: frames of each task that are measured, the same ones every time.
     """

@@ -60,7 +60,7 @@ def prepare_phase(
     if phase.held_out is not None:
         dataset, apart = without_held_out(dataset, phase.held_out, experiment.data_loader, experiment.seed)
         if apart is None:
-            accelerator.print(f"phase {phase.name}: no task has two episodes, so that none is held out")
+            accelerator.print(f"phase {phase.name}: tasks have too few episodes for one to be held out")
     for part in (dataset, apart) if apart is not None else (dataset,):
         builders.set_windows(part, config)
         part.set_picture_size(builders.frame_size(config))
@@ -98,7 +98,17 @@ def prepare_phase(
         )
     optimizer, scheduler, clip = builders.make_optimizer(policy, phase, masters)
     ema = Ema(policy, phase.ema, masters=masters) if phase.ema.enabled else None
-    state = TrainingState(policy, pre, post, optimizer, scheduler, ema, masters, low_rank=phase.lora is not None)
+    state = TrainingState(
+        policy,
+        pre,
+        post,
+        optimizer,
+        scheduler,
+        ema,
+        masters,
+        low_rank=phase.lora is not None,
+        scaler=accelerator.scaler,
+    )
     about = records.describe_phase(experiment, phase, dataset, policy, init, builders.device_name(device))
     if last is not None:
         records.check_same_data(folder, about)

@@ -18,15 +18,16 @@ from huggingface_hub import hf_hub_download, snapshot_download, try_to_load_from
 from lerobot.configs.policies import PreTrainedConfig
 from lerobot.datasets.factory import resolve_delta_timestamps
 from lerobot.optim.optimizers import OptimizerConfig
-from lerobot.optim.schedulers import LRSchedulerConfig
+from lerobot.optim.schedulers import CosineDecayWithWarmupSchedulerConfig, LRSchedulerConfig
 from lerobot.policies.factory import get_policy_class, make_policy, make_pre_post_processors
 from lerobot.policies.pretrained import PreTrainedPolicy
-from lerobot.utils.constants import IMAGENET_STATS
+from lerobot.utils.constants import ACTION, IMAGENET_STATS, OBS_STATE
 from lerobot.utils.feature_utils import dataset_to_policy_features
 
 from robocasa_lerobot.data.mixture import MixtureDataset, MixtureMeta
 from robocasa_lerobot.data.statistics import Statistics
 from robocasa_lerobot.errors import UnknownNameError, UserError
+from robocasa_lerobot.policies.common.statistics import CONSTANT_RANGE, widen_constant_components
 from robocasa_lerobot.policies.needs import explained
 from robocasa_lerobot.policies.registry import register_policies
 from robocasa_lerobot.training.config.phase import PhaseConfig
@@ -38,6 +39,7 @@ from robocasa_lerobot.training.weights.master_weights import MasterWeights
 _NO_FIELDS = ("type", "path", RENAME, LEAVE_OUT)  # settings of a policy that are no fields of its configuration
 _LOAD_TOKENIZERS = ("pi0", "pi05", "smolvla", "xvla")  # by name, in their processors
 _NOT_LOADED = "Could not load state dict"
+_BY_NAME = "xvla-adamw"  # LeRobot's optimiser whose rates go by the names of parameters
 
 
 def best_device(wanted: str | None) -> str:
@@ -168,7 +170,10 @@ def make_processors(
     """
     with explained(config.type):
         if checkpoint is None or not keep_statistics:
-            return make_pre_post_processors(config, dataset_stats=meta.stats, dataset_meta=meta)
+            stats = meta.stats
+            if stats is not None and not hasattr(config, "constant_range"):  # our own policies do it themselves
+                stats = widen_constant_components(stats, (OBS_STATE, ACTION), CONSTANT_RANGE)
+            return make_pre_post_processors(config, dataset_stats=stats, dataset_meta=meta)
         overrides = {"device_processor": {"device": str(config.device)}}
         # With the dataset's metadata, some policies' processors (GR00T's) go on as those of a training: random crops,
         # dropout of the state. Without, LeRobot takes them for an evaluation's.
@@ -206,7 +211,7 @@ def make_optimizer(
     """
     preset = _changed(OptimizerConfig, policy.config.get_optimizer_preset(), phase.optimizer, "optimizer")
     masters = MasterWeights(policy) if masters is None else masters
-    optimizer = preset.build(masters.groups(_trained_groups(policy, phase)))
+    optimizer = preset.build(masters.groups(_trained_groups(policy, phase, by_name=preset.type == _BY_NAME)))
     if not isinstance(optimizer, torch.optim.Optimizer):
         raise UserError(f"policy {policy.config.type!r} wants several optimisers, which training does not support.")
     for group in optimizer.param_groups:
@@ -224,7 +229,11 @@ def make_optimizer(
         schedule = _changed(LRSchedulerConfig, schedule, phase.scheduler, "scheduler")
     if schedule is not None and phase.warmup_steps is not None:
         schedule = dataclasses.replace(schedule, num_warmup_steps=phase.warmup_steps)
-    scheduler = schedule.build(optimizer, phase.schedule_steps or phase.steps) if schedule is not None else None
+    total = phase.schedule_steps or phase.steps
+    if isinstance(schedule, CosineDecayWithWarmupSchedulerConfig) and _warmup_is_given(phase):
+        # For a training shorter than its decay, LeRobot shortens the warm-up, too: not one that was asked for.
+        schedule = dataclasses.replace(schedule, num_decay_steps=min(schedule.num_decay_steps, total))
+    scheduler = schedule.build(optimizer, total) if schedule is not None else None
     clip = preset.grad_clip_norm if phase.grad_clip_norm is None else phase.grad_clip_norm
     return optimizer, scheduler, float(clip or 0.0)
 
@@ -249,17 +258,24 @@ def _changed(registry: Any, preset: Any, changes: Mapping[str, Any], what: str) 
         raise UserError(f"`{what}` of type {kind!r}: {error}.") from error
 
 
-def _trained_groups(policy: PreTrainedPolicy, phase: PhaseConfig) -> Any:
-    """The policy's parameter groups without frozen parameters; one group where low-rank changes are trained."""
-    trained = [p for p in policy.parameters() if p.requires_grad]
+def _warmup_is_given(phase: PhaseConfig) -> bool:
+    return phase.warmup_steps is not None or "num_warmup_steps" in phase.scheduler
+
+
+def _trained_groups(policy: PreTrainedPolicy, phase: PhaseConfig, by_name: bool) -> Any:
+    """The policy's parameter groups without frozen parameters; one group where low-rank changes are trained.
+
+    For an optimiser that goes `by_name`, the parameters by their names.
+    """
+    trained = {name: p for name, p in policy.named_parameters() if p.requires_grad}
     if not trained:
         raise UserError(f"phase {phase.name!r}: `freeze` leaves nothing of the policy to train.")
+    if by_name:
+        return trained
     if phase.lora is not None:
-        return [{"params": trained}]
+        return [{"params": list(trained.values())}]
     params = policy.get_optim_params()
-    if isinstance(params, dict):  # an optimiser that goes by the names
-        return {name: p for name, p in params.items() if p.requires_grad}
-    params = list(params)
+    params = list(params.values() if isinstance(params, dict) else params)
     groups = params if params and isinstance(params[0], dict) else [{"params": params}]
     kept = [{**group, "params": [p for p in group["params"] if p.requires_grad]} for group in groups]
     return [group for group in kept if group["params"]]

@@ -35,6 +35,7 @@ CHECKPOINTS, LAST, LINK_ASIDE = "checkpoints", "last", ".last"
 PRETRAINED, STATE = "pretrained_model", "training_state"
 RAW_WEIGHTS, AVERAGE, LOG_WINDOW = "raw_model.safetensors", "average.safetensors", "log_window.json"
 MASTERS = "master_weights.safetensors"
+SCALER = "gradient_scaler.json"
 
 
 @dataclass
@@ -51,6 +52,7 @@ class TrainingState:
     low_rank: bool = False
     step: int = 0
     log_window: dict[str, list[float]] = field(default_factory=dict)
+    scaler: torch.amp.GradScaler | None = None  # of fp16
 
     @property
     def average_apart(self) -> bool:
@@ -125,6 +127,8 @@ def save_checkpoint(phase_dir: Path, state: TrainingState, train_config: Any) ->
     model_dir, state_dir = aside / PRETRAINED, aside / STATE
     save_training_state(aside, state.step, state.optimizer, state.scheduler)
     (state_dir / LOG_WINDOW).write_text(json.dumps(state.log_window))
+    if state.scaler is not None:
+        (state_dir / SCALER).write_text(json.dumps(state.scaler.state_dict()))
     if state.ema is not None or state.low_rank:
         save_model(state.policy, str(state_dir / RAW_WEIGHTS))
     if state.ema is not None and state.average_apart:
@@ -179,6 +183,8 @@ def restore(checkpoint: Path, state: TrainingState) -> None:
     except (KeyError, ValueError, TypeError, OSError) as error:
         raise UserError(f"{folder} does not fit the phase's optimiser: {error}") from error
     state.log_window = json.loads((folder / LOG_WINDOW).read_text())
+    if state.scaler is not None and (folder / SCALER).is_file():  # checkpoints of before have none
+        state.scaler.load_state_dict(json.loads((folder / SCALER).read_text()))
     if state.ema is not None:
         state.ema.step = state.step
 

@@ -5,9 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from robocasa_lerobot.benchmark import published
+from robocasa_lerobot.benchmark.tasks import published_task_sets
 from robocasa_lerobot.evaluation.records.results import UNPERTURBED
 from robocasa_lerobot.evaluation.report.formats.csv_text import csv_text
-from robocasa_lerobot.evaluation.report.policies import PolicyResult, ReportData, average_of
+from robocasa_lerobot.evaluation.report.policies import PolicyResult, ReportData, TaskResult, average_of
+from robocasa_lerobot.evaluation.report.published_cells import tasks_of
 from robocasa_lerobot.evaluation.statistics import Estimate
 
 COLUMNS = (
@@ -34,7 +36,10 @@ COLUMNS = (
 
 
 def render(data: ReportData) -> str:
-    """Rates, progress and ends of intervals lie in [0, 1]; `task` is empty in rows of averages."""
+    """Rates, progress and ends of intervals lie in [0, 1]; `task` is empty in rows of averages.
+
+    A set that was not run as a whole has no row of its own: the mean of some of its tasks is another number.
+    """
     return csv_text(COLUMNS, _rows(data))
 
 
@@ -67,7 +72,7 @@ def _rows(data: ReportData) -> Iterator[dict[str, object]]:
                 }
             for group in _groups(policy):
                 results = tasks if group == "all" else policy.group(group, condition)
-                if results:
+                if results and (group == "all" or _is_whole(policy, group, results)):
                     mean = average_of(results)
                     yield {
                         **common,
@@ -89,6 +94,17 @@ def _progress(stages: int | None, progress: Estimate) -> dict[str, object]:
         "progress_low": f"{progress.low:.6f}",
         "progress_high": f"{progress.high:.6f}",
     }
+
+
+def _is_whole(policy: PolicyResult, group: str, results: tuple[TaskResult, ...]) -> bool:
+    """Whether these are all tasks of a published group, or of a set as the benchmark or the run's registry has it."""
+    of_benchmark = policy.header.registry is None and group in published_task_sets()
+    if group in published.GROUPS or of_benchmark:
+        whole = tasks_of(group)
+    else:
+        sets = [part.get(group, []) for one in policy.headers for part in (one.task_sets, one.missing_by_set)]
+        whole = frozenset(task for tasks in sets for task in tasks)
+    return {result.task for result in results} >= whole
 
 
 def _groups(policy: PolicyResult) -> list[str]:

@@ -77,8 +77,17 @@ def sentence(data: ReportData) -> str | None:
     overall, tasks = pair.comparison.overall, pair.comparison.tasks
     difference = overall.difference
     on = f"on the same {fmt.count(overall.pairs, 'trial')}"
-    if overall.p_value < ALPHA:
-        verdict = "better" if overall.only_b > overall.only_a else "worse"
+    if overall.p_value < ALPHA and difference.value * (overall.only_b - overall.only_a) <= 0:
+        # The test counts trials, and the difference weighs tasks alike: where tasks have unequal numbers of trials the
+        # two may point different ways.
+        text = (
+            f"{pair.b.label} and {pair.a.label} cannot be ranked, since the tasks disagree: counted by trials, "
+            f"{pair.b.label} alone solved {overall.only_b:,} and {pair.a.label} alone {overall.only_a:,} (p "
+            f"{_p(overall.p_value)}, exact McNemar test {on}), while the mean over tasks differs by "
+            f"{fmt.points(difference.value)} points (95 % interval {fmt.points_interval(difference)})."
+        )
+    elif overall.p_value < ALPHA:
+        verdict = "better" if difference.value > 0 else "worse"
         text = (
             f"{pair.b.label} is {verdict} than {pair.a.label} by {abs(100 * difference.value):.1f} points "
             f"(95 % interval {fmt.points_interval(difference)}; p {_p(overall.p_value)}, exact McNemar test {on})."

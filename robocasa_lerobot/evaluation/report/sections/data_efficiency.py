@@ -107,6 +107,11 @@ def _said(data: ReportData, found: list[GroupCurves]) -> list[str]:
             f"these policies are of another registry ({fmt.listed(files)}), which may hold other numbers of them: "
             "read the shares, and not the numbers."
         )
+    out += [
+        f"The points of {curve.label} are of several experiments, which may differ in more than their target data."
+        for curve in shown
+        if curve.several
+    ]
     if rest:
         names = [f"{curve.label} ({', '.join(f'{demos}' for demos in curve.points)})" for curve in rest]
         out.append(

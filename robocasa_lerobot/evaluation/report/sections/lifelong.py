@@ -42,6 +42,12 @@ def section(data: ReportData) -> Section | None:
         if one.sets and one.other_tasks
     ]
     text += [
+        f"The phases of {one.label} are policies of several trainings, which may differ in more than their phase: "
+        f"{fmt.listed([policy.label for policy in one.policies.values()])}."
+        for one in found
+        if one.several
+    ]
+    text += [
         f"Left out of the matrix of {one.label}, since a column compares the same tasks: {fmt.listed(one.left_out)}."
         for one in found
         if one.left_out

@@ -1,0 +1,136 @@
+"""What a report puts together, pairs and averages, and what it does not: policies of several runs and trainings."""
+
+from __future__ import annotations
+
+import csv
+import dataclasses
+from pathlib import Path
+from typing import Any
+
+import synthetic_runs
+from evaluation_records import write_results
+
+from robocasa_lerobot.evaluation.config.evaluation import KITCHEN_ENV_FACTORY, EvaluationConfig
+from robocasa_lerobot.evaluation.config.loader import load_config
+from robocasa_lerobot.evaluation.report.formats import tidy_csv
+from robocasa_lerobot.evaluation.report.gather import gather
+from robocasa_lerobot.evaluation.report.lifelong_series import all_series
+from robocasa_lerobot.evaluation.report.policies import PolicyResult, ReportData, describe_policy, same_trials
+from robocasa_lerobot.evaluation.report.sections import comparison, data_efficiency, lifelong
+
+ATOMIC = [task for task, group in synthetic_runs.GROUPS.items() if group == "atomic_seen"]
+SETS = {"own_phase1": ["A", "B"], "own_phase2": ["C"]}
+
+
+def run(folder: Path, label: str, tasks: list[str], sets: dict[str, list[str]] | None = None, **about: Any) -> Path:
+    """A run of one policy, four trials of each task."""
+    one = synthetic_runs.policy(label, **about)
+    changes: dict[str, Any] = {} if sets is None else {"task_sets": sets}
+    head = synthetic_runs.header("custom", [one], tasks, trials=4, **changes)
+    return synthetic_runs.write(folder / label, head, synthetic_runs.trials(head, label, dict.fromkeys(tasks, 0.5), 4))
+
+
+def test_the_tidy_file_has_no_average_of_a_part_of_a_set(tmp_path: Path) -> None:
+    def groups(tasks: list[str], **sets: list[str]) -> set[str]:
+        data = gather([run(tmp_path / f"{len(tasks)}-{len(sets)}", "one", tasks, sets or None)])
+        return {row["group"] for row in csv.DictReader(tidy_csv.render(data).splitlines()) if not row["task"]}
+
+    assert groups(ATOMIC) == {"all", "atomic_seen"}
+    assert groups(ATOMIC[:-1]) == {"all"}
+    assert groups(["A", "B"], own=["A", "B"]) == {"all", "own"}
+    assert groups(["A"], own=["A", "B"], other=["A"]) == {"all", "other"}
+    assert groups(["A", "B", "C"], lifelong_phase1=["A", "B"]) == {"all"}, "not those of the benchmark"
+
+
+def test_single_points_of_several_experiments_make_a_curve_and_the_section_says_so(tmp_path: Path) -> None:
+    given = [("target only", 0.1), ("target only", 0.3), ("pretraining + target", 0.1)]
+    runs = [
+        run(tmp_path, f"p{number}", ATOMIC, experiment=f"mine{number}", demo_fraction=share, training_data=data)
+        for number, (data, share) in enumerate(given)
+    ]
+    data = gather(runs)
+    assert [list(side) for side in data_efficiency.curves(data)] == [[50, 150], [50]]
+    section = data_efficiency.section(data)
+    assert section is not None
+    assert any("The points of mine0 + mine1 are of several experiments" in text for text in section.text)
+    # Other data, or another type of policy, is another curve.
+    labels: dict[str, Any] = {"experiment": "mine3", "demo_fraction": 1.0}
+    other = run(tmp_path, "p3", ATOMIC, type="other", training_data="target only", **labels)
+    assert [list(side) for side in data_efficiency.curves(gather([*runs, other]))] == [[50, 150], [50]]
+    other = run(tmp_path, "p4", ATOMIC, training_data="other data", **labels)
+    assert [list(side) for side in data_efficiency.curves(gather([*runs, other]))] == [[50, 150], [50]]
+
+
+def test_phases_of_several_trainings_make_a_matrix_with_the_untrained_policy(tmp_path: Path) -> None:
+    tasks = [task for members in SETS.values() for task in members]
+    runs = [
+        run(tmp_path, f"p{k}", tasks, SETS, experiment=f"mine{k}" if k else None, lifelong_phase=k) for k in (0, 1, 2)
+    ]
+    data = gather(runs)
+    assert [(one.label, list(one.policies)) for one in all_series(data)] == [("mine1 + mine2", [0, 1, 2])]
+    found = lifelong.matrix(data)
+    assert found is not None
+    assert found.forward_transfer is not None
+    assert list(found.matrix) == [1, 2]
+    section = lifelong.section(data)
+    assert section is not None
+    assert any("policies of several trainings" in text for text in section.text)
+    assert "before lifelong phase 1" in describe_policy(data.policies[0])
+    # A training with several phases takes the untrained policy, and no phase of another training.
+    own = [run(tmp_path, f"own{k}", tasks, SETS, experiment="own", lifelong_phase=k) for k in (1, 2)]
+    series = {one.label: list(one.policies) for one in all_series(gather([*runs, *own]))}
+    assert series == {"own": [0, 1, 2], "mine1": [1], "mine2": [2]}
+
+
+def test_phase_0_is_a_label_that_can_be_given() -> None:
+    given = ["--policy.path=zero,random", "--env.task_sets=lifelong_phase1", "--policy.lifelong_phase=0,1"]
+    config = load_config(EvaluationConfig, given)
+    assert config.policy.lifelong_phase == [0, 1]
+    assert config.first_sets is None
+
+
+def test_trials_of_other_simulators_and_other_kitchens_are_not_paired(tmp_path: Path) -> None:
+    def policy(name: str, **changes: Any) -> PolicyResult:
+        return gather([write_results(tmp_path / name, [{"trial": t, **changes} for t in range(3)])]).policies[0]
+
+    def elsewhere(**settings: Any) -> PolicyResult:
+        head = dataclasses.replace(one.header, settings={**one.header.settings, **settings})
+        return dataclasses.replace(one, headers=(head,))
+
+    one = policy("one")
+    assert len(same_trials(one, policy("again"))["OpenDrawer"][0]) == 3
+    assert len(same_trials(one, policy("unknown", layout_id=None))["OpenDrawer"][0]) == 3
+    assert same_trials(one, policy("moved", layout_id=2)) == {}
+    assert same_trials(one, elsewhere(factory=KITCHEN_ENV_FACTORY))
+    others: list[dict[str, Any]] = [
+        {"factory": "other:make"},
+        {"simulator": {"adapter": "0"}},
+        {"options": {"robot": "Sawyer"}},
+    ]
+    for settings in others:
+        assert same_trials(one, elsewhere(**settings)) == {}
+        assert same_trials(elsewhere(**settings), elsewhere(**settings))
+
+
+def pair(tmp_path: Path, solved: dict[str, tuple[int, int, int]]) -> ReportData:
+    """Two policies: of each task so many trials, of which A alone and B alone solved the first ones."""
+    runs = []
+    for side, label in enumerate("ab"):
+        lines: list[dict[str, Any]] = []
+        for task, (trials, only_a, only_b) in solved.items():
+            mine = (range(only_a), range(only_a, only_a + only_b))[side]
+            for t in range(trials):
+                first = 80 if t in mine else None
+                lines.append(
+                    {"label": label, "task": task, "trial": t, "success": t in mine, "first_success_step": first}
+                )
+        runs.append(write_results(tmp_path / label, lines))
+    return gather(runs)
+
+
+def test_no_verdict_where_trials_and_tasks_point_different_ways(tmp_path: Path) -> None:
+    said = str(comparison.sentence(pair(tmp_path / "agree", {"Large": (40, 0, 20), "Small": (2, 0, 1)})))
+    assert "B is better than a by 50.0 points" in said
+    said = str(comparison.sentence(pair(tmp_path / "disagree", {"Large": (40, 0, 20), "Small": (2, 2, 0)})))
+    assert said.startswith("B and a cannot be ranked, since the tasks disagree")
+    assert "better than" not in said
