@@ -101,8 +101,8 @@ def render_dataset(
     check_output(out, overwrite)
     if out == source.absolute():
         raise UserError(f"--out is the dataset itself: {out}. Choose another folder.")
-    check_outside(out, source)
     plan = make_render_plan(source, settings)
+    check_outside(out, source)
     partial = partial_folder(out, plan.fingerprint)
     step, last = _Piece(plan, str(partial)), _LastJob(plan, str(partial), str(out), overwrite)
     if execution.kind == "slurm":
