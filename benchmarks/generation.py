@@ -36,6 +36,7 @@ from generation_report import Trial, ratios, summary, text
 
 from robocasa_lerobot.demos.choose import expand_names
 from robocasa_lerobot.demos.generate.settings import GenerationSettings
+from robocasa_lerobot.demos.generate.sources.prepare import file_identity
 from robocasa_lerobot.demos.generate.sources.source import sources_of
 from robocasa_lerobot.demos.recorder import Recording, record_episode
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
@@ -179,7 +180,7 @@ def keep_to_sources(folder: Path, names: Sequence[str], trials: Path) -> None:
     """
     own = {folder / f"{name}.hdf5" for name in names} & set(folder.glob("*.hdf5"))
     paths = own if len(own) == len(names) else folder.glob("*.hdf5")
-    files = {path.name: [path.stat().st_size, path.stat().st_mtime_ns] for path in sorted(paths)}
+    files = {path.name: file_identity(path) for path in sorted(paths)}
     note = trials.with_suffix(".sources.json")
     note.parent.mkdir(parents=True, exist_ok=True)
     if trials.exists() and (not note.exists() or json.loads(note.read_text()) != files):

@@ -10,7 +10,7 @@ from typing import Any
 
 from robocasa_lerobot.envs.tasks.registry import get_task
 from robocasa_lerobot.envs.tasks.typical import stages_of
-from robocasa_lerobot.evaluation.statistics.rates import wilson_interval
+from robocasa_lerobot.wilson import wilson_interval
 
 CLASSES = (
     "buttons, drawers, racks",

@@ -1,5 +1,6 @@
 #!/bin/sh
-# Prints the path of a Python 3.12 or 3.13 (requirements.lock has no wheels of NumPy for later ones) that can make virtual environments; says what to do when there is none.
+# Prints the path of a Python 3.12 or 3.13 that can make virtual environments; says what to do when there is none.
+# requirements.lock has no wheels of NumPy for later versions.
 # Order: $PYTHON, the PATH, pyenv's versions, uv's. Each candidate is run, because a pyenv shim on the PATH may
 # stand for a version that is not active.
 set -u

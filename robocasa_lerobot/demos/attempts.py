@@ -89,13 +89,23 @@ class RecordingSettings:
         """Make the attempt of a seed."""
         return self.labelled_episode(env, seed, demonstrate)
 
-    def labelled_episode(self, env: KitchenEnv, seed: int, actor: Actor, noise_seed: int | None = None) -> Recording:
-        """An episode of an actor's; where noise comes to its actions, what it wanted is kept beside them."""
-        clean: list[Array] = []
+    def labelled_episode(
+        self,
+        env: KitchenEnv,
+        seed: int,
+        actor: Actor,
+        noise_seed: int | None = None,
+        clean: Sequence[Array] | None = None,
+    ) -> Recording:
+        """An episode of an actor's; where noise comes to its actions, what it wanted is kept beside them.
+
+        An actor with noise of its own says what it wanted in `clean`, which it fills as it goes.
+        """
+        yielded: list[Array] = []
 
         def noted(env: KitchenEnv, style: MotionStyle, log: StageLog) -> Iterator[Array]:
             for wanted in actor(env, style, log):
-                clean.append(wanted.copy())
+                yielded.append(wanted.copy())
                 yield wanted
 
         recording = record_episode(
@@ -107,8 +117,9 @@ class RecordingSettings:
             actor=noted,
             noise_seed=noise_seed,
         )
-        if self.action_noise > 0.0:
-            recording.per_step[CLEAN_ACTION] = clean_labels(clean, len(recording.actions))
+        if clean is not None or self.action_noise > 0.0:
+            kept = (yielded if clean is None else clean)[: len(recording.actions)]
+            recording.per_step[CLEAN_ACTION] = np.array([_as_executed(wanted) for wanted in kept])
         return recording
 
     def make_env(self) -> KitchenEnv:
@@ -118,9 +129,9 @@ class RecordingSettings:
         return KitchenEnv(self.task, terminate_on_success=False, initial_noise=noise, **kwargs)
 
 
-def clean_labels(wanted: Sequence[Array], steps: int) -> Array:
-    """What was wanted before noise came to it, as it would have been executed: (steps, 12), in the order of HDF5."""
-    return np.array([contract.stored_to_hdf5(contract.binarize(np.clip(one, -1.0, 1.0))) for one in wanted[:steps]])
+def _as_executed(wanted: Array) -> Array:
+    """An action (12,) of an actor's as it is executed where no noise comes to it, in the order of HDF5 files."""
+    return contract.stored_to_hdf5(contract.binarize(np.clip(wanted, -1.0, 1.0)))
 
 
 @dataclass(frozen=True)

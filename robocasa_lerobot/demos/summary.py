@@ -7,6 +7,7 @@ from collections.abc import Sequence
 
 from robocasa_lerobot import contract
 from robocasa_lerobot.demos.recording import RecordingResult
+from robocasa_lerobot.wilson import wilson_interval
 
 _REASONS = 3
 
@@ -14,7 +15,7 @@ _REASONS = 3
 def print_summary(results: Sequence[RecordingResult]) -> int:
     """Print a line for each task and the most frequent reasons of failures; 1 if a task was given up, else 0.
 
-    Rates have 95 % intervals of their own; that of all tasks counts every attempt alike.
+    Rates have Wilson intervals of their own; that of all tasks counts every attempt alike.
     """
     width = max(len(result.task) for result in results)
     header = f"{'task':<{width}}  episodes   steps  s/episode  attempts  succeeded           file"
@@ -47,13 +48,11 @@ def print_summary(results: Sequence[RecordingResult]) -> int:
 
 
 def _rate(succeeded: int, tried: int) -> str:
-    """A rate with its Wilson 95 % interval."""
-    from statsmodels.stats.proportion import proportion_confint
-
+    """A rate with its Wilson interval."""
     if not tried:
         return "-"
-    low, high = proportion_confint(succeeded, tried, method="wilson")
-    return f"{succeeded / tried:.0%} ({abs(low):.0%} to {high:.0%})"
+    low, high = wilson_interval(succeeded, tried)
+    return f"{succeeded / tried:.0%} ({low:.0%} to {high:.0%})"
 
 
 def _reasons(result: RecordingResult) -> list[tuple[str, list[int]]]:

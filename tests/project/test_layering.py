@@ -18,7 +18,7 @@ from robocasa_lerobot.cli import SUBCOMMANDS
 # What each part of the package may import of the rest of the package. Parts on one level stay apart.
 BASE = {
     *("benchmark", "config_files", "contract", "errors", "files", "gl", "jobs", "jsonl", "progress"),
-    *("provenance", "quiet", "settings", "video", "wire"),
+    *("provenance", "quiet", "settings", "video", "wilson", "wire"),
 }
 LOW = {"envs", "convert", "data", "policies"}
 MAY_IMPORT: dict[str, set[str]] = {
@@ -35,6 +35,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     "jobs": {"errors", "progress"},
     "settings": {"errors"},
     "video": {"contract"},
+    "wilson": {"errors"},
     "wire": set(),
     **dict.fromkeys(LOW, BASE),
     "convert": BASE | {"envs"},  # its rendering alone: see ONLY_ROOMS
@@ -80,6 +81,7 @@ FORBIDDEN: dict[str, set[str]] = {
     "quiet": TORCH | PHYSICS,
     "settings": TORCH | PHYSICS,
     "video": TORCH | PHYSICS,
+    "wilson": TORCH | PHYSICS,
     "wire": TORCH | PHYSICS,
     "envs": TORCH,
     "demos": TORCH,

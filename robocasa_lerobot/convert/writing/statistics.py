@@ -24,12 +24,12 @@ _QUANTILE_NAMES = tuple(f"q{round(q * 100):02d}" for q in QUANTILES)
 
 def column(root: Path, key: str) -> NDArray[Any]:
     """A numeric column (N,) or (N, k) of all data files of a dataset, in file order, with its stored dtype."""
-    tables = [pq.read_table(file, columns=[key]) for file in sorted((root / "data").glob("*/*.parquet"))]
-    return column_of(pa.concat_tables(tables), key)
+    whole: NDArray[Any] = np.concatenate(list(column_batches(root, key)))
+    return whole
 
 
 def column_batches(root: Path, key: str) -> Iterator[NDArray[Any]]:
-    """A numeric column as `column` gives it, in runs of rows of which one is in memory at a time."""
+    """The same in runs of rows, of which one is in memory at a time."""
     for file in sorted((root / "data").glob("*/*.parquet")):
         for batch in pq.ParquetFile(file).iter_batches(_ROWS, columns=[key]):
             yield column_of(pa.Table.from_batches([batch]), key)

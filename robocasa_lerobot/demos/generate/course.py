@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Generator, Iterator, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -23,6 +23,16 @@ NOT_DRAWN_COST = 0.5  # as of a hand that touches something: see `planning/costs
 AT_REST = (-1, BRIDGE, -1)  # label of steps in which it is waited
 _BASE, _GRIPPER = contract.ACTION_SLICES["base_motion"], contract.ACTION_SLICES["gripper_close"].start
 KINDS = ("free", "contact", "bridge", "drive", "settle")
+
+
+class Try(NamedTuple):
+    """What tells one try at moving a part from another: source, step of its contact, part, and how it was turned."""
+
+    source: int
+    contact: int
+    part: str
+    mirror: bool
+    flip: bool
 
 
 @dataclass
@@ -55,7 +65,7 @@ class Course:
     fingers: float = OPEN
     used: list[dict[str, Any]] = field(default_factory=list)
     clean: list[Array] = field(default_factory=list)
-    failed: dict[tuple[str, ...], Counter[Any]] = field(default_factory=dict)
+    failed: dict[tuple[str, ...], Counter[Try]] = field(default_factory=dict)
     rest: dict[str, Array] = field(default_factory=dict)
     lay: dict[str, Array] = field(default_factory=dict)
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from robocasa_lerobot.demos.generate.course import Course
+from robocasa_lerobot.demos.generate.course import Course, Try
 from robocasa_lerobot.demos.generate.sources.frames import HANDLE, REST, Part, anchor, anchored, parts_of, shares_of
 from robocasa_lerobot.demos.generate.sources.rules import rules_for
 from robocasa_lerobot.demos.generate.sources.segments import PART
@@ -96,6 +96,10 @@ class Fit:
         begin = self._here((first - low) / (high - low), sign)
         end = self._here((first + far - low) / (high - low), sign)
         return begin, end
+
+    def as_try(self) -> Try:
+        """What it is remembered by, where it comes to nothing."""
+        return Try(self.piece.source.number, self.piece.segment.contact, self.part.name, self.mirror, self.flip)
 
     def apart(self, position: float) -> float:
         """How far a part is from where it stood when the segment began, as a share of its range."""

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Generator, Iterator, Mapping, Sequence
-from typing import Any
+from collections.abc import Generator, Iterator, Sequence
 
 import numpy as np
 
 from robocasa_lerobot.demos.generate.base import go_near, stands_like
 from robocasa_lerobot.demos.generate.bridge import bridged
-from robocasa_lerobot.demos.generate.course import BRIDGE, DRIVE, Course
+from robocasa_lerobot.demos.generate.course import BRIDGE, DRIVE, Course, Try
 from robocasa_lerobot.demos.generate.execute import Carried, as_target, carry_out_segment, hand_now
 from robocasa_lerobot.demos.generate.fits import Fit, fits_of
 from robocasa_lerobot.demos.generate.select import narrowed
@@ -21,6 +20,7 @@ from robocasa_lerobot.demos.planning.collision import CollisionChecker, MovingPa
 from robocasa_lerobot.demos.planning.motion_planner import MotionPlan, MotionPlanner, WaypointPath
 from robocasa_lerobot.demos.skills.common import SkillError, draw_back, hold_hand, stage_done
 from robocasa_lerobot.demos.skills.levers import turn_on_water
+from robocasa_lerobot.demos.skills.reaching import MOST_DRIVES, approach_by, is_blocked
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.kitchens.appliances.kinds.sink import Sink
 from robocasa_lerobot.envs.scene.robot_poses import RobotPose
@@ -41,7 +41,6 @@ FRUITLESS_SHARE, FAILED_COST = 0.02, 1.0  # of its range; cost of a source that 
 REST_STEPS = 6  # after which a stage must still be done
 SLIPPED_SHARE = 0.3  # of its way: a segment that gets a part less far has failed, too
 DRIVES_M = 0.03  # a base that goes farther in a segment drives
-ARRIVED_M, MOST_BLOCKED = 0.08, 2  # of a base from where it was to stand; stands that it did not get to
 
 
 def part_stage(env: KitchenEnv, stage: Stage, course: Course) -> Iterator[Array]:
@@ -76,8 +75,7 @@ def part_stage(env: KitchenEnv, stage: Stage, course: Course) -> Iterator[Array]
         moved = fit.part.position(env.data) - before
         row["moved"] = moved / fit.part.span
         if moved * np.sign(end - begin) < max(FRUITLESS_SHARE * fit.part.span, SLIPPED_SHARE * abs(end - before)):
-            failed[_trial(fit)] += 1
-            failed[fit.piece.source.number] += 1
+            failed[fit.as_try()] += 1
     if not (yield from _stays_done(env, stage, course)):
         raise SkillError(f"{stage.target}: not done after {MOST_SEGMENTS} segments")
 
@@ -95,11 +93,6 @@ def _water_runs(env: KitchenEnv, stage: Stage) -> bool:
     return (stage.skill, stage.verb) == ("levers", "turn") and env.scene.fixture(stage.target, Sink).water_on(env.data)
 
 
-def _trial(fit: Fit) -> tuple[Any, ...]:
-    """What tells one try from another."""
-    return fit.piece.source.number, fit.piece.segment.contact, fit.part.name, fit.mirror, fit.flip
-
-
 def _let_go(env: KitchenEnv) -> Iterator[Array]:
     """Open the fingers where they are, and draw the hand back."""
     yield from hold_hand(env.data, as_target(hand_now(env)), OPEN, RELEASE_STEPS)
@@ -107,7 +100,7 @@ def _let_go(env: KitchenEnv) -> Iterator[Array]:
 
 
 def _approach(
-    env: KitchenEnv, course: Course, fits: list[Fit], failed: Mapping[Any, int], *, may_stay: bool
+    env: KitchenEnv, course: Course, fits: list[Fit], failed: Counter[Try], *, may_stay: bool
 ) -> Generator[Array, None, tuple[Fit, float]]:
     """Choose a segment and a stand, go there, and bring the hand to where the segment begins.
 
@@ -122,19 +115,7 @@ def _approach(
         first_pose=lambda fit: _poses(env, fit)[0],
         hand=hand_now(env),
     )
-    most = {fit.part.name: max(_gain(env, other) for other in fits if other.part is fit.part) for fit in fits}
-    paths = [
-        WaypointPath(
-            tuple(as_target(pose) for pose in _poses(env, fit)),
-            float(course.bias[fit.piece.source.number])
-            + FAILED_COST * failed[_trial(fit)]
-            + FAILED_COST / 2 * failed[fit.piece.source.number]
-            + APART_COST * fit.apart(fit.part.position(env.data))
-            + SHORT_COST * (1.0 - _gain(env, fit) / most[fit.part.name])
-            + FLIP_COST * fit.flip,
-        )
-        for fit in fits
-    ]
+    paths = _paths(env, course, fits, failed)
     allowed = frozenset(
         int(body) for fit in fits for body in np.flatnonzero(env.scene.subtree(env.model.body(fit.part.body).name))
     )
@@ -143,28 +124,52 @@ def _approach(
     if may_stay and course.manner.base == "replan" and None not in stands:
         stands = [None, *stands]
     stands = _beside(env, fits, stands)
-    blocked: list[RobotPose] = []
-    while True:
-        planner = MotionPlanner(env, paths, 1, allowed=allowed)
-        plans = planner.best([stand for stand in stands if not _is_one_of(stand, blocked)])[:MOST_APPROACHES]
+
+    def best(blocked: Sequence[RobotPose]) -> MotionPlan:
+        left = stands
+        if blocked:  # something stood in the way: what can be done from elsewhere, and from here?
+            others = [stand for stand in stands if stand is not None and not is_blocked(stand, blocked)]
+            left = _beside(env, fits, [None, *(others if len(blocked) < MOST_DRIVES else [])])
+        plans = MotionPlanner(env, paths, 1, allowed=allowed).best(left)[:MOST_APPROACHES]
         if not plans:
             raise SkillError("no source's segment is within reach")
-        ways = [(plan, _free_way(env, plan, plan.base)) for plan in plans]
-        plan, _ = min(ways, key=lambda one: one[0].cost + one[1].cost)
+        return min(plans, key=lambda plan: plan.cost + _free_way(env, plan, plan.base).cost)
+
+    def begun(plan: MotionPlan) -> tuple[Fit, float]:
+        """A plan's segment, and the fingers that it begins with."""
         fit = next(one for one, path in zip(fits, paths, strict=True) if path is plan.path)
-        gripper = float(fit.piece.data.gripper[fit.piece.segment.lead])
-        if plan.base is None:
-            break
-        yield from course.labelled(go_near(env, plan.base, gripper), DRIVE)
-        if _has_arrived(env, plan.base) or len(blocked) == MOST_BLOCKED:
-            break
-        # Something stood in the way: what can be done from elsewhere, and from here?
-        blocked.append(plan.base)
-        stands = [stand for stand in stands if stand is not None]
-        stands = _beside(env, fits, [None, *stands])
+        return fit, float(fit.piece.data.gripper[fit.piece.segment.lead])
+
+    plan = yield from course.choosing(
+        approach_by(env, best, lambda plan, stand: go_near(env, stand, begun(plan)[1])), DRIVE
+    )
+    fit, gripper = begun(plan)
     way = _free_way(env, plan, None)
     yield from course.labelled(bridged(env, course.manner, way, _poses(env, fit)[0], gripper), BRIDGE)
     return fit, plan.cost + way.cost
+
+
+def _paths(env: KitchenEnv, course: Course, fits: list[Fit], failed: Counter[Try]) -> list[WaypointPath]:
+    """The segments as alternatives for the planner: dearer the less they lead on, and what has failed before."""
+    gains = [_gain(env, fit) for fit in fits]
+    most: dict[str, float] = {}
+    for fit, gain in zip(fits, gains, strict=True):
+        most[fit.part.name] = max(gain, most.get(fit.part.name, 0.0))
+    of_source: Counter[int] = Counter()
+    for tried, times in failed.items():
+        of_source[tried.source] += times
+    return [
+        WaypointPath(
+            tuple(as_target(pose) for pose in _poses(env, fit)),
+            float(course.bias[fit.piece.source.number])
+            + FAILED_COST * failed[fit.as_try()]
+            + FAILED_COST / 2 * of_source[fit.piece.source.number]
+            + APART_COST * fit.apart(fit.part.position(env.data))
+            + SHORT_COST * (1.0 - gain / most[fit.part.name])
+            + FLIP_COST * fit.flip,
+        )
+        for fit, gain in zip(fits, gains, strict=True)
+    ]
 
 
 def _gain(env: KitchenEnv, fit: Fit) -> float:
@@ -172,15 +177,6 @@ def _gain(env: KitchenEnv, fit: Fit) -> float:
     if fit.words_relative or fit.piece.springs:
         return 1.0
     return max(abs(fit.way()[1] - fit.part.position(env.data)), 1e-6)
-
-
-def _has_arrived(env: KitchenEnv, stand: RobotPose) -> bool:
-    position, _ = base_pose(env.data)
-    return bool(np.hypot(stand.x - position[0], stand.y - position[1]) < ARRIVED_M)
-
-
-def _is_one_of(stand: RobotPose | None, others: Sequence[RobotPose]) -> bool:
-    return stand is not None and any(np.hypot(stand.x - one.x, stand.y - one.y) < ARRIVED_M for one in others)
 
 
 def _free_way(env: KitchenEnv, plan: MotionPlan, base: RobotPose | None) -> MotionPlan:
@@ -233,14 +229,14 @@ def _poses(env: KitchenEnv, fit: Fit) -> list[Array]:
     )
     _, end = fit.way()
     first, far = fit.piece.travel()
-    drives, floor = _drives(fit), _floor_map(env, fit)
+    floor = _floor_map(env, fit) if _drives(fit) else None
     out = []
     for step in steps:
         share = 0.0 if far == 0.0 else (data.joints[segment.ref][step] - first) / far
         now = fit.part.position(env.data)
         at = now + float(np.clip(share, 0.0, 1.0)) * (end - now) if step > segment.contact else now
         pose = anchored(_part_pose_at(env, fit.part, at), fit.point) @ fit.local(data.eef[step], step)
-        if drives:
+        if floor is not None:
             pose = _as_from(_base_like(fit, floor, step), _base_like(fit, floor, segment.lead)) @ pose
         out.append(pose)
     return out

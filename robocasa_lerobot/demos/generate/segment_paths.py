@@ -14,8 +14,10 @@ from robocasa_lerobot.demos.generate.select import narrowed
 from robocasa_lerobot.demos.generate.sources.source import Piece
 from robocasa_lerobot.demos.generate.sources.transform import heading, inverse, make_pose, yaw_pose
 from robocasa_lerobot.demos.motion import UP, Array, HandTarget, base_pose, rotation_about
-from robocasa_lerobot.demos.skills.reaching import WaypointPath
+from robocasa_lerobot.demos.skills.common import SkillError
+from robocasa_lerobot.demos.skills.reaching import Held, MotionPlan, WaypointPath, plan_reach
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
+from robocasa_lerobot.envs.scene.robot_poses import RobotPose
 
 STEEP_RAD = np.deg2rad(15.0)  # of a hand from straight down, up to which it may come turned in any way
 MOST_PATHS, EACH_PATHS = 200, 10  # that are planned for; of each source, the best ones, first
@@ -95,6 +97,34 @@ def cheapest[P: SegmentPath](env: KitchenEnv, paths: Sequence[P], course: Course
         count[path.piece.source.number] += 1
         (first if count[path.piece.source.number] <= EACH_PATHS else rest).append(path)
     return sorted((first + rest)[:MOST_PATHS], key=lambda path: path.extra)
+
+
+def best_plan(
+    env: KitchenEnv,
+    course: Course,
+    paths: Sequence[SegmentPath],
+    point: Array,
+    blocked: Sequence[RobotPose],
+    *,
+    key: int,
+    allowed: frozenset[int],
+    lacking: str,
+    held: Held | None = None,
+    loaded: int = 0,
+    most: float = np.inf,
+) -> MotionPlan:
+    """The best of the paths, from where the robot stands or from where it may go; see `plan_reach`.
+
+    Raises:
+        SkillError: none is within reach, or none for less than a cost of `most`: that is `lacking`.
+    """
+    may_drive = course.manner.base != "fixed"
+    found = plan_reach(
+        env, paths, point, key=key, held=held, loaded=loaded, allowed=allowed, blocked=blocked, may_drive=may_drive
+    )
+    if not found or found[0].cost - found[0].path.drawn > most:
+        raise SkillError(lacking)
+    return found[0]
 
 
 def after_letting_go(let_go: Array, last: Array, pose: Array, about: Array) -> Array:

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from robocasa_lerobot.demos.attempts import CLEAN_ACTION, RecordingSettings, clean_labels
+from robocasa_lerobot.demos.attempts import RecordingSettings
 from robocasa_lerobot.demos.generate.course import KINDS, Course
 from robocasa_lerobot.demos.generate.mimicgen.plain import Sources, plain_episode, read_sources, suited
 from robocasa_lerobot.demos.generate.mimicgen.subtasks import datagen_of, digest_of_infos
@@ -141,11 +141,13 @@ class GenerationSettings(RecordingSettings):
         rng = np.random.default_rng([seed, _CHOICE_STREAM])
         if self.method == MIMICGEN:
             subtasks, course = self.subtasks(), Course([], rng, Manner("random", "fixed", "line"), self.spread)
+            noisy = any(one.action_noise > 0.0 for one in subtasks.template.subtasks)
             recording = self.labelled_episode(
-                env, seed, lambda env, style, log: course.counted(plain_episode(env, log, subtasks, course))
+                env,
+                seed,
+                lambda env, style, log: course.counted(plain_episode(env, log, subtasks, course)),
+                clean=course.clean if noisy else None,
             )
-            if self.action_noise > 0.0 or any(one.action_noise > 0.0 for one in subtasks.template.subtasks):
-                recording.per_step[CLEAN_ACTION] = clean_labels(course.clean, len(recording.actions))
             return labelled(recording, course)
         if self.method == REPLAY:
             return self._replayed(env, seed, Course([], rng, Manner(), self.spread))

@@ -39,12 +39,14 @@ class WaypointPath:
     Attributes:
         targets: all paths that are compared have the same number.
         extra: cost that it has in any case.
+        drawn: what of that was drawn at random, and is no reason to stand elsewhere.
         takes: the object in the gripper after the pose that is solved first, as it will be.
     """
 
     targets: tuple[HandTarget, ...]
     extra: float = 0.0
     takes: Held | None = None
+    drawn: float = 0.0
 
 
 @dataclass(frozen=True)

@@ -52,14 +52,13 @@ class Quality:
     @property
     def most_used_source(self) -> float | None:
         """Share of all segments that come from the source that most come from; None where none was generated."""
-        used = Counter(source for one in self.kept for source in one.sources)
-        return max(used.values()) / used.total() if used else None
+        return max(self._used.values()) / self._used.total() if self._used else None
 
     @property
     def effective_sources(self) -> float | None:
         """Of how many evenly used sources the segments would be as mixed: one over the sum of squared shares."""
-        used = Counter(source for one in self.kept for source in one.sources)
-        return used.total() ** 2 / sum(count**2 for count in used.values()) if used else None
+        squares = sum(count**2 for count in self._used.values())
+        return self._used.total() ** 2 / squares if self._used else None
 
     def kept_with(self, which: int) -> dict[str, tuple[int, int]]:
         """Of the attempts that began a segment, how many were kept and how many there were.
@@ -110,6 +109,11 @@ class Quality:
         own = {name: getattr(self, name) for name in (*names, "stand_spread_rad", "seconds_spread")}
         rates = {"segments": self.kept_with(0), "sources": self.kept_with(1)}
         return {"task": self.task, "kept": len(self.kept), **own, **{name: self.mean(name) for name in means}, **rates}
+
+    @cached_property
+    def _used(self) -> Counter[int]:
+        """How many segments come from each source."""
+        return Counter(source for one in self.kept for source in one.sources)
 
     @cached_property
     def _path_distances(self) -> Array:

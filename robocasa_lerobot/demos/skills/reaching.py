@@ -25,13 +25,16 @@ from robocasa_lerobot.envs.scene.robot_poses import RobotPose
 
 __all__ = [
     "GOOD_ENOUGH",
+    "MOST_DRIVES",
     "Held",
     "MotionPlan",
     "WaypointPath",
     "approach",
+    "approach_by",
     "follow_with",
     "free_stands",
     "go_to",
+    "is_blocked",
     "plan_reach",
 ]
 
@@ -53,7 +56,6 @@ def plan_reach(
     blocked: Sequence[RobotPose] = (),
     may_drive: bool = True,
     may_stay: bool = True,
-    drawn: Callable[[WaypointPath], float] = lambda path: 0.0,
 ) -> list[MotionPlan]:
     """The paths that cost least, best first, from where the robot stands or from where it could.
 
@@ -68,16 +70,15 @@ def plan_reach(
         blocked: places that the base did not get to; after `MOST_DRIVES` of them it stays where it is.
         may_drive: whether the base may go elsewhere at all.
         may_stay: whether it may stay where it is, if there is another place.
-        drawn: what of a path's cost was drawn at random: no reason to go elsewhere.
     """
     if not paths:
         return []
     planner = MotionPlanner(env, paths, key, held=held, loaded=loaded, allowed=allowed)
     found = planner.best([None])
-    good = may_stay and bool(found) and found[0].cost - drawn(found[0].path) <= GOOD_ENOUGH
+    good = may_stay and bool(found) and found[0].cost - found[0].path.drawn <= GOOD_ENOUGH
     if may_drive and not good and len(blocked) < MOST_DRIVES:
         others = free_stands(env, point)
-        stands = [s for s in others if all(np.hypot(s.x - b.x, s.y - b.y) > BLOCKED_M for b in blocked)]
+        stands = [stand for stand in others if not is_blocked(stand, blocked)]
         elsewhere = planner.best(stands, folded=not is_full(held))
         found = sorted((found if may_stay or not elsewhere else []) + elsewhere, key=lambda plan: plan.cost)
     return found
@@ -90,16 +91,30 @@ def approach(
 
     With a full vessel in the hand the arm stays as it is on the drive.
     """
+    return (yield from approach_by(env, plan, lambda choice, stand: go_to(env, stand, gripper, held)))
+
+
+def approach_by(
+    env: KitchenEnv,
+    plan: Callable[[Sequence[RobotPose]], MotionPlan],
+    drive: Callable[[MotionPlan, RobotPose], Iterator[Array]],
+) -> Generator[Array, None, MotionPlan]:
+    """The same with drives of another kind: `drive` is given a plan and where it begins."""
     blocked: list[RobotPose] = []
     while True:
         choice = plan(blocked)
         if choice.base is None:
             return choice
-        yield from go_to(env, choice.base, gripper, held)
+        yield from drive(choice, choice.base)
         base, _ = base_pose(env.data)
         if np.hypot(choice.base.x - base[0], choice.base.y - base[1]) < ARRIVED_M:
             return choice
         blocked.append(choice.base)
+
+
+def is_blocked(stand: RobotPose, blocked: Sequence[RobotPose]) -> bool:
+    """Whether a stand is about one of those that the base did not get to."""
+    return any(np.hypot(stand.x - one.x, stand.y - one.y) <= BLOCKED_M for one in blocked)
 
 
 def follow_with(env: KitchenEnv, joints: Array, held: Held) -> Iterator[Array]:

@@ -11,7 +11,7 @@ from robocasa_lerobot.demos.quality.summary import BIN_M, Quality
 from robocasa_lerobot.evaluation.report import numbers as fmt
 from robocasa_lerobot.evaluation.report.model import Bar, Cell, Column, Document, Section, Table
 from robocasa_lerobot.evaluation.statistics import Estimate
-from robocasa_lerobot.evaluation.statistics.rates import wilson_interval
+from robocasa_lerobot.wilson import wilson_interval
 
 
 @dataclass(frozen=True)

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Mapping
+from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from robocasa_lerobot.benchmark import published
 from robocasa_lerobot.evaluation.records.results import UNPERTURBED
-from robocasa_lerobot.evaluation.report.joining import alike
+from robocasa_lerobot.evaluation.report.joining import put_together
 from robocasa_lerobot.evaluation.report.policies import GROUP_LABELS, PolicyResult, ReportData
 from robocasa_lerobot.evaluation.report.published_cells import AVERAGE, tasks_of
 from robocasa_lerobot.evaluation.statistics.averages import Counts
@@ -89,9 +89,8 @@ def all_curves(data: ReportData) -> list[Curve]:
         label = name or ("with pretraining" if pretrained else TARGET_ONLY)
         curve = found.setdefault((pretrained, name, number), Curve(label, pretrained, place is not None))
         curve.points[demos] = policy
-    curves = _put_together(list(found.values()))
-    for curve in curves:
-        curve.points = dict(sorted(curve.points.items()))
+    sides = [[curve for curve in found.values() if curve.pretrained == side] for side in (False, True)]
+    curves = [curve for side in sides for curve in _put_together(side)]
     return sorted(curves, key=lambda curve: (curve.pretrained, not curve.published, -len(curve.points)))
 
 
@@ -116,26 +115,14 @@ def published_percent(key: str, pretrained: bool, demos: int) -> float | None:
     return None
 
 
-def _put_together(curves: list[Curve]) -> list[Curve]:
-    """Single points of several experiments as one curve, where no experiment has several: alone they make none."""
-    out = [curve for curve in curves if len(curve.points) > 1]
-    sides = {curve.pretrained for curve in out}
-    for curve in curves:
-        if len(curve.points) > 1:
-            continue
-        ((demos, policy),) = curve.points.items()
-        fitting = (
-            other
-            for other in out
-            if curve.pretrained not in sides and other.pretrained == curve.pretrained and demos not in other.points
-            # What a policy without target data was trained on is called otherwise, whatever the others' is called.
-            if all(alike(policy, point, data=0 not in (demos, at)) for at, point in other.points.items())
-        )
-        if (found := next(fitting, None)) is None:
-            out.append(curve)
-        else:
-            found.points[demos] = policy
-            found.label, found.published = f"{found.label} + {curve.label}", found.published and curve.published
+def _put_together(curves: Sequence[Curve]) -> list[Curve]:
+    """The curves of one side; single points of several experiments as one."""
+    out = []
+    for numbers in put_together([curve.points for curve in curves]):
+        parts = [curves[number] for number in numbers]
+        label, published_too = " + ".join(part.label for part in parts), all(part.published for part in parts)
+        points = {demos: policy for part in parts for demos, policy in part.points.items()}
+        out.append(Curve(label, parts[0].pretrained, published_too, dict(sorted(points.items()))))
     return out
 
 

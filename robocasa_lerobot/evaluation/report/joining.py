@@ -9,7 +9,7 @@ stay apart and are shown both.
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Hashable, Sequence
+from collections.abc import Hashable, Mapping, Sequence
 from pathlib import Path
 
 from robocasa_lerobot.evaluation.report.places import tables
@@ -75,6 +75,35 @@ def alike(a: PolicyResult, b: PolicyResult, data: bool = True) -> bool:
     rules = all(getattr(a.header, rule) == getattr(b.header, rule) for rule in _RULES if rule != "protocol")
     same = (a.info.type, a.condition) == (b.info.type, b.condition)
     return rules and same and (not data or a.info.training_data == b.info.training_data)
+
+
+def put_together(found: Sequence[Mapping[int, PolicyResult]], zero_joins: bool = False) -> list[list[int]]:
+    """Which of some series of points, by their numbers, make one: those of a single point, where no other has several.
+
+    Alone they would make nothing. Only policies that are `alike` go together; what one at 0, without target data or
+    untrained, was trained on may be called otherwise. With `zero_joins` it joins a series of several points, too.
+    """
+    out = [[number] for number, points in enumerate(found) if len(points) > 1]
+    none_whole = not out
+    for number, points in enumerate(found):
+        if len(points) > 1:
+            continue
+        ((at, policy),) = points.items()
+        fitting = (
+            group
+            for group in out
+            if none_whole or (zero_joins and at == 0)
+            if all(
+                at != other and alike(policy, one, data=0 not in (at, other))
+                for member in group
+                for other, one in found[member].items()
+            )
+        )
+        if (group := next(fitting, None)) is None:
+            out.append([number])
+        else:
+            group.append(number)
+    return out
 
 
 def training_folder(path: str) -> Path | None:

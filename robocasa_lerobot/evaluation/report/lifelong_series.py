@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 from robocasa_lerobot.evaluation.report import numbers as fmt
-from robocasa_lerobot.evaluation.report.joining import alike, training_folder
+from robocasa_lerobot.evaluation.report.joining import put_together, training_folder
 from robocasa_lerobot.evaluation.report.policies import (
     GROUP_LABELS,
     LIFELONG_SETS,
@@ -110,7 +110,11 @@ def all_series(data: ReportData) -> list[LifelongSeries]:
         while phase in found.get((*key, number), {}):
             number += 1
         found.setdefault((*key, number), {})[phase] = policy
-    series = _put_together(list(found.values()))
+    trainings = list(found.values())
+    series = [
+        dict(sorted(point for number in numbers for point in trainings[number].items()))
+        for numbers in put_together(trainings, zero_joins=True)  # an untrained policy is of no training
+    ]
     labels = [_label(policies) for policies in series]
     return [
         LifelongSeries(
@@ -118,30 +122,6 @@ def all_series(data: ReportData) -> list[LifelongSeries]:
         )
         for number, (label, policies) in enumerate(zip(labels, series, strict=True), start=1)
     ]
-
-
-def _put_together(found: list[dict[int, PolicyResult]]) -> list[dict[int, PolicyResult]]:
-    """Single phases of several trainings as one series, where no training has several: alone they make no matrix.
-
-    An untrained policy, which is of no training, goes to the first series like it that lacks one.
-    """
-    out = [policies for policies in found if len(policies) > 1]
-    none_whole = not out
-    for policies in found:
-        if len(policies) > 1:
-            continue
-        ((phase, policy),) = policies.items()
-        fitting = (
-            other
-            for other in out
-            if (none_whole or phase == 0) and phase not in other
-            if all(alike(policy, one, data=0 not in (phase, at)) for at, one in other.items())
-        )
-        if (series := next(fitting, None)) is None:
-            out.append(policies)
-        else:
-            series[phase] = policy
-    return [dict(sorted(policies.items())) for policies in out]
 
 
 def _label(policies: dict[int, PolicyResult]) -> str:

@@ -6,7 +6,8 @@ One question per file: `rates` (one task), `averages` (several tasks), `paired` 
 """
 
 from robocasa_lerobot.evaluation.statistics.averages import Estimate, average_over_tasks, linear_combination
-from robocasa_lerobot.evaluation.statistics.rates import CONFIDENCE, Rate, success_rate, wilson_interval
+from robocasa_lerobot.evaluation.statistics.rates import Rate, success_rate
+from robocasa_lerobot.wilson import CONFIDENCE, wilson_interval
 
 __all__ = [
     "CONFIDENCE",

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from robocasa_lerobot.errors import UserError
-from robocasa_lerobot.evaluation.statistics.rates import CONFIDENCE
+from robocasa_lerobot.wilson import CONFIDENCE
 
 Counts = Sequence[tuple[int, int]]
 

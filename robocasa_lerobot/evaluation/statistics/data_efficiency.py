@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from robocasa_lerobot.errors import UserError
 from robocasa_lerobot.evaluation.statistics.averages import Counts
-from robocasa_lerobot.evaluation.statistics.rates import CONFIDENCE
+from robocasa_lerobot.wilson import CONFIDENCE
 
 Array = NDArray[np.float64]
 RESAMPLES = 2000

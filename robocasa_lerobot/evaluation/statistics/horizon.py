@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robocasa_lerobot.errors import UserError
-from robocasa_lerobot.evaluation.statistics.rates import CONFIDENCE, wilson_interval
+from robocasa_lerobot.wilson import CONFIDENCE, wilson_interval
 
 Array = NDArray[np.float64]
 

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from robocasa_lerobot.errors import UserError
 from robocasa_lerobot.evaluation.statistics.averages import Estimate
-from robocasa_lerobot.evaluation.statistics.rates import CONFIDENCE, wilson_interval
+from robocasa_lerobot.wilson import CONFIDENCE, wilson_interval
 
 
 def mean_progress(shares: Sequence[float], confidence: float = CONFIDENCE) -> Estimate:

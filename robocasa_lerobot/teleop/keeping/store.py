@@ -191,16 +191,16 @@ class Store:
 
     def _check(self) -> None:
         note = self.folder / _SETTINGS
-        before = json.loads(note.read_text(encoding="utf-8")) if note.exists() else self.settings.identity()
-        if before != self.settings.identity() and not self.path.exists() and not any(self.folder.glob("[0-9]*.hdf5")):
+        own = self.settings.identity()
+        before = json.loads(note.read_text(encoding="utf-8")) if note.exists() else own
+        if before != own:
+            if self.path.exists() or any(self.folder.glob("[0-9]*.hdf5")):
+                raise UserError(
+                    f"{self.settings.out} has episodes of {self.settings.task} that were recorded with other settings "
+                    f"({differing(before, own)}). Give those, or choose another --out."
+                )
             note.unlink()  # nothing was kept with other settings, and numbers of attempts stand for other kitchens
             (self.folder / _ATTEMPTS).unlink(missing_ok=True)
-        elif before != self.settings.identity():
-            others = differing(before, self.settings.identity())
-            raise UserError(
-                f"{self.settings.out} has episodes of {self.settings.task} that were recorded with other settings "
-                f"({others}). Give those, or choose another --out."
-            )
         if self.path.exists() and (not note.exists() or not self._is_ours()):
             raise UserError(
                 f"{self.path} exists, and this command did not record it here. Move it away, or choose another --out."

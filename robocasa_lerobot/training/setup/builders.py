@@ -171,8 +171,9 @@ def make_processors(
     with explained(config.type):
         if checkpoint is None or not keep_statistics:
             stats = meta.stats
-            if stats is not None and not hasattr(config, "constant_range"):  # our own policies do it themselves
-                stats = widen_constant_components(stats, (OBS_STATE, ACTION), CONSTANT_RANGE)
+            if stats is not None:  # our own policies do so wherever they are trained, and nothing the second time
+                narrow = getattr(config, "constant_range", CONSTANT_RANGE)
+                stats = widen_constant_components(stats, (OBS_STATE, ACTION), narrow)
             return make_pre_post_processors(config, dataset_stats=stats, dataset_meta=meta)
         overrides = {"device_processor": {"device": str(config.device)}}
         # With the dataset's metadata, some policies' processors (GR00T's) go on as those of a training: random crops,

@@ -120,7 +120,7 @@ def plain_episode(env: KitchenEnv, log: StageLog, sources: Sources, course: Cour
     course.label = (-1, BRIDGE, -1)
     for _ in range(STILL_STEPS):
         course.clean.append(action(gripper=gripper))
-        yield action(gripper=gripper)
+        yield course.clean[-1]
     raise SkillError("the subtasks are over")
 
 

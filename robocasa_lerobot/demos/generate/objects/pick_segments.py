@@ -16,11 +16,12 @@ from robocasa_lerobot.demos.generate.course import BRIDGE, DRIVE, Course
 from robocasa_lerobot.demos.generate.execute import as_target, carry_out_segment, hand_now
 from robocasa_lerobot.demos.generate.objects.draw_out import draw_out
 from robocasa_lerobot.demos.generate.objects.lid_places import LID_VERBS, knob_grasps
-from robocasa_lerobot.demos.generate.objects.place_segments import drawn_cost, place_strategy_of
+from robocasa_lerobot.demos.generate.objects.place_segments import place_strategy_of
 from robocasa_lerobot.demos.generate.segment_paths import (
     STEEP_RAD,
     SegmentPath,
     along,
+    best_plan,
     cheapest,
     poses_at,
 )
@@ -51,7 +52,7 @@ from robocasa_lerobot.demos.skills.pick_place.strategies import (
     target_object,
 )
 from robocasa_lerobot.demos.skills.pick_place.verbs import BY_USE, come_to, free_grasp
-from robocasa_lerobot.demos.skills.reaching import MotionPlan, approach, plan_reach
+from robocasa_lerobot.demos.skills.reaching import approach
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.scene.robot_poses import RobotPose
 from robocasa_lerobot.envs.tasks.task import Stage
@@ -102,23 +103,8 @@ def pick_as_shown(env: KitchenEnv, stage: Stage, obj: Graspable, course: Course,
     ways = _pick_ways(env, obj, strategy, pieces, course, tried, lid=stage.verb in LID_VERBS)
     if not ways:
         raise SkillError(f"{obj.title}: no source's grasp fits it")
-
-    def plan(blocked: Sequence[RobotPose]) -> MotionPlan:
-        drives = course.manner.base != "fixed"
-        found = plan_reach(
-            env,
-            ways,
-            origin,
-            key=2,
-            allowed=obj.bodies,
-            blocked=blocked,
-            may_drive=drives,
-            drawn=partial(drawn_cost, course),
-        )
-        if not found or found[0].cost - drawn_cost(course, found[0].path) > HOPELESS:
-            raise SkillError(f"{obj.title}: no source's grasp is within reach")
-        return found[0]
-
+    lacking = f"{obj.title}: no source's grasp is within reach"
+    plan = partial(best_plan, env, course, ways, origin, key=2, allowed=obj.bodies, lacking=lacking, most=HOPELESS)
     choice = yield from course.choosing(approach(env, plan, OPEN), DRIVE)
     way = choice.path
     assert isinstance(way, SegmentPath)
@@ -178,15 +164,15 @@ def _pick_ways(
                     for other in tried
                 )
                 extra = WORSE_GRASP * (best - pose.score) + TRIED_COST * again + 0.1 * abs(turn)
-                extra += float(course.bias[piece.source.number])
+                drawn = float(course.bias[piece.source.number])
                 for rotation in (pose.rotation, pose.rotation @ HALF_TURN):
-                    way = _pick_way(piece, pose.position, rotation, extra)
+                    way = _pick_way(piece, pose.position, rotation, extra + drawn, drawn)
                     if way is not None:
                         ways.append(way)
     return cheapest(env, ways, course)
 
 
-def _pick_way(piece: Piece, position: Array, rotation: Array, extra: float) -> SegmentPath | None:
+def _pick_way(piece: Piece, position: Array, rotation: Array, extra: float, drawn: float) -> SegmentPath | None:
     """A segment brought to a grasp; None where that would tip the hand over."""
     segment, data = piece.segment, piece.data
     source = data.eef[segment.contact]
@@ -205,4 +191,4 @@ def _pick_way(piece: Piece, position: Array, rotation: Array, extra: float) -> S
     lead, contact = segment.lead, segment.contact
     chosen = poses_at(piece, hand, (lead, lead + (contact - lead) // 2, contact, segment.end))
     extra += ASKEW_COST * askew
-    return SegmentPath(chosen, extra, piece=piece, hand=hand, target=lambda step: here(data.target[step]))
+    return SegmentPath(chosen, extra, drawn=drawn, piece=piece, hand=hand, target=lambda step: here(data.target[step]))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import replace
 from functools import partial
 
@@ -17,6 +17,7 @@ from robocasa_lerobot.demos.generate.segment_paths import (
     SegmentPath,
     after_letting_go,
     along,
+    best_plan,
     cheapest,
     led_ahead,
     poses_at,
@@ -40,9 +41,8 @@ from robocasa_lerobot.demos.skills.pick_place.pick import is_held
 from robocasa_lerobot.demos.skills.pick_place.place import PlacePose, PlaceStrategy, leave
 from robocasa_lerobot.demos.skills.pick_place.strategies import place_strategy
 from robocasa_lerobot.demos.skills.pick_place.verbs import bring
-from robocasa_lerobot.demos.skills.reaching import Held, MotionPlan, WaypointPath, approach, plan_reach
+from robocasa_lerobot.demos.skills.reaching import Held, approach
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
-from robocasa_lerobot.envs.scene.robot_poses import RobotPose
 from robocasa_lerobot.envs.tasks.task import Stage
 
 MOST_SPOTS, YAWS = 12, 8
@@ -77,33 +77,13 @@ def place_as_shown(
         yield from course.labelled(move_torso(env, 0.0, CLOSED, Held.now(env.data, obj.name, obj.contents)), DRIVE)
     held = Held.now(env.data, obj.name, obj.contents)
 
-    def ways() -> list[SegmentPath]:
-        return _place_ways(env, stage, obj, held, strategy, pieces, course, put_down)
-
-    found = ways()
-    if not found:
+    ways = _place_ways(env, stage, obj, held, strategy, pieces, course, put_down)
+    if not ways:
         raise SkillError(f"{obj.title}: nowhere to put it")
-    middle = np.mean([way.targets[2].position for way in found], axis=0)
+    middle = np.mean([way.targets[2].position for way in ways], axis=0)
     mine = obj.bodies | obj.carried
-
-    def plan(blocked: Sequence[RobotPose]) -> MotionPlan:
-        drives = course.manner.base != "fixed"
-        plans = plan_reach(
-            env,
-            found,
-            middle,
-            key=2,
-            held=held,
-            loaded=3,
-            allowed=mine,
-            blocked=blocked,
-            may_drive=drives,
-            drawn=partial(drawn_cost, course),
-        )
-        if not plans:
-            raise SkillError(f"{obj.title}: no source's way to put it down is within reach")
-        return plans[0]
-
+    lacking = f"{obj.title}: no source's way to put it down is within reach"
+    plan = partial(best_plan, env, course, ways, middle, key=2, held=held, loaded=3, allowed=mine, lacking=lacking)
     choice = yield from course.choosing(approach(env, plan, CLOSED, held), DRIVE)
     if not is_held(env, obj.name):
         return
@@ -119,12 +99,6 @@ def place_as_shown(
     if is_held(env, obj.name):
         return
     yield from course.labelled(leave(env, obj), BRIDGE)
-
-
-def drawn_cost(course: Course, path: WaypointPath) -> float:
-    """What of a path's cost its source has for not being drawn."""
-    assert isinstance(path, SegmentPath)
-    return float(course.bias[path.piece.source.number])
 
 
 def _slip(env: KitchenEnv, obj: Graspable, held: Held, way: SegmentPath) -> Array:
@@ -170,8 +144,8 @@ def _place_ways(
         about = rotation_about(UP, yaw - float(piece.data.base[piece.segment.contact, 2]))
         way = _place_way(obj, held, rest, present, piece, spot, strategy, about, turn)
         again = sum(float(np.linalg.norm(way.targets[2].position - other)) < AGAIN_M for other in put_down)
-        extra = way.extra + AGAIN_COST * again + float(course.bias[piece.source.number])
-        ways.append(replace(way, extra=extra))
+        drawn = float(course.bias[piece.source.number])
+        ways.append(replace(way, extra=way.extra + AGAIN_COST * again + drawn, drawn=drawn))
     return cheapest(env, ways, course)
 
 

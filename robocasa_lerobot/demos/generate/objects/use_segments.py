@@ -20,6 +20,7 @@ from robocasa_lerobot.demos.generate.segment_paths import (
     SegmentPath,
     after_letting_go,
     along,
+    best_plan,
     cheapest,
     led_ahead,
     poses_at,
@@ -40,7 +41,7 @@ from robocasa_lerobot.demos.skills.pick_place.carrying.loss import touched_by_ha
 from robocasa_lerobot.demos.skills.pick_place.graspable import Graspable
 from robocasa_lerobot.demos.skills.pick_place.pick import is_held
 from robocasa_lerobot.demos.skills.pick_place.place import leave
-from robocasa_lerobot.demos.skills.reaching import Held, MotionPlan, approach, plan_reach
+from robocasa_lerobot.demos.skills.reaching import Held, MotionPlan, approach
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.scene.robot_poses import RobotPose
 from robocasa_lerobot.envs.tasks.task import Stage
@@ -123,22 +124,13 @@ def use(env: KitchenEnv, stage: Stage, obj: Graspable, course: Course, failed: d
     frame = _frame(env, stage, course)
     paths = _paths(env, stage, obj, frame, pieces, course, failed)
     mine = obj.bodies | obj.carried | _used_on(env, stage)
+    lacking = f"{obj.title}: no source's way to use it is within reach"
 
     def plan(blocked: Sequence[RobotPose]) -> MotionPlan:
-        found = plan_reach(
-            env,
-            paths,
-            frame[:3, 3],
-            key=1,
-            held=Held.now(env.data, obj.name, obj.contents),
-            loaded=1,
-            allowed=mine,
-            blocked=blocked,
-            may_drive=course.manner.base != "fixed",
+        now = Held.now(env.data, obj.name, obj.contents)
+        return best_plan(
+            env, course, paths, frame[:3, 3], blocked, key=1, held=now, loaded=1, allowed=mine, lacking=lacking
         )
-        if not found:
-            raise SkillError(f"{obj.title}: no source's way to use it is within reach")
-        return found[0]
 
     held = Held.now(env.data, obj.name, obj.contents)
     choice = yield from course.choosing(approach(env, plan, CLOSED, held), DRIVE)

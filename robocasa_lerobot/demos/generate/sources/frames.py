@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import mujoco
 import numpy as np
+from numpy.typing import NDArray
 
 from robocasa_lerobot.demos.generate.sources.transform import make_pose
 from robocasa_lerobot.demos.motion import Array
@@ -120,12 +121,18 @@ def _part(env: KitchenEnv, role: str, fixture: Fixture, joint: str) -> Part:
 def _lever(env: KitchenEnv, body: int) -> Array | None:
     """The middle of the solid shapes of bodies fixed to one, (3,) in its axes; None where it is solid itself."""
     model, data = env.model, env.data
-    solid = (model.geom_contype != 0) | (model.geom_conaffinity != 0)
+    solid = _solid(model)
     below = env.scene.subtree(model.body(body).name)
     if solid[model.geom_bodyid == body].any() or not (mine := solid & below[model.geom_bodyid]).any():
         return None
     middle: Array = data.xmat[body].reshape(3, 3).T @ (data.geom_xpos[mine].mean(axis=0) - data.xpos[body])
     return middle
+
+
+def _solid(model: mujoco.MjModel) -> NDArray[np.bool_]:
+    """For each shape whether it collides, (ngeom,)."""
+    collides: NDArray[np.bool_] = (model.geom_contype != 0) | (model.geom_conaffinity != 0)
+    return collides
 
 
 def solid_boxes(model: mujoco.MjModel, body: int) -> dict[str, Array]:
@@ -135,9 +142,9 @@ def solid_boxes(model: mujoco.MjModel, body: int) -> dict[str, Array]:
     """
     corners: dict[str, list[Array]] = {}
     first = int(model.body_geomadr[body])
-    own = range(first, first + int(model.body_geomnum[body]))
-    solid = [geom for geom in own if model.geom_contype[geom] or model.geom_conaffinity[geom]]
-    for geom in solid or own:
+    own = np.arange(first, first + int(model.body_geomnum[body]))
+    solid = own[_solid(model)[own]]
+    for geom in (solid if len(solid) else own).tolist():
         turn = np.empty(9)
         mujoco.mju_quat2Mat(turn, model.geom_quat[geom])
         axes, box = turn.reshape(3, 3), model.geom_aabb[geom]

@@ -72,8 +72,7 @@ def prepare_files(paths: Iterable[Path], *, workers: int = 1, fresh: bool = Fals
         jobs = [(path, demo, one.folder) for path, one in begun.items() for demo in one.demos]
         for outcome in as_they_end(prepare_one, jobs, workers):
             yield outcome
-            if begun[outcome.path].is_last(outcome.demo):
-                begun[outcome.path].publish()
+            begun[outcome.path].end(outcome.demo)
 
 
 @dataclass
@@ -93,16 +92,13 @@ class _Begun:
     lock: contextlib.ExitStack
     left: set[str]
 
-    def is_last(self, demo: str) -> bool:
-        """Whether no other demonstration is left when this one has ended."""
-        self.left.discard(demo)
-        return not self.left
-
-    def publish(self) -> None:
-        """Replace the file, and let others at it."""
-        _publish(self.path, self.demos, self.folder)
-        shutil.rmtree(self.folder)
-        self.lock.close()
+    def end(self, demo: str) -> None:
+        """Note that a demonstration has ended; with the last one replace the file, and let others at it."""
+        self.left.remove(demo)
+        if not self.left:
+            _publish(self.path, self.demos, self.folder)
+            shutil.rmtree(self.folder)
+            self.lock.close()
 
 
 def _begin(path: Path, demos: list[str], locks: contextlib.ExitStack, *, fresh: bool) -> _Begun:
