@@ -47,6 +47,18 @@ def test_random_crops_are_reproducible_and_reach_every_place() -> None:
         assert torch.equal(crop[0], images[0, 0, row : row + 3, column : column + 3])
 
 
+@pytest.mark.parametrize("shape", [(5, 6, 8), (5, 3, 6, 8), (5, 2, 3, 6, 8)])
+def test_crops_by_one_kernel_are_those_by_slices(shape: tuple[int, ...]) -> None:
+    """As on a GPU, and in what `torch.compile` translates."""
+    images = torch.rand(shape, generator=torch.Generator().manual_seed(0))
+    torch._dynamo.reset()
+    compiled = torch.compile(random_crop, backend="eager", fullgraph=True)
+    torch.manual_seed(1)
+    expected = random_crop(images, 0.7)
+    torch.manual_seed(1)
+    assert torch.equal(compiled(images, 0.7), expected)
+
+
 def test_spatial_softmax_finds_a_peak() -> None:
     pool = SpatialSoftmax(1, 1)
     pool.to_keypoints.weight.data.fill_(1.0)
@@ -108,6 +120,16 @@ def test_token_encoder_reads_words_in_order_and_ignores_padding() -> None:
     assert (a[0] - a[1]).abs().max() > 1e-3
     for i, text in enumerate(["put the cup left of the bowl", "put the bowl left of the cup", "open", ""]):
         torch.testing.assert_close(encode(text)[0], a[i])
+
+
+def test_instructions_are_encoded_alike_each_once_and_sample_by_sample() -> None:
+    """On a CPU each instruction is encoded once; on a GPU, and compiled, each sample's, with all its padding."""
+    torch.manual_seed(0)
+    encoder = TokenEncoder(buckets=256, max_words=12, dim=16)
+    tokens = token_tensor(["open the drawer", "close it", "open the drawer", ""], 12, 256)
+    mask = (tokens != PADDING).any(dim=-1)
+    compiled = torch.compile(encoder, backend="eager", fullgraph=True)
+    torch.testing.assert_close(compiled(tokens, mask), encoder(tokens, mask))
 
 
 def test_constant_components_keep_their_scale() -> None:

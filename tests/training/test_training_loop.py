@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib.util
 import json
 import os
+import pickle
 import signal
 import subprocess
 import sys
@@ -30,7 +31,7 @@ from robocasa_lerobot.training.augment import augment
 from robocasa_lerobot.training.config.experiment import TRACKERS
 from robocasa_lerobot.training.config.phase import AugmentConfig
 from robocasa_lerobot.training.interrupts import REQUEUE
-from robocasa_lerobot.training.loading import load_batches
+from robocasa_lerobot.training.loading import InFile, load_batches
 from robocasa_lerobot.training.loop import part_shares
 from robocasa_lerobot.training.phases import run_experiment
 from robocasa_lerobot.training.setup.build_phase import prepare_phase
@@ -144,6 +145,15 @@ def test_loader_processes_outlive_what_asks_the_run_to_end(tmp_path: Path, data:
     del found
     process.join()
     assert process.exitcode == -signal.SIGKILL
+
+
+def test_loader_processes_are_started_without_waiting_for_each_other(tmp_path: Path, data: Path) -> None:
+    """What one is started with fits into a pipe: its parent would wait until it has imported everything."""
+    experiment = tiny(tmp_path, data)
+    run = prepare_phase(experiment, experiment.phases[0], "cpu", Accelerator(cpu=True))
+    handed = InFile(run.batches)
+    assert len(pickle.dumps(handed)) < 4096
+    assert torch.equal(pickle.loads(pickle.dumps(handed))[1]["index"], run.batches[1]["index"])
 
 
 @pytest.mark.slow

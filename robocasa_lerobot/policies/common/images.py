@@ -48,8 +48,20 @@ def random_crop(images: Tensor, fraction: float, generator: torch.Generator | No
     h, w = crop_size((height, width), fraction)
     if (h, w) == (height, width):
         return images
-    tops = torch.randint(height - h + 1, (count,), generator=generator).tolist()
-    lefts = torch.randint(width - w + 1, (count,), generator=generator).tolist()
-    return torch.stack(
-        [image[..., t : t + h, left : left + w] for image, t, left in zip(images, tops, lefts, strict=True)]
-    )
+    tops = torch.randint(height - h + 1, (count,), generator=generator)
+    lefts = torch.randint(width - w + 1, (count,), generator=generator)
+    if images.device.type != "cpu" or torch.compiler.is_compiling():
+        return _windows(images, tops.to(images.device), lefts.to(images.device), (h, w))
+    places = zip(images, tops.tolist(), lefts.tolist(), strict=True)
+    return torch.stack([image[..., t : t + h, left : left + w] for image, t, left in places])
+
+
+def _windows(images: Tensor, tops: Tensor, lefts: Tensor, size: tuple[int, int]) -> Tensor:
+    """Windows of images (N, ..., H, W), one of `size` each: one kernel, where slices would be one for each image."""
+    flat = images.flatten(1, -3) if images.ndim > 3 else images.unsqueeze(1)
+    count, channels = flat.shape[:2]
+    image = torch.arange(count, device=images.device).view(-1, 1, 1, 1)
+    channel = torch.arange(channels, device=images.device).view(1, -1, 1, 1)
+    rows = (tops[:, None] + torch.arange(size[0], device=images.device)).view(count, 1, -1, 1)
+    columns = (lefts[:, None] + torch.arange(size[1], device=images.device)).view(count, 1, 1, -1)
+    return flat[image, channel, rows, columns].reshape(*images.shape[:-2], *size)

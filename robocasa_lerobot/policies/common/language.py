@@ -80,19 +80,26 @@ class TokenEncoder(nn.Module):
 
     def forward(self, tokens: Tensor, mask: Tensor) -> Tensor:
         """Maps tokens (N, W, SUBWORDS) and mask (N, W), true where there is a word, to (N, dim)."""
+        if tokens.device.type != "cpu" or torch.compiler.is_compiling():
+            # How many instructions and words there are would have to be waited for, and be shapes that change.
+            return self._encode(tokens, mask)
         # A batch repeats few instructions: encode each once.
         unique, where = torch.unique(torch.cat([tokens.flatten(1), mask.long()], dim=1), dim=0, return_inverse=True)
         words = int(mask.sum(dim=1).max().clamp(min=1))
         mask = unique[:, -mask.shape[1] :][:, :words].bool()
         tokens = unique[:, : tokens.shape[1] * SUBWORDS].unflatten(1, (-1, SUBWORDS))[:, :words]
+        return self._encode(tokens, mask)[where]
+
+    def _encode(self, tokens: Tensor, mask: Tensor) -> Tensor:
         pieces = (tokens != PADDING).sum(dim=-1, keepdim=True).clamp(min=1)
-        x = self.embedding(tokens).sum(dim=-2) / pieces + self.position_embedding[:, :words]
+        x = self.embedding(tokens).sum(dim=-2) / pieces + self.position_embedding[:, : tokens.shape[1]]
         # An empty instruction attends to its first (empty) place: a softmax over nothing is not a number.
-        attended = mask.clone()
+        attended = mask.bool().clone()
         attended[:, 0] = True
         x = self.norm(self.layer(x, src_key_padding_mask=~attended))
         weight = attended.unsqueeze(-1).to(x.dtype)
-        return ((x * weight).sum(dim=1) / weight.sum(dim=1))[where]
+        out: Tensor = (x * weight).sum(dim=1) / weight.sum(dim=1)
+        return out
 
 
 class ClipTextEncoder(nn.Module):
@@ -124,7 +131,8 @@ class ClipTextEncoder(nn.Module):
         return self.model if hasattr(self, "model") else self._held[0]
 
     # Cached embeddings must be the same under automatic mixed precision and usable for training although first
-    # seen in inference mode.
+    # seen in inference mode. `torch.compile` has nothing to translate in a dictionary.
+    @torch.compiler.disable
     @torch.inference_mode(False)
     @torch.no_grad()
     def forward(self, tokens: Tensor, mask: Tensor) -> Tensor:

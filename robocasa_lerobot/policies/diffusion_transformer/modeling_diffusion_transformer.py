@@ -71,6 +71,14 @@ class DiffusionTransformerPolicy(PreTrainedPolicy):
         ]
         return [group for group in groups if group["params"]]
 
+    def compile(self, *arguments: Any, **options: Any) -> None:
+        """Have `torch.compile` translate the encoder, and the transformer layer by layer, with its own arguments.
+
+        Layers are alike, so that one is translated for all of them.
+        """
+        for part in (self.observation_encoder, *self.denoiser.layers()):
+            part.compile(*arguments, **options)
+
     def forward(
         self,
         batch: dict[str, Tensor],

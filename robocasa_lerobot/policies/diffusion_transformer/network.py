@@ -7,6 +7,7 @@ token per observed step; action tokens attend to themselves causally and to the 
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 
 import torch
 from torch import Tensor, nn
@@ -94,6 +95,11 @@ class DenoisingTransformer(nn.Module):
         self.apply(_initialise)
         for position in (self.condition_position, self.action_position):
             nn.init.normal_(position, std=INITIAL_STD)
+
+    def layers(self) -> Iterator[nn.Module]:
+        """Of both transformers, from the condition to the actions."""
+        for stack in (self.condition_encoder, self.decoder):
+            yield from getattr(stack, "layers", ())
 
     def forward(self, noisy_actions: Tensor, times: Tensor, features: Tensor) -> Tensor:
         """Predict, for each action of a chunk, what the training target is (noise or clean action).
