@@ -6,6 +6,8 @@ import torch
 from torch import Tensor
 from torch.nn import functional
 
+from robocasa_lerobot.policies.common.transfer import to_device
+
 
 def to_signed_float(images: Tensor) -> Tensor:
     """Images as float in [-1, 1], from uint8 in [0, 255] or float in [0, 1]; any shape."""
@@ -51,7 +53,7 @@ def random_crop(images: Tensor, fraction: float, generator: torch.Generator | No
     tops = torch.randint(height - h + 1, (count,), generator=generator)
     lefts = torch.randint(width - w + 1, (count,), generator=generator)
     if images.device.type != "cpu" or torch.compiler.is_compiling():
-        return _windows(images, tops.to(images.device), lefts.to(images.device), (h, w))
+        return _windows(images, to_device(tops, images.device), to_device(lefts, images.device), (h, w))
     places = zip(images, tops.tolist(), lefts.tolist(), strict=True)
     return torch.stack([image[..., t : t + h, left : left + w] for image, t, left in places])
 

@@ -17,6 +17,7 @@ import torch
 from torch import Tensor, nn
 
 from robocasa_lerobot.errors import UserError
+from robocasa_lerobot.policies.common.transfer import to_device
 
 SUBWORDS = 8  # per word: the word itself and its first seven trigrams
 PADDING = 0  # token of no word; hashes are 1 ... buckets
@@ -138,13 +139,16 @@ class ClipTextEncoder(nn.Module):
     def forward(self, tokens: Tensor, mask: Tensor) -> Tensor:
         """Maps CLIP's tokens (N, L) and attention mask (N, L) to its text embeddings (N, dim), in float32."""
         keys = [row.numpy().tobytes() for row in tokens.cpu()]
-        new = [i for i, key in enumerate(keys) if key not in self._memory and keys.index(key) == i]
+        first = {key: i for i, key in reversed(list(enumerate(keys)))}  # where each is for the first time
+        new = sorted(i for key, i in first.items() if key not in self._memory)
         if new:
             model = self.text_model.to(tokens.device).eval()
             with torch.autocast(tokens.device.type, enabled=False):
                 embeddings = model(input_ids=tokens[new], attention_mask=mask[new].long()).text_embeds.float()
             self._memory.update({keys[i]: embedding for i, embedding in zip(new, embeddings, strict=True)})
-        return torch.stack([self._memory[key].to(tokens.device) for key in keys])
+        place = {key: i for i, key in enumerate(first)}
+        known = torch.stack([self._memory[key].to(tokens.device) for key in first])
+        return known[to_device(torch.tensor([place[key] for key in keys], dtype=torch.int64), tokens.device)]
 
     def _load_from_state_dict(self, *args: Any, **kwargs: Any) -> None:
         self._memory.clear()  # what other weights gave

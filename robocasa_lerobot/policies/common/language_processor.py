@@ -40,7 +40,10 @@ class _InstructionStep(ObservationProcessorStep):
                 f"the batch has no instructions: {TASK_KEY!r} is {instructions!r}, expected a list of strings. "
                 "Datasets carry it as their task; an env's loop adds it to the observation."
             )
-        tokens, mask = self.tokenize(list(instructions))
+        # A batch repeats few instructions: make tokens of each once.
+        place = {instruction: i for i, instruction in enumerate(dict.fromkeys(instructions))}
+        where = torch.tensor([place[instruction] for instruction in instructions], dtype=torch.int64)
+        tokens, mask = (each[where] for each in self.tokenize(list(place)))
         return {**observation, OBS_LANGUAGE_TOKENS: tokens, OBS_LANGUAGE_ATTENTION_MASK: mask}
 
     def transform_features(

@@ -23,6 +23,7 @@ from robocasa_lerobot.policies.common.chunks import (
 )
 from robocasa_lerobot.policies.common.look_back import LookBack
 from robocasa_lerobot.policies.common.traced import Traced
+from robocasa_lerobot.policies.common.transfer import to_device
 from robocasa_lerobot.policies.diffusion_transformer.configuration_diffusion_transformer import (
     DiffusionTransformerConfig,
 )
@@ -106,7 +107,7 @@ class DiffusionTransformerPolicy(PreTrainedPolicy):
             noise = normal_noise(actions.shape, generator, actions)
         if times is None:
             steps = self.config.num_train_timesteps
-            times = torch.randint(steps, actions.shape[:1], generator=generator).to(actions.device)
+            times = to_device(torch.randint(steps, actions.shape[:1], generator=generator), actions.device)
         noisy = self.scheduler.add_noise(actions, noise, times)
         target = noise if self.config.prediction_type == "epsilon" else actions
         with short_attention(actions.device):

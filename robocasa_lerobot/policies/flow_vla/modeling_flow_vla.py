@@ -23,6 +23,7 @@ from robocasa_lerobot.policies.common.chunks import (
 )
 from robocasa_lerobot.policies.common.state import StateInput
 from robocasa_lerobot.policies.common.traced import Traced
+from robocasa_lerobot.policies.common.transfer import to_device
 from robocasa_lerobot.policies.flow_vla.configuration_flow_vla import FlowVlaConfig
 from robocasa_lerobot.policies.flow_vla.expert import ActionExpert, PrefixCache, expert_context
 from robocasa_lerobot.policies.flow_vla.prefix import Prefix, ScratchPrefix
@@ -90,7 +91,7 @@ class FlowVlaPolicy(PreTrainedPolicy):
         if noise is None:
             noise = normal_noise(actions.shape, generator, actions)
         if times is None:
-            times = self.sample_times(actions.shape[0], generator).to(actions.device)
+            times = to_device(self.sample_times(actions.shape[0], generator), actions.device)
         t = times[:, None, None]
         velocity = self.velocity(state, t * noise + (1.0 - t) * actions, times, prefix)
         losses = sample_losses(velocity, noise - actions, batch, self.config)
