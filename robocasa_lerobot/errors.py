@@ -28,6 +28,10 @@ class LackingMachineError(UserError):
 OF_THE_MACHINE = (OSError, MemoryError, LackingMachineError)
 
 
+class WorkerDiedError(UserError):
+    """A process that was working did not live to report: killed, out of memory, or crashed."""
+
+
 class UnknownNameError(UserError):
     """A name that no registry entry has; the message names the closest ones."""
 

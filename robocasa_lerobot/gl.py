@@ -192,9 +192,10 @@ def check_device(device: int) -> None:
 def ensure_gl(device: int | None = None) -> str:
     """Choose MuJoCo's backend for this process and its children, and return its name.
 
-    A `MUJOCO_GL` that is already set stays. Without one, on Linux, the first of EGL and OSMesa that renders is
-    chosen; other systems have a working default. Warns when the CPU draws although the machine has a GPU; with a
-    backend that was chosen before, `note_renderer` does so at the first picture.
+    A `MUJOCO_GL` that is already set stays; MuJoCo is bound to it, should it have been imported before. Without one, on
+    Linux, the first of EGL and OSMesa that renders is chosen; other systems have a working default. Warns when the CPU
+    draws although the machine has a GPU; with a backend that was chosen before, `note_renderer` does so at the first
+    picture.
 
     Args:
         device: number of the EGL device that this process shall draw on; None leaves it to `MUJOCO_EGL_DEVICE_ID`,
@@ -209,6 +210,8 @@ def ensure_gl(device: int | None = None) -> str:
         _pin(device)
     asked = os.environ.get(VARIABLE)
     if asked:
+        if asked in HEADLESS_BACKENDS and _bound_backend() not in (None, asked):
+            use(asked)
         return asked
     if sys.platform != "linux":
         return "default"
@@ -238,6 +241,14 @@ def use(backend: str, device: int | None = None) -> None:
     if mujoco is not None:
         module = importlib.import_module("mujoco.rendering.classic.gl_context")
         mujoco.GLContext = importlib.reload(module).GLContext  # type: ignore[attr-defined]
+
+
+def _bound_backend() -> str | None:
+    """The backend that MuJoCo is bound to, an empty name for none; None before its import."""
+    mujoco = sys.modules.get("mujoco")
+    if mujoco is None:
+        return None
+    return str(getattr(getattr(mujoco, "GLContext", None), "__module__", "")).rpartition(".")[2]
 
 
 def note_renderer() -> str:

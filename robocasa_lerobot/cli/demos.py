@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import argparse
-import os
 from pathlib import Path
 from typing import TYPE_CHECKING
+
+from robocasa_lerobot.jobs.workers import cores_here
 
 if TYPE_CHECKING:
     from robocasa_lerobot.demos.recording import RecordingSettings
@@ -104,7 +105,7 @@ def run(args: argparse.Namespace) -> int:
     ]
     if execution.kind != "local":
         return _distribute(settings, args, execution)
-    workers = args.workers if args.workers is not None else os.cpu_count() or 1
+    workers = args.workers if args.workers is not None else cores_here()
     results = record_tasks(settings, args.out, workers=workers, keep_failures=args.keep_failures)
     return print_summary(results)
 

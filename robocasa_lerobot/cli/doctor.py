@@ -117,6 +117,9 @@ def check_gpu() -> Finding:
         names = [torch.cuda.get_device_name(i) for i in range(torch.cuda.device_count())]
         return Finding("GPU", "ok", ", ".join(names))
     if gl.has_gpu():
+        if torch.version.cuda is None:
+            remedy = "rm -r .venv && make setup  (its torch is built for CUDA)"
+            return Finding("GPU", "warning", "there is one, but torch was built without CUDA", remedy)
         remedy = "nvidia-smi  (names the driver's fault; torch needs a driver for CUDA " + str(torch.version.cuda) + ")"
         return Finding("GPU", "warning", "there is one, but torch cannot use it", remedy)
     return Finding("GPU", "ok", "none: the small presets train on the CPU")

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import argparse
-import os
 from pathlib import Path
+
+from robocasa_lerobot.jobs.workers import cores_here
 
 EXAMPLE = (
     "robocasa-lerobot gallery --show tasks --out gallery/ "
@@ -34,7 +35,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
         "several the last one counts",
     )
     parser.add_argument(
-        "--workers", type=int, default=os.cpu_count() or 1, help="of the page of tasks: processes (default: all cores)"
+        "--workers", type=int, default=cores_here(), help="of the page of tasks: processes (default: all cores)"
     )
     parser.add_argument("--preset", default="fast", help="render preset of starts: fast or quality (default fast)")
     parser.add_argument("--image-size", type=int, default=256, help="height and width of camera pictures (default 256)")

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import argparse
 import json
-import os
 from dataclasses import asdict
 from pathlib import Path
 
 from robocasa_lerobot.cli.demos import add_kitchen_options
+from robocasa_lerobot.jobs.workers import cores_here
 
 EXAMPLE = (
     "robocasa-lerobot generate --source demos/ --tasks OpenDrawer --episodes 100 --split pretrain --seed 100000 "
@@ -117,5 +117,5 @@ def run(args: argparse.Namespace) -> int:
         if line:
             print(line)
         return status
-    workers = args.workers if args.workers is not None else os.cpu_count() or 1
+    workers = args.workers if args.workers is not None else cores_here()
     return print_summary(record_tasks(settings, args.out, workers=workers, keep_failures=args.keep_failures))

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import argparse
 import json
-import os
 from pathlib import Path
 
 from robocasa_lerobot.convert.inspect import show as files
 from robocasa_lerobot.errors import UserError
+from robocasa_lerobot.jobs.workers import cores_here
 
 EXAMPLE = (
     f"{files.EXAMPLE}\n  robocasa-lerobot inspect configs/experiments/parts/kitchens.yaml --out outputs/data.html\n  "
@@ -35,9 +35,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
         help="of demonstrations recorded or generated here: which starts they cover, how they differ, how they move",
     )
     parser.add_argument("--beside", type=Path, metavar="DIR", help="of --worth: others of the same tasks, to compare")
-    parser.add_argument(
-        "--workers", type=int, default=os.cpu_count() or 1, help="of --worth: processes (default: all cores)"
-    )
+    parser.add_argument("--workers", type=int, default=cores_here(), help="of --worth: processes (default: all cores)")
 
 
 def run(args: argparse.Namespace) -> int:

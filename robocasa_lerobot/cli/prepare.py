@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import argparse
-import os
 from pathlib import Path
+
+from robocasa_lerobot.jobs.workers import cores_here
 
 EXAMPLE = (
     "robocasa-lerobot prepare demos/\n  robocasa-lerobot prepare lift.hdf5 --bodies cube_main --asset-root assets/"
@@ -14,7 +15,7 @@ EXAMPLE = (
 def configure(parser: argparse.ArgumentParser) -> None:
     """Add the arguments."""
     parser.add_argument("paths", nargs="+", type=Path, metavar="PATH", help="files of demonstrations, or folders")
-    parser.add_argument("--workers", type=int, default=os.cpu_count() or 1, help="processes (default: all cores)")
+    parser.add_argument("--workers", type=int, default=cores_here(), help="processes (default: all cores)")
     parser.add_argument(
         "--bodies",
         metavar="NAMES",

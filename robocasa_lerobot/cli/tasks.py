@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import argparse
 import json
-import os
 from pathlib import Path
 from typing import TYPE_CHECKING
+
+from robocasa_lerobot.jobs.workers import cores_here
 
 if TYPE_CHECKING:
     from robocasa_lerobot.envs.tasks.task import Task
@@ -39,7 +40,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--seeds", type=int, default=10, metavar="N", help="of --check, from 0 on (default 10)")
     parser.add_argument("--log", type=Path, metavar="FILE", help="of --check: keep what was found, and go on from it")
-    parser.add_argument("--workers", type=int, default=os.cpu_count() or 1, help="of --check (default: all cores)")
+    parser.add_argument("--workers", type=int, default=cores_here(), help="of --check (default: all cores)")
     parser.add_argument("--json", action="store_true", help="print JSON")
 
 

@@ -21,7 +21,7 @@ import numpy as np
 from robocasa_lerobot import contract
 from robocasa_lerobot.demos.demonstrator import demonstrate
 from robocasa_lerobot.demos.failures import film_of, keep_failure
-from robocasa_lerobot.demos.hdf5 import Failure, segments_of, write_part
+from robocasa_lerobot.demos.hdf5 import Failure, segments_of, versions, write_part
 from robocasa_lerobot.demos.motion import Array
 from robocasa_lerobot.demos.motion_style import MotionStyle
 from robocasa_lerobot.demos.recorder import Actor, Recording, record_episode
@@ -79,6 +79,19 @@ class RecordingSettings:
             field.name: getattr(self, field.name) for field in dataclasses.fields(self) if field.name != "episodes"
         }
         return {key: list(value) if isinstance(value, tuple) else value for key, value in values.items()}
+
+    def check(self) -> None:
+        """Whether attempts can be made at all.
+
+        Raises:
+            UnknownNameError: no such task, split, layout or style.
+            UserError: no episode is wanted, or the seed is one that no scene can have.
+        """
+        self.make_env()
+        if self.episodes < 1:
+            raise UserError(f"episodes ({self.episodes}) must be at least 1.")
+        if self.seed < 0:
+            raise UserError(f"seed {self.seed}: scenes have seeds from 0 on. Choose such a --seed.")
 
     @property
     def limit(self) -> int:
@@ -172,20 +185,22 @@ class Parts:
         self._failures: dict[str, Failure] = {}  # notes that have been read: there may be thousands of them
 
     def prepare(self) -> None:
-        """Make the folder, dropping one of other settings in which nothing has succeeded.
+        """Make the folder, dropping one of other settings or versions in which nothing has succeeded.
 
         Raises:
-            UserError: it holds demonstrations that were recorded with other settings.
+            UserError: it holds demonstrations that were recorded with other settings, or under other versions.
         """
         note = self.folder / "settings.json"
-        identity = self.settings.identity()
-        others = differing(json.loads(note.read_text()) if note.exists() else {}, identity)
+        found = json.loads(note.read_text()) if note.exists() else {}
+        identity = {**self.settings.identity(), **versions()}
+        others = differing(found, identity)
         if self.folder.exists() and others:
             kept = len(list(self.folder.glob("[0-9]*.hdf5")))
             if kept:
+                remedy = "Give" if differing(found, self.settings.identity()) else "Install"
                 raise UserError(
                     f"{self.folder} holds {kept} demonstration(s) of an interrupted recording with other settings "
-                    f"({others}). Give those to go on with it, remove the folder, or choose another --out."
+                    f"({others}). {remedy} those to go on with it, remove the folder, or choose another --out."
                 )
             shutil.rmtree(self.folder)
         self.folder.mkdir(parents=True, exist_ok=True)
@@ -225,6 +240,11 @@ class Parts:
             self._failures[name] = Failure.of(json.loads((self.folder / name).read_text()))
         return self._failures[name]
 
+    def most(self, tally: Tally) -> int:
+        """The greatest number of attempts as far as is known: where none has succeeded, the task may be hopeless."""
+        limit = self.settings.limit
+        return limit if any(tally.done.values()) else min(limit, HOPELESS)
+
     def wanted(self, tally: Tally) -> list[int]:
         """The attempts to make next: those that were jumped over, and as many as may be needed beyond."""
         done = tally.done
@@ -233,9 +253,7 @@ class Parts:
         missing = self.settings.episodes - sum(done.values()) - len(gaps)
         if len(done) >= _ENOUGH_FOR_A_RATE:
             missing = math.ceil(missing / max(tally.rate, 0.1))
-        if not any(done.values()):  # it may be hopeless
-            missing = min(missing, max(HOPELESS - top, 1))
-        return [*gaps, *range(top, min(top + max(missing, 0), self.settings.limit))]
+        return [*gaps, *range(top, min(top + max(missing, 0), self.most(tally)))]
 
     def gave_up(self, tally: Tally) -> str:
         """Why no more attempts are made, or "" if they are."""
@@ -244,9 +262,12 @@ class Parts:
         if len(tally.chosen) == settings.episodes or not (hopeless or tally.tried >= settings.limit):
             return ""
         last = tally.failures[-1].reason if tally.failures else ""
+        remedies = ["fewer episodes", "less --action-noise"]
+        # Kitchens that were chosen may be none that the task can be set up in.
+        remedies += [f"other --{what}" for what in ("layouts", "styles") if getattr(settings, what) is not None]
         return (
             f"{settings.task}: {len(tally.chosen)} of {settings.episodes} episodes succeeded in {tally.tried} attempts "
-            f"(last failure: {last}). Ask for fewer episodes, less --action-noise, or another --seed."
+            f"(last failure: {last}). Ask for {', '.join(remedies)}, or another --seed."
         )
 
     def attempt(self, number: int, env: KitchenEnv) -> None:

@@ -47,7 +47,7 @@ def record_distributed(
     """
     assert execution.kind in ("slurm", "ray")
     for one in settings:
-        one.make_env()  # mistakes come up here, not in the first job
+        one.check()  # mistakes come up here, not in the first job
     asked = json.dumps([dataclasses.asdict(one) for one in settings])
     folder = out / _FOLDER / hashlib.sha256(asked.encode()).hexdigest()[:12]  # for these settings only
     folder.mkdir(parents=True, exist_ok=True)

@@ -88,6 +88,11 @@ def write_part(path: Path, recording: Recording) -> None:
             file.create_dataset(f"{ASSETS_GROUP}/{name}", data=np.frombuffer(content, dtype=np.uint8))
 
 
+def versions() -> dict[str, str]:
+    """Of what makes kitchens and moves them, by their attributes' names: under others the same seed may differ."""
+    return {"robocasa_lerobot_version": __version__, "mujoco_version": mujoco.__version__}
+
+
 @dataclass(frozen=True)
 class Summary:
     """What a file of demonstrations says of itself; `settings` is None for files recorded by others."""
@@ -100,13 +105,16 @@ class Summary:
 
 
 def read_summary(path: Path) -> Summary:
-    """Read the attributes of a file that `merge_parts` wrote."""
+    """Read the attributes of a file that `merge_parts` wrote; files of others have few of them, or none."""
     with h5py.File(path, "r") as file:
-        attributes = file["data"].attrs
+        data = file["data"]
+        attributes = data.attrs
+        demos = [name for name in data if name.startswith("demo_")]
+        total = attributes.get("total")
         return Summary(
             settings=json.loads(attributes["recording_settings"]) if "recording_settings" in attributes else None,
-            episodes=sum(name.startswith("demo_") for name in file["data"]),
-            steps=int(attributes["total"]),
+            episodes=len(demos),
+            steps=int(total) if total is not None else sum(len(data[f"{name}/actions"]) for name in demos),
             tried=int(attributes.get("episodes_tried", 0)),
             failures=[Failure.of(f) for f in json.loads(attributes.get("failures", "[]"))],
         )
@@ -141,8 +149,7 @@ def merge_parts(
             {
                 "date": now.strftime("%m-%d-%Y"),
                 "time": now.strftime("%H:%M:%S"),
-                "robocasa_lerobot_version": __version__,
-                "mujoco_version": mujoco.__version__,
+                **versions(),
                 "env": env_name,
                 "env_info": json.dumps(env_kwargs),
                 "env_args": json.dumps(

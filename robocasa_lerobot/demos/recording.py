@@ -19,6 +19,7 @@ from robocasa_lerobot.errors import UserError, differing
 from robocasa_lerobot.gl import ensure_gl
 from robocasa_lerobot.jobs.pool import PoolExecutor, polled
 from robocasa_lerobot.jobs.publish import held_lock
+from robocasa_lerobot.jobs.workers import check_workers
 
 __all__ = ["FAILURES_FOLDER", "RecordingResult", "RecordingSettings", "record_task", "record_tasks"]
 
@@ -92,13 +93,12 @@ def record_tasks(
 
     Raises:
         UnknownNameError: no such task, split, layout or style.
-        UserError: a file, or what an interrupted recording left, has other settings, the same recording is running
-            already, or episodes or workers below 1.
+        UserError: a file, or what an interrupted recording left, has other settings or is of other versions, the same
+            recording is running already, episodes or workers are below 1, or a seed is below 0.
     """
     for settings in all_settings:
-        settings.make_env()  # checks the names before any process starts
-        if settings.episodes < 1 or workers < 1:
-            raise UserError(f"episodes ({settings.episodes}) and workers ({workers}) must be at least 1.")
+        settings.check()  # before any process starts
+    check_workers(workers)
     if keep_failures or any(settings.images for settings in all_settings):
         ensure_gl()
     results: dict[str, RecordingResult] = {}
@@ -136,7 +136,7 @@ def _record(waiting: list[Parts], out: Path, workers: int, board: Board) -> Iter
                 continue
             wanted = parts.wanted(tally)
             if len(left) == 1:  # nothing else to do for a process that would wait
-                beyond = range(max(wanted) + 1, parts.settings.limit)
+                beyond = range(max(wanted) + 1, parts.most(tally))
                 wanted += list(beyond)[: -len(wanted) % workers]
             jobs += [(parts, number) for number in wanted]
             if len(jobs) >= most:
@@ -153,6 +153,8 @@ def _finished(parts: Parts, tally: Tally, out: Path) -> RecordingResult | None:
         return RecordingResult(path, 0, 0, tally.tried, tally.failures, gave_up)
     if len(tally.chosen) < settings.episodes:
         return None
+    if parts.films is not None:  # before the file appears, after which nobody would look for them
+        remove_others(parts.films, tally.failures)
     steps = merge_parts(
         path,
         [parts.episode(number) for number in tally.chosen],
@@ -162,8 +164,6 @@ def _finished(parts: Parts, tally: Tally, out: Path) -> RecordingResult | None:
         tried=tally.tried,
         failures=tally.failures,
     )
-    if parts.films is not None:
-        remove_others(parts.films, tally.failures)
     shutil.rmtree(parts.folder)
     return RecordingResult(path, len(tally.chosen), steps, tally.tried, tally.failures)
 

@@ -23,7 +23,7 @@ from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.predicates import parts_with_memory
 from robocasa_lerobot.envs.scene.reset_noise import InitialNoise
 from robocasa_lerobot.envs.tasks.task import Task
-from robocasa_lerobot.errors import UserError
+from robocasa_lerobot.errors import LackingMachineError, UserError
 from robocasa_lerobot.jobs.as_completed import as_they_end
 
 Array = NDArray[np.float64]
@@ -38,11 +38,12 @@ class Replayed:
     Attributes:
         path: the file.
         demo: its name in the file.
-        task: name.
+        task: name; empty where that cannot be read.
         actions: whether the goal held for as long as a recording asks for, when the actions were carried out.
         states: whether the goal holds in the last recorded state; where it has memory, as the recorded terms say too.
         same_start: whether the kitchen's own first state is the recorded one, bit for bit.
-        deviation: largest difference of a joint position between the recorded states and those passed through.
+        deviation: largest difference of a joint position between the recorded states and those passed through;
+            infinite where they are of another kitchen than is made now, or of none.
         note: what went wrong, or "".
     """
 
@@ -131,8 +132,17 @@ def demonstrations(paths: Iterable[Path]) -> list[tuple[Path, str]]:
 
 
 def replay_all(chosen: Sequence[tuple[Path, str]], workers: int = 1) -> Iterator[Replayed]:
-    """Replay demonstrations, in several processes, as they end."""
-    yield from as_they_end(replay, chosen, workers)
+    """Replay demonstrations, in several processes, as they end; of those that cannot be, a note says why."""
+    yield from as_they_end(_replay_or_note, chosen, workers)
+
+
+def _replay_or_note(path: Path, demo: str) -> Replayed:
+    try:
+        return replay(path, demo)
+    except LackingMachineError:
+        raise
+    except UserError as error:  # one file of other software must not cost what came of the rest
+        return Replayed(path, demo, "", False, False, False, np.inf, str(error))
 
 
 def read_kitchen(path: Path, demo: str) -> Kitchen:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass
@@ -12,6 +13,7 @@ from robocasa_lerobot.demos.recorder import record_episode
 from robocasa_lerobot.envs.checks.tasks import CHECK_SEEDS, check_task
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.tasks.registry import get_task
+from robocasa_lerobot.errors import OF_THE_MACHINE
 from robocasa_lerobot.jobs.as_completed import as_they_end
 from robocasa_lerobot.jsonl import read_whole_lines
 
@@ -34,23 +36,34 @@ class Checked:
 
 
 def check(task: str, split: str, seeds: Sequence[int] = CHECK_SEEDS) -> Checked:
-    """`check_task` on every seed; then the demonstrator on one seed after the other until it has solved one."""
-    faults = check_task(task, split, seeds)
+    """`check_task` on every seed; then the demonstrator on one seed after the other until it has solved one.
+
+    What either raises is a fault: the other tasks are checked all the same.
+    """
+    faults: list[str] = []
     failed: list[int] = []
     solved = None
-    if can_demonstrate(get_task(task)):
-        env = KitchenEnv(task, split=split, cameras=(), terminate_on_success=False)
-        try:
-            for seed in seeds:
-                if record_episode(env, seed, varied=True).success:
-                    solved = seed
-                    break
-                failed.append(seed)
-        finally:
-            env.close()
-        if solved is None:
-            faults.append(f"the demonstrator solved none of {len(failed)} seeds")
+    try:
+        faults += check_task(task, split, seeds)
+        if can_demonstrate(get_task(task)):
+            solved = _first_solved(task, split, seeds, failed)
+            if solved is None:
+                faults.append(f"the demonstrator solved none of {len(failed)} seeds")
+    except OF_THE_MACHINE:
+        raise
+    except Exception as error:
+        faults.append(f"{type(error).__name__}: {error}")
     return Checked(task, split, tuple(faults), solved, tuple(failed))
+
+
+def _first_solved(task: str, split: str, seeds: Sequence[int], failed: list[int]) -> int | None:
+    """The first seed that the demonstrator solves; those before it come into `failed`."""
+    with contextlib.closing(KitchenEnv(task, split=split, cameras=(), terminate_on_success=False)) as env:
+        for seed in seeds:
+            if record_episode(env, seed, varied=True).success:
+                return seed
+            failed.append(seed)
+    return None
 
 
 def check_all(

@@ -210,6 +210,8 @@ class KitchenEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
             task=self.task,
             split=self.split,
             seed=self.scene.seed,
+            layout_id=self.scene.layout_id,
+            style_id=self.scene.style_id,
             steps=self._steps,
             physics=physics,
             asleep=asleep,
@@ -221,7 +223,7 @@ class KitchenEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         """Go on from `state`, in its scene; returns the observation and info of that moment.
 
         Raises:
-            UserError: the state is of another task, split, MuJoCo version or version of the kitchens.
+            UserError: the state is of another task, split, kitchen, MuJoCo version or version of the kitchens.
         """
         for what, found, expected in (
             ("task", state.task, self.task),
@@ -232,6 +234,15 @@ class KitchenEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
                 raise UserError(f"kitchen state: found {what} {found!r}, but this env has {expected!r}.")
         if self._initial is None or self._initial.seed != state.seed:
             self._build(state.seed)
+        for what, number, ours in (
+            ("layout", state.layout_id, self.scene.layout_id),
+            ("style", state.style_id, self.scene.style_id),
+        ):
+            if number not in (None, ours):
+                raise UserError(
+                    f"kitchen state: found {what} {number}, but seed {state.seed} gives {what} {ours} in this env. "
+                    "Make it with the same `layouts` and `styles`."
+                )
         self._restore(state)
         return self._observe(), self._info()
 
@@ -244,8 +255,10 @@ class KitchenEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         """
         data, controller = self.data, self._controller
         assert controller is not None
-        command = contract.stored_to_hdf5(contract.binarize(np.asarray(action, dtype=np.float64)))
-        control_step(self.model, data, controller, command)
+        wanted = np.asarray(action, dtype=np.float64)
+        if not np.isfinite(wanted).all():  # made binary, NaN would be -1
+            raise contract.ContractError(f"action: found {wanted}, expected finite numbers.")
+        control_step(self.model, data, controller, contract.stored_to_hdf5(contract.binarize(wanted)))
         self.scene.after_control_step(data)
         self._steps += 1
         info = self._info()
@@ -276,8 +289,7 @@ class KitchenEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
 
     def _build(self, seed: int) -> None:
         self._close_renderer()
-        self._initial = None
-        self._scene = build_scene(
+        scene = build_scene(
             self._declared,
             self.split,
             seed,
@@ -287,18 +299,21 @@ class KitchenEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
             self._kitchens,
             self.robot,
         )
-        self._bound = self._declared.bound(self._scene)
+        bound = self._declared.bound(scene)
         if self.novel_language:
-            wordings = self._scene.paraphrases
+            wordings = scene.paraphrases
             choice = np.random.default_rng([seed, _WORDING_STREAM]).integers(len(wordings))
-            self._scene.instruction = wordings[int(choice)]
+            scene.instruction = wordings[int(choice)]
         if self.initial_noise is not None:
-            add_initial_noise(self._scene, self.initial_noise)
+            add_initial_noise(scene, self.initial_noise)
         noise = np.random.default_rng([seed, _ARM_NOISE_STREAM])
-        self._data, self._controller = self._scene.initial_data(noise)
+        data, controller = scene.initial_data(noise)
+        # Together and last: a reset that fails or is interrupted leaves the episode before it whole.
+        self._initial = None
+        self._scene, self._bound, self._data, self._controller = scene, bound, data, controller
         self._steps = 0
         self._pictures = {}
-        self.task_description = self._scene.instruction
+        self.task_description = scene.instruction
         self._initial = self.get_state()
 
     def _restore(self, state: KitchenState) -> None:

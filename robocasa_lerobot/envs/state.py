@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass, fields
+from dataclasses import MISSING, asdict, dataclass, fields
 from typing import Any
 
 import mujoco
@@ -19,12 +19,13 @@ class KitchenState:
     """A state of a `KitchenEnv`; on the same machine and MuJoCo version it continues bit for bit.
 
     Attributes:
-        task, split, seed: the scene, which is a function of them.
+        task, split, seed: the scene, which is a function of them and of the kitchens that the env chooses from.
         steps: control steps since the reset.
         physics: MuJoCo's integration state (time, qpos, qvel, controls, applied forces, solver warm start).
         asleep: which trees of bodies sleep (int32), as MuJoCo encodes it.
         controller: goals and targets of the robot's controllers.
         mujoco_version: that the state is of.
+        layout_id, style_id: the kitchen that was chosen; None in a state that was stored without it.
     """
 
     task: str
@@ -35,10 +36,12 @@ class KitchenState:
     asleep: NDArray[np.int32]
     controller: NDArray[np.float64]
     mujoco_version: str
+    layout_id: int | None = None
+    style_id: int | None = None
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values and arrays, for `numpy.savez` or a message to another process."""
-        return asdict(self)
+        return {name: value for name, value in asdict(self).items() if value is not None}
 
     @classmethod
     def from_dict(cls, values: dict[str, Any]) -> KitchenState:
@@ -47,7 +50,8 @@ class KitchenState:
         Raises:
             UserError: a part is missing.
         """
-        missing = [field.name for field in fields(cls) if field.name not in values]
+        needed = [field.name for field in fields(cls) if field.default is MISSING]
+        missing = [name for name in needed if name not in values]
         if missing:
             raise UserError(f"kitchen state: {', '.join(missing)} missing; found {', '.join(values) or 'nothing'}.")
         return cls(
@@ -59,6 +63,8 @@ class KitchenState:
             asleep=np.asarray(values["asleep"], dtype=np.int32),
             controller=np.asarray(values["controller"], dtype=np.float64),
             mujoco_version=str(values["mujoco_version"]),
+            layout_id=int(values["layout_id"]) if "layout_id" in values else None,
+            style_id=int(values["style_id"]) if "style_id" in values else None,
         )
 
 

@@ -13,14 +13,10 @@ import multiprocess
 from datatrove.executor.local import LocalPipelineExecutor
 from datatrove.utils.logging import logger as datatrove_logger
 
-from robocasa_lerobot.errors import UserError
+from robocasa_lerobot.errors import WorkerDiedError
 from robocasa_lerobot.jobs.parent import end_with
 
 POLL_SECONDS = 0.3
-
-
-class WorkerDiedError(UserError):
-    """A process that was working did not live to report: killed, out of memory, or crashed."""
 
 
 class PoolExecutor(LocalPipelineExecutor):

@@ -111,8 +111,11 @@ def _datasets(folder: Path) -> Iterator[Path]:
 
 
 def _what(source: Path) -> tuple[str, str, str] | None:
-    """Task, split and source of a folder `<split>/<kind>/<Task>/<date>[/<source>/demo/<time>]/<views>`."""
-    parts = source.parts
+    """Task, split and source of a folder `<split>/<kind>/<Task>/<date>[/<source>/demo/<time>]/<views>`.
+
+    A relative path may begin anywhere in it.
+    """
+    parts = source.absolute().parts
     for number, task in enumerate(parts):
         if number >= 2 and task in published_tasks() and parts[number - 1] == published_tasks()[task][0]:
             inner = parts[number + 2 : -1]

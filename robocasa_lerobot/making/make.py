@@ -15,7 +15,6 @@ from typing import TYPE_CHECKING
 from robocasa_lerobot.data.registry.published import dataset_version
 from robocasa_lerobot.data.registry.recipes import REPLAY, RecipeConfig
 from robocasa_lerobot.demos.attempts import Parts, RecordingSettings
-from robocasa_lerobot.errors import UserError
 from robocasa_lerobot.files import write_text
 from robocasa_lerobot.jobs.executors import Execution
 from robocasa_lerobot.making.needs import WORK, Need
@@ -118,6 +117,7 @@ class MadeDataset:
 
     def _record(self, workers: int) -> Path:
         """The file of demonstrations: generated where the recipe has sources and it can be done, else recorded."""
+        from robocasa_lerobot.demos.generate.sources.source import UnfitSourcesError
         from robocasa_lerobot.demos.generate.stage import can_generate
         from robocasa_lerobot.demos.recording import record_task, record_tasks
         from robocasa_lerobot.envs.tasks.registry import get_task
@@ -133,7 +133,7 @@ class MadeDataset:
         sources = record_task(own, self.work / SOURCES, workers=workers, show_progress=False).path
         try:
             generation = self._generation(sources, workers)
-        except UserError as error:  # not one of the sources could be prepared
+        except UnfitSourcesError as error:  # what passes, as sources that are being prepared, does not decide
             reason = str(error)
         else:
             made = record_tasks([generation], self.work, workers=workers, show_progress=False)[0]

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import argparse
+import os
 import re
 import subprocess
 import sys
 from pathlib import Path
 from types import SimpleNamespace
+from typing import Any
 
 import pytest
 
@@ -83,6 +85,29 @@ def test_users_mistake_is_one_sentence_and_status_2(
     printed = capsys.readouterr()
     assert printed.err == "robocasa-lerobot vet: found a cat, expected a dog; call a vet.\n"
     assert printed.out == ""
+
+
+@pytest.mark.parametrize("name", cli.SUBCOMMANDS)
+def test_processes_are_as_many_as_the_cores_that_this_one_may_use(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(os, "sched_getaffinity", lambda process: set(range(3)), raising=False)
+    monkeypatch.setattr(os, "cpu_count", lambda: 96)
+    parser = cli.build_parser([name])
+    example = str(sys.modules[cli.SUBCOMMANDS[name].module].EXAMPLE).strip().splitlines()[0]  # type: ignore[attr-defined]
+    args, _ = parser.parse_known_args(example.split("#")[0].split()[1:])
+    assert getattr(args, "workers", None) in (None, 3)  # None: chosen later
+
+
+def test_so_are_those_of_a_recording(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    asked: list[int] = []
+
+    def record_tasks(*_: Any, workers: int, **__: Any) -> None:
+        asked.append(workers)
+        raise UserError("this far")
+
+    monkeypatch.setattr(os, "sched_getaffinity", lambda process: set(range(3)), raising=False)
+    monkeypatch.setattr("robocasa_lerobot.demos.recording.record_tasks", record_tasks)
+    assert cli.main(["demos", "--tasks", "CloseDrawer", "--out", str(tmp_path)]) == 2
+    assert asked == [3]
 
 
 def test_console_script_is_installed() -> None:

@@ -7,6 +7,7 @@ import subprocess
 from pathlib import Path
 
 import pytest
+import torch
 
 from robocasa_lerobot import cli, gl
 from robocasa_lerobot.cli import doctor
@@ -104,6 +105,22 @@ def test_cache_that_cannot_be_written(tmp_path: Path) -> None:
     assert finding.status == "fault"
     assert "HF_HOME" in finding.remedy
     assert doctor.check_cache(tmp_path / "new" / "cache").status == "ok"
+
+
+@pytest.mark.parametrize(
+    ("built", "found", "remedy"), [(None, "without CUDA", "make setup"), ("13.0", "cannot use it", "CUDA 13.0")]
+)
+def test_a_gpu_that_torch_cannot_use(
+    built: str | None, found: str, remedy: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(torch.cuda, "is_available", lambda: False)
+    monkeypatch.setattr(torch.version, "cuda", built)
+    monkeypatch.setattr(gl, "has_gpu", one_gpu)
+    finding = doctor.check_gpu()
+    assert finding.status == "warning"
+    assert found in finding.found
+    assert remedy in finding.remedy
+    assert ("nvidia-smi" in finding.remedy) == (built is not None)
 
 
 def test_plugin_failure_shows_its_reason() -> None:

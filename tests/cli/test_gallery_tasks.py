@@ -103,6 +103,21 @@ def test_the_command_makes_what_is_missing(tmp_path: Path, capsys: pytest.Captur
         assert main([*command, *wrong]) == 2
 
 
+def test_a_task_that_raises_has_a_card_that_says_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def broken(*_: object) -> None:
+        raise IndexError("list index out of range")
+
+    monkeypatch.setattr("robocasa_lerobot.gallery.tasks.pictures.record_episode", broken)
+    (tmp_path / "tasks").mkdir()
+    (tmp_path / "tasks" / "CloseDrawer_start.webp").write_bytes(TINY)  # of another seed
+    command = ["gallery", "--show=tasks", "--tasks=CloseDrawer", "--workers=1", f"--out={tmp_path}"]
+    for _ in range(2):  # the second finds what the first has made
+        assert main(command) == 0
+        page = (tmp_path / "tasks.html").read_text()
+        assert "No pictures: IndexError: list index out of range (target, seed 0)" in page
+        assert '<script type="text/plain"' not in page
+
+
 @pytest.fixture(scope="module")
 def page(tmp_path_factory: pytest.TempPathFactory) -> Path:
     shown = Shown("target", 0, "Do it.", 12.25, ("first this",))

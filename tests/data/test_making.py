@@ -22,10 +22,13 @@ from robocasa_lerobot import cli
 from robocasa_lerobot.data.fake import write_fake_dataset
 from robocasa_lerobot.data.registry.published import dataset_version
 from robocasa_lerobot.demos.generate.settings import GenerationSettings
+from robocasa_lerobot.demos.generate.sources import prepare
 from robocasa_lerobot.demos.recording import RecordingResult, RecordingSettings, record_tasks
-from robocasa_lerobot.jobs.pool import WorkerDiedError
+from robocasa_lerobot.errors import WorkerDiedError
+from robocasa_lerobot.jobs.publish import held_lock
 from robocasa_lerobot.making import estimate
 from robocasa_lerobot.making.downloads import find_downloads
+from robocasa_lerobot.making.make import SOURCES
 from robocasa_lerobot.making.needs import WORK, needs_of, parse_episodes
 from robocasa_lerobot.training.config.experiment import load_experiment
 
@@ -55,6 +58,19 @@ def experiment_on(tmp_path: Path, *selections: dict[str, object], tasks: tuple[s
     }
     (tmp_path / "few.yaml").write_text(yaml.safe_dump(content))
     return tmp_path / "few.yaml"
+
+
+def published_experiment() -> Path:
+    """An experiment on what people have shown of two tasks, as it is published."""
+    selection = {"tasks": ["OpenDrawer", "CloseDrawer"], "split": "pretrain", "source": "human"}
+    content = {
+        "name": "published",
+        "output_dir": "out",
+        "policy": {"type": "act"},
+        "phases": [{"name": "train", "steps": 1, "mixture": {"select": [selection]}}],
+    }
+    Path("published.yaml").write_text(yaml.safe_dump(content))
+    return Path("published.yaml")
 
 
 HUMAN: dict[str, object] = {"task_set": "pretrain300", "split": "pretrain", "source": "human"}
@@ -159,6 +175,18 @@ def test_downloads_behind_links_are_found(tmp_path: Path) -> None:
     assert [download.source for download in find_downloads(folder)] == [folder / "linked/OpenDrawer/lerobot"]
 
 
+def test_downloads_are_known_from_inside_their_folders(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    task = tmp_path / "datasets/v1.0/pretrain/atomic/OpenDrawer"
+    there = task / "20250101/lerobot"
+    (there / "meta").mkdir(parents=True)
+    (there / "meta/info.json").write_text(json.dumps({"codebase_version": "v2.1"}))
+    needs = needs_of(load_experiment(published_experiment()))[0]
+    for folder in (task.parents[2], task.parents[1], task.parent, task):
+        monkeypatch.chdir(folder)
+        found = find_downloads(Path(), needs=needs)
+        assert [download.source.absolute() for download in found] == [there]
+
+
 def test_downloads_are_converted_in_bulk(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     whole = v2.write_dataset(tmp_path / "source", (6, 4))
     base = tmp_path / "datasets/v1.0"
@@ -169,15 +197,7 @@ def test_downloads_are_converted_in_bulk(tmp_path: Path, capsys: pytest.CaptureF
     broken = base / "pretrain/atomic/CloseDrawer/20250101/lerobot"
     v2.clone(whole, broken)
     (broken / "meta/episodes.jsonl").write_text("{")
-    selection = {"tasks": ["OpenDrawer", "CloseDrawer"], "split": "pretrain", "source": "human"}
-    content = {
-        "name": "published",
-        "output_dir": "out",
-        "policy": {"type": "act"},
-        "phases": [{"name": "train", "steps": 1, "mixture": {"select": [selection]}}],
-    }
-    Path("published.yaml").write_text(yaml.safe_dump(content))
-    command = ["data", "published.yaml", "--convert", "datasets", "--workers", "1"]
+    command = ["data", str(published_experiment()), "--convert", "datasets", "--workers", "1"]
     assert (
         cli.main(command) == 1
     )  # of the two that it needs, one is broken: that ends neither the other nor the command
@@ -223,6 +243,24 @@ def test_missing_data_are_recorded_converted_and_drawn_again(
     assert cli.main(command) == 0
     assert [root.stat().st_mtime_ns for root in roots] == before
     assert cli.main(["data", str(file), "--check"]) == 0
+
+
+@pytest.mark.render
+def test_only_sources_that_are_none_have_a_dataset_recorded_instead(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = experiment_on(tmp_path, {**HUMAN, "task_set": "mimicgen60", "source": "mg"})
+    command = ["data", str(file), "--make", "--episodes", "mg=1", "--workers", "1"]
+    work = Path("datasets/kitchens", WORK, "pretrain/mg/CloseDrawer")
+    with held_lock(work / SOURCES / ".CloseDrawer.prepare.lock"):  # as another run does that prepares them
+        assert cli.main(command) == 1
+    assert "not made: datasets/kitchens/pretrain/mg/CloseDrawer: the same work is running" in capsys.readouterr().out
+    assert (work / SOURCES / "CloseDrawer.hdf5").exists()
+    assert not (work / "recorded").exists()
+    monkeypatch.setattr(prepare, "prepare_files", lambda paths, workers: iter(()))
+    assert cli.main(command) == 0
+    assert "recorded, since generating it came to nothing" in capsys.readouterr().out
+    assert dataset_version(Path("datasets/kitchens/pretrain/mg/CloseDrawer")) == "v3.0"
 
 
 @pytest.mark.slow

@@ -6,14 +6,17 @@ import json
 from dataclasses import replace
 from pathlib import Path
 
+import h5py
 import numpy as np
 import pytest
+from idle_demonstration import write_idle
 
 from robocasa_lerobot import cli, contract
-from robocasa_lerobot.demos.hdf5 import segments_of
+from robocasa_lerobot.demos.hdf5 import Failure, read_summary, segments_of
 from robocasa_lerobot.demos.quality.measure import Measures, Start, _idle, _jerk, _saturated
 from robocasa_lerobot.demos.quality.summary import BIN_M, Quality
 from robocasa_lerobot.demos.recording import RecordingSettings, record_tasks
+from robocasa_lerobot.errors import UserError
 from robocasa_lerobot.evaluation.inventory import worth
 
 
@@ -66,6 +69,28 @@ def test_motion() -> None:
     actions[1, contract.ACTION_SLICES["end_effector_rotation"]] = [0.0, -1.0, 0.0]
     actions[2, contract.ACTION_SLICES["base_motion"]] = 1.0
     assert _saturated(actions) == 0.25
+
+
+def test_drives_to_objects_and_kitchens_that_cannot_be_made(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    nowhere = Failure(-5, "ValueError: expected non-negative integer", segments=(("part drawer.box", "a"),))
+    path = write_idle(tmp_path / "AlignSilverware.hdf5", [nowhere])
+    assert cli.main(["inspect", str(path), "--worth", "--workers", "1", "--report", "json"]) == 0
+    (found,) = json.loads(capsys.readouterr().out)[str(path)]
+    assert (found["kept"], found["rate"], found["covered"]) == (1, 0.5, 1.0)
+    assert found["segments"] == {"part drawer.box": [0, 1]}
+    printed = worth.text({"set": [Quality("AlignSilverware", (one(0, 0.1),), (), ((),), nowhere=1)]})
+    assert "50%" in printed
+
+
+def test_files_of_other_software_are_refused_in_words(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "CloseDrawer.hdf5"
+    with h5py.File(path, "w") as file:
+        file.create_dataset("data/demo_0/actions", data=np.zeros((3, 7)))
+    assert (read_summary(path).episodes, read_summary(path).steps) == (1, 3)
+    assert cli.main(["inspect", str(path), "--worth", "--workers", "1"]) == 2
+    assert "other software" in capsys.readouterr().err
+    with pytest.raises(UserError, match="was recorded with other settings"):
+        record_tasks([RecordingSettings("CloseDrawer", 1)], tmp_path, show_progress=False)
 
 
 @pytest.mark.slow

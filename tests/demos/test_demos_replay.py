@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import json
+import shutil
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -11,6 +12,7 @@ from typing import Any
 import h5py
 import numpy as np
 import pytest
+from idle_demonstration import write_idle
 from PIL import Image
 
 from robocasa_lerobot import cli
@@ -96,6 +98,42 @@ def test_a_film_strip_shows_the_way_from_the_first_state_to_the_last(folder: Pat
     assert strip.shape[1] == STRIP_PICTURES * STRIP_SIZE
     columns = np.split(strip[-4 * STRIP_SIZE :], STRIP_PICTURES, axis=1)
     assert all(np.abs(a - b).mean() > 1.0 for a, b in itertools.pairwise(columns[:-1]))
+
+
+@pytest.fixture
+def mixed(tmp_path: Path) -> list[str]:
+    """Two files of one name, a third whose states the kitchen as it is made now has no room for, and a foreign one."""
+    files = [tmp_path / folder / "CloseDrawer.hdf5" for folder in ("a", "b", "c")]
+    write_idle(files[0])
+    for other in files[1:]:
+        other.parent.mkdir()
+        shutil.copy(files[0], other)
+    with h5py.File(files[2], "r+") as file:
+        states = file["data/demo_0/states"][()]
+        del file["data/demo_0/states"]
+        file["data/demo_0/states"] = states[:, :-1]
+    with h5py.File(tmp_path / "lift.hdf5", "w") as file:
+        file.create_dataset("data/demo_0/actions", data=np.zeros((3, 7)))
+    return [str(path) for path in (*files, tmp_path / "lift.hdf5")]
+
+
+def test_what_cannot_be_replayed_costs_nothing_of_the_rest(
+    mixed: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    drawn: list[str] = []
+    module = "robocasa_lerobot.demos.film_strip.film_strip"
+    monkeypatch.setattr(module, lambda path, demo, out: drawn.append(out.name) or print("a strip"))
+    assert cli.main(["replay", *mixed, "--workers", "1", "--strips", str(tmp_path / "strips")]) == 1
+    said = capsys.readouterr().out
+    assert "recorded by other software" in said
+    assert "numbers in a state" in said
+    assert said.index("4 demonstrations, 2 of them") < said.index("a strip")
+    assert drawn == ["1_CloseDrawer_demo_0.png", "2_CloseDrawer_demo_0.png"]
+    assert cli.main(["replay", *mixed, "--workers", "1", "--json"]) == 1
+    found = json.loads(capsys.readouterr().out, parse_constant=pytest.fail)  # no `Infinity`, which is no JSON
+    assert [row["deviation"] for row in found["demonstrations"]] == [0.0, 0.0, None, None]
+    assert cli.main(["replay", *mixed, "--every", "0"]) == 2
+    assert "--every 0: expected 1" in capsys.readouterr().err
 
 
 @pytest.mark.slow

@@ -11,6 +11,7 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, cast
 
+import mujoco
 import numpy as np
 import pytest
 from cluster_work import hdf5_content
@@ -108,6 +109,22 @@ def test_attempts_that_are_made_next() -> None:
         assert bool(Parts(Path("out"), settings).gave_up(tally)) == given_up
 
 
+@pytest.mark.parametrize("workers", [1, 16])
+def test_a_hopeless_task_is_given_up_after_as_many_attempts_by_any_number_of_processes(
+    workers: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def in_vain(jobs: list[tuple[Parts, int]], workers: int, board: Board) -> None:
+        for parts, number in jobs:
+            (parts.folder / f"{number:06d}.json").write_text(json.dumps(dataclasses.asdict(Failure(number, "no"))))
+
+    monkeypatch.setattr("robocasa_lerobot.demos.recording._run_round", in_vain)
+    settings = RecordingSettings("CloseDrawer", 50, layouts=(2,))
+    (result,) = record_tasks([settings], tmp_path, workers=workers, show_progress=False)
+    assert result.tried == HOPELESS
+    # The kitchens may be none that the task can be set up in.
+    assert "less --action-noise, other --layouts, or another --seed." in result.gave_up
+
+
 class Elsewhere(RecordingSettings):
     """Attempts that fail in the kitchen of another seed, as replays do."""
 
@@ -141,6 +158,29 @@ def test_a_changed_option_throws_nothing_away(tmp_path: Path) -> None:
     parts.episode(1).rename(parts.folder / "000001.json")  # where nothing has succeeded, nothing is lost
     Parts(tmp_path, noisy).prepare()
     assert not (parts.folder / "000001.json").exists()
+
+
+def test_a_recording_does_not_go_on_under_another_version(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    settings = RecordingSettings("CloseDrawer", 2, seed=1)
+    parts = Parts(tmp_path, settings)
+    parts.prepare()
+    parts.episode(1).touch()
+    monkeypatch.setattr(mujoco, "__version__", "2.0")
+    with pytest.raises(UserError, match=r"\(mujoco_version: '3.*', now '2\.0'\)\. Install those"):
+        record_tasks([settings], tmp_path, show_progress=False)
+    parts.episode(1).rename(parts.folder / "000001.json")  # failed, as may be mended since
+    Parts(tmp_path, settings).prepare()
+    assert parts.tally().done == {}
+
+
+def test_seeds_that_no_scene_can_have_are_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    command = ["demos", "--tasks", "CloseDrawer", "--episodes", "1", "--seed", "-5", "--out", str(tmp_path)]
+    assert cli.main(command) == 2
+    assert "scenes have seeds from 0 on" in capsys.readouterr().err
+    settings = [RecordingSettings("CloseDrawer", 1, seed=-5)]
+    with pytest.raises(UserError, match="from 0 on"):
+        record_distributed(settings, tmp_path, Execution("ray"), keep_failures=False)
+    assert not list(tmp_path.iterdir())
 
 
 def test_time_left_follows_from_what_this_run_has_done(capsys: pytest.CaptureFixture[str]) -> None:
@@ -189,6 +229,28 @@ def test_failures_are_kept_with_a_film_and_the_missing_terms(
     (folder / "seed_000007.json").unlink()
     assert Parts(tmp_path, settings).tally().done == {0: False}
     assert Parts(tmp_path, settings, folder).tally().done == {}
+
+
+@pytest.mark.render
+def test_a_kill_as_the_file_appears_leaves_no_film_of_what_was_not_needed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    settings = RecordingSettings("CloseDrawer", 1, seed=7)
+    films = tmp_path / FAILURES_FOLDER / "CloseDrawer"
+    parts = Parts(tmp_path, settings, films)
+    parts.prepare()
+    parts.episode(0).touch()
+    (parts.folder / "000001.json").write_text(json.dumps(dataclasses.asdict(Failure(8, "made meanwhile"))))
+    films.mkdir(parents=True)
+    (films / "seed_000008.json").touch()
+
+    def killed(*_: Any, **__: Any) -> int:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("robocasa_lerobot.demos.recording.merge_parts", killed)
+    with pytest.raises(KeyboardInterrupt):
+        record_tasks([settings], tmp_path, keep_failures=True, show_progress=False)
+    assert not list(films.iterdir())
 
 
 def test_what_a_skill_should_not_raise_is_a_failure_of_its_attempt(

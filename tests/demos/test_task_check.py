@@ -15,6 +15,7 @@ from robocasa_lerobot.envs.checks.tasks import check_task
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.kitchens.splits import SPLITS
 from robocasa_lerobot.envs.tasks.registry import task_names
+from robocasa_lerobot.errors import LackingMachineError
 
 pytestmark = pytest.mark.render
 TASK = "OpenDrawer"
@@ -45,6 +46,29 @@ def test_a_demonstrator_that_solves_nothing_is_a_fault(monkeypatch: pytest.Monke
     found = task_check.check(TASK, "target", (0, 1))
     assert (found.solved, found.failed) == (None, (0, 1))
     assert found.faults == ("the demonstrator solved none of 2 seeds",)
+
+
+def test_a_task_that_raises_is_a_fault_and_the_others_are_checked(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def broken(name: str, split: str, seeds: Sequence[int]) -> list[str]:
+        if name == TASK:
+            raise KeyError("knife")
+        return []
+
+    def lacking(name: str, split: str, seeds: Sequence[int]) -> list[str]:
+        raise LackingMachineError("no OpenGL")
+
+    monkeypatch.setattr(task_check, "can_demonstrate", lambda task: False)
+    monkeypatch.setattr(task_check, "check_task", broken)
+    assert cli.main(["tasks", TASK, "CloseDrawer", "--check", "--workers", "1"]) == 1
+    lines = capsys.readouterr().out.splitlines()
+    for split in SPLITS:
+        assert f"{TASK}, {split}: KeyError: 'knife'" in lines
+        assert f"CloseDrawer, {split}: ok, no demonstrator" in lines
+    monkeypatch.setattr(task_check, "check_task", lacking)
+    with pytest.raises(LackingMachineError):
+        task_check.check(TASK, "target", (0,))
 
 
 def test_what_is_sunk_into_something_is_found_though_it_sleeps(monkeypatch: pytest.MonkeyPatch) -> None:

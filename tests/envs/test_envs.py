@@ -208,6 +208,11 @@ def test_other_mistakes_say_what_to_do():
     env.reset(seed=0)
     with pytest.raises(ContractError, match="12"):
         env.step(np.zeros(11, dtype=np.float32))
+    for part in contract.split_action(np.arange(12)).values():
+        action = np.zeros(12, dtype=np.float32)
+        action[part] = np.nan
+        with pytest.raises(ContractError, match="finite"):
+            env.step(action)
     with pytest.raises(UnknownNameError, match="robot0_agentview_left"):
         env.render_camera("robot0_agentview_lef")
     env.close()

@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 import pytest
 from task_selection import every_task
 
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.robots.panda_omron.robot import PANDA_OMRON
-from robocasa_lerobot.envs.scene.reset_noise import InitialNoise
-from robocasa_lerobot.envs.scene.robot_poses import RobotPose, is_free
+from robocasa_lerobot.envs.scene import reset_noise
+from robocasa_lerobot.envs.scene.build import build_scene
+from robocasa_lerobot.envs.scene.reset_noise import InitialNoise, add_initial_noise, touched
+from robocasa_lerobot.envs.scene.robot_poses import RobotPose, in_room, is_free
+from robocasa_lerobot.envs.tasks.registry import get_task
 from robocasa_lerobot.errors import UserError
 
 SEEDS = range(6)
@@ -61,11 +66,37 @@ def test_the_base_starts_in_no_open_door_and_within_the_room() -> None:
     for seed in range(12):
         env.reset(seed=seed)
         scene = env.scene
-        opened = [(scene.fixtures[name], 1.0) for (name, _), share in scene.openness.items() if share > 0.5]
-        assert opened
-        assert is_free(scene.layout, scene.robot_pose, PANDA_OMRON.shape, opened)
+        assert max(scene.openness.values()) > 0.5
+        assert in_room(scene.layout, scene.robot_pose)
+        assert touched(scene) == []
         moved += scene.robot_pose != env_start(env, seed)
     assert moved > 6
+
+
+def test_a_start_that_touches_what_no_floor_plan_shows_is_drawn_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The doors of a fridge that stands open, say; a start that touches nothing is the one that was drawn first."""
+    scene = build_scene(get_task("CloseFridge"), "target", 0)
+    start = scene.robot_pose
+
+    def noisy(seed: int) -> tuple[RobotPose, list[str]]:
+        moved = dataclasses.replace(scene, seed=seed, robot_pose=start)
+        add_initial_noise(moved, InitialNoise(base_within_m=1.5))
+        return moved.robot_pose, touched(moved)
+
+    found = [noisy(seed) for seed in range(40)]
+    assert not any(names for _, names in found)
+    monkeypatch.setattr(reset_noise, "touched", lambda _: [])
+    drawn_first = [noisy(seed) for seed in range(40)]
+    assert any("fridge" in name for _, names in drawn_first for name in names)
+    assert all(pose == first for (pose, _), (first, names) in zip(found, drawn_first, strict=True) if not names)
+
+
+def test_where_every_start_would_touch_something_the_base_stays(monkeypatch: pytest.MonkeyPatch) -> None:
+    scene = build_scene(get_task("OpenDrawer"), "target", 0)
+    start = scene.robot_pose
+    monkeypatch.setattr(reset_noise, "touched", lambda _: ["wall"])
+    add_initial_noise(scene, InitialNoise(base_within_m=1.5))
+    assert scene.robot_pose == start
 
 
 def env_start(env: KitchenEnv, seed: int) -> RobotPose:

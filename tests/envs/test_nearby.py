@@ -14,6 +14,7 @@ from task_selection import demonstrated, every_task
 
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.physics.nearby import Nearby
+from robocasa_lerobot.envs.robots.panda_omron.control import kernel
 
 TASK = "PickPlaceCounterToSink"
 Rows = list[bytes]
@@ -134,6 +135,24 @@ def teleport(env: KitchenEnv, number: int) -> None:
 @pytest.mark.parametrize("seed", [0, 3])
 def test_what_a_user_writes_is_the_same(meddle: Meddle, seed: int) -> None:
     assert_same_as_with_all(TASK, seed, steps=60, meddle=meddle)
+
+
+def test_after_an_interruption_all_is_looked_at_again() -> None:
+    """Ctrl-C just before the compiled steps: the next control step would take the zero masks for the model's own."""
+    env = KitchenEnv(TASK, cameras=())
+    env.reset(seed=0)
+    model, masks = env.model, (env.model.body_contype.copy(), env.model.body_conaffinity.copy())
+
+    def interrupt(*_: object) -> None:
+        assert not np.array_equal(model.body_contype, masks[0])
+        raise KeyboardInterrupt
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(kernel, "run", interrupt)
+        with pytest.raises(KeyboardInterrupt):
+            env.step(np.zeros(12, np.float32))
+    assert np.array_equal(model.body_contype, masks[0])
+    assert np.array_equal(model.body_conaffinity, masks[1])
 
 
 def test_nothing_is_left_out_where_more_can_move() -> None:

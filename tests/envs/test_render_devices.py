@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import os
+import subprocess
 import sys
 import types
 from contextlib import closing
 from functools import partial
 
+import mujoco
 import pytest
 from vector_support import STILL, FaultyEnv, clean_workers  # noqa: F401 (a fixture)
 
@@ -40,6 +42,25 @@ def test_a_device_in_the_environment_reaches_the_workers(monkeypatch: pytest.Mon
         make_vector_env(FaultyEnv, 2)
 
 
+def test_a_device_in_the_environment_matters_only_where_egl_draws(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(gl, "render_devices", lambda: ())
+    monkeypatch.setenv(gl.DEVICE_VARIABLE, "0")
+    for cameras in ((), []):
+        with closing(make_vector_env("OpenDrawer", 1, cameras=cameras)) as envs:
+            assert envs.call("cameras") == ((),)
+    monkeypatch.setenv(gl.VARIABLE, "osmesa")
+    monkeypatch.setattr(gl, "ensure_gl", lambda: "default")  # workers that draw nothing need no OSMesa
+    with closing(make_vector_env(FaultyEnv, 1)) as envs:
+        assert envs.reset(seed=1)[0]["agent_pos"].tolist() == [[1, 0]]
+
+
+def test_devices_that_are_given_are_those_of_kitchens_without_cameras_too(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Such a kitchen draws when it is asked to."""
+    monkeypatch.setattr(gl, "render_devices", lambda: devices("H200", "H200"))
+    with closing(make_vector_env("OpenDrawer", 1, devices=1, cameras=())) as envs:
+        assert [(member.backend, member.device) for member in envs._members] == [("egl", 1)]
+
+
 @pytest.mark.parametrize("device", [2, -1, True])
 def test_unknown_devices_are_refused_with_those_there_are(monkeypatch: pytest.MonkeyPatch, device: int) -> None:
     monkeypatch.setattr(gl, "render_devices", lambda: devices("H200", "A40"))
@@ -61,10 +82,31 @@ def test_devices_need_egl(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_a_process_that_draws_cannot_change_its_device(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(gl, "render_devices", lambda: devices("H200", "H200"))
     monkeypatch.setitem(sys.modules, "mujoco.egl", types.SimpleNamespace(EGL_DISPLAY=object()))
+    monkeypatch.setattr(mujoco, "GLContext", types.SimpleNamespace(__module__="mujoco.egl"))
     monkeypatch.setenv(gl.DEVICE_VARIABLE, "0")
     assert gl.ensure_gl(0) == "egl"
     with pytest.raises(gl.RenderDeviceError, match="draws on device 0 already"):
         gl.ensure_gl(1)
+
+
+@pytest.mark.render
+def test_a_backend_that_is_named_after_mujocos_import_draws() -> None:
+    code = """
+import os, sys
+import mujoco
+assert mujoco.GLContext.__module__ == "mujoco.glfw"
+os.environ["MUJOCO_GL"] = sys.argv[1]
+from robocasa_lerobot.gl import ensure_gl
+assert ensure_gl() == sys.argv[1]
+assert mujoco.GLContext.__module__ == f"mujoco.{sys.argv[1]}"
+with mujoco.Renderer(mujoco.MjModel.from_xml_string("<mujoco/>"), 8, 8) as renderer:
+    assert renderer.render().shape == (8, 8, 3)
+"""
+    chosen = {gl.VARIABLE, "PYOPENGL_PLATFORM"}  # by this process
+    environment = {name: value for name, value in os.environ.items() if name not in chosen}
+    command = [sys.executable, "-c", code, os.environ[gl.VARIABLE]]
+    done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
 
 
 @pytest.mark.render

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from task_selection import demonstrated, every_task
 
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
+from robocasa_lerobot.envs.scene.scene import Scene
 from robocasa_lerobot.envs.state import KitchenState
 from robocasa_lerobot.errors import UserError
 
@@ -126,3 +127,38 @@ def test_a_state_of_something_else_is_refused() -> None:
     del values["asleep"]
     with pytest.raises(UserError, match="asleep missing"):
         KitchenState.from_dict(values)
+
+
+def test_a_state_of_another_kitchen_is_refused() -> None:
+    """The same task, split and seed in other layouts or styles are another scene."""
+    env = KitchenEnv("OpenDrawer", cameras=(), layouts=[11], styles=[11])
+    env.reset(seed=0)
+    state = env.get_state()
+    for layout, style, words in ((12, 11, "layout 11"), (11, 12, "style 11")):
+        other = KitchenEnv("OpenDrawer", cameras=(), layouts=[layout], styles=[style])
+        for _ in range(2):  # the scene is built for it, then it is the running one
+            with pytest.raises(UserError, match=rf"{words}.*gives \w+ 12.*`layouts` and `styles`"):
+                other.set_state(state)
+    values = state.to_dict()
+    del values["layout_id"], values["style_id"]  # as states were stored before
+    again = KitchenEnv("OpenDrawer", cameras=(), layouts=[11], styles=[11])
+    again.set_state(KitchenState.from_dict(KitchenState.from_dict(values).to_dict()))
+    assert np.array_equal(again.get_state().physics, state.physics)
+
+
+def test_a_reset_that_is_interrupted_leaves_the_running_episode_as_it_was() -> None:
+    env = make("OpenDrawer")
+    env.reset(seed=3)
+    expected = trajectory(env, actions(10, 0))
+    env.reset(seed=3)
+
+    def interrupt(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(Scene, "initial_data", interrupt)
+        with pytest.raises(KeyboardInterrupt):
+            env.reset(seed=4)
+    assert env.scene.seed == env.get_state().seed == 3
+    assert_same(trajectory(env, actions(10, 0)), expected)
+    assert env.reset(seed=4)[1]["seed"] == env.scene.seed == 4

@@ -172,6 +172,11 @@ def test_gymnasiums_make_vec_makes_ours() -> None:
         assert envs.call("horizon") == (5, 5)
 
 
+def test_gymnasiums_time_limit_is_told_to_be_the_horizon() -> None:
+    with pytest.raises(UnknownNameError, match=r"'max_episode_steps'.*`horizon`"):
+        gymnasium.make_vec("robocasa_lerobot/OpenDrawer", num_envs=2, max_episode_steps=100)
+
+
 def test_spawned_workers_do_as_well() -> None:
     with closing(make_vector_env(FaultyEnv, 1, context="spawn")) as envs:
         assert envs.reset(seed=1)[0]["agent_pos"].tolist() == [[1, 0]]
@@ -190,6 +195,7 @@ def test_spawned_workers_do_as_well() -> None:
         ({"task": FaultyEnv, "context": "fork"}, UnknownNameError),
         ({"task": FaultyEnv, "autoreset": "same"}, UnknownNameError),
         ({"task": FaultyEnv, "devices": []}, UserError),
+        ({"task": "OpenDrawer", "image_sz": 64}, UnknownNameError),
     ],
 )
 def test_mistakes_are_told_before_any_worker_starts(arguments: dict[str, Any], error: type[UserError]) -> None:

@@ -108,6 +108,8 @@ def test_an_exception_in_a_call_ends_nothing() -> None:
         assert "env worker 1" in caught.value.__notes__[0]
         with pytest.raises(AttributeError):
             envs.get_attr("no_such_thing")
+        with pytest.raises(TypeError, match="cannot pickle 'generator'"):
+            envs.call("unsendable")
         assert envs.step(STILL)[0]["agent_pos"].tolist() == [[20, 1], [21, 1]]
 
 

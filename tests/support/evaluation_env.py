@@ -2,7 +2,8 @@
 
 A slider starts at a place drawn from the seed, and the first action component moves it; the goal has two terms.
 Faults are asked for through the task's name, so that they reach the worker processes: `Slide+crash` raises at step 2,
-`+kill` ends the process, `+hang` sleeps for ever, each only once, or n times with `+crashxN`; `+slow` takes its time.
+`+diverge` as the kitchens do when their physics is lost, `+kill` ends the process, `+hang` sleeps for ever, each only
+once, or n times with `+crashxN`; `+slow` takes its time.
 `SLIDE_FAULTY_SEEDS` (JSON, seed -> fault) has those that happen in every attempt at a trial; `sigkill` and `nan` too.
 """
 
@@ -95,6 +96,10 @@ class SlideEnv(gymnasium.Env):
     def _happen(self, kind):
         if kind == "crash":
             raise RuntimeError("the block fell off")
+        if kind == "diverge":
+            from robocasa_lerobot.envs.robots.control_step import DivergedError
+
+            raise DivergedError("the simulation diverged at 0.100 s; reset the env.")
         if kind == "kill":
             os._exit(7)
         if kind == "sigkill":

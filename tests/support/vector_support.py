@@ -78,6 +78,9 @@ class FaultyEnv(gymnasium.Env):
         self._maybe_fail("call")
         return self._seed
 
+    def unsendable(self):
+        return (step for step in range(self._step))
+
     def _observe(self):
         picture = np.full((4, 4, 3), self._step, np.uint8)
         return {"pixels": picture, "agent_pos": np.array([self._seed, self._step], np.float64)}

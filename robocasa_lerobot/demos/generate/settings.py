@@ -75,8 +75,9 @@ class GenerationSettings(RecordingSettings):
         """With the sources looked at.
 
         Raises:
-            UserError: none is prepared, they are seeds of the attempts, their scenes are not made again, or they do not
-                suit the subtasks; or a number is none that it could be.
+            UnfitSourcesError: none is prepared, no subtask can be derived from them, or they do not suit the template.
+            UserError: they are seeds of the attempts, or their scenes are not made again; or a number is none that it
+                could be.
         """
         settings = cls(source=str(source), **values)
         for name, number, fits, expected in (
@@ -113,7 +114,7 @@ class GenerationSettings(RecordingSettings):
         """The sources as MimicGen reads them.
 
         Raises:
-            UserError: one does not suit the template, or none can be derived.
+            UnfitSourcesError: one does not suit the template, or none can be derived.
         """
         if self.template:
             place = place_of(self.folder, self.task)

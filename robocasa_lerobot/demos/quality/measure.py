@@ -152,10 +152,10 @@ def _saturated(actions: Array) -> float:
 
 
 def _about(env: KitchenEnv, data: mujoco.MjData, stage: Stage) -> Array:
-    """Middle of what a stage is about, (3,): its object, or else its fixture."""
-    name = env.scene.fill(stage.object)
-    if name in env.scene.objects:
-        return np.array(middle_of(env.scene, data, name))
+    """Middle of what a stage is about, (3,): its object, or else its target, which may be an object too."""
+    for name in (env.scene.fill(stage.object), env.scene.fill(stage.target)):
+        if name in env.scene.objects:
+            return np.array(middle_of(env.scene, data, name))
     return np.array(env.scene.fixture(stage.target).pos, dtype=np.float64)
 
 

@@ -17,6 +17,7 @@ from robocasa_lerobot.demos.hdf5 import Failure, read_summary
 from robocasa_lerobot.demos.motion import Array
 from robocasa_lerobot.demos.quality.measure import Measures, Start, measure, start_of
 from robocasa_lerobot.demos.replay import demonstrations
+from robocasa_lerobot.errors import OF_THE_MACHINE
 from robocasa_lerobot.jobs.as_completed import as_they_end
 
 BIN_M = 0.2  # sides of the squares of the floor that starts are counted in
@@ -30,18 +31,25 @@ class Quality:
         task: name.
         kept: measures of those that were kept.
         failed: starts of the attempts that were not.
-        in_vain: segments that each of these had begun, where they were generated.
+        in_vain: segments that each attempt that was not kept had begun, where they were generated.
+        nowhere: attempts that were not kept and have no start, since their kitchen cannot be made.
     """
 
     task: str
     kept: tuple[Measures, ...]
     failed: tuple[Start, ...]
     in_vain: tuple[tuple[tuple[str, str], ...], ...] = ()
+    nowhere: int = 0
+
+    @property
+    def tried(self) -> int:
+        """Attempts."""
+        return len(self.kept) + len(self.failed) + self.nowhere
 
     @property
     def rate(self) -> float:
         """Of attempts, that were kept."""
-        return len(self.kept) / max(len(self.kept) + len(self.failed), 1)
+        return len(self.kept) / max(self.tried, 1)
 
     @property
     def covered(self) -> float:
@@ -129,7 +137,14 @@ def _square(start: Start) -> tuple[int, int]:
 
 @dataclass(frozen=True)
 class Part:
-    """What came of looking at one attempt of a file."""
+    """What came of looking at one attempt of a file.
+
+    Attributes:
+        path: the file.
+        kept: measures of one that was kept.
+        failed: start of one that was not; None where its kitchen cannot be made.
+        in_vain: segments that it had begun.
+    """
 
     path: Path
     kept: Measures | None = None
@@ -168,7 +183,12 @@ def _look(path: Path, which: str | Failure) -> Part:
         start_within_m=float(settings.get("start_within_m", 0.0)),
     ).make_env()
     try:
-        env.reset(seed=which.scene_seed)
+        try:
+            env.reset(seed=which.scene_seed)
+        except OF_THE_MACHINE:
+            raise
+        except Exception:  # no more than when it was recorded, which is why the attempt failed
+            return Part(path, in_vain=which.segments)
         return Part(path, failed=start_of(env), in_vain=which.segments)
     finally:
         env.close()
@@ -176,15 +196,21 @@ def _look(path: Path, which: str | Failure) -> Part:
 
 def qualities(parts: Iterable[Part]) -> list[Quality]:
     """What was looked at, task by task."""
-    found: dict[str, tuple[list[Measures], list[Start], list[tuple[tuple[str, str], ...]]]] = {}
+    found: dict[str, list[Part]] = {}
     for part in parts:
-        kept, failed, in_vain = found.setdefault(part.path.stem, ([], [], []))
-        if part.kept is not None:
-            kept.append(part.kept)
-        if part.failed is not None:
-            failed.append(part.failed)
-            in_vain.append(part.in_vain)
-    return [
-        Quality(task, tuple(sorted(kept, key=lambda one: one.start.seed)), tuple(failed), tuple(in_vain))
-        for task, (kept, failed, in_vain) in sorted(found.items())
-    ]
+        found.setdefault(part.path.stem, []).append(part)
+    return [_quality(task, looked_at) for task, looked_at in sorted(found.items())]
+
+
+def _quality(task: str, parts: Sequence[Part]) -> Quality:
+    kept = [part.kept for part in parts if part.kept is not None]
+    lost = [part for part in parts if part.kept is None]
+    failed = tuple(part.failed for part in lost if part.failed is not None)
+    in_vain = tuple(part.in_vain for part in lost)
+    return Quality(
+        task,
+        tuple(sorted(kept, key=lambda one: one.start.seed)),
+        failed,
+        in_vain,
+        nowhere=len(lost) - len(failed),
+    )

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 from dataclasses import dataclass
 
+import mujoco
 import numpy as np
 
 from robocasa_lerobot.envs.scene.robot_poses import RobotPose, is_free, open_before
@@ -49,8 +50,8 @@ class InitialNoise:
 def add_initial_noise(scene: Scene, noise: InitialNoise) -> None:
     """Move the start of a scene's robot, before its `initial_data`; the noise follows from the scene's seed.
 
-    A base pose that would stand in a fixture, in an open door or drawer, or outside of the room is drawn again; where
-    none of 100 is free, the base stays.
+    A base pose that would stand in a fixture, in an open door or drawer, or outside of the room, or touch anything, is
+    drawn again; where none of 100 is free, the base stays.
     """
     scene.arm_noise_rad = noise.arm_rad
     if not noise.moves_base:
@@ -66,6 +67,19 @@ def add_initial_noise(scene: Scene, noise: InitialNoise) -> None:
             far = noise.base_within_m * np.sqrt(rng.uniform())
             shift = shift + far * np.array([np.cos(bearing), np.sin(bearing)])
         pose = RobotPose(start.x + float(shift[0]), start.y + float(shift[1]), start.yaw + float(turn), start.side)
-        if is_free(scene.layout, pose, scene.robot.shape, opened):
-            scene.robot_pose = pose
+        if not is_free(scene.layout, pose, scene.robot.shape, opened):
+            continue
+        scene.robot_pose = pose
+        if not touched(scene):
             return
+    scene.robot_pose = start
+
+
+def touched(scene: Scene) -> list[str]:
+    """What the robot touches where it starts, its arm without noise.
+
+    No floor plan shows all of it: the open doors of a fridge, or objects.
+    """
+    data = scene.placed_data()
+    mujoco.mj_fwdPosition(scene.model, data)
+    return scene.robot_touches(data)

@@ -9,6 +9,7 @@ Observations travel through shared memory. A worker that raises, dies or hangs e
 
 from __future__ import annotations
 
+import inspect
 import os
 from collections.abc import Sequence
 from functools import partial
@@ -62,8 +63,8 @@ def make_vector_env(
         kitchen: further arguments of `KitchenEnv`, for the envs that are given by a task's name.
 
     Raises:
-        UserError: no env, more tasks than envs, or an unknown context, autoreset mode or argument of the kitchen.
-        UnknownNameError: no such task.
+        UserError: no env, or more tasks than envs.
+        UnknownNameError: no such task, context, autoreset mode or argument of the kitchen.
         RenderDeviceError: no such render device.
         NoOpenGLError: nothing on this machine can render.
         WorkerError: a worker could not start.
@@ -76,12 +77,14 @@ def make_vector_env(
         raise UserError(f"{', '.join(kitchen)}: arguments of the kitchen, but every env has a factory of its own.")
     if "render_device" in kitchen:
         raise UserError("render_device: in a vector env the devices are given together: devices=[...].")
+    _check_arguments(kitchen)
     for one in tasks:
         if isinstance(one, str):
             get_task(one)  # a misspelt name fails here, and not in a worker
-    numbers = _render_devices(devices)
     # Envs without cameras run on machines that cannot render.
-    backend = None if kitchen.get("cameras", contract.CAMERAS) == () else gl.ensure_gl()
+    drawing = bool(kitchen.get("cameras", contract.CAMERAS))
+    numbers = _render_devices(devices, drawing)
+    backend = gl.ensure_gl() if drawing or devices is not None else None
     members = []
     for index in range(count):
         one = tasks[index % len(tasks)]
@@ -121,11 +124,22 @@ def _autoreset_mode(mode: AutoresetMode | str) -> AutoresetMode:
     return by_name.get(mode) or by_name[mode.lower()]
 
 
-def _render_devices(devices: int | Sequence[int] | None) -> list[int]:
-    """The devices to deal out, all of which exist; those of the environment variable if none are given."""
+def _check_arguments(kitchen: dict[str, Any]) -> None:
+    known = set(inspect.signature(KitchenEnv).parameters) - {"task", "render_device"}
+    for name in kitchen:
+        if name not in known:
+            remedy = "A limit on the steps is `horizon`." if name == "max_episode_steps" else ""
+            raise UnknownNameError("argument of the kitchen", name, known, remedy)
+
+
+def _render_devices(devices: int | Sequence[int] | None, drawing: bool) -> list[int]:
+    """The devices to deal out, all of which exist; those of the environment variable if none are given.
+
+    The variable may be there for other programs: it counts only where pictures are drawn, and by EGL.
+    """
     if devices is None:
         inherited = os.environ.get(gl.DEVICE_VARIABLE)
-        if inherited is None:
+        if inherited is None or not drawing or (os.environ.get(gl.VARIABLE) or "egl") != "egl":
             return []
         if not inherited.isdecimal():
             raise gl.RenderDeviceError(f"{gl.DEVICE_VARIABLE}: found {inherited!r}, expected a device's number.")

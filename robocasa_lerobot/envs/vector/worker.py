@@ -19,7 +19,7 @@ import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
 from multiprocessing.connection import Connection
-from multiprocessing.reduction import DupFd
+from multiprocessing.reduction import DupFd, ForkingPickler
 from typing import IO, Any
 
 import gymnasium
@@ -119,7 +119,7 @@ class Failure:
 
 @dataclass(frozen=True)
 class Raised:
-    """The answer to a `call` that raised; unlike a failure of reset or step it ends nothing."""
+    """The answer to a `call` that raised or gave what cannot be sent; unlike a failure of a step it ends nothing."""
 
     failure: Failure
 
@@ -256,7 +256,9 @@ class _Worker:
         self._write(phase="call")
         try:
             attribute = env.get_wrapper_attr(name)
-            return attribute(*args, **kwargs) if callable(attribute) else attribute
+            result = attribute(*args, **kwargs) if callable(attribute) else attribute
+            ForkingPickler.dumps(result)  # what cannot be sent fails here, and not the worker
+            return result
         except Exception as error:
             return Raised(Failure.of(error))
 

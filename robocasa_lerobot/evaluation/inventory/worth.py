@@ -157,7 +157,7 @@ def _parts_tables(sets: Mapping[str, Sequence[Quality]]) -> list[Table]:
 
 
 def _rate(one: Quality) -> list[Cell]:
-    return _rated(len(one.kept), len(one.kept) + len(one.failed))
+    return _rated(len(one.kept), one.tried)
 
 
 def _rated(kept: int, tried: int) -> list[Cell]:

@@ -90,7 +90,8 @@ def run_trial(
 
     Raises:
         RolloutError: an env that goes on past its horizon.
-        DivergedError: an action, proprioception or physics that is not finite.
+        DivergedError: an action, proprioception or physics that is not finite; kitchens raise their own, that of
+            `envs/robots/control_step.py`, before it is looked for here.
     """
     base: Any = env.unwrapped
     started = time.perf_counter()

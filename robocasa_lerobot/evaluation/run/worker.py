@@ -17,6 +17,7 @@ from typing import Any
 import gymnasium
 
 from robocasa_lerobot import gl
+from robocasa_lerobot.envs.robots import control_step
 from robocasa_lerobot.errors import UserError
 from robocasa_lerobot.evaluation.actors.actor import Actor
 from robocasa_lerobot.evaluation.actors.checkpoint import PolicySource
@@ -125,7 +126,7 @@ class _Worker:
             # What the trial left behind may be broken as well: the next one starts from a new env and policy.
             self.close_env()
             self._drop_policy()
-            kind = DIVERGED if isinstance(error, DivergedError) else CRASHED
+            kind = DIVERGED if isinstance(error, (DivergedError, control_step.DivergedError)) else CRASHED
             lost = str(error) if isinstance(error, LostError) else None
             return Finished(Outcome(), None, time.monotonic() - started, traceback.format_exc(), kind, lost)
         return Finished(outcome, video, time.monotonic() - started, None)

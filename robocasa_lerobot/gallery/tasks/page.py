@@ -46,7 +46,8 @@ def entry(card: Card, shown: Shown | None, folder: Path) -> Entry:
     if shown is None:
         return Entry(card)
     start, strip = (folder / f"{card.name}_{kind}.webp" for kind in ("start", "strip"))
-    return Entry(card, shown, start.read_bytes(), strip.read_bytes() if strip.exists() else None)
+    pictures = (path.read_bytes() if path.exists() else None for path in (start, strip))
+    return Entry(card, shown, *pictures)
 
 
 def write_page(path: Path, entries: Sequence[Entry]) -> Path:

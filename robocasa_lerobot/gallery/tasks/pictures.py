@@ -5,6 +5,7 @@ What is there already for the same split and seed is taken as it is, so that wor
 
 from __future__ import annotations
 
+import contextlib
 import json
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -21,6 +22,7 @@ from robocasa_lerobot.demos.recorder import record_episode
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.rendering import SceneRenderer
 from robocasa_lerobot.envs.tasks.registry import get_task
+from robocasa_lerobot.errors import OF_THE_MACHINE
 from robocasa_lerobot.files import write_text, written_aside
 from robocasa_lerobot.gallery.scene_pictures import visitor_camera
 
@@ -36,10 +38,11 @@ class Shown:
 
     Attributes:
         split, seed: of the scene.
-        instruction: of the episode.
+        instruction: of the episode; empty where it ended with an error.
         seconds: length of the demonstration; None without one.
         stages: of the episode, in words.
-        failure: why the demonstration did not end well; empty where it did, or where there is none.
+        failure: why the demonstration did not end well, or the error that there are no pictures for; empty where it
+            did, or where there is none.
     """
 
     split: str
@@ -53,40 +56,50 @@ class Shown:
 def make(name: str, split: str, seed: int, folder: Path) -> str:
     """Write `<name>_start.webp`, `<name>_strip.webp` where there is a demonstrator, and `<name>.json`; returns `name`.
 
-    Of seeds from `seed` on, the first that the demonstrator solves; the last that was tried where it solves none.
+    Of seeds from `seed` on, the first that the demonstrator solves; the last that was tried where it solves none. Of a
+    task that raises there are no pictures.
     """
     if read(name, split, seed, folder) is not None:
         return name
     folder.mkdir(parents=True, exist_ok=True)
-    env = KitchenEnv(name, split=split, cameras=(), terminate_on_success=False)
-    try:
-        if not can_demonstrate(get_task(name)):
-            env.reset(seed=seed)
-            shown = Shown(split, seed, env.task_description)
-            states = None
+    start, strip = (folder / f"{name}_{kind}.webp" for kind in ("start", "strip"))
+    with contextlib.closing(KitchenEnv(name, split=split, cameras=(), terminate_on_success=False)) as env:
+        try:
+            shown, states = _episode(env, seed)
+        except OF_THE_MACHINE:
+            raise
+        except Exception as error:  # a task that breaks must not cost the page of all others
+            shown = Shown(split, seed, "", failure=f"{type(error).__name__}: {error}")
+            for old in (start, strip):  # of another seed
+                old.unlink(missing_ok=True)
         else:
-            for tried in range(seed, seed + TRIES):
-                recording = record_episode(env, tried)
-                if recording.success:
-                    break
-            shown = Shown(
-                split,
-                tried,
-                env.task_description,
-                len(recording.actions) / contract.CONTROL_HZ,
-                tuple(stage["text"] for stage in recording.ep_meta["stages"]),
-                "" if recording.success else recording.reason,
-            )
-            states = recording.states
-            env.reset(seed=tried)  # the start again
-        _save(_start(env), folder / f"{name}_start.webp", START_QUALITY)
-        if states is not None:
-            _save(_strip(env, states), folder / f"{name}_strip.webp", STRIP_QUALITY)
-    finally:
-        env.close()
+            _save(_start(env), start, START_QUALITY)
+            if states is not None:
+                _save(_strip(env, states), strip, STRIP_QUALITY)
     # Last: what has it is whole.
     write_text(folder / f"{name}.json", json.dumps({"asked": seed, **asdict(shown)}))
     return name
+
+
+def _episode(env: KitchenEnv, seed: int) -> tuple[Shown, NDArray[np.float64] | None]:
+    """What is shown, and the states of its demonstration, if there is one; the env is at its start again."""
+    if not can_demonstrate(get_task(env.task)):
+        env.reset(seed=seed)
+        return Shown(env.split, seed, env.task_description), None
+    for tried in range(seed, seed + TRIES):
+        recording = record_episode(env, tried)
+        if recording.success:
+            break
+    shown = Shown(
+        env.split,
+        tried,
+        env.task_description,
+        len(recording.actions) / contract.CONTROL_HZ,
+        tuple(stage["text"] for stage in recording.ep_meta["stages"]),
+        "" if recording.success else recording.reason,
+    )
+    env.reset(seed=tried)
+    return shown, recording.states
 
 
 def read(name: str, split: str, seed: int, folder: Path) -> Shown | None:

@@ -20,7 +20,7 @@ from robocasa_lerobot.demos.generate.mimicgen.template import (
 )
 from robocasa_lerobot.demos.generate.select import pose_distance
 from robocasa_lerobot.demos.generate.sources.segments import signals_of
-from robocasa_lerobot.demos.generate.sources.source import Source
+from robocasa_lerobot.demos.generate.sources.source import Source, UnfitSourcesError
 from robocasa_lerobot.demos.generate.sources.transform import carried_over, interpolated
 from robocasa_lerobot.demos.motion import Array
 from robocasa_lerobot.errors import UnknownNameError, UserError
@@ -109,7 +109,7 @@ def boundaries(info: DatagenInfo, template: Template) -> list[int]:
 
     Raises:
         UnknownNameError: it has no such signal.
-        UserError: a signal never rises.
+        UnfitSourcesError: a signal never rises.
     """
     ends: list[int] = []
     for subtask in template.subtasks[:-1]:
@@ -120,7 +120,7 @@ def boundaries(info: DatagenInfo, template: Template) -> list[int]:
         risen = np.flatnonzero(np.diff(info.signals[signal].astype(np.int64)) > 0) + 1
         later = risen[risen >= begin]
         if not len(later):
-            raise UserError(f"{info.name}: the signal {signal} does not rise from step {begin} on.")
+            raise UnfitSourcesError(f"{info.name}: the signal {signal} does not rise from step {begin} on.")
         ends.append(int(later[0]) + 1)
     return [*ends, len(info.eef)]
 

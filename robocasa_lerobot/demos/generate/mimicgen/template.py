@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from robocasa_lerobot.demos.generate.sources.segments import PLACE, USE
-from robocasa_lerobot.demos.generate.sources.source import Source
+from robocasa_lerobot.demos.generate.sources.source import Source, UnfitSourcesError
 from robocasa_lerobot.errors import UnknownNameError, UserError
 
 RANDOM, OBJECT, ROBOT, INTERPOLATION = STRATEGIES = (
@@ -153,7 +153,7 @@ def derived_template(sources: Sequence[Source]) -> tuple[Template, list[Source]]
     and not at the last target, and there is no noise but what is asked for: all of which helps.
 
     Raises:
-        UserError: no source has a segment.
+        UnfitSourcesError: no source has a segment.
     """
 
     def kinds(source: Source) -> tuple[tuple[str, str], ...]:
@@ -162,7 +162,7 @@ def derived_template(sources: Sequence[Source]) -> tuple[Template, list[Source]]
     sequences = Counter(kinds(source) for source in sources if source.segments)
     if not sequences:
         tasks = ", ".join(sorted({source.task for source in sources}))
-        raise UserError(
+        raise UnfitSourcesError(
             f"in none of the {len(sources)} sources ({tasks}) the hand moves anything: there are no subtasks to carry "
             "over. Choose another --method."
         )

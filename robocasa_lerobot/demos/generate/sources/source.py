@@ -22,6 +22,10 @@ from robocasa_lerobot.envs.tasks.task import Stage
 from robocasa_lerobot.errors import UserError
 
 
+class UnfitSourcesError(UserError):
+    """Nothing can be generated from these sources, however often it is tried; from others it might."""
+
+
 @dataclass(frozen=True, eq=False)
 class Source:
     """A prepared demonstration.
@@ -98,11 +102,11 @@ def sources_of(folder: Path, task: str, rules: str = "{}") -> list[Source]:
         rules: JSON of what `rules.rules_from` takes.
 
     Raises:
-        UserError: nothing there has been prepared.
+        UnfitSourcesError: nothing there has been prepared.
     """
     found = _read(place_of(folder, task), _stamp(folder), rules)
     if not found:
-        raise UserError(
+        raise UnfitSourcesError(
             f"{folder}: no demonstration there has been prepared, or none replays. "
             f"`robocasa-lerobot prepare {folder}` makes them ready."
         )

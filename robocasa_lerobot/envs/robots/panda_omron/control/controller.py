@@ -77,12 +77,16 @@ class PandaOmronController:
         memory, views, places, watch = self._memory, self._views, self._places, self._nearby.watch
         model, data = self._model._address, self._data._address
         stale = False
-        while True:
-            self._nearby.leave_out()
-            made, now = kernel.run(memory, views, places, watch, model, data, substeps)
-            stale, substeps = stale or now, substeps - made
-            if substeps == 0:
-                return stale
+        try:
+            while True:
+                self._nearby.leave_out()
+                made, now = kernel.run(memory, views, places, watch, model, data, substeps)
+                stale, substeps = stale or now, substeps - made
+                if substeps == 0:
+                    return stale
+        finally:
+            # Ctrl-C between the two calls would leave the masks zero, and the next step take them for the model's own.
+            self._nearby.look_at_all()
 
     def goal_in_base(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Goal position (3,) metres and rotation matrix (3, 3) of the grip site in the arm's base frame."""
