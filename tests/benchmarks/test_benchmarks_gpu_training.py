@@ -55,6 +55,7 @@ def test_rates_are_told_by_the_plain_one_and_losses_by_the_same_batch(gpu_traini
     }
 
 
+@pytest.mark.slow
 def test_it_runs_and_goes_on_after_a_variant_that_fails(
     gpu_training: ModuleType, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

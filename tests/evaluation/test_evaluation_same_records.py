@@ -142,6 +142,7 @@ def test_workers_policy_servers_and_their_number_change_nothing(
         evaluate(tmp_path / "b", **own, executed_steps=4)
 
 
+@pytest.mark.slow
 def test_a_gpu_that_is_of_no_use_any_more_costs_its_process_and_an_attempt(
     tmp_path: Path, checkpoint: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -156,6 +157,7 @@ def test_a_gpu_that_is_of_no_use_any_more_costs_its_process_and_an_attempt(
     assert len(list(processes.iterdir())) == 2
 
 
+@pytest.mark.slow
 def test_slurm_runs_the_shards_and_joins_them(
     tmp_path: Path,
     slurm: Path,

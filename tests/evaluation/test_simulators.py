@@ -113,6 +113,7 @@ def test_fixed_starts_are_the_seeds(tmp_path: Path) -> None:
         evaluate(tmp_path / "b", **own, trials=4)
 
 
+@pytest.mark.slow
 def test_killed_and_given_again(tmp_path: Path) -> None:
     notes = tmp_path / "pids"
     notes.mkdir()

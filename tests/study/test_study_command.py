@@ -44,6 +44,7 @@ def test_the_plan_tells_what_each_part_takes(tmp_path: Path) -> None:
     assert not (tmp_path / "datasets").exists()
 
 
+@pytest.mark.slow
 def test_the_plan_leaves_out_what_has_ended(tmp_path: Path) -> None:
     whole = load_study()
     for run in runs_of([whole.parts["multitask"]], tmp_path, configs_folder())[:2]:
