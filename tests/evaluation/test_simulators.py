@@ -7,6 +7,7 @@ import csv
 import dataclasses
 import io
 import os
+import pickle
 import signal
 import subprocess
 import sys
@@ -30,7 +31,7 @@ from robocasa_lerobot.evaluation.run import engine
 from robocasa_lerobot.evaluation.simulators import foreign_worker
 from robocasa_lerobot.evaluation.simulators.fit import UnfitPolicyError
 from robocasa_lerobot.evaluation.simulators.foreign_env import ForeignEnv
-from robocasa_lerobot.evaluation.simulators.process import ForeignProcess, SimulatorError
+from robocasa_lerobot.evaluation.simulators.process import EnvRaisedError, ForeignProcess, SimulatorError
 from robocasa_lerobot.evaluation.simulators.simulator import Simulator
 from robocasa_lerobot.video import frames_and_rate
 
@@ -295,3 +296,8 @@ def test_settings_of_our_own_envs_are_as_before(tmp_path: Path) -> None:
     settings = engine.prepare(load_config(EvaluationConfig, arguments(tmp_path, **own))).header.settings
     assert not {"python", "type", "options", "simulator"} & settings.keys()
     assert {field.name for field in dataclasses.fields(Simulator)} == {"python", "factory", "options"}
+
+
+def test_what_an_env_raised_survives_being_pickled() -> None:
+    again = pickle.loads(pickle.dumps(EnvRaisedError("KeyError", "no such object")))
+    assert (again.kind, str(again)) == ("KeyError", "no such object")

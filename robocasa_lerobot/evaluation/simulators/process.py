@@ -31,8 +31,11 @@ class EnvRaisedError(SimulatorError):
     """The env, or what makes it, raised; `kind` is the name of the exception."""
 
     def __init__(self, kind: str, text: str) -> None:
-        super().__init__(text)
+        super().__init__(kind, text)  # what pickle makes it again from
         self.kind = kind
+
+    def __str__(self) -> str:
+        return str(self.args[1])
 
 
 class ForeignProcess:
