@@ -173,9 +173,25 @@ def _mend(path: Path) -> None:
         path.write_bytes(content[: content.rfind(b"\n") + 1])
 
 
+def others_there(options: argparse.Namespace) -> str:
+    """What a result that is there was measured with, where that is something else than these options; else nothing."""
+    if not options.out.is_file():
+        return ""
+    kept = json.loads(options.out.read_text(encoding="utf-8"))["settings"]
+    asked = {"first_seed": options.first_seed, "action_noise": options.action_noise, "varied": not options.plain}
+    return ", ".join(f"{name} {kept[name]} (now {value})" for name, value in asked.items() if kept[name] != value)
+
+
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run what is missing, print, write."""
     options = parse(arguments)
+    if others := others_there(options):  # whose trials would be dropped
+        print(
+            f"demonstrators: {options.out} was measured with {others}. Give the same again, or files of your own: "
+            "--trials outputs/mine.jsonl --out outputs/mine.json.",
+            file=sys.stderr,
+        )
+        return 2
     names = expand_names(options.tasks)
     splits = tuple(split.strip() for split in options.splits.split(","))
     seeds = range(options.first_seed, options.first_seed + options.seeds)

@@ -78,7 +78,10 @@ def run(args: argparse.Namespace) -> int:
         )
         needs, said = needs_of(experiment, episodes)
         asked = f" --episodes {args.episodes}" if args.episodes else ""
-        print(listing(experiment.name, args.experiment, needs, said, cores, asked), flush=True)
+        same = "".join(
+            f" {word}" for word in [*(["--scale", args.scale] if args.scale else []), *getattr(args, "settings", ())]
+        )
+        print(listing(experiment.name, args.experiment, needs, said, cores, asked, same), flush=True)
     elif args.convert is None:
         raise UserError(
             "no experiment: `robocasa-lerobot data configs/experiments/small/foundation.yaml` lists its data."

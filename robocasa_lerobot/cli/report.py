@@ -5,7 +5,9 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-EXAMPLE = "robocasa-lerobot report outputs/demo/evaluation --training outputs/demo --demos demos/OpenDrawer.hdf5"
+EXAMPLE = (
+    "robocasa-lerobot report outputs/demo/evaluation --training outputs/demo --demos outputs/demo/demos/OpenDrawer.hdf5"
+)
 
 
 def configure(parser: argparse.ArgumentParser) -> None:

@@ -34,7 +34,9 @@ def configure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--style", type=int, metavar="ID", help="the same for styles")
     parser.add_argument("--operator", default="", help="name that is written into each episode")
     parser.add_argument("--hide-goal", action="store_true", help="do not show whether the goal's terms hold")
-    parser.add_argument("--image-size", type=int, default=256, help="height and width of the pictures (default 256)")
+    parser.add_argument(
+        "--image-size", type=int, default=256, help="height and width of the pictures (default 256; a policy's own)"
+    )
     parser.add_argument("--preset", default="fast", help="fast, or quality: with shadows (default fast)")
     parser.add_argument("--host", default="127.0.0.1", help="address to serve at (default 127.0.0.1, this machine)")
     parser.add_argument("--port", type=int, default=8765, help="port, 0 for a free one (default 8765)")

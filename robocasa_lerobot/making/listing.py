@@ -13,7 +13,9 @@ from robocasa_lerobot.training.planning.skipped import Skipped
 _SHOWN = 8  # names of tasks in a line
 
 
-def listing(name: str, file: str, needs: Sequence[Need], said: Sequence[Skipped], cores: int, asked: str = "") -> str:
+def listing(
+    name: str, file: str, needs: Sequence[Need], said: Sequence[Skipped], cores: int, asked: str = "", same: str = ""
+) -> str:
     """Lines for people.
 
     Args:
@@ -22,7 +24,8 @@ def listing(name: str, file: str, needs: Sequence[Need], said: Sequence[Skipped]
         needs: the datasets.
         said: phases that are left out or partial.
         cores: that would make the missing datasets.
-        asked: further options of the command.
+        asked: further options of the command that makes them.
+        same: those that the command which trains takes too.
     """
     contents = {need.root: need.content() for need in needs}
     missing = [need for need in needs if need.missing]
@@ -42,9 +45,9 @@ def listing(name: str, file: str, needs: Sequence[Need], said: Sequence[Skipped]
         more = f" and {len(tasks) - _SHOWN} more" if len(tasks) > _SHOWN else ""
         lines.append(f"missing: {', '.join(tasks[:_SHOWN])}{more}: {remedy}")
     if any(need.made for need in missing):
-        lines.append(f"make what our demonstrators can: robocasa-lerobot data {file} --make{asked}")
+        lines.append(f"make what our demonstrators can: robocasa-lerobot data {file} --make{asked}{same}")
     if not missing:
-        lines.append(f"all is there: python train.py --config_path {file}")
+        lines.append(f"all is there: python train.py --config_path {file}{same}")
     return "\n".join(lines)
 
 

@@ -31,6 +31,18 @@ def _trial(bench: ModuleType, task: str, split: str, seed: int, success: bool, s
     )
 
 
+def test_a_result_of_other_seeds_is_not_written_over(
+    bench: ModuleType, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "kept.json"
+    out.write_text(json.dumps({"settings": {"first_seed": 5, "action_noise": 0.0, "varied": True}}))
+    before = out.read_bytes()
+    assert bench.main(["--tasks", "OpenDrawer", "--trials", str(tmp_path / "t.jsonl"), "--out", str(out)]) == 2
+    assert "first_seed 5 (now 610000)" in capsys.readouterr().err
+    assert [path.name for path in tmp_path.iterdir()] == ["kept.json"]
+    assert out.read_bytes() == before
+
+
 def test_rates_times_and_reasons_are_counted(bench: ModuleType, tmp_path: Path) -> None:
     report = importlib.import_module("demonstrators_report")
     trials = [_trial(bench, "OpenDrawer", "target", seed, seed != 1) for seed in range(4)]

@@ -159,6 +159,8 @@ def test_what_is_there_is_counted(tmp_path: Path, capsys: pytest.CaptureFixture[
     assert "1 dataset(s), 1 there" in said
     assert "have fewer demonstrations than asked for" in said
     assert "all is there: python train.py" in said
+    assert cli.main(["data", str(file), "--scale", "tiny", "--seed=3"]) == 0
+    assert f"python train.py --config_path {file} --scale tiny --seed=3\n" in capsys.readouterr().out
     assert parse_episodes("human=3, mg=4") == {"human": 3, "mg": 4}
     assert cli.main(["data", str(file), "--make", "--episodes", "human=3"]) == 0  # nothing to do
     assert sorted(path.name for path in Path("datasets/kitchens").iterdir()) == ["pretrain"]
