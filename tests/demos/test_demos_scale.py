@@ -179,7 +179,7 @@ def test_seeds_that_no_scene_can_have_are_refused(tmp_path: Path, capsys: pytest
     assert "scenes have seeds from 0 on" in capsys.readouterr().err
     settings = [RecordingSettings("CloseDrawer", 1, seed=-5)]
     with pytest.raises(UserError, match="from 0 on"):
-        record_distributed(settings, tmp_path, Execution("ray"), keep_failures=False)
+        record_distributed(settings, tmp_path, cast(Any, SimpleNamespace(kind="ray")), keep_failures=False)
     assert not list(tmp_path.iterdir())
 
 
