@@ -24,7 +24,7 @@ import os
 import signal
 import sys
 import time
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import asdict
 from pathlib import Path
@@ -40,6 +40,7 @@ from robocasa_lerobot.demos.demonstrator import can_demonstrate
 from robocasa_lerobot.demos.recorder import record_episode
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.tasks.registry import get_task, task_names
+from robocasa_lerobot.errors import differing
 from robocasa_lerobot.files import write_text, written_aside
 from robocasa_lerobot.progress import Bar
 
@@ -173,19 +174,16 @@ def _mend(path: Path) -> None:
         path.write_bytes(content[: content.rfind(b"\n") + 1])
 
 
-def others_there(options: argparse.Namespace) -> str:
-    """What a result that is there was measured with, where that is something else than these options; else nothing."""
-    if not options.out.is_file():
-        return ""
-    kept = json.loads(options.out.read_text(encoding="utf-8"))["settings"]
-    asked = {"first_seed": options.first_seed, "action_noise": options.action_noise, "varied": not options.plain}
-    return ", ".join(f"{name} {kept[name]} (now {value})" for name, value in asked.items() if kept[name] != value)
+def others_there(out: Path, settings: Mapping[str, Any]) -> str:
+    """What a result that is there was measured with, where that is something else; else nothing."""
+    return differing(json.loads(out.read_text(encoding="utf-8"))["settings"], settings) if out.is_file() else ""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run what is missing, print, write."""
     options = parse(arguments)
-    if others := others_there(options):  # whose trials would be dropped
+    settings = {"first_seed": options.first_seed, "action_noise": options.action_noise, "varied": not options.plain}
+    if others := others_there(options.out, settings):  # whose trials would be dropped
         print(
             f"demonstrators: {options.out} was measured with {others}. Give the same again, or files of your own: "
             "--trials outputs/mine.jsonl --out outputs/mine.json.",
@@ -217,13 +215,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     body = {
         "machine": common.machine(),
         "versions": common.versions("mujoco", "numpy"),
-        "settings": {
-            "first_seed": options.first_seed,
-            "seeds_per_split": options.seeds,
-            "splits": list(splits),
-            "action_noise": options.action_noise,
-            "varied": not options.plain,
-        },
+        "settings": {**settings, "seeds_per_split": options.seeds, "splits": list(splits)},
         "trials": len(trials),
         "commits": {c: sum(t.commit == c for t in trials) for c in sorted({t.commit for t in trials})},
         "ratios": ratios(tasks),

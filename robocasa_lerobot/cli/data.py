@@ -73,14 +73,11 @@ def run(args: argparse.Namespace) -> int:
     needs: list[Need] | None = None
     if args.experiment is not None:
         episodes = parse_episodes(args.episodes) if args.episodes else {}
-        experiment = load_experiment(
-            find_config(args.experiment, "experiments"), getattr(args, "settings", ()), args.scale
-        )
+        changes = getattr(args, "settings", ())
+        experiment = load_experiment(find_config(args.experiment, "experiments"), changes, args.scale)
         needs, said = needs_of(experiment, episodes)
         asked = f" --episodes {args.episodes}" if args.episodes else ""
-        same = "".join(
-            f" {word}" for word in [*(["--scale", args.scale] if args.scale else []), *getattr(args, "settings", ())]
-        )
+        same = "".join(f" {word}" for word in ([f"--scale {args.scale}"] if args.scale else []) + list(changes))
         print(listing(experiment.name, args.experiment, needs, said, cores, asked, same), flush=True)
     elif args.convert is None:
         raise UserError(

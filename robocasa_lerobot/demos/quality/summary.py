@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
@@ -182,7 +183,7 @@ def _look(path: Path, which: str | Failure) -> Part:
         styles=settings.get("styles"),
         start_within_m=float(settings.get("start_within_m", 0.0)),
     ).make_env()
-    try:
+    with contextlib.closing(env):
         try:
             env.reset(seed=which.scene_seed)
         except OF_THE_MACHINE:
@@ -190,8 +191,6 @@ def _look(path: Path, which: str | Failure) -> Part:
         except Exception:  # no more than when it was recorded, which is why the attempt failed
             return Part(path, in_vain=which.segments)
         return Part(path, failed=start_of(env), in_vain=which.segments)
-    finally:
-        env.close()
 
 
 def qualities(parts: Iterable[Part]) -> list[Quality]:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import dataclasses
 from dataclasses import dataclass
 
-import mujoco
 import numpy as np
 
 from robocasa_lerobot.envs.scene.robot_poses import RobotPose, is_free, open_before
@@ -76,10 +75,5 @@ def add_initial_noise(scene: Scene, noise: InitialNoise) -> None:
 
 
 def touched(scene: Scene) -> list[str]:
-    """What the robot touches where it starts, its arm without noise.
-
-    No floor plan shows all of it: the open doors of a fridge, or objects.
-    """
-    data = scene.placed_data()
-    mujoco.mj_fwdPosition(scene.model, data)
-    return scene.robot_touches(data)
+    """What the robot touches where it starts, its arm without noise."""
+    return scene.robot_touches(scene.evaluated_start())

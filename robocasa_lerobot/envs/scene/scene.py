@@ -182,6 +182,15 @@ class Scene(Drawn):
             data.joint(f"{placed.name}_joint0").qpos[:] = [*placed.pos, *placed.quat]
         return data
 
+    def evaluated_start(self) -> mujoco.MjData:
+        """Everything where it was put, with its poses and contacts; the arm without noise.
+
+        No plan of footprints shows all of these: handles, open doors, objects.
+        """
+        data = self.placed_data()
+        mujoco.mj_fwdPosition(self.model, data)
+        return data
+
     def initial_data(self, rng: np.random.Generator) -> tuple[mujoco.MjData, Controller]:
         """State at the start of an episode: everything placed, then settled without commands.
 

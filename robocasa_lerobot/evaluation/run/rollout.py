@@ -12,6 +12,7 @@ import gymnasium
 import numpy as np
 from numpy.typing import NDArray
 
+from robocasa_lerobot.envs.robots import control_step
 from robocasa_lerobot.envs.tasks.stage_progress import StageProgress
 from robocasa_lerobot.errors import UserError
 from robocasa_lerobot.evaluation.actors.actor import Actor
@@ -49,8 +50,8 @@ class RolloutError(RuntimeError):
     """The policy or the env did something that no trial can go on from."""
 
 
-class DivergedError(RolloutError):
-    """Numbers that are not finite, from the policy or the physics."""
+class DivergedError(RolloutError, control_step.DivergedError):
+    """Numbers that are not finite, from the policy or the physics, found by the rollout and not by the env itself."""
 
 
 @dataclass
@@ -90,8 +91,7 @@ def run_trial(
 
     Raises:
         RolloutError: an env that goes on past its horizon.
-        DivergedError: an action, proprioception or physics that is not finite; kitchens raise their own, that of
-            `envs/robots/control_step.py`, before it is looked for here.
+        control_step.DivergedError: an action, proprioception or physics that is not finite.
     """
     base: Any = env.unwrapped
     started = time.perf_counter()

@@ -17,7 +17,7 @@ from typing import Any
 import gymnasium
 
 from robocasa_lerobot import gl
-from robocasa_lerobot.envs.robots import control_step
+from robocasa_lerobot.envs.robots.control_step import DivergedError
 from robocasa_lerobot.errors import UserError
 from robocasa_lerobot.evaluation.actors.actor import Actor
 from robocasa_lerobot.evaluation.actors.checkpoint import PolicySource
@@ -32,7 +32,7 @@ from robocasa_lerobot.evaluation.run.film import Film, NoPicturesError
 from robocasa_lerobot.evaluation.run.messages import Alive, Finished, Ready, Refused
 from robocasa_lerobot.evaluation.run.policy_server import PolicyConnection
 from robocasa_lerobot.evaluation.run.processes import take_over
-from robocasa_lerobot.evaluation.run.rollout import DivergedError, Outcome, horizon_of, run_trial
+from robocasa_lerobot.evaluation.run.rollout import Outcome, horizon_of, run_trial
 from robocasa_lerobot.evaluation.run.success import SuccessRule
 from robocasa_lerobot.evaluation.simulators.fit import UnfitPolicyError, needs_of
 from robocasa_lerobot.evaluation.simulators.foreign_env import ForeignEnv
@@ -126,7 +126,7 @@ class _Worker:
             # What the trial left behind may be broken as well: the next one starts from a new env and policy.
             self.close_env()
             self._drop_policy()
-            kind = DIVERGED if isinstance(error, (DivergedError, control_step.DivergedError)) else CRASHED
+            kind = DIVERGED if isinstance(error, DivergedError) else CRASHED
             lost = str(error) if isinstance(error, LostError) else None
             return Finished(Outcome(), None, time.monotonic() - started, traceback.format_exc(), kind, lost)
         return Finished(outcome, video, time.monotonic() - started, None)

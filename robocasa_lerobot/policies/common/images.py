@@ -6,7 +6,7 @@ import torch
 from torch import Tensor
 from torch.nn import functional
 
-from robocasa_lerobot.policies.common.transfer import to_device
+from robocasa_lerobot.policies.common.transfer import is_plain_cpu, to_device
 
 
 def to_signed_float(images: Tensor) -> Tensor:
@@ -52,10 +52,10 @@ def random_crop(images: Tensor, fraction: float, generator: torch.Generator | No
         return images
     tops = torch.randint(height - h + 1, (count,), generator=generator)
     lefts = torch.randint(width - w + 1, (count,), generator=generator)
-    if images.device.type != "cpu" or torch.compiler.is_compiling():
-        return _windows(images, to_device(tops, images.device), to_device(lefts, images.device), (h, w))
-    places = zip(images, tops.tolist(), lefts.tolist(), strict=True)
-    return torch.stack([image[..., t : t + h, left : left + w] for image, t, left in places])
+    if is_plain_cpu(images.device):
+        places = zip(images, tops.tolist(), lefts.tolist(), strict=True)
+        return torch.stack([image[..., t : t + h, left : left + w] for image, t, left in places])
+    return _windows(images, to_device(tops, images.device), to_device(lefts, images.device), (h, w))
 
 
 def _windows(images: Tensor, tops: Tensor, lefts: Tensor, size: tuple[int, int]) -> Tensor:

@@ -17,7 +17,7 @@ import torch
 from torch import Tensor, nn
 
 from robocasa_lerobot.errors import UserError
-from robocasa_lerobot.policies.common.transfer import to_device
+from robocasa_lerobot.policies.common.transfer import each_once, is_plain_cpu, to_device
 
 SUBWORDS = 8  # per word: the word itself and its first seven trigrams
 PADDING = 0  # token of no word; hashes are 1 ... buckets
@@ -81,8 +81,7 @@ class TokenEncoder(nn.Module):
 
     def forward(self, tokens: Tensor, mask: Tensor) -> Tensor:
         """Maps tokens (N, W, SUBWORDS) and mask (N, W), true where there is a word, to (N, dim)."""
-        if tokens.device.type != "cpu" or torch.compiler.is_compiling():
-            # How many instructions and words there are would have to be waited for, and be shapes that change.
+        if not is_plain_cpu(tokens.device):  # how many instructions and words there are would be shapes
             return self._encode(tokens, mask)
         # A batch repeats few instructions: encode each once.
         unique, where = torch.unique(torch.cat([tokens.flatten(1), mask.long()], dim=1), dim=0, return_inverse=True)
@@ -139,16 +138,15 @@ class ClipTextEncoder(nn.Module):
     def forward(self, tokens: Tensor, mask: Tensor) -> Tensor:
         """Maps CLIP's tokens (N, L) and attention mask (N, L) to its text embeddings (N, dim), in float32."""
         keys = [row.numpy().tobytes() for row in tokens.cpu()]
-        first = {key: i for i, key in reversed(list(enumerate(keys)))}  # where each is for the first time
-        new = sorted(i for key, i in first.items() if key not in self._memory)
+        different, where = each_once(keys)
+        new = [keys.index(key) for key in different if key not in self._memory]
         if new:
             model = self.text_model.to(tokens.device).eval()
             with torch.autocast(tokens.device.type, enabled=False):
                 embeddings = model(input_ids=tokens[new], attention_mask=mask[new].long()).text_embeds.float()
             self._memory.update({keys[i]: embedding for i, embedding in zip(new, embeddings, strict=True)})
-        place = {key: i for i, key in enumerate(first)}
-        known = torch.stack([self._memory[key].to(tokens.device) for key in first])
-        return known[to_device(torch.tensor([place[key] for key in keys], dtype=torch.int64), tokens.device)]
+        known = torch.stack([self._memory[key].to(tokens.device) for key in different])
+        return known[to_device(where, tokens.device)]
 
     def _load_from_state_dict(self, *args: Any, **kwargs: Any) -> None:
         self._memory.clear()  # what other weights gave

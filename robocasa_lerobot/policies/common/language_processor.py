@@ -16,6 +16,7 @@ from torch import Tensor
 from robocasa_lerobot.contract import TASK_KEY
 from robocasa_lerobot.errors import UserError
 from robocasa_lerobot.policies.common.language import PADDING, SUBWORDS, load_clip_tokenizer, token_tensor
+from robocasa_lerobot.policies.common.transfer import each_once
 
 
 class _InstructionStep(ObservationProcessorStep):
@@ -41,9 +42,8 @@ class _InstructionStep(ObservationProcessorStep):
                 "Datasets carry it as their task; an env's loop adds it to the observation."
             )
         # A batch repeats few instructions: make tokens of each once.
-        place = {instruction: i for i, instruction in enumerate(dict.fromkeys(instructions))}
-        where = torch.tensor([place[instruction] for instruction in instructions], dtype=torch.int64)
-        tokens, mask = (each[where] for each in self.tokenize(list(place)))
+        different, where = each_once(instructions)
+        tokens, mask = (each[where] for each in self.tokenize(different))
         return {**observation, OBS_LANGUAGE_TOKENS: tokens, OBS_LANGUAGE_ATTENTION_MASK: mask}
 
     def transform_features(

@@ -12,6 +12,8 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
+from robocasa_lerobot.policies.common.transfer import is_plain_cpu
+
 RESNET18_CHANNELS = (64, 128, 256, 512)  # two residual blocks each
 
 
@@ -137,7 +139,7 @@ class ConvNet(nn.Module):
 
     def forward(self, x: Tensor, condition: Tensor) -> Tensor:
         """Maps (N, 3, H, W) to (N, channels[-1], H / s, W / s), s = stem * 2^(n - 1)."""
-        if x.device.type == "cpu" and not torch.compiler.is_compiling():
+        if is_plain_cpu(x.device):
             # A quarter faster, forth and back, in so shallow a network; ResNet-18 takes longer with it.
             x = x.contiguous(memory_format=torch.channels_last)
         for i, (convolution, norm) in enumerate(zip(self.convolutions, self.norms, strict=True)):

@@ -20,9 +20,8 @@ def ask_for_room(scene: Scene) -> None:
     Raises:
         PlacementError: an object reaches too deep into anything, or the robot touches something.
     """
-    data = scene.placed_data()
+    data = scene.evaluated_start()
     objects = scene.subtree(*scene.objects) if scene.objects else np.zeros(scene.model.nbody, dtype=bool)
-    mujoco.mj_fwdPosition(scene.model, data)
     for one, other, depth in _deeper(scene.model, data, SUNK_M):
         if objects[scene.model.body(one).id] or objects[scene.model.body(other).id]:
             raise PlacementError(f"{one} reaches {depth:.3f} m into {other}")
