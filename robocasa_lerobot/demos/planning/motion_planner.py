@@ -10,7 +10,7 @@ from __future__ import annotations
 import heapq
 import itertools
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -46,7 +46,7 @@ class WaypointPath:
     targets: tuple[HandTarget, ...]
     extra: float = 0.0
     takes: Held | None = None
-    drawn: float = 0.0
+    drawn: float = field(default=0.0, kw_only=True)  # no place of its own: kinds of paths add their parts after these
 
 
 @dataclass(frozen=True)

@@ -353,7 +353,7 @@ def _paths(
                     out = -turn[:, 2] if name == "along" else entry(env, name)
                     low = LEVEL_COST if name == "level" else LOW_COST if lift < LIFT_M else 0.0
                     poses_on_it = _poses(pose.position, turn, out, name, strategy, lift)
-                    found.append(_GraspPath(poses_on_it, cost + low, takes, pose.width))
+                    found.append(_GraspPath(poses_on_it, cost + low, takes, width=pose.width))
     return found
 
 
