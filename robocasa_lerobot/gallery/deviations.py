@@ -20,7 +20,8 @@ FEW = Fraction(1, 5)  # of the kitchens: a task that fewer admit says why
 _HEAD = """# Other than the original
 
 Generated from the declarations by `make docs`; do not edit. What our tasks ask for is compared with the published tasks
-by tests, sentence by sentence (`tests/envs/test_composites.py`); what differs, and why, stands here.
+by tests, sentence by sentence (`tests/envs/test_composites.py`, `tests/envs/test_atomic_blueprints.py`); what differs,
+and why, stands here.
 
 "Kitchens" are those in which the task finds its fixtures, and room for its objects within {tries} draws: of the
 {target} target kitchens, and of one kitchen of each of the {pretrain} pretraining layouts. Scenes are drawn from these

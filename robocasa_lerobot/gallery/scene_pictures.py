@@ -11,7 +11,7 @@ from PIL import Image
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.kitchens.footprints import Footprint
 from robocasa_lerobot.envs.rendering import SceneRenderer
-from robocasa_lerobot.envs.scene.robot_poses import footprint
+from robocasa_lerobot.envs.scene.roles import footprint
 from robocasa_lerobot.envs.scene.scene import Scene
 
 _NEAREST_M, _FARTHEST_M, _MARGIN_M, _EYE_M = 1.4, 3.0, 0.2, 1.5

@@ -169,7 +169,7 @@ def _object(wanted: ObjectSpec) -> str:
         said += f", all of one {kind}" if own else f", of the {kind} of `{wanted.same_category_as}`"
     if wanted.part_of:
         said += f" of `{wanted.part_of}`"
-    asked = [*(["graspable"] if wanted.graspable else []), *(["washable"] if wanted.washable else [])]
+    asked = ["graspable"] if wanted.graspable else []
     asked += [word.replace("_", " ") for word in wanted.properties]
     if asked:
         said += f" ({', '.join(asked)})"

@@ -282,9 +282,9 @@ def test_every_stage_of_every_task_has_a_condition(name: str) -> None:
 
 
 def test_conditions_of_verbs_are_those_of_goals() -> None:
-    open_, place = Stage("doors", "open", "fxtr"), Stage("pick_place", "place", "plate", object="obj")
+    (open_,), place = get_task("OpenFridge").stages, Stage("pick_place", "place", "plate", object="obj")
     task = SimpleNamespace(name="t", stages=(open_, place), fixtures=(), goal=StateIs("fxtr", "on"))
-    assert stage_condition(task, open_).name == get_task("OpenFridge").goal.name  # type: ignore[arg-type]
+    assert stage_condition(task, open_) == get_task("OpenFridge").goal  # type: ignore[arg-type]
     on, away = stage_condition(task, place).parts  # type: ignore[arg-type]
     assert (on, away) == (ObjectOn("obj", "plate"), GripperFar("obj"))
     assert without_gripper(stage_condition(task, place)).parts == (on,)  # type: ignore[arg-type]

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from blueprint_reading import Category, category, counted, lengths, offset, per_axis, rectangle, scale, turn
+from blueprint_reading import Category, category, counted, is_turned, lengths, offset, per_axis, rectangle, scale, turn
 from blueprint_words import all_words
 from blueprint_words.ours import MISCOUNTED, UNLISTED, UNLISTED_LAST
 
@@ -295,10 +295,8 @@ def _check_start(task: Task, wanted: ObjectSpec, said: dict[str, Any]) -> None:
     _check_fixture(task, start, at)
     if pos is None and not offset(placed):
         _check_part(start, at)
-    turned = OURS[task.name].turned.get(wanted.name) or turn(at, placed)
-    assert (turned is not None) == (start.rotation != Placement().rotation)
-    if turned is not None:
-        assert start.rotation == pytest.approx(turned, abs=1e-3)
+    own = OURS[task.name].turned.get(wanted.name)
+    assert is_turned(start, (own,) if own else turn(at, placed, said["category"]))
 
 
 def _side(pos: float | str | None) -> float | str | None:

@@ -20,7 +20,7 @@ def test_it_counts_in_the_jug_however_it_lies_there(split: str) -> None:
     mujoco.mj_resetData(scene.model, data)
     mujoco.mj_forward(scene.model, data)
     jug = scene.fixture("blender", Blender).regions["jug"]
-    goal = ObjectInside("marinade_veg1", "blender", margin=0.01)
+    goal = ObjectInside("marinade_veg1", "blender")
     half = max(scene.objects["marinade_veg1"].item.size) / 2
     (wide, _, tall), joint = jug.half, data.joint("marinade_veg1_joint0")
     places = {

@@ -28,8 +28,7 @@ from robocasa_lerobot.envs.kitchens.splits import (
     without,
 )
 from robocasa_lerobot.envs.scene.placement.counter_areas import standing_on
-from robocasa_lerobot.envs.scene.robot_poses import footprint
-from robocasa_lerobot.envs.scene.roles import candidates
+from robocasa_lerobot.envs.scene.roles import candidates, footprint
 from robocasa_lerobot.errors import UnknownNameError, UserError
 
 ALL = tuple(range(1, 61))

@@ -6,7 +6,17 @@ import mujoco
 import numpy as np
 import pytest
 from goal_states import hold, put_object, write
-from predicate_scenes import SINK, STOVE, TOASTER_OVEN, Change, beside, check_hits_and_misses, shift, state
+from predicate_scenes import (
+    PLATE,
+    SINK,
+    STOVE,
+    TOASTER_OVEN,
+    Change,
+    beside,
+    check_hits_and_misses,
+    shift,
+    state,
+)
 
 from robocasa_lerobot.envs.kitchens.appliances.kinds.racked import Racked
 from robocasa_lerobot.envs.kitchens.appliances.kinds.sink import Sink
@@ -24,6 +34,7 @@ from robocasa_lerobot.envs.predicates import (
     NearerThan,
     Not,
     ObjectInBasin,
+    ObjectOn,
     ObjectOnRack,
     OnBurner,
     OnOneSide,
@@ -34,6 +45,7 @@ from robocasa_lerobot.envs.predicates import (
     When,
     parts_with_memory,
 )
+from robocasa_lerobot.envs.predicates.contacts import touching
 from robocasa_lerobot.envs.predicates.logic import every_goal_in, terms_by_name
 from robocasa_lerobot.envs.predicates.objects import radius
 from robocasa_lerobot.envs.scene.build import build_scene
@@ -49,6 +61,7 @@ def scenes() -> dict[str, Scene]:
     return {
         "stove": build_scene(STOVE, "target", 4),
         "sink": build_scene(SINK, "target", 0),
+        "plate": build_scene(PLATE, "target", 0),
         "basins": build_scene(get_task("PreRinseStation"), "target", 0),
         "toaster_oven": build_scene(TOASTER_OVEN, "target", 0),
     }
@@ -238,6 +251,27 @@ def test_it_holds_in_its_state_and_in_no_near_miss(case: str, scenes: dict[str, 
 def test_every_predicate_that_can_be_missed_by_little_is_among_the_cases() -> None:
     kinds = {type(part) for _, goal, _, _ in CASES.values() for part in every_goal_in(goal)}
     assert {UnderWater, ObjectOnRack, OnBurner, OverBasin, Grasped, GripperTouches, Near, NearerThan} <= kinds
+
+
+@pytest.mark.parametrize("angle", [0.0, 30.0, 45.0])
+@pytest.mark.parametrize(("share", "held"), [(0.98, True), (1.02, False)])
+def test_a_round_plate_reaches_to_a_corner_of_its_box(
+    share: float, held: bool, angle: float, scenes: dict[str, Scene]
+) -> None:
+    scene = scenes["plate"]
+    data = state(scene)
+    mujoco.mj_kinematics(scene.model, data)
+    length, width, _ = scene.objects["plate"].item.size
+    assert length == width
+    away = share * 0.7 * np.hypot(length, width) / 2
+    way = np.array([np.cos(np.deg2rad(angle)), np.sin(np.deg2rad(angle)), 0.0])
+    put_object(scene, data, "obj", data.body("plate").xpos + away * way)
+    assert (hold(ObjectOn("obj", "plate"), scene, data) is None) == held
+    assert touching(scene.model, data, scene.subtree("obj"), scene.subtree("plate")), "of the distance alone"
+    # What is longer than wide has half the diagonal of its footprint, too.
+    sponge = scenes["sink"].objects["obj"].item.size
+    assert sponge[0] != sponge[1]
+    assert radius(scenes["sink"], "obj") == pytest.approx(np.hypot(*sponge[:2]) / 2)
 
 
 @pytest.mark.parametrize(

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from robocasa_lerobot.envs.kitchens.footprints import Footprint, Footprints, PlacementError
-from robocasa_lerobot.envs.kitchens.layout import load_layout
+from robocasa_lerobot.envs.kitchens.layout import layout_ids, load_layout
 from robocasa_lerobot.envs.robots.panda_omron.robot import PANDA_OMRON
 from robocasa_lerobot.envs.scene.placement.objects import place_objects
 from robocasa_lerobot.envs.scene.placement.regions import choose_parts, parts_of, rectangle_in
 from robocasa_lerobot.envs.scene.robot_poses import faces, is_free, open_doors_of, robot_pose
-from robocasa_lerobot.envs.scene.roles import candidates, cast_roles, ground_fixture
+from robocasa_lerobot.envs.scene.roles import candidates, cast_roles, footprint, ground_fixture
 from robocasa_lerobot.envs.scene.spec import FixtureSpec, ObjectSpec, Placement, RobotStart, SampleRegion
 from robocasa_lerobot.envs.tasks.registry import get_task
 
@@ -139,6 +139,43 @@ def test_several_footprints_answer_as_each_of_them_does() -> None:
         answers.append(bool(Footprints(marks).overlapping(place, other.half, margin)[0]))
         assert answers[-1] == any(mark.overlaps(other, margin) for mark in marks)
     assert 50 < sum(answers) < 350
+
+
+UNIT = Footprint(0.0, 0.0, 0.0, (0.5, 0.25))
+
+
+@pytest.mark.parametrize(
+    ("other", "gap"),
+    [
+        (Footprint(1.3, 0.1, 0.0, (0.5, 0.25)), 0.3),  # side by side
+        (Footprint(1.3, 0.9, 0.0, (0.5, 0.25)), 0.5),  # from corner to corner: 0.3 and 0.4
+        (Footprint(1.2, 0.0, np.pi / 4, (0.3, 0.3)), 0.7 - 0.3 * np.sqrt(2)),  # a corner before a side
+        (Footprint(0.0, 1.0, np.pi / 2, (0.5, 0.1)), 0.25),
+        (Footprint(0.7, 0.0, 0.0, (0.5, 0.25)), 0.0),
+        (Footprint(0.0, 0.0, np.pi / 2, (0.6, 0.1)), 0.0),  # crossed: no corner of one is in the other
+    ],
+)
+def test_the_gap_of_two_rectangles(other: Footprint, gap: float) -> None:
+    assert UNIT.gap(other) == pytest.approx(gap)
+    assert other.gap(UNIT) == pytest.approx(gap)
+
+
+def test_fixtures_that_are_to_be_apart_are_so_between_their_sides() -> None:
+    task = get_task("NavigateKitchen")
+    gaps, middles = [], []
+    for number in layout_ids():
+        layout = load_layout(number)
+        try:
+            roles = cast_roles(np.random.default_rng(number), task.fixtures, layout)
+        except PlacementError:  # nothing is so far from this one: the builder draws again
+            continue
+        source, target = (layout.fixtures[roles[role]] for role in ("source", "target"))
+        gaps.append(footprint(source).gap(footprint(target)))
+        middles.append(float(footprint(source).distances(np.array([target.pos[:2]]))[0]))
+    assert len(gaps) > 30
+    assert min(gaps) >= 1.0
+    # Middles are farther off than sides, or it would say the same of both.
+    assert min(np.array(middles) - gaps) > 0.05
 
 
 def test_what_does_not_fit_is_said_with_free_area_and_three_remedies() -> None:

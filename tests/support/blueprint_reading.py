@@ -8,7 +8,10 @@ from typing import Any
 
 import numpy as np
 
+from robocasa_lerobot.envs.scene.spec import Placement
+
 type Pos = list[float | str | None]
+type Turn = tuple[float, float]
 
 
 @dataclass(frozen=True)
@@ -89,25 +92,63 @@ def offset(placed: Any) -> dict[int, float]:
     return {"xy".index(axis): float(by) for axis, by in re.findall(r"offset ([xy]) ([+-][\d.]+)", str(placed))}
 
 
-def turn(at: str, placed: Any) -> tuple[float, float] | None:
-    """Bounds of the turn, radians: of a right angle, of none at all, or of what is said to have a yaw."""
-    text = str(placed)
-    if (
-        "turned 90 deg" in at
-        or ("rotation" in text and "90 deg" in text)
-        or "yaw pi/2" in text
-        or re.search(r"(\[|'rotation_rad': )1\.5708", text)
-    ):
-        return np.pi / 2, np.pi / 2
-    if "handle turned 45-67.5 deg" in at:
-        return np.pi / 4, 3 * np.pi / 8
+def turn(at: str, placed: Any, kind: str = "") -> tuple[Turn, ...]:
+    """Bounds of the turn, radians, of ours: one pair, or two if it may be to either side; none if nothing is said.
+
+    To either side handles are turned: ours lie along -x, the original's along -y, a quarter turn from there. Those of
+    our mugs lie along +x, a quarter turn to the other side.
+    """
+    back = np.pi / 2 if kind == "mug" else 0.0
+    return tuple((low - back, high - back) for low, high in _turn(at, placed))
+
+
+def _turn(at: str, placed: Any) -> tuple[Turn, ...]:
+    text = f"{at} {placed}"
+    if aside := _to_either_side(text):
+        low, high = aside
+        return (np.pi / 2 - high, np.pi / 2 - low), (np.pi / 2 + low, np.pi / 2 + high)
+    if re.search(r"(turned|rotation) 90 deg|yaw pi/2|(\[|'rotation_rad': )1\.5708", text):
+        return ((np.pi / 2, np.pi / 2),)
+    if between := re.search(r"'rotation': \[(-?[\d.]+), (-?[\d.]+)\]", text):
+        return ((float(between.group(1)), float(between.group(2))),)
     if "yaw pi/8 to pi/4" in text:
-        return np.pi / 8, np.pi / 4
-    if "'rotation_rad': 0" in text or re.search(r"(rotation|yaw) 0(?![.\d])", f"{at} {text}"):
-        return 0.0, 0.0
+        return ((np.pi / 8, np.pi / 4),)
+    if re.search(r"('rotation(_rad)?':|rotation|yaw) 0(?![.\d])", text):
+        return ((0.0, 0.0),)
     if re.search(r"yaw pi(?!/)", text):
-        return np.pi, np.pi
-    return (np.pi / 4, 3 * np.pi / 8) if "yaw" in text or "rotation" in text else None
+        return ((np.pi, np.pi),)
+    assert not re.search("turned|yaw|rotation", text), f"a turn that cannot be read: {text}"
+    return ()
+
+
+def _to_either_side(text: str) -> Turn | None:
+    """By how much at least and at most, radians."""
+    if re.search(r"45-67\.5 deg to either side|\+-\(pi/4\.\.3pi/8\)|-67\.5\.\.-45 or 45\.\.67\.5 deg", text):
+        return np.pi / 4, 3 * np.pi / 8
+    if both := re.search(r"\+-\(([\d.]+) to ([\d.]+)\)", text):
+        return float(both.group(1)), float(both.group(2))
+    both = re.search(r"\[\[-([\d.]+), -([\d.]+)\], \[\2, \1\]\]", text)
+    return (float(both.group(2)), float(both.group(1))) if both else None
+
+
+def is_turned(start: object, sides: tuple[Turn, ...]) -> bool:
+    """Whether a placement turns by these alone; by none where it says nothing of its own."""
+    ours = [start.rotation, start.other_rotation] if isinstance(start, Placement) else []
+    ours = [] if ours == [Placement().rotation, None] else [side for side in ours if side is not None]
+    return len(ours) == len(sides) and bool(
+        np.allclose(sorted(ours), sorted(sides), rtol=0.0, atol=5e-3)
+    )  # said with two digits
+
+
+def greatest(text: str) -> tuple[float | None, float | None, float | None]:
+    """Bounds of the size along x, y, z, metres, of "tool (height <= 0.10 m)", "food (footprint <= 0.15x0.15 m)"."""
+    flat = re.search(r"footprint <= ([\d.]+)x([\d.]+) m", text)
+    high = re.search(r"height <= ([\d.]+) m", text)
+    return (
+        float(flat.group(1)) if flat else None,
+        float(flat.group(2)) if flat else None,
+        float(high.group(1)) if high else None,
+    )
 
 
 def lengths(text: str) -> list[float]:

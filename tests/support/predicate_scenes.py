@@ -45,6 +45,16 @@ SINK = SceneSpec(
     ),
     instruction="Wash.",
 )
+PLATE = SceneSpec(
+    name="OneBesideAPlate",
+    fixtures=(FixtureSpec("sink", "sink"),),
+    robot_start=RobotStart("sink"),
+    objects=(
+        ObjectSpec("plate", ("plate",), OnCounter("sink", loc="left_right", size=(0.40, 0.40))),
+        ObjectSpec("obj", ("apple",), OnCounter("sink", loc="left_right", size=(0.40, 0.40))),
+    ),
+    instruction="Serve.",
+)
 TOASTER_OVEN = SceneSpec(
     name="OneAtAToasterOven",
     fixtures=(FixtureSpec("toaster_oven", "toaster_oven_with_two_racks"),),

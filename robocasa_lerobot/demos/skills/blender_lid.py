@@ -28,7 +28,8 @@ from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.kitchens.appliances.kinds.blender import Blender
 from robocasa_lerobot.envs.kitchens.footprints import Area, Footprint
 from robocasa_lerobot.envs.scene.placement.counter_areas import counter_areas
-from robocasa_lerobot.envs.scene.robot_poses import RobotPose, footprint
+from robocasa_lerobot.envs.scene.robot_poses import RobotPose
+from robocasa_lerobot.envs.scene.roles import footprint
 from robocasa_lerobot.envs.scene.spec import OnCounter
 from robocasa_lerobot.envs.tasks.task import Stage
 

@@ -1,6 +1,6 @@
 """Doors on a vertical hinge, opened: pulled by their handle, and pushed on from inside at their free edge.
 
-What takes long are fridges with a freezer below, before an island or a wall: two doors, and little room for the base.
+What takes long are fridges before an island or a wall, which leave the base little room.
 """
 
 from __future__ import annotations

@@ -12,7 +12,7 @@ from robocasa_lerobot.envs.kitchens.appliances.catalogue import kinds_standing
 from robocasa_lerobot.envs.kitchens.fixtures.base import Fixture
 from robocasa_lerobot.envs.kitchens.footprints import Footprint
 from robocasa_lerobot.envs.kitchens.layout import Layout
-from robocasa_lerobot.envs.scene.robot_poses import footprint
+from robocasa_lerobot.envs.scene.roles import footprint
 from robocasa_lerobot.envs.scene.scene import Scene
 
 PENETRATION_M = 0.002  # that fixtures may have

@@ -48,6 +48,18 @@ class Footprint:
                 return False
         return True
 
+    def distances(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """How far n points of the floor plan, (n, 2), are from the rectangle, metres, (n,); 0 of those in it."""
+        beyond = np.maximum(np.abs((points - (self.x, self.y)) @ self.axes().T) - self.half, 0.0)
+        found: NDArray[np.float64] = np.hypot(beyond[:, 0], beyond[:, 1])
+        return found
+
+    def gap(self, other: Footprint) -> float:
+        """Metres between two rectangles: none where they overlap, else from a corner of either to the other one."""
+        if self.overlaps(other):
+            return 0.0
+        return float(min(self.distances(other.corners()).min(), other.distances(self.corners()).min()))
+
 
 class Footprints:
     """Several footprints, asked at once whether others come near: for searches with thousands of questions."""

@@ -94,11 +94,6 @@ class Category:
         return "graspable" in self.properties
 
     @property
-    def washable(self) -> bool:
-        """Whether it may go into a sink."""
-        return "washable" in self.properties
-
-    @property
     def largest(self) -> Size:
         """Bounds of the full extents of its instances, metres."""
         x, y, z = (s * (1 + _SPREAD) * (1 + _STRETCH) for s in self.typical_size)

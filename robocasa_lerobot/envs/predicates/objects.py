@@ -283,8 +283,11 @@ class ObjectTilt(Term):
 
 
 def radius(scene: Scene, name: str) -> float:
-    """Horizontal radius of an object: half of the longer edge of its bounding box, metres."""
-    return max(scene.objects[name].item.size[:2]) / 2
+    """Horizontal radius of an object, metres: from the middle of its bounding box to a corner, as seen from above.
+
+    It is RoboCasa's `horizontal_radius`: its site for it lies at a corner of the box (docs/robocasa.md, section 8).
+    """
+    return scene.objects[name].item.horizontal_radius
 
 
 def middle_of(scene: Scene, data: mujoco.MjData, name: str) -> NDArray[np.float64]:

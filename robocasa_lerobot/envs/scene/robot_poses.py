@@ -15,7 +15,7 @@ from robocasa_lerobot.envs.kitchens.footprints import Footprint, Footprints, Par
 from robocasa_lerobot.envs.kitchens.layout import Layout
 from robocasa_lerobot.envs.kitchens.plan.islands import STOOL_OUT_M
 from robocasa_lerobot.envs.robots.robot import StandingShape
-from robocasa_lerobot.envs.scene.roles import ground_fixture
+from robocasa_lerobot.envs.scene.roles import footprint, ground_fixture
 from robocasa_lerobot.envs.scene.spec import RobotStart
 
 # Free poses are searched for with the start's deviation, then with wider ones (docs/robocasa.md, section 6); RoboCasa
@@ -275,8 +275,3 @@ def in_room(layout: Layout, pose: RobotPose) -> bool:
 def _handles(fixture: Fixture, top: float) -> list[Footprint]:
     """The handles of a fixture that are low enough to be met: they stand out of its box."""
     return [] if fixture.pos[2] > top else [_footprint_of(fixture, box) for box in fixture.handles_out()]
-
-
-def footprint(fixture: Fixture) -> Footprint:
-    """A fixture's box on the floor plan."""
-    return Footprint(fixture.pos[0], fixture.pos[1], fixture.yaw, (fixture.width / 2, fixture.depth / 2))

@@ -9,7 +9,7 @@ import numpy as np
 from robocasa_lerobot.envs.kitchens.fixture_types import fixture_filter
 from robocasa_lerobot.envs.kitchens.fixtures.base import Fixture
 from robocasa_lerobot.envs.kitchens.fixtures.counters import Counter
-from robocasa_lerobot.envs.kitchens.footprints import PlacementError
+from robocasa_lerobot.envs.kitchens.footprints import Footprint, PlacementError
 from robocasa_lerobot.envs.kitchens.layout import Layout
 from robocasa_lerobot.envs.scene.spec import FixtureSpec
 
@@ -41,11 +41,13 @@ def cast_roles(rng: np.random.Generator, fixtures: Sequence[FixtureSpec], layout
 
 
 def _suits(fixture: Fixture, wanted: FixtureSpec, layout: Layout, roles: dict[str, str]) -> bool:
-    others = {roles[role] for role in wanted.other_than}
+    names = {roles[role] for role in wanted.other_than}
+    others = [layout.fixtures[name] for name in names]
     large = fixture.width >= wanted.size[0] and fixture.depth >= wanted.size[1]
-    apart = all(_distance(layout.fixtures[name], fixture) >= wanted.apart_m for name in others)
+    apart = all(footprint(other).gap(footprint(fixture)) >= wanted.apart_m for other in others)
+    far = all(_distance(other, fixture) >= wanted.middle_apart_m for other in others)
     beside = not wanted.side or _reaches(fixture, layout.fixtures[roles[wanted.near]], wanted.side)
-    return fixture.name not in others and large and apart and beside
+    return fixture.name not in names and large and apart and far and beside
 
 
 def _reaches(fixture: Fixture, ref: Fixture, side: str) -> bool:
@@ -57,9 +59,14 @@ def _reaches(fixture: Fixture, ref: Fixture, side: str) -> bool:
 
 
 def _distance(fixture: Fixture, ref: Fixture) -> float:
-    """Metres on the floor plan from a point to the rectangle of a fixture."""
+    """Metres on the floor plan from the middle of a reference to the rectangle of a fixture."""
     x, y = fixture.to_local(ref.pos)
     return float(np.hypot(max(abs(x) - fixture.width / 2, 0.0), max(abs(y) - fixture.depth / 2, 0.0)))
+
+
+def footprint(fixture: Fixture) -> Footprint:
+    """A fixture's box on the floor plan."""
+    return Footprint(fixture.pos[0], fixture.pos[1], fixture.yaw, (fixture.width / 2, fixture.depth / 2))
 
 
 def candidates(layout: Layout, kind: str) -> list[Fixture]:

@@ -21,7 +21,8 @@ class FixtureSpec:
         near: role of an earlier fixture that it is the nearest to.
         other_than: roles of earlier fixtures that it is none of.
         size: least width and depth of its top, metres; of counters.
-        apart_m: least distance on the floor from the fixtures of `other_than`, metres.
+        apart_m: least gap on the floor between it and the fixtures of `other_than`, metres.
+        middle_apart_m: the same from its middle, metres: a long counter that reaches up to them has room far from them.
         side: of the fixture of `near`, "left" or "right" as seen from before it: it stands in one row with that, and
             reaches beyond it there, as does a counter that the other is let into; any side if empty.
         fitted: with what it is fitted in this task alone, such as "freezer_drawers"; as it is everywhere if empty.
@@ -33,6 +34,7 @@ class FixtureSpec:
     other_than: tuple[str, ...] = ()
     size: tuple[float, float] = (0.0, 0.0)
     apart_m: float = 0.0
+    middle_apart_m: float = 0.0
     side: str = ""
     fitted: str = ""
 
@@ -180,9 +182,9 @@ class ObjectSpec:
         groups: object groups to draw from; may name a choice in braces.
         start: where.
         count: least and greatest number, both possible; or in braces a choice that is a number, 0 included.
-        graspable, washable: properties asked for.
+        graspable: whether the gripper must be able to lift it.
         max_height: bound of its size along z, metres.
-        properties: further properties asked for, such as "cookable".
+        properties: further properties asked for, such as "cookable" or "washable".
         exclude: groups or categories that are not wanted.
         max_size: bounds of its size along x, y, z, metres; None leaves an axis free.
         scale: factor of its size, or one for each of x, y, z, before it is turned upright; or in braces a choice that
@@ -204,7 +206,6 @@ class ObjectSpec:
     start: OnCounter | InsideOf | Placement
     count: tuple[int, int] | str = (1, 1)
     graspable: bool = False
-    washable: bool = False
     max_height: float | None = None
     properties: tuple[str, ...] = ()
     exclude: tuple[str, ...] = ()

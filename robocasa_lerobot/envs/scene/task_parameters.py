@@ -142,7 +142,7 @@ class _Asked(NamedTuple):
 def _asked(wanted: ObjectSpec, index: int, choices: Mapping[str, str]) -> _Asked:
     return _Asked(
         tuple(filled(group, choices) for group in wanted.groups),
-        (*wanted.properties, *("graspable",) * wanted.graspable, *("washable",) * wanted.washable),
+        (*wanted.properties, *("graspable",) * wanted.graspable),
         wanted.exclude,
         (None, None, wanted.max_height) if wanted.max_size is None else wanted.max_size,
         _factors(wanted, index, choices),

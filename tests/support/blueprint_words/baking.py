@@ -20,7 +20,7 @@ from robocasa_lerobot.envs.scene.spec import InitialOpenness
 
 
 def in_mixer(name: str) -> Goal:
-    return ObjectInside(name, "stand_mixer", lower=0.5, margin=0.01)
+    return ObjectInside(name, "stand_mixer", lower=0.5)
 
 
 def served(first: str, second: str) -> Goal:

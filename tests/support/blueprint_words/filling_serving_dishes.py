@@ -19,7 +19,7 @@ OURS = {
             "gripper > 0.25 m from meat": GripperFar("meat", 0.25),
             "gripper > 0.25 m from vegetable": GripperFar("vegetable", 0.25),
         },
-        initial={"fridge door(s) open (0.90-1.0)": InitialOpenness("fridge", 0.9, 1.0)},
+        initial={"fridge door(s) open (0.90-1.0)": InitialOpenness("fridge", 0.9, 1.0, part="fridge")},
     ),
     "MixedFruitPlatter": Ours(
         goal={

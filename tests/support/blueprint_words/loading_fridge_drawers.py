@@ -23,7 +23,7 @@ OURS = {
             ),
         },
         initial={
-            "fridge door(s) fully open (1.0)": InitialOpenness("fridge", 1.0, 1.0),
+            "fridge door(s) fully open (1.0)": InitialOpenness("fridge", 1.0, 1.0, part="fridge"),
             "highest fridge drawer open 0.5-0.8 of range": PartAt("fridge", "{drawer}", (0.5, 0.8)),
         },
         kinds={"fridge": "fridge_with_drawer"},

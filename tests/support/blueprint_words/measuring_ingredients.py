@@ -22,7 +22,6 @@ from robocasa_lerobot.envs.scene.spec import InitialOpenness
 WANTED, OTHER = "measuring_cup_{size}", "measuring_cup_{_other}"
 
 CUPS = ("measuring_cup_small", "measuring_cup_medium", "measuring_cup_large")
-TO_FRONT = np.pi / 2  # where the handles of our models point to the front
 
 
 def right_of(name: str, other: str) -> Beside:
@@ -73,7 +72,6 @@ OURS = {
             "all three cups are the same model at scale 0.8 / 1.0 / 1.2": "measuring_cup_large",
             "robot base centred on measuring_cup_medium": None,
         },
-        turned=dict.fromkeys(CUPS, (TO_FRONT + 0.611, TO_FRONT + 1.047)),
         near={"counter": "cabinet"},
         more={"cabinet"},
     ),

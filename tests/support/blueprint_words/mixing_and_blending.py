@@ -33,7 +33,7 @@ OURS = {
     ),
     "MakeBananaMilkshake": Ours(
         goal={
-            "banana inside blender (bbox, margin 0.01 m)": ObjectInside("banana", "blender", margin=0.01),
+            "banana inside blender (bbox, margin 0.01 m)": ObjectInside("banana", "blender"),
             "milk bbox within 0.30 m of blender": NearFixture("milk", "blender", 0.3),
             "honey bbox within 0.30 m of blender": NearFixture("honey", "blender", 0.3),
             "honey touching any counter": ObjectTouchesAnyCounter("honey"),

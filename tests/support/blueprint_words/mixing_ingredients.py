@@ -38,11 +38,11 @@ STIRRED = StepsWhile(
 
 
 def in_jar(name: str) -> ObjectInside:
-    return ObjectInside(name, "blender", margin=0.01)
+    return ObjectInside(name, "blender")
 
 
 def in_bowl(name: str) -> ObjectInside:
-    return ObjectInside(name, "stand_mixer", lower=0.5, margin=0.01)
+    return ObjectInside(name, "stand_mixer", lower=0.5)
 
 
 def leans_in(name: str) -> AllOf:

@@ -36,7 +36,7 @@ OURS = {
             "gripper > 0.25 m from meat": GripperFar("meat", 0.25),
         },
         initial={
-            "fridge doors open": InitialOpenness("fridge", 0.9, 1.0),
+            "fridge doors open": InitialOpenness("fridge", 0.9, 1.0, part="fridge"),
         },
         order=WEIGHED,
     ),

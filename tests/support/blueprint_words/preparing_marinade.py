@@ -38,8 +38,8 @@ OURS = {
     ),
     "BlendMarinade": Ours(
         goal={
-            "marinade_veg1 inside blender (slack 0.01)": ObjectInside("marinade_veg1", "blender", margin=0.01),
-            "marinade_veg2 inside blender (slack 0.01)": ObjectInside("marinade_veg2", "blender", margin=0.01),
+            "marinade_veg1 inside blender (slack 0.01)": ObjectInside("marinade_veg1", "blender"),
+            "marinade_veg2 inside blender (slack 0.01)": ObjectInside("marinade_veg2", "blender"),
             "blender on (lid within 0.04 m of closed pose and upright within 7 deg; power button pressed "
             "and released)": StateIs("blender", "on"),
         },

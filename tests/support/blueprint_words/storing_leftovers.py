@@ -16,7 +16,7 @@ from robocasa_lerobot.envs.predicates import (
 from robocasa_lerobot.envs.scene.spec import InitialOpenness
 
 DUMPLINGS = ("dumpling1", "dumpling2", "dumpling3", "dumpling4")
-OPEN = InitialOpenness("fridge", 0.9, 1.0)
+OPEN = InitialOpenness("fridge", 0.9, 1.0, part="fridge")
 
 
 def two_in(box: str) -> Exactly:
@@ -32,7 +32,7 @@ OURS = {
             "corners inside, tol 0.05)": ObjectInside("bowl", "fridge", region="fridge_shelf", margin=0.05, lower=0.9),
             "gripper > 0.25 m from bowl": GripperFar("bowl", 0.25),
         },
-        initial={"fridge doors open": InitialOpenness("fridge", 0.9, 1.0), "robot base centred on bowl": "bowl"},
+        initial={"fridge doors open": OPEN, "robot base centred on bowl": "bowl"},
     ),
     "FreezeCookedFood": Ours(
         goal={

@@ -85,6 +85,11 @@ def contents_of(env: KitchenEnv, name: str) -> tuple[str, ...]:
     return tuple(found)
 
 
+def half_length(env: KitchenEnv, name: str) -> float:
+    """Half of the longer edge of an object's bounding box as seen from above, metres: the radius of a round one."""
+    return max(env.scene.objects[name].item.size[:2]) / 2
+
+
 def holder_of(env: KitchenEnv, name: str) -> str:
     """Name of the object that an object is in or on; empty where there is none."""
     holders = (other for other in env.scene.objects if other != name and name in contents_of(env, other))

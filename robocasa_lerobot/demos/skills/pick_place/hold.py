@@ -22,7 +22,7 @@ from robocasa_lerobot.demos.skills.common import HOLD_SPEED, SkillError, move_ha
 from robocasa_lerobot.demos.skills.pick_place.carrying.carry import carry_to, in_reach, standing_pose_for
 from robocasa_lerobot.demos.skills.pick_place.carrying.level import levelled
 from robocasa_lerobot.demos.skills.pick_place.grasp_strategy import ANY_APPROACH, entry, steep
-from robocasa_lerobot.demos.skills.pick_place.graspable import Graspable, graspable
+from robocasa_lerobot.demos.skills.pick_place.graspable import Graspable, graspable, half_length
 from robocasa_lerobot.demos.skills.pick_place.pick import INTEGRAL_GAIN, is_held
 from robocasa_lerobot.demos.skills.pick_place.verbs import take
 from robocasa_lerobot.demos.skills.reaching import Held, MotionPlan, WaypointPath, follow_with, plan_reach
@@ -30,7 +30,7 @@ from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.kitchens.appliances.kinds.sink import Sink
 from robocasa_lerobot.envs.predicates import UnderWater
 from robocasa_lerobot.envs.predicates.logic import every_goal_in
-from robocasa_lerobot.envs.predicates.objects import middle_of, radius
+from robocasa_lerobot.envs.predicates.objects import middle_of
 from robocasa_lerobot.envs.tasks.conditions import stage_condition
 from robocasa_lerobot.envs.tasks.task import Stage
 
@@ -38,7 +38,7 @@ ATTEMPTS = 4
 PATIENCE_STEPS = 30  # without headway, before the object is held elsewhere
 YAWS = 12
 ENTRIES, IN_M = ("up", "across", "out"), 0.22
-# Under a stream: of the highest object below the spout's tip, with costs; shares of the radius beside the stream.
+# Under a stream: of the highest object below the spout's tip, with costs; shares of half the length beside the stream.
 BELOW_M = ((0.03, 0.0), (0.06, 0.02), (0.10, 0.05), (0.15, 0.1))
 ASIDE_SHARES, ASIDE_COST = (0.0, 0.5), 0.3
 # How far what nothing lies in leans with the hand, so that this reaches under a spout from before it; with costs.
@@ -138,7 +138,7 @@ def _under_stream(env: KitchenEnv, obj: Graspable, sink: Sink, washed: str) -> l
     local = turn.T @ (middle_of(env.scene, data, washed) - body.xpos)
     upright = levelled(turn)
     above = _top(env, obj) - float((upright @ local)[2])  # from the point to the highest of it
-    tip, reach = data.site(f"{sink.name}_water").xpos, radius(env.scene, washed)
+    tip, reach = data.site(f"{sink.name}_water").xpos, half_length(env, washed)
     _, yaw = base_pose(data)
     ahead, left = floor_axes(yaw)
     poses = []

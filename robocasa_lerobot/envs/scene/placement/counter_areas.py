@@ -6,8 +6,7 @@ from robocasa_lerobot.envs.kitchens.fixtures.base import Fixture
 from robocasa_lerobot.envs.kitchens.fixtures.regions import regions_of
 from robocasa_lerobot.envs.kitchens.footprints import Area, Footprint, PlacementError
 from robocasa_lerobot.envs.kitchens.layout import Layout
-from robocasa_lerobot.envs.scene.robot_poses import footprint
-from robocasa_lerobot.envs.scene.roles import counter_of
+from robocasa_lerobot.envs.scene.roles import counter_of, footprint
 from robocasa_lerobot.envs.scene.spec import InsideOf, OnCounter
 
 MIN_REGION_WIDTH_M = 0.12

@@ -14,7 +14,7 @@ from robocasa_lerobot.envs.scene.spec import (
     RobotStart,
     SampleRegion,
 )
-from robocasa_lerobot.envs.tasks.atomic.common import counter_near
+from robocasa_lerobot.envs.tasks.atomic.common import MUG_UNDER_SPOUT, counter_near
 from robocasa_lerobot.envs.tasks.task import Stage, Task
 
 _HEATED = (
@@ -27,7 +27,7 @@ _HEATED = (
 )
 
 _MUG_UNDER_SPOUT = ObjectSpec(
-    "obj", ("mug",), Placement("coffee_machine", region=SampleRegion(name="cup"), rotation=(0.39, 0.79))
+    "obj", ("mug",), Placement("coffee_machine", region=SampleRegion(name="cup"), rotation=MUG_UNDER_SPOUT)
 )
 
 

@@ -2,7 +2,7 @@
 
 from robocasa_lerobot.envs.predicates import AllOf, GripperFar, ObjectAtSite, ObjectTouches
 from robocasa_lerobot.envs.scene.spec import FixtureSpec, ObjectSpec, Placement, RobotStart, SampleRegion
-from robocasa_lerobot.envs.tasks.atomic.common import counter_near, on_counter
+from robocasa_lerobot.envs.tasks.atomic.common import MUG_ON_COUNTER, MUG_UNDER_SPOUT, counter_near, on_counter
 from robocasa_lerobot.envs.tasks.task import Stage, Task
 
 _FIXTURES = (FixtureSpec("coffee_machine", "coffee_machine"), counter_near("coffee_machine"))
@@ -15,7 +15,7 @@ TASKS = (
         robot_start=RobotStart("coffee_machine"),
         objects=(
             ObjectSpec(
-                "obj", ("mug",), on_counter("coffee_machine", (0.3, 0.4), rotation=(0.79, 1.57)), graspable=True
+                "obj", ("mug",), on_counter("coffee_machine", (0.3, 0.4), rotation=MUG_ON_COUNTER), graspable=True
             ),
         ),
         goal=AllOf(ObjectAtSite("obj", "coffee_machine", "receptacle", across=0.04, high=0.10), GripperFar("obj")),
@@ -37,7 +37,7 @@ TASKS = (
             ObjectSpec(
                 "obj",
                 ("mug",),
-                Placement("coffee_machine", region=SampleRegion(name="cup"), rotation=(0.39, 0.79)),
+                Placement("coffee_machine", region=SampleRegion(name="cup"), rotation=MUG_UNDER_SPOUT),
                 graspable=True,
             ),
         ),

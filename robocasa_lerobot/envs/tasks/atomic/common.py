@@ -2,14 +2,20 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from robocasa_lerobot.envs.scene.spec import FixtureSpec, ObjectSpec, Placement, SampleRegion
 from robocasa_lerobot.envs.tasks.task import Stage, Task
 
 WITHIN_REACH_M = (0.5, 1.65)  # heights of shelves that the arm reaches
-# Handles of cookware point away from the knobs by this much to either side, radians.
-HANDLE_TURN = (0.785, 1.178)
-# Handles of our pans lie along -x, RoboCasa's along -y: the turn that stands for its usual one, of up to 45 degrees.
-HANDLE_TO_FRONT = (0.7853981633974483, 2.356194490192345)
+# Turns of cookware, radians. Handles of our pans lie along -x, RoboCasa's along -y: a quarter turn brings them to the
+# front, with RoboCasa's usual turn, of up to 45 degrees, about that. An ear of our pots lies along -x too.
+HANDLE_TO_FRONT = (0.25 * np.pi, 0.75 * np.pi)
+# Away from the knobs: 45 to 67.5 degrees off the front, to its left or to its right.
+HANDLE_LEFT, HANDLE_RIGHT = (0.125 * np.pi, 0.25 * np.pi), (0.75 * np.pi, 0.875 * np.pi)
+# Handles of our mugs lie along +x, a quarter turn on from RoboCasa's: less that they point where theirs do.
+MUG_UNDER_SPOUT = (-0.375 * np.pi, -0.25 * np.pi)
+MUG_ON_COUNTER = (-0.25 * np.pi, 0.0)
 TASKS: tuple[Task, ...] = ()
 
 

@@ -2,18 +2,28 @@
 
 from robocasa_lerobot.envs.predicates import DoorsClosed, DoorsOpen, PartWithin
 from robocasa_lerobot.envs.scene.initial_states import PartAt
-from robocasa_lerobot.envs.scene.spec import FixtureSpec, InitialOpenness, ObjectSpec, Placement, RobotStart
+from robocasa_lerobot.envs.scene.spec import (
+    FixtureSpec,
+    InitialOpenness,
+    ObjectSpec,
+    Placement,
+    RobotStart,
+    SampleRegion,
+)
 from robocasa_lerobot.envs.tasks.atomic.common import counter_near, distractors
 from robocasa_lerobot.envs.tasks.task import Stage, Task
 
 # A door that folds down is lifted shut, that of a dishwasher from above; the doors of a fridge are too large to reach
 # round.
 _CLOSING = dict.fromkeys(("oven", "toaster_oven"), "lift_shut") | {"fridge": "close_large", "dishwasher": "lift_low"}
+# Of a fixture with several compartments, the one that is meant: a fridge's freezer stays shut.
+_PART = {"fridge": "fridge"}
 AJAR_AT_MOST, OPEN = (0.0, 0.0), (0.90, 1.0)
 
 
-def _inside(size: tuple[float, float] = (0.3, 0.3), **more: object) -> ObjectSpec:
-    return ObjectSpec("door_obj", ("any",), Placement("fxtr", size=size, pos=(None, -1.0)), graspable=True, **more)  # type: ignore[arg-type]
+def _inside(region: str = "", **more: object) -> ObjectSpec:
+    start = Placement("fxtr", region=SampleRegion(name=region), size=(0.3, 0.3), pos=(None, -1.0))
+    return ObjectSpec("door_obj", ("any",), start, graspable=True, **more)  # type: ignore[arg-type]
 
 
 def _door(
@@ -29,18 +39,19 @@ def _door(
     opened: tuple[float, float] = OPEN,
     needs: tuple[str, ...] = (),
 ) -> Task:
-    opens = name.startswith("Open")
+    opens, part = name.startswith("Open"), _PART.get(kind, "")
+    which = f"Every door of the {part} compartment" if part else "Every door"
     return Task(
         name=name,
-        summary="Every door is open by at least 90 % of its range."
+        summary=f"{which} is open by at least 90 % of its range."
         if opens
-        else "Every door is within 0.5 % of its range of being shut.",
+        else f"{which} is within 0.5 % of its range of being shut.",
         fixtures=(FixtureSpec("fxtr", kind), *([counter_near("fxtr")] if clutter else [])),
         robot_start=RobotStart("fxtr", beside=beside, setback=setback),
         objects=(*([inside] if inside else []), *([distractors("fxtr")] if clutter else [])),
-        initial=(InitialOpenness("fxtr", *((0.0, 0.0) if opens else opened)),),
-        goal=DoorsOpen("fxtr") if opens else DoorsClosed("fxtr"),
-        stages=(Stage("doors", "open" if opens else _CLOSING.get(kind, "close"), "fxtr"),),
+        initial=(InitialOpenness("fxtr", *((0.0, 0.0) if opens else opened), part=part),),
+        goal=DoorsOpen("fxtr", part=part) if opens else DoorsClosed("fxtr", part=part),
+        stages=(Stage("doors", "open" if opens else _CLOSING.get(kind, "close"), "fxtr", part=part),),
         instruction=instruction,
         paraphrases=paraphrases,
         needs=needs,
@@ -82,12 +93,12 @@ TASKS = (
     _door(
         "OpenFridge",
         "fridge",
-        inside=_inside(properties=("fridgable",)),
+        inside=_inside("fridge_shelf:any", properties=("fridgable",)),
         setback=0.3,
-        instruction="Open the fridge {doors}.",
+        instruction="Open the fridge {fridge_doors}.",
         paraphrases=(
             "I need to see into the fridge.",
-            "Swing the {doors} of the refrigerator out as far as possible.",
+            "Swing the {fridge_doors} of the refrigerator out as far as possible.",
             "The fridge should stand wide open.",
             "Get the refrigerator open.",
         ),
@@ -95,12 +106,12 @@ TASKS = (
     _door(
         "CloseFridge",
         "fridge",
-        inside=_inside(properties=("fridgable",)),
+        inside=_inside("fridge_shelf:any", properties=("fridgable",)),
         setback=0.3,
-        instruction="Close the fridge {doors}.",
+        instruction="Close the fridge {fridge_doors}.",
         paraphrases=(
             "The fridge is losing its cold; shut it.",
-            "Swing the {doors} of the refrigerator back until shut.",
+            "Swing the {fridge_doors} of the refrigerator back until shut.",
             "No door of the fridge should be left open.",
             "Get the refrigerator closed.",
         ),

@@ -15,7 +15,13 @@ _FIXTURES = (FixtureSpec("drawer", "drawer_top"),)
 # The base is placed as exactly as the original does for tasks beside a fixture.
 _START = RobotStart("drawer", beside=True, deviation=(0.05, 0.05))
 _OBJECTS = (
-    ObjectSpec("drawer_obj", ("tool", "utensil"), InsideOf("drawer", size=(0.30, 0.30), at=-0.75), max_height=0.10),
+    ObjectSpec(
+        "drawer_obj",
+        ("tool", "utensil"),
+        InsideOf("drawer", size=(0.30, 0.30), at=-0.75),
+        graspable=True,
+        max_height=0.10,
+    ),
     ObjectSpec(
         "distr_counter", ("any",), OnCounter("drawer", size=(1.0, 0.5), at="front", offset=(0.0, 0.1)), count=(1, 3)
     ),

@@ -16,12 +16,30 @@ from robocasa_lerobot.envs.scene.spec import (
     RobotStart,
     SampleRegion,
 )
-from robocasa_lerobot.envs.tasks.atomic.common import HANDLE_TURN
+from robocasa_lerobot.envs.tasks.atomic.common import HANDLE_LEFT, HANDLE_RIGHT
 from robocasa_lerobot.envs.tasks.task import Stage, Task
 
 KNOB = Choice("knob", of="stove")
 
-_COOKWARE = ("pan", "pot", "saucepan", "kettle_non_electric")
+_KETTLE = ObjectSpec(
+    "kettle",
+    ("kettle_non_electric",),
+    Placement("stove", region=SampleRegion(name="{knob}"), size=(0.05, 0.05), pos=(0.0, 0.0), ensure_inside=False),
+)
+# In half of the scenes it stands on the burner that is meant.
+_COOKWARE = ObjectSpec(
+    "cookware",
+    ("pan", "pot", "saucepan", "kettle_non_electric"),
+    Placement(
+        "stove",
+        region=SampleRegion(name="{knob}|any"),
+        size=(0.02, 0.02),
+        pos=(0.0, 0.0),
+        rotation=HANDLE_LEFT,
+        other_rotation=HANDLE_RIGHT,
+        ensure_inside=False,
+    ),
+)
 
 
 def _stove(
@@ -33,29 +51,15 @@ def _stove(
     *,
     instruction: str,
     paraphrases: tuple[str, ...],
+    cookware: ObjectSpec = _COOKWARE,
 ) -> Task:
-    cookware, groups = ("kettle", _COOKWARE[-1:]) if name == "LowerHeat" else ("cookware", _COOKWARE)
-    region = SampleRegion(name="{knob}" if name == "LowerHeat" else "{knob}|any")
     return Task(
         name=name,
         summary=summary,
         fixtures=(FixtureSpec("stove", "stove"),),
         robot_start=RobotStart("stove"),
         choices=(KNOB,),
-        objects=(
-            ObjectSpec(
-                cookware,
-                groups,
-                Placement(
-                    "stove",
-                    region=region,
-                    size=(0.02, 0.02),
-                    pos=(0.0, 0.0),
-                    rotation=HANDLE_TURN,
-                    ensure_inside=False,
-                ),
-            ),
-        ),
+        objects=(cookware,),
         initial=(BurnerAt("stove", "{knob}", start),),
         goal=goal,
         stages=(Stage("knobs", verb, "stove", part="knob_{knob}"),),
@@ -106,6 +110,7 @@ STOVE = (
             "Take the heat under the kettle back to low.",
             "Let the kettle keep warm on a small flame.",
         ),
+        cookware=_KETTLE,
     ),
 )
 

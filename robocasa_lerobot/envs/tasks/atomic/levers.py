@@ -27,7 +27,7 @@ _SINK_OBJECTS = (
         on_counter("sink", (0.3, 0.3), loc="left_right", offset=(0.0, 0.1)),
         count=(1, 3),
     ),
-    ObjectSpec("distr_sink", ("any",), Placement("sink", size=(0.3, 0.4), pos=(0.0, -1.0)), washable=True),
+    ObjectSpec("distr_sink", ("any",), Placement("sink", size=(0.3, 0.4), pos=(0.0, -1.0)), properties=("washable",)),
 )
 
 

@@ -17,7 +17,14 @@ from robocasa_lerobot.envs.scene.spec import (
     RobotStart,
     SampleRegion,
 )
-from robocasa_lerobot.envs.tasks.atomic.common import HANDLE_TURN, counter_near, in_cabinet, on_counter, place
+from robocasa_lerobot.envs.tasks.atomic.common import (
+    HANDLE_LEFT,
+    HANDLE_RIGHT,
+    counter_near,
+    in_cabinet,
+    on_counter,
+    place,
+)
 from robocasa_lerobot.envs.tasks.task import Task
 
 _TOOLS, _NOT_TOOLS = ("reamer", "strainer", "cheese_grater"), ("tool", "utensil")
@@ -27,7 +34,8 @@ _PAN = Placement(
     region=SampleRegion(name="any", height=(0.7, 1.2)),
     size=(0.02, 0.02),
     pos=(0.0, 0.0),
-    rotation=HANDLE_TURN,
+    rotation=HANDLE_LEFT,
+    other_rotation=HANDLE_RIGHT,
     ensure_inside=False,
 )
 _DOOR_OPEN = (0.90, 1.0)
@@ -144,7 +152,11 @@ SINK = (
         robot_start=RobotStart("sink"),
         objects=(
             ObjectSpec(
-                "obj", ("food",), Placement("sink", size=(0.25, 0.25), pos=(0.0, 1.0)), graspable=True, washable=True
+                "obj",
+                ("food",),
+                Placement("sink", size=(0.25, 0.25), pos=(0.0, 1.0)),
+                graspable=True,
+                properties=("washable",),
             ),
             ObjectSpec("container", ("plate",), on_counter("sink", (0.35, 0.4), loc="left_right")),
             ObjectSpec("distr_counter", ("any",), on_counter("sink", (0.3, 0.3), loc="left_right", offset=(0.0, 0.3))),

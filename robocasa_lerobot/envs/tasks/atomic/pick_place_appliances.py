@@ -119,7 +119,6 @@ OVENS = (
                 Placement(
                     "toaster", region=SampleRegion(name="slot{slot}"), rotation=(0.0, 0.0), margin=0.0, slot=True
                 ),
-                scale=0.85,
                 upright=True,
             ),
             ObjectSpec("plate", ("plate",), on_counter("toaster", (0.8, 0.3))),

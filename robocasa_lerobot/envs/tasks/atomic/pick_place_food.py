@@ -48,7 +48,9 @@ COUNTER = (
         fixtures=(FixtureSpec("cabinet", "cabinet"), counter_near("cabinet")),
         robot_start=RobotStart("counter", at_object="ice_bowl"),
         objects=(
-            ObjectSpec("ice_bowl", ("bowl",), on_counter("cabinet", (1.0, 0.4), pos=(0.0, -1.0))),
+            ObjectSpec(
+                "ice_bowl", ("bowl",), on_counter("cabinet", (1.0, 0.4), pos=(0.0, -1.0)), scale=(1.0, 1.0, 0.75)
+            ),
             ObjectSpec("ice_cube1", ("ice_cube",), Placement(object="ice_bowl"), graspable=True, scale=0.8),
             ObjectSpec(
                 "ice_cube2", ("ice_cube",), Placement(object="ice_bowl"), graspable=True, scale=0.8, repeats=True
@@ -57,7 +59,7 @@ COUNTER = (
                 "cup",
                 ("glass_cup",),
                 Placement("counter", reuse_region_from="ice_bowl", size=(0.5, 0.25), pos=(0.0, -1.0)),
-                scale=1.25,
+                scale=(1.25, 1.25, 1.0),
                 filled="coffee",
             ),
         ),
@@ -85,7 +87,7 @@ COUNTER = (
                 "cooked_food_container",
                 ("tupperware",),
                 Placement("counter", size=(0.5, 0.5), pos=(0.0, -1.0), rotation=(0.0, 0.0)),
-                scale=2.0,
+                scale=(1.5, 1.5, 1.25),
             ),
             ObjectSpec("cooked_food", ("cooked_food",), Placement(object="cooked_food_container"), graspable=True),
             ObjectSpec(

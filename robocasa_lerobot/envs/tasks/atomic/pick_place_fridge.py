@@ -29,14 +29,14 @@ FRIDGE = (
         summary="The object is inside the highest drawer of the fridge, the gripper 15 cm away.",
         fixtures=(FixtureSpec("fridge", "fridge_with_drawer"),),
         robot_start=RobotStart("fridge", setback=0.3),
-        choices=(Choice("level", {"-1": {}, "-2": {}}), DRAWER),
+        choices=(Choice("level", {"highest": {}, "second_highest": {}}), DRAWER),
         objects=(
             ObjectSpec(
                 "obj",
                 ("vegetable", "fruit"),
                 Placement(
                     "fridge",
-                    region=SampleRegion(name="fridge_shelf", level="{level}"),
+                    region=SampleRegion(name="fridge_shelf:{level}"),
                     size=(0.4, 0.15),
                     pos=(0.0, -1.0),
                 ),
@@ -46,12 +46,12 @@ FRIDGE = (
             ObjectSpec(
                 "distr",
                 ("any",),
-                Placement("fridge", region=SampleRegion(name="fridge_shelf"), size=(0.4, 0.15), pos=(0.0, -0.5)),
+                Placement("fridge", region=SampleRegion(name="fridge_shelf:any"), size=(0.4, 0.15), pos=(0.0, -0.5)),
                 properties=("fridgable",),
                 exclude=("vegetable", "fruit"),
             ),
         ),
-        initial=(InitialOpenness("fridge", 1.0, 1.0), PartAt("fridge", "{drawer}", (0.8, 1.0))),
+        initial=(InitialOpenness("fridge", 1.0, 1.0, part="fridge"), PartAt("fridge", "{drawer}", (0.8, 1.0))),
         goal=AllOf(ObjectInside("obj", "fridge", region="{drawer}"), GripperFar("obj", _FRIDGE_FAR_M)),
         stages=place(target="fridge", part="{drawer}"),
         instruction="Take the {obj} off the fridge shelf and put it into the fridge drawer.",
@@ -79,12 +79,12 @@ FRIDGE = (
             ObjectSpec(
                 "distr",
                 ("any",),
-                Placement("fridge", region=SampleRegion(name="fridge_shelf"), size=(0.4, 0.2), pos=(0.0, 0.5)),
+                Placement("fridge", region=SampleRegion(name="fridge_shelf:any"), size=(0.4, 0.2), pos=(0.0, 0.5)),
                 properties=("fridgable",),
                 exclude=("vegetable", "fruit"),
             ),
         ),
-        initial=(InitialOpenness("fridge", 1.0, 1.0), PartAt("fridge", "{drawer}", (0.8, 0.8))),
+        initial=(InitialOpenness("fridge", 1.0, 1.0, part="fridge"), PartAt("fridge", "{drawer}", (0.8, 0.8))),
         goal=AllOf(
             ObjectInside("obj", "fridge", region="fridge_shelf", lower=0.9, height=USABLE_SHELF),
             GripperFar("obj", _FRIDGE_FAR_M),

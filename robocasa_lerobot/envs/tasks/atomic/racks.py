@@ -31,7 +31,7 @@ _FRIDGE_OBJECTS = (
     ObjectSpec(
         "distr_shelf",
         ("any",),
-        Placement("fridge", region=SampleRegion(name="fridge_shelf"), size=(0.4, 0.2), pos=(0.0, 0.0)),
+        Placement("fridge", region=SampleRegion(name="fridge_shelf:any"), size=(0.4, 0.2), pos=(0.0, 0.0)),
         graspable=True,
         properties=("fridgable",),
     ),
@@ -55,7 +55,7 @@ def _fridge_drawer(
         robot_start=RobotStart("fridge", setback=0.3),
         choices=(DRAWER,),
         objects=_FRIDGE_OBJECTS,
-        initial=(InitialOpenness("fridge", 1.0, 1.0), PartAt("fridge", FRIDGE_DRAWER, at)),
+        initial=(InitialOpenness("fridge", 1.0, 1.0, part="fridge"), PartAt("fridge", FRIDGE_DRAWER, at)),
         goal=goal,
         stages=(Stage("racks", verb, "fridge", part=FRIDGE_DRAWER),),
         instruction=instruction,

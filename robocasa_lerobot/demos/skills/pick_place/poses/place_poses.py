@@ -8,13 +8,13 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from robocasa_lerobot.demos.motion import UP, Array, base_pose
-from robocasa_lerobot.demos.skills.pick_place.graspable import Graspable, contents_of, filled, graspable
+from robocasa_lerobot.demos.skills.pick_place.graspable import Graspable, contents_of, filled, graspable, half_length
 from robocasa_lerobot.demos.skills.pick_place.place import PlacePose
 from robocasa_lerobot.demos.skills.pick_place.poses.plate_poses import is_flat, offsets
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.kitchens.appliances.kinds.stove import Hob
 from robocasa_lerobot.envs.kitchens.fixtures.base import Region
-from robocasa_lerobot.envs.predicates.objects import RECEPTACLE_SHARE, radius
+from robocasa_lerobot.envs.predicates.objects import RECEPTACLE_SHARE
 
 type PlacePoses = Callable[[], Sequence[PlacePose]]
 
@@ -29,7 +29,7 @@ EDGE_M, OFF_SHARE, BESIDE_COST = 0.005, 0.5, 3.0  # beside the middle, with a co
 ASIDE_SHARE, ON_OTHERS_COST = 0.4, 8.0  # beside what lies there, with a gain for each metre from it
 NARROW_SHARE = 0.7  # the same in what is narrow: what stands there is as high in its middle as anywhere
 LEAST_ROOM_M, SHALLOW_M = 0.01, 0.02
-COUNTS_SHARE = 0.85  # of the distance from the middle at which goals count an object as in or on another one
+COUNTS_SHARE = 0.85  # of how far from the middle an object counts as in or on another one, however narrow that is
 # In a vessel an object goes to where others heap up least, so that it comes to touch the vessel: cost for each metre,
 # and factors of how far it is from the middle.
 HEAP_COST, BESIDE_SHARES = 8.0, (1.0, 1.4)
@@ -54,8 +54,11 @@ KNOB_ROOM_M, TIGHT_COST, ON_TOP_M = 0.30, 2.0, 0.05
 
 
 def reach_on(env: KitchenEnv, holder: str) -> float:
-    """How far from an object's middle others count as in or on it, with some to spare, metres."""
-    return COUNTS_SHARE * RECEPTACLE_SHARE * radius(env.scene, holder)
+    """How far from an object's middle others are put in or on it, metres: goals count them there, with some to spare.
+
+    Goals measure to a corner of its box, beyond the rim of a round one; this is a share of half its length.
+    """
+    return COUNTS_SHARE * RECEPTACLE_SHARE * half_length(env, holder)
 
 
 def on_object(env: KitchenEnv, obj: Graspable, holder: str, *, more: bool = False) -> PlacePoses:

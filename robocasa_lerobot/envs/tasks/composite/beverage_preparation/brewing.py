@@ -2,8 +2,6 @@
 
 from dataclasses import replace
 
-import numpy as np
-
 from robocasa_lerobot.envs.predicates import (
     AllOf,
     DoorsClosed,
@@ -25,7 +23,14 @@ from robocasa_lerobot.envs.scene.spec import (
     RobotStart,
     SampleRegion,
 )
-from robocasa_lerobot.envs.tasks.atomic.common import HANDLE_TURN, counter_near, in_cabinet, on_counter
+from robocasa_lerobot.envs.tasks.atomic.common import (
+    HANDLE_LEFT,
+    HANDLE_RIGHT,
+    MUG_UNDER_SPOUT,
+    counter_near,
+    in_cabinet,
+    on_counter,
+)
 from robocasa_lerobot.envs.tasks.composite.common import before_stool, fetch
 from robocasa_lerobot.envs.tasks.task import Stage, Task
 
@@ -50,7 +55,8 @@ KETTLE_BOILING = Task(
                 region=SampleRegion(name="any", height=(0.7, 1.2)),
                 size=(0.02, 0.02),
                 pos=(0.0, 0.0),
-                rotation=HANDLE_TURN,
+                rotation=HANDLE_LEFT,
+                other_rotation=HANDLE_RIGHT,
                 ensure_inside=False,
             ),
             graspable=True,
@@ -123,7 +129,6 @@ PREPARE_COFFEE = Task(
     ),
 )
 
-_AS_UNDER_SPOUTS = (np.pi / 8, np.pi / 4)  # radians
 _BY_BREAKFAST = AllOf(
     ObjectTouches("brewed_coffee", "dining_counter"),
     Near("brewed_coffee", "breakfast_plate", 0.3),
@@ -144,7 +149,7 @@ DELIVER_BREWED_COFFEE = Task(
         ObjectSpec(
             "brewed_coffee",
             ("mug",),
-            Placement("coffee_machine", region=SampleRegion(name="cup"), rotation=_AS_UNDER_SPOUTS),
+            Placement("coffee_machine", region=SampleRegion(name="cup"), rotation=MUG_UNDER_SPOUT),
             graspable=True,
             filled="coffee",
         ),

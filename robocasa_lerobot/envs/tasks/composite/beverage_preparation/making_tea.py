@@ -62,7 +62,7 @@ ARRANGE_TEA_ACCOMPANIMENTS = Task(
         ObjectSpec(
             "distr",
             ("any",),
-            Placement("fridge", region=SampleRegion(name="fridge_shelf"), size=(0.4, 0.2), pos=(0.0, 1.0)),
+            Placement("fridge", region=SampleRegion(name="fridge_shelf:any"), size=(0.4, 0.2), pos=(0.0, 1.0)),
             properties=("fridgable",),
             exclude=("milk",),
         ),

@@ -104,7 +104,7 @@ CLEAR_SINK_AREA = Task(
     fixtures=(
         FixtureSpec("sink", "sink"),
         counter_near("sink"),
-        FixtureSpec("spot", "counter", other_than=("sink",), apart_m=1.6),
+        FixtureSpec("spot", "counter", other_than=("sink",), middle_apart_m=1.6),
     ),
     robot_start=RobotStart("sink"),
     objects=(

@@ -253,7 +253,6 @@ TRANSPORT_COOKWARE = Task(
             ("pan",),
             replace(_ANY_BURNER, rotation=HANDLE_TO_FRONT),
             graspable=True,
-            max_size=(0.45, 0.35, None),
         ),
     ),
     goal=AllOf(*(ObjectInBasin(name, "sink") for name in _WASHED_UP), *map(GripperFar, _WASHED_UP)),

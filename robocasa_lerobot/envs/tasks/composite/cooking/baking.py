@@ -224,7 +224,7 @@ COOKIE_DOUGH_PREP = Task(
         ObjectSpec(
             "distr1",
             ("any",),
-            Placement("fridge", region=SampleRegion(name="fridge_shelf"), size=(0.3, 0.3), pos=(0.0, 0.0)),
+            Placement("fridge", region=SampleRegion(name="fridge_shelf:any"), size=(0.3, 0.3), pos=(0.0, 0.0)),
             properties=("fridgable",),
             exclude=("egg", "butter_stick"),
         ),
@@ -297,11 +297,9 @@ COOL_BAKED_CAKE = Task(
     ),
 )
 
-_IN_BOWL_M = 0.01  # by which corners may stand out of the mixer's bowl
-
 
 def _in_mixer(name: str) -> Goal:
-    return ObjectInside(name, "stand_mixer", lower=0.5, margin=_IN_BOWL_M)
+    return ObjectInside(name, "stand_mixer", lower=0.5)
 
 
 def _into_mixer(name: str) -> Stage:

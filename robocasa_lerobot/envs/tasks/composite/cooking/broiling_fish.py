@@ -151,7 +151,7 @@ WASH_FISH = Task(
         ObjectSpec(
             "distractor",
             ("any",),
-            Placement("fridge", region=SampleRegion(name="fridge_shelf"), size=(0.5, 0.3), pos=(0.5, 1.0)),
+            Placement("fridge", region=SampleRegion(name="fridge_shelf:any"), size=(0.5, 0.3), pos=(0.5, 1.0)),
             properties=("fridgable",),
             exclude=("fish",),
         ),

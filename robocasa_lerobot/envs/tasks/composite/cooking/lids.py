@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from robocasa_lerobot.envs.predicates import AllOf, GripperFar, ObjectOn, ObjectTouches, ObjectUpright, OnBurner
 from robocasa_lerobot.envs.scene.spec import Choice, FixtureSpec, ObjectSpec, Placement, SampleRegion
-from robocasa_lerobot.envs.tasks.atomic.common import HANDLE_TURN, counter_near
+from robocasa_lerobot.envs.tasks.atomic.common import HANDLE_LEFT, HANDLE_RIGHT, counter_near
 from robocasa_lerobot.envs.tasks.task import Stage, Task
 
 TASKS: tuple[Task, ...] = ()
@@ -28,15 +28,16 @@ UNCOVERS = Stage(
 
 
 def saucepan(
-    filled: str, *, rotation: tuple[float, float] = HANDLE_TURN, scale: float = 1.0, graspable: bool = False
+    filled: str, *, rotation: tuple[float, float] | None = None, scale: float = 1.0, graspable: bool = False
 ) -> ObjectSpec:
-    """The saucepan that has a lid, on the burner that was drawn; its handle points to the front, by default askew."""
+    """The saucepan with a lid, on the burner that was drawn; by default its handle is left or right of the front."""
     start = Placement(
         "stove",
         region=SampleRegion(name="{knob}"),
         size=(0.05, 0.05),
         pos=(0.0, 0.0),
-        rotation=rotation,
+        rotation=rotation or HANDLE_LEFT,
+        other_rotation=None if rotation else HANDLE_RIGHT,
         ensure_inside=False,
     )
     return ObjectSpec(PAN, ("saucepan_with_lid",), start, graspable=graspable, scale=scale, filled=filled)

@@ -24,7 +24,13 @@ from robocasa_lerobot.envs.scene.spec import (
     RobotStart,
     SampleRegion,
 )
-from robocasa_lerobot.envs.tasks.atomic.common import HANDLE_TO_FRONT, HANDLE_TURN, counter_near, on_counter
+from robocasa_lerobot.envs.tasks.atomic.common import (
+    HANDLE_LEFT,
+    HANDLE_RIGHT,
+    HANDLE_TO_FRONT,
+    counter_near,
+    on_counter,
+)
 from robocasa_lerobot.envs.tasks.composite.common import before_stool, fetch
 from robocasa_lerobot.envs.tasks.task import Stage, Task
 
@@ -146,7 +152,6 @@ _ON_BURNER = Placement(
     region=SampleRegion(name="{knob}"),
     size=(0.02, 0.02),
     pos=(0.0, 0.0),
-    rotation=HANDLE_TURN,
     ensure_inside=False,
 )
 _LIT = StateIs("stove", "{knob}_on")
@@ -165,7 +170,7 @@ WARM_CROISSANT = Task(
             on_counter("stove", (0.3, 0.3), loc="left_right", try_to_place_in="plate"),
             graspable=True,
         ),
-        ObjectSpec("pan", ("pan",), _ON_BURNER),
+        ObjectSpec("pan", ("pan",), replace(_ON_BURNER, rotation=HANDLE_LEFT, other_rotation=HANDLE_RIGHT)),
     ),
     goal=AllOf(_LIT, ObjectOn("croissant", "pan"), GripperFar("croissant")),
     stages=(Stage("pick_place", "place", "pan", object="croissant"), _LIGHT),

@@ -11,7 +11,13 @@ from robocasa_lerobot.envs.predicates import (
 )
 from robocasa_lerobot.envs.scene.initial_states import BurnerAt, Water
 from robocasa_lerobot.envs.scene.spec import Choice, FixtureSpec, ObjectSpec, Placement, RobotStart, SampleRegion
-from robocasa_lerobot.envs.tasks.atomic.common import HANDLE_TO_FRONT, HANDLE_TURN, counter_near, on_counter
+from robocasa_lerobot.envs.tasks.atomic.common import (
+    HANDLE_LEFT,
+    HANDLE_RIGHT,
+    HANDLE_TO_FRONT,
+    counter_near,
+    on_counter,
+)
 from robocasa_lerobot.envs.tasks.composite.cooking.lids import (
     COVERED,
     COVERS,
@@ -46,7 +52,8 @@ REMOVE_STEAMED_VEGETABLES = Task(
                 region=SampleRegion(name="{knob}"),
                 size=(0.05, 0.05),
                 pos=(0.0, 0.0),
-                rotation=HANDLE_TURN,
+                rotation=HANDLE_LEFT,
+                other_rotation=HANDLE_RIGHT,
                 ensure_inside=False,
             ),
             scale=(1.35, 1.35, 0.75),

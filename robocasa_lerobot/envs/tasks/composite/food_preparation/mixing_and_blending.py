@@ -100,7 +100,7 @@ SPICY_MARINADE = Task(
 
 
 _SHELF = SampleRegion(name="fridge_shelf", height=(1.0, 1.5))
-_IN_JUG = AllOf(ObjectInside("banana", "blender", margin=0.01), GripperFar("banana"))
+_IN_JUG = AllOf(ObjectInside("banana", "blender"), GripperFar("banana"))
 
 
 def _by_blender(name: str) -> AllOf:
@@ -129,7 +129,7 @@ MAKE_BANANA_MILKSHAKE = Task(
         ObjectSpec(
             "fridge_distractor",
             ("any",),
-            Placement("fridge", region=SampleRegion(name="fridge_shelf"), size=(0.5, 0.3), pos=(0.0, 0.0)),
+            Placement("fridge", region=SampleRegion(name="fridge_shelf:any"), size=(0.5, 0.3), pos=(0.0, 0.0)),
             exclude=("milk", "honey_bottle", "banana"),
         ),
         ObjectSpec("honey", ("honey_bottle",), in_cabinet("cabinet", (0.3, 0.2)), graspable=True),

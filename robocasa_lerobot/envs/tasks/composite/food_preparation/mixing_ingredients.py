@@ -36,7 +36,7 @@ _SALSA = ("tomato", "chili_pepper", "onion")
 
 
 def _blended(*names: str) -> AllOf:
-    return AllOf(*(ObjectInside(name, "blender", margin=0.01) for name in names), *BLENDER_ON.parts)
+    return AllOf(*(ObjectInside(name, "blender") for name in names), *BLENDER_ON.parts)
 
 
 def _on_plate(name: str, kind: str, scale: float | tuple[float, float, float] = 1.0, **more: object) -> ObjectSpec:
@@ -194,7 +194,7 @@ _MIXING, _HEAD_DOWN = (
 
 
 def _in_mixer(name: str) -> ObjectInside:
-    return ObjectInside(name, "stand_mixer", lower=0.5, margin=0.01)
+    return ObjectInside(name, "stand_mixer", lower=0.5)
 
 
 MAKE_CHEESECAKE_FILLING = Task(
@@ -312,7 +312,7 @@ PREPARE_VEGGIE_DIP = Task(
         ObjectSpec(
             "distr",
             ("any",),
-            Placement("fridge", region=SampleRegion(name="fridge_shelf"), size=(0.5, 0.3), pos=(0.0, 0.0)),
+            Placement("fridge", region=SampleRegion(name="fridge_shelf:any"), size=(0.5, 0.3), pos=(0.0, 0.0)),
             exclude=("vegetable", "cream_cheese_stick"),
         ),
     ),

@@ -117,7 +117,7 @@ BLEND_MARINADE = Task(
         for name, x in zip(_VEGETABLES, (-0.3, 0.3), strict=True)
     ),
     initial=(InitialOpenness("fridge", 0.9, 1.0, part="fridge"), LidAside("blender")),
-    goal=AllOf(*(ObjectInside(name, "blender", margin=0.01) for name in _VEGETABLES), *BLENDER_ON.parts),
+    goal=AllOf(*(ObjectInside(name, "blender") for name in _VEGETABLES), *BLENDER_ON.parts),
     stages=(*fetch_in_turn(_VEGETABLES, "fridge", "blender"), *cover_and_blend()),
     instruction=(
         "Put {marinade_veg1+marinade_veg2} from the fridge into the blender, put its lid on and switch it on."
@@ -155,7 +155,7 @@ PLACE_MEAT_IN_MARINADE = Task(
         ObjectSpec(
             "fridge_distractor",
             ("any",),
-            Placement("fridge", region=SampleRegion(name="fridge_shelf"), size=(0.4, 0.3), pos=(0.0, 1.0)),
+            Placement("fridge", region=SampleRegion(name="fridge_shelf:any"), size=(0.4, 0.3), pos=(0.0, 1.0)),
             exclude=("meat",),
             properties=("fridgable",),
         ),

@@ -42,7 +42,7 @@ def _stored(name: str, groups: tuple[str, ...]) -> ObjectSpec:
 
 
 def _beside_food(name: str, exclude: tuple[str, ...], size: tuple[float, float] = (0.3, 0.3)) -> ObjectSpec:
-    start = Placement("fridge", region=SampleRegion(name="fridge_shelf"), size=size, pos=(0.0, 0.0))
+    start = Placement("fridge", region=SampleRegion(name="fridge_shelf:any"), size=size, pos=(0.0, 0.0))
     return ObjectSpec(name, ("any",), start, properties=("fridgable",), exclude=exclude)
 
 

@@ -41,7 +41,7 @@ MOVE_TO_FREEZER_DRAWER = Task(
         ObjectSpec(
             "fridge_distractor",
             ("any",),
-            Placement("fridge", region=SampleRegion(name="fridge_shelf"), size=(0.4, 0.2), pos=(None, 1.0)),
+            Placement("fridge", region=SampleRegion(name="fridge_shelf:any"), size=(0.4, 0.2), pos=(None, 1.0)),
             graspable=True,
             properties=("fridgable",),
             exclude=("fruit", "vegetable"),

@@ -121,7 +121,6 @@ CREATE_CHILD_FRIENDLY_FRIDGE = Task(
             _by_fridge((0.5, 0.3)),
             graspable=True,
             properties=("fridgable",),
-            max_height=_FITS_M,
         ),
         ObjectSpec(
             "item2",

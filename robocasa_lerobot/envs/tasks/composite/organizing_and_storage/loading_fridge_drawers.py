@@ -50,11 +50,11 @@ PLACE_VEGGIES_IN_DRAWER = Task(
         ObjectSpec(
             "fridge_distractor",
             ("any",),
-            Placement("fridge", region=SampleRegion(name="fridge_shelf"), size=(0.5, 0.5), pos=(None, 1.0)),
+            Placement("fridge", region=SampleRegion(name="fridge_shelf:any"), size=(0.5, 0.5), pos=(None, 1.0)),
             properties=("fridgable",),
         ),
     ),
-    initial=(InitialOpenness("fridge", 1.0, 1.0), PartAt("fridge", _DRAWER, (0.5, 0.8))),
+    initial=(InitialOpenness("fridge", 1.0, 1.0, part="fridge"), PartAt("fridge", _DRAWER, (0.5, 0.8))),
     goal=AllOf(
         *(ObjectInside(name, "fridge", region=_DRAWER) for name in _VEGETABLES), *map(GripperFar, _VEGETABLES), _SHUT
     ),

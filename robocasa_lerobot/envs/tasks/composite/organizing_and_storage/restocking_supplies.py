@@ -275,7 +275,6 @@ FRESH_PRODUCE_ORGANIZATION = Task(
             on_counter("fridge", (1.0, 0.4), pos=(-0.25, -1.0)),
             graspable=True,
             properties=("graspable", "fridgable"),
-            max_height=0.2,
         ),
         *(
             ObjectSpec(

@@ -64,7 +64,7 @@ STORE_LEFTOVERS_IN_BOWL = Task(
         _in_fridge("distr1", -0.3),
         _in_fridge("distr2", 0.3),
     ),
-    initial=(InitialOpenness("fridge", 0.9, 1.0),),
+    initial=(InitialOpenness("fridge", 0.9, 1.0, part="fridge"),),
     goal=AllOf(
         ObjectOn("chicken_drumstick", "bowl"),
         ObjectOn("vegetable", "bowl"),
@@ -234,7 +234,7 @@ STORE_DUMPLINGS = Task(
             for number in (1, 2)
         ),
     ),
-    initial=(InitialOpenness("fridge", 0.9, 1.0),),
+    initial=(InitialOpenness("fridge", 0.9, 1.0, part="fridge"),),
     goal=AllOf(
         *(Exactly(2, *(ObjectOn(name, box) for name in _DUMPLINGS)) for box in _BOXES),
         *(OnShelf(box, "fridge") for box in _BOXES),
@@ -298,7 +298,7 @@ STORE_LEFTOVERS_BY_TYPE = Task(
         _kept("meat", -0.3),
         _kept("vegetable", 0.3),
     ),
-    initial=(InitialOpenness("fridge", 0.9, 1.0),),
+    initial=(InitialOpenness("fridge", 0.9, 1.0, part="fridge"),),
     goal=AllOf(
         *(OnShelf(f"{kind}_{where}", "fridge", level) for kind, level in _BY_TYPE.items() for where in _PLACES),
         *(GripperFar(f"{kind}_counter") for kind in _BY_TYPE),

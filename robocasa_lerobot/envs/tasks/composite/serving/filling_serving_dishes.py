@@ -49,7 +49,7 @@ BUILD_APPETIZER_PLATE = Task(
             scale=1.25,
         ),
     ),
-    initial=(InitialOpenness("fridge", 0.9, 1.0),),
+    initial=(InitialOpenness("fridge", 0.9, 1.0, part="fridge"),),
     goal=AllOf(
         *(ObjectOn(name, "appetizer_plate") for name in _STARTERS),
         ObjectTouches("appetizer_plate", "dining_table"),
@@ -137,7 +137,7 @@ MIXED_FRUIT_PLATTER = Task(
         ObjectSpec(
             "distr_fridge",
             ("food",),
-            Placement("fridge", region=SampleRegion(name="fridge_shelf"), size=(0.3, 0.3), pos=(0.0, 1.0)),
+            Placement("fridge", region=SampleRegion(name="fridge_shelf:any"), size=(0.3, 0.3), pos=(0.0, 1.0)),
             properties=("fridgable",),
             exclude=("fruit",),
         ),

@@ -41,7 +41,7 @@ GARNISH_PANCAKE = Task(
         ObjectSpec(
             "distr_fridge",
             ("food",),
-            Placement("fridge", region=SampleRegion(name="fridge_shelf"), size=(0.3, 0.3), pos=(0.0, 1.0)),
+            Placement("fridge", region=SampleRegion(name="fridge_shelf:any"), size=(0.3, 0.3), pos=(0.0, 1.0)),
             properties=("fridgable",),
             exclude=("pancake",),
         ),
@@ -97,7 +97,7 @@ ADD_LEMON_TO_FISH = Task(
         ObjectSpec(
             "distr_fridge",
             ("food",),
-            Placement("fridge", region=SampleRegion(name="fridge_shelf"), size=(0.3, 0.3), pos=(0.0, 1.0)),
+            Placement("fridge", region=SampleRegion(name="fridge_shelf:any"), size=(0.3, 0.3), pos=(0.0, 1.0)),
             properties=("fridgable",),
         ),
         ObjectSpec("fish_container", ("plate",), before_stool((0.35, 0.35))),

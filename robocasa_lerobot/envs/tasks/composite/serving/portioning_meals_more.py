@@ -121,7 +121,7 @@ SCALE_PORTIONING = Task(
             properties=("fridgable",),
         ),
     ),
-    initial=(InitialOpenness("fridge", 0.9, 1.0),),
+    initial=(InitialOpenness("fridge", 0.9, 1.0, part="fridge"),),
     goal=AllOf(ObjectOn("meat", "plate"), _WEIGHED, GripperFar("meat")),
     stages=(
         *fetch("meat", "fridge", "digital_scale", until=_WEIGHED),

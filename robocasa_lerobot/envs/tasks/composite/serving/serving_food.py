@@ -22,7 +22,14 @@ from robocasa_lerobot.envs.scene.spec import (
     RobotStart,
     SampleRegion,
 )
-from robocasa_lerobot.envs.tasks.atomic.common import HANDLE_TO_FRONT, counter_near, in_cabinet, on_counter
+from robocasa_lerobot.envs.tasks.atomic.common import (
+    HANDLE_LEFT,
+    HANDLE_RIGHT,
+    HANDLE_TO_FRONT,
+    counter_near,
+    in_cabinet,
+    on_counter,
+)
 from robocasa_lerobot.envs.tasks.composite.common import before_stool, fetch, fetch_in_turn
 from robocasa_lerobot.envs.tasks.task import Stage, Task
 
@@ -275,7 +282,8 @@ PREPARE_SOUP_SERVING = Task(
                 size=(0.02, 0.02),
                 pos=(0.0, 0.0),
                 ensure_inside=False,
-                rotation=(np.pi / 4, 3 * np.pi / 8),
+                rotation=HANDLE_LEFT,
+                other_rotation=HANDLE_RIGHT,
             ),
             graspable=True,
         ),

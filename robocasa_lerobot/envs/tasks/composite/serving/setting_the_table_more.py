@@ -138,7 +138,7 @@ SETUP_BUTTER_PLATE = Task(
         ObjectSpec(
             "fridge_distractor",
             ("any",),
-            Placement("fridge", region=SampleRegion(name="fridge_shelf"), size=(0.35, 0.35), pos=(0.0, 1.0)),
+            Placement("fridge", region=SampleRegion(name="fridge_shelf:any"), size=(0.35, 0.35), pos=(0.0, 1.0)),
             exclude=("butter_stick",),
             properties=("fridgable",),
         ),
