@@ -115,7 +115,7 @@ def test_the_page_has_rates_differences_and_circumstances(tmp_path: Path) -> Non
     assert "|B|0 % (0 to 32)|38 % (" in text
     assert "4 of 4 trainings, 6.0 hours of training (on NVIDIA H200) and" in text
     assert "0123456789ab-dirty" in text
-    assert "Not run yet: `robocasa-lerobot study later`." in text
+    assert "Not run yet: `robocasa-lerobot study later`, with" in text
     for figure in ("amount_rates.svg", "amount_curves.svg"):
         assert f"(results/{figure})" in text
         assert (results / figure).read_text(encoding="utf-8").startswith("<?xml")
