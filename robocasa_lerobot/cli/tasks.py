@@ -7,7 +7,7 @@ import json
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from robocasa_lerobot.jobs.workers import cores_here
+from robocasa_lerobot.jobs.workers import check_workers, cores_here
 
 if TYPE_CHECKING:
     from robocasa_lerobot.envs.tasks.task import Task
@@ -40,7 +40,9 @@ def configure(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--seeds", type=int, default=10, metavar="N", help="of --check, from 0 on (default 10)")
     parser.add_argument("--log", type=Path, metavar="FILE", help="of --check: keep what was found, and go on from it")
-    parser.add_argument("--workers", type=int, default=cores_here(), help="of --check (default: all cores)")
+    parser.add_argument(
+        "--workers", type=int, default=cores_here(), help="of --check and --deviations (default: all cores)"
+    )
     parser.add_argument("--json", action="store_true", help="print JSON")
 
 
@@ -51,6 +53,7 @@ def run(args: argparse.Namespace) -> int:
     from robocasa_lerobot.gallery.task_pages import page, pages
 
     tasks = _chosen(args)
+    check_workers(args.workers)
     if args.check:
         if args.seeds < 1:
             raise UserError(f"--seeds {args.seeds}: --check needs at least one seed.")
@@ -62,7 +65,7 @@ def run(args: argparse.Namespace) -> int:
     if args.deviations:
         from robocasa_lerobot.gallery.deviations import deviations
 
-        write_text(args.deviations, deviations(tasks))
+        write_text(args.deviations, deviations(tasks, args.workers))
         print(f"{args.deviations}: {len(tasks)} tasks")
         return 0
     if args.pictures:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 
@@ -12,8 +12,11 @@ from robocasa_lerobot.envs.kitchens.footprints import PlacementError
 from robocasa_lerobot.envs.kitchens.layout import load_layout
 from robocasa_lerobot.envs.kitchens.splits import EXCLUDED, SPLITS, benchmark_split, scene_ids
 from robocasa_lerobot.envs.scene.build import arrange
+from robocasa_lerobot.envs.tasks.registry import get_task
 from robocasa_lerobot.envs.tasks.task import Task
 from robocasa_lerobot.errors import UserError
+from robocasa_lerobot.jobs.as_completed import as_they_end
+from robocasa_lerobot.progress import Bar
 
 TRIES = 5  # arrangements of a task in a kitchen before it counts as one that does not admit it
 FEW = Fraction(1, 5)  # of the kitchens: a task that fewer admit says why
@@ -45,17 +48,28 @@ class Admitted:
         return Fraction(self.kitchens, self.of)
 
 
-def deviations(tasks: Iterable[Task]) -> str:
-    """The whole of `docs/deviations.md`: each task that differs, or that not all kitchens admit."""
+def deviations(tasks: Sequence[Task], workers: int = 1) -> str:
+    """The whole of `docs/deviations.md`: each task that differs, or that not all kitchens admit.
+
+    Args:
+        tasks: in the order of the page.
+        workers: processes; the page is the same with any number.
+    """
     asked = {split: kitchens(split) for split in SPLITS}
     lines = [_HEAD.format(tries=TRIES, **{split: len(pairs) for split, pairs in asked.items()}).rstrip("\n")]
+    jobs = [(task.name,) for task in tasks]
+    with Bar(as_they_end(_admitted_in_both, jobs, workers), total=len(jobs), unit="task", disable=None) as bar:
+        by_task = dict(bar)
     for task in tasks:
-        found = [admitted(task, split) for split in ("target", "pretrain")]
-        said = explained(task)
+        found, said = by_task[task.name], explained(task)
         if said or any(one.share < 1 for one in found):
             numbers = " | ".join(f"{one.kitchens} of {one.of}" for one in found)
             lines.append(f"| [{task.name}](tasks.md#{task.name.lower()}) | {numbers} | {said} |")
     return "\n".join(lines) + "\n"
+
+
+def _admitted_in_both(name: str) -> tuple[str, tuple[Admitted, ...]]:
+    return name, tuple(admitted(get_task(name), split) for split in ("target", "pretrain"))
 
 
 def explained(task: Task) -> str:

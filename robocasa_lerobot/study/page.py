@@ -54,7 +54,10 @@ def write_page(study: StudyConfig, stored: Stored, sets: Sets, results: Path, pa
         lines += [f"## {part.asks}", ""]
         lines += [f"Published: {part.published}", ""] if part.published else []
         if not own:
-            lines += [f"Not run yet: `robocasa-lerobot study {name}`, with the `--results` and `--page` of this page.", ""]
+            lines += [
+                f"Not run yet: `robocasa-lerobot study {name}`, with the `--results` and `--page` of this page.",
+                "",
+            ]
             continue
         lines += _part(name, part, own, sets, results, folder)
     page.parent.mkdir(parents=True, exist_ok=True)
