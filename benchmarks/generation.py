@@ -38,6 +38,8 @@ from robocasa_lerobot.demos.choose import expand_names
 from robocasa_lerobot.demos.generate.settings import GenerationSettings
 from robocasa_lerobot.demos.generate.sources.prepare import file_identity
 from robocasa_lerobot.demos.generate.sources.source import sources_of
+from robocasa_lerobot.demos.quality.measure import start_of
+from robocasa_lerobot.demos.quality.summary import square_of
 from robocasa_lerobot.demos.recorder import Recording, record_episode
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.files import write_text
@@ -60,13 +62,14 @@ OUTPUT = common.RESULTS / "generation.json"
 
 @dataclass(frozen=True)
 class Job:
-    """An attempt to be made: a task, a seed, an arm, the folder of its sources, and the commit that makes it."""
+    """An attempt to be made: task, seed, arm, the folder of its sources, the commit, and how many run at once."""
 
     task: str
     seed: int
     arm: str
     source: Path
     commit: str = ""
+    workers: int = 1
 
     @property
     def key(self) -> tuple[str, int, str]:
@@ -118,24 +121,33 @@ def attempt(job: Job) -> Trial:
         started = time.perf_counter()
         with contextlib.closing(settings.make_env()) as env:
             recording = record(job, settings, env)
+            seconds = round(time.perf_counter() - started, 3)
+            env.reset(seed=job.seed)
+            start = square_of(start_of(env))
     except Exception as error:
         reason = f"{type(error).__name__}: {error}"
         seconds = round(time.perf_counter() - started, 3)
-        return Trial(*job.key, False, False, 0, seconds, 0, (), False, reason, job.commit)
+        return Trial(*job.key, False, False, 0, seconds, 0, (), False, reason, job.commit, job.workers)
     rows = recording.ep_meta.get("generation", {}).get("segments", [])
-    told = [(row["kind"], row.get("part", row["ref"])) for row in rows]
     return Trial(
         *job.key,
         success=recording.success,
         ever=recording.success or bool(recording.rewards.any()),
         steps=len(recording.actions),
-        seconds=round(time.perf_counter() - started, 3),
+        seconds=seconds,
         segments=len(rows),
         sources=tuple(row["demo"] for row in rows),
-        first_try=recording.success and len(set(told)) == len(told),
+        first_try=recording.success and not any(row.get("in_vain") for row in rows) and not _again(recording),
         reason=recording.reason,
         commit=job.commit,
+        workers=job.workers,
+        start=start,
     )
+
+
+def _again(recording: Recording) -> bool:
+    """Whether a stage was begun a second time."""
+    return any(stage["attempts"] > 1 for stage in recording.ep_meta.get("stages", ()))
 
 
 def arms_of(text: str, attempts: int) -> dict[str, int]:
@@ -152,11 +164,12 @@ def arms_of(text: str, attempts: int) -> dict[str, int]:
 def jobs_of(args: argparse.Namespace, names: Iterable[str], arms: Mapping[str, int]) -> list[Job]:
     """All attempts, some seeds after others, so that a run that is stopped has seen all tasks about equally often.
 
-    A task without sources of its own has no scenes of its own either, for the arm `own`.
+    A task without sources of its own has no scenes of its own either, for the arm `own`, and no whole subtasks for
+    the arm `mimicgen`.
     """
     commit = common.versions()["commit"]
-    with_file = [name for name in names if (args.source / f"{name}.hdf5").exists()] if "own" in arms else []
-    own = {name: [one.seed for one in sources_of(args.source, name)] for name in with_file}
+    with_file = [name for name in names if (args.source / f"{name}.hdf5").exists()]
+    own = {name: [one.seed for one in sources_of(args.source, name)] for name in with_file} if "own" in arms else {}
     jobs = []
     for begin in range(0, max(arms.values()), BLOCK):
         for name in names:
@@ -165,10 +178,10 @@ def jobs_of(args: argparse.Namespace, names: Iterable[str], arms: Mapping[str, i
                     known = own.get(name, [])
                     if number >= (min(attempts, len(known)) if arm == "own" else attempts):
                         continue
-                    if arm == "far" and name in DRIVING:
+                    if (arm == "far" and name in DRIVING) or (arm == "mimicgen" and name not in with_file):
                         continue
                     seed = known[number] if arm == "own" else args.first_seed + number
-                    jobs.append(Job(name, seed, arm, args.source, commit))
+                    jobs.append(Job(name, seed, arm, args.source, commit, args.workers))
     return jobs
 
 
@@ -207,7 +220,8 @@ def run(jobs: Sequence[Job], path: Path, workers: int) -> None:
 
 def read(path: Path) -> dict[tuple[str, int, str], Trial]:
     """Finished attempts; a line that a kill has cut off is made anew."""
-    trials = (Trial(**values | {"sources": tuple(values["sources"])}) for values in read_whole_lines(path))
+    rows = read_whole_lines(path)
+    trials = (Trial(**row | {key: tuple(row[key]) for key in ("sources", "start") if key in row}) for row in rows)
     return {(trial.task, trial.seed, trial.arm): trial for trial in trials}
 
 
@@ -224,7 +238,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         done = read(args.trials)
     trials = [done[job.key] for job in jobs]
     body = {
-        "ratios": ratios(trials, args.workers),
+        "ratios": ratios(trials),
         "arms": {arm: summary([trial for trial in trials if trial.arm == arm]) for arm in arms},
         "settings": {"attempts": arms, "first_seed": args.first_seed, "split": "pretrain"},
         "commits": sorted({trial.commit for trial in trials}),

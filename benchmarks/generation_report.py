@@ -32,7 +32,8 @@ class Trial:
     """An attempt of an arm: `segments` the contacts that it took, `sources` whose they were.
 
     `success` is the task's goal held to the end, which decides what is kept; `ever` says whether it held at any step,
-    by which others count.
+    by which others count; `first_try` that no segment and no stage had to be done again; `workers` how many attempts
+    ran at once; `start` the square of the floor in which it began, none where its scene could not be made.
     """
 
     task: str
@@ -47,6 +48,8 @@ class Trial:
     first_try: bool
     reason: str
     commit: str = ""
+    workers: int = 1
+    start: tuple[int, ...] = ()
 
 
 def class_of(task: str) -> str:
@@ -72,6 +75,7 @@ def summary(trials: Sequence[Trial]) -> dict[str, Any]:
         if rates:
             by_class[group] = {"tasks": len(rates), "mean": statistics.mean(rates), "worst": min(rates)}
     means = {"mean": _mean(by_task, "rate"), "mean_ever": _mean(by_task, "ever")}
+    means |= {f"mean_{name}": _mean(by_task, name) for name in ("most_used_source", "starts_covered")}
     return {**means, "classes": by_class, "tasks": by_task}
 
 
@@ -89,30 +93,47 @@ def _rate(trials: Sequence[Trial]) -> dict[str, Any]:
         "first_try": sum(trial.first_try for trial in trials) / len(trials),
         "seconds": sum(trial.seconds for trial in trials),
         "most_used_source": max(used.values()) / sum(used.values()) if used else None,
+        "starts_covered": _covered(trials),
         "failures": dict(reasons.most_common(3)),
     }
 
 
+def _covered(trials: Sequence[Trial]) -> float | None:
+    """Share of the squares in which an attempt began, in which one began that was kept."""
+    begun = {trial.start for trial in trials if trial.start}
+    kept = {trial.start for trial in trials if trial.start and trial.success}
+    return len(kept) / len(begun) if begun else None
+
+
 def _mean(by_task: dict[str, Any], share: str) -> float | None:
-    return statistics.mean(row[share] for row in by_task.values()) if by_task else None
+    there = [row[share] for row in by_task.values() if row[share] is not None]
+    return statistics.mean(there) if there else None
 
 
-def ratios(trials: Sequence[Trial], workers: int) -> dict[str, float]:
-    """Mean rates of arms, what ours keeps beside the others, and kept demonstrations an hour on all workers."""
-    arms = list(dict.fromkeys(trial.arm for trial in trials))
-    mine = {arm: [trial for trial in trials if trial.arm == arm] for arm in arms}
-    means = {arm: summary(mine[arm])["mean"] for arm in arms}
-    hourly = {
-        arm: 3600.0 * workers * sum(trial.success for trial in rows) / sum(trial.seconds for trial in rows)
-        for arm, rows in mine.items()
-    }
-    out = {f"mean_success_{arm}": mean for arm, mean in means.items()}
-    out |= {f"kept_an_hour_{arm}": value for arm, value in hourly.items()}
+def ratios(trials: Sequence[Trial]) -> dict[str, float]:
+    """Mean rates of arms, kept demonstrations an hour on all workers, and what ours keeps beside the others.
+
+    Beside another arm only those tasks and seeds count that both have tried.
+    """
+    mine = {arm: [one for one in trials if one.arm == arm] for arm in dict.fromkeys(trial.arm for trial in trials)}
+    out: dict[str, float] = {f"mean_success_{arm}": summary(rows)["mean"] for arm, rows in mine.items()}
+    out |= {f"kept_an_hour_{arm}": hourly(rows) for arm, rows in mine.items()}
     for other in ("mimicgen", "scripted"):
-        if "ours" in means and means.get(other):
-            out[f"success_ours_over_{other}"] = means["ours"] / means[other]
-            out[f"kept_an_hour_ours_over_{other}"] = hourly["ours"] / hourly[other]
+        theirs = mine.get(other, [])
+        both = {(one.task, one.seed) for one in theirs} & {(one.task, one.seed) for one in mine.get("ours", [])}
+        ours, others = (
+            [one for one in rows if (one.task, one.seed) in both] for rows in (mine.get("ours", []), theirs)
+        )
+        if any(one.success for one in others):
+            out[f"success_ours_over_{other}"] = summary(ours)["mean"] / summary(others)["mean"]
+            out[f"kept_an_hour_ours_over_{other}"] = hourly(ours) / hourly(others)
     return out
+
+
+def hourly(trials: Sequence[Trial]) -> float:
+    """Kept demonstrations an hour, with as many at once as ran: seconds are those of one process."""
+    hours = sum(trial.seconds / trial.workers for trial in trials) / 3600.0
+    return sum(trial.success for trial in trials) / hours if hours else 0.0
 
 
 def text(trials: Sequence[Trial], head: str) -> str:
@@ -126,17 +147,22 @@ def text(trials: Sequence[Trial], head: str) -> str:
             lines.append(f"| {group} | {row['tasks']} | {row['mean']:.0%} | {row['worst']:.0%} |")
         lines += [f"| all | {len(found['tasks'])} | {found['mean']:.1%} | |"]
         lines += [f"| all, the goal at any step | {len(found['tasks'])} | {found['mean_ever']:.1%} | |", ""]
+        if found["mean_starts_covered"] is not None:
+            lines += [f"Squares of starts in which one was kept, of all tried: {found['mean_starts_covered']:.0%}.", ""]
         lines += [
-            "| task | kept | rate | 95 % | first try | s an attempt | most used source | fails most with |",
-            "|---|--:|--:|---|--:|--:|--:|---|",
+            "| task | kept | rate | 95 % | first try | s an attempt | most used source | starts covered "
+            "| fails most with |",
+            "|---|--:|--:|---|--:|--:|--:|--:|---|",
         ]
         for name, row in sorted(found["tasks"].items(), key=lambda one: (one[1]["rate"], one[0])):
             low, high = row["wilson_95"]
-            most = f"{row['most_used_source']:.0%}" if row["most_used_source"] else ""
+            most, covered = (
+                "" if row[key] is None else f"{row[key]:.0%}" for key in ("most_used_source", "starts_covered")
+            )
             why = next(iter(row["failures"]), "").replace("|", "/")
             lines.append(
                 f"| {name} | {row['kept']} of {row['attempts']} | {row['rate']:.0%} | {low:.0%} to {high:.0%} | "
-                f"{row['first_try']:.0%} | {row['seconds'] / row['attempts']:.1f} | {most} | {why} |"
+                f"{row['first_try']:.0%} | {row['seconds'] / row['attempts']:.1f} | {most} | {covered} | {why} |"
             )
         lines.append("")
     return "\n".join(lines)

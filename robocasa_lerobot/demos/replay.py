@@ -108,15 +108,19 @@ class Demonstration(Kitchen):
 
 
 def demonstrations(paths: Iterable[Path]) -> list[tuple[Path, str]]:
-    """Files and names of all demonstrations in files and folders, in order.
+    """Files and names of all demonstrations in files and folders, in order, each once however often it was given.
 
     Raises:
         UserError: there are none.
     """
     found: list[tuple[Path, str]] = []
+    seen: set[Path] = set()
     for path in paths:
         files = sorted(path.glob("*.hdf5")) if path.is_dir() else [path]
         for file in files:
+            if file.resolve() in seen:
+                continue
+            seen.add(file.resolve())
             if not file.is_file():
                 raise UserError(f"{file}: no such file or folder; `robocasa-lerobot demos` records demonstrations.")
             try:

@@ -46,7 +46,14 @@ def prepare_foreign(path: Path, bodies: Sequence[str], asset_roots: Sequence[Pat
                 "OSC_POSE. Files of these kitchens are prepared without --bodies."
             )
         model = model_of(path, demo, asset_roots)
-        found.append((demo, datagen_of(number, f"{path.stem}/{demo}", model, states, actions, bodies)))
+        try:
+            info = datagen_of(number, f"{path.stem}/{demo}", model, states, actions, bodies)
+        except KeyError as error:
+            raise UserError(
+                f"{path}, {demo}: its model has no Panda with a Panda's gripper under robosuite's names ({error}). "
+                "Sources of other robots cannot be carried over."
+            ) from error
+        found.append((demo, info))
         yield found[-1][1]
     with written_aside(path) as aside:
         shutil.copyfile(path, aside)

@@ -42,7 +42,8 @@ def test_every_task_belongs_to_a_class(report: ModuleType) -> None:
 def test_rates_and_ratios(report: ModuleType) -> None:
     def trial(task: str, seed: int, arm: str, success: bool, seconds: float, *sources: int) -> object:
         held, reason = success or seed == 1, "" if success else "late"
-        return report.Trial(task, seed, arm, success, held, 100, seconds, len(sources), sources, success, reason)
+        counted = (100, seconds, len(sources), sources, success, reason)
+        return report.Trial(task, seed, arm, success, held, *counted, workers=2, start=(seed // 2, 0))
 
     trials = [trial("OpenDrawer", seed, "ours", seed != 0, 1.0, seed % 2, 1) for seed in range(4)]
     trials += [trial("TurnOnStove", seed, "ours", True, 3.0, 5) for seed in range(4)]
@@ -55,7 +56,13 @@ def test_rates_and_ratios(report: ModuleType) -> None:
     assert ours["tasks"]["OpenDrawer"]["most_used_source"] == pytest.approx(5 / 6)
     assert ours["tasks"]["OpenDrawer"]["failures"] == {"late": 1}
     assert ours["classes"]["knobs, levers"] == {"tasks": 1, "mean": 1.0, "worst": 1.0}
-    found = report.ratios(trials, 2)
+    assert ours["tasks"]["OpenDrawer"]["starts_covered"] == 1.0
+    assert report.summary(trials[8:])["tasks"]["OpenDrawer"]["starts_covered"] == 0.5
+    # Seeds that the other arm has not tried say nothing of both.
+    more = [trial("OpenDrawer", seed, "ours", False, 9.0) for seed in range(4, 8)]
+    assert report.ratios([*trials, *more])["success_ours_over_mimicgen"] == pytest.approx(0.875 / 0.25)
+    assert report.ratios([*trials, *more])["mean_success_ours"] < 0.875
+    found = report.ratios(trials)
     assert found["success_ours_over_mimicgen"] == pytest.approx(0.875 / 0.25)
     assert found["kept_an_hour_ours"] == pytest.approx(2 * 3600 * 7 / 16)
     assert found["kept_an_hour_ours_over_mimicgen"] == pytest.approx((7 / 16) / (2 / 4))

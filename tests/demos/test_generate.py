@@ -128,10 +128,14 @@ def test_rules_of_a_file_replace_what_is_derived(tmp_path: Path) -> None:
     rules = read_rules(path)
     assert rules_for(rules, {"skill": "drawers", "verb": "open"}) == CutRules(near_m=0.1, frame="handle")
     assert rules_for(rules, {"skill": "drawers", "verb": "close"}) == CutRules()
+    path.write_text("drawers open:")
+    assert read_rules(path) == {}
     for wrong, said in (
         ("drawers pen: {}", "drawers open"),
         ("drawers open: {nearm: 1}", "near_m"),
         ("drawers open: {gap_steps: few}", "should be a int"),
+        ("drawers open: handle", "expected rules with their values"),
+        ("drawers open: {frame: handel}", "handle"),
         ("- a", "should name"),
     ):
         path.write_text(wrong)

@@ -12,10 +12,12 @@ import numpy as np
 import pytest
 
 from robocasa_lerobot import cli
+from robocasa_lerobot.demos.generate.mimicgen.refs import name_here
 from robocasa_lerobot.demos.generate.mimicgen.subtasks import (
     DatagenInfo,
     boundaries,
     carried,
+    datagen_of,
     read_datagen,
     selected,
     with_offsets,
@@ -48,7 +50,9 @@ from robocasa_lerobot.demos.generate.sources.transform import inverse, yaw_pose
 from robocasa_lerobot.demos.motion import Array, hand_rotation
 from robocasa_lerobot.demos.recording import RecordingSettings, record_tasks
 from robocasa_lerobot.demos.replay import replay
+from robocasa_lerobot.demos.skills.common import SkillError
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
+from robocasa_lerobot.envs.tasks.registry import task_names
 from robocasa_lerobot.errors import UserError
 
 STACK: dict[str, Any] = {
@@ -103,12 +107,14 @@ def written(path: Path, seeds: list[int]) -> Path:
     return path
 
 
-def opened(path: Path, *touches: slice, pose: Array | None = None, yaws: Array | float = 0.0) -> Path:
+def opened(
+    path: Path, *touches: slice, pose: Array | None = None, yaws: Array | float = 0.0, name: str = "drawer.box"
+) -> Path:
     """A file as `prepare` writes it, with one demonstration in which a drawer is touched and moved so often."""
     still_there, touched = still(np.eye(4) if pose is None else pose), np.zeros(STEPS, np.int64)
     for steps in touches:
         touched[steps] = 1
-    name = "drawer.box"
+    words = {"skill": "drawers", "verb": "open", "parts": [name], "thing": "", "place": "drawer"}
     found = Prepared(
         eef=still_there,
         target=still_there,
@@ -122,11 +128,11 @@ def opened(path: Path, *touches: slice, pose: Array | None = None, yaws: Array |
         contact_points={name: np.zeros((STEPS, 3))},
         undersides={},
         working_points={},
-        about={"stages": [{"skill": "drawers", "verb": "open", "parts": [name]}], "parts": {name: {"range": [0, 1]}}},
+        about={"stages": [words], "parts": {name: {"range": [0, 1]}}},
     )
     with h5py.File(path, "w") as file:
         demo = file.create_group("data/demo_0")
-        file["data"].attrs["env"] = "OpenDrawer"
+        file["data"].attrs["env"] = path.stem if path.stem in task_names() else "OpenDrawer"
         write_prepared(demo, found, signals_of(cut(found), STEPS))
     return path
 
@@ -158,6 +164,35 @@ def test_subtasks_are_derived_by_the_rules_that_are_given(tmp_path: Path) -> Non
     assert boundaries(apart.infos[0], apart.template) == [7, STEPS]  # where the first touch has ended
     with pytest.raises(UserError, match=r"no subtasks to carry over\. Choose another --method"):
         settings_of(opened(tmp_path / "none.hdf5"))
+
+
+def test_a_part_is_the_scenes_own_whatever_the_source_calls_its(tmp_path: Path) -> None:
+    for number, name in enumerate(("stove.knob_rear_left", "stove.knob_front_left")):
+        opened(tmp_path / f"{number}.hdf5", slice(2, 6), name=name)
+    sources = [one for number in range(2) for one in sources_of(tmp_path / f"{number}.hdf5", "OpenDrawer")]
+    template, alike = derived_template(sources)
+    assert [subtask.object_ref for subtask in template.subtasks] == ["stage0.part0"]
+    assert len(alike) == 2
+    assert all("stage0.part0" in datagen_of(0, source).objects for source in alike)
+    env = KitchenEnv("TurnOnStove", cameras=())
+    try:
+        called = {}
+        for seed in range(12):
+            env.reset(seed=seed)
+            called[name_here(env, "stage0.part0")] = env.scene.fill("stove.{knob}")
+        assert len(called) > 1
+        assert all(wanted.removeprefix("stove.") in name for name, wanted in called.items())
+        assert name_here(env, "stage0.place") == name_here(env, "stove") == "stove"
+        with pytest.raises(SkillError, match="has 1 of the parts"):
+            name_here(env, "stage0.part1")
+    finally:
+        env.close()
+
+
+def test_whole_subtasks_come_from_demonstrations_of_the_same_task(tmp_path: Path) -> None:
+    opened(tmp_path / "CloseDrawer.hdf5", slice(2, 6))
+    with pytest.raises(UserError, match="no sources of OpenDrawer, but of CloseDrawer"):
+        settings_of(tmp_path)
 
 
 def test_a_template_says_what_it_says_and_the_rest_is_the_librarys() -> None:
@@ -247,11 +282,12 @@ def test_files_are_generated_as_published_and_with_a_template(
     record_tasks([RecordingSettings(task, 10, split="pretrain", seed=100_000)], sources, show_progress=False)
     assert not any(outcome.dropped for outcome in prepare_files([sources]))
     found, alike = derived_template(sources_of(sources, task))
-    assert [subtask.object_ref for subtask in found.subtasks] == ["obj", "sink"]
+    assert [subtask.object_ref for subtask in found.subtasks] == ["stage0.object", "stage0.place"]
     assert len(alike) >= 2
     with h5py.File(sources / f"{task}.hdf5") as file:
         one = read_datagen(0, "one", file["data/demo_0"][GROUP])
-    end, last = boundaries(one, found)
+    (signal,) = one.signals
+    end, last = boundaries(datagen_of(0, alike[0]), found)
     assert 0 < end < last == len(one.eef)
     command = f"generate --source {sources} --tasks {task} --episodes 1 --split pretrain --seed 200500 --workers 1"
     assert cli.main([*command.split(), "--method", "mimicgen", "--out", str(tmp_path / "made")]) == 0
@@ -264,7 +300,6 @@ def test_files_are_generated_as_published_and_with_a_template(
     assert [row["ref"] for row in segments] == ["obj", "sink"]
     assert set(labels) <= {-1, *(row["demo"] for row in segments)}
     assert not base.any()
-    signal = found.subtasks[0].signal
     spec = {"subtask_1": {"object_ref": "obj", "subtask_term_signal": signal}, "subtask_2": {"object_ref": "sink"}}
     path = tmp_path / "template.json"
     path.write_text(json.dumps({"task": {"task_spec": spec}}))

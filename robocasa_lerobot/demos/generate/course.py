@@ -75,8 +75,11 @@ class Course:
     def most_alike(self, pieces: Sequence[Piece], env: KitchenEnv, stage: Stage) -> list[Piece]:
         """Those segments that are asked whether they fit a stage, where there are many, as of many tasks.
 
-        Those of drawn sources come first, and those of stages about the same kind of fixture.
+        Those of drawn sources come first, and those of stages about the same kind of fixture. Where the selection goes
+        by distance or by chance, it has all to go by.
         """
+        if self.manner.select != "feasible":
+            return list(pieces)
         fixture = env.scene.roles.get(stage.target)
         wanted = type(env.scene.fixtures[fixture]).__name__ if fixture else ""
 

@@ -76,6 +76,7 @@ def part_stage(env: KitchenEnv, stage: Stage, course: Course) -> Iterator[Array]
         row["moved"] = moved / fit.part.span
         if moved * np.sign(end - begin) < max(FRUITLESS_SHARE * fit.part.span, SLIPPED_SHARE * abs(end - before)):
             failed[fit.as_try()] += 1
+            row["in_vain"] = True
     if not (yield from _stays_done(env, stage, course)):
         raise SkillError(f"{stage.target}: not done after {MOST_SEGMENTS} segments")
 

@@ -25,6 +25,7 @@ from robocasa_lerobot.demos.generate.replays import (
 from robocasa_lerobot.demos.generate.select import Manner
 from robocasa_lerobot.demos.generate.sources.source import (
     Source,
+    UnfitSourcesError,
     digest_of,
     first_of_each_task,
     place_of,
@@ -114,12 +115,18 @@ class GenerationSettings(RecordingSettings):
         """The sources as MimicGen reads them.
 
         Raises:
-            UnfitSourcesError: one does not suit the template, or none can be derived.
+            UnfitSourcesError: one does not suit the template, they are other tasks', or none can be derived.
         """
         if self.template:
             place = place_of(self.folder, self.task)
             return read_sources(place, template_from(json.loads(self.template)), self.first_sources)
-        template, alike = derived_template(self.read())
+        found = self.read()
+        if others := sorted({source.task for source in found} - {self.task}):
+            raise UnfitSourcesError(
+                f"{self.folder} has no sources of {self.task}, but of {', '.join(others[:3])}: whole subtasks are "
+                "carried over from demonstrations of the same task. Record and prepare some, or leave --method out."
+            )
+        template, alike = derived_template(found)
         return suited(template, (datagen_of(number, source) for number, source in enumerate(alike)))
 
     def recorded(self) -> list[tuple[str, Demonstration]]:

@@ -22,6 +22,7 @@ from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.predicates.objects import middle_of
 from robocasa_lerobot.envs.projection import camera_matrix, project
 from robocasa_lerobot.envs.tasks.task import Stage
+from robocasa_lerobot.errors import UserError
 
 EVERY = 4  # steps between states that are looked at for contacts and views
 PATH_POINTS = 20  # of a path that is compared with others
@@ -81,7 +82,7 @@ def measure(path: Path, demo: str) -> Measures:
     """Of a demonstration in a file.
 
     Raises:
-        UserError: other software recorded it, or its kitchen cannot be made again.
+        UserError: other software recorded it, or its kitchen cannot be made again, or is made differently now.
     """
     recorded = read_demonstration(path, demo)
     with h5py.File(path) as file:
@@ -90,6 +91,12 @@ def measure(path: Path, demo: str) -> Measures:
     env = kitchen_of(recorded)
     try:
         env.reset(seed=recorded.seed)
+        expected = 1 + env.model.nq + env.model.nv
+        if recorded.states.shape[1] != expected:
+            raise UserError(
+                f"{path}, {demo}: found states of {recorded.states.shape[1]} numbers, expected {expected}: its kitchen "
+                "is made differently now. Take the version that recorded it, or leave the file out."
+            )
         return _measured(env, recorded, sources)
     finally:
         env.close()

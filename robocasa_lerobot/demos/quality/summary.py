@@ -55,8 +55,8 @@ class Quality:
     @property
     def covered(self) -> float:
         """Share of the squares in which an attempt began, in which one began that was kept."""
-        kept = {_square(one.start) for one in self.kept}
-        return len(kept) / max(len(kept | {_square(start) for start in self.failed}), 1)
+        kept = {square_of(one.start) for one in self.kept}
+        return len(kept) / max(len(kept | {square_of(start) for start in self.failed}), 1)
 
     @property
     def most_used_source(self) -> float | None:
@@ -132,7 +132,8 @@ class Quality:
         return found
 
 
-def _square(start: Start) -> tuple[int, int]:
+def square_of(start: Start) -> tuple[int, int]:
+    """Of the floor, in which an episode begins: numbers from the object or fixture on, ahead and to the left."""
     return int(np.floor(start.ahead_m / BIN_M)), int(np.floor(start.left_m / BIN_M))
 
 

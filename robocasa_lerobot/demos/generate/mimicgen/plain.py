@@ -14,6 +14,7 @@ import numpy as np
 from robocasa_lerobot import contract
 from robocasa_lerobot.demos.generate.course import BRIDGE, CONTACT, Course
 from robocasa_lerobot.demos.generate.execute import hand_now, pose_command
+from robocasa_lerobot.demos.generate.mimicgen.refs import name_here
 from robocasa_lerobot.demos.generate.mimicgen.subtasks import (
     DatagenInfo,
     boundaries,
@@ -96,7 +97,8 @@ def plain_episode(env: KitchenEnv, log: StageLog, sources: Sources, course: Cour
 
     def begin(info: DatagenInfo, subtask: Subtask, span: tuple[int, int]) -> None:
         log.current = min(subtask.stage, len(log.outcomes) - 1)
-        row = {"source": info.name, "demo": info.number, "kind": "subtask", "ref": subtask.object_ref}
+        ref = subtask.object_ref and name_here(env, subtask.object_ref)
+        row = {"source": info.name, "demo": info.number, "kind": "subtask", "ref": ref}
         course.used.append(row | {"steps": list(span)})
 
     gripper = -1.0
@@ -104,7 +106,7 @@ def plain_episode(env: KitchenEnv, log: StageLog, sources: Sources, course: Cour
         sources.infos,
         sources.template,
         course.rng,
-        pose_of=lambda ref: pose_of(env, ref),
+        pose_of=lambda ref: pose_of(env, name_here(env, ref)),
         hand=lambda: hand_now(env),
         begin=begin,
     )

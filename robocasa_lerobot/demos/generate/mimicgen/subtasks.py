@@ -11,12 +11,14 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
+from robocasa_lerobot.demos.generate.mimicgen.refs import refs_of
 from robocasa_lerobot.demos.generate.mimicgen.template import (
     NEAREST,
     OBJECT,
     RANDOM,
     Subtask,
     Template,
+    derived_signal,
 )
 from robocasa_lerobot.demos.generate.select import pose_distance
 from robocasa_lerobot.demos.generate.sources.segments import signals_of
@@ -73,10 +75,15 @@ def read_datagen(number: int, name: str, group: h5py.Group) -> DatagenInfo:
 
 
 def datagen_of(number: int, source: Source) -> DatagenInfo:
-    """The same of a source, with the signals of its segments: those in its file are of the common rules."""
-    data = source.data
-    signals = signals_of(list(source.segments), len(data))
-    return DatagenInfo(number, source.name, data.eef, data.target, data.gripper, data.poses, signals, source.seed)
+    """The same of a source, as a derived template calls it.
+
+    The signals are of its own segments: those in its file are of the common rules.
+    """
+    data, segments = source.data, list(source.segments)
+    risen = zip(segments, signals_of(segments, len(data)).values(), strict=False)  # the last segment has none
+    signals = {derived_signal(index, one.kind): values for index, (one, values) in enumerate(risen)}
+    poses = {**data.poses, **{ref: data.poses[name] for ref, name in refs_of(source).items()}}
+    return DatagenInfo(number, source.name, data.eef, data.target, data.gripper, poses, signals, source.seed)
 
 
 def write_datagen(group: h5py.Group, info: DatagenInfo, env_name: str) -> None:

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from robocasa_lerobot.demos.generate.mimicgen.refs import ref_of, refs_of
 from robocasa_lerobot.demos.generate.sources.segments import PLACE, USE
 from robocasa_lerobot.demos.generate.sources.source import Source, UnfitSourcesError
 from robocasa_lerobot.errors import UnknownNameError, UserError
@@ -144,6 +145,11 @@ def _subtask(where: str, spec: Mapping[str, Any], *, last: bool) -> Subtask:
     )
 
 
+def derived_signal(number: int, kind: str) -> str:
+    """Name of the signal that ends a derived subtask, of whatever part or object."""
+    return f"{number}_{kind}"
+
+
 def derived_template(sources: Sequence[Source]) -> tuple[Template, list[Source]]:
     """What RoboCasa's tasks have, from the segments of prepared sources, and those sources that it is for.
 
@@ -157,7 +163,7 @@ def derived_template(sources: Sequence[Source]) -> tuple[Template, list[Source]]
     """
 
     def kinds(source: Source) -> tuple[tuple[str, str], ...]:
-        return tuple((one.kind, one.ref) for one in source.segments)
+        return tuple((one.kind, ref_of(source, one)) for one in source.segments)
 
     sequences = Counter(kinds(source) for source in sources if source.segments)
     if not sequences:
@@ -171,11 +177,10 @@ def derived_template(sources: Sequence[Source]) -> tuple[Template, list[Source]]
     model = alike[0]
     subtasks = []
     for number, one in enumerate(model.segments):
-        words = model.data.about["stages"][one.stage]
+        words, place = model.data.about["stages"][one.stage], f"stage{one.stage}.place"
         last = number == len(model.segments) - 1
-        signal = None if last else f"{number}_{one.signal}"
-        ref = words["place"] if one.kind == PLACE else one.ref
-        if one.kind == USE and not words["about_itself"] and words["place"] in model.data.poses:
-            ref = words["place"]
+        signal = None if last else derived_signal(number, one.kind)
+        elsewhere = one.kind == PLACE or (one.kind == USE and not words["about_itself"])
+        ref = place if elsewhere and place in refs_of(model) else ref_of(model, one)
         subtasks.append(Subtask(ref, signal, selection=INTERPOLATION, neighbours=ROBOCASA_NEAREST, stage=one.stage))
     return Template(tuple(subtasks), per_subtask=True, first_pose=True, from_last_target=False), alike

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from robocasa_lerobot.demos.generate.course import Course
+from robocasa_lerobot.demos.generate.course import BRIDGE, Course
 from robocasa_lerobot.demos.generate.execute import as_target, hand_now
 from robocasa_lerobot.demos.generate.objects.pick_segments import come_to_object, pick_as_shown
 from robocasa_lerobot.demos.generate.objects.place_segments import place_as_shown
@@ -72,6 +72,7 @@ def object_stage(env: KitchenEnv, stage: Stage, course: Course) -> Iterator[Arra
         for _ in range(15):
             if stage_done(env, stage):
                 return
-            yield from hold_hand(env.data, as_target(hand_now(env)), CLOSED if is_held(env, obj.name) else OPEN, 1)
+            fingers = CLOSED if is_held(env, obj.name) else OPEN
+            yield from course.labelled(hold_hand(env.data, as_target(hand_now(env)), fingers, 1), BRIDGE)
     what = "was used in vain" if stage.verb in USES else "is not where it belongs"
     raise SkillError(f"{graspable(env, stage.object).title} {what} after {TRIES} tries")

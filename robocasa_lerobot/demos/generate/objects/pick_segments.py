@@ -113,9 +113,10 @@ def pick_as_shown(env: KitchenEnv, stage: Stage, obj: Graspable, course: Course,
     body = env.data.body(obj.name)
     start, turn = body.xpos.copy(), body.xmat.reshape(3, 3).copy()
     course.lay[obj.name] = where_it_lay(make_pose(start, turn), float(start[2]) - obj.below(turn))
-    row = course.begin(way.piece, cost=round(choice.cost, 3))
+    row = course.begin(way.piece, object=obj.name, cost=round(choice.cost, 3))
     yield from carry_out_segment(env, course, along(way, lambda: start - origin))
     row["held"] = is_held(env, obj.name)
+    row["in_vain"] = not row["held"]
     if row["held"] and enclosed:
         yield from course.labelled(draw_out(env, strategy, env.data.body(obj.name).xpos - start), BRIDGE)
     if not row["held"]:

@@ -93,12 +93,12 @@ def place_as_shown(
     if not is_held(env, obj.name):
         return
     put_down.append(way.targets[2].position)
-    course.begin(way.piece, cost=round(choice.cost, 3))
+    row = course.begin(way.piece, object=obj.name, cost=round(choice.cost, 3))
     slip = _slip(env, obj, held, way)
     yield from carry_out_segment(env, course, replace(along(way, lambda: slip), keeps=True))
-    if is_held(env, obj.name):
-        return
-    yield from course.labelled(leave(env, obj), BRIDGE)
+    row["in_vain"] = is_held(env, obj.name)
+    if not row["in_vain"]:
+        yield from course.labelled(leave(env, obj), BRIDGE)
 
 
 def _slip(env: KitchenEnv, obj: Graspable, held: Held, way: SegmentPath) -> Array:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -146,9 +146,10 @@ def use(env: KitchenEnv, stage: Stage, obj: Graspable, course: Course, failed: d
         lambda: _frame(env, stage, course)[:3, 3] - frame[:3, 3],
         lambda step: step == stays and touched_by_hand(env, obj)[0] and not stage_done(env, stage),
     )
-    row = course.begin(piece, cost=round(choice.cost, 3))
+    row = course.begin(piece, object=obj.name, cost=round(choice.cost, 3))
     yield from carry_out_segment(env, course, carried)
     row["done"] = stage_done(env, stage)
+    row["in_vain"] = not row["done"]
     if path.shown.opens is not None:
         yield from course.labelled(leave(env, obj), BRIDGE)
     if not row["done"]:
@@ -193,9 +194,11 @@ def _paths(
         own = about @ data.poses[segment.ref][segment.lead][:3, :3] @ held.rotation.T
         alike = _about_vertical(hand @ own.T)
         for spin in SPINS:
-            cost = float(course.bias[source]) + TRIED_COST * failed.get(source, 0)
+            drawn = float(course.bias[source])
+            cost = drawn + TRIED_COST * failed.get(source, 0)
             cost += TURN_COST * abs(turn) + SPIN_COST * min(abs(spin), np.pi - abs(spin))
-            found.append(use_path(stage, obj, held, frame, shown, about, alike + spin, cost))
+            way = use_path(stage, obj, held, frame, shown, about, alike + spin, cost)
+            found.append(replace(way, drawn=drawn))
     return cheapest(env, found, course)
 
 

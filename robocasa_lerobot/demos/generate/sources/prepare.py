@@ -188,6 +188,8 @@ def replayed(recorded: Demonstration) -> Prepared | str:
         if held < SUCCESS_HOLD_STEPS:
             return f"its actions do not reach the goal any more: it holds for {held} steps at the end"
         return watcher.prepared()
+    except OF_THE_MACHINE:
+        raise
     except UserError as error:
         return str(error)
     finally:

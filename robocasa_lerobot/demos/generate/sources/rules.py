@@ -14,6 +14,7 @@ from typing import Any
 
 import yaml
 
+from robocasa_lerobot.demos.generate.sources.frames import HANDLE, REST
 from robocasa_lerobot.demos.skills import SKILLS
 from robocasa_lerobot.errors import UnknownNameError, UserError
 
@@ -42,6 +43,7 @@ class CutRules:
 
 
 COMMON = CutRules()
+FRAMES = ("", HANDLE, REST)
 DERIVED: Mapping[str, CutRules] = MappingProxyType({})
 
 
@@ -54,7 +56,7 @@ def read_rules(path: Path) -> dict[str, CutRules]:
     """Rules by skill and verb from a YAML file, such as `drawers open: {near_m: 0.1, frame: handle}`.
 
     Raises:
-        UnknownNameError: no such verb, or no such rule.
+        UnknownNameError: no such verb, rule, or part to lie on.
         UserError: the file cannot be read, or a value is of another kind.
     """
     try:
@@ -79,10 +81,16 @@ def rules_from(asked: Mapping[str, Any], where: str = "rules") -> dict[str, CutR
     for verb, values in asked.items():
         if verb not in verbs:
             raise UnknownNameError("skill and verb", str(verb), verbs)
-        for name, value in dict(values or {}).items():
+        if values is None:
+            continue
+        if not isinstance(values, dict):
+            raise UserError(f"{where}, {verb}: found {values!r}, expected rules with their values, as near_m: 0.1.")
+        for name, value in values.items():
             if name not in known:
                 raise UnknownNameError("rule", str(name), known)
             if not isinstance(value, (int, float) if known[name] is float else known[name]):
                 raise UserError(f"{where}, {verb}: {name} is {value!r}, but should be a {known[name].__name__}.")
+        if (frame := values.get("frame", "")) not in FRAMES:
+            raise UnknownNameError(f"{where}, {verb}: frame", frame, FRAMES)
         found[str(verb)] = replace(COMMON, **values)
     return found
