@@ -12,6 +12,9 @@ from pathlib import Path
 
 import robocasa_lerobot
 
+# What `make study` writes as it goes, which changes nothing of what it runs next.
+_WRITTEN_BY_US = ("docs/results", "docs/results.md")
+
 
 def utc_now() -> str:
     """This moment, ISO 8601 with seconds."""
@@ -60,7 +63,7 @@ def _gpus() -> list[str]:
 def git_commit(*beside: str) -> str | None:
     """Commit of the checkout that this package runs from, with `-dirty` when tracked files differ; None elsewhere.
 
-    `beside` are folders of the checkout whose changes do not count.
+    `beside` are files and folders of the checkout whose changes do not count, as those of the study's results.
     """
     root = Path(robocasa_lerobot.__file__).parents[1]
     if not (root / ".git").exists():
@@ -68,7 +71,8 @@ def git_commit(*beside: str) -> str | None:
     try:
         commit = _git(root, "rev-parse", "HEAD")
         dirty = _git(
-            root, "status", "--porcelain", "--untracked-files=no", "--", ".", *(f":!{folder}" for folder in beside)
+            *(root, "status", "--porcelain", "--untracked-files=no", "--", "."),
+            *(f":!{path}" for path in (*_WRITTEN_BY_US, *beside)),
         )
     except (OSError, subprocess.SubprocessError):
         return None

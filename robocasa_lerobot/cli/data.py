@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from robocasa_lerobot.errors import UserError
+from robocasa_lerobot.jobs.parent import add_end_with_input, end_with_input
 
 if TYPE_CHECKING:
     from robocasa_lerobot.making.needs import Need
@@ -53,12 +54,15 @@ def configure(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--scale", metavar="NAME", help="as in `train`: what the experiment needs at that scale")
     parser.add_argument("--workers", type=int, help="processes of this machine (default: all cores)")
+    add_end_with_input(parser)
     add_options(parser)
     parser.set_defaults(takes_settings=True)
 
 
 def run(args: argparse.Namespace) -> int:
     """List, make or convert; status 1 if `--check` finds something missing or something could not be made."""
+    if args.end_with_input:
+        end_with_input()
     from robocasa_lerobot.config_files import find_config
     from robocasa_lerobot.jobs.executors import execution_of
     from robocasa_lerobot.jobs.workers import cores_here

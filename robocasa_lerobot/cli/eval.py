@@ -5,15 +5,14 @@ from __future__ import annotations
 import argparse
 import dataclasses
 import inspect
-import os
 import sys
 import textwrap
-import threading
 import typing
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
 from robocasa_lerobot.errors import UserError
+from robocasa_lerobot.jobs.parent import add_end_with_input, end_with_input
 
 if TYPE_CHECKING:
     from robocasa_lerobot.evaluation.config.evaluation import EvaluationConfig
@@ -32,9 +31,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
     add_options(parser)
     parser.add_argument("--shards", type=int, metavar="N", help="with --executor: into how many parts the plan is cut")
     parser.add_argument("--merge", action="store_true", help="join the results of --shard=1/N to N/N, run nothing")
-    parser.add_argument(
-        "--end-with-input", action="store_true", help="end when standard input closes, as when the caller is killed"
-    )
+    add_end_with_input(parser)
     parser.add_argument("--check", action="store_true", help="print what would run, and end; no checkpoint is needed")
     parser.add_argument(
         "--config_path",
@@ -57,7 +54,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Evaluate, print the success rates, write the report."""
     if args.end_with_input:
-        threading.Thread(target=_end_with_input, daemon=True).start()
+        end_with_input()
     from robocasa_lerobot.evaluation.config.evaluation import EvaluationConfig
     from robocasa_lerobot.evaluation.config.loader import load_config
     from robocasa_lerobot.evaluation.planning.run_header import partial_sentence
@@ -98,13 +95,6 @@ def run(args: argparse.Namespace) -> int:
     else:
         print(f"shard {config.shard} is complete. When all are: the same command with --merge instead of --shard.")
     return 0
-
-
-def _end_with_input() -> None:
-    """Wait for the end of standard input, and end with it; the workers end when their pipes close."""
-    while os.read(0, 4096):
-        pass
-    os._exit(1)
 
 
 def _run_elsewhere(config: EvaluationConfig, args: argparse.Namespace) -> int:

@@ -17,7 +17,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
         nargs="+",
         type=Path,
         metavar="RUN",
-        help="folder with a trials.jsonl, that file, or output of a training with evaluations",
+        help="folder with a trials.jsonl, such a file, or output of a training with evaluations",
     )
     parser.add_argument(
         "--training",
@@ -41,7 +41,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
         type=Path,
         default=None,
         metavar="FILE",
-        help="HTML file, with .md, .tex and .csv beside it; default: report.html in the first RUN",
+        help="HTML file, with .md, .tex and .csv beside it; default: report.html in the first RUN, or beside that file",
     )
     parser.add_argument("--title", default=None, help="heading of the report")
     parser.add_argument("--no-videos", action="store_true", help="film strips only, for a smaller file")
@@ -53,9 +53,9 @@ def run(args: argparse.Namespace) -> int:
     from robocasa_lerobot.evaluation.report.formats.render import check_ending
     from robocasa_lerobot.evaluation.report.output import print_rates, write_report
 
-    # Films and report lie beside the file.
     results = [path.parent if path.name == TRIALS_FILE and path.is_file() else path for path in args.results]
-    out = args.out or results[0] / "report.html"
+    # Films and report lie beside a file.
+    out = args.out or (results[0].parent if results[0].is_file() else results[0]) / "report.html"
     check_ending(out)
     print_rates(results)
     write_report(results, args.training, args.demos, out, args.title, videos=not args.no_videos)

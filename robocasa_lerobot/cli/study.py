@@ -24,7 +24,9 @@ def configure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--measure", type=int, default=20, metavar="STEPS", help="steps that --plan times; 0: none (default 20)"
     )
-    parser.add_argument("--seeds", type=int, metavar="N", help="trainings of each experiment (default: the part's own)")
+    parser.add_argument(
+        "--seeds", type=int, metavar="N", help="trainings of each experiment of PARTs (default: their own)"
+    )
     parser.add_argument(
         "--device",
         choices=DEVICES,
@@ -36,7 +38,12 @@ def configure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--episodes", metavar="KIND=N,...", help="as in `data`: demonstrations of each task (default: the registry's)"
     )
-    parser.add_argument("--root", type=Path, metavar="DIR", help="folder of the trainings (default: the study file's)")
+    parser.add_argument(
+        "--root",
+        type=Path,
+        metavar="DIR",
+        help="folder of the trainings (default: the study file's, another one for each --device, --scale, --episodes)",
+    )
     parser.add_argument("--results", type=Path, metavar="DIR", help="where ended runs are kept (default: ROOT/results)")
     parser.add_argument("--page", type=Path, metavar="FILE", help="Markdown page (default: RESULTS/results.md)")
     parser.add_argument("--report", action="store_true", help="run nothing: write the page of what has ended")
@@ -50,22 +57,27 @@ def run(args: argparse.Namespace) -> int:
     for name in ("seeds", "workers"):
         if getattr(args, name) is not None and getattr(args, name) < 1:
             raise UserError(f"--{name} is {getattr(args, name)}, expected at least 1.")
-    study = load_study(args.config_path, args.seeds)
-    parts = study.chosen(args.parts)
+    study = load_study(args.config_path)
+    parts = study.chosen(args.parts, args.seeds)
 
     # After the mistakes: these take seconds.
     from robocasa_lerobot.data.registry.registry import open_registry
     from robocasa_lerobot.jobs.workers import cores_here
+    from robocasa_lerobot.making.needs import parse_episodes
+    from robocasa_lerobot.study.check import check_study
     from robocasa_lerobot.study.costs import cost_lines, costs
     from robocasa_lerobot.study.page import write_page
     from robocasa_lerobot.study.runs import configs_for, root_for, runs_of
-    from robocasa_lerobot.study.stored import is_stored, read_stored, stands_for, store
+    from robocasa_lerobot.study.stored import check_results, is_stored, read_stored, stands_for, store
 
-    root = args.root or root_for(study, args.device, args.scale)
+    numbers = parse_episodes(args.episodes) if args.episodes else {}
+    episodes = ",".join(f"{kind}={number}" for kind, number in sorted(numbers.items())) or None
+    root = args.root or root_for(study, args.device, args.scale, episodes)
     results = args.results or root / "results"
-    asked = (args.scale, args.episodes)
+    asked = (args.scale, episodes)
     configs = configs_for(args.device, study, root)
     sets = open_registry(str(configs / study.registry)).task_sets
+    check_study(study, configs, sets)
     if args.plan:
         runs, planned = {}, set[str]()
         for name, part in parts.items():
@@ -76,14 +88,17 @@ def run(args: argparse.Namespace) -> int:
         found = costs(study, runs, configs, cores, args.measure)
         print("\n".join(cost_lines(parts, found, cores, args.device)))
         return 0
-    whole = runs_of(list(study.parts.values()), root, configs, *asked)
+    shown = study.shown_with(parts)
+    whole = runs_of(list(shown.parts.values()), root, configs, *asked)
 
     def report() -> None:
         there = [(run, read_stored(results, run.experiment, run.seed)) for run in whole]
         stored = {(run.experiment, run.seed): one for run, one in there if one and stands_for(one.about, run)}
-        write_page(study, stored, sets, results, args.page or results / "results.md")
+        write_page(shown, stored, sets, results, args.page or results / "results.md")
 
     wanted = [] if args.report else runs_of(list(parts.values()), root, configs, *asked)
+    if wanted:
+        check_results(whole, results)
     for number, run in enumerate(wanted, start=1):
         if is_stored(run, results):
             continue

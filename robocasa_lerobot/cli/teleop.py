@@ -35,7 +35,10 @@ def configure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--operator", default="", help="name that is written into each episode")
     parser.add_argument("--hide-goal", action="store_true", help="do not show whether the goal's terms hold")
     parser.add_argument(
-        "--image-size", type=int, default=256, help="height and width of the pictures (default 256; a policy's own)"
+        "--image-size",
+        type=int,
+        default=256,
+        help="height and width of the pictures that you see (default 256); a policy sees its own size",
     )
     parser.add_argument("--preset", default="fast", help="fast, or quality: with shadows (default fast)")
     parser.add_argument("--host", default="127.0.0.1", help="address to serve at (default 127.0.0.1, this machine)")
@@ -49,7 +52,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--policy-keys", default="", help="key map of a policy behind a socket, as eval's --policy.keys"
     )
-    parser.add_argument("--device", default="auto", help="that the policy computes on: auto, cpu or cuda")
+    parser.add_argument("--device", default="auto", help="that the policy computes on: auto, cpu, cuda, cuda:1, mps")
 
 
 def run(args: argparse.Namespace) -> int:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import argparse
 
+from robocasa_lerobot.jobs.parent import add_end_with_input, end_with_input
+
 EXAMPLE = "robocasa-lerobot train --config_path configs/experiments/demo.yaml"
 
 
@@ -36,6 +38,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--measure", type=int, default=20, metavar="STEPS", help="steps that --plan times; 0: none (default 20)"
     )
+    add_end_with_input(parser)
     parser.epilog = (
         f"{parser.epilog or ''}\n\nAny setting of the experiment can be given as --name=value, such as\n"
         "  --output_dir=outputs/try --phases.pretrain.batch_size=16 --policy.horizon=16 --defaults.learning_rate=1e-4"
@@ -45,6 +48,8 @@ def configure(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Run the experiment; 0 when finished, 3 when it stopped as asked, 75 when a signal ended it (run it again)."""
+    if args.end_with_input:
+        end_with_input()
     from robocasa_lerobot.training.cpu_tuning import limit_spinning
 
     limit_spinning()

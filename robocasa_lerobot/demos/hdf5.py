@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import contextlib
 import datetime
+import io
 import json
-from collections.abc import Iterable, Mapping
+from collections.abc import Buffer, Iterable, Iterator, Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -55,14 +57,73 @@ class Failure:
 
 
 def segments_of(meta: Mapping[str, Any]) -> tuple[tuple[str, str], ...]:
-    """What each segment of a generated episode is about, and its source's name, from its `ep_meta`."""
+    """What each segment of a generated episode is about, and its source's name, from its `ep_meta`.
+
+    Parts and objects are called as in the episode's own scene: `ref` is what the source called them.
+    """
     rows = meta.get("generation", {}).get("segments", ())
-    return tuple((f"{row['kind']} {row['ref']}".strip(), str(row["source"])) for row in rows)
+    return tuple(
+        (f"{row['kind']} {row.get('part', row.get('object', row['ref']))}".strip(), str(row["source"])) for row in rows
+    )
+
+
+class _Shielded(io.FileIO):
+    """A file in which no write seems to fail to HDF5; `error` is what failed first.
+
+    On a full disk HDF5 2.0 raises RuntimeError from its own bookkeeping when a file is closed, and where datasets are
+    compressed it ends the whole process.
+    """
+
+    error: OSError | None = None
+
+    def write(self, data: Buffer, /) -> int:
+        """Write all of it, or note why not."""
+        left = memoryview(data).cast("B")
+        size = len(left)
+        while len(left) and self.error is None:
+            try:
+                left = left[super().write(left) :]
+            except OSError as error:
+                self.error = error
+        return size
+
+    def truncate(self, size: int | None = None, /) -> int:
+        """Cut or extend, or note why not."""
+        try:
+            return super().truncate(size)
+        except OSError as error:
+            self.error = self.error or error
+            return size or 0
+
+
+@contextlib.contextmanager
+def _new_file(path: Path) -> Iterator[h5py.File]:
+    """A file to fill, which appears at `path` only when complete.
+
+    Raises:
+        OSError: it cannot be written, or what HDF5 was told to copy cannot be read.
+    """
+    with written_aside(path) as aside, _Shielded(aside, "w+") as shielded:
+        try:
+            with h5py.File(shielded, "w") as file:
+                yield file
+        except RuntimeError as error:  # what HDF5 has no better word for
+            if shielded.error is None:
+                raise OSError(f"{path} cannot be written: {error}") from error
+        except Exception:
+            if shielded.error is None:
+                raise
+        if shielded.error is not None:
+            raise OSError(shielded.error.errno, shielded.error.strerror, str(path)) from shielded.error
 
 
 def write_part(path: Path, recording: Recording) -> None:
-    """Write one episode to a file of its own; it appears under its name only when complete."""
-    with written_aside(path) as aside, h5py.File(aside, "w") as file:
+    """Write one episode to a file of its own; it appears under its name only when complete.
+
+    Raises:
+        OSError: it cannot be written, on a full disk for example.
+    """
+    with _new_file(path) as file:
         demo = file.create_group("demo")
         demo.attrs["model_file"] = recording.model_file
         demo.attrs["ep_meta"] = json.dumps(recording.ep_meta)
@@ -133,10 +194,13 @@ def merge_parts(
     """Join episode files to one file `path`, demos numbered from 0; returns the number of steps in all.
 
     The file appears under its name only when complete.
+
+    Raises:
+        OSError: it cannot be written, or a part cannot be read.
     """
     now = datetime.datetime.now(datetime.UTC)
     total = 0
-    with written_aside(path) as aside, h5py.File(aside, "w") as file:
+    with _new_file(path) as file:
         data = file.create_group("data")
         for index, part in enumerate(parts):
             with h5py.File(part, "r") as source:

@@ -9,6 +9,8 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
+from robocasa_lerobot.jobs.parent import END_WITH_INPUT
+
 STOP_SIGNALS = (signal.SIGTERM, signal.SIGUSR1)  # Slurm sends the one it is told to before the time is over
 # Not `-m`: the module would be there twice, and so would the classes of its messages.
 _PROGRAM = "import sys; from {module} import serve; serve(*map(int, sys.argv[1:]))"
@@ -30,9 +32,11 @@ def start_serving(module: str, descriptors: Sequence[int], **environment: str) -
 def run_command(*arguments: str) -> int:
     """Run a command of `robocasa-lerobot` to its end and return its status, negative where a signal ended it.
 
-    What asks this process to end is passed on to the command, which would otherwise go on alone.
+    What asks this process to end is passed on to the command, which would otherwise go on alone; where this process is
+    killed, the command ends as its standard input closes. It is one that knows `--end-with-input`.
     """
-    with subprocess.Popen([sys.executable, "-m", "robocasa_lerobot.cli", *arguments]) as child:
+    command = [sys.executable, "-m", "robocasa_lerobot.cli", *arguments, END_WITH_INPUT]
+    with subprocess.Popen(command, stdin=subprocess.PIPE) as child:
 
         def pass_on(number: int, _frame: object) -> None:
             child.send_signal(number)

@@ -146,7 +146,7 @@ def submit_to_slurm(
     Raises:
         UserError: jobs of an earlier call are still in the queue, or Slurm refuses.
     """
-    from robocasa_lerobot.jobs.slurm import ArrayExecutor
+    from robocasa_lerobot.jobs.slurm import ArrayExecutor, JobRecord
 
     record = logs / JOBS_FILE  # not in the folder of the work, which the last job removes
     if record.is_file():
@@ -163,6 +163,7 @@ def submit_to_slurm(
         tasks=pieces,
         logging_dir=str(folder),
         skip_completed=skip_complete,
+        job_id_retriever=JobRecord(record),
         slurm_logs_folder=str(logs),
         time=slurm.time,
         partition=slurm.partition,
@@ -186,7 +187,6 @@ def submit_to_slurm(
         last = executor.submit_after(array, shlex.join(command))
     except (subprocess.CalledProcessError, OSError) as error:
         raise UserError(f"Slurm did not take the jobs: {error}. Its message stands above.") from error
-    record.write_text(json.dumps([job for job in (array, last) if job]), encoding="utf-8")
     return array, last
 
 

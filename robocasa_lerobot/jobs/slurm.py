@@ -5,14 +5,36 @@
 
 from __future__ import annotations
 
+import json
 import pickle
 import sys
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from datatrove.executor.base import DistributedEnvVars
-from datatrove.executor.slurm import SlurmPipelineExecutor, launch_slurm_job
+from datatrove.executor.slurm import SlurmPipelineExecutor, default_job_id_retriever, launch_slurm_job
 from datatrove.utils.logging import logger as datatrove_logger
+
+
+@dataclass
+class JobRecord:
+    """Finds a job's number in what sbatch said, and notes it in a file at once: what comes after may fail.
+
+    Attributes:
+        file: JSON list of the jobs of one submission; one of an earlier submission is replaced.
+        jobs: their numbers so far.
+    """
+
+    file: Path
+    jobs: list[str] = field(default_factory=list)
+
+    def __call__(self, said: str) -> str:
+        """The job's number."""
+        number = str(default_job_id_retriever(said, -1))
+        self.jobs.append(number)
+        self.file.write_text(json.dumps(self.jobs), encoding="utf-8")
+        return number
 
 
 class ArrayExecutor(SlurmPipelineExecutor):

@@ -15,8 +15,10 @@ from typing import TYPE_CHECKING
 from robocasa_lerobot.data.registry.published import dataset_version
 from robocasa_lerobot.data.registry.recipes import REPLAY, RecipeConfig
 from robocasa_lerobot.demos.attempts import Parts, RecordingSettings
+from robocasa_lerobot.demos.hdf5 import read_summary
 from robocasa_lerobot.files import write_text
 from robocasa_lerobot.jobs.executors import Execution
+from robocasa_lerobot.jobs.publish import held_folder
 from robocasa_lerobot.making.needs import WORK, Need
 from robocasa_lerobot.making.pieces import Outcome, run_pieces
 
@@ -80,15 +82,17 @@ class MadeDataset:
         """Record, convert, and draw again; files that are there are left alone. Returns what people should be told.
 
         Raises:
-            UserError: too many attempts failed, or a dataset of other making is already there.
+            UserError: too many attempts failed, a dataset of other making is already there, or it is being made.
         """
-        if self._lacks(self.need):
-            self._record_and_convert(workers)
-        for need in self.drawn:
-            if self._lacks(need):
-                self._draw_again(need, workers)
-        note = self._instead / _REASON
-        return note.read_text(encoding="utf-8") if note.is_file() else ""
+        with held_folder(self.work):
+            if self._lacks(self.need):
+                self._drop_other_numbers()
+                self._record_and_convert(workers)
+            for need in self.drawn:
+                if self._lacks(need):
+                    self._draw_again(need, workers)
+            note = self._instead / _REASON
+            return note.read_text(encoding="utf-8") if note.is_file() else ""
 
     @property
     def _instead(self) -> Path:
@@ -102,6 +106,21 @@ class MadeDataset:
             return False
         info = json.loads((need.root / "meta/info.json").read_text(encoding="utf-8"))
         return int(info["total_episodes"]) < (need.demonstrations or 0)
+
+    def _drop_other_numbers(self) -> None:
+        """Remove finished files of other numbers of demonstrations, which a kill before their conversion has left.
+
+        What is not a file yet goes on: attempts are the same for any number.
+        """
+        settings = recording_settings(self.need)
+        name = f"{settings.task}.hdf5"
+        if _other_number(self.work / SOURCES / name, _recipe(self.need).sources_for(settings.episodes)):
+            shutil.rmtree(self.work / SOURCES)  # and what was generated from these
+            shutil.rmtree(Parts(self.work, settings).folder, ignore_errors=True)
+            (self.work / name).unlink(missing_ok=True)
+        for folder in (self.work, self._instead):
+            if _other_number(folder / name, settings.episodes):
+                (folder / name).unlink()
 
     def _record_and_convert(self, workers: int) -> None:
         from robocasa_lerobot.convert.pipeline import convert
@@ -204,6 +223,11 @@ def make_datasets(pieces: Sequence[MadeDataset], execution: Execution, cores: in
     if not outcome.submitted:
         _clear_empty(root / WORK)
     return outcome
+
+
+def _other_number(file: Path, episodes: int) -> bool:
+    """Whether a file was recorded to have another number of demonstrations."""
+    return file.exists() and (read_summary(file).settings or {}).get("episodes") != episodes
 
 
 def _clear_empty(folder: Path) -> None:

@@ -116,16 +116,20 @@ def run_pieces(
     logs.mkdir(parents=True, exist_ok=True)
     cpus = cores if execution.kind == "local" else execution.cpus
     step = partial(run_piece, pieces=pieces, logs=logs, workers=cpus)
+    # Every piece runs: the datasets say what is left, and markers of a run before outlive one that was removed or that
+    # is asked for with more demonstrations.
     if execution.kind == "slurm":
         last = partial(_summed_up, pieces, logs)
-        array, final = submit_to_slurm(step, last, len(pieces), logs, folder / _LOGS, execution.slurm)
+        array, final = submit_to_slurm(
+            step, last, len(pieces), logs, folder / _LOGS, execution.slurm, skip_complete=False
+        )
         line = (
             f"submitted to Slurm: {len(pieces)} pieces in job {array}, summed up by job {final}; see {folder / _LOGS}"
         )
         return Outcome({}, submitted=line)
     with _progress(pieces, what, unit):
         if execution.kind == "ray":
-            run_with_ray(step, len(pieces), logs, execution.ray)
+            run_with_ray(step, len(pieces), logs, execution.ray, skip_complete=False)
         else:
             _run_here(step, len(pieces), logs, cores, preload)
     return _outcome(pieces, logs)

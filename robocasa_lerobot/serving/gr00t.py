@@ -32,6 +32,9 @@ _OPTIONS = ("seed", "number", "reset")
 _UNAUTHORIZED = "Unauthorized: Invalid API token"  # their words, which clients look for
 # Clients leave without a word, and may simulate for minutes between two requests.
 _SILENT_SECONDS = 3600.0
+# Messages of a client that are read before their turn; all else waits in its own queue. Messages of ever so many parts
+# count once, and ZeroMQ knows no limit of them.
+_MOST_WAITING = 2
 _KNOWN = 16  # times as many clients as are served at a time are known at most, however often they ask
 
 
@@ -78,6 +81,7 @@ class GrootServer:
         tasks: set[asyncio.Task[None]] = set()
         try:
             socket.setsockopt(zmq.MAXMSGSIZE, self._limits.message_bytes)
+            socket.setsockopt(zmq.RCVHWM, _MOST_WAITING)
             socket.setsockopt(zmq.LINGER, 1000)
             socket.setsockopt(zmq.IPV6, int(":" in self._access.host))
             host = f"[{self._access.host}]" if ":" in self._access.host else self._access.host

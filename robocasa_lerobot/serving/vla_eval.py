@@ -99,6 +99,8 @@ class VlaEvalServer:
                 raise
             except Exception as error:
                 text = describe(error)
+                if episode is not None and episode.broken:
+                    episode, text = None, f"{text}; the episode has ended with it: begin another with episode_start"
                 _log.warning("a client's request failed: %a", text, exc_info=not is_clients_mistake(error))
                 await connection.send(self._pack("error", {"error": text}, sequence))
 
@@ -146,7 +148,11 @@ class VlaEvalServer:
 
 
 class Episode:
-    """One trial: its history of observations and its queue of actions."""
+    """One trial: its history of observations and its queue of actions.
+
+    Attributes:
+        broken: whether the policy has failed, which leaves history and queue between two steps.
+    """
 
     def __init__(self, host: Host, session: Session) -> None:
         self._host, self._session = host, session
@@ -156,12 +162,13 @@ class Episode:
         self._actor = ChunkActor(host.served.source.label, shape, self._predict)
         self._actor.reset(seed, None)
         self._step = 0
+        self.broken = False
 
     def act(self, payload: Mapping[Any, Any]) -> np.ndarray:
         """The action (12,) for the next observation, in the order that its names stand for.
 
         Raises:
-            RequestError: the observation is not what the policy needs.
+            RequestError: the observation is not what the policy needs; anything else is the policy's.
         """
         seed = whole_number(payload, "seed") if self._step == 0 else None
         if seed is not None:
@@ -173,7 +180,9 @@ class Episode:
             asked = read_observation(payload, self._host.wanted_now)
             observation, instruction = asked.observations[0], asked.instruction
             self._stored_order = asked.stored_order
+        self.broken = True
         action = self._actor.act(observation, instruction)
+        self.broken = False
         self._step += 1
         return action if self._stored_order else contract.stored_to_hdf5(action)
 

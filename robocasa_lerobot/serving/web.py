@@ -91,8 +91,9 @@ async def serve_websockets(
             max_queue=1,
             ping_interval=None,  # a client that renders or plans for minutes is not gone
         )
-    except OSError as error:
-        raise UserError(f"cannot listen on {access.host}:{access.port}: {error.strerror or error}") from error
+    except (OSError, UnicodeError) as error:  # the latter: no name of a host
+        why = getattr(error, "strerror", None) or error
+        raise UserError(f"cannot listen on {access.host}:{access.port}: {why}") from error
     ready(server.sockets[0].getsockname()[1])
     await stop.wait()
     server.close()

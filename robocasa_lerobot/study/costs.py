@@ -6,10 +6,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
+from robocasa_lerobot.data.registry.registry import open_registry
 from robocasa_lerobot.evaluation.records.results import TRIALS_FILE
 from robocasa_lerobot.making.estimate import estimate
 from robocasa_lerobot.making.needs import Need, needs_of, parse_episodes
-from robocasa_lerobot.settings import load_yaml
 from robocasa_lerobot.study.runs import Run
 from robocasa_lerobot.study.settings import PartConfig, StudyConfig
 from robocasa_lerobot.training.config.experiment import load_experiment
@@ -58,8 +58,8 @@ def costs(
     Raises:
         UserError: a mistake in an experiment.
     """
-    registry = load_yaml(configs / study.registry)
-    pixels = min(int(dataset["make"]["image_size"]) for dataset in registry["datasets"])
+    datasets = open_registry(str(configs / study.registry)).config.datasets
+    pixels = min((dataset.make.image_size for dataset in datasets if dataset.make is not None), default=None)
     measured: dict[str, float | str] = {}
     recorded: set[Path] = set()
     plans: dict[str, _Plan] = {}
@@ -102,8 +102,9 @@ class _Plan:
     steps: int
 
 
-def _planned(run: Run, pixels: int, measured_steps: int, measured: dict[str, float | str]) -> _Plan:
-    experiment = load_experiment(run.write_file(), (f"--loader.image_size={pixels}",), run.scale)
+def _planned(run: Run, pixels: int | None, measured_steps: int, measured: dict[str, float | str]) -> _Plan:
+    sizes = () if pixels is None else (f"--loader.image_size={pixels}",)
+    experiment = load_experiment(run.write_file(), sizes, run.scale)
     needs, _ = needs_of(experiment, parse_episodes(run.episodes) if run.episodes else {})
     phases = plan_experiment(experiment, measured_steps=measured_steps, measured=measured)
     evaluations = plan_evaluations(experiment, [plan.phase for plan in phases if not plan.left_out])

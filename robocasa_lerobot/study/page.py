@@ -122,10 +122,11 @@ def _most(part: PartConfig, rates: Mapping[str, CellRate]) -> list[str]:
 
 def _retained(name: str, rows: Mapping[int, str], lifelong: Mapping[str, Lifelong]) -> str:
     found, last = lifelong.get(name), max(rows)
-    if found is None or last not in found.matrix:
+    matrix: Mapping[int, Mapping[int, Estimate]] = {} if found is None else found.matrix
+    earlier = [j for j in rows if j < last and j in matrix.get(last, {}) and j in matrix.get(j, {})]
+    if not earlier:
         return f"- {name}: not run to its end yet."
-    earlier = [j for j in rows if j < last and j in found.matrix.get(j, {})]
-    after, before = _mean([found.matrix[last][j] for j in earlier]), _mean([found.matrix[j][j] for j in earlier])
+    after, before = _mean([matrix[last][j] for j in earlier]), _mean([matrix[j][j] for j in earlier])
     share = f", {after.value / before.value:.0%} of it" if before.value else ""
     return f"- {name}: the earlier phases reached {_percent(before)}, and after the last one {_percent(after)}{share}."
 

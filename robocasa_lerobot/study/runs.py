@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+import re
 import shutil
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -12,7 +14,8 @@ from typing import Any
 import yaml
 
 from robocasa_lerobot.config_files import configs_folder
-from robocasa_lerobot.errors import UserError
+from robocasa_lerobot.data.registry.registry_file import RegisteredDataset, load_registry
+from robocasa_lerobot.errors import UnknownNameError, UserError
 from robocasa_lerobot.files import write_text
 from robocasa_lerobot.jobs.child_process import run_command
 from robocasa_lerobot.settings import load_yaml
@@ -76,8 +79,18 @@ class Run:
     def config(self) -> ExperimentConfig:
         """The experiment, without its seed and folder."""
         if not self.base.is_file():
-            raise UserError(f"the study names the experiment {self.experiment!r}; there is no {self.base}.")
+            known = [file.stem for file in self.base.parent.glob("*.yaml")]
+            raise UnknownNameError("experiment", self.experiment, known, f"(of the study; there is no {self.base})")
         return load_experiment(self.base, scale=self.scale)
+
+    @property
+    def device(self) -> str:
+        """The kind of device that it trains on: the experiment's, or the best one that this machine has."""
+        if self.config.device is not None:
+            return self.config.device
+        from robocasa_lerobot.training.setup.builders import best_device  # with torch, which `--help` needs not
+
+        return best_device(None)
 
     def write_file(self) -> Path:
         """Write that file and return its path."""
@@ -148,10 +161,14 @@ def runs_of(
     return list(found.values())
 
 
-def root_for(study: StudyConfig, device: str, scale: str | None) -> Path:
-    """The folder of the trainings: another one for each device and scale, which are other trainings."""
-    others = [name for name in (device if device != CPU else None, Path(scale).stem if scale else None) if name]
-    return Path("_".join([study.root, *others]))
+def root_for(study: StudyConfig, device: str, scale: str | None, episodes: str | None = None) -> Path:
+    """The folder of the trainings: another one for each device, scale and `KIND=N,...`, which are other trainings."""
+    others = [
+        None if device == CPU else device,
+        Path(scale).stem if scale else None,
+        re.sub(r"[^\w.]+", "-", episodes) if episodes else None,
+    ]
+    return Path("_".join([study.root, *filter(None, others)]))
 
 
 def configs_for(device: str, study: StudyConfig, root: Path) -> Path:
@@ -160,20 +177,23 @@ def configs_for(device: str, study: StudyConfig, root: Path) -> Path:
     In the copy the larger policy stands in the place of the small one, and recorded pictures have twice as many pixels
     each way, in a dataset folder of their own; so have those of experiments that name a size, and experiments that name
     a policy's file have the larger one's. Batches are eight times as large, and steps a quarter as many.
+
+    Raises:
+        UserError: the study's registry is not among the files that are copied, or has a mistake.
     """
     configs = configs_folder()
     if device == CPU:
         return configs
+    if not (configs / study.registry).resolve().is_relative_to(configs.resolve()):  # it would be written to itself
+        raise UserError(
+            f"the study's `registry` is {study.registry}, outside of {configs}. With --device {device} a changed copy "
+            "of that folder is used: put the registry file there, and name it from there."
+        )
     copy = root / "configs"
     shutil.copytree(configs, copy, dirs_exist_ok=True)
     parts = copy / "experiments" / "parts"
     shutil.copyfile(parts / _GPU_POLICY, parts / _POLICY)
-    registry = copy / study.registry
-    content: dict[str, Any] = load_yaml(registry)
-    content["root"] = f"{content['root']}_{CUDA}"
-    for dataset in content["datasets"]:
-        dataset["make"]["image_size"] = int(dataset["make"]["image_size"]) * _GPU_PIXELS
-    write_text(registry, yaml.safe_dump(content, sort_keys=False))
+    _enlarge_pictures(copy / study.registry)
     for file in sorted((copy / "experiments" / EXPERIMENTS).glob("*.yaml")):
         experiment: dict[str, Any] = load_yaml(file)
         policy = experiment.get("policy")
@@ -181,10 +201,32 @@ def configs_for(device: str, study: StudyConfig, root: Path) -> Path:
             experiment["policy"] = str(Path(policy).with_name(_GPU_POLICIES[Path(policy).name]))
         elif isinstance(policy, dict) and "image_size" in policy:
             policy["image_size"] = [pixels * _GPU_PIXELS for pixels in policy["image_size"]]
-        for settings in (experiment.get("defaults", {}), *experiment.get("phases", [])):
+        for settings in (experiment.get("defaults") or {}, *(experiment.get("phases") or [])):
             if "steps" in settings:
                 settings["steps"] //= _GPU_STEPS
             if "batch_size" in settings:
                 settings["batch_size"] *= _GPU_BATCH
         write_text(file, yaml.safe_dump(experiment, sort_keys=False))
     return copy
+
+
+def _enlarge_pictures(file: Path) -> None:
+    """Let a registry file record larger pictures, in folders of their own; what is not recorded stays where it is."""
+    registry = load_registry(file)  # as it is with those that it is laid over
+    recorded = registry.scheme is None and all(dataset.make is not None for dataset in registry.datasets)
+    own_root = recorded and Path(registry.root).name != ""
+    folder = "" if own_root else f"{CUDA}/"
+
+    def enlarged(dataset: RegisteredDataset) -> RegisteredDataset:
+        if dataset.make is None:
+            return dataset
+        redraw = None if dataset.make.redraw is None else f"{folder}{dataset.make.redraw}"
+        make = dataclasses.replace(dataset.make, image_size=dataset.make.image_size * _GPU_PIXELS, redraw=redraw)
+        return dataclasses.replace(dataset, path=f"{folder}{dataset.path}", make=make)
+
+    changed = dataclasses.replace(
+        registry,
+        root=f"{registry.root}_{CUDA}" if own_root else registry.root,
+        datasets=[enlarged(dataset) for dataset in registry.datasets],
+    )
+    write_text(file, yaml.safe_dump(dataclasses.asdict(changed), sort_keys=False))

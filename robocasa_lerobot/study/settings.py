@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -16,6 +16,7 @@ from robocasa_lerobot.settings import check_keys, decode, load_yaml
 
 EXPERIMENTS = "study"  # folder in configs/experiments/
 FILE = "study.yaml"
+_AFTER = ", after phase "
 
 
 @dataclass(frozen=True)
@@ -62,6 +63,13 @@ class PartConfig:
             raise UserError(f"part {self.asks!r}: expected rows, sets, and at least one seed.")
         if self.reference is not None and self.reference not in self.rows:
             raise UnknownNameError("row", self.reference, self.rows, f"(`reference` of the part {self.asks!r})")
+        for row in self.rows if self.matrix else ():
+            found = variant_of(row)
+            if found is None or not 1 <= found[1] <= len(self.sets):
+                raise UserError(
+                    f"part {self.asks!r} has `matrix`, and a row {row!r}; expected `NAME{_AFTER}K` with a K from 1 to "
+                    f"{len(self.sets)}, as many as its `sets`."
+                )
 
     @property
     def experiments(self) -> tuple[str, ...]:
@@ -83,8 +91,8 @@ class StudyConfig:
     registry: str
     parts: dict[str, PartConfig] = field(default_factory=dict)
 
-    def chosen(self, names: Sequence[str]) -> dict[str, PartConfig]:
-        """The parts of these names, in the study's order; all without names.
+    def chosen(self, names: Sequence[str], seeds: int | None = None) -> dict[str, PartConfig]:
+        """The parts of these names, in the study's order; all without names. With `seeds` each has so many.
 
         Raises:
             UnknownNameError: there is no such part.
@@ -92,11 +100,29 @@ class StudyConfig:
         for name in names:
             if name not in self.parts:
                 raise UnknownNameError("part of the study", name, self.parts)
-        return {name: part for name, part in self.parts.items() if not names or name in names}
+        own = {name: part for name, part in self.parts.items() if not names or name in names}
+        return own if seeds is None else {name: dataclasses.replace(part, seeds=seeds) for name, part in own.items()}
+
+    def shown_with(self, parts: Mapping[str, PartConfig]) -> StudyConfig:
+        """The study as its page shows it when `parts` are run: with its own seeds, and more where these have more.
+
+        Fewer would take from the page what has been run before.
+        """
+        more = {
+            name: dataclasses.replace(part, seeds=max(part.seeds, parts[name].seeds)) if name in parts else part
+            for name, part in self.parts.items()
+        }
+        return dataclasses.replace(self, parts=more)
 
 
-def load_study(path: Path | None = None, seeds: int | None = None) -> StudyConfig:
-    """The study of a file, the package's own by default; with `seeds` all parts have so many.
+def variant_of(row: str) -> tuple[str, int] | None:
+    """Name and phase of a row that is called `NAME, after phase K`; None for another one."""
+    name, after, phase = row.rpartition(_AFTER)
+    return (name, int(phase)) if after and phase.isdecimal() else None
+
+
+def load_study(path: Path | None = None) -> StudyConfig:
+    """The study of a file, the package's own by default.
 
     Raises:
         UserError: no such file, an unknown key, or a value that does not fit.
@@ -104,8 +130,4 @@ def load_study(path: Path | None = None, seeds: int | None = None) -> StudyConfi
     file = path or configs_folder() / FILE
     data = load_yaml(file)
     check_keys(StudyConfig, data, file.name)
-    study = decode(StudyConfig, data, str(file))
-    if seeds is None:
-        return study
-    parts = {name: dataclasses.replace(part, seeds=seeds) for name, part in study.parts.items()}
-    return dataclasses.replace(study, parts=parts)
+    return decode(StudyConfig, data, str(file))

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from robocasa_lerobot.errors import UserError
+from robocasa_lerobot.errors import UserError, differing
 from robocasa_lerobot.evaluation.records.results import TrialRecord, read_results
 from robocasa_lerobot.files import write_text, written_aside
 from robocasa_lerobot.provenance import git_commit, machine, utc_now, versions
@@ -132,11 +132,24 @@ def store(run: Run, results: Path) -> Path:
 
 def is_stored(run: Run, results: Path) -> bool:
     """Whether all phases of a run were kept."""
-    file = stored_folder(results, run.experiment, run.seed) / ABOUT
-    if not file.is_file():
-        return False
-    about = json.loads(file.read_text(encoding="utf-8"))
-    return stands_for(about, run) and len(about["steps"]) == len(run.config.phases)
+    about = _about(results, run)
+    return about is not None and stands_for(about, run) and len(about["steps"]) == len(run.config.phases)
+
+
+def check_results(runs: Iterable[Run], results: Path) -> None:
+    """Check that what was kept in the places of these runs is theirs, since they and the page replace it.
+
+    Raises:
+        UserError: there is something of another scale, of other demonstrations, or of a CPU for a GPU.
+    """
+    for run in runs:
+        about = _about(results, run)
+        others = "" if about is None else _others(about, run)
+        if others:
+            raise UserError(
+                f"{stored_folder(results, run.experiment, run.seed)} holds results of another study ({others}), which "
+                "this one would replace. Give another --results and --page."
+            )
 
 
 def stands_for(about: Mapping[str, Any], run: Run) -> bool:
@@ -147,11 +160,23 @@ def stands_for(about: Mapping[str, Any], run: Run) -> bool:
         run: as the study has it.
     """
     steps = {phase.name: phase.steps for phase in run.config.phases}
-    return (
-        (about["scale"], about["episodes"]) == (run.scale, run.episodes)
-        and about["steps"].items() <= steps.items()
-        and (about["device"] == CPU) == (run.config.device == CPU)
-    )
+    return not _others(about, run) and about["steps"].items() <= steps.items()
+
+
+def _others(about: Mapping[str, Any], run: Run) -> str:
+    """What of the settings of a study's command was another when something was kept; empty where nothing was."""
+    found = {"scale": about["scale"], "episodes": about["episodes"], "device": _kind(about["device"])}
+    return differing(found, {"scale": run.scale, "episodes": run.episodes, "device": _kind(run.device)})
+
+
+def _kind(device: str) -> str:
+    return "CPU" if device == CPU else "GPU"
+
+
+def _about(results: Path, run: Run) -> dict[str, Any] | None:
+    """What was kept of a run's circumstances; None where nothing was."""
+    file = stored_folder(results, run.experiment, run.seed) / ABOUT
+    return dict(json.loads(file.read_text(encoding="utf-8"))) if file.is_file() else None
 
 
 def read_stored(results: Path, experiment: str, seed: int) -> StoredRun | None:

@@ -11,11 +11,10 @@ import numpy as np
 from robocasa_lerobot.evaluation.statistics.averages import Estimate, average_over_tasks
 from robocasa_lerobot.evaluation.statistics.lifelong import Lifelong, lifelong
 from robocasa_lerobot.evaluation.statistics.paired import paired_difference
-from robocasa_lerobot.study.settings import PartConfig
+from robocasa_lerobot.study.settings import PartConfig, variant_of
 from robocasa_lerobot.study.stored import StoredRun, StoredTrial
 
 Stored = Mapping[tuple[str, int], StoredRun]  # by experiment and seed
-_AFTER = ", after phase "
 
 
 @dataclass(frozen=True)
@@ -80,8 +79,9 @@ def variants(part: PartConfig) -> dict[str, dict[int, str]]:
     """Of a part with `matrix`: the rows of each variant, by phase."""
     found: dict[str, dict[int, str]] = {}
     for row in part.rows:
-        name, _, phase = row.rpartition(_AFTER)
-        found.setdefault(name, {})[int(phase)] = row
+        variant = variant_of(row)
+        assert variant is not None, "PartConfig has looked at its rows"
+        found.setdefault(variant[0], {})[variant[1]] = row
     return found
 
 

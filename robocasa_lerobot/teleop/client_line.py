@@ -29,7 +29,6 @@ class ClientLine:
         self._texts: collections.deque[str] = collections.deque()
         self._picture: tuple[int, bytes] | None = None
         self._sent: collections.OrderedDict[int, float] = collections.OrderedDict()
-        self._reported = False
         self._wake = asyncio.Event()
 
     @property
@@ -51,15 +50,11 @@ class ClientLine:
         """The client has drawn a picture, and needs none before it any more."""
         for sent in [sent for sent in self._sent if sent <= number]:
             del self._sent[sent]
-        self._reported = False
         self._wake.set()
 
     def overdue(self, seconds: float) -> bool:
-        """Whether a picture has waited for its acknowledgement for so long; said once."""
-        if self._reported or not self._sent:
-            return False
-        self._reported = time.monotonic() - next(iter(self._sent.values())) > seconds
-        return self._reported
+        """Whether a picture has waited for its acknowledgement for so long."""
+        return bool(self._sent) and time.monotonic() - next(iter(self._sent.values())) > seconds
 
     async def send(self) -> None:
         """Send for as long as the client is there."""

@@ -25,7 +25,7 @@ _MOST_LATE_S = 0.25  # that is caught up; beyond it, time is lost and the page s
 
 @dataclass(frozen=True)
 class Event:
-    """What has happened to the operator's connection: `joined`, `disconnected` or `stale`."""
+    """What has happened to the operator's connection: `joined` or `disconnected`."""
 
     what: str
 
@@ -39,6 +39,9 @@ class Audience(Protocol):
 
     def wants_frames(self) -> bool:
         """Whether somebody can take a picture now."""
+
+    def sees_nothing(self) -> bool:
+        """Whether the operator has shown no picture for too long, though one waits for it."""
 
     def frame(self, told: dict[str, Any], pictures: list[bytes]) -> None:
         """A picture message; `told` is its header."""
@@ -66,13 +69,20 @@ class ControlLoop:
         self._stop.set()
 
     def run(self) -> None:
-        """Tick until the session is done or stopped; what is saved is merged in any case."""
+        """Tick until the session is done or stopped; what is saved is merged in any case.
+
+        Raises:
+            UserError: the disk is full: the session has ended before its time, or its file could not be written.
+        """
         session = self._session
         due, drawn = time.monotonic(), 0.0
         wanted = True
         try:
             while not self._stop.is_set():
                 wanted |= self._listen(due)
+                if session.clocked and self._audience.sees_nothing():
+                    session.hold_still("stale")
+                    wanted = True
                 started = time.monotonic()
                 stepping = session.phase == RUNNING
                 moved = session.tick(started)
@@ -93,6 +103,8 @@ class ControlLoop:
             self._tell()
             self._draw(time.monotonic())
             session.close()
+        if session.failure is not None:
+            raise session.failure
 
     def _listen(self, due: float) -> bool:
         """Carry out what has been said, until the next tick is due; whether there was anything."""
@@ -115,8 +127,6 @@ class ControlLoop:
         elif item.what == "disconnected":
             session.hold_still(item.what)
             session.driver.by_steps = False
-        elif item.what == "stale" and session.clocked:
-            session.hold_still(item.what)
 
     def _draw(self, now: float) -> None:
         number, parts = self._session.draw(now)

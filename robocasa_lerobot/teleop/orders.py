@@ -98,8 +98,7 @@ def _focus(session: Session, message: Message, now: float) -> None:
 def _rewind(session: Session, message: Message, now: float) -> None:
     steps = message.get("steps")
     if steps is not None:
-        at = session.rewinding.step if session.phase == REWINDING else len(session.driven)
-        session.go_back(max(at - steps, 0))
+        session.go_back(max(session.shown - steps, 0))
     elif message.get("on", True):
         session.rewind(now, message.get("speed", _REWIND_SPEED))
     elif session.phase == REWINDING:
@@ -124,9 +123,10 @@ def _reach(session: Session, message: Message, now: float) -> None:
     name = message["camera"]
     if not _known(session, message, [name]):
         return
-    camera = session.free.camera(session.env.data) if name == FREE else name
+    data, free = session.pictures.shown(message.get("frame", 0), session.env, session.free)
+    camera = free.camera(data) if name == FREE else name
     try:
-        what, point = assist.point_under(session.env, camera, message["u"], message["v"])
+        what, point = assist.point_under(session.env, data, camera, message["u"], message["v"])
     except SkillError as error:
         session.note("warning", str(error), "reach")
         return

@@ -16,7 +16,7 @@ from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.web_view import WebView
 from robocasa_lerobot.gl import ensure_gl
 from robocasa_lerobot.teleop.driving.pilot import Pilot, load_pilot
-from robocasa_lerobot.teleop.keeping.store import Store
+from robocasa_lerobot.teleop.keeping.store import Store, check_out
 from robocasa_lerobot.teleop.loop import ControlLoop, Inbox
 from robocasa_lerobot.teleop.server import TeleopServer
 from robocasa_lerobot.teleop.session import Session
@@ -65,9 +65,11 @@ def run_session(
         free_view: run MuJoCo's own web viewer beside it, on the loopback address.
 
     Raises:
-        UserError: unknown names, episodes of other settings, a port that is taken, a policy that cannot be loaded.
+        UserError: unknown names, episodes of other settings, a folder that cannot be written to, a port that is
+            taken, a policy that cannot be loaded; a disk that is full at the end.
         NoOpenGLError: nothing on this machine can render.
     """
+    check_out(settings.out)
     ensure_gl()
     pilot: Pilot | None = None
     size = settings.image_size

@@ -62,7 +62,7 @@ class TeleopServer:
         self._operator: ClientLine | None = None
         self._scene: dict[str, Any] | None = None
         self._map: tuple[str, bytes] = ("", b"")
-        self._hungry = False
+        self._hungry = self._blind = False
         self._failure: BaseException | None = None
         self._loop = asyncio.new_event_loop()
         self._started, self._ended = threading.Event(), asyncio.Event()
@@ -103,6 +103,10 @@ class TeleopServer:
         """Whether somebody can take a picture now."""
         return self._hungry
 
+    def sees_nothing(self) -> bool:
+        """Whether the operator has not answered a picture for too long."""
+        return self._blind
+
     def frame(self, told: dict[str, Any], pictures: list[bytes]) -> None:
         """Send a picture message to everybody; it replaces one that still waits."""
         self._soon(self._spread_frame, told, pictures)
@@ -133,6 +137,7 @@ class TeleopServer:
 
     def _count(self) -> None:
         self._hungry = any(line.hungry for line in self._lines)
+        self._blind = self._operator is not None and self._operator.overdue(STALE_S)
 
     def _run(self) -> None:
         asyncio.set_event_loop(self._loop)
@@ -236,6 +241,7 @@ class TeleopServer:
             if self._operator is None:
                 self._operator = line
                 line.say({"type": "role", "role": OPERATOR})
+                self._count()
                 self._inbox.put(Event("joined"))
             elif self._operator is not line:
                 line.say(_answer("take", "another client drives"))
@@ -245,11 +251,10 @@ class TeleopServer:
             line.say(_answer(message.type, "you are watching: another client drives"))
 
     async def _watch(self) -> None:
-        """Tell the session where the operator has not answered for too long."""
+        """Notice where the operator has not answered for too long."""
         while True:
             await asyncio.sleep(_WATCH_S)
-            if self._operator is not None and self._operator.overdue(STALE_S):
-                self._inbox.put(Event("stale"))
+            self._count()
 
 
 def _answer(about: str, text: str) -> dict[str, Any]:

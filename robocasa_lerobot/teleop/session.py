@@ -13,11 +13,12 @@ from typing import Any
 from robocasa_lerobot import contract
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.robots.control_step import DivergedError
-from robocasa_lerobot.errors import OF_THE_MACHINE
+from robocasa_lerobot.errors import OF_THE_MACHINE, UserError
 from robocasa_lerobot.provenance import git_commit
 from robocasa_lerobot.teleop.driving.driver import Driver
 from robocasa_lerobot.teleop.driving.pilot import AUTONOMOUS, Pilot
 from robocasa_lerobot.teleop.keeping.episode import Episode
+from robocasa_lerobot.teleop.keeping.pictures import LastPictures
 from robocasa_lerobot.teleop.keeping.playback import Playback, Rewinding
 from robocasa_lerobot.teleop.keeping.store import Store
 from robocasa_lerobot.teleop.settings import LONGEST_STEPS, TeleopSettings
@@ -26,7 +27,7 @@ from robocasa_lerobot.teleop.views import SEEN, FreeCamera, KitchenMap, Views, k
 # Phases: see `protocol.md`.
 LOADING, READY, RUNNING, PAUSED = "loading", "ready", "running", "paused"
 REWINDING, REVIEW, SAVING, DONE = "rewinding", "review", "saving", "done"
-_AGES, _STEP_TIMES, _DRAWN = 2000, 20, 256  # of what is remembered
+_AGES, _STEP_TIMES = 2000, 20  # of what is remembered
 _PACE_STEPS = 41  # over which simulated seconds per second are counted
 _BACK_ON_DIVERGENCE = 20  # steps
 _MOST_UNMADE = 5  # kitchens, one after the other, that cannot be made
@@ -48,9 +49,11 @@ class Session:
         episode: what is driven now; None while a kitchen is made.
         scenes: kitchens shown so far; map: of the present one.
         driver, free, cameras: who drives, the free camera, which pictures are sent.
+        pictures: that were drawn last.
         playback, rewinding: in `review` and `rewinding`.
         resumes: whether the next input ends a pause by itself.
         ages, paces, seconds: of commands' pictures, steps and their times, lately.
+        failure: why the session is done before its time, or without its file.
     """
 
     def __init__(self, settings: TeleopSettings, store: Store, env: KitchenEnv, pilot: Pilot | None = None) -> None:
@@ -68,8 +71,9 @@ class Session:
         self._views = Views(settings.image_size, settings.render_preset)
         self._number, self._began = store.next_number(), 0.0
         self._announced = self._trim = False
-        self._picture = self._unmade = 0
-        self._drawn: collections.OrderedDict[int, float] = collections.OrderedDict()
+        self._unmade = 0
+        self.pictures = LastPictures()
+        self.failure: UserError | None = None
         if len(store.saved) >= settings.episodes:
             self.finish()
 
@@ -78,6 +82,13 @@ class Session:
         """The episode, where there is one."""
         assert self.episode is not None, "a kitchen is being made"
         return self.episode
+
+    @property
+    def shown(self) -> int:
+        """The step of the episode whose state is shown; after the last one, how many there are."""
+        if self.phase == REVIEW:
+            return self.playback.step
+        return self.rewinding.step if self.phase == REWINDING else len(self.driven)
 
     @property
     def hurries(self) -> bool:
@@ -121,14 +132,11 @@ class Session:
 
     def draw(self, now: float) -> tuple[int, list[tuple[dict[str, Any], bytes]]]:
         """A number for the picture of the present state, counting up, and its parts: what each is, and the JPEG."""
-        self._picture += 1
-        self._drawn[self._picture] = now
-        while len(self._drawn) > _DRAWN:
-            self._drawn.popitem(last=False)
         if self.episode is None or self.phase in (LOADING, SAVING, DONE):
-            return self._picture, []
+            return self.pictures.add(now, None, self.free), []
+        number = self.pictures.add(now, self.episode.states[self.shown], self.free)
         seen = self.episode.observation["pixels"] if self.env.render_observations else {}
-        return self._picture, self._views.take(self.env, seen, self.cameras, self.free)
+        return number, self._views.take(self.env, seen, self.cameras, self.free)
 
     def run(self, now: float) -> None:
         """Let time run; with the first input the episode begins."""
@@ -146,8 +154,7 @@ class Session:
     def rewind(self, now: float, speed: float) -> None:
         """Go backwards from what is shown, for as long as this is repeated."""
         if self.phase != REWINDING:
-            at = self.playback.step if self.phase == REVIEW else len(self.driven)
-            self.rewinding = Rewinding(float(at), speed, now)
+            self.rewinding = Rewinding(float(self.shown), speed, now)
             self.driver.release()
             self.phase, self.pause = REWINDING, ""
         self.rewinding.hold(speed, now)
@@ -183,18 +190,28 @@ class Session:
         """Note that this attempt came to nothing; the next kitchen, or with `REDO` the same again."""
         episode = self.driven
         steps, wall = len(episode), self._wall(now)
-        self.store.discard(self._number, reason, steps=steps, undos=episode.undos, wall_seconds=wall)
+        try:
+            self.store.discard(self._number, reason, steps=steps, undos=episode.undos, wall_seconds=wall)
+        except OSError as error:
+            self.note("error", f"it could not be noted ({error}): free disk space and try it again", "discard")
+            if self.phase == SAVING:
+                self.review()
+            return
         told = {"seed": episode.seed, "steps": steps, "reason": reason, "discarded": self.store.discarded}
         self.outgoing.append({"type": "discarded", **told})
         self._next()
 
     def finish(self) -> None:
-        """End the session: what is saved becomes one file."""
+        """End the session: what is saved becomes one file. `failure` says why not, where the disk is full."""
         if self.phase == DONE:
             return
         self.driver.release()
         self.phase, self.pause = DONE, ""
-        path = self.store.merge()
+        path = None
+        try:
+            path = self.store.merge()
+        except OSError as error:
+            self._fail(f"{self.store.path.name} could not be written ({error})")
         self.outgoing.append({"type": "done", "path": path.name if path else None, "saved": len(self.store.saved)})
 
     def close(self) -> None:
@@ -223,8 +240,13 @@ class Session:
                 raise
             self.note("error", f"kitchen {self.settings.seed + self._number} cannot be made ({error})", "scene")
             why = f"{type(error).__name__}: {error}"
-            self.store.discard(self._number, why, steps=0, undos=0, wall_seconds=0.0)
-            self._next()
+            try:
+                self.store.discard(self._number, why, steps=0, undos=0, wall_seconds=0.0)
+            except OSError as lacking:  # without the note the same kitchen would come again
+                self._fail(f"nothing can be noted in {self.store.folder} ({lacking})")
+                self.finish()
+            else:
+                self._next()
             return
         self.scenes += 1
         self.free.anchor = None
@@ -258,8 +280,9 @@ class Session:
             return True
         if planned is None:
             return False
-        if driver.answered is not None and driver.answered in self._drawn:
-            self.ages.append(now - self._drawn[driver.answered])
+        age = self.pictures.age(driver.answered, now)
+        if age is not None:
+            self.ages.append(age)
         driver.answered = None
         env.render_observations = self._policy_looks()
         try:
@@ -284,8 +307,8 @@ class Session:
         self.env.render_observations = False
         trimmed = episode.idle_head() if self._trim else 0
         if trimmed:
-            shorter = episode.without_head(trimmed)
-            if not shorter.successful:
+            shorter = self._without_head(episode, trimmed)
+            if shorter is None:
                 episode.show(len(episode))
                 self.note("warning", f"without its first {trimmed} steps it does not succeed: save it whole", "save")
                 self.review()
@@ -309,6 +332,21 @@ class Session:
         self.outgoing.append({"type": "saved", **told})
         self.note("info", f"saved as episode {saved} of {wanted}", "save")
         self._next()
+
+    @staticmethod
+    def _without_head(episode: Episode, steps: int) -> Episode | None:
+        """The episode without its first steps, where it succeeds without."""
+        try:
+            shorter = episode.without_head(steps)
+        except DivergedError:
+            return None
+        return shorter if shorter.successful else None
+
+    def _fail(self, why: str) -> None:
+        """Tell the page, and the command at its end; the first reason counts."""
+        remedy = f"What is saved is whole in {self.store.folder}: free disk space and give the same command again."
+        self.failure = self.failure or UserError(f"{why}. {remedy}")
+        self.note("error", f"{why}. {remedy}", "finish")
 
     def _meta(self, episode: Episode, trimmed: int, wall: float) -> dict[str, Any]:
         """How an episode was driven, for its `ep_meta`."""

@@ -9,7 +9,7 @@ from robocasa_lerobot import contract
 from robocasa_lerobot.demos.motion import base_pose, grip_position
 from robocasa_lerobot.demos.recorder import SUCCESS_HOLD_STEPS
 from robocasa_lerobot.teleop.messages import MODES, MOTION_FRAMES, PROTOCOL
-from robocasa_lerobot.teleop.session import PAUSED, REVIEW, REWINDING, RUNNING, Session
+from robocasa_lerobot.teleop.session import PAUSED, REVIEW, RUNNING, Session
 from robocasa_lerobot.teleop.settings import EXPIRES_S, STALE_S, TeleopSettings
 from robocasa_lerobot.teleop.views import SEEN
 
@@ -86,11 +86,7 @@ def header(session: Session, number: int, now: float) -> dict[str, Any]:
 
 def _of_episode(session: Session) -> dict[str, Any]:
     episode = session.driven
-    step = len(episode)
-    if session.phase == REVIEW:
-        step = session.playback.step
-    elif session.phase == REWINDING:
-        step = session.rewinding.step
+    step = session.shown
     position, heading = base_pose(session.env.data)
     told: dict[str, Any] = {
         "step": step,

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import contextlib
 import functools
+from collections.abc import Iterator
 from pathlib import Path
 
 from accelerate import Accelerator, DistributedDataParallelKwargs, InitProcessGroupKwargs
 
 from robocasa_lerobot.data.registry.hub import fetch_missing
+from robocasa_lerobot.errors import UserError
+from robocasa_lerobot.jobs.locks import LockHeldError, locked
 from robocasa_lerobot.training import metrics, records
 from robocasa_lerobot.training.config.experiment import FROM_SCRATCH, HUB, ExperimentConfig, PhaseConfig
 from robocasa_lerobot.training.interrupts import Interrupts
@@ -42,8 +46,8 @@ def run_experiment(
         interrupts: tells afterwards why it ended; None makes one.
 
     Raises:
-        UserError: settings or data of a begun phase have changed, or something in the configuration does not fit; at
-            the end, evaluations that failed.
+        UserError: settings or data of a begun phase have changed, something in the configuration does not fit, or the
+            same training is running; at the end, evaluations that failed.
     """
     interrupts = interrupts or Interrupts(stop_after)
     output = Path(experiment.output_dir)
@@ -139,22 +143,49 @@ def _run(
 ) -> bool:
     output = Path(experiment.output_dir)
     for phase in phases:
-        if is_finished(output, phase):
-            accelerator.print(f"phase {phase.name}: finished before")
-            if accelerator.is_main_process:
-                tidy(output / phase.name)
-        else:
-            run = prepare_phase(experiment, phase, device, accelerator, interrupts.stop, force)
-            finished = train_phase(run, accelerator)
-            step = run.state.step
-            del run  # its policy and optimiser need not stay in memory beside the next phase's
-            accelerator.free_memory()
-            if not finished:
-                accelerator.print(f"stopped in phase {phase.name} at step {step}; the same command goes on")
-                return False
-        if evaluations is not None:
-            planned = functools.partial(evaluations.run, phase.name, lambda: interrupts.signalled)
-            if first_process_works(accelerator, planned):
-                accelerator.print(f"stopped in the evaluations of phase {phase.name}; the same command goes on")
-                return False
+        with contextlib.ExitStack() as held:
+            if evaluations is not None or not is_finished(output, phase):
+                held.enter_context(_alone_in(phase, output, accelerator))
+            if is_finished(output, phase):
+                accelerator.print(f"phase {phase.name}: finished before")
+                if accelerator.is_main_process:
+                    tidy(output / phase.name)
+            else:
+                run = prepare_phase(experiment, phase, device, accelerator, interrupts.stop, force)
+                finished = train_phase(run, accelerator)
+                step = run.state.step
+                del run  # its policy and optimiser need not stay in memory beside the next phase's
+                accelerator.free_memory()
+                if not finished:
+                    accelerator.print(f"stopped in phase {phase.name} at step {step}; the same command goes on")
+                    return False
+            if evaluations is not None:
+                planned = functools.partial(evaluations.run, phase.name, lambda: interrupts.signalled)
+                if first_process_works(accelerator, planned):
+                    accelerator.print(f"stopped in the evaluations of phase {phase.name}; the same command goes on")
+                    return False
     return True
+
+
+@contextlib.contextmanager
+def _alone_in(phase: PhaseConfig, output: Path, accelerator: Accelerator) -> Iterator[None]:
+    """Keep other runs out of a phase, by a lock that the first process holds and the system frees when it ends.
+
+    Raises:
+        UserError: another run is at it.
+    """
+    path = output / f".{phase.name}.lock"  # beside the phase's folder, which people remove to begin it anew
+
+    def hold() -> None:
+        try:
+            held.enter_context(locked(path, wait=False))
+        except LockHeldError:
+            raise UserError(
+                f"the same training is running: another process trains or evaluates phase {phase.name!r} of {output}. "
+                f"Wait until it ends, end it, or give another `--output_dir`. If none is, since its machine is gone, "
+                f"remove {path}."
+            ) from None
+
+    with contextlib.ExitStack() as held:
+        first_process_works(accelerator, hold)
+        yield

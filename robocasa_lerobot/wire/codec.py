@@ -9,7 +9,10 @@ Source of the layouts: openpi-client 0.1.2, msgpack-numpy 0.4.8, vla-eval 0.8.0,
 from __future__ import annotations
 
 import io
-from collections.abc import Mapping
+import itertools
+import math
+import operator
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Final, Literal
 
 import msgpack
@@ -18,7 +21,7 @@ import numpy as np
 Dialect = Literal["openpi", "msgpack_numpy", "vla_eval", "gr00t"]
 
 MAX_MESSAGE_BYTES: Final = 64 * 2**20  # eight 1024x1024 pictures and a chunk; more is a mistake or an attack
-# Maps and lists of a message; one byte of it can stand for an empty one, which takes sixty in memory.
+# Maps and lists of a message, and texts of its arrays; one byte of it can stand for an empty list, which takes sixty.
 MAX_CONTAINERS: Final = 100_000
 KINDS: Final = "biuf"  # kinds of dtype that cross the wire: bool, integers, floats; never objects, records, text
 
@@ -52,22 +55,22 @@ def decode(data: bytes, max_bytes: int = MAX_MESSAGE_BYTES) -> Any:
     """The message in `data`; arrays of every dialect become read-only numpy arrays.
 
     Raises:
-        WireError: not msgpack, larger than `max_bytes`, of too many maps and lists, or an array whose bytes, type and
-            shape do not fit.
+        WireError: not msgpack, larger than `max_bytes`, of too many maps, lists and texts, or an array whose bytes,
+            type and shape do not fit.
     """
     if len(data) > max_bytes:
         raise WireError(f"a message of {len(data)} bytes; at most {max_bytes} are read")
     left = MAX_CONTAINERS
 
-    def count() -> None:
+    def count(made: int = 1) -> None:
         nonlocal left
-        left -= 1
+        left -= made
         if left < 0:
-            raise WireError(f"a message of more than {MAX_CONTAINERS} maps and lists")
+            raise WireError(f"a message of more than {MAX_CONTAINERS} maps and lists, and texts of arrays")
 
     def read_map(raw: dict[Any, Any]) -> Any:
         count()
-        return _from_map(raw)
+        return _from_map(raw, count)
 
     def read_list(raw: list[Any]) -> list[Any]:
         count()
@@ -116,8 +119,8 @@ def _scalar_to_map(value: np.generic, dialect: Dialect) -> Any:
     return value.item()  # plain numbers are read by everybody
 
 
-def _from_map(raw: dict[Any, Any]) -> Any:
-    """A decoded map, or the array that it stands for."""
+def _from_map(raw: dict[Any, Any], count: Callable[[int], None]) -> Any:
+    """A decoded map, or the array that it stands for; `count` is told of lists and texts that an array becomes."""
     text = {text_of(key): value for key, value in raw.items()}
     if "__ndarray__" in text:
         return _to_array(text, "dtype")
@@ -128,7 +131,7 @@ def _from_map(raw: dict[Any, Any]) -> Any:
     if "__npgeneric__" in text:
         return _dtype(text.get("dtype")).type(text.get("data"))
     if "__ndarray_class__" in text:
-        return _from_npy(text.get("as_npy"))
+        return _from_npy(text.get("as_npy"), count)
     return raw
 
 
@@ -159,25 +162,58 @@ def _to_array(text: Mapping[str, Any], dtype_key: str) -> np.ndarray:
         raise WireError(f"an array needs bytes and a shape; found {type(data).__name__} and {type(shape).__name__}")
     if not all(isinstance(size, int) and not isinstance(size, bool) and size >= 0 for size in shape):
         raise WireError(f"the shape of an array is {list(shape)!r}; sizes of 0 or more were expected")
-    expected = dtype.itemsize
-    for size in shape:  # Python's whole numbers: no overflow for absurd sizes
-        expected *= size
-    if expected != len(data):
-        raise WireError(f"an array of shape {list(shape)} and dtype {dtype.str} has {len(data)} bytes, not {expected}")
+    _check_size(shape, dtype, len(data))
     return np.frombuffer(data, dtype).reshape(tuple(shape))
 
 
-def _from_npy(data: Any) -> Any:
+def _check_size(shape: Sequence[int], dtype: np.dtype[Any], found: int) -> None:
+    """Whether so many bytes are the array, and whether it is small where it needs none.
+
+    Raises:
+        WireError: other bytes, or rows without end of nothing, which whoever makes lists of them would count.
+    """
+    expected = math.prod(shape, start=dtype.itemsize)  # Python's whole numbers: no overflow for absurd sizes
+    if expected != found:
+        raise WireError(f"an array of shape {list(shape)} and dtype {dtype.str} has {found} bytes, not {expected}")
+    if not found and math.prod(size for size in shape if size) > MAX_CONTAINERS:
+        raise WireError(f"an array of shape {list(shape)} has nothing in more than {MAX_CONTAINERS} rows")
+
+
+def _from_npy(data: Any, count: Callable[[int], None]) -> Any:
     """An array; lists of text for one of text."""
     if not isinstance(data, bytes):
         raise WireError(f"an array's npy bytes are missing; found {type(data).__name__}")
+    file = io.BytesIO(data)
     try:
-        array: np.ndarray = np.load(io.BytesIO(data), allow_pickle=False)
+        shape, dtype = _npy_header(file)
     except Exception as error:  # numpy parses the header with ast: broken ones raise anything
         raise WireError(f"an array's npy bytes cannot be read: {error}") from error
-    if array.dtype.kind == "U":  # instructions, as GR00T's clients send them
+    # Looked at before anything is read: of a type without width, numpy reads any number of items out of no bytes.
+    if dtype.kind not in (*KINDS, "U") or not dtype.itemsize or any(size < 0 for size in shape):
+        found = f"an array of shape {list(shape)} and dtype {dtype}"
+        raise WireError(f"{found} is refused; booleans, integers, floats and text are read")
+    _check_size(shape, dtype, len(data) - file.tell())
+    if dtype.kind == "U":  # instructions, as GR00T's clients send them: each row becomes a list, each item a text
+        count(sum(itertools.accumulate(shape, operator.mul, initial=1)))
+    try:
+        array: np.ndarray = np.load(io.BytesIO(data), allow_pickle=False)
+    except Exception as error:
+        raise WireError(f"an array's npy bytes cannot be read: {error}") from error
+    if dtype.kind == "U":
         return array.tolist()
-    if array.dtype.kind not in KINDS:
-        raise WireError(f"an array of dtype {array.dtype} is refused; booleans, integers and floats are read")
     array.flags.writeable = False
     return array
+
+
+def _npy_header(file: io.BytesIO) -> tuple[tuple[int, ...], np.dtype[Any]]:
+    """Shape and type of the items that follow in a file of `numpy.save`.
+
+    Raises:
+        ValueError: it is none, or of version 3, which only records have.
+    """
+    version = np.lib.format.read_magic(file)
+    readers = {(1, 0): np.lib.format.read_array_header_1_0, (2, 0): np.lib.format.read_array_header_2_0}
+    if version not in readers:
+        raise ValueError(f"version {version} of its header; {', '.join(map(str, readers))} are read")
+    shape, _, dtype = readers[version](file)
+    return shape, dtype

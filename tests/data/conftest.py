@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import pytest
 from atomic_version import atomic_tasks_only
+from ray_support import ray
+
+__all__ = ["atomic_only", "ray"]
 
 
 @pytest.fixture

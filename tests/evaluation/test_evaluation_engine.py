@@ -249,6 +249,13 @@ def test_what_no_film_shows_is_run_again_and_must_go_the_same_way(
     assert all((out / str(r.video)).is_file() for r in with_film)
     evaluate(out, videos=1, **arguments)
     assert "nothing to run" in capsys.readouterr().out
+    more = evaluate(out, videos=3, **arguments)
+    assert comparable(more) == comparable(plain)
+    assert all(record.video for record in more[:3]), "what is asked for later is filmed later"
+    assert {record.video for record in filmed} <= {record.video for record in more}
+    capsys.readouterr()
+    evaluate(out, videos=3, **arguments)
+    assert "nothing to run" in capsys.readouterr().out
     # A record whose trial goes another way keeps its outcome and gets no film.
     other = tmp_path / "other"
     other.mkdir()

@@ -18,7 +18,7 @@ from robocasa_lerobot.errors import UserError
 from robocasa_lerobot.evaluation.actors.actor import ChunkActor, ChunkRequest, chunk_seed
 from robocasa_lerobot.evaluation.actors.checkpoint import read_source
 from robocasa_lerobot.evaluation.actors.chunk_policy import ChunkPolicy, LoadedCheckpoint
-from robocasa_lerobot.evaluation.actors.policy_runner import StepPolicy, load_actor
+from robocasa_lerobot.evaluation.actors.policy_runner import StepPolicy, load_actor, pick_device
 from robocasa_lerobot.evaluation.planning.trials import TrialSpec, make_plan
 from robocasa_lerobot.evaluation.run.rollout import run_trial
 
@@ -180,3 +180,23 @@ def test_an_unregistered_type_is_a_clear_error(checkpoint: Path, tmp_path: Path)
     (folder / "model.safetensors").write_bytes(b"")
     with pytest.raises(UserError, match="policy type 'nonsense' is not registered"):
         load_actor(read_source(str(folder)), "cpu", None)
+
+
+@pytest.mark.parametrize("device", ["gpu", "", "CPU", "cuda:977", "cuda:256", "cuda:-1", "meta", "xpu"])
+def test_a_device_that_is_not_there_is_a_mistake(device: str) -> None:
+    with pytest.raises(UserError, match=r"torch sees cpu.* or auto"):
+        pick_device(device)
+    assert pick_device("cpu") == "cpu"
+
+
+def test_each_gpu_has_its_number(monkeypatch: pytest.MonkeyPatch) -> None:
+    import torch
+
+    monkeypatch.setattr(torch.cuda, "is_available", lambda: True)
+    monkeypatch.setattr(torch.cuda, "device_count", lambda: 2)
+    assert [pick_device(device) for device in ("auto", "cuda", "cuda:1")] == ["cuda", "cuda", "cuda:1"]
+    with pytest.raises(UserError, match="cpu, cuda, cuda:0, cuda:1"):
+        pick_device("cuda:2")
+    monkeypatch.setattr(torch.cuda, "is_available", lambda: False)
+    with pytest.raises(UserError, match="'cuda:1' is not there"):
+        pick_device("cuda:1")

@@ -10,6 +10,7 @@ from typing import Any
 import synthetic_runs
 from evaluation_records import write_results
 
+from robocasa_lerobot.cli import main
 from robocasa_lerobot.evaluation.config.evaluation import KITCHEN_ENV_FACTORY, EvaluationConfig
 from robocasa_lerobot.evaluation.config.loader import load_config
 from robocasa_lerobot.evaluation.report.formats import tidy_csv
@@ -134,3 +135,38 @@ def test_no_verdict_where_trials_and_tasks_point_different_ways(tmp_path: Path) 
     said = str(comparison.sentence(pair(tmp_path / "disagree", {"Large": (40, 0, 20), "Small": (2, 2, 0)})))
     assert said.startswith("B and a cannot be ranked, since the tasks disagree")
     assert "better than" not in said
+
+
+def test_learning_curves_are_found_of_policies_that_are_one_row(tmp_path: Path) -> None:
+    """Two phases of a training, each for its own tasks, are joined; their training is one."""
+    runs = []
+    for task in ("OpenDrawer", "CloseDrawer"):
+        phase = tmp_path / "out" / f"finetune_{task}"
+        checkpoint = phase / "checkpoints/000400/pretrained_model"
+        checkpoint.mkdir(parents=True)
+        (phase / "metrics.jsonl").write_text('{"step": 1, "loss": 0.5}\n{"step": 2, "loss": 0.25}\n')
+        policy = {"path": str(checkpoint), "phase": phase.name, "experiment": "mine", "training_data": "target only"}
+        runs.append(
+            write_results(phase / "evaluations/own", [{"policy": policy, "task": task, "trial": t} for t in range(2)])
+        )
+    (joined,) = gather(runs).policies
+    assert len(joined.parts) == 2
+    assert main(["report", *map(str, runs), "--out", str(tmp_path / "report.html"), "--no-videos"]) == 0
+    text = (tmp_path / "report.html").read_text()
+    assert 'id="learning-1-1-numbers"' in text
+    assert 'id="learning-1-2-numbers"' in text
+    assert "learning-2" not in text
+
+
+def test_results_files_of_any_name_are_reported_beside_them(tmp_path: Path) -> None:
+    files = []
+    for label, success in (("a", True), ("b", False)):
+        outcome = {"success": success, "first_success_step": 80 if success else None}
+        folder = write_results(tmp_path / label, [{"trial": t, **outcome} for t in range(3)])
+        files.append((folder / "trials.jsonl").rename(tmp_path / f"run_{label}.jsonl"))
+    assert main(["report", *map(str, files), "--no-videos"]) == 0
+    text = (tmp_path / "report.md").read_text().replace("\\", "")
+    assert "finetune-000400 (run_a.jsonl)" in text
+    assert "finetune-000400 (run_b.jsonl)" in text
+    found = {policy.label: policy for policy in gather(files).policies}
+    assert {policy.folder for policy in found.values()} == {tmp_path}, "where films are looked for"

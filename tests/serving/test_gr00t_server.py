@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Iterator
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+import zmq
 from gr00t_client import GrootClient
 from serving_support import blocked_host, observation, panda_omron_names, serving
 
@@ -215,6 +217,29 @@ def test_more_clients_than_the_limit_wait_for_their_turn() -> None:
             thread.join(30)
             client.close()
     assert [action["gripper_close"].shape for action, _ in found] == [(1, 1, 1)] * 5
+
+
+def test_what_a_client_sends_beyond_its_turn_waits_with_it() -> None:
+    begun, go = threading.Event(), threading.Event()
+    with serving(blocked_host(begun, go), "gr00t", limits=Limits(clients=1)) as port:
+        slow, found = GrootClient(port), list[Any]()
+        asking = threading.Thread(target=ask_blocked, args=(slow, found))
+        asking.start()
+        assert begun.wait(30)
+        flood = zmq.Context.instance().socket(zmq.DEALER)
+        for option, value in ((zmq.SNDHWM, 1), (zmq.LINGER, 0), (zmq.SNDTIMEO, 500)):
+            flood.setsockopt(option, value)
+        flood.connect(f"tcp://127.0.0.1:{port}")
+        most, sent = 150, 0
+        with suppress(zmq.Again):
+            while sent < most:
+                flood.send(bytes(2**20))
+                sent += 1
+        flood.close()
+        go.set()
+        asking.join(30)
+        slow.close()
+    assert sent < most  # what the system's own buffers hold, and two
 
 
 def test_sessions_outlive_the_limit_until_their_clients_are_silent_for_long(monkeypatch: pytest.MonkeyPatch) -> None:

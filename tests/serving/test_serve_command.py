@@ -140,13 +140,16 @@ def test_mistakes_are_one_sentence(arguments: list[str], text: str, capsys: pyte
     assert text in capsys.readouterr().err
 
 
-def test_a_short_token_and_a_taken_port_are_refused(
+def test_a_short_token_a_taken_port_and_no_host_are_refused(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     with socket.create_server(("127.0.0.1", 0)) as taken:
         port = taken.getsockname()[1]
         assert cli.main(["serve", "--policy.path=random", f"--port={port}"]) == 2
         assert "cannot listen" in capsys.readouterr().err
+    monkeypatch.setenv("ROBOCASA_LEROBOT_POLICY_TOKEN", TOKEN)
+    assert cli.main(["serve", "--policy.path=random", "--host=no..host"]) == 2
+    assert "cannot listen on no..host" in capsys.readouterr().err
     monkeypatch.setenv("ROBOCASA_LEROBOT_POLICY_TOKEN", "short")
     assert cli.main(["serve", "--policy.path=random"]) == 2
     assert "at least 16" in capsys.readouterr().err

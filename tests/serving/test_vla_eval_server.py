@@ -154,6 +154,20 @@ def test_mistakes_are_told_and_the_connection_goes_on(port: int) -> None:
         assert one.ask("observation", good)["type"] == "action"
 
 
+def test_a_failure_of_the_policy_ends_the_episode_and_says_so() -> None:
+    go = threading.Event()
+    go.set()
+    step = {"agent_pos": np.zeros(16), "task": "x"}
+    with serving(blocked_host(go, go), "vla_eval") as port, client(port) as one:
+        one.send("episode_start", {})
+        assert one.ask("observation", step)["type"] == "action"
+        error = one.ask("observation", {**step, "task": "fail"})["payload"]["error"]
+        assert "the policy broke; the episode has ended with it" in error
+        assert "before episode_start" in one.ask("observation", step)["payload"]["error"]
+        one.send("episode_start", {})
+        assert one.ask("observation", step)["type"] == "action"
+
+
 def get(port: int, path: str, **headers: str) -> tuple[int, dict[str, Any]]:
     request = urllib.request.Request(f"http://127.0.0.1:{port}{path}", headers=headers)
     try:

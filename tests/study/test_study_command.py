@@ -13,14 +13,16 @@ from pathlib import Path
 import psutil
 import pytest
 
+from robocasa_lerobot import cli
 from robocasa_lerobot.config_files import configs_folder
+from robocasa_lerobot.study import stored as files
 from robocasa_lerobot.study.runs import configs_for, root_for, runs_of
 from robocasa_lerobot.study.settings import load_study
 from robocasa_lerobot.study.stored import ABOUT, is_stored, stored_folder
 from robocasa_lerobot.training.config.experiment import load_experiment
 
 TINY = ("--scale=tiny", "--seeds=1", "--measure=0")
-STUDIES = {"study.yaml": "pretrain=1,target=1,few=1", "study_generation.yaml": "sources=1,made=1"}  # and demonstrations
+STUDIES = {"study.yaml": "few=1,pretrain=1,target=1", "study_generation.yaml": "made=1,sources=1"}  # and demonstrations
 PARTS = [(file, part) for file in STUDIES for part in load_study(configs_folder() / file).parts]
 
 
@@ -140,9 +142,84 @@ def test_a_trial_of_the_study_does_not_stand_for_it(tmp_path: Path) -> None:
     assert "--replace" in asked.commands(None)[0], "its data neither"
     roots = [root_for(whole, *case) for case in (("cpu", None), ("cpu", "tiny"), ("cuda", None))]
     assert [str(root) for root in roots] == ["outputs/study", "outputs/study_tiny", "outputs/study_cuda"]
+    few = root_for(whole, "cpu", None, "few=1,pretrain=10")
+    assert str(few) == "outputs/study_few-1-pretrain-10", "phases of ten demonstrations are not the study's"
 
 
-def test_nothing_goes_on_alone_when_the_study_is_told_to_end(tmp_path: Path) -> None:
+def keep_a_run(results: Path, **changes: object) -> Path:
+    """What is kept of the first run of `multitask`, made otherwise."""
+    run = runs_of([load_study().parts["multitask"]], Path("unused"), configs_folder())[0]
+    about = {"scale": None, "episodes": None, "device": "cpu", "steps": {"multitask": 1}, **changes}
+    folder = stored_folder(results, run.experiment, run.seed)
+    folder.mkdir(parents=True)
+    (folder / ABOUT).write_text(json.dumps(about))
+    return folder
+
+
+@pytest.mark.parametrize(
+    ("words", "kept", "told"),
+    [
+        (["--scale=tiny"], {}, "scale: None, now 'tiny'"),
+        (["--episodes=pretrain=10"], {}, "episodes: None, now 'pretrain=10'"),
+        (["--scale=tiny"], {"scale": "tiny", "device": "NVIDIA H200"}, "device: 'GPU', now 'CPU'"),
+    ],
+)
+def test_kept_results_are_not_replaced_by_those_of_another_study(
+    words: list[str],
+    kept: dict[str, object],
+    told: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    folder = keep_a_run(tmp_path / "kept", **kept)
+    for part in ("multitask", "quality"):  # the page is of all parts
+        assert cli.main(["study", part, "--results=kept", *words]) == 2
+        said = capsys.readouterr().err
+        assert told in said
+        assert "Give another --results and --page" in said
+    assert [path.name for path in folder.iterdir()] == [ABOUT]
+    assert not (tmp_path / "datasets").exists(), "nothing was made"
+
+
+def test_fewer_seeds_take_nothing_from_the_page(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """With all that is asked for kept, the command only writes the page."""
+    whole = load_study()
+    kept = tmp_path / "kept"
+    for part, seeds in (("multitask", 1), ("quality", 3)):
+        for run in runs_of([whole.parts[part]], tmp_path, configs_folder()):
+            if run.seed < seeds:
+                steps = {phase.name: phase.steps for phase in run.config.phases}
+                keep_whole_run(stored_folder(kept, run.experiment, run.seed), steps)
+    monkeypatch.chdir(tmp_path)
+    assert cli.main(["study", "multitask", "--seeds=1", "--results=kept"]) == 0
+    assert "==" not in capsys.readouterr().out, "nothing was run"
+    page = (kept / "results.md").read_text(encoding="utf-8")
+    assert "1 of 3 trainings" in page
+    assert "15 of 15 trainings" in page, "those of the other part"
+    parts = whole.shown_with(whole.chosen(["recipes"], seeds=2)).parts
+    assert (parts["recipes"].seeds, parts["quality"].seeds) == (2, 3)
+
+
+def keep_whole_run(folder: Path, steps: dict[str, int]) -> None:
+    """A run of which all phases are kept, without trials."""
+    folder.mkdir(parents=True)
+    files._write_trials(folder / files.TRIALS, [])
+    (folder / files.CURVES).write_text("phase,step,loss\n" + "".join(f"{phase},1,0.5\n" for phase in steps))
+    about = {
+        **{"scale": None, "episodes": None, "device": "cpu", "steps": steps, "commit": "c", "versions": {}},
+        **{"machine": {"processor": "P", "cores": "2"}, "training_hours": 1.0, "trial_hours_of_one_process": 1.0},
+    }
+    (folder / ABOUT).write_text(json.dumps(about))
+
+
+@pytest.mark.parametrize(
+    ("number", "status"), [(signal.SIGTERM, 2), pytest.param(signal.SIGKILL, -signal.SIGKILL, marks=pytest.mark.slow)]
+)
+def test_nothing_goes_on_alone_when_the_study_ends(tmp_path: Path, number: signal.Signals, status: int) -> None:
     words = ("multitask", "--episodes=pretrain=100", *TINY)
     with subprocess.Popen([*COMMAND, *words], cwd=tmp_path, stderr=subprocess.PIPE, text=True) as process:
         deadline = time.monotonic() + 120
@@ -152,12 +229,12 @@ def test_nothing_goes_on_alone_when_the_study_is_told_to_end(tmp_path: Path) -> 
             time.sleep(0.2)
         others = psutil.Process(process.pid).children(recursive=True)
         assert others
-        process.send_signal(signal.SIGTERM)
-        assert process.wait(60) == 2
+        process.send_signal(number)
+        assert process.wait(60) == status
+        _, alive = psutil.wait_procs(others, timeout=60)
+        assert not alive
         assert process.stderr is not None
-        assert "the same study goes on there" in process.stderr.read()
-    _, alive = psutil.wait_procs(others, timeout=60)
-    assert not alive
+        assert ("the same study goes on there" in process.stderr.read()) is (status == 2)
 
 
 def test_each_phase_is_a_command_of_its_own(tmp_path: Path) -> None:
@@ -177,8 +254,8 @@ def test_a_part_runs_from_data_to_its_table(file: str, part: str, tmp_path: Path
     words = (part, f"--config_path={path}", f"--episodes={STUDIES[file]}", *TINY)
     done = study(tmp_path, *words)
     assert done.returncode == 0, done.stderr[-3000:]
-    whole = load_study(path, seeds=1)
-    results = tmp_path / f"{whole.root}_tiny" / "results"
+    whole = load_study(path)
+    results = tmp_path / root_for(whole, "cpu", "tiny", STUDIES[file]) / "results"
     page = (results / "results.md").read_text(encoding="utf-8")
     assert "these numbers mean nothing" in page
     config = whole.parts[part]

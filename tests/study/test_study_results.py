@@ -16,6 +16,7 @@ from robocasa_lerobot.study.page import write_page
 from robocasa_lerobot.study.settings import PartConfig, RowConfig, StudyConfig
 from robocasa_lerobot.study.stored import StoredRun, StoredTrial, read_stored
 from robocasa_lerobot.study.tables import cell, difference, failure_terms, row_trials, summaries
+from robocasa_lerobot.training.setup import builders
 
 SETS = {"both": ["A", "B"], "first": ["A"], "second": ["B"]}
 ABOUT = {
@@ -172,3 +173,23 @@ def test_phases_are_stored_as_they_end(tmp_path: Path) -> None:
     assert not files.stands_for({**found.about, "steps": {"phase1": steps - 1}}, run), "of other lengths"
     assert not files.stands_for({**found.about, "scale": "tiny"}, run)
     assert not files.stands_for({**found.about, "device": "NVIDIA H200"}, run)
+
+
+def test_a_run_without_a_device_of_its_own_is_of_the_machine_s(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    run = files.Run("multitask", 0, tmp_path, configs_folder())
+    anywhere = dataclasses.replace(run.config, device=None)
+    run.__dict__["config"] = anywhere  # as of a file that names none
+    about = {"scale": None, "episodes": None, "steps": {"multitask": anywhere.phases[0].steps}}
+    for here, trained_on in (("cpu", "cpu"), ("cuda", "NVIDIA H200")):
+        monkeypatch.setattr(builders, "best_device", lambda wanted, here=here: here)
+        assert files.stands_for({**about, "device": trained_on}, run)
+        assert not files.stands_for({**about, "device": "cpu" if here == "cuda" else "NVIDIA H200"}, run)
+
+
+def test_a_matrix_of_what_was_not_tried_says_so(tmp_path: Path) -> None:
+    rows = {f"plain, after phase {k}": row("lifelong", f"phase{k}") for k in (1, 2)}
+    part = PartConfig("What?", rows, ["first", "second"], 1, matrix=True)
+    phases = [trials("phase1", {"A": "++++"}), trials("phase2", {"B": "++--"})]  # not the first phase's tasks again
+    stored = {("lifelong", 0): run("lifelong", 0, *phases)}
+    write_page(StudyConfig("r", "x", {"lifelong": part}), stored, SETS, tmp_path / "results", tmp_path / "page.md")
+    assert "plain: not run to its end yet." in (tmp_path / "page.md").read_text(encoding="utf-8")

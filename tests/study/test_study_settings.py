@@ -2,14 +2,21 @@
 
 from __future__ import annotations
 
+import re
+import shutil
 from pathlib import Path
 
 import pytest
 import yaml
 
+from robocasa_lerobot import cli
 from robocasa_lerobot.config_files import config_names, configs_folder
+from robocasa_lerobot.data.registry.recipes import IMAGE_SIZE
 from robocasa_lerobot.data.registry.registry import open_registry
+from robocasa_lerobot.data.registry.registry_file import load_registry
 from robocasa_lerobot.errors import UnknownNameError, UserError
+from robocasa_lerobot.study import runs
+from robocasa_lerobot.study.costs import costs
 from robocasa_lerobot.study.settings import EXPERIMENTS, StudyConfig, load_study
 from robocasa_lerobot.training.config.experiment import load_experiment
 from robocasa_lerobot.training.planning.evaluations import phase_evaluations
@@ -84,3 +91,78 @@ def test_wrong_studies_are_refused(tmp_path: Path) -> None:
         loaded({**whole, "parts": {"a": {**part, "seeds": 0}}})
     with pytest.raises(UnknownNameError, match="multitask"):
         STUDY.chosen(["multitasking"])
+    lifelong = {**part, "sets": ["study_phase1", "study_phase2"], "matrix": True}
+    assert loaded({**whole, "parts": {"a": {**lifelong, "rows": {"plain, after phase 2": row}}}})
+    for label in ("plain", "plain, after phase two", "plain, after phase 3", "plain, after phase 0"):
+        with pytest.raises(UserError, match="`NAME, after phase K` with a K from 1 to 2"):
+            loaded({**whole, "parts": {"a": {**lifelong, "rows": {label: row}}}})
+
+
+@pytest.mark.parametrize(
+    ("change", "told"),
+    [
+        ({"sets": ["study_21"]}, r"unknown task set 'study_21'. Did you mean .*'study_12'"),
+        ({"experiment": "multitsk"}, r"unknown experiment 'multitsk'. Did you mean 'multitask'"),
+        ({"phase": "multitasks"}, r"unknown phase 'multitasks'. Did you mean 'multitask'\? \(of the row 'one'"),
+        ({"evaluation": "study_targets"}, r"unknown evaluation 'study_targets'. Did you mean 'study_target'"),
+    ],
+)
+@pytest.mark.parametrize("words", [["--plan", "--measure=0"], ["--report"]], ids=["plan", "report"])
+def test_what_a_study_misspells_is_told_before_anything_runs(
+    change: dict[str, object],
+    told: str,
+    words: list[str],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    row = {"experiment": "multitask", "phase": "multitask", "evaluation": "study_target"}
+    row |= {key: str(value) for key, value in change.items() if key in row}
+    part = {"asks": "?", "rows": {"one": row}, "sets": change.get("sets", ["study_12"])}
+    content = {"root": "out", "registry": "experiments/parts/study.yaml", "parts": {"a": part}}
+    (tmp_path / "mine.yaml").write_text(yaml.safe_dump(content))
+    monkeypatch.chdir(tmp_path)
+    assert cli.main(["study", "--config_path=mine.yaml", *words]) == 2
+    assert re.search(told, capsys.readouterr().err)
+    assert [path.name for path in tmp_path.iterdir()] == ["mine.yaml"]
+
+
+def own_configs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, registry: str) -> StudyConfig:
+    """A copy of the package's files in which a study has a registry of its own."""
+    configs = tmp_path / "configs"
+    shutil.copytree(configs_folder(), configs)
+    (configs / "experiments/parts/mine.yaml").write_text(registry)
+    monkeypatch.setattr(runs, "configs_folder", lambda: configs)
+    return StudyConfig("out", "experiments/parts/mine.yaml", {})
+
+
+def test_registries_that_lean_on_others_and_on_defaults_serve_a_gpu_too(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    study = own_configs(tmp_path, monkeypatch, "base: study.yaml\n")
+    found = load_registry(runs.configs_for("cuda", study, tmp_path / "one") / study.registry)
+    assert found.root == "datasets/study_cuda"
+    assert {dataset.make.image_size for dataset in found.datasets if dataset.make} == {128, 192}
+    mine = [
+        {"path": "ours/{task}", "tasks": ["OpenDrawer"], "make": {"episodes": "few", "seed": 1}},
+        {"path": "by_hand", "tasks": ["OpenDrawer"]},
+    ]
+    file = tmp_path / "configs" / study.registry
+    file.write_text(yaml.safe_dump({"episodes": {"few": 1}, "datasets": mine}))
+    found = load_registry(runs.configs_for("cuda", study, tmp_path / "two") / study.registry)
+    assert [(one.path, one.make and one.make.image_size) for one in found.datasets] == [
+        ("cuda/ours/{task}", 2 * IMAGE_SIZE),
+        ("by_hand", None),
+    ], "what nobody records anew stays where it is"
+    assert found.root == load_registry(file).root
+    outside = StudyConfig("out", str(file.rename(tmp_path / "mine.yaml")), {})
+    with pytest.raises(UserError, match="outside of"):
+        runs.configs_for("cuda", outside, tmp_path / "three")
+    assert not (tmp_path / "three").exists()
+
+
+def test_costs_need_no_registry_that_says_everything(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    study = own_configs(tmp_path, monkeypatch, "base: study.yaml\n")
+    assert costs(study, {}, tmp_path / "configs", 1, 0) == {}
+    (tmp_path / "configs" / study.registry).write_text("root: mine\n")
+    assert costs(study, {}, tmp_path / "configs", 1, 0) == {}

@@ -15,6 +15,7 @@ from robocasa_lerobot import contract
 from robocasa_lerobot.demos.motion import base_pose, grip_position
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.projection import camera_matrix, project
+from robocasa_lerobot.envs.rendering import SceneRenderer
 from robocasa_lerobot.teleop.driving.assist import ABOVE_M
 from robocasa_lerobot.teleop.telling import header
 
@@ -98,6 +99,33 @@ def test_the_hand_reaches_above_an_object_in_a_picture(table: Desk, env: Kitchen
     assert np.linalg.norm(away[:2]) < 0.05
     assert ABOVE_M[0] - 0.03 < away[2] < ABOVE_M[-1] + 0.15
     assert table.session.driven.origins[-2].assisted  # the last one was zeros again
+
+
+def test_a_click_is_about_the_picture_that_was_clicked(table: Desk, env: KitchenEnv) -> None:
+    renderer = SceneRenderer(env.model, 256, 256)
+    try:
+        _, geoms = renderer.geometry(env.data, CAMERA)
+    finally:
+        renderer.close()
+    rows, columns = np.nonzero((geoms >= 0) & env.scene.subtree("obj")[env.model.geom_bodyid[geoms]])
+    middle = len(rows) // 2
+    u, v = (float(columns[middle]) + 0.5) / 256, (float(rows[middle]) + 0.5) / 256
+    number, _ = table.session.draw(table.now)
+    free = table.session.pictures.shown(number, env, table.session.free)[1]
+    table.say("set", mode="base")
+    table.say("view", azimuth=2.0)
+    table.hold(25, base=[0, 0, 1])
+    table.say("reach", camera=CAMERA, u=u, v=v)
+    assert "above obj" not in table.notes()[-1]
+    table.say("reach", camera=CAMERA, u=u, v=v, frame=10_000)  # none that is known
+    assert "above obj" not in table.notes()[-1]
+    table.say("reach", camera=CAMERA, u=u, v=v, frame=number)
+    assert table.notes()[-1] == "reaching above obj"
+    assert free == table.session.pictures.shown(number, env, table.session.free)[1] != table.session.free
+    later, _ = table.session.draw(table.now)
+    data, _ = table.session.pictures.shown(later, env, table.session.free)
+    assert data is not env.data
+    assert np.array_equal(data.qpos, env.data.qpos)
 
 
 def test_what_cannot_be_reached_is_said_and_nothing_moves(table: Desk, env: KitchenEnv) -> None:

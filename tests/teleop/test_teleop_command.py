@@ -132,3 +132,6 @@ def test_mistakes_are_told_in_a_sentence(tmp_path: Path, capsys: pytest.CaptureF
     (tmp_path / f"{TASK}.hdf5").write_bytes(b"")
     assert cli.main(["teleop", "--task", TASK, *out]) == 2
     assert "did not record it here" in capsys.readouterr().err
+    wrong = ["--policy", "nowhere", "--out", str(tmp_path / f"{TASK}.hdf5")]
+    assert cli.main(["teleop", "--task", TASK, *wrong]) == 2
+    assert "is a file. Choose a folder." in capsys.readouterr().err

@@ -20,6 +20,7 @@ from robocasa_lerobot import contract
 from robocasa_lerobot.demos.recorder import SUCCESS_HOLD_STEPS, Recording
 from robocasa_lerobot.demos.replay import replay
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
+from robocasa_lerobot.envs.robots.control_step import DivergedError
 from robocasa_lerobot.errors import UserError
 from robocasa_lerobot.teleop.keeping.store import REDO, Store
 from robocasa_lerobot.teleop.telling import header
@@ -293,19 +294,37 @@ def test_a_folder_in_which_nothing_was_kept_takes_other_settings(tmp_path: Path)
         assert store.next_number() == 0
 
 
-def test_a_full_disk_leaves_the_episode_to_be_saved_again(tmp_path: Path, env: KitchenEnv, shown: Recording) -> None:
+def test_an_idle_head_whose_loss_loses_the_physics_stays(
+    tmp_path: Path, env: KitchenEnv, shown: Recording, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def lost(action: np.ndarray) -> Any:
+        raise DivergedError("the simulation diverged at 0.050 s; reset the env.")
+
     with desk(tmp_path, env, shown) as table:
-        table.follow(200)
-        folder = tmp_path / f".{TASK}.teleop"
-        block = folder / "000000.hdf5.partial"
-        block.mkdir()  # nothing can be written there
-        table.say("save")
-        table.until("review")
-        assert "save it again" in table.notes()[-1]
-        block.rmdir()
+        table.say("start")
+        table.tick(3)
+        for action in contract.hdf5_to_stored(shown.actions):
+            table.say("action", frame=0, action=action.tolist())
+            table.tick()
+        steps = len(table.session.driven)
+        with monkeypatch.context() as broken:
+            broken.setattr(env, "step", lost)
+            table.say("save", trim=True)
+            table.until("review")
+        assert "does not succeed: save it whole" in table.notes()[-1]
+        assert len(table.session.driven) == steps
         table.say("save")
         table.until("done")
     assert replay(tmp_path / f"{TASK}.hdf5", "demo_0").deviation == 0.0
+
+
+def test_steps_are_undone_from_the_one_that_is_shown(tmp_path: Path, env: KitchenEnv, shown: Recording) -> None:
+    with desk(tmp_path, env, shown) as table:
+        table.follow(40)
+        table.say("end")
+        table.say("review", seek=30)
+        table.say("rewind", steps=10)
+        assert (table.session.phase, len(table.session.driven)) == ("paused", 20)
 
 
 def test_a_kitchen_that_cannot_be_made_is_left_out(

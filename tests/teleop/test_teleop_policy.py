@@ -20,6 +20,8 @@ from robocasa_lerobot.convert.settings import ConversionSettings, make_plan
 from robocasa_lerobot.demos.replay import replay
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.errors import UserError
+from robocasa_lerobot.evaluation.actors import policy_runner
+from robocasa_lerobot.evaluation.remote.failures import LostError
 from robocasa_lerobot.teleop.client import TeleopClient
 from robocasa_lerobot.teleop.driving.pilot import load_pilot
 from robocasa_lerobot.teleop.telling import header
@@ -170,6 +172,15 @@ def test_a_policy_behind_a_socket_drives_and_its_end_is_no_end(tmp_path: Path) -
                 assert (table.session.phase, pilot.state) == ("running", "AUTONOMOUS")
                 assert len(table.session.driven) == steps + 5
         env.close()
+
+
+def test_a_server_that_is_gone_again_is_a_mistake_with_a_remedy(monkeypatch: pytest.MonkeyPatch) -> None:
+    def gone(*arguments: Any) -> Any:
+        raise LostError("openpi://127.0.0.1:8000: refused")
+
+    monkeypatch.setattr(policy_runner, "load_actor", gone)
+    with pytest.raises(UserError, match=r"refused\. Start the server"):
+        load_pilot("zero", TASK)
 
 
 def test_a_policy_that_is_none_is_a_mistake(tmp_path: Path) -> None:

@@ -21,6 +21,7 @@ from robocasa_lerobot.teleop.client_line import MOST_UNACKNOWLEDGED
 from robocasa_lerobot.teleop.loop import Inbox
 from robocasa_lerobot.teleop.messages import LONGEST_MESSAGE
 from robocasa_lerobot.teleop.server import TeleopServer
+from robocasa_lerobot.teleop.settings import STALE_S
 
 pytestmark = pytest.mark.render
 
@@ -148,6 +149,24 @@ def test_pictures_wait_for_who_does_not_acknowledge_and_time_stands(session: Ser
         operator._acknowledges = True
         operator.send("ack", frame=operator.frame["id"])
         operator.until(lambda: operator.frame["id"] > last + MOST_UNACKNOWLEDGED)
+        operator.send("resume")
+        assert operator.until_phase("running")
+
+
+def test_who_has_long_answered_no_picture_cannot_have_time_run(session: Served, operator: TeleopClient) -> None:
+    with TeleopClient(session.address) as viewer:
+        operator._acknowledges = False
+        last = operator.frame["id"]
+        operator.until(lambda: operator.frame["id"] > last)
+        time.sleep(2 * STALE_S)  # while nothing runs that is nobody's matter
+        operator.send("start")
+        assert viewer.until_phase("paused")["pause"] == "stale"
+        shown = viewer.frame["id"]
+        operator.send("resume")
+        viewer.until(lambda: viewer.frame["id"] > shown + 3)
+        assert (viewer.frame["phase"], viewer.frame["pause"]) == ("paused", "stale")
+        operator._acknowledges = True
+        operator.send("ack", frame=operator.frame["id"])
         operator.send("resume")
         assert operator.until_phase("running")
 

@@ -20,6 +20,10 @@ import torch
 from training_support import ROOT, experiment_file, losses
 
 from robocasa_lerobot.data.fake import write_fake_dataset
+from robocasa_lerobot.errors import UserError
+from robocasa_lerobot.jobs.locks import locked
+from robocasa_lerobot.training.config.experiment import load_experiment
+from robocasa_lerobot.training.phases import run_experiment
 from robocasa_lerobot.training.weights.checkpoint import checkpoint_step, last_checkpoint
 
 # Without dropout, whose masks belong to processes; everything else that is random belongs to samples.
@@ -118,6 +122,38 @@ def test_the_slurm_recipe_passes_the_signal_on_to_the_trainers(
     assert last is not None
     assert 2 <= checkpoint_step(last) == losses(tmp_path, "pretrain")[-1][0] < 100000, log.read_text()[-3000:]
     assert "the same command goes on" in log.read_text()
+
+
+def test_one_run_at_a_time_trains_a_phase_and_its_end_lets_the_next_one_in(tmp_path: Path, data: Path) -> None:
+    path = experiment_file(tmp_path, data, defaults={"steps": 100000, "save_every": 2})
+    words = [*command(path), "--end-with-input"]
+    log = tmp_path / "log"
+    with log.open("w") as file:
+        first = subprocess.Popen(words, env=environment(), stdin=subprocess.PIPE, stdout=file, stderr=file)
+    try:
+        while not (tmp_path / "out/pretrain/checkpoints/000002").is_dir():
+            assert first.poll() is None, log.read_text()[-3000:]
+            time.sleep(0.05)
+        with pytest.raises(UserError, match="the same training is running: another process trains"):
+            run_experiment(load_experiment(path))
+        assert first.poll() is None
+        assert first.stdin is not None
+        first.stdin.close()  # as the system does where its caller is killed
+        assert first.wait(60) == 1, log.read_text()[-3000:]
+    finally:
+        first.kill()
+    assert not run_experiment(load_experiment(path), stop_after=1), "it goes on"
+
+
+@pytest.mark.slow
+def test_none_of_several_processes_trains_what_another_run_trains(tmp_path: Path, data: Path) -> None:
+    path = experiment_file(tmp_path, data)
+    (tmp_path / "out").mkdir()
+    with locked(tmp_path / "out/.pretrain.lock", wait=False):
+        found = in_two_processes(command(path), tmp_path)
+    assert [status for status, _ in found] == [2, 2]
+    assert all("the same training is running" in log for _, log in found)
+    assert not (tmp_path / "out/pretrain").exists()
 
 
 WAITING = """

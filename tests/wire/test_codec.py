@@ -69,6 +69,42 @@ def test_text_in_npy_bytes_becomes_lists() -> None:
     assert decode(message) == [["open the drawer"]]
 
 
+def npy(descr: str, shape: str, data: bytes = b"", version: int = 1) -> bytes:
+    """A message of an array in `numpy.save`'s bytes whose header says what it likes."""
+    header = f"{{'descr': '{descr}', 'fortran_order': False, 'shape': {shape}}}".encode()
+    as_npy = b"\x93NUMPY" + bytes([version, 0]) + len(header).to_bytes(2, "little") + header + data
+    return bytes(msgpack.packb({"__ndarray_class__": True, "as_npy": as_npy}))
+
+
+@pytest.mark.parametrize(
+    ("message", "why"),
+    [
+        (npy("<U0", "(1000000000000,)"), "is refused"),
+        (npy("|S0", "(1000000000000,)"), "is refused"),
+        (npy("|V0", "(1000000000000,)"), "is refused"),
+        (npy("|O", "(1000000000000,)"), "is refused"),
+        (npy("<f4", "(-1,)"), "is refused"),
+        (npy("<f4", "(1000000000000,)", b"1234"), "4 bytes, not 4000000000000"),
+        (npy("<f4", "(1,)", b"12345678"), "8 bytes, not 4"),
+        (npy("<U1", "(1000000000000, 0)"), "nothing in more than"),
+        (npy("<f4", "(1000000000000, 0)"), "nothing in more than"),
+        (npy("<U1", "(200000,)", b"a\0\0\0" * 200_000), "texts of arrays"),
+        (npy("<U1", "(100, 300, 0, 100)"), "nothing in more than"),
+        (npy("<U1", "(100, 999, 0)"), "texts of arrays"),
+        (npy("<f4", "(1,)", b"1234", version=3), "cannot be read"),
+    ],
+)
+def test_npy_bytes_that_promise_more_than_there_is_are_refused_unread(message: bytes, why: str) -> None:
+    with pytest.raises(WireError, match=why):
+        decode(message)
+
+
+def test_rows_without_end_of_nothing_are_refused() -> None:
+    array = {"__ndarray__": True, "dtype": "<f4", "shape": [2**40, 0], "data": b""}
+    with pytest.raises(WireError, match="nothing in more than"):
+        decode(msgpack.packb(array))
+
+
 class _Bomb:
     def __reduce__(self) -> tuple[object, tuple[str]]:
         return exec, ("raise SystemExit('a pickle was executed')",)

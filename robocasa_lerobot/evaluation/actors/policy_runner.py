@@ -100,15 +100,21 @@ def load_reference(source: PolicySource) -> Actor:
 
 
 def pick_device(device: str) -> str:
-    """`auto` resolved to cuda where there is one, else cpu.
+    """A device as torch calls it; `auto` is cuda where there is one, else cpu.
 
     Raises:
         UserError: a device that this machine does not have.
     """
     import torch
 
+    gpus = torch.cuda.device_count() if torch.cuda.is_available() else 0
     if device == "auto":
-        return "cuda" if torch.cuda.is_available() else "cpu"
-    if device == "cuda" and not torch.cuda.is_available():
-        raise UserError("policy.device=cuda, but torch sees no GPU: use --policy.device=cpu.")
+        return "cuda" if gpus else "cpu"
+    there = ["cpu"]
+    if gpus:
+        there += ["cuda", *(f"cuda:{index}" for index in range(gpus))]
+    if torch.backends.mps.is_available():
+        there.append("mps")
+    if device not in there:  # names are not read: to torch cuda:256 is cuda:0
+        raise UserError(f"device {device!r} is not there: torch sees {', '.join(there)}. Choose one of them, or auto.")
     return device

@@ -35,7 +35,7 @@ def gather(results: Sequence[Path], title: str | None = None) -> ReportData:
     """Read runs.
 
     Args:
-        results: folders with a `trials.jsonl`, or outputs of trainings with evaluations.
+        results: folders with a `trials.jsonl`, such files of whatever name, or outputs of trainings with evaluations.
         title: heading; default: made from the protocol and the tasks.
 
     Raises:
@@ -43,7 +43,7 @@ def gather(results: Sequence[Path], title: str | None = None) -> ReportData:
     """
     once = {run.resolve(): run for folder in results for run in runs_in(folder)}  # one that is named twice is one
     runs = {folder: read_results(folder) for folder in once.values()}
-    policies = tuple(policy for folder, run in runs.items() for policy in _policies(folder, run))
+    policies = tuple(policy for run in runs.values() for policy in _policies(run))
     if not policies:
         raise UserError(f"no trials in {', '.join(map(str, results))}: run `robocasa-lerobot eval` first.")
     policies = _with_distinct_labels(join(_with_distinct_labels(policies)))
@@ -101,7 +101,7 @@ def _seconds(trials: Sequence[TrialRecord], fps: float | None) -> tuple[float | 
     return tuple(out)
 
 
-def _policies(folder: Path, results: Results) -> list[PolicyResult]:
+def _policies(results: Results) -> list[PolicyResult]:
     by_label: dict[str, dict[str, dict[str, list[TrialRecord]]]] = {}
     for record in results.trials:
         conditions = by_label.setdefault(record.label, {})
@@ -112,7 +112,8 @@ def _policies(folder: Path, results: Results) -> list[PolicyResult]:
         names = sorted(conditions, key=lambda name: name != UNPERTURBED)
         tasks = {name: tuple(summarize(*item, fps) for item in conditions[name].items()) for name in names}
         info, headers, planned = _info(results, tasks), _headers(results, tasks), _planned(results, label)
-        out.append(PolicyResult(label_under(label, names[0]), folder, info, headers, tasks, planned=planned))
+        folder, file = results.path.parent, results.path.name
+        out.append(PolicyResult(label_under(label, names[0]), folder, info, headers, tasks, planned=planned, file=file))
     return sorted(out, key=_training_order)
 
 
@@ -159,24 +160,29 @@ def _training_order(policy: PolicyResult) -> tuple[bool, int]:
 
 
 def _with_distinct_labels(policies: tuple[PolicyResult, ...]) -> tuple[PolicyResult, ...]:
-    folders: dict[str, list[Path]] = {}
+    found: dict[str, list[Path]] = {}
     for policy in policies:
-        folders.setdefault(policy.label, []).append(policy.folder)
+        found.setdefault(policy.label, []).append(_place(policy))
     return tuple(
-        dataclasses.replace(policy, label=f"{policy.label} ({_end_of(policy.folder, folders[policy.label])})")
-        if len(folders[policy.label]) > 1
+        dataclasses.replace(policy, label=f"{policy.label} ({_end_of(_place(policy), found[policy.label])})")
+        if len(found[policy.label]) > 1
         else policy
         for policy in policies
     )
 
 
-def _end_of(folder: Path, folders: Sequence[Path]) -> str:
-    """As much of the end of a folder's path as tells it from the others."""
-    for length in range(1, len(folder.parts) + 1):
-        end = folder.parts[-length:]
-        if sum(other.parts[-length:] == end for other in folders) == 1:
+def _place(policy: PolicyResult) -> Path:
+    """The folder of a policy's results, or the file where it is called otherwise than each folder's."""
+    return policy.folder if policy.file == TRIALS_FILE else policy.folder / policy.file
+
+
+def _end_of(place: Path, places: Sequence[Path]) -> str:
+    """As much of the end of a path as tells it from the others."""
+    for length in range(1, len(place.parts) + 1):
+        end = place.parts[-length:]
+        if sum(other.parts[-length:] == end for other in places) == 1:
             return "/".join(end)
-    return str(folder)
+    return str(place)
 
 
 def _title(policies: Sequence[PolicyResult], names: Sequence[str]) -> str:

@@ -40,7 +40,7 @@ def write_report(
 ) -> None:
     """Write the report's files and print where they are."""
     data = gather(results, title)
-    trainings = [read_training(folder) for folder in list(training) or find_trainings(data.policies)]
+    trainings = [read_training(folder) for folder in list(training) or find_trainings(data.single)]
     demonstrators = [result for path in demos for result in read_demonstrator(path)]
     html, *others = render(build(data, trainings, demonstrators, videos), data, out)
     print(f"report: {html.resolve()} and {', '.join(path.name for path in others)}")

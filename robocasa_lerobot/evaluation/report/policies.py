@@ -11,7 +11,7 @@ import numpy as np
 
 from robocasa_lerobot.benchmark import published
 from robocasa_lerobot.evaluation.config.evaluation import KITCHEN_ENV_FACTORY
-from robocasa_lerobot.evaluation.records.results import UNPERTURBED, PolicyInfo, RunHeader, TrialRecord
+from robocasa_lerobot.evaluation.records.results import TRIALS_FILE, UNPERTURBED, PolicyInfo, RunHeader, TrialRecord
 from robocasa_lerobot.evaluation.report.places import PERTURBATIONS, Place, places, tables
 from robocasa_lerobot.evaluation.statistics import Estimate, Rate, average_over_tasks
 from robocasa_lerobot.evaluation.statistics.paired import Outcomes
@@ -86,7 +86,7 @@ class TaskResult:
 
 @dataclass(frozen=True, eq=False)
 class PolicyResult:
-    """All trials of one policy in one run; `folder` is where they and their videos lie.
+    """All trials of one policy in one run; `folder` is where they, in `file`, and their videos lie.
 
     `conditions` has the tasks under each perturbation, the unperturbed ones (where there are any) first. One that was
     joined of several policies (`joining`) has these in `parts`; `folder` is then that of the first. `planned` has the
@@ -100,6 +100,7 @@ class PolicyResult:
     conditions: dict[str, tuple[TaskResult, ...]]
     parts: tuple[PolicyResult, ...] = ()
     planned: Mapping[tuple[str, str], int] = field(default_factory=dict)
+    file: str = TRIALS_FILE
 
     @cached_property
     def places(self) -> tuple[Place, ...]:

@@ -207,13 +207,14 @@ def evaluate(evaluation: Evaluation) -> list[TrialRecord]:
 def showcase(
     plan: Sequence[TrialSpec], records: Mapping[TrialKey, TrialRecord], never: Collection[str] = ()
 ) -> list[TrialSpec]:
-    """Trials to run once more for their films: the first success and the first failure that no film shows yet.
+    """Trials to run once more for their films: those to film that have none, and others that show what no film does.
 
+    The former were run before so many films were asked for, the latter are the first success and the first failure.
     Which trials succeed is not known when the filmed ones are fixed; a trial can be run again, because it takes the
     same course. Only policies that are filmed at all are looked at, and not those in `never`, whose trials take no
     course twice.
     """
-    chosen = []
+    chosen: list[TrialSpec] = []
     groups: dict[tuple[str, str], list[TrialSpec]] = {}
     for spec in plan:
         if spec.label not in never:
@@ -221,10 +222,12 @@ def showcase(
     for specs in groups.values():
         if not any(spec.film for spec in specs):
             continue
+        done = [s for s in specs if s.key in records and records[s.key].error is None]
+        asked = [s for s in done if s.film and records[s.key].video is None]
+        chosen += asked
         for success in (True, False):
-            done = [s for s in specs if s.key in records]
-            these = [s for s in done if records[s.key].success is success and records[s.key].error is None]
-            if these and all(records[spec.key].video is None for spec in these):
+            these = [s for s in done if records[s.key].success is success]
+            if these and all(records[s.key].video is None and s not in asked for s in these):
                 chosen.append(to_film(these[0]))
     return chosen
 

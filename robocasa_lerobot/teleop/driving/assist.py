@@ -66,11 +66,14 @@ def reach_above(env: KitchenEnv, point: Array, *, closed: bool) -> Iterator[Arra
     yield from move_hand(env.data, found[0].targets[0], gripper, max_steps=40)
 
 
-def point_under(env: KitchenEnv, camera: str | mujoco.MjvCamera, u: float, v: float) -> tuple[str, Array]:
+def point_under(
+    env: KitchenEnv, data: mujoco.MjData, camera: str | mujoco.MjvCamera, u: float, v: float
+) -> tuple[str, Array]:
     """What is seen at a place of a picture, and the point (3,) to reach above: the top of an object, else the place.
 
     Args:
-        env: in the state of the picture.
+        env: in the present state; an object is reached for where it is now.
+        data: in the state of the picture.
         camera: of the picture, square; a name or a free one.
         u: to the right, share of the picture.
         v: down, share of the picture.
@@ -81,13 +84,13 @@ def point_under(env: KitchenEnv, camera: str | mujoco.MjvCamera, u: float, v: fl
     renderer = SceneRenderer(env.model, _PIXELS, _PIXELS)
     try:
         column, row = min(int(u * _PIXELS), _PIXELS - 1), min(int(v * _PIXELS), _PIXELS - 1)
-        depth, ids = renderer.geometry(env.data, camera)
+        depth, ids = renderer.geometry(data, camera)
         geom, far = int(ids[row, column]), float(depth[row, column])
     finally:
         renderer.close()
     if geom < 0:
         raise SkillError("nothing is to be seen there")
-    model, data = env.model, env.data
+    model = env.model
     body = int(model.geom_bodyid[geom])
     if env.scene.subtree(env.robot.names.base)[body]:
         raise SkillError("that is the robot itself")

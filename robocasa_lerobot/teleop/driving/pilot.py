@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv, Observation
+from robocasa_lerobot.errors import UserError
 
 if TYPE_CHECKING:
     from robocasa_lerobot.evaluation.actors.actor import Actor
@@ -89,8 +90,12 @@ def load_pilot(policy: str, task: str, device: str = "auto", keys: str = "") -> 
     from robocasa_lerobot.evaluation.actors.policy_runner import load_actor, pick_device
     from robocasa_lerobot.evaluation.config.evaluation import EnvSettings, EvaluationConfig, PolicySettings
     from robocasa_lerobot.evaluation.planning.sources import open_sources
+    from robocasa_lerobot.evaluation.remote.failures import RemoteError
 
     asked = PolicySettings(path=[policy], keys=[keys] if keys else [])
     (source,), size = open_sources(EvaluationConfig(policy=asked, env=EnvSettings(tasks=[task])))
     where = pick_device(device) if source.is_checkpoint else "cpu"
-    return Pilot(source.label, lambda: load_actor(source, where, None)), size
+    try:
+        return Pilot(source.label, lambda: load_actor(source, where, None)), size
+    except RemoteError as error:  # it answered a moment ago
+        raise UserError(f"{error}. Start the server, then give the same command again.") from error

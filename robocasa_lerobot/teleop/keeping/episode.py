@@ -14,6 +14,7 @@ from robocasa_lerobot.demos.recorder import SUCCESS_HOLD_STEPS, EpisodeBuffer, R
 from robocasa_lerobot.demos.skills.common import stage_done
 from robocasa_lerobot.demos.stages import StageLog, StageOutcome
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv, Observation
+from robocasa_lerobot.envs.robots.control_step import DivergedError
 
 Array = NDArray[np.float64]
 Info = dict[str, Any]
@@ -145,7 +146,11 @@ class Episode:
         return int(busy.argmax()) if busy.any() else len(self)
 
     def without_head(self, steps: int) -> Episode:
-        """The same actions carried out again from the start of the kitchen without the first ones; it may fail."""
+        """The same actions carried out again from the start of the kitchen without the first ones; it may fail.
+
+        Raises:
+            DivergedError: the physics is lost on the way.
+        """
         other = Episode(self.env, self.seed)
         for action, origin in zip(self.actions()[steps:], self.origins[steps:], strict=True):
             other.step(action, origin)
@@ -164,7 +169,11 @@ class Episode:
             if not np.array_equal(now, state):
                 same = False
                 break
-            env.step(action.astype(np.float32))
+            try:
+                env.step(action.astype(np.float32))
+            except DivergedError:
+                same = False
+                break
         same = same and bool(np.array_equal(env.get_state().physics, self.states[-1].physics))
         self.show(len(self))
         return same

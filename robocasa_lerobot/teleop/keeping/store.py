@@ -7,6 +7,7 @@ the start of the next one where a session was killed.
 from __future__ import annotations
 
 import contextlib
+import errno
 import json
 import os
 import statistics
@@ -19,7 +20,7 @@ from typing import Any
 
 import h5py
 
-from robocasa_lerobot.demos.hdf5 import Failure, merge_parts, read_summary, write_part
+from robocasa_lerobot.demos.hdf5 import Failure, merge_parts, read_summary, versions, write_part
 from robocasa_lerobot.demos.recorder import Recording
 from robocasa_lerobot.errors import UserError, differing
 from robocasa_lerobot.files import write_text
@@ -73,27 +74,37 @@ class Store:
         """Keep other sessions out, read what earlier ones left, and merge what a killed one has not.
 
         Raises:
-            UserError: another session holds the folder, or there are episodes that were recorded otherwise.
+            UserError: another session holds the folder, there are episodes that were recorded otherwise, or what
+                there is cannot be read or merged.
         """
-        self.settings.out.mkdir(parents=True, exist_ok=True)
-        self._check()
+        check_out(self.settings.out)
         with held_folder(self.folder):
-            self._read()
-            write_text(self.folder / _SETTINGS, json.dumps(self.settings.identity()))
-            merged = read_summary(self.path).episodes if self.path.exists() else 0
-            if merged > len(self.saved):
+            try:
+                self._open()
+            except OSError as error:
                 raise UserError(
-                    f"{self.path} has {merged} episodes, and {self.folder} the single files of {len(self.saved)}: put "
-                    "the others back, or choose another --out."
-                )
-            if merged < len(self.saved):
-                self.merge()
+                    f"{self.folder} cannot be read, or {self.path.name} not made of it ({error}). Look after the disk, "
+                    "then give the same command again."
+                ) from error
             yield self
+
+    def _open(self) -> None:
+        self._check()
+        self._read()
+        write_text(self.folder / _SETTINGS, json.dumps(self._recorded_with()))
+        merged = read_summary(self.path).episodes if self.path.exists() else 0
+        if merged > len(self.saved):
+            raise UserError(
+                f"{self.path} has {merged} episodes, and {self.folder} the single files of {len(self.saved)}: put "
+                "the others back, or choose another --out."
+            )
+        if merged < len(self.saved):
+            self.merge()
 
     @property
     def saved(self) -> list[int]:
         """Numbers of the kitchens with a saved episode, in the order of the kitchens."""
-        return sorted(attempt.number for attempt in self.attempts if attempt.saved)
+        return sorted({attempt.number for attempt in self.attempts if attempt.saved})
 
     @property
     def discarded(self) -> int:
@@ -110,16 +121,31 @@ class Store:
         return self.folder / f"{number:06d}.hdf5"
 
     def save(self, number: int, recording: Recording, *, undos: int, wall_seconds: float) -> None:
-        """Keep an episode; it counts from when its file has its name."""
-        write_part(self.part(number), recording)
-        self._note(number, "", len(recording.actions), undos, wall_seconds, saved=True)
+        """Keep an episode, once: it counts from when its file has its name.
+
+        Raises:
+            OSError: it could not be written, or not be noted; save it again, or discard it.
+        """
+        if number not in self.saved:
+            write_part(self.part(number), recording)
+            self._note(number, "", len(recording.actions), undos, wall_seconds, saved=True)
 
     def discard(self, number: int, reason: str, *, steps: int, undos: int, wall_seconds: float) -> None:
-        """Note that an attempt came to nothing."""
+        """Note that an attempt came to nothing.
+
+        Raises:
+            OSError: that could not be written, and does not count.
+        """
+        if number not in self.saved:  # its file may be there all the same, where it could not be noted
+            self.part(number).unlink(missing_ok=True)
         self._note(number, reason, steps, undos, wall_seconds, saved=False)
 
     def merge(self) -> Path | None:
-        """Write the file of all saved episodes; None where there are none."""
+        """Write the file of all saved episodes; None where there are none.
+
+        Raises:
+            OSError: it could not be written; the one before it is as it was.
+        """
         saved = self.saved
         if saved:
             first = self.settings.seed
@@ -160,10 +186,7 @@ class Store:
     def _note(self, number: int, reason: str, steps: int, undos: int, wall_seconds: float, *, saved: bool) -> None:
         at = time.time() - self._began
         attempt = Attempt(number, saved, reason, steps, undos, round(wall_seconds, 3), self._began, round(at, 3))
-        with (self.folder / _ATTEMPTS).open("a", encoding="utf-8") as file:
-            file.write(json.dumps(asdict(attempt)) + "\n")
-            file.flush()
-            os.fsync(file.fileno())
+        _append(self.folder / _ATTEMPTS, (json.dumps(asdict(attempt)) + "\n").encode())
         self.attempts.append(attempt)
         self._write_stats()
 
@@ -189,15 +212,20 @@ class Store:
                 "put them back, or choose another --out."
             )
 
+    def _recorded_with(self) -> dict[str, Any]:
+        """What episodes of one file have in common: under other versions the same seed may be another kitchen."""
+        return {**self.settings.identity(), **versions()}
+
     def _check(self) -> None:
         note = self.folder / _SETTINGS
-        own = self.settings.identity()
+        own = self._recorded_with()
         before = json.loads(note.read_text(encoding="utf-8")) if note.exists() else own
         if before != own:
             if self.path.exists() or any(self.folder.glob("[0-9]*.hdf5")):
+                remedy = "Give" if differing(before, self.settings.identity()) else "Install"
                 raise UserError(
                     f"{self.settings.out} has episodes of {self.settings.task} that were recorded with other settings "
-                    f"({differing(before, own)}). Give those, or choose another --out."
+                    f"({differing(before, own)}). {remedy} those to go on with them, or choose another --out."
                 )
             note.unlink()  # nothing was kept with other settings, and numbers of attempts stand for other kitchens
             (self.folder / _ATTEMPTS).unlink(missing_ok=True)
@@ -214,6 +242,49 @@ class Store:
             return False
 
     def _write_stats(self) -> None:
-        file = self.settings.out / STATS_FILE
-        known: dict[str, Any] = json.loads(file.read_text(encoding="utf-8")) if file.exists() else {}
-        write_text(file, json.dumps({**known, self.settings.task: self.stats()}, indent=1) + "\n")
+        """Write the figures, where that is possible: they follow from the attempts, and come again with the next."""
+        file, own = self.settings.out / STATS_FILE, self.stats()
+        with contextlib.suppress(OSError):
+            try:
+                known: dict[str, Any] = json.loads(file.read_text(encoding="utf-8")) if file.exists() else {}
+            except ValueError:
+                known = {}
+            write_text(file, json.dumps({**known, self.settings.task: own}, indent=1) + "\n")
+
+
+def check_out(out: Path) -> None:
+    """Whether the folder of the sessions is there or can be made; nothing is made.
+
+    Raises:
+        UserError: there is a file in its place, or nothing may be written.
+    """
+    there = next(path for path in (out, *out.absolute().parents) if _exists(path))
+    if not there.is_dir():
+        raise UserError(f"--out {out}: {there} is a file. Choose a folder.")
+    if not os.access(there, os.W_OK | os.X_OK):
+        raise UserError(f"--out {out}: nothing may be written in {there}. Choose another folder, or change its rights.")
+
+
+def _exists(path: Path) -> bool:
+    try:
+        return path.exists()
+    except PermissionError:  # of a folder above it, which is asked next
+        return False
+
+
+def _append(file: Path, line: bytes) -> None:
+    """Add a line to a file, all of it or nothing.
+
+    Raises:
+        OSError: nothing was added.
+    """
+    with file.open("ab", buffering=0) as opened:
+        before = opened.tell()
+        try:
+            if opened.write(line) < len(line):
+                raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(file))
+            os.fsync(opened.fileno())
+        except OSError:
+            with contextlib.suppress(OSError):
+                opened.truncate(before)
+            raise

@@ -9,7 +9,6 @@ const PAUSES = {
   focus: ["Paused", "The page was left, so everything was let go."],
   stale: ["Pictures are late", "No picture was drawn for half a second, so the robot stands."],
   disconnected: ["Paused", "The line was lost, so the robot stands."],
-  marked: ["Back at the mark", "Press a key to go on from here."],
 };
 const ready = (touch) => (touch ? "Move a stick to begin." : "Nothing counts before your first key.");
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from robocasa_lerobot.evaluation.records.results import TRIALS_FILE, UNPERTURBED, PolicyInfo
+from robocasa_lerobot.evaluation.records.results import UNPERTURBED, PolicyInfo
 from robocasa_lerobot.evaluation.report.model import Block, Listing, Section
 from robocasa_lerobot.evaluation.report.policies import PolicyResult, ReportData, describe_policy
 from robocasa_lerobot.evaluation.report.sections.beside_published import horizon_phrase, success_phrase
@@ -22,7 +22,7 @@ def section(data: ReportData) -> Section:
             ("what", describe_policy(policy)),
             ("path", policy.info.path),
             *_what_decided(policy.info),
-            ("results", f"{policy.folder.name}/{TRIALS_FILE}"),
+            ("results", f"{policy.folder.name}/{policy.file}"),
         )
         parts.append(Listing(policy.label, items, folded=len(data.single) > 2))
     return Section("settings", "Settings and provenance", parts=tuple(parts))

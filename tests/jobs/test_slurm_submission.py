@@ -1,0 +1,50 @@
+"""What is noted of jobs that Slurm has taken, also where it refuses the next; with a stand-in that runs nothing."""
+
+from __future__ import annotations
+
+import json
+import os
+from pathlib import Path
+
+import pytest
+
+from robocasa_lerobot.errors import UserError
+from robocasa_lerobot.jobs.executors import JOBS_FILE, SlurmSettings, submit_to_slurm
+
+TAKES = """#!/bin/bash
+number=$(($(cat {count} 2>/dev/null || echo 0) + 1))
+[ $number -gt {most} ] && {{ echo "no more" >&2; exit 1; }}
+echo $number > {count}
+echo "Submitted batch job $number"
+"""
+
+
+def takes(folder: Path, most: int) -> None:
+    """Let sbatch take so many jobs, numbered from 1."""
+    (folder / "count").unlink(missing_ok=True)
+    (folder / "sbatch").write_text(TAKES.format(count=folder / "count", most=most))
+    (folder / "sbatch").chmod(0o755)
+
+
+def submit(folder: Path, arrays: int) -> tuple[str | None, str]:
+    settings = SlurmSettings(partition="cpu", time="1:00", max_array_size=1)
+    return submit_to_slurm(print, os.getpid, arrays, folder / "work", folder / "logs", settings)
+
+
+def test_each_array_that_was_taken_is_noted_at_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("PATH", f"{tmp_path}{os.pathsep}{os.environ['PATH']}")
+    (tmp_path / "squeue").write_text("#!/bin/bash\necho waiting\n")
+    (tmp_path / "squeue").chmod(0o755)
+    record = tmp_path / "logs" / JOBS_FILE
+    for taken in (1, 2):  # of two arrays and the job that comes after them
+        takes(tmp_path, taken)
+        with pytest.raises(UserError, match="Slurm did not take the jobs"):
+            submit(tmp_path, 2)
+        noted = [str(number) for number in range(1, taken + 1)]
+        assert json.loads(record.read_text()) == noted
+        with pytest.raises(UserError, match=f"still in the queue: {', '.join(noted)}"):
+            submit(tmp_path, 2)
+        record.unlink()
+    takes(tmp_path, 3)
+    assert submit(tmp_path, 2) == ("2", "3")
+    assert json.loads(record.read_text()) == ["1", "2", "3"]
