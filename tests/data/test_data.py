@@ -188,6 +188,7 @@ def kill_filling(source: DatasetSource, folder: Path, videos: int, monkeypatch: 
 
     with monkeypatch.context() as patched:
         patched.setattr(frame_cache, "_decode", counting)
+        patched.setattr(frame_cache, "cores_here", lambda: 2)  # one episode after the other
         with pytest.raises(KeyboardInterrupt):
             frame_cache.open_or_build(source, list(contract.IMAGE_KEYS), (32, 32), folder)
 
@@ -202,6 +203,7 @@ def test_cache_is_reused_continued_and_tied_to_the_data(
     monkeypatch.setattr(frame_cache, "_decode", lambda s, k, e, *r: decoded.append(e) or real(s, k, e, *r))
     cache = frame_cache.open_or_build(source, keys, (32, 32), tmp_path / "c")
     assert set(decoded) == {2, 3}  # the first two episodes were kept
+    monkeypatch.setattr(frame_cache, "cores_here", lambda: 8)  # several episodes at once
     whole = frame_cache.open_or_build(source, keys, (32, 32), tmp_path / "whole")
     assert torch.equal(cache.frames(keys[0], np.arange(36)), whole.frames(keys[0], np.arange(36)))
     decoded.clear()

@@ -11,8 +11,9 @@ import functools
 import hashlib
 import json
 import sys
-from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
+from collections import deque
+from collections.abc import Iterable, Iterator, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -26,10 +27,12 @@ from robocasa_lerobot.data.reading.source import DatasetSource
 from robocasa_lerobot.errors import UserError
 from robocasa_lerobot.files import write_text
 from robocasa_lerobot.jobs.locks import locked
+from robocasa_lerobot.jobs.workers import cores_here
 from robocasa_lerobot.progress import Bar
 
 FORMAT = 1  # counted up when the content of a cache changes
 _BLOCK = 512  # bytes of the unit of `st_blocks`, whatever the file system's own is
+_AHEAD = 4000  # frames of each camera, 0.8 GB before they are made smaller
 _TOLERANCE_S = 1e-4  # LeRobot's tolerance between the asked and the decoded timestamp
 
 
@@ -108,24 +111,51 @@ def _fill(source: DatasetSource, keys: list[str], size: tuple[int, int], folder:
         key: np.lib.format.open_memmap(folder / f"{key}.npy", mode=mode, dtype=np.uint8, shape=None if done else shape)
         for key in keys
     }
-    timestamps = source.columns["timestamp"]
     episodes = Bar(
-        range(done, len(source.starts)),
+        _decoded(source, keys, size, range(done, len(source.starts))),
         initial=done,
         total=len(source.starts),
         desc=f"decoding {source.root.name}",
         unit="episode",
         mininterval=0.2 if sys.stderr.isatty() else 10.0,  # seconds; a log file needs few lines
     )
-    with ThreadPoolExecutor(max_workers=len(keys)) as pool:
-        for episode in episodes:
-            where = slice(int(source.starts[episode]), int(source.ends[episode]))
-            jobs = {key: pool.submit(_decode, source, key, episode, timestamps[where], size) for key in keys}
-            for key, job in jobs.items():
-                arrays[key][where] = job.result().numpy()
-            for array in arrays.values():
-                array.flush()
-            write_text(progress, json.dumps({"episodes": episode + 1, "keys": keys}))
+    for episode, where, frames in episodes:
+        for key, array in arrays.items():
+            array[where] = frames[key].numpy()
+            array.flush()
+        write_text(progress, json.dumps({"episodes": episode + 1, "keys": keys}))
+
+
+def _decoded(
+    source: DatasetSource, keys: Sequence[str], size: tuple[int, int], episodes: Iterable[int]
+) -> Iterator[tuple[int, slice, dict[str, torch.Tensor]]]:
+    """Episodes in order, with their rows and their frames of each camera; later ones are decoded meanwhile.
+
+    As many at once as keep all cores busy, but none beyond the first while more frames than `_AHEAD` are waiting.
+    """
+    timestamps, cores = source.columns["timestamp"], cores_here()
+    begun: deque[tuple[int, slice, dict[str, Future[torch.Tensor]]]] = deque()
+    left, waiting = iter(episodes), 0
+    with ThreadPoolExecutor(max_workers=max(cores, len(keys))) as pool:
+        while True:
+            while not begun or (len(begun) <= cores // len(keys) and waiting < _AHEAD):
+                episode = next(left, None)
+                if episode is None:
+                    break
+                where = slice(int(source.starts[episode]), int(source.ends[episode]))
+                jobs = {key: pool.submit(_decode, source, key, episode, timestamps[where], size) for key in keys}
+                begun.append((episode, where, jobs))
+                waiting += where.stop - where.start
+            if not begun:
+                return
+            episode, where, jobs = begun.popleft()
+            try:
+                frames = {key: job.result() for key, job in jobs.items()}
+            except BaseException:
+                pool.shutdown(wait=False, cancel_futures=True)
+                raise
+            waiting -= where.stop - where.start
+            yield episode, where, frames
 
 
 def _decode(
