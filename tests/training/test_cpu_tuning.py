@@ -27,7 +27,7 @@ def check():
     print("set")
     sys.exit(0)
 cpu_tuning.limit_spinning = check
-command.run(argparse.Namespace(config_path="none.yaml"))
+command.run(argparse.Namespace(config_path="none.yaml", end_with_input=False))
 """
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False)
     assert (done.returncode, done.stdout) == (0, "set\n"), done.stderr
