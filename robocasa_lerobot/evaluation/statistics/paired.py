@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,10 +37,20 @@ class Paired:
 
 @dataclass(frozen=True)
 class Comparison:
-    """B against A over all tasks, and on each task."""
+    """B against A over all tasks, and on each task: `single` without a correction for their number."""
 
     overall: Paired
-    tasks: dict[str, Paired]
+    single: dict[str, Paired]
+
+    @functools.cached_property
+    def tasks(self) -> dict[str, Paired]:
+        """On each task, with `p_holm`; when asked for, since statsmodels has all memory collected each time."""
+        from statsmodels.stats.multitest import multipletests
+
+        corrected = multipletests([one.p_value for one in self.single.values()], method="holm")[1]
+        return {
+            task: replace(one, p_holm=float(p)) for (task, one), p in zip(self.single.items(), corrected, strict=True)
+        }
 
 
 def exact_mcnemar(only_a: int, only_b: int) -> float:
@@ -65,8 +76,6 @@ def compare(trials: Mapping[str, tuple[Outcomes, Outcomes]]) -> Comparison:
     Raises:
         UserError: no pairs, or lengths that differ.
     """
-    from statsmodels.stats.multitest import multipletests
-
     kept = {}
     for task, (a, b) in trials.items():
         a, b = np.asarray(a, dtype=bool), np.asarray(b, dtype=bool)
@@ -76,13 +85,7 @@ def compare(trials: Mapping[str, tuple[Outcomes, Outcomes]]) -> Comparison:
             kept[task] = (a, b)
     if not kept:
         raise UserError("nothing to compare: the two runs have no trial in common.")
-    single = {task: _paired({task: pair}) for task, pair in kept.items()}
-    corrected = multipletests([one.p_value for one in single.values()], method="holm")[1]
-    tasks = {
-        task: Paired(**{**vars(one), "p_holm": float(p)})
-        for (task, one), p in zip(single.items(), corrected, strict=True)
-    }
-    return Comparison(_paired(kept), tasks)
+    return Comparison(_paired(kept), {task: _paired({task: pair}) for task, pair in kept.items()})
 
 
 def _paired(trials: Mapping[str, tuple[Outcomes, Outcomes]]) -> Paired:

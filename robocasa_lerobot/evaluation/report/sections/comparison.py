@@ -30,7 +30,8 @@ def section(data: ReportData) -> Section | None:
     pairs = all_pairs(data)
     if not pairs:
         return None
-    main = next((pair for pair in pairs if _is_main(data, pair)), pairs[0])
+    wanted = _main_policies(data)
+    main = next((pair for pair in pairs if wanted and (pair.a is wanted[0] and pair.b is wanted[1])), pairs[0])
     text = (
         "Only policies on the same trials are compared: the same kitchen, start, instruction, horizon and perturbation "
         "for both. "
@@ -63,10 +64,15 @@ def make_pair(a: PolicyResult, b: PolicyResult) -> Pair | None:
 
 
 def main_pair(data: ReportData) -> Pair | None:
-    """The last policy against the one before it that is no reference, if there are two."""
+    """The last policy against the one before it that is no reference, if there are two with common trials."""
+    wanted = _main_policies(data)
+    return make_pair(*wanted) if wanted else None
+
+
+def _main_policies(data: ReportData) -> tuple[PolicyResult, PolicyResult] | None:
     learned = [policy for policy in data.policies if not is_reference(policy)]
     policies = learned if len(learned) > 1 else list(data.policies)
-    return make_pair(policies[-2], policies[-1]) if len(policies) > 1 else None
+    return (policies[-2], policies[-1]) if len(policies) > 1 else None
 
 
 def sentence(data: ReportData) -> str | None:
@@ -120,11 +126,6 @@ def sentence(data: ReportData) -> str | None:
 def _p(value: float) -> str:
     text = fmt.p_value(value)
     return text if text.startswith("<") else f"= {text}"
-
-
-def _is_main(data: ReportData, pair: Pair) -> bool:
-    main = main_pair(data)
-    return main is not None and (main.a is pair.a and main.b is pair.b)
 
 
 def _pairs_table(pairs: list[Pair]) -> Table:
