@@ -24,6 +24,7 @@ def _command(source: Path, out: Path, *more: str) -> list[str]:
     return ["convert", str(source), "--out", str(out), *options]
 
 
+@pytest.mark.slow
 def test_slurm_pieces_are_run_resumed_and_joined(
     slurm: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

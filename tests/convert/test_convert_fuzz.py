@@ -107,6 +107,7 @@ def test_five_hundred_damaged_files(tmp_path: Path) -> None:
     print(dict(_fuzz(tmp_path, range(1000, 1500))))
 
 
+@pytest.mark.slow
 def test_every_variant_of_the_undamaged_file_converts(tmp_path: Path) -> None:
     """Otherwise the damaged ones would prove nothing."""
     for variant in range(VARIANTS):

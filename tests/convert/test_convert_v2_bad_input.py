@@ -317,7 +317,7 @@ TAMPERINGS: dict[str, tuple[str, str]] = {
 }
 
 
-@pytest.mark.parametrize("name", TAMPERINGS)
+@pytest.mark.parametrize("name", ["a number", pytest.param("a reward", marks=pytest.mark.slow)])
 def test_verify_finds_a_changed_number(name: str, good: Path, tmp_path: Path) -> None:
     check, key = TAMPERINGS[name]
     result = convert([good], tmp_path / "out", SETTINGS, workers=1)

@@ -164,7 +164,10 @@ def test_damage_is_noticed(case: str, damaged: Path) -> None:
     assert next(check for check in report.checks if check.name == name).differences
 
 
-@pytest.mark.parametrize("case", ["one action by one unit in the last place", "two frames swapped"])
+@pytest.mark.parametrize(
+    "case",
+    ["one action by one unit in the last place", pytest.param("two frames swapped", marks=pytest.mark.slow)],
+)
 def test_several_processes_find_the_same(case: str, damaged: Path) -> None:
     DAMAGES[case][0](damaged / "data")
     alone, several = (verify(damaged / "data", [damaged / "demos.hdf5"], workers=number) for number in (1, 2))

@@ -49,6 +49,7 @@ def test_discovery_of_installed_plugins_finds_both_types() -> None:
     assert "diffusion_transformer" in finding.found
 
 
+@pytest.mark.slow
 def test_discovery_flag_finds_both_types() -> None:
     """`--env.discover_packages_path` on LeRobot's command line, without the companion distribution."""
     parsed = in_new_process(

@@ -110,7 +110,8 @@ def kill_and_rerun(out: Path, kills: int) -> list[TrialRecord]:
     return read_results(out).trials
 
 
-@pytest.mark.parametrize("kills", [1, pytest.param(10, marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("kills", [1, 10])
 def test_killed_and_given_again(tmp_path: Path, kills: int) -> None:
     whole = evaluate(tmp_path / "whole", **{"env.tasks": "Slide+slow"}, trials=12)
     assert comparable(kill_and_rerun(tmp_path / "out", kills)) == comparable(whole)

@@ -64,6 +64,7 @@ GROOT_KEYS = {
 }
 
 
+@pytest.mark.slow
 def test_a_key_map_of_ones_own_takes_seed_and_number_to_gr00ts_wire(checkpoint: Path, tmp_path: Path) -> None:
     """(Our servers recognised by themselves: `tests/evaluation/test_remote_and_served.py`.)"""
     ours = evaluate(str(checkpoint), tmp_path / "ours", SIZE, "--policy.device=cpu")

@@ -216,9 +216,8 @@ def keep_whole_run(folder: Path, steps: dict[str, int]) -> None:
     (folder / ABOUT).write_text(json.dumps(about))
 
 
-@pytest.mark.parametrize(
-    ("number", "status"), [(signal.SIGTERM, 2), pytest.param(signal.SIGKILL, -signal.SIGKILL, marks=pytest.mark.slow)]
-)
+@pytest.mark.slow
+@pytest.mark.parametrize(("number", "status"), [(signal.SIGTERM, 2), (signal.SIGKILL, -signal.SIGKILL)])
 def test_nothing_goes_on_alone_when_the_study_ends(tmp_path: Path, number: signal.Signals, status: int) -> None:
     words = ("multitask", "--episodes=pretrain=100", *TINY)
     with subprocess.Popen([*COMMAND, *words], cwd=tmp_path, stderr=subprocess.PIPE, text=True) as process:

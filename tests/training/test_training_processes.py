@@ -183,7 +183,7 @@ finally:
 """
 
 
-@pytest.mark.parametrize("end", ["fails", "dies"])
+@pytest.mark.parametrize("end", ["dies", pytest.param("fails", marks=pytest.mark.slow)])
 def test_no_process_gives_up_while_the_first_one_evaluates(tmp_path: Path, end: str) -> None:
     """Work of twice the time after which a barrier fails; and where it fails or is killed, no process hangs."""
     (tmp_path / "waiting.py").write_text(WAITING)
