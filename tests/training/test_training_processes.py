@@ -83,7 +83,10 @@ def test_two_processes_train_as_one_does(tmp_path: Path, data: Path, kind: str) 
     run_in_two_processes(two)
     for phase in ("pretrain", "finetune"):
         ours, theirs = losses(tmp_path / "two", phase), losses(tmp_path / "one", phase)
-        np.testing.assert_allclose(ours, theirs, rtol=1e-5)
+        np.testing.assert_allclose(ours[:, :2], theirs[:, :2], rtol=1e-5)
+        # Norms of gradients have kinks: a unit whose input is zero but for rounding is on in one order of the sums and
+        # off in another. A gradient that is averaged wrongly is off by far more.
+        np.testing.assert_allclose(ours[:, 2], theirs[:, 2], rtol=1e-3)
 
 
 @pytest.mark.slow
