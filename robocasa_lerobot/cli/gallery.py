@@ -116,7 +116,9 @@ def _starts(args: argparse.Namespace) -> None:
     try:
         width, height = (int(s) for s in args.overview_size.split("x"))
     except ValueError:
-        raise UserError(f"--overview-size {args.overview_size!r}: expected WIDTHxHEIGHT in pixels.") from None
+        width = height = 0
+    if width < 1 or height < 1:
+        raise UserError(f"--overview-size {args.overview_size!r}: expected WIDTHxHEIGHT in pixels.")
     for name in names:
         for seed in seeds:
             for path in render_task(

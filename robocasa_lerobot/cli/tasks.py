@@ -58,6 +58,8 @@ def run(args: argparse.Namespace) -> int:
         if args.seeds < 1:
             raise UserError(f"--seeds {args.seeds}: --check needs at least one seed.")
         return _check(tasks, range(args.seeds), args.workers, args.log)
+    if page_file := args.markdown or args.deviations:
+        page_file.parent.mkdir(parents=True, exist_ok=True)  # before the work, not after it
     if args.markdown:
         write_text(args.markdown, pages(tasks))
         print(f"{args.markdown}: {len(tasks)} tasks")

@@ -56,5 +56,7 @@ def run(args: argparse.Namespace) -> int:
         return 0
     import mujoco.viewer
 
-    mujoco.viewer.launch(scene.model, data)
+    from robocasa_lerobot.envs.web_view import as_shown
+
+    mujoco.viewer.launch(as_shown(scene.model), data)
     return 0

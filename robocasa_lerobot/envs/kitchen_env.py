@@ -203,8 +203,12 @@ class KitchenEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         return int(copy.deepcopy(self.np_random).integers(_SEED_LIMIT))
 
     def get_state(self) -> KitchenState:
-        """The state of the running episode."""
-        assert self._controller is not None
+        """The state of the running episode.
+
+        Raises:
+            UserError: before the first reset.
+        """
+        controller = self.controller
         physics, asleep = read_physics(self.model, self.data)
         return KitchenState(
             task=self.task,
@@ -215,7 +219,7 @@ class KitchenEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
             steps=self._steps,
             physics=physics,
             asleep=asleep,
-            controller=self._controller.get_state(),
+            controller=controller.get_state(),
             mujoco_version=mujoco.mj_versionString(),
         )
 

@@ -8,6 +8,7 @@ what is used.
 from __future__ import annotations
 
 import contextlib
+import copy
 import queue
 import socket
 import time
@@ -16,10 +17,12 @@ from typing import Any, ClassVar
 
 import mujoco
 
+from robocasa_lerobot.envs.rendering.canvas import COLLISION_GROUP
 from robocasa_lerobot.errors import UserError
 
 _LOOPBACK = "127.0.0.1"
 _START_S, _POLL_S = 60.0, 0.05
+_NOT_SHOWN = 3  # the first group that MuJoCo's viewers leave out
 
 
 class WebView:
@@ -49,6 +52,7 @@ class WebView:
         WebView._running = True
         self._copy: mujoco.MjData | None = None
         self._model: mujoco.MjModel | None = None
+        self._shown: mujoco.MjModel | None = None
 
     @property
     def address(self) -> str:
@@ -58,13 +62,13 @@ class WebView:
     def sync(self, model: mujoco.MjModel, data: mujoco.MjData) -> None:
         """Show a state (3 ms). What somebody does in the viewer changes a copy of it and never `data`."""
         if self._copy is None or model is not self._model:
-            self._model, self._copy = model, mujoco.MjData(model)
+            self._model, self._copy, self._shown = model, mujoco.MjData(model), as_shown(model)
         mujoco.mj_copyData(self._copy, model, data)
-        self._handle.sync(model, self._copy)
+        self._handle.sync(self._shown, self._copy)
 
     def run(self, model: mujoco.MjModel, data: mujoco.MjData) -> None:
         """Simulate `data` and show it until the viewer ends or the user interrupts; needs `simulate`."""
-        self._handle.set_model(model, data=data)
+        self._handle.set_model(as_shown(model), data=data)
         while self._handle.is_running():
             self._handle.sync()
 
@@ -80,6 +84,13 @@ class WebView:
     def __exit__(self, *_: object) -> None:
         """End it."""
         self.close()
+
+
+def as_shown(model: mujoco.MjModel) -> mujoco.MjModel:
+    """A copy for MuJoCo's own viewers: its collision shapes are in a group that these leave out, as cameras do."""
+    shown = copy.copy(model)
+    shown.geom_group[shown.geom_group == COLLISION_GROUP] = _NOT_SHOWN
+    return shown
 
 
 def _studio() -> dict[str, Any]:
@@ -137,7 +148,7 @@ def _port(bound: queue.Queue[int], handle: Any, asked: int) -> int:
             continue
         except ConnectionRefusedError:  # bound, and not listening yet
             time.sleep(_POLL_S)
-        except RuntimeError as error:
+        except (RuntimeError, OverflowError) as error:
             where = asked or "8080 and the next ones"
             raise UserError(f"the web viewer cannot listen at port {where}: {error}") from error
     raise UserError("MuJoCo's web viewer did not start within a minute.")

@@ -8,6 +8,7 @@ import mujoco
 import numpy as np
 from PIL import Image
 
+from robocasa_lerobot.demos.motion import base_pose
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.kitchens.footprints import Footprint
 from robocasa_lerobot.envs.rendering import SceneRenderer
@@ -43,25 +44,25 @@ def render_task(
         env.close()
         renderer = SceneRenderer(env.model, *overview_size, shadows=preset == "quality")
         kitchen = out / f"{task}_{seed}_kitchen.{file_format}"
-        Image.fromarray(renderer.render(env.data, visitor_camera(env.scene))).save(kitchen, quality=90)
+        Image.fromarray(renderer.render(env.data, visitor_camera(env.scene, env.data))).save(kitchen, quality=90)
         renderer.close()
     finally:
         env.close()
     return [cameras, kitchen]
 
 
-def visitor_camera(scene: Scene) -> mujoco.MjvCamera:
+def visitor_camera(scene: Scene, data: mujoco.MjData) -> mujoco.MjvCamera:
     """A free camera at eye height behind and beside the robot, as far away as the room and its furniture allow."""
     camera = mujoco.MjvCamera()
-    towards = np.array([np.cos(scene.robot_pose.yaw), np.sin(scene.robot_pose.yaw)])
-    camera.lookat = [scene.robot_pose.x + 0.25 * towards[0], scene.robot_pose.y + 0.25 * towards[1], 0.95]
+    (x, y, _), yaw = base_pose(data)
+    camera.lookat = [x + 0.25 * np.cos(yaw), y + 0.25 * np.sin(yaw), 0.95]
     camera.elevation = -14.0
     spots = [
-        (_clear_distance(scene, camera, scene.robot_pose.yaw + np.radians(side)), -abs(side), side)
+        (_clear_distance(scene, camera, yaw + np.radians(side)), -abs(side), side)
         for side in (28.0, -28.0, 55.0, -55.0, 80.0, -80.0)
     ]
     camera.distance, _, side = max(spots)
-    camera.azimuth = float(np.degrees(scene.robot_pose.yaw)) + side
+    camera.azimuth = float(np.degrees(yaw)) + side
     return camera
 
 

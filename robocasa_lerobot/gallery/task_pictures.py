@@ -55,7 +55,7 @@ def render_states(task: str, out: Path, *, split: str = "target", seed: int = 0)
 def _row(env: KitchenEnv) -> Picture:
     renderer = SceneRenderer(env.model, _HEIGHT, _WIDE)
     try:
-        visitor = renderer.render(env.data, visitor_camera(env.scene))
+        visitor = renderer.render(env.data, visitor_camera(env.scene, env.data))
     finally:
         renderer.close()
     return np.hstack([visitor, *(env.render_camera(camera) for camera in env.cameras)])

@@ -54,8 +54,8 @@ def test_fewer_kitchens_admit_what_needs_more() -> None:
 
 def test_the_command_writes_the_page(tmp_path: Path) -> None:
     names = ["OpenOven", "OpenDishwasher"]
-    assert cli.main(["tasks", *names, "--deviations", str(tmp_path / "page.md"), "--workers=2"]) == 0
-    text = (tmp_path / "page.md").read_text(encoding="utf-8")
+    assert cli.main(["tasks", *names, "--deviations", str(tmp_path / "new" / "page.md"), "--workers=2"]) == 0
+    text = (tmp_path / "new" / "page.md").read_text(encoding="utf-8")
     assert text == deviations([get_task(name) for name in sorted(names)])
     assert "| [OpenOven](tasks.md#openoven) | " in text
 

@@ -162,3 +162,10 @@ def test_a_reset_that_is_interrupted_leaves_the_running_episode_as_it_was() -> N
     assert env.scene.seed == env.get_state().seed == 3
     assert_same(trajectory(env, actions(10, 0)), expected)
     assert env.reset(seed=4)[1]["seed"] == env.scene.seed == 4
+
+
+def test_there_is_no_state_before_the_first_reset() -> None:
+    env = KitchenEnv("CloseDrawer", cameras=())
+    with pytest.raises(UserError, match="call reset"):
+        env.get_state()
+    env.close()

@@ -128,6 +128,16 @@ def test_same_step_keeps_the_final_observation_and_info_in_the_infos() -> None:
         assert "final_info" not in env_info(infos, 1)
 
 
+@pytest.mark.parametrize("shape", [(1, 2), (3, 2), (2, 3)])
+def test_actions_of_another_shape_leave_no_env_ahead(shape: tuple[int, ...]) -> None:
+    with closing(make_vector_env([FaultyEnv, FaultyEnv])) as envs:
+        envs.reset(seed=7)
+        with pytest.raises(UserError, match=r"found shape .*, expected \(2,"):
+            envs.step(np.zeros(shape, np.float32))
+        observations, *_ = envs.step(STILL)
+        assert observations["agent_pos"][:, 1].tolist() == [1, 1]
+
+
 def test_without_autoreset_the_caller_resets_and_cannot_forget_to() -> None:
     with closing(make_vector_env([FaultyEnv, partial(FaultyEnv, length=4)], autoreset="disabled")) as envs:
         envs.reset(seed=7)

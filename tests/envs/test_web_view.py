@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 
 from robocasa_lerobot.cli import main
-from robocasa_lerobot.envs.web_view import WebView
+from robocasa_lerobot.envs.web_view import WebView, as_shown
 
 XML = "<mujoco><worldbody><body><freejoint/><geom size='.1'/></body></worldbody></mujoco>"
 
@@ -51,8 +51,11 @@ def test_page_and_model_answer(view: WebView) -> None:
         view.sync(model, data)
     page = fetch(view.address)
     assert b"<html" in page.lower()
-    expected = np.empty(mujoco.mj_sizeModel(model), np.uint8)
-    mujoco.mj_saveModel(model, None, expected)
+    shown = as_shown(model)
+    assert not np.any(model.geom_group)
+    assert not mujoco.MjvOption().geomgroup[shown.geom_group].any(), "shapes that are only touched"
+    expected = np.empty(mujoco.mj_sizeModel(shown), np.uint8)
+    mujoco.mj_saveModel(shown, None, expected)
     for _ in range(200):  # its thread takes the model over in its own time
         if len(served := fetch(view.address + "model")) == expected.size:
             break
@@ -84,6 +87,14 @@ def test_a_taken_port_is_explained() -> None:
         done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert done.returncode == 2
     assert str(port) in done.stderr
+    assert "Traceback" not in done.stderr
+
+
+def test_a_port_that_is_none_is_explained() -> None:
+    command = [sys.executable, "-m", "robocasa_lerobot.cli", "view", "--task=OpenDrawer", "--web", "--port=70000"]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 2
+    assert "70000" in done.stderr
     assert "Traceback" not in done.stderr
 
 

@@ -155,8 +155,11 @@ class KitchenVectorEnv(AsyncVectorEnv):
         """Begin a step.
 
         Raises:
-            UserError: without autoreset, an env whose episode has ended.
+            UserError: actions of another shape, or without autoreset an env whose episode has ended.
         """
+        # Gymnasium notices only when it has sent some of them: those envs would be a step ahead from then on.
+        if np.shape(actions) != self.action_space.shape:
+            raise UserError(f"actions: found shape {np.shape(actions)}, expected {self.action_space.shape}.")
         if self.autoreset_mode == AutoresetMode.DISABLED and self._ended.any():
             ended = np.flatnonzero(self._ended).tolist()
             raise UserError(f"envs {ended}: their episodes have ended; reset them (options={{'reset_mask': ...}}).")

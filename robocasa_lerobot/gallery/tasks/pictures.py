@@ -116,7 +116,7 @@ def read(name: str, split: str, seed: int, folder: Path) -> Shown | None:
 def _start(env: KitchenEnv) -> NDArray[np.uint8]:
     renderer = SceneRenderer(env.model, *START_SIZE)
     try:
-        return renderer.render(env.data, visitor_camera(env.scene))
+        return renderer.render(env.data, visitor_camera(env.scene, env.data))
     finally:
         renderer.close()
 
