@@ -29,10 +29,9 @@ from pathlib import Path
 import common
 import evaluation_sides
 import training_sides
-from commands import CLI, run
+from commands import CLI, result, run
 
-from robocasa_lerobot.benchmark.tasks import facts_of
-from robocasa_lerobot.envs.tasks.registry import task_names
+from robocasa_lerobot.demos.choose import expand_names
 from robocasa_lerobot.progress import Bar
 
 OUTPUT = common.RESULTS / "between_commits.json"
@@ -125,10 +124,6 @@ def timed_run(checkout: Path, command: Sequence[str]) -> tuple[str, float]:
     return said, _children_s() - before
 
 
-def _atomic() -> list[str]:
-    return [name for name in task_names() if facts_of(name).kind == "atomic"]
-
-
 def _adopt_orphans() -> None:
     """Make this process the parent of what its children leave behind, where the system can do that (Linux).
 
@@ -179,18 +174,17 @@ class Work:
         return others.get(kind, lambda: self._simulate(kind))()
 
     def _plan(self) -> float:
-        return self._answer(PLANNING, str(PLANNED_SEEDS), ",".join(_atomic()[::EVERY]))
+        return self._answer(PLANNING, str(PLANNED_SEEDS), ",".join(expand_names("atomic")[::EVERY]))
 
     def _scene(self, pictures: bool) -> float:
-        return self._answer(SCENES, ",".join(_atomic()), str(pictures))
+        return self._answer(SCENES, ",".join(expand_names("atomic")), str(pictures))
 
     def _simulate(self, kind: str) -> float:
         return self._answer(CONTROL_STEP, TASK, str(STEPS[kind]), str(kind == "sim_pictures"))
 
     def _answer(self, program: str, *arguments: str) -> float:
         """The number that a program of this file prints as its result."""
-        said = run(self._checkout, ["-c", program, *arguments])
-        return float(said.rsplit("RESULT", 1)[1])
+        return float(result(run(self._checkout, ["-c", program, *arguments])))
 
     def _convert(self) -> float:
         out = self._folder / "dataset"
@@ -207,7 +201,7 @@ class Work:
         file.write_text(json.dumps(dataclasses.asdict(job)), encoding="utf-8")
         script = self._checkout / "benchmarks" / "evaluation_sides.py"
         said, seconds = timed_run(self._checkout, [str(script), evaluation_sides.OURS, str(file)])
-        return seconds / sum(json.loads(said.rsplit("RESULT ", 1)[1])["steps"])
+        return seconds / sum(result(said)["steps"])
 
 
 def measure(before: Path, scratch: Path, kinds: Sequence[str], repetitions: int) -> dict[str, dict[str, list[float]]]:

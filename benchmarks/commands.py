@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import json
 import os
 import subprocess
 import sys
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
+RESULT = "RESULT "  # before the last line of what a program says, as JSON
 CLI = ("-c", "import sys; from robocasa_lerobot.cli import main; sys.exit(main())")
 
 
@@ -21,3 +24,8 @@ def run(checkout: Path, command: Sequence[str]) -> str:
     if done.returncode:
         raise SystemExit(f"{command[0]} failed in {checkout}:\n{done.stdout[-2000:]}\n{done.stderr[-4000:]}")
     return done.stdout
+
+
+def result(said: str) -> Any:
+    """What a program has printed last, after `RESULT`."""
+    return json.loads(said.rsplit(RESULT, 1)[1])

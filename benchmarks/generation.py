@@ -30,6 +30,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import Any
 
 import common
 from generation_report import Trial, ratios, summary, text
@@ -218,10 +219,14 @@ def run(jobs: Sequence[Job], path: Path, workers: int) -> None:
             raise
 
 
+def _trial(row: Mapping[str, Any]) -> Trial:
+    start = row.get("start")
+    return Trial(**{**row, "sources": tuple(row["sources"]), "start": None if start is None else tuple(start)})
+
+
 def read(path: Path) -> dict[tuple[str, int, str], Trial]:
     """Finished attempts; a line that a kill has cut off is made anew."""
-    rows = read_whole_lines(path)
-    trials = (Trial(**row | {key: tuple(row[key]) for key in ("sources", "start") if key in row}) for row in rows)
+    trials = map(_trial, read_whole_lines(path))
     return {(trial.task, trial.seed, trial.arm): trial for trial in trials}
 
 

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from robocasa_lerobot.demos.quality.summary import Square, covered_share
 from robocasa_lerobot.envs.tasks.registry import get_task
 from robocasa_lerobot.envs.tasks.typical import stages_of
 from robocasa_lerobot.wilson import wilson_interval
@@ -49,7 +50,7 @@ class Trial:
     reason: str
     commit: str = ""
     workers: int = 1
-    start: tuple[int, ...] = ()
+    start: Square | None = None
 
 
 def class_of(task: str) -> str:
@@ -99,10 +100,9 @@ def _rate(trials: Sequence[Trial]) -> dict[str, Any]:
 
 
 def _covered(trials: Sequence[Trial]) -> float | None:
-    """Share of the squares in which an attempt began, in which one began that was kept."""
-    begun = {trial.start for trial in trials if trial.start}
-    kept = {trial.start for trial in trials if trial.start and trial.success}
-    return len(kept) / len(begun) if begun else None
+    """Share of the squares of starts in which one was kept; None where no start is known."""
+    known = {success: [t.start for t in trials if t.start and t.success is success] for success in (True, False)}
+    return covered_share(known[True], known[False]) if any(known.values()) else None
 
 
 def _mean(by_task: dict[str, Any], share: str) -> float | None:

@@ -10,7 +10,6 @@ their lengths and successes.
 from __future__ import annotations
 
 import argparse
-import json
 import sys
 import tempfile
 from collections.abc import Sequence
@@ -18,10 +17,9 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import common
-from commands import run
+from commands import result, run
 
-from robocasa_lerobot.benchmark.tasks import facts_of
-from robocasa_lerobot.envs.tasks.registry import task_names
+from robocasa_lerobot.demos.choose import expand_names
 from robocasa_lerobot.progress import Bar
 
 OUTPUT = common.REPOSITORY / "outputs" / "same_demos.json"
@@ -55,7 +53,7 @@ def parse(arguments: Sequence[str] | None = None) -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("before", help="commit that is compared with")
     parser.add_argument("--every", type=int, default=5, help="of the composite tasks, each so many-th (default 5)")
-    parser.add_argument("--tasks", default="", help="names separated by commas, instead of these")
+    parser.add_argument("--tasks", default="", help="names or sets separated by commas, instead of these")
     parser.add_argument("--first-seed", type=int, default=FIRST_SEED, help=f"default {FIRST_SEED}")
     parser.add_argument("--workers", type=int, default=2, help="processes (default 2)")
     parser.add_argument("--out", type=Path, default=OUTPUT, help="result")
@@ -69,14 +67,13 @@ def jobs_of(tasks: Sequence[str], first_seed: int) -> list[str]:
 
 def chosen(every: int) -> list[str]:
     """Every atomic task, and some of the composite ones."""
-    atomic = [name for name in task_names() if facts_of(name).kind == "atomic"]
-    return atomic + [name for name in task_names() if name not in atomic][::every]
+    return [*expand_names("atomic"), *expand_names("composite")[::every]]
 
 
 def recorded(checkout: Path, jobs: Sequence[str]) -> dict[str, Made]:
     """What the demonstrators of a checkout do, by job."""
-    said = run(checkout, ["-c", RECORD, *jobs])
-    return {job: (made[0], made[1], made[2]) for job, made in json.loads(said.rsplit("RESULT", 1)[1]).items()}
+    made = result(run(checkout, ["-c", RECORD, *jobs]))
+    return {job: (digest, steps, success) for job, (digest, steps, success) in made.items()}
 
 
 def differing(before: dict[str, Made], now: dict[str, Made]) -> list[str]:
@@ -87,7 +84,7 @@ def differing(before: dict[str, Made], now: dict[str, Made]) -> list[str]:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Record, compare, print, write; 1 if anything differs."""
     options = parse(arguments)
-    jobs = jobs_of(options.tasks.split(",") if options.tasks else chosen(options.every), options.first_seed)
+    jobs = jobs_of(expand_names(options.tasks) if options.tasks else chosen(options.every), options.first_seed)
     found: dict[str, dict[str, Made]] = {"before": {}, "now": {}}
     with tempfile.TemporaryDirectory() as folder, ThreadPoolExecutor(options.workers) as pool:
         sides = {"before": common.unpack(options.before, Path(folder) / "checkout"), "now": common.REPOSITORY}

@@ -28,7 +28,7 @@ from typing import Any
 import common
 import evaluation_sides
 import training_sides
-from commands import CLI, run
+from commands import CLI, result, run
 from scaling_limits import Use, Watch, limit
 from workers import Worker, run_together
 
@@ -151,7 +151,7 @@ class Work:
         file.write_text(json.dumps(dataclasses.asdict(job)), encoding="utf-8")
         script = common.REPOSITORY / "benchmarks" / "evaluation_sides.py"
         said = run(common.REPOSITORY, [str(script), evaluation_sides.OURS, str(file)])
-        return Done(sum(json.loads(said.rsplit("RESULT ", 1)[1])["steps"]))
+        return Done(sum(result(said)["steps"]))
 
     def _demos(self, part: int) -> Path:
         return self._scratch / f"demos_{part}"

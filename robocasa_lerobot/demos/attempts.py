@@ -21,14 +21,14 @@ import numpy as np
 from robocasa_lerobot import contract
 from robocasa_lerobot.demos.demonstrator import demonstrate
 from robocasa_lerobot.demos.failures import film_of, keep_failure
-from robocasa_lerobot.demos.hdf5 import Failure, segments_of, versions, write_part
+from robocasa_lerobot.demos.hdf5 import Failure, recorded_otherwise, segments_of, versions, write_part
 from robocasa_lerobot.demos.motion import Array
 from robocasa_lerobot.demos.motion_style import MotionStyle
 from robocasa_lerobot.demos.recorder import Actor, Recording, record_episode
 from robocasa_lerobot.demos.stages import StageLog
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.scene.reset_noise import InitialNoise
-from robocasa_lerobot.errors import OF_THE_MACHINE, UserError, differing
+from robocasa_lerobot.errors import OF_THE_MACHINE, UserError
 from robocasa_lerobot.files import write_text
 from robocasa_lerobot.jobs.pool import exit_if_orphaned
 
@@ -192,19 +192,17 @@ class Parts:
         """
         note = self.folder / "settings.json"
         found = json.loads(note.read_text()) if note.exists() else {}
-        identity = {**self.settings.identity(), **versions()}
-        others = differing(found, identity)
+        others = recorded_otherwise(found, self.settings.identity(), versions())
         if self.folder.exists() and others:
             kept = len(list(self.folder.glob("[0-9]*.hdf5")))
             if kept:
-                remedy = "Give" if differing(found, self.settings.identity()) else "Install"
                 raise UserError(
-                    f"{self.folder} holds {kept} demonstration(s) of an interrupted recording with other settings "
-                    f"({others}). {remedy} those to go on with it, remove the folder, or choose another --out."
+                    f"{self.folder} holds {kept} demonstration(s) of an interrupted recording with {others} it, "
+                    "remove the folder, or choose another --out."
                 )
             shutil.rmtree(self.folder)
         self.folder.mkdir(parents=True, exist_ok=True)
-        write_text(note, json.dumps(identity))
+        write_text(note, json.dumps({**self.settings.identity(), **versions()}))
 
     def episode(self, attempt: int) -> Path:
         """File of an attempt that succeeded."""

@@ -17,6 +17,7 @@ import numpy as np
 
 from robocasa_lerobot import __version__
 from robocasa_lerobot.demos.recorder import Recording
+from robocasa_lerobot.errors import differing
 from robocasa_lerobot.files import written_aside
 
 ENV_TYPE_ROBOSUITE = 1  # robomimic's number for environments of this family
@@ -152,6 +153,19 @@ def write_part(path: Path, recording: Recording) -> None:
 def versions() -> dict[str, str]:
     """Of what makes kitchens and moves them, by their attributes' names: under others the same seed may differ."""
     return {"robocasa_lerobot_version": __version__, "mujoco_version": mujoco.__version__}
+
+
+def recorded_otherwise(found: Mapping[str, Any], settings: Mapping[str, Any], software: Mapping[str, str]) -> str:
+    """What differs where recordings are to be gone on with, and what to give or install; empty where nothing does.
+
+    Args:
+        found: settings and versions that stand beside what was recorded.
+        settings: of now.
+        software: `versions` of now.
+    """
+    others = differing(found, {**settings, **software})
+    remedy = "Give" if differing(found, settings) else "Install"
+    return f"other settings ({others}). {remedy} those to go on with" if others else ""
 
 
 @dataclass(frozen=True)

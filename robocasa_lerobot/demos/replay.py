@@ -202,16 +202,22 @@ def replay(path: Path, demo: str, declaration: Task | None = None) -> Replayed:
     env = kitchen_of(recorded, declaration)
     try:
         env.reset(seed=recorded.seed)
-        start = _state(env)
-        if start.shape != states[0].shape:
-            note = f"{states[0].size} numbers in a state, {start.size} in the kitchen as it is made now"
+        if note := made_otherwise(env, states):
             return Replayed(path, demo, task, False, False, False, np.inf, note)
-        same = bool(np.array_equal(start, states[0]))
+        same = bool(np.array_equal(_state(env), states[0]))
         final, note = _goal_held_at_the_end(env, recorded)
         done, deviation = _carry_out(env, states, recorded.actions)
     finally:
         env.close()
     return Replayed(path, demo, task, done, final, same, deviation, note)
+
+
+def made_otherwise(env: KitchenEnv, states: Array) -> str:
+    """Why recorded states (T, N) are not of the kitchen that an env has made of their seed; empty where they may be."""
+    size = 1 + env.model.nq + env.model.nv
+    if states.shape[1] == size:
+        return ""
+    return f"{states.shape[1]} numbers in a state, {size} in the kitchen as it is made now"
 
 
 def kitchen_of(kitchen: Kitchen, declaration: Task | None = None, **drawn: Any) -> KitchenEnv:

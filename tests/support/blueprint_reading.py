@@ -110,7 +110,7 @@ def _turn(at: str, placed: Any) -> tuple[Turn, ...]:
     if re.search(r"(turned|rotation) 90 deg|yaw pi/2|(\[|'rotation_rad': )1\.5708", text):
         return ((np.pi / 2, np.pi / 2),)
     if between := re.search(r"'rotation': \[(-?[\d.]+), (-?[\d.]+)\]", text):
-        return ((float(between.group(1)), float(between.group(2))),)
+        return ((_eighths(between.group(1)), _eighths(between.group(2))),)
     if "yaw pi/8 to pi/4" in text:
         return ((np.pi / 8, np.pi / 4),)
     if re.search(r"('rotation(_rad)?':|rotation|yaw) 0(?![.\d])", text):
@@ -119,6 +119,13 @@ def _turn(at: str, placed: Any) -> tuple[Turn, ...]:
         return ((np.pi, np.pi),)
     assert not re.search("turned|yaw|rotation", text), f"a turn that cannot be read: {text}"
     return ()
+
+
+def _eighths(text: str) -> float:
+    """A number of radians; one of two digits that is an eighth of pi or several, rounded, is that."""
+    said = float(text)
+    exact = round(said / (np.pi / 8)) * np.pi / 8
+    return exact if f"{exact:.2f}" == text else said
 
 
 def _to_either_side(text: str) -> Turn | None:
@@ -135,9 +142,7 @@ def is_turned(start: object, sides: tuple[Turn, ...]) -> bool:
     """Whether a placement turns by these alone; by none where it says nothing of its own."""
     ours = [start.rotation, start.other_rotation] if isinstance(start, Placement) else []
     ours = [] if ours == [Placement().rotation, None] else [side for side in ours if side is not None]
-    return len(ours) == len(sides) and bool(
-        np.allclose(sorted(ours), sorted(sides), rtol=0.0, atol=5e-3)
-    )  # said with two digits
+    return len(ours) == len(sides) and bool(np.allclose(sorted(ours), sorted(sides), rtol=0.0, atol=1e-3))
 
 
 def greatest(text: str) -> tuple[float | None, float | None, float | None]:

@@ -136,7 +136,8 @@ def _decoded(
     timestamps, cores = source.columns["timestamp"], cores_here()
     begun: deque[tuple[int, slice, dict[str, Future[torch.Tensor]]]] = deque()
     left, waiting = iter(episodes), 0
-    with ThreadPoolExecutor(max_workers=max(cores, len(keys))) as pool:
+    pool = ThreadPoolExecutor(max_workers=max(cores, len(keys)))
+    try:
         while True:
             while not begun or (len(begun) <= cores // len(keys) and waiting < _AHEAD):
                 episode = next(left, None)
@@ -149,13 +150,11 @@ def _decoded(
             if not begun:
                 return
             episode, where, jobs = begun.popleft()
-            try:
-                frames = {key: job.result() for key, job in jobs.items()}
-            except BaseException:
-                pool.shutdown(wait=False, cancel_futures=True)
-                raise
+            frames = {key: job.result() for key, job in jobs.items()}
             waiting -= where.stop - where.start
             yield episode, where, frames
+    finally:  # what nobody will take is not decoded
+        pool.shutdown(cancel_futures=True)
 
 
 def _decode(

@@ -74,9 +74,10 @@ def part_stage(env: KitchenEnv, stage: Stage, course: Course) -> Iterator[Array]
             yield from course.labelled(turn_on_water(env, stage), BRIDGE)
         moved = fit.part.position(env.data) - before
         row["moved"] = moved / fit.part.span
-        if moved * np.sign(end - begin) < max(FRUITLESS_SHARE * fit.part.span, SLIPPED_SHARE * abs(end - before)):
+        least = max(FRUITLESS_SHARE * fit.part.span, SLIPPED_SHARE * abs(end - before))
+        row["in_vain"] = bool(moved * np.sign(end - begin) < least)
+        if row["in_vain"]:
             failed[fit.as_try()] += 1
-            row["in_vain"] = True
     if not (yield from _stays_done(env, stage, course)):
         raise SkillError(f"{stage.target}: not done after {MOST_SEGMENTS} segments")
 

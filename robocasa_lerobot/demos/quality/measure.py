@@ -17,7 +17,7 @@ from robocasa_lerobot import contract
 from robocasa_lerobot.demos.hdf5 import segments_of
 from robocasa_lerobot.demos.motion import UP, Array, base_pose, floor_axes, grip_position, rotation_about
 from robocasa_lerobot.demos.planning.base_room import wrap
-from robocasa_lerobot.demos.replay import Demonstration, kitchen_of, read_demonstration
+from robocasa_lerobot.demos.replay import Demonstration, kitchen_of, made_otherwise, read_demonstration
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.predicates.objects import middle_of
 from robocasa_lerobot.envs.projection import camera_matrix, project
@@ -91,12 +91,8 @@ def measure(path: Path, demo: str) -> Measures:
     env = kitchen_of(recorded)
     try:
         env.reset(seed=recorded.seed)
-        expected = 1 + env.model.nq + env.model.nv
-        if recorded.states.shape[1] != expected:
-            raise UserError(
-                f"{path}, {demo}: found states of {recorded.states.shape[1]} numbers, expected {expected}: its kitchen "
-                "is made differently now. Take the version that recorded it, or leave the file out."
-            )
+        if why := made_otherwise(env, recorded.states):
+            raise UserError(f"{path}, {demo}: {why}. Take the version that recorded it, or leave the file out.")
         return _measured(env, recorded, sources)
     finally:
         env.close()

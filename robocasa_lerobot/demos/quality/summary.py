@@ -23,6 +23,8 @@ from robocasa_lerobot.jobs.as_completed import as_they_end
 
 BIN_M = 0.2  # sides of the squares of the floor that starts are counted in
 
+type Square = tuple[int, int]
+
 
 @dataclass(frozen=True)
 class Quality:
@@ -55,8 +57,7 @@ class Quality:
     @property
     def covered(self) -> float:
         """Share of the squares in which an attempt began, in which one began that was kept."""
-        kept = {square_of(one.start) for one in self.kept}
-        return len(kept) / max(len(kept | {square_of(start) for start in self.failed}), 1)
+        return covered_share(map(square_of, (one.start for one in self.kept)), map(square_of, self.failed))
 
     @property
     def most_used_source(self) -> float | None:
@@ -132,7 +133,13 @@ class Quality:
         return found
 
 
-def square_of(start: Start) -> tuple[int, int]:
+def covered_share(kept: Iterable[Square], failed: Iterable[Square]) -> float:
+    """Share of the squares in which attempts began, in which one began that was kept."""
+    own = set(kept)
+    return len(own) / max(len(own.union(failed)), 1)
+
+
+def square_of(start: Start) -> Square:
     """Of the floor, in which an episode begins: numbers from the object or fixture on, ahead and to the left."""
     return int(np.floor(start.ahead_m / BIN_M)), int(np.floor(start.left_m / BIN_M))
 

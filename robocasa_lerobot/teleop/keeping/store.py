@@ -20,9 +20,9 @@ from typing import Any
 
 import h5py
 
-from robocasa_lerobot.demos.hdf5 import Failure, merge_parts, read_summary, versions, write_part
+from robocasa_lerobot.demos.hdf5 import Failure, merge_parts, read_summary, recorded_otherwise, versions, write_part
 from robocasa_lerobot.demos.recorder import Recording
-from robocasa_lerobot.errors import UserError, differing
+from robocasa_lerobot.errors import UserError
 from robocasa_lerobot.files import write_text
 from robocasa_lerobot.jobs.publish import held_folder
 from robocasa_lerobot.teleop.settings import TeleopSettings
@@ -222,10 +222,10 @@ class Store:
         before = json.loads(note.read_text(encoding="utf-8")) if note.exists() else own
         if before != own:
             if self.path.exists() or any(self.folder.glob("[0-9]*.hdf5")):
-                remedy = "Give" if differing(before, self.settings.identity()) else "Install"
+                others = recorded_otherwise(before, self.settings.identity(), versions())
                 raise UserError(
-                    f"{self.settings.out} has episodes of {self.settings.task} that were recorded with other settings "
-                    f"({differing(before, own)}). {remedy} those to go on with them, or choose another --out."
+                    f"{self.settings.out} has episodes of {self.settings.task} that were recorded with {others} them, "
+                    "or choose another --out."
                 )
             note.unlink()  # nothing was kept with other settings, and numbers of attempts stand for other kitchens
             (self.folder / _ATTEMPTS).unlink(missing_ok=True)

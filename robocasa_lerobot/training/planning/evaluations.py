@@ -20,6 +20,7 @@ from typing import Any
 from robocasa_lerobot.config_files import find_config
 from robocasa_lerobot.data.mixture_config import ROBOCASA365
 from robocasa_lerobot.errors import UserError
+from robocasa_lerobot.jobs.parent import END_WITH_INPUT
 from robocasa_lerobot.settings import load_yaml, parse_overrides
 from robocasa_lerobot.training.config.experiment import ExperimentConfig, PhaseConfig
 from robocasa_lerobot.training.planning import skipped
@@ -175,7 +176,7 @@ def run_evaluations(
         what = " ".join((last.name, item.plan, *item.evaluation.settings))
         if item.nothing is not None or (done.is_file() and done.read_text() == what):
             continue
-        command = [sys.executable, "-m", "robocasa_lerobot.cli", "eval", "--end-with-input", *item.arguments]
+        command = [sys.executable, "-m", "robocasa_lerobot.cli", "eval", END_WITH_INPUT, *item.arguments]
         status = _run(command, stop)
         if status is None or (status and stop()):  # a signal to all processes ends it as well, and is no failure
             break

@@ -174,13 +174,13 @@ def derived_template(sources: Sequence[Source]) -> tuple[Template, list[Source]]
         )
     usual, _ = sequences.most_common(1)[0]
     alike = [source for source in sources if kinds(source) == usual]
-    model = alike[0]
-    subtasks = []
+    model, subtasks = alike[0], []
+    known = refs_of(model)
     for number, one in enumerate(model.segments):
         words, place = model.data.about["stages"][one.stage], f"stage{one.stage}.place"
         last = number == len(model.segments) - 1
         signal = None if last else derived_signal(number, one.kind)
         elsewhere = one.kind == PLACE or (one.kind == USE and not words["about_itself"])
-        ref = place if elsewhere and place in refs_of(model) else ref_of(model, one)
+        ref = place if elsewhere and place in known else ref_of(model, one)
         subtasks.append(Subtask(ref, signal, selection=INTERPOLATION, neighbours=ROBOCASA_NEAREST, stage=one.stage))
     return Template(tuple(subtasks), per_subtask=True, first_pose=True, from_last_target=False), alike

@@ -115,11 +115,10 @@ def pick_as_shown(env: KitchenEnv, stage: Stage, obj: Graspable, course: Course,
     course.lay[obj.name] = where_it_lay(make_pose(start, turn), float(start[2]) - obj.below(turn))
     row = course.begin(way.piece, object=obj.name, cost=round(choice.cost, 3))
     yield from carry_out_segment(env, course, along(way, lambda: start - origin))
-    row["held"] = is_held(env, obj.name)
-    row["in_vain"] = not row["held"]
-    if row["held"] and enclosed:
+    row["in_vain"] = not is_held(env, obj.name)
+    if enclosed and not row["in_vain"]:
         yield from course.labelled(draw_out(env, strategy, env.data.body(obj.name).xpos - start), BRIDGE)
-    if not row["held"]:
+    if row["in_vain"]:
         at = as_target(hand_now(env))
         yield from course.labelled(hold_hand(env.data, at, OPEN, RELEASE_STEPS), BRIDGE)
         yield from course.labelled(draw_back(env.data, OPEN, 0.08), BRIDGE)

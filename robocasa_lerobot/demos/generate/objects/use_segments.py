@@ -148,11 +148,10 @@ def use(env: KitchenEnv, stage: Stage, obj: Graspable, course: Course, failed: d
     )
     row = course.begin(piece, object=obj.name, cost=round(choice.cost, 3))
     yield from carry_out_segment(env, course, carried)
-    row["done"] = stage_done(env, stage)
-    row["in_vain"] = not row["done"]
+    row["in_vain"] = not stage_done(env, stage)
     if path.shown.opens is not None:
         yield from course.labelled(leave(env, obj), BRIDGE)
-    if not row["done"]:
+    if row["in_vain"]:
         failed[piece.source.number] = failed.get(piece.source.number, 0) + 1
 
 

@@ -24,7 +24,14 @@ from robocasa_lerobot.demos.generate.sources.transform import inverse, make_pose
 from robocasa_lerobot.demos.generate.sources.uses import is_about_itself, is_use, use_frame, use_key, working_point
 from robocasa_lerobot.demos.motion import Array, base_pose, grip_position, hand_rotation
 from robocasa_lerobot.demos.recorder import SUCCESS_HOLD_STEPS
-from robocasa_lerobot.demos.replay import Demonstration, demonstrations, kitchen_of, put_state, read_demonstration
+from robocasa_lerobot.demos.replay import (
+    Demonstration,
+    demonstrations,
+    kitchen_of,
+    made_otherwise,
+    put_state,
+    read_demonstration,
+)
 from robocasa_lerobot.demos.skills.pick_place.graspable import Graspable, graspable
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.tasks.task import Stage
@@ -175,7 +182,7 @@ def replayed(recorded: Demonstration) -> Prepared | str:
     env = kitchen_of(recorded)
     try:
         env.reset(seed=recorded.seed)
-        if recorded.states[0].size != 1 + env.model.nq + env.model.nv:
+        if made_otherwise(env, recorded.states):
             return "its kitchen is made differently now"
         put_state(env, env.data, recorded.states[0])
         watcher = _Watcher(env, recorded)

@@ -16,6 +16,7 @@ HANDLE_LEFT, HANDLE_RIGHT = (0.125 * np.pi, 0.25 * np.pi), (0.75 * np.pi, 0.875 
 # Handles of our mugs lie along +x, a quarter turn on from RoboCasa's: less that they point where theirs do.
 MUG_UNDER_SPOUT = (-0.375 * np.pi, -0.25 * np.pi)
 MUG_ON_COUNTER = (-0.25 * np.pi, 0.0)
+_KNOBS_BURNER = SampleRegion(name="{knob}")
 TASKS: tuple[Task, ...] = ()
 
 
@@ -53,3 +54,25 @@ def in_cabinet(
 ) -> Placement:
     """On a shelf of a cabinet that the arm reaches, by default at its front."""
     return Placement(role, region=SampleRegion(height=WITHIN_REACH_M), size=size, pos=pos, **more)  # type: ignore[arg-type]
+
+
+def on_burner(
+    region: SampleRegion = _KNOBS_BURNER, size_m: float = 0.02, *, rotation: tuple[float, float] | None = None
+) -> Placement:
+    """Cookware about the middle of a burner.
+
+    Args:
+        region: of the stove: by default the burner of the knob that was drawn.
+        size_m: edge of the square that its middle is drawn in.
+        rotation: bounds of its turn, radians; by default its handle is to the left or the right of the front, away
+            from the knobs.
+    """
+    return Placement(
+        "stove",
+        region=region,
+        size=(size_m, size_m),
+        pos=(0.0, 0.0),
+        rotation=rotation or HANDLE_LEFT,
+        other_rotation=None if rotation else HANDLE_RIGHT,
+        ensure_inside=False,
+    )

@@ -16,7 +16,7 @@ from robocasa_lerobot.envs.scene.spec import (
     RobotStart,
     SampleRegion,
 )
-from robocasa_lerobot.envs.tasks.atomic.common import HANDLE_LEFT, HANDLE_RIGHT
+from robocasa_lerobot.envs.tasks.atomic.common import on_burner
 from robocasa_lerobot.envs.tasks.task import Stage, Task
 
 KNOB = Choice("knob", of="stove")
@@ -30,15 +30,7 @@ _KETTLE = ObjectSpec(
 _COOKWARE = ObjectSpec(
     "cookware",
     ("pan", "pot", "saucepan", "kettle_non_electric"),
-    Placement(
-        "stove",
-        region=SampleRegion(name="{knob}|any"),
-        size=(0.02, 0.02),
-        pos=(0.0, 0.0),
-        rotation=HANDLE_LEFT,
-        other_rotation=HANDLE_RIGHT,
-        ensure_inside=False,
-    ),
+    on_burner(SampleRegion(name="{knob}|any")),
 )
 
 

@@ -17,27 +17,12 @@ from robocasa_lerobot.envs.scene.spec import (
     RobotStart,
     SampleRegion,
 )
-from robocasa_lerobot.envs.tasks.atomic.common import (
-    HANDLE_LEFT,
-    HANDLE_RIGHT,
-    counter_near,
-    in_cabinet,
-    on_counter,
-    place,
-)
+from robocasa_lerobot.envs.tasks.atomic.common import counter_near, in_cabinet, on_burner, on_counter, place
 from robocasa_lerobot.envs.tasks.task import Task
 
 _TOOLS, _NOT_TOOLS = ("reamer", "strainer", "cheese_grater"), ("tool", "utensil")
 _IN_PAN_M = 0.07  # horizontally from the middle of a pan
-_PAN = Placement(
-    "stove",
-    region=SampleRegion(name="any", height=(0.7, 1.2)),
-    size=(0.02, 0.02),
-    pos=(0.0, 0.0),
-    rotation=HANDLE_LEFT,
-    other_rotation=HANDLE_RIGHT,
-    ensure_inside=False,
-)
+_PAN = on_burner(SampleRegion(name="any", height=(0.7, 1.2)))
 _DOOR_OPEN = (0.90, 1.0)
 
 

@@ -31,7 +31,7 @@ def section(data: ReportData) -> Section | None:
     if not pairs:
         return None
     wanted = _main_policies(data)
-    main = next((pair for pair in pairs if wanted and (pair.a is wanted[0] and pair.b is wanted[1])), pairs[0])
+    main = next((pair for pair in pairs if (pair.a, pair.b) == wanted), pairs[0])
     text = (
         "Only policies on the same trials are compared: the same kitchen, start, instruction, horizon and perturbation "
         "for both. "

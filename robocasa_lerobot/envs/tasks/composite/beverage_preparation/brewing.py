@@ -23,14 +23,7 @@ from robocasa_lerobot.envs.scene.spec import (
     RobotStart,
     SampleRegion,
 )
-from robocasa_lerobot.envs.tasks.atomic.common import (
-    HANDLE_LEFT,
-    HANDLE_RIGHT,
-    MUG_UNDER_SPOUT,
-    counter_near,
-    in_cabinet,
-    on_counter,
-)
+from robocasa_lerobot.envs.tasks.atomic.common import MUG_UNDER_SPOUT, counter_near, in_cabinet, on_burner, on_counter
 from robocasa_lerobot.envs.tasks.composite.common import before_stool, fetch
 from robocasa_lerobot.envs.tasks.task import Stage, Task
 
@@ -50,15 +43,7 @@ KETTLE_BOILING = Task(
         ObjectSpec(
             "stove_distr",
             ("pan", "pot"),
-            Placement(
-                "stove",
-                region=SampleRegion(name="any", height=(0.7, 1.2)),
-                size=(0.02, 0.02),
-                pos=(0.0, 0.0),
-                rotation=HANDLE_LEFT,
-                other_rotation=HANDLE_RIGHT,
-                ensure_inside=False,
-            ),
+            on_burner(SampleRegion(name="any", height=(0.7, 1.2))),
             graspable=True,
         ),
     ),

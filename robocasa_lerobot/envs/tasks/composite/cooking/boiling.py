@@ -21,7 +21,7 @@ from robocasa_lerobot.envs.scene.spec import (
     RobotStart,
     SampleRegion,
 )
-from robocasa_lerobot.envs.tasks.atomic.common import HANDLE_TO_FRONT, counter_near, in_cabinet, on_counter
+from robocasa_lerobot.envs.tasks.atomic.common import HANDLE_TO_FRONT, counter_near, in_cabinet, on_burner, on_counter
 from robocasa_lerobot.envs.tasks.composite.common import fetch
 from robocasa_lerobot.envs.tasks.composite.cooking.lids import (
     COVERED,
@@ -196,14 +196,7 @@ BOIL_EGGS = Task(
         ObjectSpec(
             "saucepan",
             ("saucepan",),
-            Placement(
-                "stove",
-                region=SampleRegion(name="{knob}"),
-                size=(0.05, 0.05),
-                pos=(0.0, 0.0),
-                rotation=HANDLE_TO_FRONT,
-                ensure_inside=False,
-            ),
+            on_burner(size_m=0.05, rotation=HANDLE_TO_FRONT),
             filled="water",
         ),
         ObjectSpec("egg_plate", ("plate",), on_counter("stove", (0.4, 0.35), loc="left_right")),

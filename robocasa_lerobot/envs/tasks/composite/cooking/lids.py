@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from robocasa_lerobot.envs.predicates import AllOf, GripperFar, ObjectOn, ObjectTouches, ObjectUpright, OnBurner
-from robocasa_lerobot.envs.scene.spec import Choice, FixtureSpec, ObjectSpec, Placement, SampleRegion
-from robocasa_lerobot.envs.tasks.atomic.common import HANDLE_LEFT, HANDLE_RIGHT, counter_near
+from robocasa_lerobot.envs.scene.spec import Choice, FixtureSpec, ObjectSpec, Placement
+from robocasa_lerobot.envs.tasks.atomic.common import counter_near, on_burner
 from robocasa_lerobot.envs.tasks.task import Stage, Task
 
 TASKS: tuple[Task, ...] = ()
@@ -31,15 +31,7 @@ def saucepan(
     filled: str, *, rotation: tuple[float, float] | None = None, scale: float = 1.0, graspable: bool = False
 ) -> ObjectSpec:
     """The saucepan with a lid, on the burner that was drawn; by default its handle is left or right of the front."""
-    start = Placement(
-        "stove",
-        region=SampleRegion(name="{knob}"),
-        size=(0.05, 0.05),
-        pos=(0.0, 0.0),
-        rotation=rotation or HANDLE_LEFT,
-        other_rotation=None if rotation else HANDLE_RIGHT,
-        ensure_inside=False,
-    )
+    start = on_burner(size_m=0.05, rotation=rotation)
     return ObjectSpec(PAN, ("saucepan_with_lid",), start, graspable=graspable, scale=scale, filled=filled)
 
 

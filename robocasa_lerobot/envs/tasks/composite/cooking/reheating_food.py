@@ -1,7 +1,5 @@
 """Warm food up again."""
 
-from dataclasses import replace
-
 import numpy as np
 
 from robocasa_lerobot.envs.predicates import (
@@ -24,13 +22,7 @@ from robocasa_lerobot.envs.scene.spec import (
     RobotStart,
     SampleRegion,
 )
-from robocasa_lerobot.envs.tasks.atomic.common import (
-    HANDLE_LEFT,
-    HANDLE_RIGHT,
-    HANDLE_TO_FRONT,
-    counter_near,
-    on_counter,
-)
+from robocasa_lerobot.envs.tasks.atomic.common import HANDLE_TO_FRONT, counter_near, on_burner, on_counter
 from robocasa_lerobot.envs.tasks.composite.common import before_stool, fetch
 from robocasa_lerobot.envs.tasks.task import Stage, Task
 
@@ -147,13 +139,6 @@ MAKE_LOADED_POTATO = Task(
     ),
 )
 
-_ON_BURNER = Placement(
-    "stove",
-    region=SampleRegion(name="{knob}"),
-    size=(0.02, 0.02),
-    pos=(0.0, 0.0),
-    ensure_inside=False,
-)
 _LIT = StateIs("stove", "{knob}_on")
 _LIGHT = Stage("knobs", "on", "stove", part="knob_{knob}")
 
@@ -170,7 +155,7 @@ WARM_CROISSANT = Task(
             on_counter("stove", (0.3, 0.3), loc="left_right", try_to_place_in="plate"),
             graspable=True,
         ),
-        ObjectSpec("pan", ("pan",), replace(_ON_BURNER, rotation=HANDLE_LEFT, other_rotation=HANDLE_RIGHT)),
+        ObjectSpec("pan", ("pan",), on_burner()),
     ),
     goal=AllOf(_LIT, ObjectOn("croissant", "pan"), GripperFar("croissant")),
     stages=(Stage("pick_place", "place", "pan", object="croissant"), _LIGHT),
@@ -249,7 +234,7 @@ REHEAT_MEAT_ON_STOVE = Task(
         ObjectSpec("plate", ("plate",), before_stool((0.3, 0.3))),
         ObjectSpec("meat", ("meat",), Placement(object="plate"), graspable=True, exclude=("shrimp",)),
         ObjectSpec("distr_food", ("vegetable", "fruit"), Placement(object="plate", heaped=True), graspable=True),
-        ObjectSpec("pan", ("pan",), replace(_ON_BURNER, size=(0.05, 0.05), rotation=HANDLE_TO_FRONT)),
+        ObjectSpec("pan", ("pan",), on_burner(size_m=0.05, rotation=HANDLE_TO_FRONT)),
     ),
     initial=(BurnerAt("stove", "{knob}", "low"),),
     goal=AllOf(ObjectOn("meat", "pan"), OnBurner("pan", "stove", burner="{knob}"), _LIT, GripperFar("meat")),

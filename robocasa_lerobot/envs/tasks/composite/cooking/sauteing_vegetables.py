@@ -16,7 +16,7 @@ from robocasa_lerobot.envs.predicates import (
 )
 from robocasa_lerobot.envs.scene.initial_states import BurnerAt
 from robocasa_lerobot.envs.scene.spec import Choice, FixtureSpec, ObjectSpec, Placement, RobotStart, SampleRegion
-from robocasa_lerobot.envs.tasks.atomic.common import HANDLE_TO_FRONT, counter_near, on_counter
+from robocasa_lerobot.envs.tasks.atomic.common import HANDLE_TO_FRONT, counter_near, on_burner, on_counter
 from robocasa_lerobot.envs.tasks.task import Stage, Task
 
 _STIRRED = StepsWhile(
@@ -98,14 +98,7 @@ _LIT = StateIs("stove", "{knob}_on")
 
 
 def _on_knob(rotation: tuple[float, float] = HANDLE_TO_FRONT) -> Placement:
-    return Placement(
-        "stove",
-        region=SampleRegion(name="{knob}"),
-        size=(0.05, 0.05),
-        pos=(0.0, 0.0),
-        rotation=rotation,
-        ensure_inside=False,
-    )
+    return on_burner(size_m=0.05, rotation=rotation)
 
 
 _OVER_FLAME = OnBurner("pan", "stove", burner="{knob}", lit=True)

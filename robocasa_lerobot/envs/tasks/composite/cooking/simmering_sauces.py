@@ -2,8 +2,8 @@
 
 from robocasa_lerobot.envs.predicates import AllOf, Goal, Never, Not, StateIs, StepsWhile, When
 from robocasa_lerobot.envs.scene.initial_states import BurnerAt
-from robocasa_lerobot.envs.scene.spec import Choice, FixtureSpec, ObjectSpec, Placement, RobotStart, SampleRegion
-from robocasa_lerobot.envs.tasks.atomic.common import HANDLE_TO_FRONT
+from robocasa_lerobot.envs.scene.spec import Choice, FixtureSpec, ObjectSpec, RobotStart
+from robocasa_lerobot.envs.tasks.atomic.common import HANDLE_TO_FRONT, on_burner
 from robocasa_lerobot.envs.tasks.task import Stage, Task
 
 _STEPS = {"460": {"seconds": "twenty-three"}, "480": {"seconds": "twenty-four"}, "500": {"seconds": "twenty-five"}}
@@ -30,14 +30,7 @@ TURN_OFF_SIMMERED_SAUCE_HEAT = Task(
         ObjectSpec(
             "saucepan",
             ("saucepan",),
-            Placement(
-                "stove",
-                region=SampleRegion(name="{knob}"),
-                size=(0.05, 0.05),
-                pos=(0.0, 0.0),
-                rotation=HANDLE_TO_FRONT,
-                ensure_inside=False,
-            ),
+            on_burner(size_m=0.05, rotation=HANDLE_TO_FRONT),
             filled="tomato_sauce",
         ),
     ),

@@ -19,9 +19,8 @@ from robocasa_lerobot.envs.scene.spec import (
     ObjectSpec,
     Placement,
     RobotStart,
-    SampleRegion,
 )
-from robocasa_lerobot.envs.tasks.atomic.common import HANDLE_TO_FRONT, counter_near, on_counter
+from robocasa_lerobot.envs.tasks.atomic.common import HANDLE_TO_FRONT, counter_near, on_burner, on_counter
 from robocasa_lerobot.envs.tasks.task import Stage, Task
 
 STEAM_IN_MICROWAVE = Task(
@@ -133,14 +132,7 @@ STEAM_FISH = Task(
         ObjectSpec(
             "pan",
             ("pan",),
-            Placement(
-                "stove",
-                region=SampleRegion(name="{knob}"),
-                size=(0.03, 0.03),
-                pos=(0.0, 0.0),
-                rotation=HANDLE_TO_FRONT,
-                ensure_inside=False,
-            ),
+            on_burner(size_m=0.03, rotation=HANDLE_TO_FRONT),
             scale=(1.0, 1.0, 1.25),
             filled="soy_sauce",
         ),

@@ -10,14 +10,8 @@ from robocasa_lerobot.envs.predicates import (
     UnderWater,
 )
 from robocasa_lerobot.envs.scene.initial_states import BurnerAt, Water
-from robocasa_lerobot.envs.scene.spec import Choice, FixtureSpec, ObjectSpec, Placement, RobotStart, SampleRegion
-from robocasa_lerobot.envs.tasks.atomic.common import (
-    HANDLE_LEFT,
-    HANDLE_RIGHT,
-    HANDLE_TO_FRONT,
-    counter_near,
-    on_counter,
-)
+from robocasa_lerobot.envs.scene.spec import Choice, FixtureSpec, ObjectSpec, Placement, RobotStart
+from robocasa_lerobot.envs.tasks.atomic.common import HANDLE_TO_FRONT, counter_near, on_burner, on_counter
 from robocasa_lerobot.envs.tasks.composite.cooking.lids import (
     COVERED,
     COVERS,
@@ -47,15 +41,7 @@ REMOVE_STEAMED_VEGETABLES = Task(
         ObjectSpec(
             "saucepan",
             ("saucepan",),
-            Placement(
-                "stove",
-                region=SampleRegion(name="{knob}"),
-                size=(0.05, 0.05),
-                pos=(0.0, 0.0),
-                rotation=HANDLE_LEFT,
-                other_rotation=HANDLE_RIGHT,
-                ensure_inside=False,
-            ),
+            on_burner(size_m=0.05),
             scale=(1.35, 1.35, 0.75),
             filled="water",
         ),
@@ -119,14 +105,7 @@ PREPARE_VEGGIES_FOR_STEAMING = Task(
         ObjectSpec(
             "saucepan",
             ("saucepan",),
-            Placement(
-                "stove",
-                region=SampleRegion(name="{knob}"),
-                size=(0.05, 0.05),
-                pos=(0.0, 0.0),
-                rotation=HANDLE_TO_FRONT,
-                ensure_inside=False,
-            ),
+            on_burner(size_m=0.05, rotation=HANDLE_TO_FRONT),
         ),
     ),
     initial=(Water("sink", on=True),),

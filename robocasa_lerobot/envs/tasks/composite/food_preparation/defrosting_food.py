@@ -11,7 +11,7 @@ from robocasa_lerobot.envs.scene.spec import (
     RobotStart,
     SampleRegion,
 )
-from robocasa_lerobot.envs.tasks.atomic.common import HANDLE_LEFT, HANDLE_RIGHT, counter_near, on_counter
+from robocasa_lerobot.envs.tasks.atomic.common import counter_near, on_burner, on_counter
 from robocasa_lerobot.envs.tasks.composite.common import fetch, on_shelf
 from robocasa_lerobot.envs.tasks.task import Stage, Task
 
@@ -179,15 +179,7 @@ QUICK_THAW = Task(
         ObjectSpec(
             "container",
             ("pot",),
-            Placement(
-                "stove",
-                region=SampleRegion(name="{knob}"),
-                size=(0.02, 0.02),
-                pos=(0.0, 0.0),
-                rotation=HANDLE_LEFT,
-                other_rotation=HANDLE_RIGHT,
-                ensure_inside=False,
-            ),
+            on_burner(),
         ),
     ),
     initial=(BurnerAt("stove", "{knob}", "off"),),

@@ -27,7 +27,7 @@ from robocasa_lerobot.envs.scene.spec import (
     RobotStart,
     SampleRegion,
 )
-from robocasa_lerobot.envs.tasks.atomic.common import HANDLE_TO_FRONT, counter_near, on_counter
+from robocasa_lerobot.envs.tasks.atomic.common import HANDLE_TO_FRONT, counter_near, on_burner, on_counter
 from robocasa_lerobot.envs.tasks.composite.common import BLENDER_ON, JAR_MOUTH_M, cover_and_blend, fetch, fetch_in_turn
 from robocasa_lerobot.envs.tasks.task import Stage, Task
 
@@ -87,14 +87,7 @@ BLEND_VEGETABLE_SAUCE = Task(
         ObjectSpec(
             "saucepan",
             ("saucepan",),
-            Placement(
-                "stove",
-                region=SampleRegion(name="{knob}"),
-                size=(0.05, 0.05),
-                pos=(0.0, 0.0),
-                rotation=HANDLE_TO_FRONT,
-                ensure_inside=False,
-            ),
+            on_burner(size_m=0.05, rotation=HANDLE_TO_FRONT),
             graspable=True,
             scale=(1.35, 1.35, 0.85),
             filled="water",

@@ -19,7 +19,7 @@ from robocasa_lerobot.envs.scene.spec import (
     RobotStart,
     SampleRegion,
 )
-from robocasa_lerobot.envs.tasks.atomic.common import HANDLE_TO_FRONT, counter_near, in_cabinet, on_counter
+from robocasa_lerobot.envs.tasks.atomic.common import HANDLE_TO_FRONT, counter_near, in_cabinet, on_burner, on_counter
 from robocasa_lerobot.envs.tasks.composite.common import BLENDER_ON, JAR_MOUTH_M, cover_and_blend, fetch, fetch_in_turn
 from robocasa_lerobot.envs.tasks.task import Stage, Task
 
@@ -140,14 +140,7 @@ PLACE_MEAT_IN_MARINADE = Task(
         ObjectSpec(
             "pan",
             ("saucepan", "pan"),
-            Placement(
-                "stove",
-                region=SampleRegion(name="{knob}"),
-                size=(0.05, 0.05),
-                pos=(0.0, 0.0),
-                rotation=HANDLE_TO_FRONT,
-                ensure_inside=False,
-            ),
+            on_burner(size_m=0.05, rotation=HANDLE_TO_FRONT),
             filled="marinade",
         ),
         ObjectSpec("meat_container", ("plate",), Placement("fridge", region=_SHELF, size=(0.4, 0.25), pos=(0.0, -1.0))),

@@ -21,7 +21,7 @@ from robocasa_lerobot.envs.scene.spec import (
     RobotStart,
     SampleRegion,
 )
-from robocasa_lerobot.envs.tasks.atomic.common import HANDLE_TO_FRONT, counter_near, in_cabinet, on_counter
+from robocasa_lerobot.envs.tasks.atomic.common import HANDLE_TO_FRONT, counter_near, in_cabinet, on_burner, on_counter
 from robocasa_lerobot.envs.tasks.composite.common import before_stool, fetch, fetch_in_turn, on_shelf
 from robocasa_lerobot.envs.tasks.task import Stage, Task
 
@@ -123,14 +123,7 @@ PACK_FOOD_BY_TEMP = Task(
         ObjectSpec(
             "hot0_container",
             ("pan",),
-            Placement(
-                "stove",
-                region=SampleRegion(name="{knob}"),
-                size=(0.05, 0.05),
-                pos=(0.0, 0.0),
-                rotation=HANDLE_TO_FRONT,
-                ensure_inside=False,
-            ),
+            on_burner(size_m=0.05, rotation=HANDLE_TO_FRONT),
         ),
         ObjectSpec("hot0", ("cooked_food",), Placement(object="hot0_container"), graspable=True),
         ObjectSpec("hot1_container", ("plate",), on_counter("stove", (np.inf, 0.5), loc="left_right")),

@@ -4,7 +4,7 @@ import numpy as np
 
 from robocasa_lerobot.envs.predicates import AllOf, Exactly, GripperFar, ObjectOn
 from robocasa_lerobot.envs.scene.spec import Choice, FixtureSpec, ObjectSpec, Placement, RobotStart, SampleRegion
-from robocasa_lerobot.envs.tasks.atomic.common import HANDLE_TO_FRONT
+from robocasa_lerobot.envs.tasks.atomic.common import HANDLE_TO_FRONT, on_burner
 from robocasa_lerobot.envs.tasks.composite.common import before_stool, fetch
 from robocasa_lerobot.envs.tasks.task import Stage, Task
 
@@ -173,14 +173,7 @@ DISTRIBUTE_CHICKEN = Task(
         ObjectSpec(
             "pan",
             ("pan",),
-            Placement(
-                "stove",
-                region=SampleRegion(name="{knob}"),
-                size=(0.05, 0.05),
-                pos=(0.0, 0.0),
-                rotation=HANDLE_TO_FRONT,
-                ensure_inside=False,
-            ),
+            on_burner(size_m=0.05, rotation=HANDLE_TO_FRONT),
             scale=1.25,
         ),
         *(

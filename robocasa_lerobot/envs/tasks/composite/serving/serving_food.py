@@ -22,14 +22,7 @@ from robocasa_lerobot.envs.scene.spec import (
     RobotStart,
     SampleRegion,
 )
-from robocasa_lerobot.envs.tasks.atomic.common import (
-    HANDLE_LEFT,
-    HANDLE_RIGHT,
-    HANDLE_TO_FRONT,
-    counter_near,
-    in_cabinet,
-    on_counter,
-)
+from robocasa_lerobot.envs.tasks.atomic.common import HANDLE_TO_FRONT, counter_near, in_cabinet, on_burner, on_counter
 from robocasa_lerobot.envs.tasks.composite.common import before_stool, fetch, fetch_in_turn
 from robocasa_lerobot.envs.tasks.task import Stage, Task
 
@@ -48,14 +41,7 @@ PAN_TRANSFER = Task(
         ObjectSpec(
             "vegetable_container",
             ("pan",),
-            Placement(
-                "stove",
-                region=SampleRegion(name="any", height=(0.7, 1.2)),
-                size=(0.05, 0.05),
-                pos=(0.0, 0.0),
-                rotation=HANDLE_TO_FRONT,
-                ensure_inside=False,
-            ),
+            on_burner(SampleRegion(name="any", height=(0.7, 1.2)), size_m=0.05, rotation=HANDLE_TO_FRONT),
             graspable=True,
         ),
         ObjectSpec("vegetable", ("vegetable",), Placement(object="vegetable_container"), properties=("cookable",)),
@@ -276,15 +262,7 @@ PREPARE_SOUP_SERVING = Task(
         ObjectSpec(
             "pot",
             ("pot",),
-            Placement(
-                "stove",
-                region=SampleRegion(name="{burner}"),
-                size=(0.02, 0.02),
-                pos=(0.0, 0.0),
-                ensure_inside=False,
-                rotation=HANDLE_LEFT,
-                other_rotation=HANDLE_RIGHT,
-            ),
+            on_burner(SampleRegion(name="{burner}")),
             graspable=True,
         ),
         ObjectSpec("bowl1", ("bowl",), on_counter("stove", (0.4, 0.4), loc="left_right"), graspable=True),
