@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import errno
 import importlib
 import sys
 from collections.abc import Sequence
@@ -11,6 +12,8 @@ from types import ModuleType
 
 from robocasa_lerobot import __version__
 from robocasa_lerobot.errors import UserError, suggest
+
+_FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)  # a disk, one's share of it, or the largest file that it takes
 
 
 @dataclass(frozen=True)
@@ -99,6 +102,11 @@ def main(argv: Sequence[str] | None = None) -> int:
         return int(args.run(args) or 0)
     except UserError as error:
         print(f"robocasa-lerobot {name}: {error}", file=sys.stderr)
+        return 2
+    except OSError as error:
+        if error.errno not in _FULL:
+            raise
+        print(f"robocasa-lerobot {name}: {error}. Free disk space, and give the command again.", file=sys.stderr)
         return 2
     except KeyboardInterrupt:
         print(f"\nrobocasa-lerobot {name}: interrupted", file=sys.stderr)

@@ -48,29 +48,36 @@ def configure(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Write what is asked for: pictures of starts, the page of tasks, contact sheets and a page of everything else."""
-    from robocasa_lerobot.errors import UnknownNameError
-    from robocasa_lerobot.gallery.sections import SECTIONS
+    from robocasa_lerobot.errors import UnknownNameError, UserError
+    from robocasa_lerobot.gallery.sections import SECTIONS, check_categories
 
     known = ["starts", "tasks", *SECTIONS]
     shown = known if args.show == "all" else [name.strip() for name in args.show.split(",")]
     for name in shown:
         if name not in known:
             raise UnknownNameError("part of the gallery", name, [*known, "all"])
+    sections = [name for name in shown if name in SECTIONS]
+    categories = tuple(c.strip() for c in args.category.split(",")) if args.category else ()
+    if categories and not sections:
+        raise UserError(f"--category is of {', '.join(SECTIONS)}: ask for one of them with --show.")
+    if args.tasks and sections == shown:
+        raise UserError("--tasks is of starts and tasks: ask for one of them with --show.")
+    check_categories(sections, categories)
     if "starts" in shown:
         _starts(args)
     if "tasks" in shown:
         _tasks(args)
-    sections = [name for name in shown if name in SECTIONS]
     if sections:
-        _sections(args, sections)
+        _sections(args, sections, categories)
     return 0
 
 
 def _tasks(args: argparse.Namespace) -> None:
     """The page of all tasks. What a run that was stopped has made is kept beside it, and taken up."""
+    from robocasa_lerobot.envs.tasks.registry import task_names
     from robocasa_lerobot.gallery.tasks.cards import cards, read_rates
     from robocasa_lerobot.gallery.tasks.page import entry, write_page
-    from robocasa_lerobot.gallery.tasks.pictures import make, read
+    from robocasa_lerobot.gallery.tasks.pictures import is_made, make, read
     from robocasa_lerobot.jobs.as_completed import as_they_end
     from robocasa_lerobot.progress import Bar
 
@@ -82,11 +89,11 @@ def _tasks(args: argparse.Namespace) -> None:
     }
     names, (seed, *_), split = _names(args), _seeds(args), args.split or "target"
     folder = args.out / "tasks"
-    todo = [(name, split, seed, folder) for name in names if read(name, split, seed, folder) is None]
+    todo = [(name, split, seed, folder) for name in names if not is_made(name, split, seed, folder)]
     bar = Bar(as_they_end(make, todo, args.workers), total=len(todo), desc="tasks", unit="task")
     for name in bar:
         bar.set_postfix(made=name)
-    shown = {name: read(name, split, seed, folder) for name in names}
+    shown = {name: read(name, split, seed, folder) for name in task_names()}  # of all, also those that were made before
     page = write_page(args.out / "tasks.html", [entry(card, shown.get(card.name), folder) for card in cards(rates)])
     print(f"{page} ({page.stat().st_size / 1e6:.1f} MB)")
 
@@ -99,12 +106,13 @@ def _names(args: argparse.Namespace) -> list[str]:
 
 
 def _seeds(args: argparse.Namespace) -> list[int]:
+    from robocasa_lerobot.envs.seeds import SEEDS, checked_seed
     from robocasa_lerobot.errors import UserError
 
     try:
-        return [int(s) for s in args.seeds.split(",")]
+        return [checked_seed(int(s)) for s in args.seeds.split(",")]
     except ValueError:
-        raise UserError(f"--seeds {args.seeds!r}: expected numbers separated by commas.") from None
+        raise UserError(f"--seeds {args.seeds!r}: expected {SEEDS}, or several separated by commas.") from None
 
 
 def _starts(args: argparse.Namespace) -> None:
@@ -134,14 +142,13 @@ def _starts(args: argparse.Namespace) -> None:
                 print(path)
 
 
-def _sections(args: argparse.Namespace, names: list[str]) -> None:
+def _sections(args: argparse.Namespace, names: list[str], categories: tuple[str, ...]) -> None:
     from robocasa_lerobot.errors import UserError
     from robocasa_lerobot.gallery.page import write_page
     from robocasa_lerobot.gallery.sections import SPLITS, Tile, tiles_of, write_sheets
     from robocasa_lerobot.progress import Bar
 
     splits = (args.split,) if args.split else SPLITS
-    categories = tuple(c.strip() for c in args.category.split(",")) if args.category else ()
     made: dict[str, list[Tile]] = {}
     for name in names:
         made[name] = list(Bar(tiles_of(name, splits, categories), desc=name, unit="picture"))

@@ -26,7 +26,7 @@ from robocasa_lerobot.convert.reading.demo_file import ASSETS_GROUP, IMAGE_SUFFI
 from robocasa_lerobot.convert.reading.layout import ABSOLUTE_ACTIONS, ACTIONS
 from robocasa_lerobot.convert.reading.stages import STAGE_DATASET
 from robocasa_lerobot.errors import UnknownNameError, UserError
-from robocasa_lerobot.files import written_aside
+from robocasa_lerobot.hdf5_files import new_hdf5
 from robocasa_lerobot.progress import Bar
 
 COMPRESSIONS = ("gzip", "lzf", "none")
@@ -83,7 +83,7 @@ def export(root: Path, out: Path, settings: ExportSettings | None = None, overwr
     notes: list[str] = []
     out.parent.mkdir(parents=True, exist_ok=True)
     try:
-        with written_aside(out) as aside, h5py.File(aside, "w") as file:
+        with new_hdf5(out) as file:
             num_frames = _write(file, dataset, episodes, cameras, settings, notes)
     except OSError as error:
         raise UserError(f"writing {out} failed: {error}. Nothing is there; free disk space and repeat.") from error

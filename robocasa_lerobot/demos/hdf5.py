@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import contextlib
 import datetime
-import io
 import json
-from collections.abc import Buffer, Iterable, Iterator, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -18,7 +16,7 @@ import numpy as np
 from robocasa_lerobot import __version__
 from robocasa_lerobot.demos.recorder import Recording
 from robocasa_lerobot.errors import differing
-from robocasa_lerobot.files import written_aside
+from robocasa_lerobot.hdf5_files import new_hdf5
 
 ENV_TYPE_ROBOSUITE = 1  # robomimic's number for environments of this family
 # Group of files that MJCFs name; MuJoCo needs them to load a `model_file` again. It lies beside `data`, not in it:
@@ -68,63 +66,13 @@ def segments_of(meta: Mapping[str, Any]) -> tuple[tuple[str, str], ...]:
     )
 
 
-class _Shielded(io.FileIO):
-    """A file in which no write seems to fail to HDF5; `error` is what failed first.
-
-    On a full disk HDF5 2.0 raises RuntimeError from its own bookkeeping when a file is closed, and where datasets are
-    compressed it ends the whole process.
-    """
-
-    error: OSError | None = None
-
-    def write(self, data: Buffer, /) -> int:
-        """Write all of it, or note why not."""
-        left = memoryview(data).cast("B")
-        size = len(left)
-        while len(left) and self.error is None:
-            try:
-                left = left[super().write(left) :]
-            except OSError as error:
-                self.error = error
-        return size
-
-    def truncate(self, size: int | None = None, /) -> int:
-        """Cut or extend, or note why not."""
-        try:
-            return super().truncate(size)
-        except OSError as error:
-            self.error = self.error or error
-            return size or 0
-
-
-@contextlib.contextmanager
-def _new_file(path: Path) -> Iterator[h5py.File]:
-    """A file to fill, which appears at `path` only when complete.
-
-    Raises:
-        OSError: it cannot be written, or what HDF5 was told to copy cannot be read.
-    """
-    with written_aside(path) as aside, _Shielded(aside, "w+") as shielded:
-        try:
-            with h5py.File(shielded, "w") as file:
-                yield file
-        except RuntimeError as error:  # what HDF5 has no better word for
-            if shielded.error is None:
-                raise OSError(f"{path} cannot be written: {error}") from error
-        except Exception:
-            if shielded.error is None:
-                raise
-        if shielded.error is not None:
-            raise OSError(shielded.error.errno, shielded.error.strerror, str(path)) from shielded.error
-
-
 def write_part(path: Path, recording: Recording) -> None:
     """Write one episode to a file of its own; it appears under its name only when complete.
 
     Raises:
         OSError: it cannot be written, on a full disk for example.
     """
-    with _new_file(path) as file:
+    with new_hdf5(path) as file:
         demo = file.create_group("demo")
         demo.attrs["model_file"] = recording.model_file
         demo.attrs["ep_meta"] = json.dumps(recording.ep_meta)
@@ -214,7 +162,7 @@ def merge_parts(
     """
     now = datetime.datetime.now(datetime.UTC)
     total = 0
-    with _new_file(path) as file:
+    with new_hdf5(path) as file:
         data = file.create_group("data")
         for index, part in enumerate(parts):
             with h5py.File(part, "r") as source:

@@ -25,6 +25,7 @@ from robocasa_lerobot.envs.robots.robot import Controller, Robot
 from robocasa_lerobot.envs.scene.build import RENDER_PRESETS, build_scene
 from robocasa_lerobot.envs.scene.reset_noise import InitialNoise, add_initial_noise
 from robocasa_lerobot.envs.scene.scene import Scene
+from robocasa_lerobot.envs.seeds import checked_seed
 from robocasa_lerobot.envs.state import KitchenState, restore
 from robocasa_lerobot.envs.tasks.registry import get_task
 from robocasa_lerobot.envs.tasks.task import BoundTask, Task
@@ -45,7 +46,7 @@ class KitchenEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
 
     Observation: `pixels` {camera: uint8 (S, S, 3), upright} and `agent_pos` float64 (16,), the contract's state; on
     request `depth` {camera: float32 (S, S, 1), metres along the optical axis} and `segmentation` {camera: int32
-    (S, S, 1), geom ids, -1 for nothing}, see `segmentation_names`.
+    (S, S, 1), geom ids, -1 for nothing}, see `segmentation_names`. Without cameras `agent_pos` alone.
     Action: float32 (12,) in [-1, 1] in the contract's stored order; binary parts count as +1 from 0.5 on.
     Reward: 1 in a step after which the goal holds, else 0. `terminated` at success, `truncated` at the horizon.
     Info, at reset and every step: `success`, `is_success`, `success_terms`, `instruction`, `task`, `scene`, `seed`.
@@ -135,8 +136,8 @@ class KitchenEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         self.render_observations = True
         self.rendering_seconds = 0.0  # wall time in which observations' pictures were made, since the env was made
         self.task_description = ""
-        pictures = picture_spaces(self.cameras, image_size, **self._kinds)
-        self._picture_keys = tuple(sorted(pictures))
+        # Gymnasium's checker takes no empty dictionary for a space.
+        pictures = picture_spaces(self.cameras, image_size, **self._kinds) if self.cameras else {}
         self.observation_space = gymnasium.spaces.Dict(
             {
                 **pictures,
@@ -189,7 +190,12 @@ class KitchenEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Observation, dict[str, Any]]:
-        """Make the scene of `seed` (without one: of the next number of the env's generator) and settle it."""
+        """Make the scene of `seed` (without one: of the next number of the env's generator) and settle it.
+
+        Raises:
+            UserError: it is no seed, or no arrangement was found.
+        """
+        seed = None if seed is None else checked_seed(seed)
         super().reset(seed=seed)
         episode_seed = seed if seed is not None else int(self.np_random.integers(_SEED_LIMIT))
         if self._initial is not None and self._initial.seed == episode_seed:
@@ -340,7 +346,7 @@ class KitchenEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
 
     def _observe(self) -> Observation:
         if not self.cameras:
-            pictures: Pictures = {key: {} for key in self._picture_keys}
+            pictures: Pictures = {}
         else:
             if self.render_observations or not self._pictures:
                 started = time.perf_counter()

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -92,6 +92,29 @@ SECTIONS: dict[str, tuple[Section, int, int]] = {
     "appliances": (appliances, 150, 3),
     "objects": (objects, 140, 10),
 }
+
+
+def categories_of(section: str) -> set[str]:
+    """What a section's pictures can be chosen by."""
+    if section == "layouts":
+        return {layout_record(layout_id)["plan"] for layout_id in layout_ids()}
+    if section == "styles":
+        return {load_style(style_id).panel for style_id in style_ids()}
+    if section == "appliances":
+        return set(kinds())
+    return {*CATEGORIES, *(group for category in CATEGORIES.values() for group in category.groups)}
+
+
+def check_categories(sections: Sequence[str], categories: Sequence[str]) -> None:
+    """Every category is one of some section.
+
+    Raises:
+        UnknownNameError: one is of none; names the closest ones.
+    """
+    known = set().union(*map(categories_of, sections))
+    for category in categories:
+        if category not in known:
+            raise UnknownNameError(f"category of {', '.join(sections)}", category, known)
 
 
 def tiles_of(section: str, splits: tuple[str, ...] = SPLITS, categories: tuple[str, ...] = ()) -> Iterator[Tile]:

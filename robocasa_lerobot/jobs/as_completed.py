@@ -27,6 +27,7 @@ def as_they_end[Result](
             yield function(*job)
         return
     context = multiprocessing.get_context("forkserver")
+    context.set_forkserver_preload(["__main__", function.__module__])  # imported once, not by each process
     with ProcessPoolExecutor(min(workers, len(jobs)), mp_context=context, initializer=_end_with_parent) as pool:
         try:
             futures = [pool.submit(function, *job) for job in jobs]

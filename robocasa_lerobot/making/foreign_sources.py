@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import shutil
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
@@ -17,7 +16,7 @@ from robocasa_lerobot.demos.generate.mimicgen.subtasks import DatagenInfo, write
 from robocasa_lerobot.demos.generate.sources.prepared import GROUP
 from robocasa_lerobot.demos.replay import demonstrations
 from robocasa_lerobot.errors import UserError
-from robocasa_lerobot.files import written_aside
+from robocasa_lerobot.hdf5_files import changed_hdf5
 
 ACTIONS = 7  # `OSC_POSE` deltas and the fingers
 
@@ -55,14 +54,12 @@ def prepare_foreign(path: Path, bodies: Sequence[str], asset_roots: Sequence[Pat
             ) from error
         found.append((demo, info))
         yield found[-1][1]
-    with written_aside(path) as aside:
-        shutil.copyfile(path, aside)
-        with h5py.File(aside, "r+") as file:
-            for demo, info in found:
-                group = file[f"data/{demo}"]
-                if GROUP in group:
-                    del group[GROUP]
-                write_datagen(group.create_group(GROUP), info, _env_name(file["data"]))
+    with changed_hdf5(path) as file:
+        for demo, info in found:
+            group = file[f"data/{demo}"]
+            if GROUP in group:
+                del group[GROUP]
+            write_datagen(group.create_group(GROUP), info, _env_name(file["data"]))
 
 
 def model_of(path: Path, demo: str, asset_roots: Sequence[Path] = ()) -> mujoco.MjModel:

@@ -135,7 +135,7 @@ class Session:
         if self.episode is None or self.phase in (LOADING, SAVING, DONE):
             return self.pictures.add(now, None, self.free), []
         number = self.pictures.add(now, self.episode.states[self.shown], self.free)
-        seen = self.episode.observation["pixels"] if self.env.render_observations else {}
+        seen = self.episode.observation.get("pixels", {}) if self.env.render_observations else {}
         return number, self._views.take(self.env, seen, self.cameras, self.free)
 
     def run(self, now: float) -> None:

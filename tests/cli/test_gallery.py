@@ -53,6 +53,22 @@ def test_sections_are_filtered() -> None:
         list(tiles_of("layout"))
 
 
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (["--category=toaster"], "--show"),
+        (["--show=layouts", "--tasks=OpenDrawer"], "--show"),
+        (["--show=layouts", "--category=island,galey"], "galley"),
+        (["--seeds=-1"], "from 0"),
+        (["--show=tasks", "--seeds=-1"], "from 0"),
+    ],
+)
+def test_what_does_not_apply_is_said_before_any_work(options, words, tmp_path, capsys) -> None:
+    assert main(["gallery", *options, f"--out={tmp_path / 'out'}"]) == 2
+    assert words in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
+
+
 def test_the_viewer_says_that_there_is_no_display(monkeypatch, capsys) -> None:
     for name in ("DISPLAY", "WAYLAND_DISPLAY"):
         monkeypatch.delenv(name, raising=False)

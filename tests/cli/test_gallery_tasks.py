@@ -16,7 +16,7 @@ from robocasa_lerobot.envs.tasks.registry import task_names
 from robocasa_lerobot.errors import UserError
 from robocasa_lerobot.gallery.tasks.cards import Rate, cards, length_class, read_rates
 from robocasa_lerobot.gallery.tasks.page import Entry, choices, write_page
-from robocasa_lerobot.gallery.tasks.pictures import Shown
+from robocasa_lerobot.gallery.tasks.pictures import Shown, _made_of
 
 CHROMIUM = find_chromium()
 MAX_BYTES = 15_000_000
@@ -93,6 +93,11 @@ def test_the_command_makes_what_is_missing(tmp_path: Path, capsys: pytest.Captur
     assert main(command) == 0
     assert {path: path.stat().st_mtime_ns for path in (tmp_path / "tasks").iterdir()} == before
     assert "tasks.html" in capsys.readouterr().out
+    made = tmp_path / "tasks" / "CloseDrawer.json"
+    said = json.loads(made.read_text())
+    made.write_text(json.dumps(said | {"of": said["of"] | {"task": "as it was declared before"}}))
+    assert main(command) == 0
+    assert json.loads(made.read_text()) == said
     row = {"successes": 3, "trials": 4, "low": 0.3, "high": 0.95}
     for name, tasks in (("atomic", {"CloseDrawer": row}), ("more", {"AddIceCubes": row | {"successes": 2}})):
         (tmp_path / f"{name}.json").write_text(json.dumps({"tasks": tasks}))
@@ -101,6 +106,17 @@ def test_the_command_makes_what_is_missing(tmp_path: Path, capsys: pytest.Captur
     assert [f"{count} of 4 trials" in text for text in (page, rated) for count in (2, 3)] == [False, False, True, True]
     for wrong in (["--tasks=CloseDraw"], ["--seeds=a"], ["--rates=none.json"], ["--show=task"]):
         assert main([*command, *wrong]) == 2
+
+
+def test_pictures_of_other_tasks_stay_on_the_page(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "tasks").mkdir()
+    said = {"asked": 0, "split": "target", "seed": 0, "instruction": "Open it.", "seconds": None}
+    for name in ("CloseDrawer", "OpenDrawer"):
+        of = _made_of(name)
+        (tmp_path / "tasks" / f"{name}.json").write_text(json.dumps({**said, "of": of, "stages": [], "failure": ""}))
+        (tmp_path / "tasks" / f"{name}_start.webp").write_bytes(TINY)
+    assert main(["gallery", "--show=tasks", "--tasks=CloseDrawer", "--workers=1", f"--out={tmp_path}"]) == 0
+    assert (tmp_path / "tasks.html").read_text().count('<script type="text/plain"') == 2
 
 
 def test_a_task_that_raises_has_a_card_that_says_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

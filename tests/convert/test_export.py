@@ -13,6 +13,7 @@ import pytest
 import v2_support as v2
 from convert_layouts import write_robocasa_v01
 from convert_support import INSTRUCTION, write_demos
+from full_disk import full_after
 
 from robocasa_lerobot import cli, contract
 from robocasa_lerobot.errors import UserError
@@ -51,6 +52,16 @@ def items(path: Path) -> dict[str, h5py.Dataset]:
     with h5py.File(path) as file:
         file.visititems(visit)
     return found
+
+
+@pytest.mark.parametrize("share", [0.05, 0.5, 0.99])
+def test_a_full_disk_is_explained_and_leaves_nothing(
+    ours: tuple[Path, Path, Path], tmp_path: Path, share: float
+) -> None:
+    size = ours[2].stat().st_size
+    with full_after(int(share * size)), pytest.raises(UserError, match="free disk space and repeat"):
+        export(ours[1], tmp_path / "again.hdf5")
+    assert not list(tmp_path.iterdir())
 
 
 def test_vectors_states_and_scenes_are_those_of_the_source_bit_for_bit(ours: tuple[Path, Path, Path]) -> None:

@@ -12,6 +12,7 @@ import h5py
 import mujoco
 import numpy as np
 import pytest
+from full_disk import full_after
 
 from robocasa_lerobot import cli, contract
 from robocasa_lerobot.demos.generate.sources.prepare import DROPPED, FILE, file_identity, prepare_files, prepare_one
@@ -183,6 +184,20 @@ def test_a_file_is_prepared_and_what_was_recorded_stays(
     ahead = np.linalg.norm(found.target[:, :3, 3] - found.eef[:, :3, 3], axis=1)
     assert ahead.max() < 0.05 * np.sqrt(3) + 1e-3
     assert list(prepare_files([path])) == list(prepare_files([path]))  # done already
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("share", [0.1, 1.01])  # of a demonstration's own file, and of the whole one
+def test_a_full_disk_leaves_the_file_as_it_was_recorded(
+    recorded: Path, tmp_path: Path, share: float, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = Path(shutil.copy(recorded, tmp_path))
+    before = path.read_bytes()
+    with full_after(int(share * len(before))):
+        assert cli.main(["prepare", str(path), "--workers", "1"]) == 2
+    assert "Free disk space" in capsys.readouterr().err
+    assert path.read_bytes() == before
+    assert cli.main(["prepare", str(path), "--workers", "1"]) == 0
 
 
 @pytest.mark.slow

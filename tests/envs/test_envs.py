@@ -19,6 +19,7 @@ from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.kitchens.appliances.kinds.sink import Sink
 from robocasa_lerobot.envs.kitchens.fixtures.cabinets import Drawer
 from robocasa_lerobot.envs.kitchens.splits import scene_ids
+from robocasa_lerobot.envs.scene.build import build_scene
 from robocasa_lerobot.envs.tasks.registry import get_task, task_names, task_set, task_sets
 from robocasa_lerobot.errors import UnknownNameError, UserError
 
@@ -216,6 +217,18 @@ def test_other_mistakes_say_what_to_do():
     with pytest.raises(UnknownNameError, match="robot0_agentview_left"):
         env.render_camera("robot0_agentview_lef")
     env.close()
+
+
+@pytest.mark.parametrize("seed", [-1, 2**63, 1.0, "1"])
+def test_what_is_no_seed_is_explained(seed):
+    with pytest.raises(UserError, match="expected a whole number from 0"):
+        KitchenEnv("OpenDrawer", cameras=()).reset(seed=seed)
+    with pytest.raises(UserError, match="expected a whole number from 0"):
+        build_scene(get_task("OpenDrawer"), "target", seed)
+
+
+def test_a_seed_may_be_numpys():
+    assert KitchenEnv("CloseDrawer", cameras=()).reset(seed=np.int64(3))[1]["seed"] == 3
 
 
 def test_task_sets():

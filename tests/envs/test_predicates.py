@@ -34,6 +34,7 @@ from robocasa_lerobot.envs.predicates import (
     NearerThan,
     Not,
     ObjectInBasin,
+    ObjectInside,
     ObjectOn,
     ObjectOnRack,
     OnBurner,
@@ -246,6 +247,23 @@ CASES: dict[str, tuple[str, Goal, list[Change], list[Change]]] = {
 def test_it_holds_in_its_state_and_in_no_near_miss(case: str, scenes: dict[str, Scene]) -> None:
     where, goal, hits, misses = CASES[case]
     check_hits_and_misses(scenes[where], goal, hits, misses)
+
+
+@pytest.mark.parametrize(
+    ("where", "goal"), [("sink", ObjectInside("{food}", "sink")), ("plate", ObjectOn("{food}", "{dish}"))]
+)
+def test_objects_may_be_named_by_a_choice(
+    where: str, goal: Goal, scenes: dict[str, Scene], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    scene = scenes[where]
+    for name, value in (("food", "obj"), ("dish", "plate")):
+        monkeypatch.setitem(scene.choices, name, value)
+    data = state(scene)
+    assert hold(goal, scene, data) is not None
+    basin = scene.fixture("sink", Sink).regions["basin0"]
+    put_object(scene, data, "obj", data.body("plate").xpos if where == "plate" else basin.world(data, (0.0, 0.0, 0.0)))
+    assert hold(goal, scene, data) is None
+    assert not any("{" in name for name in terms_by_name(goal))
 
 
 def test_every_predicate_that_can_be_missed_by_little_is_among_the_cases() -> None:

@@ -214,6 +214,16 @@ def test_a_state_that_is_shown_by_colour_is_seen() -> None:
     check()
     assert merged._alike.model is made
     assert (merged.render(data, "above") != before).any()
+    shown = merged.render(data, "above")
+    for alpha in (0.0, 1.0):  # hidden, and shown again
+        model.geom_rgba[11, 3] = alpha
+        check()
+    model.geom_rgba[7, 3] = 0.0  # one that has a part of its own
+    model.geom_rgba[12, 0] += 0.01  # another changes meanwhile
+    check()
+    model.geom_rgba[7, 3], model.geom_rgba[12, 0] = 1.0, model.geom_rgba[12, 0] - 0.01
+    check()
+    assert np.abs(merged.render(data, "above").astype(int) - shown.astype(int)).mean() < 0.1
     model.geom_group[9] = 0
     check()
     merged.close()

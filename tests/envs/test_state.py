@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import gymnasium
 import numpy as np
 import pytest
 from demonstration_steps import demonstrated_commands
 from numpy.typing import NDArray
 from task_selection import demonstrated, every_task
 
+import robocasa_lerobot.envs  # noqa: F401  (makes the tasks known to Gymnasium)
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.scene.scene import Scene
 from robocasa_lerobot.envs.state import KitchenState
@@ -162,6 +164,23 @@ def test_a_reset_that_is_interrupted_leaves_the_running_episode_as_it_was() -> N
     assert env.scene.seed == env.get_state().seed == 3
     assert_same(trajectory(env, actions(10, 0)), expected)
     assert env.reset(seed=4)[1]["seed"] == env.scene.seed == 4
+
+
+def test_an_env_that_gymnasium_made_goes_on_from_a_state() -> None:
+    first = make("CloseDrawer")
+    first.reset(seed=3)
+    state = first.get_state()
+    expected = trajectory(first, actions(5, 0))
+    made = gymnasium.make("robocasa_lerobot/CloseDrawer", cameras=())
+    made.reset(seed=4)  # Gymnasium asks for one
+    kitchen = made.unwrapped
+    assert isinstance(kitchen, KitchenEnv)
+    kitchen.set_state(state)
+    for command in actions(5, 0):
+        made.step(command)
+    assert np.array_equal(kitchen.data.qpos, expected[-1][: kitchen.model.nq])
+    made.close()
+    first.close()
 
 
 def test_there_is_no_state_before_the_first_reset() -> None:

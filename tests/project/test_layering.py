@@ -17,7 +17,7 @@ from robocasa_lerobot.cli import SUBCOMMANDS
 
 # What each part of the package may import of the rest of the package. Parts on one level stay apart.
 BASE = {
-    *("benchmark", "config_files", "contract", "errors", "files", "gl", "jobs", "jsonl", "progress"),
+    *("benchmark", "config_files", "contract", "errors", "files", "gl", "hdf5_files", "jobs", "jsonl", "progress"),
     *("provenance", "quiet", "settings", "video", "wilson", "wire"),
 }
 LOW = {"envs", "convert", "data", "policies"}
@@ -28,6 +28,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     "gl": {"errors"},
     "benchmark": {"errors"},
     "files": set(),
+    "hdf5_files": {"files"},
     "jsonl": set(),
     "provenance": set(),
     "progress": set(),
@@ -74,6 +75,7 @@ FORBIDDEN: dict[str, set[str]] = {
     "gl": TORCH,
     "benchmark": TORCH | PHYSICS,
     "files": TORCH | PHYSICS,
+    "hdf5_files": TORCH | PHYSICS,
     "jsonl": TORCH | PHYSICS,
     "provenance": TORCH | PHYSICS,
     "jobs": TORCH | PHYSICS,

@@ -36,7 +36,7 @@ class ObjectInBasin(Term):
     @property
     def name(self) -> str:
         """E.g. `obj_in_sink`."""
-        return f"{self.object}_in_{self.fixture}"
+        return f"{plain(self.object)}_in_{self.fixture}"
 
     def holds(self, scene: Scene, data: mujoco.MjData) -> bool:
         """Test the body's origin against the basins' regions."""
@@ -94,11 +94,12 @@ class ObjectInside(Term):
     @property
     def name(self) -> str:
         """E.g. `obj_inside_cabinet`."""
-        return f"{self.object}_inside_{self.fixture}"
+        return f"{plain(self.object)}_inside_{self.fixture}"
 
     def holds(self, scene: Scene, data: mujoco.MjData) -> bool:
         """Test the origin against each region, then the corners."""
-        origin = data.body(scene.fill(self.object)).xpos
+        object = scene.fill(self.object)
+        origin = data.body(object).xpos
         around = [
             region
             for region in scene.regions(self.fixture, self.region)
@@ -106,7 +107,7 @@ class ObjectInside(Term):
         ]
         if not around:
             return False
-        corners = object_corners(scene, data, self.object)
+        corners = object_corners(scene, data, object)
         return any(region.encloses(data, corners, self.margin) for region in around)
 
     def _usable(self, data: mujoco.MjData, region: Region) -> bool:
@@ -200,14 +201,15 @@ class ObjectOn(Term):
     @property
     def name(self) -> str:
         """E.g. `obj_on_plate`."""
-        return f"{self.object}_on_{self.receptacle}"
+        return plain(f"{self.object}_on_{self.receptacle}")
 
     def holds(self, scene: Scene, data: mujoco.MjData) -> bool:
         """Look at distance, then contacts."""
-        apart = data.body(scene.fill(self.object)).xpos[:2] - middle_of(scene, data, self.receptacle)[:2]
-        limit = RECEPTACLE_SHARE * radius(scene, self.receptacle) if self.within is None else self.within
+        object, receptacle = scene.fill(self.object), scene.fill(self.receptacle)
+        apart = data.body(object).xpos[:2] - middle_of(scene, data, receptacle)[:2]
+        limit = RECEPTACLE_SHARE * radius(scene, receptacle) if self.within is None else self.within
         return float(np.linalg.norm(apart)) < limit and touching(
-            scene.model, data, scene.subtree(scene.fill(self.object)), scene.subtree(self.receptacle)
+            scene.model, data, scene.subtree(object), scene.subtree(receptacle)
         )
 
 
@@ -231,7 +233,7 @@ class ObjectAtSite(Term):
     @property
     def name(self) -> str:
         """E.g. `obj_under_coffee_machine`."""
-        return f"{self.object}_under_{self.fixture}"
+        return f"{plain(self.object)}_under_{self.fixture}"
 
     def holds(self, scene: Scene, data: mujoco.MjData) -> bool:
         """Compare both distances with the bounds."""
@@ -249,7 +251,7 @@ class ObjectUpright(Term):
     @property
     def name(self) -> str:
         """E.g. `obj_upright`."""
-        return f"{self.object}_upright"
+        return f"{plain(self.object)}_upright"
 
     def holds(self, scene: Scene, data: mujoco.MjData) -> bool:
         """Compare the tilt with the bound."""

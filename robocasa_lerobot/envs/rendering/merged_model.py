@@ -122,7 +122,8 @@ def merged_model(
     """
     if model.nskin or model.nflex or model.ntendon or model.nhfield:
         return None
-    visible = np.isin(model.geom_group, groups) & (model.geom_rgba[:, 3] > 0)
+    own = np.isin(np.arange(model.ngeom), sorted(loose))  # kept where they are hidden: they may be shown again
+    visible = np.isin(model.geom_group, groups) & ((model.geom_rgba[:, 3] > 0) | own)
     if not np.isin(model.geom_type[visible], (*_MERGED, *_KEPT)).all():
         return None
     poses = RestPoses.of(model)

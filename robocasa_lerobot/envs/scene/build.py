@@ -33,6 +33,7 @@ from robocasa_lerobot.envs.scene.scene_spec import SceneSpec
 from robocasa_lerobot.envs.scene.spec import InitialOpenness, OnCounter
 from robocasa_lerobot.envs.scene.task_parameters import Choices, draw_choices, filled
 from robocasa_lerobot.envs.scene.words import numbered, said, words_of
+from robocasa_lerobot.envs.seeds import checked_seed
 from robocasa_lerobot.errors import UnknownNameError, UserError
 
 RENDER_PRESETS = ("fast", "quality")
@@ -104,8 +105,9 @@ def build_scene(
 
     Raises:
         UnknownNameError: no such split, preset or camera set.
-        UserError: no arrangement was found in 50 attempts.
+        UserError: it is no seed, or no arrangement was found in 50 attempts.
     """
+    seed = checked_seed(seed)
     if render_preset not in RENDER_PRESETS:
         raise UnknownNameError("render preset", render_preset, RENDER_PRESETS)
     robot.cameras(camera_set)

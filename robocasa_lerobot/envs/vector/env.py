@@ -18,8 +18,8 @@ from gymnasium.vector import AsyncVectorEnv, AutoresetMode
 from gymnasium.vector.async_vector_env import AsyncState
 
 from robocasa_lerobot import gl
+from robocasa_lerobot.envs.seeds import SEEDS, is_seed
 from robocasa_lerobot.envs.vector.worker import (
-    LARGEST_SEED,
     STATUS_FIELDS,
     WHERE_SIGNAL,
     Failure,
@@ -304,13 +304,9 @@ def _seeds(seed: int | Sequence[int | None] | None, count: int) -> list[int | No
     if isinstance(seed, (int, np.integer)):
         seed = [int(seed) + index for index in range(count)]
     seeds = list(seed)
-    if len(seeds) != count or any(not (one is None or _is_seed(one)) for one in seeds):
-        raise UserError(f"seed: found {seed!r}, expected a number from 0 to 2**63 - 1, or a list of {count} of them.")
+    if len(seeds) != count or any(not (one is None or is_seed(one)) for one in seeds):
+        raise UserError(f"seed: found {seed!r}, expected {SEEDS}, or a list of {count} of them.")
     return [None if one is None else int(one) for one in seeds]
-
-
-def _is_seed(value: Any) -> bool:
-    return isinstance(value, (int, np.integer)) and 0 <= int(value) < LARGEST_SEED
 
 
 def _cause_of_death(exit_code: int | None, progress: Progress) -> str:

@@ -27,6 +27,7 @@ from gymnasium.vector import AutoresetMode
 from gymnasium.vector.utils import write_to_shared_memory
 
 from robocasa_lerobot import gl
+from robocasa_lerobot.envs.seeds import LARGEST_SEED
 
 EnvFactory = Callable[[], gymnasium.Env[Any, Any]]
 
@@ -35,7 +36,6 @@ WHERE_SIGNAL = signal.SIGUSR1
 PHASES = ("start-up", "waiting", "reset", "step", "autoreset", "call")
 # Numbers of a worker in the shared status: phase, whether the seed is known, seed, steps of the episode.
 STATUS_FIELDS = 4
-LARGEST_SEED = 2**63  # exclusive: infos and the status hold seeds as int64
 
 
 class FaultFile:

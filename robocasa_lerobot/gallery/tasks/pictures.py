@@ -1,11 +1,13 @@
 """Pictures of a task for its card: the kitchen at the start, and a strip of its demonstration; kept in files.
 
-What is there already for the same split and seed is taken as it is, so that work that was stopped goes on.
+What is there already for the same split and seed, of the task as it is declared now and by the same software, is taken
+as it is, so that work that was stopped goes on. A task that raised is tried again.
 """
 
 from __future__ import annotations
 
 import contextlib
+import hashlib
 import json
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -25,6 +27,8 @@ from robocasa_lerobot.envs.tasks.registry import get_task
 from robocasa_lerobot.errors import OF_THE_MACHINE
 from robocasa_lerobot.files import write_text, written_aside
 from robocasa_lerobot.gallery.scene_pictures import visitor_camera
+from robocasa_lerobot.gallery.task_pages import page
+from robocasa_lerobot.provenance import versions
 
 START_SIZE = (270, 432)  # height and width, pixels
 STRIP_PICTURES, STRIP_COLUMNS, STRIP_SIZE = 8, 4, 144
@@ -59,7 +63,7 @@ def make(name: str, split: str, seed: int, folder: Path) -> str:
     Of seeds from `seed` on, the first that the demonstrator solves; the last that was tried where it solves none. Of a
     task that raises there are no pictures.
     """
-    if read(name, split, seed, folder) is not None:
+    if is_made(name, split, seed, folder):
         return name
     folder.mkdir(parents=True, exist_ok=True)
     start, strip = (folder / f"{name}_{kind}.webp" for kind in ("start", "strip"))
@@ -77,8 +81,14 @@ def make(name: str, split: str, seed: int, folder: Path) -> str:
             if states is not None:
                 _save(_strip(env, states), strip, STRIP_QUALITY)
     # Last: what has it is whole.
-    write_text(folder / f"{name}.json", json.dumps({"asked": seed, **asdict(shown)}))
+    write_text(folder / f"{name}.json", json.dumps({"asked": seed, "of": _made_of(name), **asdict(shown)}))
     return name
+
+
+def _made_of(name: str) -> dict[str, str]:
+    """What the pictures of a task follow from: its declaration, in a digest of its page, and the software."""
+    words = "\n".join(page(get_task(name)))
+    return {"task": hashlib.sha256(words.encode()).hexdigest(), **versions("mujoco")}
 
 
 def _episode(env: KitchenEnv, seed: int) -> tuple[Shown, NDArray[np.float64] | None]:
@@ -102,13 +112,19 @@ def _episode(env: KitchenEnv, seed: int) -> tuple[Shown, NDArray[np.float64] | N
     return shown, recording.states
 
 
+def is_made(name: str, split: str, seed: int, folder: Path) -> bool:
+    """Whether there are pictures of a task for this split and seed; where it raised there are none."""
+    shown = read(name, split, seed, folder)
+    return shown is not None and shown.instruction != ""
+
+
 def read(name: str, split: str, seed: int, folder: Path) -> Shown | None:
-    """What was made of a task for this split and seed; None where nothing was."""
+    """What was made of a task for this split and seed, as it is declared now; None where nothing was."""
     path = folder / f"{name}.json"
     if not path.exists():
         return None
     values = json.loads(path.read_text(encoding="utf-8"))
-    if (values.pop("asked"), values["split"]) != (seed, split):
+    if (values.pop("asked"), values.pop("of", None), values["split"]) != (seed, _made_of(name), split):
         return None
     return Shown(**{**values, "stages": tuple(values["stages"])})
 

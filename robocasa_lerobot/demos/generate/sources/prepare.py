@@ -36,7 +36,8 @@ from robocasa_lerobot.demos.skills.pick_place.graspable import Graspable, graspa
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.tasks.task import Stage
 from robocasa_lerobot.errors import OF_THE_MACHINE, UserError
-from robocasa_lerobot.files import write_text, written_aside
+from robocasa_lerobot.files import write_text
+from robocasa_lerobot.hdf5_files import changed_hdf5, new_hdf5
 from robocasa_lerobot.jobs.as_completed import as_they_end
 from robocasa_lerobot.jobs.publish import held_lock
 
@@ -154,7 +155,7 @@ def prepare_one(path: Path, demo: str, folder: Path) -> Outcome:
     if isinstance(found, str):
         write_text(note, json.dumps(found))
         return Outcome(path, demo, found)
-    with written_aside(part) as aside, h5py.File(aside, "w") as file:
+    with new_hdf5(part) as file:
         write_prepared(file.create_group("demo"), found, signals)
     return Outcome(path, demo)
 
@@ -162,19 +163,17 @@ def prepare_one(path: Path, demo: str, folder: Path) -> Outcome:
 def _publish(path: Path, demos: list[str], folder: Path) -> None:
     """Write the file again with what was found beside its demonstrations; it is replaced when that is complete."""
     dropped: dict[str, str] = {}
-    with written_aside(path) as aside:
-        shutil.copyfile(path, aside)
-        with h5py.File(aside, "r+") as file:
-            for demo in demos:
-                group, part = file[f"data/{demo}"], folder / f"{demo}.hdf5"
-                if GROUP in group:
-                    del group[GROUP]
-                if part.exists():
-                    with h5py.File(part) as source:
-                        source.copy(source[f"demo/{GROUP}"], group, name=GROUP)
-                else:
-                    dropped[demo] = json.loads((folder / f"{demo}.json").read_text())
-            file["data"].attrs[DROPPED] = json.dumps(dropped)
+    with changed_hdf5(path) as file:
+        for demo in demos:
+            group, part = file[f"data/{demo}"], folder / f"{demo}.hdf5"
+            if GROUP in group:
+                del group[GROUP]
+            if part.exists():
+                with h5py.File(part) as source:
+                    source.copy(source[f"demo/{GROUP}"], group, name=GROUP)
+            else:
+                dropped[demo] = json.loads((folder / f"{demo}.json").read_text())
+        file["data"].attrs[DROPPED] = json.dumps(dropped)
 
 
 def replayed(recorded: Demonstration) -> Prepared | str:
