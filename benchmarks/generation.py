@@ -33,6 +33,7 @@ from pathlib import Path
 from typing import Any
 
 import common
+from generation_picture import draw
 from generation_report import Trial, ratios, summary, text
 
 from robocasa_lerobot.demos.choose import expand_names
@@ -92,7 +93,7 @@ def parse(arguments: Sequence[str] | None = None) -> argparse.Namespace:
     parser.add_argument("--first-seed", type=int, default=FIRST_SEED, help=f"default {FIRST_SEED}")
     parser.add_argument("--workers", type=int, default=os.cpu_count() or 1, help="processes (default: all cores)")
     parser.add_argument("--trials", type=Path, default=common.REPOSITORY / "outputs" / "generation.jsonl")
-    parser.add_argument("--out", type=Path, default=OUTPUT, help="result; a page lies beside it")
+    parser.add_argument("--out", type=Path, default=OUTPUT, help="result; a page and a picture lie beside it")
     return parser.parse_args(arguments)
 
 
@@ -252,7 +253,10 @@ def main(arguments: Sequence[str] | None = None) -> None:
         "date": utc_now(),
     }
     write_text(args.out, json.dumps(body, indent=1) + "\n")
-    page = text(trials, f"`benchmarks/generation.py`, pretraining kitchens, seeds from {args.first_seed} on.")
+    picture = args.out.with_suffix(".png")
+    draw(body["arms"], picture)
+    head = f"`benchmarks/generation.py`, pretraining kitchens, seeds from {args.first_seed} on."
+    page = text(trials, f"{head}\n\n![What is kept of each task's attempts]({picture.name})")
     write_text(args.out.with_suffix(".md"), page)
     print(page)
 

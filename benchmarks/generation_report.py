@@ -136,9 +136,22 @@ def hourly(trials: Sequence[Trial]) -> float:
     return sum(trial.success for trial in trials) / hours if hours else 0.0
 
 
+def _overview(trials: Sequence[Trial]) -> list[str]:
+    """A line for each arm."""
+    lines = ["| arm | tasks | attempts | mean of tasks | kept an hour | first try |", "|---|--:|--:|--:|--:|--:|"]
+    for arm in dict.fromkeys(trial.arm for trial in trials):
+        mine = [trial for trial in trials if trial.arm == arm]
+        found = summary(mine)
+        lines.append(
+            f"| {arm} | {len(found['tasks'])} | {len(mine):,} | {found['mean']:.1%} | {hourly(mine):,.0f} | "
+            f"{_mean(found['tasks'], 'first_try'):.1%} |"
+        )
+    return [*lines, ""]
+
+
 def text(trials: Sequence[Trial], head: str) -> str:
     """A page in Markdown: classes and tasks of each arm."""
-    lines = ["# Generated attempts", "", head, ""]
+    lines = ["# Generated attempts", "", head, "", *_overview(trials)]
     for arm in dict.fromkeys(trial.arm for trial in trials):
         mine = [trial for trial in trials if trial.arm == arm]
         found = summary(mine)

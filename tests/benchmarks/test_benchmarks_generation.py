@@ -9,6 +9,7 @@ from pathlib import Path
 from types import ModuleType
 
 import pytest
+from PIL import Image
 
 from robocasa_lerobot.demos.choose import task_set
 from robocasa_lerobot.demos.generate.sources.prepare import prepare_files
@@ -39,7 +40,7 @@ def test_every_task_belongs_to_a_class(report: ModuleType) -> None:
     assert report.class_of("KettleBoiling") == "composite"
 
 
-def test_rates_and_ratios(report: ModuleType) -> None:
+def test_rates_and_ratios(report: ModuleType, tmp_path: Path) -> None:
     def trial(task: str, seed: int, arm: str, success: bool, seconds: float, *sources: int) -> object:
         held, reason = success or seed == 1, "" if success else "late"
         counted = (100, seconds, len(sources), sources, success, reason)
@@ -66,7 +67,14 @@ def test_rates_and_ratios(report: ModuleType) -> None:
     assert found["success_ours_over_mimicgen"] == pytest.approx(0.875 / 0.25)
     assert found["kept_an_hour_ours"] == pytest.approx(2 * 3600 * 7 / 16)
     assert found["kept_an_hour_ours_over_mimicgen"] == pytest.approx((7 / 16) / (2 / 4))
-    assert "| OpenDrawer | 3 of 4 | 75% |" in report.text(trials, "head")
+    page = report.text(trials, "head")
+    assert "| OpenDrawer | 3 of 4 | 75% |" in page
+    assert "| ours | 2 | 8 | 87.5% | 3,150 | 87.5% |" in page
+    # Tasks of one arm alone have their line in the picture, too.
+    from generation_picture import draw
+
+    draw({"ours": ours, "mimicgen": report.summary(trials[8:12])}, tmp_path / "rates.png")
+    assert Image.open(tmp_path / "rates.png").width == 990
 
 
 def test_arms(bench: ModuleType) -> None:

@@ -13,6 +13,7 @@ from typing import Any
 import h5py
 import numpy as np
 import pytest
+from task_selection import every_task
 
 from robocasa_lerobot.demos import stages as module
 from robocasa_lerobot.demos.hdf5 import write_part
@@ -25,7 +26,7 @@ from robocasa_lerobot.envs.predicates.logic import Term
 from robocasa_lerobot.envs.scene.build import build_scene
 from robocasa_lerobot.envs.scene.initial_states import Water
 from robocasa_lerobot.envs.tasks.conditions import stage_condition, without_gripper
-from robocasa_lerobot.envs.tasks.registry import get_task, task_names
+from robocasa_lerobot.envs.tasks.registry import get_task
 from robocasa_lerobot.envs.tasks.task import Stage, Task
 from robocasa_lerobot.errors import UserError
 
@@ -271,7 +272,7 @@ def test_it_says_why_a_stage_that_was_done_is_to_be_done_again(monkeypatch: pyte
         list(carry_out(env, StageLog()))
 
 
-@pytest.mark.parametrize("name", task_names())
+@pytest.mark.parametrize("name", every_task())
 def test_every_stage_of_every_task_has_a_condition(name: str) -> None:
     task = get_task(name)
     task = task.bound(build_scene(task, "target", 0))
