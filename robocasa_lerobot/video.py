@@ -58,13 +58,16 @@ class VideoWriter:
         """Finish the file and move it to its place, or remove what was written."""
         if self._container is None:
             return
-        if keep:
-            self._container.mux(self._stream.encode())
-        self._container.close()
-        self._container = None
-        if keep:
-            self._part.replace(self._path)
-        else:
+        container, self._container = self._container, None
+        try:
+            try:
+                if keep:
+                    container.mux(self._stream.encode())
+            finally:
+                container.close()
+            if keep:
+                self._part.replace(self._path)
+        finally:
             self._part.unlink(missing_ok=True)
 
     def __enter__(self) -> VideoWriter:

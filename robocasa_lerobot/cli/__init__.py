@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import errno
 import importlib
+import os
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -59,6 +60,16 @@ SUBCOMMANDS: dict[str, Subcommand] = {
 }
 
 
+def _nobody_reads() -> bool:
+    """Whether standard output goes to a program that has ended, such as `head`; then nothing is written there again."""
+    try:
+        sys.stdout.flush()
+    except BrokenPipeError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return True
+    return False
+
+
 def build_parser(names: Sequence[str] = tuple(SUBCOMMANDS)) -> argparse.ArgumentParser:
     """The parser with the given subcommands configured (importing only their modules)."""
     parser = argparse.ArgumentParser(prog="robocasa-lerobot", description="Train and benchmark robots in kitchens.")
@@ -103,6 +114,10 @@ def main(argv: Sequence[str] | None = None) -> int:
     except UserError as error:
         print(f"robocasa-lerobot {name}: {error}", file=sys.stderr)
         return 2
+    except BrokenPipeError:
+        if not _nobody_reads():
+            raise
+        return 141  # as a shell says of a program that SIGPIPE has ended
     except OSError as error:
         if error.errno not in _FULL:
             raise

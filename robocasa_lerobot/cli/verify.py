@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import argparse
 import json
+import math
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from robocasa_lerobot.convert.verify import Report
@@ -42,8 +43,17 @@ def run(args: argparse.Namespace) -> int:
 
     pictures, least_db = args.pictures_per_episode, args.min_psnr
     report = verify(args.dataset, args.source, args.asset_root, pictures, least_db, args.workers)
-    print(json.dumps(report.as_json(), indent=2) if args.report == "json" else _table(report))
+    print(json.dumps(_finite(report.as_json()), indent=2) if args.report == "json" else _table(report))
     return 0 if report.passed else 1
+
+
+def _finite(value: Any) -> Any:
+    """The same with null for what JSON has no number for: equal pictures are infinitely many dB alike."""
+    if isinstance(value, dict):
+        return {key: _finite(one) for key, one in value.items()}
+    if isinstance(value, list | tuple):
+        return [_finite(one) for one in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def _count(text: str) -> int | None:

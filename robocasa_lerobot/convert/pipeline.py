@@ -140,7 +140,7 @@ def _convert(
             quiet_libraries,
             convert_shard.__module__,
         )
-        return _completed(plan, partial, out)
+        return _completed(plan, partial, out, overwrite)
 
 
 def submit(
@@ -185,7 +185,7 @@ class _LastJob:
         require_complete(len(self.plan.shards), partial)
         quiet_libraries()
         with held_folder(partial), failures_explained(out, partial):
-            return _completed(self.plan, partial, out)
+            return _completed(self.plan, partial, out, self.overwrite)
 
 
 def _prepared(
@@ -238,10 +238,11 @@ def _result(
     )
 
 
-def _completed(plan: Plan, partial: Path, out: Path) -> ConversionResult:
+def _completed(plan: Plan, partial: Path, out: Path, overwrite: bool) -> ConversionResult:
     """Join the shards, let the dataset appear, and clear away the rest."""
     result = _join(plan, partial, out)
     if result is not None:
+        check_output(out, overwrite)  # somebody else's may have appeared meanwhile
         publish(partial / _MERGED, out, partial / "replaced")
     rejected = result.rejected if result is not None else _rejected(plan, partial)
     clear_away(partial)

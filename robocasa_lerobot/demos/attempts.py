@@ -28,6 +28,7 @@ from robocasa_lerobot.demos.recorder import Actor, Recording, record_episode
 from robocasa_lerobot.demos.stages import StageLog
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.scene.reset_noise import InitialNoise
+from robocasa_lerobot.envs.seeds import SEEDS, is_seed
 from robocasa_lerobot.errors import OF_THE_MACHINE, UserError
 from robocasa_lerobot.files import write_text
 from robocasa_lerobot.jobs.pool import exit_if_orphaned
@@ -90,8 +91,13 @@ class RecordingSettings:
         self.make_env()
         if self.episodes < 1:
             raise UserError(f"episodes ({self.episodes}) must be at least 1.")
-        if self.seed < 0:
-            raise UserError(f"seed {self.seed}: scenes have seeds from 0 on. Choose such a --seed.")
+        if not (is_seed(self.seed) and is_seed(self.seed + self.limit - 1)):
+            raise UserError(
+                f"seed {self.seed}: {self.episodes} episodes may take {self.limit} attempts, with seeds from there on; "
+                f"each is to be {SEEDS}. Choose such a --seed."
+            )
+        if not 0.0 <= self.action_noise < math.inf:
+            raise UserError(f"action_noise: found {self.action_noise}, expected a number of at least 0.")
 
     @property
     def limit(self) -> int:

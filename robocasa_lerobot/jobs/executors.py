@@ -11,6 +11,7 @@ import argparse
 import importlib.util
 import json
 import pickle
+import re
 import shlex
 import shutil
 import subprocess
@@ -156,6 +157,8 @@ def submit_to_slurm(
                 f"the jobs of this work are still in the queue: {', '.join(waiting)}. Wait until they end (squeue), or "
                 "cancel them (scancel) and give the same command again."
             )
+    if any(re.search(r"\s", str(path.absolute())) for path in (folder, logs)):
+        raise UserError(f"{folder.parent}: datatrove's job files do not quote paths. Choose one without white space.")
     folder.mkdir(parents=True, exist_ok=True)
     logs.mkdir(parents=True, exist_ok=True)
     executor = ArrayExecutor(

@@ -106,5 +106,6 @@ def _start_worker(initializer: Callable[[], None] | None) -> None:
     parent = multiprocess.parent_process()
     if parent is not None:
         end_with(parent)
+        signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl+C reaches all: the parent ends its pool, and says so once
     if initializer is not None:
         initializer()

@@ -20,7 +20,7 @@ from robocasa_lerobot.study.runs import CPU, Run
 from robocasa_lerobot.study.strips import write_strips
 from robocasa_lerobot.training.config.experiment import PhaseConfig, load_experiment
 from robocasa_lerobot.training.metrics import METRICS, read_lines
-from robocasa_lerobot.training.planning.evaluations import FINISHED, FOLDER
+from robocasa_lerobot.training.planning.evaluations import FINISHED, FOLDER, phase_evaluations
 from robocasa_lerobot.training.records import PHASE_FILE
 
 TRIALS, CURVES, ABOUT = "trials.csv.gz", "curves.csv", "about.json"
@@ -99,8 +99,7 @@ def store(run: Run, results: Path) -> Path:
         training += sum(_seconds(lines))
         thinned = lines[:: max(1, len(lines) // _CURVE_POINTS)]
         curves += [(phase.name, int(line["step"]), float(line["loss"])) for line in thinned]
-        for text in phase.evaluations:
-            name = text.split()[0]
+        for name in (evaluation.name for evaluation in phase_evaluations(phase)):
             records = read_results(folder / FOLDER / name).trials
             trials += [_short(phase.name, name, record) for record in records]
             trying += sum(record.seconds.total for record in records)
@@ -195,7 +194,7 @@ def read_stored(results: Path, experiment: str, seed: int) -> StoredRun | None:
 def _has_ended(folder: Path, phase: PhaseConfig) -> bool:
     """Whether a phase was trained to its end and has all its evaluations."""
     lines = read_lines(folder / METRICS)
-    names = (text.split()[0] for text in phase.evaluations)
+    names = (evaluation.name for evaluation in phase_evaluations(phase))
     trained = bool(lines) and int(lines[-1]["step"]) >= phase.steps
     return trained and all((folder / FOLDER / name / FINISHED).is_file() for name in names)
 

@@ -22,8 +22,8 @@ pytest.importorskip("lerobot.datasets")
 from lerobot.datasets.dataset_metadata import CODEBASE_VERSION
 
 from robocasa_lerobot.convert import pipeline
-from robocasa_lerobot.convert.pipeline import convert
-from robocasa_lerobot.convert.settings import ConversionSettings
+from robocasa_lerobot.convert.pipeline import ConversionResult, convert
+from robocasa_lerobot.convert.settings import ConversionSettings, Plan
 from robocasa_lerobot.convert.verify import verify
 from robocasa_lerobot.convert.writing import card
 from robocasa_lerobot.convert.writing.encoding_process import EncodingProcess
@@ -95,6 +95,26 @@ def test_a_full_disk_keeps_what_is_finished(tmp_path: Path, monkeypatch: pytest.
     assert convert([source], out, SETTINGS, workers=1).num_frames == 1002
     assert done == [("demo_1",)]
     assert leftovers(out) == ["out"]
+
+
+def test_what_appears_at_the_output_meanwhile_is_left_alone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    source, other = (
+        write_demos(tmp_path / name, (5,), images=16, seed=i) for i, name in enumerate(("a.hdf5", "b.hdf5"))
+    )
+    out, join = tmp_path / "out", pipeline._join
+
+    def slowly(plan: Plan, partial: Path, place: Path) -> ConversionResult | None:
+        with monkeypatch.context() as patch:
+            patch.setattr(pipeline, "_join", join)
+            convert([other], out, SETTINGS, workers=1)
+        return join(plan, partial, place)
+
+    monkeypatch.setattr(pipeline, "_join", slowly)
+    with pytest.raises(UserError, match="exists already"):
+        convert([source], out, SETTINGS, workers=1)
+    monkeypatch.setattr(pipeline, "_join", join)
+    assert verify(out, [other]).passed
+    assert convert([source], out, SETTINGS, workers=1, overwrite=True).num_episodes == 1
 
 
 def _convert_with_short_files(source: Path, out: Path, limit: int) -> str:

@@ -21,7 +21,7 @@ from slurm_support import stand_in
 
 from robocasa_lerobot import cli
 from robocasa_lerobot.cli.demos import EXAMPLE
-from robocasa_lerobot.demos.attempts import HOPELESS, Parts, RecordingSettings, Tally
+from robocasa_lerobot.demos.attempts import HOPELESS, MAX_ATTEMPTS_PER_EPISODE, Parts, RecordingSettings, Tally
 from robocasa_lerobot.demos.choose import choose_tasks, expand_names
 from robocasa_lerobot.demos.demonstrator import can_demonstrate
 from robocasa_lerobot.demos.distributed import record_distributed
@@ -173,12 +173,25 @@ def test_a_recording_does_not_go_on_under_another_version(tmp_path: Path, monkey
     assert parts.tally().done == {}
 
 
+@pytest.mark.parametrize("noise", [-0.1, float("nan"), float("inf")])
+def test_noise_that_is_none_is_refused(noise: float) -> None:
+    with pytest.raises(UserError, match="action_noise: found"):
+        RecordingSettings("CloseDrawer", 1, action_noise=noise).check()
+
+
+def test_attempts_may_not_run_out_of_seeds() -> None:
+    last = 2**63 - MAX_ATTEMPTS_PER_EPISODE
+    RecordingSettings("CloseDrawer", 1, seed=last).check()
+    with pytest.raises(UserError, match="a whole number from 0"):
+        RecordingSettings("CloseDrawer", 1, seed=last + 1).check()
+
+
 def test_seeds_that_no_scene_can_have_are_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     command = ["demos", "--tasks", "CloseDrawer", "--episodes", "1", "--seed", "-5", "--out", str(tmp_path)]
     assert cli.main(command) == 2
-    assert "scenes have seeds from 0 on" in capsys.readouterr().err
+    assert "a whole number from 0" in capsys.readouterr().err
     settings = [RecordingSettings("CloseDrawer", 1, seed=-5)]
-    with pytest.raises(UserError, match="from 0 on"):
+    with pytest.raises(UserError, match="a whole number from 0"):
         record_distributed(settings, tmp_path, cast(Any, SimpleNamespace(kind="ray")), keep_failures=False)
     assert not list(tmp_path.iterdir())
 

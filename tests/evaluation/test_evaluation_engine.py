@@ -16,6 +16,7 @@ from typing import Any
 import evaluation_records
 import pytest
 from evaluation_env import SlideEnv
+from full_disk import full_after
 
 from robocasa_lerobot.errors import UserError
 from robocasa_lerobot.evaluation.actors.reference_policies import RandomPolicy, ZeroPolicy
@@ -26,7 +27,7 @@ from robocasa_lerobot.evaluation.records import results, trials_file
 from robocasa_lerobot.evaluation.records.eval_info import write_eval_info
 from robocasa_lerobot.evaluation.records.results import TrialRecord
 from robocasa_lerobot.evaluation.run import engine
-from robocasa_lerobot.evaluation.run.film import FILM_EVERY, FILM_FPS, Film
+from robocasa_lerobot.evaluation.run.film import FILM_EVERY, FILM_FPS, Film, FilmError
 from robocasa_lerobot.evaluation.run.rollout import RolloutError, run_trial
 from robocasa_lerobot.evaluation.run.worker_pool import WorkerPool
 from robocasa_lerobot.video import frames_and_rate
@@ -225,6 +226,15 @@ def test_a_film_of_a_trial_that_fails_leaves_no_file(tmp_path: Path) -> None:
     with pytest.raises(RolloutError), Film(tmp_path / "videos/trial.mp4") as film:
         run_trial(Endless("Slide", horizon=20), ZeroPolicy(), spec, film)
     assert list((tmp_path / "videos").iterdir()) == []
+
+
+@pytest.mark.parametrize("size", [0, 600])
+def test_a_film_that_cannot_be_written_is_no_failure_of_its_trial(tmp_path: Path, size: int) -> None:
+    (spec,) = make_plan(["zero"], {"Slide": 20}, trials=1, seed=0, videos=1)
+    path = tmp_path / "videos/trial.mp4"
+    with full_after(size), pytest.raises(FilmError, match="--videos=0"), Film(path) as film:
+        run_trial(SlideEnv("Slide", horizon=20), ZeroPolicy(), spec, film)
+    assert not list((tmp_path / "videos").iterdir())
 
 
 def test_random_actions_depend_on_the_seed_alone() -> None:

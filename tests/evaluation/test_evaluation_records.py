@@ -17,7 +17,7 @@ from robocasa_lerobot import contract
 from robocasa_lerobot.envs.tasks.registry import task_names
 from robocasa_lerobot.errors import UserError
 from robocasa_lerobot.evaluation.actors import checkpoint as checkpoints
-from robocasa_lerobot.evaluation.config.evaluation import EvaluationConfig, PolicySettings
+from robocasa_lerobot.evaluation.config.evaluation import EvaluationConfig, PolicySettings, output_folder
 from robocasa_lerobot.evaluation.config.loader import load_config
 from robocasa_lerobot.evaluation.planning.run_header import outcome_settings, plan_tasks
 from robocasa_lerobot.evaluation.planning.trials import make_plan, trial_seed
@@ -204,6 +204,18 @@ def test_config_from_arguments_in_either_spelling() -> None:
             ["--policy.path=zero", "--env.task_sets=lifelong_phase1", "--lifelong=true", "--policy.lifelong_phase=0"],
             "give --lifelong=false",
         ),
+        (["--policy.path=zero", "--env.tasks=A", "--env.horizon_multiplier=.inf"], "horizon_multiplier: found inf"),
+        (["--policy.path=zero", "--env.tasks=A", "--stall_seconds=.nan"], "stall_seconds: found nan"),
+        (
+            [
+                "--policy.path=zero",
+                "--env.tasks=A",
+                "--env.horizon=9",
+                "--success.rule=hold",
+                "--success.hold_steps=10",
+            ],
+            "a trial lasts 9 steps",
+        ),
         (["--policy.path=zero"], "no task: give --env.tasks"),
         (["--env.tasks=A"], "no policy: give --policy.path"),
         (["--env=A"], "env: found 'A', expected settings"),
@@ -234,6 +246,15 @@ def test_horizons_come_from_the_registry_times_the_multiplier() -> None:
     config.env.tasks = ["OpenDrawr"]
     with pytest.raises(UserError, match="Did you mean 'OpenDrawer'"):
         plan_tasks(config.env)
+
+
+def test_a_folder_of_many_policies_has_a_name_that_file_systems_take() -> None:
+    config = load_config(EvaluationConfig, ["--policy.path=zero", "--env.tasks=A"])
+    labels = [f"experiment_of_a_long_name_{number}/finetune-{number:06d}" for number in range(8)]
+    assert output_folder(config, labels[:2]).name == "-".join(label.replace("/", "__") for label in labels[:2])
+    names = {output_folder(config, labels[:count]).name for count in (7, 8)}
+    assert len(names) == 2
+    assert all(len(name.encode()) < 255 for name in names)
 
 
 def test_settings_that_cannot_change_an_outcome_are_not_compared() -> None:

@@ -78,6 +78,16 @@ def test_shards_joined_are_the_whole(tmp_path: Path, plain: list[dict[str, Any]]
     assert {g["task_group"]: g["metrics"]["successes"] for g in info["per_task"]} == {
         task: [successes[task, trial] for trial in range(5)] for task in ("Slide", "Push")
     }
+    # Joined once more it keeps films of trials whose shard has none.
+    kept = {(r.task, r.trial, r.label) for r in merged.trials if r.video}
+    shard = next(
+        file for file in out.glob(f"shards/*/{TRIALS_FILE}") if '"video":"' in file.read_text().replace(" ", "")
+    )
+    lines = [json.loads(line) for line in shard.read_text().splitlines()]
+    lines = [line | ({"video": None} if line["kind"] == "trial" else {}) for line in lines]
+    shard.write_text("".join(json.dumps(line) + "\n" for line in lines))
+    assert main(["eval", *arguments(out), "--merge"]) == 0
+    assert {(r.task, r.trial, r.label) for r in read_results(out).trials if r.video} == kept
     # A shard of other settings is refused, with what differs.
     (out / TRIALS_FILE).unlink()
     other = engine.prepare(load_config(EvaluationConfig, arguments(out, seed=4)))

@@ -253,6 +253,8 @@ def test_lifelong_summaries_of_the_published_matrix() -> None:
     one = [(5, 10)]
     some = lifelong({1: {1: one}, 2: {1: one, 2: one}, 3: {2: one, 3: one}})
     assert (set(some.average), set(some.forgetting), some.backward_transfer) == ({1, 2}, {2}, None)
+    gap = lifelong({1: {1: one}, 3: {1: one, 2: one, 3: one}}, untrained={2: one, 3: one})
+    assert (gap.forgetting, gap.backward_transfer, gap.forward_transfer) == ({}, None, None)
     with pytest.raises(UserError):
         lifelong({1: {1: [(0, 0)]}})
 
@@ -294,3 +296,4 @@ def test_data_efficiency_intervals_come_from_the_trials_and_stop_at_the_ends_of_
     assert demos_for_success(demos, np.array([0.2, 0.4, 0.6]), np.array(0.3)) == pytest.approx(10**1.5)
     assert np.isinf(demos_for_success(demos, np.array([0.2, 0.4, 0.6]), np.array(0.7)))
     assert demos_for_success(demos, np.array([0.2, 0.4, 0.6]), np.array(0.1)) == 0
+    assert demos_for_success(demos, np.array([0.0, 0.0, 0.6]), np.array(0.0)) == 0

@@ -55,6 +55,14 @@ def test_perturbations_that_change_nothing_are_said_to_change_nothing(tmp_path: 
     said = robustness.sentence(dataclasses.replace(data, policies=tuple(same)))
     assert said == "None of 2 perturbations changes the success of checkpoint."
     assert "most" in str(robustness.sentence(data))
+    # The greatest change is named, whichever way it goes.
+    for one, other in (("none", "joint"), ("joint", "none")):
+        conditions = [
+            {name: policy.conditions[other if name == "joint" else one] for name in policy.conditions}
+            for policy in data.policies
+        ]
+        changed = [dataclasses.replace(p, conditions=c) for p, c in zip(data.policies, conditions, strict=True)]
+        assert "joint" in str(robustness.sentence(dataclasses.replace(data, policies=tuple(changed))))
 
 
 def test_a_perturbation_alone_is_named_and_stands_beside_no_published_number(tmp_path: Path) -> None:

@@ -99,7 +99,7 @@ def render_dataset(
     check_workers(workers)
     out, execution = out.absolute(), execution or Execution()
     check_output(out, overwrite)
-    if out == source.absolute():
+    if out.resolve() == source.resolve():
         raise UserError(f"--out is the dataset itself: {out}. Choose another folder.")
     plan = make_render_plan(source, settings)
     check_outside(out, source)
@@ -117,7 +117,7 @@ def render_dataset(
         run_pieces(
             step, len(plan.pieces), partial, execution, workers, plan.num_frames, "rendering", quiet_libraries, __name__
         )
-        return _complete(plan, partial, out)
+        return _complete(plan, partial, out, overwrite)
 
 
 @dataclass(frozen=True)
@@ -201,10 +201,10 @@ class _LastJob:
             raise UserError(f"{len(missing)} of {len(self.plan.pieces)} pieces are not complete: submit them again.")
         quiet_libraries()
         with held_folder(partial), failures_explained(out, partial):
-            return _complete(self.plan, partial, out)
+            return _complete(self.plan, partial, out, self.overwrite)
 
 
-def _complete(plan: RenderPlan, partial: Path, out: Path) -> RenderResult:
+def _complete(plan: RenderPlan, partial: Path, out: Path, overwrite: bool) -> RenderResult:
     merged = partial / "merged"
     shutil.rmtree(merged, ignore_errors=True)  # an earlier try may have been killed here
     shutil.copytree(plan.source, merged, ignore=lambda folder, _: ["videos"] if Path(folder) == plan.source else [])
@@ -240,6 +240,7 @@ def _complete(plan: RenderPlan, partial: Path, out: Path) -> RenderResult:
     write_modality(merged, names | {"video": modality(new, (), ())["video"]})
     _write_record(plan, merged, out)
     renew_dataset_card(merged)
+    check_output(out, overwrite)  # somebody else's may have appeared meanwhile
     publish(merged, out, partial / "replaced")
     shutil.rmtree(partial)
     cameras = tuple(camera.name for camera in plan.cameras)

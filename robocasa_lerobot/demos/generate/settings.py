@@ -83,7 +83,7 @@ class GenerationSettings(RecordingSettings):
         settings = cls(source=str(source), **values)
         for name, number, fits, expected in (
             ("cap", settings.cap, 0.0 < settings.cap <= 1.0, "a share above 0 and up to 1, as 0.2"),
-            ("spread", settings.spread, settings.spread >= 0.0, "a cost of 0 or more"),
+            ("spread", settings.spread, 0.0 <= settings.spread < np.inf, "a cost of 0 or more"),
             ("first-sources", settings.first_sources, settings.first_sources >= 0, "a number of sources, or 0 for all"),
         ):
             if not fits:

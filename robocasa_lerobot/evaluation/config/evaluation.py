@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass, field, fields
@@ -20,6 +21,7 @@ DEVICES = ("auto", "cpu", "cuda", "mps")
 PLACEMENTS = ("auto", "workers", "servers")
 SUCCESS_RULES = ("any_step", "hold", "at_end")
 PERTURBATIONS = ("none", "language", "camera", "joint", "base")
+_LONGEST_NAME = 200  # bytes: file systems take 255
 
 
 @dataclass
@@ -286,12 +288,19 @@ class EvaluationConfig:
         for option in fields(self.remote):
             if not getattr(self.remote, option.name) > 0:
                 raise UserError(f"remote.{option.name}: found {getattr(self.remote, option.name)}, expected above 0.")
-        if env.horizon_multiplier <= 0 or self.stall_seconds <= 0:
-            raise UserError("env.horizon_multiplier and stall_seconds must be above 0.")
+        if not (math.isfinite(env.horizon_multiplier) and env.horizon_multiplier > 0):
+            raise UserError(f"env.horizon_multiplier: found {env.horizon_multiplier}, expected a number above 0.")
+        if not self.stall_seconds > 0:
+            raise UserError(f"stall_seconds: found {self.stall_seconds}, expected a number above 0.")
         if env.horizon is not None and env.horizon_multiplier != 1.0:
             raise UserError("env.horizon and env.horizon_multiplier exclude each other: give one of them.")
         if self.success.hold_steps != 1 and self.success.rule != "hold":
             raise UserError(f"success.hold_steps has no effect with success.rule={self.success.rule}: give hold.")
+        if env.horizon is not None and self.success.hold_steps > env.horizon:
+            raise UserError(
+                f"success.hold_steps: found {self.success.hold_steps}, but a trial lasts {env.horizon} steps "
+                "(env.horizon): none could be solved."
+            )
 
     def worker_count(self, trials: int) -> int:
         """Processes to start for `trials` trials."""
@@ -307,4 +316,9 @@ def check_factory(factory: str) -> None:
 
 def output_folder(config: EvaluationConfig, labels: list[str]) -> Path:
     """Where results go: `out`, or a folder named after the policies."""
-    return Path(config.out) if config.out else Path("outputs/evaluations") / "-".join(map(file_name, labels))
+    if config.out:
+        return Path(config.out)
+    name = "-".join(map(file_name, labels))
+    if len(name.encode()) > _LONGEST_NAME:
+        name = f"{len(labels)}-policies-{hashlib.sha256(name.encode()).hexdigest()[:12]}"
+    return Path("outputs/evaluations") / name

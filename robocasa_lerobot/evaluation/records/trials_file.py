@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import sys
 from collections.abc import Iterable
@@ -21,7 +22,7 @@ def append(path: Path, item: RunHeader | TrialRecord) -> None:
     try:
         written = os.write(descriptor, line)
         if written != len(line):
-            raise OSError(f"{path}: wrote {written} of {len(line)} bytes; is the disk full?")
+            raise OSError(errno.ENOSPC, f"wrote {written} of {len(line)} bytes", str(path))
         os.fsync(descriptor)
     finally:
         os.close(descriptor)

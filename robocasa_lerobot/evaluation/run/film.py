@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robocasa_lerobot import contract
-from robocasa_lerobot.errors import UserError
+from robocasa_lerobot.errors import LackingMachineError, UserError
 from robocasa_lerobot.video import VideoWriter, side_by_side
 
 # Half the control rate and 192 pixels: on a CPU, rendering every step at full size would take longer than the trial.
@@ -23,6 +23,16 @@ class NoPicturesError(UserError):
     """An env that has nothing to film."""
 
 
+class FilmError(LackingMachineError):
+    """A film that cannot be written, which is no fault of its trial."""
+
+    def __init__(self, path: Path, error: Exception) -> None:
+        super().__init__(
+            f"the film {path} cannot be written: {error}. Free disk space and give the command again, or give "
+            "--videos=0. What has been recorded stays."
+        )
+
+
 class Film:
     """A video of one trial, in real time: every second picture, at half the control rate (10 fps in our kitchens).
 
@@ -32,13 +42,20 @@ class Film:
     """
 
     def __init__(self, path: Path, control_hz: float | None = None) -> None:
-        self._writer = VideoWriter(path, max(1, round((control_hz or contract.CONTROL_HZ) / FILM_EVERY)))
+        self._path, self._writer = (
+            path,
+            VideoWriter(path, max(1, round((control_hz or contract.CONTROL_HZ) / FILM_EVERY))),
+        )
         self._renderer: Any = None
 
     def shoot(self, env: Any, observation: dict[str, Any], step: int) -> None:
         """Film the present state; `env` is unwrapped, `step` counts from 0 at the reset."""
         if step % FILM_EVERY == 0:
-            self._writer.write(side_by_side(self._pictures(env, observation)))
+            picture = side_by_side(self._pictures(env, observation))
+            try:
+                self._writer.write(picture)
+            except Exception as error:  # PyAV raises errors of its own, most of them no OSError
+                raise FilmError(self._path, error) from error
 
     def needs_observation(self, env: Any) -> bool:
         """Whether the env itself has to render at each step for the film."""
@@ -66,4 +83,7 @@ class Film:
     ) -> None:
         if self._renderer is not None:
             self._renderer.close()
-        self._writer.close(keep=kind is None)
+        try:
+            self._writer.close(keep=kind is None)
+        except Exception as fault:
+            raise FilmError(self._path, fault) from fault

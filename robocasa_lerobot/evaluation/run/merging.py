@@ -57,6 +57,8 @@ def merge(evaluation: Evaluation) -> list[TrialRecord]:
                     f"{results.path}: {record.label} {record.task} trial {record.trial} ended otherwise than in "
                     "another shard: policy or env is not deterministic."
                 )
+            if moved.video is None and earlier is not None and earlier.comparable() == moved.comparable():
+                moved = dataclasses.replace(moved, video=earlier.video)
             records[record.key] = moved
     check_plan(path, records, evaluation.plan)
     write_results(path, headers.values(), records.values())

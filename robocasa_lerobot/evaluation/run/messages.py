@@ -15,9 +15,13 @@ class Ready:
 
 @dataclass(frozen=True)
 class Alive:
-    """A sign of life; `step` of the trial, -1 while policy or env are being built, or outside of a trial."""
+    """A sign of life; `step` of the trial, -1 while policy or env are being built, or outside of a trial.
+
+    `loads` says that a policy is about to be loaded, during which there is none.
+    """
 
     step: int = -1
+    loads: bool = False
 
 
 @dataclass(frozen=True)

@@ -28,7 +28,7 @@ from robocasa_lerobot.evaluation.planning.trials import TrialSpec
 from robocasa_lerobot.evaluation.records.results import CRASHED, DIVERGED, file_name
 from robocasa_lerobot.evaluation.remote.failures import LostError
 from robocasa_lerobot.evaluation.remote.translation import UnfitEnvError
-from robocasa_lerobot.evaluation.run.film import Film, NoPicturesError
+from robocasa_lerobot.evaluation.run.film import Film, FilmError, NoPicturesError
 from robocasa_lerobot.evaluation.run.messages import Alive, Finished, Ready, Refused
 from robocasa_lerobot.evaluation.run.policy_server import PolicyConnection
 from robocasa_lerobot.evaluation.run.processes import take_over
@@ -120,7 +120,7 @@ class _Worker:
                 outcome = run_trial(env, policy, spec, None, self._alive, rule)
         except (EOFError, BrokenPipeError, ConnectionResetError):
             raise
-        except (BatchingError, NoPicturesError, UnfitEnvError, UnfitPolicyError) as error:
+        except (BatchingError, FilmError, NoPicturesError, UnfitEnvError, UnfitPolicyError) as error:
             return Refused(str(error))
         except Exception as error:
             # What the trial left behind may be broken as well: the next one starts from a new env and policy.
@@ -163,7 +163,9 @@ class _Worker:
 
                     torch.set_num_threads(settings.threads)
                 waiting = partial(self._alive, -1)
+                self._connection.send(Alive(loads=True))
                 actor = load_actor(source, settings.device, settings.executed_steps, settings.width, waiting)
+                self._alive(-1)
             except LostError as error:
                 return Refused(
                     f"policy {label!r} cannot be asked any more: {error}. What has been recorded stays; start the "

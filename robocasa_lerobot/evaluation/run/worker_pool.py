@@ -16,7 +16,7 @@ from robocasa_lerobot.errors import UserError
 from robocasa_lerobot.evaluation.planning.trials import TrialSpec
 from robocasa_lerobot.evaluation.records.results import CRASHED, HUNG
 from robocasa_lerobot.evaluation.run.messages import Alive, Finished, Ready, Refused
-from robocasa_lerobot.evaluation.run.policy_servers import ServerPool
+from robocasa_lerobot.evaluation.run.policy_servers import LOADING_SECONDS, ServerPool
 from robocasa_lerobot.evaluation.run.processes import cause_of_death, process_context, thread_limit
 from robocasa_lerobot.evaluation.run.rollout import Outcome
 from robocasa_lerobot.evaluation.run.worker import WorkerSettings, worker_main
@@ -66,6 +66,7 @@ class _Slot:
     render_device: int | None = None
     server: str | None = None
     ready: bool = False
+    loads: bool = False
     attempt: _Attempt | None = None
     given_at: float = 0.0
 
@@ -158,9 +159,12 @@ class WorkerPool:
                 yield attempt.ended(message)
             else:
                 assert isinstance(message, Alive), message
+                slot.loads = message.loads
         now = time.monotonic()
         for slot in list(self._slots):
             limit = self._stall_seconds if slot.ready else max(self._stall_seconds, START_SECONDS)
+            if slot.loads:
+                limit = max(limit, LOADING_SECONDS)
             if (slot.attempt is not None or not slot.ready) and now - slot.last_sign > limit:
                 slot.process.kill()
                 yield from self._bury(slot, f"no progress for {limit:g} s; the worker was killed", HUNG)

@@ -38,7 +38,8 @@ class DataWorth:
 
 
 def demos_for_success(demos: Array, success: Array, wanted: Array) -> Array:
-    """Demonstrations at which a curve reaches `wanted` success; 0 below its first point, infinity above its last.
+    """Demonstrations at which a curve reaches `wanted` success; 0 below its first point and for none, infinity above
+    its last.
 
     Linear between points in the logarithm of demonstrations. Noise may make a curve fall; it is made monotone first
     (isotonic regression), since more demonstrations are not worse for the question asked here.
@@ -56,7 +57,7 @@ def demos_for_success(demos: Array, success: Array, wanted: Array) -> Array:
         rising = row if np.all(np.diff(row) >= 0) else isotonic_regression(row).x
         if goal > rising[-1]:
             out[i] = np.inf
-        elif goal < rising[0]:
+        elif goal < rising[0] or goal <= 0.0:  # no demonstration is needed for no success
             out[i] = 0.0
         else:
             # On a flat piece the fewest demonstrations count: np.interp needs rising values, so the first is found.

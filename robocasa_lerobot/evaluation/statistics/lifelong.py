@@ -15,7 +15,8 @@ class Lifelong:
 
     average: after phase k, the mean of R[k][j] over j <= k (average accuracy of D. Lopez-Paz and M. Ranzato, "Gradient
         episodic memory for continual learning", NeurIPS 2017). Like forgetting and backward transfer there only where
-        row k has all of these phases that any row has: the mean of some is another number.
+        all of its terms are there for the phases that any row has: the mean of some is another number. So is forward
+        transfer.
     forgetting: after phase k, the mean over j < k of (the best of R[l][j] over j <= l < k) - R[k][j]; positive is loss
         (A. Chaudhry et al., "Riemannian walk for incremental learning", ECCV 2018). The interval takes the best earlier
         phase as given.
@@ -58,14 +59,16 @@ def lifelong(counts: Mapping[int, Mapping[int, Counts]], untrained: Mapping[int,
         if seen and all(j in row for j in columns if j <= k):
             average[k] = _mean(seen)
         lost = _losses(matrix, k)
-        if lost and all(j in row for j in columns if j < k):
+        if lost and len(lost) == sum(j < k for j in columns):
             forgetting[k] = _mean_of_differences(lost)
     last = max(matrix)
     backward = [(matrix[last][j], matrix[j][j]) for j in matrix[last] if j < last and j in matrix.get(j, {})]
-    if any(j not in matrix[last] for j in columns if j < last):
+    if len(backward) < sum(j < last for j in columns):
         backward = []
     start = {j: average_over_tasks(tasks) for j, tasks in (untrained or {}).items() if any(n for _, n in tasks)}
     forward = [(matrix[j - 1][j], start[j]) for j in start if j > 1 and j in matrix.get(j - 1, {})]
+    if len(forward) < sum(j > 1 for j in columns):
+        forward = []
     return Lifelong(
         matrix=matrix,
         average=average,

@@ -29,7 +29,7 @@ def section(data: ReportData) -> Section | None:
 
 
 def sentence(data: ReportData) -> str | None:
-    """The perturbation that costs most, in plain words."""
+    """The perturbation that changes the success most, in plain words."""
     policies = _perturbed(data)
     if not policies:
         return None
@@ -39,7 +39,7 @@ def sentence(data: ReportData) -> str | None:
         return None
     if not any(drop.difference.value for drop in drops.values()):
         return f"None of {fmt.count(len(drops), 'perturbation')} changes the success of {policy.label}."
-    name, worst = min(drops.items(), key=lambda item: item[1].difference.value)
+    name, worst = max(drops.items(), key=lambda item: abs(item[1].difference.value))
     return (
         f"Of {fmt.count(len(drops), 'perturbation')}, {spelled(name)} changes the success of {policy.label} most: "
         f"{fmt.points(worst.difference.value)} points (95 % interval {fmt.points_interval(worst.difference)})."
@@ -82,7 +82,7 @@ def _table(data: ReportData, policy: PolicyResult) -> Table:
     rows = []
     for name, tasks in policy.conditions.items():
         mean, drop = average_of(tasks), _drop(policy, name)
-        parameters = policy.header.perturbations.get(name, {})
+        parameters = next((h.perturbations[name] for h in policy.headers if name in h.perturbations), {})
         rows.append(
             (
                 Cell(spelled(name)),

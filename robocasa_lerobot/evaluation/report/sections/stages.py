@@ -87,17 +87,18 @@ def _rows(result: TaskResult) -> Iterator[tuple[Cell, ...]]:
     ends = Counter(_stage(record) for record in failed)
     for number, trials in ends.most_common():
         words = next(r.stages.next for r in failed if r.stages is not None and _stage(r) == number)
+        place = Cell(fmt.NONE) if number is None else Cell(f"{number}", number)
         share = trials / len(failed)
         bar = Bar(Estimate(share, share, share), loss=True, whisker=False)
         yield (
             Cell(result.task, code=True),
-            Cell(f"{number}", number),
+            place,
             Cell(words or "all stages were met, but the goal did not hold as long as it had to"),
             Cell(f"{trials} of {len(failed)}", trials, bar=bar),
         )
 
 
-def _stage(record: TrialRecord) -> int:
-    """The number, from 1, of the first stage that a trial did not meet."""
+def _stage(record: TrialRecord) -> int | None:
+    """The number, from 1, of the first stage that a trial did not meet; None where it met all."""
     assert record.stages is not None
-    return min(record.stages.met + 1, record.stages.total)
+    return record.stages.met + 1 if record.stages.met < record.stages.total else None
