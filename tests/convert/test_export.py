@@ -218,6 +218,15 @@ def test_an_export_says_nothing_of_a_licence_that_it_does_not_know(tmp_path: Pat
     assert "license: other" in (again / "README.md").read_text(encoding="utf-8")
 
 
+@pytest.mark.parametrize(("by", "licence"), [({}, "apache-2.0"), ({"recorded_by": "teleop"}, "other")])
+def test_what_people_drove_is_theirs_to_license(tmp_path: Path, by: dict[str, str], licence: str) -> None:
+    source = write_demos(tmp_path / "OpenDrawer.hdf5", (4,), images=16)
+    with h5py.File(source, "r+") as file:
+        file["data"].attrs["recording_settings"] = json.dumps({"task": "OpenDrawer", **by})
+    root = convert([source], tmp_path / "data", SETTINGS, workers=1).root
+    assert f"license: {licence}" in (root / "README.md").read_text(encoding="utf-8")
+
+
 def test_datasets_of_several_tasks_are_exported_one_by_one(tmp_path: Path) -> None:
     files = [
         write_demos(tmp_path / f"{name}.hdf5", (4,), images=16, env_name=name, seed=seed)

@@ -48,12 +48,16 @@ def renew_dataset_card(root: Path) -> None:
 
 
 def recorded_here(file: Path) -> bool:
-    """Whether `robocasa-lerobot demos` recorded an HDF5 file, or what one was exported from: nothing else says how."""
+    """Whether `robocasa-lerobot demos` recorded an HDF5 file, or what one was exported from: nothing else says how.
+
+    What people drove is theirs to license.
+    """
     if not file.is_file() or not h5py.is_hdf5(file):
         return False
     with h5py.File(file) as opened:
         data = opened.get("data")
-        return data is not None and "recording_settings" in data.attrs
+        settings = json.loads(data.attrs.get("recording_settings", "{}")) if data is not None else {}
+        return bool(settings) and settings.get("recorded_by") != "teleop"
 
 
 def _card(info: dict[str, Any], record: dict[str, Any], episodes: list[dict[str, Any]], ours: bool) -> str:
