@@ -56,11 +56,12 @@ MAY_IMPORT: dict[str, set[str]] = {
 ROOMS: dict[str, dict[str, set[str]]] = {
     "envs": {
         "physics": set(),
+        "seeds": set(),
         "rendering": set(),
         "robots": {"physics", "rendering"},
         "kitchens": {"physics", "rendering"},
         "objects": {"kitchens", "rendering"},
-        "scene": {"physics", "rendering", "robots", "kitchens", "objects"},
+        "scene": {"physics", "rendering", "robots", "kitchens", "objects", "seeds"},
         "predicates": {"robots", "kitchens", "objects", "scene"},
         "tasks": {"kitchens", "objects", "scene", "predicates"},
     },
