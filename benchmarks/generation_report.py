@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import statistics
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -136,12 +136,10 @@ def hourly(trials: Sequence[Trial]) -> float:
     return sum(trial.success for trial in trials) / hours if hours else 0.0
 
 
-def _overview(trials: Sequence[Trial]) -> list[str]:
-    """A line for each arm."""
+def _overview(arms: Mapping[str, tuple[list[Trial], dict[str, Any]]]) -> list[str]:
+    """A line for each arm, from its trials and their summary."""
     lines = ["| arm | tasks | attempts | mean of tasks | kept an hour | first try |", "|---|--:|--:|--:|--:|--:|"]
-    for arm in dict.fromkeys(trial.arm for trial in trials):
-        mine = [trial for trial in trials if trial.arm == arm]
-        found = summary(mine)
+    for arm, (mine, found) in arms.items():
         lines.append(
             f"| {arm} | {len(found['tasks'])} | {len(mine):,} | {found['mean']:.1%} | {hourly(mine):,.0f} | "
             f"{_mean(found['tasks'], 'first_try'):.1%} |"
@@ -151,10 +149,12 @@ def _overview(trials: Sequence[Trial]) -> list[str]:
 
 def text(trials: Sequence[Trial], head: str) -> str:
     """A page in Markdown: classes and tasks of each arm."""
-    lines = ["# Generated attempts", "", head, "", *_overview(trials)]
-    for arm in dict.fromkeys(trial.arm for trial in trials):
-        mine = [trial for trial in trials if trial.arm == arm]
-        found = summary(mine)
+    of_arm = {
+        arm: [trial for trial in trials if trial.arm == arm] for arm in dict.fromkeys(trial.arm for trial in trials)
+    }
+    arms = {arm: (mine, summary(mine)) for arm, mine in of_arm.items()}
+    lines = ["# Generated attempts", "", head, "", *_overview(arms)]
+    for arm, (_, found) in arms.items():
         lines += [f"## {arm}", "", "| class | tasks | mean | worst task |", "|---|--:|--:|--:|"]
         for group, row in found["classes"].items():
             lines.append(f"| {group} | {row['tasks']} | {row['mean']:.0%} | {row['worst']:.0%} |")

@@ -98,8 +98,8 @@ class ObjectInside(Term):
 
     def holds(self, scene: Scene, data: mujoco.MjData) -> bool:
         """Test the origin against each region, then the corners."""
-        object = scene.fill(self.object)
-        origin = data.body(object).xpos
+        name = scene.fill(self.object)
+        origin = data.body(name).xpos
         around = [
             region
             for region in scene.regions(self.fixture, self.region)
@@ -107,7 +107,7 @@ class ObjectInside(Term):
         ]
         if not around:
             return False
-        corners = object_corners(scene, data, object)
+        corners = object_corners(scene, data, name)
         return any(region.encloses(data, corners, self.margin) for region in around)
 
     def _usable(self, data: mujoco.MjData, region: Region) -> bool:
@@ -205,11 +205,11 @@ class ObjectOn(Term):
 
     def holds(self, scene: Scene, data: mujoco.MjData) -> bool:
         """Look at distance, then contacts."""
-        object, receptacle = scene.fill(self.object), scene.fill(self.receptacle)
-        apart = data.body(object).xpos[:2] - middle_of(scene, data, receptacle)[:2]
+        name, receptacle = scene.fill(self.object), scene.fill(self.receptacle)
+        apart = data.body(name).xpos[:2] - middle_of(scene, data, receptacle)[:2]
         limit = RECEPTACLE_SHARE * radius(scene, receptacle) if self.within is None else self.within
         return float(np.linalg.norm(apart)) < limit and touching(
-            scene.model, data, scene.subtree(object), scene.subtree(receptacle)
+            scene.model, data, scene.subtree(name), scene.subtree(receptacle)
         )
 
 

@@ -7,6 +7,7 @@ as it is, so that work that was stopped goes on. A task that raised is tried aga
 from __future__ import annotations
 
 import contextlib
+import functools
 import hashlib
 import json
 from dataclasses import asdict, dataclass
@@ -85,6 +86,7 @@ def make(name: str, split: str, seed: int, folder: Path) -> str:
     return name
 
 
+@functools.cache
 def _made_of(name: str) -> dict[str, str]:
     """What the pictures of a task follow from: its declaration, in a digest of its page, and the software."""
     words = "\n".join(page(get_task(name)))
