@@ -89,6 +89,9 @@ def test_sources_that_are_not_drawn_cost_more_and_all_are_drawn_alike() -> None:
     assert all(Counter(tasks[number] for number in drawn(seed, 0.2)).most_common(1)[0][1] == 2 for seed in range(20))
     assert drawn(3, 1.0) == set(range(20))
     assert len(drawn(3, 0.01)) == 2
+    later = source_costs(tasks, np.random.default_rng(3), 0.0, 0.2)
+    assert sorted(Counter(np.round(later, 9)).values()) == [4] * 5  # each task's ten by twos, each dearer than before
+    assert np.diff(np.unique(later))[1:] == pytest.approx(0.15)
 
 
 def test_what_is_put_down_leans_to_the_same_side_of_the_robot() -> None:

@@ -20,6 +20,7 @@ FREE, CONTACT, BRIDGE, DRIVE, SETTLE = range(5)  # kinds of steps
 MOST_SOURCES = 24  # that are asked for a stage: more than one task usually has
 OTHER_KIND_COST = 0.15  # of a segment from a stage that puts things into another kind of fixture, or onto an object
 NOT_DRAWN_COST = 0.5  # as of a hand that touches something: see `planning/costs.py`
+LATER_COST = 0.15  # more for each further draw, so that it is not always the same source that steps in
 AT_REST = (-1, BRIDGE, -1)  # label of steps in which it is waited
 _BASE, _GRIPPER = contract.ACTION_SLICES["base_motion"], contract.ACTION_SLICES["gripper_close"].start
 KINDS = ("free", "contact", "bridge", "drive", "settle")
@@ -134,7 +135,8 @@ def source_costs(tasks: Sequence[str], rng: np.random.Generator, spread: float, 
     """What it costs in an episode to take a segment of each source, by its number.
 
     An episode is a function of its seed and knows nothing of the others: so that none of a task's N sources has more
-    than its share, `cap` times N of them are drawn, and the others are only for what these cannot do.
+    than its share, `cap` times N of them are drawn, and the others are only for what these cannot do: first those that
+    are drawn next, as many again, and so on, so that what few sources can do is spread over these few.
 
     Args:
         tasks: that the sources solve, by their numbers.
@@ -145,6 +147,7 @@ def source_costs(tasks: Sequence[str], rng: np.random.Generator, spread: float, 
     bias: Array = rng.uniform(0.0, spread, size=len(tasks))
     for task in dict.fromkeys(tasks):
         mine = np.array([number for number, other in enumerate(tasks) if other == task], dtype=np.int64)
-        left_out = rng.permutation(mine)[max(1, int(np.floor(cap * len(mine) + 1e-9))) :]
-        bias[left_out] += NOT_DRAWN_COST
+        share = max(1, int(np.floor(cap * len(mine) + 1e-9)))
+        draw = np.arange(len(mine)) // share
+        bias[rng.permutation(mine)] += np.where(draw > 0, NOT_DRAWN_COST + LATER_COST * (draw - 1), 0.0)
     return bias
