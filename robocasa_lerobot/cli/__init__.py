@@ -14,6 +14,8 @@ from types import ModuleType
 from robocasa_lerobot import __version__
 from robocasa_lerobot.errors import UserError, suggest
 
+# Errors of a path that the user gave.
+_NAMED = (FileExistsError, FileNotFoundError, IsADirectoryError, NotADirectoryError, PermissionError)
 _FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)  # a disk, one's share of it, or the largest file that it takes
 
 
@@ -118,6 +120,11 @@ def main(argv: Sequence[str] | None = None) -> int:
         if not _nobody_reads():
             raise
         return 141  # as a shell says of a program that SIGPIPE has ended
+    except _NAMED as error:
+        if error.filename is None:
+            raise
+        print(f"robocasa-lerobot {name}: {error.filename}: {error.strerror}.", file=sys.stderr)
+        return 2
     except OSError as error:
         if error.errno not in _FULL:
             raise

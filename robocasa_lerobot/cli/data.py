@@ -70,6 +70,13 @@ def run(args: argparse.Namespace) -> int:
     from robocasa_lerobot.making.needs import needs_of, parse_episodes
     from robocasa_lerobot.training.config.experiment import load_experiment
 
+    changes = getattr(args, "settings", ())
+    if changes and args.experiment is None:
+        raise UserError(f"unrecognized arguments: {' '.join(changes)} (settings are an experiment's; none is given).")
+    if args.to is not None and args.convert is None:
+        raise UserError("--to is for --convert.")
+    if (args.replace or args.keep_recordings) and not args.make:
+        raise UserError("--replace and --keep-recordings are for --make.")
     execution = execution_of(args)
     if args.workers is not None and args.workers < 1:
         raise UserError(f"--workers is {args.workers}, expected at least 1.")
@@ -77,7 +84,6 @@ def run(args: argparse.Namespace) -> int:
     needs: list[Need] | None = None
     if args.experiment is not None:
         episodes = parse_episodes(args.episodes) if args.episodes else {}
-        changes = getattr(args, "settings", ())
         experiment = load_experiment(find_config(args.experiment, "experiments"), changes, args.scale)
         needs, said = needs_of(experiment, episodes)
         asked = f" --episodes {args.episodes}" if args.episodes else ""

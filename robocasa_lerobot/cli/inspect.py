@@ -57,9 +57,11 @@ def run(args: argparse.Namespace) -> int:
 def _worth(args: argparse.Namespace) -> int:
     from robocasa_lerobot.demos.quality.summary import attempts_in, look_at, qualities
     from robocasa_lerobot.evaluation.inventory import worth
-    from robocasa_lerobot.evaluation.report.formats.render import write_page
+    from robocasa_lerobot.evaluation.report.formats.render import check_ending, write_page
     from robocasa_lerobot.progress import Bar
 
+    if args.out is not None:
+        check_ending(args.out)  # before the work, not after it
     sets = {" ".join(map(str, args.paths)): args.paths} | ({str(args.beside): [args.beside]} if args.beside else {})
     found = {}
     for name, paths in sets.items():

@@ -68,6 +68,7 @@ def run(args: argparse.Namespace) -> int:
     """Load the policy and serve it until the process is told to end."""
     from robocasa_lerobot.errors import UserError
     from robocasa_lerobot.evaluation.actors.checkpoint import read_source
+    from robocasa_lerobot.evaluation.remote.address import is_address
     from robocasa_lerobot.serving.access import make_access
     from robocasa_lerobot.serving.host import Host
     from robocasa_lerobot.serving.limits import Limits
@@ -85,6 +86,8 @@ def run(args: argparse.Namespace) -> int:
             raise UserError(f"--{name}: found {number}, expected at least {low}.")
     if not 0 < args.max_message <= 1024:
         raise UserError(f"--max-message: found {args.max_message}, expected MiB above 0 and at most 1024.")
+    if is_address(args.path):
+        raise UserError(f"{args.path} is served already: give a checkpoint, random or zero.")
     port = _PORTS[args.protocol] if args.port is None else args.port
     settings = ServerSettings(
         args.protocol,

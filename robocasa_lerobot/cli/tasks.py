@@ -58,6 +58,9 @@ def run(args: argparse.Namespace) -> int:
         if args.seeds < 1:
             raise UserError(f"--seeds {args.seeds}: --check needs at least one seed.")
         return _check(tasks, range(args.seeds), args.workers, args.log)
+    asked = [name for name in ("markdown", "deviations", "pictures") if getattr(args, name)]
+    if len(asked) > 1:
+        raise UserError(f"{' and '.join(f'--{name}' for name in asked)}: give one of them at a time.")
     if page_file := args.markdown or args.deviations:
         page_file.parent.mkdir(parents=True, exist_ok=True)  # before the work, not after it
     if args.markdown:

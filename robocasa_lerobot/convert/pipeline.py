@@ -53,9 +53,11 @@ from robocasa_lerobot.jobs.publish import (
     check_outside,
     clear_away,
     failures_explained,
+    go_on,
     held_folder,
     is_done,
     make_piece,
+    output_path,
     partial_folder,
     publish,
 )
@@ -128,6 +130,7 @@ def _convert(
             clear_away(partial)  # a run was killed after its dataset had appeared, while clearing away
         return _recorded_result(plan, out)
     with held_folder(partial), failures_explained(out, partial):
+        go_on(partial / _MERGED)
         processes = num_workers(workers, len(plan.shards), plan.num_frames, _MIN_FRAMES_PER_WORKER)
         run_pieces(
             _ShardTask(plan, str(partial), in_order=processes == 1 and execution.kind == "local"),
@@ -154,6 +157,8 @@ def submit(
         UserError: as `convert`, and where Slurm does not take the jobs or still has those of an earlier call.
     """
     plan, partial, out = _prepared([file.absolute() for file in files], out, settings, overwrite)
+    with held_folder(partial):
+        go_on(partial / _MERGED)
     # Not locked: the last job takes the lock, and may start before this call returns.
     with failures_explained(out, partial):
         step, last = _ShardTask(plan, str(partial)), _LastJob(plan, str(partial), str(out), overwrite)
@@ -185,19 +190,22 @@ class _LastJob:
         require_complete(len(self.plan.shards), partial)
         quiet_libraries()
         with held_folder(partial), failures_explained(out, partial):
+            if is_done(partial / _MERGED):  # this job was killed while clearing away, and has begun again
+                clear_away(partial)
+                return _recorded_result(self.plan, out)
             return _completed(self.plan, partial, out, self.overwrite)
 
 
 def _prepared(
     files: Sequence[Path], out: Path, settings: ConversionSettings, overwrite: bool
 ) -> tuple[Plan, Path, Path]:
-    out = out.absolute()
+    out = output_path(out)
     left = _left_behind(out)
     if left is None:
         check_output(out, overwrite)
     folders = takes(files)
-    for folder in files if folders else ():
-        check_outside(out, folder)
+    for file in files:
+        check_outside(out, file)
     plan = make_v2_plan(files, settings) if folders else make_plan(files, settings)
     partial = partial_folder(out, plan.fingerprint)
     if left is not None and left != partial:

@@ -8,7 +8,7 @@ from __future__ import annotations
 import functools
 import hashlib
 from collections import OrderedDict
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -17,11 +17,12 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
+from robocasa_lerobot.data.alike import check_alike, unseen_pictures
 from robocasa_lerobot.data.mixture_config import LoaderConfig, MemberConfig, MixtureConfig
 from robocasa_lerobot.data.reading.decisions import frame_pool
 from robocasa_lerobot.data.reading.frame_cache import FrameCache, cache_bytes, open_or_build, resize_images
 from robocasa_lerobot.data.reading.pictures import PictureReader
-from robocasa_lerobot.data.reading.source import DatasetSource
+from robocasa_lerobot.data.reading.source import DatasetSource, is_image
 from robocasa_lerobot.data.registry.registry import resolve_mixture
 from robocasa_lerobot.data.sampler import MixtureSampler, mixture_probabilities
 from robocasa_lerobot.data.statistics import (
@@ -30,7 +31,7 @@ from robocasa_lerobot.data.statistics import (
     cached_statistics,
     pooled_statistics,
 )
-from robocasa_lerobot.errors import UnknownNameError, UserError
+from robocasa_lerobot.errors import UserError
 
 Item = dict[str, Any]
 
@@ -52,7 +53,7 @@ class MixtureMeta:
     @property
     def camera_keys(self) -> list[str]:
         """Features that are pictures."""
-        return [key for key, feature in self.features.items() if _is_image(feature)]
+        return [key for key, feature in self.features.items() if is_image(feature)]
 
 
 @dataclass
@@ -107,8 +108,8 @@ class MixtureDataset(torch.utils.data.Dataset[Item]):
                 opened[root] = DatasetSource(root)
         self.sources = {root: opened[root] for root in roots}
         every = {key: feature for source in self.sources.values() for key, feature in source.features.items()}
-        self._unseen = _unseen(every, loader.cameras)
-        _check_alike(list(self.sources.values()), self._unseen, any_image_size=image_size is not None)
+        self._unseen = unseen_pictures(every, loader.cameras)
+        check_alike(list(self.sources.values()), self._unseen, any_image_size=image_size is not None)
         # Whether the numbers of all datasets stay on disk, mapped into memory as they are used.
         self._mapped = sum(s.column_bytes for s in self.sources.values()) > loader.cache_columns_above_gb * 1e9
         tasks = sorted({text for source in self.sources.values() for text in source.instructions})
@@ -142,7 +143,7 @@ class MixtureDataset(torch.utils.data.Dataset[Item]):
         )
 
     def _feature(self, feature: Mapping[str, Any]) -> dict[str, Any]:
-        if self.image_size is None or not _is_image(feature):
+        if self.image_size is None or not is_image(feature):
             return dict(feature)
         return {**feature, "shape": (self.image_size, self.image_size, 3)}
 
@@ -153,6 +154,15 @@ class MixtureDataset(torch.utils.data.Dataset[Item]):
     def fingerprint(self) -> str:
         """Hash of the data of all members."""
         return hashlib.sha256("-".join(source.fingerprint for source in self._source_list).encode()).hexdigest()
+
+    @property
+    def selection_fingerprint(self) -> str:
+        """Hash of what is drawn of the data: episodes of each member, which of their frames, and how often."""
+        digest = hashlib.sha256()
+        for place, part, probability in zip(self._place, self._members, self.probabilities, strict=True):
+            digest.update(f"{place} {part.kind} {probability:.9g} {len(part.episodes)} ".encode())
+            digest.update(part.episodes.astype("<i8").tobytes())
+        return digest.hexdigest()
 
     def episodes_of(self, member: MemberConfig) -> NDArray[np.int64]:
         """Indices in its dataset, ascending, of the episodes of a member of `config`."""
@@ -166,6 +176,7 @@ class MixtureDataset(torch.utils.data.Dataset[Item]):
             for name, kitchens in (("layouts", member.layouts), ("styles", member.styles)):
                 tasks += f"; {name} {', '.join(map(str, kitchens))}" if kitchens else ""
             tasks += f"; {member.frames}" if member.frames else ""
+            tasks += f"; without {', '.join(part.source.depth)}" if part.source.depth else ""
             counts = f"{len(part.episodes)} episodes, {part.frames} frames"
             lines.append(f"{member.root} ({tasks}): {counts}, {probability:.{1 if probability >= 0.01 else 3}%}")
         return "\n".join(lines)
@@ -359,42 +370,3 @@ def _use_one(
     recent.move_to_end(root)
     while len(recent) > most:
         files[recent.popitem(last=False)[0]].close()
-
-
-def _is_image(feature: Mapping[str, Any]) -> bool:
-    return feature["dtype"] in ("video", "image")
-
-
-def _unseen(features: Mapping[str, Mapping[str, Any]], cameras: Sequence[str] | None) -> frozenset[str]:
-    """The pictures that a policy does not get, if it gets those of some cameras only.
-
-    Raises:
-        UnknownNameError: the data have no such camera.
-    """
-    if cameras is None:
-        return frozenset()
-    found = {key: key.rpartition(".")[2] for key, feature in features.items() if _is_image(feature)}
-    for camera in cameras:
-        if camera not in found.values():
-            raise UnknownNameError("camera", camera, found.values(), "(in `loader.cameras`)")
-    return frozenset(key for key, camera in found.items() if camera not in cameras)
-
-
-def _check_alike(sources: Sequence[DatasetSource], unseen: Collection[str], any_image_size: bool) -> None:
-    """All datasets must have the same columns and rate: a policy cannot tell which one a batch came from."""
-    first = sources[0]
-    for other in sources[1:]:
-        if other.fps != first.fps:
-            raise UserError(f"{other.root} has {other.fps} frames/s, {first.root} {first.fps}.")
-        for key in sorted((first.features.keys() | other.features.keys()) - set(unseen)):
-            ours, theirs = first.features.get(key), other.features.get(key)
-            if ours is None or theirs is None:
-                raise UserError(f"feature {key!r} is missing in {(first if ours is None else other).root}.")
-            if any_image_size and _is_image(ours) and _is_image(theirs):
-                continue
-            if tuple(ours["shape"]) != tuple(theirs["shape"]) or ours.get("names") != theirs.get("names"):
-                remedy = " Set `loader.image_size` to bring pictures to one size." if _is_image(ours) else ""
-                raise UserError(
-                    f"feature {key!r}: {first.root} has shape {tuple(ours['shape'])}, names {ours.get('names')}; "
-                    f"{other.root} has {tuple(theirs['shape'])}, {theirs.get('names')}.{remedy}"
-                )

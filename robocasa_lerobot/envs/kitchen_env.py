@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robocasa_lerobot import contract, gl
-from robocasa_lerobot.envs.kitchens.splits import scene_ids, without
+from robocasa_lerobot.envs.kitchens.splits import expand, scene_ids, without
 from robocasa_lerobot.envs.physics.whole_state import read_physics
 from robocasa_lerobot.envs.pictures import Pictures, picture_spaces, segmentation_names, take_pictures
 from robocasa_lerobot.envs.rendering import SceneRenderer
@@ -106,7 +106,8 @@ class KitchenEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         # Fails here, not at the first reset, for a split without kitchens.
         chosen = scene_ids(split, layouts=layouts, styles=styles)
         without(chosen, self._declared.needs, self._declared.exclude_styles)
-        self.layouts, self.styles = layouts, styles
+        self.layouts = None if layouts is None else list(expand(layouts, "layout"))
+        self.styles = None if styles is None else list(expand(styles, "style"))
         self._kitchens = None if layouts is None and styles is None else chosen
         if render_preset not in RENDER_PRESETS:
             raise UnknownNameError("render preset", render_preset, RENDER_PRESETS)
@@ -242,8 +243,21 @@ class KitchenEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         ):
             if found != expected:
                 raise UserError(f"kitchen state: found {what} {found!r}, but this env has {expected!r}.")
+        before = (self._scene, self._bound, self._data, self._controller, self._steps, self._initial)
         if self._initial is None or self._initial.seed != state.seed:
             self._build(state.seed)
+        try:
+            self._check_kitchen(state)
+            self._restore(state)
+        except UserError:  # the running episode goes on where it was
+            if before[0] is not self._scene and before[0] is not None:
+                self._close_renderer()
+                self._scene, self._bound, self._data, self._controller, self._steps, self._initial = before
+                self._pictures, self.task_description = {}, before[0].instruction
+            raise
+        return self._observe(), self._info()
+
+    def _check_kitchen(self, state: KitchenState) -> None:
         for what, number, ours in (
             ("layout", state.layout_id, self.scene.layout_id),
             ("style", state.style_id, self.scene.style_id),
@@ -253,8 +267,6 @@ class KitchenEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
                     f"kitchen state: found {what} {number}, but seed {state.seed} gives {what} {ours} in this env. "
                     "Make it with the same `layouts` and `styles`."
                 )
-        self._restore(state)
-        return self._observe(), self._info()
 
     def step(self, action: NDArray[np.float32]) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
         """Carry out one action for 50 ms.
@@ -310,12 +322,12 @@ class KitchenEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
             self.robot,
         )
         bound = self._declared.bound(scene)
+        if self.initial_noise is not None:
+            add_initial_noise(scene, self.initial_noise, self._declared)
         if self.novel_language:
             wordings = scene.paraphrases
             choice = np.random.default_rng([seed, _WORDING_STREAM]).integers(len(wordings))
             scene.instruction = wordings[int(choice)]
-        if self.initial_noise is not None:
-            add_initial_noise(scene, self.initial_noise)
         noise = np.random.default_rng([seed, _ARM_NOISE_STREAM])
         data, controller = scene.initial_data(noise)
         # Together and last: a reset that fails or is interrupted leaves the episode before it whole.

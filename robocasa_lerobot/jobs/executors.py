@@ -25,6 +25,7 @@ from robocasa_lerobot.errors import UserError
 
 KINDS = ("local", "slurm", "ray")
 JOBS_FILE = "jobs.json"
+_FORGOTTEN = "Invalid job id"  # what squeue says of a job that ended some minutes ago
 
 
 @dataclass(frozen=True)
@@ -151,7 +152,7 @@ def submit_to_slurm(
 
     record = logs / JOBS_FILE  # not in the folder of the work, which the last job removes
     if record.is_file():
-        waiting = _queued(json.loads(record.read_text(encoding="utf-8")))
+        waiting = _queued(json.loads(record.read_text(encoding="utf-8")), record)
         if waiting:
             raise UserError(
                 f"the jobs of this work are still in the queue: {', '.join(waiting)}. Wait until they end (squeue), or "
@@ -161,12 +162,13 @@ def submit_to_slurm(
         raise UserError(f"{folder.parent}: datatrove's job files do not quote paths. Choose one without white space.")
     folder.mkdir(parents=True, exist_ok=True)
     logs.mkdir(parents=True, exist_ok=True)
+    taken = JobRecord(record)
     executor = ArrayExecutor(
         pipeline=[step],
         tasks=pieces,
         logging_dir=str(folder),
         skip_completed=skip_complete,
-        job_id_retriever=JobRecord(record),
+        job_id_retriever=taken,
         slurm_logs_folder=str(logs),
         time=slurm.time,
         partition=slurm.partition,
@@ -187,20 +189,28 @@ def submit_to_slurm(
         executor.run()
         array = None if executor.job_id == -1 else str(executor.job_id)
         command = [sys.executable, "-m", "robocasa_lerobot.jobs.slurm", str(pickled)]
-        last = executor.submit_after(array, shlex.join(command))
+        last = executor.submit_after([] if array is None else list(taken.jobs), shlex.join(command))
     except (subprocess.CalledProcessError, OSError) as error:
         raise UserError(f"Slurm did not take the jobs: {error}. Its message stands above.") from error
     return array, last
 
 
-def _queued(jobs: list[str]) -> list[str]:
-    """Those of the jobs that Slurm still has to run or runs."""
+def _queued(jobs: list[str], record: Path) -> list[str]:
+    """Those of the jobs that Slurm still has to run or runs.
+
+    Raises:
+        UserError: Slurm does not answer.
+    """
     if shutil.which("squeue") is None:
         return []
     waiting = []
     for job in jobs:
-        # Fails for a job that Slurm has forgotten.
         done = subprocess.run(["squeue", "--noheader", "--jobs", job], capture_output=True, text=True, check=False)
-        if done.returncode == 0 and done.stdout.strip():
+        if done.returncode and _FORGOTTEN not in done.stderr:
+            raise UserError(
+                f"squeue does not say whether jobs of an earlier call still run ({done.stderr.strip()}). Give the same "
+                f"command again when it answers, or remove {record} if none of {', '.join(jobs)} does."
+            )
+        if not done.returncode and done.stdout.strip():
             waiting.append(job)
     return waiting

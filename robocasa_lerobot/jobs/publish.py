@@ -6,6 +6,7 @@ import contextlib
 import os
 import platform
 import shutil
+import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -13,6 +14,11 @@ from robocasa_lerobot.errors import UserError
 from robocasa_lerobot.jobs.locks import LockHeldError, locked
 
 _LOCK, _DONE = "lock", "done"
+
+
+def output_path(out: Path) -> Path:
+    """Where a dataset is to appear: absolute, and where a link points to, which stays."""
+    return out.resolve() if out.is_symlink() else out.absolute()
 
 
 def check_output(out: Path, overwrite: bool) -> None:
@@ -36,13 +42,19 @@ def check_output(out: Path, overwrite: bool) -> None:
 
 
 def check_outside(out: Path, source: Path) -> None:
-    """Whether a dataset may be made at `out` from the folder `source`.
+    """Whether a dataset may be made at `out` from a file or folder `source`.
 
     Raises:
-        UserError: it would be inside, and copied into itself.
+        UserError: it would be inside, and copied into itself; or the source is inside, or is that itself, and would go
+            with what is replaced.
     """
-    if source.resolve() in out.resolve().parents:
+    inside, outside = source.resolve(), out.resolve()
+    if inside in outside.parents:
         raise UserError(f"--out {out} is inside the dataset {source}. Choose a folder beside it.")
+    if outside == inside:
+        raise UserError(f"--out is the source itself: {out}. Choose another folder.")
+    if outside in inside.parents:
+        raise UserError(f"{source} is inside --out {out}, and would be replaced with it. Choose another --out.")
 
 
 def partial_folder(out: Path, fingerprint: str) -> Path:
@@ -105,16 +117,40 @@ def is_done(merged: Path) -> bool:
     return merged.name not in names and (_DONE in names or not names)
 
 
+def go_on(merged: Path) -> None:
+    """Make a held folder fit for the work that is asked for, whatever a kill has left in it.
+
+    What is there of a work that is done was being cleared away, and lacks parts that say they are complete.
+    """
+    done = merged.parent / _DONE
+    if done.exists():
+        if not merged.exists():
+            _empty(merged.parent)
+        done.unlink()  # there is something to do again
+
+
 def clear_away(folder: Path) -> None:
-    """Remove the held folder of a work that is done; what says so goes last, in case of a kill meanwhile."""
+    """Remove the held folder of a work that is done; what says so goes last, in case of a kill meanwhile.
+
+    Where that fails, as on a network file system that keeps open files, it is said and left alone: the work is done.
+    """
+    try:
+        (folder / _DONE).touch()
+        _empty(folder)
+        for name in (_LOCK, _DONE):
+            (folder / name).unlink(missing_ok=True)
+        folder.rmdir()
+    except OSError as error:
+        print(f"{folder} could not be removed ({error}); nothing needs it any more.", file=sys.stderr)
+
+
+def _empty(folder: Path) -> None:
+    """Remove what is in a held folder but its lock and what says that it is done."""
     for path in folder.iterdir():
-        if path.is_dir():
+        if path.is_dir() and not path.is_symlink():
             shutil.rmtree(path)
         elif path.name not in (_LOCK, _DONE):
             path.unlink(missing_ok=True)
-    for name in (_LOCK, _DONE):
-        (folder / name).unlink(missing_ok=True)
-    folder.rmdir()
 
 
 def make_piece(folder: Path, make: Callable[[Path], object]) -> None:

@@ -8,6 +8,7 @@ from __future__ import annotations
 import json
 import pickle
 import sys
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -58,12 +59,12 @@ class ArrayExecutor(SlurmPipelineExecutor):
             datatrove_executor="SLURM",
         )
 
-    def submit_after(self, array: str | None, command: str) -> str:
-        """Submit one job that runs a command once every job of the array has succeeded; gives its number."""
+    def submit_after(self, arrays: Sequence[str], command: str) -> str:
+        """Submit one job that runs a command once every job of the arrays has succeeded; gives its number."""
         arguments: dict[str, Any] = {k: v for k, v in self.get_sbatch_args().items() if k not in ("array", "gpus")}
         arguments["job-name"] = f"{self.job_name}-join"
-        if array is not None:
-            arguments["dependency"] = f"afterok:{array}"
+        if arrays:
+            arguments["dependency"] = f"afterok:{':'.join(arrays)}"
             arguments["kill-on-invalid-dep"] = "yes"
         for key in ("output", "error"):
             arguments[key] = str(Path(self.slurm_logs_folder) / "join-%j.out")

@@ -81,6 +81,7 @@ class VlaEvalServer:
                 if kind == "hello":
                     await connection.send(self._pack("hello", self._hello(payload), sequence))
                 elif kind == "episode_start":
+                    episode = None  # what is refused leaves none of before to be answered
                     session.begin(_seed(payload))
                     episode = Episode(self._host, session)
                 elif kind == "observation":

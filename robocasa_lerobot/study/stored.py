@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from robocasa_lerobot.errors import UserError, differing
-from robocasa_lerobot.evaluation.records.results import TrialRecord, read_results
+from robocasa_lerobot.evaluation.records.results import UNPERTURBED, TrialRecord, read_results
 from robocasa_lerobot.files import write_text, written_aside
 from robocasa_lerobot.provenance import git_commit, machine, utc_now, versions
 from robocasa_lerobot.study.runs import CPU, Run
@@ -100,7 +100,9 @@ def store(run: Run, results: Path) -> Path:
         thinned = lines[:: max(1, len(lines) // _CURVE_POINTS)]
         curves += [(phase.name, int(line["step"]), float(line["loss"])) for line in thinned]
         for name in (evaluation.name for evaluation in phase_evaluations(phase)):
-            records = read_results(folder / FOLDER / name).trials
+            # Those of scenes as they are: a stored trial does not say how its scene was perturbed.
+            found = read_results(folder / FOLDER / name).trials
+            records = [record for record in found if record.perturbation == UNPERTURBED]
             trials += [_short(phase.name, name, record) for record in records]
             trying += sum(record.seconds.total for record in records)
             if run.seed == FILMED_SEED:

@@ -10,7 +10,9 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from robocasa_lerobot.training.config.phase import AugmentConfig
+from robocasa_lerobot.data.mixture import MixtureMeta
+from robocasa_lerobot.errors import UnknownNameError
+from robocasa_lerobot.training.config.phase import AugmentConfig, PhaseConfig
 
 _GREY = (0.299, 0.587, 0.114)  # luma of ITU-R BT.601
 # YIQ of the NTSC standard: the hue is the angle in the plane of its last two coordinates.
@@ -36,6 +38,17 @@ def augment(
             flat = _crop_and_rotate(flat, config, drawn[:, :3])
         out[key] = _jitter(flat, config, drawn[:, 3:]).reshape(images.shape)
     return out
+
+
+def check_crop_cameras(phase: PhaseConfig, meta: MixtureMeta) -> None:
+    """Check that `augment.crop_cameras` names some of the data's cameras.
+
+    Raises:
+        UnknownNameError: no pattern fits any of them, so that nothing would be cropped.
+    """
+    patterns = phase.augment.crop_cameras if phase.augment is not None else None
+    if patterns and not any(fnmatch.filter(meta.camera_keys, pattern) for pattern in patterns):
+        raise UnknownNameError("camera", patterns[0], meta.camera_keys, "(in `augment.crop_cameras`)")
 
 
 def _crop_and_rotate(images: Tensor, config: AugmentConfig, drawn: NDArray[np.float64]) -> Tensor:

@@ -21,6 +21,11 @@ class Interrupts:
     def stop(self) -> bool:
         """Whether to save and end after this step."""
         self._steps += 1
+        return self.due
+
+    @property
+    def due(self) -> bool:
+        """Whether no further step is to be made."""
         return self.signalled or (self.stop_after is not None and self._steps >= self.stop_after)
 
     @contextmanager

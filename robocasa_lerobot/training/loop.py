@@ -131,7 +131,7 @@ def train_phase(run: PhaseRun, accelerator: Accelerator) -> bool:
         if run.held_out is not None and run.held_out.due(state.step, config.steps):
             _measure_held_out(run, run.held_out, accelerator)
             began = time.perf_counter()
-        stopped = _agree(run.stop(), accelerator)
+        stopped = any_process(run.stop(), accelerator)
         due = config.save_every > 0 and state.step % config.save_every == 0
         if due or stopped or state.step == config.steps:
             _save(run, accelerator)
@@ -256,8 +256,8 @@ def _scalars(outputs: Any) -> dict[str, float]:
     return found
 
 
-def _agree(stop: bool, accelerator: Accelerator) -> bool:
-    """Whether any process wants to stop: a signal may reach one of them only, and all must save together."""
+def any_process(stop: bool, accelerator: Accelerator) -> bool:
+    """Whether any process wants to stop: a signal may reach one of them only, and all must save and end together."""
     if accelerator.num_processes == 1:
         return stop
     return bool(accelerator.reduce(torch.tensor(float(stop), device=accelerator.device), reduction="sum") > 0)

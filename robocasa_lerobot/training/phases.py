@@ -13,15 +13,16 @@ from robocasa_lerobot.data.registry.hub import fetch_missing
 from robocasa_lerobot.errors import UserError
 from robocasa_lerobot.jobs.locks import LockHeldError, locked
 from robocasa_lerobot.training import metrics, records
+from robocasa_lerobot.training.augment import check_crop_cameras
 from robocasa_lerobot.training.config.experiment import FROM_SCRATCH, HUB, ExperimentConfig, PhaseConfig
 from robocasa_lerobot.training.interrupts import Interrupts
-from robocasa_lerobot.training.loop import train_phase
+from robocasa_lerobot.training.loop import any_process, train_phase
 from robocasa_lerobot.training.planning import skipped
 from robocasa_lerobot.training.planning.evaluations import Evaluations, phase_evaluations
 from robocasa_lerobot.training.planning.unavailable import runnable
 from robocasa_lerobot.training.setup import builders, features
 from robocasa_lerobot.training.setup import phase_data as joining
-from robocasa_lerobot.training.setup.build_phase import planned_policy, prepare_phase, start_of
+from robocasa_lerobot.training.setup.build_phase import check_begun, planned_policy, prepare_phase, start_of
 from robocasa_lerobot.training.setup.kept import check_kept_settings
 from robocasa_lerobot.training.waiting import BARRIER, first_process_works
 from robocasa_lerobot.training.weights.checkpoint import checkpoint_step, last_checkpoint, tidy
@@ -66,6 +67,7 @@ def run_experiment(
     )
     asked = experiment.phases if only is None else [experiment.phase(only)]
     records.check_unchanged(experiment, output, force)
+    records.check_descent(experiment, output)
     whole, (experiment, left_out) = experiment, runnable(experiment)
     phases = [phase for phase in experiment.phases if phase.name in {other.name for other in asked}]
     # A mistake in the last phase should not wait for the first to finish. The first process makes fake datasets.
@@ -75,7 +77,7 @@ def run_experiment(
             fetch_missing(mixture for phase in todo for mixture in joining.needed_mixtures(experiment, phase))
         for phase in phases:
             if not is_finished(output, phase):
-                check_phase(experiment, phase, device, only is not None)
+                check_phase(experiment, phase, device, only is not None, force)
         evaluations = Evaluations(experiment, phases, accelerator.is_main_process) if evaluate else None
         for phase in phases:  # weights on the hub, once all is well: a later phase should not wait for them either
             if not is_finished(output, phase) and experiment.init_of(phase).startswith(HUB):
@@ -85,13 +87,14 @@ def run_experiment(
         accelerator.print(item)
     if accelerator.is_main_process:
         output.mkdir(parents=True, exist_ok=True)
-        records.write_experiment(output, whole)
+        if all(is_finished(output, phase) for phase in phases):
+            records.write_experiment(output, whole)
         skipped.decide(output, left_out, {phase.name for phase in phases}, evaluate)
     accelerator.wait_for_everyone()
     metrics.start_trackers(accelerator, experiment.name, {"seed": experiment.seed, "policy": experiment.policy})
     try:
         with interrupts.listening():
-            finished = _run(experiment, phases, device, accelerator, interrupts, evaluations, force)
+            finished = _run(experiment, whole, phases, device, accelerator, interrupts, evaluations, force)
     finally:
         accelerator.end_training()
     if finished and evaluations is not None:  # else the same command goes on, and runs those that failed again
@@ -105,21 +108,32 @@ def is_finished(output: Path, phase: PhaseConfig) -> bool:
     return last is not None and checkpoint_step(last) >= phase.steps
 
 
-def check_phase(experiment: ExperimentConfig, phase: PhaseConfig, device: str, alone: bool = False) -> None:
+def check_phase(
+    experiment: ExperimentConfig, phase: PhaseConfig, device: str, alone: bool = False, force: bool = False
+) -> None:
     """Check what can be checked before training: policy, data, evaluation files, and with `alone` the start.
 
-    No weights are read for it.
+    No weights are read for it. With `force`, as what has begun is to go on with the settings of now.
 
     Raises:
         UserError: something is missing, or does not fit.
     """
     settings, checkpoint = planned_policy(experiment, phase)
     config = builders.policy_config(settings, checkpoint, device)
-    meta = joining.open_phase_data(experiment, phase).meta
+    data = joining.open_phase_data(experiment, phase)
+    meta = data.meta
+    check_crop_cameras(phase, meta)
+    check_begun(experiment, phase, device, data, force)
     if checkpoint is not None:
         features.check_features(config, meta)
         if phase.statistics == "keep" and experiment.parent(phase) is None:
             features.check_kept_statistics(builders.read_config(checkpoint), meta)
+    elif experiment.parent(phase) is not None:
+        first = experiment.ancestors(phase)[0]
+        begun = last_checkpoint(Path(experiment.output_dir) / first.name)
+        if begun is None:  # else its data may be gone, and the phase after it is held against its checkpoint soon
+            features.take_features(config, joining.open_phase_data(experiment, first).meta, settings)
+            features.check_features(config, meta, f"what phase {first.name!r} trains")
     if last_checkpoint(Path(experiment.output_dir) / phase.name) is None:
         parent = experiment.parent(phase)
         if parent is None:
@@ -134,6 +148,7 @@ def check_phase(experiment: ExperimentConfig, phase: PhaseConfig, device: str, a
 
 def _run(
     experiment: ExperimentConfig,
+    whole: ExperimentConfig,
     phases: list[PhaseConfig],
     device: str,
     accelerator: Accelerator,
@@ -151,7 +166,12 @@ def _run(
                 if accelerator.is_main_process:
                     tidy(output / phase.name)
             else:
+                if any_process(interrupts.due, accelerator):  # a phase's last step was the last one for now
+                    accelerator.print(f"stopped before phase {phase.name}; the same command goes on")
+                    return False
                 run = prepare_phase(experiment, phase, device, accelerator, interrupts.stop, force)
+                if accelerator.is_main_process:  # what a phase has refused is not what the folder holds
+                    records.write_experiment(output, whole)
                 finished = train_phase(run, accelerator)
                 step = run.state.step
                 del run  # its policy and optimiser need not stay in memory beside the next phase's

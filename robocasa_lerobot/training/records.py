@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import uuid
 from pathlib import Path
 from typing import Any
 
@@ -61,21 +62,71 @@ def describe_phase(
     policy: torch.nn.Module,
     init: Path | None,
     device: str,
+    begun: bool,
 ) -> dict[str, Any]:
-    """The content of `phase.json`; `device` is what it is called."""
+    """The content of `phase.json`.
+
+    A `run` lasts from a phase's first step to its last, however often it is continued.
+
+    Args:
+        experiment: what is run.
+        phase: of it.
+        dataset: that it draws from.
+        policy: that it trains.
+        init: the `pretrained_model` folder that it started from.
+        device: what it is called.
+        begun: whether it goes on from a checkpoint of its own.
+    """
+    folder, parent = Path(experiment.output_dir) / phase.name, experiment.parent(phase)
     return {
         "experiment": experiment.name,
         "phase": phase.name,
+        "run": (run_of(folder) if begun else None) or uuid.uuid4().hex,
         "init": str(init) if init else FROM_SCRATCH,
+        "init_run": run_of(folder.parent / parent.name) if parent is not None else None,
         "statistics": phase.statistics if init else "replace",
         "data": dataset.describe().splitlines(),
         "data_fingerprint": dataset.fingerprint,
+        "selection_fingerprint": dataset.selection_fingerprint,
         "parameters": sum(p.numel() for p in policy.parameters()),
         "trainable_parameters": sum(p.numel() for p in policy.parameters() if p.requires_grad),
         "device": device,
         "versions": versions(*PACKAGES),
         "git_commit": git_commit(),
     }
+
+
+def run_of(folder: Path) -> str | None:
+    """The run that a phase's folder holds; None where none has begun, or an earlier version began it."""
+    about = _about(folder)
+    return about.get("run") if about is not None else None
+
+
+def check_descent(experiment: ExperimentConfig, output: Path) -> None:
+    """Check that what has begun started from the phases that are there now.
+
+    Raises:
+        UserError: a phase that it started from has been trained anew since.
+    """
+    for phase in experiment.phases:
+        about, parent = _about(output / phase.name), experiment.parent(phase)
+        if about is None or parent is None or last_checkpoint(output / phase.name) is None:
+            continue
+        started, now = about.get("init_run"), run_of(output / parent.name)
+        if started is not None and now is not None and started != now:
+            raise UserError(
+                f"phase {phase.name!r} in {output} started from weights of {parent.name!r} that are gone: that phase "
+                f"has been trained anew since. Remove {output / phase.name} to train it from the new ones, or put the "
+                f"earlier folder {output / parent.name} back."
+            )
+
+
+def _about(folder: Path) -> dict[str, Any] | None:
+    path = folder / PHASE_FILE
+    if not path.is_file():
+        return None
+    about: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
+    return about
 
 
 def write_records(folder: Path, about: dict[str, Any], experiment: ExperimentConfig, phase: PhaseConfig) -> None:
@@ -119,20 +170,28 @@ def check_unchanged(experiment: ExperimentConfig, output: Path, force: bool) -> 
         )
 
 
-def check_same_data(folder: Path, about: dict[str, Any]) -> None:
-    """Check that a begun phase goes on with the data that it began with.
+def check_same_data(folder: Path, dataset: MixtureDataset, force: bool = False) -> None:
+    """Check that a begun phase goes on with the data that it began with, and draws from them as it did.
+
+    With `force` it may draw others of their episodes, or at other rates, as changed settings ask for.
 
     Raises:
         UserError: they are others now.
     """
-    path = folder / PHASE_FILE
-    if not path.is_file():
+    before, now = _about(folder), dataset.describe().splitlines()
+    if before is None:
         return
-    before = json.loads(path.read_text(encoding="utf-8"))
-    if before["data_fingerprint"] != about["data_fingerprint"]:
+    if before["data_fingerprint"] != dataset.fingerprint:
         raise UserError(
-            f"{folder} was begun with other data: {before['data']}; now: {about['data']} (or their content changed). "
+            f"{folder} was begun with other data: {before['data']}; now: {now} (or their content changed). "
             "Restore them, or start in another `--output_dir`."
+        )
+    drawn = before.get("selection_fingerprint")  # None in what earlier versions wrote
+    if drawn is not None and drawn != dataset.selection_fingerprint and not force:
+        raise UserError(
+            f"{folder} was begun with other episodes of its data, or other rates of drawing them: {before['data']}; "
+            f"now: {now}. What names and sets select has changed. Put it back, start in another "
+            "`--output_dir`, or pass `--resume=force` to go on with what is selected now."
         )
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import json
 import subprocess
 import sys
@@ -359,3 +360,15 @@ def test_actions_beyond_the_controllers_range_are_told(tmp_path: Path, capsys: p
         assert verify(out).passed
     found = json.loads((tmp_path / "both" / META_FOLDER / CONVERSION_FILE).read_text())[ACTIONS_OUT_OF_RANGE]
     assert (found["share"], found["largest"], found["component"]) == (0.15, 30.0, "eef_dy")
+
+
+def test_a_file_system_that_fails_rejects_no_episode(tmp_path: Path) -> None:
+    """What h5py says of a server that is away; the episodes may be good."""
+    away = OSError("Can't synchronously read data (file read failed: errno = 5, error message = 'Input/output error')")
+    with pytest.raises(UserError, match="give the same command again") as caught, hdf5.reading("'actions'"):
+        raise away
+    assert not isinstance(caught.value, hdf5.RejectedEpisodeError)
+    with pytest.raises(UserError, match="give the same command again"), hdf5.reading("'actions'"):
+        raise OSError(errno.ESTALE, "Stale file handle")
+    with pytest.raises(hdf5.RejectedEpisodeError), hdf5.reading("'actions'"):
+        raise OSError("Can't synchronously read data (inflate() failed)")

@@ -207,6 +207,58 @@ def test_a_kill_while_clearing_away_is_made_good(
     assert _content(out) == expected
 
 
+def test_a_kill_while_clearing_away_is_made_good_where_the_output_is_replaced(
+    source: Path, expected: dict[str, str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What is half removed says that it is complete, and must not be joined."""
+    out = tmp_path / "out"
+
+    def killed(folder: Path) -> None:
+        (folder / "done").touch()
+        shutil.rmtree(folder / "shards" / "00000")
+        raise KeyboardInterrupt
+
+    for _ in range(2):
+        with monkeypatch.context() as patch:
+            patch.setattr(pipeline, "clear_away", killed)
+            with pytest.raises(KeyboardInterrupt):
+                convert([source], out, ConversionSettings(), workers=1, overwrite=True)
+    result = convert([source], out, ConversionSettings(), workers=1, overwrite=True)
+    assert (result.num_episodes, result.rejected) == (EPISODES, [])
+    assert _content(out) == expected
+    assert leftovers(out) == ["out"]
+
+
+def test_what_cannot_be_cleared_away_is_said(
+    source: Path,
+    expected: dict[str, str],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    """Network file systems keep what is open; the dataset is there all the same."""
+    out = tmp_path / "out"
+    with monkeypatch.context() as patch:
+        patch.setattr(Path, "rmdir", lambda path: (_ for _ in ()).throw(OSError(39, "Directory not empty")))
+        assert convert([source], out, ConversionSettings(), workers=1).num_episodes == EPISODES
+    assert "could not be removed" in capsys.readouterr().err
+    assert _content(out) == expected
+
+
+def test_the_output_may_be_a_link_and_holds_no_source(source: Path, expected: dict[str, str], tmp_path: Path) -> None:
+    (tmp_path / "disk").mkdir()
+    link = tmp_path / "link"
+    link.symlink_to(tmp_path / "disk")
+    for _ in range(2):
+        convert([source], link, ConversionSettings(), workers=1, overwrite=True)
+        assert link.is_symlink()
+        assert _content(tmp_path / "disk") == expected
+    inside = Path(shutil.copy(source, tmp_path / "disk" / source.name))
+    with pytest.raises(UserError, match=r"is inside --out .* would be replaced"):
+        convert([inside], link, ConversionSettings(), workers=1, overwrite=True)
+    assert inside.is_file()
+
+
 def test_what_is_made_again_is_not_taken_for_what_was_left(source: Path, tmp_path: Path) -> None:
     out = tmp_path / "out"
     convert([source], out, ConversionSettings(), workers=1)

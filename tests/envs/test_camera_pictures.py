@@ -19,7 +19,7 @@ from robocasa_lerobot.envs.pictures import BACKGROUND
 from robocasa_lerobot.envs.projection import back_project, camera_matrix, project
 from robocasa_lerobot.envs.rendering import canvas
 from robocasa_lerobot.envs.robots.camera_noise import CameraNoise
-from robocasa_lerobot.envs.robots.cameras import apply_camera_configs
+from robocasa_lerobot.envs.robots.cameras import apply_camera_configs, camera_configs
 from robocasa_lerobot.envs.robots.panda_omron.bodies import BODIES
 from robocasa_lerobot.envs.robots.panda_omron.cameras import CAMERA_SETS
 from robocasa_lerobot.envs.scene.build import RENDER_PRESETS
@@ -208,6 +208,23 @@ def test_replayed_cameras_give_the_same_pictures() -> None:
         assert same == (camera == "robot0_frontview")
         np.testing.assert_array_equal(plain.render_camera(camera), observation["pixels"][camera])
     plain.close()
+
+
+@pytest.mark.parametrize(("ours", "theirs"), [("default", "cotraining"), ("cotraining", "default")])
+def test_cameras_of_another_set_apply_after_a_picture_was_drawn(ours: str, theirs: str) -> None:
+    """Lenses too, which one of the sets has."""
+    kwargs = {"image_size": 32, "cameras": (WRIST,)}
+    other = KitchenEnv("OpenDrawer", camera_set=theirs, **kwargs)
+    expected = other.reset(seed=8)[0]["pixels"][WRIST]
+    configs = camera_configs(other.model, (WRIST,))
+    other.close()
+    env = KitchenEnv("OpenDrawer", camera_set=ours, **kwargs)
+    before = env.reset(seed=8)[0]["pixels"][WRIST]
+    assert not np.array_equal(before, expected)
+    apply_camera_configs(env.model, configs)
+    mujoco.mj_forward(env.model, env.data)
+    np.testing.assert_array_equal(env.render_camera(WRIST), expected)
+    env.close()
 
 
 def test_more_noise_moves_pictures_more() -> None:

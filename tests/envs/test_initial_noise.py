@@ -60,6 +60,27 @@ def test_the_base_starts_anywhere_within_a_distance_and_at_any_heading() -> None
     assert np.cos(shifts[:, 2]).min() < 0.0
 
 
+@pytest.mark.parametrize("novel", [False, True])
+def test_the_side_that_an_instruction_names_is_that_of_where_the_base_starts(novel: bool) -> None:
+    """As seen by somebody at its place who faces the counter, as the task has it start."""
+    noise = InitialNoise(base_within_m=1.5)
+    plain = KitchenEnv("OpenDrawer", cameras=(), novel_language=novel)
+    moved = KitchenEnv("OpenDrawer", cameras=(), novel_language=novel, initial_noise=noise)
+    named = []
+    for seed in range(12):
+        plain.reset(seed=seed)
+        _, info = moved.reset(seed=seed)
+        facing, start = plain.scene.robot_pose.yaw, moved.scene.robot_pose
+        drawer = moved.scene.fixtures[moved.scene.roles["drawer"]]
+        ahead, left = drawer.pos[0] - start.x, drawer.pos[1] - start.y
+        side = "left" if -np.sin(facing) * ahead + np.cos(facing) * left > 0 else "right"
+        assert side in moved.scene.instruction
+        assert moved.scene.instruction == info["instruction"] == moved.task_description
+        assert len(moved.scene.paraphrases) == len(plain.scene.paraphrases)
+        named.append(moved.scene.instruction == plain.scene.instruction)
+    assert 0 < sum(named) < len(named), "some starts are on the other side of the drawer"
+
+
 def test_the_base_starts_in_no_open_door_and_within_the_room() -> None:
     env = KitchenEnv("CloseFridge", cameras=(), initial_noise=InitialNoise(base_within_m=1.5))
     moved = 0
@@ -80,7 +101,7 @@ def test_a_start_that_touches_what_no_floor_plan_shows_is_drawn_again(monkeypatc
 
     def noisy(seed: int) -> tuple[RobotPose, list[str]]:
         moved = dataclasses.replace(scene, seed=seed, robot_pose=start)
-        add_initial_noise(moved, InitialNoise(base_within_m=1.5))
+        add_initial_noise(moved, InitialNoise(base_within_m=1.5), get_task("CloseFridge"))
         return moved.robot_pose, touched(moved)
 
     found = [noisy(seed) for seed in range(40)]
@@ -95,7 +116,7 @@ def test_where_every_start_would_touch_something_the_base_stays(monkeypatch: pyt
     scene = build_scene(get_task("OpenDrawer"), "target", 0)
     start = scene.robot_pose
     monkeypatch.setattr(reset_noise, "touched", lambda _: ["wall"])
-    add_initial_noise(scene, InitialNoise(base_within_m=1.5))
+    add_initial_noise(scene, InitialNoise(base_within_m=1.5), get_task("OpenDrawer"))
     assert scene.robot_pose == start
 
 

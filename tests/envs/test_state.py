@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
+from typing import Any
 
 import gymnasium
 import numpy as np
@@ -18,8 +20,8 @@ from robocasa_lerobot.envs.state import KitchenState
 from robocasa_lerobot.errors import UserError
 
 
-def make(task: str) -> KitchenEnv:
-    return KitchenEnv(task, cameras=())  # states alone; pictures have tests of their own
+def make(task: str, **kwargs: Any) -> KitchenEnv:
+    return KitchenEnv(task, cameras=(), **kwargs)  # states alone; pictures have tests of their own
 
 
 def actions(count: int, seed: int) -> list[NDArray[np.float32]]:
@@ -146,6 +148,29 @@ def test_a_state_of_another_kitchen_is_refused() -> None:
     again = KitchenEnv("OpenDrawer", cameras=(), layouts=[11], styles=[11])
     again.set_state(KitchenState.from_dict(KitchenState.from_dict(values).to_dict()))
     assert np.array_equal(again.get_state().physics, state.physics)
+
+
+def test_a_state_that_is_refused_leaves_the_running_episode_as_it_was() -> None:
+    env = make("OpenDrawer", layouts=[11], styles=[11])
+    env.reset(seed=3)
+    expected = trajectory(env, actions(10, 0))
+    env.reset(seed=3)
+    halves = actions(10, 0)
+    first = trajectory(env, halves[:5])
+    elsewhere = make("OpenDrawer", layouts=[12], styles=[12])
+    elsewhere.reset(seed=4)
+    with pytest.raises(UserError, match="Make it with the same `layouts`"):
+        env.set_state(elsewhere.get_state())
+    assert (env.scene.seed, env.task_description) == (3, env.scene.instruction)
+    assert_same([*first, *trajectory(env, halves[5:])], expected)
+
+
+def test_kitchens_given_as_numbers_of_numpy_are_written_as_json() -> None:
+    env = KitchenEnv("OpenDrawer", cameras=(), layouts=np.arange(11, 13), styles=np.int64(11))
+    _, info = env.reset(seed=0)
+    json.dumps(env.scene.ep_meta())
+    assert type(info["scene"]["layout_id"]) is int
+    assert (env.layouts, env.styles) == ([11, 12], [11])
 
 
 def test_a_reset_that_is_interrupted_leaves_the_running_episode_as_it_was() -> None:

@@ -153,6 +153,23 @@ def test_without_autoreset_the_caller_resets_and_cannot_forget_to() -> None:
         assert envs.step(STILL)[0]["agent_pos"].tolist() == [[30, 1], [8, 4]]
 
 
+@pytest.mark.parametrize("mode", [AutoresetMode.NEXT_STEP, AutoresetMode.DISABLED])
+def test_a_state_that_is_set_after_the_end_goes_on(mode: AutoresetMode) -> None:
+    kitchen: dict[str, Any] = {"cameras": (), "horizon": 2}
+    action = np.zeros((1, contract.ACTION_SIZE), dtype=np.float32)
+    with closing(make_vector_env(["OpenDrawer"], autoreset=mode, **kitchen)) as envs:
+        envs.reset(seed=[5])
+        (begin,) = envs.call("get_state")
+        envs.step(action)
+        (expected,) = envs.call("get_state")
+        _, _, _, truncated, _ = envs.step(action)
+        assert truncated.all()
+        envs.call("set_state", begin)
+        envs.step(action)
+        (found,) = envs.call("get_state")
+    assert pickle.dumps(found) == pickle.dumps(expected)
+
+
 def test_infos_of_different_tasks_stay_apart() -> None:
     with closing(make_vector_env([partial(FaultyEnv, "A"), partial(FaultyEnv, "B")], 3)) as envs:
         _, infos = envs.reset(seed=[4, 5, 6])

@@ -55,6 +55,15 @@ def test_shards_of_a_gpu_are_joined_where_there_is_none(tmp_path: Path, capsys: 
     assert "device: 'cuda' in the file, 'cpu' now" in capsys.readouterr().err
 
 
+def test_servers_are_on_devices_that_the_results_name(tmp_path: Path) -> None:
+    words = arguments(tmp_path / "out", evaluation_records.make_checkpoint(tmp_path / "checkpoint"))
+    for devices, remedy in (("cuda:0,cuda:1", "Set policy.device to the kind"), ("cpu,cuda:0", "cuda:0")):
+        config = load_config(EvaluationConfig, [*words, "--policy.device=cpu", f"--policy.devices={devices}"])
+        with pytest.raises(UserError, match=remedy):
+            engine.prepare(config)
+    assert engine.prepare(load_config(EvaluationConfig, [*words, "--policy.device=cpu", "--policy.devices=cpu"]))
+
+
 def test_devices_of_shards_are_not_looked_for_where_they_are_submitted(
     tmp_path: Path, slurm: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

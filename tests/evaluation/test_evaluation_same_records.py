@@ -20,6 +20,7 @@ from trial_faults import REASONS, assert_faults_cost_only_their_trials
 
 from robocasa_lerobot.cli import main
 from robocasa_lerobot.errors import UserError
+from robocasa_lerobot.evaluation.actors.checkpoint import PolicySource
 from robocasa_lerobot.evaluation.config.evaluation import EvaluationConfig
 from robocasa_lerobot.evaluation.config.loader import load_config
 from robocasa_lerobot.evaluation.records.results import TRIALS_FILE, TrialRecord, read_results
@@ -93,6 +94,23 @@ def test_shards_joined_are_the_whole(tmp_path: Path, plain: list[dict[str, Any]]
     other = engine.prepare(load_config(EvaluationConfig, arguments(out, seed=4)))
     with pytest.raises(UserError, match="seed: 0 in the file, 4 now"):
         merge(other)
+
+
+def test_of_trials_that_do_not_repeat_the_first_one_counts(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """As where a policy behind a socket is asked again, since there are other numbers of shards now."""
+    out = tmp_path / "out"
+    for shard in ("1/1", "1/2", "2/2"):
+        assert main(["eval", *arguments(out), f"--shard={shard}"]) == 0
+    first, later = out / "shards/1-of-1" / TRIALS_FILE, out / "shards/1-of-2" / TRIALS_FILE
+    lines = [json.loads(line) for line in later.read_text().splitlines()]
+    lines = [line | ({"trajectory": "another"} if line["kind"] == "trial" else {}) for line in lines]
+    later.write_text("".join(json.dumps(line) + "\n" for line in lines))
+    whole = engine.prepare(load_config(EvaluationConfig, arguments(out)))
+    with pytest.raises(UserError, match="not deterministic"):
+        merge(whole)
+    monkeypatch.setattr(PolicySource, "repeats", False)
+    merge(whole)
+    assert comparable(read_results(out).trials) == comparable(read_results(first.parent).trials)
 
 
 def kill_and_rerun(out: Path, kills: int) -> list[TrialRecord]:

@@ -12,6 +12,7 @@ from robocasa_lerobot.errors import UserError
 from robocasa_lerobot.jobs.executors import JOBS_FILE, SlurmSettings, submit_to_slurm
 
 TAKES = """#!/bin/bash
+cp "${{@: -1}}" {script}
 number=$(($(cat {count} 2>/dev/null || echo 0) + 1))
 [ $number -gt {most} ] && {{ echo "no more" >&2; exit 1; }}
 echo $number > {count}
@@ -22,7 +23,7 @@ echo "Submitted batch job $number"
 def takes(folder: Path, most: int) -> None:
     """Let sbatch take so many jobs, numbered from 1."""
     (folder / "count").unlink(missing_ok=True)
-    (folder / "sbatch").write_text(TAKES.format(count=folder / "count", most=most))
+    (folder / "sbatch").write_text(TAKES.format(count=folder / "count", most=most, script=folder / "script"))
     (folder / "sbatch").chmod(0o755)
 
 
@@ -48,3 +49,21 @@ def test_each_array_that_was_taken_is_noted_at_once(tmp_path: Path, monkeypatch:
     takes(tmp_path, 3)
     assert submit(tmp_path, 2) == ("2", "3")
     assert json.loads(record.read_text()) == ["1", "2", "3"]
+    script = (tmp_path / "script").read_text()  # of the last one, which waits for all arrays
+    assert "--dependency=afterok:1:2\n" in script
+
+
+def test_only_jobs_that_slurm_has_forgotten_are_over(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("PATH", f"{tmp_path}{os.pathsep}{os.environ['PATH']}")
+    takes(tmp_path, 9)
+    squeue = tmp_path / "squeue"
+    squeue.write_text("#!/bin/bash\necho 'slurm_load_jobs error: Invalid job id specified' >&2\nexit 1\n")
+    squeue.chmod(0o755)
+    assert submit(tmp_path, 1) == ("1", "2")
+    squeue.write_text("#!/bin/bash\necho 'Unable to contact slurm controller' >&2\nexit 1\n")
+    with pytest.raises(
+        UserError, match=r"squeue does not say .*Unable to contact.*remove .*jobs\.json if none of 1, 2"
+    ):
+        submit(tmp_path, 1)
+    squeue.write_text("#!/bin/bash\necho 'Invalid job id specified' >&2\nexit 1\n")
+    assert submit(tmp_path, 1) == ("3", "4")

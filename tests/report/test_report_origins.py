@@ -16,7 +16,7 @@ from robocasa_lerobot.evaluation.actors.checkpoint import REFERENCE_POLICIES, RE
 from robocasa_lerobot.evaluation.report.gather import gather
 from robocasa_lerobot.evaluation.report.numbers import seconds
 from robocasa_lerobot.evaluation.report.policies import REFERENCES, describe_policy
-from robocasa_lerobot.evaluation.report.sections import comparison
+from robocasa_lerobot.evaluation.report.sections import comparison, provenance
 
 TASKS = {"OpenDrawer": 0.6, "CloseDrawer": 0.6}
 PUSHT = {"factory": "lerobot", "type": "lerobot:pusht", "simulator": {"adapter": "0"}}
@@ -67,3 +67,23 @@ def test_seconds_are_those_of_the_env(
     line = next(line for line in lines if line.startswith("| mine |") and line.count("|") == 9)
     both = sorted(steps["OpenDrawer"] + steps["CloseDrawer"])
     assert line.split("|")[-3].strip() == seconds(None if rate is None else float(np.median(both)) / rate)
+
+
+def test_settings_are_those_of_every_run_that_was_continued(tmp_path: Path) -> None:
+    """The second half of the trials on another machine, by another version."""
+    about = synthetic_runs.policy("mine")
+    heads = [
+        synthetic_runs.header("custom", [about], list(TASKS), task_sets={}, trials=10, **of_run)
+        for of_run in ({}, {"machine": {"processor": "another"}, "versions": {"mujoco": "3.18.0"}})
+    ]
+    assert heads[0].id != heads[1].id
+    run = tmp_path / "run"
+    run.mkdir()
+    lines = [head.to_line() for head in heads]
+    for record in synthetic_runs.trials(heads[0], "mine", TASKS, 10):
+        lines.append(dataclasses.replace(record, run=heads[record.trial // 5].id).to_line())
+    (run / "trials.jsonl").write_text("\n".join(lines) + "\n")
+    rows = dict(provenance.common_settings(gather([run]).single))
+    assert rows["processor"] == "none: these trials were drawn at random, another"
+    assert rows["mujoco"] == "3.17.0, 3.18.0"
+    assert rows["device"] == "synthetic"

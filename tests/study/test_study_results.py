@@ -142,10 +142,10 @@ def test_the_table_of_phases(tmp_path: Path) -> None:
 
 
 def phase_with_trials(folder: Path, steps: int, evaluation: str, finished: bool = True) -> None:
-    """What a training leaves of a phase that has ended, with an evaluation of one trial."""
+    """What a training leaves of a phase that has ended, with a trial of an evaluation and one in a perturbed scene."""
     line = {"step": steps, "loss": 0.5, "seconds_per_step": 0.1}
     out = folder / "evaluations" / evaluation
-    write_results(out, [{"trial": 3}])
+    write_results(out, [{"trial": 3}, {"trial": 3, "perturbation": "camera"}])
     (folder / "metrics.jsonl").write_text(json.dumps(line) + "\n")
     (folder / "phase.json").write_text(json.dumps({"device": "cpu"}))
     if finished:

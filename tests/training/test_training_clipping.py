@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import pytest
@@ -17,6 +18,23 @@ from robocasa_lerobot.training.phases import run_experiment
 @pytest.fixture(scope="module")
 def data(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return write_fake_dataset(tmp_path_factory.mktemp("data") / "fake", episodes=4, length=12, image_size=32)
+
+
+@pytest.mark.parametrize("widest", [2.0, 1.0])
+def test_what_was_widened_goes_back_with_the_statistics(widest: float, tmp_path: Path, data: Path) -> None:
+    """A third phase keeps the statistics and with them the reach, or makes its own, in which nothing lies beyond 1."""
+    path = experiment_file(tmp_path, data, defaults={"steps": 1})
+    content = yaml.safe_load(path.read_text())
+    content["phases"][0]["mixture"]["members"][0]["tasks"] = ["CloseDrawer"]
+    statistics = "keep" if widest > 1 else "replace"
+    content["phases"].append({**content["phases"][1], "name": "third", "statistics": statistics})
+    path.write_text(yaml.safe_dump(content))
+    assert run_experiment(load_experiment(path))
+    reaches = [
+        json.loads((tmp_path / "out" / phase / "checkpoints/last/pretrained_model/config.json").read_text())
+        for phase in ("finetune", "third")
+    ]
+    assert [config["clip_sample_range"] for config in reaches] == pytest.approx([2.0, widest], abs=1e-3)
 
 
 @pytest.mark.parametrize("own", [None, 1.5])

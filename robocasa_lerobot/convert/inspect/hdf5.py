@@ -111,11 +111,11 @@ def _walk(file: DemoFile, found: Survey, report: FileReport) -> Demo | None:
                 raise RejectedEpisodeError(trap)
             demo = file.demo(name)
             shapes = demo.shapes()
-            counts.update(shapes.keys())
-            first = {**shapes, **first}
             rows = shapes.get(file.layout.action_key, ((0,), ""))[0]
             if not rows or rows[0] == 0:
                 raise RejectedEpisodeError(f"it has no steps in {file.layout.action_key!r}.")
+            counts.update(shapes.keys())
+            first = {**shapes, **first}
             report.lengths.append(rows[0])
             if sample is None:
                 sample = demo

@@ -7,6 +7,7 @@ import json
 from pathlib import Path
 
 from robocasa_lerobot.errors import UserError
+from robocasa_lerobot.files import write_text
 
 EXAMPLE = "robocasa-lerobot inspect demos.hdf5 --draft-mapping mapping.yaml"
 
@@ -34,6 +35,7 @@ def run(args: argparse.Namespace) -> int:
             raise UserError("--draft-mapping takes one HDF5 file; datasets need no mapping.")
         if args.draft_mapping.exists():
             raise UserError(f"{args.draft_mapping} exists already: choose another name for the draft.")
+        args.draft_mapping.parent.mkdir(parents=True, exist_ok=True)
     found = []
     for path in args.paths:
         if is_dataset(path):
@@ -45,7 +47,7 @@ def run(args: argparse.Namespace) -> int:
             found.append(report.as_json())
             text = describe(report)
             if args.draft_mapping is not None:
-                args.draft_mapping.write_text(draft_mapping(report), encoding="utf-8")
+                write_text(args.draft_mapping, draft_mapping(report))
         if args.report == "table":
             print(text, end="\n\n" if path != args.paths[-1] else "\n")
     if args.report == "json":

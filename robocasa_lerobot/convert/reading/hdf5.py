@@ -8,7 +8,9 @@ file is an error. Sizes are looked at before anything is read, since a few bytes
 from __future__ import annotations
 
 import contextlib
+import errno
 import math
+import re
 from collections.abc import Iterator
 from typing import Any
 
@@ -29,6 +31,8 @@ MAX_RECORDED_BYTES = 1 << 20
 MAX_IMAGE_SIDE = 4096
 LEFT_OUT = "(attributes left out)"
 _MAX_LINKS = 8
+# Errors of a disk or a network file system.
+_NOT_OF_THE_FILE = (errno.EIO, errno.ESTALE, errno.ETIMEDOUT, errno.ENOTCONN, errno.EHOSTDOWN)
 # Everything that h5py has been seen to raise on damaged files.
 _FAILURES = (OSError, RuntimeError, ValueError, TypeError, LookupError, ArithmeticError, MemoryError, SystemError)
 
@@ -49,7 +53,19 @@ def reading(what: str) -> Iterator[None]:
     except UserError:
         raise
     except _FAILURES as error:
+        if _file_system_failed(error):
+            raise UserError(
+                f"{what} cannot be read now ({first_line(error)}): the file system fails, or is away. Finished parts "
+                "are kept: give the same command again when it answers, or leave the file out."
+            ) from None
         raise RejectedEpisodeError(f"{what} cannot be read ({first_line(error)}).") from None
+
+
+def _file_system_failed(error: BaseException) -> bool:
+    """Whether reading failed below HDF5, which says nothing about what the file holds."""
+    said = re.search(r"errno = (\d+)", str(error))
+    number = int(said.group(1)) if said else getattr(error, "errno", None)
+    return number in _NOT_OF_THE_FILE
 
 
 def member(group: h5py.Group, path: str) -> h5py.Group | h5py.Dataset | None:

@@ -50,9 +50,12 @@ from robocasa_lerobot.jobs.pieces import report_frames, run_pieces, submit_piece
 from robocasa_lerobot.jobs.publish import (
     check_output,
     check_outside,
+    clear_away,
     failures_explained,
+    go_on,
     held_folder,
     make_piece,
+    output_path,
     partial_folder,
     publish,
 )
@@ -61,6 +64,7 @@ from robocasa_lerobot.jsonl import json_text
 from robocasa_lerobot.quiet import quiet_libraries
 
 _HISTOGRAMS = "histograms.npz"
+_MERGED = "merged"  # in the working folder
 _MIN_FRAMES_PER_WORKER = 200
 _REPORT_FRAMES = 10
 
@@ -97,15 +101,15 @@ def render_dataset(
         UserError: the dataset or the output path cannot be used. Nothing is at `out` then.
     """
     check_workers(workers)
-    out, execution = out.absolute(), execution or Execution()
+    out, execution = output_path(out), execution or Execution()
     check_output(out, overwrite)
-    if out.resolve() == source.resolve():
-        raise UserError(f"--out is the dataset itself: {out}. Choose another folder.")
     plan = make_render_plan(source, settings)
     check_outside(out, source)
     partial = partial_folder(out, plan.fingerprint)
     step, last = _Piece(plan, str(partial)), _LastJob(plan, str(partial), str(out), overwrite)
     if execution.kind == "slurm":
+        with held_folder(partial):
+            go_on(partial / _MERGED)
         return submit_pieces(step, last, len(plan.pieces), partial, out, execution)
     workers = num_workers(workers, len(plan.pieces), plan.num_frames, _MIN_FRAMES_PER_WORKER)
     with (
@@ -114,6 +118,7 @@ def render_dataset(
         contextlib.closing(shared_encoder),
         contextlib.closing(scenes_ahead),
     ):
+        go_on(partial / _MERGED)
         run_pieces(
             step, len(plan.pieces), partial, execution, workers, plan.num_frames, "rendering", quiet_libraries, __name__
         )
@@ -205,7 +210,7 @@ class _LastJob:
 
 
 def _complete(plan: RenderPlan, partial: Path, out: Path, overwrite: bool) -> RenderResult:
-    merged = partial / "merged"
+    merged = partial / _MERGED
     shutil.rmtree(merged, ignore_errors=True)  # an earlier try may have been killed here
     shutil.copytree(plan.source, merged, ignore=lambda folder, _: ["videos"] if Path(folder) == plan.source else [])
     keys = [contract.image_key(camera.name) for camera in plan.cameras]
@@ -242,7 +247,7 @@ def _complete(plan: RenderPlan, partial: Path, out: Path, overwrite: bool) -> Re
     renew_dataset_card(merged)
     check_output(out, overwrite)  # somebody else's may have appeared meanwhile
     publish(merged, out, partial / "replaced")
-    shutil.rmtree(partial)
+    clear_away(partial)
     cameras = tuple(camera.name for camera in plan.cameras)
     return RenderResult(out, len(plan.dataset.episodes), plan.num_frames, cameras)
 

@@ -26,19 +26,18 @@ class PictureReader:
         self._others: OrderedDict[Path, LeRobotDataset] = OrderedDict()
 
     def frames(self, source: DatasetSource, key: str, indices: NDArray[np.int64]) -> torch.Tensor:
-        """The frames of the dataset with the given indices (n,): (n, 3, height, width), uint8 for colours.
+        """The frames of the dataset with the given indices (n,): (n, 3, height, width), uint8.
 
         Raises:
             UserError: a video cannot be read.
         """
         distinct, back = np.unique(indices, return_inverse=True)
         feature = source.features[key]
-        depth = bool((feature.get("info") or {}).get("is_depth_map"))
-        if feature["dtype"] != "video" or depth:
+        if feature["dtype"] != "video":
             others = self._lerobot(source)
             pictures = torch.stack([others[int(index)][key] for index in distinct])[torch.from_numpy(back)]
             # LeRobot gives pictures that are stored singly as floats, whatever it is asked for.
-            return pictures if depth else pictures.mul(255).round().to(torch.uint8)
+            return pictures.mul(255).round().to(torch.uint8)
         parts = []
         episodes = np.searchsorted(source.ends, distinct, side="right")
         for episode in np.unique(episodes):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import functools
 import hashlib
 import json
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +24,7 @@ from robocasa_lerobot.jsonl import read_jsonl
 EPISODE_TABLE = "meta/robocasa/episodes.jsonl"
 # What a member can choose episodes by: columns of that table, and the member's fields.
 _CHOSEN_BY = {"task_name": "tasks", "layout_id": "layouts", "style_id": "styles"}
+COLOURS = 3  # channels of a picture
 _EPISODE_COLUMNS = ("episode_index", "dataset_from_index", "dataset_to_index")
 
 
@@ -49,10 +51,12 @@ class DatasetSource:
         # Not the stages of episodes: datasets without them go together with those that have them, and a row of one
         # dataset's table of subtasks means nothing in another. Nor who decided a step, for the first reason.
         apart = {contract.decision_key(name) for name in contract.DECISIONS}
+        # Depth maps: no policy here takes pictures of distances.
+        self.depth = [key for key, feature in self._info.features.items() if _is_depth(feature)]
         self.features: dict[str, dict[str, Any]] = {
-            key: feature
+            key: _channels_last(feature)
             for key, feature in self._info.features.items()
-            if key not in apart and key not in contract.STAGE_KEYS
+            if key not in apart and key not in contract.STAGE_KEYS and key not in self.depth
         }
         self.decisions = {key: feature for key, feature in self._info.features.items() if key in apart}
         tasks = load_tasks(self.root).sort_values("task_index")
@@ -159,6 +163,29 @@ class DatasetSource:
     def __getstate__(self) -> dict[str, Any]:
         """Columns are read again in a worker process instead of being sent to it."""
         return {key: value for key, value in self.__dict__.items() if key != "columns"}
+
+
+def is_image(feature: Mapping[str, Any]) -> bool:
+    """Whether a feature is pictures."""
+    return feature["dtype"] in ("video", "image")
+
+
+def _is_depth(feature: Mapping[str, Any]) -> bool:
+    about = feature.get("info") or {}
+    return is_image(feature) and bool(about.get("is_depth_map") or about.get("video.is_depth_map"))
+
+
+def _channels_last(feature: dict[str, Any]) -> dict[str, Any]:
+    """A feature whose pictures have the shape (height, width, channels), as LeRobot writes them by default.
+
+    Some datasets say (channels, height, width), and all pictures are handed out so, whatever is said.
+    """
+    if not is_image(feature):
+        return feature
+    names, shape = [str(name).rstrip("s") for name in feature.get("names") or ()], list(feature["shape"])
+    first = names[0] == "channel" if names else shape[0] == COLOURS and shape[2] != COLOURS
+    shape = [*shape[1:], shape[0]] if first else shape
+    return {**feature, "shape": tuple(shape), "names": ["height", "width", "channel"]}
 
 
 def _check_is_dataset(root: Path) -> None:

@@ -120,7 +120,7 @@ def moved(scene: Scene, data: mujoco.MjData) -> dict[str, float]:
 
 def _moving_parts(model: mujoco.MjModel, scene: Scene) -> NDArray[np.intp]:
     """Bodies of fixtures that can move and be met; what only shows a state, such as water, cannot be met."""
-    own = {model.body(name).id for name in (*scene.objects, "robot0_base")}
+    own = {model.body(name).id for name in (*scene.objects, scene.robot.names.base)}
     solid = set(model.geom_bodyid[model.geom_contype != 0])
     return np.array(
         [b for b in range(1, model.nbody) if model.body_weldid[b] and b in solid and model.body_rootid[b] not in own],

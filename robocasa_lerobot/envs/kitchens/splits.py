@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
+import numpy as np
+
 from robocasa_lerobot.envs.kitchens.layout import layout_ids
 from robocasa_lerobot.envs.kitchens.materials import LAST_TARGET_ID, style_ids
 from robocasa_lerobot.errors import UnknownNameError, UserError
@@ -71,7 +73,8 @@ def expand(ids: int | Iterable[int], what: str) -> tuple[int, ...]:
     """
     known = layout_ids() if what == "layout" else style_ids()
     found: list[int] = []
-    for number in [ids] if isinstance(ids, int) else ids:
+    for number in [ids] if isinstance(ids, int | np.integer) else ids:
+        number = int(number)  # NumPy's cannot be written as JSON
         if number in GROUPS:
             found += GROUPS[number]
         elif number in known:

@@ -164,9 +164,9 @@ class Instance:
 
     @functools.cached_property
     def interior(self) -> Interior | None:
-        """Its interior in the frame of its body; None if it holds no other objects, or was turned upright."""
+        """Its interior in the frame of its body; None if it holds no other objects, or was turned."""
         inside = model_of(self).interior
-        if inside is None or self.upright_axis is not None:
+        if inside is None or self.upright_axis is not None or self.face_down:
             return None
         cx, cy, cz = (c * k for c, k in zip(inside.center, self.scale, strict=True))
         hx, hy, hz = (h * k for h, k in zip(inside.half, self.scale, strict=True))

@@ -28,6 +28,7 @@ VISIBLE_GROUPS = (1, 2)  # of MuJoCo's default options, less the collision shape
 VISIBLE_GROUP = 1  # of all geoms of a look-alike but its backdrop
 # Edge of the squares of floor over which bodies that never move are merged: culling still tells them apart.
 CELL_M = 2.0
+_LENSES = ("cam_fovy", "cam_sensorsize", "cam_intrinsic", "cam_resolution")
 MIN_SAVED_DRAWS = 50  # below it, a look-alike costs more memory and building time than it is worth
 _BOX, _MESH = int(mujoco.mjtGeom.mjGEOM_BOX), int(mujoco.mjtGeom.mjGEOM_MESH)
 _CYLINDER, _CAPSULE = int(mujoco.mjtGeom.mjGEOM_CYLINDER), int(mujoco.mjtGeom.mjGEOM_CAPSULE)
@@ -82,7 +83,7 @@ class MergedModel:
         own.geom_xmat[:] = (rotations @ self._rotations).reshape(-1, 9)
         own.cam_xpos[:], own.cam_xmat[:] = on_grid(data.cam_xpos, data.cam_xmat)
         own.light_xpos[:], own.light_xdir[:] = data.light_xpos, data.light_xdir
-        for name in ("cam_fovy", "light_active", "light_diffuse"):
+        for name in (*_LENSES, "light_active", "light_diffuse"):
             getattr(model, name)[:] = getattr(source, name)
         for name in ("mat_rgba", "mat_emission"):
             getattr(model, name)[:] = np.repeat(getattr(source, name), 2, axis=0)  # baked and not
@@ -98,7 +99,7 @@ class MergedModel:
     def view(self, camera: int) -> bytes:
         """From where, how wide and in what light a camera sees: views that are alike have the same bytes."""
         model, data = self.model, self.data
-        camera_is = (data.cam_xpos[camera], data.cam_xmat[camera], model.cam_fovy[camera])
+        camera_is = (data.cam_xpos[camera], data.cam_xmat[camera], *(getattr(model, name)[camera] for name in _LENSES))
         lights = (data.light_xpos, data.light_xdir, model.light_active, model.light_diffuse)
         return b"".join(np.asarray(value).tobytes() for value in (*camera_is, *lights))
 

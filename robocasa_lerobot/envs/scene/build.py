@@ -38,6 +38,7 @@ from robocasa_lerobot.errors import UnknownNameError, UserError
 
 RENDER_PRESETS = ("fast", "quality")
 MAX_ATTEMPTS = 50
+FEW_KITCHENS = 5  # in so few, 50 attempts have met each about ten times
 # Key of the generator of camera noise: a stream of its own, so that noise changes nothing else of the scene.
 _CAMERA_NOISE_STREAM = 2
 
@@ -121,10 +122,18 @@ def build_scene(
             return _attempt(task, split, seed, layout_id, style_id, look, robot, rng)
         except PlacementError as error:
             failure = str(error)
+    remedy = "Use another seed." if len(pairs) > FEW_KITCHENS else "It may have no room there: name other kitchens."
     raise UserError(
         f"{task.name}, split {split}, seed {seed}: no arrangement in {MAX_ATTEMPTS} attempts (last: {failure}). "
-        "Use another seed."
+        f"{remedy}"
     )
+
+
+def tell(scene: Scene, task: SceneSpec) -> None:
+    """Word a scene's instruction anew, as of where its robot stands now."""
+    scene.words["side"] = scene.robot_pose.side
+    scene.instruction = said(task.instruction, scene.words)
+    scene.paraphrases = tuple(said(wording, scene.words) for wording in task.paraphrases)
 
 
 def _attempt(

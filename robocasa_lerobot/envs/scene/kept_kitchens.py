@@ -6,6 +6,7 @@ is kept is bounded, and is only ever copied: a scene is the same whether its kit
 
 from __future__ import annotations
 
+import contextlib
 import functools
 import hashlib
 import pickle
@@ -65,7 +66,9 @@ def kitchen(layout: Layout, render_preset: str = "fast") -> tuple[mujoco.MjSpec,
         return bare_kitchen(layout, render_preset)
     before = _attributes(layout)
     spec, palette = bare_kitchen(layout, render_preset)
-    place.built = _Built(spec.copy(), palette.added, _noted(before, _attributes(layout)))
+    # Fixtures of somebody's own may note what cannot be kept, and are built each time.
+    with contextlib.suppress(pickle.PicklingError, AttributeError, TypeError):
+        place.built = _Built(spec.copy(), palette.added, _noted(before, _attributes(layout)))
     return spec, palette
 
 

@@ -7,8 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from robocasa_lerobot.envs.scene.build import tell
 from robocasa_lerobot.envs.scene.robot_poses import RobotPose, is_free, open_before
 from robocasa_lerobot.envs.scene.scene import Scene
+from robocasa_lerobot.envs.scene.scene_spec import SceneSpec
 from robocasa_lerobot.errors import UserError
 
 _BASE_NOISE_STREAM = 3  # key of its generator, apart from those of the scene, the arm and the cameras
@@ -46,11 +48,12 @@ class InitialNoise:
                 raise UserError(f"initial_noise.{field.name}: found {value}, expected a finite number of at least 0.")
 
 
-def add_initial_noise(scene: Scene, noise: InitialNoise) -> None:
+def add_initial_noise(scene: Scene, noise: InitialNoise, task: SceneSpec) -> None:
     """Move the start of a scene's robot, before its `initial_data`; the noise follows from the scene's seed.
 
     A base pose that would stand in a fixture, in an open door or drawer, or outside of the room, or touch anything, is
-    drawn again; where none of 100 is free, the base stays.
+    drawn again; where none of 100 is free, the base stays. An instruction that says on which side of the robot a
+    fixture is says so of the new place, seen as from the old one's heading: facing the counter.
     """
     scene.arm_noise_rad = noise.arm_rad
     if not noise.moves_base:
@@ -65,13 +68,24 @@ def add_initial_noise(scene: Scene, noise: InitialNoise) -> None:
             bearing, turn = rng.uniform(-np.pi, np.pi), turn + rng.uniform(-np.pi, np.pi)
             far = noise.base_within_m * np.sqrt(rng.uniform())
             shift = shift + far * np.array([np.cos(bearing), np.sin(bearing)])
-        pose = RobotPose(start.x + float(shift[0]), start.y + float(shift[1]), start.yaw + float(turn), start.side)
+        place = (start.x + float(shift[0]), start.y + float(shift[1]))
+        pose = RobotPose(*place, start.yaw + float(turn), _side(scene, task, place) if start.side else "")
         if not is_free(scene.layout, pose, scene.robot.shape, opened):
             continue
         scene.robot_pose = pose
         if not touched(scene):
+            if pose.side != start.side:
+                tell(scene, task)
             return
     scene.robot_pose = start
+
+
+def _side(scene: Scene, task: SceneSpec, place: tuple[float, float]) -> str:
+    """On which side of a robot at a place, that faces as the task has it start, its fixture is."""
+    fixture = scene.fixtures[scene.roles[scene.fill(task.robot_start.fixture)]]
+    ahead, left = fixture.pos[0] - place[0], fixture.pos[1] - place[1]
+    yaw = scene.robot_pose.yaw
+    return "left" if np.cos(yaw) * left > np.sin(yaw) * ahead else "right"
 
 
 def touched(scene: Scene) -> list[str]:

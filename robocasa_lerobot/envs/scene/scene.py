@@ -142,7 +142,7 @@ class Scene(Drawn):
 
     def robot_touches(self, data: mujoco.MjData) -> list[str]:
         """Names of the bodies, but for the floor, that the robot is in contact with in a state."""
-        robot = self.subtree("robot0_base")
+        robot = self.subtree(self.robot.names.base)
         sides = self.model.geom_bodyid[data.contact.geom].reshape(-1, 2)
         others = sides[robot[sides].sum(axis=1) == 1]
         return sorted({self.model.body(side).name for side in others[~robot[others]]} - {"floor"})

@@ -108,7 +108,7 @@ def item_of(
     like = _like(wanted, index, items)
     if like is not None and wanted.same_model:
         item = catalogue.scaled(catalogue.instance(like.category, like.index), asked.scale)
-        return replace(item, upright=wanted.upright, stained=wanted.stained)
+        return replace(item, upright=wanted.upright, stained=wanted.stained, face_down=wanted.face_down)
     groups = asked.groups if like is None else (like.category.name,)
     # An instruction names one object of the scene.
     used = frozenset(() if wanted.repeats or like is not None else (item.category.name for item in items.values()))

@@ -20,6 +20,7 @@ from gymnasium.vector.async_vector_env import AsyncState
 from robocasa_lerobot import gl
 from robocasa_lerobot.envs.seeds import SEEDS, is_seed
 from robocasa_lerobot.envs.vector.worker import (
+    BEGIN,
     STATUS_FIELDS,
     WHERE_SIGNAL,
     Failure,
@@ -170,6 +171,12 @@ class KitchenVectorEnv(AsyncVectorEnv):
         results = super().step_wait(timeout)
         self._ended = results[2] | results[3]
         return results
+
+    def call_async(self, name: str, *args: Any, **kwargs: Any) -> None:
+        """Begin a call of a method of each env; after `set_state` and `reset` an episode runs, whatever was before."""
+        super().call_async(name, *args, **kwargs)
+        if name in BEGIN:
+            self._ended[:] = False
 
     def call_wait(self, timeout: float | None = None) -> tuple[Any, ...]:
         """The results of a call; an exception in an env is raised as itself, with the worker's traceback as a note."""

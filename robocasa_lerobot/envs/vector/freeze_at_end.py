@@ -7,7 +7,8 @@ from typing import Any
 
 import gymnasium
 
-# The option with which LeRobot's rollout resets: only this ends the hold, as automatic resets come without options.
+# The option with which LeRobot's rollout resets: only this or a seed ends the hold, as automatic
+# resets come without either.
 NEW_ROLLOUT = "lerobot_new_rollout"
 
 
@@ -23,8 +24,11 @@ class HoldAtEnd(gymnasium.Wrapper[Any, Any, Any, Any]):
         self._last: tuple[Any, bool, bool, dict[str, Any]] | None = None
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
-        """Begin an episode, or, while the env holds, give the last observation and info."""
-        if self._last is not None and not (options or {}).get(NEW_ROLLOUT):
+        """Begin an episode, or, while the env holds, give the last observation and info.
+
+        A seed begins one, too: automatic resets have none.
+        """
+        if self._last is not None and seed is None and not (options or {}).get(NEW_ROLLOUT):
             observation, _, _, info = self._last
             return observation, info
         self._last = None

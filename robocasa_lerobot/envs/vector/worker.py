@@ -33,6 +33,7 @@ EnvFactory = Callable[[], gymnasium.Env[Any, Any]]
 
 # At this signal a worker writes where it is to its fault file, even if it hangs inside compiled code.
 WHERE_SIGNAL = signal.SIGUSR1
+BEGIN = ("reset", "set_state")  # methods after which an episode runs, whatever was before
 PHASES = ("start-up", "waiting", "reset", "step", "autoreset", "call")
 # Numbers of a worker in the shared status: phase, whether the seed is known, seed, steps of the episode.
 STATUS_FIELDS = 4
@@ -257,6 +258,8 @@ class _Worker:
         try:
             attribute = env.get_wrapper_attr(name)
             result = attribute(*args, **kwargs) if callable(attribute) else attribute
+            if name in BEGIN:
+                self._ended, self._steps = False, int(getattr(env.unwrapped, "steps", 0))
             ForkingPickler.dumps(result)  # what cannot be sent fails here, and not the worker
             return result
         except Exception as error:

@@ -108,7 +108,11 @@ def _demonstrations(root: Path, entries: Iterable[DatasetEntry]) -> list[Demonst
         raise UserError(f"{root}: its info.json has no `fps`; convert the dataset again.")
     path = root / _EPISODES
     if not path.is_file():
-        # Only a dataset of one task can do without the table.
+        if len(wanted) > 1:
+            raise UserError(
+                f"{root}: no {_EPISODES} says which episodes are of which task, and the registry does not either: name "
+                "its task there (`tasks: [OpenDrawer]`), or convert the dataset with `robocasa-lerobot convert`."
+            )
         task = next(iter(wanted))
         return [Demonstration(task, length / rate, None) for length in report["lengths"]]
     lengths = report["lengths"]

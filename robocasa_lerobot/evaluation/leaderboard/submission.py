@@ -118,7 +118,8 @@ def _notes(policy: PolicyResult, facts: SubmissionFacts) -> str:
     header = policy.header
     means = {group: average_of(policy.group(group, UNPERTURBED)) for group in published.GROUPS}
     intervals = ", ".join(f"{group} {100 * m.low:.1f}-{100 * m.high:.1f}" for group, m in means.items())
-    trials = sorted({result.rate.trials for result in policy.conditions[UNPERTURBED]})
+    ranked = published.group_of_task()
+    trials = sorted({one.rate.trials for one in policy.conditions[UNPERTURBED] if one.task in ranked})
     said = [
         "Evaluated in robocasa_lerobot's kitchens, which are made in code in MuJoCo: other scenes, objects and "
         "demonstrations than RoboCasa's own, so not comparable one to one.",

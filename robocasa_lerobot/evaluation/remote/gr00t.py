@@ -26,6 +26,15 @@ _RETRY_SECONDS = 0.25
 _OTHER_CALL = ("unexpected keyword argument", "required positional argument")  # of a service that is asked wrongly
 
 
+def _only_ipv6(address: Address) -> bool:
+    """Whether a host has no IPv4 address: ZeroMQ looks for either kind, as it is told."""
+    try:
+        found = socket.getaddrinfo(address.host.strip("[]"), address.port, type=socket.SOCK_STREAM)
+    except OSError:
+        return False
+    return all(kind == socket.AF_INET6 for kind, *_ in found)
+
+
 class Gr00tClient:
     """A connection to GR00T's inference service; see `PolicyClient`.
 
@@ -53,6 +62,7 @@ class Gr00tClient:
         self._context = zmq.Context()
         self._socket = self._context.socket(zmq.REQ)
         self._socket.setsockopt(zmq.LINGER, 0)
+        self._socket.setsockopt(zmq.IPV6, int(_only_ipv6(address)))
         self._socket.setsockopt(zmq.MAXMSGSIZE, MAX_MESSAGE_BYTES)
         # A service that dies leaves a request without an answer for ever; the monitor tells.
         self._monitor = self._socket.get_monitor_socket(zmq.EVENT_DISCONNECTED)

@@ -31,7 +31,7 @@ from robocasa_lerobot.evaluation.records.results import (
     read_results,
 )
 from robocasa_lerobot.evaluation.records.trials_file import append, check_same_run, drop_torn_line
-from robocasa_lerobot.evaluation.run.serving import open_servers, served_labels
+from robocasa_lerobot.evaluation.run.serving import check_devices, open_servers, served_labels
 from robocasa_lerobot.evaluation.run.worker import WorkerSettings
 from robocasa_lerobot.evaluation.run.worker_pool import Completed, WorkerPool
 from robocasa_lerobot.evaluation.simulators.foreign_env import FACTORY
@@ -91,6 +91,8 @@ def prepare(config: EvaluationConfig, ask: bool = True, here: bool = True) -> Ev
     _check_folders(by_label)
     out = output_folder(config, list(by_label))
     device = _device(config.policy.device, any(source.is_checkpoint for source in sources), out, here)
+    if device != "auto":
+        check_devices(config.policy.devices, device, here)
     kinds = [source.type for source in sources if source.is_checkpoint]
     settings = resolve.outcome_settings(config, image_size, device, kinds)
     seeds = _stored_seeds(sources, config, settings, list(tasks.horizons))

@@ -50,6 +50,9 @@ def merge(evaluation: Evaluation) -> list[TrialRecord]:
         for record in results.trials:
             moved = _moved(record, folder, out)
             earlier = records.get(record.key)
+            source = evaluation.sources.get(record.label)
+            if earlier is not None and earlier.error is None and source is not None and not source.repeats:
+                continue  # made again after the number of shards had changed; the first one counts, not the best one
             if earlier is not None and earlier.comparable() != moved.comparable() and earlier.error is None:
                 if record.error is not None:
                     continue

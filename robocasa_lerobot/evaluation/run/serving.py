@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 
-from robocasa_lerobot.errors import UserError
+from robocasa_lerobot.errors import UnknownNameError, UserError
 from robocasa_lerobot.evaluation.actors.checkpoint import PolicySource
 from robocasa_lerobot.evaluation.actors.chunk_policy import STATELESS_TYPES
 from robocasa_lerobot.evaluation.config.evaluation import EvaluationConfig, PolicySettings
@@ -37,6 +37,32 @@ def served_labels(sources: Mapping[str, PolicySource], settings: PolicySettings,
             "of its own, so that it runs in the workers: use auto or workers."
         )
     return frozenset(able)
+
+
+def check_devices(devices: Sequence[str], device: str, here: bool) -> None:
+    """Check that policy servers are on devices of the kind that the results name.
+
+    Args:
+        devices: of the servers, as given.
+        device: that the policies compute on.
+        here: whether this machine has them.
+
+    Raises:
+        UserError: they are not.
+    """
+    for name in devices:
+        if name.partition(":")[0] != device:
+            raise UserError(
+                f"policy.devices has {name!r}, and policy.device is {device!r}, which the results name: outcomes "
+                "depend on it. Set policy.device to the kind of all policy.devices, such as cuda for cuda:0."
+            )
+    if here and device == "cuda":
+        import torch
+
+        there = [f"cuda:{index}" for index in range(torch.cuda.device_count())]
+        for name in devices:
+            if name not in (*there, "cuda"):
+                raise UnknownNameError("device", name, there, "(in policy.devices)")
 
 
 @contextmanager

@@ -118,7 +118,9 @@ class ActionChunkConfig(PreTrainedConfig):
         size = self.robot_state_feature.shape[0]
         if self.state_indices is None:
             return
-        if not self.state_indices or any(not 0 <= i < size for i in self.state_indices):
+        out_of_range = not self.state_indices or any(not 0 <= i < size for i in self.state_indices)
+        # Of another robot's state the default would leave out whatever has these places there.
+        if out_of_range or (size != STATE_SIZE and self.state_indices == state_without_base()):
             hint = "" if size == STATE_SIZE else f" The default is for the {STATE_SIZE} components of PandaOmron."
             raise UserError(
                 f"state_indices is {self.state_indices}, but observation.state has {size} components.{hint} "

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
@@ -62,11 +63,18 @@ class Pilot:
             noise = np.random.SeedSequence([env.scene.seed, self._hand_backs]).generate_state(1)[0]
             self._actor.reset(int(noise), env)
             self._fresh, self._hand_backs = True, self._hand_backs + 1
-        return np.asarray(self._actor.act(observation, instruction), dtype=np.float64)
+        action = np.asarray(self._actor.act(observation, instruction), dtype=np.float64)
+        if not np.isfinite(action).all():
+            raise UserError(f"its action holds numbers that are not finite: {action}.")
+        return action
 
     def lost(self) -> None:
         """It has failed: a person drives, and the policy is made again when it is given back to."""
-        self._actor = None
+        actor, self._actor = self._actor, None
+        close = getattr(actor, "close", None)  # of one behind a socket, which has few places
+        if close is not None:
+            with contextlib.suppress(Exception):
+                close()
         self.take_over()
 
     def describe(self, *, driving: bool) -> dict[str, Any]:

@@ -138,6 +138,7 @@ function note({ level, text: said }) {
 
 function turn(changes) {
   Object.assign(view, changes);
+  view.azimuth = Math.atan2(Math.sin(view.azimuth), Math.cos(view.azimuth));
   view.elevation = Math.min(-0.05, Math.max(-1.5, view.elevation));
   send({ type: "view", ...view });
 }

@@ -89,7 +89,7 @@ export class Operator {
     const camera = this.drag?.camera ?? this.depth?.camera;
     if (camera) {
       // A picture leads by itself: what is dragged counts in its plane, the wheel into it.
-      const axes = { ...ZERO, x: this.depth?.sign ?? 0, y: this.drag?.left ?? 0, z: this.drag?.up ?? 0 };
+      const axes = { ...ZERO, x: this.depth?.sign ?? 0, y: clip(this.drag?.left ?? 0), z: clip(this.drag?.up ?? 0) };
       return { axes, device: "mouse", camera };
     }
     return { axes: total, device };

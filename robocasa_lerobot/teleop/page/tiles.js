@@ -116,7 +116,8 @@ export class Tiles {
     canvas.addEventListener("pointerup", (event) => {
       if (start && !moved && !start.idle) {
         const box = canvas.getBoundingClientRect();
-        this.on.point(camera, (event.clientX - box.left) / box.width, (event.clientY - box.top) / box.height);
+        const share = (at, size) => Math.min(1, Math.max(0, at / size)); // it may be let go beside the picture
+        this.on.point(camera, share(event.clientX - box.left, box.width), share(event.clientY - box.top, box.height));
       }
       end();
     });

@@ -25,7 +25,12 @@ export class Transport {
     click("stop-assist", () => send({ type: "stop" }));
     click("finish", () => send({ type: "finish" }));
     for (const id of ["redo", "review-redo"]) click(id, () => send({ type: "redo" }));
-    for (const id of ["discard", "review-discard"]) click(id, () => $("discard-dialog").showModal());
+    for (const id of ["discard", "review-discard"]) {
+      click(id, () => {
+        $("discard-dialog").returnValue = ""; // Escape leaves what the button said the time before
+        $("discard-dialog").showModal();
+      });
+    }
     click("veil-button", () => send({ type: "resume" }));
     click("save", () => send({ type: "save", trim: $("trim").checked }));
     click("continue", () => send({ type: "continue" }));

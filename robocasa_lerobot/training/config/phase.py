@@ -144,7 +144,7 @@ class PhaseConfig:
         batch_size: samples per optimiser step, over all processes and accumulated parts.
         gradient_accumulation: parts in which a batch goes through the policy, one after the other.
         learning_rate: null is the policy's own; otherwise the rates of all parameter groups are scaled alike.
-        warmup_steps: null is the policy's own schedule's.
+        warmup_steps: null is the policy's own schedule's; a rate without a schedule is constant after them.
         optimizer: fields of the policy's own optimiser that this phase changes, such as `weight_decay`; with a
             `type`, another of LeRobot's optimisers.
         scheduler: likewise for the schedule of the learning rate; `type: none` keeps the rate constant.

@@ -29,6 +29,8 @@ from robocasa_lerobot.training.weights.checkpoint import TrainingState, last_che
 from robocasa_lerobot.training.weights.ema import Ema
 from robocasa_lerobot.training.weights.master_weights import MasterWeights
 
+MOST_HELD_OUT = 32  # frames that are measured at once, however many processes there are: the noise goes by the batch
+
 
 def prepare_phase(
     experiment: ExperimentConfig,
@@ -47,14 +49,17 @@ def prepare_phase(
     """
     folder = Path(experiment.output_dir) / phase.name
     init, last = start_of(experiment, phase), last_checkpoint(folder)
-    settings = policy_settings(experiment, phase) if last is None else {}
-    if last is not None and force:
-        settings = _forced_settings(experiment, phase)
+    settings = _settings_of_start(experiment, phase, last, force)
     start = pretrained_model(last) if last is not None else init
     config = builders.policy_config(settings, start, device)
     keep, rename = init is not None and phase.statistics == "keep", settings.get(RENAME)
     if start is not None and (keep or last is not None):
         check_kept_settings(config, builders.policy_config({}, start, device), phase.name, begun=last is not None)
+    begins = last is None and experiment.parent(phase) is not None
+    if begins and not keep and clipping.clips(config) and clipping.RANGE not in settings:
+        # What an earlier phase reached for, in statistics that this one does not keep, means nothing in its own.
+        planned = builders.policy_config(*planned_policy(experiment, phase), device)
+        setattr(config, clipping.RANGE, getattr(planned, clipping.RANGE))
     seed = phase_seed(experiment.seed, phase.name)
     dataset, apart = joining.open_phase_data(experiment, phase), None
     if phase.held_out is not None:
@@ -109,9 +114,11 @@ def prepare_phase(
         low_rank=phase.lora is not None,
         scaler=accelerator.scaler,
     )
-    about = records.describe_phase(experiment, phase, dataset, policy, init, builders.device_name(device))
+    about = records.describe_phase(
+        experiment, phase, dataset, policy, init, builders.device_name(device), begun=last is not None
+    )
     if last is not None:
-        records.check_same_data(folder, about)
+        records.check_same_data(folder, dataset, force)
         restore(last, state)
         accelerator.print(f"phase {phase.name}: going on from step {state.step}")
     accelerator.wait_for_everyone()  # all have read the files that are replaced now
@@ -127,7 +134,7 @@ def prepare_phase(
     held_out = None
     if apart is not None and phase.held_out is not None:
         frames = held_out_frames(apart, phase.held_out.samples, experiment.seed)
-        held_out = HeldOut(phase.held_out, apart, frames, max(1, share // accelerator.num_processes))
+        held_out = HeldOut(phase.held_out, apart, frames, min(share, MOST_HELD_OUT))
     return PhaseRun(
         config=phase,
         folder=folder,
@@ -143,6 +150,26 @@ def prepare_phase(
         always_eval=always_eval,
         earlier_steps=sum(other.steps for other in experiment.phases[: experiment.phases.index(phase)]),
     )
+
+
+def check_begun(
+    experiment: ExperimentConfig, phase: PhaseConfig, device: str, data: MixtureDataset, force: bool
+) -> None:
+    """Check that a phase that has begun can go on with these settings and data; see `prepare_phase`.
+
+    Raises:
+        UserError: it cannot.
+    """
+    folder = Path(experiment.output_dir) / phase.name
+    last = last_checkpoint(folder)
+    if last is None:
+        return
+    start = pretrained_model(last)
+    config = builders.policy_config(_settings_of_start(experiment, phase, last, force), start, device)
+    check_kept_settings(config, builders.policy_config({}, start, device), phase.name, begun=True)
+    if phase.held_out is not None:
+        data, _ = without_held_out(data, phase.held_out, experiment.data_loader, experiment.seed)
+    records.check_same_data(folder, data, force)
 
 
 def phase_seed(seed: int, name: str) -> int:
@@ -169,8 +196,28 @@ def policy_settings(experiment: ExperimentConfig, phase: PhaseConfig) -> dict[st
     return settings
 
 
-def _forced_settings(experiment: ExperimentConfig, phase: PhaseConfig) -> dict[str, Any]:
-    """What a begun phase's policy has now, to be laid over its own checkpoint, whose inputs are the data's already."""
+def _settings_of_start(
+    experiment: ExperimentConfig, phase: PhaseConfig, last: Path | None, force: bool
+) -> dict[str, Any]:
+    """What changes in the policy's configuration of the checkpoint that a phase goes on from, or begins with.
+
+    A begun phase keeps its own unless with `force`. One that begins from an earlier phase has what the experiment says
+    now, which may have changed since that one was trained; but not less reach than it was given then.
+    """
+    parent = experiment.parent(phase)
+    if last is not None:
+        return _laid_over(experiment, phase) if force else {}
+    own = policy_settings(experiment, phase)
+    if parent is None:
+        return own
+    before = _laid_over(experiment, parent)
+    if phase.statistics == "keep":
+        before.pop(clipping.RANGE, None)
+    return {**before, **own}
+
+
+def _laid_over(experiment: ExperimentConfig, phase: PhaseConfig) -> dict[str, Any]:
+    """What a phase's policy has now, to be laid over its checkpoint, whose inputs are the data's already."""
     settings, _ = planned_policy(experiment, phase)
     return {key: value for key, value in settings.items() if key not in (RENAME, LEAVE_OUT)}
 

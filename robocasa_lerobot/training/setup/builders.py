@@ -18,7 +18,7 @@ from huggingface_hub import hf_hub_download, snapshot_download, try_to_load_from
 from lerobot.configs.policies import PreTrainedConfig
 from lerobot.datasets.factory import resolve_delta_timestamps
 from lerobot.optim.optimizers import OptimizerConfig
-from lerobot.optim.schedulers import CosineDecayWithWarmupSchedulerConfig, LRSchedulerConfig
+from lerobot.optim.schedulers import CosineDecayWithWarmupSchedulerConfig, DiffuserSchedulerConfig, LRSchedulerConfig
 from lerobot.policies.factory import get_policy_class, make_policy, make_pre_post_processors
 from lerobot.policies.pretrained import PreTrainedPolicy
 from lerobot.utils.constants import ACTION, IMAGENET_STATS, OBS_STATE
@@ -228,7 +228,9 @@ def make_optimizer(
         schedule = None
     elif phase.scheduler:
         schedule = _changed(LRSchedulerConfig, schedule, phase.scheduler, "scheduler")
-    if schedule is not None and phase.warmup_steps is not None:
+    if schedule is None and phase.warmup_steps:
+        schedule = DiffuserSchedulerConfig(name="constant_with_warmup", num_warmup_steps=phase.warmup_steps)
+    elif schedule is not None and phase.warmup_steps is not None:
         schedule = dataclasses.replace(schedule, num_warmup_steps=phase.warmup_steps)
     total = phase.schedule_steps or phase.steps
     if isinstance(schedule, CosineDecayWithWarmupSchedulerConfig) and _warmup_is_given(phase):

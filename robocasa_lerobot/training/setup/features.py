@@ -57,8 +57,22 @@ def new_names(inputs: Mapping[str, Any], rename: Mapping[str, str]) -> dict[str,
     return {theirs: mine for mine, theirs in rename.items() if mine not in inputs}
 
 
-def check_features(config: PreTrainedConfig, meta: MixtureMeta) -> None:
+def take_features(config: PreTrainedConfig, meta: MixtureMeta, settings: Mapping[str, Any]) -> None:
+    """Give a policy that is yet to be made the features that it will have of data, under its settings' other names."""
+    found = dataset_to_policy_features(meta.features)
+    config.output_features = {key: feature for key, feature in found.items() if feature.type is FeatureType.ACTION}
+    inputs = config.input_features or {key: found[key] for key in found if key not in config.output_features}
+    rename, left_out = settings.get(RENAME) or {}, settings.get(LEAVE_OUT) or []
+    config.input_features = renamed_inputs(inputs, rename, left_out, "as the first phase makes it")
+
+
+def check_features(config: PreTrainedConfig, meta: MixtureMeta, whose: str = "the checkpoint's policy") -> None:
     """Check that the data have what the policy takes in and gives out, in sizes that fit it.
+
+    Args:
+        config: the policy's.
+        meta: of the data.
+        whose: the policy, for errors.
 
     Raises:
         UserError: the data lack something, or have another size that the policy does not pad or scale.
@@ -70,12 +84,12 @@ def check_features(config: PreTrainedConfig, meta: MixtureMeta) -> None:
                 "feature",
                 key,
                 found,
-                "(the checkpoint's policy needs it; the data lack it; say in the policy's settings which of the data's "
+                f"({whose} needs it; the data lack it; say in the policy's settings which of the data's "
                 f"it is, `{RENAME}: {{<name in the data>: {key}}}`, or `{LEAVE_OUT}: [{key}]`)",
             )
         if not _fits(config, found[key], wanted):
             raise UserError(
-                f"feature {key!r}: the checkpoint's policy has shape {tuple(wanted.shape)}, the data "
+                f"feature {key!r}: {whose} has shape {tuple(wanted.shape)}, the data "
                 f"{tuple(found[key].shape)}. For pictures, set `loader.image_size` to the policy's size."
             )
 

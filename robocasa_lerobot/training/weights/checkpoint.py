@@ -105,6 +105,9 @@ def _point_last_at(checkpoint: Path) -> None:
     link = checkpoint.with_name(LINK_ASIDE)
     link.unlink(missing_ok=True)
     link.symlink_to(checkpoint.name)
+    last = checkpoint.with_name(LAST)
+    if last.is_dir() and not last.is_symlink():  # the training was copied by something that follows links
+        _drop(last)
     link.replace(checkpoint.with_name(LAST))
 
 

@@ -28,7 +28,7 @@ def ask_for_rest(scene: Scene) -> None:
         return
     model, data = scene.model, scene.placed_data()
     mujoco.mj_forward(model, data)
-    robot = scene.subtree("robot0_base")[model.dof_bodyid]
+    robot = scene.subtree(scene.robot.names.base)[model.dof_bodyid]
     data.qfrc_applied[robot] = data.qfrc_bias[robot]  # it hangs where it is
     trees = model.body_treeid[[model.body(name).id for name in scene.objects]]
     calm: dict[str, np.ndarray] = {}

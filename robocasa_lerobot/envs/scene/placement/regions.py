@@ -106,7 +106,7 @@ def choose_parts(
         for part in parts_of(layout, fixture, openness)
         if part.name.startswith(names)
         and low <= part.area.z <= high
-        and (placement.slot or _sides(part.area) >= (MIN_SIDE_M, MIN_SIDE_M))
+        and (placement.slot or min(_sides(part.area)) >= MIN_SIDE_M)
     ]
     if region.level is not None:
         parts.sort(key=lambda part: part.area.z)

@@ -12,6 +12,7 @@ from robocasa_lerobot.evaluation.report.sections.beside_published import horizon
 
 MAX_ERRORS = 30
 MAX_SAID = 20  # lines of what a server says about itself
+MAX_VALUES = 3  # of a setting that runs of one policy differ in
 
 
 def section(data: ReportData) -> Section:
@@ -88,14 +89,17 @@ def common_settings(policies: Sequence[PolicyResult]) -> list[tuple[str, str]]:
         "started",
     )
     for name in heads:
-        values = [_plain(getattr(policy.header, name)) for policy in policies]
+        values = [_over_runs(policy, [getattr(header, name) for header in policy.headers]) for policy in policies]
         rows.append((name.replace("_", " "), _same_or_each(values, policies)))
     for group in ("settings", "versions", "machine"):
-        tables: list[dict[str, Any]] = [flat(getattr(policy.header, group)) for policy in policies]
-        for name in dict.fromkeys(key for table in tables for key in table):
+        tables: list[list[dict[str, Any]]] = [[flat(getattr(h, group)) for h in policy.headers] for policy in policies]
+        for name in dict.fromkeys(key for runs in tables for table in runs for key in table):
             if name in heads:
                 continue
-            values = [_plain(table.get(name)) for table in tables]
+            values = [
+                _over_runs(policy, [table.get(name) for table in runs])
+                for policy, runs in zip(policies, tables, strict=True)
+            ]
             rows.append((name.replace("_", " "), _same_or_each(values, policies)))
     commits = [
         ", ".join(sorted({h.git_commit for h in policy.headers if h.git_commit})) or "not in a git checkout"
@@ -117,6 +121,14 @@ def flat(values: dict[str, Any], prefix: str = "") -> dict[str, Any]:
         else:
             out[prefix + name] = value
     return out
+
+
+def _over_runs(policy: PolicyResult, values: Sequence[Any]) -> str:
+    """What a setting was in the runs that a policy's results are from: a run that is continued may be elsewhere."""
+    found = list(dict.fromkeys(_plain(value) for value in values))
+    if len(found) <= MAX_VALUES:
+        return ", ".join(found)
+    return f"{found[0]} ... {found[-1]} (of {len(policy.headers)} runs)"
 
 
 def _same_or_each(values: list[str], policies: Sequence[PolicyResult]) -> str:
