@@ -163,7 +163,7 @@ def test_what_cannot_be_rendered_is_said_before_anything_is_written(converted: P
     refused("episode 1 .* cannot be rendered", source=copy)
     shutil.rmtree(copy / "extras")
     refused("convert the recording again", source=copy)
-    with pytest.raises(UserError, match="the dataset itself"):
+    with pytest.raises(UserError, match="the source itself"):
         render_dataset(converted, converted, _settings(), workers=1, overwrite=True)
     with pytest.raises(UserError, match="is inside the dataset"):
         render_dataset(converted, converted / "again", _settings(), workers=1)
