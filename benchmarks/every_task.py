@@ -66,7 +66,7 @@ class Steps:
             )
             step |= {"status": done.returncode, "printed": done.stdout}
         finally:
-            step["seconds"] += round(time.monotonic() - started, 1)
+            step["seconds"] += round(time.monotonic() - started, 3)
             write_text(self._path, json.dumps(self.done, indent=1) + "\n")
         print(done.stdout[-1500:], flush=True)
         if done.returncode not in accepted:

@@ -241,7 +241,6 @@ def test_holding_an_ended_env_does_what_lerobots_own_wrapper_does() -> None:
             env.reset(seed=1, options=new),
             *[env.step(STILL[0]) for _ in range(5)],
             env.reset(),
-            env.reset(seed=2),
             env.step(STILL[0]),
             env.reset(seed=2, options=new),
             env.step(STILL[0]),
@@ -253,6 +252,9 @@ def test_holding_an_ended_env_does_what_lerobots_own_wrapper_does() -> None:
         assert all(same(a, b) for a, b in zip(our, their, strict=True)), index
     assert results[0][5][0]["agent_pos"].tolist() == [1, 3]  # the fifth step is still the third
     assert results[0][-1][0]["agent_pos"].tolist() == [3, 0]  # a reset in mid-episode is one
+    for _ in range(5):
+        ours.step(STILL[0])
+    assert ours.reset(seed=4)[0]["agent_pos"].tolist() == [4, 0]  # a seed begins an episode, which LeRobot's does not
 
 
 @pytest.mark.render

@@ -104,6 +104,7 @@ def _walk(file: DemoFile, found: Survey, report: FileReport) -> Demo | None:
     texts: Counter[str] = Counter()
     sources: Counter[str] = Counter()
     first: dict[str, tuple[tuple[int, ...], str]] = {}
+    seen: dict[str, tuple[tuple[int, ...], str]] = {}  # in any episode, also such without steps
     sample: Demo | None = None
     for name in Bar(file.demo_names, unit="episode", desc="looking", leave=False):
         try:
@@ -111,10 +112,11 @@ def _walk(file: DemoFile, found: Survey, report: FileReport) -> Demo | None:
                 raise RejectedEpisodeError(trap)
             demo = file.demo(name)
             shapes = demo.shapes()
+            counts.update(shapes.keys())
+            seen = {**shapes, **seen}
             rows = shapes.get(file.layout.action_key, ((0,), ""))[0]
             if not rows or rows[0] == 0:
                 raise RejectedEpisodeError(f"it has no steps in {file.layout.action_key!r}.")
-            counts.update(shapes.keys())
             first = {**shapes, **first}
             report.lengths.append(rows[0])
             if sample is None:
@@ -129,6 +131,7 @@ def _walk(file: DemoFile, found: Survey, report: FileReport) -> Demo | None:
             sources[instruction.source] += 1
         except UserError:
             texts["(none recorded)"] += 1
+    first = {**seen, **first}
     report.datasets = {key: DatasetShape(*first[key], counts[key]) for key in sorted(first)}
     report.cameras = {key: found.shape for key, found in report.datasets.items() if is_picture(found)}
     report.instructions = dict(texts.most_common())
