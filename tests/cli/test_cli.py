@@ -115,3 +115,37 @@ def test_console_script_is_installed() -> None:
         [sys.executable, "-m", "robocasa_lerobot.cli", "--version"], capture_output=True, text=True, check=False
     )
     assert (done.returncode, done.stdout) == (0, f"robocasa-lerobot {__version__}\n")
+
+
+def test_a_path_that_cannot_be_used_is_one_sentence(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def run(args: argparse.Namespace) -> int:
+        (tmp_path / "no folder" / "file").write_text("")
+        return 0
+
+    module = SimpleNamespace(EXAMPLE="robocasa-lerobot vet", configure=lambda _: None, run=run)
+    monkeypatch.setitem(sys.modules, "a_vet", module)
+    monkeypatch.setitem(cli.SUBCOMMANDS, "vet", cli.Subcommand("a_vet", "look after animals"))
+    assert cli.main(["vet"]) == 2
+    path = tmp_path / "no folder/file"
+    assert capsys.readouterr().err == f"robocasa-lerobot vet: {path}: No such file or directory.\n"
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["data", "--convert", ".", "--out=elsewhere"], "unrecognized arguments: --out=elsewhere"),
+        (["data", "small/foundation.yaml", "--to", "elsewhere"], "--to is for --convert"),
+        (["data", "small/foundation.yaml", "--replace"], "are for --make"),
+        (["serve", "--policy.path=openpi://localhost:8000"], "is served already"),
+        (["tasks", "--markdown", "a.md", "--deviations", "b.md"], "one of them at a time"),
+    ],
+)
+def test_what_would_be_left_out_without_a_word_is_told(
+    words: list[str], said: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert cli.main(words) == 2
+    assert said in capsys.readouterr().err
+    assert not list(tmp_path.iterdir())

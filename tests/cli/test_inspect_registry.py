@@ -96,3 +96,13 @@ def test_mistakes_are_explained(registry: Path, tmp_path: Path, capsys: pytest.C
     ):
         assert main(["inspect", *arguments]) == 2
         assert message in capsys.readouterr().err
+
+
+def test_demonstrations_of_no_known_task_are_told(registry: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Of a dataset without a table of episodes the registry has to say the task."""
+    content = yaml.safe_load(registry.read_text())
+    content["datasets"] = [{"path": "OpenDrawer"}]
+    other = registry.with_name("other.yaml")
+    other.write_text(yaml.safe_dump(content))
+    assert main(["inspect", str(other)]) == 2
+    assert "says which episodes are of which task" in capsys.readouterr().err

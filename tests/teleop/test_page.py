@@ -255,6 +255,33 @@ def test_dragging_in_a_picture_and_turning_the_wheel(page: Page) -> None:
     assert page.text("#motion-frame [aria-checked=true]") == "robot"  # a drag's frame is its own
 
 
+@pytest.mark.parametrize("pixels", [108, 155])
+def test_a_straight_drag_commands_no_more_than_everything(page: Page, pixels: int) -> None:
+    """Of these lengths the quotient is a hair above 1, which the kitchen refuses together with the page."""
+    browser = page.browser
+    left, top, width, height = browser.box("[data-camera=robot0_agentview_left] canvas")
+    x, y = left + width / 2, top + height / 2
+    browser.mouse("mousePressed", x, y)
+    browser.mouse("mouseMoved", x, y - pixels)
+    page.steps(4)
+    browser.mouse("mouseReleased", x, y - pixels)
+    page.steps(2)
+    assert not page.session.pause
+
+
+def test_a_discard_that_was_thought_better_of_discards_nothing(page: Page) -> None:
+    """Though the one before was meant: a dialog that is closed by Escape says what it said the last time."""
+    ask = page.browser.ask
+    page.hold("KeyR", 3)
+    ask("document.querySelector('#discard-dialog').returnValue = 'ok'")
+    page.click("#discard")
+    page.browser.until("document.querySelector('#discard-dialog').open")
+    ask("document.querySelector('#discard-dialog').close()")
+    page.browser.until("!document.querySelector('#discard-dialog').open")
+    page.hold("KeyR", 3)
+    assert page.session.phase == "running"
+
+
 def test_a_click_on_the_map_drives_there(page: Page) -> None:
     steps = "document.querySelector('#g-step').textContent"
     start = np.array(base_pose(page.session.env.data)[0])

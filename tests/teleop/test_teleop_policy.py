@@ -186,3 +186,14 @@ def test_a_server_that_is_gone_again_is_a_mistake_with_a_remedy(monkeypatch: pyt
 def test_a_policy_that_is_none_is_a_mistake(tmp_path: Path) -> None:
     with pytest.raises(UserError, match="no such folder"), served(settings(tmp_path), policy=str(tmp_path / "none")):
         pass
+
+
+def test_an_action_that_is_not_finite_is_a_failure_of_the_policy(monkeypatch: pytest.MonkeyPatch) -> None:
+    """So that a person drives, as with any other: it must not end the session."""
+    env = KitchenEnv(TASK, cameras=())
+    observation, _ = env.reset(seed=0)
+    pilot, _ = load_pilot("zero", TASK)
+    assert np.isfinite(pilot.act(env, observation, "")).all()
+    monkeypatch.setattr(type(pilot._actor), "act", lambda *_: np.full(contract.ACTION_SIZE, np.nan))
+    with pytest.raises(UserError, match="not finite"):
+        pilot.act(env, observation, "")
