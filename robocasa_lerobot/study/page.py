@@ -27,8 +27,8 @@ Sets = Mapping[str, Sequence[str]]
 _HEAD = """# Results
 
 What small policies learn in our kitchens, and what helps them. Written by `robocasa-lerobot study` from the trials,
-curves and circumstances that are kept in {folder}. `make study` makes them again, part by part, from
-nothing but seeds (`configs/study.yaml`). Intervals are 95 % and cover the drawing of trials: what another training
+curves and circumstances that are kept in {folder}. The same command makes them again, part by part, from
+nothing but seeds (`configs/study*.yaml`). Intervals are 95 % and cover the drawing of trials: what another training
 would change, the seeds beside each other show. Trials of one seed are the same in all rows of a table, and differences
 are computed from these pairs. Published numbers are of policies a thousand times as large, of human demonstrations and
 other kitchens: they show the direction of an effect, no more.
