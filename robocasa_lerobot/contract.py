@@ -209,6 +209,17 @@ def dataset_features(image_size: tuple[int, int] = (IMAGE_SIZE, IMAGE_SIZE)) -> 
     }
 
 
+def is_picture(feature: Mapping[str, Any]) -> bool:
+    """Whether a feature of a LeRobotDataset's info.json is pictures, of colours or of depth."""
+    return feature["dtype"] in ("video", "image")
+
+
+def is_depth(feature: Mapping[str, Any]) -> bool:
+    """Whether a picture feature is declared to hold depth."""
+    info = feature.get("info") or feature.get("video_info") or {}
+    return bool(info.get("video.is_depth_map") or info.get("is_depth_map")) if isinstance(info, dict) else False
+
+
 def demo_subset(total: int, count: int, seed: int = 0) -> tuple[int, ...]:
     """Which `count` of `total` demonstrations `<count>_demos` means, ascending; all where there are no more.
 

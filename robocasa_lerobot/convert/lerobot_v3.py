@@ -87,7 +87,7 @@ class ExportedDataset:
         return {
             key.removeprefix(contract.IMAGE_PREFIX): key
             for key, feature in self.features.items()
-            if feature["dtype"] in ("video", "image") and not (feature.get("info") or {}).get("is_depth_map")
+            if contract.is_picture(feature) and not contract.is_depth(feature)
         }
 
     def columns(self, episode: ExportedEpisode) -> dict[str, NDArray[Any]]:

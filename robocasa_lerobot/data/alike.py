@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping, Sequence
 from typing import Any
 
-from robocasa_lerobot.data.reading.source import DatasetSource, is_image
+from robocasa_lerobot import contract
+from robocasa_lerobot.data.reading.source import DatasetSource
 from robocasa_lerobot.errors import UnknownNameError, UserError
 
 
@@ -17,7 +18,7 @@ def unseen_pictures(features: Mapping[str, Mapping[str, Any]], cameras: Sequence
     """
     if cameras is None:
         return frozenset()
-    found = {key: key.rpartition(".")[2] for key, feature in features.items() if is_image(feature)}
+    found = {key: key.rpartition(".")[2] for key, feature in features.items() if contract.is_picture(feature)}
     for camera in cameras:
         if camera not in found.values():
             raise UnknownNameError("camera", camera, found.values(), "(in `loader.cameras`)")
@@ -43,10 +44,10 @@ def check_alike(sources: Sequence[DatasetSource], unseen: Collection[str], any_i
             ours, theirs = first.features.get(key), other.features.get(key)
             if ours is None or theirs is None:
                 raise UserError(f"feature {key!r} is missing in {(first if ours is None else other).root}.")
-            if any_image_size and is_image(ours) and is_image(theirs):
+            if any_image_size and contract.is_picture(ours) and contract.is_picture(theirs):
                 continue
             if tuple(ours["shape"]) != tuple(theirs["shape"]) or ours.get("names") != theirs.get("names"):
-                remedy = " Set `loader.image_size` to bring pictures to one size." if is_image(ours) else ""
+                remedy = " Set `loader.image_size` to bring pictures to one size." if contract.is_picture(ours) else ""
                 raise UserError(
                     f"feature {key!r}: {first.root} has shape {tuple(ours['shape'])}, names {ours.get('names')}; "
                     f"{other.root} has {tuple(theirs['shape'])}, {theirs.get('names')}.{remedy}"

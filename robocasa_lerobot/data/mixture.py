@@ -17,12 +17,13 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
+from robocasa_lerobot import contract
 from robocasa_lerobot.data.alike import check_alike, unseen_pictures
 from robocasa_lerobot.data.mixture_config import LoaderConfig, MemberConfig, MixtureConfig
 from robocasa_lerobot.data.reading.decisions import frame_pool
 from robocasa_lerobot.data.reading.frame_cache import FrameCache, cache_bytes, open_or_build, resize_images
 from robocasa_lerobot.data.reading.pictures import PictureReader
-from robocasa_lerobot.data.reading.source import DatasetSource, is_image
+from robocasa_lerobot.data.reading.source import DatasetSource
 from robocasa_lerobot.data.registry.registry import resolve_mixture
 from robocasa_lerobot.data.sampler import MixtureSampler, mixture_probabilities
 from robocasa_lerobot.data.statistics import (
@@ -53,7 +54,7 @@ class MixtureMeta:
     @property
     def camera_keys(self) -> list[str]:
         """Features that are pictures."""
-        return [key for key, feature in self.features.items() if is_image(feature)]
+        return [key for key, feature in self.features.items() if contract.is_picture(feature)]
 
 
 @dataclass
@@ -143,7 +144,7 @@ class MixtureDataset(torch.utils.data.Dataset[Item]):
         )
 
     def _feature(self, feature: Mapping[str, Any]) -> dict[str, Any]:
-        if self.image_size is None or not is_image(feature):
+        if self.image_size is None or not contract.is_picture(feature):
             return dict(feature)
         return {**feature, "shape": (self.image_size, self.image_size, 3)}
 

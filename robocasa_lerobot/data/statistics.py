@@ -17,8 +17,9 @@ import numpy as np
 import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
+from robocasa_lerobot import contract
 from robocasa_lerobot.data.quantiles import QuantileSearch
-from robocasa_lerobot.data.reading.source import DatasetSource, is_image
+from robocasa_lerobot.data.reading.source import DatasetSource
 from robocasa_lerobot.errors import UserError
 from robocasa_lerobot.files import write_text
 from robocasa_lerobot.jobs.locks import locked
@@ -71,7 +72,7 @@ def pooled_statistics(parts: Sequence[Part], images: bool = True) -> Statistics:
     out: Statistics = {}
     columns: dict[str, _Column] = {}
     for key, feature in parts[0].source.features.items():
-        if is_image(feature):
+        if contract.is_picture(feature):
             if images and all(key in part.source.features for part in parts):
                 out[key] = _image_statistics(key, parts)
         elif has_statistics(key, feature):

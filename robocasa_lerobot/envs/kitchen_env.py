@@ -26,7 +26,7 @@ from robocasa_lerobot.envs.scene.build import RENDER_PRESETS, build_scene
 from robocasa_lerobot.envs.scene.reset_noise import InitialNoise, add_initial_noise
 from robocasa_lerobot.envs.scene.scene import Scene
 from robocasa_lerobot.envs.seeds import checked_seed
-from robocasa_lerobot.envs.state import KitchenState, restore
+from robocasa_lerobot.envs.state import KitchenState, check_fits, restore
 from robocasa_lerobot.envs.tasks.registry import get_task
 from robocasa_lerobot.envs.tasks.task import BoundTask, Task
 from robocasa_lerobot.errors import UnknownNameError, UserError
@@ -202,7 +202,7 @@ class KitchenEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         if self._initial is not None and self._initial.seed == episode_seed:
             self._restore(self._initial)
         else:
-            self._build(episode_seed)
+            self._begin(*self._made(episode_seed))
         return self._observe(), self._info()
 
     def next_seed(self) -> int:
@@ -243,30 +243,23 @@ class KitchenEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         ):
             if found != expected:
                 raise UserError(f"kitchen state: found {what} {found!r}, but this env has {expected!r}.")
-        before = (self._scene, self._bound, self._data, self._controller, self._steps, self._initial)
-        if self._initial is None or self._initial.seed != state.seed:
-            self._build(state.seed)
-        try:
-            self._check_kitchen(state)
-            self._restore(state)
-        except UserError:  # the running episode goes on where it was
-            if before[0] is not self._scene and before[0] is not None:
-                self._close_renderer()
-                self._scene, self._bound, self._data, self._controller, self._steps, self._initial = before
-                self._pictures, self.task_description = {}, before[0].instruction
-            raise
-        return self._observe(), self._info()
-
-    def _check_kitchen(self, state: KitchenState) -> None:
+        runs = self._initial is not None and self._initial.seed == state.seed
+        made = None if runs else self._made(state.seed)
+        scene = self.scene if made is None else made[0]
         for what, number, ours in (
-            ("layout", state.layout_id, self.scene.layout_id),
-            ("style", state.style_id, self.scene.style_id),
+            ("layout", state.layout_id, scene.layout_id),
+            ("style", state.style_id, scene.style_id),
         ):
             if number not in (None, ours):
                 raise UserError(
                     f"kitchen state: found {what} {number}, but seed {state.seed} gives {what} {ours} in this env. "
                     "Make it with the same `layouts` and `styles`."
                 )
+        check_fits(scene.model, state)
+        if made is not None:
+            self._begin(*made)
+        self._restore(state)
+        return self._observe(), self._info()
 
     def step(self, action: NDArray[np.float32]) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
         """Carry out one action for 50 ms.
@@ -309,8 +302,8 @@ class KitchenEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         """Free the OpenGL context."""
         self._close_renderer()
 
-    def _build(self, seed: int) -> None:
-        self._close_renderer()
+    def _made(self, seed: int) -> tuple[Scene, BoundTask, mujoco.MjData, Controller]:
+        """The beginning of the episode of a seed; the running one does not notice."""
         scene = build_scene(
             self._declared,
             self.split,
@@ -329,7 +322,10 @@ class KitchenEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
             choice = np.random.default_rng([seed, _WORDING_STREAM]).integers(len(wordings))
             scene.instruction = wordings[int(choice)]
         noise = np.random.default_rng([seed, _ARM_NOISE_STREAM])
-        data, controller = scene.initial_data(noise)
+        return scene, bound, *scene.initial_data(noise)
+
+    def _begin(self, scene: Scene, bound: BoundTask, data: mujoco.MjData, controller: Controller) -> None:
+        self._close_renderer()
         # Together and last: a reset that fails or is interrupted leaves the episode before it whole.
         self._initial = None
         self._scene, self._bound, self._data, self._controller = scene, bound, data, controller

@@ -68,11 +68,11 @@ class KitchenState:
         )
 
 
-def restore(model: mujoco.MjModel, data: mujoco.MjData, controller: Controller, state: KitchenState) -> None:
-    """Put `data` and `controller` into `state`, positions and velocities evaluated.
+def check_fits(model: mujoco.MjModel, state: KitchenState) -> None:
+    """Check that a state has as many numbers as a model.
 
     Raises:
-        UserError: the state is of another model.
+        UserError: it is of another one.
     """
     size = physics_size(model)
     if state.physics.shape != (size,) or state.asleep.shape != (model.ntree,):
@@ -80,5 +80,14 @@ def restore(model: mujoco.MjModel, data: mujoco.MjData, controller: Controller, 
             f"kitchen state: {state.physics.size} numbers and {state.asleep.size} trees do not fit this scene "
             f"({size} and {model.ntree}); it was made by another version of the kitchens."
         )
+
+
+def restore(model: mujoco.MjModel, data: mujoco.MjData, controller: Controller, state: KitchenState) -> None:
+    """Put `data` and `controller` into `state`, positions and velocities evaluated.
+
+    Raises:
+        UserError: the state is of another model.
+    """
+    check_fits(model, state)
     write_physics(model, data, state.physics, state.asleep)
     controller.set_state(state.controller)

@@ -120,22 +120,21 @@ def check_phase(
     """
     settings, checkpoint = planned_policy(experiment, phase)
     config = builders.policy_config(settings, checkpoint, device)
-    data = joining.open_phase_data(experiment, phase)
+    data, parent = joining.open_phase_data(experiment, phase), experiment.parent(phase)
     meta = data.meta
     check_crop_cameras(phase, meta)
     check_begun(experiment, phase, device, data, force)
     if checkpoint is not None:
         features.check_features(config, meta)
-        if phase.statistics == "keep" and experiment.parent(phase) is None:
+        if phase.statistics == "keep" and parent is None:
             features.check_kept_statistics(builders.read_config(checkpoint), meta)
-    elif experiment.parent(phase) is not None:
+    elif parent is not None:
         first = experiment.ancestors(phase)[0]
-        begun = last_checkpoint(Path(experiment.output_dir) / first.name)
-        if begun is None:  # else its data may be gone, and the phase after it is held against its checkpoint soon
+        # Of one that has begun the data may be gone; the phase after it is held against its checkpoint soon.
+        if last_checkpoint(Path(experiment.output_dir) / first.name) is None:
             features.take_features(config, joining.open_phase_data(experiment, first).meta, settings)
             features.check_features(config, meta, f"what phase {first.name!r} trains")
     if last_checkpoint(Path(experiment.output_dir) / phase.name) is None:
-        parent = experiment.parent(phase)
         if parent is None:
             builders.check_processors(config, meta)
         if phase.statistics == "keep" and experiment.init_of(phase) != FROM_SCRATCH:

@@ -98,7 +98,7 @@ class V2Dataset:
     @property
     def pictures(self) -> dict[str, dict[str, Any]]:
         """Declared features that hold pictures, depth maps included."""
-        return {key: feature for key, feature in self.features.items() if feature["dtype"] in ("video", "image")}
+        return {key: feature for key, feature in self.features.items() if contract.is_picture(feature)}
 
     @cached_property
     def annotation_columns(self) -> tuple[str, ...]:
@@ -220,12 +220,6 @@ class V2Dataset:
 def camera_of(key: str) -> str:
     """Camera name of a picture feature."""
     return key.removeprefix(contract.IMAGE_PREFIX).removeprefix("observation.")
-
-
-def is_depth(feature: dict[str, Any]) -> bool:
-    """Whether a picture feature is declared to hold depth."""
-    info = feature.get("info") or feature.get("video_info") or {}
-    return bool(info.get("video.is_depth_map") or info.get("is_depth_map")) if isinstance(info, dict) else False
 
 
 def _is_feature(feature: Any) -> bool:

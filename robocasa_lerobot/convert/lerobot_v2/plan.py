@@ -21,7 +21,6 @@ from robocasa_lerobot.convert.lerobot_v2.dataset import (
     V2Dataset,
     camera_of,
     is_dataset_folder,
-    is_depth,
 )
 from robocasa_lerobot.convert.lerobot_v2.episode import Column, V2Episode, given_instruction
 from robocasa_lerobot.convert.mapping.robot_mapping import RobotMapping
@@ -223,7 +222,7 @@ def _columns(dataset: V2Dataset, notes: list[str]) -> tuple[tuple[Column, ...], 
     schema = _sample_schema(dataset)
     columns = []
     for name, feature in dataset.features.items():
-        if feature["dtype"] in ("video", "image") or name in INDEX_COLUMNS:
+        if contract.is_picture(feature) or name in INDEX_COLUMNS:
             continue
         if name not in schema.names:
             notes.append(f"column {name} is declared but not in the tables: left out")
@@ -316,8 +315,8 @@ def _cameras(
     samples: dict[str, Path] = {}
     for camera, key in keys.items():
         feature = dataset.pictures[key]
-        if feature["dtype"] == "image" or is_depth(feature) or "/" in key:
-            what = "depth" if is_depth(feature) else "a path" if "/" in key else "pictures inside the tables"
+        if feature["dtype"] == "image" or contract.is_depth(feature) or "/" in key:
+            what = "depth" if contract.is_depth(feature) else "a path" if "/" in key else "pictures inside the tables"
             lack = f"camera {camera} is declared as {what}, which is not converted"
         else:
             paths = (dataset.video_file(line.index, key) for line in dataset.episodes)

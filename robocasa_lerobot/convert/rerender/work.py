@@ -54,6 +54,7 @@ from robocasa_lerobot.jobs.publish import (
     failures_explained,
     go_on,
     held_folder,
+    is_done,
     make_piece,
     output_path,
     partial_folder,
@@ -206,7 +207,15 @@ class _LastJob:
             raise UserError(f"{len(missing)} of {len(self.plan.pieces)} pieces are not complete: submit them again.")
         quiet_libraries()
         with held_folder(partial), failures_explained(out, partial):
+            if is_done(partial / _MERGED):  # this job was killed while clearing away, and has begun again
+                clear_away(partial)
+                return _result(self.plan, out)
             return _complete(self.plan, partial, out, self.overwrite)
+
+
+def _result(plan: RenderPlan, out: Path) -> RenderResult:
+    cameras = tuple(camera.name for camera in plan.cameras)
+    return RenderResult(out, len(plan.dataset.episodes), plan.num_frames, cameras)
 
 
 def _complete(plan: RenderPlan, partial: Path, out: Path, overwrite: bool) -> RenderResult:
@@ -228,7 +237,7 @@ def _complete(plan: RenderPlan, partial: Path, out: Path, overwrite: bool) -> Re
             "info": get_video_info(first, video_encoder=codec),
         }
     info = dict(plan.dataset.info)
-    info["features"] = new | {k: v for k, v in info["features"].items() if v["dtype"] not in ("video", "image")}
+    info["features"] = new | {k: v for k, v in info["features"].items() if not contract.is_picture(v)}
     info |= {
         "video_files_size_in_mb": VIDEO_FILE_MB,
         "video_path": "videos/{video_key}/chunk-{chunk_index:03d}/file-{file_index:03d}.mp4",
@@ -248,8 +257,7 @@ def _complete(plan: RenderPlan, partial: Path, out: Path, overwrite: bool) -> Re
     check_output(out, overwrite)  # somebody else's may have appeared meanwhile
     publish(merged, out, partial / "replaced")
     clear_away(partial)
-    cameras = tuple(camera.name for camera in plan.cameras)
-    return RenderResult(out, len(plan.dataset.episodes), plan.num_frames, cameras)
+    return _result(plan, out)
 
 
 def _place_videos(
@@ -279,7 +287,7 @@ def _place_videos(
 
 
 def _replace_entries(plan: RenderPlan, merged: Path, columns: Mapping[int, Mapping[str, Any]]) -> None:
-    old = [key for key, feature in plan.dataset.features.items() if feature["dtype"] in ("video", "image")]
+    old = [key for key, feature in plan.dataset.features.items() if contract.is_picture(feature)]
     prefixes = tuple(f"{kind}/{key}/" for key in old for kind in ("videos", "stats"))
     for file in sorted((merged / "meta" / "episodes").glob("*/*.parquet")):
         table = pq.ParquetFile(file).read()

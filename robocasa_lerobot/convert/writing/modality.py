@@ -34,7 +34,7 @@ def modality(
             vectors[kind] = {
                 name: {"original_key": key, "start": where.start, "end": where.stop} for name, where in known.items()
             }
-    cameras = [key for key, feature in features.items() if feature["dtype"] in ("video", "image")]
+    cameras = [key for key, feature in features.items() if contract.is_picture(feature)]
     column = _INSTRUCTION_COLUMN if _INSTRUCTION_COLUMN in features else "task_index"
     return vectors | {
         "video": {key.removeprefix(contract.IMAGE_PREFIX): {"original_key": key} for key in cameras},

@@ -16,6 +16,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
+from robocasa_lerobot import contract
 from robocasa_lerobot.convert.writing.encoder import QUANTILES, Histogram, num_sampled_pixels, unit_statistics
 
 _ROWS = 65_536  # read at a time
@@ -51,7 +52,7 @@ def dataset_statistics(
     """Statistics of every feature in LeRobot's layout: (k,) for numbers, (3, 1, 1) in [0, 1] for pictures."""
     stats = {}
     for key, feature in features.items():
-        if feature["dtype"] in ("video", "image"):
+        if contract.is_picture(feature):
             stats[key] = picture_statistics(histograms[key], feature["shape"])
         elif feature["dtype"] not in ("string", "language"):
             stats[key] = _column_statistics(root, key)

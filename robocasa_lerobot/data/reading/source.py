@@ -5,7 +5,6 @@ from __future__ import annotations
 import functools
 import hashlib
 import json
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -52,7 +51,9 @@ class DatasetSource:
         # dataset's table of subtasks means nothing in another. Nor who decided a step, for the first reason.
         apart = {contract.decision_key(name) for name in contract.DECISIONS}
         # Depth maps: no policy here takes pictures of distances.
-        self.depth = [key for key, feature in self._info.features.items() if _is_depth(feature)]
+        self.depth = [
+            key for key, ft in self._info.features.items() if contract.is_picture(ft) and contract.is_depth(ft)
+        ]
         self.features: dict[str, dict[str, Any]] = {
             key: _channels_last(feature)
             for key, feature in self._info.features.items()
@@ -165,22 +166,12 @@ class DatasetSource:
         return {key: value for key, value in self.__dict__.items() if key != "columns"}
 
 
-def is_image(feature: Mapping[str, Any]) -> bool:
-    """Whether a feature is pictures."""
-    return feature["dtype"] in ("video", "image")
-
-
-def _is_depth(feature: Mapping[str, Any]) -> bool:
-    about = feature.get("info") or {}
-    return is_image(feature) and bool(about.get("is_depth_map") or about.get("video.is_depth_map"))
-
-
 def _channels_last(feature: dict[str, Any]) -> dict[str, Any]:
     """A feature whose pictures have the shape (height, width, channels), as LeRobot writes them by default.
 
     Some datasets say (channels, height, width), and all pictures are handed out so, whatever is said.
     """
-    if not is_image(feature):
+    if not contract.is_picture(feature):
         return feature
     names, shape = [str(name).rstrip("s") for name in feature.get("names") or ()], list(feature["shape"])
     first = names[0] == "channel" if names else shape[0] == COLOURS and shape[2] != COLOURS

@@ -130,8 +130,7 @@ def build_scene(
 
 
 def tell(scene: Scene, task: SceneSpec) -> None:
-    """Word a scene's instruction anew, as of where its robot stands now."""
-    scene.words["side"] = scene.robot_pose.side
+    """Word a scene's instruction with the words that it has now."""
     scene.instruction = said(task.instruction, scene.words)
     scene.paraphrases = tuple(said(wording, scene.words) for wording in task.paraphrases)
 
@@ -175,8 +174,7 @@ def _attempt(
         openness=arranged.openness,
         robot=robot,
         robot_pose=pose,
-        instruction=said(task.instruction, words),
-        paraphrases=tuple(said(wording, words) for wording in task.paraphrases),
+        instruction="",
         choices=choices.values,
         words=words,
         initial=arranged.initial,
@@ -184,6 +182,7 @@ def _attempt(
         remembering=remembering,
         memory=Memory.of(model, kept),
     )
+    tell(scene, task)
     ask_for_room(scene)
     ask_for_rest(scene)
     return scene

@@ -75,6 +75,7 @@ def add_initial_noise(scene: Scene, noise: InitialNoise, task: SceneSpec) -> Non
         scene.robot_pose = pose
         if not touched(scene):
             if pose.side != start.side:
+                scene.words["side"] = pose.side
                 tell(scene, task)
             return
     scene.robot_pose = start
