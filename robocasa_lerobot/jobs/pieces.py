@@ -13,6 +13,7 @@ from robocasa_lerobot.jobs.ray import run_with_ray
 from robocasa_lerobot.progress import Bar
 
 _EXECUTOR = "executor"  # folder of completion markers
+_PROGRESS, _TOTAL = "progress", "total"
 Step = Callable[..., None]
 
 
@@ -90,22 +91,38 @@ def report_frames(partial: Path, rank: int, count: int) -> None:
     """Leave a piece's count of frames where the bar finds it; ends a worker whose parent was killed."""
     exit_if_orphaned()
     with contextlib.suppress(OSError):  # only for the eye
-        file = partial / "progress" / f"{rank:05d}"
+        file = partial / _PROGRESS / f"{rank:05d}"
         file.parent.mkdir(exist_ok=True)
         file.write_text(str(count))
+
+
+def share_done(partial: Path) -> float:
+    """The share of a work's frames that is done, 0 where nothing tells; asked from outside while it runs."""
+    folder = partial / _PROGRESS
+    with contextlib.suppress(OSError, ValueError):
+        total = int((folder / _TOTAL).read_text())
+        counts = (_count(path) for path in folder.iterdir() if path.name != _TOTAL)
+        return min(1.0, sum(counts) / total) if total else 0.0
+    return 0.0
+
+
+def _count(path: Path) -> int:
+    """What a piece has reported."""
+    with contextlib.suppress(OSError, ValueError):
+        return int(path.read_text())
+    return 0
 
 
 @contextlib.contextmanager
 def _progress_bar(pieces: int, partial: Path, num_frames: int, what: str) -> Iterator[None]:
     """A bar over frames, fed by the counts that the workers leave in files."""
-
-    def done(rank: int) -> int:
-        with contextlib.suppress(OSError, ValueError):
-            return int((partial / "progress" / f"{rank:05d}").read_text())
-        return 0
+    folder = partial / _PROGRESS
+    with contextlib.suppress(OSError):  # only for the eye
+        folder.mkdir(exist_ok=True)
+        (folder / _TOTAL).write_text(str(num_frames))
 
     def show() -> None:
-        bar.n = min(num_frames, sum(done(rank) for rank in range(pieces)))
+        bar.n = min(num_frames, sum(_count(folder / f"{rank:05d}") for rank in range(pieces)))
         bar.refresh()
 
     with Bar(total=num_frames, unit="frame", desc=what, smoothing=0.05) as bar:

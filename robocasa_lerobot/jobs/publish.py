@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import glob
 import os
 import platform
 import shutil
@@ -14,6 +15,7 @@ from robocasa_lerobot.errors import UserError
 from robocasa_lerobot.jobs.locks import LockHeldError, locked
 
 _LOCK, _DONE = "lock", "done"
+_PARTIAL = ".partial-"  # between an output's name and the fingerprint of the work on it
 
 
 def output_path(out: Path) -> Path:
@@ -59,7 +61,12 @@ def check_outside(out: Path, source: Path) -> None:
 
 def partial_folder(out: Path, fingerprint: str) -> Path:
     """Where the work is done: named by what decides its bytes, so that the same command finds it again."""
-    return out.with_name(f"{out.name}.partial-{fingerprint}")
+    return out.with_name(f"{out.name}{_PARTIAL}{fingerprint}")
+
+
+def partial_folders(out: Path) -> list[Path]:
+    """Where work on an output has been begun, by whatever settings."""
+    return sorted(out.parent.glob(f"{glob.escape(out.name)}{_PARTIAL}*"))
 
 
 @contextlib.contextmanager

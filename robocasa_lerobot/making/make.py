@@ -18,7 +18,8 @@ from robocasa_lerobot.demos.attempts import Parts, RecordingSettings
 from robocasa_lerobot.demos.hdf5 import read_summary
 from robocasa_lerobot.files import write_text
 from robocasa_lerobot.jobs.executors import Execution
-from robocasa_lerobot.jobs.publish import held_folder
+from robocasa_lerobot.jobs.pieces import share_done
+from robocasa_lerobot.jobs.publish import held_folder, partial_folders
 from robocasa_lerobot.making.needs import WORK, Need
 from robocasa_lerobot.making.pieces import Outcome, run_pieces
 
@@ -29,6 +30,7 @@ _PRELOAD = ("robocasa_lerobot.envs.kitchen_env", "robocasa_lerobot.convert.shard
 SOURCES, SOURCE_SEEDS = "sources", 50_000_000  # folder of those that are multiplied, and how far off their seeds are
 _REASON = "reason.txt"
 _HALF = 0.5  # of the work on a dataset is recording, half drawing and encoding
+_DRAWN = 0.99  # of the latter comes before the pieces are joined
 
 
 @dataclass(frozen=True)
@@ -63,14 +65,15 @@ class MadeDataset:
         return sum(need.demonstrations or 0 for need in (self.need, *self.drawn))
 
     def done(self) -> float:
-        """Demonstrations that are recorded count half until their dataset is there."""
-        count = sum(need.demonstrations or 0 for need in (self.need, *self.drawn) if not self._lacks(need))
-        if not self._lacks(self.need):
-            return count
+        """Demonstrations that are recorded count half, and more as their pictures are drawn."""
+        lacking = [need for need in (self.need, *self.drawn) if self._lacks(need)]
+        count = float(self.size - sum(need.demonstrations or 0 for need in lacking))
+        if self.need not in lacking:
+            return count + sum((need.demonstrations or 0) * _share_drawn(need) for need in lacking)
         settings = recording_settings(self.need)
         folder = self._instead if self._instead.exists() else self.work
         if (folder / f"{settings.task}.hdf5").exists():
-            return _HALF * settings.episodes
+            return _HALF * settings.episodes * (1.0 + _share_drawn(self.need))
         try:
             names = os.listdir(Parts(folder, settings).folder)  # noqa: PTH208 names will do, and there may be thousands
         except FileNotFoundError:
@@ -223,6 +226,11 @@ def make_datasets(pieces: Sequence[MadeDataset], execution: Execution, cores: in
     if not outcome.submitted:
         _clear_empty(root / WORK)
     return outcome
+
+
+def _share_drawn(need: Need) -> float:
+    """How much of a dataset that is being converted or drawn has been, never all: it is not there yet."""
+    return _DRAWN * max(map(share_done, partial_folders(need.root)), default=0.0)
 
 
 def _other_number(file: Path, episodes: int) -> bool:

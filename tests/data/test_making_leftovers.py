@@ -16,7 +16,9 @@ from ray_support import StandIn
 from robocasa_lerobot import cli
 from robocasa_lerobot.demos.attempts import Parts
 from robocasa_lerobot.jobs.executors import Execution, RaySettings, SlurmSettings
-from robocasa_lerobot.jobs.publish import held_folder
+from robocasa_lerobot.jobs.pieces import report_frames
+from robocasa_lerobot.jobs.pieces import run_pieces as run_frames
+from robocasa_lerobot.jobs.publish import held_folder, partial_folder
 from robocasa_lerobot.making.make import SOURCES, MadeDataset, pieces_of, recording_settings
 from robocasa_lerobot.making.needs import needs_of
 from robocasa_lerobot.making.pieces import run_pieces
@@ -155,3 +157,26 @@ def test_a_killed_making_does_not_block_one_of_another_number(
     assert cli.main(command) == 0, capsys.readouterr().out
     info = json.loads(Path("datasets/kitchens/pretrain/human/CloseDrawer/meta/info.json").read_text())
     assert info["total_episodes"] == 1
+
+
+def test_a_dataset_counts_half_when_it_is_recorded_and_more_as_it_is_drawn(tmp_path: Path) -> None:
+    piece = piece_of(experiment(tmp_path, "human"))
+    need = piece.need
+    assert piece.done() == 0.0
+    settings = recording_settings(need)
+    piece.work.mkdir(parents=True)
+    (piece.work / f"{settings.task}.hdf5").touch()
+    assert piece.done() == settings.episodes / 2
+    need.root.parent.mkdir(parents=True, exist_ok=True)
+    partial = partial_folder(need.root, "0123")
+    seen = []
+
+    def convert(data: None, rank: int = 0, world_size: int = 1) -> None:
+        report_frames(partial, rank, 10)
+        seen.append(piece.done())
+
+    with held_folder(partial):
+        run_frames(convert, 4, partial, Execution(), 1, 40, "converting", int, "json")
+    half = settings.episodes / 2
+    assert seen == pytest.approx([half + half * 0.99 * share for share in (0.25, 0.5, 0.75, 1.0)])
+    assert seen[-1] < settings.episodes  # the dataset is not there
