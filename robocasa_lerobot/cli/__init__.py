@@ -13,6 +13,7 @@ from types import ModuleType
 
 from robocasa_lerobot import __version__
 from robocasa_lerobot.errors import UserError, suggest
+from robocasa_lerobot.jobs.workers import check_workers
 
 # Errors of a path that the user gave.
 _NAMED = (FileExistsError, FileNotFoundError, IsADirectoryError, NotADirectoryError, PermissionError)
@@ -112,6 +113,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     try:
         if unknown:
             args.settings = unknown
+        check_workers(getattr(args, "workers", None))
         return int(args.run(args) or 0)
     except UserError as error:
         print(f"robocasa-lerobot {name}: {error}", file=sys.stderr)

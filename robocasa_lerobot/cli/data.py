@@ -78,8 +78,6 @@ def run(args: argparse.Namespace) -> int:
     if (args.replace or args.keep_recordings) and not args.make:
         raise UserError("--replace and --keep-recordings are for --make.")
     execution = execution_of(args)
-    if args.workers is not None and args.workers < 1:
-        raise UserError(f"--workers is {args.workers}, expected at least 1.")
     cores = args.workers or cores_here()
     needs: list[Need] | None = None
     if args.experiment is not None:

@@ -30,7 +30,9 @@ def configure(parser: argparse.ArgumentParser) -> None:
         metavar="DIR",
         help="where their meshes lie",
     )
-    parser.add_argument("--fresh", action="store_true", help="prepare again what is prepared already")
+    parser.add_argument(
+        "--fresh", action="store_true", help="prepare again what is prepared already (with --bodies always)"
+    )
 
 
 def run(args: argparse.Namespace) -> int:

@@ -54,9 +54,8 @@ def run(args: argparse.Namespace) -> int:
     from robocasa_lerobot.errors import UserError
     from robocasa_lerobot.study.settings import load_study
 
-    for name in ("seeds", "workers"):
-        if getattr(args, name) is not None and getattr(args, name) < 1:
-            raise UserError(f"--{name} is {getattr(args, name)}, expected at least 1.")
+    if args.seeds is not None and args.seeds < 1:
+        raise UserError(f"--seeds is {args.seeds}, expected at least 1.")
     study = load_study(args.config_path)
     parts = study.chosen(args.parts, args.seeds)
 

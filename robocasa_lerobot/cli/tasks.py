@@ -7,7 +7,7 @@ import json
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from robocasa_lerobot.jobs.workers import check_workers, cores_here
+from robocasa_lerobot.jobs.workers import cores_here
 
 if TYPE_CHECKING:
     from robocasa_lerobot.envs.tasks.task import Task
@@ -53,7 +53,6 @@ def run(args: argparse.Namespace) -> int:
     from robocasa_lerobot.gallery.task_pages import page, pages
 
     tasks = _chosen(args)
-    check_workers(args.workers)
     if args.check:
         if args.seeds < 1:
             raise UserError(f"--seeds {args.seeds}: --check needs at least one seed.")

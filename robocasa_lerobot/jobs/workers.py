@@ -26,7 +26,7 @@ def check_workers(asked: int | None) -> None:
         UserError: fewer than one was asked for.
     """
     if asked is not None and asked < 1:
-        raise UserError(f"{asked} workers: at least 1 is needed.")
+        raise UserError(f"--workers is {asked}, expected at least 1.")
 
 
 def num_workers(asked: int | None, pieces: int, work: int, least_work: int) -> int:

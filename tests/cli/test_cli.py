@@ -46,6 +46,19 @@ def test_example_parses(name: str) -> None:
             assert (REPOSITORY / path).is_file(), f"{path} of the example does not exist"
 
 
+def test_no_command_takes_a_number_of_workers_that_does_nothing(capsys: pytest.CaptureFixture[str]) -> None:
+    asked = []
+    for name in cli.SUBCOMMANDS:
+        parser = cli.build_parser([name])
+        example = str(sys.modules[cli.SUBCOMMANDS[name].module].EXAMPLE).splitlines()[0]  # type: ignore[attr-defined]
+        words = example.split("#")[0].split()[1:]
+        if hasattr(parser.parse_known_args(words)[0], "workers"):
+            asked.append(name)
+            assert cli.main([*words, "--workers", "0"]) == 2
+            assert "--workers is 0, expected at least 1" in capsys.readouterr().err
+    assert {"demos", "convert", "replay", "prepare", "gallery", "inspect", "study"} <= set(asked)
+
+
 def test_no_command_lists_them(capsys: pytest.CaptureFixture[str]) -> None:
     assert cli.main([]) == 0
     shown = capsys.readouterr().out

@@ -106,6 +106,7 @@ def test_a_label_with_a_slash_is_one_folder_of_films_and_one_file_of_rates(tmp_p
     ("fault", "words", "outcome"),
     [
         ("crash", "RuntimeError: the block fell off", "crashed"),
+        ("pipe", "BrokenPipeError: the env's own simulator ended", "crashed"),
         ("diverge", "DivergedError: the simulation diverged", "diverged"),
         ("kill", "ended with exit status 7", "crashed"),
         ("hang", "no progress for 2 s", "hung"),

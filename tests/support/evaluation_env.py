@@ -96,6 +96,8 @@ class SlideEnv(gymnasium.Env):
     def _happen(self, kind):
         if kind == "crash":
             raise RuntimeError("the block fell off")
+        if kind == "pipe":
+            raise BrokenPipeError("the env's own simulator ended")
         if kind == "diverge":
             from robocasa_lerobot.envs.robots.control_step import DivergedError
 

@@ -84,10 +84,14 @@ def worker_main(
         connection.send(Ready())
         while (spec := connection.recv()) is not None:
             connection.send(worker.run(spec))
-    except (EOFError, BrokenPipeError, ConnectionResetError):
+    except (EOFError, BrokenPipeError, ConnectionResetError, _OrphanedError):
         pass  # The parent is gone: nobody waits for this worker any more.
     finally:
         worker.close_env()
+
+
+class _OrphanedError(Exception):
+    """Nobody listens any more. Of a type of its own: pipes of a user's env break too, which is a failed trial."""
 
 
 class _Worker:
@@ -118,7 +122,7 @@ class _Worker:
                     outcome = run_trial(env, policy, spec, film, self._alive, rule)
             else:
                 outcome = run_trial(env, policy, spec, None, self._alive, rule)
-        except (EOFError, BrokenPipeError, ConnectionResetError):
+        except _OrphanedError:
             raise
         except (BatchingError, FilmError, NoPicturesError, UnfitEnvError, UnfitPolicyError) as error:
             return Refused(str(error))
@@ -145,8 +149,11 @@ class _Worker:
             if isinstance(actor, RemoteActor):
                 actor.close()
 
-    def _alive(self, step: int) -> None:
-        self._connection.send(Alive(step))
+    def _alive(self, step: int, loads: bool = False) -> None:
+        try:
+            self._connection.send(Alive(step, loads))
+        except (BrokenPipeError, ConnectionResetError) as error:
+            raise _OrphanedError from error
 
     def _policy_of(self, label: str) -> Actor | Refused:
         if self._policy is None or self._policy[0] != label:
@@ -163,9 +170,11 @@ class _Worker:
 
                     torch.set_num_threads(settings.threads)
                 waiting = partial(self._alive, -1)
-                self._connection.send(Alive(loads=True))
+                self._alive(-1, loads=True)
                 actor = load_actor(source, settings.device, settings.executed_steps, settings.width, waiting)
                 self._alive(-1)
+            except _OrphanedError:
+                raise
             except LostError as error:
                 return Refused(
                     f"policy {label!r} cannot be asked any more: {error}. What has been recorded stays; start the "
