@@ -97,7 +97,7 @@ bench-convert: $(STAMP)  ## our converter beside LeRobot's and the official one,
 bench-grasps: $(STAMP)  ## which objects a gripper can lift: every instance, the best of 16 poses
 	$(BIN)/python benchmarks/grasps.py $(BENCH_ARGS)
 
-# Goes on where it was stopped. BENCH_ARGS='--first-seed 500000' goes on with the committed result, `--tasks OpenDrawer --fresh` beside it runs a task again, `--seeds N` takes N of each split.
+# Goes on with the committed result; BENCH_ARGS='--tasks OpenDrawer --fresh' runs a task again, `--seeds N` makes N of each split.
 bench-demonstrators: $(STAMP)  ## how often and how fast each demonstrator solves its task
 	$(BIN)/python benchmarks/demonstrators.py $(BENCH_ARGS)
 

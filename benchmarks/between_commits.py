@@ -112,7 +112,11 @@ def parse(arguments: Sequence[str] | None = None) -> argparse.Namespace:
     parser.add_argument("--repetitions", type=int, default=5, help="of each side (default 5)")
     parser.add_argument("--kinds", default=",".join(KINDS), help="default: all")
     parser.add_argument("--out", type=Path, default=OUTPUT, help="result")
-    return parser.parse_args(arguments)
+    options = parser.parse_args(arguments)
+    options.kinds = options.kinds.split(",")
+    if unknown := set(options.kinds) - set(KINDS):
+        parser.error(f"no kind {', '.join(sorted(unknown))}: there are {', '.join(KINDS)}")
+    return options
 
 
 def timed_run(checkout: Path, command: Sequence[str]) -> tuple[str, float]:
@@ -232,7 +236,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     with tempfile.TemporaryDirectory() as folder:
         scratch = Path(folder)
         before = common.unpack(options.before, scratch / "checkout")
-        found = measure(before, scratch, options.kinds.split(","), options.repetitions)
+        found = measure(before, scratch, options.kinds, options.repetitions)
     medians = {kind: {side: statistics.median(values) for side, values in row.items()} for kind, row in found.items()}
     ratios = {f"{kind}_now_to_before": round(row["now"] / row["before"], 4) for kind, row in medians.items()}
     lines = [

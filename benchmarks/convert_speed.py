@@ -337,6 +337,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         renderer = gl.probe(backend).renderer if backend in gl.HEADLESS_BACKENDS else backend
         effort = QUICK if options.quick else FULL
         sections = chosen_sections(options.only, output)
+        if options.only and options.without_peer and "lift" in sections:
+            raise UserError("--only lift --without-peer: the section is ours beside the peer; leave one of both out.")
         peer = not options.without_peer and "lift" in sections
         memory = not options.without_memory and options.only is None
         body = measure(effort, options.work.absolute(), peer, memory, sections)

@@ -1,6 +1,7 @@
 """The demonstrators: how often each solves its task in kitchens it was not made on, and how long it takes.
 
-Seeds from 610,000 on in both splits: nothing was chosen by them. Every trial is a line of
+The seeds are those of the result that is there, or from 610,000 on, in both splits: nothing was chosen by them.
+Every trial is a line of
 `outputs/demonstrators.jsonl`, so that a run can be stopped and continued; the result holds all trials that are there.
 They are kept beside it (`.trials.gz`), where a checkout without such a file begins. A trial says which declaration and
 which code of skills it was made with: the same command makes those again for which that has changed, and no others.
@@ -59,7 +60,9 @@ def parse(arguments: Sequence[str] | None = None) -> argparse.Namespace:
     parser.add_argument("--tasks", default="all", help="names or sets separated by commas (default: all)")
     parser.add_argument("--seeds", type=int, default=20, help="seeds in each split (default 20)")
     parser.add_argument("--splits", default=",".join(SPLITS), help="default: both")
-    parser.add_argument("--first-seed", type=int, default=FIRST_SEED, help=f"default {FIRST_SEED}")
+    parser.add_argument(
+        "--first-seed", type=int, help=f"default: that of the result that is there, or {FIRST_SEED} where there is none"
+    )
     parser.add_argument("--action-noise", type=float, default=0.0, help="as of `demos` (default 0)")
     parser.add_argument("--plain", action="store_true", help="without variety of speed, paths and grasps")
     parser.add_argument("--workers", type=int, default=os.cpu_count() or 1, help="processes (default: all cores)")
@@ -67,7 +70,11 @@ def parse(arguments: Sequence[str] | None = None) -> argparse.Namespace:
     parser.add_argument("--report", action="store_true", help="run nothing: result and picture of what is there")
     parser.add_argument("--trials", type=Path, default=TRIALS, help="file of finished trials")
     parser.add_argument("--out", type=Path, default=OUTPUT, help="result; the picture lies beside it")
-    return parser.parse_args(arguments)
+    options = parser.parse_args(arguments)
+    if options.first_seed is None:
+        there = json.loads(options.out.read_text(encoding="utf-8")) if options.out.is_file() else {}
+        options.first_seed = there.get("settings", {}).get("first_seed", FIRST_SEED)
+    return options
 
 
 def attempt(key: Key, workers: int, commit: str) -> Trial:
@@ -206,8 +213,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(f"{len(able)} of {len(names)} tasks have a demonstrator; {len(todo)} of {len(jobs)} trials to make")
         if todo:
             run(todo, options.trials, options.workers)
-    wanted = {(split, seed) for split in splits for seed in seeds}
-    found = [t for t in read_trials(options.trials).values() if t.key[3:] == how and (t.split, t.seed) in wanted]
+    # All that are there, also of seeds and splits that were not asked for this time.
+    found = [t for t in read_trials(options.trials).values() if t.key[3:] == how and t.seed >= options.first_seed]
     trials = [trial for trial in found if is_current(trial)]
     if len(trials) < len(found):
         print(f"{len(found) - len(trials)} trials were made with other skills or declarations, and do not count")
@@ -215,7 +222,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     body = {
         "machine": common.machine(),
         "versions": common.versions("mujoco", "numpy"),
-        "settings": {**settings, "seeds_per_split": options.seeds, "splits": list(splits)},
+        "settings": {
+            **settings,
+            "seeds_per_split": len({trial.seed for trial in trials}),
+            "splits": [split for split in SPLITS if any(trial.split == split for trial in trials)],
+        },
         "trials": len(trials),
         "commits": {c: sum(t.commit == c for t in trials) for c in sorted({t.commit for t in trials})},
         "ratios": ratios(tasks),

@@ -54,9 +54,15 @@ class Steps:
         self.done: dict[str, dict[str, Any]] = json.loads(self._path.read_text()) if self._path.exists() else {}
 
     def run(self, name: str, words: Sequence[str], accepted: tuple[int, ...] = (0,)) -> str:
-        """What a command printed; it is not run again where an earlier run has ended well."""
+        """What a command printed; it is not run again where an earlier run of the same has ended well."""
         step = self.done.setdefault(name, {"seconds": 0.0, "status": None, "printed": ""})
+        asked = _without_workers(words)
         if step["status"] in accepted:
+            if step.get("words") != asked:
+                raise SystemExit(
+                    f"{self._path} is of `{' '.join(step.get('words') or ['another command'])}`; this one is "
+                    f"`{' '.join(asked)}`. Give the same options again, or another --folder."
+                )
             return str(step["printed"])
         print("robocasa-lerobot", *words, flush=True)
         started = time.monotonic()
@@ -64,7 +70,7 @@ class Steps:
             done = subprocess.run(
                 [sys.executable, *CLI, *words], cwd=common.REPOSITORY, stdout=subprocess.PIPE, text=True, check=False
             )
-            step |= {"status": done.returncode, "printed": done.stdout}
+            step |= {"status": done.returncode, "printed": done.stdout, "words": asked}
         finally:
             step["seconds"] += round(time.monotonic() - started, 3)
             write_text(self._path, json.dumps(self.done, indent=1) + "\n")
@@ -72,6 +78,12 @@ class Steps:
         if done.returncode not in accepted:
             raise SystemExit(f"robocasa-lerobot {words[0]} ended with status {done.returncode}.")
         return done.stdout
+
+
+def _without_workers(words: Sequence[str]) -> list[str]:
+    """The words that decide what comes of a command."""
+    where = words.index("--workers") if "--workers" in words else len(words)
+    return [*words[:where], *words[where + 2 :]]
 
 
 def walk(args: argparse.Namespace, steps: Steps) -> dict[str, Any]:

@@ -245,7 +245,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     trials = [done[job.key] for job in jobs]
     body = {
         "ratios": ratios(trials),
-        "arms": {arm: summary([trial for trial in trials if trial.arm == arm]) for arm in arms},
+        "arms": {arm: summary(own) for arm in arms if (own := [trial for trial in trials if trial.arm == arm])},
         "settings": {"attempts": arms, "first_seed": args.first_seed, "split": "pretrain"},
         "commits": sorted({trial.commit for trial in trials}),
         "machine": common.machine(),

@@ -159,7 +159,7 @@ class Work:
     def _record(self, part: int) -> None:
         """Demonstrations for one more process, each file with seeds of its own."""
         command = [*CLI, "demos", f"--tasks={DEMONSTRATED}", f"--episodes={EPISODES}", f"--out={self._demos(part)}"]
-        run(common.REPOSITORY, [*command, f"--seed={part}", "--workers=1"])
+        run(common.REPOSITORY, [*command, f"--seed={SEEDS_APART * part}", "--workers=1"])
 
     def _convert(self, processes: int) -> Done:
         files = [str(self._demos(part) / f"{DEMONSTRATED}.hdf5") for part in range(1, processes + 1)]

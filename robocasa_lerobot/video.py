@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robocasa_lerobot import contract
+from robocasa_lerobot.errors import UserError
 
 # Pictures smaller than this are enlarged by a whole factor, so that a film of a policy with small inputs can be seen.
 MIN_HEIGHT = 128
@@ -102,9 +103,25 @@ def read_frames(path: Path, indices: Sequence[int]) -> list[NDArray[np.uint8]]:
     return [found[index] for index in indices if index in found]
 
 
+class DamagedVideoError(UserError):
+    """A video that cannot be read to its end, as one that was copied in part."""
+
+
 def spread_frames(path: Path, count: int) -> list[tuple[float, NDArray[np.uint8]]]:
-    """At most `count` evenly spaced frames (H, W, 3), the first and the last among them, each with its second."""
-    total, rate = frames_and_rate(path)
-    count = min(count, total)
-    indices = sorted({round(place * (total - 1) / max(1, count - 1)) for place in range(count)})
-    return [(index / rate, picture) for index, picture in zip(indices, read_frames(path, indices), strict=True)]
+    """At most `count` evenly spaced frames (H, W, 3), the first and the last among them, each with its second.
+
+    Raises:
+        DamagedVideoError: it has fewer frames than it says, or is no video.
+    """
+    import av
+
+    try:
+        total, rate = frames_and_rate(path)
+        count = min(count, total)
+        indices = sorted({round(place * (total - 1) / max(1, count - 1)) for place in range(count)})
+        pictures = read_frames(path, indices)
+    except (av.FFmpegError, IndexError) as error:
+        raise DamagedVideoError(f"{path} cannot be read as a video: {error}") from error
+    if len(pictures) < len(indices):
+        raise DamagedVideoError(f"{path} ends before its last frame: was it copied in part?")
+    return [(index / rate, picture) for index, picture in zip(indices, pictures, strict=True)]

@@ -58,11 +58,16 @@ def make_env(
     cameras: str = "agentview,robot0_eye_in_hand",
     demos: str | None = None,
     by: str = "actions",
+    terminate_on_success: bool = True,
 ) -> RobosuiteEnv:
     """An env of robosuite; with `demos` that of its human demonstrations, whose robot is the Panda."""
+    names = cameras.split(",")
     if demos is not None:
-        return RecordedEnv(task, "Panda", horizon, image_size or 256, cameras.split(","), demos, by)
-    return RobosuiteEnv(task, robot, horizon or HORIZON, image_size or 256, cameras.split(","))
+        env: RobosuiteEnv = RecordedEnv(task, "Panda", horizon, image_size or 256, names, demos, by)
+    else:
+        env = RobosuiteEnv(task, robot, horizon or HORIZON, image_size or 256, names)
+    env.terminate_on_success = terminate_on_success
+    return env
 
 
 class RobosuiteEnv:
@@ -80,7 +85,7 @@ class RobosuiteEnv:
 
     def __init__(self, task: str, robot: str, horizon: int, size: int, cameras: list[str]) -> None:
         self.task, self.horizon = task, horizon
-        self.render_observations = True
+        self.render_observations = self.terminate_on_success = True
         self.task_description = INSTRUCTIONS[task]
         self._robot, self._size, self._cameras = robot, size, cameras
         self._env: Any = None
@@ -88,6 +93,9 @@ class RobosuiteEnv:
         self._ours = robot == "PandaOmron"
         self._order = _action_order(self._env) if self._ours else np.arange(self._env.action_dim)
         self.action_space = Space(self._env.action_dim)
+
+    def _ends(self, info: dict[str, Any]) -> bool:
+        return bool(info["is_success"]) and self.terminate_on_success
 
     def reset(self, seed: int) -> tuple[dict[str, Any], dict[str, Any]]:
         self._make(seed)
@@ -99,7 +107,7 @@ class RobosuiteEnv:
         seen, reward, _, _ = self._env.step(np.asarray(action, np.float64)[self._order])
         self._steps += 1
         info = self._info(seen)
-        return self._observe(seen), float(reward), info["is_success"], self._steps >= self.horizon, info
+        return self._observe(seen), float(reward), self._ends(info), self._steps >= self.horizon, info
 
     def expert_action(self) -> Any:
         """The scripted reach's next action."""

@@ -15,6 +15,8 @@ EXAMPLE = (
     "--out generated/"
 )
 
+_OF_CONTACTS = ("base", "bridge", "select", "spread", "cap")
+
 
 def configure(parser: argparse.ArgumentParser) -> None:
     """Add the arguments."""
@@ -35,26 +37,26 @@ def configure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--template", type=Path, metavar="JSON", help="of --method mimicgen: one of its templates (default: derived)"
     )
-    parser.add_argument("--base", choices=("replan", "copy", "fixed"), default="replan", help="where the robot stands")
-    parser.add_argument("--bridge", choices=("plan", "line"), default="plan", help="how segments are joined")
-    parser.add_argument(
+    contacts = parser.add_argument_group("of --method contacts")
+    contacts.add_argument(
+        "--base", choices=("replan", "copy", "fixed"), help="where the robot stands (default: replan)"
+    )
+    contacts.add_argument("--bridge", choices=("plan", "line"), help="how segments are joined (default: plan)")
+    contacts.add_argument(
         "--select",
         choices=("feasible", "random", "nearest_object", "nearest_robot"),
-        default="feasible",
-        help="which source a segment is taken from (default: %(default)s)",
+        help="which source a segment is taken from (default: feasible)",
     )
-    parser.add_argument(
+    contacts.add_argument(
         "--spread",
         type=float,
-        default=0.3,
-        help="how evenly sources are used: cost that each has at random in an attempt (default: %(default)s)",
+        help="how evenly sources are used: cost that each has at random in an attempt (default: 0.3)",
     )
-    parser.add_argument(
+    contacts.add_argument(
         "--cap",
         type=float,
-        default=0.2,
         metavar="SHARE",
-        help="of the segments that one source should have at most; 1 takes whichever fits best (default: %(default)s)",
+        help="of the segments that one source should have at most; 1 takes whichever fits best (default: 0.2)",
     )
     parser.add_argument(
         "--first-sources",
@@ -85,6 +87,14 @@ def run(args: argparse.Namespace) -> int:
     rules = json.dumps({verb: asdict(rule) for verb, rule in read_rules(args.rules).items()} if args.rules else {})
     if args.template and args.method != "mimicgen":
         raise UserError("--template says what MimicGen's subtasks are: give --method mimicgen too.")
+    of_contacts = {name: value for name in _OF_CONTACTS if (value := getattr(args, name)) is not None}
+    if of_contacts and args.method != "contacts":
+        raise UserError(f"--{next(iter(of_contacts))} is of --method contacts; {args.method} has none to choose.")
+    if args.rules and (args.template or args.method == "replay"):
+        other = "--template says where subtasks end" if args.template else "--method replay cuts nothing"
+        raise UserError(f"--rules are for what is cut into segments: {other}.")
+    if args.out.resolve() == args.source.resolve():
+        raise UserError(f"--out is the folder of the sources: {args.out}. Choose another one.")
     template = json.dumps(read_json_template(args.template)) if args.template else ""
     settings = [
         GenerationSettings.of(
@@ -102,13 +112,9 @@ def run(args: argparse.Namespace) -> int:
             varied=False,
             method=args.method,
             template=template,
-            base=args.base,
-            bridge=args.bridge,
-            select=args.select,
-            spread=args.spread,
-            cap=args.cap,
             first_sources=args.first_sources,
             rules=rules,
+            **of_contacts,
         )
         for name in expand_names(args.tasks)
     ]

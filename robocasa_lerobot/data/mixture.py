@@ -188,9 +188,9 @@ class MixtureDataset(torch.utils.data.Dataset[Item]):
         Without `images`, of the numbers alone. With a cache folder they are computed once for all processes.
         """
         if self._cache_dir is None:
-            found = pooled_statistics(self._parts(), images)
+            found = pooled_statistics(self._parts(), images, self._unseen)
         else:
-            found = cached_statistics(self._parts(), self._cache_dir, images)
+            found = cached_statistics(self._parts(), self._cache_dir, images, self._unseen)
         return {key: value for key, value in found.items() if key not in self._unseen}
 
     def _parts(self) -> list[Part]:
@@ -235,7 +235,8 @@ class MixtureDataset(torch.utils.data.Dataset[Item]):
     def cached_bytes(self) -> dict[Path, int]:
         """Bytes on disk of each dataset's pictures, once they are decoded; none where they are no video."""
         keys = self.meta.camera_keys
-        if any(self.meta.features[key]["dtype"] != "video" for key in keys) or not keys:
+        videos = (source.features[key]["dtype"] == "video" for source in self.sources.values() for key in keys)
+        if not keys or not all(videos):
             return {}
         size = self._picture_size or self._feature_size()
         return {root: cache_bytes(source, keys, size) for root, source in self.sources.items()}
@@ -331,6 +332,16 @@ class MixtureDataset(torch.utils.data.Dataset[Item]):
         return np.clip(wanted, first, last), (wanted < first) | (wanted > last)
 
 
+def check_share(batch_size: int, processes: int) -> None:
+    """Whether processes can have equal shares of the samples that go through the policy at once.
+
+    Raises:
+        UserError: they cannot.
+    """
+    if batch_size % processes:
+        raise UserError(f"batch of {batch_size} samples cannot be shared by {processes} processes; use a multiple.")
+
+
 class StepBatches(torch.utils.data.Dataset[Item]):
     """Item i is the i-th batch of a phase for this process: what a loader needs to start anywhere.
 
@@ -341,8 +352,7 @@ class StepBatches(torch.utils.data.Dataset[Item]):
     def __init__(
         self, dataset: MixtureDataset, sampler: MixtureSampler, batch_size: int, rank: int = 0, processes: int = 1
     ) -> None:
-        if batch_size % processes:
-            raise UserError(f"batch of {batch_size} samples cannot be shared by {processes} processes; use a multiple.")
+        check_share(batch_size, processes)
         self.dataset, self.sampler = dataset, sampler
         self.batch_size, self._share, self._rank = batch_size, batch_size // processes, rank
 

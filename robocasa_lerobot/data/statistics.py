@@ -8,7 +8,7 @@ from __future__ import annotations
 import hashlib
 import json
 import sys
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -57,14 +57,14 @@ class Part:
                 yield {key: column[at : min(at + _BLOCK, int(last))] for key, column in columns.items()}
 
 
-def pooled_statistics(parts: Sequence[Part], images: bool = True) -> Statistics:
+def pooled_statistics(parts: Sequence[Part], images: bool = True, unseen: Collection[str] = ()) -> Statistics:
     """Statistics over the episodes of all parts.
 
     Numbers: mean and standard deviation (population) of all frames by weight, exact extremes, and quantiles of
     all frames by weight (inverse of the distribution function), each of shape (dim,). Images, unless left out: mean,
     standard deviation and extremes pooled from the statistics that the dataset holds for each episode, shape
     (3, 1, 1), values in [0, 1]; they have no quantiles, because those of a union do not follow from those of its parts.
-    Of a camera that not all datasets have there are none: nothing is seen of it.
+    Of a camera that not all datasets have, or that is among `unseen`, there are none: nothing is seen of it.
 
     Raises:
         UserError: a dataset has no statistics of its images, or a number that is not finite.
@@ -73,7 +73,7 @@ def pooled_statistics(parts: Sequence[Part], images: bool = True) -> Statistics:
     columns: dict[str, _Column] = {}
     for key, feature in parts[0].source.features.items():
         if contract.is_picture(feature):
-            if images and all(key in part.source.features for part in parts):
+            if images and key not in unseen and all(key in part.source.features for part in parts):
                 out[key] = _image_statistics(key, parts)
         elif has_statistics(key, feature):
             columns[key] = _Column(int(np.prod(feature["shape"])), str(feature["dtype"]))
@@ -100,9 +100,12 @@ def has_statistics(key: str, feature: Mapping[str, Any]) -> bool:
     return key not in BOOKKEEPING and str(feature["dtype"]).startswith(("float", "int", "uint", "bool"))
 
 
-def cached_statistics(parts: Sequence[Part], folder: Path, images: bool = True) -> Statistics:
+def cached_statistics(
+    parts: Sequence[Part], folder: Path, images: bool = True, unseen: Collection[str] = ()
+) -> Statistics:
     """`pooled_statistics`, kept in `folder`: of several processes one computes, the others read."""
-    digest = hashlib.sha256(json.dumps([FORMAT, images]).encode())
+    left_out = [sorted(unseen)] if unseen else []
+    digest = hashlib.sha256(json.dumps([FORMAT, images, *left_out]).encode())
     for part in parts:
         digest.update(part.source.fingerprint.encode() + part.episodes.tobytes())
         digest.update(np.float64(part.probability).tobytes())
@@ -110,7 +113,7 @@ def cached_statistics(parts: Sequence[Part], folder: Path, images: bool = True) 
     path = folder / f"statistics_{digest.hexdigest()[:16]}.json"
     with locked(path.with_suffix(".lock"), wait=True):
         if not path.is_file():
-            stats = pooled_statistics(parts, images)
+            stats = pooled_statistics(parts, images, unseen)
             text = {key: {name: v.tolist() for name, v in values.items()} for key, values in stats.items()}
             write_text(path, json.dumps(text))
     stored = json.loads(path.read_text())

@@ -39,6 +39,14 @@ _ENOUGH_FOR_A_RATE = 10
 CLEAN_ACTION = contract.DECISIONS[3]
 
 
+class BrokenAttemptError(Exception):
+    """An attempt that raised, with what is known of it: see `Failure`."""
+
+    def __init__(self, cause: Exception, scene: int | None, segments: tuple[tuple[str, str], ...]) -> None:
+        self.scene, self.segments = scene, segments
+        super().__init__(f"{type(cause).__name__}: {cause}")
+
+
 @dataclass(frozen=True)
 class RecordingSettings:
     """What a file of demonstrations is made from.
@@ -103,6 +111,9 @@ class RecordingSettings:
     def limit(self) -> int:
         """The greatest number of attempts."""
         return self.episodes * MAX_ATTEMPTS_PER_EPISODE
+
+    def check_ready(self) -> None:
+        """Whether what attempts need besides a seed is there; what is raised ends the run, and is no failed attempt."""
 
     def record(self, env: KitchenEnv, seed: int) -> Recording:
         """Make the attempt of a seed."""
@@ -281,12 +292,15 @@ class Parts:
         """
         exit_if_orphaned()
         settings = self.settings
+        settings.check_ready()
         seed = settings.seed + number
         recording: Recording | None = None
         try:
             recording = settings.record(env, seed)
         except OF_THE_MACHINE:
             raise
+        except BrokenAttemptError as error:
+            failure = Failure(seed, str(error), scene=error.scene, segments=error.segments)
         except Exception as error:
             failure = Failure(seed, f"{type(error).__name__}: {error}")
         else:

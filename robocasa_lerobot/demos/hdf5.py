@@ -7,6 +7,7 @@ import json
 from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import h5py
@@ -103,6 +104,10 @@ def versions() -> dict[str, str]:
     return {"robocasa_lerobot_version": __version__, "mujoco_version": mujoco.__version__}
 
 
+# What generated demonstrations are made by, of recorded ones, whose settings are all among those of generated ones.
+RECORDED: Mapping[str, Any] = MappingProxyType({"method": None})
+
+
 def recorded_otherwise(found: Mapping[str, Any], settings: Mapping[str, Any], software: Mapping[str, str]) -> str:
     """What differs where recordings are to be gone on with, and what to give or install; empty where nothing does.
 
@@ -111,6 +116,7 @@ def recorded_otherwise(found: Mapping[str, Any], settings: Mapping[str, Any], so
         settings: of now.
         software: `versions` of now.
     """
+    settings = {**RECORDED, **settings}
     others = differing(found, {**settings, **software})
     remedy = "Give" if differing(found, settings) else "Install"
     return f"other settings ({others}). {remedy} those to go on with" if others else ""

@@ -12,7 +12,7 @@ from typing import Any
 
 from robocasa_lerobot.demos.attempts import Parts, RecordingSettings, Tally
 from robocasa_lerobot.demos.failures import remove_others
-from robocasa_lerobot.demos.hdf5 import Failure, merge_parts, read_summary
+from robocasa_lerobot.demos.hdf5 import RECORDED, Failure, merge_parts, read_summary
 from robocasa_lerobot.demos.progress import Board
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.errors import UserError, differing
@@ -191,7 +191,7 @@ def _recorded(path: Path, settings: RecordingSettings) -> RecordingResult:
         UserError: it was recorded with others.
     """
     summary = read_summary(path)
-    others = differing(summary.settings or {}, {**settings.identity(), "episodes": settings.episodes})
+    others = differing(summary.settings or {}, {**RECORDED, **settings.identity(), "episodes": settings.episodes})
     if others:
         raise UserError(
             f"{path} exists and was recorded with other settings ({others}). Remove it, or choose another --out."

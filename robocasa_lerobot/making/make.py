@@ -131,11 +131,10 @@ class MadeDataset:
 
         made = self._record(workers)
         self.need.root.parent.mkdir(parents=True, exist_ok=True)
+        if self.keep:  # before the dataset is there: after that nothing of it would be made again
+            made = _kept(made, self.need.root.with_name(f"{self.need.root.name}.hdf5"))
         conversion = ConversionSettings(image_size=_recipe(self.need).image_size)
         convert([made], self.need.root, conversion, workers, overwrite=self.replace)
-        if self.keep:
-            kept = self.need.root.with_name(f"{self.need.root.name}.hdf5")
-            shutil.move(made, kept)
 
     def _record(self, workers: int) -> Path:
         """The file of demonstrations: generated where the recipe has sources and it can be done, else recorded."""
@@ -231,6 +230,17 @@ def make_datasets(pieces: Sequence[MadeDataset], execution: Execution, cores: in
 def _share_drawn(need: Need) -> float:
     """How much of a dataset that is being converted or drawn has been, never all: it is not there yet."""
     return _DRAWN * max(map(share_done, partial_folders(need.root)), default=0.0)
+
+
+def _kept(made: Path, kept: Path) -> Path:
+    """The same recording at the place where it stays; one of before is replaced."""
+    aside = kept.with_name(f".{kept.name}")
+    aside.unlink(missing_ok=True)
+    try:
+        aside.hardlink_to(made)
+    except OSError:  # not all file systems have links
+        shutil.copyfile(made, aside)
+    return aside.replace(kept)
 
 
 def _other_number(file: Path, episodes: int) -> bool:

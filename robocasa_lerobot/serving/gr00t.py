@@ -146,9 +146,7 @@ class GrootServer:
             case "get_modality_config":
                 return encode(modality_config(self._host.served, self._version), "gr00t")
             case "reset":
-                options = data.get("options") if isinstance(data, Mapping) else None
-                for row, session in enumerate(self._sessions(client, 1)):
-                    session.begin(whole_number(_row_options(options or {}, row), "seed"))
+                self._reset(client, (data.get("options") if isinstance(data, Mapping) else None) or {})
                 return encode({}, "gr00t")
             case "get_action":
                 return encode(await self._get_action(client, data), "gr00t")
@@ -176,6 +174,16 @@ class GrootServer:
             return actions
         return [actions, {"number": [reply.number for reply in replies]}]
 
+    def _reset(self, client: bytes, options: Any) -> None:
+        """Begin a client's trials; a list of seeds says how many rows its batches have from now on."""
+        count = _listed(options, self._limits.clients)
+        sessions = self._sessions(client, count or 1)
+        rows = range(count or len(sessions))
+        seeds = [whole_number(_row_options(options, row), "seed") for row in rows]
+        del sessions[len(rows) :]
+        for session, seed in zip(sessions, seeds, strict=True):
+            session.begin(seed)
+
     def _sessions(self, client: bytes, count: int) -> list[Session]:
         """A client's sessions, one for each row of its batches."""
         own = self._clients.setdefault(client, _Client())
@@ -194,6 +202,17 @@ class GrootServer:
                 return
             if client not in self._busy:
                 del self._clients[client]
+
+
+def _listed(options: Any, most: int) -> int:
+    """How many rows the options are listed for; 0 where none is a list."""
+    values = [options.get(key) for key in _OPTIONS] if isinstance(options, Mapping) else []
+    lists = [value.tolist() if isinstance(value, np.ndarray) else value for value in values]
+    lengths = (len(one) for one in lists if isinstance(one, Sequence) and not isinstance(one, str | bytes))
+    count = max(lengths, default=0)
+    if count > most:
+        raise RequestError(f"options: found {count} rows, expected at most {most}.")
+    return count
 
 
 def _row_options(options: Mapping[Any, Any], row: int) -> dict[str, Any]:

@@ -5,9 +5,10 @@ from __future__ import annotations
 import csv
 import dataclasses
 import gzip
+import hashlib
 import io
 import json
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -16,6 +17,7 @@ from robocasa_lerobot.errors import UserError, differing
 from robocasa_lerobot.evaluation.records.results import UNPERTURBED, TrialRecord, read_results
 from robocasa_lerobot.files import write_text, written_aside
 from robocasa_lerobot.provenance import git_commit, machine, utc_now, versions
+from robocasa_lerobot.settings import load_yaml
 from robocasa_lerobot.study.runs import CPU, Run
 from robocasa_lerobot.study.strips import write_strips
 from robocasa_lerobot.training.config.experiment import PhaseConfig, load_experiment
@@ -123,6 +125,7 @@ def store(run: Run, results: Path) -> Path:
         "machine": machine(),
         "device": ", ".join(dict.fromkeys(devices)),
         "steps": {phase.name: phase.steps for phase in ended},
+        "evaluations": _evaluations(run.config.phases, {phase.name for phase in ended}),
         "training_hours": round(training / 3600, 3),
         "trial_hours_of_one_process": round(trying / 3600, 3),
         "ended": utc_now(),
@@ -156,12 +159,28 @@ def check_results(runs: Iterable[Run], results: Path) -> None:
 def stands_for(about: Mapping[str, Any], run: Run) -> bool:
     """Whether what was kept is of this run as it is now; a trial of it, shorter phases, or a CPU for a GPU are not.
 
+    Nor are other evaluations, as of more trials; what was kept before these were noted stands for any.
+
     Args:
         about: the content of `about.json`.
         run: as the study has it.
     """
     steps = {phase.name: phase.steps for phase in run.config.phases}
-    return not _others(about, run) and about["steps"].items() <= steps.items()
+    tried = _evaluations(run.config.phases, set(about["steps"]))
+    alike = about.get("evaluations", tried) == tried
+    return not _others(about, run) and about["steps"].items() <= steps.items() and alike
+
+
+def _evaluations(phases: Iterable[PhaseConfig], names: Collection[str]) -> dict[str, dict[str, str]]:
+    """Of phases of these names what each evaluation is: a name that changes with its file or its settings."""
+    return {
+        phase.name: {
+            one.name: hashlib.sha256(json.dumps([load_yaml(one.file), one.settings]).encode()).hexdigest()[:12]
+            for one in phase_evaluations(phase)
+        }
+        for phase in phases
+        if phase.name in names
+    }
 
 
 def _others(about: Mapping[str, Any], run: Run) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -11,7 +12,7 @@ from numpy.typing import NDArray
 from robocasa_lerobot import contract
 from robocasa_lerobot.evaluation.records.results import TrialRecord
 from robocasa_lerobot.files import written_aside
-from robocasa_lerobot.video import spread_frames
+from robocasa_lerobot.video import DamagedVideoError, spread_frames
 
 MOST_ROWS = 6  # of solved trials, and as many of others
 FRAMES = 5
@@ -42,17 +43,20 @@ def write_strips(folder: Path, records: Sequence[TrialRecord], path: Path) -> bo
     """
     from PIL import Image, ImageDraw
 
-    rows = [record for record in chosen(records) if (folder / str(record.video)).is_file()]
+    rows = []
+    for record in chosen(records):
+        with contextlib.suppress(FileNotFoundError, DamagedVideoError):
+            rows.append((record, spread_frames(folder / str(record.video), FRAMES)))
     if not rows:
         return False
     height = VIEW_PIXELS + _TEXT_PIXELS
     sheet = Image.new("RGB", (FRAMES * 2 * VIEW_PIXELS, height * len(rows)), "white")
     draw = ImageDraw.Draw(sheet)
-    for place, record in enumerate(rows):
+    for place, (record, pictures) in enumerate(rows):
         what = "solved" if record.success else "not solved"
         where = f"kitchen {record.layout_id}, style {record.style_id}"
         draw.text((2, place * height), f"{record.task}: {what}, {record.steps} steps, {where}", fill="black")
-        for column, (_, picture) in enumerate(spread_frames(folder / str(record.video), FRAMES)):
+        for column, (_, picture) in enumerate(pictures):
             for number, view in enumerate(_views(picture)):
                 shown = Image.fromarray(view).resize((VIEW_PIXELS, VIEW_PIXELS), Image.Resampling.LANCZOS)
                 sheet.paste(shown, ((2 * column + number) * VIEW_PIXELS, place * height + _TEXT_PIXELS))

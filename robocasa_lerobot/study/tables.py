@@ -86,12 +86,18 @@ def variants(part: PartConfig) -> dict[str, dict[int, str]]:
 
 
 def summaries(part: PartConfig, stored: Stored, sets: Mapping[str, Sequence[str]]) -> dict[str, Lifelong]:
-    """Of a part with `matrix`: what each variant of which there are trials gained and forgot, over all seeds."""
+    """Of a part with `matrix`: what each variant of which there are trials gained and forgot.
+
+    Over those seeds that have come as far as any: what one training reached is not compared with what another kept.
+    """
     found = {}
     for name, rows in variants(part).items():
         counts: dict[int, dict[int, list[tuple[int, int]]]] = {}
-        for phase, row in rows.items():
-            trials = [trial for _, trial in row_trials(part, row, stored)]
+        of_rows = {phase: row_trials(part, row, stored) for phase, row in rows.items()}
+        there = [{seed for seed, _ in trials} for trials in of_rows.values() if trials]
+        whole = set.intersection(*there) if there else set()
+        for phase in rows:
+            trials = [trial for seed, trial in of_rows[phase] if seed in whole]
             for number, task_set in enumerate(part.sets, start=1):
                 own = [_count([trial for trial in trials if trial.task == task]) for task in sets[task_set]]
                 if all(n for _, n in own):

@@ -9,6 +9,7 @@ from pathlib import Path
 
 from accelerate import Accelerator, DistributedDataParallelKwargs, InitProcessGroupKwargs
 
+from robocasa_lerobot.data.mixture import check_share
 from robocasa_lerobot.data.registry.hub import fetch_missing
 from robocasa_lerobot.errors import UserError
 from robocasa_lerobot.jobs.locks import LockHeldError, locked
@@ -22,8 +23,15 @@ from robocasa_lerobot.training.planning.evaluations import Evaluations, phase_ev
 from robocasa_lerobot.training.planning.unavailable import runnable
 from robocasa_lerobot.training.setup import builders, features
 from robocasa_lerobot.training.setup import phase_data as joining
-from robocasa_lerobot.training.setup.build_phase import check_begun, planned_policy, prepare_phase, start_of
+from robocasa_lerobot.training.setup.build_phase import (
+    check_begun,
+    check_scope,
+    planned_policy,
+    prepare_phase,
+    start_of,
+)
 from robocasa_lerobot.training.setup.kept import check_kept_settings
+from robocasa_lerobot.training.setup.optimizers import check_optimizer
 from robocasa_lerobot.training.waiting import BARRIER, first_process_works
 from robocasa_lerobot.training.weights.checkpoint import checkpoint_step, last_checkpoint, tidy
 
@@ -53,6 +61,8 @@ def run_experiment(
     interrupts = interrupts or Interrupts(stop_after)
     output = Path(experiment.output_dir)
     device = builders.best_device(experiment.device)
+    if experiment.mixed_precision == "fp16" and device == "cpu":  # which Accelerate would leave out without a word
+        raise UserError("mixed_precision: fp16 needs a GPU; on a CPU set bf16, or no.")
     metrics.check_trackers(experiment.trackers)
     accelerator = Accelerator(
         cpu=device == "cpu",
@@ -68,6 +78,8 @@ def run_experiment(
     asked = experiment.phases if only is None else [experiment.phase(only)]
     records.check_unchanged(experiment, output, force)
     records.check_descent(experiment, output)
+    if only is None:
+        records.check_parents(experiment, output)
     whole, (experiment, left_out) = experiment, runnable(experiment)
     phases = [phase for phase in experiment.phases if phase.name in {other.name for other in asked}]
     # A mistake in the last phase should not wait for the first to finish. The first process makes fake datasets.
@@ -77,10 +89,11 @@ def run_experiment(
             fetch_missing(mixture for phase in todo for mixture in joining.needed_mixtures(experiment, phase))
         for phase in phases:
             if not is_finished(output, phase):
-                check_phase(experiment, phase, device, only is not None, force)
+                check_phase(experiment, phase, device, only is not None, force, accelerator.num_processes)
         evaluations = Evaluations(experiment, phases, accelerator.is_main_process) if evaluate else None
         for phase in phases:  # weights on the hub, once all is well: a later phase should not wait for them either
-            if not is_finished(output, phase) and experiment.init_of(phase).startswith(HUB):
+            begun = last_checkpoint(output / phase.name) is not None
+            if not begun and experiment.init_of(phase).startswith(HUB):
                 start_of(experiment, phase)
     left_out += evaluations.left_out if evaluations is not None else []
     for item in left_out:
@@ -109,7 +122,12 @@ def is_finished(output: Path, phase: PhaseConfig) -> bool:
 
 
 def check_phase(
-    experiment: ExperimentConfig, phase: PhaseConfig, device: str, alone: bool = False, force: bool = False
+    experiment: ExperimentConfig,
+    phase: PhaseConfig,
+    device: str,
+    alone: bool = False,
+    force: bool = False,
+    processes: int = 1,
 ) -> None:
     """Check what can be checked before training: policy, data, evaluation files, and with `alone` the start.
 
@@ -123,6 +141,8 @@ def check_phase(
     data, parent = joining.open_phase_data(experiment, phase), experiment.parent(phase)
     meta = data.meta
     check_crop_cameras(phase, meta)
+    check_optimizer(config, phase)
+    check_share(phase.batch_size // phase.gradient_accumulation, processes)
     check_begun(experiment, phase, device, data, force)
     if checkpoint is not None:
         features.check_features(config, meta)
@@ -140,8 +160,9 @@ def check_phase(
         if phase.statistics == "keep" and experiment.init_of(phase) != FROM_SCRATCH:
             before = planned_policy(experiment, parent) if parent is not None else ({}, checkpoint)
             check_kept_settings(config, builders.policy_config(*before, device), phase.name)
+        check_scope(config, meta, phase)
     phase_evaluations(phase)
-    if alone:
+    if alone and last_checkpoint(Path(experiment.output_dir) / phase.name) is None:
         start_of(experiment, phase)
 
 

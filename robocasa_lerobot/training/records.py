@@ -73,18 +73,23 @@ def describe_phase(
         phase: of it.
         dataset: that it draws from.
         policy: that it trains.
-        init: the `pretrained_model` folder that it started from.
+        init: the `pretrained_model` folder that it starts from; of a begun phase that is known.
         device: what it is called.
         begun: whether it goes on from a checkpoint of its own.
     """
     folder, parent = Path(experiment.output_dir) / phase.name, experiment.parent(phase)
+    before = (_about(folder) or {}) if begun else {}
+    start = {
+        "init": str(init) if init else FROM_SCRATCH,
+        "init_run": run_of(folder.parent / parent.name) if parent is not None else None,
+        "statistics": phase.statistics if init else "replace",
+    }
     return {
         "experiment": experiment.name,
         "phase": phase.name,
         "run": (run_of(folder) if begun else None) or uuid.uuid4().hex,
-        "init": str(init) if init else FROM_SCRATCH,
-        "init_run": run_of(folder.parent / parent.name) if parent is not None else None,
-        "statistics": phase.statistics if init else "replace",
+        **start,
+        **{key: before[key] for key in start if key in before},
         "data": dataset.describe().splitlines(),
         "data_fingerprint": dataset.fingerprint,
         "selection_fingerprint": dataset.selection_fingerprint,
@@ -118,6 +123,23 @@ def check_descent(experiment: ExperimentConfig, output: Path) -> None:
                 f"phase {phase.name!r} in {output} started from weights of {parent.name!r} that are gone: that phase "
                 f"has been trained anew since. Remove {output / phase.name} to train it from the new ones, or put the "
                 f"earlier folder {output / parent.name} back."
+            )
+
+
+def check_parents(experiment: ExperimentConfig, output: Path) -> None:
+    """Check that no phase would be trained again, without being asked, under others that came from it.
+
+    Raises:
+        UserError: the checkpoints of one are gone, and what was trained from it is there.
+    """
+    for phase in experiment.phases:
+        if last_checkpoint(output / phase.name) is not None:
+            continue
+        later = [other for other in experiment.phases if experiment.parent(other) == phase]
+        if begun := [other.name for other in later if last_checkpoint(output / other.name) is not None]:
+            raise UserError(
+                f"phase {phase.name!r} has no checkpoint in {output}, and {begun[0]!r}, which was trained from it, has "
+                f"begun. `--phase {begun[0]}` goes on with that; to train both anew remove {output / begun[0]}."
             )
 
 

@@ -37,8 +37,10 @@ def test_a_result_of_other_seeds_is_not_written_over(
     out = tmp_path / "kept.json"
     out.write_text(json.dumps({"settings": {"first_seed": 5, "action_noise": 0.0, "varied": True}}))
     before = out.read_bytes()
-    assert bench.main(["--tasks", "OpenDrawer", "--trials", str(tmp_path / "t.jsonl"), "--out", str(out)]) == 2
+    words = ["--tasks", "OpenDrawer", "--trials", str(tmp_path / "t.jsonl"), "--out", str(out)]
+    assert bench.main([*words, "--first-seed", "610000"]) == 2
     assert "first_seed: 5, now 610000" in capsys.readouterr().err
+    assert bench.parse(words).first_seed == 5
     assert [path.name for path in tmp_path.iterdir()] == ["kept.json"]
     assert out.read_bytes() == before
 

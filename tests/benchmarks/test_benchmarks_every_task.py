@@ -24,7 +24,9 @@ def test_a_command_that_has_ended_well_is_not_run_again(benchmark: ModuleType, t
     again = benchmark.Steps(tmp_path)
     assert again.done["verify"]["status"] == 2
     assert again.done["sets"]["seconds"] > 0
-    assert again.run("sets", ["no such command"]) == printed
+    assert again.run("sets", ["tasks", "--help", "--workers", "1"]) == printed
+    with pytest.raises(SystemExit, match="is of `tasks --help`; this one is `no such command`"):
+        again.run("sets", ["no such command"])
 
 
 @pytest.mark.slow

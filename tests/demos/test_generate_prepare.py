@@ -15,7 +15,14 @@ import pytest
 from full_disk import full_after
 
 from robocasa_lerobot import cli, contract
-from robocasa_lerobot.demos.generate.sources.prepare import DROPPED, FILE, file_identity, prepare_files, prepare_one
+from robocasa_lerobot.demos.generate.sources.prepare import (
+    DROPPED,
+    FILE,
+    file_identity,
+    known_outcomes,
+    prepare_files,
+    prepare_one,
+)
 from robocasa_lerobot.demos.generate.sources.prepared import GROUP, read_prepared
 from robocasa_lerobot.demos.generate.sources.segments import PART, cut, runs
 from robocasa_lerobot.demos.generate.sources.transform import (
@@ -161,7 +168,7 @@ def test_a_file_is_prepared_and_what_was_recorded_stays(
     assert _arrays(path) == before
     assert not parts.exists()
     with h5py.File(path) as file:
-        assert list(json.loads(file["data"].attrs[DROPPED])) == ["demo_1"]
+        assert list(json.loads(file["data"].attrs[DROPPED])["reasons"]) == ["demo_1"]
         assert GROUP not in file["data/demo_1"]
         group = file["data/demo_0"][GROUP]
         steps = len(file["data/demo_0/actions"])
@@ -184,6 +191,14 @@ def test_a_file_is_prepared_and_what_was_recorded_stays(
     ahead = np.linalg.norm(found.target[:, :3, 3] - found.eef[:, :3, 3], axis=1)
     assert ahead.max() < 0.05 * np.sqrt(3) + 1e-3
     assert list(prepare_files([path])) == list(prepare_files([path]))  # done already
+    (tmp_path / ".CloseDrawer.prepare").mkdir()  # a run was killed when it had replaced the file
+    assert len(list(prepare_files([path]))) == 2
+    assert [one.name for one in tmp_path.iterdir()] == ["CloseDrawer.hdf5"]
+    with h5py.File(path, "r+") as file:  # what other versions have dropped these may replay
+        words = json.loads(file["data"].attrs[DROPPED])
+        words["versions"]["mujoco_version"] = "0"
+        file["data"].attrs[DROPPED] = json.dumps(words)
+    assert set(known_outcomes(path)) == {"demo_0"}
 
 
 @pytest.mark.slow

@@ -118,6 +118,7 @@ def test_experiment_plans(path: Path, tmp_path: Path, monkeypatch: pytest.Monkey
 def test_policies_of_our_own_experiments_build(path: Path) -> None:
     builders = pytest.importorskip("robocasa_lerobot.training.setup.builders")
     adapters = pytest.importorskip("robocasa_lerobot.training.weights.adapters")
+    optimizers = pytest.importorskip("robocasa_lerobot.training.setup.optimizers")
     from robocasa_lerobot.data.mixture import MixtureMeta
 
     experiment = load_experiment(path)
@@ -127,7 +128,7 @@ def test_policies_of_our_own_experiments_build(path: Path) -> None:
         config = builders.policy_config({**experiment.policy, **phase.policy}, None, "cpu")
         policy = builders.make_phase_policy(config, meta, None)
         adapters.apply_training_scope(policy, phase, 0)
-        _, scheduler, _ = builders.make_optimizer(policy, phase)
+        _, scheduler, _ = optimizers.make_optimizer(policy, phase)
         assert sum(p.numel() for p in policy.parameters() if p.requires_grad) > 0
         assert scheduler is not None or config.get_scheduler_preset() is None
 

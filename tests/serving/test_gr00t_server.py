@@ -121,6 +121,12 @@ def test_reset_with_a_seed_begins_a_trial(client: GrootClient, in_process: Chunk
             assert found == number
             for name, values in expected(in_process, STEPS[0], seed, number).items():
                 np.testing.assert_array_equal(action[name][0], values)
+    for seeds in ([21, 22], [23]):  # rows that have not asked yet, and fewer rows than before
+        assert client.call("reset", {"options": {"seed": seeds}}) == {}
+        action, _ = client.call("get_action", {"observation": nested(STEPS[: len(seeds)]), "options": None})
+        for row, seed in enumerate(seeds):
+            for name, values in expected(in_process, STEPS[row], seed, 0).items():
+                np.testing.assert_array_equal(action[name][row], values)
     assert client.call("reset", {"options": None}) == {}
     own, number = ask()
     assert number == 0

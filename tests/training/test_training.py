@@ -25,7 +25,7 @@ from robocasa_lerobot.evaluation.actors.checkpoint import read_source
 from robocasa_lerobot.training.config.experiment import EmaConfig, load_experiment
 from robocasa_lerobot.training.phases import run_experiment
 from robocasa_lerobot.training.records import check_unchanged
-from robocasa_lerobot.training.setup import builders
+from robocasa_lerobot.training.setup import builders, optimizers
 from robocasa_lerobot.training.weights.checkpoint import last_checkpoint, pretrained_model
 from robocasa_lerobot.training.weights.ema import Ema, ema_decay
 
@@ -305,6 +305,11 @@ def test_loss_falls(tmp_path: Path, data: Path) -> None:
         (["--device=cuda:1"], "set `device: cuda`, and choose the GPU before the command: `CUDA_VISIBLE_DEVICES=1`"),
         (["--phases.finetune.mixture.members=[{root: nowhere}]"], "no dataset at nowhere"),
         (["--phases.pretrain.mixture.members=[{root: nowhere}]"], "no dataset at nowhere"),
+        (["--phases.finetune.freeze=[obs_encoder]"], "unknown part of the policy 'obs_encoder'"),
+        (["--phases.finetune.lora={targets: [nothing]}"], "unknown layer 'nothing'"),
+        (["--phases.finetune.optimizer={type: adamx}"], "'adam' or 'adamw'"),
+        (["--phases.finetune.scheduler={name: cosin}"], "`scheduler`"),
+        (["--mixed_precision=fp16"], "fp16 needs a GPU"),
     ],
 )
 def test_mistakes_are_told_before_training(tmp_path: Path, data: Path, overrides: list[str], message: str) -> None:
@@ -370,7 +375,7 @@ def test_learning_rate_scales_all_groups(data: Path, tmp_path: Path) -> None:
 
     meta = open_mixture(experiment.phases[0].mixture, experiment.loader).meta
     policy = builders.make_phase_policy(config, meta, None)
-    optimizer, _, clip = builders.make_optimizer(policy, experiment.phases[0])
+    optimizer, _, clip = optimizers.make_optimizer(policy, experiment.phases[0])
     preset = config.get_optimizer_preset()
     assert optimizer.param_groups[0]["lr"] == pytest.approx(2e-5)
     assert optimizer.param_groups[1]["lr"] == pytest.approx(config.optimizer_lr_backbone * 2e-5 / preset.lr)

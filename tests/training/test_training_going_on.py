@@ -93,6 +93,25 @@ def test_a_phase_whose_start_was_trained_anew_is_told(tmp_path: Path, data: Path
     assert run_experiment(tiny(folder, data))
 
 
+def test_what_has_begun_needs_its_start_no_more_and_that_is_not_trained_anew(
+    tmp_path: Path, data: Path, begun: Path
+) -> None:
+    folder = copied(begun, tmp_path)
+    assert not run_experiment(tiny(folder, data), stop_after=4), "two steps of the next"
+    about = (folder / "out/finetune/phase.json").read_bytes()
+    shutil.rmtree(folder / "out/pretrain/checkpoints")  # for its disk space
+    with pytest.raises(
+        UserError, match=r"'pretrain' has no checkpoint .* and 'finetune', .* `--phase finetune` goes on"
+    ):
+        run_experiment(tiny(folder, data))
+    assert not (folder / "out/pretrain/checkpoints").exists()
+    assert run_experiment(tiny(folder, data), only="finetune")
+    before, now = json.loads(about), json.loads((folder / "out/finetune/phase.json").read_text())
+    assert {key: now[key] for key in ("run", "init", "init_run")} == {
+        key: before[key] for key in ("run", "init", "init_run")
+    }
+
+
 def test_other_episodes_of_the_same_data_are_told(tmp_path: Path, data: Path, begun: Path) -> None:
     """As where a set of tasks, or the share that is held out, means something else in a later version."""
     folder = copied(begun, tmp_path)

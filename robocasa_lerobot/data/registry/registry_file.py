@@ -81,6 +81,9 @@ class RegistryConfig:
             raise UnknownNameError("scheme of a registry:", str(self.scheme), [ROBOCASA365])
         if self.only not in (None, DEMONSTRATED):
             raise UnknownNameError("`only` of a registry:", str(self.only), [DEMONSTRATED])
+        for kind, number in self.episodes.items():
+            if number < 1:
+                raise UserError(f"episodes of {kind!r}: found {number}, expected at least 1.")
         for dataset in self.datasets:
             if dataset.make is not None and dataset.make.episodes not in self.episodes:
                 where = f"(`episodes` of the recipe of {dataset.path})"

@@ -97,6 +97,11 @@ class Fit:
         end = self._here((first + far - low) / (high - low), sign)
         return begin, end
 
+    def way_from(self, position: float) -> tuple[float, float]:
+        """The same; of a goal that is counted from where the part stands, from there."""
+        begin, end = self.way()
+        return (position, position + end - begin) if self.words_relative else (begin, end)
+
     def as_try(self) -> Try:
         """What it is remembered by, where it comes to nothing."""
         return Try(self.piece.source.number, self.piece.segment.contact, self.part.name, self.mirror, self.flip)

@@ -67,19 +67,29 @@ def part_stage(env: KitchenEnv, stage: Stage, course: Course) -> Iterator[Array]
             )
         fit, cost = yield from _approach(env, course, fits, failed, may_stay=number > 0)
         before, runs = fit.part.position(env.data), _water_runs(env, stage)
-        begin, end = fit.way()
+        begin, end = fit.way_from(before)
+        ahead = float(np.sign(end - begin))
         row = course.begin(fit.piece, part=fit.part.name, mirror=fit.mirror, cost=round(cost, 3))
-        yield from carry_out_segment(env, course, _carried(env, stage, fit))
+        farthest = yield from _farthest(env, fit.part, ahead, carry_out_segment(env, course, _carried(env, stage, fit)))
         if runs and not _water_runs(env, stage):  # the hand has leaned on the lever
             yield from course.labelled(turn_on_water(env, stage), BRIDGE)
         moved = fit.part.position(env.data) - before
         row["moved"] = moved / fit.part.span
         least = max(FRUITLESS_SHARE * fit.part.span, SLIPPED_SHARE * abs(end - before))
-        row["in_vain"] = bool(moved * np.sign(end - begin) < least)
+        row["in_vain"] = bool((farthest if fit.piece.springs else moved * ahead) < least)
         if row["in_vain"]:
             failed[fit.as_try()] += 1
     if not (yield from _stays_done(env, stage, course)):
         raise SkillError(f"{stage.target}: not done after {MOST_SEGMENTS} segments")
+
+
+def _farthest(env: KitchenEnv, part: Part, ahead: float, steps: Iterator[Array]) -> Generator[Array, None, float]:
+    """Carry out steps; returns the most that a part has gone one way meanwhile, also where it has sprung back since."""
+    before, most = part.position(env.data), 0.0
+    for step in steps:
+        yield step
+        most = max(most, (part.position(env.data) - before) * ahead)
+    return most
 
 
 def _stays_done(env: KitchenEnv, stage: Stage, course: Course) -> Generator[Array, None, bool]:
@@ -310,10 +320,8 @@ def _lets_go(fit: Fit) -> int:
 def _carried(env: KitchenEnv, stage: Stage, fit: Fit) -> Carried:
     """The segment with its frame on the part as it moves, the base going along where it did in the source."""
     segment, data, part = fit.piece.segment, fit.piece.data, fit.part
-    begin, end = fit.way()
     start = part.position(env.data)
-    if fit.words_relative:
-        begin, end = start, start + end - begin
+    begin, end = fit.way_from(start)
     if (begin - start) * (end - begin) > 0:  # the part has yet to come to where it stood in the source
         begin = start
 

@@ -16,12 +16,14 @@ import numpy as np
 from robocasa_lerobot import contract
 from robocasa_lerobot.demos.attempts import RecordingSettings
 from robocasa_lerobot.demos.generate.course import AT_REST, CONTACT, Course
+from robocasa_lerobot.demos.generate.sources.source import Stamp
 from robocasa_lerobot.demos.motion import Array, action
 from robocasa_lerobot.demos.recorder import SUCCESS_HOLD_STEPS
 from robocasa_lerobot.demos.replay import Demonstration, demonstrations, read_demonstration
 from robocasa_lerobot.demos.skills.common import SkillError
 from robocasa_lerobot.demos.stages import StageLog, StageOutcome
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
+from robocasa_lerobot.envs.kitchens.splits import expand
 from robocasa_lerobot.errors import UserError
 
 REPLAY = "replay"
@@ -29,8 +31,8 @@ _GRIPPER = contract.ACTION_SLICES["gripper_close"]
 
 
 @lru_cache(maxsize=4)
-def recorded(place: Path, stamp: float) -> tuple[tuple[str, Demonstration], ...]:
-    """The demonstrations of a file by their names; `stamp`, its time, is there so that a new one is read anew."""
+def recorded(place: Path, stamp: Stamp) -> tuple[tuple[str, Demonstration], ...]:
+    """The demonstrations of a file by their names; `stamp` is there so that a new one is read anew."""
     return tuple((f"{file.stem}/{demo}", read_demonstration(file, demo)) for file, demo in demonstrations([place]))
 
 
@@ -45,8 +47,8 @@ def check_scenes(found: Sequence[Demonstration], settings: RecordingSettings) ->
     asked = {
         "task": settings.task,
         "split": settings.split,
-        "layouts": _listed(settings.layouts),
-        "styles": _listed(settings.styles),
+        "layouts": _expanded(settings.layouts, "layout"),
+        "styles": _expanded(settings.styles, "style"),
         "base_within_m": settings.start_within_m,
     }
     for one in found:
@@ -97,5 +99,6 @@ def digest_of_actions(found: Sequence[Demonstration]) -> str:
     return digest.hexdigest()[:16]
 
 
-def _listed(ids: tuple[int, ...] | None) -> list[int] | None:
-    return None if ids is None else list(ids)
+def _expanded(ids: tuple[int, ...] | None, what: str) -> list[int] | None:
+    """As an env notes them."""
+    return None if ids is None else list(expand(ids, what))

@@ -28,7 +28,7 @@ class Manner:
     Attributes:
         select: one of `SELECTIONS`.
         base: `replan` stands where the sources' segments are reached best, `copy` only as the source stood, `fixed`
-            does not drive at all.
+            drives to no segment, but along with one whose base drove.
         bridge: `plan` leads the arm round obstacles, `line` straight there.
     """
 

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import json
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from robocasa_lerobot.demos.attempts import RecordingSettings
+from robocasa_lerobot.demos.attempts import BrokenAttemptError, RecordingSettings
 from robocasa_lerobot.demos.generate.course import KINDS, Course
 from robocasa_lerobot.demos.generate.mimicgen.plain import Sources, plain_episode, read_sources, suited
 from robocasa_lerobot.demos.generate.mimicgen.subtasks import datagen_of, digest_of_infos
@@ -25,17 +26,20 @@ from robocasa_lerobot.demos.generate.replays import (
 from robocasa_lerobot.demos.generate.select import Manner
 from robocasa_lerobot.demos.generate.sources.source import (
     Source,
+    Stamp,
     UnfitSourcesError,
     digest_of,
     first_of_each_task,
     place_of,
     sources_of,
+    stamp_of,
 )
 from robocasa_lerobot.demos.generate.stage import generated
+from robocasa_lerobot.demos.hdf5 import segments_of
 from robocasa_lerobot.demos.recorder import Recording
 from robocasa_lerobot.demos.replay import Demonstration
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
-from robocasa_lerobot.errors import UserError
+from robocasa_lerobot.errors import OF_THE_MACHINE, LackingMachineError, UserError
 
 MIMICGEN = "mimicgen"
 _CHOICE_STREAM = 7  # of the choices among sources, apart from those of scene, arm, noise and style
@@ -89,15 +93,11 @@ class GenerationSettings(RecordingSettings):
             if not fits:
                 raise UserError(f"--{name} is {number}, expected {expected}.")
         if settings.method == REPLAY:
-            own = [one for _, one in settings.recorded()]
-            check_scenes(own, settings)
-            return cls(source=str(source), sources=digest_of_actions(own), **values)
-        infos = settings.subtasks().infos if settings.method == MIMICGEN else ()  # mistakes come up here
-        if settings.method == MIMICGEN and settings.template:  # of files that others have prepared
-            seeds, digest = [one.seed for one in infos], digest_of_infos(infos)
-        else:
-            found = settings.read()
-            seeds, digest = [one.seed for one in found], digest_of(found)
+            check_scenes([one for _, one in settings.recorded()], settings)
+            return cls(source=str(source), sources=settings.identified()[1], **values)
+        if settings.method == MIMICGEN:
+            settings.subtasks()  # mistakes come up here
+        seeds, digest = settings.identified()
         clash = sorted(seed for seed in seeds if 0 <= seed - settings.seed < settings.limit)
         if clash and values.get("split") is not None:
             raise UserError(
@@ -105,6 +105,32 @@ class GenerationSettings(RecordingSettings):
                 f"{settings.seed} on. Choose another --seed, so that nothing is generated in a source's own scene."
             )
         return cls(source=str(source), sources=digest, **values)
+
+    def identified(self) -> tuple[list[int], str]:
+        """Seeds of the sources' scenes, and what tells this set of sources from another.
+
+        Raises:
+            UserError: they cannot be read, or are none.
+        """
+        return _identified(self, stamp_of(place_of(self.folder, self.task)))
+
+    def check_ready(self) -> None:
+        """Whether the sources are those that this began with.
+
+        Raises:
+            LackingMachineError: they are others, or cannot be read.
+        """
+        try:
+            _, digest = self.identified()
+        except UserError as error:
+            raise LackingMachineError(
+                f"the sources cannot be read any more: {error} With these in place the same command goes on."
+            ) from error
+        if self.sources and digest != self.sources:
+            raise LackingMachineError(
+                f"{self.folder} holds other sources of {self.task} than when this began; with those in place the same "
+                "command goes on. What is generated from these needs another --out."
+            )
 
     def read(self) -> list[Source]:
         """The sources."""
@@ -119,7 +145,7 @@ class GenerationSettings(RecordingSettings):
         """
         if self.template:
             place = place_of(self.folder, self.task)
-            return read_sources(place, template_from(json.loads(self.template)), self.first_sources)
+            return read_sources(place, template_from(json.loads(self.template)), self.first_sources, stamp_of(place))
         found = self.read()
         if others := sorted({source.task for source in found} - {self.task}):
             raise UnfitSourcesError(
@@ -132,7 +158,7 @@ class GenerationSettings(RecordingSettings):
     def recorded(self) -> list[tuple[str, Demonstration]]:
         """The task's own demonstrations as they were recorded, by their names."""
         place = place_of(self.folder, self.task)
-        found = list(recorded(place, place.stat().st_mtime if place.exists() else 0.0))
+        found = list(recorded(place, stamp_of(place)))
         return found[: self.first_sources] if self.first_sources else found
 
     @property
@@ -145,34 +171,65 @@ class GenerationSettings(RecordingSettings):
         return {key: value for key, value in super().identity().items() if key != "source"}
 
     def record(self, env: KitchenEnv, seed: int) -> Recording:
-        """Make the attempt of a seed."""
+        """Make the attempt of a seed.
+
+        Raises:
+            BrokenAttemptError: it raised.
+        """
+        course = self._course(seed)
+        try:
+            return labelled(self._episode(env, seed, course), course)
+        except OF_THE_MACHINE:
+            raise
+        except Exception as error:
+            scene = self._replayed_in_turn(seed)[2].seed if self.method == REPLAY else None
+            begun = segments_of({"generation": {"segments": course.used}})
+            raise BrokenAttemptError(error, scene, begun) from error
+
+    def _course(self, seed: int) -> Course:
         rng = np.random.default_rng([seed, _CHOICE_STREAM])
         if self.method == MIMICGEN:
-            subtasks, course = self.subtasks(), Course([], rng, Manner("random", "fixed", "line"), self.spread)
+            return Course([], rng, Manner("random", "fixed", "line"), self.spread)
+        if self.method == REPLAY:
+            return Course([], rng, Manner(), self.spread)
+        return Course(self.read(), rng, Manner(self.select, self.base, self.bridge), self.spread, self.cap)
+
+    def _episode(self, env: KitchenEnv, seed: int, course: Course) -> Recording:
+        if self.method == MIMICGEN:
+            subtasks = self.subtasks()
             noisy = any(one.action_noise > 0.0 for one in subtasks.template.subtasks)
-            recording = self.labelled_episode(
+            return self.labelled_episode(
                 env,
                 seed,
                 lambda env, style, log: course.counted(plain_episode(env, log, subtasks, course)),
                 clean=course.clean if noisy else None,
             )
-            return labelled(recording, course)
         if self.method == REPLAY:
-            return self._replayed(env, seed, Course([], rng, Manner(), self.spread))
-        course = Course(self.read(), rng, Manner(self.select, self.base, self.bridge), self.spread, self.cap)
-        recording = self.labelled_episode(env, seed, lambda env, style, log: generated(env, style, log, course))
-        return labelled(recording, course)
+            number, name, source = self._replayed_in_turn(seed)
+            course.used.append(segment_of(name, number, source))
+            return self.labelled_episode(
+                env, source.seed, lambda env, _, log: course.counted(replayed(env, log, source, number, course)), seed
+            )
+        return self.labelled_episode(env, seed, lambda env, style, log: generated(env, style, log, course))
 
-    def _replayed(self, env: KitchenEnv, seed: int, course: Course) -> Recording:
-        """The attempt of a seed at repeating a source, each of which has its turn."""
+    def _replayed_in_turn(self, seed: int) -> tuple[int, str, Demonstration]:
+        """Number, name and content of the source that the attempt of a seed repeats: each has its turn."""
         found = self.recorded()
         number = (seed - self.seed) % len(found)
-        name, source = found[number]
-        course.used.append(segment_of(name, number, source))
-        recording = self.labelled_episode(
-            env, source.seed, lambda env, _, log: course.counted(replayed(env, log, source, number, course)), seed
-        )
-        return labelled(recording, course)
+        return number, *found[number]
+
+
+@lru_cache(maxsize=8)
+def _identified(settings: GenerationSettings, stamp: Stamp) -> tuple[list[int], str]:
+    """See `identified`; `stamp` is there so that sources that changed are looked at again."""
+    if settings.method == REPLAY:
+        own = [one for _, one in settings.recorded()]
+        return [one.seed for one in own], digest_of_actions(own)
+    if settings.method == MIMICGEN and settings.template:  # of files that others have prepared
+        infos = settings.subtasks().infos
+        return [one.seed for one in infos], digest_of_infos(infos)
+    found = settings.read()
+    return [one.seed for one in found], digest_of(found)
 
 
 def labelled(recording: Recording, course: Course) -> Recording:

@@ -68,4 +68,7 @@ def _bound(carry_out: Callable[[KitchenEnv, Stage, Course], Iterator[Array]], co
 
 
 def _planned(course: Course, skill: Skill, kind: int, env: KitchenEnv, stage: Stage) -> Iterator[Array]:
-    yield from course.labelled(skill(env, stage), kind)
+    try:
+        yield from course.labelled(skill(env, stage), kind)
+    finally:
+        course.label = AT_REST

@@ -159,7 +159,16 @@ def _about(env: KitchenEnv, data: mujoco.MjData, stage: Stage) -> Array:
     for name in (env.scene.fill(stage.object), env.scene.fill(stage.target)):
         if name in env.scene.objects:
             return np.array(middle_of(env.scene, data, name))
+        if name in _loose(env):
+            return np.array(data.body(name).xpos)
     return np.array(env.scene.fixture(stage.target).pos, dtype=np.float64)
+
+
+def _loose(env: KitchenEnv) -> set[str]:
+    """Bodies that move freely though they are no objects, as a blender's lid."""
+    model = env.model
+    free = np.flatnonzero(model.jnt_type == mujoco.mjtJoint.mjJNT_FREE)
+    return {model.body(int(model.jnt_bodyid[joint])).name for joint in free}
 
 
 def _seen(env: KitchenEnv, data: mujoco.MjData, stage: Stage) -> bool:
@@ -183,11 +192,12 @@ class _Masks:
     @classmethod
     def of(cls, env: KitchenEnv) -> _Masks:
         scene = env.scene
-        names = set()
+        names: set[str] = set()
+        loose = _loose(env)
         for stage in env.declaration.stages:
             for word in (stage.object, stage.target):
                 filled = scene.fill(word)
-                if filled in scene.objects:
+                if filled in scene.objects or filled in loose:
                     names.add(filled)
                 elif word in scene.roles:
                     names.add(scene.fixtures[scene.roles[word]].name)

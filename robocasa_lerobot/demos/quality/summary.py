@@ -97,8 +97,11 @@ class Quality:
 
     @property
     def stand_spread_rad(self) -> float:
-        """The same of its heading, relative to that at the beginning."""
-        return float(np.std([one.stand[2] for one in self.kept])) if self.kept else 0.0
+        """The same of its heading, relative to that at the beginning, on the circle."""
+        if not self.kept:
+            return 0.0
+        turns = np.exp(1j * np.array([one.stand[2] for one in self.kept]))
+        return float(np.sqrt(-2.0 * np.log(np.clip(np.abs(turns.mean()), 1e-12, 1.0))))
 
     def mean(self, name: str) -> float:
         """Of a measure."""

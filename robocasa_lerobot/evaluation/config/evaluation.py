@@ -92,7 +92,8 @@ class EnvSettings:
     horizon: control steps at 20 Hz for all tasks; default: each task's own.
     horizon_multiplier: factor on each task's own horizon.
     factory: `module:callable` that makes the env, called with task, split, render_preset, image_size and horizon; with
-        `python`, `module:callable` or `FILE.py:callable` of that interpreter (docs/simulators.md).
+        `python`, `module:callable` or `FILE.py:callable` of that interpreter (docs/simulators.md). Success rules that
+        look at more than the first success add `terminate_on_success=False`.
     python: interpreter in which another simulator's envs run; default: this one.
     type: `lerobot:NAME`, an env that LeRobot knows, such as lerobot:pusht, in `python` or here, in place of a factory.
     options: arguments of another simulator's factory, as `--env.options.NAME=VALUE`.

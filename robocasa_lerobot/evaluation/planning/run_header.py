@@ -273,7 +273,8 @@ def resolve_device(asked: str, needs_torch: bool) -> str:
 
     if not needs_torch:
         return "cpu"
-    may_be_gpu = Path("/proc/driver/nvidia").exists() or Path("/dev/kfd").exists() or platform.system() != "Linux"
+    shown = any(Path(path).exists() for path in ("/proc/driver/nvidia", "/dev/kfd", "/dev/dxg"))  # the last: WSL2
+    may_be_gpu = shown or platform.system() != "Linux"
     if asked == "cpu" or (asked == "auto" and not may_be_gpu):
         return "cpu"
     from robocasa_lerobot.evaluation.actors.policy_runner import pick_device

@@ -209,7 +209,7 @@ class TrialRecord:
         split: "target" or "pretrain".
         layout_id, style_id: of the kitchen; None where the trial never got one, or the env has none.
         instruction: what the policy was told.
-        horizon: steps after which the trial ended at the latest; None where it never began in an env of one's own.
+        horizon: steps after which the trial ended at the latest; None where that was left to an env of one's own.
         horizon_multiplier: what the task's own horizon was multiplied by.
         success: by the run's success rule.
         first_success_step: the first step after which the goal held (with rule "hold": had held long enough).

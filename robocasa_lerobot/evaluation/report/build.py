@@ -56,14 +56,16 @@ def build(
         provenance.errors(data),
         published_tables.section(data),
     ]
-    header = data.policies[-1].header
+    headers = [policy.header for policy in data.policies]
+    protocols = [header.protocol for header in headers]
+    splits = [beside_published.SPLITS.get(header.split, header.split) for header in headers]
     return Document(
         title=data.title,
         headline=summary.headline(data),
         sections=[section for section in sections if section is not None],
         made=datetime.datetime.now(datetime.UTC).strftime("%Y-%m-%d %H:%M UTC"),
         synthetic=data.synthetic,
-        tags=tuple(dict.fromkeys((header.protocol, beside_published.SPLITS.get(header.split, header.split)))),
+        tags=tuple(dict.fromkeys((*protocols, *splits))),
     )
 
 

@@ -148,7 +148,10 @@ Part = Table | Figure | Listing | Block | Film
 
 @dataclass(frozen=True)
 class Section:
-    """A section of the report; `text` are paragraphs before its parts, `sentences` are paragraphs with a catchword."""
+    """A section of the report; `text` are paragraphs before its parts, `sentences` are paragraphs with a catchword.
+
+    `marks_legend` says what the squares of single trials are, where there are any.
+    """
 
     id: str
     title: str
@@ -157,7 +160,7 @@ class Section:
     cards: tuple[Card, ...] = ()
     parts: tuple[Part, ...] = ()
     legend: tuple[Series, ...] = ()
-    marks_legend: bool = False
+    marks_legend: str = ""
 
 
 @dataclass(frozen=True)

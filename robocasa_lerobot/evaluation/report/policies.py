@@ -205,7 +205,7 @@ def same_trials(
     """
     if any(getattr(a.header, rule) != getattr(b.header, rule) for rule in _SAME_RULES):
         return {}
-    if _simulator(a.header) != _simulator(b.header):
+    if simulator_of(a.header) != simulator_of(b.header):
         return {}
     one, two = condition_a or a.condition, condition_b or b.condition
     if one != two and (condition_a is None or condition_b is None):
@@ -230,7 +230,8 @@ def _start(record: TrialRecord) -> tuple[object, ...]:
     return (record.task, record.trial, record.seed, record.split, record.horizon)
 
 
-def _simulator(header: RunHeader) -> tuple[object, ...]:
+def simulator_of(header: RunHeader) -> tuple[object, ...]:
+    """What tells one simulator, and its adapter's settings, from another."""
     settings = {"factory": KITCHEN_ENV_FACTORY, **header.settings}
     return tuple(settings.get(name) or None for name in _SIMULATOR)
 

@@ -113,8 +113,9 @@ def run_trial(
     warnings = PhysicsWarnings(base)
     physics = filming = 0.0
     if film is not None:
+        shooting = time.perf_counter()
         film.shoot(base, observation, 0)
-        filming += time.perf_counter() - started - building
+        filming += time.perf_counter() - shooting
     digest = hashlib.sha256(proprioception(observation).tobytes())
     counts: dict[str, TermCount] = {}
     progress = StageProgress(base.declaration, base.scene, base.data) if hasattr(base, "declaration") else None

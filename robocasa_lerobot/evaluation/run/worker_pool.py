@@ -124,7 +124,7 @@ class WorkerPool:
                     if result.lost is not None and lost >= MAX_LOST:
                         raise UserError(_gave_up(completed, result.lost))
                     if result.error is not None and (result.lost is not None or number - lost < MAX_ATTEMPTS):
-                        pending.appendleft(_Attempt(completed.spec, number + 1, result, lost))
+                        pending.appendleft(_Attempt(completed.spec, number + 1, completed.earlier or result, lost))
                     else:
                         yield completed
             finished = True

@@ -79,11 +79,11 @@ def lifelong(counts: Mapping[int, Mapping[int, Counts]], untrained: Mapping[int,
 
 
 def _losses(matrix: Mapping[int, Mapping[int, Estimate]], k: int) -> list[tuple[Estimate, Estimate]]:
-    """For each earlier phase j: its best result before phase k, and its result after phase k."""
+    """For each earlier phase j whose results since its own training are there: the best, and that after phase k."""
     out = []
     for j in matrix[k]:
-        before = [matrix[m][j] for m in matrix if j <= m < k and j in matrix[m]]
-        if j < k and before:
+        before = [matrix[m][j] for m in range(j, k) if j in matrix.get(m, {})]
+        if j < k and len(before) == k - j:
             out.append((max(before, key=lambda estimate: estimate.value), matrix[k][j]))
     return out
 

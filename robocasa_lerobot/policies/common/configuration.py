@@ -12,6 +12,8 @@ from robocasa_lerobot.contract import STATE_PARTS, STATE_SIZE, STATE_SLICES
 from robocasa_lerobot.errors import UserError
 from robocasa_lerobot.policies.common.statistics import CONSTANT_RANGE
 
+LANGUAGE_HEADS = 4  # of the layer that makes a vector of an instruction's words
+
 
 def state_without_base() -> list[int]:
     """Indices of the state's components that do not depend on where the kitchen's origin is."""

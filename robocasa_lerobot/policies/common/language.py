@@ -17,6 +17,7 @@ import torch
 from torch import Tensor, nn
 
 from robocasa_lerobot.errors import UserError
+from robocasa_lerobot.policies.common.configuration import LANGUAGE_HEADS
 from robocasa_lerobot.policies.common.transfer import each_once, is_plain_cpu, to_device
 
 SUBWORDS = 8  # per word: the word itself and its first seven trigrams
@@ -75,7 +76,13 @@ class TokenEncoder(nn.Module):
         self.embedding = nn.Embedding(1 + buckets, dim, padding_idx=PADDING)
         self.position_embedding = nn.Parameter(torch.randn(1, max_words, dim) * 0.02)
         self.layer = nn.TransformerEncoderLayer(
-            dim, nhead=4, dim_feedforward=2 * dim, dropout=0.0, activation="gelu", batch_first=True, norm_first=True
+            dim,
+            nhead=LANGUAGE_HEADS,
+            dim_feedforward=2 * dim,
+            dropout=0.0,
+            activation="gelu",
+            batch_first=True,
+            norm_first=True,
         )
         self.norm = nn.LayerNorm(dim)
 

@@ -16,7 +16,7 @@ from lerobot.configs import NormalizationMode, PreTrainedConfig
 from lerobot.optim import DiffuserSchedulerConfig
 
 from robocasa_lerobot.errors import UnknownNameError, UserError
-from robocasa_lerobot.policies.common.configuration import ActionChunkConfig
+from robocasa_lerobot.policies.common.configuration import LANGUAGE_HEADS, ActionChunkConfig
 
 VISION_ENCODERS = ("resnet18", "convnet")
 TEXT_ENCODERS = ("token", "clip")
@@ -149,6 +149,11 @@ class DiffusionTransformerConfig(ActionChunkConfig):
             )
         if self.width % self.n_heads or self.width % 2:
             raise UserError(f"width is {self.width}, expected an even multiple of n_heads ({self.n_heads}).")
+        self.check_at_least_one(("max_words", "language_buckets", "language_dim"))
+        if self.n_condition_layers < 0:
+            raise UserError(f"n_condition_layers is {self.n_condition_layers}, expected 0 or more.")
+        if self.text_encoder == "token" and self.language_dim % LANGUAGE_HEADS:
+            raise UserError(f"language_dim is {self.language_dim}, expected a multiple of {LANGUAGE_HEADS}.")
         self.check_crop()
         self.check_channels()
         if self.num_inference_steps is not None and not 1 <= self.num_inference_steps <= self.num_train_timesteps:

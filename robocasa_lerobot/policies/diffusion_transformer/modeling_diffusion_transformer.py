@@ -29,6 +29,7 @@ from robocasa_lerobot.policies.diffusion_transformer.configuration_diffusion_tra
 )
 from robocasa_lerobot.policies.diffusion_transformer.network import DenoisingTransformer
 from robocasa_lerobot.policies.diffusion_transformer.observation import ObservationEncoder
+from robocasa_lerobot.policies.diffusion_transformer.sampling import ddim_step, sampling_times
 
 
 class DiffusionTransformerPolicy(PreTrainedPolicy):
@@ -144,11 +145,16 @@ class DiffusionTransformerPolicy(PreTrainedPolicy):
         random = generator if generator is None or isinstance(generator, torch.Generator) else list(generator)
         shape = (features.shape[0], self.config.horizon, self.action_dim)
         x = starting_noise(noise, shape, generator, features)
-        self.scheduler.set_timesteps(self.config.num_inference_steps or self.config.num_train_timesteps)
-        for time in self.scheduler.timesteps.tolist():
-            times = torch.full(shape[:1], time, device=x.device, dtype=torch.long)
-            prediction = self._denoise(x, times, features).float()
-            x = self.scheduler.step(prediction, time, x, generator=random).prev_sample
+        times = sampling_times(self.config)
+        if isinstance(self.scheduler, DDPMScheduler):
+            self.scheduler.set_timesteps(timesteps=times)
+        for time, before in zip(times, [*times[1:], -1], strict=True):
+            asked = torch.full(shape[:1], time, device=x.device, dtype=torch.long)
+            prediction = self._denoise(x, asked, features).float()
+            if isinstance(self.scheduler, DDPMScheduler):
+                x = self.scheduler.step(prediction, time, x, generator=random).prev_sample
+            else:
+                x = ddim_step(self.scheduler, prediction, x, time, before)
         return x
 
     def reset(self) -> None:

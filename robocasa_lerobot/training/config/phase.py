@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -27,6 +28,15 @@ class EmaConfig:
     inv_gamma: float = 1.0
     min_decay: float = 0.0
     max_decay: float = 0.9999
+
+    def __post_init__(self) -> None:
+        if not self.inv_gamma > 0:
+            raise UserError(f"ema: inv_gamma is {self.inv_gamma}, expected more than 0.")
+        if not 0 <= self.min_decay <= self.max_decay <= 1:
+            raise UserError(
+                f"ema: min_decay is {self.min_decay} and max_decay {self.max_decay}, expected 0 <= min_decay <= "
+                "max_decay <= 1."
+            )
 
 
 @dataclass
@@ -208,6 +218,9 @@ class PhaseConfig:
                 f"phase {self.name!r}: batch_size {self.batch_size} is no multiple of gradient_accumulation "
                 f"{self.gradient_accumulation}."
             )
+        for name in ("learning_rate", "warmup_steps", "schedule_steps", "grad_clip_norm"):
+            if not 0 <= (getattr(self, name) or 0) < math.inf:
+                raise UserError(f"phase {self.name!r}: {name} is {getattr(self, name)}, expected 0 or more.")
         if self.lora is not None and self.freeze:
             raise UserError(f"phase {self.name!r}: `lora` freezes everything but its own weights; leave `freeze` out.")
         if self.statistics is not None:

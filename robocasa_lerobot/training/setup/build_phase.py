@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import contextlib
+import copy
 import dataclasses
 import hashlib
 from collections.abc import Callable
@@ -11,9 +13,10 @@ from typing import Any
 import torch
 from accelerate import Accelerator
 from lerobot.configs.default import DatasetConfig
+from lerobot.configs.policies import PreTrainedConfig
 from lerobot.configs.train import TrainPipelineConfig
 
-from robocasa_lerobot.data.mixture import MixtureDataset, StepBatches
+from robocasa_lerobot.data.mixture import MixtureDataset, MixtureMeta, StepBatches
 from robocasa_lerobot.errors import UserError
 from robocasa_lerobot.training import records
 from robocasa_lerobot.training.config.experiment import FROM_SCRATCH, HUB, ExperimentConfig, PhaseConfig
@@ -24,6 +27,7 @@ from robocasa_lerobot.training.setup import builders, clipping
 from robocasa_lerobot.training.setup import phase_data as joining
 from robocasa_lerobot.training.setup.features import LEAVE_OUT, RENAME
 from robocasa_lerobot.training.setup.kept import check_kept_settings
+from robocasa_lerobot.training.setup.optimizers import make_optimizer
 from robocasa_lerobot.training.weights.adapters import apply_training_scope
 from robocasa_lerobot.training.weights.checkpoint import TrainingState, last_checkpoint, pretrained_model, restore, tidy
 from robocasa_lerobot.training.weights.ema import Ema
@@ -48,11 +52,12 @@ def prepare_phase(
         UserError: data, start and settings do not fit each other, or the phase was begun with other data.
     """
     folder = Path(experiment.output_dir) / phase.name
-    init, last = start_of(experiment, phase), last_checkpoint(folder)
+    last, starts = last_checkpoint(folder), experiment.init_of(phase) != FROM_SCRATCH
+    init = start_of(experiment, phase) if last is None else None  # what a begun phase came from may be gone
     settings = _settings_of_start(experiment, phase, last, force)
     start = pretrained_model(last) if last is not None else init
     config = builders.policy_config(settings, start, device)
-    keep, rename = init is not None and phase.statistics == "keep", settings.get(RENAME)
+    keep, rename = starts and phase.statistics == "keep", settings.get(RENAME)
     if start is not None and (keep or last is not None):
         check_kept_settings(config, builders.policy_config({}, start, device), phase.name, begun=last is not None)
     begins = last is None and experiment.parent(phase) is not None
@@ -69,9 +74,10 @@ def prepare_phase(
     for part in (dataset, apart) if apart is not None else (dataset,):
         builders.set_windows(part, config)
         part.set_picture_size(builders.frame_size(config))
-    accelerator.print(f"phase {phase.name}: {phase.steps} steps from {init or 'scratch'} on")
+    where = init or (FROM_SCRATCH if last is None else last)
+    accelerator.print(f"phase {phase.name}: {phase.steps} steps from {where} on")
     accelerator.print("  " + dataset.describe().replace("\n", "\n  "))
-    if init is not None:
+    if starts:
         accelerator.print(f"  statistics of normalisation: {phase.statistics}")
     for part in (dataset, apart) if apart is not None else (dataset,):
         _cache_frames(experiment, part)
@@ -101,7 +107,7 @@ def prepare_phase(
             f"the policy {config.type!r} has weights in half precision, whose gradients fp16 cannot scale; set "
             "`mixed_precision: bf16`, or the policy's own type of weights to float32."
         )
-    optimizer, scheduler, clip = builders.make_optimizer(policy, phase, masters)
+    optimizer, scheduler, clip = make_optimizer(policy, phase, masters)
     ema = Ema(policy, phase.ema, masters=masters) if phase.ema.enabled else None
     state = TrainingState(
         policy,
@@ -172,6 +178,25 @@ def check_begun(
     records.check_same_data(folder, data, force)
 
 
+def check_scope(config: PreTrainedConfig, meta: MixtureMeta, phase: PhaseConfig) -> None:
+    """Whether what a phase freezes, or changes by low ranks, is there in its policy, built without its weights.
+
+    A policy that cannot be built so is not looked at: its phase will say.
+
+    Raises:
+        UserError: a pattern fits nothing, or nothing is left to train.
+    """
+    policy, config = None, copy.deepcopy(config)
+    config.device = "meta"
+    if phase.freeze or phase.lora is not None:
+        with contextlib.suppress(Exception), torch.device("meta"):  # LeRobot's raise all kinds without their weights
+            policy = builders.make_phase_policy(config, meta, None)
+    if policy is not None:
+        apply_training_scope(policy, phase, seed=0)
+        if not any(weight.requires_grad for weight in policy.parameters()):
+            raise UserError(f"phase {phase.name!r}: `freeze` leaves nothing of the policy to train.")
+
+
 def phase_seed(seed: int, name: str) -> int:
     """The seed of a phase: no two phases of an experiment see the same noise or sample order."""
     return int.from_bytes(hashlib.sha256(f"{seed}/{name}".encode()).digest()[:4], "big")
@@ -185,7 +210,9 @@ def policy_settings(experiment: ExperimentConfig, phase: PhaseConfig) -> dict[st
     """
     init = experiment.init_of(phase)
     own = experiment.policy if experiment.parent(phase) is None else {}  # a phase before has them already
-    settings = {**own, **phase.policy}
+    if phase.policy.get("type", own.get("type")) != own.get("type"):
+        own = {}  # another policy than the experiment's, whose fields are none of its
+    settings = builders.laid_over(own, phase.policy)
     kind = settings.get("type", experiment.policy.get("type"))
     if kind == "groot":  # its warm-up is `warmup_ratio` of these, which LeRobot leaves at 10,000 for any training
         settings.setdefault("max_steps", phase.schedule_steps or phase.steps)
@@ -235,7 +262,7 @@ def planned_policy(
         init = experiment.init_of(phase)
         return policy_settings(experiment, phase), None if init == FROM_SCRATCH else _config_folder(init, offline)
     settings, checkpoint = planned_policy(experiment, parent, offline)
-    return {**settings, **policy_settings(experiment, phase)}, checkpoint
+    return builders.laid_over(settings, policy_settings(experiment, phase)), checkpoint
 
 
 def _config_folder(init: str, offline: bool) -> Path | None:

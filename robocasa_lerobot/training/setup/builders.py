@@ -1,4 +1,4 @@
-"""From configuration to objects: LeRobot policy configs, policies, processors, optimisers and schedules."""
+"""From configuration to objects: LeRobot policy configs, policies and processors."""
 
 from __future__ import annotations
 
@@ -17,8 +17,6 @@ import torch
 from huggingface_hub import hf_hub_download, snapshot_download, try_to_load_from_cache
 from lerobot.configs.policies import PreTrainedConfig
 from lerobot.datasets.factory import resolve_delta_timestamps
-from lerobot.optim.optimizers import OptimizerConfig
-from lerobot.optim.schedulers import CosineDecayWithWarmupSchedulerConfig, DiffuserSchedulerConfig, LRSchedulerConfig
 from lerobot.policies.factory import get_policy_class, make_policy, make_pre_post_processors
 from lerobot.policies.pretrained import PreTrainedPolicy
 from lerobot.utils.constants import ACTION, IMAGENET_STATS, OBS_STATE
@@ -30,16 +28,14 @@ from robocasa_lerobot.errors import UnknownNameError, UserError
 from robocasa_lerobot.policies.common.statistics import CONSTANT_RANGE, widen_constant_components
 from robocasa_lerobot.policies.needs import explained
 from robocasa_lerobot.policies.registry import register_policies
-from robocasa_lerobot.training.config.phase import PhaseConfig
 from robocasa_lerobot.training.setup.features import LEAVE_OUT, RENAME, fit_features, new_names, renamed_inputs
 from robocasa_lerobot.training.setup.features import check_features as _check_features
 from robocasa_lerobot.training.setup.kept import rename_kept
-from robocasa_lerobot.training.weights.master_weights import MasterWeights
 
 _NO_FIELDS = ("type", "path", RENAME, LEAVE_OUT)  # settings of a policy that are no fields of its configuration
 _LOAD_TOKENIZERS = ("pi0", "pi05", "smolvla", "xvla")  # by name, in their processors
 _NOT_LOADED = "Could not load state dict"
-_BY_NAME = "xvla-adamw"  # LeRobot's optimiser whose rates go by the names of parameters
+MAPPING = "normalization_mapping"
 
 
 def best_device(wanted: str | None) -> str:
@@ -95,6 +91,8 @@ def policy_config(settings: Mapping[str, Any], checkpoint: Path | None, device: 
     for key in fields:
         if key not in names:
             raise UnknownNameError("key", key, names, f"(in the settings of the policy {kind!r})")
+    if MAPPING in fields:  # LeRobot takes what a mapping does not name for left as it is
+        fields[MAPPING] = {**(base.get(MAPPING) or _own_mapping(str(kind))), **(fields[MAPPING] or {})}
     data = {"push_to_hub": False, **base, **fields, "device": device, "pretrained_path": None, "type": kind}
     try:
         config: PreTrainedConfig = draccus.decode(PreTrainedConfig, data)
@@ -102,6 +100,22 @@ def policy_config(settings: Mapping[str, Any], checkpoint: Path | None, device: 
         cause = error.__cause__ if isinstance(error.__cause__, UserError) else error
         raise UserError(f"settings of the policy {kind!r}: {cause}") from error
     return config
+
+
+def laid_over(own: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
+    """Settings of a policy with others laid over them; of a mapping of normalisation, those that are named."""
+    both = {**own, **changes}
+    if isinstance(own.get(MAPPING), Mapping) and isinstance(changes.get(MAPPING), Mapping):
+        both[MAPPING] = {**own[MAPPING], **changes[MAPPING]}
+    return both
+
+
+def _own_mapping(kind: str) -> dict[str, Any]:
+    """How a type of policies normalises where nothing is said."""
+    for entry in dataclasses.fields(PreTrainedConfig.get_choice_class(kind)):
+        if entry.name == MAPPING and callable(entry.default_factory):
+            return {name: getattr(mode, "value", mode) for name, mode in entry.default_factory().items()}
+    return {}
 
 
 def frame_size(config: PreTrainedConfig) -> tuple[int, int] | None:
@@ -198,90 +212,6 @@ def check_processors(config: PreTrainedConfig, meta: MixtureMeta) -> None:
         config = copy.deepcopy(config)
         config.input_features = config.input_features or dataset_to_policy_features(meta.features)
         make_processors(config, dataclasses.replace(meta, stats=None), None, keep_statistics=False)
-
-
-def make_optimizer(
-    policy: PreTrainedPolicy, phase: PhaseConfig, masters: MasterWeights | None = None
-) -> tuple[torch.optim.Optimizer, torch.optim.lr_scheduler.LRScheduler | None, float]:
-    """The policy's own optimiser and schedule with the phase's changes, and the largest gradient norm (0: any).
-
-    It updates the float32 copies in `masters` of weights in half precision; None makes them.
-
-    Raises:
-        UserError: a setting that the optimiser or schedule does not have, or nothing to train.
-    """
-    preset = _changed(OptimizerConfig, policy.config.get_optimizer_preset(), phase.optimizer, "optimizer")
-    masters = MasterWeights(policy) if masters is None else masters
-    optimizer = preset.build(masters.groups(_trained_groups(policy, phase, by_name=preset.type == _BY_NAME)))
-    if not isinstance(optimizer, torch.optim.Optimizer):
-        raise UserError(f"policy {policy.config.type!r} wants several optimisers, which training does not support.")
-    for group in optimizer.param_groups:
-        # One kernel for all elements instead of a dozen: on a CPU the update is several times faster.
-        if "fused" in group and policy.config.device == "cpu":
-            group["fused"] = True
-    masters.follow(optimizer)
-    if phase.learning_rate is not None:
-        for group in optimizer.param_groups:
-            group["lr"] *= phase.learning_rate / preset.lr
-    schedule = policy.config.get_scheduler_preset()
-    if phase.scheduler.get("type") == "none":
-        schedule = None
-    elif phase.scheduler:
-        schedule = _changed(LRSchedulerConfig, schedule, phase.scheduler, "scheduler")
-    if schedule is None and phase.warmup_steps:
-        schedule = DiffuserSchedulerConfig(name="constant_with_warmup", num_warmup_steps=phase.warmup_steps)
-    elif schedule is not None and phase.warmup_steps is not None:
-        schedule = dataclasses.replace(schedule, num_warmup_steps=phase.warmup_steps)
-    total = phase.schedule_steps or phase.steps
-    if isinstance(schedule, CosineDecayWithWarmupSchedulerConfig) and _warmup_is_given(phase):
-        # For a training shorter than its decay, LeRobot shortens the warm-up, too: not one that was asked for.
-        schedule = dataclasses.replace(schedule, num_decay_steps=min(schedule.num_decay_steps, total))
-    scheduler = schedule.build(optimizer, total) if schedule is not None else None
-    clip = preset.grad_clip_norm if phase.grad_clip_norm is None else phase.grad_clip_norm
-    return optimizer, scheduler, float(clip or 0.0)
-
-
-def _changed(registry: Any, preset: Any, changes: Mapping[str, Any], what: str) -> Any:
-    """The policy's own settings with changes, or another type's with the given fields."""
-    kind = changes.get("type", preset.type if preset is not None else None)
-    fields = {key: value for key, value in changes.items() if key != "type"}
-    if kind not in registry.get_known_choices():
-        raise UnknownNameError(f"type of {what}", str(kind), [*registry.get_known_choices(), "none"])
-    chosen = registry.get_choice_class(kind)
-    names = [f.name for f in dataclasses.fields(chosen)]
-    for key in fields:
-        if key not in names:
-            raise UnknownNameError("key", key, names, f"(in `{what}`)")
-    fields = {key: tuple(value) if isinstance(value, list) else value for key, value in fields.items()}
-    if preset is not None and kind == preset.type:
-        return dataclasses.replace(preset, **fields)
-    try:
-        return chosen(**fields)
-    except TypeError as error:
-        raise UserError(f"`{what}` of type {kind!r}: {error}.") from error
-
-
-def _warmup_is_given(phase: PhaseConfig) -> bool:
-    return phase.warmup_steps is not None or "num_warmup_steps" in phase.scheduler
-
-
-def _trained_groups(policy: PreTrainedPolicy, phase: PhaseConfig, by_name: bool) -> Any:
-    """The policy's parameter groups without frozen parameters; one group where low-rank changes are trained.
-
-    For an optimiser that goes `by_name`, the parameters by their names.
-    """
-    trained = {name: p for name, p in policy.named_parameters() if p.requires_grad}
-    if not trained:
-        raise UserError(f"phase {phase.name!r}: `freeze` leaves nothing of the policy to train.")
-    if by_name:
-        return trained
-    if phase.lora is not None:
-        return [{"params": list(trained.values())}]
-    params = policy.get_optim_params()
-    params = list(params.values() if isinstance(params, dict) else params)
-    groups = params if params and isinstance(params[0], dict) else [{"params": params}]
-    kept = [{**group, "params": [p for p in group["params"] if p.requires_grad]} for group in groups]
-    return [group for group in kept if group["params"]]
 
 
 def hub_checkpoint(name: str) -> Path:

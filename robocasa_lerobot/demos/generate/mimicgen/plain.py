@@ -17,13 +17,14 @@ from robocasa_lerobot.demos.generate.execute import hand_now, pose_command
 from robocasa_lerobot.demos.generate.mimicgen.refs import name_here
 from robocasa_lerobot.demos.generate.mimicgen.subtasks import (
     DatagenInfo,
-    boundaries,
+    check_suits,
     read_datagen,
     targets,
 )
 from robocasa_lerobot.demos.generate.mimicgen.template import Subtask, Template
 from robocasa_lerobot.demos.generate.sources.frames import body_pose
 from robocasa_lerobot.demos.generate.sources.prepared import GROUP, HAND_IN_SITE
+from robocasa_lerobot.demos.generate.sources.source import Stamp
 from robocasa_lerobot.demos.generate.sources.transform import yaw_pose
 from robocasa_lerobot.demos.motion import Array, action
 from robocasa_lerobot.demos.replay import demonstrations
@@ -45,13 +46,14 @@ class Sources:
 
 
 @lru_cache(maxsize=4)
-def read_sources(path: Path, template: Template, first: int = 0) -> Sources:
+def read_sources(path: Path, template: Template, first: int = 0, stamp: Stamp = ()) -> Sources:
     """Read what MimicGen or `prepare` has written.
 
     Args:
         path: file or folder.
         template: of their task.
         first: of each file only so many, the first ones; 0 takes all.
+        stamp: of the files; others are read anew.
 
     Raises:
         UserError: none is prepared, or one does not suit the template.
@@ -78,11 +80,12 @@ def suited(template: Template, infos: Iterable[DatagenInfo]) -> Sources:
     """Demonstrations together with what they are taken by.
 
     Raises:
-        UserError: one does not suit the template.
+        UnknownNameError: one has nothing of a subtask's object_ref, or no such signal.
+        UnfitSourcesError: a signal never rises, or an offset may put a subtask's end before its beginning.
     """
     found = Sources(template, tuple(infos))
     for info in found.infos:
-        boundaries(info, template)  # before anything is made of them
+        check_suits(info, template)  # before anything is made of them
     return found
 
 

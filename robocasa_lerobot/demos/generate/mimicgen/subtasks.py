@@ -132,6 +132,26 @@ def boundaries(info: DatagenInfo, template: Template) -> list[int]:
     return [*ends, len(info.eef)]
 
 
+def check_suits(info: DatagenInfo, template: Template) -> None:
+    """Whether a demonstration can be taken by a template, whatever offsets are drawn.
+
+    Raises:
+        UnknownNameError: it has nothing of a subtask's object_ref, or no such signal.
+        UnfitSourcesError: a signal never rises, or an offset may put a subtask's end before its beginning.
+    """
+    for subtask in template.subtasks:
+        if subtask.object_ref is not None and subtask.object_ref not in info.objects:
+            raise UnknownNameError("object_ref", subtask.object_ref, info.objects, f"({info.name})")
+    ends = boundaries(info, template)
+    spans = [(end + low, end + high) for end, (low, high) in _but_the_last(ends, template)]
+    for (_, latest), (earliest, _) in itertools.pairwise([(0, 0), *spans, (ends[-1], ends[-1])]):
+        if earliest <= latest:
+            raise UnfitSourcesError(
+                f"{info.name}: its subtasks end at steps {ends}, which offsets of the template may put before they "
+                "begin. Take smaller subtask_term_offset_range, or leave the demonstration out."
+            )
+
+
 def with_offsets(ends: Sequence[int], template: Template, rng: np.random.Generator) -> list[tuple[int, int]]:
     """First and last step of each subtask, its end put off by as many steps as its template has drawn.
 

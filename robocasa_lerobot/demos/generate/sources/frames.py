@@ -81,6 +81,14 @@ def parts_of(env: KitchenEnv, stage: Stage) -> list[Part]:
     return [_part(env, stage.target, fixture, joint) for joint in _joints(env, stage, fixture)]
 
 
+def possible_parts(env: KitchenEnv, stage: Stage) -> list[Part]:
+    """The parts that a stage may come to be about: of a knob that follows where something is put, all burners'."""
+    if stage.skill != "knobs" or not stage.object:
+        return parts_of(env, stage)
+    hob = env.scene.fixture(stage.target, Hob)
+    return [_part(env, stage.target, hob, hob.joint(f"{KNOB}{location}")) for location in hob.burners]
+
+
 def _joints(env: KitchenEnv, stage: Stage, fixture: Fixture) -> list[str]:
     part = env.scene.fill(stage.part)
     if stage.skill == "drawers":

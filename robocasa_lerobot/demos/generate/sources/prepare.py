@@ -17,11 +17,12 @@ from typing import Any
 import h5py
 import numpy as np
 
-from robocasa_lerobot.demos.generate.sources.frames import HANDLE, Part, body_pose, parts_of
+from robocasa_lerobot.demos.generate.sources.frames import HANDLE, Part, body_pose, parts_of, possible_parts
 from robocasa_lerobot.demos.generate.sources.prepared import GROUP, Prepared, is_prepared, world_pose, write_prepared
 from robocasa_lerobot.demos.generate.sources.segments import cut, signals_of
 from robocasa_lerobot.demos.generate.sources.transform import inverse, make_pose, yaw_pose
 from robocasa_lerobot.demos.generate.sources.uses import is_about_itself, is_use, use_frame, use_key, working_point
+from robocasa_lerobot.demos.hdf5 import versions
 from robocasa_lerobot.demos.motion import Array, base_pose, grip_position, hand_rotation
 from robocasa_lerobot.demos.recorder import SUCCESS_HOLD_STEPS
 from robocasa_lerobot.demos.replay import (
@@ -74,6 +75,7 @@ def prepare_files(paths: Iterable[Path], *, workers: int = 1, fresh: bool = Fals
         for path, demos in by_file.items():
             known = {} if fresh else known_outcomes(path)
             if all(demo in known for demo in demos):
+                _clear_left(path)
                 yield from known.values()
             else:
                 begun[path] = _begin(path, demos, locks, fresh=fresh)
@@ -109,10 +111,26 @@ class _Begun:
             self.lock.close()
 
 
+def _clear_left(path: Path) -> None:
+    """Remove what a run left that was killed when it had replaced a file."""
+    folder = _folder_of(path)
+    if folder.exists():
+        with contextlib.suppress(UserError), held_lock(_lock_of(path)):  # held: another one prepares it afresh
+            shutil.rmtree(folder, ignore_errors=True)
+
+
+def _folder_of(path: Path) -> Path:
+    return path.with_name(f".{path.stem}.prepare")
+
+
+def _lock_of(path: Path) -> Path:
+    return path.with_name(f".{path.stem}.prepare.lock")
+
+
 def _begin(path: Path, demos: list[str], locks: contextlib.ExitStack, *, fresh: bool) -> _Begun:
     lock = locks.enter_context(contextlib.ExitStack())
-    lock.enter_context(held_lock(path.with_name(f".{path.stem}.prepare.lock")))
-    folder = path.with_name(f".{path.stem}.prepare")
+    lock.enter_context(held_lock(_lock_of(path)))
+    folder = _folder_of(path)
     note, identity = folder / FILE, file_identity(path)
     # What a killed run left may be of another recording that had the file's name then.
     if folder.exists() and (fresh or not note.exists() or json.loads(note.read_text()) != identity):
@@ -122,17 +140,18 @@ def _begin(path: Path, demos: list[str], locks: contextlib.ExitStack, *, fresh: 
     return _Begun(path, demos, folder, lock, set(demos))
 
 
-def file_identity(path: Path) -> dict[str, int]:
-    """What tells a file from another that had its place."""
+def file_identity(path: Path) -> dict[str, Any]:
+    """What tells a file from another that had its place, and what is found out of it from what other software would."""
     status = path.stat()
-    return {"size": status.st_size, "modified_ns": status.st_mtime_ns}
+    return {"size": status.st_size, "modified_ns": status.st_mtime_ns, **versions()}
 
 
 def known_outcomes(path: Path) -> dict[str, Outcome]:
     """What is known of a file's demonstrations already, by their names."""
     with h5py.File(path) as file:
         dropped = json.loads(file["data"].attrs.get(DROPPED, "{}"))
-        found = {demo: Outcome(path, demo, reason) for demo, reason in dropped.items()}
+        same = dropped.get("versions") == versions()  # others may replay what these do not
+        found = {demo: Outcome(path, demo, reason) for demo, reason in dropped.get("reasons", {}).items() if same}
         found |= {demo: Outcome(path, demo) for demo, group in file["data"].items() if is_prepared(group)}
     return found
 
@@ -173,7 +192,7 @@ def _publish(path: Path, demos: list[str], folder: Path) -> None:
                     source.copy(source[f"demo/{GROUP}"], group, name=GROUP)
             else:
                 dropped[demo] = json.loads((folder / f"{demo}.json").read_text())
-        file["data"].attrs[DROPPED] = json.dumps(dropped)
+        file["data"].attrs[DROPPED] = json.dumps({"versions": versions(), "reasons": dropped})
 
 
 def replayed(recorded: Demonstration) -> Prepared | str:
@@ -211,13 +230,12 @@ class _Watcher:
         self._words = [{word: getattr(stage, word) for word in _STAGE_WORDS} for stage in self._stages]
         self._parts: dict[str, Part] = {}
         for stage, words in zip(self._stages, self._words, strict=True):
-            own = parts_of(env, stage)
-            words["parts"] = [part.name for part in own]
+            words["parts"] = [part.name for part in parts_of(env, stage)]
             words["drawn_to"] = env.scene.fill(stage.to)
             words["thing"] = env.scene.fill(stage.object)
             words["place"] = env.scene.fill(stage.target)
             words["about_itself"] = is_use(stage) and is_about_itself(env, stage)
-            self._parts |= {part.name: part for part in own}
+            self._parts |= {part.name: part for part in possible_parts(env, stage)}
         loose = {*env.scene.objects, *(w["thing"] for w in self._words if w["thing"])}
         self._objects: dict[str, Graspable] = {name: graspable(env, name) for name in sorted(loose)}
         self._bodies = {name: int(env.model.body(name).id) for name in self._objects}
@@ -242,6 +260,9 @@ class _Watcher:
     def before(self) -> None:
         """Note the state before a step."""
         env, data = self._env, self._env.data
+        step = len(self._rows.get("eef", ()))
+        if step == 0 or self._stage[step] != self._stage[step - 1]:
+            self._begin_stage(int(self._stage[step]))
         (x, y, _), yaw = base_pose(data)
         self._frame = make_pose(*env.controller.arm_frame())
         self._note("eef", make_pose(grip_position(data), hand_rotation(data)))
@@ -262,6 +283,11 @@ class _Watcher:
         for number, stage in enumerate(self._stages):
             if is_use(stage):
                 self._before_use(number, stage)
+
+    def _begin_stage(self, number: int) -> None:
+        """Note which parts a stage is about: that may follow from where something was put in one before."""
+        if number < len(self._stages):
+            self._words[number]["parts"] = [part.name for part in parts_of(self._env, self._stages[number])]
 
     def _before_use(self, number: int, stage: Stage) -> None:
         """Note where a stage uses its object, and the point of it that counts."""
@@ -299,14 +325,16 @@ class _Watcher:
 
     def prepared(self) -> Prepared:
         """All that was noted."""
+        parts = {name for words in self._words for name in words["parts"]}
+        left_out = set(self._parts) - parts  # another burner's knob
 
         def series(prefix: str) -> dict[str, Any]:
-            start = f"{prefix}/"
-            return {key.removeprefix(start): np.array(v) for key, v in self._rows.items() if key.startswith(start)}
+            found = {key.partition("/")[2]: rows for key, rows in self._rows.items() if key.startswith(f"{prefix}/")}
+            return {name: np.array(rows) for name, rows in found.items() if name not in left_out}
 
         about = {
             "stages": self._words,
-            "parts": {name: _described(part) for name, part in self._parts.items()},
+            "parts": {name: _described(part) for name, part in self._parts.items() if name in parts},
             "objects": {name: self._size(name) for name in self._objects},
             "fixtures": {
                 role: {"kind": type(fixture).__name__, "yaw": fixture.yaw} for role, fixture in self._roles.items()

@@ -20,7 +20,7 @@ from robocasa_lerobot.demos.motion import Array
 
 GROUP = "datagen_info"
 OURS = "kitchen"
-VERSION = 4  # of this layout: files of another one are prepared again
+VERSION = 5  # of this layout: files of another one are prepared again
 INTERFACE, INTERFACE_TYPE = "MG_KitchenEnv", "robocasa_lerobot"
 # The hand body's axes in those of the grip site, which MimicGen's poses have: a quarter turn about the approach.
 HAND_IN_SITE = np.array([[0.0, -1.0, 0.0, 0.0], [1.0, 0.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0], [0.0, 0.0, 0.0, 1.0]])

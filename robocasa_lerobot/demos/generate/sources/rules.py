@@ -6,6 +6,7 @@ segments begin and end from contacts.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
@@ -44,6 +45,7 @@ class CutRules:
 
 COMMON = CutRules()
 FRAMES = ("", HANDLE, REST)
+_ABOVE_0 = ("near_m", "place_near_m", "use_near_m")
 DERIVED: Mapping[str, CutRules] = MappingProxyType({})
 
 
@@ -90,6 +92,8 @@ def rules_from(asked: Mapping[str, Any], where: str = "rules") -> dict[str, CutR
                 raise UnknownNameError("rule", str(name), known)
             if not isinstance(value, (int, float) if known[name] is float else known[name]):
                 raise UserError(f"{where}, {verb}: {name} is {value!r}, but should be a {known[name].__name__}.")
+            if name in _ABOVE_0 and not 0.0 < values[name] < math.inf:
+                raise UserError(f"{where}, {verb}: {name} is {value!r}, expected a number of metres above 0.")
         if (frame := values.get("frame", "")) not in FRAMES:
             raise UnknownNameError(f"{where}, {verb}: frame", frame, FRAMES)
         found[str(verb)] = replace(COMMON, **values)

@@ -137,7 +137,8 @@ def _object_segments(found: Prepared, stage: _Stage, before: list[Segment]) -> I
         lead = _lead(found, close, first, rules.near_m, rules.far_steps)
         yield Segment(PICK, stage.number, name, first, lead, close, lifted, lifted)
     if verb in USES:
-        yield from _use_segments(found, stage, lifted, opened, lay)
+        # What is used where it stands never rises.
+        yield from _use_segments(found, stage, lifted if lifted < opened else close, opened, lay)
     if verb != "pick" and (verb not in USES or verb == RINSE) and opened < last:
         lead = _lead(found, opened, close, rules.place_near_m, rules.far_steps)
         yield Segment(PLACE, stage.number, name, close, lead, opened, opened, last)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import json
 from collections.abc import Mapping, Sequence
@@ -20,6 +21,8 @@ from robocasa_lerobot.demos.generate.sources.uses import UNDER_WATER
 from robocasa_lerobot.demos.replay import demonstrations
 from robocasa_lerobot.envs.tasks.task import Stage
 from robocasa_lerobot.errors import UserError
+
+type Stamp = tuple[tuple[str, int, int], ...]
 
 
 class UnfitSourcesError(UserError):
@@ -104,7 +107,8 @@ def sources_of(folder: Path, task: str, rules: str = "{}") -> list[Source]:
     Raises:
         UnfitSourcesError: nothing there has been prepared.
     """
-    found = _read(place_of(folder, task), _stamp(folder), rules)
+    place = place_of(folder, task)
+    found = _read(place, stamp_of(place), rules)
     if not found:
         raise UnfitSourcesError(
             f"{folder}: no demonstration there has been prepared, or none replays. "
@@ -160,13 +164,18 @@ def _alike(one: str, other: str) -> bool:
     return one == other or (one in UNDER_WATER and other in UNDER_WATER)
 
 
-def _stamp(folder: Path) -> float:
-    files = sorted(folder.glob("*.hdf5")) if folder.is_dir() else [folder]
-    return max((file.stat().st_mtime for file in files if file.exists()), default=0.0)
+def stamp_of(place: Path) -> Stamp:
+    """Names, times and sizes of the files of a folder, or of one file: what is kept of others is read anew."""
+    found = []
+    for file in sorted(place.glob("*.hdf5")) if place.is_dir() else [place]:
+        with contextlib.suppress(FileNotFoundError):
+            status = file.stat()
+            found.append((file.name, status.st_mtime_ns, status.st_size))
+    return tuple(found)
 
 
 @lru_cache(maxsize=4)
-def _read(path: Path, stamp: float, rules: str) -> tuple[Source, ...]:
+def _read(path: Path, stamp: Stamp, rules: str) -> tuple[Source, ...]:
     found: list[Source] = []
     cuts = rules_from(json.loads(rules))
     for file, demo in demonstrations([path]):

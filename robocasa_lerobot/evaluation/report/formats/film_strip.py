@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from robocasa_lerobot.evaluation.records.results import TrialRecord
 from robocasa_lerobot.evaluation.report.model import Film, Frame
 from robocasa_lerobot.evaluation.report.policies import PolicyResult, ReportData
-from robocasa_lerobot.video import frames_and_rate, spread_frames
+from robocasa_lerobot.video import DamagedVideoError, frames_and_rate, spread_frames
 
 FRAMES = 6
 JPEG_QUALITY = 80
@@ -41,7 +41,10 @@ def choose_films(data: ReportData, embed: bool = True, budget: int = BUDGET_BYTE
     films: list[Film] = []
     paths, spent = [], 0
     for policy, record in [one for _, chosen in found[::step] for one in chosen][:MAX_FILMS]:
-        film = _film(policy, record)
+        try:
+            film = _film(policy, record)
+        except DamagedVideoError:  # as one that is missing
+            continue
         size = sum(len(frame.uri) for frame in film.frames)
         if spent + size > budget:
             break

@@ -8,19 +8,28 @@ from robocasa_lerobot.evaluation.report import numbers as fmt
 from robocasa_lerobot.evaluation.report.formats.charts import Line, line_chart
 from robocasa_lerobot.evaluation.report.model import Cell, Column, Figure, Section, Series, Table
 from robocasa_lerobot.evaluation.report.policies import PolicyResult, ReportData
-from robocasa_lerobot.evaluation.statistics.horizon import success_curve, time_to_success
+from robocasa_lerobot.evaluation.statistics.horizon import SuccessCurve, success_curve, time_to_success
 
 MAX_LINES = 6
 AT = (0.25, 0.5, 0.75, 1.0)
+AT_END = "at_end"
 
 
 def section(data: ReportData) -> Section | None:
-    """None where no trial has a horizon, or none succeeded."""
-    policies = [policy for policy in data.policies if _times(policy)[1]][-MAX_LINES:]
+    """None where no trial has a horizon, or none succeeded.
+
+    Times of policies whose trials last otherwise are in other units: those of the last policy's kind are shown. Where
+    the goal must hold at the end a trial that had it earlier counts as unsolved, so that its time says nothing.
+    """
+    timed = [p for p in data.policies if p.header.success_rule != AT_END and _times(p)[1]]
+    alike = [policy for policy in timed if _is_fixed(policy) == _is_fixed(timed[-1])]
+    policies = alike[-MAX_LINES:]
     if not any(result.rate.successes for policy in policies for result in policy.tasks):
         return None
     lines, rows = [], []
-    unit = _unit(policies)
+    unit = (
+        "share of the trial's horizon" if _is_fixed(policies[-1]) else "time, as a multiple of the task's own horizon"
+    )
     for policy in policies:
         first, ended = _times(policy)
         curve = success_curve(first, ended)
@@ -50,7 +59,7 @@ def section(data: ReportData) -> Section | None:
         rows.append(
             (
                 Cell(policy.label),
-                *(Cell(fmt.percent(curve.at(share)), curve.at(share)) for share in AT),
+                *(_solved_by(curve, share, max(ended)) for share in AT),
                 *(Cell(t, values[i] if values else None) for i, t in enumerate(times)),
             )
         )
@@ -86,9 +95,26 @@ def section(data: ReportData) -> Section | None:
         "longer horizon would give a higher rate.",
         tuple(Series(line.label, line.series) for line in lines),
     )
-    left_out = len(data.policies) - len(policies)
-    text = (f"The last {len(policies)} policies; {left_out} more are in the tables.",) if left_out > 0 else ()
-    return Section("horizon", "Success against time", text, parts=(figure,))
+    return Section("horizon", "Success against time", _left_out(data, timed, alike, policies), parts=(figure,))
+
+
+def _solved_by(curve: SuccessCurve, share: float, last: float) -> Cell:
+    """Nothing is known of what lies behind the end of all trials."""
+    return Cell(fmt.NONE) if share > last else Cell(fmt.percent(curve.at(share)), curve.at(share))
+
+
+def _left_out(
+    data: ReportData, timed: list[PolicyResult], alike: list[PolicyResult], shown: list[PolicyResult]
+) -> tuple[str, ...]:
+    """Which policies are not in the figure, and why."""
+    text = []
+    if more := len(alike) - len(shown):
+        text.append(f"The last {len(shown)} policies; {more} more are in the tables.")
+    if others := [policy.label for policy in timed if policy not in alike]:
+        text.append(f"Left out is what has another kind of horizon: {fmt.listed(others)}.")
+    if at_end := [policy.label for policy in data.policies if policy.header.success_rule == AT_END]:
+        text.append(f"Left out is what must hold at the end of a trial, whenever that is: {fmt.listed(at_end)}.")
+    return tuple(text)
 
 
 def _records(policy: PolicyResult) -> list:
@@ -116,6 +142,6 @@ def _times(policy: PolicyResult) -> tuple[list[float | None], list[float]]:
     return first, ended
 
 
-def _unit(policies: list[PolicyResult]) -> str:
-    fixed = any(policy.header.horizon_rule != "task" for policy in policies)
-    return "share of the trial's horizon" if fixed else "time, as a multiple of the task's own horizon"
+def _is_fixed(policy: PolicyResult) -> bool:
+    """Whether trials do not last as long as the task's own horizon says, or a multiple of that."""
+    return policy.header.horizon_rule != "task"

@@ -6,6 +6,7 @@ from collections.abc import Callable
 
 from robocasa_lerobot.benchmark import published
 from robocasa_lerobot.benchmark.tasks import TaskFacts, task_facts
+from robocasa_lerobot.evaluation.report import comparable
 from robocasa_lerobot.evaluation.report import numbers as fmt
 from robocasa_lerobot.evaluation.report.model import Cell, Column, Section, Table
 from robocasa_lerobot.evaluation.report.policies import PolicyResult, ReportData, average_of
@@ -73,7 +74,8 @@ def _table(data: ReportData, name: str, label: str, kind_of: Callable[[TaskFacts
     )
     columns = [Column(label), Column("tasks", numeric=True)]
     columns += [Column(policy.label, numeric=True, series=data.series(policy)) for policy in policies]
-    return Table(f"kinds-{name}", f"Success by {label}", tuple(columns), rows, folded=name == "activity")
+    title, warnings = f"Success by {label}", comparable.warnings(policies)
+    return Table(f"kinds-{name}", title, tuple(columns), rows, warnings=warnings, folded=name == "activity")
 
 
 def _mean(policy: PolicyResult, tasks: list[str]) -> Cell:

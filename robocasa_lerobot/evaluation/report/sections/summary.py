@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from robocasa_lerobot.benchmark import published
 from robocasa_lerobot.evaluation.records.results import UNPERTURBED
-from robocasa_lerobot.evaluation.report import left_out
+from robocasa_lerobot.evaluation.report import comparable, left_out
 from robocasa_lerobot.evaluation.report import numbers as fmt
 from robocasa_lerobot.evaluation.report.model import Bar, Card, Cell, Column, Section, Table
 from robocasa_lerobot.evaluation.report.policies import PolicyResult, ReportData, describe_policy
@@ -63,9 +63,13 @@ def headline(data: ReportData) -> str:
         text += f", averaged over {fmt.count(len(last.tasks), 'task')}"
     if left_out.is_partial(last):
         text += " of a partial run"
-    if 0 < len(before) <= 3:
-        text += "; " + fmt.listed([f"{policy.label} {fmt.percent(policy.average.value)}" for policy in before])
-    return text[:1].upper() + text[1:] + "."
+    alike = [one for one in before if comparable.same_tasks(one, last) and not comparable.differences(one, last)]
+    if 0 < len(alike) <= 3:
+        text += "; " + fmt.listed([f"{policy.label} {fmt.percent(policy.average.value)}" for policy in alike])
+    text = text[:1].upper() + text[1:] + "."
+    others = len(before) - len(alike)
+    was = "policy was" if others == 1 else "policies were"
+    return text + (f" {others} more {was} tried on other tasks or by other rules." if others else "")
 
 
 def what_was_run(data: ReportData) -> str:

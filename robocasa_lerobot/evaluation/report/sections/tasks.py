@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from robocasa_lerobot.benchmark import published
 from robocasa_lerobot.benchmark.tasks import TaskFacts, task_facts
 from robocasa_lerobot.evaluation.records.results import UNPERTURBED, TrialRecord
+from robocasa_lerobot.evaluation.report import comparable
 from robocasa_lerobot.evaluation.report import numbers as fmt
 from robocasa_lerobot.evaluation.report.model import Bar, Cell, Column, Section, Series, Table
 from robocasa_lerobot.evaluation.report.policies import PolicyResult, ReportData, TaskResult, trial_title
@@ -13,6 +16,8 @@ from robocasa_lerobot.evaluation.statistics import Estimate
 
 # More trials than this are a texture, no longer something to point at; with many policies there is no room.
 MAX_MARKS, MAX_MARKED_POLICIES = 60, 3
+_SAME_KITCHENS = "each square is one trial; the same place is the same kitchen for every policy"
+_OWN_KITCHENS = "each square is one trial"
 
 
 def section(data: ReportData) -> Section:
@@ -55,11 +60,25 @@ def section(data: ReportData) -> Section:
         tuple(columns),
         tuple(rows),
         notes=tuple(notes),
-        warnings=(published.DIFFERENT_KITCHENS_SHORT, *differences(plain, protocol)) if known else (),
+        warnings=(
+            *comparable.warnings(data.policies),
+            *((published.DIFFERENT_KITCHENS_SHORT, *differences(plain, protocol)) if known else ()),
+        ),
         cards=True,
     )
     series = tuple(Series(policy.label, data.series(policy)) for policy in data.policies)
-    return Section("tasks", "Task by task", parts=(table,), legend=series, marks_legend=marks)
+    legend = "" if not marks else _SAME_KITCHENS if _in_line(data.policies) else _OWN_KITCHENS
+    return Section("tasks", "Task by task", parts=(table,), legend=series, marks_legend=legend)
+
+
+def _in_line(policies: Sequence[PolicyResult]) -> bool:
+    """Whether trials at the same place of a task's rows of marks have the same start for all policies."""
+    starts: dict[str, set[tuple[int, ...]]] = {}
+    for policy in policies:
+        for result in policy.tasks:
+            starts.setdefault(result.task, set()).add(tuple(record.seed for record in result.trials))
+    alike = all(not comparable.differences(policy, policies[-1]) for policy in policies)
+    return alike and all(len(seeds) == 1 for seeds in starts.values())
 
 
 def _facts(facts: TaskFacts | None) -> list[Cell]:

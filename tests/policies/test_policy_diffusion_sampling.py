@@ -1,0 +1,89 @@
+"""Noise levels and DDIM's steps of `diffusion_transformer`, beside diffusers' and a denoiser that is never wrong."""
+
+from __future__ import annotations
+
+import pytest
+import torch
+from policy_support import batch_for, build, tiny_config
+
+from robocasa_lerobot.policies.diffusion_transformer.configuration_diffusion_transformer import (
+    DiffusionTransformerConfig,
+)
+from robocasa_lerobot.policies.diffusion_transformer.modeling_diffusion_transformer import (
+    DiffusionTransformerPolicy,
+    _noise_scheduler,
+)
+from robocasa_lerobot.policies.diffusion_transformer.sampling import ddim_step, sampling_times
+
+CLEAN = 0.3
+SPACINGS = ("trailing", "leading", "linspace")
+
+
+def sampled(config: DiffusionTransformerConfig) -> torch.Tensor:
+    """What sampling comes to where every prediction is right."""
+    scheduler = _noise_scheduler(config)
+    x = torch.randn(2, 4, 3, generator=torch.Generator().manual_seed(0))
+    times = sampling_times(config)
+    for time, before in zip(times, [*times[1:], -1], strict=True):
+        level = scheduler.alphas_cumprod[time]
+        right = (x - level**0.5 * CLEAN) / (1 - level) ** 0.5
+        prediction = right if config.prediction_type == "epsilon" else torch.full_like(x, CLEAN)
+        x = ddim_step(scheduler, prediction, x, time, before)
+    return x
+
+
+@pytest.mark.parametrize("spacing", SPACINGS)
+def test_any_number_of_steps_has_as_many_levels_and_ends_clean(spacing: str) -> None:
+    for steps in range(1, 101):
+        config = tiny_config(num_train_timesteps=100, num_inference_steps=steps, timestep_spacing=spacing)
+        times = sampling_times(config)
+        assert len(times) == len(set(times)) == steps
+        assert times == sorted(times, reverse=True)
+        assert 0 <= times[-1]
+        assert times[0] <= 99
+        if spacing == "trailing":
+            assert times[0] == 99, "from pure noise on"
+    for steps in (1, 6, 10, 15, 29, 60, 97, 100):
+        for kind in ("epsilon", "sample"):
+            config = tiny_config(
+                num_train_timesteps=100, num_inference_steps=steps, timestep_spacing=spacing, prediction_type=kind
+            )
+            torch.testing.assert_close(sampled(config), torch.full((2, 4, 3), CLEAN), atol=2e-3, rtol=0)
+
+
+@pytest.mark.parametrize("kind", ["epsilon", "sample"])
+@pytest.mark.parametrize("spacing", ["trailing", "leading"])
+def test_where_the_steps_divide_the_levels_it_is_diffusers_own(spacing: str, kind: str) -> None:
+    for steps in (1, 2, 5, 10, 50, 100):
+        config = tiny_config(
+            num_train_timesteps=100, num_inference_steps=steps, timestep_spacing=spacing, prediction_type=kind
+        )
+        theirs = _noise_scheduler(config)
+        theirs.set_timesteps(steps)
+        times = sampling_times(config)
+        assert theirs.timesteps.tolist() == times
+        random = torch.Generator().manual_seed(1)
+        x = torch.randn(2, 4, 3, generator=random)
+        for time, before in zip(times, [*times[1:], -1], strict=True):
+            prediction = torch.randn(2, 4, 3, generator=random)
+            ours = ddim_step(theirs, prediction, x, time, before)
+            x = theirs.step(prediction, time, x).prev_sample
+            assert torch.equal(ours, x)
+
+
+@pytest.mark.parametrize("scheduler", ["DDIM", "DDPM"])
+def test_a_policy_asks_for_these_levels(scheduler: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    config = tiny_config(num_train_timesteps=100, num_inference_steps=29, noise_scheduler=scheduler)
+    policy, preprocess, _ = build(config)
+    assert isinstance(policy, DiffusionTransformerPolicy)
+    asked: list[int] = []
+
+    def denoise(x: torch.Tensor, times: torch.Tensor, features: torch.Tensor) -> torch.Tensor:
+        asked.append(int(times[0]))
+        level = policy.scheduler.alphas_cumprod[asked[-1]]
+        return (x - level**0.5 * CLEAN) / (1 - level) ** 0.5
+
+    monkeypatch.setattr(policy, "_denoise", denoise)
+    chunk = policy.sample(preprocess(batch_for(config, 2)))
+    assert asked == sampling_times(config)
+    torch.testing.assert_close(chunk, torch.full_like(chunk, CLEAN), atol=0.02, rtol=0)
