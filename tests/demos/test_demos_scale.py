@@ -334,7 +334,7 @@ def test_a_recording_that_is_killed_again_and_again_is_that_of_an_uninterrupted_
     settings = [RecordingSettings(task, 8, seed=40, action_noise=0.1) for task in QUICK]
     record_tasks(settings, tmp_path / "whole", show_progress=False)
     words = ["demos", "--tasks", ",".join(QUICK), "--episodes", "8", "--seed", "40", "--action-noise", "0.1"]
-    assert run_killed([*words, "--out", str(tmp_path / "killed")], rng) > 0
+    assert run_killed(words, tmp_path / "killed", rng) > 0
     for one in settings:
         whole, killed = (hdf5_content(tmp_path / place / f"{one.task}.hdf5") for place in ("whole", "killed"))
         assert list(whole) == list(killed)

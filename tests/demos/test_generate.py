@@ -232,7 +232,7 @@ def test_ten_kills_change_nothing(sources: Path, tmp_path: Path) -> None:
     )
     assert cli.main([*words.split(), "--workers", "2", "--out", str(tmp_path / "whole")]) == 0
     killed = tmp_path / "killed"
-    assert run_killed([*words.split(), "--out", str(killed)], random.Random(0), at_least=10) >= 10
+    assert run_killed(words.split(), killed, random.Random(0), at_least=10) >= 10
     here, there = (hdf5_content(place / f"{TASK}.hdf5") for place in (tmp_path / "whole", killed))
     assert list(here) == list(there)
     assert all(np.array_equal(value, there[key]) for key, value in here.items())
