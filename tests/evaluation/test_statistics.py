@@ -255,6 +255,9 @@ def test_lifelong_summaries_of_the_published_matrix() -> None:
     assert (set(some.average), set(some.forgetting), some.backward_transfer) == ({1, 2}, {2}, None)
     gap = lifelong({1: {1: one}, 3: {1: one, 2: one, 3: one}}, untrained={2: one, 3: one})
     assert (gap.forgetting, gap.backward_transfer, gap.forward_transfer) == ({}, None, None)
+    # What phase 2 had reached when it was new is not known, so that what it lost is not either.
+    lost = lifelong({1: {1: one}, 3: {1: one, 2: one, 3: one}, 4: {1: one, 2: one, 3: one, 4: one}})
+    assert lost.forgetting == {}
     with pytest.raises(UserError):
         lifelong({1: {1: [(0, 0)]}})
 

@@ -139,6 +139,13 @@ def test_a_trial_of_the_study_does_not_stand_for_it(tmp_path: Path) -> None:
     )
     assert is_stored(tried, tmp_path)
     assert not is_stored(asked, tmp_path)
+    about = json.loads((folder / ABOUT).read_text())
+    now = files._evaluations(tried.config.phases, set(steps))
+    (folder / ABOUT).write_text(json.dumps({**about, "evaluations": now}))
+    assert is_stored(tried, tmp_path)
+    more = {phase: dict.fromkeys(own, "of more trials") for phase, own in now.items()}
+    (folder / ABOUT).write_text(json.dumps({**about, "evaluations": more}))
+    assert not is_stored(tried, tmp_path), "other evaluations are run"
     assert "--replace" in asked.commands(None)[0], "its data neither"
     roots = [root_for(whole, *case) for case in (("cpu", None), ("cpu", "tiny"), ("cuda", None))]
     assert [str(root) for root in roots] == ["outputs/study", "outputs/study_tiny", "outputs/study_cuda"]

@@ -88,6 +88,17 @@ def test_forgetting_of_two_phases() -> None:
     assert found.matrix[1][2].value == pytest.approx(0.25), "the next phase's tasks, before it"
 
 
+def test_what_one_training_reached_is_not_compared_with_what_another_kept() -> None:
+    rows = {f"plain, after phase {k}": row("lifelong", f"phase{k}") for k in (1, 2)}
+    part = PartConfig("What?", rows, ["first", "second"], 2, matrix=True)
+    whole = [trials("phase1", {"A": "++--", "B": "+---"}), trials("phase2", {"A": "+---", "B": "++--"})]
+    begun = [trials("phase1", {"A": "++++", "B": "----"})]
+    stored = {("lifelong", 0): run("lifelong", 0, *whole), ("lifelong", 1): run("lifelong", 1, *begun)}
+    found = summaries(part, stored, SETS)["plain"]
+    assert found.matrix[1][1].value == pytest.approx(0.5), "of the training that has ended"
+    assert found.forgetting[2].value == pytest.approx(0.25)
+
+
 def test_a_stored_run_comes_back_as_it_was(tmp_path: Path) -> None:
     one = RUNS[0].trials[0]
     kept = [one, dataclasses.replace(one, trial=1, layout_id=None, success=False, failed=("open", "let go"))]

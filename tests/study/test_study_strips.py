@@ -41,7 +41,9 @@ def test_the_first_film_of_each_task_and_outcome_is_chosen() -> None:
 def test_a_row_has_frames_from_the_first_to_the_last(tmp_path: Path) -> None:
     film(tmp_path / "one.mp4", left=200, wrist=150, frames=9)
     film(tmp_path / "two.mp4", left=50, wrist=100, frames=2)
+    (tmp_path / "cut.mp4").write_bytes((tmp_path / "one.mp4").read_bytes()[:300])  # copied in part
     records = [trial("A", 0, True, "one.mp4"), trial("A", 1, False, "two.mp4"), trial("B", 0, False, "gone.mp4")]
+    records.append(trial("C", 0, False, "cut.mp4"))
     out = tmp_path / "strips" / "sheet.jpg"
     assert write_strips(tmp_path, records, out)
     sheet = np.asarray(Image.open(out).convert("L")).astype(int)

@@ -1,0 +1,108 @@
+"""Policies that were not tried alike stand beside each other in a report, and it says so."""
+
+from __future__ import annotations
+
+import dataclasses
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import synthetic_runs
+
+from robocasa_lerobot.evaluation.records.results import UNPERTURBED
+from robocasa_lerobot.evaluation.report import comparable
+from robocasa_lerobot.evaluation.report.formats.film_strip import choose_films
+from robocasa_lerobot.evaluation.report.gather import gather
+from robocasa_lerobot.evaluation.report.model import Figure
+from robocasa_lerobot.evaluation.report.policies import ReportData
+from robocasa_lerobot.evaluation.report.sections import horizon, summary, tasks
+from robocasa_lerobot.video import VideoWriter
+
+TASKS = {"OpenDrawer": 0.9, "CloseDrawer": 0.8}
+
+
+def a_run(folder: Path, label: str, rates: dict[str, float] | None = None, **changes: Any) -> Path:
+    rates = rates or TASKS
+    head = synthetic_runs.header("custom", [synthetic_runs.policy(label)], list(rates), task_sets={}, **changes)
+    records = synthetic_runs.trials(head, label, rates, head.trials)
+    multiplier = head.horizon_multiplier
+    kept = [dataclasses.replace(record, horizon_multiplier=multiplier) for record in records]
+    return synthetic_runs.write(folder / label, head, kept)
+
+
+def beside(folder: Path, rates: dict[str, float] | None = None, **changes: Any) -> ReportData:
+    """An older policy tried otherwise beside a newer one."""
+    return gather([a_run(folder, "old", rates, trials=9, **changes), a_run(folder, "new", trials=9)])
+
+
+@pytest.mark.parametrize(
+    ("changes", "what"),
+    [
+        ({"split": "pretrain"}, "kitchens"),
+        ({"horizon_multiplier": 0.5}, "horizons"),
+        ({"success_rule": "at_end"}, "what counts as solved"),
+        ({"settings": {"factory": "my_envs:make"}}, "simulators"),
+    ],
+)
+def test_what_was_tried_by_other_rules_is_not_compared_in_the_headline(
+    changes: dict[str, Any], what: str, tmp_path: Path
+) -> None:
+    data = beside(tmp_path, **changes)
+    said = summary.headline(data)
+    assert "old" not in said
+    assert said.endswith("1 more policy was tried on other tasks or by other rules.")
+    (warning,) = comparable.warnings(data.policies)
+    assert f"old and new differ in {what}" in warning
+    section = tasks.section(data)
+    assert warning in section.parts[0].warnings
+    assert "same kitchen" not in section.marks_legend
+
+
+def test_what_was_tried_alike_is_compared(tmp_path: Path) -> None:
+    data = beside(tmp_path)
+    assert "; old " in summary.headline(data)
+    assert comparable.warnings(data.policies) == ()
+    assert "the same place is the same kitchen" in tasks.section(data).marks_legend
+    assert "1 more policy" in summary.headline(beside(tmp_path / "other", {"OpenDrawer": 0.5}))
+
+
+def test_nothing_is_said_of_times_that_no_trial_has_reached(tmp_path: Path) -> None:
+    data = gather([a_run(tmp_path, "short", trials=9, horizon_multiplier=0.5)])
+    section = horizon.section(data)
+    assert section is not None
+    (figure,) = section.parts
+    assert isinstance(figure, Figure)
+    row = figure.table.rows[0]
+    by_half, by_three_quarters, by_all = row[2], row[3], row[4]
+    assert by_half.value is not None
+    assert by_three_quarters.value is by_all.value is None
+
+
+def test_times_of_other_kinds_are_left_out_and_named(tmp_path: Path) -> None:
+    runs = [
+        a_run(tmp_path, "fixed", trials=9, horizon_rule="fixed"),
+        a_run(tmp_path, "held", trials=9, success_rule="at_end"),
+        a_run(tmp_path, "plain", trials=9),
+    ]
+    section = horizon.section(gather(runs))
+    assert section is not None
+    assert any("another kind of horizon: fixed" in text for text in section.text)
+    assert any("at the end of a trial, whenever that is: held" in text for text in section.text)
+
+
+def test_a_damaged_film_is_as_one_that_is_missing(tmp_path: Path) -> None:
+    run = a_run(tmp_path, "filmed", {"OpenDrawer": 1.0}, trials=2)
+    data = gather([run])
+    (result,) = data.policies[0].tasks
+    film = run / "one.mp4"
+    with VideoWriter(film, 10) as writer:
+        for _ in range(12):
+            writer.write(np.zeros((128, 384, 3), np.uint8))
+    records = tuple(dataclasses.replace(record, video="one.mp4", success=True) for record in result.trials)
+    found = dataclasses.replace(result, trials=records)
+    policy = dataclasses.replace(data.policies[0], conditions={UNPERTURBED: (found,)})
+    shown = dataclasses.replace(data, policies=(policy,))
+    assert len(choose_films(shown)) == 1
+    film.write_bytes(film.read_bytes()[:400])
+    assert choose_films(shown) == []
