@@ -33,8 +33,7 @@ class Board:
     def update(self, settings: RecordingSettings, tally: Tally) -> None:
         """Show how far a task is; its clock runs from the first call on."""
         name, done = settings.task, len(tally.done)
-        if name not in self._begun or done == self._begun[name][1]:
-            self._begun.setdefault(name, (self._clock(), done))
+        self._begun.setdefault(name, (self._clock(), done))
         if self._seen.get(name) == done:
             return
         self._seen[name] = done

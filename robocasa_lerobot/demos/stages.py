@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Generator, Iterator, Mapping
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
@@ -19,7 +19,8 @@ from robocasa_lerobot.demos.skills.navigation import drive_to
 from robocasa_lerobot.demos.skills.pick_place.carrying.torso import move_torso
 from robocasa_lerobot.demos.skills.pick_place.heaps import uppermost
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
-from robocasa_lerobot.envs.predicates.logic import terms_by_name
+from robocasa_lerobot.envs.predicates.logic import Goal, terms_by_name
+from robocasa_lerobot.envs.predicates.memory import parts_with_memory
 from robocasa_lerobot.envs.predicates.objects import ObjectOn
 from robocasa_lerobot.envs.tasks.conditions import must_never, stage_condition, without_gripper
 from robocasa_lerobot.envs.tasks.task import Stage
@@ -27,6 +28,8 @@ from robocasa_lerobot.errors import UnknownNameError
 
 ATTEMPTS = 3  # of a stage; skills try several grasps in each
 PATIENCE_STEPS = 40  # after a skill, for what falls, swings and settles; as long again after each step that counted
+LAST_PATIENCE_STEPS = 100  # the same after the last one
+HELD_STEPS = 15  # that a goal must hold for, as in `recorder.SUCCESS_HOLD_STEPS`
 # Of the base from where it should stand to use a fixture, at the first attempt and at others.
 FAR_OFF_M, FAR_OFF_RAD = (0.35, 0.15), 0.6
 _AS_IT_IS = ("navigation", "pick_place")  # skills that begin with the arm as the stage before has left it
@@ -72,13 +75,13 @@ class StageLog:
 
 
 def carry_out(env: KitchenEnv, log: StageLog, skills: Mapping[tuple[str, str], Skill] | None = None) -> Iterator[Array]:
-    """Actions (12,), stored order, that do all stages; it ends when the last is done.
+    """Actions (12,), stored order, that do all stages; it ends when the goal has held for a while.
 
     A stage that is done already is left out. One that fails is tried again; if the one before it has come undone
     meanwhile (an object has slipped off), that one comes first. Where the task's goal does not hold in the end, it goes
     on with the first stage that has to do with the terms that fail; what was knocked out of a vessel, which no stage is
-    about, is put back. Of what lies heaped in a vessel, the upper is taken
-    first.
+    about, is put back. So it goes where what was done comes undone while the arm is still. Of what lies heaped in a
+    vessel, the upper is taken first.
 
     Args:
         env: in the episode.
@@ -87,9 +90,23 @@ def carry_out(env: KitchenEnv, log: StageLog, skills: Mapping[tuple[str, str], S
 
     Raises:
         UnknownNameError: a stage needs a skill that does not exist.
-        SkillError: a stage is not done after all its attempts, or something has happened that never must.
+        SkillError: a stage is not done after all its attempts, something has happened that never must, or nobody knows
+            why the goal does not hold.
     """
-    stages = env.declaration.stages
+    gripper = OPEN
+
+    def still() -> Array:
+        return action(gripper=gripper)
+
+    for step in _carry_out(env, log, SKILLS if skills is None else skills, still):
+        gripper = float(step[-1])
+        yield step
+
+
+def _carry_out(
+    env: KitchenEnv, log: StageLog, skills: Mapping[tuple[str, str], Skill], still: Callable[[], Array]
+) -> Iterator[Array]:
+    stages, goal = env.declaration.stages, env.declaration.goal
     # A task of one stage begins where it is done, unless that has been changed.
     led_away = len(stages) > 1 or (env.initial_noise is not None and env.initial_noise.moves_base)
     log.outcomes = [StageOutcome() for _ in stages]
@@ -100,18 +117,27 @@ def carry_out(env: KitchenEnv, log: StageLog, skills: Mapping[tuple[str, str], S
             if _only_the_hand_is_near(env):
                 yield from fold_arm(env)
             undone = _undone(env)
-            if undone is None:
-                fallen_out = _fallen_out(env)
-                if fallen_out is None or back_in.attempts >= ATTEMPTS:
-                    return
+            fallen_out = _fallen_out(env) if undone is None and back_in.attempts < ATTEMPTS else None
+            if fallen_out is not None:
                 log.current = len(stages) - 1
-                yield from _attempt(env, fallen_out, back_in, SKILLS if skills is None else skills)
+                yield from _attempt(env, fallen_out, back_in, skills)
                 continue
-            index = undone
+            if undone is None:
+                if (yield from _stays(env, goal, still)):
+                    return
+                _check_never(env, log.outcomes[-1])
+                if goal.evaluate(env.scene, env.data, {}):
+                    continue
+                undone = 0 if len(stages) == 1 else _undone(env)
+                if undone is None and back_in.attempts < ATTEMPTS and _fallen_out(env) is not None:
+                    continue
+                if undone is None:
+                    raise SkillError(back_in.reason or _unexplained(env))
+            index, log.outcomes[undone].done = undone, False
             _check_attempts(env, index, log.outcomes[index])
         log.current, outcome = index, log.outcomes[index]
         if len(stages) > 1 and stage_done(env, stages[index]):
-            outcome.skipped, outcome.done = outcome.attempts == 0, True
+            outcome.skipped, outcome.done, outcome.reason = outcome.attempts == 0, True, ""
             index += 1
             continue
         if led_away and stages[index].skill not in _AS_IT_IS:
@@ -122,7 +148,7 @@ def carry_out(env: KitchenEnv, log: StageLog, skills: Mapping[tuple[str, str], S
         if log.outcomes[turn].attempts >= ATTEMPTS:
             turn = index
         log.current, outcome = turn, log.outcomes[turn]
-        yield from _attempt(env, stages[turn], outcome, SKILLS if skills is None else skills)
+        yield from _attempt(env, stages[turn], outcome, skills)
         _check_never(env, outcome)
         outcome.done = stage_done(env, stages[turn])
         outcome.reason = "" if outcome.done else outcome.reason
@@ -132,9 +158,40 @@ def carry_out(env: KitchenEnv, log: StageLog, skills: Mapping[tuple[str, str], S
             index += 1
         elif index > 0 and not _still_holds(env, index - 1):
             index -= 1  # the stage that it rests on has come undone
+            log.outcomes[index].done = False
             _check_attempts(env, index, log.outcomes[index], cause=outcome.reason)
         else:
             _check_attempts(env, index, outcome)
+
+
+def _stays(env: KitchenEnv, goal: Goal, still: Callable[[], Array]) -> Generator[Array, None, bool]:
+    """Stand still until a goal holds, for what settles and what time does, and then for as long as it must hold.
+
+    Returns whether it has; it is given up when nothing has come nearer to it for some steps.
+    """
+    remembered = parts_with_memory([goal])
+
+    def progress() -> float:
+        return sum(part.progress(env.scene, env.data) for part in remembered)
+
+    left, best = LAST_PATIENCE_STEPS, progress()
+    while left and not goal.evaluate(env.scene, env.data, {}):
+        yield still()
+        now = progress()
+        left, best = (LAST_PATIENCE_STEPS, now) if now > best else (left - 1, best)
+    for _ in range(HELD_STEPS):
+        if not goal.evaluate(env.scene, env.data, {}):
+            return False
+        yield still()
+    return True
+
+
+def _unexplained(env: KitchenEnv) -> str:
+    """What is said where all stages are done, and the goal does not hold."""
+    terms: dict[str, bool] = {}
+    env.declaration.goal.evaluate(env.scene, env.data, terms)
+    missing = ", ".join(f"`{name}`" for name, holds in terms.items() if not holds)
+    return f"all stages are done, but the goal does not hold; false are {missing or 'none'} of its terms"
 
 
 def _stand_before(env: KitchenEnv, stage: Stage, most_m: float) -> Iterator[Array]:

@@ -35,7 +35,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     "quiet": set(),
     "jobs": {"errors", "progress"},
     "settings": {"errors"},
-    "video": {"contract"},
+    "video": {"contract", "errors"},
     "wilson": {"errors"},
     "wire": set(),
     **dict.fromkeys(LOW, BASE),

@@ -14,6 +14,8 @@ from robocasa_lerobot.data.fake import write_fake_dataset
 from robocasa_lerobot.errors import UnknownNameError, UserError
 from robocasa_lerobot.training.config.experiment import load_experiment
 from robocasa_lerobot.training.phases import run_experiment
+from robocasa_lerobot.training.setup import builders
+from robocasa_lerobot.training.setup.build_phase import planned_policy
 
 
 @pytest.fixture(scope="module")
@@ -158,3 +160,25 @@ def test_a_policy_without_a_schedule_warms_up_where_it_is_asked_to(tmp_path: Pat
     assert run_experiment(experiment, only="pretrain")
     rates = [line["learning_rate"] for line in metrics(tmp_path, "pretrain")]
     assert rates == pytest.approx([0.0, 5e-5, 1e-4, 1e-4])
+
+
+def test_settings_of_a_policy_are_laid_over_its_own(tmp_path: Path, data: Path) -> None:
+    def mapping(*overrides: str) -> dict[str, str]:
+        settings, start = planned_policy(experiment := tiny(tmp_path, data, overrides=overrides), experiment.phases[1])
+        found = builders.policy_config(settings, start, "cpu").normalization_mapping
+        return {kind: mode.value for kind, mode in found.items()}
+
+    one = "{STATE: MEAN_STD}"  # LeRobot takes what is not named for left as it is
+    own = {"VISUAL": "IDENTITY", "STATE": "MIN_MAX", "ACTION": "MIN_MAX"}
+    assert mapping() == own
+    assert mapping(f"--policy.normalization_mapping={one}") == {**own, "STATE": "MEAN_STD"}
+    assert mapping(f"--phases.finetune.policy={{normalization_mapping: {one}}}") == {**own, "STATE": "MEAN_STD"}
+    both = mapping(
+        "--policy.normalization_mapping={VISUAL: MEAN_STD}",
+        f"--phases.finetune.policy={{normalization_mapping: {one}}}",
+    )
+    assert both == {"VISUAL": "MEAN_STD", "STATE": "MEAN_STD", "ACTION": "MIN_MAX"}
+    other = tiny(
+        tmp_path, data, overrides=["--phases.finetune.init=from_scratch", "--phases.finetune.policy={type: act}"]
+    )
+    assert planned_policy(other, other.phases[1])[0] == {"type": "act"}, "no field of the experiment's own policy"

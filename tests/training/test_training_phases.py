@@ -29,7 +29,7 @@ from robocasa_lerobot.training.phases import run_experiment
 from robocasa_lerobot.training.planning import evaluations
 from robocasa_lerobot.training.setup import builders, optimizers
 from robocasa_lerobot.training.setup import phase_data as joining
-from robocasa_lerobot.training.setup.build_phase import planned_policy, prepare_phase
+from robocasa_lerobot.training.setup.build_phase import prepare_phase
 from robocasa_lerobot.training.weights.adapters import apply_training_scope, merged_state
 
 FROZEN = "observation_encoder"
@@ -332,28 +332,6 @@ def test_constant_components_do_not_explode_in_lerobots_policies(tmp_path: Path,
     pre, _ = builders.make_processors(config, dataset.meta, None, keep_statistics=False)
     (normalizer,) = [step for step in pre.steps if isinstance(step, NormalizerProcessorStep)]
     assert float(normalizer.stats[contract.ACTION_KEY]["std"][0]) == 1.0
-
-
-def test_settings_of_a_policy_are_laid_over_its_own(tmp_path: Path, data: Path) -> None:
-    def mapping(*overrides: str) -> dict[str, str]:
-        settings, start = planned_policy(experiment := tiny(tmp_path, data, overrides=overrides), experiment.phases[1])
-        found = builders.policy_config(settings, start, "cpu").normalization_mapping
-        return {kind: mode.value for kind, mode in found.items()}
-
-    one = "{STATE: MEAN_STD}"  # LeRobot takes what is not named for left as it is
-    own = {"VISUAL": "IDENTITY", "STATE": "MIN_MAX", "ACTION": "MIN_MAX"}
-    assert mapping() == own
-    assert mapping(f"--policy.normalization_mapping={one}") == {**own, "STATE": "MEAN_STD"}
-    assert mapping(f"--phases.finetune.policy={{normalization_mapping: {one}}}") == {**own, "STATE": "MEAN_STD"}
-    both = mapping(
-        "--policy.normalization_mapping={VISUAL: MEAN_STD}",
-        f"--phases.finetune.policy={{normalization_mapping: {one}}}",
-    )
-    assert both == {"VISUAL": "MEAN_STD", "STATE": "MEAN_STD", "ACTION": "MIN_MAX"}
-    other = tiny(
-        tmp_path, data, overrides=["--phases.finetune.init=from_scratch", "--phases.finetune.policy={type: act}"]
-    )
-    assert planned_policy(other, other.phases[1])[0] == {"type": "act"}, "no field of the experiment's own policy"
 
 
 def test_mistakes_in_phases_are_told(tmp_path: Path, data: Path) -> None:

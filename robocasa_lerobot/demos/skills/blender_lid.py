@@ -26,7 +26,7 @@ from robocasa_lerobot.demos.skills.common import SkillError, hold_hand, move_han
 from robocasa_lerobot.demos.skills.reaching import Held, MotionPlan, WaypointPath, approach, plan_reach
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.kitchens.appliances.kinds.blender import Blender
-from robocasa_lerobot.envs.kitchens.footprints import Area, Footprint
+from robocasa_lerobot.envs.kitchens.footprints import Area, Footprint, PlacementError
 from robocasa_lerobot.envs.scene.placement.counter_areas import counter_areas
 from robocasa_lerobot.envs.scene.robot_poses import RobotPose
 from robocasa_lerobot.envs.scene.roles import footprint
@@ -155,7 +155,10 @@ def grasps(env: KitchenEnv) -> list[Array]:
 def free_spots(env: KitchenEnv, blender: Blender) -> list[Array]:
     """Points of the counter beside the blender with room for the lid, those nearest to the robot's path first."""
     layout = env.scene.layout
-    areas, standing = counter_areas(layout, OnCounter("", "left_right", size=(0.45, 0.40)), blender)
+    try:
+        areas, standing = counter_areas(layout, OnCounter("", "left_right", size=(0.45, 0.40)), blender)
+    except PlacementError:
+        return []
     width, depth, _ = blender.lid_size
     half = (width / 2, depth / 2)
     found = [

@@ -42,7 +42,7 @@ SHORT_M = 0.008
 # lever is pushed just within its outer edge, by a hand rolled about its approach: the palm then stands along the case.
 IN_THE_WAY, EDGE_M = 0.7, 0.003
 ROLLS_RAD = tuple(np.deg2rad((0.0, 45.0, -45.0, 90.0)).tolist())
-PUSH_SPEED, LEAD_SPEED = 0.45, 0.35
+PUSH_SPEED = 0.45
 # How far from its middle towards the tip a faucet's lever is grasped, as a share of its length; angles in radians.
 WATER_ON_RAD, WATER_OFF_RAD = 0.70, 0.0
 SPOUT_RAD = 0.80

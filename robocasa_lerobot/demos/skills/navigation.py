@@ -25,9 +25,8 @@ from robocasa_lerobot.demos.planning.collision import Held, is_full
 from robocasa_lerobot.demos.skills.common import SkillError
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.scene.robot_poses import RobotPose
-from robocasa_lerobot.envs.scene.scene import Scene
 
-__all__ = ["Room", "drive_to", "plan_base_path"]
+__all__ = ["Room", "drive_to"]
 
 MOVE_GAIN, TURN_GAIN = 4.0, 2.0  # per second
 ON_GAIN = 7.5  # the same of moves where a path goes on
@@ -135,15 +134,6 @@ class Pace:
         slower = np.where(np.abs(wanted) < np.abs(before), self.changes[1], self.changes[0])
         self._before = before + np.clip(wanted - before, -slower, slower)
         return self._before
-
-
-def plan_base_path(scene: Scene, start: RobotPose, goal: RobotPose) -> list[RobotPose]:
-    """Poses from a start to a goal round the fixtures with all doors shut, both left out but the goal.
-
-    Raises:
-        SkillError: there is none.
-    """
-    return find_path(scene, None, start, goal).poses
 
 
 def _approach(

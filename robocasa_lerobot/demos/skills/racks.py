@@ -80,6 +80,7 @@ def push(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
                 touch = spot - part.inwards * env.robot.gripper.closed_reach(rotation, part.inwards)
                 rows.append(_row(touch, rotation, -part.inwards, part.inwards * travel))
         plan = _plan(env, part, rows, tried)
+        tried.append(plan.targets[-1].rotation)
         yield from shift_base(env, plan.shift, CLOSED)
         yield from follow_joint_path(env, plan.joints, CLOSED)
         yield from _approach(env, plan, CLOSED)
@@ -117,6 +118,7 @@ def pull(env: KitchenEnv, stage: Stage, enough: float = OUT_GOAL) -> Iterator[Ar
             hooked = _plan(env, part, _hooks(env, part, travel), tried)
             if hooked.cost < plan.cost:
                 plan, fingers = hooked, CLOSED
+        tried.append(plan.targets[-1].rotation)
         yield from shift_base(env, plan.shift, fingers)
         yield from follow_joint_path(env, plan.joints, fingers)
         yield from _approach(env, plan, fingers)
@@ -240,9 +242,7 @@ def _row(at: Array, rotation: Array, back: Array, slide: Array) -> tuple[HandTar
 
 
 def _plan(env: KitchenEnv, part: _Part, rows: list[tuple[HandTarget, ...]], tried: list[Array]) -> MotionPlan:
-    plan = plan_near(env, rows, SHIFTS, allowed=frozenset({part.body}), tried=tried)
-    tried.append(plan.targets[-1].rotation)
-    return plan
+    return plan_near(env, rows, SHIFTS, allowed=frozenset({part.body}), tried=tried)
 
 
 def _approach(env: KitchenEnv, plan: MotionPlan, gripper: float) -> Iterator[Array]:

@@ -14,7 +14,7 @@ import numpy as np
 
 from robocasa_lerobot.demos.motion import CLOSED, HALF_TURN, OPEN, UP, Array, HandTarget, frame, rotation_about
 from robocasa_lerobot.demos.planning.follow import follow_joint_path
-from robocasa_lerobot.demos.skills.common import close_fingers, move_hand
+from robocasa_lerobot.demos.skills.common import SkillError, close_fingers, move_hand
 from robocasa_lerobot.demos.skills.pick_place.grasp_strategy import (
     ANY_APPROACH,
     GraspStrategy,
@@ -82,12 +82,20 @@ def turn_first(obj: Graspable, strategy: GraspStrategy) -> Callable[[KitchenEnv]
 
     def first(env: KitchenEnv) -> Iterator[Array]:
         nonlocal left
-        while left and lies_across(env, obj) and best_grasp(env, obj, strategy).cost > HOPELESS:
+        while left and lies_across(env, obj) and _is_hopeless(env, obj, strategy):
             left -= 1
             if not (yield from turn_across(env, obj)):
                 break
 
     return first
+
+
+def _is_hopeless(env: KitchenEnv, obj: Graspable, strategy: GraspStrategy) -> bool:
+    """Whether no grasp is worth a try as an object lies."""
+    try:
+        return best_grasp(env, obj, strategy).cost > HOPELESS
+    except SkillError:
+        return True
 
 
 def turn_across(env: KitchenEnv, obj: Graspable) -> Generator[Array, None, bool]:
@@ -97,7 +105,10 @@ def turn_across(env: KitchenEnv, obj: Graspable) -> Generator[Array, None, bool]
 
     def plan(blocked: Sequence[RobotPose]) -> MotionPlan:
         point = env.data.body(obj.name).xpos.copy()
-        return plan_reach(env, _pushes(env, obj), point, key=1, allowed=obj.bodies, blocked=blocked)[0]
+        plans = plan_reach(env, _pushes(env, obj), point, key=1, allowed=obj.bodies, blocked=blocked)
+        if not plans:
+            raise SkillError(f"{obj.title} lies across, and no push of it is free")
+        return plans[0]
 
     choice = yield from approach(env, plan, OPEN)
     if choice.cost > HOPELESS_PUSH:

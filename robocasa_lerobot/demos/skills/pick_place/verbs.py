@@ -79,7 +79,8 @@ def place_object(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
     for attempt in range(ATTEMPTS):
         obj, there = graspable(env, stage.object), False
         strategy = place_strategy(env, stage, obj)
-        if not is_held(env, obj.name) and not hangs(env, obj):
+        fetched = not is_held(env, obj.name) and not hangs(env, obj)
+        if fetched:
             if attempt == 0:
                 yield from _around_door(env, _target_fixture(env, stage))
             if strategy.make_room is not None:
@@ -89,6 +90,8 @@ def place_object(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
             far = _goes_far(env, stage, obj, strategy)
             there = yield from _unless_there(env, stage, take(env, obj, strategy.grasp, towards=towards, far=far))
         if not there:
+            if fetched:
+                obj, strategy = _as_fetched(env, stage, obj, strategy)
             try:
                 yield from bring(env, stage, obj, strategy)
             except SlippedError:
@@ -102,6 +105,19 @@ def place_object(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
             fingers = CLOSED if is_held(env, obj.name) or hangs(env, obj) else OPEN
             yield from hold_hand(env.data, HandTarget(grip_position(env.data), hand_rotation(env.data)), fingers, 1)
     raise SkillError(f"{graspable(env, stage.object).title} is not where it belongs after {ATTEMPTS} attempts")
+
+
+def _as_fetched(
+    env: KitchenEnv, stage: Stage, obj: Graspable, strategy: PlaceStrategy
+) -> tuple[Graspable, PlaceStrategy]:
+    """An object that was picked up, and how it is put down, where either is another than before.
+
+    What lay over it may have stayed behind, and where it goes may have been pulled out.
+    """
+    now = graspable(env, obj.name)
+    if now.contents == obj.contents and strategy.make_room is None:
+        return obj, strategy
+    return now, place_strategy(env, stage, now)
 
 
 def _unless_there(env: KitchenEnv, stage: Stage, taking: Iterator[Array]) -> Generator[Array, None, bool]:
@@ -170,19 +186,28 @@ def take(
         LostError: it fell to the floor.
     """
     been: list[RobotPose] = []
+    failure: SkillError | None = None
     while True:
         require_off_floor(env, obj)
-        yield from come_to(env, obj, been, towards)
+        try:
+            yield from come_to(env, obj, been, towards)
+        except LostError:
+            raise
+        except SkillError as error:
+            if failure is None:
+                raise
+            raise failure from error  # why it was not picked up from where the robot could stand
         try:
             elsewhere = partial(_has_other_side, env, obj.name) if not been else lambda: False
             yield from pick(env, obj, grasp_strategy(env, obj, free, kept=kept), elsewhere, firm=kept, long_way=far)
-            yield from move_torso(env, 0.0, CLOSED, Held.now(env.data, obj.name, obj.contents))
+            yield from move_torso(env, 0.0, CLOSED, Held.now(env.data, obj.name, graspable(env, obj.name).contents))
             return
         except LostError:
             raise
-        except SkillError:
+        except SkillError as error:
             if len(been) == MOST_PLACES - 1:
                 raise
+            failure = error
         been.append(base_now(env.data))
 
 
