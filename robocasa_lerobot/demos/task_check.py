@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import contextlib
+import functools
+import hashlib
 import json
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
+import robocasa_lerobot
 from robocasa_lerobot.demos.demonstrator import can_demonstrate
 from robocasa_lerobot.demos.recorder import record_episode
 from robocasa_lerobot.envs.checks.tasks import CHECK_SEEDS, check_task
@@ -81,8 +84,8 @@ def check_all(
         splits: names.
         seeds: tried in each.
         workers: processes.
-        log: file that results are appended to as they come, a line each; those that it holds for the same seeds come
-            first and are not made again.
+        log: file that results are appended to as they come, a line each; those that it holds for the same seeds and
+            the same code, of declarations, kitchens and skills, come first and are not made again.
     """
     before = [] if log is None else _logged(log, seeds)
     known = {(one.task, one.split): one for one in before}
@@ -92,7 +95,7 @@ def check_all(
     for one in as_they_end(check, todo, workers):
         if log is not None:
             with log.open("a", encoding="utf-8") as file:
-                file.write(json.dumps({**asdict(one), "seeds": list(seeds)}) + "\n")
+                file.write(json.dumps({**asdict(one), "seeds": list(seeds), "code": code_digest()}) + "\n")
         yield one
 
 
@@ -101,5 +104,17 @@ def _logged(log: Path, seeds: Sequence[int]) -> list[Checked]:
     return [
         Checked(row["task"], row["split"], tuple(row["faults"]), row["solved"], tuple(row["failed"]))
         for row in read_whole_lines(log)
-        if row["seeds"] == list(seeds)
+        if row["seeds"] == list(seeds) and row.get("code") == code_digest()
     ]
+
+
+@functools.cache
+def code_digest() -> str:
+    """What tells the code that tasks are checked with from what it was before it was mended."""
+    package = Path(robocasa_lerobot.__file__).parent
+    digest = hashlib.sha256()
+    for folder in ("demos", "envs"):
+        for path in sorted((package / folder).rglob("*")):
+            if path.suffix in (".py", ".yaml", ".json"):
+                digest.update(path.relative_to(package).as_posix().encode() + path.read_bytes())
+    return digest.hexdigest()[:16]

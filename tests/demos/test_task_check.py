@@ -103,6 +103,9 @@ def test_a_check_goes_on_from_its_log(tmp_path: Path, monkeypatch: pytest.Monkey
     assert len(both) == 4
     list(task_check.check_all(names, SPLITS, (0,), log=log))
     assert len(made) == 8  # other seeds are another check
+    monkeypatch.setattr(task_check, "code_digest", lambda: "mended since")
+    list(task_check.check_all(names, SPLITS, (0,), log=log))
+    assert len(made) == 12
 
 
 @pytest.mark.slow
