@@ -7,6 +7,7 @@ prints one line of JSON: seconds of the evaluation itself, and where they went a
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import json
 import sys
@@ -69,6 +70,7 @@ def run_ours(job: Job) -> dict[str, Any]:
     """Our engine, on the seeds that LeRobot gives its episodes: seed, seed + 1, ... for each task."""
     from robocasa_lerobot.evaluation.config.evaluation import EnvSettings, EvaluationConfig, PolicySettings
     from robocasa_lerobot.evaluation.run.engine import evaluate, prepare
+    from robocasa_lerobot.evaluation.run.outputs import write_outputs
     from robocasa_lerobot.gl import ensure_gl
 
     ensure_gl()
@@ -79,10 +81,14 @@ def run_ours(job: Job) -> dict[str, Any]:
         workers=job.workers,
         videos=min(10, job.trials) if job.films else 0,
         out=job.out,
+        report=False,  # which LeRobot has none of; its `eval_info.json` both write
     )
     evaluation = prepare(config)
     plan = [dataclasses.replace(spec, seed=job.seed + spec.trial) for spec in evaluation.plan]
-    records = evaluate(dataclasses.replace(evaluation, plan=plan, todo_plan=plan))
+    evaluation = dataclasses.replace(evaluation, plan=plan, todo_plan=plan)
+    records = evaluate(evaluation)
+    with contextlib.redirect_stdout(sys.stderr):  # the rates, beside which the result is read
+        write_outputs(evaluation)
     assert all(record.error is None for record in records), [record.error for record in records]
     parts = ("policy", "physics", "rendering", "building", "waiting")
     total = sum(record.seconds.total for record in records)

@@ -1,8 +1,8 @@
 """Our evaluation beside `lerobot-eval`, in one run: trials per hour, and where the time goes.
 
 The same policy, kitchens, tasks of different lengths and seeds, each side in a process of its own and in turn; whole
-commands are timed, from their start to their end, once with films (LeRobot makes ten for each task, whatever one asks
-for) and once without.
+commands are timed, from their start to their end and but for our report, which LeRobot has none of, once with films
+(LeRobot makes ten for each task, whatever one asks for) and once without.
 
     python benchmarks/evaluation_speed.py --quick
 """
