@@ -105,7 +105,7 @@ bench-demonstrators: $(STAMP)  ## how often and how fast each demonstrator solve
 bench-demo: $(STAMP)  ## what the demo learns, over three seeds, with 40 trials for each policy and task
 	$(BIN)/python benchmarks/demo.py $(BENCH_ARGS)
 
-# Goes on where it was stopped; BENCH_ARGS=--fresh begins again, BENCH_ARGS='--every 31' takes a sample.
+# Goes on where it was stopped; BENCH_ARGS=--fresh begins again, BENCH_ARGS='--every 31 --out outputs/kitchens.json' takes a sample.
 bench-kitchens: $(STAMP)  ## build, check and settle all 2,510 kitchens
 	$(BIN)/python benchmarks/kitchens.py $(BENCH_ARGS)
 
@@ -114,7 +114,7 @@ lock: $(STAMP)  ## pin pyproject.toml's dependencies in requirements.lock
 	$(BIN)/uv pip compile pyproject.toml --extra dev --extra setup --python-version 3.12 --universal --generate-hashes \
 	    --no-emit-index-url --no-emit-find-links --no-annotate --no-header --quiet $(LOCK_ARGS) -o requirements.lock
 
-# About an hour and a half on two cores; goes on where it was stopped, BENCH_ARGS='--every 50' takes a sample.
+# About an hour and a half on two cores; goes on where it was stopped, BENCH_ARGS='--every 50 --out outputs/kitchen_tasks.json' takes a sample.
 bench-kitchen-tasks: $(STAMP)  ## five composite tasks in each of the 2,510 kitchens: nothing falls, overlaps or blocks
 	$(BIN)/python benchmarks/kitchen_tasks.py $(BENCH_ARGS)
 

@@ -7,7 +7,7 @@ robot touches nothing.
 
     python benchmarks/kitchen_tasks.py --workers 2
 
-The sweep goes on where it was stopped; `--fresh` begins again, `--every 50` takes a sample.
+The sweep goes on where it was stopped; `--fresh` begins again, `--every 50 --out FILE` takes a sample.
 """
 
 from __future__ import annotations
@@ -52,7 +52,10 @@ def parse(arguments: Sequence[str] | None = None) -> argparse.Namespace:
     parser.add_argument("--fresh", action="store_true", help="forget what an earlier sweep has found")
     parser.add_argument("--parts", type=Path, default=PARTS, help="file of what has been looked at")
     parser.add_argument("--out", type=Path, default=OUTPUT, help="result")
-    return parser.parse_args(arguments)
+    options = parser.parse_args(arguments)
+    if options.every > 1 and options.out == OUTPUT:
+        parser.error("a sample does not replace the result of all kitchens: give --out")
+    return options
 
 
 def composites() -> list[str]:

@@ -20,6 +20,7 @@ import statistics
 import sys
 import time
 from collections.abc import Iterator, Sequence
+from pathlib import Path
 from typing import Any
 
 import common
@@ -54,7 +55,11 @@ def parse(arguments: Sequence[str] | None = None) -> argparse.Namespace:
     )
     parser.add_argument("--fresh", action="store_true", help="forget what an earlier sweep has found")
     parser.add_argument("--time", type=int, default=0, metavar="N", help="time N builds on one process, nothing else")
-    return parser.parse_args(arguments)
+    parser.add_argument("--out", type=Path, default=OUTPUT, help="result")
+    options = parser.parse_args(arguments)
+    if options.every > 1 and not options.time and options.out == OUTPUT:
+        parser.error("a sample does not replace the result of all kitchens: give --out")
+    return options
 
 
 def examine(pair: tuple[int, int]) -> dict[str, Any]:
@@ -190,7 +195,7 @@ def summary(rows: list[dict[str, Any]]) -> dict[str, Any]:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Sweep, print, write."""
     options = parse(arguments)
-    before = json.loads(OUTPUT.read_text(encoding="utf-8")) if OUTPUT.exists() else {}
+    before = json.loads(options.out.read_text(encoding="utf-8")) if options.out.exists() else {}
     body = {key: before[key] for key in ("splits", "unsound", "refused", "build_seconds") if key in before}
     if options.time:
         body["build_seconds"] = timings(options.time)
@@ -210,7 +215,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     sound = body.get("splits", {})
     body["ratios"] = {f"sound_{split}": round(s["sound"] / s["kitchens"], 5) for split, s in sound.items()}
     body |= {"machine": common.machine(), "versions": common.versions("robocasa-lerobot", "mujoco", "numpy")}
-    common.write_result(OUTPUT, "kitchens", body)
+    common.write_result(options.out, "kitchens", body)
     return 0 if all(s["sound"] == s["kitchens"] for s in sound.values()) else 1
 
 
