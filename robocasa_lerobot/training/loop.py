@@ -109,7 +109,7 @@ def train_phase(run: PhaseRun, accelerator: Accelerator) -> bool:
         clip = run.grad_clip_norm if run.grad_clip_norm > 0 else math.inf
         grad_norm = accelerator.clip_grad_norm_(policy.parameters(), clip)
         _check_finite(run, loaded, mean_loss, grad_norm, accelerator)
-        learning_rate = optimizer.param_groups[0]["lr"]
+        learning_rate = max(group["lr"] for group in optimizer.param_groups)
         optimizer.step()
         optimizer.zero_grad()
         if state.scheduler is not None:

@@ -380,6 +380,9 @@ def test_learning_rate_scales_all_groups(data: Path, tmp_path: Path) -> None:
     assert optimizer.param_groups[0]["lr"] == pytest.approx(2e-5)
     assert optimizer.param_groups[1]["lr"] == pytest.approx(config.optimizer_lr_backbone * 2e-5 / preset.lr)
     assert clip == preset.grad_clip_norm
+    told, schedule = optimizers.in_lerobots_words(config, experiment.phases[0])
+    assert told == dataclasses.replace(preset, lr=2e-5)
+    assert schedule == config.get_scheduler_preset()
 
 
 @pytest.mark.slow

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import copy
-import dataclasses
 import hashlib
 from collections.abc import Callable
 from pathlib import Path
@@ -27,7 +26,7 @@ from robocasa_lerobot.training.setup import builders, clipping
 from robocasa_lerobot.training.setup import phase_data as joining
 from robocasa_lerobot.training.setup.features import LEAVE_OUT, RENAME
 from robocasa_lerobot.training.setup.kept import check_kept_settings
-from robocasa_lerobot.training.setup.optimizers import make_optimizer
+from robocasa_lerobot.training.setup.optimizers import in_lerobots_words, make_optimizer
 from robocasa_lerobot.training.weights.adapters import apply_training_scope
 from robocasa_lerobot.training.weights.checkpoint import TrainingState, last_checkpoint, pretrained_model, restore, tidy
 from robocasa_lerobot.training.weights.ema import Ema
@@ -309,6 +308,7 @@ def _lerobot_config(
 ) -> TrainPipelineConfig:
     """The settings in LeRobot's own form, for `train_config.json`; it has room for one dataset, the first."""
     root = Path(dataset.config.members[0].root)
+    optimizer, scheduler = in_lerobots_words(config, phase)
     return TrainPipelineConfig(
         dataset=DatasetConfig(repo_id=root.name, root=str(root), video_backend="pyav"),
         policy=config,
@@ -320,6 +320,6 @@ def _lerobot_config(
         log_freq=phase.log_every,
         save_freq=phase.save_every,
         num_workers=experiment.loader.workers,
-        optimizer=dataclasses.replace(config.get_optimizer_preset()),
-        scheduler=config.get_scheduler_preset(),
+        optimizer=optimizer,
+        scheduler=scheduler,
     )

@@ -58,9 +58,15 @@ def make_optimizer(
     return optimizer, _schedule(policy.config, phase, optimizer), float(clip or 0.0)
 
 
-def _schedule(
-    config: PreTrainedConfig, phase: PhaseConfig, optimizer: torch.optim.Optimizer
-) -> torch.optim.lr_scheduler.LRScheduler | None:
+def in_lerobots_words(config: PreTrainedConfig, phase: PhaseConfig) -> tuple[OptimizerConfig, LRSchedulerConfig | None]:
+    """The optimiser and schedule of a phase as LeRobot's training would be told of them."""
+    preset = _changed(OptimizerConfig, config.get_optimizer_preset(), phase.optimizer, "optimizer")
+    asked = {"lr": phase.learning_rate, "grad_clip_norm": phase.grad_clip_norm}
+    changes = {name: value for name, value in asked.items() if value is not None}
+    return dataclasses.replace(preset, **changes), _schedule_settings(config, phase)
+
+
+def _schedule_settings(config: PreTrainedConfig, phase: PhaseConfig) -> LRSchedulerConfig | None:
     """The policy's own schedule of the learning rate with the phase's changes."""
     schedule = config.get_scheduler_preset()
     if phase.scheduler.get("type") == "none":
@@ -71,12 +77,20 @@ def _schedule(
         schedule = DiffuserSchedulerConfig(name="constant_with_warmup", num_warmup_steps=phase.warmup_steps)
     elif schedule is not None and phase.warmup_steps is not None:
         schedule = dataclasses.replace(schedule, num_warmup_steps=phase.warmup_steps)
-    total = phase.schedule_steps or phase.steps
     if isinstance(schedule, CosineDecayWithWarmupSchedulerConfig) and _warmup_is_given(phase):
         # For a training shorter than its decay, LeRobot shortens the warm-up, too: not one that was asked for.
+        total = phase.schedule_steps or phase.steps
         schedule = dataclasses.replace(schedule, num_decay_steps=min(schedule.num_decay_steps, total))
+    return schedule
+
+
+def _schedule(
+    config: PreTrainedConfig, phase: PhaseConfig, optimizer: torch.optim.Optimizer
+) -> torch.optim.lr_scheduler.LRScheduler | None:
+    """The same for an optimiser."""
+    settings = _schedule_settings(config, phase)
     try:
-        return schedule.build(optimizer, total) if schedule is not None else None
+        return settings.build(optimizer, phase.schedule_steps or phase.steps) if settings is not None else None
     except ValueError as error:  # of diffusers, about a name that it does not know, or what that lacks
         raise UserError(f"phase {phase.name!r}: `scheduler`: {error}.") from error
 
