@@ -211,7 +211,10 @@ def test_checkpoint_with_pretrained_prefix_needs_no_other_file(kind: str, tmp_pa
     loaded = check_saved(policy, preprocess, postprocess, tmp_path / "checkpoint")
     # A checkpoint of what was loaded is as good.
     check_saved(loaded, preprocess, postprocess, tmp_path / "again")
-    assert "_name_or_path" not in json.loads((tmp_path / "again/config.json").read_text())["prefix_config"]
+    kept = json.loads((tmp_path / "again/config.json").read_text())["prefix_config"]
+    assert "_name_or_path" not in kept
+    with pytest.raises(UserError, match="prefix_layers is 1, but the checkpoint's language model has 2 layers"):
+        FlowVlaPolicy(pretrained_config(model, prefix_layers=1, prefix_config=kept))
 
 
 def test_pretrained_weights_are_those_of_the_model(pretrained: Path) -> None:

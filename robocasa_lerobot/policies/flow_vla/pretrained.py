@@ -33,6 +33,7 @@ class PretrainedPrefix(Prefix):
         super().__init__(config)
         model = _build(config.prefix_config) if config.prefix_config else _load(config)
         self.hf_config = model.config
+        _check_layers(config, model.config.text_config.num_hidden_layers)
         see, join, read = PARTS[model.config.model_type]
         self.vision, self.connector = getattr(model, see), getattr(model, join)
         self.language_model = getattr(model, read)
@@ -60,6 +61,15 @@ class PretrainedPrefix(Prefix):
         settings: dict[str, Any] = self.hf_config.to_dict()
         settings.pop("_name_or_path", None)  # where this machine had it
         return settings
+
+
+def _check_layers(config: FlowVlaConfig, there: int) -> None:
+    """Check that the language model is as deep as is asked for: a checkpoint's cannot be made otherwise."""
+    if config.prefix_layers not in (None, there):
+        raise UserError(
+            f"prefix_layers is {config.prefix_layers}, but the checkpoint's language model has {there} layers, which it "
+            f"keeps. Put {there} back, or train from `prefix_path` anew."
+        )
 
 
 def _load(config: FlowVlaConfig) -> Any:
