@@ -67,8 +67,8 @@ def _check_layers(config: FlowVlaConfig, there: int) -> None:
     """Check that the language model is as deep as is asked for: a checkpoint's cannot be made otherwise."""
     if config.prefix_layers not in (None, there):
         raise UserError(
-            f"prefix_layers is {config.prefix_layers}, but the checkpoint's language model has {there} layers, which it "
-            f"keeps. Put {there} back, or train from `prefix_path` anew."
+            f"prefix_layers is {config.prefix_layers}, but the checkpoint's language model has {there} layers, which "
+            f"it keeps. Put {there} back, or train from `prefix_path` anew."
         )
 
 
