@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import re
 import shutil
+import signal
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -29,6 +30,8 @@ _GPU_PIXELS = 2  # times as many each way in the pictures of a GPU
 _GPU_BATCH, _GPU_STEPS = 8, 4  # times as large, and a part as many
 _GPU_POLICIES = {"flow_vla_demo.yaml": "flow_vla_compact.yaml"}  # in the place of those that experiments name
 _POLICY, _GPU_POLICY = "study_policy.yaml", "study_gpu.yaml"  # in configs/experiments/parts
+
+_CRASHES = (signal.SIGSEGV, signal.SIGABRT, signal.SIGBUS, signal.SIGFPE, signal.SIGILL)
 
 
 class StoppedError(UserError):
@@ -138,6 +141,9 @@ class Run:
 
     def _run(self, command: Sequence[str]) -> None:
         status = run_command(*command)
+        if -status in _CRASHES:  # in a driver or library; what there is of the rest of a day should not wait for that
+            print(f"ended by {signal.Signals(-status).name}, tried once more: {' '.join(command)}", flush=True)
+            status = run_command(*command)
         if status:
             raise StoppedError(
                 f"{self.name}: `robocasa-lerobot {' '.join(command)}` ended with status {status}; "

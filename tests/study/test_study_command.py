@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import signal
@@ -16,7 +17,7 @@ import pytest
 from robocasa_lerobot import cli
 from robocasa_lerobot.config_files import configs_folder
 from robocasa_lerobot.study import stored as files
-from robocasa_lerobot.study.runs import configs_for, root_for, runs_of
+from robocasa_lerobot.study.runs import StoppedError, configs_for, root_for, runs_of
 from robocasa_lerobot.study.settings import load_study
 from robocasa_lerobot.study.stored import ABOUT, is_stored, stored_folder
 from robocasa_lerobot.training.config.experiment import load_experiment
@@ -241,6 +242,26 @@ def test_nothing_goes_on_alone_when_the_study_ends(tmp_path: Path, number: signa
         assert not alive
         assert process.stderr is not None
         assert ("the same study goes on there" in process.stderr.read()) is (status == 2)
+
+
+@pytest.mark.parametrize(
+    ("statuses", "told"),
+    [
+        ([0, -signal.SIGABRT, 0, 0], ""),
+        ([-signal.SIGSEGV] * 2, "status -11"),
+        ([-signal.SIGKILL], "status -9"),
+        ([2], "status 2"),
+    ],
+)
+def test_a_command_that_crashed_is_tried_once_more(
+    statuses: list[int], told: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    run = runs_of([load_study().parts["multitask"]], tmp_path, configs_folder(), "tiny")[0]
+    left = [*statuses, 0, 0]
+    monkeypatch.setattr("robocasa_lerobot.study.runs.run_command", lambda *words: left.pop(0))
+    with pytest.raises(StoppedError, match=told) if told else contextlib.nullcontext():
+        assert len(list(run.carry_out(1))) == 1
+    assert len(left) == (3 if not told else 2)
 
 
 def test_each_phase_is_a_command_of_its_own(tmp_path: Path) -> None:
