@@ -215,7 +215,7 @@ def test_exit_status_and_outputs(damaged: Path, capsys: pytest.CaptureFixture[st
 def test_what_is_no_dataset_of_ours_is_refused(good: Path, tmp_path: Path) -> None:
     with pytest.raises(UserError, match="no dataset"):
         verify(tmp_path)
-    with pytest.raises(UserError, match="0 workers"):
+    with pytest.raises(UserError, match="--workers is 0"):
         verify(good / "data", workers=0)
     copy = Path(shutil.copytree(good / "data", tmp_path / "copy"))
     with pytest.raises(UserError, match="--source"):
