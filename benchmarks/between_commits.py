@@ -113,9 +113,7 @@ def parse(arguments: Sequence[str] | None = None) -> argparse.Namespace:
     parser.add_argument("--kinds", default=",".join(KINDS), help="default: all")
     parser.add_argument("--out", type=Path, default=OUTPUT, help="result")
     options = parser.parse_args(arguments)
-    options.kinds = options.kinds.split(",")
-    if unknown := set(options.kinds) - set(KINDS):
-        parser.error(f"no kind {', '.join(sorted(unknown))}: there are {', '.join(KINDS)}")
+    options.kinds = common.chosen_kinds(parser, options.kinds, KINDS)
     return options
 
 

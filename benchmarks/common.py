@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import argparse
 import importlib.metadata
 import io
 import json
@@ -70,6 +71,20 @@ def unpack(commit: str, folder: Path, *paths: str) -> Path:
     with tarfile.open(fileobj=io.BytesIO(archive)) as files:
         files.extractall(folder, filter="data")
     return folder
+
+
+def chosen_kinds(parser: argparse.ArgumentParser, text: str, known: Sequence[str]) -> list[str]:
+    """Kinds of work out of a comma-separated list; one that there is not ends the program."""
+    kinds = text.split(",")
+    if unknown := set(kinds) - set(known):
+        parser.error(f"no kind {', '.join(sorted(unknown))}: there are {', '.join(known)}")
+    return kinds
+
+
+def keep_samples_apart(parser: argparse.ArgumentParser, every: int, out: Path, whole: Path) -> None:
+    """End the program where the result of every n-th kitchen alone would replace that of all."""
+    if every > 1 and out == whole:
+        parser.error("a sample does not replace the result of all kitchens: give --out")
 
 
 def table(header: Sequence[str], rows: Iterable[Sequence[str]]) -> str:

@@ -1,8 +1,8 @@
 """The demonstrators: how often each solves its task in kitchens it was not made on, and how long it takes.
 
 The seeds are those of the result that is there, or from 610,000 on, in both splits: nothing was chosen by them.
-Every trial is a line of
-`outputs/demonstrators.jsonl`, so that a run can be stopped and continued; the result holds all trials that are there.
+Every trial is a line of `outputs/demonstrators.jsonl`, so that a run can be stopped and continued; the result holds
+all trials that are there.
 They are kept beside it (`.trials.gz`), where a checkout without such a file begins. A trial says which declaration and
 which code of skills it was made with: the same command makes those again for which that has changed, and no others.
 `--fresh` makes all of them again:

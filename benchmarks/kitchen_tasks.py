@@ -53,8 +53,7 @@ def parse(arguments: Sequence[str] | None = None) -> argparse.Namespace:
     parser.add_argument("--parts", type=Path, default=PARTS, help="file of what has been looked at")
     parser.add_argument("--out", type=Path, default=OUTPUT, help="result")
     options = parser.parse_args(arguments)
-    if options.every > 1 and options.out == OUTPUT:
-        parser.error("a sample does not replace the result of all kitchens: give --out")
+    common.keep_samples_apart(parser, options.every, options.out, OUTPUT)
     return options
 
 

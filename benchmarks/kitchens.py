@@ -57,8 +57,8 @@ def parse(arguments: Sequence[str] | None = None) -> argparse.Namespace:
     parser.add_argument("--time", type=int, default=0, metavar="N", help="time N builds on one process, nothing else")
     parser.add_argument("--out", type=Path, default=OUTPUT, help="result")
     options = parser.parse_args(arguments)
-    if options.every > 1 and not options.time and options.out == OUTPUT:
-        parser.error("a sample does not replace the result of all kitchens: give --out")
+    if not options.time:
+        common.keep_samples_apart(parser, options.every, options.out, OUTPUT)
     return options
 
 

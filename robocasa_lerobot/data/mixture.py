@@ -188,10 +188,8 @@ class MixtureDataset(torch.utils.data.Dataset[Item]):
         Without `images`, of the numbers alone. With a cache folder they are computed once for all processes.
         """
         if self._cache_dir is None:
-            found = pooled_statistics(self._parts(), images, self._unseen)
-        else:
-            found = cached_statistics(self._parts(), self._cache_dir, images, self._unseen)
-        return {key: value for key, value in found.items() if key not in self._unseen}
+            return pooled_statistics(self._parts(), images, self._unseen)
+        return cached_statistics(self._parts(), self._cache_dir, images, self._unseen)
 
     def _parts(self) -> list[Part]:
         shares = zip(self._members, self.probabilities, strict=True)

@@ -12,14 +12,13 @@ from numpy.typing import NDArray
 from robocasa_lerobot import contract
 from robocasa_lerobot.demos.demonstrator import SkillError, demonstrate
 from robocasa_lerobot.demos.motion_style import PLAIN, MotionStyle
-from robocasa_lerobot.demos.stages import StageLog
+from robocasa_lerobot.demos.stages import HELD_STEPS, StageLog
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.tasks.stage_text import stage_text
 
 Array = NDArray[np.float64]
 
-# An episode ends after this many consecutive steps in which the goal holds (docs/robocasa.md, section 4).
-SUCCESS_HOLD_STEPS = 15
+SUCCESS_HOLD_STEPS = HELD_STEPS
 # What acts in an episode, with its style, and tells the log which stage is on.
 Actor = Callable[[KitchenEnv, MotionStyle, StageLog], Iterator[Array]]
 # Keys of the generators of action noise and of the motion style, apart from those of the scene and the arm.

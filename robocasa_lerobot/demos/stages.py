@@ -13,14 +13,13 @@ from robocasa_lerobot.demos.motion import OPEN, Array, action, base_pose
 from robocasa_lerobot.demos.planning.base_room import wrap
 from robocasa_lerobot.demos.planning.errors import LostError
 from robocasa_lerobot.demos.skills import SKILLS, Skill, SkillError
-from robocasa_lerobot.demos.skills.common import stage_done, wait_for_stage
+from robocasa_lerobot.demos.skills.common import stage_done, wait_for, wait_for_stage
 from robocasa_lerobot.demos.skills.fold import fold_arm
 from robocasa_lerobot.demos.skills.navigation import drive_to
 from robocasa_lerobot.demos.skills.pick_place.carrying.torso import move_torso
 from robocasa_lerobot.demos.skills.pick_place.heaps import uppermost
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.predicates.logic import Goal, terms_by_name
-from robocasa_lerobot.envs.predicates.memory import parts_with_memory
 from robocasa_lerobot.envs.predicates.objects import ObjectOn
 from robocasa_lerobot.envs.tasks.conditions import must_never, stage_condition, without_gripper
 from robocasa_lerobot.envs.tasks.task import Stage
@@ -29,7 +28,7 @@ from robocasa_lerobot.errors import UnknownNameError
 ATTEMPTS = 3  # of a stage; skills try several grasps in each
 PATIENCE_STEPS = 40  # after a skill, for what falls, swings and settles; as long again after each step that counted
 LAST_PATIENCE_STEPS = 100  # the same after the last one
-HELD_STEPS = 15  # that a goal must hold for, as in `recorder.SUCCESS_HOLD_STEPS`
+HELD_STEPS = 15  # consecutive ones in which a goal holds end an episode (docs/robocasa.md, section 4)
 # Of the base from where it should stand to use a fixture, at the first attempt and at others.
 FAR_OFF_M, FAR_OFF_RAD = (0.35, 0.15), 0.6
 _AS_IT_IS = ("navigation", "pick_place")  # skills that begin with the arm as the stage before has left it
@@ -116,23 +115,20 @@ def _carry_out(
         if index == len(stages):
             if _only_the_hand_is_near(env):
                 yield from fold_arm(env)
-            undone = _undone(env)
-            fallen_out = _fallen_out(env) if undone is None and back_in.attempts < ATTEMPTS else None
-            if fallen_out is not None:
-                log.current = len(stages) - 1
-                yield from _attempt(env, fallen_out, back_in, skills)
-                continue
-            if undone is None:
+            undone, fallen_out = _lacking(env, back_in)
+            if undone is None and fallen_out is None:
                 if (yield from _stays(env, goal, still)):
                     return
                 _check_never(env, log.outcomes[-1])
                 if goal.evaluate(env.scene, env.data, {}):
                     continue
-                undone = 0 if len(stages) == 1 else _undone(env)
-                if undone is None and back_in.attempts < ATTEMPTS and _fallen_out(env) is not None:
-                    continue
-                if undone is None:
-                    raise SkillError(back_in.reason or _unexplained(env))
+                undone, fallen_out = (0, None) if len(stages) == 1 else _lacking(env, back_in)
+            if fallen_out is not None:
+                log.current = len(stages) - 1
+                yield from _attempt(env, fallen_out, back_in, skills)
+                continue
+            if undone is None:
+                raise SkillError(back_in.reason or _unexplained(env))
             index, log.outcomes[undone].done = undone, False
             _check_attempts(env, index, log.outcomes[index])
         log.current, outcome = index, log.outcomes[index]
@@ -169,16 +165,7 @@ def _stays(env: KitchenEnv, goal: Goal, still: Callable[[], Array]) -> Generator
 
     Returns whether it has; it is given up when nothing has come nearer to it for some steps.
     """
-    remembered = parts_with_memory([goal])
-
-    def progress() -> float:
-        return sum(part.progress(env.scene, env.data) for part in remembered)
-
-    left, best = LAST_PATIENCE_STEPS, progress()
-    while left and not goal.evaluate(env.scene, env.data, {}):
-        yield still()
-        now = progress()
-        left, best = (LAST_PATIENCE_STEPS, now) if now > best else (left - 1, best)
+    yield from wait_for(env, goal, still, LAST_PATIENCE_STEPS)
     for _ in range(HELD_STEPS):
         if not goal.evaluate(env.scene, env.data, {}):
             return False
@@ -263,6 +250,12 @@ def _only_the_hand_is_near(env: KitchenEnv) -> bool:
     several = len(env.declaration.stages) > 1  # a single stage's skill has gone away as far as it can
     done = without_gripper(goal).evaluate(env.scene, env.data, {})
     return several and done and not goal.evaluate(env.scene, env.data, {})
+
+
+def _lacking(env: KitchenEnv, back_in: StageOutcome) -> tuple[int | None, Stage | None]:
+    """The stage that comes again where the goal does not hold, or the one that puts back what has fallen out."""
+    undone = _undone(env)
+    return undone, _fallen_out(env) if undone is None and back_in.attempts < ATTEMPTS else None
 
 
 def _fallen_out(env: KitchenEnv) -> Stage | None:

@@ -16,7 +16,7 @@ from robocasa_lerobot.data.registry.published import dataset_version
 from robocasa_lerobot.data.registry.recipes import REPLAY, RecipeConfig
 from robocasa_lerobot.demos.attempts import Parts, RecordingSettings
 from robocasa_lerobot.demos.hdf5 import read_summary
-from robocasa_lerobot.files import write_text
+from robocasa_lerobot.files import write_text, written_aside
 from robocasa_lerobot.jobs.executors import Execution
 from robocasa_lerobot.jobs.pieces import share_done
 from robocasa_lerobot.jobs.publish import held_folder, partial_folders
@@ -234,13 +234,13 @@ def _share_drawn(need: Need) -> float:
 
 def _kept(made: Path, kept: Path) -> Path:
     """The same recording at the place where it stays; one of before is replaced."""
-    aside = kept.with_name(f".{kept.name}")
-    aside.unlink(missing_ok=True)
-    try:
-        aside.hardlink_to(made)
-    except OSError:  # not all file systems have links
-        shutil.copyfile(made, aside)
-    return aside.replace(kept)
+    with written_aside(kept) as aside:
+        aside.unlink(missing_ok=True)  # of a run that was killed
+        try:
+            aside.hardlink_to(made)
+        except OSError:  # not all file systems have links
+            shutil.copyfile(made, aside)
+    return kept
 
 
 def _other_number(file: Path, episodes: int) -> bool:

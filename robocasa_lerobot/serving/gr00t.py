@@ -206,10 +206,8 @@ class GrootServer:
 
 def _listed(options: Any, most: int) -> int:
     """How many rows the options are listed for; 0 where none is a list."""
-    values = [options.get(key) for key in _OPTIONS] if isinstance(options, Mapping) else []
-    lists = [value.tolist() if isinstance(value, np.ndarray) else value for value in values]
-    lengths = (len(one) for one in lists if isinstance(one, Sequence) and not isinstance(one, str | bytes))
-    count = max(lengths, default=0)
+    values = [_plain(options.get(key)) for key in _OPTIONS] if isinstance(options, Mapping) else []
+    count = max((len(value) for value in values if _is_listed(value)), default=0)
     if count > most:
         raise RequestError(f"options: found {count} rows, expected at most {most}.")
     return count
@@ -222,14 +220,21 @@ def _row_options(options: Mapping[Any, Any], row: int) -> dict[str, Any]:
 
 
 def _option(options: Mapping[Any, Any], key: str, row: int) -> Any:
-    value = options.get(key)
-    if isinstance(value, np.ndarray):
-        value = value.tolist()
-    if not isinstance(value, Sequence) or isinstance(value, str | bytes):
+    value = _plain(options.get(key))
+    if not _is_listed(value):
         return value
     if row >= len(value):
         raise RequestError(f"options.{key}: found {len(value)} of them, expected one for each row of the batch.")
     return value[row]
+
+
+def _plain(value: Any) -> Any:
+    return value.tolist() if isinstance(value, np.ndarray) else value
+
+
+def _is_listed(value: Any) -> bool:
+    """Whether an option has a value for each row."""
+    return isinstance(value, Sequence) and not isinstance(value, str | bytes)
 
 
 def _error(text: str) -> bytes:

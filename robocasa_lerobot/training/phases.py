@@ -139,7 +139,7 @@ def check_phase(
     settings, checkpoint = planned_policy(experiment, phase)
     config = builders.policy_config(settings, checkpoint, device)
     data, parent = joining.open_phase_data(experiment, phase), experiment.parent(phase)
-    meta = data.meta
+    meta, begun = data.meta, last_checkpoint(Path(experiment.output_dir) / phase.name) is not None
     check_crop_cameras(phase, meta)
     check_optimizer(config, phase)
     check_share(phase.batch_size // phase.gradient_accumulation, processes)
@@ -154,7 +154,7 @@ def check_phase(
         if last_checkpoint(Path(experiment.output_dir) / first.name) is None:
             features.take_features(config, joining.open_phase_data(experiment, first).meta, settings)
             features.check_features(config, meta, f"what phase {first.name!r} trains")
-    if last_checkpoint(Path(experiment.output_dir) / phase.name) is None:
+    if not begun:
         if parent is None:
             builders.check_processors(config, meta)
         if phase.statistics == "keep" and experiment.init_of(phase) != FROM_SCRATCH:
@@ -162,7 +162,7 @@ def check_phase(
             check_kept_settings(config, builders.policy_config(*before, device), phase.name)
         check_scope(config, meta, phase)
     phase_evaluations(phase)
-    if alone and last_checkpoint(Path(experiment.output_dir) / phase.name) is None:
+    if alone and not begun:
         start_of(experiment, phase)
 
 

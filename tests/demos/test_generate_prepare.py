@@ -18,10 +18,10 @@ from robocasa_lerobot import cli, contract
 from robocasa_lerobot.demos.generate.sources.prepare import (
     DROPPED,
     FILE,
-    file_identity,
     known_outcomes,
     prepare_files,
     prepare_one,
+    work_identity,
 )
 from robocasa_lerobot.demos.generate.sources.prepared import GROUP, read_prepared
 from robocasa_lerobot.demos.generate.sources.segments import PART, cut, runs
@@ -158,7 +158,7 @@ def test_a_file_is_prepared_and_what_was_recorded_stays(
     # One of them was prepared before a kill.
     parts = tmp_path / ".CloseDrawer.prepare"
     parts.mkdir()
-    (parts / FILE).write_text(json.dumps(file_identity(path)))
+    (parts / FILE).write_text(json.dumps(work_identity(path)))
     prepare_one(path, "demo_0", parts)
     stamp = (parts / "demo_0.hdf5").stat().st_mtime_ns
     assert prepare_one(path, "demo_0", parts).dropped == ""
@@ -220,7 +220,7 @@ def test_what_was_prepared_of_another_recording_is_not_taken(recorded: Path, tmp
     path = Path(shutil.copy(recorded, tmp_path))
     parts = tmp_path / ".CloseDrawer.prepare"
     parts.mkdir()
-    (parts / FILE).write_text(json.dumps(file_identity(path)))
+    (parts / FILE).write_text(json.dumps(work_identity(path)))
     (parts / "demo_0.json").write_text('"of the recording that had this name"')
     path.touch()
     assert [one.dropped for one in prepare_files([path])] == ["", ""]

@@ -28,6 +28,7 @@ EVERY = 4  # steps between states that are looked at for contacts and views
 PATH_POINTS = 20  # of a path that is compared with others
 STILL_M = 0.002  # of the hand in a step: it idles
 FULL = 0.98  # of a command: it is saturated
+FREE_DOFS = 6
 
 
 @dataclass(frozen=True)
@@ -159,16 +160,16 @@ def _about(env: KitchenEnv, data: mujoco.MjData, stage: Stage) -> Array:
     for name in (env.scene.fill(stage.object), env.scene.fill(stage.target)):
         if name in env.scene.objects:
             return np.array(middle_of(env.scene, data, name))
-        if name in _loose(env):
+        if _is_loose(env, name):
             return np.array(data.body(name).xpos)
     return np.array(env.scene.fixture(stage.target).pos, dtype=np.float64)
 
 
-def _loose(env: KitchenEnv) -> set[str]:
-    """Bodies that move freely though they are no objects, as a blender's lid."""
+def _is_loose(env: KitchenEnv, name: str) -> bool:
+    """Whether a body of that name moves freely, as objects do, and a blender's lid, which is none."""
     model = env.model
-    free = np.flatnonzero(model.jnt_type == mujoco.mjtJoint.mjJNT_FREE)
-    return {model.body(int(model.jnt_bodyid[joint])).name for joint in free}
+    body = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, name)
+    return body >= 0 and model.body_dofnum[body] == FREE_DOFS
 
 
 def _seen(env: KitchenEnv, data: mujoco.MjData, stage: Stage) -> bool:
@@ -193,11 +194,10 @@ class _Masks:
     def of(cls, env: KitchenEnv) -> _Masks:
         scene = env.scene
         names: set[str] = set()
-        loose = _loose(env)
         for stage in env.declaration.stages:
             for word in (stage.object, stage.target):
                 filled = scene.fill(word)
-                if filled in scene.objects or filled in loose:
+                if filled in scene.objects or _is_loose(env, filled):
                     names.add(filled)
                 elif word in scene.roles:
                     names.add(scene.fixtures[scene.roles[word]].name)

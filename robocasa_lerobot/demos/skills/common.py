@@ -19,7 +19,7 @@ from robocasa_lerobot.demos.motion import (
 )
 from robocasa_lerobot.demos.planning.errors import SkillError
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
-from robocasa_lerobot.envs.predicates import parts_with_memory
+from robocasa_lerobot.envs.predicates import Goal, parts_with_memory
 from robocasa_lerobot.envs.robots.panda_omron.names import FINGER_JOINTS
 from robocasa_lerobot.envs.tasks.conditions import stage_condition
 from robocasa_lerobot.envs.tasks.task import Stage
@@ -33,7 +33,7 @@ __all__ = [
     "move_hand",
     "require_near",
     "stage_done",
-    "stage_progress",
+    "wait_for",
     "wait_for_stage",
 ]
 
@@ -134,16 +134,20 @@ def stage_done(env: KitchenEnv, stage: Stage) -> bool:
     return stage_condition(env.declaration, stage).evaluate(env.scene, env.data, {})
 
 
-def stage_progress(env: KitchenEnv, stage: Stage) -> float:
-    """How much of what the stage's condition remembers is there: 1 for each memory that is full."""
-    remembered = parts_with_memory([stage_condition(env.declaration, stage)])
-    return sum(part.progress(env.scene, env.data) for part in remembered)
+def wait_for(env: KitchenEnv, goal: Goal, act: Callable[[], Array], patience_steps: int) -> Iterator[Array]:
+    """Repeat an action until a goal holds, or until nothing that it remembers has come nearer to it for some steps."""
+    remembered = parts_with_memory([goal])
+
+    def progress() -> float:
+        return sum(part.progress(env.scene, env.data) for part in remembered)
+
+    left, best = patience_steps, progress()
+    while left and not goal.evaluate(env.scene, env.data, {}):
+        yield act()
+        now = progress()
+        left, best = (patience_steps, now) if now > best else (left - 1, best)
 
 
 def wait_for_stage(env: KitchenEnv, stage: Stage, act: Callable[[], Array], patience_steps: int) -> Iterator[Array]:
-    """Repeat an action until a stage's condition holds, or until nothing has come nearer to it for some steps."""
-    left, best = patience_steps, stage_progress(env, stage)
-    while left and not stage_done(env, stage):
-        yield act()
-        now = stage_progress(env, stage)
-        left, best = (patience_steps, now) if now > best else (left - 1, best)
+    """The same for a stage's condition."""
+    yield from wait_for(env, stage_condition(env.declaration, stage), act, patience_steps)

@@ -5,11 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from robocasa_lerobot.evaluation.report import numbers as fmt
-from robocasa_lerobot.evaluation.report.joining import RULES
 from robocasa_lerobot.evaluation.report.policies import PolicyResult, simulator_of
 
-_ALIKE = tuple(rule for rule in RULES if rule not in ("protocol", "render_preset"))
-_SPELLED = {
+# Fields of a run's header, and what they are called in a sentence.
+_RULES = {
     "split": "kitchens",
     "horizon_rule": "horizons",
     "horizon_multiplier": "horizons",
@@ -21,7 +20,7 @@ _SPELLED = {
 
 def differences(a: PolicyResult, b: PolicyResult) -> list[str]:
     """In what the trials of two policies differ, but for the tasks; empty where their rates can be compared."""
-    found = [_SPELLED[rule] for rule in _ALIKE if getattr(a.header, rule) != getattr(b.header, rule)]
+    found = [what for rule, what in _RULES.items() if getattr(a.header, rule) != getattr(b.header, rule)]
     found += ["simulators"] if simulator_of(a.header) != simulator_of(b.header) else []
     return list(dict.fromkeys(found))
 

@@ -15,7 +15,7 @@ from pathlib import Path
 from robocasa_lerobot.evaluation.report.places import tables
 from robocasa_lerobot.evaluation.report.policies import PolicyResult, TaskResult, label_under
 
-RULES = (
+_RULES = (
     "protocol",
     "split",
     "horizon_rule",
@@ -49,7 +49,7 @@ def _key(policy: PolicyResult) -> Hashable | None:
     perturbed = info.experiment is not None and len(policy.conditions) > 1
     if not policy.places and not perturbed and not any(label is not None for label in labels):
         return None
-    rules = tuple(getattr(policy.header, rule) for rule in RULES)
+    rules = tuple(getattr(policy.header, rule) for rule in _RULES)
     return (
         info.experiment,
         training_folder(info.path),
@@ -72,7 +72,7 @@ def alike(a: PolicyResult, b: PolicyResult, data: bool = True) -> bool:
 
     With `data` their `training_data` agree too.
     """
-    rules = all(getattr(a.header, rule) == getattr(b.header, rule) for rule in RULES if rule != "protocol")
+    rules = all(getattr(a.header, rule) == getattr(b.header, rule) for rule in _RULES if rule != "protocol")
     same = (a.info.type, a.condition) == (b.info.type, b.condition)
     return rules and same and (not data or a.info.training_data == b.info.training_data)
 

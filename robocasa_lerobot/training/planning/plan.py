@@ -168,15 +168,11 @@ def _plan_data(loader: LoaderConfig, dataset: MixtureDataset, size: tuple[int, i
 
 def _plan_policy(config: PreTrainedConfig, meta: MixtureMeta, phase: PhaseConfig, plan: PhasePlan) -> None:
     """Sizes of the policy, which is built without memory for its weights."""
-    device, config.device = config.device, "meta"
     try:
-        with torch.device("meta"):
-            policy = builders.make_phase_policy(config, meta, None)
-    except Exception as error:  # policies of LeRobot raise all kinds where weights or packages are missing
+        policy = builders.policy_without_weights(config, meta)
+    except Exception as error:  # where weights or packages are missing
         plan.notes.append(f"the policy {config.type!r} cannot be built here: {_first_line(error)}")
         return
-    finally:
-        config.device = device
     total = sum(p.numel() for p in policy.parameters())
     apply_training_scope(policy, phase, seed=0)
     plan.parameters = (total, sum(p.numel() for p in policy.parameters() if p.requires_grad))

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
-import copy
 import hashlib
 from collections.abc import Callable
 from pathlib import Path
@@ -26,7 +24,7 @@ from robocasa_lerobot.training.setup import builders, clipping
 from robocasa_lerobot.training.setup import phase_data as joining
 from robocasa_lerobot.training.setup.features import LEAVE_OUT, RENAME
 from robocasa_lerobot.training.setup.kept import check_kept_settings
-from robocasa_lerobot.training.setup.optimizers import in_lerobots_words, make_optimizer
+from robocasa_lerobot.training.setup.optimizers import in_lerobots_words, make_optimizer, trained_parameters
 from robocasa_lerobot.training.weights.adapters import apply_training_scope
 from robocasa_lerobot.training.weights.checkpoint import TrainingState, last_checkpoint, pretrained_model, restore, tidy
 from robocasa_lerobot.training.weights.ema import Ema
@@ -185,15 +183,14 @@ def check_scope(config: PreTrainedConfig, meta: MixtureMeta, phase: PhaseConfig)
     Raises:
         UserError: a pattern fits nothing, or nothing is left to train.
     """
-    policy, config = None, copy.deepcopy(config)
-    config.device = "meta"
-    if phase.freeze or phase.lora is not None:
-        with contextlib.suppress(Exception), torch.device("meta"):  # LeRobot's raise all kinds without their weights
-            policy = builders.make_phase_policy(config, meta, None)
-    if policy is not None:
-        apply_training_scope(policy, phase, seed=0)
-        if not any(weight.requires_grad for weight in policy.parameters()):
-            raise UserError(f"phase {phase.name!r}: `freeze` leaves nothing of the policy to train.")
+    if not phase.freeze and phase.lora is None:
+        return
+    try:
+        policy = builders.policy_without_weights(config, meta)
+    except Exception:  # as where packages are missing
+        return
+    apply_training_scope(policy, phase, seed=0)
+    trained_parameters(policy, phase)
 
 
 def phase_seed(seed: int, name: str) -> int:

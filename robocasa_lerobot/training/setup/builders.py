@@ -214,6 +214,14 @@ def check_processors(config: PreTrainedConfig, meta: MixtureMeta) -> None:
         make_processors(config, dataclasses.replace(meta, stats=None), None, keep_statistics=False)
 
 
+def policy_without_weights(config: PreTrainedConfig, meta: MixtureMeta) -> PreTrainedPolicy:
+    """A policy whose weights take no memory, to look at its parts; policies of LeRobot's raise all kinds of errors."""
+    config = copy.deepcopy(config)
+    config.device = "meta"
+    with torch.device("meta"):
+        return make_phase_policy(config, meta, None)
+
+
 def hub_checkpoint(name: str) -> Path:
     """Folder of a policy on the hub, downloaded or from the local cache.
 

@@ -26,7 +26,7 @@ def check_optimizer(config: PreTrainedConfig, phase: PhaseConfig) -> None:
     Raises:
         UserError: a setting that they do not have, or a value that does not fit.
     """
-    preset = _changed(OptimizerConfig, config.get_optimizer_preset(), phase.optimizer, "optimizer")
+    preset = _optimizer_settings(config, phase)
     stand_in = torch.optim.SGD([torch.nn.Parameter(torch.zeros(1))], lr=preset.lr)
     _schedule(config, phase, stand_in)
 
@@ -41,7 +41,7 @@ def make_optimizer(
     Raises:
         UserError: a setting that the optimiser or schedule does not have, or nothing to train.
     """
-    preset = _changed(OptimizerConfig, policy.config.get_optimizer_preset(), phase.optimizer, "optimizer")
+    preset = _optimizer_settings(policy.config, phase)
     masters = MasterWeights(policy) if masters is None else masters
     optimizer = preset.build(masters.groups(_trained_groups(policy, phase, by_name=preset.type == _BY_NAME)))
     if not isinstance(optimizer, torch.optim.Optimizer):
@@ -60,10 +60,16 @@ def make_optimizer(
 
 def in_lerobots_words(config: PreTrainedConfig, phase: PhaseConfig) -> tuple[OptimizerConfig, LRSchedulerConfig | None]:
     """The optimiser and schedule of a phase as LeRobot's training would be told of them."""
-    preset = _changed(OptimizerConfig, config.get_optimizer_preset(), phase.optimizer, "optimizer")
+    preset = _optimizer_settings(config, phase)
     asked = {"lr": phase.learning_rate, "grad_clip_norm": phase.grad_clip_norm}
     changes = {name: value for name, value in asked.items() if value is not None}
     return dataclasses.replace(preset, **changes), _schedule_settings(config, phase)
+
+
+def _optimizer_settings(config: PreTrainedConfig, phase: PhaseConfig) -> OptimizerConfig:
+    """The policy's own optimiser with the phase's changes."""
+    settings: OptimizerConfig = _changed(OptimizerConfig, config.get_optimizer_preset(), phase.optimizer, "optimizer")
+    return settings
 
 
 def _schedule_settings(config: PreTrainedConfig, phase: PhaseConfig) -> LRSchedulerConfig | None:
@@ -121,14 +127,24 @@ def _warmup_is_given(phase: PhaseConfig) -> bool:
     return phase.warmup_steps is not None or "num_warmup_steps" in phase.scheduler
 
 
+def trained_parameters(policy: PreTrainedPolicy, phase: PhaseConfig) -> dict[str, torch.nn.Parameter]:
+    """Those that are not frozen, by their names.
+
+    Raises:
+        UserError: all are.
+    """
+    trained = {name: p for name, p in policy.named_parameters() if p.requires_grad}
+    if not trained:
+        raise UserError(f"phase {phase.name!r}: `freeze` leaves nothing of the policy to train.")
+    return trained
+
+
 def _trained_groups(policy: PreTrainedPolicy, phase: PhaseConfig, by_name: bool) -> Any:
     """The policy's parameter groups without frozen parameters; one group where low-rank changes are trained.
 
     For an optimiser that goes `by_name`, the parameters by their names.
     """
-    trained = {name: p for name, p in policy.named_parameters() if p.requires_grad}
-    if not trained:
-        raise UserError(f"phase {phase.name!r}: `freeze` leaves nothing of the policy to train.")
+    trained = trained_parameters(policy, phase)
     if by_name:
         return trained
     if phase.lora is not None:

@@ -131,7 +131,7 @@ def _begin(path: Path, demos: list[str], locks: contextlib.ExitStack, *, fresh: 
     lock = locks.enter_context(contextlib.ExitStack())
     lock.enter_context(held_lock(_lock_of(path)))
     folder = _folder_of(path)
-    note, identity = folder / FILE, file_identity(path)
+    note, identity = folder / FILE, work_identity(path)
     # What a killed run left may be of another recording that had the file's name then.
     if folder.exists() and (fresh or not note.exists() or json.loads(note.read_text()) != identity):
         shutil.rmtree(folder)
@@ -140,10 +140,15 @@ def _begin(path: Path, demos: list[str], locks: contextlib.ExitStack, *, fresh: 
     return _Begun(path, demos, folder, lock, set(demos))
 
 
-def file_identity(path: Path) -> dict[str, Any]:
-    """What tells a file from another that had its place, and what is found out of it from what other software would."""
+def file_identity(path: Path) -> dict[str, int]:
+    """What tells a file from another that had its place."""
     status = path.stat()
-    return {"size": status.st_size, "modified_ns": status.st_mtime_ns, **versions()}
+    return {"size": status.st_size, "modified_ns": status.st_mtime_ns}
+
+
+def work_identity(path: Path) -> dict[str, Any]:
+    """The same, and what tells what is found out of it from what other software would find."""
+    return {**file_identity(path), **versions()}
 
 
 def known_outcomes(path: Path) -> dict[str, Outcome]:

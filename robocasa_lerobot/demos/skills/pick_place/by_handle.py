@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from robocasa_lerobot.demos.motion import Array
 from robocasa_lerobot.demos.planning.grasps import GraspPose
-from robocasa_lerobot.demos.skills.pick_place.grasp_strategy import ANY_APPROACH
+from robocasa_lerobot.demos.skills.pick_place.grasp_strategy import ANY_APPROACH, GraspStrategy
 from robocasa_lerobot.demos.skills.pick_place.graspable import Graspable, filled, grasps
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 
@@ -90,5 +90,12 @@ def by_one_end(env: KitchenEnv, obj: Graspable, approach: Array) -> list[GraspPo
 # A tool is held far from its working end, which reaches into something; a pan near it, since it hangs on that.
 TOOL_BY_THE_HANDLE = replace(ANY_APPROACH, poses=partial(by_the_handle, share=TOOL_SHARE, farther_score=TOOL_SCORE))
 PAN_BY_THE_HANDLE = replace(ANY_APPROACH, poses=partial(by_the_handle, share=PAN_SHARE, farther_score=PAN_SCORE))
+
+
+def pan_grasp(obj: Graspable) -> GraspStrategy:
+    """How a vessel is held that may be a pan: by its handle if it has one."""
+    return PAN_BY_THE_HANDLE if has_handle(obj) else ANY_APPROACH
+
+
 # What goes into a vessel with one end first is held near the other one: the palm stays over the rim.
 BY_ONE_END = replace(ANY_APPROACH, poses=by_one_end)

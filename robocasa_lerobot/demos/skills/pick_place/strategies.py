@@ -8,7 +8,7 @@ import numpy as np
 
 from robocasa_lerobot.demos.motion import UP, hand_rotation
 from robocasa_lerobot.demos.skills.drawers import make_room
-from robocasa_lerobot.demos.skills.pick_place.by_handle import BY_ONE_END, PAN_BY_THE_HANDLE, has_handle
+from robocasa_lerobot.demos.skills.pick_place.by_handle import BY_ONE_END, PAN_BY_THE_HANDLE, has_handle, pan_grasp
 from robocasa_lerobot.demos.skills.pick_place.grasp_strategy import (
     ANY_APPROACH,
     FOR_A_STACK,
@@ -286,7 +286,7 @@ def _into_sink(env: KitchenEnv, stage: Stage, obj: Graspable, sink: Sink) -> Pla
     poses = below_spout(env, obj, sink) if spout else on_floor(env, basin)
     return PlaceStrategy(
         poses, leans=(0.0, _SMALL, _LEANT), entries=("up", "across"), in_m=0.2, fit=room_in(env, obj, basin),
-        grasp=PAN_BY_THE_HANDLE if has_handle(obj) else ANY_APPROACH,
+        grasp=pan_grasp(obj),
     )  # fmt: skip
 
 

@@ -18,9 +18,8 @@ from robocasa_lerobot.demos.motion import (
     rotation_about,
 )
 from robocasa_lerobot.demos.skills.common import SkillError, move_hand, stage_done
-from robocasa_lerobot.demos.skills.pick_place.by_handle import PAN_BY_THE_HANDLE, has_handle
+from robocasa_lerobot.demos.skills.pick_place.by_handle import pan_grasp
 from robocasa_lerobot.demos.skills.pick_place.carrying.level import level_out, levelled
-from robocasa_lerobot.demos.skills.pick_place.grasp_strategy import ANY_APPROACH
 from robocasa_lerobot.demos.skills.pick_place.graspable import Graspable, graspable
 from robocasa_lerobot.demos.skills.pick_place.tools.brought import bring
 from robocasa_lerobot.demos.skills.reaching import Held, MotionPlan, WaypointPath, approach, follow_with, plan_reach
@@ -78,8 +77,7 @@ def pour(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
         if not obj.contents:
             raise SkillError(f"{obj.title} is empty, but what was in it is not where it belongs")
         top, fixture = _top(env, target)
-        grasp = PAN_BY_THE_HANDLE if has_handle(obj) else ANY_APPROACH
-        yield from bring(env, obj, target if fixture is None else (top, fixture), grasp, towards_target=True)
+        yield from bring(env, obj, target if fixture is None else (top, fixture), pan_grasp(obj), towards_target=True)
         obj = graspable(env, stage.object)
         held = Held.now(env.data, obj.name, obj.contents)
         yield from approach(env, partial(_plan, env, obj, target, failed), CLOSED, held)
