@@ -19,9 +19,13 @@ from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
-from robocasa_lerobot.errors import LackingMachineError, UserError
+from robocasa_lerobot.errors import LackingMachineError, UnknownNameError, UserError
 
 VARIABLE = "MUJOCO_GL"
+# Who draws, where that is not left to the machine; children inherit it.
+RENDERER_VARIABLE = "ROBOCASA_LEROBOT_RENDERER"
+RENDERERS = ("cpu", "opengl")
+OWN_RENDERER = "robocasa_lerobot (CPU)"
 DEVICE_VARIABLE = "MUJOCO_EGL_DEVICE_ID"
 HEADLESS_BACKENDS = ("egl", "osmesa")
 # Renderer names of the software rasterizers of Mesa and of SwiftShader.
@@ -146,6 +150,50 @@ def has_gpu() -> bool:
     return Path("/proc/driver/nvidia/version").exists() or Path("/dev/kfd").exists()
 
 
+def sees_gpu() -> bool:
+    """Whether the kernel shows anything that OpenGL could draw on, an integrated graphics chip included."""
+    if has_gpu() or Path("/dev/dxg").exists():
+        return True
+    return any(Path("/dev/dri").glob("renderD*"))
+
+
+def draws_on_cpu() -> bool:
+    """Whether pictures are drawn by our own code on the CPU, and not by OpenGL.
+
+    They are where OpenGL would use the CPU as well, or does not work: its software rasterizers take twice as long.
+    `ROBOCASA_LEROBOT_RENDERER` decides it where it is set, and is set for this process's children where it took a try
+    to find out; a render device that is asked for is OpenGL's.
+
+    Raises:
+        UnknownNameError: that variable names no renderer.
+    """
+    asked = os.environ.get(RENDERER_VARIABLE)
+    if asked:
+        if asked not in RENDERERS:
+            raise UnknownNameError(RENDERER_VARIABLE, asked, RENDERERS)
+        return asked == "cpu"
+    if sys.platform != "linux" or os.environ.get(DEVICE_VARIABLE):
+        return False
+    backend = os.environ.get(VARIABLE) or "egl"
+    if backend == "osmesa" or not sees_gpu():
+        return True
+    found = probe(backend)
+    on_cpu = found.renderer is None or found.software
+    if on_cpu:
+        announce(found.renderer or f"OpenGL does not work: {found.failure}")
+    os.environ[RENDERER_VARIABLE] = "cpu" if on_cpu else "opengl"
+    return on_cpu
+
+
+def ensure_drawing() -> str | None:
+    """Have what draws chosen for this process and its children; the backend of OpenGL where that draws, else None.
+
+    Raises:
+        as `draws_on_cpu` and `ensure_gl`.
+    """
+    return None if draws_on_cpu() else ensure_gl()
+
+
 @cache
 def render_devices() -> tuple[RenderDevice, ...]:
     """The devices that EGL lists (about half a second, once); empty where EGL lists none.
@@ -266,6 +314,12 @@ def note_renderer() -> str:
     return name
 
 
+def note_own_renderer() -> None:
+    """Have `used_renderer` say that this process draws by our own code."""
+    global _used_renderer
+    _used_renderer = OWN_RENDERER
+
+
 def announce_backend() -> None:
     """Try what renders, and announce it, in a process whose workers will render; costs half a second beside a GPU."""
     if has_gpu():
@@ -281,14 +335,18 @@ def used_renderer() -> str | None:
 
 def announce(renderer: str) -> None:
     """Warn, once in a process, if `renderer` is software on a machine that has a GPU."""
-    if renderer not in _announced and is_software(renderer) and has_gpu():
+    if renderer not in _announced and not _on_gpu(renderer) and has_gpu():
         _announced.add(renderer)
         warnings.warn(
-            f"pictures are drawn by the CPU ({renderer}) although this machine has a GPU: many times "
+            f"pictures are drawn by the CPU ({renderer}) although this machine has a GPU: "
             f"slower. Install the vendor's OpenGL libraries: {NVIDIA_REMEDY} ({NVIDIA_CONTAINER_NOTE}).",
             SoftwareRenderingWarning,
             stacklevel=3,
         )
+
+
+def _on_gpu(renderer: str) -> bool:
+    return not is_software(renderer) and not renderer.startswith("OpenGL does not work")
 
 
 def _pin(device: int) -> None:

@@ -50,7 +50,18 @@ def check_python(version: tuple[int, int, int] | None = None) -> Finding:
     return Finding("Python", "ok", found)
 
 
-def check_opengl(probe: Callable[[str], gl.GLProbe] = gl.probe, has_gpu: Callable[[], bool] = gl.has_gpu) -> Finding:
+def check_pictures(on_cpu: Callable[[], bool] = gl.draws_on_cpu) -> Finding:
+    """Who draws what cameras see."""
+    asked = os.environ.get(gl.RENDERER_VARIABLE)
+    why = f", by {gl.RENDERER_VARIABLE}" if asked else ""
+    return Finding("pictures", "ok", ("drawn by our own code on the CPU" if on_cpu() else "drawn by OpenGL") + why)
+
+
+def check_opengl(
+    probe: Callable[[str], gl.GLProbe] = gl.probe,
+    has_gpu: Callable[[], bool] = gl.has_gpu,
+    on_cpu: Callable[[], bool] = gl.draws_on_cpu,
+) -> Finding:
     """A backend really renders: the one in `MUJOCO_GL`, else EGL, else OSMesa."""
     asked = os.environ.get(gl.VARIABLE)
     results = []
@@ -61,6 +72,9 @@ def check_opengl(probe: Callable[[str], gl.GLProbe] = gl.probe, has_gpu: Callabl
     last = results[-1]
     if last.renderer is None:
         failures = "; ".join(f"{r.backend}: {r.failure}" for r in results)
+        if on_cpu() and not asked:
+            found = f"{failures}; without it no shadows (--preset quality), depth, segmentation and views from above"
+            return Finding("OpenGL", "warning", found, gl.REMEDY)
         return Finding("OpenGL", "fault", failures, f"unset {gl.VARIABLE}" if asked else gl.REMEDY)
     found = f"{last.backend}: {last.renderer}"
     if last.software and has_gpu():
@@ -204,6 +218,7 @@ def _run_discovery() -> subprocess.CompletedProcess[str]:
 
 CHECKS: tuple[Callable[[], Finding], ...] = (
     check_python,
+    check_pictures,
     check_opengl,
     check_render_devices,
     check_video,

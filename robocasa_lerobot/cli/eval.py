@@ -61,7 +61,7 @@ def run(args: argparse.Namespace) -> int:
     from robocasa_lerobot.evaluation.run.engine import evaluate, prepare
     from robocasa_lerobot.evaluation.run.merging import merge
     from robocasa_lerobot.evaluation.run.outputs import write_outputs
-    from robocasa_lerobot.gl import announce_backend, ensure_gl
+    from robocasa_lerobot.gl import announce_backend, ensure_drawing
 
     given = [f"--{key.removeprefix('set:')}={value}" for key, value in vars(args).items() if key.startswith("set:")]
     path = [f"--config_path={args.config_path}"] if args.config_path else []
@@ -87,7 +87,7 @@ def run(args: argparse.Namespace) -> int:
         write_outputs(evaluation)
         return 0
     if config.env.is_kitchen:
-        ensure_gl()  # Inherited by the workers.
+        ensure_drawing()  # Inherited by the workers.
         announce_backend()
     evaluate(evaluation)
     if config.shard is None:

@@ -60,10 +60,10 @@ def remove_others(folder: Path, failures: list[Failure]) -> None:
 
 def _film(path: Path, env: KitchenEnv, recording: Recording) -> None:
     from robocasa_lerobot.envs.rendering import SceneRenderer
-    from robocasa_lerobot.gl import ensure_gl
+    from robocasa_lerobot.gl import ensure_drawing
     from robocasa_lerobot.video import VideoWriter, side_by_side
 
-    ensure_gl()
+    ensure_drawing()
     model, data = env.model, mujoco.MjData(env.model)
     renderer = SceneRenderer(model, FILM_SIZE, FILM_SIZE)
     try:

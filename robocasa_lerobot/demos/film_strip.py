@@ -30,9 +30,9 @@ def film_strip(path: Path, demo: str, out: Path) -> None:
         UserError: the kitchen of the demonstration cannot be made again.
     """
     from robocasa_lerobot.envs.rendering import SceneRenderer
-    from robocasa_lerobot.gl import ensure_gl
+    from robocasa_lerobot.gl import ensure_drawing
 
-    ensure_gl()
+    ensure_drawing()
     recorded = read_demonstration(path, demo)
     shown = np.linspace(0, len(recorded.states) - 1, STRIP_PICTURES).round().astype(int)
     env = kitchen_of(recorded)

@@ -16,7 +16,7 @@ from robocasa_lerobot.demos.hdf5 import RECORDED, Failure, merge_parts, read_sum
 from robocasa_lerobot.demos.progress import Board
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.errors import UserError, differing
-from robocasa_lerobot.gl import ensure_gl
+from robocasa_lerobot.gl import ensure_drawing
 from robocasa_lerobot.jobs.pool import PoolExecutor, polled
 from robocasa_lerobot.jobs.publish import held_lock
 from robocasa_lerobot.jobs.workers import check_workers
@@ -100,7 +100,7 @@ def record_tasks(
         settings.check()  # before any process starts
     check_workers(workers)
     if keep_failures or any(settings.images for settings in all_settings):
-        ensure_gl()
+        ensure_drawing()
     results: dict[str, RecordingResult] = {}
     waiting: list[Parts] = []
     for settings in all_settings:

@@ -342,9 +342,12 @@ class KitchenEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
 
     def _open_renderer(self) -> SceneRenderer:
         if self._renderer is None:
-            gl.ensure_gl(self.render_device)
+            opengl = None
+            if self.render_device is not None:
+                gl.ensure_gl(self.render_device)
+                opengl = True
             shadows = self.render_preset == "quality"
-            self._renderer = SceneRenderer(self.model, self.image_size, self.image_size, shadows=shadows)
+            self._renderer = SceneRenderer(self.model, self.image_size, self.image_size, shadows=shadows, opengl=opengl)
         return self._renderer
 
     def _close_renderer(self) -> None:

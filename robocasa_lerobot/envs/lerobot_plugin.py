@@ -22,7 +22,7 @@ from robocasa_lerobot.envs.tasks import registry
 from robocasa_lerobot.envs.vector.freeze_at_end import held
 from robocasa_lerobot.envs.vector.kitchens import make_vector_env
 from robocasa_lerobot.errors import UnknownNameError, UserError
-from robocasa_lerobot.gl import ensure_gl
+from robocasa_lerobot.gl import ensure_drawing
 
 ENV_TYPE = "robocasa_kitchen"
 
@@ -151,7 +151,7 @@ class RobocasaKitchenEnvConfig(EnvConfig):
                 "use --eval.use_async_envs=true, or --eval.batch_size=1."
             )
         names = self.task_names()
-        ensure_gl()  # here, so that the workers inherit the choice
+        ensure_drawing()  # here, so that the workers inherit the choice
         return {name: {0: self._vector_env(partial(KitchenEnv, name, **self.gym_kwargs), n_envs)} for name in names}
 
     def _vector_env(self, make: Callable[..., KitchenEnv], n_envs: int) -> Any:

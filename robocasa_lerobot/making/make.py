@@ -216,10 +216,10 @@ def pieces_of(needs: Sequence[Need], replace: bool = False, keep: bool = False) 
 
 def make_datasets(pieces: Sequence[MadeDataset], execution: Execution, cores: int) -> Outcome:
     """Make them; see `run_pieces`."""
-    from robocasa_lerobot.gl import ensure_gl
+    from robocasa_lerobot.gl import ensure_drawing
 
     if execution.kind == "local":
-        ensure_gl()
+        ensure_drawing()
     root = pieces[0].need.registry_root
     outcome = run_pieces(pieces, root / WORK, execution, cores, "making", "demo", _PRELOAD)
     if not outcome.submitted:

@@ -96,7 +96,7 @@ class Kitchens:
         """The first observation of a trial."""
         if self._env is None or self._env.task != task:
             self.close()
-            gl.ensure_gl()
+            gl.ensure_drawing()
             self._env = KitchenEnv(task, **self._arguments)
         self._success = False
         observation, info = self._env.reset(seed=self.seeds(task, trial)["seed"])

@@ -14,7 +14,7 @@ from pathlib import Path
 from robocasa_lerobot import contract
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.web_view import WebView
-from robocasa_lerobot.gl import ensure_gl
+from robocasa_lerobot.gl import ensure_drawing
 from robocasa_lerobot.teleop.driving.pilot import Pilot, load_pilot
 from robocasa_lerobot.teleop.keeping.store import Store, check_out
 from robocasa_lerobot.teleop.loop import ControlLoop, Inbox
@@ -70,7 +70,7 @@ def run_session(
         NoOpenGLError: nothing on this machine can render.
     """
     check_out(settings.out)
-    ensure_gl()
+    ensure_drawing()
     pilot: Pilot | None = None
     size = settings.image_size
     if policy:

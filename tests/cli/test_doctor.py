@@ -63,9 +63,11 @@ def test_no_opengl() -> None:
         asked.append(backend)
         return gl.GLProbe(backend, None, "ImportError: nothing")
 
-    finding = doctor.check_opengl(probe, no_gpu)
-    assert (finding.status, finding.remedy) == ("fault", gl.REMEDY)
-    assert asked == ["egl", "osmesa"]
+    for on_cpu, status in ((False, "fault"), (True, "warning")):  # our own code draws most of it
+        asked.clear()
+        finding = doctor.check_opengl(probe, no_gpu, lambda on_cpu=on_cpu: on_cpu)
+        assert (finding.status, finding.remedy) == (status, gl.REMEDY)
+        assert asked == ["egl", "osmesa"]
     assert "egl: ImportError" in finding.found
     assert "osmesa: ImportError" in finding.found
 
@@ -80,6 +82,14 @@ def test_software_rendering_beside_a_gpu_is_a_warning() -> None:
     assert doctor.check_opengl(lambda b: SOFTWARE, one_gpu).status == "warning"
     assert doctor.check_opengl(lambda b: SOFTWARE, no_gpu).status == "ok"
     assert doctor.check_opengl(lambda b: HARDWARE, one_gpu).status == "ok"
+
+
+def test_who_draws_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv(gl.RENDERER_VARIABLE, raising=False)
+    assert doctor.check_pictures(lambda: True).found == "drawn by our own code on the CPU"
+    assert doctor.check_pictures(lambda: False).found == "drawn by OpenGL"
+    monkeypatch.setenv(gl.RENDERER_VARIABLE, "opengl")
+    assert doctor.check_pictures().found == f"drawn by OpenGL, by {gl.RENDERER_VARIABLE}"
 
 
 def test_render_devices_are_listed_with_both_numbers(monkeypatch: pytest.MonkeyPatch) -> None:

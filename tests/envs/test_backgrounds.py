@@ -62,7 +62,10 @@ def test_a_joined_picture_is_the_full_drawing(task: str, joined: list[bool]) -> 
     for _ in walk(env, SEED):
         steps += 1
         if not renderers:
-            renderers = [SceneRenderer(env.model, PIXELS, PIXELS, keeps_backgrounds=keeps) for keeps in (False, True)]
+            renderers = [
+                SceneRenderer(env.model, PIXELS, PIXELS, opengl=True, keeps_backgrounds=keeps)
+                for keeps in (False, True)
+            ]
         full, keeping = (renderer.pictures(env.data, contract.CAMERAS) for renderer in renderers)
         pairs = zip(contract.CAMERAS, full, keeping, strict=True)
         assert [name for name, one, other in pairs if not np.array_equal(one, other)] == []
@@ -78,7 +81,7 @@ def test_a_picture_does_not_depend_on_what_was_drawn_before(joined: list[bool]) 
     env = KitchenEnv("OpenDrawer", cameras=(), terminate_on_success=False)
     states = [(env.data.qpos.copy(), env.data.qvel.copy()) for _ in walk(env, SEED)]
     shuffled = np.random.default_rng(0).permutation(np.repeat(np.arange(len(states)), 2))
-    renderer = SceneRenderer(env.model, PIXELS, PIXELS)
+    renderer = SceneRenderer(env.model, PIXELS, PIXELS, opengl=True)
     drawn: dict[int, list[NDArray[np.uint8]]] = {}
     for number in [*range(len(states)), *shuffled.tolist()]:
         env.data.qpos[:], env.data.qvel[:] = states[number]
@@ -122,7 +125,7 @@ def test_pixels_of_several_samples_are_not_joined(joined: list[bool]) -> None:
     env = KitchenEnv("OpenDrawer", cameras=(), terminate_on_success=False)
     env.reset(seed=SEED)
     env.model.vis.quality.offsamples = 4
-    renderer = SceneRenderer(env.model, PIXELS, PIXELS)
+    renderer = SceneRenderer(env.model, PIXELS, PIXELS, opengl=True)
     for _ in range(4):
         renderer.pictures(env.data, contract.CAMERAS)
     assert joined == []

@@ -123,11 +123,12 @@ def volume_of(surface: Surface) -> float:
 
 
 @pytest.mark.render
+@pytest.mark.parametrize("opengl", [False, True])
 @pytest.mark.parametrize("task", every_task())
-def test_the_merged_model_looks_alike(task: str) -> None:
+def test_the_merged_model_looks_alike(task: str, opengl: bool) -> None:
     env = KitchenEnv(task, image_size=128)
     env.reset(seed=2)
-    merged = SceneRenderer(env.model, 128, 128)
+    merged = SceneRenderer(env.model, 128, 128, opengl=opengl)
     exact = SceneRenderer(env.model, 128, 128)
     assert merged._alike is not None
     assert merged._alike.model.ngeom < 0.5 * np.isin(env.model.geom_group, GROUPS).sum()
@@ -147,9 +148,10 @@ def test_the_merged_model_looks_alike(task: str) -> None:
     env.close()
 
 
-def boards(texuniform: bool) -> mujoco.MjModel:
+def boards(texuniform: bool, samples: int = 0) -> mujoco.MjModel:
     """Sixty textured boxes on one body, in two sizes and turned, seen from above."""
     spec = mujoco.MjSpec()
+    spec.visual.quality.offsamples = samples
     texture = spec.add_texture(name="t", type=mujoco.mjtTexture.mjTEXTURE_2D, width=64, height=64, nchannel=3)
     ramp = np.zeros((64, 64, 3), np.uint8)
     ramp[..., 0], ramp[..., 1] = np.arange(64)[None] * 4, np.arange(64)[:, None] * 4
@@ -170,12 +172,13 @@ def boards(texuniform: bool) -> mujoco.MjModel:
 
 
 @pytest.mark.render
+@pytest.mark.parametrize("opengl", [False, True])
 @pytest.mark.parametrize("texuniform", [False, True])
-def test_textures_lie_as_mujoco_lays_them(texuniform: bool) -> None:
+def test_textures_lie_as_mujoco_lays_them(texuniform: bool, opengl: bool) -> None:
     model = boards(texuniform)
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
-    merged, exact = SceneRenderer(model, 200, 200), SceneRenderer(model, 200, 200)
+    merged, exact = SceneRenderer(model, 200, 200, opengl=opengl), SceneRenderer(model, 200, 200)
     exact._alike = None
     one, other = merged.render(data, "above"), exact.render(data, "above")
     assert merged._alike is not None
@@ -188,12 +191,13 @@ def test_textures_lie_as_mujoco_lays_them(texuniform: bool) -> None:
 
 
 @pytest.mark.render
-def test_a_state_that_is_shown_by_colour_is_seen() -> None:
+@pytest.mark.parametrize("opengl", [False, True])
+def test_a_state_that_is_shown_by_colour_is_seen(opengl: bool) -> None:
     """Colours of materials are followed; a recoloured shape gets a part of its own, once."""
     model = boards(texuniform=False)
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
-    merged, exact = SceneRenderer(model, 64, 64), SceneRenderer(model, 64, 64)
+    merged, exact = SceneRenderer(model, 64, 64, opengl=opengl), SceneRenderer(model, 64, 64)
     exact._alike = None
 
     def check() -> None:

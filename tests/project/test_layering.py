@@ -57,7 +57,7 @@ ROOMS: dict[str, dict[str, set[str]]] = {
     "envs": {
         "physics": set(),
         "seeds": set(),
-        "rendering": set(),
+        "rendering": {"physics"},
         "robots": {"physics", "rendering"},
         "kitchens": {"physics", "rendering"},
         "objects": {"kitchens", "rendering"},

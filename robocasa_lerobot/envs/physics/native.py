@@ -18,9 +18,25 @@ def compiled[**P, T](function: Callable[P, T]) -> Callable[P, T]:
     written, as in a read-only container, every process compiles for itself.
     """
     try:
-        return njit(cache=True, nogil=True)(function)
+        made = njit(cache=True, nogil=True)(function)
     except RuntimeError:  # numba found no folder that it may write to
         return njit(nogil=True)(function)
+    # Numba would take code from the disk as long as the function's own file is as it was, whatever it calls.
+    kept = getattr(getattr(made, "_cache", None), "_cache_file", None)
+    if hasattr(kept, "_source_stamp"):
+        kept._source_stamp = _stamp(Path(function.__code__.co_filename).parent)
+    return made
+
+
+@cache
+def _stamp(folder: Path) -> tuple[tuple[str, int, int], ...]:
+    """What changes when a module of a folder does."""
+    return tuple((file.name, file.stat().st_mtime_ns, file.stat().st_size) for file in sorted(folder.glob("*.py")))
+
+
+def inlined[**P, T](function: Callable[P, T]) -> Callable[P, T]:
+    """As `compiled`, of what is put into each compiled function that calls it: for a few lines called very often."""
+    return njit(nogil=True, inline="always")(function)
 
 
 @cache

@@ -31,7 +31,7 @@ _HIDDEN_GROUP = 5  # MuJoCo's last geom group, which no camera draws
 _SPARE_GEOMS = 200  # of a scene, beyond the model's own: lights, skins and the like
 # Distances in metres between the parts of a view that are drawn one after the other, the nearest first. Near
 # ones hide the rest before its pixels are computed; more than a dozen parts cost more than they save.
-_LAYER_EDGES_M = (0.15, 0.3, 0.45, 0.6, 0.8, 1.0, 1.3, 1.7, 2.2, 3.0, 4.5)
+LAYER_EDGES_M = (0.15, 0.3, 0.45, 0.6, 0.8, 1.0, 1.3, 1.7, 2.2, 3.0, 4.5)
 # What `MjrContext` knows of the framebuffer that pictures are drawn into.
 _FRAMEBUFFER = ("offFBO", "offFBO_r", "offColor", "offColor_r", "offDepthStencil", "offDepthStencil_r")
 _CONTEXT_SIZE = 64  # of the window that some drivers need; pictures are drawn elsewhere
@@ -106,12 +106,12 @@ class Canvas:
         groups = model.geom_group.copy()
         seen = np.flatnonzero(geoms)
         # By distance alone: where faces lie in one plane, the order decides, and must not hang on what was left out.
-        layers = np.searchsorted(_LAYER_EDGES_M, distances(model, data, camera)[seen])
-        layers[groups[seen] == BACKDROP_GROUP] = len(_LAYER_EDGES_M) + 1
+        layers = np.searchsorted(LAYER_EDGES_M, distances(model, data, camera)[seen])
+        layers[groups[seen] == BACKDROP_GROUP] = len(LAYER_EDGES_M) + 1
         try:
             model.geom_group[:] = _HIDDEN_GROUP
             self._update(data, camera)
-            for number in range(len(_LAYER_EDGES_M) + 2):
+            for number in range(len(LAYER_EDGES_M) + 2):
                 layer = seen[layers == number]
                 if len(layer) == 0:
                     continue

@@ -114,9 +114,11 @@ class MergedModel:
 
 
 def merged_model(
-    model: mujoco.MjModel, groups: tuple[int, ...], loose: frozenset[int] = frozenset()
+    model: mujoco.MjModel, groups: tuple[int, ...], loose: frozenset[int] = frozenset(), *, always: bool = False
 ) -> MergedModel | None:
     """Make the look-alike of the geoms in `groups`; None where it would save little, or could not show everything.
+
+    `always` makes it however little it saves.
 
     Boxes, cylinders, capsules and untextured meshes of one body, material and colour become one mesh, but for the
     `loose` ones and transparent ones. Other shapes are taken over as they are.
@@ -130,7 +132,7 @@ def merged_model(
     poses = RestPoses.of(model)
     shown = _shown_faces(model, poses, visible, loose)
     parts = _parts(model, poses, visible & shown.any(axis=1), loose)
-    if visible.sum() - len(parts) < MIN_SAVED_DRAWS:
+    if visible.sum() - len(parts) < MIN_SAVED_DRAWS and not (always and parts):
         return None
     spec = mujoco.MjSpec()
     _add_textures_and_materials(spec, model)

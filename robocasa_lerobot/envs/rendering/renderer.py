@@ -11,16 +11,19 @@ from numpy.typing import NDArray
 from robocasa_lerobot.envs.rendering.backgrounds import Backgrounds
 from robocasa_lerobot.envs.rendering.canvas import Canvas
 from robocasa_lerobot.envs.rendering.merged_model import VISIBLE_GROUPS, MergedModel, merged_model
+from robocasa_lerobot.envs.rendering.software.painter import Painter
 from robocasa_lerobot.errors import UnknownNameError
+from robocasa_lerobot.gl import draws_on_cpu
 
 
 class SceneRenderer:
     """Renders cameras of one model.
 
-    Without shadows, RGB pictures are drawn from a look-alike of the model with merged shapes, the nearest first:
-    measured in a kitchen of 390 geoms on a software rasterizer, two thirds of the time, and pictures that differ by
-    0.2 to 0.3 of 255 levels on average, at the facets of round shapes. They are seen from the nearest pose of a grid of
-    0.2 mm and 0.2 mrad, and of a view that comes again only what moves is drawn (`backgrounds`).
+    Without shadows, RGB pictures are drawn from a look-alike of the model with merged shapes, the nearest first: by our
+    own code for CPUs (`software`) where there is no graphics card, else by OpenGL. Pictures of the two differ by 0.2 of
+    255 levels on average, at edges; those of the look-alike and the model by as much, at the facets of round shapes.
+    They are seen from the nearest pose of a grid of 0.2 mm and 0.2 mrad, and of a view that comes again OpenGL draws
+    only what moves (`backgrounds`). Shadows, free cameras, depth and ids are always drawn by OpenGL.
 
     Args:
         model: to render.
@@ -28,12 +31,13 @@ class SceneRenderer:
         width: of the pictures, pixels.
         shadows: shadows and reflections (render preset `quality`).
         alike: the model's look-alike, if it has been made already.
+        opengl: whether OpenGL draws; None: where there is a graphics card (`gl.draws_on_cpu`).
         keeps_backgrounds: draw only what moves where a view comes again; the pictures are the same either way. Models
             whose pixels have several samples are always drawn in full.
 
     Raises:
-        NoOpenGLError: nothing on this machine can render.
-        ForkedContextError: this process was forked from one that had rendered.
+        NoOpenGLError: OpenGL is needed, and nothing on this machine has it.
+        ForkedContextError: OpenGL is needed, and this process was forked from one that had used it.
     """
 
     def __init__(
@@ -44,6 +48,7 @@ class SceneRenderer:
         *,
         shadows: bool = False,
         alike: MergedModel | None = None,
+        opengl: bool | None = None,
         keeps_backgrounds: bool = True,
     ) -> None:
         self._model = model
@@ -55,11 +60,12 @@ class SceneRenderer:
         self._backgrounds: Backgrounds | None = None
         self._exact: Canvas | None = None
         self._merged: Canvas | None = None
-        self._alike = None if shadows else alike or merged_model(model, VISIBLE_GROUPS)
+        self._painter: Painter | None = None
+        self._on_cpu = not shadows and (draws_on_cpu() if opengl is None else not opengl)
+        self._alike = None if shadows else alike or self._made_alike()
+        self._open_alike()
         if self._alike is None:
             self._open_exact()  # so that a machine without OpenGL fails here
-        else:
-            self._merged = Canvas(self._alike.model, height, width)
 
     def render(self, data: mujoco.MjData, camera: str | mujoco.MjvCamera) -> NDArray[np.uint8]:
         """A picture of shape (height, width, 3), upright.
@@ -114,6 +120,9 @@ class SceneRenderer:
 
     def _drawn(self, cameras: Sequence[int]) -> list[NDArray[np.uint8]]:
         """Pictures of the state that the look-alike follows."""
+        if self._painter is not None:
+            assert self._alike is not None
+            return self._painter.pictures(self._alike.data, cameras)
         assert self._merged is not None
         assert self._alike is not None
         if self._backgrounds is None:
@@ -135,9 +144,20 @@ class SceneRenderer:
     def _merged_model(self) -> MergedModel | None:
         """The look-alike, made anew when shapes have changed their looks beyond what it can follow."""
         if self._alike is not None and (changed := self._alike.changed()):
-            assert self._merged is not None
-            self._merged.close()
-            self._alike = merged_model(self._model, VISIBLE_GROUPS, self._alike.loose | changed)
-            self._merged = None if self._alike is None else Canvas(self._alike.model, *self._size)
-            self._backgrounds = None
+            self._alike = self._made_alike(self._alike.loose | changed)
+            self._open_alike()
         return self._alike
+
+    def _made_alike(self, loose: frozenset[int] = frozenset()) -> MergedModel | None:
+        # What OpenGL draws as it is costs little; our own code draws look-alikes alone.
+        return merged_model(self._model, VISIBLE_GROUPS, loose, always=self._on_cpu)
+
+    def _open_alike(self) -> None:
+        """Make ready what draws the look-alike: our own code, or OpenGL where that cannot, or shall not."""
+        if self._merged is not None:
+            self._merged.close()
+        self._painter = self._merged = self._backgrounds = None
+        if self._alike is not None and self._on_cpu:
+            self._painter = Painter.of(self._alike.model, *self._size)
+        if self._alike is not None and self._painter is None:
+            self._merged = Canvas(self._alike.model, *self._size)

@@ -91,6 +91,34 @@ def capsules(
     return _placed(unit, vertices, positions, rotations, repeat)
 
 
+@cache
+def unit_box(quads: tuple[int, int, int], *, only_top: bool = False) -> Surface:
+    """A box of half size 1, its edges along x, y and z parted into so many; or its upper face alone."""
+    parts = []
+    for axis, side in [(2, 1)] if only_top else [(axis, side) for axis in range(3) for side in (-1, 1)]:
+        across, up = (axis + 1) % 3, (axis + 2) % 3
+        wide, high = quads[across], quads[up]
+        u, v = np.meshgrid(np.linspace(-1.0, 1.0, wide + 1), np.linspace(-1.0, 1.0, high + 1))
+        vertices = np.empty((u.size, 3))
+        vertices[:, axis], vertices[:, across], vertices[:, up] = side, side * u.ravel(), v.ravel()
+        a = (np.arange(high)[:, None] * (wide + 1) + np.arange(wide)).ravel()
+        b, c, d = a + 1, a + wide + 2, a + wide + 1
+        faces = np.concatenate((np.stack((a, b, d), axis=1), np.stack((b, c, d), axis=1))).astype(np.int32)
+        normals = np.zeros_like(vertices)
+        normals[:, axis] = side
+        parts.append(Surface(vertices, normals, vertices[:, :2], faces))
+    return joined(parts)
+
+
+def spheres(half_sizes: Array, slices: int, stacks: int) -> Surface:
+    """An ellipsoid of half sizes (3,), metres, with so many facets around and from pole to pole."""
+    rise = np.linspace(-np.pi / 2, np.pi / 2, stacks + 1)
+    unit = _tube(_circle(slices), np.cos(rise), np.sin(rise), np.sin(rise))
+    normals = unit.normals / half_sizes
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    return Surface(unit.vertices * half_sizes, normals, unit.texcoords, unit.faces)
+
+
 def _placed(unit: Surface, vertices: Array, positions: Array, rotations: Array, repeat: Array) -> Surface:
     """Copies of a unit shape that have `vertices` (n, k, 3) each."""
     turned = rotations.transpose(0, 2, 1)

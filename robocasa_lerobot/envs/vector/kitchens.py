@@ -84,7 +84,10 @@ def make_vector_env(
     # Envs without cameras run on machines that cannot render.
     drawing = bool(kitchen.get("cameras", contract.CAMERAS))
     numbers = _render_devices(devices, drawing)
-    backend = gl.ensure_gl() if drawing or devices is not None else None
+    if devices is not None:
+        backend: str | None = gl.ensure_gl()
+    else:
+        backend = gl.ensure_drawing() if drawing else None
     members = []
     for index in range(count):
         one = tasks[index % len(tasks)]

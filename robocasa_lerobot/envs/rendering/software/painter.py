@@ -1,0 +1,159 @@
+"""Draws the pictures of a look-alike on the CPU, several cameras at once."""
+
+from __future__ import annotations
+
+import os
+from collections import deque
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from functools import cache
+
+import mujoco
+import numpy as np
+
+from robocasa_lerobot.envs.rendering.canvas import LAYER_EDGES_M
+from robocasa_lerobot.envs.rendering.frustum import clipping_planes, view_frustum
+from robocasa_lerobot.envs.rendering.software.arrays import LIGHT_COLUMNS, Array, Picture, Pose, Scratch, Shapes, View
+from robocasa_lerobot.envs.rendering.software.drawing import draw
+from robocasa_lerobot.envs.rendering.software.rasterization import nearest_m
+from robocasa_lerobot.envs.rendering.software.triangles import shapes_of
+from robocasa_lerobot.gl import note_own_renderer
+
+_EDGES_M = np.array(LAYER_EDGES_M)
+_USUAL_COLOUR = (0.5, 0.5, 0.5, 1.0)  # of a geom, which a material's stands above
+_USUAL_LOOK = (0.0, 0.5, 0.5)  # glow, highlights and their sharpness without a material
+_DIRECTIONAL = int(mujoco.mjtLightType.mjLIGHT_DIRECTIONAL)
+_WIDEST_DEGREES = 90.0  # of a cone of light, half its angle: more is no cone
+_MOST_THREADS = 4
+_BANDS = 2  # of a picture, which are shared out: three cameras are no even work for two threads
+
+# Threads that draw, by process: one that was forked has none of its parent's.
+_threads: dict[int, ThreadPoolExecutor] = {}
+
+
+class Painter:
+    """Draws one model into pictures of one size, in plain memory: no OpenGL, and any process and thread may use it.
+
+    Args:
+        model: to draw.
+        height, width: of the pictures, pixels.
+        shapes: of the model, as of `shapes_of`.
+    """
+
+    def __init__(self, model: mujoco.MjModel, height: int, width: int, shapes: Shapes) -> None:
+        note_own_renderer()
+        self._model = model
+        self._size = (height, width)
+        self._shapes = shapes
+        self._scratch: list[Scratch] = []  # of each thread that draws
+        self._materials = np.append(
+            np.column_stack((model.mat_emission, model.mat_specular, model.mat_shininess)).reshape(-1, 3),
+            [_USUAL_LOOK],
+            axis=0,
+        )
+
+    @classmethod
+    def of(cls, model: mujoco.MjModel, height: int, width: int) -> Painter | None:
+        """Of a model; None where it has what only OpenGL draws here (see `shapes_of`)."""
+        shapes = shapes_of(model)
+        return None if shapes is None else cls(model, height, width, shapes)
+
+    def pictures(self, data: mujoco.MjData, cameras: Sequence[int]) -> list[Picture]:
+        """What each camera sees, upright RGB of shape (height, width, 3)."""
+        looks = self._looks()
+        pictures: list[Picture] = [np.empty((*self._size, 3), np.uint8) for _ in cameras]
+        height, width = self._size
+        threads = _threads_at_most()
+        bands = 1 if threads == 1 else _BANDS
+        rows = [(height * band // bands, height * (band + 1) // bands) for band in range(bands)]
+        poses = [self._pose(data, camera, looks) for camera in cameras]
+        work: deque[tuple[Pose, View, Picture]] = deque(
+            (pose, View(first, end, width), picture)
+            for pose, picture in zip(poses, pictures, strict=True)
+            for first, end in rows
+        )
+        count = min(threads, len(work))
+        while len(self._scratch) < count:
+            self._scratch.append(Scratch.of(len(self._shapes.vertices), height, width))
+        # Compiled code leaves Python's lock alone: this thread draws what the others have not begun.
+        others = [_pool().submit(self._draw, work, scratch) for scratch in self._scratch[1:count]]
+        self._draw(work, self._scratch[0])
+        for other in others:
+            other.result()
+        return pictures
+
+    def _draw(self, work: deque[tuple[Pose, View, Picture]], scratch: Scratch) -> None:
+        """Draw what is left to do."""
+        far_m = clipping_planes(self._model)[1]
+        while work:
+            try:
+                pose, view, picture = work.popleft()
+            except IndexError:  # another thread was faster
+                return
+            draw(self._shapes, pose, scratch, view, _EDGES_M, far_m, picture)
+
+    def _looks(self) -> Array:
+        """Colour, opacity, glow, highlights and their sharpness of each geom at present, (ngeom, 7)."""
+        model = self._model
+        self._materials[:-1, 0] = model.mat_emission
+        colours = model.geom_rgba.astype(np.float64)
+        own = (model.geom_rgba != _USUAL_COLOUR).any(axis=1) | (model.geom_matid < 0)
+        if model.nmat:
+            colours = np.where(own[:, None], colours, model.mat_rgba[model.geom_matid])
+        return np.column_stack((colours, self._materials[model.geom_matid]))
+
+    def _pose(self, data: mujoco.MjData, camera: int, looks: Array) -> Pose:
+        """The state as a camera sees it."""
+        height, width = self._size
+        left, right, bottom, top = view_frustum(self._model, camera, width / height)
+        focal_x, focal_y = width / (right - left), height / (top - bottom)
+        near = nearest_m(clipping_planes(self._model)[0], max(focal_x, focal_y))
+        axes = data.cam_xmat[camera].copy()
+        return Pose(
+            data.geom_xpos,
+            data.geom_xmat,
+            looks,
+            self._lights(data, axes),
+            data.cam_xpos[camera].copy(),
+            axes,
+            np.array((focal_x, focal_y, -left * focal_x, top * focal_y, near)),
+        )
+
+    def _lights(self, data: mujoco.MjData, axes: Array) -> Array:
+        """What is lit at present, in the columns of `Pose.lights`; the headlight shines where the camera looks."""
+        model, head = self._model, self._model.vis.headlight
+        shining = np.flatnonzero(model.light_active)
+        lights = np.zeros((len(shining) + bool(head.active), LIGHT_COLUMNS))
+        if head.active:
+            lights[0] = (*-axes[2::3], *head.ambient, *head.diffuse, *head.specular, 0, 0, 0, 1, 0, 0, -1, 0, 1)
+        rows = lights[len(lights) - len(shining) :]
+        rows[:, 0:3], rows[:, 3:6], rows[:, 6:9] = (
+            data.light_xdir[shining],
+            model.light_ambient[shining],
+            model.light_diffuse[shining],
+        )
+        rows[:, 9:12], rows[:, 12:15], rows[:, 15:18] = (
+            model.light_specular[shining],
+            data.light_xpos[shining],
+            model.light_attenuation[shining],
+        )
+        cone = model.light_cutoff[shining]
+        rows[:, 18] = np.where(cone > _WIDEST_DEGREES, -1.0, np.cos(np.deg2rad(cone)))
+        rows[:, 19] = model.light_exponent[shining]
+        rows[:, 20] = model.light_type[shining] == _DIRECTIONAL
+        return lights
+
+
+@cache
+def _threads_at_most() -> int:
+    """How many threads of this process draw: its cores, up to four, or fewer by `OMP_NUM_THREADS`."""
+    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    asked = os.environ.get("OMP_NUM_THREADS", "")
+    return max(1, min(cores, _MOST_THREADS, int(asked) if asked.isdecimal() else cores))
+
+
+def _pool() -> ThreadPoolExecutor:
+    """This process's threads that draw beside the one that asks."""
+    if (pool := _threads.get(os.getpid())) is None:
+        pool = _threads[os.getpid()] = ThreadPoolExecutor(_threads_at_most() - 1, "painter")
+    return pool
