@@ -23,7 +23,7 @@ def compiled[**P, T](function: Callable[P, T]) -> Callable[P, T]:
         return njit(nogil=True)(function)
     # Numba would take code from the disk as long as the function's own file is as it was, whatever it calls.
     kept = getattr(getattr(made, "_cache", None), "_cache_file", None)
-    if hasattr(kept, "_source_stamp"):
+    if kept is not None and hasattr(kept, "_source_stamp"):
         kept._source_stamp = _stamp(Path(function.__code__.co_filename).parent)
     return made
 
