@@ -8,6 +8,7 @@ import shutil
 import subprocess
 import sys
 import tempfile
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -70,6 +71,16 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
             pytest.exit(f"tests that render cannot be left out here: {error}", returncode=1)
         for item in rendering:
             item.add_marker(pytest.mark.skip(reason=str(error)))
+
+
+@pytest.fixture(autouse=True)
+def renderer_as_it_was() -> Iterator[None]:
+    """A test on a pretended machine does not decide who draws in the next one."""
+    before = os.environ.get(gl.RENDERER_VARIABLE)
+    yield
+    os.environ.pop(gl.RENDERER_VARIABLE, None)
+    if before is not None:
+        os.environ[gl.RENDERER_VARIABLE] = before
 
 
 @pytest.fixture(scope="session")

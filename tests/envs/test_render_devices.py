@@ -126,6 +126,7 @@ def test_every_device_of_this_machine_can_be_pinned() -> None:
 def test_software_rendering_beside_a_gpu_is_announced_once(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(gl, "_announced", set())
     monkeypatch.setattr(gl, "has_gpu", lambda: True)
+    monkeypatch.setattr(gl, "probe", lambda backend: gl.GLProbe(backend, "NVIDIA H200/PCIe/SSE2"))  # here, not there
     with closing(make_vector_env(partial(FaultyEnv, renderer="llvmpipe (LLVM 15)"), 2)) as envs:
         with pytest.warns(gl.SoftwareRenderingWarning, match="although this machine has a GPU") as caught:
             envs.reset(seed=1)
@@ -139,6 +140,7 @@ def test_software_rendering_beside_a_gpu_is_announced_once(monkeypatch: pytest.M
 def test_what_is_as_it_should_be_is_not_announced(monkeypatch: pytest.MonkeyPatch, renderer: str, gpu: bool) -> None:
     monkeypatch.setattr(gl, "_announced", set())
     monkeypatch.setattr(gl, "has_gpu", lambda: gpu)
+    monkeypatch.setattr(gl, "probe", lambda backend: gl.GLProbe(backend, renderer))
     with closing(make_vector_env(partial(FaultyEnv, renderer=renderer), 2)) as envs:
         envs.reset(seed=1)
         assert envs.renderer == renderer

@@ -24,6 +24,7 @@ from robocasa_lerobot.envs.tasks.registry import get_task
 from robocasa_lerobot.envs.vector.env import KitchenVectorEnv, WorkerError
 from robocasa_lerobot.envs.vector.worker import EnvFactory, FaultFile, Member
 from robocasa_lerobot.errors import UnknownNameError, UserError
+from robocasa_lerobot.jobs.workers import cores_here
 
 __all__ = ["KitchenVectorEnv", "WorkerError", "env_info", "make_vector_env"]
 
@@ -88,13 +89,14 @@ def make_vector_env(
         backend: str | None = gl.ensure_gl()
     else:
         backend = gl.ensure_drawing() if drawing else None
+    variables = _variables(count, drawing, devices is not None or backend is not None)
     members = []
     for index in range(count):
         one = tasks[index % len(tasks)]
         make = partial(KitchenEnv, one, **kitchen) if isinstance(one, str) else one
         label = one if isinstance(one, str) else getattr(one, "__name__", repr(one))
         device = numbers[index % len(numbers)] if numbers else None
-        members.append(Member(make, label, backend if backend != "default" else None, device, FaultFile()))
+        members.append(Member(make, label, backend if backend != "default" else None, device, FaultFile(), variables))
     return KitchenVectorEnv(members, _autoreset_mode(autoreset), context, timeout_seconds, copy)
 
 
@@ -133,6 +135,16 @@ def _check_arguments(kitchen: dict[str, Any]) -> None:
         if name not in known:
             remedy = "A limit on the steps is `horizon`." if name == "max_episode_steps" else ""
             raise UnknownNameError("argument of the kitchen", name, known, remedy)
+
+
+def _variables(workers: int, drawing: bool, opengl: bool) -> dict[str, str]:
+    """What workers find in their environment: who draws, and with how many threads if they share the cores."""
+    variables = {}
+    if drawing or opengl:
+        variables[gl.RENDERER_VARIABLE] = "opengl" if opengl else "cpu"
+    if not os.environ.get("OMP_NUM_THREADS"):
+        variables["OMP_NUM_THREADS"] = str(max(1, cores_here() // workers))
+    return variables
 
 
 def _render_devices(devices: int | Sequence[int] | None, drawing: bool) -> list[int]:

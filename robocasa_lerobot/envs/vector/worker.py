@@ -16,8 +16,8 @@ import tempfile
 import threading
 import traceback
 import warnings
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from multiprocessing.connection import Connection
 from multiprocessing.reduction import DupFd, ForkingPickler
 from typing import IO, Any
@@ -62,7 +62,8 @@ class FaultFile:
 class Member:
     """One env of a vector env: how to make it, how to name it in messages, and where it renders.
 
-    `backend` and `device` are given along because a fork server has the environment variables of its own start.
+    `backend`, `device` and `variables` of the environment are given along because a fork server has those of its own
+    start.
     """
 
     make: EnvFactory
@@ -70,6 +71,7 @@ class Member:
     backend: str | None
     device: int | None
     faults: FaultFile
+    variables: Mapping[str, str] = field(default_factory=dict)
 
     def __call__(self) -> gymnasium.Env[Any, Any]:
         """The env; Gymnasium makes one in the parent too, to read its spaces."""
@@ -159,6 +161,7 @@ def serve(
     # The parent announces it, once for all workers.
     warnings.filterwarnings("ignore", category=gl.SoftwareRenderingWarning)
     worker = _Worker(index, pipe, status, shared_memory, autoreset_mode)
+    os.environ.update(member.variables)
     try:
         if member.backend is not None:
             gl.use(member.backend, member.device)

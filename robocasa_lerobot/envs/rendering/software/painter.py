@@ -18,6 +18,7 @@ from robocasa_lerobot.envs.rendering.software.drawing import draw
 from robocasa_lerobot.envs.rendering.software.rasterization import nearest_m
 from robocasa_lerobot.envs.rendering.software.triangles import shapes_of
 from robocasa_lerobot.gl import note_own_renderer
+from robocasa_lerobot.jobs.workers import cores_here
 
 _EDGES_M = np.array(LAYER_EDGES_M)
 _USUAL_COLOUR = (0.5, 0.5, 0.5, 1.0)  # of a geom, which a material's stands above
@@ -147,9 +148,8 @@ class Painter:
 @cache
 def _threads_at_most() -> int:
     """How many threads of this process draw: its cores, up to four, or fewer by `OMP_NUM_THREADS`."""
-    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
     asked = os.environ.get("OMP_NUM_THREADS", "")
-    return max(1, min(cores, _MOST_THREADS, int(asked) if asked.isdecimal() else cores))
+    return max(1, min(cores_here(), _MOST_THREADS, int(asked) if asked.isdecimal() else _MOST_THREADS))
 
 
 def _pool() -> ThreadPoolExecutor:
