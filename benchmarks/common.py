@@ -16,6 +16,7 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
+from robocasa_lerobot import gl
 from robocasa_lerobot.files import write_text
 from robocasa_lerobot.provenance import git_commit, utc_now
 
@@ -36,6 +37,12 @@ def machine() -> dict[str, Any]:
         "python": platform.python_version(),
     }
     return {**facts, "variables": {name: os.environ[name] for name in VARIABLES if name in os.environ}}
+
+
+def renderers(backend: str) -> str:
+    """What draws our pictures, and the OpenGL that draws a peer's."""
+    found = gl.probe(backend).renderer if backend in gl.HEADLESS_BACKENDS else backend
+    return f"{gl.OWN_RENDERER}; OpenGL: {found}" if gl.draws_on_cpu() else str(found)
 
 
 def versions(*packages: str) -> dict[str, str]:

@@ -334,7 +334,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     output = options.output or OUTPUT
     try:
         backend = gl.ensure_gl()
-        renderer = gl.probe(backend).renderer if backend in gl.HEADLESS_BACKENDS else backend
+        renderer = common.renderers(backend)
         effort = QUICK if options.quick else FULL
         sections = chosen_sections(options.only, output)
         if options.only and options.without_peer and "lift" in sections:

@@ -170,7 +170,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         programs = {OURS: (Path(sys.executable), BENCHMARKS / "ours_sim.py")}
         if not options.without_peer:
             programs = {PEER: (prepare_venv("robosuite"), BENCHMARKS / "peers" / "robosuite_sim.py"), **programs}
-        renderer = gl.probe(backend).renderer if backend in gl.HEADLESS_BACKENDS else backend
+        renderer = common.renderers(backend)
         body = measure(programs, QUICK if options.quick else FULL)
     except (UserError, WorkerError) as error:
         print(f"sim_speed: {error}", file=sys.stderr)

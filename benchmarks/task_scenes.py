@@ -106,7 +106,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except (UserError, WorkerError) as error:
         print(f"task_scenes: {error}", file=sys.stderr)
         return 2
-    renderer = gl.probe(backend).renderer if backend in gl.HEADLESS_BACKENDS else backend
+    renderer = common.renderers(backend)
     body = {
         "machine": {**common.machine(), "renderer": renderer},
         "versions": {**common.versions("mujoco", "numpy", "numba"), "peer": PEER_VERSIONS},
