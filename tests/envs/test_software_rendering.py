@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import subprocess
 import sys
@@ -14,11 +15,12 @@ import task_selection
 from numpy.typing import NDArray
 
 from robocasa_lerobot import contract, gl
+from robocasa_lerobot.demos.demonstrator import demonstrate
+from robocasa_lerobot.demos.planning.errors import SkillError
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.rendering import SceneRenderer
-from robocasa_lerobot.envs.rendering.software.arrays import Pose, Scratch, View
+from robocasa_lerobot.envs.rendering.software.arrays import View
 from robocasa_lerobot.envs.rendering.software.rasterization import NOTHING, visible
-from robocasa_lerobot.envs.rendering.software.triangles import shapes_of
 from robocasa_lerobot.errors import UnknownNameError
 
 Picture = NDArray[np.uint8]
@@ -137,6 +139,8 @@ WITHOUT_OPENGL = """
 import hashlib, os, sys
 sys.modules["OpenGL"] = None
 import numpy as np
+from robocasa_lerobot.demos.demonstrator import demonstrate
+from robocasa_lerobot.demos.planning.errors import SkillError
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 
 env = KitchenEnv("TurnOnSinkFaucet", image_size=96)
@@ -194,23 +198,15 @@ def shuffled(rng: np.random.Generator, corners: int) -> tuple[NDArray[np.float64
 
 @pytest.mark.parametrize("corners", [2, 5, 40])
 def test_each_pixel_belongs_to_one_of_the_triangles_that_meet_there(corners: int) -> None:
-    model = mujoco.MjModel.from_xml_string(scene(FLOOR))
-    shapes = shapes_of(model)
-    assert shapes is not None
     points, faces = shuffled(np.random.default_rng(corners), corners)
     view = View(0, 64, 64)
-    scratch = Scratch.of(len(points), 64, 64)
-    scratch.corners[:] = points
     lens = np.array((32.0, 32.0, 32.0, 32.0, 1e-3))
-    empty = np.zeros((0, 3))
-    pose = Pose(empty, np.zeros((0, 9)), np.zeros((0, 7)), np.zeros((0, 21)), np.zeros(3), np.zeros(9), lens)
     covered = np.zeros(64 * 64, dtype=int)
-    net = shapes._replace(faces=np.ascontiguousarray(faces[:, ::-1]))
-    for turned in (shapes._replace(faces=faces), net):
+    for turned in (faces, np.ascontiguousarray(faces[:, ::-1])):
         for face in range(len(faces)):
-            scratch.inverse[:], scratch.seen[:] = 0.0, NOTHING
-            visible(face, face + 1, turned, pose, scratch, view, scratch.inverse, scratch.seen)
-            covered += scratch.seen == face
+            inverse, seen = np.zeros(64 * 64, dtype=np.float32), np.full(64 * 64, NOTHING, dtype=np.int32)
+            visible(face, face + 1, True, turned, points, lens, view, inverse, seen)
+            covered += seen == face
     assert (covered == 1).all()  # of one of the two sides; the other one is its back
 
 
@@ -279,3 +275,32 @@ def test_who_draws_follows_from_the_machine(
     monkeypatch.delenv(gl.RENDERER_VARIABLE)
     monkeypatch.setenv(gl.DEVICE_VARIABLE, "0")
     assert gl.draws_on_cpu() is False
+
+
+@pytest.mark.parametrize("task", task_selection.demonstrated())
+def test_a_picture_does_not_depend_on_what_is_kept(task: str) -> None:
+    """A demonstration, drawn in full and with what stands still kept; then its states in any order."""
+    env = KitchenEnv(task, cameras=(), terminate_on_success=False)
+    env.reset(seed=7)
+    full, keeping = (SceneRenderer(env.model, 48, 48, opengl=False, keeps_backgrounds=keeps) for keeps in (False, True))
+    found: list[tuple[NDArray[np.float64], list[Picture]]] = []
+    with contextlib.suppress(SkillError):
+        for action in demonstrate(env):
+            *_, truncated, info = env.step(action.astype(np.float32))
+            one, other = (renderer.pictures(env.data, contract.CAMERAS) for renderer in (full, keeping))
+            assert all(np.array_equal(*pair) for pair in zip(one, other, strict=True))
+            found.append((env.data.qpos.copy(), one))
+            if truncated or info["success"]:
+                break
+    painter = keeping._painter
+    assert painter is not None
+    assert painter._standing is not None
+    assert any(painter._standing._kept.values()), "views came again"
+    before = [pictures for _, pictures in found]
+    for number in np.random.default_rng(0).permutation(len(found))[:60].tolist():
+        env.data.qpos[:] = found[number][0]
+        mujoco.mj_forward(env.model, env.data)
+        again = [renderer.pictures(env.data, contract.CAMERAS) for renderer in (full, keeping)]
+        assert all(np.array_equal(*pair) for pair in zip(*again, strict=True))
+        assert all(np.array_equal(*pair) for pair in zip(again[0], before[number], strict=True))
+    env.close()

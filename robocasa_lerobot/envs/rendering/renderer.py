@@ -158,6 +158,6 @@ class SceneRenderer:
             self._merged.close()
         self._painter = self._merged = self._backgrounds = None
         if self._alike is not None and self._on_cpu:
-            self._painter = Painter.of(self._alike.model, *self._size)
+            self._painter = Painter.of(self._alike.model, *self._size, keeps_views=self._keeps)
         if self._alike is not None and self._painter is None:
             self._merged = Canvas(self._alike.model, *self._size)

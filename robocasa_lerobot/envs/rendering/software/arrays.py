@@ -91,6 +91,33 @@ class View(NamedTuple):
     width: int
 
 
+class Kept(NamedTuple):
+    """What stands still in a view, drawn without the rest.
+
+    Attributes:
+        is_in: geoms that it has, (ngeom,).
+        inverse: as in `Scratch`, of the whole picture, (height * width,).
+        seen: as in `Scratch`, of the whole picture, (height * width,).
+        colours: of what is seen, (height, width, 3).
+    """
+
+    is_in: NDArray[np.bool_]
+    inverse: Single
+    seen: Numbers
+    colours: Picture
+
+    @classmethod
+    def of(cls, is_in: NDArray[np.bool_], height: int, width: int) -> Kept:
+        """To be drawn, of a picture of that size."""
+        pixels = height * width
+        return cls(
+            is_in,
+            np.empty(pixels, dtype=np.float32),
+            np.empty(pixels, dtype=np.int32),
+            np.empty((height, width, 3), dtype=np.uint8),
+        )
+
+
 class Scratch(NamedTuple):
     """What the drawing of rows of a picture works in.
 
@@ -100,7 +127,7 @@ class Scratch(NamedTuple):
         lit: their light, red, green and blue from 0 to 1, (n, 3).
         inverse: of the distance from the camera's plane to what is seen, 1/m, row after row, (rows * width,).
         seen: number of the triangle that is seen, negative for none, row after row, (rows * width,).
-        over_inverse, over_seen: the same, of one transparent triangle.
+        over_seen: the same of what is drawn over it, (rows * width,).
     """
 
     corners: Array
@@ -108,7 +135,6 @@ class Scratch(NamedTuple):
     lit: Single
     inverse: Single
     seen: Numbers
-    over_inverse: Single
     over_seen: Numbers
 
     @classmethod
@@ -121,6 +147,5 @@ class Scratch(NamedTuple):
             np.empty((vertices, 3), dtype=np.float32),
             np.empty(pixels, dtype=np.float32),
             np.empty(pixels, dtype=np.int32),
-            np.zeros(pixels, dtype=np.float32),
             np.full(pixels, -1, dtype=np.int32),
         )

@@ -5,43 +5,94 @@ from __future__ import annotations
 import numpy as np
 
 from robocasa_lerobot.envs.physics.native import compiled
-from robocasa_lerobot.envs.rendering.software.arrays import OPAQUE, Array, Numbers, Picture, Pose, Scratch, Shapes, View
+from robocasa_lerobot.envs.rendering.software.arrays import (
+    OPAQUE,
+    Array,
+    Kept,
+    Numbers,
+    Picture,
+    Pose,
+    Scratch,
+    Shapes,
+    Single,
+    View,
+)
 from robocasa_lerobot.envs.rendering.software.rasterization import NOTHING, to_camera, visible
 from robocasa_lerobot.envs.rendering.software.shading import shade
 
+KEEP_NOTHING, KEEP, USE_KEPT = 0, 1, 2
 _LAYS = 2  # MuJoCo lays what is transparent over the picture twice, as pictures show
 
 
 @compiled
 def draw(
-    shapes: Shapes, pose: Pose, scratch: Scratch, view: View, edges: Array, far_m: float, picture: Picture
+    shapes: Shapes,
+    pose: Pose,
+    scratch: Scratch,
+    view: View,
+    edges: Array,
+    far_m: float,
+    keeping: int,
+    kept: Kept,
+    picture: Picture,
 ) -> None:
     """Draw rows of what a camera sees into `picture`, (height, width, 3), upright.
+
+    The picture is the same whatever is kept, and however its rows are shared out.
 
     Args:
         shapes: of the model.
         pose: the state, as the camera sees it.
         scratch: for at least as many pixels.
-        view: the rows; a picture is the same however its rows are shared out.
+        view: the rows.
         edges: distances, metres, between the parts of a view that are drawn one after the other, the nearest first.
         far_m: distance from the camera's plane, metres, up to which is drawn.
+        keeping: `KEEP_NOTHING`, `KEEP` or `USE_KEPT`.
+        kept: what stands still, of the whole picture; its rows are written with `KEEP`.
         picture: written.
     """
+    pixels = (view.end_row - view.first_row) * view.width
+    inverse, seen, over = scratch.inverse[:pixels], scratch.seen[:pixels], scratch.over_seen[:pixels]
+    everything = (view.first_row, view.end_row, 0, view.width)
+    rows = slice(view.first_row * view.width, view.end_row * view.width)
     scratch.is_lit[:] = False
-    scratch.inverse[:] = 1.0 / far_m
-    scratch.seen[:] = NOTHING
-    picture[view.first_row : view.end_row] = 0
     opaque, transparent = _in_view(shapes, pose, view, edges)
-    to_camera(opaque, shapes, pose, scratch)
-    for geom in opaque:
-        first, end = shapes.first_face[geom], shapes.first_face[geom + 1]
-        visible(first, end, shapes, pose, scratch, view, scratch.inverse, scratch.seen)
-    shade((view.first_row, view.end_row, 0, view.width), scratch.seen, shapes, pose, scratch, view, picture)
+    if keeping == USE_KEPT:
+        inverse[:] = kept.inverse[rows]
+        seen[:] = kept.seen[rows]
+        picture[view.first_row : view.end_row] = kept.colours[view.first_row : view.end_row]
+    else:
+        inverse[:] = 1.0 / far_m
+        seen[:] = NOTHING
+        picture[view.first_row : view.end_row] = 0
+        chosen = opaque if keeping == KEEP_NOTHING else opaque[kept.is_in[opaque]]
+        _see(chosen, shapes, pose, scratch, view, inverse, seen)
+        shade(everything, seen, shapes, pose, scratch, view, picture)
+    if keeping == KEEP:
+        kept.inverse[rows] = inverse
+        kept.seen[rows] = seen
+        kept.colours[view.first_row : view.end_row] = picture[view.first_row : view.end_row]
+    if keeping != KEEP_NOTHING:
+        _see(opaque[~kept.is_in[opaque]], shapes, pose, scratch, view, inverse, seen)
+        for pixel in range(pixels):
+            over[pixel] = seen[pixel] if seen[pixel] != kept.seen[rows.start + pixel] else NOTHING
+        shade(everything, over, shapes, pose, scratch, view, picture)
     if len(transparent) > 0:
         to_camera(transparent, shapes, pose, scratch)
         for _ in range(_LAYS):
             for geom in transparent:
                 _lay_over(geom, shapes, pose, scratch, view, picture)
+
+
+@compiled
+def _see(
+    geoms: Numbers, shapes: Shapes, pose: Pose, scratch: Scratch, view: View, inverse: Single, seen: Numbers
+) -> None:
+    """Note where these geoms are seen."""
+    to_camera(geoms, shapes, pose, scratch)
+    for geom in geoms:
+        first, end = shapes.first_face[geom], shapes.first_face[geom + 1]
+        visible(first, end, True, shapes.faces, scratch.corners, pose.lens, view, inverse, seen)
 
 
 @compiled
@@ -128,8 +179,7 @@ def _lay_over(geom: int, shapes: Shapes, pose: Pose, scratch: Scratch, view: Vie
             continue
         for y in range(first_row - view.first_row, end_row - view.first_row):
             for pixel in range(np.uint64(y * width + first_column), np.uint64(y * width + end_column)):
-                scratch.over_inverse[pixel] = scratch.inverse[pixel]
                 scratch.over_seen[pixel] = NOTHING
-        visible(face, face + 1, shapes, pose, scratch, view, scratch.over_inverse, scratch.over_seen)
+        visible(face, face + 1, False, faces, corners, pose.lens, view, scratch.inverse, scratch.over_seen)
         window = (first_row, end_row, first_column, end_column)
         shade(window, scratch.over_seen, shapes, pose, scratch, view, picture)

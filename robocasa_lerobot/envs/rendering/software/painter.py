@@ -13,9 +13,19 @@ import numpy as np
 
 from robocasa_lerobot.envs.rendering.canvas import LAYER_EDGES_M
 from robocasa_lerobot.envs.rendering.frustum import clipping_planes, view_frustum
-from robocasa_lerobot.envs.rendering.software.arrays import LIGHT_COLUMNS, Array, Picture, Pose, Scratch, Shapes, View
-from robocasa_lerobot.envs.rendering.software.drawing import draw
+from robocasa_lerobot.envs.rendering.software.arrays import (
+    LIGHT_COLUMNS,
+    Array,
+    Kept,
+    Picture,
+    Pose,
+    Scratch,
+    Shapes,
+    View,
+)
+from robocasa_lerobot.envs.rendering.software.drawing import KEEP_NOTHING, draw
 from robocasa_lerobot.envs.rendering.software.rasterization import nearest_m
+from robocasa_lerobot.envs.rendering.software.standing_views import StandingViews
 from robocasa_lerobot.envs.rendering.software.triangles import shapes_of
 from robocasa_lerobot.gl import note_own_renderer
 from robocasa_lerobot.jobs.workers import cores_here
@@ -31,6 +41,8 @@ _BANDS = 2  # of a picture, which are shared out: three cameras are no even work
 # Threads that draw, by process: one that was forked has none of its parent's.
 _threads: dict[int, ThreadPoolExecutor] = {}
 
+_Work = tuple[Pose, View, int, Kept, Picture]  # rows of a picture
+
 
 class Painter:
     """Draws one model into pictures of one size, in plain memory: no OpenGL, and any process and thread may use it.
@@ -39,14 +51,19 @@ class Painter:
         model: to draw.
         height, width: of the pictures, pixels.
         shapes: of the model, as of `shapes_of`.
+        keeps_views: draw only what moves in views that come again; the pictures are the same either way.
     """
 
-    def __init__(self, model: mujoco.MjModel, height: int, width: int, shapes: Shapes) -> None:
+    def __init__(
+        self, model: mujoco.MjModel, height: int, width: int, shapes: Shapes, *, keeps_views: bool = True
+    ) -> None:
         note_own_renderer()
         self._model = model
         self._size = (height, width)
         self._shapes = shapes
         self._scratch: list[Scratch] = []  # of each thread that draws
+        self._nothing = Kept.of(np.zeros(model.ngeom, dtype=np.bool_), 0, 0)
+        self._standing = StandingViews(model.ngeom, height, width) if keeps_views else None
         self._materials = np.append(
             np.column_stack((model.mat_emission, model.mat_specular, model.mat_shininess)).reshape(-1, 3),
             [_USUAL_LOOK],
@@ -54,10 +71,10 @@ class Painter:
         )
 
     @classmethod
-    def of(cls, model: mujoco.MjModel, height: int, width: int) -> Painter | None:
+    def of(cls, model: mujoco.MjModel, height: int, width: int, *, keeps_views: bool = True) -> Painter | None:
         """Of a model; None where it has what only OpenGL draws here (see `shapes_of`)."""
         shapes = shapes_of(model)
-        return None if shapes is None else cls(model, height, width, shapes)
+        return None if shapes is None else cls(model, height, width, shapes, keeps_views=keeps_views)
 
     def pictures(self, data: mujoco.MjData, cameras: Sequence[int]) -> list[Picture]:
         """What each camera sees, upright RGB of shape (height, width, 3)."""
@@ -68,10 +85,16 @@ class Painter:
         bands = 1 if threads == 1 else _BANDS
         rows = [(height * band // bands, height * (band + 1) // bands) for band in range(bands)]
         poses = [self._pose(data, camera, looks) for camera in cameras]
-        work: deque[tuple[Pose, View, Picture]] = deque(
-            (pose, View(first, end, width), picture)
-            for pose, picture in zip(poses, pictures, strict=True)
-            for first, end in rows
+        if self._standing is not None and poses:
+            self._standing.look(poses[0])
+        chosen = [
+            (KEEP_NOTHING, self._nothing) if self._standing is None else self._standing.choose(camera, pose)
+            for camera, pose in zip(cameras, poses, strict=True)
+        ]
+        work: deque[_Work] = deque(
+            (pose, View(first, end, width), *keeping, picture)
+            for first, end in reversed(rows)  # the lower ones first: they show more, and take longer
+            for pose, keeping, picture in zip(poses, chosen, pictures, strict=True)
         )
         count = min(threads, len(work))
         while len(self._scratch) < count:
@@ -83,15 +106,15 @@ class Painter:
             other.result()
         return pictures
 
-    def _draw(self, work: deque[tuple[Pose, View, Picture]], scratch: Scratch) -> None:
+    def _draw(self, work: deque[_Work], scratch: Scratch) -> None:
         """Draw what is left to do."""
         far_m = clipping_planes(self._model)[1]
         while work:
             try:
-                pose, view, picture = work.popleft()
+                pose, view, keeping, kept, picture = work.popleft()
             except IndexError:  # another thread was faster
                 return
-            draw(self._shapes, pose, scratch, view, _EDGES_M, far_m, picture)
+            draw(self._shapes, pose, scratch, view, _EDGES_M, far_m, keeping, kept, picture)
 
     def _looks(self) -> Array:
         """Colour, opacity, glow, highlights and their sharpness of each geom at present, (ngeom, 7)."""

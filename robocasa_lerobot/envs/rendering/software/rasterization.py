@@ -1,8 +1,8 @@
 """Which triangle is seen in each pixel: vertices into a camera's frame, then triangle by triangle.
 
 As in OpenGL, a pixel is covered if its middle is, corners are moved to 1/256 of a pixel, an edge that two triangles
-share belongs to one of them, and of what is as near the later one is seen. Colours are computed afterwards, once for
-each pixel (`shading`).
+share belongs to one of them. Of what is as near the triangle of the higher number is seen, so that the order of drawing
+does not matter. Colours are computed afterwards, once for each pixel (`shading`).
 """
 
 from __future__ import annotations
@@ -55,22 +55,30 @@ def to_camera(geoms: Numbers, shapes: Shapes, pose: Pose, scratch: Scratch) -> N
 
 @compiled
 def visible(
-    first: int, end: int, shapes: Shapes, pose: Pose, scratch: Scratch, view: View, inverse: Single, seen: Numbers
+    first: int,
+    end: int,
+    hides: bool,
+    faces: Numbers,
+    corners: Array,
+    lens: Array,
+    view: View,
+    inverse: Single,
+    seen: Numbers,
 ) -> None:
     """Note for each pixel which of the triangles from `first` to `end` is seen there, and its inverse distance.
 
     Args:
         first: of the triangles, which are drawn in their order.
         end: one more than the last.
-        shapes: of the model.
-        pose: the state, as the camera sees it.
-        scratch: with the triangles' corners in the camera's frame.
+        hides: whether they hide what is drawn after them; else `inverse` is left as it is.
+        faces: vertices of each triangle, (m, 3).
+        corners: vertices in the camera's frame, (n, 3).
+        lens: as in `Pose`.
         view: rows that are drawn.
         inverse: of the distance from the camera's plane, 1/m, where something was drawn before, row after row.
         seen: number of the triangle, row after row; both are changed.
     """
-    faces, corners = shapes.faces, scratch.corners
-    focal_x, focal_y, middle_x, middle_y, near = pose.lens
+    focal_x, focal_y, middle_x, middle_y, near = lens
     left, right = -middle_x / focal_x, (view.width - middle_x) / focal_x
     top, bottom = (middle_y - view.first_row) / focal_y, (middle_y - view.end_row) / focal_y
     cut, steps_x, steps_y = np.empty((4, 3)), np.empty(4, np.int64), np.empty(4, np.int64)
@@ -116,6 +124,7 @@ def visible(
                 down,
                 corner,
                 face,
+                hides,
                 view,
                 inverse,
                 seen,
@@ -169,6 +178,7 @@ def _fill(
     down: float,
     corner: float,
     face: int,
+    hides: bool,
     view: View,
     inverse: Single,
     seen: Numbers,
@@ -208,8 +218,10 @@ def _fill(
             for x in range(first_x, last_x + 1):
                 if (here_a | here_b | here_c) >= 0:
                     single = np.float32(at_pixel)
-                    if single >= inverse[row + x]:
-                        inverse[row + x] = single
+                    before = inverse[row + x]
+                    if single > before or (single == before and number > seen[row + x]):
+                        if hides:
+                            inverse[row + x] = single
                         seen[row + x] = number
                 here_a += ax
                 here_b += bx
@@ -232,8 +244,9 @@ def _fill(
             for pixel in range(np.uint64(row + low), np.uint64(row + high + 1)):
                 near = begin + step * np.float32(count)
                 count = np.int32(count + 1)
-                nearer = near >= inverse[pixel]
-                inverse[pixel] = near if nearer else inverse[pixel]
+                before = inverse[pixel]
+                nearer = (near > before) | ((near == before) & (number > seen[pixel]))
+                inverse[pixel] = near if nearer and hides else before
                 seen[pixel] = number if nearer else seen[pixel]
         a += ay
         b += by

@@ -36,7 +36,7 @@ _LANE = np.uint64(0xFFFF)
 _TO_BYTES = 1.0 / 65280.0  # of 255 for the light times 255 and 8 bits of fraction for the texture
 
 
-@compiled
+@inlined
 def light(vertex: int, geom: int, shapes: Shapes, pose: Pose, scratch: Scratch) -> None:
     """Write the light that a vertex of a geom sends to the eye into `scratch.lit`."""
     turn, look, axes, eye = pose.rotations[geom], pose.looks[geom], pose.axes, pose.eye
@@ -158,8 +158,9 @@ def shade(
             px, py, pz = vy * az - vz * ay, vz * ax - vx * az, vx * ay - vy * ax
             qx, qy, qz = ay * uz - az * uy, az * ux - ax * uz, ax * uy - ay * ux
             nx, px, qx = nx / focal_x, px / focal_x, qx / focal_x
-            left = x + 0.5 - middle_x
-            n, p, q = nx * left + ny * up + nz, px * left + py * up + pz, qx * left + qy * up + qz
+            # From the picture's edge on: a pixel's colour does not depend on which of its neighbours are seen.
+            n, p, q = ny * up + nz - nx * middle_x, py * up + pz - px * middle_x, qy * up + qz - qx * middle_x
+            across = x + 0.5
             red, green, blue = 255.0 * lit[a, 0], 255.0 * lit[a, 1], 255.0 * lit[a, 2]
             red_b, green_b, blue_b = 255.0 * lit[b, 0] - red, 255.0 * lit[b, 1] - green, 255.0 * lit[b, 2] - blue
             red_c, green_c, blue_c = 255.0 * lit[c, 0] - red, 255.0 * lit[c, 1] - green, 255.0 * lit[c, 2] - blue
@@ -168,15 +169,13 @@ def shade(
                 opacity = 1.0
             if texture < 0:
                 for k in range(x, end):
-                    share = 1.0 / n
-                    at_b, at_c = p * share, q * share
+                    share = 1.0 / (n + nx * across)
+                    at_b, at_c = (p + px * across) * share, (q + qx * across) * share
                     one = red + at_b * red_b + at_c * red_c
                     two = green + at_b * green_b + at_c * green_c
                     three = blue + at_b * blue_b + at_c * blue_c
                     _put(picture, y, k, one, two, three, opacity)
-                    n += nx
-                    p += px
-                    q += qx
+                    across += 1.0
             else:
                 copies, count = shapes.levels[texture], shapes.counts[texture]
                 wide, high = float(copies[0, 1]), float(copies[0, 2])
@@ -185,8 +184,8 @@ def shade(
                 u_c, v_c = texcoords[c, 0] - u, texcoords[c, 1] - v
                 n_y, p_y, q_y = ny / focal_y, py / focal_y, qy / focal_y
                 for k in range(x, end):
-                    share = 1.0 / n
-                    at_b, at_c = p * share, q * share
+                    share = 1.0 / (n + nx * across)
+                    at_b, at_c = (p + px * across) * share, (q + qx * across) * share
                     # How far the texture moves from pixel to pixel, in texels.
                     b_x, c_x = (px - at_b * nx) * share, (qx - at_c * nx) * share
                     b_y, c_y = (p_y - at_b * n_y) * share, (q_y - at_c * n_y) * share
@@ -201,7 +200,5 @@ def shade(
                     texel = texel >> np.uint64(LANE_BITS)
                     three = (blue + at_b * blue_b + at_c * blue_c) * np.float64(np.int64(texel & _LANE))
                     _put(picture, y, k, one * _TO_BYTES, two * _TO_BYTES, three * _TO_BYTES, opacity)
-                    n += nx
-                    p += px
-                    q += qx
+                    across += 1.0
             x = end
