@@ -12,7 +12,7 @@ from gymnasium.utils.env_checker import check_env
 from task_selection import every_task
 
 import robocasa_lerobot.envs  # noqa: F401  (makes the tasks known to Gymnasium)
-from robocasa_lerobot import contract
+from robocasa_lerobot import contract, gl
 from robocasa_lerobot.contract import ContractError
 from robocasa_lerobot.envs.checks.tasks import check_task
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
@@ -176,7 +176,8 @@ def test_asynchronous_vector_env_gives_the_same_as_a_single_env():
     vector.close()
 
 
-def test_a_fork_after_rendering_is_an_error_and_not_a_hang():
+def test_a_fork_after_rendering_with_opengl_is_an_error_and_not_a_hang(monkeypatch):
+    monkeypatch.setenv(gl.RENDERER_VARIABLE, "opengl")
     single = make("OpenDrawer")
     single.reset(seed=0)
     single.close()
@@ -184,6 +185,17 @@ def test_a_fork_after_rendering_is_an_error_and_not_a_hang():
     with pytest.raises(UserError, match="spawn"):
         vector.reset(seed=0)
     vector.close()
+
+
+def test_a_fork_after_rendering_without_opengl_draws_the_same(monkeypatch):
+    monkeypatch.setenv(gl.RENDERER_VARIABLE, "cpu")
+    env = KitchenEnv("OpenDrawer", image_size=32)
+    pictures = env.reset(seed=0)[0]["pixels"]
+    vector = gymnasium.vector.AsyncVectorEnv([partial(KitchenEnv, "OpenDrawer", image_size=32)], context="fork")
+    forked = vector.reset(seed=[0])[0]["pixels"]
+    assert all(np.array_equal(pictures[name], forked[name][0]) for name in pictures)
+    vector.close()
+    env.close()
 
 
 @pytest.mark.parametrize(
