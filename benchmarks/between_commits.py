@@ -28,7 +28,6 @@ from pathlib import Path
 
 import common
 import evaluation_sides
-import training_sides
 from commands import CLI, result, run
 
 from robocasa_lerobot.demos.choose import expand_names
@@ -40,6 +39,13 @@ KINDS = ("sim", "sim_pictures", "convert", "evaluation", "planning", "new_scene"
 TASK, EPISODES = "PickPlaceCounterToSink", 4
 EVALUATED, TRIALS, IMAGE_SIZE = ["CloseDrawer", "PickPlaceCounterToSink"], 2, 96
 STEPS = {"sim": 1200, "sim_pictures": 150}
+CHECKPOINT = """
+import sys
+from pathlib import Path
+sys.path.insert(0, "benchmarks")
+import evaluation_sides, training_sides
+evaluation_sides.make_checkpoint(Path(sys.argv[1]), training_sides.policy_settings("demo"), int(sys.argv[2]))
+"""
 CONTROL_STEP = """
 import sys, time
 import numpy as np
@@ -213,7 +219,7 @@ def measure(before: Path, scratch: Path, kinds: Sequence[str], repetitions: int)
         command = [*CLI, "demos", f"--tasks={TASK}", f"--episodes={EPISODES}", f"--out={demos}"]
         run(before, [*command, "--workers=1"])
     if "evaluation" in kinds:
-        evaluation_sides.make_checkpoint(checkpoint, training_sides.policy_settings("demo"), IMAGE_SIZE)
+        run(before, ["-c", CHECKPOINT, str(checkpoint), str(IMAGE_SIZE)])
     work = {
         side: Work(checkout, scratch / side, demos, checkpoint)
         for side, checkout in (("before", before), ("now", common.REPOSITORY))
