@@ -6,7 +6,7 @@ from collections import OrderedDict
 
 import numpy as np
 
-from robocasa_lerobot.envs.rendering.software.arrays import Kept, Pose
+from robocasa_lerobot.envs.rendering.software.arrays import Array, Kept, Pose
 from robocasa_lerobot.envs.rendering.software.drawing import KEEP, KEEP_NOTHING, USE_KEPT
 
 _VIEWS = 8  # that are kept for each camera: 0.7 MB each with 256 x 256 pixels
@@ -26,7 +26,7 @@ class StandingViews:
     def __init__(self, geoms: int, height: int, width: int) -> None:
         self._size = (height, width)
         self._nothing = Kept.of(np.zeros(geoms, dtype=np.bool_), 0, 0)
-        self._last: tuple[np.ndarray, ...] = ()
+        self._last: tuple[Array, ...] = ()
         self._changed = np.zeros(geoms, dtype=np.int64)  # the number of the picture in which each changed last
         self._number = 0
         self._seen: dict[int, OrderedDict[bytes, None]] = {}
