@@ -180,7 +180,7 @@ def draws_on_cpu() -> bool:
     found = probe(backend)
     on_cpu = found.renderer is None or found.software
     if on_cpu:
-        announce(found.renderer or f"OpenGL does not work: {found.failure}")
+        _warn_of_cpu(found.renderer or f"OpenGL does not work: {found.failure}")
     os.environ[RENDERER_VARIABLE] = "cpu" if on_cpu else "opengl"
     return on_cpu
 
@@ -335,18 +335,20 @@ def used_renderer() -> str | None:
 
 def announce(renderer: str) -> None:
     """Warn, once in a process, if `renderer` is software on a machine that has a GPU."""
-    if renderer not in _announced and not _on_gpu(renderer) and has_gpu():
-        _announced.add(renderer)
+    if is_software(renderer):
+        _warn_of_cpu(renderer)
+
+
+def _warn_of_cpu(why: str) -> None:
+    """Warn, once in a process, that the CPU draws on a machine that has a GPU."""
+    if why not in _announced and has_gpu():
+        _announced.add(why)
         warnings.warn(
-            f"pictures are drawn by the CPU ({renderer}) although this machine has a GPU: "
+            f"pictures are drawn by the CPU ({why}) although this machine has a GPU: "
             f"slower. Install the vendor's OpenGL libraries: {NVIDIA_REMEDY} ({NVIDIA_CONTAINER_NOTE}).",
             SoftwareRenderingWarning,
-            stacklevel=3,
+            stacklevel=4,
         )
-
-
-def _on_gpu(renderer: str) -> bool:
-    return not is_software(renderer) and not renderer.startswith("OpenGL does not work")
 
 
 def _pin(device: int) -> None:

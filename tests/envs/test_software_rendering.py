@@ -294,7 +294,6 @@ def test_a_picture_does_not_depend_on_what_is_kept(task: str) -> None:
                 break
     painter = keeping._painter
     assert painter is not None
-    assert painter._standing is not None
     assert any(painter._standing._kept.values()), "views came again"
     before = [pictures for _, pictures in found]
     for number in np.random.default_rng(0).permutation(len(found))[:60].tolist():

@@ -85,11 +85,12 @@ def make_vector_env(
     # Envs without cameras run on machines that cannot render.
     drawing = bool(kitchen.get("cameras", contract.CAMERAS))
     numbers = _render_devices(devices, drawing)
+    backend: str | None = None
     if devices is not None:
-        backend: str | None = gl.ensure_gl()
-    else:
-        backend = gl.ensure_drawing() if drawing else None
-    variables = _variables(count, drawing, devices is not None or backend is not None)
+        backend = gl.ensure_gl()
+    elif drawing:
+        backend = gl.ensure_drawing()
+    variables = _variables(count, drawing, backend is not None)
     members = []
     for index in range(count):
         one = tasks[index % len(tasks)]

@@ -14,7 +14,16 @@ import numpy as np
 from robocasa_lerobot.envs.rendering.canvas import LAYER_EDGES_M
 from robocasa_lerobot.envs.rendering.frustum import clipping_planes, view_frustum
 from robocasa_lerobot.envs.rendering.software.arrays import (
+    AMBIENT,
+    ATTENUATION,
+    DIFFUSE,
+    DIRECTION,
+    EXPONENT,
+    IS_FAR,
     LIGHT_COLUMNS,
+    NARROWEST_COSINE,
+    POSITION,
+    SPECULAR,
     Array,
     Kept,
     Picture,
@@ -23,7 +32,7 @@ from robocasa_lerobot.envs.rendering.software.arrays import (
     Shapes,
     View,
 )
-from robocasa_lerobot.envs.rendering.software.drawing import KEEP_NOTHING, draw
+from robocasa_lerobot.envs.rendering.software.drawing import draw
 from robocasa_lerobot.envs.rendering.software.rasterization import nearest_m
 from robocasa_lerobot.envs.rendering.software.standing_views import StandingViews
 from robocasa_lerobot.envs.rendering.software.triangles import shapes_of
@@ -62,8 +71,8 @@ class Painter:
         self._size = (height, width)
         self._shapes = shapes
         self._scratch: list[Scratch] = []  # of each thread that draws
-        self._nothing = Kept.of(np.zeros(model.ngeom, dtype=np.bool_), 0, 0)
-        self._standing = StandingViews(model.ngeom, height, width) if keeps_views else None
+        self._standing = StandingViews(model.ngeom, height, width, keeps=keeps_views)
+        self._near_m, self._far_m = clipping_planes(model)
         self._materials = np.append(
             np.column_stack((model.mat_emission, model.mat_specular, model.mat_shininess)).reshape(-1, 3),
             [_USUAL_LOOK],
@@ -85,12 +94,9 @@ class Painter:
         bands = 1 if threads == 1 else _BANDS
         rows = [(height * band // bands, height * (band + 1) // bands) for band in range(bands)]
         poses = [self._pose(data, camera, looks) for camera in cameras]
-        if self._standing is not None and poses:
+        if poses:
             self._standing.look(poses[0])
-        chosen = [
-            (KEEP_NOTHING, self._nothing) if self._standing is None else self._standing.choose(camera, pose)
-            for camera, pose in zip(cameras, poses, strict=True)
-        ]
+        chosen = [self._standing.choose(camera, pose) for camera, pose in zip(cameras, poses, strict=True)]
         work: deque[_Work] = deque(
             (pose, View(first, end, width), *keeping, picture)
             for first, end in reversed(rows)  # the lower ones first: they show more, and take longer
@@ -108,13 +114,12 @@ class Painter:
 
     def _draw(self, work: deque[_Work], scratch: Scratch) -> None:
         """Draw what is left to do."""
-        far_m = clipping_planes(self._model)[1]
         while work:
             try:
                 pose, view, keeping, kept, picture = work.popleft()
             except IndexError:  # another thread was faster
                 return
-            draw(self._shapes, pose, scratch, view, _EDGES_M, far_m, keeping, kept, picture)
+            draw(self._shapes, pose, scratch, view, _EDGES_M, self._far_m, keeping, kept, picture)
 
     def _looks(self) -> Array:
         """Colour, opacity, glow, highlights and their sharpness of each geom at present, (ngeom, 7)."""
@@ -131,7 +136,7 @@ class Painter:
         height, width = self._size
         left, right, bottom, top = view_frustum(self._model, camera, width / height)
         focal_x, focal_y = width / (right - left), height / (top - bottom)
-        near = nearest_m(clipping_planes(self._model)[0], max(focal_x, focal_y))
+        near = nearest_m(self._near_m, max(focal_x, focal_y))
         axes = data.cam_xmat[camera].copy()
         return Pose(
             data.geom_xpos,
@@ -151,20 +156,19 @@ class Painter:
         if head.active:
             lights[0] = (*-axes[2::3], *head.ambient, *head.diffuse, *head.specular, 0, 0, 0, 1, 0, 0, -1, 0, 1)
         rows = lights[len(lights) - len(shining) :]
-        rows[:, 0:3], rows[:, 3:6], rows[:, 6:9] = (
-            data.light_xdir[shining],
-            model.light_ambient[shining],
-            model.light_diffuse[shining],
-        )
-        rows[:, 9:12], rows[:, 12:15], rows[:, 15:18] = (
-            model.light_specular[shining],
-            data.light_xpos[shining],
-            model.light_attenuation[shining],
-        )
+        for first, values in (
+            (DIRECTION, data.light_xdir),
+            (AMBIENT, model.light_ambient),
+            (DIFFUSE, model.light_diffuse),
+            (SPECULAR, model.light_specular),
+            (POSITION, data.light_xpos),
+            (ATTENUATION, model.light_attenuation),
+        ):
+            rows[:, first : first + 3] = values[shining]
         cone = model.light_cutoff[shining]
-        rows[:, 18] = np.where(cone > _WIDEST_DEGREES, -1.0, np.cos(np.deg2rad(cone)))
-        rows[:, 19] = model.light_exponent[shining]
-        rows[:, 20] = model.light_type[shining] == _DIRECTIONAL
+        rows[:, NARROWEST_COSINE] = np.where(cone > _WIDEST_DEGREES, -1.0, np.cos(np.deg2rad(cone)))
+        rows[:, EXPONENT] = model.light_exponent[shining]
+        rows[:, IS_FAR] = model.light_type[shining] == _DIRECTIONAL
         return lights
 
 

@@ -21,10 +21,11 @@ class StandingViews:
         geoms: of the model.
         height: pixels.
         width: pixels.
+        keeps: whether anything is kept.
     """
 
-    def __init__(self, geoms: int, height: int, width: int) -> None:
-        self._size = (height, width)
+    def __init__(self, geoms: int, height: int, width: int, *, keeps: bool) -> None:
+        self._size, self._keeps = (height, width), keeps
         self._nothing = Kept.of(np.zeros(geoms, dtype=np.bool_), 0, 0)
         self._last: tuple[Array, ...] = ()
         self._changed = np.zeros(geoms, dtype=np.int64)  # the number of the picture in which each changed last
@@ -34,6 +35,8 @@ class StandingViews:
 
     def look(self, pose: Pose) -> None:
         """Take note of a new state, before the pictures of it are asked for."""
+        if not self._keeps:
+            return
         self._number += 1
         now = (pose.positions, pose.rotations, pose.looks)
         if self._last:
@@ -43,6 +46,8 @@ class StandingViews:
 
     def choose(self, camera: int, pose: Pose) -> tuple[int, Kept]:
         """How a camera's picture of that state is drawn: `draw`'s `keeping` and `kept`."""
+        if not self._keeps:
+            return KEEP_NOTHING, self._nothing
         view = b"".join(part.tobytes() for part in (pose.eye, pose.axes, pose.lens, pose.lights))
         kept = self._kept.setdefault(camera, OrderedDict())
         if view in kept:

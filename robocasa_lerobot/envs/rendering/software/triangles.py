@@ -22,7 +22,7 @@ _SHARPEST_COSINE = 0.8
 _TINY = 1e-12
 _DIRECTIONAL, _SPOT = int(mujoco.mjtLightType.mjLIGHT_DIRECTIONAL), int(mujoco.mjtLightType.mjLIGHT_SPOT)
 _FLAT = int(mujoco.mjtTexture.mjTEXTURE_2D)
-_QUAD_M = 0.3
+_QUAD_M = 0.3  # as long as parts of a box's edge get, up to MuJoCo's number of them
 
 
 def shapes_of(model: mujoco.MjModel) -> Shapes | None:
