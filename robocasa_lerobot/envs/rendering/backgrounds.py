@@ -8,7 +8,6 @@ depth) the view is drawn in full.
 from __future__ import annotations
 
 import time
-from collections import OrderedDict
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -19,14 +18,11 @@ from robocasa_lerobot.envs.rendering.canvas import Canvas
 from robocasa_lerobot.envs.rendering.depth_join import join_by_depth
 from robocasa_lerobot.envs.rendering.frustum import opaque
 from robocasa_lerobot.envs.rendering.merged_model import MergedModel
+from robocasa_lerobot.envs.rendering.standing_views import Key, StandingViews
 from robocasa_lerobot.gl import is_software, note_renderer
 
-Key = tuple[int, bytes]
 Picture = NDArray[np.uint8]
 
-KEPT_VIEWS = 8  # of a camera: a base that is held goes to and fro between few places of the grid
-SEEN_VIEWS = 64  # that were drawn in full, to know one that comes again
-RESTED = 10  # pictures for which a shape has not moved that belongs to a new background
 TIMED = 8  # drawings of each kind whose shortest time decides whether joining is cheaper on a graphics card
 DOUBTFUL = 20  # pictures of a camera that are drawn in full after one that could not be joined for certain
 MOST_MOVED = 0.5  # share of the shapes in view from which on nothing is gained
@@ -45,14 +41,12 @@ class Background:
         depth: reversed depth buffer of what is opaque, (height, width).
         veil: that of what is transparent, if anything is.
         still: which shapes are in it, (n,).
-        looks: pose and colours of all shapes when it was drawn, (n, k).
     """
 
     colours: Picture
     depth: NDArray[np.float32]
     veil: NDArray[np.float32] | None
     still: NDArray[np.bool_]
-    looks: NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -72,17 +66,15 @@ class Backgrounds:
     def __init__(self, alike: MergedModel, canvas: Canvas, *, keeps: bool = True) -> None:
         self._alike, self._canvas, self._keeps = alike, canvas, keeps
         self._device = note_renderer()
-        self._kept: OrderedDict[Key, Background] = OrderedDict()
-        self._seen: OrderedDict[Key, None] = OrderedDict()
+        self._views: StandingViews[Background] = StandingViews()
         self._doubtful: dict[int, int] = {}  # pictures that are still to be drawn in full, by camera
-        self._looks: NDArray[np.float64] = np.empty((0, 0))
-        self._rested: NDArray[np.int64] = np.empty(0, dtype=np.int64)
         self._solid: NDArray[np.bool_] = np.empty(0, dtype=np.bool_)
 
     def pictures(self, cameras: Sequence[int]) -> list[Picture]:
         """One picture (height, width, 3), upright, of each camera, of the state that the look-alike follows."""
         if self._keeps:
-            self._note_what_moved()
+            self._views.note(self._alike.looks())
+            self._solid = opaque(self._alike.model)
         plans = [self._plan(camera) for camera in cameras]
         # All are begun before one is read: the device draws while the next one is prepared.
         for place, plan in enumerate(plans):
@@ -90,15 +82,6 @@ class Backgrounds:
                 self._draw(plan, plan.still, place + len(plans))
             self._draw(plan, None if plan.still is None else ~plan.still, place)
         return [self._finished(plan, place, place + len(plans)) for place, plan in enumerate(plans)]
-
-    def _note_what_moved(self) -> None:
-        looks = self._alike.looks()
-        if len(self._looks) != len(looks):
-            self._rested = np.full(len(looks), RESTED)
-        else:
-            self._rested = np.where((looks != self._looks).any(axis=1), 0, self._rested + 1)
-        self._looks = looks
-        self._solid = opaque(self._alike.model)
 
     def _draw(self, plan: _Plan, shapes: NDArray[np.bool_] | None, place: int) -> None:
         """Begin a picture of what is in view, or of those shapes of it."""
@@ -118,15 +101,10 @@ class Backgrounds:
             self._doubtful[camera] -= 1
             return full
         key = (camera, self._alike.view(camera))
-        background = self._kept.get(key)
-        if background is not None and ((self._looks != background.looks).any(axis=1) & background.still).any():
-            background = None
-        elif background is None and key not in self._seen:
-            self._seen[key] = None
-            while len(self._seen) > SEEN_VIEWS:
-                self._seen.popitem(last=False)
+        found = self._views.find(key)
+        if found is None and not self._views.comes_again(key):
             return full
-        still = self._rested >= RESTED if background is None else background.still
+        background, still = (None, self._views.still) if found is None else found
         moved = ~still & full.in_view
         if moved.sum() > MOST_MOVED * full.in_view.sum() or (moved & ~self._solid).any():
             return full
@@ -142,7 +120,7 @@ class Backgrounds:
             if not is_software(self._device) and self._device not in _joining_pays:
                 self._compare(plan, background, behind)
         assert plan.key is not None
-        self._keep(plan.key, background)
+        self._views.keep(plan.key, background, background.still)
         colours, depth = self._canvas.drawn_with_depth(place)
         picture, certain = join_by_depth(background.colours, background.depth, colours, depth, background.veil)
         if certain:
@@ -150,13 +128,6 @@ class Backgrounds:
         self._doubtful[plan.camera] = DOUBTFUL
         self._draw(plan, None, place)
         return self._canvas.drawn(place)
-
-    def _keep(self, key: Key, background: Background) -> None:
-        self._kept[key] = background
-        self._kept.move_to_end(key)
-        mine = [other for other in self._kept if other[0] == key[0]]
-        if len(mine) > KEPT_VIEWS:
-            del self._kept[mine[0]]
 
     def _made(self, plan: _Plan, still: NDArray[np.bool_], place: int) -> Background:
         """What has been drawn in a place of what stands still."""
@@ -167,7 +138,7 @@ class Backgrounds:
             veil = self._canvas.drawn_depth(place)
             self._see(plan, still & self._solid)
             depth = self._canvas.drawn_depth(place)
-        return Background(colours, depth, veil, still, self._looks)
+        return Background(colours, depth, veil, still)
 
     def _compare(self, plan: _Plan, background: Background, place: int) -> None:
         """Measure once for each graphics card whether joining pays."""

@@ -32,10 +32,10 @@ from robocasa_lerobot.envs.rendering.software.arrays import (
     Shapes,
     View,
 )
-from robocasa_lerobot.envs.rendering.software.drawing import draw
+from robocasa_lerobot.envs.rendering.software.drawing import KEEP, KEEP_NOTHING, USE_KEPT, draw
 from robocasa_lerobot.envs.rendering.software.rasterization import nearest_m
-from robocasa_lerobot.envs.rendering.software.standing_views import StandingViews
 from robocasa_lerobot.envs.rendering.software.triangles import shapes_of
+from robocasa_lerobot.envs.rendering.standing_views import StandingViews
 from robocasa_lerobot.gl import note_own_renderer
 from robocasa_lerobot.jobs.workers import cores_here
 
@@ -71,7 +71,9 @@ class Painter:
         self._size = (height, width)
         self._shapes = shapes
         self._scratch: list[Scratch] = []  # of each thread that draws
-        self._standing = StandingViews(model.ngeom, height, width, keeps=keeps_views)
+        self._keeps_views = keeps_views
+        self._standing: StandingViews[Kept] = StandingViews()
+        self._nothing = Kept.of(np.zeros(model.ngeom, dtype=np.bool_), 0, 0)
         self._near_m, self._far_m = clipping_planes(model)
         self._materials = np.append(
             np.column_stack((model.mat_emission, model.mat_specular, model.mat_shininess)).reshape(-1, 3),
@@ -94,9 +96,9 @@ class Painter:
         bands = 1 if threads == 1 else _BANDS
         rows = [(height * band // bands, height * (band + 1) // bands) for band in range(bands)]
         poses = [self._pose(data, camera, looks) for camera in cameras]
-        if poses:
-            self._standing.look(poses[0])
-        chosen = [self._standing.choose(camera, pose) for camera, pose in zip(cameras, poses, strict=True)]
+        if self._keeps_views:
+            self._standing.note(np.column_stack((data.geom_xpos, data.geom_xmat, looks)))
+        chosen = [self._kept(camera, pose) for camera, pose in zip(cameras, poses, strict=True)]
         work: deque[_Work] = deque(
             (pose, View(first, end, width), *keeping, picture)
             for first, end in reversed(rows)  # the lower ones first: they show more, and take longer
@@ -111,6 +113,19 @@ class Painter:
         for other in others:
             other.result()
         return pictures
+
+    def _kept(self, camera: int, pose: Pose) -> tuple[int, Kept]:
+        """How a picture is drawn: `draw`'s `keeping` and `kept`."""
+        if not self._keeps_views:
+            return KEEP_NOTHING, self._nothing
+        key = (camera, b"".join(part.tobytes() for part in (pose.eye, pose.axes, pose.lens, pose.lights)))
+        if (found := self._standing.find(key)) is not None:
+            return USE_KEPT, found[0]
+        if not self._standing.comes_again(key):
+            return KEEP_NOTHING, self._nothing
+        made = Kept.of(self._standing.still, *self._size)
+        self._standing.keep(key, made, made.is_in)
+        return KEEP, made
 
     def _draw(self, work: deque[_Work], scratch: Scratch) -> None:
         """Draw what is left to do."""
