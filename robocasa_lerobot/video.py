@@ -16,7 +16,9 @@ from robocasa_lerobot.errors import UserError
 
 # Pictures smaller than this are enlarged by a whole factor, so that a film of a policy with small inputs can be seen.
 MIN_HEIGHT = 128
-CRF = "23"
+# As good as "veryfast" at 23, measured on a film of a kitchen: a third larger, in two thirds of its time.
+CRF = "24"
+PRESET = "superfast"
 
 
 def side_by_side(pixels: dict[str, NDArray[np.uint8]]) -> NDArray[np.uint8]:
@@ -48,7 +50,7 @@ class VideoWriter:
         if self._container is None:
             self._path.parent.mkdir(parents=True, exist_ok=True)
             self._container = av.open(str(self._part), mode="w", format="mp4")
-            options = {"crf": CRF, "preset": "veryfast", "threads": "1"}
+            options = {"crf": CRF, "preset": PRESET, "threads": "1"}
             self._stream = self._container.add_stream("libx264", rate=Fraction(self._fps), options=options)
             self._stream.height, self._stream.width = picture.shape[:2]
             self._stream.pix_fmt = "yuv420p"

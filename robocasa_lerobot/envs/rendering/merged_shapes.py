@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robocasa_lerobot.envs.rendering.rest_poses import RestPoses
+from robocasa_lerobot.envs.rendering.sharp_corners import flat_normals, sharp_corners
 from robocasa_lerobot.envs.rendering.tessellation import Surface, boxes, capsules, cylinders, textured, used_slices
 
 Array = NDArray[np.float64]
@@ -125,13 +126,21 @@ def _round(
 
 
 def _meshes(model: mujoco.MjModel, poses: RestPoses, geoms: Counts, places: Counts, repeat: Array) -> _Group:
-    """With a vertex for each pair of a place and a normal."""
+    """With a vertex for each pair of a place and a normal; sharp corners get their triangle's, as MuJoCo gives them.
+
+    A look-alike has texture coordinates, so that MuJoCo takes its normals as they are.
+    """
     used, which = np.unique(model.geom_dataid[geoms[places]], return_inverse=True)
     face_counts = model.mesh_facenum[used].astype(np.intp)
     corners = _ranges(model.mesh_faceadr[used].astype(np.intp), face_counts)
     where = model.mesh_face[corners] + np.repeat(model.mesh_vertadr[used], face_counts)[:, None]
     facing = model.mesh_facenormal[corners] + np.repeat(model.mesh_normaladr[used], face_counts)[:, None]
-    normals = np.int64(len(model.mesh_normal))
+    flat = flat_normals(model.mesh_vert[where])
+    bare = np.repeat(model.mesh_texcoordadr[used] < 0, face_counts)
+    sharp = sharp_corners(flat, model.mesh_normal[facing]) & bare[:, None]
+    facing = np.where(sharp, len(model.mesh_normal) + np.arange(len(corners))[:, None], facing)
+    known = np.concatenate((model.mesh_normal, flat))
+    normals = np.int64(len(known))
     pairs, corner_pairs = np.unique(where * normals + facing, return_inverse=True)
     where, facing = np.divmod(pairs, normals)
     # Pairs are in the order of places, and so of meshes, whose numbers are in that order too.
@@ -139,7 +148,7 @@ def _meshes(model: mujoco.MjModel, poses: RestPoses, geoms: Counts, places: Coun
     pair_ends = np.append(pair_starts[1:], len(pairs))
     face_starts = _starts(face_counts)
     faces = (corner_pairs.reshape(-1, 3) - np.repeat(pair_starts, face_counts)[:, None]).astype(np.int32)
-    vertices, facings = model.mesh_vert[where].astype(np.float64), model.mesh_normal[facing].astype(np.float64)
+    vertices, facings = model.mesh_vert[where].astype(np.float64), known[facing].astype(np.float64)
     found: list[tuple[Array, Array, NDArray[np.int32]]] = []
     for geom, mesh in zip(geoms[places].tolist(), which.tolist(), strict=True):
         mine = slice(pair_starts[mesh], pair_ends[mesh])

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robocasa_lerobot.envs.rendering.canvas import BACKDROP_GROUP
+from robocasa_lerobot.envs.rendering.sharp_corners import flat_normals, sharp_corners
 from robocasa_lerobot.envs.rendering.software.arrays import Shapes
 from robocasa_lerobot.envs.rendering.software.textures import Textures
 from robocasa_lerobot.envs.rendering.tessellation import Surface, spheres, textured, unit_box
@@ -16,10 +17,6 @@ from robocasa_lerobot.envs.rendering.tessellation import Surface, spheres, textu
 _PLANE, _SPHERE = int(mujoco.mjtGeom.mjGEOM_PLANE), int(mujoco.mjtGeom.mjGEOM_SPHERE)
 _ELLIPSOID, _BOX = int(mujoco.mjtGeom.mjGEOM_ELLIPSOID), int(mujoco.mjtGeom.mjGEOM_BOX)
 _MESH = int(mujoco.mjtGeom.mjGEOM_MESH)
-# Of meshes without texture coordinates, corners whose normal is further from the triangle's get the triangle's: as
-# MuJoCo draws them, measured on pictures (0.75 and 0.85 are worse).
-_SHARPEST_COSINE = 0.8
-_TINY = 1e-12
 _DIRECTIONAL, _SPOT = int(mujoco.mjtLightType.mjLIGHT_DIRECTIONAL), int(mujoco.mjtLightType.mjLIGHT_SPOT)
 _FLAT = int(mujoco.mjtTexture.mjTEXTURE_2D)
 _QUAD_M = 0.3  # as long as parts of a box's edge get, up to MuJoCo's number of them
@@ -133,10 +130,9 @@ def _meshes(model: mujoco.MjModel) -> list[Surface]:
     texcoord_of = np.where(has_texcoords[mesh_of, None], model.mesh_facetexcoord, model.mesh_face)
     # All of them at once: mesh by mesh, numpy's calls cost more than their work.
     points = model.mesh_vert[model.mesh_face + model.mesh_vertadr[mesh_of, None]]
-    flat = np.cross(points[:, 1] - points[:, 0], points[:, 2] - points[:, 0])
-    flat /= np.maximum(np.linalg.norm(flat, axis=1, keepdims=True), _TINY)
+    flat = flat_normals(points)
     normals = model.mesh_normal[model.mesh_facenormal + model.mesh_normaladr[mesh_of, None]]
-    sharp = ((normals * flat[:, None]).sum(axis=2) < _SHARPEST_COSINE) & ~has_texcoords[mesh_of, None]
+    sharp = sharp_corners(flat, normals) & ~has_texcoords[mesh_of, None]
     alike = (model.mesh_face == model.mesh_facenormal) & (model.mesh_face == texcoord_of) & ~sharp
     plain = np.logical_and.reduceat(alike.all(axis=1), model.mesh_faceadr).tolist()
     return [
