@@ -43,10 +43,12 @@ def _decoded(path: Path) -> list[np.ndarray]:
         return [frame.to_ndarray(format="rgb24") for frame in container.decode(video=0)]
 
 
-@pytest.mark.parametrize("yielding", [False, True])
-def test_every_frame_is_kept_however_fast_they_come(yielding: bool, encoder: EncodingProcess, tmp_path: Path) -> None:
+@pytest.mark.parametrize("takes_colours", [False, True])
+def test_every_frame_is_kept_however_fast_they_come(
+    takes_colours: bool, encoder: EncodingProcess, tmp_path: Path
+) -> None:
     pictures = {"a": moving_pictures(300, 64, 1), "b": moving_pictures(300, 64, 2)[:, :, :48]}
-    encoder.start_episode(SETTINGS, list(pictures), tmp_path, 300, yielding)
+    encoder.start_episode(SETTINGS, list(pictures), tmp_path, 300, takes_colours)
     for step in range(300):
         for key, values in pictures.items():
             encoder.feed(key, values[step])
@@ -106,9 +108,9 @@ def test_a_wrong_number_of_frames_is_refused_and_the_next_episode_goes_on(
     assert len(list(tmp_path.iterdir())) == 1  # the files of the first are gone
 
 
-@pytest.mark.parametrize("yielding", [False, True])
-def test_odd_sizes_are_refused(yielding: bool, encoder: EncodingProcess, tmp_path: Path) -> None:
-    encoder.start_episode(SETTINGS, ["a"], tmp_path, 1, yielding)
+@pytest.mark.parametrize("takes_colours", [False, True])
+def test_odd_sizes_are_refused(takes_colours: bool, encoder: EncodingProcess, tmp_path: Path) -> None:
+    encoder.start_episode(SETTINGS, ["a"], tmp_path, 1, takes_colours)
     # Which of the three hears of it is a race.
     with pytest.raises(EncodingError, match="63x63 pixels"):  # noqa: PT012
         encoder.feed("a", np.zeros((63, 63, 3), np.uint8))

@@ -171,7 +171,7 @@ def _render_episode(
         with shared_encoder.borrowed() as encoder, EpisodePictures(plan, episode, scenes_ahead) as pictures:
             if coming is not None:
                 scenes_ahead.request(coming, plan.settings.render_preset, pictures=True)
-            encoder.start_episode(settings, keys, place, episode.length, yielding=True)
+            encoder.start_episode(settings, keys, place, episode.length, takes_colours=True)
             for step in pictures:
                 for key, picture in step.items():
                     encoder.feed(key, picture)

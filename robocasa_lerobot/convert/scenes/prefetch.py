@@ -25,9 +25,6 @@ if TYPE_CHECKING:
 # Where a scene comes from: gives the loadable MJCF and its files. It can be pickled, and compared by value.
 SceneSource = Callable[[], tuple[str, dict[str, bytes]]]
 _STARTED = "started"  # the other process's first message
-# A renderer without a graphics card uses every core, and is what everybody waits for; but a machine that is busy with
-# other work must not hold up the scene for long.
-_NICE = 10
 # The other process draws nothing: MuJoCo need not load a driver.
 _WITHOUT_OPENGL = {"MUJOCO_GL": "disabled"}
 
@@ -152,7 +149,6 @@ def serve(down: int, up: int, *files: int) -> None:
     from robocasa_lerobot.convert.scenes.compiled import CompiledScene, KeptScene, keep
 
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # a user's Ctrl-C: the process that asks ends this one
-    os.nice(_NICE)
     model, merged_model = files
     with os.fdopen(down, "rb") as pipe, os.fdopen(up, "wb") as answers, contextlib.suppress(BrokenPipeError, EOFError):
         pickle.dump(_STARTED, answers)

@@ -88,7 +88,7 @@ class DatasetWriter:
         scratch = self.root / "encoding" / str(self._number)
         shutil.rmtree(scratch, ignore_errors=True)
         scratch.mkdir(parents=True)
-        self._encoder.start_episode(self._settings, self._files.video_keys, scratch, length, yielding=rendered)
+        self._encoder.start_episode(self._settings, self._files.video_keys, scratch, length, takes_colours=rendered)
         given = 0
         try:
             for step in pictures:

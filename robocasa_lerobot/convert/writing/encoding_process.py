@@ -37,10 +37,6 @@ from robocasa_lerobot.quiet import quiet_codecs
 if TYPE_CHECKING:
     from robocasa_lerobot.convert.writing.video import VideoForm
 
-# Beside a renderer the encoder takes what that leaves: on two cores it would otherwise hold up the renderer's own
-# threads, which makes the conversion of states 6 to 15 % slower.
-_NICE = 19
-
 
 @dataclass(frozen=True)
 class _Start:
@@ -50,12 +46,12 @@ class _Start:
     keys: tuple[str, ...]
     folder: str
     length: int
-    yielding: bool
+    takes_colours: bool
 
 
 @dataclass(frozen=True)
 class _Picture:
-    """The next frame of a video, or its place: planes, or colours where the other process yields."""
+    """The next frame of a video, or its place: planes, or colours, as the episode has it."""
 
     key: str
     shape: tuple[int, ...]
@@ -95,7 +91,7 @@ class EncodingProcess:
             self._frames.others_only()
         self._pipe = os.fdopen(down_write, "wb", buffering=0)
         self._answers = os.fdopen(up_read, "rb")
-        self._broken = self._yielding = False
+        self._broken = self._takes_colours = False
         self._preparation: FramePreparation | None = None
         self._prepared: deque[FramePreparation] = deque()
         self._received: queue.SimpleQueue[_Answer | None] = queue.SimpleQueue()
@@ -115,7 +111,7 @@ class EncodingProcess:
         return not self._broken and self._process.poll() is None
 
     def start_episode(
-        self, settings: VideoSettings, keys: Sequence[str], folder: Path, length: int, yielding: bool = False
+        self, settings: VideoSettings, keys: Sequence[str], folder: Path, length: int, takes_colours: bool = False
     ) -> None:
         """Begin an episode.
 
@@ -124,11 +120,10 @@ class EncodingProcess:
             keys: one video for each.
             folder: an existing one, somewhere below which the videos come.
             length: number of frames.
-            yielding: making the pictures takes longer than encoding them, so the other process takes over what it can,
-                and lets this one go first, from now on.
+            takes_colours: making the pictures takes longer than encoding them, so the other process makes the planes.
         """
-        self._preparation, self._yielding = FramePreparation(keys, length), yielding
-        self._tell(_Start(settings, tuple(keys), str(folder), length, yielding))
+        self._preparation, self._takes_colours = FramePreparation(keys, length), takes_colours
+        self._tell(_Start(settings, tuple(keys), str(folder), length, takes_colours))
 
     def feed(self, key: str, picture: NDArray[np.uint8]) -> None:
         """Hand over the next frame (H, W, 3) of a video.
@@ -137,7 +132,7 @@ class EncodingProcess:
             EncodingError: the other process is gone, or the picture has an odd height or width.
         """
         assert self._preparation is not None, "an episode has been started"
-        frame = picture if self._yielding else self._preparation.prepared(key, picture)
+        frame = picture if self._takes_colours else self._preparation.prepared(key, picture)
         try:
             where = self._frames.put(frame) if self._frames else frame
         except OSError:
@@ -282,7 +277,6 @@ class _Episode:
         self._encoder: EpisodeEncoder | None = None
         self._frames: FramePreparation | None = None  # where they come as colours
         self._failure: Exception | None = None
-        self._yields = False
 
     def take(self, message: Any, frame: NDArray[np.uint8] | None = None) -> _Answer | None:
         """Act on a message; gives the answer to be sent, if there is one."""
@@ -312,11 +306,8 @@ class _Episode:
 
     def _start(self, message: _Start) -> None:
         self._failure = self._frames = None
-        if message.yielding:
+        if message.takes_colours:
             self._frames = FramePreparation(message.keys, message.length)
-        if message.yielding and not self._yields:
-            os.nice(_NICE)
-            self._yields = True
         self._encoder = EpisodeEncoder(message.settings, message.keys, Path(message.folder), message.length)
 
     def _cancel(self) -> None:
