@@ -41,6 +41,8 @@ class GraspStrategy:
         first: done before each attempt.
         nearer: how far an object may be put down again nearer to the robot than it lies, metres.
         doubtful: cost of a path from which on it rather is, though it is held.
+        close_fit: whether an object is about as wide as the open hand, which comes up to it the more exactly, and goes
+            after it where it is pushed on.
     """
 
     tilts: tuple[tuple[float, float], ...] = ((0.0, 0.0),)
@@ -57,6 +59,7 @@ class GraspStrategy:
     first: Callable[[KitchenEnv], Iterator[Array]] | None = None
     nearer: Callable[[KitchenEnv], float] | None = None
     doubtful: float = DOUBTFUL
+    close_fit: bool = False
 
 
 def in_radians(*tilts: tuple[float, float]) -> tuple[tuple[float, float], ...]:

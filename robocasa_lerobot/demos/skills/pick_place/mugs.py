@@ -55,15 +55,13 @@ def across_body(
     body = env.data.body(obj.name)
     turn = body.xmat.reshape(3, 3)
     middle = np.array([*obj.item.interior.center[:2], 0.0])
-    away = obj.cloud - middle
     if 2 * radius > WIDEST_M:
         return []
-    out = np.linalg.norm(away[:, :2], axis=1)
     ahead = np.array([*approach[:2], 0.0]) / np.hypot(approach[0], approach[1])
     behind = 1.0
-    if out.max() > radius + HANDLE_M:
-        handle = turn @ (away[out.argmax()] * [1.0, 1.0, 0.0]) / out.max()
-        behind = float(handle @ ahead)
+    handle = handle_of(obj)
+    if handle is not None:
+        behind = float(turn @ handle @ ahead)
     if behind < HANDLE_BEHIND:
         return []
     rotation = frame(approach, np.cross(UP, ahead))
@@ -75,6 +73,18 @@ def across_body(
         GraspPose(foot + height * UP - short * approach, rotation, 2 * radius, score - UPPER * index)
         for index, height in enumerate(heights)
     ]
+
+
+def handle_of(obj: Graspable) -> Array | None:
+    """Unit vector (3,) from the middle of a vessel to its handle, in its own axes; None of what has none."""
+    if obj.item is None or obj.item.interior is None:
+        return None
+    away = obj.cloud - np.array([*obj.item.interior.center[:2], 0.0])
+    out = np.linalg.norm(away[:, :2], axis=1)
+    if out.max() <= float(min(obj.item.size[:2])) / 2 + HANDLE_M:
+        return None
+    handle: Array = away[out.argmax()] * [1.0, 1.0, 0.0] / out.max()
+    return handle
 
 
 FROM_THE_SIDE = GraspStrategy(

@@ -62,6 +62,7 @@ ATTEMPTS = 5
 INTEGRAL_GAIN = 0.12
 GRASP_STEPS, RELEASE_STEPS = 11, 8
 STANDOFF_M = 0.06
+CLOSE_FIT_M, PUSHED_M = 0.003, 0.004  # of the hand before it comes in round a close fit; by which that was pushed on
 HOPELESS, POOR = 3.5, 1.5  # cost of a path from which on it is not tried, or not before one from another side
 WORTH_M = 0.02  # by less than this, what is held is not put down nearer to the robot
 BLOCKED_M, BACK_M = 0.05, 0.08  # a hand as far as this from where the grasp begins is blocked: another grasp is next
@@ -126,9 +127,8 @@ def pick(
         moved = data.body(obj.name).xpos - start
         yield from move_hand(data, _shifted(far, moved), OPEN, tolerance=0.03)
         line = far.position + moved if strategy.narrow or not steep(far, before) else None
-        yield from move_hand(
-            data, _shifted(before, moved), OPEN, tolerance=0.008, integral_gain=INTEGRAL_GAIN, start=line
-        )
+        there, near = _shifted(before, moved), CLOSE_FIT_M if strategy.close_fit else 0.008
+        yield from move_hand(data, there, OPEN, tolerance=near, integral_gain=INTEGRAL_GAIN, start=line)
         moved = data.body(obj.name).xpos - start
         if pose_error(data, _shifted(before, moved)).position > BLOCKED_M:
             tried.note(planned)
@@ -137,8 +137,12 @@ def pick(
         at = _shifted(at, moved)
         integral_gain = 0.0 if strategy.narrow else INTEGRAL_GAIN
         yield from move_hand(data, at, OPEN, speed=0.6, tolerance=0.005, max_steps=45, integral_gain=integral_gain)
-        if strategy.narrow:
-            more = (data.body(obj.name).xpos - start - moved) * [1.0, 1.0, 0.0]
+        more = (data.body(obj.name).xpos - start - moved) * [1.0, 1.0, 0.0]
+        if strategy.close_fit and np.linalg.norm(more) > PUSHED_M:
+            moved = moved + more
+            at = _shifted(at, more)
+            yield from move_hand(data, at, OPEN, speed=0.6, tolerance=0.004, max_steps=20, integral_gain=integral_gain)
+        elif strategy.narrow:
             at = HandTarget(np.array([*(at.position + more)[:2], grip_position(data)[2]]), at.rotation)
             yield from move_hand(data, at, OPEN, speed=0.4, tolerance=0.004, max_steps=15)
         upright = _uprightness(env, obj)

@@ -55,6 +55,7 @@ UP_RISE_M, RISES_M, LOW_COST = 0.06, (0.035, 0.010), 0.05  # over where it is le
 LEVEL_RISE_M, LEVEL_COST = 0.004, 0.1
 # Of heights that are planned for together, and of the sine of the hand's tilt, where the best plan of all costs more.
 BAND_M, TILT_BAND, POOR = 0.05, 0.15, 1.2
+NO_WAY = 2.5  # cost of a plan that meets something
 AGAIN, AGAIN_M = 0.5, 0.02  # cost of a hand that goes where it went without success, as near as this
 LEANING, LOADED_LEANING = 0.35, 1.0  # cost of a radian that the object is tilted, and of one with others in it
 # Of what stands on so narrow a foot that it would fall over, if it were let go with that lean.
@@ -97,6 +98,7 @@ class PlaceStrategy:
         upended: what lies in the hand comes to stand on end: a lean about the line between the fingers costs nothing.
         make_room: before an object is fetched, makes room for it with an empty hand; told whether it had none before.
         falls_off: whether an object would fall to the floor from such an origin and rotation: it is not let go there.
+        anew: how it is set down to be grasped in another manner, where there is no way in as it is held.
     """
 
     poses: Callable[[], Sequence[PlacePose]]
@@ -115,6 +117,12 @@ class PlaceStrategy:
     upended: bool = False
     falls_off: Callable[[Array, Array], bool] | None = None
     make_room: Callable[[KitchenEnv, bool], Iterator[Array]] | None = None
+    anew: PlaceStrategy | None = None
+
+
+def has_way_in(env: KitchenEnv, obj: Graspable, strategy: PlaceStrategy) -> bool:
+    """Whether the object in the hand, as it is held, can be put down from here without meeting anything."""
+    return _planner(env, obj, strategy, [])(()).cost < NO_WAY
 
 
 def put(env: KitchenEnv, obj: Graspable, strategy: PlaceStrategy, failed: list[Array]) -> Iterator[Array]:

@@ -21,6 +21,7 @@ from robocasa_lerobot.demos.skills.pick_place.grasp_strategy import (
     in_radians,
 )
 from robocasa_lerobot.demos.skills.pick_place.graspable import Graspable
+from robocasa_lerobot.demos.skills.pick_place.handle_away import below_a_spout
 from robocasa_lerobot.demos.skills.pick_place.location import Location, locate
 from robocasa_lerobot.demos.skills.pick_place.mugs import FROM_THE_SIDE, UNDER_A_SPOUT
 from robocasa_lerobot.demos.skills.pick_place.place import ASIDE_M, PlaceStrategy
@@ -79,6 +80,7 @@ from robocasa_lerobot.envs.predicates.heat_and_water import OnBurner
 from robocasa_lerobot.envs.predicates.logic import Not, every_goal_in
 from robocasa_lerobot.envs.predicates.objects import ObjectAtSite, ObjectInside
 from robocasa_lerobot.envs.predicates.placed_by import Behind
+from robocasa_lerobot.envs.scene.roles import counter_of
 from robocasa_lerobot.envs.tasks.conditions import IN_RANGE, stage_condition
 from robocasa_lerobot.envs.tasks.task import Stage
 
@@ -247,7 +249,11 @@ def _by_target(env: KitchenEnv, stage: Stage, obj: Graspable) -> PlaceStrategy:
             return _into_sink(env, stage, obj, fixture)
         case CoffeeMachine():
             poses = at_site(env, f"{fixture.name}_{part}", next(iter(fixture.regions.values())))
-            return PlaceStrategy(poses, entries=("out", "level"), grasp=FROM_THE_SIDE, in_m=0.17, gap_m=0.003)
+            counter = counter_of(env.scene.layout, fixture)
+            beside = PlaceStrategy(on_counter(env, obj, counter), leans=(0.0, _STEEP), entries=("up", "across"))
+            return PlaceStrategy(
+                poses, entries=("out", "level"), grasp=below_a_spout(obj), in_m=0.17, gap_m=0.003, anew=beside
+            )
     if isinstance(fixture, Hob) and part not in IN_RANGE:
         left_out = _unwanted_burners(env, stage)
         burners = [burner for burner in fixture.burners if part in ("", burner) and burner not in left_out]

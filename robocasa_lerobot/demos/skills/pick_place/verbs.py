@@ -29,7 +29,7 @@ from robocasa_lerobot.demos.skills.pick_place.grasp_strategy import ANY_APPROACH
 from robocasa_lerobot.demos.skills.pick_place.graspable import Graspable, graspable
 from robocasa_lerobot.demos.skills.pick_place.location import locate
 from robocasa_lerobot.demos.skills.pick_place.pick import is_held, pick
-from robocasa_lerobot.demos.skills.pick_place.place import PlaceStrategy, put
+from robocasa_lerobot.demos.skills.pick_place.place import PlaceStrategy, has_way_in, put
 from robocasa_lerobot.demos.skills.pick_place.reach_in import drive_around_open_door
 from robocasa_lerobot.demos.skills.pick_place.strategies import (
     grasp_strategy,
@@ -97,6 +97,9 @@ def place_object(env: KitchenEnv, stage: Stage) -> Iterator[Array]:
             except SlippedError:
                 continue  # it is picked up where it lies
             yield from move_torso(env, 0.0, CLOSED, Held.now(env.data, obj.name, obj.contents))
+            if strategy.anew is not None and not has_way_in(env, obj, strategy):
+                yield from put(env, obj, strategy.anew, [])
+                continue
             yield from put(env, obj, strategy, failed)
         for _ in range(SETTLE_STEPS):
             if stage_done(env, stage):
