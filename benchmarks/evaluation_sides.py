@@ -71,9 +71,9 @@ def run_ours(job: Job) -> dict[str, Any]:
     from robocasa_lerobot.evaluation.config.evaluation import EnvSettings, EvaluationConfig, PolicySettings
     from robocasa_lerobot.evaluation.run.engine import evaluate, prepare
     from robocasa_lerobot.evaluation.run.outputs import write_outputs
-    from robocasa_lerobot.gl import ensure_gl
+    from robocasa_lerobot.gl import ensure_drawing
 
-    ensure_gl()
+    ensure_drawing()  # as the command does
     config = EvaluationConfig(
         policy=PolicySettings(path=[job.checkpoint], label=["policy"], device="cpu"),
         env=EnvSettings(tasks=job.tasks, image_size=job.image_size),
