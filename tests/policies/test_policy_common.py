@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import subprocess
 import sys
 from pathlib import Path
@@ -130,6 +131,45 @@ def test_instructions_are_encoded_alike_each_once_and_sample_by_sample() -> None
     mask = (tokens != PADDING).any(dim=-1)
     compiled = torch.compile(encoder, backend="eager", fullgraph=True)
     torch.testing.assert_close(compiled(tokens, mask), encoder(tokens, mask))
+
+
+def test_an_instruction_that_is_asked_for_again_is_encoded_by_the_present_weights() -> None:
+    torch.manual_seed(0)
+    encoder = TokenEncoder(buckets=256, max_words=12, dim=16).eval()
+    tokens = token_tensor(["open the drawer"], 12, 256)
+    mask = (tokens != PADDING).any(dim=-1)
+    encoded: list[int] = []
+    own = encoder._encode_each_once
+    encoder._encode_each_once = lambda *inputs: encoded.append(1) or own(*inputs)  # type: ignore[func-returns-value,method-assign]
+
+    @torch.inference_mode()
+    def sampled() -> torch.Tensor:
+        return encoder(tokens, mask)
+
+    @torch.no_grad()
+    def fresh() -> torch.Tensor:
+        return own(tokens, mask)
+
+    first = sampled()
+    with torch.no_grad():
+        encoder(tokens, mask).zero_()  # what a caller does with it changes nothing
+    assert torch.equal(sampled(), first)
+    assert len(encoded) == 1
+    copied = copy.deepcopy(encoder)  # as for a moving average of the weights
+    with torch.no_grad():
+        assert torch.equal(copied(tokens, mask), first)
+    assert encoder(tokens, mask).requires_grad  # with gradients nothing is remembered
+    with torch.no_grad():
+        encoder.norm.bias += 1.0
+    assert torch.equal(sampled(), fresh())
+    encoder.norm.bias.data = encoder.norm.bias.data - 1.0
+    assert torch.equal(sampled(), fresh())
+    encoder.load_state_dict({name: 0.5 * weight for name, weight in encoder.state_dict().items()})
+    assert torch.equal(sampled(), fresh())
+    encoder.train()
+    encoder.norm.bias.data.add_(1.0)  # which no counter notices
+    encoder.eval()
+    assert torch.equal(sampled(), fresh())
 
 
 def test_constant_components_keep_their_scale() -> None:

@@ -13,7 +13,7 @@ from robocasa_lerobot.policies.diffusion_transformer.modeling_diffusion_transfor
     DiffusionTransformerPolicy,
     _noise_scheduler,
 )
-from robocasa_lerobot.policies.diffusion_transformer.sampling import ddim_step, sampling_times
+from robocasa_lerobot.policies.diffusion_transformer.sampling import DdimSteps, sampling_times
 
 CLEAN = 0.3
 SPACINGS = ("trailing", "leading", "linspace")
@@ -24,11 +24,12 @@ def sampled(config: DiffusionTransformerConfig) -> torch.Tensor:
     scheduler = _noise_scheduler(config)
     x = torch.randn(2, 4, 3, generator=torch.Generator().manual_seed(0))
     times = sampling_times(config)
-    for time, before in zip(times, [*times[1:], -1], strict=True):
+    steps = DdimSteps(scheduler, times)
+    for number, time in enumerate(times):
         level = scheduler.alphas_cumprod[time]
         right = (x - level**0.5 * CLEAN) / (1 - level) ** 0.5
         prediction = right if config.prediction_type == "epsilon" else torch.full_like(x, CLEAN)
-        x = ddim_step(scheduler, prediction, x, time, before)
+        x = steps.step(number, prediction, x)
     return x
 
 
@@ -64,9 +65,10 @@ def test_where_the_steps_divide_the_levels_it_is_diffusers_own(spacing: str, kin
         assert theirs.timesteps.tolist() == times
         random = torch.Generator().manual_seed(1)
         x = torch.randn(2, 4, 3, generator=random)
-        for time, before in zip(times, [*times[1:], -1], strict=True):
+        own = DdimSteps(theirs, times)
+        for number, time in enumerate(times):
             prediction = torch.randn(2, 4, 3, generator=random)
-            ours = ddim_step(theirs, prediction, x, time, before)
+            ours = own.step(number, prediction, x)
             x = theirs.step(prediction, time, x).prev_sample
             assert torch.equal(ours, x)
 

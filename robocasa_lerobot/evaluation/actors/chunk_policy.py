@@ -71,6 +71,7 @@ class ChunkPolicy:
         self.shape = ChunkShape(executed=int(executed), offsets=offsets)
         parameters = inspect.signature(loaded.policy.predict_action_chunk).parameters
         self._takes_generators = "generator" in parameters
+        self._whole_chunks = config.type == _WHOLE_CHUNKS  # draccus looks a type up in its registry each time
         if width > 1 and not self._takes_generators and config.type != _WITHOUT_NOISE:
             raise UserError(
                 f"policy.batch_width={width}: policies of type {config.type!r} draw their noise for a whole batch, so "
@@ -140,7 +141,7 @@ class ChunkPolicy:
                     f"a policy of type {loaded.config.type!r} predicts {chunk.shape[1]} actions at once, and "
                     f"{self.shape.executed} are to be executed: use --executed_steps={chunk.shape[1]} or fewer."
                 )
-            if loaded.config.type == _WHOLE_CHUNKS:
+            if self._whole_chunks:
                 actions = loaded.post(chunk)
             else:
                 actions = loaded.post(chunk.reshape(-1, chunk.shape[-1])).reshape(count, chunk.shape[1], -1)

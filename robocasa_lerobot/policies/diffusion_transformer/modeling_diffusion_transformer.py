@@ -29,7 +29,7 @@ from robocasa_lerobot.policies.diffusion_transformer.configuration_diffusion_tra
 )
 from robocasa_lerobot.policies.diffusion_transformer.network import DenoisingTransformer
 from robocasa_lerobot.policies.diffusion_transformer.observation import ObservationEncoder
-from robocasa_lerobot.policies.diffusion_transformer.sampling import ddim_step, sampling_times
+from robocasa_lerobot.policies.diffusion_transformer.sampling import DdimSteps, sampling_times
 
 
 class DiffusionTransformerPolicy(PreTrainedPolicy):
@@ -59,6 +59,7 @@ class DiffusionTransformerPolicy(PreTrainedPolicy):
         )
         self.scheduler = _noise_scheduler(config)
         self._denoise = Traced(self.denoiser)
+        self._ddim: DdimSteps | None = None  # of the levels that were last asked for
         self._observed_keys = (*self.observation_encoder.image_keys, OBS_STATE)
         self.reset()
 
@@ -146,16 +147,24 @@ class DiffusionTransformerPolicy(PreTrainedPolicy):
         shape = (features.shape[0], self.config.horizon, self.action_dim)
         x = starting_noise(noise, shape, generator, features)
         times = sampling_times(self.config)
+        ddim = None
         if isinstance(self.scheduler, DDPMScheduler):
             self.scheduler.set_timesteps(timesteps=times)
-        for time, before in zip(times, [*times[1:], -1], strict=True):
+        else:
+            ddim = self._ddim_steps(times)
+        for number, time in enumerate(times):
             asked = torch.full(shape[:1], time, device=x.device, dtype=torch.long)
             prediction = self._denoise(x, asked, features).float()
-            if isinstance(self.scheduler, DDPMScheduler):
+            if ddim is None:
                 x = self.scheduler.step(prediction, time, x, generator=random).prev_sample
             else:
-                x = ddim_step(self.scheduler, prediction, x, time, before)
+                x = ddim.step(number, prediction, x)
         return x
+
+    def _ddim_steps(self, times: list[int]) -> DdimSteps:
+        if self._ddim is None or self._ddim.times != tuple(times):
+            self._ddim = DdimSteps(self.scheduler, times)
+        return self._ddim
 
     def reset(self) -> None:
         """Forget observations and planned actions; called at the start of an episode."""

@@ -1,4 +1,4 @@
-"""The noise levels that sampling asks for, and DDIM's step between two of them.
+"""The noise levels that sampling asks for, and DDIM's steps between them.
 
 diffusers' own DDIM goes back by the same whole number of levels each time, which is right only where the number of
 steps divides that of the levels, and its `trailing` levels may be one more than asked for. Its DDPM takes levels as
@@ -7,6 +7,7 @@ they are given.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -37,25 +38,34 @@ def sampling_times(config: DiffusionTransformerConfig) -> list[int]:
     return [int(level) for level in found]
 
 
-def ddim_step(scheduler: DDIMScheduler, prediction: Tensor, x: Tensor, time: int, before: int) -> Tensor:
-    """The sample (B, T, A) at level `before`, -1 for none, from that at level `time`, without new noise.
+class DdimSteps:
+    """The steps of one denoising, from level to level, without new noise.
 
     Source: J. Song et al., "Denoising Diffusion Implicit Models" (2020), equation 12 with sigma 0.
 
     Args:
         scheduler: of the training, whose `config` says what is predicted and how far samples reach.
-        prediction: of the denoiser at `time`, (B, T, A).
-        x: sample at `time`, (B, T, A).
-        time: noise level of `x`.
-        before: noise level of what is returned.
+        times: the noise levels, falling; after the last one comes none.
     """
-    here = scheduler.alphas_cumprod[time]
-    there = scheduler.alphas_cumprod[before] if before >= 0 else scheduler.final_alpha_cumprod
-    if scheduler.config.prediction_type == "epsilon":
-        noise, clean = prediction, (x - (1 - here) ** 0.5 * prediction) / here**0.5
-    else:
-        noise, clean = (x - here**0.5 * prediction) / (1 - here) ** 0.5, prediction
-    if scheduler.config.clip_sample:
-        clean = clean.clamp(-scheduler.config.clip_sample_range, scheduler.config.clip_sample_range)
-    out: Tensor = there**0.5 * clean + (1 - there) ** 0.5 * noise
-    return out
+
+    def __init__(self, scheduler: DDIMScheduler, times: Sequence[int]) -> None:
+        self.times = tuple(times)
+        self._epsilon = scheduler.config.prediction_type == "epsilon"
+        self._reach = scheduler.config.clip_sample_range if scheduler.config.clip_sample else None
+        levels = [scheduler.alphas_cumprod[time] for time in times]
+        self._shares = [
+            (here**0.5, (1 - here) ** 0.5, there**0.5, (1 - there) ** 0.5)  # of the sample and of noise, here and there
+            for here, there in zip(levels, [*levels[1:], scheduler.final_alpha_cumprod], strict=True)
+        ]
+
+    def step(self, number: int, prediction: Tensor, x: Tensor) -> Tensor:
+        """The sample (B, T, A) after step `number` from 0 on, from the one before and the denoiser's prediction."""
+        sample_here, noise_here, sample_there, noise_there = self._shares[number]
+        if self._epsilon:
+            noise, clean = prediction, (x - noise_here * prediction) / sample_here
+        else:
+            noise, clean = (x - sample_here * prediction) / noise_here, prediction
+        if self._reach is not None:
+            clean = clean.clamp(-self._reach, self._reach)
+        out: Tensor = sample_there * clean + noise_there * noise
+        return out
