@@ -13,8 +13,8 @@ from robocasa_lerobot.demos.recorder import record_episode
 from robocasa_lerobot.demos.skills.common import stage_done
 from robocasa_lerobot.demos.skills.pick_place.grasp_strategy import ahead_of
 from robocasa_lerobot.demos.skills.pick_place.graspable import graspable
-from robocasa_lerobot.demos.skills.pick_place.handle_away import IN_THE_WAY, below_a_spout, turned_first
 from robocasa_lerobot.demos.skills.pick_place.mugs import handle_of
+from robocasa_lerobot.demos.skills.pick_place.turning.handle_away import IN_THE_WAY, below_a_spout, turned_first
 from robocasa_lerobot.demos.skills.pick_place.verbs import place_object
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 

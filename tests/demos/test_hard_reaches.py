@@ -13,7 +13,7 @@ from robocasa_lerobot.demos.planning.kinematics import Arm
 from robocasa_lerobot.demos.skills.pick_place.graspable import graspable
 from robocasa_lerobot.demos.skills.pick_place.pick import best_grasp, is_held, pick
 from robocasa_lerobot.demos.skills.pick_place.strategies import grasp_strategy
-from robocasa_lerobot.demos.skills.pick_place.turn_across import (
+from robocasa_lerobot.demos.skills.pick_place.turning.across import (
     ACROSS_COS,
     OUT_OF_CABINET,
     lies_across,

@@ -11,7 +11,7 @@ from robocasa_lerobot.demos.motion import OPEN, grip_position
 from robocasa_lerobot.demos.skills.pick_place.carrying.torso import EASY_M, MOST_M, move_torso, torso_for, torso_height
 from robocasa_lerobot.demos.skills.pick_place.graspable import graspable
 from robocasa_lerobot.demos.skills.pick_place.pick import best_grasp
-from robocasa_lerobot.demos.skills.pick_place.turn_across import OUT_OF_CABINET
+from robocasa_lerobot.demos.skills.pick_place.turning.across import OUT_OF_CABINET
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 
 AS_IT_IS_M = 0.02

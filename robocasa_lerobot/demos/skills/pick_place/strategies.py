@@ -21,7 +21,6 @@ from robocasa_lerobot.demos.skills.pick_place.grasp_strategy import (
     in_radians,
 )
 from robocasa_lerobot.demos.skills.pick_place.graspable import Graspable
-from robocasa_lerobot.demos.skills.pick_place.handle_away import below_a_spout
 from robocasa_lerobot.demos.skills.pick_place.location import Location, locate
 from robocasa_lerobot.demos.skills.pick_place.mugs import FROM_THE_SIDE, UNDER_A_SPOUT
 from robocasa_lerobot.demos.skills.pick_place.place import ASIDE_M, PlaceStrategy
@@ -60,8 +59,14 @@ from robocasa_lerobot.demos.skills.pick_place.reach_in import (
     clear_of_counter,
     pull_out_first,
 )
-from robocasa_lerobot.demos.skills.pick_place.turn_across import OUT_OF_CABINET, between_shelves, to_front, turn_first
 from robocasa_lerobot.demos.skills.pick_place.turn_over import END_FIRST, LEANS, TO_TURN, stands_askew, which_way_up
+from robocasa_lerobot.demos.skills.pick_place.turning.across import (
+    OUT_OF_CABINET,
+    between_shelves,
+    to_front,
+    turn_first,
+)
+from robocasa_lerobot.demos.skills.pick_place.turning.handle_away import below_a_spout
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.kitchens.appliances.kinds.blender import Blender
 from robocasa_lerobot.envs.kitchens.appliances.kinds.coffee_machine import CoffeeMachine
