@@ -8,7 +8,7 @@ from pathlib import Path
 from robocasa_lerobot.evaluation.statistics.averages import Estimate, linear_combination
 from robocasa_lerobot.evaluation.statistics.lifelong import Lifelong
 from robocasa_lerobot.files import write_text
-from robocasa_lerobot.study.figures import draw_curves, draw_rates
+from robocasa_lerobot.study.figures import draw_curves, draw_matrices, draw_rates
 from robocasa_lerobot.study.runs import CPU
 from robocasa_lerobot.study.settings import PartConfig, RowConfig, StudyConfig
 from robocasa_lerobot.study.stored import FILMED_SEED, StoredRun, StoredTrial, stored_folder, strips_name
@@ -93,8 +93,11 @@ def _part(name: str, part: PartConfig, stored: Stored, sets: Sets, results: Path
     if part.tasks:
         lines += _by_task(there, sets[part.sets[0]])
     figures = (f"{name}_rates.svg", f"{name}_curves.svg")
-    if rates:
-        draw_rates(rates, results / figures[0])
+    if lifelong or rates:
+        if part.matrix:
+            draw_matrices(lifelong, len(part.sets), results / figures[0])
+        else:
+            draw_rates(rates, part.sets[0], results / figures[0])
         lines += [f"![Rates]({folder}/{figures[0]})", ""]
     draw_curves(stored.values(), results / figures[1])
     lines += [f"![Losses]({folder}/{figures[1]})", ""]

@@ -128,6 +128,8 @@ def test_the_page_has_rates_differences_and_circumstances(tmp_path: Path) -> Non
     assert "4 of 4 trainings, 6.0 hours of training (on NVIDIA H200) and" in text
     assert "0123456789ab-dirty" in text
     assert "Not run yet: `robocasa-lerobot study later`, with" in text
+    drawn = (results / "amount_rates.svg").read_text(encoding="utf-8")
+    assert "success rate at" in drawn, "of which tasks it is"
     for figure in ("amount_rates.svg", "amount_curves.svg"):
         assert f"(results/{figure})" in text
         assert (results / figure).read_text(encoding="utf-8").startswith("<?xml")
@@ -150,6 +152,9 @@ def test_the_table_of_phases(tmp_path: Path) -> None:
         "plain: the earlier phases reached 100 % (51 to 100), and after the last one 25 % (5 to 70), 25% of it." in text
     )
     assert "|plain|38 % (" in text
+    drawn = (tmp_path / "results" / "lifelong_rates.svg").read_text(encoding="utf-8")
+    for words in ("plain", "after phase 2", "tasks of phase", "100 %", "25 %", "50 %"):
+        assert f"<!-- {words} -->" in drawn, "a map of all phases, not of the first one's tasks alone"
 
 
 def phase_with_trials(folder: Path, steps: int, evaluation: str, finished: bool = True) -> None:
