@@ -37,22 +37,22 @@ def draw_rates(rates: Mapping[str, CellRate], task_set: str, path: Path) -> None
 def draw_matrices(found: Mapping[str, Lifelong], count: int, path: Path) -> None:
     """A map for each variant: the rates at the tasks of each of `count` phases (across) after each phase (down)."""
     rows = -(-len(found) // _MAPS_IN_ROW)
-    figure, axes = _figure(0.4 + (0.9 + 0.5 * count) * rows, rows, _MAPS_IN_ROW)
-    for place, (name, summary) in zip(axes.flat, found.items(), strict=False):
+    figure, maps = _figure(0.4 + (0.9 + 0.5 * count) * rows, rows, _MAPS_IN_ROW)
+    for axes, (name, summary) in zip(maps.flat, found.items(), strict=False):
         rates = np.full((count, count), np.nan)
         for after, row in summary.matrix.items():
             for tasks, rate in row.items():
                 rates[after - 1, tasks - 1] = rate.value
                 colour = "white" if rate.value > _PALE else "black"
                 text = f"{100 * rate.value:.0f} %"
-                place.text(tasks - 1, after - 1, text, ha="center", va="center", fontsize="small", color=colour)
-        place.imshow(rates, cmap="Blues", vmin=0.0, vmax=1.0, aspect="auto")
-        place.set_title(name, fontsize="medium")
-        place.set_xticks(range(count), [str(number) for number in range(1, count + 1)], fontsize="small")
-        place.set_xlabel("tasks of phase", fontsize="small")
-        place.set_yticks(range(count), [f"after phase {number}" for number in range(1, count + 1)], fontsize="small")
-    for place in axes.flat[len(found) :]:
-        place.set_axis_off()
+                axes.text(tasks - 1, after - 1, text, ha="center", va="center", fontsize="small", color=colour)
+        axes.imshow(rates, cmap="Blues", vmin=0.0, vmax=1.0, aspect="auto")
+        axes.set_title(name, fontsize="medium")
+        axes.set_xticks(range(count), [str(number) for number in range(1, count + 1)], fontsize="small")
+        axes.set_xlabel("tasks of phase", fontsize="small")
+        axes.set_yticks(range(count), [f"after phase {number}" for number in range(1, count + 1)], fontsize="small")
+    for axes in maps.flat[len(found) :]:
+        axes.set_axis_off()
     _save(figure, path)
 
 

@@ -93,11 +93,11 @@ def _part(name: str, part: PartConfig, stored: Stored, sets: Sets, results: Path
     if part.tasks:
         lines += _by_task(there, sets[part.sets[0]])
     figures = (f"{name}_rates.svg", f"{name}_curves.svg")
+    if lifelong:
+        draw_matrices(lifelong, len(part.sets), results / figures[0])
+    elif rates:
+        draw_rates(rates, part.sets[0], results / figures[0])
     if lifelong or rates:
-        if part.matrix:
-            draw_matrices(lifelong, len(part.sets), results / figures[0])
-        else:
-            draw_rates(rates, part.sets[0], results / figures[0])
         lines += [f"![Rates]({folder}/{figures[0]})", ""]
     draw_curves(stored.values(), results / figures[1])
     lines += [f"![Losses]({folder}/{figures[1]})", ""]

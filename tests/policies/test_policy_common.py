@@ -5,6 +5,7 @@ from __future__ import annotations
 import copy
 import subprocess
 import sys
+import warnings
 from pathlib import Path
 
 import numpy as np
@@ -166,6 +167,13 @@ def test_an_instruction_that_is_asked_for_again_is_encoded_by_the_present_weight
     assert torch.equal(sampled(), fresh())
     encoder.load_state_dict({name: 0.5 * weight for name, weight in encoder.state_dict().items()})
     assert torch.equal(sampled(), fresh())
+    other = token_tensor(["close the drawer"], 12, 256)
+    with torch.no_grad(), warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # of values that a recording takes for constants, such as the number of words
+        recorded = torch.jit.trace(encoder, (tokens, mask), check_trace=False)
+        assert torch.equal(recorded(other, mask), own(other, mask)), "what is remembered is no constant of a recording"
+    with torch.inference_mode():
+        assert torch.equal(copy.deepcopy(encoder)(tokens, mask), fresh()), "weights without a count of their changes"
     encoder.train()
     encoder.norm.bias.data.add_(1.0)  # which no counter notices
     encoder.eval()

@@ -209,3 +209,15 @@ def test_a_matrix_of_what_was_not_tried_says_so(tmp_path: Path) -> None:
     stored = {("lifelong", 0): run("lifelong", 0, *phases)}
     write_page(StudyConfig("r", "x", {"lifelong": part}), stored, SETS, tmp_path / "results", tmp_path / "page.md")
     assert "plain: not run to its end yet." in (tmp_path / "page.md").read_text(encoding="utf-8")
+
+
+def test_phases_of_no_common_training_are_drawn_as_rates(tmp_path: Path) -> None:
+    rows = {f"plain, after phase {k}": row("lifelong", f"phase{k}") for k in (1, 2)}
+    part = PartConfig("What?", rows, ["first", "second"], 2, matrix=True)
+    stored = {
+        ("lifelong", seed): run("lifelong", seed, trials(f"phase{seed + 1}", {"A": "++--", "B": "+---"}))
+        for seed in (0, 1)
+    }
+    write_page(StudyConfig("r", "x", {"lifelong": part}), stored, SETS, tmp_path / "results", tmp_path / "page.md")
+    assert "plain: not run to its end yet." in (tmp_path / "page.md").read_text(encoding="utf-8")
+    assert "success rate at first" in (tmp_path / "results" / "lifelong_rates.svg").read_text(encoding="utf-8")

@@ -91,7 +91,9 @@ class TokenEncoder(nn.Module):
         """Maps tokens (N, W, SUBWORDS) and mask (N, W), true where there is a word, to (N, dim)."""
         if not is_plain_cpu(tokens.device):  # how many instructions and words there are would be shapes
             return self._encode(tokens, mask)
-        if self.training or torch.is_grad_enabled() or torch.is_autocast_enabled("cpu"):
+        differs = self.training or torch.is_grad_enabled() or torch.is_autocast_enabled("cpu")
+        # A recording would take what is remembered for a constant, and tensors of inference mode do not count changes.
+        if differs or torch.jit.is_tracing() or any(weight.is_inference() for weight in self.parameters()):
             return self._encode_each_once(tokens, mask)
         # A trial asks with the same instruction again and again, which takes a tenth of a small policy's time.
         weights = tuple((weight.data_ptr(), weight._version) for weight in self.parameters())
