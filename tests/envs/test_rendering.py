@@ -178,10 +178,11 @@ def test_the_merged_model_looks_alike(task: str, opengl: bool) -> None:
             one, other = merged.render(env.data, camera), exact.render(env.data, camera)
             difference = np.abs(one.astype(int) - other.astype(int))
             # Highlights are computed at the corners of facets, and large boards have other corners: over all tasks
-            # up to 2.6, where a shelf fills the view of the wrist's camera.
-            assert difference.mean() < 3.0, camera
-            assert (difference.max(axis=-1) > 24).mean() < 0.02, camera  # edges of round shapes
-            assert one.std() > 10, camera  # something is seen, if only the inside of a fridge
+            # up to 1.0, and 2.6 where a shelf fills the view of the wrist's camera.
+            at_wrist = camera == "robot0_eye_in_hand"
+            assert difference.mean() < (3.0 if at_wrist else 1.5), camera
+            assert (difference.max(axis=-1) > 24).mean() < (0.02 if at_wrist else 0.01), camera  # edges of round shapes
+            assert one.std() > (10 if at_wrist else 20), camera  # something is seen, if only the inside of a fridge
         for _ in range(10):
             env.step(np.full(12, 0.7, dtype=np.float32))  # poses are followed
     merged.close()

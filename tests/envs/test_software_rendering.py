@@ -45,10 +45,12 @@ def test_a_kitchen_is_drawn_as_opengl_draws_it(task: str) -> None:
         ours, theirs = (renderer.pictures(env.data, contract.CAMERAS) for renderer in renderers)
         for camera, one, other in zip(contract.CAMERAS, ours, theirs, strict=True):
             apart = differences(one, other)
-            # Over all tasks at most 1.3, 0.13 and 0.014: fine textures, panes one behind the other and their edges.
-            assert apart.mean() < 1.5, camera
+            # Over all tasks at most 0.93, 0.13 and 0.003, and 1.3, 0.12 and 0.014 at the wrist: fine textures, panes
+            # one behind the other and their edges.
+            at_wrist = camera == "robot0_eye_in_hand"
+            assert apart.mean() < (1.5 if at_wrist else 1.0), camera
             assert (apart > 2).mean() < 0.15, camera
-            assert (apart > 24).mean() < 0.02, camera
+            assert (apart > 24).mean() < (0.02 if at_wrist else 0.01), camera
             assert one.std() > 10.0, camera
     for renderer in renderers:
         renderer.close()
