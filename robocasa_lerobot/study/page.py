@@ -145,6 +145,10 @@ def _forgetting(last: int, lifelong: Mapping[str, Lifelong]) -> list[str]:
 
 
 def _by_task(there: Mapping[str, Sequence[tuple[int, StoredTrial]]], tasks: Sequence[str]) -> list[str]:
+    """Rates of each task and row, whichever of the two are fewer as columns."""
+    if len(there) > len(tasks):
+        turned = [[row, *(_shown(cell(trials, [task])) for task in tasks)] for row, trials in there.items()]
+        return [*_markdown(["", *tasks], turned), ""]
     rows = [[task, *(_shown(cell(trials, [task])) for trials in there.values())] for task in tasks]
     return [*_markdown(["task", *there], rows), ""]
 
