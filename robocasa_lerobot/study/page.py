@@ -146,11 +146,11 @@ def _forgetting(last: int, lifelong: Mapping[str, Lifelong]) -> list[str]:
 
 def _by_task(there: Mapping[str, Sequence[tuple[int, StoredTrial]]], tasks: Sequence[str]) -> list[str]:
     """Rates of each task and row, whichever of the two are fewer as columns."""
+    of_rows = [[row, *(_shown(cell(trials, [task])) for task in tasks)] for row, trials in there.items()]
     if len(there) > len(tasks):
-        turned = [[row, *(_shown(cell(trials, [task])) for task in tasks)] for row, trials in there.items()]
-        return [*_markdown(["", *tasks], turned), ""]
-    rows = [[task, *(_shown(cell(trials, [task])) for trials in there.values())] for task in tasks]
-    return [*_markdown(["task", *there], rows), ""]
+        return [*_markdown(["", *tasks], of_rows), ""]
+    head, *of_tasks = zip(["task", *tasks], *of_rows, strict=True)
+    return [*_markdown(head, of_tasks), ""]
 
 
 def _strips(row: RowConfig, label: str, results: Path, folder: str) -> list[str]:

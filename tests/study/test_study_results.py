@@ -221,3 +221,11 @@ def test_phases_of_no_common_training_are_drawn_as_rates(tmp_path: Path) -> None
     write_page(StudyConfig("r", "x", {"lifelong": part}), stored, SETS, tmp_path / "results", tmp_path / "page.md")
     assert "plain: not run to its end yet." in (tmp_path / "page.md").read_text(encoding="utf-8")
     assert "success rate at first" in (tmp_path / "results" / "lifelong_rates.svg").read_text(encoding="utf-8")
+
+
+def test_fewer_tasks_than_rows_are_the_columns(tmp_path: Path) -> None:
+    for sets, head, line in ((["first"], "||A|", "|few|38 % ("), (["both", "first"], "|task|few|many|", "|A|38 % (")):
+        part = dataclasses.replace(PART, sets=sets)
+        write_page(StudyConfig("r", "x", {"some": part}), STORED, SETS, tmp_path / "results", tmp_path / "page.md")
+        lines = (tmp_path / "page.md").read_text(encoding="utf-8").splitlines()
+        assert lines[lines.index(head) + 2].startswith(line)
