@@ -10,6 +10,7 @@ from robocasa_lerobot.data.registry.registry import open_registry
 from robocasa_lerobot.evaluation.records.results import TRIALS_FILE
 from robocasa_lerobot.making.estimate import estimate
 from robocasa_lerobot.making.needs import Need, needs_of, parse_episodes
+from robocasa_lerobot.progress import Bar
 from robocasa_lerobot.study.runs import Run
 from robocasa_lerobot.study.settings import PartConfig, StudyConfig
 from robocasa_lerobot.training.config.experiment import load_experiment
@@ -62,17 +63,20 @@ def costs(
     pixels = min((dataset.make.image_size for dataset in datasets if dataset.make is not None), default=None)
     measured: dict[str, float | str] = {}
     recorded: set[Path] = set()
+    # Other seeds need the same data and take as long, where they have not begun.
+    kinds = {run: run.name if run.folder.exists() else run.experiment for own in runs.values() for run in own}
     plans: dict[str, _Plan] = {}
+    with Bar(total=len(set(kinds.values())), desc="timing steps", unit="experiment", leave=False) as bar:
+        for run, kind in kinds.items():
+            if kind not in plans:
+                plans[kind] = _planned(run, pixels, measured_steps, measured)
+                bar.update()
     out: dict[str, Cost] = {}
     for part, own in runs.items():
         needs: list[Need] = []
         mine: list[_Plan] = []
         for run in own:
-            # Other seeds need the same data and take as long, where they have not begun.
-            kind = run.name if run.folder.exists() else run.experiment
-            if kind not in plans:
-                plans[kind] = _planned(run, pixels, measured_steps, measured)
-            mine.append(plan := plans[kind])
+            mine.append(plan := plans[kinds[run]])
             needs += [need for need in plan.needs if need.root not in recorded]
             recorded |= {need.root for need in needs}
         data = estimate(needs, cores)
