@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Literal
 
 from robocasa_lerobot import gl
+from robocasa_lerobot.jobs.workers import memory_bytes
 from robocasa_lerobot.policies.registry import POLICY_TYPES
 
 EXAMPLE = "robocasa-lerobot doctor --json"
@@ -153,7 +154,7 @@ def check_disk(folder: Path | None = None, free_bytes: int | None = None) -> Fin
 def check_memory(total_bytes: int | None = None) -> Finding:
     """There is memory for training beside two kitchens."""
     if total_bytes is None:
-        total_bytes = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
+        total_bytes = memory_bytes()
     total_gib = total_bytes / 2**30
     found = f"{total_gib:.0f} GiB"
     if total_gib < MEMORY_GIB:

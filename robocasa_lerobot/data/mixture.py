@@ -33,6 +33,7 @@ from robocasa_lerobot.data.statistics import (
     pooled_statistics,
 )
 from robocasa_lerobot.errors import UserError
+from robocasa_lerobot.jobs.workers import memory_bytes
 
 Item = dict[str, Any]
 
@@ -226,8 +227,9 @@ class MixtureDataset(torch.utils.data.Dataset[Item]):
         if not needed or (budget_bytes is not None and sum(needed.values()) > budget_bytes):
             return False
         keys, size = self.meta.camera_keys, self._picture_size or self._feature_size()
+        scattered = sum(needed.values()) > memory_bytes() // 2
         for root, source in self.sources.items():
-            self._caches[root] = open_or_build(self._use(source), keys, size, cache_dir)
+            self._caches[root] = open_or_build(self._use(source), keys, size, cache_dir, scattered)
         return True
 
     def cached_bytes(self) -> dict[Path, int]:

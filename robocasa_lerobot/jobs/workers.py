@@ -1,4 +1,4 @@
-"""How many processes of this machine a piece of work takes."""
+"""Cores and memory of this machine, and how many processes a piece of work takes."""
 
 from __future__ import annotations
 
@@ -12,6 +12,11 @@ _MAX_AUTOMATIC_WORKERS = 8
 def cores_here() -> int:
     """Cores that this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def memory_bytes() -> int:
+    """Memory of this machine."""
+    return os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
 
 
 def automatic_workers(pieces: int, work: int, least_work: int) -> int:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import pickle
+import re
 import shutil
 from pathlib import Path
 from types import SimpleNamespace
@@ -23,6 +24,7 @@ pytest.importorskip("lerobot.datasets")
 from lerobot.datasets.lerobot_dataset import LeRobotDataset
 
 from robocasa_lerobot import contract
+from robocasa_lerobot.data import mixture as mixtures
 from robocasa_lerobot.data.fake import INSTRUCTIONS, write_fake_dataset
 from robocasa_lerobot.data.mixture import MixtureDataset, StepBatches
 from robocasa_lerobot.data.reading import frame_cache
@@ -230,6 +232,27 @@ def test_cache_that_does_not_fit_is_left_out(root: Path, tmp_path: Path) -> None
     dataset = mixture(root)
     assert not dataset.cache_frames(tmp_path, budget_bytes=36 * 3 * 3 * 32 * 32 - 1)
     assert dataset.cache_frames(tmp_path, budget_bytes=36 * 3 * 3 * 32 * 32)
+
+
+@pytest.mark.skipif(not Path("/proc/self/smaps").is_file(), reason="only Linux tells how a file is mapped")
+def test_a_cache_larger_than_memory_is_read_frame_by_frame(
+    root: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    indices, key = np.array([[35, 0], [7, 7]]), contract.IMAGE_KEYS[1]
+    read = []
+    for memory in (2 * 36 * 3 * 3 * 32 * 32, 2 * 36 * 3 * 3 * 32 * 32 - 2):
+        monkeypatch.setattr(mixtures, "memory_bytes", lambda memory=memory: memory)
+        dataset = mixture(root)
+        assert dataset.cache_frames(tmp_path)
+        (cache,) = pickle.loads(pickle.dumps(list(dataset._caches.values())))
+        read.append((cache.scattered, cache.frames(key, indices)))
+        maps = Path("/proc/self/smaps").read_text(encoding="utf-8")
+        flags = re.findall(rf"{re.escape(str(cache.folder))}/{key}\.npy\n(?:.*\n)*?VmFlags:(.*)", maps)
+        cache.close()
+        assert any("rr" in one.split() for one in flags) == cache.scattered, "as the system was told"
+    (at_once, whole), (singly, parts) = read
+    assert (at_once, singly) == (False, True)
+    assert torch.equal(whole, parts)
 
 
 def test_statistics_are_those_of_the_frames_weighted_by_the_mixture(root: Path) -> None:

@@ -10,6 +10,7 @@ from __future__ import annotations
 import functools
 import hashlib
 import json
+import mmap
 import sys
 from collections import deque
 from collections.abc import Iterable, Iterator, Sequence
@@ -51,19 +52,31 @@ def cache_bytes(source: DatasetSource, keys: Sequence[str], size: tuple[int, int
 
 
 class FrameCache:
-    """A complete cache, opened for reading."""
+    """A complete cache, opened for reading.
 
-    def __init__(self, folder: Path) -> None:
-        self.folder = folder
+    `scattered` is for caches that memory cannot hold, each frame of which is read from the disk again: no more than
+    that frame is. Otherwise the system reads megabytes around each, which soon has all of a small cache in memory. Of
+    33 GB, 24 GiB of memory and batches of 64 frames from three cameras, a batch takes 4 ms instead of 130.
+    """
+
+    def __init__(self, folder: Path, scattered: bool = False) -> None:
+        self.folder, self.scattered = folder, scattered and hasattr(mmap, "MADV_RANDOM")
 
     @functools.cached_property
     def _arrays(self) -> dict[str, NDArray[np.uint8]]:
         keys = json.loads((self.folder / "cache.json").read_text())["keys"]
-        return {key: np.load(self.folder / f"{key}.npy", mmap_mode="r") for key in keys}
+        arrays = {key: np.load(self.folder / f"{key}.npy", mmap_mode="r") for key in keys}
+        if self.scattered:
+            for array in arrays.values():
+                _mapped(array).madvise(mmap.MADV_RANDOM)
+        return arrays
 
     def frames(self, key: str, indices: NDArray[np.int64]) -> torch.Tensor:
         """Frames of a camera feature: uint8 (*indices.shape, 3, height, width)."""
-        return torch.from_numpy(self._arrays[key][indices])
+        array = self._arrays[key]
+        if self.scattered:
+            _fetch(array, indices)
+        return torch.from_numpy(array[indices])
 
     def close(self) -> None:
         """Let go of the files until they are used again: a mapped file keeps its descriptor."""
@@ -71,13 +84,29 @@ class FrameCache:
 
     def __getstate__(self) -> dict[str, Any]:
         """A worker process maps the files itself; the arrays must not travel."""
-        return {"folder": self.folder}
+        return {"folder": self.folder, "scattered": self.scattered}
 
 
-def open_or_build(source: DatasetSource, keys: Sequence[str], size: tuple[int, int], cache_dir: Path) -> FrameCache:
+def _mapped(array: NDArray[np.uint8]) -> mmap.mmap:
+    assert isinstance(array.base, mmap.mmap)
+    return array.base
+
+
+def _fetch(array: NDArray[np.uint8], indices: NDArray[np.int64]) -> None:
+    """Have the system read rows of a mapped file all at once, instead of page by page as they are used."""
+    mapped, length = _mapped(array), array[0].nbytes
+    first = len(mapped) - array.nbytes  # the file's header, or what of it the mapping has
+    for start in (first + indices.ravel() * length).tolist():
+        page = start - start % mmap.PAGESIZE
+        mapped.madvise(mmap.MADV_WILLNEED, page, start + length - page)
+
+
+def open_or_build(
+    source: DatasetSource, keys: Sequence[str], size: tuple[int, int], cache_dir: Path, scattered: bool = False
+) -> FrameCache:
     """The cache of the camera features `keys` of `source` at (height, width) `size`, decoded if not there yet.
 
-    Several processes may ask at once: one decodes, the others wait.
+    `scattered` is how it is read, see `FrameCache`. Several processes may ask at once: one decodes, the others wait.
 
     Raises:
         UserError: too little free disk for it, or a video that lacks frames.
@@ -93,7 +122,7 @@ def open_or_build(source: DatasetSource, keys: Sequence[str], size: tuple[int, i
             check_disk(needed, cache_dir, "the frame cache", remedy)
             _fill(source, sorted(keys), size, partial)
             partial.rename(folder)
-    return FrameCache(folder)
+    return FrameCache(folder, scattered)
 
 
 def _allocated(folder: Path) -> int:
