@@ -21,6 +21,8 @@ ROWS: dict[str, str] = {
     "states_renderer_2": "renderer alone, 2 processes",
     "states_scenes_1": "renderer alone and opening scenes, 1 process",
     "states_scenes_2": "renderer alone and opening scenes, 2 processes",
+    "small_ours_1": "ours, 1 worker",
+    "small_ours_2": "ours, 2 workers",
     "lift_ours_1": "ours, 1 worker",
     "lift_ours_2": "ours, 2 workers",
     "lift_ours_quality": "ours, 1 worker, shadows as in robosuite",
@@ -31,6 +33,7 @@ ROWS: dict[str, str] = {
 SECTIONS: dict[str, str] = {
     "images": "pictures in the file",
     "states": "states only",
+    "small": "states only, 64 pixels",
     "lift": "robosuite's Lift, states only",
     "decode": "random access, batches of 16",
 }

@@ -40,6 +40,7 @@ OUTPUT = common.RESULTS / "convert_speed.json"
 WORK = common.REPOSITORY / "outputs" / "convert_speed"
 PROGRAM = BENCHMARKS / "convert_work.py"
 PNG_THREADS = 4
+SMALL_PIXELS = 64  # of a newcomer's datasets: the demo's and the study's
 
 
 @dataclass(frozen=True)
@@ -159,6 +160,7 @@ def _parts(peer: bool) -> list[Part]:
         parts.append(Part(f"images_encoder_{n}", partial(_encoder, processes=n)))
         parts.append(Part(f"states_ours_{n}", partial(_ours, kind="states", processes=n)))
         parts.append(Part(f"states_renderer_{n}", partial(_renderer, processes=n)))
+        parts.append(Part(f"small_ours_{n}", partial(_small, processes=n)))
         if peer:
             parts.append(Part(f"lift_ours_{n}", partial(_lift_ours, key=f"lift_ours_{n}", processes=n)))
     parts.append(Part("images_lerobot", partial(_lerobot, kind="images"), slow=True))
@@ -219,6 +221,12 @@ def _ours(run: Run, kind: str, processes: int) -> float:
     key = f"{kind}_ours_{processes}"
     answer = run.workers[0].ask("convert", file=str(file), out=run.place(key), workers=processes)
     return _rate(run, key, answer)
+
+
+def _small(run: Run, processes: int) -> float:
+    key = f"small_ours_{processes}"
+    file, out = str(run.files.states), run.place(key)
+    return _rate(run, key, run.workers[0].ask("convert", file=file, out=out, workers=processes, size=SMALL_PIXELS))
 
 
 def _lerobot(run: Run, kind: str) -> float:

@@ -64,13 +64,15 @@ def convert(
     cameras: list[str] | None = None,
     asset_roots: list[str] | None = None,
     preset: str = "fast",
+    size: int | None = None,
 ) -> dict[str, Any]:
-    """The converter, from the file to the finished dataset."""
+    """The converter, from the file to the finished dataset; `size` in pixels, None: as stored or usual."""
     shutil.rmtree(out, ignore_errors=True)
     settings = ConversionSettings(
         asset_roots=tuple(asset_roots or ()),
         cameras=None if cameras is None else tuple(cameras),
         render_preset=preset,
+        image_size=size,
     )
     clock = Clock()
     result = pipeline.convert([Path(file)], Path(out), settings, workers)

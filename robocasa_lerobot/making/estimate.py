@@ -1,8 +1,8 @@
 """How long our demonstrators and the conversion take, and what comes of it on disk: measured means, no promises.
 
 On two cores of an AMD EPYC without a GPU: demonstrations of 72 tasks by `benchmarks/demonstrators.py`, kind by kind
-(`benchmarks/results/demonstrators_alone.json`), drawing and encoding by `make bench-convert` (states of 256
-pixels in two processes: `benchmarks/results/convert_speed.json`; smaller pictures are not slower), sizes of three
+(`benchmarks/results/demonstrators_alone.json`), drawing and encoding by `make bench-convert` (states, in two
+processes: `benchmarks/results/convert_speed.json`), sizes of three
 tasks' datasets at 128 pixels that `robocasa-lerobot data --make` made.
 """
 
@@ -12,6 +12,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 from robocasa_lerobot.benchmark.tasks import task_facts
+from robocasa_lerobot.contract import IMAGE_SIZE
 from robocasa_lerobot.data.registry.recipes import REPLAY
 from robocasa_lerobot.making.needs import Need
 
@@ -20,7 +21,8 @@ SECONDS_PER_DEMONSTRATION: Mapping[str, float] = {"atomic": 0.71, "composite": 7
 STEPS_PER_DEMONSTRATION: Mapping[str, int] = {"atomic": 165, "composite": 950}
 # Of one core: a source is carried out again, and what it touches is noted (18 demonstrations of three tasks).
 PREPARING_SECONDS_PER_STEP = 0.003
-STEPS_PER_SECOND = 53.0  # of one core, with three cameras
+# Of one core, with three cameras, by the height and width of their pictures.
+STEPS_PER_SECOND: Mapping[int, float] = {64: 160.0, 256: 53.0}
 BYTES_PER_STEP = 6_000
 BYTES_PER_EPISODE = 500_000  # scene, textures and states, kept so that it can be drawn again
 
@@ -48,22 +50,33 @@ def estimate(needs: Iterable[Need], cores: int) -> Estimate:
     """What making the datasets takes, their sources among it; those that are drawn again are not recorded."""
     facts = task_facts()
     demonstrations = frames = 0
-    recording_seconds = 0.0
+    recording_seconds = converting_seconds = 0.0
     for need in needs:
         count = need.demonstrations or 0
         kind = facts[need.task].kind if need.task in facts else "atomic"  # of somebody's own tasks nothing is known
         demonstrations += count
-        frames += count * STEPS_PER_DEMONSTRATION[kind]
+        steps = count * STEPS_PER_DEMONSTRATION[kind]
+        frames += steps
+        converting_seconds += steps * _seconds_per_step(need)
         if need.redrawn is None:
             recording_seconds += count * SECONDS_PER_DEMONSTRATION[kind] + _seconds_of_sources(need, kind)
     return Estimate(
         demonstrations,
         frames,
         recording_seconds / cores / 3600,
-        frames / STEPS_PER_SECOND / cores / 3600,
+        converting_seconds / cores / 3600,
         frames * BYTES_PER_STEP + demonstrations * BYTES_PER_EPISODE,
         cores,
     )
+
+
+def _seconds_per_step(need: Need) -> float:
+    """Of one core, to draw and encode, by the number of pixels; larger pictures than were measured take more."""
+    recipe = None if need.made is None else need.made.make
+    pixels = IMAGE_SIZE if recipe is None else recipe.image_size
+    (small, small_rate), (large, large_rate) = sorted(STEPS_PER_SECOND.items())
+    share = max(0.0, (pixels**2 - small**2) / (large**2 - small**2))
+    return (1 - share) / small_rate + share / large_rate
 
 
 def _seconds_of_sources(need: Need, kind: str) -> float:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
@@ -48,7 +49,8 @@ def write_page(study: StudyConfig, stored: Stored, sets: Sets, results: Path, pa
     folder = _relative(results, page)
     kept = results.is_dir() and any(results.iterdir())
     link = f"[`{folder}`]({folder})" if kept else f"`{folder}`"
-    lines = [_HEAD.format(folder=link)]
+    short = ["## In short", ""]
+    lines: list[str] = []
     for name, part in study.parts.items():
         own = {key: run for key, run in stored.items() if key[0] in part.experiments and key[1] < part.seeds}
         lines += [f"## {part.asks}", ""]
@@ -59,17 +61,26 @@ def write_page(study: StudyConfig, stored: Stored, sets: Sets, results: Path, pa
                 "",
             ]
             continue
-        lines += _part(name, part, own, sets, results, folder)
+        answers, text = _part(name, part, own, sets, results, folder)
+        lines += text
+        first, *others = answers
+        short += [f"- [{part.asks}](#{_anchor(part.asks)}) {first}".rstrip()]
+        short += [f"  {answer}" for answer in others]
+    short = [*short, ""] if len(short) > 2 else []
     page.parent.mkdir(parents=True, exist_ok=True)
-    write_text(page, "\n".join(lines).rstrip("\n") + "\n")
+    write_text(page, "\n".join([_HEAD.format(folder=link), *short, *lines]).rstrip("\n") + "\n")
 
 
-def _part(name: str, part: PartConfig, stored: Stored, sets: Sets, results: Path, folder: str) -> list[str]:
+def _part(
+    name: str, part: PartConfig, stored: Stored, sets: Sets, results: Path, folder: str
+) -> tuple[list[str], list[str]]:
+    """Its answer, and all of its section below the question."""
     there = {row: trials for row in part.rows if (trials := row_trials(part, row, stored))}
     head = ["", *part.sets, "trials", "each training"]
     head += [f"against {part.reference}"] if part.reference else []
     table: list[list[str]] = []
     rates: dict[str, CellRate] = {}
+    against: dict[str, Estimate] = {}
     for row, trials in there.items():
         cells = [cell(trials, sets[task_set]) for task_set in part.sets]
         first = cells[0]
@@ -80,14 +91,15 @@ def _part(name: str, part: PartConfig, stored: Stored, sets: Sets, results: Path
             compared = part.reference in there and row != part.reference
             points = difference(trials, there[part.reference], sets[part.sets[0]]) if compared else None
             line.append(_points(points))
+            if points is not None:
+                against[row] = points
         table.append(line)
     lifelong = summaries(part, stored, sets) if part.matrix else {}
-    answers = (
-        [_retained(name, rows, lifelong) for name, rows in variants(part).items()]
-        if part.matrix
-        else _most(part, rates)
-    )
-    lines = [*answers, "", *_markdown(head, table), ""]
+    if part.matrix:
+        answers = ["", *(_retained(name, rows, lifelong) for name, rows in variants(part).items())]
+    else:
+        answers = [_most(part, rates, against)]
+    lines = [*answers[part.matrix :], "", *_markdown(head, table), ""]
     if part.matrix:
         lines += _forgetting(len(part.sets), lifelong)
     if part.tasks:
@@ -110,17 +122,23 @@ def _part(name: str, part: PartConfig, stored: Stored, sets: Sets, results: Path
     if terms:
         listed = "; ".join(f"{task}: `{term}` ({count})" for task, term, count in terms)
         lines += [f"What most often did not hold at the end of a failed trial: {listed}.", ""]
-    return [*lines, *_circumstances(part, stored.values()), ""]
+    return answers, [*lines, *_circumstances(part, stored.values()), ""]
 
 
-def _most(part: PartConfig, rates: Mapping[str, CellRate]) -> list[str]:
+def _most(part: PartConfig, rates: Mapping[str, CellRate], against: Mapping[str, Estimate]) -> str:
     """A sentence or two, of numbers alone."""
     if not rates:
-        return ["No row of the table has all its trials yet."]
-    if len(rates) < 3:
-        return [" ".join(f"{row}: {_percent(found.rate)} of {part.sets[0]}." for row, found in rates.items())]
+        return "No row of the table has all its trials yet."
+    if len(rates) < 3 and not against:
+        return " ".join(f"{row}: {_percent(found.rate)} of {part.sets[0]}." for row, found in rates.items())
     best = max(rates, key=lambda row: rates[row].rate.value)
-    return [f"Most: {best}, {_percent(rates[best].rate)}."]
+    most = f"Most: {best}, {_percent(rates[best].rate)}"
+    if best in against:
+        return f"{most}; against {part.reference}: {_points(against[best])}."
+    if best != part.reference or not against:
+        return f"{most}."
+    second = max(against, key=lambda row: against[row].value)
+    return f"{most}; beside it, {second}: {_points(against[second])}."
 
 
 def _retained(name: str, rows: Mapping[int, str], lifelong: Mapping[str, Lifelong]) -> str:
@@ -208,6 +226,11 @@ def _seeds(found: CellRate | None) -> str:
 
 def _mean(parts: Sequence[Estimate]) -> Estimate:
     return linear_combination(parts, [1 / len(parts)] * len(parts))
+
+
+def _anchor(heading: str) -> str:
+    """Of a heading on GitHub's pages: small letters, digits and hyphens."""
+    return re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-")
 
 
 def _relative(results: Path, page: Path) -> str:

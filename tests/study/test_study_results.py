@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import re
 from pathlib import Path
 
 import pytest
@@ -127,6 +128,8 @@ def test_the_page_has_rates_differences_and_circumstances(tmp_path: Path) -> Non
     assert "|B|0 % (0 to 32)|38 % (" in text
     assert "4 of 4 trainings, 6.0 hours of training (on NVIDIA H200) and" in text
     assert "0123456789ab-dirty" in text
+    assert "## In short\n\n- [Which?](#which) Most: many, 62 % (" in text, "the answers first"
+    assert re.search(r"; against few: \+44 \(.*\)\.\n\n## Which\?\n", text)
     assert "Not run yet: `robocasa-lerobot study later`, with" in text
     drawn = (results / "amount_rates.svg").read_text(encoding="utf-8")
     assert "success rate at" in drawn, "of which tasks it is"
