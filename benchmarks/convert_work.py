@@ -264,7 +264,7 @@ def _recorded(root: Path) -> tuple[dict[str, Any], dict[str, NDArray[Any]], list
     features = {
         key: {word: feature[word] for word in ("dtype", "shape", "names")}
         for key, feature in meta.features.items()
-        if key not in own
+        if key not in own and feature["dtype"] != "language"  # stages, which its own commands do not record either
     }
     columns = {
         key: column(root, key).reshape(meta.total_frames, *feature["shape"])

@@ -22,7 +22,7 @@ STEPS_PER_DEMONSTRATION: Mapping[str, int] = {"atomic": 165, "composite": 950}
 # Of one core: a source is carried out again, and what it touches is noted (18 demonstrations of three tasks).
 PREPARING_SECONDS_PER_STEP = 0.003
 # Of one core, with three cameras, by the height and width of their pictures.
-STEPS_PER_SECOND: Mapping[int, float] = {64: 160.0, 256: 53.0}
+STEPS_PER_SECOND: Mapping[int, float] = {64: 167.0, 256: 94.0}
 BYTES_PER_STEP = 6_000
 BYTES_PER_EPISODE = 500_000  # scene, textures and states, kept so that it can be drawn again
 

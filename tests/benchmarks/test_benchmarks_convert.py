@@ -142,6 +142,11 @@ def test_the_encoder_alone_writes_every_picture_as_our_converter_does(tmp_path: 
 def test_lerobots_own_path_records_the_same_demos(tmp_path: Path) -> None:
     work = module("convert_work")
     file = write_demos(tmp_path / "a.hdf5", (6, 4), images=64)
+    with h5py.File(file, "r+") as demos:  # with stages, as our demonstrators tell them
+        for demo in demos["data"].values():
+            demo["stage"] = np.zeros(len(demo["actions"]), np.int32)
+            stages = {"stages": [{"text": "open the drawer", "skill": "open"}]}
+            demo.attrs["ep_meta"] = json.dumps(json.loads(demo.attrs["ep_meta"]) | stages)
     reference, out = tmp_path / "reference", tmp_path / "lerobot"
     work.convert(str(file), str(reference), workers=1)
     assert work.record_with_lerobot(str(file), str(reference), str(out), render=False)["frames"] == 10
@@ -149,6 +154,8 @@ def test_lerobots_own_path_records_the_same_demos(tmp_path: Path) -> None:
         np.testing.assert_array_equal(work.column(out, key), work.column(reference, key))
     features = json.loads((out / "meta" / "info.json").read_text())["features"]
     assert features[contract.IMAGE_KEYS[0]]["info"]["video.codec"] == "av1"  # its default, not ours
+    kept = json.loads((reference / "meta" / "info.json").read_text())["features"]
+    assert set(kept) - set(features) == {contract.LANGUAGE_KEY}
 
 
 @pytest.mark.render

@@ -96,7 +96,7 @@ def test_hours_and_disk_come_first_and_check_says_it_with_its_status(capsys: pyt
     assert cli.main(["data", file, "--workers", "2", "--episodes", "human=100,mg=10000,target=500"]) == 0
     lines = capsys.readouterr().out.splitlines()
     assert lines[0] == "experiment small_foundation: 143 dataset(s), 0 there (0 MB)"
-    assert "615,500 demonstrations in 143 dataset(s), about 60.8 h of recording and 266.1 h" in lines[1]
+    assert "615,500 demonstrations in 143 dataset(s), about 60.8 h of recording and 97.6 h" in lines[1]
     assert any(line.startswith("pretrain/mg/{task}") and "600,000" in line for line in lines)
     assert any("composite_seen_10 is left out" in line for line in lines)
     assert f"robocasa-lerobot data {file} --make --episodes human=100,mg=10000,target=500" in lines[-1]

@@ -41,11 +41,12 @@ def study(folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
 
 
 def test_the_plan_tells_what_each_part_takes(tmp_path: Path) -> None:
-    done = study(tmp_path, "--plan", "--measure=0", "multitask", "lifelong")
+    done = study(tmp_path, "--plan", "--measure=0", "multitask", "data_efficiency", "lifelong")
     assert done.returncode == 0, done.stderr
     lines = {line.split()[0]: line.split() for line in done.stdout.splitlines() if line and not line.startswith(" ")}
-    assert lines["multitask"][1:3] == ["3", "1,800"]
-    assert lines["lifelong"][1:3] == ["3", "0"], "its data are the first part's"
+    assert lines["multitask"][1:3] == ["3", "7,200"]
+    assert lines["data_efficiency"][1:3] == ["3", "1,700"]
+    assert lines["lifelong"][1:3] == ["3", "300"], "most of its data are the second part's"
     assert lines["multitask"][4] == "?", "trainings were not measured"
     assert not (tmp_path / "datasets").exists()
 
