@@ -19,9 +19,9 @@ def memory_bytes() -> int:
     return os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
 
 
-def automatic_workers(pieces: int, work: int, least_work: int) -> int:
+def automatic_workers(pieces: int, work: int, least_work: int, cores_each: int = 1) -> int:
     """By cores, number of pieces, and the least work that pays for starting a process; `work` is all there is."""
-    return max(1, min(cores_here(), _MAX_AUTOMATIC_WORKERS, pieces, work // least_work))
+    return max(1, min(cores_here() // cores_each, _MAX_AUTOMATIC_WORKERS, pieces, work // least_work))
 
 
 def check_workers(asked: int | None) -> None:
@@ -34,13 +34,13 @@ def check_workers(asked: int | None) -> None:
         raise UserError(f"--workers is {asked}, expected at least 1.")
 
 
-def num_workers(asked: int | None, pieces: int, work: int, least_work: int) -> int:
-    """As many as were asked for, at most one for each piece; None chooses.
+def num_workers(asked: int | None, pieces: int, work: int, least_work: int, cores_each: int = 1) -> int:
+    """As many as were asked for, at most one for each piece; None chooses, one for each `cores_each` cores.
 
     Raises:
         UserError: fewer than one was asked for.
     """
     check_workers(asked)
     if asked is None:
-        return automatic_workers(pieces, work, least_work)
+        return automatic_workers(pieces, work, least_work, cores_each)
     return min(asked, pieces)
