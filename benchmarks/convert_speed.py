@@ -160,7 +160,7 @@ def _parts(peer: bool) -> list[Part]:
         parts.append(Part(f"images_encoder_{n}", partial(_encoder, processes=n)))
         parts.append(Part(f"states_ours_{n}", partial(_ours, kind="states", processes=n)))
         parts.append(Part(f"states_renderer_{n}", partial(_renderer, processes=n)))
-        parts.append(Part(f"small_ours_{n}", partial(_small, processes=n)))
+        parts.append(Part(f"small_ours_{n}", partial(_ours, kind="small", processes=n, size=SMALL_PIXELS)))
         if peer:
             parts.append(Part(f"lift_ours_{n}", partial(_lift_ours, key=f"lift_ours_{n}", processes=n)))
     parts.append(Part("images_lerobot", partial(_lerobot, kind="images"), slow=True))
@@ -216,17 +216,11 @@ def _start(run: Run, stack: contextlib.ExitStack) -> tuple[dict[str, float], dic
     return startup, said
 
 
-def _ours(run: Run, kind: str, processes: int) -> float:
+def _ours(run: Run, kind: str, processes: int, size: int | None = None) -> float:
     file = run.files.images if kind == "images" else run.files.states
     key = f"{kind}_ours_{processes}"
-    answer = run.workers[0].ask("convert", file=str(file), out=run.place(key), workers=processes)
+    answer = run.workers[0].ask("convert", file=str(file), out=run.place(key), workers=processes, size=size)
     return _rate(run, key, answer)
-
-
-def _small(run: Run, processes: int) -> float:
-    key = f"small_ours_{processes}"
-    file, out = str(run.files.states), run.place(key)
-    return _rate(run, key, run.workers[0].ask("convert", file=file, out=out, workers=processes, size=SMALL_PIXELS))
 
 
 def _lerobot(run: Run, kind: str) -> float:

@@ -63,9 +63,8 @@ def write_page(study: StudyConfig, stored: Stored, sets: Sets, results: Path, pa
             continue
         answers, text = _part(name, part, own, sets, results, folder)
         lines += text
-        first, *others = answers
-        short += [f"- [{part.asks}](#{_anchor(part.asks)}) {first}".rstrip()]
-        short += [f"  {answer}" for answer in others]
+        question = f"- [{part.asks}](#{_anchor(part.asks)})"
+        short += [question, *(f"  {answer}" for answer in answers)] if part.matrix else [f"{question} {answers[0]}"]
     short = [*short, ""] if len(short) > 2 else []
     page.parent.mkdir(parents=True, exist_ok=True)
     write_text(page, "\n".join([_HEAD.format(folder=link), *short, *lines]).rstrip("\n") + "\n")
@@ -74,7 +73,7 @@ def write_page(study: StudyConfig, stored: Stored, sets: Sets, results: Path, pa
 def _part(
     name: str, part: PartConfig, stored: Stored, sets: Sets, results: Path, folder: str
 ) -> tuple[list[str], list[str]]:
-    """Its answer, and all of its section below the question."""
+    """Its answers, a line for each variant of a matrix or one, and all of its section below the question."""
     there = {row: trials for row in part.rows if (trials := row_trials(part, row, stored))}
     head = ["", *part.sets, "trials", "each training"]
     head += [f"against {part.reference}"] if part.reference else []
@@ -96,10 +95,10 @@ def _part(
         table.append(line)
     lifelong = summaries(part, stored, sets) if part.matrix else {}
     if part.matrix:
-        answers = ["", *(_retained(name, rows, lifelong) for name, rows in variants(part).items())]
+        answers = [_retained(name, rows, lifelong) for name, rows in variants(part).items()]
     else:
         answers = [_most(part, rates, against)]
-    lines = [*answers[part.matrix :], "", *_markdown(head, table), ""]
+    lines = [*answers, "", *_markdown(head, table), ""]
     if part.matrix:
         lines += _forgetting(len(part.sets), lifelong)
     if part.tasks:
