@@ -12,7 +12,7 @@ from typing import Any
 import psutil
 from workers import WorkerError
 
-SAMPLE_S = 0.05
+SAMPLE_S = 0.02
 
 
 def run_command(arguments: Sequence[str]) -> dict[str, Any]:
@@ -20,7 +20,8 @@ def run_command(arguments: Sequence[str]) -> dict[str, Any]:
 
     Returns:
         `seconds`, start of the interpreter and imports included; `peak_mib`, the largest sum over the process and
-        its descendants of what each has in RAM, sampled 20 times a second (pages that forked processes share count
+        its descendants of what each has in RAM, sampled 50 times a second (a command that
+        is over sooner is not measured; pages that forked processes share count
         once for each of them); `processes`, the most at one time.
 
     Raises:

@@ -190,9 +190,9 @@ def test_the_renderer_alone_draws_what_our_converter_draws(tmp_path: Path) -> No
 
 def test_memory_of_a_command_and_one_that_fails() -> None:
     memory, workers = module("convert_memory"), module("workers")
-    found = memory.run_command(["convert", "--help"])
+    found = memory.run_command(["tasks"])  # imports the kitchens: seconds, where a command's help ends between samples
     assert found["seconds"] > 0
-    assert found["peak_mib"] > 1
+    assert found["peak_mib"] > 20
     assert found["processes"] >= 1
     with pytest.raises(workers.WorkerError, match="unknown command"):
         memory.run_command(["convrt"])
