@@ -4,14 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 from lerobot.configs import PreTrainedConfig
 from lerobot.optim import AdamWConfig
+from lerobot.optim.optimizers import OptimizerConfig
 
 from robocasa_lerobot.contract import STATE_PARTS, STATE_SIZE, STATE_SLICES
-from robocasa_lerobot.errors import UserError
+from robocasa_lerobot.errors import UnknownNameError, UserError
+from robocasa_lerobot.policies.common.muon import MuonConfig
 from robocasa_lerobot.policies.common.statistics import CONSTANT_RANGE
 
+OPTIMIZERS = ("adamw", "muon")
 LANGUAGE_HEADS = 4  # of the layer that makes a vector of an instruction's words
 
 
@@ -51,7 +55,10 @@ class ActionChunkConfig(PreTrainedConfig):
     # Normalisation. See `policies/common/statistics.py` for constant components.
     constant_range: float = CONSTANT_RANGE  # a narrower component (max - min) counts as constant and keeps its scale
 
-    # AdamW and warm-up, used by training unless it says otherwise.
+    # Optimiser and warm-up, used by training unless it says otherwise. `muon` is for the matrices inside the network
+    # and AdamW then for the rest (policies/common/muon.py).
+    optimizer_name: str = "adamw"
+    optimizer_matrix_lr: float = 0.01  # of `muon`
     optimizer_lr: float = 1e-4
     optimizer_betas: tuple[float, float] = (0.9, 0.95)
     optimizer_eps: float = 1e-8
@@ -66,15 +73,24 @@ class ActionChunkConfig(PreTrainedConfig):
         """No rewards are used."""
         return None
 
-    def get_optimizer_preset(self) -> AdamWConfig:
-        """AdamW; groups with their own weight decay come from the policy's `get_optim_params`."""
-        return AdamWConfig(
-            lr=self.optimizer_lr,
-            betas=self.optimizer_betas,
-            eps=self.optimizer_eps,
-            weight_decay=self.optimizer_weight_decay,
-            grad_clip_norm=self.optimizer_grad_clip_norm,
-        )
+    def get_optimizer_preset(self) -> OptimizerConfig:
+        """AdamW or Muon; AdamW's groups with their own weight decay come from the policy's `get_optim_params`.
+
+        Raises:
+            UnknownNameError: `optimizer_name` is another one.
+        """
+        shared: dict[str, Any] = {
+            "lr": self.optimizer_lr,
+            "betas": self.optimizer_betas,
+            "eps": self.optimizer_eps,
+            "weight_decay": self.optimizer_weight_decay,
+            "grad_clip_norm": self.optimizer_grad_clip_norm,
+        }
+        if self.optimizer_name == "muon":
+            return MuonConfig(**shared, matrix_lr=self.optimizer_matrix_lr)
+        if self.optimizer_name != "adamw":
+            raise UnknownNameError("optimizer_name", self.optimizer_name, OPTIMIZERS)
+        return AdamWConfig(**shared)
 
     def check_at_least_one(self, names: Sequence[str]) -> None:
         """Check counts.

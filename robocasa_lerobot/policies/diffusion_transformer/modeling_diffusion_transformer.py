@@ -63,8 +63,13 @@ class DiffusionTransformerPolicy(PreTrainedPolicy):
         self._observed_keys = (*self.observation_encoder.image_keys, OBS_STATE)
         self.reset()
 
-    def get_optim_params(self) -> list[dict[str, Any]]:
-        """Parameter groups: matrices of the transformer, its biases, norms and positions, and the encoders."""
+    def get_optim_params(self) -> list[dict[str, Any]] | dict[str, torch.nn.Parameter]:
+        """Parameter groups: matrices of the transformer, its biases, norms and positions, and the encoders.
+
+        For `muon`, which goes by names, the parameters by their names.
+        """
+        if self.config.optimizer_name == "muon":
+            return {name: p for name, p in self.named_parameters() if p.requires_grad}
         decayed, rest = decay_groups(self.denoiser)
         encoder = [p for p in self.observation_encoder.parameters() if p.requires_grad]
         groups: list[dict[str, Any]] = [

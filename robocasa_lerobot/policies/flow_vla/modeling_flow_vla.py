@@ -57,8 +57,13 @@ class FlowVlaPolicy(PreTrainedPolicy):
         self._ask_expert = Traced(self.expert)
         self.reset()
 
-    def get_optim_params(self) -> list[dict[str, Any]]:
-        """Parameter groups: matrices of linear layers, and the rest, which does not decay."""
+    def get_optim_params(self) -> list[dict[str, Any]] | dict[str, torch.nn.Parameter]:
+        """Parameter groups: matrices of linear layers, and the rest, which does not decay.
+
+        For `muon`, which goes by names, the parameters by their names.
+        """
+        if self.config.optimizer_name == "muon":
+            return {name: p for name, p in self.named_parameters() if p.requires_grad}
         decayed, rest = decay_groups(self)
         groups: list[dict[str, Any]] = [{"params": decayed}, {"params": rest, "weight_decay": 0.0}]
         return [group for group in groups if group["params"]]

@@ -17,7 +17,7 @@ from robocasa_lerobot.training.config.phase import PhaseConfig
 from robocasa_lerobot.training.weights.master_weights import MasterWeights
 
 _SHARED = ("lr", "weight_decay", "grad_clip_norm", "betas", "eps")  # what optimisers of several types have
-_BY_NAME = "xvla-adamw"  # LeRobot's optimiser whose rates go by the names of parameters
+_BY_NAME = ("xvla-adamw", "muon")  # optimisers whose rates go by the names of parameters
 
 
 def check_optimizer(config: PreTrainedConfig, phase: PhaseConfig) -> None:
@@ -43,7 +43,7 @@ def make_optimizer(
     """
     preset = _optimizer_settings(policy.config, phase)
     masters = MasterWeights(policy) if masters is None else masters
-    optimizer = preset.build(masters.groups(_trained_groups(policy, phase, by_name=preset.type == _BY_NAME)))
+    optimizer = preset.build(masters.groups(_trained_groups(policy, phase, by_name=preset.type in _BY_NAME)))
     if not isinstance(optimizer, torch.optim.Optimizer):
         raise UserError(f"policy {policy.config.type!r} wants several optimisers, which training does not support.")
     for group in optimizer.param_groups:
