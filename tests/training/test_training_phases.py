@@ -311,6 +311,10 @@ def test_optimizer_and_schedule_of_a_phase(tmp_path: Path, data: Path) -> None:
     assert optimizer.param_groups[0]["lr"] == own.lr, "the policy's, not that of LeRobot's adam"
     optimizer, _ = made("--phases.pretrain.optimizer={type: xvla-adamw}", "--phases.pretrain.lora={rank: 2}")
     assert [group["name"] for group in optimizer.param_groups] == ["other"]  # it goes by names
+    optimizer, _ = made(
+        "--phases.pretrain.optimizer={type: muon, matrix_lr: 0.1}", "--phases.pretrain.learning_rate=1e-6"
+    )
+    assert [group["lr"] for group in optimizer.param_groups] == pytest.approx([0.1 * 1e-6 / own.lr, 1e-6])
     cosine = "type: cosine_decay_with_warmup, num_decay_steps: 1000, peak_lr: 1.0, decay_lr: 0.1, num_warmup_steps: 3"
     _, schedule = made(f"--phases.pretrain.scheduler={{{cosine}}}")  # a warm-up that was asked for is not shortened
     assert [schedule.lr_lambdas[0](step) for step in range(3)] == pytest.approx([0.25, 0.5, 0.75])

@@ -2,7 +2,7 @@
 
 Muon: Jordan et al. 2024, "Muon: An optimizer for hidden layers in neural networks"; a step's momentum is made
 orthogonal, so that all directions of a matrix move alike. PyTorch's has matrices only; the weights of convolutions
-are taken here as matrices of (outputs, inputs x height x width). What it is worth: docs/decisions/0034.
+are taken here as matrices of (outputs, inputs x height x width). What it is worth: docs/decisions/0043.
 """
 
 from __future__ import annotations
@@ -17,12 +17,15 @@ from torch import Tensor, nn
 from torch.optim import _muon
 
 # Parts of names of what is no map between hidden features: tables, positions, first and last layers, modulations.
-NOT_HIDDEN = ("embed", "position", "head", "film", "text_encoder")
+NOT_HIDDEN = ("embed", "position", "film", "modulation", "text_encoder")
+LAST_LAYER = "head"  # ends a part of its name, which `multihead_attn` does not
 
 
 def is_hidden_matrix(name: str, parameter: Tensor) -> bool:
-    """Whether Muon is for a parameter: two axes or more, more than one row and column, and none of `NOT_HIDDEN`."""
+    """Whether Muon is for a parameter: two axes or more, more than one row and column, none of `NOT_HIDDEN`."""
     if parameter.ndim < 2 or any(part in name for part in NOT_HIDDEN):
+        return False
+    if any(part.endswith(LAST_LAYER) for part in name.split(".")):
         return False
     return min(parameter.shape[0], parameter.shape[1:].numel()) > 1
 

@@ -13,6 +13,7 @@ from lerobot.optim.schedulers import CosineDecayWithWarmupSchedulerConfig, Diffu
 from lerobot.policies.pretrained import PreTrainedPolicy
 
 from robocasa_lerobot.errors import UnknownNameError, UserError
+from robocasa_lerobot.policies.common.muon import MuonConfig
 from robocasa_lerobot.training.config.phase import PhaseConfig
 from robocasa_lerobot.training.weights.master_weights import MasterWeights
 
@@ -63,6 +64,8 @@ def in_lerobots_words(config: PreTrainedConfig, phase: PhaseConfig) -> tuple[Opt
     preset = _optimizer_settings(config, phase)
     asked = {"lr": phase.learning_rate, "grad_clip_norm": phase.grad_clip_norm}
     changes = {name: value for name, value in asked.items() if value is not None}
+    if isinstance(preset, MuonConfig) and phase.learning_rate is not None:
+        changes["matrix_lr"] = preset.matrix_lr * phase.learning_rate / preset.lr
     return dataclasses.replace(preset, **changes), _schedule_settings(config, phase)
 
 
