@@ -176,25 +176,6 @@ def weight_decay(folder: Path, step: str) -> float:
     return float(json.loads(path.read_text())[0]["weight_decay"])
 
 
-def test_matrices_are_trained_by_muon_where_a_policy_says_so(tmp_path: Path, data: Path, finished: Path) -> None:
-    """In one go and stopped, by the same rates in both phases; LeRobot's settings of it lie beside the weights."""
-    changes = ["--policy.optimizer_name=muon", "--phases.finetune.learning_rate=5e-4"]
-    assert run_experiment(tiny(tmp_path, data, overrides=changes))
-    assert losses(tmp_path, "pretrain")[0] == losses(finished, "pretrain")[0]
-    assert losses(tmp_path, "pretrain")[1:] != losses(finished, "pretrain")[1:]
-    again = tmp_path / "again"
-    again.mkdir()
-    stopped = tiny(again, data, overrides=changes)
-    assert not run_experiment(stopped, stop_after=3)
-    assert run_experiment(stopped)
-    for phase in ("pretrain", "finetune"):
-        assert losses(again, phase) == losses(tmp_path, phase)
-        told = json.loads((tmp_path / f"out/{phase}/checkpoints/last/pretrained_model/train_config.json").read_text())
-        part = 1.0 if phase == "pretrain" else 0.5
-        assert told["optimizer"]["type"] == "muon"
-        assert (told["optimizer"]["lr"], told["optimizer"]["matrix_lr"]) == pytest.approx((1e-3 * part, 0.01 * part))
-
-
 def test_forced_without_changes_gives_the_same_losses(tmp_path: Path, data: Path, finished: Path) -> None:
     experiment = tiny(tmp_path, data)
     assert not run_experiment(experiment, stop_after=3)

@@ -27,7 +27,7 @@ from robocasa_lerobot.training.config.experiment import load_experiment
 from robocasa_lerobot.training.config.phase import LoraConfig, PhaseConfig
 from robocasa_lerobot.training.phases import run_experiment
 from robocasa_lerobot.training.planning import evaluations
-from robocasa_lerobot.training.setup import builders, optimizers
+from robocasa_lerobot.training.setup import builders
 from robocasa_lerobot.training.setup import phase_data as joining
 from robocasa_lerobot.training.setup.build_phase import prepare_phase
 from robocasa_lerobot.training.weights.adapters import apply_training_scope, merged_state
@@ -288,40 +288,6 @@ def test_low_rank_change_starts_at_nothing() -> None:
     phase.lora = LoraConfig(targets=["b"])
     with pytest.raises(UserError, match="unknown layer 'b'"):
         apply_training_scope(torch.nn.Sequential(torch.nn.Linear(2, 2)), phase, 0)
-
-
-def test_optimizer_and_schedule_of_a_phase(tmp_path: Path, data: Path) -> None:
-    def made(*overrides: str) -> tuple[torch.optim.Optimizer, Any]:
-        experiment = tiny(tmp_path, data, "act", overrides)
-        config = builders.policy_config(experiment.policy, None, "cpu")
-        meta = open_mixture(experiment.phases[0].mixture, experiment.loader).meta
-        policy = builders.make_phase_policy(config, meta, None)
-        return optimizers.make_optimizer(policy, experiment.phases[0])[:2]
-
-    optimizer, _ = made("--phases.pretrain.optimizer={weight_decay: 0.5, betas: [0.5, 0.6]}")
-    assert optimizer.param_groups[0]["weight_decay"] == 0.5
-    assert optimizer.param_groups[0]["betas"] == (0.5, 0.6)
-    optimizer, schedule = made(
-        "--phases.pretrain.optimizer={type: sgd, lr: 0.1}", "--phases.pretrain.scheduler={type: none}"
-    )
-    assert isinstance(optimizer, torch.optim.SGD)
-    assert schedule is None
-    optimizer, _ = made("--phases.pretrain.optimizer={type: adam}")
-    own = builders.policy_config(tiny(tmp_path, data, "act").policy, None, "cpu").get_optimizer_preset()
-    assert optimizer.param_groups[0]["lr"] == own.lr, "the policy's, not that of LeRobot's adam"
-    optimizer, _ = made("--phases.pretrain.optimizer={type: xvla-adamw}", "--phases.pretrain.lora={rank: 2}")
-    assert [group["name"] for group in optimizer.param_groups] == ["other"]  # it goes by names
-    optimizer, _ = made(
-        "--phases.pretrain.optimizer={type: muon, matrix_lr: 0.1}", "--phases.pretrain.learning_rate=1e-6"
-    )
-    assert [group["lr"] for group in optimizer.param_groups] == pytest.approx([0.1 * 1e-6 / own.lr, 1e-6])
-    cosine = "type: cosine_decay_with_warmup, num_decay_steps: 1000, peak_lr: 1.0, decay_lr: 0.1, num_warmup_steps: 3"
-    _, schedule = made(f"--phases.pretrain.scheduler={{{cosine}}}")  # a warm-up that was asked for is not shortened
-    assert [schedule.lr_lambdas[0](step) for step in range(3)] == pytest.approx([0.25, 0.5, 0.75])
-    with pytest.raises(UserError, match="Did you mean 'weight_decay'"):
-        made("--phases.pretrain.optimizer={weight_decy: 0.5}")
-    with pytest.raises(UserError, match="type of optimizer"):
-        made("--phases.pretrain.optimizer={type: sdg}")
 
 
 def test_constant_components_do_not_explode_in_lerobots_policies(tmp_path: Path, data: Path) -> None:
