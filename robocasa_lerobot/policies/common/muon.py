@@ -1,8 +1,8 @@
-"""Muon for the matrices inside a network, AdamW for the rest: a third of AdamW's steps to the same loss.
+"""Muon for the matrices inside a network, AdamW for the rest.
 
 Muon: Jordan et al. 2024, "Muon: An optimizer for hidden layers in neural networks"; a step's momentum is made
 orthogonal, so that all directions of a matrix move alike. PyTorch's has matrices only; the weights of convolutions
-are taken here as matrices of (outputs, inputs x height x width). What it is worth: docs/decisions/0043.
+are taken here as matrices of (outputs, inputs x height x width). What it is worth: docs/decisions/0043-muon.md.
 """
 
 from __future__ import annotations
