@@ -20,9 +20,8 @@ def run_command(arguments: Sequence[str]) -> dict[str, Any]:
 
     Returns:
         `seconds`, start of the interpreter and imports included; `peak_mib`, the largest sum over the process and
-        its descendants of what each has in RAM, sampled 50 times a second (a command that
-        is over sooner is not measured; pages that forked processes share count
-        once for each of them); `processes`, the most at one time.
+        its descendants of what each has in RAM, sampled 50 times a second (a command that is over sooner is not
+        measured; pages that forked processes share count once for each of them); `processes`, the most at one time.
 
     Raises:
         WorkerError: the command failed; the message has its last words.

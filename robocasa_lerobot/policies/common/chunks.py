@@ -75,6 +75,11 @@ def starting_noise(noise: Tensor | None, shape: Sequence[int], generator: Genera
     return x
 
 
+def trained_by_name(module: nn.Module) -> dict[str, nn.Parameter]:
+    """The parameters of `module` that are not frozen, by their names, for optimisers that go by these."""
+    return {name: p for name, p in module.named_parameters() if p.requires_grad}
+
+
 def decay_groups(module: nn.Module) -> tuple[list[nn.Parameter], list[nn.Parameter]]:
     """Trainable parameters of `module` that weight decay is for, and the rest.
 

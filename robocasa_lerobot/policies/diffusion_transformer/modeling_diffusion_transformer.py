@@ -20,6 +20,7 @@ from robocasa_lerobot.policies.common.chunks import (
     sample_losses,
     starting_noise,
     target_actions,
+    trained_by_name,
 )
 from robocasa_lerobot.policies.common.look_back import LookBack
 from robocasa_lerobot.policies.common.traced import Traced
@@ -69,7 +70,7 @@ class DiffusionTransformerPolicy(PreTrainedPolicy):
         For `muon`, which goes by names, the parameters by their names.
         """
         if self.config.optimizer_name == "muon":
-            return {name: p for name, p in self.named_parameters() if p.requires_grad}
+            return trained_by_name(self)
         decayed, rest = decay_groups(self.denoiser)
         encoder = [p for p in self.observation_encoder.parameters() if p.requires_grad]
         groups: list[dict[str, Any]] = [

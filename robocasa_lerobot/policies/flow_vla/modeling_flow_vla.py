@@ -20,6 +20,7 @@ from robocasa_lerobot.policies.common.chunks import (
     sample_losses,
     starting_noise,
     target_actions,
+    trained_by_name,
 )
 from robocasa_lerobot.policies.common.state import StateInput
 from robocasa_lerobot.policies.common.traced import Traced
@@ -63,7 +64,7 @@ class FlowVlaPolicy(PreTrainedPolicy):
         For `muon`, which goes by names, the parameters by their names.
         """
         if self.config.optimizer_name == "muon":
-            return {name: p for name, p in self.named_parameters() if p.requires_grad}
+            return trained_by_name(self)
         decayed, rest = decay_groups(self)
         groups: list[dict[str, Any]] = [{"params": decayed}, {"params": rest, "weight_decay": 0.0}]
         return [group for group in groups if group["params"]]

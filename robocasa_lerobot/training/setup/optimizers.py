@@ -13,6 +13,7 @@ from lerobot.optim.schedulers import CosineDecayWithWarmupSchedulerConfig, Diffu
 from lerobot.policies.pretrained import PreTrainedPolicy
 
 from robocasa_lerobot.errors import UnknownNameError, UserError
+from robocasa_lerobot.policies.common.chunks import trained_by_name
 from robocasa_lerobot.policies.common.muon import MuonConfig
 from robocasa_lerobot.training.config.phase import PhaseConfig
 from robocasa_lerobot.training.weights.master_weights import MasterWeights
@@ -136,7 +137,7 @@ def trained_parameters(policy: PreTrainedPolicy, phase: PhaseConfig) -> dict[str
     Raises:
         UserError: all are.
     """
-    trained = {name: p for name, p in policy.named_parameters() if p.requires_grad}
+    trained = trained_by_name(policy)
     if not trained:
         raise UserError(f"phase {phase.name!r}: `freeze` leaves nothing of the policy to train.")
     return trained
