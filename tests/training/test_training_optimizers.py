@@ -10,21 +10,10 @@ import pytest
 import torch
 from training_support import losses, tiny
 
-from robocasa_lerobot.data.fake import write_fake_dataset
 from robocasa_lerobot.data.mixture import open_mixture
 from robocasa_lerobot.errors import UserError
 from robocasa_lerobot.training.phases import run_experiment
 from robocasa_lerobot.training.setup import builders, optimizers
-
-
-@pytest.fixture(scope="module")
-def data(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return write_fake_dataset(tmp_path_factory.mktemp("data") / "fake", episodes=4, length=12, image_size=32)
-
-
-@pytest.fixture(autouse=True)
-def _one_thread() -> None:
-    torch.set_num_threads(1)
 
 
 def test_optimizer_and_schedule_of_a_phase(tmp_path: Path, data: Path) -> None:
