@@ -38,6 +38,7 @@ SUBCOMMANDS: dict[str, Subcommand] = {
     "demos": Subcommand("robocasa_lerobot.cli.demos", "record demonstrations of tasks as HDF5"),
     "teleop": Subcommand("robocasa_lerobot.cli.teleop", "record demonstrations by hand, in a browser"),
     "replay": Subcommand("robocasa_lerobot.cli.replay", "check that demonstrations can be replayed"),
+    "correct": Subcommand("robocasa_lerobot.cli.correct", "let demonstrators take over from a policy, and record it"),
     "prepare": Subcommand("robocasa_lerobot.cli.prepare", "make demonstrations ready to be sources of `generate`"),
     "generate": Subcommand("robocasa_lerobot.cli.generate", "make demonstrations in new scenes out of prepared ones"),
     "convert": Subcommand("robocasa_lerobot.cli.convert", "convert demonstration files to a LeRobotDataset v3.0"),

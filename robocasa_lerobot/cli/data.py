@@ -101,6 +101,9 @@ def run(args: argparse.Namespace) -> int:
         from robocasa_lerobot.making.make import make_datasets, pieces_of
 
         pieces = pieces_of(needs or [], args.replace, args.keep_recordings)
+        for need in [piece.need for piece in pieces if piece.need.waits]:
+            print(f"{need.root} comes later: it corrects the policy of {need.policy}, which is not trained yet")
+        pieces = [piece for piece in pieces if not piece.need.waits]
         return _said(make_datasets(pieces, execution, cores)) if pieces else 0
     return int(args.check and any(need.missing for need in needs or []))
 

@@ -5,6 +5,7 @@ Numbers come from memory, pictures from the frame cache or, without one, from Le
 
 from __future__ import annotations
 
+import dataclasses
 import functools
 import hashlib
 from collections import OrderedDict
@@ -20,7 +21,7 @@ from numpy.typing import NDArray
 from robocasa_lerobot import contract
 from robocasa_lerobot.data.alike import check_alike, unseen_pictures
 from robocasa_lerobot.data.mixture_config import LoaderConfig, MemberConfig, MixtureConfig
-from robocasa_lerobot.data.reading.decisions import frame_pool
+from robocasa_lerobot.data.reading.decisions import NoFramesError, frame_pool
 from robocasa_lerobot.data.reading.frame_cache import FrameCache, cache_bytes, open_or_build, resize_images
 from robocasa_lerobot.data.reading.pictures import PictureReader
 from robocasa_lerobot.data.reading.source import DatasetSource
@@ -79,7 +80,8 @@ class MixtureDataset(torch.utils.data.Dataset[Item]):
     `<key>_is_pad` (true where the window leaves the episode and repeats its edge). Images are uint8
     (time, 3, H, W), other floats float32; `task` is the instruction and `task_index` its place in `meta.tasks`.
     Index i counts the frames of the first member's dataset, then of the second's, and so on. Datasets in `opened` are
-    not opened again, and those that are opened are added to it.
+    not opened again, and those that are opened are added to it. Members without any frame of the kind that they ask
+    for are left out of `config`, unless none would be left.
 
     Raises:
         UserError: members that do not fit each other, or that have no such episodes.
@@ -93,7 +95,7 @@ class MixtureDataset(torch.utils.data.Dataset[Item]):
         opened: dict[Path, DatasetSource] | None = None,
     ) -> None:
         config, loader = resolve_mixture(config), loader or LoaderConfig()
-        self.config, self.image_size = config, image_size if image_size is not None else loader.image_size
+        self.image_size = image_size if image_size is not None else loader.image_size
         image_size = self.image_size
         self._deltas: dict[str, list[int]] = {}
         self._picture_size: tuple[int, int] | None = None
@@ -120,10 +122,20 @@ class MixtureDataset(torch.utils.data.Dataset[Item]):
         self._task_index = {
             root: np.array([number[text] for text in source.instructions]) for root, source in self.sources.items()
         }
-        self._members = []
+        self._members, kept, without = [], [], []
         for member in config.members:
             source = self.sources[Path(member.root)]
-            self._members.append(_Member(source, source.select(member), member.frames))
+            one = _Member(source, source.select(member), member.frames)
+            try:
+                one.frames  # noqa: B018 counted, and kept
+            except NoFramesError as error:  # a policy that needed no correction in this dataset
+                without.append(error)
+                continue
+            self._members.append(one)
+            kept.append(member)
+        if not kept:
+            raise without[0]
+        self.config = config = dataclasses.replace(config, members=kept)
         places = {root: place for place, root in enumerate(self.sources)}
         self._source_list = list(self.sources.values())
         self._place = np.array([places[Path(member.root)] for member in config.members])  # of each member's source

@@ -54,8 +54,7 @@ class MemberConfig:
     frames: str | None = None
 
     def __post_init__(self) -> None:
-        if self.frames is not None and self.frames not in contract.FRAME_KINDS:
-            raise UnknownNameError("kind of frames", self.frames, contract.FRAME_KINDS, "(of a mixture's member)")
+        _check_frames(self.frames)
         if self.repo_id is not None and not re.fullmatch(r"[\w.-]+/[\w.-]+", self.repo_id):
             raise UserError(f"mixture: repo_id is {self.repo_id!r}, expected OWNER/NAME of a dataset on the hub.")
         if not self.root and self.repo_id is None:
@@ -83,6 +82,7 @@ class SelectionConfig:
         group: class of the datasets, as for a member.
         layouts: kitchens to keep of each dataset, by their layout, as for a member.
         styles: likewise by their style.
+        frames: kind of the frames that start samples, as for a member; datasets without any are left out.
     """
 
     registry: str = ROBOCASA365
@@ -97,8 +97,10 @@ class SelectionConfig:
     group: str | None = None
     layouts: list[int] | None = None
     styles: list[int] | None = None
+    frames: str | None = None
 
     def __post_init__(self) -> None:
+        _check_frames(self.frames)
         what = f"selection of {self.registry!r}"
         if self.tasks_per_set is not None and self.tasks_per_set < 1:
             raise UserError(f"{what}: tasks_per_set is {self.tasks_per_set}, expected at least 1.")
@@ -178,6 +180,11 @@ def demo_count(demos: str, total: int) -> int:
         return min(total, int(count[1]))
     assert share, f"not checked: demos {demos!r}"
     return max(1, round(total * float(share[1]) / 100))
+
+
+def _check_frames(kind: str | None) -> None:
+    if kind is not None and kind not in contract.FRAME_KINDS:
+        raise UnknownNameError("kind of frames", kind, contract.FRAME_KINDS, "(of a mixture's member)")
 
 
 def _check_part(what: str, weight: float | None, demos: str | None) -> str | None:

@@ -43,13 +43,15 @@ def demonstrate(
     style: MotionStyle = PLAIN,
     log: StageLog | None = None,
     skills: Mapping[tuple[str, str], Skill] | None = None,
+    *,
+    midway: bool = False,
 ) -> Iterator[Array]:
-    """Actions (12,), stored order, for the episode that `env` has been reset to, one per control step.
+    """Actions (12,), stored order, for the episode that `env` is in, one per control step.
 
     Each action is computed from the state that the env is in when it is asked for, so the caller must step the env
     with it before asking for the next. It ends after the last stage, with the arm held still from then on. `style`
     says how it is carried out; `log` tells which stage each action belongs to, and what came of them; `skills` are
-    those that do it, the demonstrator's own if None.
+    those that do it, the demonstrator's own if None. `midway` says that somebody else has begun the episode.
 
     Raises:
         UnknownNameError: a stage needs a skill that does not exist.
@@ -57,7 +59,7 @@ def demonstrate(
     """
     gripper = -1.0
     give_motion_style(env, style)
-    for step in carry_out(env, StageLog() if log is None else log, skills):
+    for step in carry_out(env, StageLog() if log is None else log, skills, midway=midway):
         gripper = float(step[-1])
         yield style.carry_out(step)
     while True:

@@ -21,6 +21,7 @@ from robocasa_lerobot.demos.skills.pick_place.heaps import uppermost
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.predicates.logic import Goal, terms_by_name
 from robocasa_lerobot.envs.predicates.objects import ObjectOn
+from robocasa_lerobot.envs.scene.robot_poses import RobotPose
 from robocasa_lerobot.envs.tasks.conditions import must_never, stage_condition, without_gripper
 from robocasa_lerobot.envs.tasks.task import Stage
 from robocasa_lerobot.errors import UnknownNameError
@@ -73,7 +74,13 @@ class StageLog:
         ]
 
 
-def carry_out(env: KitchenEnv, log: StageLog, skills: Mapping[tuple[str, str], Skill] | None = None) -> Iterator[Array]:
+def carry_out(
+    env: KitchenEnv,
+    log: StageLog,
+    skills: Mapping[tuple[str, str], Skill] | None = None,
+    *,
+    midway: bool = False,
+) -> Iterator[Array]:
     """Actions (12,), stored order, that do all stages; it ends when the goal has held for a while.
 
     A stage that is done already is left out. One that fails is tried again; if the one before it has come undone
@@ -86,6 +93,7 @@ def carry_out(env: KitchenEnv, log: StageLog, skills: Mapping[tuple[str, str], S
         env: in the episode.
         log: tells which stage is on.
         skills: what carries out a stage, by its skill and verb; None takes the demonstrator's.
+        midway: somebody else has begun: the robot may stand anywhere, with its arm in any posture.
 
     Raises:
         UnknownNameError: a stage needs a skill that does not exist.
@@ -97,13 +105,18 @@ def carry_out(env: KitchenEnv, log: StageLog, skills: Mapping[tuple[str, str], S
     def still() -> Array:
         return action(gripper=gripper)
 
-    for step in _carry_out(env, log, SKILLS if skills is None else skills, still):
+    for step in _carry_out(env, log, SKILLS if skills is None else skills, still, midway=midway):
         gripper = float(step[-1])
         yield step
 
 
 def _carry_out(
-    env: KitchenEnv, log: StageLog, skills: Mapping[tuple[str, str], Skill], still: Callable[[], Array]
+    env: KitchenEnv,
+    log: StageLog,
+    skills: Mapping[tuple[str, str], Skill],
+    still: Callable[[], Array],
+    *,
+    midway: bool,
 ) -> Iterator[Array]:
     stages, goal = env.declaration.stages, env.declaration.goal
     # A task of one stage begins where it is done, unless that has been changed.
@@ -136,7 +149,8 @@ def _carry_out(
             outcome.skipped, outcome.done, outcome.reason = outcome.attempts == 0, True, ""
             index += 1
             continue
-        if led_away and stages[index].skill not in _AS_IT_IS:
+        stray = midway and (outcome.attempts > 0 or _stand_of(env, stages[index], FAR_OFF_M[0]) is not None)
+        if (led_away or stray) and stages[index].skill not in _AS_IT_IS:
             yield from fold_arm(env)
             yield from move_torso(env, 0.0, OPEN)
             yield from _stand_before(env, stages[index], FAR_OFF_M[min(outcome.attempts, 1)])
@@ -186,13 +200,19 @@ def _stand_before(env: KitchenEnv, stage: Stage, most_m: float) -> Iterator[Arra
 
     Skills that use fixtures go farther by themselves only a little.
     """
-    if not stage.target or stage.target not in env.scene.roles:
-        return
-    stand, (base, yaw) = env.scene.place_before(stage.target), base_pose(env.data)
-    turned = abs(wrap(stand.yaw - yaw))
-    if np.hypot(stand.x - base[0], stand.y - base[1]) > most_m or turned > FAR_OFF_RAD:
+    stand = _stand_of(env, stage, most_m)
+    if stand is not None:
         with contextlib.suppress(SkillError):
             yield from drive_to(env, stand.x, stand.y, stand.yaw)
+
+
+def _stand_of(env: KitchenEnv, stage: Stage, most_m: float) -> RobotPose | None:
+    """Where a robot stands to use a stage's fixture, if it is farther off than `most_m` or turned away; else None."""
+    if not stage.target or stage.target not in env.scene.roles:
+        return None
+    stand, (base, yaw) = env.scene.place_before(stage.target), base_pose(env.data)
+    far = np.hypot(stand.x - base[0], stand.y - base[1]) > most_m
+    return stand if far or abs(wrap(stand.yaw - yaw)) > FAR_OFF_RAD else None
 
 
 def _attempt(

@@ -281,6 +281,15 @@ class KitchenEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         truncated = self._steps >= self.horizon and not terminated
         return self._observe(), float(info["success"]), terminated, truncated, info
 
+    def observe(self) -> Observation:
+        """The observation of the present state; with pictures of before where `render_observations` is off.
+
+        Raises:
+            UserError: before the first reset.
+        """
+        assert self.scene is not None
+        return self._observe()
+
     def render(self) -> NDArray[np.uint8]:
         """The picture of the first camera, (S, S, 3) uint8; of the contract's first, where none is observed."""
         return self.render_camera((*self.cameras, *contract.CAMERAS)[0])

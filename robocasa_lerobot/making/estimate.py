@@ -23,6 +23,8 @@ STEPS_PER_DEMONSTRATION: Mapping[str, int] = {"atomic": 165, "composite": 950}
 PREPARING_SECONDS_PER_STEP = 0.003
 # Of one core, with three cameras, by the height and width of their pictures.
 STEPS_PER_SECOND: Mapping[int, float] = {64: 167.0, 256: 94.0}
+# Of one core, a small policy that drives before it is corrected (`benchmarks/results/scaling.json`: trials).
+DRIVEN_STEPS_PER_SECOND, DRIVEN_STEPS = 66.0, 175
 BYTES_PER_STEP = 6_000
 BYTES_PER_EPISODE = 500_000  # scene, textures and states, kept so that it can be drawn again
 
@@ -55,7 +57,9 @@ def estimate(needs: Iterable[Need], cores: int) -> Estimate:
         count = need.demonstrations or 0
         kind = facts[need.task].kind if need.task in facts else "atomic"  # of somebody's own tasks nothing is known
         demonstrations += count
-        steps = count * STEPS_PER_DEMONSTRATION[kind]
+        driven = 0 if need.policy is None else count * DRIVEN_STEPS
+        steps = count * STEPS_PER_DEMONSTRATION[kind] + driven
+        recording_seconds += driven / DRIVEN_STEPS_PER_SECOND
         frames += steps
         converting_seconds += steps * _seconds_per_step(need)
         if need.redrawn is None:

@@ -102,6 +102,8 @@ def _origin(need: Need) -> str:
         return "not published"
     if need.made is None:
         return "the user"
+    if need.policy is not None:
+        return f"our demonstrators, correcting {need.policy}"
     return "our demonstrators" if need.redrawn is None else f"{need.redrawn.parent}, drawn again"
 
 

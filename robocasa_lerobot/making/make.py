@@ -24,6 +24,7 @@ from robocasa_lerobot.making.needs import WORK, Need
 from robocasa_lerobot.making.pieces import Outcome, run_pieces
 
 if TYPE_CHECKING:
+    from robocasa_lerobot.corrections.settings import CorrectionSettings
     from robocasa_lerobot.demos.generate.settings import GenerationSettings
 
 _PRELOAD = ("robocasa_lerobot.envs.kitchen_env", "robocasa_lerobot.convert.shard")
@@ -144,6 +145,9 @@ class MadeDataset:
         from robocasa_lerobot.envs.tasks.registry import get_task
 
         settings, recipe = recording_settings(self.need), _recipe(self.need)
+        if self.need.policy is not None:
+            corrections = _corrections(self.need.policy, settings, recipe)
+            return record_task(corrections, self.work, workers=workers, show_progress=False).path
         if self._instead.exists():  # of a run before
             return record_task(settings, self._instead, workers=workers, show_progress=False).path
         number = recipe.sources_for(settings.episodes)
@@ -201,6 +205,19 @@ def recording_settings(need: Need) -> RecordingSettings:
         styles=tuple(recipe.styles) if recipe.styles is not None else None,
         varied=recipe.varied,
     )
+
+
+def _corrections(policy: Path, settings: RecordingSettings, recipe: RecipeConfig) -> CorrectionSettings:
+    """What `correct` records for a dataset.
+
+    Raises:
+        CheckpointError: the policy is not there.
+    """
+    from robocasa_lerobot.corrections.settings import AFTER_STEPS, CorrectionSettings
+
+    values = {entry.name: getattr(settings, entry.name) for entry in fields(settings)}
+    low, high = AFTER_STEPS if recipe.after is None else recipe.after
+    return CorrectionSettings.of(str(policy), **values | {"after_steps": (low, high)})
 
 
 def pieces_of(needs: Sequence[Need], replace: bool = False, keep: bool = False) -> list[MadeDataset]:

@@ -42,6 +42,8 @@ class Need:
         made: how our demonstrators make it, if they do.
         registry_root: folder of the registry that it is from.
         redrawn: the dataset whose episodes are drawn again for it, if it is made so.
+        policy: folder of the phase whose policy is corrected for it, if it is made so.
+        waits: whether that phase has not ended yet.
     """
 
     group: str
@@ -54,6 +56,8 @@ class Need:
     made: RegisteredDataset | None = None
     registry_root: Path = Path()
     redrawn: Path | None = None
+    policy: Path | None = None
+    waits: bool = False
 
     @property
     def work(self) -> Path:
@@ -70,27 +74,32 @@ class Need:
 
 
 def needs_of(
-    experiment: ExperimentConfig, episodes: Mapping[str, int] | None = None
+    experiment: ExperimentConfig, episodes: Mapping[str, int] | None = None, phase: str | None = None
 ) -> tuple[list[Need], list[Skipped]]:
-    """The datasets of all phases that can run, each once, and the ones left out or partial.
+    """The datasets of all phases that can run, or of one, each once, and the phases left out or partial.
 
     Args:
         experiment: the one to train.
         episodes: demonstrations of each kind of dataset, over those that the registries say.
+        phase: its name, where it is to be the only one.
 
     Raises:
+        UnknownNameError: there is no such phase.
         UserError: a selection does not fit its registry, or `episodes` has a kind that none of them has.
     """
     part, said = runnable(experiment)
+    if phase is not None:
+        experiment.phase(phase)
     found: dict[tuple[Path, str, str, str], Need] = {}  # missing published data has no folders yet
     kinds: set[str] = set()
-    for mixture in [phase.mixture for phase in part.phases]:
+    for mixture in [one.mixture for one in part.phases if phase in (None, one.name)]:
         for selection in mixture.select:
             registry = open_registry(selection.registry)
             kinds |= set(registry.config.episodes)
             numbers = {**registry.config.episodes, **(episodes or {})}
             for entry in select_datasets(selection):
                 for need in _needs_of_entry(entry, registry, numbers):
+                    need = _with_policy(need, experiment)
                     found.setdefault((need.root, need.task, need.split, need.source), need)
         alone = MixtureConfig(members=mixture.members) if mixture.members else None
         lacking = {entry.root: entry for entry in missing_datasets(alone)} if alone else {}
@@ -131,6 +140,19 @@ def _needs_of_entry(entry: DatasetEntry, registry: Registry, numbers: Mapping[st
         *_needs_of_entry(before[0], registry, numbers),
         dataclasses.replace(need, redrawn=before[0].root),
     ]
+
+
+def _with_policy(need: Need, experiment: ExperimentConfig) -> Need:
+    """A need with the place of the policy that is corrected for it, where it is made so."""
+    recipe = None if need.made is None else need.made.make
+    if recipe is None or recipe.corrects is None:
+        return need
+    from robocasa_lerobot.training.weights.checkpoint import checkpoint_step, last_checkpoint  # with torch
+
+    phase = experiment.phase(recipe.corrects)
+    folder = Path(experiment.output_dir) / phase.name
+    last = last_checkpoint(folder)
+    return dataclasses.replace(need, policy=folder, waits=last is None or checkpoint_step(last) < phase.steps)
 
 
 def _dataset_of_path(datasets: Sequence[RegisteredDataset], path: str) -> RegisteredDataset:

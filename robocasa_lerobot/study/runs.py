@@ -19,6 +19,7 @@ from robocasa_lerobot.data.registry.registry_file import RegisteredDataset, load
 from robocasa_lerobot.errors import UnknownNameError, UserError
 from robocasa_lerobot.files import write_text
 from robocasa_lerobot.jobs.child_process import run_command
+from robocasa_lerobot.making.needs import needs_of
 from robocasa_lerobot.settings import load_yaml
 from robocasa_lerobot.study.settings import EXPERIMENTS, PartConfig, StudyConfig
 from robocasa_lerobot.training.config.experiment import ExperimentConfig, load_experiment
@@ -113,18 +114,21 @@ class Run:
         return self.file
 
     def commands(self, workers: int | None) -> list[list[str]]:
-        """Arguments of `robocasa-lerobot` that make its data, and then train each phase and try what it has learnt."""
+        """Arguments of `robocasa-lerobot` that make its data, and then train each phase and try what it has learnt.
+
+        Data come first, but for those that correct an earlier phase's policy, which come before the phase that asks.
+        """
         scale = [] if self.scale is None else [f"--scale={self.scale}"]
         made = [] if workers is None else [f"--workers={workers}"]
         made += [] if self.episodes is None else [f"--episodes={self.episodes}"]
-        return [
-            # What a trial with fewer demonstrations has left does not stand for them.
-            ["data", str(self.file), "--make", "--replace", *made, *scale],
-            *(
-                ["train", f"--config_path={self.file}", f"--phase={phase.name}", "--evaluate", *scale]
-                for phase in self.config.phases
-            ),
-        ]
+        # What a trial with fewer demonstrations has left does not stand for them.
+        data = ["data", str(self.file), "--make", "--replace", *made, *scale]
+        found = [data]
+        for phase in self.config.phases:
+            if any(need.policy is not None for need in needs_of(self.config, phase=phase.name)[0]):
+                found.append(data)  # again: what corrects an earlier phase's policy can be made now
+            found.append(["train", f"--config_path={self.file}", f"--phase={phase.name}", "--evaluate", *scale])
+        return found
 
     def carry_out(self, workers: int | None) -> Iterator[None]:
         """Make its data, then train and try phase by phase, and come back after each; what is finished takes seconds.
@@ -133,11 +137,10 @@ class Run:
             StoppedError: one did not end well; its own message stands above.
         """
         self.write_file()
-        data, *trainings = self.commands(workers)
-        self._run(data)
-        for training in trainings:
-            self._run(training)
-            yield
+        for command in self.commands(workers):
+            self._run(command)
+            if command[0] == "train":
+                yield
 
     def _run(self, command: Sequence[str]) -> None:
         status = run_command(*command)

@@ -68,3 +68,15 @@ def test_what_says_nothing_has_no_such_frames(data: Path) -> None:
     write_fake_dataset(data / "person_alone", episodes=1, length=1, decisions=True)
     with pytest.raises(UserError, match="no frame is left with frames=autonomous"):
         MixtureDataset(MixtureConfig(members=[MemberConfig(str(data / "person_alone"), frames="autonomous")]))
+    kept = MixtureDataset(
+        MixtureConfig(
+            members=[
+                MemberConfig(str(data / "person_alone"), frames="autonomous"),
+                MemberConfig(str(data / "corrected"), frames="autonomous"),
+            ]
+        )
+    )
+    assert [member.root for member in kept.config.members] == [str(data / "corrected")], (
+        "a dataset without any is left out"
+    )
+    assert kept.probabilities.tolist() == [1.0]

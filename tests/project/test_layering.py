@@ -43,14 +43,17 @@ MAY_IMPORT: dict[str, set[str]] = {
     "demos": BASE | {"envs"},
     "training": BASE | {"data", "policies"},
     "evaluation": BASE | {"envs", "convert", "data", "policies", "demos"},  # demos: a reference policy
-    "making": BASE | {"envs", "convert", "data", "demos", "training"},  # data that an experiment needs
+    "corrections": BASE | {"envs", "demos", "evaluation"},
+    "making": BASE | {"envs", "convert", "data", "demos", "training", "corrections"},  # data that an experiment needs
     "study": BASE | {"data", "training", "evaluation", "making"},
     "gallery": BASE | {"envs", "demos"},
     "serving": BASE | {"envs", "evaluation"},  # policies for others' evaluations, kitchens for others' policies
     "teleop": BASE | {"envs", "demos", "evaluation"},
     "devices": BASE | {"envs", "demos"},  # the kitchen as a LeRobot robot
     "plugins": BASE | LOW | {"demos", "training", "evaluation", "devices"},
-    "cli": BASE | LOW | {"demos", "training", "evaluation", "making", "gallery", "study", "serving", "teleop"},
+    "cli": BASE
+    | LOW
+    | {"demos", "training", "evaluation", "making", "gallery", "study", "serving", "teleop", "corrections"},
 }
 # Of these parts, what each room (a folder, or a file beside the folders) may import of the other rooms.
 ROOMS: dict[str, dict[str, set[str]]] = {

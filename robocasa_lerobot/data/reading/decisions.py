@@ -11,6 +11,11 @@ from robocasa_lerobot.data.reading.source import DatasetSource
 from robocasa_lerobot.data.sampler import FramePool
 from robocasa_lerobot.errors import UserError
 
+
+class NoFramesError(UserError):
+    """Episodes of which no frame was decided by those who were asked for."""
+
+
 INTERVENTIONS = "interventions"  # the other one of `contract.FRAME_KINDS` is the policy's own steps
 
 
@@ -39,7 +44,7 @@ def frame_pool(
     """The frames of some episodes, ascending, that may start a sample: all, or those of a kind.
 
     Raises:
-        UserError: there is none of that kind.
+        NoFramesError: there is none of that kind.
     """
     starts, ends = source.starts[episodes], source.ends[episodes]
     # A shorter episode keeps its first frame (of the kind): no episode drops out of the training unnoticed.
@@ -55,6 +60,6 @@ def frame_pool(
         if not len(edges) and of_episode.any():
             runs.append((start + int(of_episode.argmax()), 1))
     if not runs:
-        raise UserError(f"{source.root}: no frame is left with frames={kind} in {len(episodes)} episodes.")
+        raise NoFramesError(f"{source.root}: no frame is left with frames={kind} in {len(episodes)} episodes.")
     pool = np.array(runs, dtype=np.int64)
     return FramePool(pool[:, 0], pool[:, 1])

@@ -35,6 +35,9 @@ class RecipeConfig:
         method: how sources are multiplied, as `generate --method`; `replay` repeats them with `action_noise`.
         redraw: instead of recording: `path` of the registry's dataset whose episodes are drawn again.
         camera_set: of the cameras that `redraw` draws with, as `render --camera-set`.
+        corrects: phase of the experiment that asks for the dataset; the policy that it has trained drives first, and
+            demonstrators take over, as `correct` does it. What one seed's policy was corrected of serves all seeds.
+        after: control steps between which it is drawn when they do, as `correct --after`; null is its default.
     """
 
     episodes: str = "human"
@@ -48,10 +51,17 @@ class RecipeConfig:
     method: str = METHODS[0]
     redraw: str | None = None
     camera_set: str | None = None
+    corrects: str | None = None
+    after: list[int] | None = None
 
     def __post_init__(self) -> None:
         if (self.redraw is None) != (self.camera_set is None):
             raise UserError("recipe of a dataset: `redraw` and `camera_set` go together; one of them is missing.")
+        if self.corrects is not None and (self.redraw is not None or self.sources is not None):
+            other = "redraw" if self.redraw is not None else "sources"
+            raise UserError(f"recipe of a dataset: `corrects` and `{other}` are two ways to make it; give one.")
+        if self.after is not None and (self.corrects is None or len(self.after) != 2):
+            raise UserError(f"recipe of a dataset: `after` is {self.after}; it takes two steps, with `corrects`.")
         if self.sources is not None and self.sources < 1:
             raise UserError(f"recipe of a dataset: `sources` is {self.sources}; it takes one at least, or null.")
         if self.method not in METHODS:

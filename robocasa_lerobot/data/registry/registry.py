@@ -251,6 +251,7 @@ def resolve_mixture(config: MixtureConfig) -> MixtureConfig:
                     group=selection.group,
                     layouts=selection.layouts,
                     styles=selection.styles,
+                    frames=selection.frames,
                 )
             )
     return dataclasses.replace(config, members=members, select=[])

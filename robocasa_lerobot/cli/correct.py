@@ -1,0 +1,80 @@
+"""`robocasa-lerobot correct`: a policy drives, a demonstrator takes over where it has not solved the task."""
+
+from __future__ import annotations
+
+import argparse
+
+from robocasa_lerobot.cli.demos import add_kitchen_options
+from robocasa_lerobot.jobs.workers import cores_here
+
+EXAMPLE = (
+    "robocasa-lerobot correct --policy outputs/demo/pretrain --tasks OpenDrawer --episodes 100 --seed 200000 "
+    "--out corrections/"
+)
+
+
+def configure(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments."""
+    from robocasa_lerobot.jobs.executors import add_options
+
+    parser.add_argument("--policy", required=True, help="its checkpoint's folder, as of `eval --policy.path`")
+    add_kitchen_options(parser)
+    parser.add_argument(
+        "--after",
+        type=_after,
+        metavar="STEPS",
+        help="when the demonstrator takes over: a number of control steps drawn between two (default 100,250)",
+    )
+    parser.add_argument("--device", default="cpu", help="that the policy computes on: cpu, cuda or mps (default cpu)")
+    parser.add_argument("--plain", action="store_true", help="no variety in the corrections, as of `demos --plain`")
+    add_options(parser)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Record every task and print a table; status 1 if one had to be given up."""
+    from robocasa_lerobot.corrections.settings import AFTER_STEPS, CorrectionSettings
+    from robocasa_lerobot.demos.choose import choose_tasks
+    from robocasa_lerobot.demos.distributed import record_distributed
+    from robocasa_lerobot.demos.recording import record_tasks
+    from robocasa_lerobot.demos.summary import print_summary
+    from robocasa_lerobot.jobs.executors import execution_of
+
+    execution = execution_of(args)
+    chosen = choose_tasks(args.tasks)
+    if chosen.left_out:
+        print(f"left out, for want of a demonstrator: {', '.join(chosen.left_out)}", flush=True)
+    settings = [
+        CorrectionSettings.of(
+            args.policy,
+            task=name,
+            episodes=args.episodes,
+            split=args.split,
+            seed=args.seed,
+            action_noise=args.action_noise,
+            start_within_m=args.start_within,
+            images=args.images,
+            image_size=args.image_size,
+            layouts=args.layouts,
+            styles=args.styles,
+            varied=not args.plain,
+            after_steps=args.after or AFTER_STEPS,
+            device=args.device,
+        )
+        for name in chosen.names
+    ]
+    if execution.kind != "local":
+        line, status = record_distributed(settings, args.out, execution, keep_failures=args.keep_failures)
+        if line:
+            print(line)
+        return status
+    workers = args.workers if args.workers is not None else cores_here()
+    return print_summary(record_tasks(settings, args.out, workers=workers, keep_failures=args.keep_failures))
+
+
+def _after(text: str) -> tuple[int, int]:
+    from robocasa_lerobot.corrections.settings import parse_after
+
+    try:
+        return parse_after(text)
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"{text!r} is neither a number of steps nor two, as in 100,250") from None

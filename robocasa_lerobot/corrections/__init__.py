@@ -1,0 +1,1 @@
+"""Demonstrators that correct a policy: DAgger without a person."""
