@@ -21,7 +21,6 @@ from robocasa_lerobot.demos.skills.pick_place.heaps import uppermost
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.predicates.logic import Goal, terms_by_name
 from robocasa_lerobot.envs.predicates.objects import ObjectOn
-from robocasa_lerobot.envs.scene.robot_poses import RobotPose
 from robocasa_lerobot.envs.tasks.conditions import must_never, stage_condition, without_gripper
 from robocasa_lerobot.envs.tasks.task import Stage
 from robocasa_lerobot.errors import UnknownNameError
@@ -93,7 +92,7 @@ def carry_out(
         env: in the episode.
         log: tells which stage is on.
         skills: what carries out a stage, by its skill and verb; None takes the demonstrator's.
-        midway: somebody else has begun: the robot may stand anywhere, with its arm in any posture.
+        midway: somebody else has begun: the arm may be in any posture, and is folded where a first attempt fails.
 
     Raises:
         UnknownNameError: a stage needs a skill that does not exist.
@@ -149,8 +148,7 @@ def _carry_out(
             outcome.skipped, outcome.done, outcome.reason = outcome.attempts == 0, True, ""
             index += 1
             continue
-        stray = midway and (outcome.attempts > 0 or _stand_of(env, stages[index], FAR_OFF_M[0]) is not None)
-        if (led_away or stray) and stages[index].skill not in _AS_IT_IS:
+        if (led_away or (midway and outcome.attempts > 0)) and stages[index].skill not in _AS_IT_IS:
             yield from fold_arm(env)
             yield from move_torso(env, 0.0, OPEN)
             yield from _stand_before(env, stages[index], FAR_OFF_M[min(outcome.attempts, 1)])
@@ -200,19 +198,13 @@ def _stand_before(env: KitchenEnv, stage: Stage, most_m: float) -> Iterator[Arra
 
     Skills that use fixtures go farther by themselves only a little.
     """
-    stand = _stand_of(env, stage, most_m)
-    if stand is not None:
+    if not stage.target or stage.target not in env.scene.roles:
+        return
+    stand, (base, yaw) = env.scene.place_before(stage.target), base_pose(env.data)
+    turned = abs(wrap(stand.yaw - yaw))
+    if np.hypot(stand.x - base[0], stand.y - base[1]) > most_m or turned > FAR_OFF_RAD:
         with contextlib.suppress(SkillError):
             yield from drive_to(env, stand.x, stand.y, stand.yaw)
-
-
-def _stand_of(env: KitchenEnv, stage: Stage, most_m: float) -> RobotPose | None:
-    """Where a robot stands to use a stage's fixture, if it is farther off than `most_m` or turned away; else None."""
-    if not stage.target or stage.target not in env.scene.roles:
-        return None
-    stand, (base, yaw) = env.scene.place_before(stage.target), base_pose(env.data)
-    far = np.hypot(stand.x - base[0], stand.y - base[1]) > most_m
-    return stand if far or abs(wrap(stand.yaw - yaw)) > FAR_OFF_RAD else None
 
 
 def _attempt(
