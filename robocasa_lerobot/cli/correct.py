@@ -33,6 +33,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Record every task and print a table; status 1 if one had to be given up."""
     from robocasa_lerobot.corrections.settings import AFTER_STEPS, CorrectionSettings
+    from robocasa_lerobot.corrections.summary import correction_line
     from robocasa_lerobot.demos.choose import choose_tasks
     from robocasa_lerobot.demos.distributed import record_distributed
     from robocasa_lerobot.demos.recording import record_tasks
@@ -68,7 +69,12 @@ def run(args: argparse.Namespace) -> int:
             print(line)
         return status
     workers = args.workers if args.workers is not None else cores_here()
-    return print_summary(record_tasks(settings, args.out, workers=workers, keep_failures=args.keep_failures))
+    results = record_tasks(settings, args.out, workers=workers, keep_failures=args.keep_failures)
+    status = print_summary(results)
+    for result in results:
+        if not result.gave_up:
+            print(correction_line(result.path))
+    return status
 
 
 def _after(text: str) -> tuple[int, int]:

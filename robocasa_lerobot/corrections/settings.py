@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -167,4 +168,5 @@ def _actor(source: PolicySource, device: str) -> Actor:
         import torch
 
         torch.set_num_threads(1)
-    return load_actor(source, pick_device(device) if source.is_checkpoint else "cpu", None)
+    with contextlib.redirect_stdout(None):  # LeRobot tells of every file that it reads
+        return load_actor(source, pick_device(device) if source.is_checkpoint else "cpu", None)

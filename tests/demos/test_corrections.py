@@ -34,6 +34,7 @@ def correct(out: Path, *options: str, task: str = "CloseDrawer") -> int:
 @pytest.mark.render
 def test_what_a_demonstrator_corrects_can_be_trained_on(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert correct(tmp_path) == 0
+    assert "CloseDrawer: 1 of 1 episodes corrected, for" in capsys.readouterr().out
     file = tmp_path / "CloseDrawer.hdf5"
     with h5py.File(file) as content:
         demo = content["data/demo_0"] if "demo_0" in content["data"] else next(iter(content["data"].values()))
