@@ -57,7 +57,8 @@ STAGE_KEYS: tuple[str, ...] = (STAGE_KEY, SUBTASK_KEY, LANGUAGE_KEY)
 # dataset. Whether a person decided while there was a policy (0, 1); what the policy wanted (12, the order of the file's
 # actions); whether the step belongs to a planned motion that the person asked for (0, 1). And what a demonstrator
 # wanted before noise came to it (12, as before).
-DECISIONS: tuple[str, ...] = ("intervention", "policy_action", "assisted", "clean_action")
+INTERVENTION, POLICY_ACTION, ASSISTED, CLEAN_ACTION = "intervention", "policy_action", "assisted", "clean_action"
+DECISIONS: tuple[str, ...] = (INTERVENTION, POLICY_ACTION, ASSISTED, CLEAN_ACTION)
 EXTRA_PREFIX = "extra."
 FRAME_KINDS: tuple[str, ...] = ("interventions", "autonomous")  # frames by who decided them
 

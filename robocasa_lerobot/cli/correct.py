@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import argparse
 
-from robocasa_lerobot.cli.demos import add_kitchen_options
-from robocasa_lerobot.jobs.workers import cores_here
+from robocasa_lerobot.cli.demos import add_kitchen_options, demonstrable, kitchen_values, record
 
 EXAMPLE = (
     "robocasa-lerobot correct --policy outputs/demo/pretrain --tasks OpenDrawer --episodes 100 --seed 200000 "
@@ -32,45 +31,16 @@ def configure(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Record every task and print a table; status 1 if one had to be given up."""
-    from robocasa_lerobot.corrections.settings import AFTER_STEPS, CorrectionSettings
+    from robocasa_lerobot.corrections.settings import CorrectionSettings
     from robocasa_lerobot.corrections.summary import correction_line
-    from robocasa_lerobot.demos.choose import choose_tasks
-    from robocasa_lerobot.demos.distributed import record_distributed
-    from robocasa_lerobot.demos.recording import record_tasks
-    from robocasa_lerobot.demos.summary import print_summary
     from robocasa_lerobot.jobs.executors import execution_of
 
     execution = execution_of(args)
-    chosen = choose_tasks(args.tasks)
-    if chosen.left_out:
-        print(f"left out, for want of a demonstrator: {', '.join(chosen.left_out)}", flush=True)
-    settings = [
-        CorrectionSettings.of(
-            args.policy,
-            task=name,
-            episodes=args.episodes,
-            split=args.split,
-            seed=args.seed,
-            action_noise=args.action_noise,
-            start_within_m=args.start_within,
-            images=args.images,
-            image_size=args.image_size,
-            layouts=args.layouts,
-            styles=args.styles,
-            varied=not args.plain,
-            after_steps=args.after or AFTER_STEPS,
-            device=args.device,
-        )
-        for name in chosen.names
-    ]
-    if execution.kind != "local":
-        line, status = record_distributed(settings, args.out, execution, keep_failures=args.keep_failures)
-        if line:
-            print(line)
-        return status
-    workers = args.workers if args.workers is not None else cores_here()
-    results = record_tasks(settings, args.out, workers=workers, keep_failures=args.keep_failures)
-    status = print_summary(results)
+    values = {**kitchen_values(args), "varied": not args.plain, "device": args.device}
+    if args.after is not None:
+        values["after_steps"] = args.after
+    settings = [CorrectionSettings.of(args.policy, task=name, **values) for name in demonstrable(args.tasks)]
+    status, results = record(settings, args, execution)
     for result in results:
         if not result.gave_up:
             print(correction_line(result.path))

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from robocasa_lerobot.jobs.workers import cores_here
 
 if TYPE_CHECKING:
-    from robocasa_lerobot.demos.recording import RecordingSettings
+    from robocasa_lerobot.demos.recording import RecordingResult, RecordingSettings
     from robocasa_lerobot.jobs.executors import Execution
 
 EXAMPLE = (
@@ -78,45 +79,56 @@ def add_kitchen_options(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Record every task and print a table; status 1 if one had to be given up."""
-    from robocasa_lerobot.demos.choose import choose_tasks
-    from robocasa_lerobot.demos.recording import RecordingSettings, record_tasks
-    from robocasa_lerobot.demos.summary import print_summary
+    from robocasa_lerobot.demos.recording import RecordingSettings
     from robocasa_lerobot.jobs.executors import execution_of
 
     execution = execution_of(args)
-    chosen = choose_tasks(args.tasks)
+    values = {**kitchen_values(args), "varied": not args.plain}
+    settings = [RecordingSettings(task=name, **values) for name in demonstrable(args.tasks)]
+    return record(settings, args, execution)[0]
+
+
+def kitchen_values(args: argparse.Namespace) -> dict[str, Any]:
+    """What `add_kitchen_options` asked for, as values of `RecordingSettings`, but for the task."""
+    return {
+        "episodes": args.episodes,
+        "split": args.split,
+        "seed": args.seed,
+        "action_noise": args.action_noise,
+        "start_within_m": args.start_within,
+        "images": args.images,
+        "image_size": args.image_size,
+        "layouts": args.layouts,
+        "styles": args.styles,
+    }
+
+
+def demonstrable(tasks: str) -> tuple[str, ...]:
+    """The tasks of these names and sets that have a demonstrator; the others of the sets are named on the terminal."""
+    from robocasa_lerobot.demos.choose import choose_tasks
+
+    chosen = choose_tasks(tasks)
     if chosen.left_out:
         print(f"left out, for want of a demonstrator: {', '.join(chosen.left_out)}", flush=True)
-    settings = [
-        RecordingSettings(
-            task=name,
-            episodes=args.episodes,
-            split=args.split,
-            seed=args.seed,
-            action_noise=args.action_noise,
-            start_within_m=args.start_within,
-            images=args.images,
-            image_size=args.image_size,
-            layouts=args.layouts,
-            styles=args.styles,
-            varied=not args.plain,
-        )
-        for name in chosen.names
-    ]
+    return chosen.names
+
+
+def record(
+    settings: Sequence[RecordingSettings], args: argparse.Namespace, execution: Execution
+) -> tuple[int, list[RecordingResult]]:
+    """Record every task and print a table; the command's status, and the results, none where jobs do it elsewhere."""
+    from robocasa_lerobot.demos.distributed import record_distributed
+    from robocasa_lerobot.demos.recording import record_tasks
+    from robocasa_lerobot.demos.summary import print_summary
+
     if execution.kind != "local":
-        return _distribute(settings, args, execution)
+        line, status = record_distributed(settings, args.out, execution, keep_failures=args.keep_failures)
+        if line:
+            print(line)
+        return status, []
     workers = args.workers if args.workers is not None else cores_here()
     results = record_tasks(settings, args.out, workers=workers, keep_failures=args.keep_failures)
-    return print_summary(results)
-
-
-def _distribute(settings: list[RecordingSettings], args: argparse.Namespace, execution: Execution) -> int:
-    from robocasa_lerobot.demos.distributed import record_distributed
-
-    line, status = record_distributed(settings, args.out, execution, keep_failures=args.keep_failures)
-    if line:
-        print(line)
-    return status
+    return print_summary(results), results
 
 
 def _ids(text: str) -> tuple[int, ...]:

@@ -7,8 +7,7 @@ import json
 from dataclasses import asdict
 from pathlib import Path
 
-from robocasa_lerobot.cli.demos import add_kitchen_options
-from robocasa_lerobot.jobs.workers import cores_here
+from robocasa_lerobot.cli.demos import add_kitchen_options, kitchen_values, record
 
 EXAMPLE = (
     "robocasa-lerobot generate --source demos/ --tasks OpenDrawer --episodes 100 --split pretrain --seed 100000 "
@@ -74,12 +73,9 @@ def configure(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Generate for every task and print a table; status 1 if one had to be given up."""
     from robocasa_lerobot.demos.choose import expand_names
-    from robocasa_lerobot.demos.distributed import record_distributed
     from robocasa_lerobot.demos.generate.mimicgen.template import read_json_template
     from robocasa_lerobot.demos.generate.settings import GenerationSettings
     from robocasa_lerobot.demos.generate.sources.rules import read_rules
-    from robocasa_lerobot.demos.recording import record_tasks
-    from robocasa_lerobot.demos.summary import print_summary
     from robocasa_lerobot.errors import UserError
     from robocasa_lerobot.jobs.executors import execution_of
 
@@ -100,28 +96,14 @@ def run(args: argparse.Namespace) -> int:
         GenerationSettings.of(
             args.source,
             task=name,
-            episodes=args.episodes,
-            split=args.split,
-            seed=args.seed,
-            action_noise=args.action_noise,
-            start_within_m=args.start_within,
-            images=args.images,
-            image_size=args.image_size,
-            layouts=args.layouts,
-            styles=args.styles,
             varied=False,
             method=args.method,
             template=template,
             first_sources=args.first_sources,
             rules=rules,
+            **kitchen_values(args),
             **of_contacts,
         )
         for name in expand_names(args.tasks)
     ]
-    if execution.kind != "local":
-        line, status = record_distributed(settings, args.out, execution, keep_failures=args.keep_failures)
-        if line:
-            print(line)
-        return status
-    workers = args.workers if args.workers is not None else cores_here()
-    return print_summary(record_tasks(settings, args.out, workers=workers, keep_failures=args.keep_failures))
+    return record(settings, args, execution)[0]

@@ -26,7 +26,6 @@ from robocasa_lerobot.evaluation.actors.checkpoint import (
     read_source,
 )
 
-INTERVENTION, POLICY_ACTION = contract.DECISIONS[0], contract.DECISIONS[1]
 # Control steps: most demonstrations of the short tasks have ended by then, so that a policy that has not is astray.
 AFTER_STEPS = (100, 250)
 _TAKEOVER_STREAM, _POLICY_STREAM = 8, 9  # apart from those of scene, arm, noise, style and choice among sources
@@ -87,10 +86,11 @@ class CorrectionSettings(RecordingSettings):
         return {key: value for key, value in super().identity().items() if key not in ("policy", "device")}
 
     def check_ready(self) -> None:
-        """Whether the policy is the one that this began with.
+        """Whether the policy is the one that this began with, and can be loaded: no other attempt would load it.
 
         Raises:
             LackingMachineError: it is another one, or not there.
+            UserError: it does not load, or there is no such device.
         """
         try:
             found = self.source.fingerprint
@@ -101,14 +101,11 @@ class CorrectionSettings(RecordingSettings):
                 f"{self.policy} is another policy than when this began. With that one in place the same command goes "
                 "on; what corrects this one needs another --out."
             )
+        _actor(self.source, self.device)
 
-    def make_env(self) -> KitchenEnv:
-        """The env that attempts are made in: with the policy's pictures, and time for both."""
-        env = super().make_env()
-        env.close()
-        horizon = get_task(self.task).horizon + self.after_steps[1]
-        kwargs = {**self.env_kwargs(), "image_size": self.picture_size, "horizon": horizon}
-        return KitchenEnv(self.task, terminate_on_success=False, initial_noise=env.initial_noise, **kwargs)
+    def attempt_kwargs(self) -> dict[str, Any]:
+        """The policy's pictures, and time for both."""
+        return {"image_size": self.picture_size, "horizon": get_task(self.task).horizon + self.after_steps[1]}
 
     def record(self, env: KitchenEnv, seed: int) -> Recording:
         """Make the attempt of a seed; who decided each step, and what the policy asked for, stand beside it."""
@@ -117,15 +114,16 @@ class CorrectionSettings(RecordingSettings):
         noise = int(np.random.SeedSequence([seed, _POLICY_STREAM]).generate_state(1)[0])
         takeover = Takeover(_actor(self.source, self.device), noise, after)
         recording = self.labelled_episode(env, seed, takeover.act)
-        steps = len(recording.actions)
-        recording.per_step[INTERVENTION] = np.array(takeover.corrected[:steps], dtype=np.uint8).reshape(-1, 1)
+        corrected = np.array(takeover.corrected[: len(recording.actions)], dtype=np.uint8).reshape(-1, 1)
+        wanted = recording.per_step.get(contract.CLEAN_ACTION, recording.actions)
+        recording.per_step[contract.INTERVENTION] = corrected
         # Where the policy was not asked, its place has what was carried out: no number that is none.
-        recording.per_step[POLICY_ACTION] = recording.actions.copy()
+        recording.per_step[contract.POLICY_ACTION] = np.where(corrected > 0, recording.actions, wanted)
         recording.ep_meta["correction"] = {
             "policy": self.source.label,
             "fingerprint": self.fingerprint,
             "after_steps": after,
-            "corrected_steps": int(sum(takeover.corrected[:steps])),
+            "corrected_steps": int(corrected.sum()),
         }
         return recording
 

@@ -7,13 +7,13 @@ from pathlib import Path
 import h5py
 import numpy as np
 
-from robocasa_lerobot.corrections.settings import INTERVENTION
+from robocasa_lerobot import contract
 
 
 def correction_line(path: Path) -> str:
     """How many of a file's episodes were corrected, and for how many control steps at the median."""
     with h5py.File(path) as file:
-        corrected = [int(demo[INTERVENTION][()].sum()) for demo in file["data"].values()]
+        corrected = [int(demo[contract.INTERVENTION][()].sum()) for demo in file["data"].values()]
     lengths = [steps for steps in corrected if steps]
     alone = len(corrected) - len(lengths)
     if not lengths:

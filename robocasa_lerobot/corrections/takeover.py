@@ -16,10 +16,10 @@ from robocasa_lerobot.demos.motion import OPEN, Array, HandTarget, base_pose, gr
 from robocasa_lerobot.demos.motion_style import MotionStyle
 from robocasa_lerobot.demos.planning.base_path import carried
 from robocasa_lerobot.demos.planning.base_room import wrap
-from robocasa_lerobot.demos.skills.common import draw_back, hold_hand, stage_done
+from robocasa_lerobot.demos.skills.common import draw_back, hold_hand
 from robocasa_lerobot.demos.skills.fold import fold_arm
 from robocasa_lerobot.demos.skills.navigation import drive_to
-from robocasa_lerobot.demos.stages import HELD_STEPS, StageLog, StageOutcome
+from robocasa_lerobot.demos.stages import HELD_STEPS, StageLog, StageOutcome, stage_from
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.robots.panda_omron.names import FINGER_JOINTS
 from robocasa_lerobot.evaluation.actors.actor import Actor
@@ -59,7 +59,7 @@ class Takeover:
         self._policy.reset(self._noise_seed, env)
         held = 0
         while held < HELD_STEPS and (len(self.corrected) < self._after_steps or held):
-            log.current = _stage(env, log.current)
+            log.current = stage_from(env, log.current)
             wanted = self._policy_action(env)
             self.corrected.append(False)
             yield wanted
@@ -94,11 +94,3 @@ class Takeover:
                 with contextlib.suppress(SkillError):  # as near as it gets
                     yield from drive_to(env, float(there[0]), float(there[1]), heading)
         yield from demonstrate(env, style, log, midway=True)
-
-
-def _stage(env: KitchenEnv, current: int) -> int:
-    """The stage that a policy's step belongs to: the first, from that of the step before on, that is not done."""
-    stages = env.declaration.stages
-    while current < len(stages) - 1 and stage_done(env, stages[current]):
-        current += 1
-    return current

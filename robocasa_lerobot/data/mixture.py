@@ -6,7 +6,6 @@ Numbers come from memory, pictures from the frame cache or, without one, from Le
 from __future__ import annotations
 
 import dataclasses
-import functools
 import hashlib
 from collections import OrderedDict
 from collections.abc import Mapping, Sequence
@@ -63,13 +62,32 @@ class MixtureMeta:
 class _Member:
     source: DatasetSource
     episodes: NDArray[np.int64]
+    frames: int
     kind: str | None = None
 
-    @functools.cached_property
-    def frames(self) -> int:
-        if self.kind is not None:
-            return frame_pool(self.source, self.episodes, self.kind).size
-        return int((self.source.ends - self.source.starts)[self.episodes].sum())
+
+def _with_frames(config: MixtureConfig, opened: Mapping[Path, DatasetSource]) -> tuple[MixtureConfig, list[_Member]]:
+    """The mixture without members that have no frame of the kind that they ask for, and those that are left.
+
+    Such a dataset is of a task that a policy needed no correction in.
+
+    Raises:
+        NoFramesError: none would be left.
+    """
+    kept: list[tuple[MemberConfig, _Member]] = []
+    without: list[NoFramesError] = []
+    for member in config.members:
+        source = opened[Path(member.root)]
+        episodes = source.select(member)
+        try:
+            frames = frame_pool(source, episodes, member.frames).size
+        except NoFramesError as error:
+            without.append(error)
+        else:
+            kept.append((member, _Member(source, episodes, frames, member.frames)))
+    if not kept:
+        raise without[0]
+    return dataclasses.replace(config, members=[member for member, _ in kept]), [one for _, one in kept]
 
 
 class MixtureDataset(torch.utils.data.Dataset[Item]):
@@ -105,12 +123,13 @@ class MixtureDataset(torch.utils.data.Dataset[Item]):
         self._recent_caches: OrderedDict[Path, None] = OrderedDict()  # and those with mapped pictures
         self._max_open = loader.cache_open_files
         self._cache_dir = Path(loader.cache_dir) if loader.cache_dir else None
-        roots = dict.fromkeys(Path(member.root) for member in config.members)
         opened = {} if opened is None else opened
-        for root in roots:
+        for root in dict.fromkeys(Path(member.root) for member in config.members):
             if root not in opened:
                 opened[root] = DatasetSource(root)
-        self.sources = {root: opened[root] for root in roots}
+        config, self._members = _with_frames(config, opened)
+        self.config = config
+        self.sources = {root: opened[root] for root in dict.fromkeys(Path(member.root) for member in config.members)}
         every = {key: feature for source in self.sources.values() for key, feature in source.features.items()}
         self._unseen = unseen_pictures(every, loader.cameras)
         check_alike(list(self.sources.values()), self._unseen, any_image_size=image_size is not None)
@@ -122,20 +141,6 @@ class MixtureDataset(torch.utils.data.Dataset[Item]):
         self._task_index = {
             root: np.array([number[text] for text in source.instructions]) for root, source in self.sources.items()
         }
-        self._members, kept, without = [], [], []
-        for member in config.members:
-            source = self.sources[Path(member.root)]
-            one = _Member(source, source.select(member), member.frames)
-            try:
-                one.frames  # noqa: B018 counted, and kept
-            except NoFramesError as error:  # a policy that needed no correction in this dataset
-                without.append(error)
-                continue
-            self._members.append(one)
-            kept.append(member)
-        if not kept:
-            raise without[0]
-        self.config = config = dataclasses.replace(config, members=kept)
         places = {root: place for place, root in enumerate(self.sources)}
         self._source_list = list(self.sources.values())
         self._place = np.array([places[Path(member.root)] for member in config.members])  # of each member's source

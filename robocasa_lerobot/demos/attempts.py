@@ -36,7 +36,6 @@ from robocasa_lerobot.jobs.pool import exit_if_orphaned
 # Give up when this many attempts per wanted episode were not enough, or when none of the first ones has succeeded.
 MAX_ATTEMPTS_PER_EPISODE, HOPELESS = 10, 20
 _ENOUGH_FOR_A_RATE = 10
-CLEAN_ACTION = contract.DECISIONS[3]
 
 
 class BrokenAttemptError(Exception):
@@ -149,12 +148,16 @@ class RecordingSettings:
         )
         if clean is not None or self.action_noise > 0.0:
             kept = (yielded if clean is None else clean)[: len(recording.actions)]
-            recording.per_step[CLEAN_ACTION] = np.array([_as_executed(wanted) for wanted in kept])
+            recording.per_step[contract.CLEAN_ACTION] = np.array([_as_executed(wanted) for wanted in kept])
         return recording
 
+    def attempt_kwargs(self) -> dict[str, Any]:
+        """Arguments of the env that attempts are made in, beyond the file's: nothing is rendered that is not stored."""
+        return {} if self.images else {"cameras": ()}
+
     def make_env(self) -> KitchenEnv:
-        """The env that attempts are made in; it renders nothing unless pictures are stored."""
-        kwargs = self.env_kwargs() if self.images else {**self.env_kwargs(), "cameras": ()}
+        """The env that attempts are made in."""
+        kwargs = {**self.env_kwargs(), **self.attempt_kwargs()}
         noise = InitialNoise(base_within_m=self.start_within_m) if self.start_within_m else None
         return KitchenEnv(self.task, terminate_on_success=False, initial_noise=noise, **kwargs)
 

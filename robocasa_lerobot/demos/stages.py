@@ -172,6 +172,14 @@ def _carry_out(
             _check_attempts(env, index, outcome)
 
 
+def stage_from(env: KitchenEnv, earlier: int) -> int:
+    """The stage that a step of somebody else's belongs to: the first, from an earlier step's on, that is not done."""
+    stages, stage = env.declaration.stages, earlier
+    while stage < len(stages) - 1 and stage_done(env, stages[stage]):
+        stage += 1
+    return stage
+
+
 def _stays(env: KitchenEnv, goal: Goal, still: Callable[[], Array]) -> Generator[Array, None, bool]:
     """Stand still until a goal holds, for what settles and what time does, and then for as long as it must hold.
 

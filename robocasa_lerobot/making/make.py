@@ -8,7 +8,7 @@ import os
 import shutil
 from collections import deque
 from collections.abc import Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -177,9 +177,8 @@ class MadeDataset:
         recipe = _recipe(self.need)
         if recipe.method != REPLAY:
             deque(prepare_files([sources], workers=workers), maxlen=0)
-        settings = recording_settings(self.need)
-        values = {entry.name: getattr(settings, entry.name) for entry in fields(settings)}
-        return GenerationSettings.of(sources.parent, **values | {"varied": False, "method": recipe.method})
+        settings = replace(recording_settings(self.need), varied=False)
+        return GenerationSettings.of(sources.parent, method=recipe.method, **vars(settings))
 
     def _draw_again(self, need: Need, workers: int) -> None:
         from robocasa_lerobot.convert.rerender.camera_configs import camera_set
@@ -213,11 +212,10 @@ def _corrections(policy: Path, settings: RecordingSettings, recipe: RecipeConfig
     Raises:
         CheckpointError: the policy is not there.
     """
-    from robocasa_lerobot.corrections.settings import AFTER_STEPS, CorrectionSettings
+    from robocasa_lerobot.corrections.settings import CorrectionSettings
 
-    values = {entry.name: getattr(settings, entry.name) for entry in fields(settings)}
-    low, high = AFTER_STEPS if recipe.after is None else recipe.after
-    return CorrectionSettings.of(str(policy), **values | {"after_steps": (low, high)})
+    after = {} if recipe.after is None else {"after_steps": tuple(recipe.after)}
+    return CorrectionSettings.of(str(policy), **vars(settings), **after)
 
 
 def pieces_of(needs: Sequence[Need], replace: bool = False, keep: bool = False) -> list[MadeDataset]:

@@ -88,11 +88,10 @@ def needs_of(
         UserError: a selection does not fit its registry, or `episodes` has a kind that none of them has.
     """
     part, said = runnable(experiment)
-    if phase is not None:
-        experiment.phase(phase)
+    asked = {one.name for one in experiment.phases} if phase is None else {experiment.phase(phase).name}
     found: dict[tuple[Path, str, str, str], Need] = {}  # missing published data has no folders yet
     kinds: set[str] = set()
-    for mixture in [one.mixture for one in part.phases if phase in (None, one.name)]:
+    for mixture in [one.mixture for one in part.phases if one.name in asked]:
         for selection in mixture.select:
             registry = open_registry(selection.registry)
             kinds |= set(registry.config.episodes)

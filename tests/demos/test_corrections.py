@@ -100,6 +100,19 @@ def test_skills_begin_wherever_a_policy_has_led_the_hand(task: str) -> None:
         env.close()
 
 
+def test_what_the_policy_asked_for_has_no_noise() -> None:
+    settings = CorrectionSettings.of("zero", task="CloseDrawer", episodes=1, action_noise=0.1, after_steps=(20, 20))
+    env = settings.make_env()
+    try:
+        recording = settings.record(env, 780_000)
+    finally:
+        env.close()
+    asked, arm = recording.per_step["policy_action"], slice(0, 6)
+    assert not asked[:20, arm].any()
+    assert recording.actions[:20, arm].any()
+    assert np.array_equal(asked[20:], recording.actions[20:])
+
+
 @pytest.mark.parametrize(
     ("options", "said"),
     [

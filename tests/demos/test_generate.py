@@ -15,7 +15,7 @@ from cluster_work import hdf5_content
 from killed_runs import run_killed
 
 from robocasa_lerobot import cli, contract
-from robocasa_lerobot.demos.attempts import CLEAN_ACTION, RecordingSettings
+from robocasa_lerobot.demos.attempts import RecordingSettings
 from robocasa_lerobot.demos.generate.course import KINDS, source_costs
 from robocasa_lerobot.demos.generate.fits import _turn_about
 from robocasa_lerobot.demos.generate.objects.place_segments import lean_of
@@ -268,7 +268,7 @@ def test_replays_with_noise_repeat_each_source_in_its_own_scene(
         with h5py.File(path) as file:
             group = file[f"data/demo_{number}"]
             source = own[int(group["src_demo_inds"][0])]
-            wanted = contract.hdf5_to_stored(group[CLEAN_ACTION][()])
+            wanted = contract.hdf5_to_stored(group[contract.CLEAN_ACTION][()])
         assert made.seed == source.seed
         np.testing.assert_array_equal(made.states[0], source.states[0])
         common = min(len(wanted), len(source.actions))

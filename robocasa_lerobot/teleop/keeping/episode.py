@@ -11,15 +11,12 @@ from numpy.typing import NDArray
 
 from robocasa_lerobot import contract
 from robocasa_lerobot.demos.recorder import SUCCESS_HOLD_STEPS, EpisodeBuffer, Recording, stage_rows
-from robocasa_lerobot.demos.skills.common import stage_done
-from robocasa_lerobot.demos.stages import StageLog, StageOutcome
+from robocasa_lerobot.demos.stages import StageLog, StageOutcome, stage_from
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv, Observation
 from robocasa_lerobot.envs.robots.control_step import DivergedError
 
 Array = NDArray[np.float64]
 Info = dict[str, Any]
-
-INTERVENTION, POLICY_ACTION, ASSISTED = contract.DECISIONS[:3]
 
 
 @dataclass(frozen=True)
@@ -193,21 +190,19 @@ class Episode:
             success=self.successful,
             reason="" if self.successful else f"the goal holds for {self.held} steps at the end",
         )
-        recording.per_step[ASSISTED] = np.array([[o.assisted] for o in self.origins], dtype=np.uint8)
+        recording.per_step[contract.ASSISTED] = np.array([[o.assisted] for o in self.origins], dtype=np.uint8)
         if with_policy:
-            recording.per_step[INTERVENTION] = np.array([[o.intervention] for o in self.origins], dtype=np.uint8)
+            recording.per_step[contract.INTERVENTION] = np.array(
+                [[o.intervention] for o in self.origins], dtype=np.uint8
+            )
             # Where nobody asked the policy, its place has what was carried out: no number that is none.
             asked = [
                 done if o.policy_action is None else contract.stored_to_hdf5(o.policy_action)
                 for o, done in zip(self.origins, self._buffer.actions, strict=True)
             ]
-            recording.per_step[POLICY_ACTION] = np.array(asked)
+            recording.per_step[contract.POLICY_ACTION] = np.array(asked)
         return recording
 
     def _stage(self) -> int:
-        """The stage that the present step belongs to: the first, from that of the last step on, that is not done."""
-        stages = self.env.declaration.stages
-        stage = self._buffer.stages[-1] if self._buffer.stages else 0
-        while stage < len(stages) - 1 and stage_done(self.env, stages[stage]):
-            stage += 1
-        return stage
+        """The stage that the present step belongs to."""
+        return stage_from(self.env, self._buffer.stages[-1] if self._buffer.stages else 0)
