@@ -14,6 +14,7 @@ from robocasa_lerobot.data.mixture import MixtureMeta
 from robocasa_lerobot.errors import UnknownNameError
 from robocasa_lerobot.training.config.phase import AugmentConfig, PhaseConfig
 
+BLANK = 0.5  # mid-grey, what is zero to networks that take pictures in [-1, 1]
 _GREY = (0.299, 0.587, 0.114)  # luma of ITU-R BT.601
 # YIQ of the NTSC standard: the hue is the angle in the plane of its last two coordinates.
 _TO_YIQ = torch.tensor([_GREY, (0.5959, -0.2746, -0.3213), (0.2115, -0.5227, 0.3112)])
@@ -33,22 +34,31 @@ def augment(
         generator = np.random.default_rng((seed, number))
         drawn = generator.uniform(-1, 1, (count * processes, 7))[rank * count : (rank + 1) * count]
         flat = images.reshape(count, -1, *images.shape[-3:])
-        moved = config.crop_cameras is None or any(fnmatch.fnmatchcase(key, p) for p in config.crop_cameras)
-        if moved and (config.crop < 1 or config.rotate > 0):
+        if (config.crop < 1 or config.rotate > 0) and _meant(key, config.crop_cameras):
             flat = _crop_and_rotate(flat, config, drawn[:, :3])
-        out[key] = _jitter(flat, config, drawn[:, 3:]).reshape(images.shape)
+        flat = _jitter(flat, config, drawn[:, 3:])
+        if config.blank and _meant(key, config.blank_cameras):
+            chances = np.random.default_rng((seed, number, 1)).uniform(size=count * processes)
+            blank = torch.from_numpy(chances[rank * count : (rank + 1) * count] < config.blank)
+            flat = torch.where(blank.to(flat.device)[:, None, None, None, None], flat.new_tensor(BLANK), flat)
+        out[key] = flat.reshape(images.shape)
     return out
 
 
-def check_crop_cameras(phase: PhaseConfig, meta: MixtureMeta) -> None:
-    """Check that `augment.crop_cameras` names some of the data's cameras.
+def check_cameras(phase: PhaseConfig, meta: MixtureMeta) -> None:
+    """Check that `augment.crop_cameras` and `augment.blank_cameras` name some of the data's cameras.
 
     Raises:
-        UnknownNameError: no pattern fits any of them, so that nothing would be cropped.
+        UnknownNameError: no pattern of one of them fits any camera, so that nothing would be changed.
     """
-    patterns = phase.augment.crop_cameras if phase.augment is not None else None
-    if patterns and not any(fnmatch.filter(meta.camera_keys, pattern) for pattern in patterns):
-        raise UnknownNameError("camera", patterns[0], meta.camera_keys, "(in `augment.crop_cameras`)")
+    for field in ("crop_cameras", "blank_cameras"):
+        patterns = getattr(phase.augment, field, None)
+        if patterns and not any(fnmatch.filter(meta.camera_keys, pattern) for pattern in patterns):
+            raise UnknownNameError("camera", patterns[0], meta.camera_keys, f"(in `augment.{field}`)")
+
+
+def _meant(key: str, patterns: list[str] | None) -> bool:
+    return patterns is None or any(fnmatch.fnmatchcase(key, pattern) for pattern in patterns)
 
 
 def _crop_and_rotate(images: Tensor, config: AugmentConfig, drawn: NDArray[np.float64]) -> Tensor:

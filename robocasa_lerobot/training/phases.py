@@ -14,7 +14,7 @@ from robocasa_lerobot.data.registry.hub import fetch_missing
 from robocasa_lerobot.errors import UserError
 from robocasa_lerobot.jobs.locks import LockHeldError, locked
 from robocasa_lerobot.training import metrics, records
-from robocasa_lerobot.training.augment import check_crop_cameras
+from robocasa_lerobot.training.augment import check_cameras
 from robocasa_lerobot.training.config.experiment import FROM_SCRATCH, HUB, ExperimentConfig, PhaseConfig
 from robocasa_lerobot.training.interrupts import Interrupts
 from robocasa_lerobot.training.loop import any_process, train_phase
@@ -140,7 +140,7 @@ def check_phase(
     config = builders.policy_config(settings, checkpoint, device)
     data, parent = joining.open_phase_data(experiment, phase), experiment.parent(phase)
     meta, begun = data.meta, last_checkpoint(Path(experiment.output_dir) / phase.name) is not None
-    check_crop_cameras(phase, meta)
+    check_cameras(phase, meta)
     check_optimizer(config, phase)
     check_share(phase.batch_size // phase.gradient_accumulation, processes)
     check_begun(experiment, phase, device, data, force)

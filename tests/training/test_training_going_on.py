@@ -147,6 +147,9 @@ def test_features_that_a_later_phase_lacks_are_told_before_the_first(tmp_path: P
 
 
 def test_cameras_to_crop_that_are_none_are_told(tmp_path: Path, data: Path) -> None:
+    blanks = "--phases.pretrain.augment={blank: 0.5, blank_cameras: ['*agentview_lefft']}"
+    with pytest.raises(UnknownNameError, match="blank_cameras"):
+        run_experiment(tiny(tmp_path, data, overrides=[blanks]))
     crops = "--phases.pretrain.augment={crop: 0.9, crop_cameras: ['*agentview_lefft']}"
     with pytest.raises(UnknownNameError, match="crop_cameras"):
         run_experiment(tiny(tmp_path, data, overrides=[crops]))

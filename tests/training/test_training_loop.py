@@ -27,7 +27,7 @@ from robocasa_lerobot.data.fake import write_fake_dataset
 from robocasa_lerobot.errors import UserError
 from robocasa_lerobot.jobs.child_process import STOP_SIGNALS
 from robocasa_lerobot.training import metrics as module
-from robocasa_lerobot.training.augment import augment
+from robocasa_lerobot.training.augment import BLANK, augment
 from robocasa_lerobot.training.config.experiment import TRACKERS
 from robocasa_lerobot.training.config.phase import AugmentConfig
 from robocasa_lerobot.training.interrupts import REQUEUE
@@ -190,7 +190,7 @@ def test_no_augmentation_changes_nothing() -> None:
     assert torch.equal(changed(AugmentConfig()), pictures()[CAMERA])
 
 
-FULL = AugmentConfig(crop=0.9, rotate=5, brightness=0.3, contrast=0.4, saturation=0.5, hue=0.08)
+FULL = AugmentConfig(crop=0.9, rotate=5, brightness=0.3, contrast=0.4, saturation=0.5, hue=0.08, blank=0.3)
 
 
 def test_augmentation_belongs_to_samples() -> None:
@@ -230,6 +230,20 @@ def test_each_augmentation_does_what_it_says() -> None:
     torch.testing.assert_close(steps[..., 4:-4], torch.full_like(steps[..., 4:-4], 0.5 / 15))  # half as steep
     kept = augment({CAMERA: ramp}, [CAMERA], AugmentConfig(crop=0.5, crop_cameras=["*wrist*"]), 0)[CAMERA]
     assert torch.equal(kept, ramp)
+
+
+def test_cameras_are_blanked_in_a_share_of_the_samples_each_on_its_own() -> None:
+    cameras = ["observation.images.left", "observation.images.right", "observation.images.wrist"]
+    batch = {key: torch.rand(2000, 1, 3, 2, 2) * 0.4 for key in cameras}
+    out = augment(batch, cameras, AugmentConfig(blank=0.3, blank_cameras=["*left", "*right"]), 0)
+    assert torch.equal(out[cameras[2]], batch[cameras[2]])
+    blank = {key: (out[key] == BLANK).flatten(1).all(dim=1) for key in cameras[:2]}
+    for key, which in blank.items():
+        assert torch.equal(out[key][~which], batch[key][~which])
+        assert 0.26 < float(which.float().mean()) < 0.34
+    assert 0.06 < float((blank[cameras[0]] & blank[cameras[1]]).float().mean()) < 0.12
+    with pytest.raises(UserError, match="blank is 1"):
+        AugmentConfig(blank=1)
 
 
 def test_training_with_everything_on(tmp_path: Path, data: Path) -> None:

@@ -115,6 +115,9 @@ class AugmentConfig:
         saturation: likewise, around each pixel's grey.
         hue: turn of the hue within -h .. h, in full turns.
         crop_cameras: patterns of the cameras that are cropped and rotated; null is all.
+        blank: share of the samples in which a camera's pictures are plain grey, drawn for each camera on its own. A
+            view of the whole room tells kitchens apart, and a policy that knows the kitchen by heart looks no more.
+        blank_cameras: patterns of the cameras that this happens to; null is all.
     """
 
     crop: float = 1.0
@@ -124,6 +127,8 @@ class AugmentConfig:
     saturation: float = 0.0
     hue: float = 0.0
     crop_cameras: list[str] | None = None
+    blank: float = 0.0
+    blank_cameras: list[str] | None = None
 
     def __post_init__(self) -> None:
         if not 0 < self.crop <= 1:
@@ -131,6 +136,8 @@ class AugmentConfig:
         for name in ("rotate", "brightness", "contrast", "saturation", "hue"):
             if getattr(self, name) < 0:
                 raise UserError(f"augment: {name} is {getattr(self, name)}, expected 0 or more.")
+        if not 0 <= self.blank < 1:
+            raise UserError(f"augment: blank is {self.blank}, expected 0 or more and less than 1.")
 
 
 @dataclass
