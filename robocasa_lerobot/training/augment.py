@@ -4,15 +4,18 @@ from __future__ import annotations
 
 import fnmatch
 import math
+from typing import Any
 
 import numpy as np
 import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
+from robocasa_lerobot.contract import ACTION_KEY, STATE_KEY
 from robocasa_lerobot.data.mixture import MixtureMeta
 from robocasa_lerobot.errors import UnknownNameError
 from robocasa_lerobot.training.config.phase import AugmentConfig, PhaseConfig
+from robocasa_lerobot.training.mirror import check_mirror, mirror
 
 BLANK = 0.5  # mid-grey, what is zero to networks that take pictures in [-1, 1]
 _GREY = (0.299, 0.587, 0.114)  # luma of ITU-R BT.601
@@ -21,15 +24,18 @@ _TO_YIQ = torch.tensor([_GREY, (0.5959, -0.2746, -0.3213), (0.2115, -0.5227, 0.3
 
 
 def augment(
-    batch: dict[str, Tensor], cameras: list[str], config: AugmentConfig, seed: int, rank: int = 0, processes: int = 1
-) -> dict[str, Tensor]:
+    batch: dict[str, Any], cameras: list[str], config: AugmentConfig, seed: int, rank: int = 0, processes: int = 1
+) -> dict[str, Any]:
     """The batch with changed pictures, float (B, ..., 3, H, W) in [0, 1].
 
     The augmentation of a sample depends on the seed and its place in the batch of all processes only.
     """
     out = dict(batch)
+    if config.mirror:
+        count = batch[cameras[0]].shape[0]
+        out = mirror(out, cameras, _drawn(config.mirror, count, (seed, len(cameras)), rank, processes))
     for number, key in enumerate(cameras):
-        images = batch[key]
+        images = out[key]
         count = images.shape[0]
         generator = np.random.default_rng((seed, number))
         drawn = generator.uniform(-1, 1, (count * processes, 7))[rank * count : (rank + 1) * count]
@@ -38,23 +44,31 @@ def augment(
             flat = _crop_and_rotate(flat, config, drawn[:, :3])
         flat = _jitter(flat, config, drawn[:, 3:])
         if config.blank and _meant(key, config.blank_cameras):
-            chances = np.random.default_rng((seed, number, 1)).uniform(size=count * processes)
-            blank = torch.from_numpy(chances[rank * count : (rank + 1) * count] < config.blank)
+            blank = _drawn(config.blank, count, (seed, number, 1), rank, processes)
             flat = torch.where(blank.to(flat.device)[:, None, None, None, None], flat.new_tensor(BLANK), flat)
         out[key] = flat.reshape(images.shape)
     return out
 
 
 def check_cameras(phase: PhaseConfig, meta: MixtureMeta) -> None:
-    """Check that `augment.crop_cameras` and `augment.blank_cameras` name some of the data's cameras.
+    """Check that `augment.crop_cameras` and `blank_cameras` name some of the data's cameras, and `mirror` fits them.
 
     Raises:
         UnknownNameError: no pattern of one of them fits any camera, so that nothing would be changed.
+        UserError: a mirror is asked for, for data of which it is not known what that makes of them.
     """
+    if phase.augment is not None and phase.augment.mirror:
+        check_mirror(meta.camera_keys, {key: meta.features[key]["shape"][-1] for key in (STATE_KEY, ACTION_KEY)})
     for field in ("crop_cameras", "blank_cameras"):
         patterns = getattr(phase.augment, field, None)
         if patterns and not any(fnmatch.filter(meta.camera_keys, pattern) for pattern in patterns):
             raise UnknownNameError("camera", patterns[0], meta.camera_keys, f"(in `augment.{field}`)")
+
+
+def _drawn(share: float, count: int, seed: tuple[int, ...], rank: int, processes: int) -> Tensor:
+    """Which of the `count` samples of a process something happens to, (count,)."""
+    chances = np.random.default_rng(seed).uniform(size=count * processes)
+    return torch.from_numpy(chances[rank * count : (rank + 1) * count] < share)
 
 
 def _meant(key: str, patterns: list[str] | None) -> bool:

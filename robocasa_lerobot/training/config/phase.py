@@ -114,6 +114,8 @@ class AugmentConfig:
         contrast: likewise, around the picture's mean grey.
         saturation: likewise, around each pixel's grey.
         hue: turn of the hue within -h .. h, in full turns.
+        mirror: share of the samples that are seen in a mirror: pictures, state, actions and `left` and `right` in the
+            instruction. For data of PandaOmron, with both cameras beside the hand.
         crop_cameras: patterns of the cameras that are cropped and rotated; null is all.
         blank: share of the samples in which a camera's pictures are plain grey, drawn for each camera on its own. A
             view of the whole room tells kitchens apart, and a policy that knows the kitchen by heart looks no more.
@@ -128,6 +130,7 @@ class AugmentConfig:
     hue: float = 0.0
     crop_cameras: list[str] | None = None
     blank: float = 0.0
+    mirror: float = 0.0
     blank_cameras: list[str] | None = None
 
     def __post_init__(self) -> None:
@@ -136,8 +139,9 @@ class AugmentConfig:
         for name in ("rotate", "brightness", "contrast", "saturation", "hue"):
             if getattr(self, name) < 0:
                 raise UserError(f"augment: {name} is {getattr(self, name)}, expected 0 or more.")
-        if not 0 <= self.blank < 1:
-            raise UserError(f"augment: blank is {self.blank}, expected 0 or more and less than 1.")
+        for name in ("blank", "mirror"):
+            if not 0 <= getattr(self, name) < 1:
+                raise UserError(f"augment: {name} is {getattr(self, name)}, expected 0 or more and less than 1.")
 
 
 @dataclass

@@ -14,12 +14,14 @@ from lerobot.configs.policies import PreTrainedConfig
 from lerobot.configs.train import TrainPipelineConfig
 
 from robocasa_lerobot.data.mixture import MixtureDataset, MixtureMeta, StepBatches
+from robocasa_lerobot.data.statistics import Statistics
 from robocasa_lerobot.errors import UserError
 from robocasa_lerobot.training import records
 from robocasa_lerobot.training.config.experiment import FROM_SCRATCH, HUB, ExperimentConfig, PhaseConfig
 from robocasa_lerobot.training.held_out import HeldOut, held_out_frames, without_held_out
 from robocasa_lerobot.training.loop import PhaseRun
 from robocasa_lerobot.training.metrics import truncate_metrics
+from robocasa_lerobot.training.mirror import mirror_statistics
 from robocasa_lerobot.training.setup import builders, clipping
 from robocasa_lerobot.training.setup import phase_data as joining
 from robocasa_lerobot.training.setup.features import LEAVE_OUT, RENAME
@@ -83,6 +85,7 @@ def prepare_phase(
         imagenet = phase.image_statistics == "imagenet"
         images = not imagenet
         stats = joining.pooled(experiment, phase, dataset, images) if pool else dataset.statistics(images)
+        stats = _as_trained(stats, phase)
         cameras = dataset.meta.camera_keys
         dataset.meta.stats = builders.with_imagenet_statistics(stats, cameras) if imagenet else stats
 
@@ -90,7 +93,7 @@ def prepare_phase(
     processors: tuple[Any, Any] | None = None
     if keep and last is None and clipping.clips(config) and clipping.RANGE not in phase.policy:
         processors = builders.make_processors(config, dataset.meta, start, keep_statistics=True, rename=rename)
-        reach = clipping.widen_clip_range(config, processors[0], dataset.statistics(images=False))
+        reach = clipping.widen_clip_range(config, processors[0], _as_trained(dataset.statistics(images=False), phase))
         if reach is not None:
             accelerator.print(f"  actions reach {reach:.1f} times as far as the statistics know: so does sampling now")
     policy = builders.make_phase_policy(config, dataset.meta, start)
@@ -290,6 +293,12 @@ def start_of(experiment: ExperimentConfig, phase: PhaseConfig) -> Path | None:
 
 def _folder(init: str) -> Path:
     return builders.hub_checkpoint(init.removeprefix(HUB)) if init.startswith(HUB) else Path(init)
+
+
+def _as_trained(stats: Statistics, phase: PhaseConfig) -> Statistics:
+    """Statistics of what the phase trains on: of the data, or of them and their mirror image."""
+    share = phase.augment.mirror if phase.augment is not None else 0.0
+    return mirror_statistics(stats, share) if share else stats
 
 
 def _cache_frames(experiment: ExperimentConfig, dataset: MixtureDataset) -> None:
