@@ -24,6 +24,14 @@ settings.register_profile("tests", deadline=None, derandomize=True, max_examples
 settings.load_profile("tests")
 
 
+# Here and not when pytest is configured: where folders are given, their own conftests are imported before that, and with
+# them what reads these when it is imported. Then the hub was asked five times for each file that is not there (23 s).
+_CACHE = tempfile.mkdtemp(prefix="robocasa_lerobot_tests_")
+os.environ.update(HF_HOME=_CACHE, HF_HUB_OFFLINE="1", WANDB_MODE="disabled")
+# Tiny networks: more threads only wait for each other (12 s became 150 s beside other work on two cores).
+os.environ.setdefault("OMP_NUM_THREADS", "1")
+
+
 def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption("--task-sample", metavar="TEXT", help="draw the fast tests' tasks by this (default: the commit)")
 
@@ -42,16 +50,11 @@ def _commit() -> str:
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    # Before any test module imports the Hugging Face libraries, which read these when they are imported.
-    config.stash[_CACHE] = cache = tempfile.mkdtemp(prefix="robocasa_lerobot_tests_")
-    os.environ.update(HF_HOME=cache, HF_HUB_OFFLINE="1", WANDB_MODE="disabled")
-    # Tiny networks: more threads only wait for each other (12 s became 150 s beside other work on two cores).
     os.environ[SAMPLE_VARIABLE] = config.getoption("--task-sample") or _commit()
-    os.environ.setdefault("OMP_NUM_THREADS", "1")
 
 
-def pytest_unconfigure(config: pytest.Config) -> None:
-    shutil.rmtree(config.stash[_CACHE], ignore_errors=True)
+def pytest_unconfigure() -> None:
+    shutil.rmtree(_CACHE, ignore_errors=True)
 
 
 def pytest_collection_finish() -> None:
@@ -90,6 +93,3 @@ def shared() -> Path:
     if not folder.is_dir():
         pytest.skip(f"no folder with real input: {folder.name}/ beside the checkout")
     return folder
-
-
-_CACHE = pytest.StashKey[str]()
