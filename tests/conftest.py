@@ -24,8 +24,8 @@ settings.register_profile("tests", deadline=None, derandomize=True, max_examples
 settings.load_profile("tests")
 
 
-# Here and not when pytest is configured: where folders are given, their own conftests are imported before that, and with
-# them what reads these when it is imported. Then the hub was asked five times for each file that is not there (23 s).
+# Here and not when pytest is configured: where folders are given, their own conftests are imported before that, and
+# with them what reads these when it is imported. The hub was then asked five times for each missing file (23 s).
 _CACHE = tempfile.mkdtemp(prefix="robocasa_lerobot_tests_")
 os.environ.update(HF_HOME=_CACHE, HF_HUB_OFFLINE="1", WANDB_MODE="disabled")
 # Tiny networks: more threads only wait for each other (12 s became 150 s beside other work on two cores).
