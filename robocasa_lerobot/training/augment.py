@@ -11,7 +11,7 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from robocasa_lerobot.contract import ACTION_KEY, STATE_KEY
+from robocasa_lerobot.contract import ACTION_KEY
 from robocasa_lerobot.data.mixture import MixtureMeta
 from robocasa_lerobot.errors import UnknownNameError
 from robocasa_lerobot.training.config.phase import AugmentConfig, PhaseConfig
@@ -32,8 +32,8 @@ def augment(
     """
     out = dict(batch)
     if config.mirror:
-        count = batch[cameras[0]].shape[0]
-        out = mirror(out, cameras, _drawn(config.mirror, count, (seed, len(cameras)), rank, processes))
+        chosen = _drawn(config.mirror, len(batch[ACTION_KEY]), (seed, len(cameras)), rank, processes)
+        out = mirror(out, cameras, chosen)
     for number, key in enumerate(cameras):
         images = out[key]
         count = images.shape[0]
@@ -57,10 +57,12 @@ def check_cameras(phase: PhaseConfig, meta: MixtureMeta) -> None:
         UnknownNameError: no pattern of one of them fits any camera, so that nothing would be changed.
         UserError: a mirror is asked for, for data of which it is not known what that makes of them.
     """
-    if phase.augment is not None and phase.augment.mirror:
-        check_mirror(meta.camera_keys, {key: meta.features[key]["shape"][-1] for key in (STATE_KEY, ACTION_KEY)})
-    for field in ("crop_cameras", "blank_cameras"):
-        patterns = getattr(phase.augment, field, None)
+    config = phase.augment
+    if config is None:
+        return
+    if config.mirror:
+        check_mirror(meta)
+    for field, patterns in (("crop_cameras", config.crop_cameras), ("blank_cameras", config.blank_cameras)):
         if patterns and not any(fnmatch.filter(meta.camera_keys, pattern) for pattern in patterns):
             raise UnknownNameError("camera", patterns[0], meta.camera_keys, f"(in `augment.{field}`)")
 

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from robocasa_lerobot.contract import ACTION_KEY, ACTION_PARTS, STATE_KEY, STATE_PARTS, TASK_KEY, component_names
+from robocasa_lerobot.data.mixture import MixtureMeta
 from robocasa_lerobot.data.statistics import Statistics
 from robocasa_lerobot.errors import UserError
 
@@ -55,10 +56,11 @@ _REFLECTIONS = {
     ACTION_KEY: _Reflection.of(component_names(ACTION_PARTS), ("base_left", "base_yaw", "eef_dy", "eef_rx", "eef_rz")),
 }
 _OPPOSITE = {"min": "max", "q01": "q99", "q10": "q90", "q50": "q50", "q90": "q10", "q99": "q01", "max": "min"}
-# Words that mean a side, but not "the right way up", "right beside" and "until none is left in ...".
+# Sides, the only group; before them what has these words and means none, which is passed over.
 _SIDES = re.compile(
-    r"(?<!is )(?<!are )\b(left|right)(?=most\b|-hand\b|\b)(?! way\b| beside\b| next\b| away\b)"
-    r"|(?<=is )(left|right)(?= of\b)",
+    r"what is left\b|\b(?:is|are|be) left\b(?! of\b)|\bleft (?:behind|over)\b"
+    r"|\bright (?:way|beside|next|away|tool)\b|\bon the right one\b"
+    r"|\b(left|right)(?=most\b|\b)",
     re.IGNORECASE,
 )
 _OTHER = {"left": "right", "right": "left"}
@@ -72,11 +74,8 @@ def mirror(batch: dict[str, Any], cameras: list[str], chosen: Tensor) -> dict[st
             not normalised, and `task`, B instructions.
         cameras: keys of pictures; one with `left` in its name belongs to the one with `right` in its place.
         chosen: (B,) bool.
-
-    Raises:
-        UserError: state or action are not those of the contract, or a camera of a pair is missing.
+        What of these can be mirrored, `check_mirror` says.
     """
-    check_mirror(cameras, {key: batch[key].shape[-1] for key in (STATE_KEY, ACTION_KEY)})
     out = dict(batch)
     for key in cameras:
         flipped = batch[swap_sides(key)].flip(-1)
@@ -88,18 +87,19 @@ def mirror(batch: dict[str, Any], cameras: list[str], chosen: Tensor) -> dict[st
     return out
 
 
-def check_mirror(cameras: list[str], sizes: dict[str, int]) -> None:
-    """Check that samples can be mirrored; `sizes` are the numbers of components of state and action.
+def check_mirror(meta: MixtureMeta) -> None:
+    """Check that samples of a mixture can be mirrored.
 
     Raises:
-        UserError: as for `mirror`.
+        UserError: state or action are not those of the contract, or a camera of a pair is missing.
     """
+    cameras = meta.camera_keys
     for key, reflection in _REFLECTIONS.items():
-        expected = len(reflection.signs)
-        if sizes[key] != expected:
+        expected, found = [len(reflection.signs)], list(meta.features.get(key, {}).get("shape", ()))
+        if found != expected:
             raise UserError(
-                f"augment: mirror: {key} has {sizes[key]} components, expected the {expected} of PandaOmron, whose "
-                "sides are known. Leave `mirror` out."
+                f"augment: mirror: {key} has the shape {found}, expected {expected}, that of PandaOmron, whose sides "
+                "are known. Leave `mirror` out."
             )
     for key in cameras:
         if swap_sides(key) not in cameras:
@@ -143,7 +143,9 @@ def swap_sides(name: str) -> str:
 
 
 def _other_side(found: re.Match[str]) -> str:
-    word = found.group()
+    word = found.group(1)
+    if word is None:
+        return found.group()
     other = _OTHER[word.lower()]
     return other.capitalize() if word[0].isupper() else other
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 from typing import Any
 
@@ -9,20 +10,36 @@ import mujoco
 import numpy as np
 import pytest
 import torch
+from safetensors.numpy import load_file
 from training_support import losses, tiny
 
 from robocasa_lerobot import contract
 from robocasa_lerobot.data.fake import write_fake_dataset
+from robocasa_lerobot.data.mixture import MixtureMeta, open_mixture
+from robocasa_lerobot.data.mixture_config import LoaderConfig, MemberConfig, MixtureConfig
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.errors import UserError
 from robocasa_lerobot.training.augment import augment
 from robocasa_lerobot.training.config.phase import AugmentConfig
-from robocasa_lerobot.training.mirror import mirror, mirror_action, mirror_state, mirror_statistics, mirror_text
+from robocasa_lerobot.training.mirror import (
+    check_mirror,
+    mirror,
+    mirror_action,
+    mirror_state,
+    mirror_statistics,
+    mirror_text,
+)
 from robocasa_lerobot.training.phases import run_experiment
 
 STATE, ACTION, TASK = contract.STATE_KEY, contract.ACTION_KEY, contract.TASK_KEY
 LEFT, RIGHT, WRIST = contract.IMAGE_KEYS
 EEF = contract.slices(contract.STATE_PARTS)
+
+
+@pytest.fixture
+def data(tmp_path: Path) -> Path:
+    """A dataset of the test's own, of four short episodes with three cameras."""
+    return write_fake_dataset(tmp_path / "fake", episodes=4, length=12, image_size=32)
 
 
 def batch(count: int) -> dict[str, Any]:
@@ -67,9 +84,19 @@ def test_the_robot_is_its_own_mirror_image() -> None:
         mujoco.mju_quat2Mat(seen, np.array([w, x, y, z]))
         np.testing.assert_allclose(seen.reshape(3, 3), turned, atol=2e-3)
     left, right = (model.camera(f"robot0_agentview_{side}") for side in ("left", "right"))
-    np.testing.assert_allclose(left.pos * [1, -1, 1], right.pos)
-    assert model.camera("robot0_eye_in_hand").pos[1] == 0
+    wrist = model.camera("robot0_eye_in_hand")
+    for camera, other in ((left, right), (wrist, wrist)):
+        np.testing.assert_allclose(camera.pos * [1, -1, 1], other.pos)
+        # A picture's own sides change as well: its first axis points to the right.
+        np.testing.assert_allclose(flip @ axes(camera) @ np.diag([-1, 1, 1]), axes(other), atol=1e-6)
     env.close()
+
+
+def axes(camera: Any) -> np.ndarray:
+    """Axes of a camera in the frame that it is mounted in, (3, 3): right, up, back."""
+    out = np.zeros(9)
+    mujoco.mju_quat2Mat(out, camera.quat)
+    return out.reshape(3, 3)
 
 
 def test_mirrored_commands_move_the_hand_to_the_mirrored_place() -> None:
@@ -130,6 +157,15 @@ def test_twice_mirrored_is_what_it_was() -> None:
         ),
         ("Carry on until none is left in the left basin.", "Carry on until none is left in the right basin."),
         ("The cup is left of the plate.", "The cup is right of the plate."),
+        ("No cabinet should be left open.", "No cabinet should be left open."),
+        ("Freeze what is left of the soup, and leave no door left behind.",) * 2,
+        ("Make sure that no gap is left at the left drawer.", "Make sure that no gap is left at the right drawer."),
+        ("A shelf for each kind: put the pear on the right one.",) * 2,
+        ("Fetch the right tool from the right drawer.", "Fetch the right tool from the left drawer."),
+        (
+            "The fork at the left hand, the spoon right, dishes in the right one.",
+            "The fork at the right hand, the spoon left, dishes in the left one.",
+        ),
         ("Open the drawer.", "Open the drawer."),
     ],
 )
@@ -177,20 +213,33 @@ def test_processes_mirror_their_part_of_the_batch() -> None:
     assert len(set(whole[TASK])) == 2
 
 
-def test_data_whose_sides_are_not_known_are_refused() -> None:
-    other = batch(2)
-    other[ACTION] = other[ACTION][..., :7]
-    with pytest.raises(UserError, match="action has 7 components, expected the 12"):
-        mirror(other, list(contract.IMAGE_KEYS), torch.ones(2, dtype=torch.bool))
+def test_data_whose_sides_are_not_known_are_refused(tmp_path: Path, data: Path) -> None:
+    features = open_mixture(MixtureConfig(members=[MemberConfig(str(data))]), LoaderConfig()).meta.features
+
+    def refused(changed: dict[str, Any], message: str) -> None:
+        with pytest.raises(UserError, match=message):
+            check_mirror(MixtureMeta(changed, 20, None, [], 1, 1))
+
+    refused({**features, ACTION: {**features[ACTION], "shape": [7]}}, r"action has the shape \[7\], expected \[12\]")
+    refused({key: value for key, value in features.items() if key != STATE}, r"state has the shape \[\]")
+    lacking = {key: value for key, value in features.items() if key != RIGHT}
+    refused(lacking, "agentview_right in a mirror")
+    (data / "meta/info.json").write_text(
+        json.dumps({**json.loads((data / "meta/info.json").read_text()), "features": lacking})
+    )
     with pytest.raises(UserError, match="agentview_right in a mirror"):
-        mirror(batch(2), [LEFT, WRIST], torch.ones(2, dtype=torch.bool))
+        run_experiment(tiny(tmp_path, data, overrides=["--defaults.augment={mirror: 0.5}"]))
 
 
-def test_training_with_a_mirror_goes_on_where_it_was(tmp_path: Path) -> None:
+def test_training_with_a_mirror_goes_on_where_it_was(tmp_path: Path, data: Path) -> None:
     """All three cameras, stopped and continued: the losses of a training in one go; statistics are symmetric."""
-    data = write_fake_dataset(tmp_path / "fake", episodes=4, length=12, image_size=32)
     overrides = ["--defaults.augment={mirror: 0.5, blank: 0.3, blank_cameras: ['*agentview*']}"]
     assert not run_experiment(tiny(tmp_path / "a", data, overrides=overrides), stop_after=4)
     assert not run_experiment(tiny(tmp_path / "b", data, overrides=overrides), stop_after=2)
     assert not run_experiment(tiny(tmp_path / "b", data, overrides=overrides), stop_after=2)
     assert losses(tmp_path / "a", "pretrain") == losses(tmp_path / "b", "pretrain")
+    (path,) = (tmp_path / "a/out/pretrain/checkpoints/last/pretrained_model").glob("policy_pre*normalizer*.safetensors")
+    stats, names = load_file(path), contract.component_names(contract.STATE_PARTS)
+    low, high = stats[f"{STATE}.min"][names.index("eef_y")], stats[f"{STATE}.max"][names.index("eef_y")]
+    assert low == -high < 0
+    assert stats[f"{STATE}.mean"][names.index("eef_y")] == pytest.approx(0, abs=1e-6)

@@ -114,12 +114,12 @@ class AugmentConfig:
         contrast: likewise, around the picture's mean grey.
         saturation: likewise, around each pixel's grey.
         hue: turn of the hue within -h .. h, in full turns.
-        mirror: share of the samples that are seen in a mirror: pictures, state, actions and `left` and `right` in the
-            instruction. For data of PandaOmron, with both cameras beside the hand.
         crop_cameras: patterns of the cameras that are cropped and rotated; null is all.
         blank: share of the samples in which a camera's pictures are plain grey, drawn for each camera on its own. A
             view of the whole room tells kitchens apart, and a policy that knows the kitchen by heart looks no more.
         blank_cameras: patterns of the cameras that this happens to; null is all.
+        mirror: share of the samples that are seen in a mirror: pictures, state, actions and `left` and `right` in the
+            instruction. For data of PandaOmron, with both cameras beside the hand.
     """
 
     crop: float = 1.0
@@ -130,8 +130,8 @@ class AugmentConfig:
     hue: float = 0.0
     crop_cameras: list[str] | None = None
     blank: float = 0.0
-    mirror: float = 0.0
     blank_cameras: list[str] | None = None
+    mirror: float = 0.0
 
     def __post_init__(self) -> None:
         if not 0 < self.crop <= 1:

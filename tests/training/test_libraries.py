@@ -1,4 +1,4 @@
-"""What all tests stand on: no network and one thread, in whatever order pytest imports."""
+"""What all tests stand on: no network and one thread, though this folder's own conftest imports torch and the hub."""
 
 from __future__ import annotations
 
