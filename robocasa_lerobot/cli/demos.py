@@ -27,6 +27,13 @@ def configure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--plain", action="store_true", help="no variety: speed, paths and choice of grasps as the skills have them"
     )
+    parser.add_argument(
+        "--disturbances",
+        type=int,
+        default=0,
+        metavar="N",
+        help="up to N times in an episode the hand is led astray on its way, and comes from there (default: none)",
+    )
     add_options(parser)
 
 
@@ -83,7 +90,7 @@ def run(args: argparse.Namespace) -> int:
     from robocasa_lerobot.jobs.executors import execution_of
 
     execution = execution_of(args)
-    values = {**kitchen_values(args), "varied": not args.plain}
+    values = {**kitchen_values(args), "varied": not args.plain, "disturbances": args.disturbances}
     settings = [RecordingSettings(task=name, **values) for name in demonstrable(args.tasks)]
     return record(settings, args, execution)[0]
 

@@ -200,6 +200,7 @@ def recording_settings(need: Need) -> RecordingSettings:
         split=need.split,
         seed=recipe.seed,
         action_noise=recipe.action_noise,
+        disturbances=recipe.disturbances,
         layouts=tuple(recipe.layouts) if recipe.layouts is not None else None,
         styles=tuple(recipe.styles) if recipe.styles is not None else None,
         varied=recipe.varied,

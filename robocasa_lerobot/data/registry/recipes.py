@@ -28,6 +28,8 @@ class RecipeConfig:
         layouts: kitchens by layout; null is the split's own.
         styles: likewise by style.
         action_noise: standard deviation of noise on arm commands, as `demos --action-noise`.
+        disturbances: up to how many times the hand is led astray on its way, as `demos --disturbances`; mixtures leave
+            these frames out by `frames: interventions`.
         varied: each demonstration in a style of its own, as `demos` without `--plain`.
         image_size: height and width of the pictures, pixels.
         sources: so many demonstrations are recorded (no more than are asked for), and multiplied to as many as asked
@@ -45,6 +47,7 @@ class RecipeConfig:
     layouts: list[int] | None = None
     styles: list[int] | None = None
     action_noise: float = 0.0
+    disturbances: int = 0
     varied: bool = True
     image_size: int = IMAGE_SIZE
     sources: int | None = None
@@ -60,6 +63,8 @@ class RecipeConfig:
         if self.corrects is not None and (self.redraw is not None or self.sources is not None):
             other = "redraw" if self.redraw is not None else "sources"
             raise UserError(f"recipe of a dataset: `corrects` and `{other}` are two ways to make it; give one.")
+        if self.disturbances and (self.corrects or self.redraw or self.sources):
+            raise UserError("recipe of a dataset: `disturbances` are for demonstrations that are recorded anew.")
         if self.after is not None and (self.corrects is None or len(self.after) != 2):
             raise UserError(f"recipe of a dataset: `after` is {self.after}; it takes two steps, with `corrects`.")
         if self.sources is not None and self.sources < 1:
