@@ -1,1 +1,1 @@
-"""Demonstrators that correct a policy: DAgger without a person."""
+"""Demonstrators that correct what a policy does, or something that leads the hand astray: no person is needed."""

@@ -5,7 +5,6 @@ Numbers come from memory, pictures from the frame cache or, without one, from Le
 
 from __future__ import annotations
 
-import dataclasses
 import hashlib
 from collections import OrderedDict
 from collections.abc import Mapping, Sequence
@@ -19,11 +18,13 @@ from numpy.typing import NDArray
 
 from robocasa_lerobot import contract
 from robocasa_lerobot.data.alike import check_alike, unseen_pictures
+from robocasa_lerobot.data.members import with_frames
 from robocasa_lerobot.data.mixture_config import LoaderConfig, MemberConfig, MixtureConfig
-from robocasa_lerobot.data.reading.decisions import NoFramesError, frame_pool
+from robocasa_lerobot.data.reading.decisions import frame_pool
 from robocasa_lerobot.data.reading.frame_cache import FrameCache, cache_bytes, open_or_build, resize_images
 from robocasa_lerobot.data.reading.pictures import PictureReader
 from robocasa_lerobot.data.reading.source import DatasetSource
+from robocasa_lerobot.data.reading.windows import Bounds
 from robocasa_lerobot.data.registry.registry import resolve_mixture
 from robocasa_lerobot.data.sampler import MixtureSampler, mixture_probabilities
 from robocasa_lerobot.data.statistics import (
@@ -58,44 +59,13 @@ class MixtureMeta:
         return [key for key, feature in self.features.items() if contract.is_picture(feature)]
 
 
-@dataclass
-class _Member:
-    source: DatasetSource
-    episodes: NDArray[np.int64]
-    frames: int
-    kind: str | None = None
-
-
-def _with_frames(config: MixtureConfig, opened: Mapping[Path, DatasetSource]) -> tuple[MixtureConfig, list[_Member]]:
-    """The mixture without members that have no frame of the kind that they ask for, and those that are left.
-
-    Such a dataset is of a task that a policy needed no correction in.
-
-    Raises:
-        NoFramesError: none would be left.
-    """
-    kept: list[tuple[MemberConfig, _Member]] = []
-    without: list[NoFramesError] = []
-    for member in config.members:
-        source = opened[Path(member.root)]
-        episodes = source.select(member)
-        try:
-            frames = frame_pool(source, episodes, member.frames).size
-        except NoFramesError as error:
-            without.append(error)
-        else:
-            kept.append((member, _Member(source, episodes, frames, member.frames)))
-    if not kept:
-        raise without[0]
-    return dataclasses.replace(config, members=[member for member, _ in kept]), [one for _, one in kept]
-
-
 class MixtureDataset(torch.utils.data.Dataset[Item]):
     """Items as LeRobot's datasets give them, over the members of a mixture.
 
     `config` is the mixture with its selections written out as members (`data/registry/registry.py`).
     An item has every column of the frame, and for the keys of `delta_timestamps` a leading time axis and
-    `<key>_is_pad` (true where the window leaves the episode and repeats its edge). Images are uint8
+    `<key>_is_pad` (true where the window leaves the episode and repeats its edge; so does one that leaves a run of the
+    frames that are asked for, in members that ask for a kind). Images are uint8
     (time, 3, H, W), other floats float32; `task` is the instruction and `task_index` its place in `meta.tasks`.
     Index i counts the frames of the first member's dataset, then of the second's, and so on. Datasets in `opened` are
     not opened again, and those that are opened are added to it. Members without any frame of the kind that they ask
@@ -127,7 +97,7 @@ class MixtureDataset(torch.utils.data.Dataset[Item]):
         for root in dict.fromkeys(Path(member.root) for member in config.members):
             if root not in opened:
                 opened[root] = DatasetSource(root)
-        config, self._members = _with_frames(config, opened)
+        config, self._members = with_frames(config, opened)
         self.config = config
         self.sources = {root: opened[root] for root in dict.fromkeys(Path(member.root) for member in config.members)}
         every = {key: feature for source in self.sources.values() for key, feature in source.features.items()}
@@ -278,7 +248,7 @@ class MixtureDataset(torch.utils.data.Dataset[Item]):
         for place in dict.fromkeys(places.tolist()):
             chosen = np.flatnonzero(places == place)
             order.append(chosen)
-            parts.append(self._read(self._use(self._source_list[place]), frames[chosen]))
+            parts.append(self._read(self._use(self._source_list[place]), frames[chosen], members[chosen]))
         if len(parts) == 1:
             return parts[0]
         back = np.argsort(np.concatenate(order))
@@ -291,11 +261,11 @@ class MixtureDataset(torch.utils.data.Dataset[Item]):
                 out[key] = [joined[i] for i in back]
         return out
 
-    def _read(self, source: DatasetSource, frames: NDArray[np.int64]) -> Item:
-        out = self._read_pictures(source, frames)
-        episode = source.columns["episode_index"][frames]
+    def _read(self, source: DatasetSource, frames: NDArray[np.int64], members: NDArray[np.int64]) -> Item:
+        bounds = self._bounds(source, frames, members)
+        out = self._read_pictures(source, frames, bounds)
         for key, column in source.columns.items():
-            indices, padded = self._window(key, source, frames, episode)
+            indices, padded = self._window(key, frames, bounds)
             out[key] = torch.from_numpy(column[indices])
             if padded is not None:
                 out[f"{key}_is_pad"] = torch.from_numpy(padded)
@@ -304,16 +274,15 @@ class MixtureDataset(torch.utils.data.Dataset[Item]):
         out["task"] = [self.meta.tasks[i] for i in task]
         return out
 
-    def _read_pictures(self, source: DatasetSource, frames: NDArray[np.int64]) -> Item:
+    def _read_pictures(self, source: DatasetSource, frames: NDArray[np.int64], bounds: Bounds) -> Item:
         keys, out = self.meta.camera_keys, Item()
         if not keys:
             return out
-        episode = source.columns["episode_index"][frames]
         cache = self._caches.get(source.root)
         if cache:
             _use_one(source.root, self._recent_caches, self._caches, self._max_open)
         for key in keys:
-            indices, padded = self._window(key, source, frames, episode)
+            indices, padded = self._window(key, frames, bounds)
             if cache:
                 out[key] = cache.frames(key, indices)
             else:
@@ -338,15 +307,20 @@ class MixtureDataset(torch.utils.data.Dataset[Item]):
         _use_one(source.root, self._recent, self.sources, self._max_open)
         return source
 
+    def _bounds(self, source: DatasetSource, frames: NDArray[np.int64], members: NDArray[np.int64]) -> Bounds:
+        """Of the windows around frames: their episodes, and where a kind of frame is drawn, the end of its run."""
+        episode = source.columns["episode_index"][frames]
+        last = source.ends[episode] - 1
+        for number in np.unique(members).tolist():
+            if (runs := self._members[number].last) is not None:
+                last = np.where(members == number, runs[frames], last)
+        return Bounds(source.starts[episode], last)
+
     def _window(
-        self, key: str, source: DatasetSource, frames: NDArray[np.int64], episode: NDArray[np.int64]
+        self, key: str, frames: NDArray[np.int64], bounds: Bounds
     ) -> tuple[NDArray[np.int64], NDArray[np.bool_] | None]:
-        """Dataset indices of a key's window, (n,) or (n, time), and where it leaves the episode."""
-        if key not in self._deltas:
-            return frames, None
-        wanted = frames[:, None] + np.asarray(self._deltas[key], dtype=np.int64)
-        first, last = source.starts[episode][:, None], source.ends[episode][:, None] - 1
-        return np.clip(wanted, first, last), (wanted < first) | (wanted > last)
+        """Dataset indices of a key's window, (n,) or (n, time), and where it is out of bounds."""
+        return (frames, None) if key not in self._deltas else bounds.window(frames, self._deltas[key])
 
 
 def check_share(batch_size: int, processes: int) -> None:

@@ -20,7 +20,6 @@ import numpy as np
 
 from robocasa_lerobot import contract
 from robocasa_lerobot.demos.demonstrator import demonstrate
-from robocasa_lerobot.demos.disturbances import MOST_MORE_STEPS, DisturbedDemonstrator
 from robocasa_lerobot.demos.failures import film_of, keep_failure
 from robocasa_lerobot.demos.hdf5 import Failure, recorded_otherwise, segments_of, versions, write_part
 from robocasa_lerobot.demos.motion import Array
@@ -30,7 +29,6 @@ from robocasa_lerobot.demos.stages import StageLog
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.scene.reset_noise import InitialNoise
 from robocasa_lerobot.envs.seeds import SEEDS, is_seed
-from robocasa_lerobot.envs.tasks.registry import get_task
 from robocasa_lerobot.errors import OF_THE_MACHINE, UserError
 from robocasa_lerobot.files import write_text
 from robocasa_lerobot.jobs.pool import exit_if_orphaned
@@ -38,7 +36,6 @@ from robocasa_lerobot.jobs.pool import exit_if_orphaned
 # Give up when this many attempts per wanted episode were not enough, or when none of the first ones has succeeded.
 MAX_ATTEMPTS_PER_EPISODE, HOPELESS = 10, 20
 _ENOUGH_FOR_A_RATE = 10
-_DISTURBANCE_STREAM = 10  # apart from those of scene, arm, noise, style, choice among sources and corrections
 
 
 class BrokenAttemptError(Exception):
@@ -65,7 +62,6 @@ class RecordingSettings:
         styles: the same for styles.
         varied: whether each demonstration has a style of its own (`demos.motion_style`).
         start_within_m: the robot starts anywhere within so many metres of the task's own start, at any heading.
-        disturbances: up to how many times the hand is led astray on its way (`demos.disturbances`).
     """
 
     task: str
@@ -79,7 +75,6 @@ class RecordingSettings:
     styles: tuple[int, ...] | None = None
     varied: bool = True
     start_within_m: float = 0.0
-    disturbances: int = 0
 
     def env_kwargs(self) -> dict[str, Any]:
         """Arguments of the env, for the file's `env_args`."""
@@ -108,8 +103,6 @@ class RecordingSettings:
                 f"seed {self.seed}: {self.episodes} episodes may take {self.limit} attempts, with seeds from there on; "
                 f"each is to be {SEEDS}. Choose such a --seed."
             )
-        if self.disturbances < 0:
-            raise UserError(f"disturbances: found {self.disturbances}, expected a number of at least 0.")
         if not 0.0 <= self.action_noise < math.inf:
             raise UserError(f"action_noise: found {self.action_noise}, expected a number of at least 0.")
 
@@ -122,16 +115,8 @@ class RecordingSettings:
         """Whether what attempts need besides a seed is there; what is raised ends the run, and is no failed attempt."""
 
     def record(self, env: KitchenEnv, seed: int) -> Recording:
-        """Make the attempt of a seed; with disturbances it says which steps the demonstrator decided."""
-        if not self.disturbances:
-            return self.labelled_episode(env, seed, demonstrate)
-        rng = np.random.default_rng([seed, _DISTURBANCE_STREAM])
-        demonstrator = DisturbedDemonstrator(rng, self.disturbances)
-        recording = self.labelled_episode(env, seed, demonstrator.act)
-        decided = np.array(demonstrator.decided[: len(recording.actions)], dtype=np.uint8)
-        recording.per_step[contract.INTERVENTION] = decided.reshape(-1, 1)
-        recording.ep_meta["disturbances"] = demonstrator.count
-        return recording
+        """Make the attempt of a seed."""
+        return self.labelled_episode(env, seed, demonstrate)
 
     def labelled_episode(
         self,
@@ -168,10 +153,7 @@ class RecordingSettings:
 
     def attempt_kwargs(self) -> dict[str, Any]:
         """Arguments of the env that attempts are made in, beyond the file's: nothing is rendered that is not stored."""
-        unseen = {} if self.images else {"cameras": ()}
-        if not self.disturbances:
-            return unseen
-        return {**unseen, "horizon": get_task(self.task).horizon + self.disturbances * MOST_MORE_STEPS}
+        return {} if self.images else {"cameras": ()}
 
     def make_env(self) -> KitchenEnv:
         """The env that attempts are made in."""

@@ -194,17 +194,21 @@ class MadeDataset:
 def recording_settings(need: Need) -> RecordingSettings:
     """What `demos` records for a dataset."""
     recipe = _recipe(need)
-    return RecordingSettings(
+    settings = RecordingSettings(
         need.task,
         need.demonstrations or 1,
         split=need.split,
         seed=recipe.seed,
         action_noise=recipe.action_noise,
-        disturbances=recipe.disturbances,
         layouts=tuple(recipe.layouts) if recipe.layouts is not None else None,
         styles=tuple(recipe.styles) if recipe.styles is not None else None,
         varied=recipe.varied,
     )
+    if not recipe.disturbances:
+        return settings
+    from robocasa_lerobot.corrections.disturbances import DisturbedSettings
+
+    return DisturbedSettings(**vars(settings), disturbances=recipe.disturbances)
 
 
 def _corrections(policy: Path, settings: RecordingSettings, recipe: RecipeConfig) -> CorrectionSettings:

@@ -15,6 +15,7 @@ from robocasa_lerobot.data.mixture import MixtureDataset
 from robocasa_lerobot.errors import UserError
 from robocasa_lerobot.files import write_text
 from robocasa_lerobot.provenance import git_commit, versions
+from robocasa_lerobot.settings import decode
 from robocasa_lerobot.training.config import experiment_files as overlay
 from robocasa_lerobot.training.config.experiment import FROM_SCRATCH, ExperimentConfig, PhaseConfig, to_yaml
 from robocasa_lerobot.training.weights.checkpoint import last_checkpoint
@@ -23,8 +24,9 @@ EXPERIMENT_FILE, PHASE_FILE, CONFIG_FILE = "experiment.yaml", "phase.json", "con
 PACKAGES = ("lerobot", "torch", "accelerate", "transformers", "diffusers", "numpy")
 # Settings that may change while a phase is running, because the losses do not depend on them.
 FREE_SETTINGS = (
-    *("loader.workers", "loader.cache", "device", "trackers", "save_every", "keep_last", "keep_every", "log_every"),
-    *("held_out.every", "held_out.samples", "evaluations", "scale"),
+    *("loader.workers", "loader.cache", "device", "cpu_processes", "trackers"),
+    *("save_every", "keep_last", "keep_every", "log_every", "held_out.every", "held_out.samples", "evaluations"),
+    "scale",
 )
 # Settings of what a phase makes when it begins: its checkpoints hold the statistics that inputs are normalised with.
 AS_IT_BEGAN = ("statistics", "image_statistics")
@@ -53,6 +55,18 @@ def _with_starts(experiment: dict[str, Any]) -> dict[str, Any]:
         phases.append({**phase, "init": phase["init"] or start})
         start = phase["name"]
     return {**experiment, "phases": phases}
+
+
+def _completed(experiment: dict[str, Any]) -> dict[str, Any]:
+    """With the settings that have come to be since an experiment was written, at what leaves it as it was.
+
+    What cannot be read any more, such as one that is gone, stays as it is.
+    """
+    try:
+        found: dict[str, Any] = yaml.safe_load(to_yaml(decode(ExperimentConfig, experiment)))
+    except UserError:
+        return experiment
+    return found
 
 
 def describe_phase(
@@ -171,7 +185,7 @@ def check_unchanged(experiment: ExperimentConfig, output: Path, force: bool) -> 
     if not path.is_file():
         return
     begun = {phase.name for phase in experiment.phases if last_checkpoint(output / phase.name)}
-    old = overlay.flatten(_with_starts(yaml.safe_load(path.read_text(encoding="utf-8"))))
+    old = overlay.flatten(_with_starts(_completed(yaml.safe_load(path.read_text(encoding="utf-8")))))
     new = overlay.flatten(_with_starts(yaml.safe_load(to_yaml(experiment))))
     changed = {
         key: f"\n  {key}: {old.get(key, '(not set)')} -> {new.get(key, '(not set)')}"

@@ -64,6 +64,20 @@ def test_what_was_refused_is_refused_again(setting: str, tmp_path: Path, data: P
     assert run_experiment(tiny(folder, data))
 
 
+def test_what_began_before_a_setting_came_to_be_goes_on(tmp_path: Path, data: Path, begun: Path) -> None:
+    """As `augment.mirror`, of which an experiment of an earlier version says nothing."""
+    folder = copied(begun, tmp_path)
+    path = folder / "out/experiment.yaml"
+    old = yaml.safe_load(path.read_text())
+    del old["trackers"], old["registry"]
+    for phase in old["phases"]:
+        del phase["compile"], phase["ema"]["enabled"]
+    path.write_text(yaml.safe_dump(old))
+    with pytest.raises(UserError, match=r"phases\.pretrain\.compile: False -> True"):
+        run_experiment(tiny(folder, data, overrides=["--defaults.compile=true"]))
+    assert run_experiment(tiny(folder, data))
+
+
 def test_forced_settings_of_the_policy_are_those_of_later_phases(tmp_path: Path, data: Path, begun: Path) -> None:
     folder = copied(begun, tmp_path)
     assert not run_experiment(tiny(folder, data), stop_after=2)  # the first phase is finished, the second not begun

@@ -82,7 +82,7 @@ def test_two_processes_train_as_one_does(tmp_path: Path, data: Path, kind: str) 
     assert done.returncode == 0, done.stderr[-3000:]
     run_in_two_processes(two)
     for phase in ("pretrain", "finetune"):
-        ours, theirs = losses(tmp_path / "two", phase), losses(tmp_path / "one", phase)
+        ours, theirs = (np.array(losses(tmp_path / name, phase)) for name in ("two", "one"))
         np.testing.assert_allclose(ours[:, :2], theirs[:, :2], rtol=1e-5)
         # Norms of gradients have kinks: a unit whose input is zero but for rounding is on in one order of the sums and
         # off in another. A gradient that is averaged wrongly is off by far more.

@@ -38,6 +38,20 @@ def frames_of(source: DatasetSource, kind: str) -> NDArray[np.bool_]:
     return person if kind == INTERVENTIONS else ~person
 
 
+def last_of_runs(source: DatasetSource, kind: str) -> NDArray[np.int64]:
+    """For each frame (frames,) of a dataset that is of a kind, the last one that follows it of the same; else itself.
+
+    What comes after it, somebody else has decided: actions that are learned from a kind of frame end there.
+    """
+    wanted = frames_of(source, kind)
+    goes_on = np.zeros(len(wanted), dtype=np.bool_)
+    goes_on[:-1] = wanted[:-1] & wanted[1:]
+    goes_on[source.ends - 1] = False
+    ends = np.flatnonzero(~goes_on)
+    last: NDArray[np.int64] = ends[np.searchsorted(ends, np.arange(len(wanted)))]
+    return last
+
+
 def frame_pool(
     source: DatasetSource, episodes: NDArray[np.int64], kind: str | None, drop_last_frames: int = 0
 ) -> FramePool:

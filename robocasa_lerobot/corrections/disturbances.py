@@ -8,14 +8,21 @@ hand, only pictures say where to go (Laskey et al. 2017, DART, do so by noise at
 from __future__ import annotations
 
 from collections.abc import Generator, Iterator
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
+from robocasa_lerobot import contract
+from robocasa_lerobot.demos.attempts import RecordingSettings
 from robocasa_lerobot.demos.demonstrator import demonstrate
 from robocasa_lerobot.demos.motion import CLOSED, OPEN, Array, action, limit
 from robocasa_lerobot.demos.motion_style import MotionStyle
+from robocasa_lerobot.demos.recorder import Recording
 from robocasa_lerobot.demos.stages import StageLog
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
+from robocasa_lerobot.envs.tasks.registry import get_task
+from robocasa_lerobot.errors import UserError
 
 # Control steps, drawn between the two: what the demonstrator has until the next disturbance, and how long that lasts. A
 # full command moves the hand by a good centimetre.
@@ -23,6 +30,46 @@ BETWEEN_STEPS, DISTURBED_STEPS = (4, 30), (6, 20)
 UP_SHARE, TURN_SHARE = 0.4, 0.3  # of a full command: most of it upwards or downwards, and about each axis
 MOST_MORE_STEPS = 60  # of an episode, for each: to be led astray and to come back
 TOGGLED = 0.3  # share of them in which the gripper changes, as after a grasp that has missed
+
+
+_DISTURBANCE_STREAM = 10  # apart from those of scene, arm, noise, style, choice among sources and corrections
+
+
+@dataclass(frozen=True)
+class DisturbedSettings(RecordingSettings):
+    """A recording in which the hand is led astray on its way; it says which steps the demonstrator decided.
+
+    Attributes:
+        disturbances: up to how many times in an episode; 0 is never.
+    """
+
+    disturbances: int = 0
+
+    def check(self) -> None:
+        """Whether attempts can be made at all.
+
+        Raises:
+            UserError: there are fewer disturbances than none, or see `RecordingSettings`.
+        """
+        if self.disturbances < 0:
+            raise UserError(f"disturbances: found {self.disturbances}, expected a number of at least 0.")
+        super().check()
+
+    def attempt_kwargs(self) -> dict[str, Any]:
+        """Time to be led astray and to come back."""
+        more = self.disturbances * MOST_MORE_STEPS
+        return {**super().attempt_kwargs(), **({"horizon": get_task(self.task).horizon + more} if more else {})}
+
+    def record(self, env: KitchenEnv, seed: int) -> Recording:
+        """Make the attempt of a seed."""
+        if not self.disturbances:
+            return super().record(env, seed)
+        demonstrator = DisturbedDemonstrator(np.random.default_rng([seed, _DISTURBANCE_STREAM]), self.disturbances)
+        recording = self.labelled_episode(env, seed, demonstrator.act)
+        decided = np.array(demonstrator.decided[: len(recording.actions)], dtype=np.uint8)
+        recording.per_step[contract.INTERVENTION] = decided.reshape(-1, 1)
+        recording.ep_meta["disturbances"] = demonstrator.count
+        return recording
 
 
 class DisturbedDemonstrator:

@@ -1,0 +1,59 @@
+"""What each member of a mixture gives to it: a dataset, episodes of it, and which of their frames."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from robocasa_lerobot.data.mixture_config import MemberConfig, MixtureConfig
+from robocasa_lerobot.data.reading.decisions import NoFramesError, frame_pool, last_of_runs
+from robocasa_lerobot.data.reading.source import DatasetSource
+
+
+@dataclass
+class Member:
+    """A dataset's part in a mixture.
+
+    Attributes:
+        source: the dataset.
+        episodes: indices of those that are drawn from, ascending.
+        frames: how many frames may start a sample.
+        kind: of `contract.FRAME_KINDS`, which these are; None: all.
+        last: of each frame of the dataset, the last one of its run of this kind.
+    """
+
+    source: DatasetSource
+    episodes: NDArray[np.int64]
+    frames: int
+    kind: str | None = None
+    last: NDArray[np.int64] | None = None
+
+
+def with_frames(config: MixtureConfig, opened: Mapping[Path, DatasetSource]) -> tuple[MixtureConfig, list[Member]]:
+    """The mixture without members that have no frame of the kind that they ask for, and those that are left.
+
+    Such a dataset is of a task that a policy needed no correction in.
+
+    Raises:
+        NoFramesError: none would be left.
+    """
+    kept: list[tuple[MemberConfig, Member]] = []
+    without: list[NoFramesError] = []
+    for member in config.members:
+        source = opened[Path(member.root)]
+        episodes = source.select(member)
+        try:
+            frames = frame_pool(source, episodes, member.frames).size
+        except NoFramesError as error:
+            without.append(error)
+        else:
+            last = None if member.frames is None else last_of_runs(source, member.frames)
+            kept.append((member, Member(source, episodes, frames, member.frames, last)))
+    if not kept:
+        raise without[0]
+    return dataclasses.replace(config, members=[member for member, _ in kept]), [one for _, one in kept]
