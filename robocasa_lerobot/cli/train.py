@@ -3,15 +3,8 @@
 from __future__ import annotations
 
 import argparse
-import subprocess
-import sys
-from typing import TYPE_CHECKING
 
-from robocasa_lerobot.jobs.child_process import environment_of_python
 from robocasa_lerobot.jobs.parent import add_end_with_input, end_with_input
-
-if TYPE_CHECKING:
-    from robocasa_lerobot.training.config.experiment import ExperimentConfig
 
 EXAMPLE = "robocasa-lerobot train --config_path configs/experiments/demo.yaml"
 
@@ -79,48 +72,13 @@ def run(args: argparse.Namespace) -> int:
     print(to_yaml(experiment), flush=True)
     if args.print_config:
         return 0
-    from robocasa_lerobot.training.cores import in_processes, launched, processes_for
-    from robocasa_lerobot.training.interrupts import REQUEUE, STOPPED
+    from robocasa_lerobot.training.interrupts import REQUEUE, STOPPED, Interrupts
+    from robocasa_lerobot.training.phases import run_experiment
 
-    phases = experiment.phases if args.phase is None else [experiment.phase(args.phase)]
-    count = 1
-    if experiment.cpu_processes != 1 and not launched() and _on_cpu(experiment.device):
-        count = processes_for(experiment.cpu_processes, [p.batch_size // p.gradient_accumulation for p in phases])
-    finished, signalled = in_processes(
-        count,
-        _train,
-        experiment=experiment,
-        force=args.resume == "force",
-        only=args.phase,
-        evaluate=args.evaluate,
-        stop_after=args.stop_after,
+    interrupts = Interrupts(args.stop_after)
+    finished = run_experiment(
+        experiment, force=args.resume == "force", only=args.phase, evaluate=args.evaluate, interrupts=interrupts
     )
     if finished:
         return 0
-    return REQUEUE if signalled else STOPPED
-
-
-def _train(
-    experiment: ExperimentConfig, force: bool, only: str | None, evaluate: bool, stop_after: int | None
-) -> tuple[bool, bool]:
-    """Run the experiment, in this process or one of several; whether it is finished, and whether a signal came."""
-    from robocasa_lerobot.training.interrupts import Interrupts
-    from robocasa_lerobot.training.phases import run_experiment
-
-    interrupts = Interrupts(stop_after)
-    finished = run_experiment(experiment, force=force, only=only, evaluate=evaluate, interrupts=interrupts)
-    return finished, interrupts.signalled
-
-
-def _on_cpu(device: str | None) -> bool:
-    """Whether the experiment trains on a CPU; torch is asked in a process of its own, since it reads its threads once.
-
-    Where a device is named, nobody is asked.
-    """
-    if device is not None:
-        return device == "cpu"
-    asked = "from robocasa_lerobot.training.setup.builders import best_device; print(best_device(None))"
-    done = subprocess.run(
-        [sys.executable, "-c", asked], capture_output=True, text=True, check=True, env=environment_of_python()
-    )
-    return done.stdout.split()[-1] == "cpu"
+    return REQUEUE if interrupts.signalled else STOPPED

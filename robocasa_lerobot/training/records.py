@@ -24,9 +24,8 @@ EXPERIMENT_FILE, PHASE_FILE, CONFIG_FILE = "experiment.yaml", "phase.json", "con
 PACKAGES = ("lerobot", "torch", "accelerate", "transformers", "diffusers", "numpy")
 # Settings that may change while a phase is running, because the losses do not depend on them.
 FREE_SETTINGS = (
-    *("loader.workers", "loader.cache", "device", "cpu_processes", "trackers"),
-    *("save_every", "keep_last", "keep_every", "log_every", "held_out.every", "held_out.samples", "evaluations"),
-    "scale",
+    *("loader.workers", "loader.cache", "device", "trackers", "save_every", "keep_last", "keep_every", "log_every"),
+    *("held_out.every", "held_out.samples", "evaluations", "scale"),
 )
 # Settings of what a phase makes when it begins: its checkpoints hold the statistics that inputs are normalised with.
 AS_IT_BEGAN = ("statistics", "image_statistics")

@@ -40,8 +40,6 @@ class ExperimentConfig:
         seed: of everything random, together with the phase's name.
         device: `cpu`, `cuda`, `mps`, or null for the best one there is.
         mixed_precision: `no`, `bf16` or `fp16`.
-        cpu_processes: on a CPU, how many processes share the cores and every batch; 0 is one for each core, up to eight
-            and as far as batches can be shared. Small networks train nearly as many times as fast.
         registry: where selections of datasets look that name no registry, and whose task sets evaluations mean that
             name none; null is the benchmark's.
         trackers: where metrics go besides `metrics.jsonl`: `tensorboard`, `trackio`, `wandb`.
@@ -55,7 +53,6 @@ class ExperimentConfig:
     seed: int = 0
     device: str | None = None
     mixed_precision: str = "no"
-    cpu_processes: int = 1
     trackers: list[str] = field(default_factory=list)
     registry: str | None = None
     loader: LoaderConfig = field(default_factory=LoaderConfig)
@@ -71,8 +68,6 @@ class ExperimentConfig:
         if self.mixed_precision == str(False):  # what YAML makes of a bare `no`
             self.mixed_precision = "no"
         check_choice("mixed_precision", self.mixed_precision, MIXED_PRECISION)
-        if self.cpu_processes < 0:
-            raise UserError(f"cpu_processes is {self.cpu_processes}, expected at least 1, or 0 for one on each core.")
         for tracker in self.trackers:
             check_choice("trackers", tracker, TRACKERS)
         names = [phase.name for phase in self.phases]

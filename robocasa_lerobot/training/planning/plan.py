@@ -24,7 +24,6 @@ from robocasa_lerobot.data.mixture_config import LoaderConfig, MemberConfig, Mix
 from robocasa_lerobot.data.registry.registry import missing_datasets
 from robocasa_lerobot.errors import UserError
 from robocasa_lerobot.training.config.experiment import FROM_SCRATCH, ExperimentConfig, PhaseConfig
-from robocasa_lerobot.training.cores import processes_for, threads_for
 from robocasa_lerobot.training.loop import train_phase
 from robocasa_lerobot.training.metrics import METRICS, read_lines
 from robocasa_lerobot.training.planning.evaluations import phase_evaluations
@@ -206,28 +205,21 @@ def _what_a_step_is(experiment: ExperimentConfig, phase: PhaseConfig) -> str:
     settings, checkpoint = planned_policy(experiment, phase)
     names = ("batch_size", "gradient_accumulation", "freeze", "lora", "augment", "compile", "ema")
     asked = dataclasses.asdict(phase)
-    what = [settings, str(checkpoint), {name: asked[name] for name in names}, experiment.cpu_processes]
-    return json.dumps(what, sort_keys=True, default=str)
+    return json.dumps([settings, str(checkpoint), {name: asked[name] for name in names}], sort_keys=True, default=str)
 
 
 def _measure(experiment: ExperimentConfig, phase: PhaseConfig, device: str, steps: int) -> float | str:
-    """Seconds per step, the median after the first quarter; or why there are none.
-
-    Where processes share a batch, of one that has its share of it and of the cores, without the others beside it.
-    """
+    """Seconds per step, the median after the first quarter; or why there are none."""
     settings, checkpoint = planned_policy(experiment, phase)
     if checkpoint is not None and not (checkpoint / SAFETENSORS_SINGLE_FILE).is_file():
         return f"not measured: no weights in {checkpoint} yet, which a training downloads from the hub"
-    share = phase.batch_size // phase.gradient_accumulation
-    processes = processes_for(experiment.cpu_processes, [share]) if device == "cpu" else 1
-    with tempfile.TemporaryDirectory(prefix="plan_") as folder, threads_for(processes):
+    with tempfile.TemporaryDirectory(prefix="plan_") as folder:
         size = experiment.loader.image_size or _IMAGE_SIZE
         data = write_fake_dataset(Path(folder) / "fake", episodes=2, length=64, image_size=size)
         alone = dataclasses.replace(
             phase,
             mixture=MixtureConfig(members=[MemberConfig(str(data))]),
             steps=steps,
-            batch_size=phase.batch_size // processes,
             init=str(checkpoint) if checkpoint else FROM_SCRATCH,
             statistics="replace",
             policy=settings,
