@@ -86,19 +86,14 @@ def add_kitchen_options(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Record every task and print a table; status 1 if one had to be given up."""
-    from robocasa_lerobot.corrections.disturbances import DisturbedSettings
+    from robocasa_lerobot.corrections.disturbances import with_disturbances
     from robocasa_lerobot.demos.recording import RecordingSettings
     from robocasa_lerobot.jobs.executors import execution_of
 
     execution = execution_of(args)
     values = {**kitchen_values(args), "varied": not args.plain}
-    names = demonstrable(args.tasks)
-    settings: list[RecordingSettings]
-    if args.disturbances:
-        settings = [DisturbedSettings(task=name, **values, disturbances=args.disturbances) for name in names]
-    else:
-        settings = [RecordingSettings(task=name, **values) for name in names]
-    return record(settings, args, execution)[0]
+    settings = [RecordingSettings(task=name, **values) for name in demonstrable(args.tasks)]
+    return record([with_disturbances(one, args.disturbances) for one in settings], args, execution)[0]
 
 
 def kitchen_values(args: argparse.Namespace) -> dict[str, Any]:

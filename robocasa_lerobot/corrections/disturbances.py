@@ -30,8 +30,6 @@ BETWEEN_STEPS, DISTURBED_STEPS = (4, 30), (6, 20)
 UP_SHARE, TURN_SHARE = 0.4, 0.3  # of a full command: most of it upwards or downwards, and about each axis
 MOST_MORE_STEPS = 60  # of an episode, for each: to be led astray and to come back
 TOGGLED = 0.3  # share of them in which the gripper changes, as after a grasp that has missed
-
-
 _DISTURBANCE_STREAM = 10  # apart from those of scene, arm, noise, style, choice among sources and corrections
 
 
@@ -40,36 +38,39 @@ class DisturbedSettings(RecordingSettings):
     """A recording in which the hand is led astray on its way; it says which steps the demonstrator decided.
 
     Attributes:
-        disturbances: up to how many times in an episode; 0 is never.
+        disturbances: up to how many times in an episode.
     """
 
-    disturbances: int = 0
+    disturbances: int = 1
 
     def check(self) -> None:
         """Whether attempts can be made at all.
 
         Raises:
-            UserError: there are fewer disturbances than none, or see `RecordingSettings`.
+            UserError: there are fewer disturbances than one, or see `RecordingSettings`.
         """
-        if self.disturbances < 0:
-            raise UserError(f"disturbances: found {self.disturbances}, expected a number of at least 0.")
+        if self.disturbances < 1:
+            raise UserError(f"disturbances: found {self.disturbances}, expected at least 1, or 0 for none at all.")
         super().check()
 
     def attempt_kwargs(self) -> dict[str, Any]:
         """Time to be led astray and to come back."""
         more = self.disturbances * MOST_MORE_STEPS
-        return {**super().attempt_kwargs(), **({"horizon": get_task(self.task).horizon + more} if more else {})}
+        return {**super().attempt_kwargs(), "horizon": get_task(self.task).horizon + more}
 
     def record(self, env: KitchenEnv, seed: int) -> Recording:
         """Make the attempt of a seed."""
-        if not self.disturbances:
-            return super().record(env, seed)
         demonstrator = DisturbedDemonstrator(np.random.default_rng([seed, _DISTURBANCE_STREAM]), self.disturbances)
         recording = self.labelled_episode(env, seed, demonstrator.act)
         decided = np.array(demonstrator.decided[: len(recording.actions)], dtype=np.uint8)
         recording.per_step[contract.INTERVENTION] = decided.reshape(-1, 1)
         recording.ep_meta["disturbances"] = demonstrator.count
         return recording
+
+
+def with_disturbances(settings: RecordingSettings, disturbances: int) -> RecordingSettings:
+    """The same recording with up to so many disturbances in an episode; 0 leaves it as it is."""
+    return DisturbedSettings(**vars(settings), disturbances=disturbances) if disturbances else settings
 
 
 class DisturbedDemonstrator:
@@ -100,22 +101,23 @@ class DisturbedDemonstrator:
         while self.count < most:
             gripper = yield from self._demonstrate(env, style, log, int(self._rng.integers(*BETWEEN_STEPS)))
             self.count += 1
-            for disturbed in self._disturb(env, gripper):
-                self.decided.append(False)
-                yield disturbed
+            yield from self._disturb(env, gripper)
         yield from self._demonstrate(env, style, log, None)
 
     def _demonstrate(
         self, env: KitchenEnv, style: MotionStyle, log: StageLog, steps: int | None
     ) -> Generator[Array, None, float]:
         """The demonstrator for so many steps, or to the end once it touches something; what the gripper does then."""
-        demonstrator = demonstrate(env, style, log, midway=self.count > 0)
-        for step, wanted in enumerate(demonstrator):
-            if steps is not None and env.scene.robot_touches(env.data):
-                steps = None
+        if env.scene.robot_touches(env.data):
+            steps = None
+        for step, wanted in enumerate(demonstrate(env, style, log, midway=self.count > 0), start=1):
             self.decided.append(True)
             yield wanted
-            if steps is not None and step + 1 >= steps and not env.scene.robot_touches(env.data):
+            if steps is None:
+                continue
+            if env.scene.robot_touches(env.data):
+                steps = None
+            elif step >= steps:
                 return float(wanted[-1])
         raise AssertionError("a demonstrator stands still in the end, and does not stop")
 
@@ -130,4 +132,5 @@ class DisturbedDemonstrator:
         for _ in range(int(rng.integers(*DISTURBED_STEPS))):
             if env.scene.robot_touches(env.data):
                 return
+            self.decided.append(False)
             yield action(position=move, rotation=turn, gripper=gripper)

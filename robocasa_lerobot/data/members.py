@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robocasa_lerobot.data.mixture_config import MemberConfig, MixtureConfig
-from robocasa_lerobot.data.reading.decisions import NoFramesError, frame_pool, last_of_runs
+from robocasa_lerobot.data.reading.decisions import NoFramesError, frame_pool, frames_of, last_of_runs
 from robocasa_lerobot.data.reading.source import DatasetSource
 
 
@@ -24,6 +24,7 @@ class Member:
         episodes: indices of those that are drawn from, ascending.
         frames: how many frames may start a sample.
         kind: of `contract.FRAME_KINDS`, which these are; None: all.
+        wanted: of each frame of the dataset, whether it is of that kind.
         last: of each frame of the dataset, the last one of its run of this kind.
     """
 
@@ -31,6 +32,7 @@ class Member:
     episodes: NDArray[np.int64]
     frames: int
     kind: str | None = None
+    wanted: NDArray[np.bool_] | None = None
     last: NDArray[np.int64] | None = None
 
 
@@ -46,14 +48,15 @@ def with_frames(config: MixtureConfig, opened: Mapping[Path, DatasetSource]) -> 
     without: list[NoFramesError] = []
     for member in config.members:
         source = opened[Path(member.root)]
-        episodes = source.select(member)
-        try:
-            frames = frame_pool(source, episodes, member.frames).size
-        except NoFramesError as error:
-            without.append(error)
-        else:
-            last = None if member.frames is None else last_of_runs(source, member.frames)
-            kept.append((member, Member(source, episodes, frames, member.frames, last)))
+        episodes, kind = source.select(member), member.frames
+        wanted = None if kind is None else frames_of(source, kind)
+        frames = frame_pool(source, episodes, wanted).size
+        if not frames:
+            lacking = f"no frame is left with frames={kind} in {len(episodes)} episodes."
+            without.append(NoFramesError(f"{source.root}: {lacking}"))
+            continue
+        last = None if wanted is None else last_of_runs(source, wanted)
+        kept.append((member, Member(source, episodes, frames, kind, wanted, last)))
     if not kept:
         raise without[0]
     return dataclasses.replace(config, members=[member for member, _ in kept]), [one for _, one in kept]

@@ -185,7 +185,7 @@ class MixtureDataset(torch.utils.data.Dataset[Item]):
 
     def sampler(self, seed: int, drop_last_frames: int = 0) -> MixtureSampler:
         """The sampler over the mixture; the last frames of each episode can be kept from starting a sample."""
-        pools = [frame_pool(m.source, m.episodes, m.kind, drop_last_frames) for m in self._members]
+        pools = [frame_pool(m.source, m.episodes, m.wanted, drop_last_frames) for m in self._members]
         return MixtureSampler(pools, self.probabilities, seed)
 
     def set_windows(self, delta_timestamps: Mapping[str, Sequence[float]] | None) -> None:

@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from robocasa_lerobot.corrections.disturbances import with_disturbances
 from robocasa_lerobot.data.registry.published import dataset_version
 from robocasa_lerobot.data.registry.recipes import REPLAY, RecipeConfig
 from robocasa_lerobot.demos.attempts import Parts, RecordingSettings
@@ -204,11 +205,7 @@ def recording_settings(need: Need) -> RecordingSettings:
         styles=tuple(recipe.styles) if recipe.styles is not None else None,
         varied=recipe.varied,
     )
-    if not recipe.disturbances:
-        return settings
-    from robocasa_lerobot.corrections.disturbances import DisturbedSettings
-
-    return DisturbedSettings(**vars(settings), disturbances=recipe.disturbances)
+    return with_disturbances(settings, recipe.disturbances)
 
 
 def _corrections(policy: Path, settings: RecordingSettings, recipe: RecipeConfig) -> CorrectionSettings:

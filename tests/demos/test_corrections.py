@@ -8,7 +8,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
-import yaml
+from recipe_experiments import experiment_of, made_dataset
 
 from robocasa_lerobot import cli
 from robocasa_lerobot.corrections.settings import CorrectionSettings
@@ -22,7 +22,6 @@ from robocasa_lerobot.evaluation.actors.reference_policies import DemonstratorPo
 from robocasa_lerobot.making.needs import needs_of
 from robocasa_lerobot.training.config.experiment import load_experiment
 
-ROOT = Path(__file__).parents[2]
 AFTER = 30
 
 
@@ -140,37 +139,16 @@ def test_another_policy_does_not_go_on_where_one_was_corrected(tmp_path: Path) -
 
 def experiment(folder: Path, corrects: str) -> Path:
     """Of two phases, the second of which is trained on corrections of one."""
-    make = {"episodes": "few", "image_size": 64, "seed": 780_100}
-    registry = {
-        "root": str(folder / "data"),
-        "episodes": {"few": 1},
-        "datasets": [
-            {"path": "shown/{task}", "tasks": ["CloseDrawer"], "split": "pretrain", "source": "shown", "make": make},
-            {
-                "path": "corrected/{task}",
-                "tasks": ["CloseDrawer"],
-                "split": "pretrain",
-                "source": "corrected",
-                "make": {**make, "seed": 780_200, "corrects": corrects, "after": [20, 20]},
-            },
-        ],
-    }
-    (folder / "registry.yaml").write_text(yaml.safe_dump(registry))
+    datasets = [
+        made_dataset("shown", seed=780_100),
+        made_dataset("corrected", seed=780_200, corrects=corrects, after=[20, 20]),
+    ]
     shown, corrected = ({"split": "pretrain", "source": source} for source in ("shown", "corrected"))
-    content = {
-        "name": "two",
-        "output_dir": str(folder / "out"),
-        "registry": str(folder / "registry.yaml"),
-        "policy": str(ROOT / "configs/policies/diffusion_transformer_demo.yaml"),
-        "device": "cpu",
-        "defaults": {"steps": 1, "batch_size": 4, "statistics": "keep"},
-        "phases": [
-            {"name": "first", "mixture": {"select": [shown]}},
-            {"name": "second", "mixture": {"select": [shown, {**corrected, "frames": "interventions"}]}},
-        ],
-    }
-    (folder / "two.yaml").write_text(yaml.safe_dump(content))
-    return folder / "two.yaml"
+    phases = [
+        {"name": "first", "mixture": {"select": [shown]}},
+        {"name": "second", "mixture": {"select": [shown, {**corrected, "frames": "interventions"}]}},
+    ]
+    return experiment_of(folder, datasets, phases)
 
 
 def test_corrections_wait_for_their_policy(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

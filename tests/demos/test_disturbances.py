@@ -8,7 +8,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
-import yaml
+from recipe_experiments import experiment_of, made_dataset
 
 from robocasa_lerobot import cli
 from robocasa_lerobot.corrections.disturbances import DISTURBED_STEPS, DisturbedDemonstrator, DisturbedSettings
@@ -23,7 +23,6 @@ from robocasa_lerobot.making.make import recording_settings
 from robocasa_lerobot.making.needs import needs_of
 from robocasa_lerobot.training.config.experiment import load_experiment
 
-ROOT = Path(__file__).parents[2]
 MOST = 3
 
 
@@ -99,22 +98,9 @@ def test_demonstrators_come_from_where_they_were_led(task: str) -> None:
 
 @pytest.mark.render
 def test_an_experiment_trains_on_its_own_data(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    make = {"episodes": "few", "image_size": 64, "seed": 800_030, "disturbances": MOST}
-    dataset = {"path": "led/{task}", "tasks": ["CloseDrawer"], "split": "pretrain", "source": "led", "make": make}
-    registry = {"root": str(tmp_path / "data"), "episodes": {"few": 1}, "datasets": [dataset]}
-    (tmp_path / "registry.yaml").write_text(yaml.safe_dump(registry))
     selected = {"split": "pretrain", "source": "led", "frames": "interventions"}
-    content = {
-        "name": "led",
-        "output_dir": str(tmp_path / "out"),
-        "registry": str(tmp_path / "registry.yaml"),
-        "policy": str(ROOT / "configs/policies/diffusion_transformer_demo.yaml"),
-        "device": "cpu",
-        "defaults": {"steps": 1, "batch_size": 4},
-        "phases": [{"name": "train", "mixture": {"select": [selected]}}],
-    }
-    file = tmp_path / "led.yaml"
-    file.write_text(yaml.safe_dump(content))
+    phases = [{"name": "train", "mixture": {"select": [selected]}}]
+    file = experiment_of(tmp_path, [made_dataset("led", seed=800_030, disturbances=MOST)], phases)
     (need,) = needs_of(load_experiment(file))[0]
     assert recording_settings(need) == DisturbedSettings(
         "CloseDrawer", 1, split="pretrain", seed=800_030, disturbances=MOST

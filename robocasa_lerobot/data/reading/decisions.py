@@ -38,12 +38,11 @@ def frames_of(source: DatasetSource, kind: str) -> NDArray[np.bool_]:
     return person if kind == INTERVENTIONS else ~person
 
 
-def last_of_runs(source: DatasetSource, kind: str) -> NDArray[np.int64]:
-    """For each frame (frames,) of a dataset that is of a kind, the last one that follows it of the same; else itself.
+def last_of_runs(source: DatasetSource, wanted: NDArray[np.bool_]) -> NDArray[np.int64]:
+    """For each `wanted` frame (frames,) of a dataset the last one of those that follow it without a gap; else itself.
 
     What comes after it, somebody else has decided: actions that are learned from a kind of frame end there.
     """
-    wanted = frames_of(source, kind)
     goes_on = np.zeros(len(wanted), dtype=np.bool_)
     goes_on[:-1] = wanted[:-1] & wanted[1:]
     goes_on[source.ends - 1] = False
@@ -53,19 +52,14 @@ def last_of_runs(source: DatasetSource, kind: str) -> NDArray[np.int64]:
 
 
 def frame_pool(
-    source: DatasetSource, episodes: NDArray[np.int64], kind: str | None, drop_last_frames: int = 0
+    source: DatasetSource, episodes: NDArray[np.int64], wanted: NDArray[np.bool_] | None, drop_last_frames: int = 0
 ) -> FramePool:
-    """The frames of some episodes, ascending, that may start a sample: all, or those of a kind.
-
-    Raises:
-        NoFramesError: there is none of that kind.
-    """
+    """The frames of some episodes, ascending, that may start a sample: all, or the `wanted` ones (frames,)."""
     starts, ends = source.starts[episodes], source.ends[episodes]
     # A shorter episode keeps its first frame (of the kind): no episode drops out of the training unnoticed.
     lengths = np.maximum(1, ends - starts - drop_last_frames)
-    if kind is None:
+    if wanted is None:
         return FramePool(starts, lengths)
-    wanted = frames_of(source, kind)
     runs: list[tuple[int, int]] = []
     for start, end, length in zip(starts.tolist(), ends.tolist(), lengths.tolist(), strict=True):
         of_episode = wanted[start:end]
@@ -73,7 +67,5 @@ def frame_pool(
         runs += [(start + begin, stop - begin) for begin, stop in edges.reshape(-1, 2).tolist()]
         if not len(edges) and of_episode.any():
             runs.append((start + int(of_episode.argmax()), 1))
-    if not runs:
-        raise NoFramesError(f"{source.root}: no frame is left with frames={kind} in {len(episodes)} episodes.")
-    pool = np.array(runs, dtype=np.int64)
+    pool = np.array(runs, dtype=np.int64).reshape(-1, 2)
     return FramePool(pool[:, 0], pool[:, 1])
