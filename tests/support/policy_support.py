@@ -101,7 +101,8 @@ def check_trains_and_predicts(policy: Any, preprocess: Any, postprocess: Any, le
     assert chunk.shape == (4, config.n_action_steps, contract.ACTION_SIZE)
     assert policy.sample(batch).shape == (4, length, contract.ACTION_SIZE)
     assert torch.isfinite(postprocess(chunk)).all()
-    assert len(config.action_delta_indices) == length
+    ahead = getattr(config, "look_ahead", 0)
+    assert len(config.action_delta_indices) == max(length, ahead and ahead - 1 + config.n_obs_steps)
 
 
 def check_wrong_features_and_batches_are_explained(

@@ -62,6 +62,11 @@ class DiffusionTransformerConfig(ActionChunkConfig):
     language_film: bool = True  # modulates every block of the vision encoder
     language_concat: bool = False  # also concatenated to the features of each observation
 
+    # Looking ahead: while training, features of the observation must also tell, by themselves, how far the next
+    # `look_ahead` steps travel (look_ahead.py). 0: they need not.
+    look_ahead: int = 0
+    look_ahead_weight: float = 1.0  # beside the loss of actions
+
     # Denoising transformer.
     width: int = 512
     n_heads: int = 8
@@ -73,6 +78,7 @@ class DiffusionTransformerConfig(ActionChunkConfig):
     # Diffusion.
     noise_scheduler: str = "DDIM"
     num_train_timesteps: int = 100
+    time_alpha: float = 1.0  # training times are drawn from Beta(time_alpha, 1): above 1 more of them near the noise
     num_inference_steps: int | None = 10  # null: as many as for training
     beta_schedule: str = "squaredcos_cap_v2"
     beta_start: float = 1e-4
@@ -149,6 +155,11 @@ class DiffusionTransformerConfig(ActionChunkConfig):
             )
         if self.width % self.n_heads or self.width % 2:
             raise UserError(f"width is {self.width}, expected an even multiple of n_heads ({self.n_heads}).")
+        if self.look_ahead < 0 or self.look_ahead_weight < 0 or self.time_alpha <= 0:
+            raise UserError(
+                f"look_ahead is {self.look_ahead}, look_ahead_weight {self.look_ahead_weight} and time_alpha "
+                f"{self.time_alpha}: expected at least 0, at least 0, and more than 0."
+            )
         self.check_at_least_one(("max_words", "language_buckets", "language_dim"))
         if self.n_condition_layers < 0:
             raise UserError(f"n_condition_layers is {self.n_condition_layers}, expected 0 or more.")
@@ -178,8 +189,9 @@ class DiffusionTransformerConfig(ActionChunkConfig):
 
     @property
     def action_delta_indices(self) -> list[int]:
-        """Frame offsets of the predicted actions of a sample."""
-        return list(range(1 - self.n_obs_steps, 1 - self.n_obs_steps + self.horizon))
+        """Frame offsets of the predicted actions of a sample, and of those that it looks ahead to."""
+        first = 1 - self.n_obs_steps
+        return list(range(first, max(first + self.horizon, self.look_ahead)))
 
     def get_scheduler_preset(self) -> DiffuserSchedulerConfig:
         """Linear warm-up, then (by default) half a cosine over the rest of the run."""

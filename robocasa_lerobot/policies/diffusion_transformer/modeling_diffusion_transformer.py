@@ -9,11 +9,12 @@ import torch
 from diffusers.schedulers.scheduling_ddim import DDIMScheduler
 from diffusers.schedulers.scheduling_ddpm import DDPMScheduler
 from lerobot.policies.pretrained import PreTrainedPolicy
-from lerobot.utils.constants import OBS_LANGUAGE_ATTENTION_MASK, OBS_LANGUAGE_TOKENS, OBS_STATE
+from lerobot.utils.constants import ACTION, OBS_LANGUAGE_ATTENTION_MASK, OBS_LANGUAGE_TOKENS, OBS_STATE
 from torch import Tensor
 
 from robocasa_lerobot.policies.common.attention import short_attention
 from robocasa_lerobot.policies.common.chunks import (
+    ACTION_IS_PAD,
     Generators,
     decay_groups,
     normal_noise,
@@ -28,6 +29,7 @@ from robocasa_lerobot.policies.common.transfer import to_device
 from robocasa_lerobot.policies.diffusion_transformer.configuration_diffusion_transformer import (
     DiffusionTransformerConfig,
 )
+from robocasa_lerobot.policies.diffusion_transformer.look_ahead import LookAhead
 from robocasa_lerobot.policies.diffusion_transformer.network import DenoisingTransformer
 from robocasa_lerobot.policies.diffusion_transformer.observation import ObservationEncoder
 from robocasa_lerobot.policies.diffusion_transformer.sampling import DdimSteps, sampling_times
@@ -58,6 +60,17 @@ class DiffusionTransformerPolicy(PreTrainedPolicy):
             dropout_embedding=config.dropout_embedding,
             dropout=config.dropout,
         )
+        self.look_ahead = (
+            LookAhead(
+                self.observation_encoder.feature_dim,
+                config.width,
+                self.action_dim,
+                config.look_ahead,
+                first=1 - config.n_obs_steps,
+            )
+            if config.look_ahead
+            else None
+        )
         self.scheduler = _noise_scheduler(config)
         self._denoise = Traced(self.denoiser)
         self._ddim: DdimSteps | None = None  # of the levels that were last asked for
@@ -73,6 +86,8 @@ class DiffusionTransformerPolicy(PreTrainedPolicy):
             return trained_by_name(self)
         decayed, rest = decay_groups(self.denoiser)
         encoder = [p for p in self.observation_encoder.parameters() if p.requires_grad]
+        if self.look_ahead is not None:
+            encoder += self.look_ahead.parameters()
         groups: list[dict[str, Any]] = [
             {"params": decayed},
             {"params": rest, "weight_decay": 0.0},
@@ -109,19 +124,39 @@ class DiffusionTransformerPolicy(PreTrainedPolicy):
             The loss, and scalars to log.
         """
         draws = self.config.noise_draws
-        features = self.observation_encoder(batch, generator).float().repeat_interleave(draws, dim=0)
-        actions = target_actions(batch, self.config.horizon, self.action_dim, draws)
+        observed = self.observation_encoder(batch, generator).float()
+        features = observed.repeat_interleave(draws, dim=0)
+        chunk = self._chunk(batch)
+        actions = target_actions(chunk, self.config.horizon, self.action_dim, draws)
         if noise is None:
             noise = normal_noise(actions.shape, generator, actions)
         if times is None:
-            steps = self.config.num_train_timesteps
-            times = to_device(torch.randint(steps, actions.shape[:1], generator=generator), actions.device)
+            times = to_device(self.sample_times(actions.shape[0], generator), actions.device)
         noisy = self.scheduler.add_noise(actions, noise, times)
         target = noise if self.config.prediction_type == "epsilon" else actions
         with short_attention(actions.device):
             predicted = self.denoiser(noisy, times, features).float()
-        losses = sample_losses(predicted, target, batch, self.config)
-        return (losses if reduction == "none" else losses.mean()), {}
+        losses = sample_losses(predicted, target, chunk, self.config)
+        told: dict[str, Any] = {}
+        if self.look_ahead is not None:
+            ahead = self.look_ahead(observed, batch)
+            losses = losses + self.config.look_ahead_weight * ahead
+            told["look_ahead_loss"] = ahead.mean().detach()
+        return (losses if reduction == "none" else losses.mean()), told
+
+    def sample_times(self, count: int, generator: torch.Generator | None = None) -> Tensor:
+        """Diffusion steps to train (count,), on the CPU: evenly, or by Beta(time_alpha, 1) more of the noisy ones."""
+        steps, alpha = self.config.num_train_timesteps, self.config.time_alpha
+        if alpha == 1.0:
+            return torch.randint(steps, (count,), generator=generator)
+        return (steps * torch.rand(count, generator=generator) ** (1.0 / alpha)).long().clamp(max=steps - 1)
+
+    def _chunk(self, batch: dict[str, Tensor]) -> dict[str, Tensor]:
+        """The batch with the actions of a chunk alone, where it has those that are looked ahead to as well."""
+        if self.look_ahead is None:
+            return batch
+        end = self.config.horizon
+        return {key: value[:, :end] if key in (ACTION, ACTION_IS_PAD) else value for key, value in batch.items()}
 
     @torch.no_grad()
     def predict_action_chunk(
