@@ -7,6 +7,7 @@ import torch
 from policy_support import batch_for, build, generators, tiny_config
 
 from robocasa_lerobot import contract
+from robocasa_lerobot.errors import UserError
 from robocasa_lerobot.policies.diffusion_transformer.look_ahead import TRAVELLING, LookAhead
 
 
@@ -69,6 +70,8 @@ def test_what_lies_behind_a_chunk_is_not_learned_as_actions() -> None:
     assert not torch.equal(raw["action"], other["action"])
     one, two = (policy(preprocess(dict(b)), generator=generators(0)[0])[0] for b in (raw, other))
     assert one == two
+    with pytest.raises(UserError, match="action_delta_indices"):  # a chunk alone is not enough to look ahead
+        policy(preprocess({**raw, "action": raw["action"][:, : policy.config.horizon]}))
 
 
 def test_training_times() -> None:

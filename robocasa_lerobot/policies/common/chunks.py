@@ -35,12 +35,12 @@ def target_actions(batch: Mapping[str, Tensor], length: int, size: int, draws: i
 def sample_losses(prediction: Tensor, target: Tensor, batch: Mapping[str, Tensor], config: ActionChunkConfig) -> Tensor:
     """The loss of each sample, (B,): mean squared error over its draws and over the actions that count.
 
-    `prediction` and `target` are (B * noise_draws, T, A).
+    `prediction` and `target` are (B * noise_draws, T, A), of the first T actions of the batch.
     """
     draws = config.noise_draws
     ignored = batch.get(ACTION_IS_PAD) if config.mask_padded_actions else None
     if ignored is not None:
-        ignored = ignored.repeat_interleave(draws, dim=0)
+        ignored = ignored[:, : target.shape[1]].repeat_interleave(draws, dim=0)
     return masked_mse(prediction, target, ignored).unflatten(0, (-1, draws)).mean(dim=1)
 
 
@@ -50,11 +50,20 @@ def masked_mse(prediction: Tensor, target: Tensor, ignored: Tensor | None) -> Te
     A sample with nothing left counts as zero. Every sample weighs the same, however much of it is ignored, so that
     the mean over a batch is the mean over any equal parts of it (processes, accumulated batches).
     """
-    error = functional.mse_loss(prediction, target, reduction="none").mean(dim=-1)
+    return masked_mean(functional.mse_loss(prediction, target, reduction="none").mean(dim=-1), ignored)
+
+
+def masked_mean(values: Tensor, ignored: Tensor | None) -> Tensor:
+    """Mean (B, ...) of each sample's values (B, T, ...) over the steps that are not `ignored` (B, T); of none zero."""
     if ignored is None:
-        return error.mean(dim=1)
-    kept = (~ignored).to(error.dtype)
-    return (error * kept).sum(dim=1) / kept.sum(dim=1).clamp(min=1.0)
+        return values.mean(dim=1)
+    kept = (~ignored).to(values.dtype).unflatten(1, (-1, *[1] * (values.ndim - 2)))
+    return (values * kept).sum(dim=1) / kept.sum(dim=1).clamp(min=1.0)
+
+
+def beta_times(count: int, alpha: float, generator: torch.Generator | None) -> Tensor:
+    """Training times (count,) in [0, 1) on the CPU: Beta(alpha, 1), by the inverse of its distribution, u^(1/alpha)."""
+    return torch.rand(count, generator=generator) ** (1.0 / alpha)
 
 
 def normal_noise(shape: Sequence[int], generator: Generators, like: Tensor) -> Tensor:

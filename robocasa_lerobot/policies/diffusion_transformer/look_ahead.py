@@ -8,13 +8,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-import torch
 from lerobot.utils.constants import ACTION
 from torch import Tensor, nn
 from torch.nn import functional
 
 from robocasa_lerobot.contract import ACTION_SIZE, ACTION_SLICES
-from robocasa_lerobot.policies.common.chunks import ACTION_IS_PAD
+from robocasa_lerobot.policies.common.chunks import ACTION_IS_PAD, masked_mean
 
 TRAVELLING = ("base_motion", "end_effector_position")  # parts of an action whose sum over time is a displacement
 
@@ -42,11 +41,8 @@ class LookAhead(nn.Module):
         """
         window = slice(-self.first, self.steps - self.first)
         moves = batch[ACTION].float()[:, window][..., self.indices]
-        kept = torch.ones_like(moves[..., 0])
-        if ACTION_IS_PAD in batch:
-            kept = (~batch[ACTION_IS_PAD][:, window]).to(moves.dtype)
-        counted = kept.sum(dim=1)
-        average = (moves * kept.unsqueeze(-1)).sum(dim=1) / counted.clamp(min=1.0).unsqueeze(-1)
+        padded = batch[ACTION_IS_PAD][:, window] if ACTION_IS_PAD in batch else None
+        travel = masked_mean(moves, padded) * self.steps**0.5
         told = self.layers(features[:, -1]).float()
-        error = functional.mse_loss(told, average * self.steps**0.5, reduction="none").mean(dim=-1)
-        return error * (counted > 0)
+        error = functional.mse_loss(told, travel, reduction="none").mean(dim=-1)
+        return error if padded is None else error * ~padded.all(dim=1)

@@ -9,13 +9,13 @@ import torch
 from diffusers.schedulers.scheduling_ddim import DDIMScheduler
 from diffusers.schedulers.scheduling_ddpm import DDPMScheduler
 from lerobot.policies.pretrained import PreTrainedPolicy
-from lerobot.utils.constants import ACTION, OBS_LANGUAGE_ATTENTION_MASK, OBS_LANGUAGE_TOKENS, OBS_STATE
+from lerobot.utils.constants import OBS_LANGUAGE_ATTENTION_MASK, OBS_LANGUAGE_TOKENS, OBS_STATE
 from torch import Tensor
 
 from robocasa_lerobot.policies.common.attention import short_attention
 from robocasa_lerobot.policies.common.chunks import (
-    ACTION_IS_PAD,
     Generators,
+    beta_times,
     decay_groups,
     normal_noise,
     sample_losses,
@@ -114,7 +114,8 @@ class DiffusionTransformerPolicy(PreTrainedPolicy):
         """Loss of a batch.
 
         Args:
-            batch: observations (B, n_obs_steps, ...), `action` (B, horizon, A) and, for the mask, `action_is_pad`.
+            batch: observations (B, n_obs_steps, ...), `action` (B, L, A) at the config's `action_delta_indices`, whose
+                first `horizon` are the chunk, and, for the mask, `action_is_pad`.
             reduction: `mean` gives a scalar, `none` the loss of each sample (B,).
             generator: for noise, diffusion times and crops; None uses the global one.
             noise: (B * noise_draws, horizon, A), drawn where None.
@@ -126,8 +127,8 @@ class DiffusionTransformerPolicy(PreTrainedPolicy):
         draws = self.config.noise_draws
         observed = self.observation_encoder(batch, generator).float()
         features = observed.repeat_interleave(draws, dim=0)
-        chunk = self._chunk(batch)
-        actions = target_actions(chunk, self.config.horizon, self.action_dim, draws)
+        loaded = target_actions(batch, len(self.config.action_delta_indices), self.action_dim, draws)
+        actions = loaded[:, : self.config.horizon]
         if noise is None:
             noise = normal_noise(actions.shape, generator, actions)
         if times is None:
@@ -136,7 +137,7 @@ class DiffusionTransformerPolicy(PreTrainedPolicy):
         target = noise if self.config.prediction_type == "epsilon" else actions
         with short_attention(actions.device):
             predicted = self.denoiser(noisy, times, features).float()
-        losses = sample_losses(predicted, target, chunk, self.config)
+        losses = sample_losses(predicted, target, batch, self.config)
         told: dict[str, Any] = {}
         if self.look_ahead is not None:
             ahead = self.look_ahead(observed, batch)
@@ -149,14 +150,7 @@ class DiffusionTransformerPolicy(PreTrainedPolicy):
         steps, alpha = self.config.num_train_timesteps, self.config.time_alpha
         if alpha == 1.0:
             return torch.randint(steps, (count,), generator=generator)
-        return (steps * torch.rand(count, generator=generator) ** (1.0 / alpha)).long().clamp(max=steps - 1)
-
-    def _chunk(self, batch: dict[str, Tensor]) -> dict[str, Tensor]:
-        """The batch with the actions of a chunk alone, where it has those that are looked ahead to as well."""
-        if self.look_ahead is None:
-            return batch
-        end = self.config.horizon
-        return {key: value[:, :end] if key in (ACTION, ACTION_IS_PAD) else value for key, value in batch.items()}
+        return (steps * beta_times(count, alpha, generator)).long().clamp(max=steps - 1)
 
     @torch.no_grad()
     def predict_action_chunk(

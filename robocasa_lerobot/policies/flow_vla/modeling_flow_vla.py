@@ -15,6 +15,7 @@ from torch import Tensor
 
 from robocasa_lerobot.policies.common.chunks import (
     Generators,
+    beta_times,
     decay_groups,
     normal_noise,
     sample_losses,
@@ -104,9 +105,9 @@ class FlowVlaPolicy(PreTrainedPolicy):
         return (losses if reduction == "none" else losses.mean()), {}
 
     def sample_times(self, count: int, generator: torch.Generator | None = None) -> Tensor:
-        """Training times (count,) on the CPU: Beta(time_alpha, 1), by the inverse of its distribution, u^(1/alpha)."""
+        """Training times (count,) on the CPU: of Beta(time_alpha, 1), brought into [time_smallest, 1]."""
         smallest = self.config.time_smallest
-        return smallest + (1.0 - smallest) * torch.rand(count, generator=generator) ** (1.0 / self.config.time_alpha)
+        return smallest + (1.0 - smallest) * beta_times(count, self.config.time_alpha, generator)
 
     def velocity(self, state: Tensor, noisy: Tensor, times: Tensor, prefix: PrefixCache) -> Tensor:
         """The predicted velocity (B, T, A), in float32; see `ActionExpert.forward`."""
