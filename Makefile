@@ -54,8 +54,8 @@ study: $(STAMP)  ## what small policies learn: trainings from data to trials, an
 test: $(STAMP)  ## the fast tests
 	PYTHON=$(BIN)/python sh scripts/test.sh $(PYTEST_ARGS)
 
-test-slow: $(STAMP)  ## the slow tests: every task and kitchen, long trainings
-	$(BIN)/python -m pytest -m slow $(PYTEST_ARGS)
+test-slow: $(STAMP)  ## the slow and costly tests: every task and kitchen, long trainings
+	$(BIN)/python -m pytest -m "slow or costly" $(PYTEST_ARGS)
 
 # 25 minutes on two idle cores; PYTEST_ARGS="-k lifelong" walks some. File, phases and minutes go to outputs/walk.md.
 walk: $(STAMP)  ## every experiment file from its first step to its report, at a tiny scale

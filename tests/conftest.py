@@ -13,7 +13,7 @@ from pathlib import Path
 
 import pytest
 from hypothesis import settings
-from task_sample import SAMPLE_VARIABLE
+from task_sample import SAMPLE_VARIABLE, whose_turn
 
 from robocasa_lerobot import gl
 
@@ -34,6 +34,7 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 
 def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption("--task-sample", metavar="TEXT", help="draw the fast tests' tasks by this (default: the commit)")
+    parser.addoption("--in-turns", action="store_true", help="run a third of the costly tests, drawn as tasks are")
 
 
 def pytest_report_collectionfinish() -> str | None:
@@ -63,7 +64,12 @@ def pytest_collection_finish() -> None:
     gc.freeze()
 
 
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    if config.getoption("--in-turns"):
+        costly = [item for item in items if item.get_closest_marker("costly")]
+        later = set(costly) - set(whose_turn(costly, os.environ[SAMPLE_VARIABLE]))
+        config.hook.pytest_deselected(items=[item for item in items if item in later])
+        items[:] = [item for item in items if item not in later]
     rendering = [item for item in items if item.get_closest_marker("render")]
     if not rendering:
         return

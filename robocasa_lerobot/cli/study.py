@@ -14,6 +14,7 @@ EXAMPLE = (
 
 def configure(parser: argparse.ArgumentParser) -> None:
     """Add the options."""
+    from robocasa_lerobot.jobs.parent import add_end_with_input
     from robocasa_lerobot.study.runs import CPU, DEVICES
 
     parser.add_argument("parts", nargs="*", metavar="PART", help="parts of the study (default: all, in their order)")
@@ -34,6 +35,13 @@ def configure(parser: argparse.ArgumentParser) -> None:
         help="cuda: a larger policy, pictures twice as large each way, eight times the batch, a quarter of the steps",
     )
     parser.add_argument("--workers", type=int, help="processes that make data (default: all cores)")
+    parser.add_argument(
+        "--at_once",
+        type=int,
+        metavar="N",
+        help="trainings beside each other, each with its share of the cores (default: one for each core, at most 4; "
+        "one on a GPU); the same command on further nodes of a cluster takes part as well",
+    )
     parser.add_argument("--scale", metavar="NAME", help="as in `train`: try all of it in minutes")
     parser.add_argument(
         "--episodes", metavar="KIND=N,...", help="as in `data`: demonstrations of each task (default: the registry's)"
@@ -47,15 +55,21 @@ def configure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--results", type=Path, metavar="DIR", help="where ended runs are kept (default: ROOT/results)")
     parser.add_argument("--page", type=Path, metavar="FILE", help="Markdown page (default: RESULTS/results.md)")
     parser.add_argument("--report", action="store_true", help="run nothing: write the page of what has ended")
+    add_end_with_input(parser)
 
 
 def run(args: argparse.Namespace) -> int:
     """Plan, or run what has not ended yet; keep each phase that ends, and write the page anew."""
     from robocasa_lerobot.errors import UserError
+    from robocasa_lerobot.jobs.parent import end_with_input
     from robocasa_lerobot.study.settings import load_study
 
+    if args.end_with_input:
+        end_with_input()
     if args.seeds is not None and args.seeds < 1:
         raise UserError(f"--seeds is {args.seeds}, expected at least 1.")
+    if args.at_once is not None and args.at_once < 1:
+        raise UserError(f"--at_once is {args.at_once}, expected at least 1 training at a time.")
     study = load_study(args.config_path)
     parts = study.chosen(args.parts, args.seeds)
 
@@ -66,7 +80,8 @@ def run(args: argparse.Namespace) -> int:
     from robocasa_lerobot.study.check import check_study
     from robocasa_lerobot.study.costs import cost_lines, costs
     from robocasa_lerobot.study.page import write_page
-    from robocasa_lerobot.study.runs import configs_for, root_for, runs_of
+    from robocasa_lerobot.study.runs import CUDA, Run, configs_for, root_for, runs_of
+    from robocasa_lerobot.study.sharing import alone, at_once_by_default, helped_by, shared_runs
     from robocasa_lerobot.study.stored import check_results, is_stored, read_stored, stands_for, store
 
     numbers = parse_episodes(args.episodes) if args.episodes else {}
@@ -77,6 +92,7 @@ def run(args: argparse.Namespace) -> int:
     configs = configs_for(args.device, study, root)
     sets = open_registry(str(configs / study.registry)).task_sets
     check_study(study, configs, sets)
+    at_once = args.at_once or at_once_by_default(cores_here(), args.device == CUDA)
     if args.plan:
         runs, planned = {}, set[str]()
         for name, part in parts.items():
@@ -84,8 +100,8 @@ def run(args: argparse.Namespace) -> int:
             planned |= {run.name for run in own}
             runs[name] = [run for run in own if not is_stored(run, results)]
         cores = args.workers or cores_here()
-        found = costs(study, runs, configs, cores, args.measure)
-        print("\n".join(cost_lines(parts, found, cores, args.device)))
+        found = costs(study, runs, configs, cores, args.measure, at_once)
+        print("\n".join(cost_lines(parts, found, cores, args.device, at_once)))
         return 0
     shown = study.shown_with(parts)
     whole = runs_of(list(shown.parts.values()), root, configs, *asked)
@@ -98,13 +114,26 @@ def run(args: argparse.Namespace) -> int:
     wanted = [] if args.report else runs_of(list(parts.values()), root, configs, *asked)
     if wanted:
         check_results(whole, results)
-    for number, run in enumerate(wanted, start=1):
-        if is_stored(run, results):
-            continue
-        print(f"== {number} of {len(wanted)}: {run.name}", flush=True)
-        for _ in run.carry_out(args.workers):
-            print(f"kept: {store(run, results)}", flush=True)
-            report()
+
+    def ended(run: Run) -> bool:
+        return is_stored(run, results)
+
+    left = sum(not ended(run) for run in wanted)
+    helpers = max(0, min(at_once, left) - 1)
+    threads = max(1, cores_here() // at_once) if at_once > 1 else None
+    with helped_by(helpers, [*_words(args), "--at_once=1"], root, threads or 1):
+        for run in shared_runs(wanted, ended, root):
+            print(f"== {wanted.index(run) + 1} of {len(wanted)}: {run.name}", flush=True)
+            for _ in run.carry_out(args.workers, threads, lambda: alone(root, "data")):
+                with alone(root, "page"):
+                    print(f"kept: {store(run, results)}", flush=True)
+                    report()
     report()
     print(f"written: {args.page or results / 'results.md'}")
     return 0
+
+
+def _words(args: argparse.Namespace) -> list[str]:
+    """The arguments of a process that takes part."""
+    given = ("config_path", "seeds", "device", "workers", "scale", "episodes", "root", "results", "page")
+    return [*args.parts, *(f"--{name}={value}" for name in given if (value := getattr(args, name)) is not None)]

@@ -6,8 +6,9 @@ import os
 import signal
 import subprocess
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import IO
 
 from robocasa_lerobot.jobs.parent import END_WITH_INPUT
 
@@ -29,24 +30,45 @@ def start_serving(module: str, descriptors: Sequence[int], **environment: str) -
     )
 
 
-def run_command(*arguments: str) -> int:
-    """Run a command of `robocasa-lerobot` to its end and return its status, negative where a signal ended it.
+def start_command(
+    arguments: Sequence[str], environment: Mapping[str, str], log: IO[str] | None = None
+) -> subprocess.Popen[bytes]:
+    """Start a command of `robocasa-lerobot` that knows `--end-with-input`: it ends where this process is killed.
 
-    What asks this process to end is passed on to the command, which would otherwise go on alone; where this process is
-    killed, the command ends as its standard input closes. It is one that knows `--end-with-input`.
+    Its output goes to `log` where there is one. `environment` is added to this process's.
     """
-    command = [sys.executable, "-m", "robocasa_lerobot.cli", *arguments, END_WITH_INPUT]
-    with subprocess.Popen(command, stdin=subprocess.PIPE) as child:
+    return subprocess.Popen(
+        [sys.executable, "-m", "robocasa_lerobot.cli", *arguments, END_WITH_INPUT],
+        stdin=subprocess.PIPE,
+        stdout=log,
+        stderr=log,
+        env={**os.environ, **environment},
+    )
+
+
+def run_command(arguments: Sequence[str], environment: Mapping[str, str]) -> int:
+    """Run such a command to its end and return its status, negative where a signal ended it.
+
+    What asks this process to end is passed on to the command, which would otherwise go on alone; whoever had that
+    signal before gets it when the command has ended.
+    """
+    taken: list[signal.Signals] = []
+    with start_command(arguments, environment) as child:
 
         def pass_on(number: int, _frame: object) -> None:
             child.send_signal(number)
+            taken.append(signal.Signals(number))
 
         before = {number: signal.signal(number, pass_on) for number in STOP_SIGNALS}
         try:
-            return child.wait()
+            status = child.wait()
         finally:
             for number, handler in before.items():
                 signal.signal(number, handler)
+    for number in taken:
+        if callable(handler := before[number]):
+            handler(number, None)
+    return status
 
 
 def environment_of_python() -> dict[str, str]:

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+
+import torch
 
 from robocasa_lerobot.data.registry.registry import open_registry
 from robocasa_lerobot.evaluation.records.results import TRIALS_FILE
@@ -52,9 +55,17 @@ class Cost:
 
 
 def costs(
-    study: StudyConfig, runs: Mapping[str, list[Run]], configs: Path, cores: int, measured_steps: int
+    study: StudyConfig,
+    runs: Mapping[str, list[Run]],
+    configs: Path,
+    cores: int,
+    measured_steps: int,
+    at_once: int,
 ) -> dict[str, Cost]:
     """What each part takes; `runs` are those of each part that no earlier part has and that have not ended.
+
+    Trainings are measured with the threads that each of `at_once` has beside the others, and alone: they share caches
+    and memory as well, so that two of the demo's policy take 6 % longer than that.
 
     Raises:
         UserError: a mistake in an experiment.
@@ -66,7 +77,11 @@ def costs(
     # Other seeds need the same data and take as long, where they have not begun.
     kinds = {run: run.name if run.folder.exists() else run.experiment for own in runs.values() for run in own}
     plans: dict[str, _Plan] = {}
-    with Bar(total=len(set(kinds.values())), desc="timing steps", unit="experiment", leave=False) as bar:
+    total = len(set(kinds.values()))
+    with (
+        Bar(total=total, desc="timing steps", unit="experiment", leave=False) as bar,
+        _torch_threads(max(1, cores // at_once) if at_once > 1 else None),
+    ):
         for run, kind in kinds.items():
             if kind not in plans:
                 plans[kind] = _planned(run, pixels, measured_steps, measured)
@@ -87,13 +102,24 @@ def costs(
             runs=len(own),
             demonstrations=data.demonstrations,
             data_hours=data.recording_hours + data.converting_hours,
-            training_hours=sum(hours) if known else None,
+            training_hours=sum(hours) / at_once if known else None,
             trials=sum(plan.trials for plan in mine),
             trial_hours=sum(plan.steps for plan in mine) * PART_OF_HORIZON / TRIAL_STEPS_PER_SECOND / cores / 3600,
             longest_hours=max(hours, default=0.0) if known else None,
             size=data.size + sum((phase.checkpoint_bytes or 0) * phase.kept for phase in phases),
         )
     return out
+
+
+@contextmanager
+def _torch_threads(number: int | None) -> Iterator[None]:
+    """Let torch compute with so many threads inside; None leaves it as it is."""
+    before = torch.get_num_threads()
+    torch.set_num_threads(number or before)
+    try:
+        yield
+    finally:
+        torch.set_num_threads(before)
 
 
 @dataclass(frozen=True)
@@ -131,7 +157,9 @@ def _share_left(run: Run, item: PlannedEvaluation) -> float:
     return max(0.0, 1.0 - done / max(item.trials, 1))
 
 
-def cost_lines(parts: Mapping[str, PartConfig], found: Mapping[str, Cost], cores: int, device: str) -> list[str]:
+def cost_lines(
+    parts: Mapping[str, PartConfig], found: Mapping[str, Cost], cores: int, device: str, at_once: int
+) -> list[str]:
     """The costs as a table, and their sum."""
     head = ("part", "runs", "demos", "data h", "training h", "trials", "trials h", "GB")
     rows = [head]
@@ -148,6 +176,7 @@ def cost_lines(parts: Mapping[str, PartConfig], found: Mapping[str, Cost], cores
             lines.append(f"    {parts[row[0]].asks}")
     all_hours = sum(cost.hours for cost in found.values())
     longest = max((cost.longest_hours or 0.0 for cost in found.values()), default=0.0)
-    lines += ["", f"in all about {all_hours:.1f} hours on {cores} core(s) and {device}, what is there left out"]
+    beside = f", {at_once} trainings at once" if at_once > 1 else ""
+    lines += ["", f"in all about {all_hours:.1f} hours on {cores} core(s) and {device}{beside}, what is there left out"]
     lines += [f"the longest single training: {60 * longest:.0f} minutes"] if longest else []
     return lines

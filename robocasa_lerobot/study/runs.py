@@ -6,7 +6,8 @@ import dataclasses
 import re
 import shutil
 import signal
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -130,23 +131,35 @@ class Run:
             found.append(["train", f"--config_path={self.file}", f"--phase={phase.name}", "--evaluate", *scale])
         return found
 
-    def carry_out(self, workers: int | None) -> Iterator[None]:
+    def carry_out(
+        self,
+        workers: int | None,
+        threads: int | None = None,
+        data_alone: Callable[[], AbstractContextManager[None]] = nullcontext,
+    ) -> Iterator[None]:
         """Make its data, then train and try phase by phase, and come back after each; what is finished takes seconds.
+
+        Args:
+            workers: processes that make data; None is one for each core.
+            threads: of a training; None leaves it to torch.
+            data_alone: entered while data are made, which other runs may need as well.
 
         Raises:
             StoppedError: one did not end well; its own message stands above.
         """
         self.write_file()
         for command in self.commands(workers):
-            self._run(command)
-            if command[0] == "train":
+            making = command[0] == "data"
+            with data_alone() if making else nullcontext():
+                self._run(command, {} if threads is None or making else {"OMP_NUM_THREADS": str(threads)})
+            if not making:
                 yield
 
-    def _run(self, command: Sequence[str]) -> None:
-        status = run_command(*command)
+    def _run(self, command: Sequence[str], environment: dict[str, str]) -> None:
+        status = run_command(command, environment)
         if -status in _CRASHES:  # in a driver or library; what there is of the rest of a day should not wait for that
             print(f"ended by {signal.Signals(-status).name}, tried once more: {' '.join(command)}", flush=True)
-            status = run_command(*command)
+            status = run_command(command, environment)
         if status:
             raise StoppedError(
                 f"{self.name}: `robocasa-lerobot {' '.join(command)}` ended with status {status}; "

@@ -77,6 +77,7 @@ def test_of_several_things_each_has_its_turn_in_a_log(capsys: pytest.CaptureFixt
     assert lines[-1] == "[1/2] b done"
 
 
+@pytest.mark.costly
 def test_convert_writes_few_lines_into_a_log(tmp_path: Path) -> None:
     source = write_demos(tmp_path / "demos.hdf5", [60] * 4, images=128)
     command = ["convert", str(source), "--out", str(tmp_path / "data"), "--workers", "1"]

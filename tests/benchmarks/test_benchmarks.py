@@ -141,6 +141,7 @@ def test_a_reset_that_is_not_what_it_claims_is_an_error() -> None:
         simulator.reset(2, same_scene=True)
 
 
+@pytest.mark.costly
 @pytest.mark.render
 def test_scenes_of_composite_tasks_are_measured(tmp_path: Path) -> None:
     sim = module("ours_tasks_sim")

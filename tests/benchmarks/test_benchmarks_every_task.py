@@ -16,6 +16,7 @@ def benchmark(monkeypatch: pytest.MonkeyPatch) -> ModuleType:
     return importlib.import_module("every_task")
 
 
+@pytest.mark.costly
 def test_a_command_that_has_ended_well_is_not_run_again(benchmark: ModuleType, tmp_path: Path) -> None:
     steps = benchmark.Steps(tmp_path)
     with pytest.raises(SystemExit, match="verify ended with status 2"):

@@ -91,6 +91,7 @@ def check(scaling: ModuleType, kinds: tuple[str, ...], out: Path) -> None:
         assert one["cores"] > 0
 
 
+@pytest.mark.costly
 def test_the_command_measures_steps(scaling: ModuleType, tmp_path: Path) -> None:
     check(scaling, ("steps_no_cameras",), tmp_path / "scaling.json")
 

@@ -52,6 +52,7 @@ def test_fewer_kitchens_admit_what_needs_more() -> None:
     assert 0 < rare.share < 1
 
 
+@pytest.mark.costly
 def test_the_command_writes_the_page(tmp_path: Path) -> None:
     names = ["OpenOven", "OpenDishwasher"]
     assert cli.main(["tasks", *names, "--deviations", str(tmp_path / "new" / "page.md"), "--workers=2"]) == 0

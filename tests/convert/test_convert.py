@@ -112,6 +112,7 @@ def test_records_and_extras(stored: tuple[Path, Path]) -> None:
     assert leftovers(root) == [root.name]
 
 
+@pytest.mark.costly
 def test_result_does_not_depend_on_the_workers(tmp_path: Path) -> None:
     source = write_demos(tmp_path / "a.hdf5", (251, 251), images=16)
     for workers in (1, 2):

@@ -192,6 +192,7 @@ def test_settings_are_those_that_lerobot_makes_of_the_codec(codec: str) -> None:
     assert dict(settings.options) == config.get_codec_options(1, as_strings=True)
 
 
+@pytest.mark.costly
 @pytest.mark.parametrize("codec", CODECS)
 @pytest.mark.parametrize("size", [32, 48, 96])
 def test_the_same_pictures_give_the_same_bytes(codec: str, size: int, tmp_path: Path) -> None:

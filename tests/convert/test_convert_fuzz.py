@@ -92,6 +92,7 @@ def _warm(folder: Path) -> None:
     assert _outcome(source, folder / "good", _settings(0)) == "converted"
 
 
+@pytest.mark.costly
 @pytest.mark.timeout(600)
 def test_a_dozen_damaged_files(tmp_path: Path) -> None:
     _warm(tmp_path)

@@ -61,6 +61,7 @@ LAYOUTS: dict[str, tuple[Callable[[Path], Path], str | None, str]] = {
 }  # fmt: skip
 
 
+@pytest.mark.costly
 @pytest.mark.parametrize("case", LAYOUTS)
 def test_layouts_are_understood_and_their_drafts_convert(case: str, tmp_path: Path) -> None:
     pytest.importorskip("lerobot.datasets")

@@ -179,6 +179,7 @@ def test_twenty_kills(source: Path, expected: dict[str, str], tmp_path: Path) ->
     assert running >= 15, "most of the kills must meet a running conversion"
 
 
+@pytest.mark.costly
 def test_a_kill_while_clearing_away_is_made_good(
     source: Path, expected: dict[str, str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -207,6 +208,7 @@ def test_a_kill_while_clearing_away_is_made_good(
     assert _content(out) == expected
 
 
+@pytest.mark.costly
 def test_a_kill_while_clearing_away_is_made_good_where_the_output_is_replaced(
     source: Path, expected: dict[str, str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -245,6 +247,7 @@ def test_what_cannot_be_cleared_away_is_said(
     assert _content(out) == expected
 
 
+@pytest.mark.costly
 def test_the_output_may_be_a_link_and_holds_no_source(source: Path, expected: dict[str, str], tmp_path: Path) -> None:
     (tmp_path / "disk").mkdir()
     link = tmp_path / "link"

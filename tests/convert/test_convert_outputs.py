@@ -129,6 +129,7 @@ def _convert_with_short_files(source: Path, out: Path, limit: int) -> str:
     return "converted"
 
 
+@pytest.mark.costly
 @pytest.mark.parametrize("limit", [2_000, 8_000, 40_000])
 def test_files_that_may_not_grow(limit: int, tmp_path: Path) -> None:
     """The kernel's own error in the middle of a file, of whatever writes it: videos, tables, extras."""

@@ -207,6 +207,7 @@ def _content(out: Path) -> dict[str, str]:
     return hashes
 
 
+@pytest.mark.costly
 @pytest.mark.render
 def test_a_dataset_does_not_depend_on_it(source: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Over the borders of shards; the damaged one is rejected for the same reason, and nothing was asked for then."""

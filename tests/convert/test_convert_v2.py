@@ -312,6 +312,7 @@ def test_command(source: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str
     assert "PASSED" in capsys.readouterr().out
 
 
+@pytest.mark.costly
 def test_isaac_groot_data_as_found_in_the_wild(shared: Path, tmp_path: Path) -> None:
     source = shared / "real" / "groot_picknplace"
     result = convert([source], tmp_path / "out", ConversionSettings(max_gop=250), workers=1)

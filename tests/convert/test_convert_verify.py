@@ -152,6 +152,7 @@ DAMAGES: dict[str, tuple[Callable[[Path], None], str]] = {
 }
 
 
+@pytest.mark.costly
 @pytest.mark.parametrize("case", DAMAGES)
 def test_damage_is_noticed(case: str, damaged: Path) -> None:
     damage, name = DAMAGES[case]

@@ -112,6 +112,7 @@ def test_moved_cameras_stay_moved_when_rendered_once_more(converted: Path, tmp_p
     assert merged == {name: {"pos": [-0.3, 0.1, 1.2], "camera_attribs": {"fovy": [110.0]}}}
 
 
+@pytest.mark.costly
 @pytest.mark.render
 def test_rendering_goes_on_after_an_interruption_and_does_not_depend_on_the_workers(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch

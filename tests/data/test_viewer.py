@@ -5,6 +5,8 @@ from __future__ import annotations
 import subprocess
 import sys
 
+import pytest
+
 PROGRAM = """
 import torch
 from torch.utils.data import DataLoader
@@ -30,6 +32,7 @@ def test_frames_with_none_make_a_batch() -> None:
     ]
 
 
+@pytest.mark.costly
 def test_it_takes_the_viewers_own_arguments() -> None:
     command = [sys.executable, "-m", "robocasa_lerobot.data.viewer", "--help"]
     done = subprocess.run(command, capture_output=True, text=True, check=True)

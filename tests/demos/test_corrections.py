@@ -84,6 +84,7 @@ def test_what_a_policy_solves_is_left_to_it() -> None:
         env.close()
 
 
+@pytest.mark.costly
 @pytest.mark.parametrize("task", ["OpenDrawer", "TurnOnMicrowave", "PickPlaceCounterToSink"])
 def test_skills_begin_wherever_a_policy_has_led_the_hand(task: str) -> None:
     env = KitchenEnv(task, cameras=(), terminate_on_success=False, split="pretrain", horizon=1500)

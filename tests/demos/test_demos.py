@@ -152,6 +152,7 @@ def test_pictures_are_recorded_on_request(recordings):
         assert f"{camera}_image" not in recordings["OpenDrawer"].observations
 
 
+@pytest.mark.costly
 def test_a_file_is_the_same_for_any_number_of_workers(tmp_path):
     settings = RecordingSettings("CloseDrawer", episodes=2, seed=5)
     contents = []

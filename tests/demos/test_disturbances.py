@@ -32,6 +32,7 @@ def disturbed_runs(decided: np.ndarray) -> list[tuple[int, int]]:
     return [(int(a), int(b)) for a, b in edges.reshape(-1, 2)]
 
 
+@pytest.mark.costly
 @pytest.mark.render
 def test_what_led_the_hand_astray_is_not_trained_on(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     command = ["demos", "--tasks=CloseDrawer", "--episodes=2", "--seed=800010", "--workers=1", f"--out={tmp_path}"]
@@ -63,6 +64,7 @@ def test_what_led_the_hand_astray_is_not_trained_on(tmp_path: Path, capsys: pyte
     assert not inside.all()
 
 
+@pytest.mark.costly
 @pytest.mark.parametrize(
     "task", ["OpenDrawer", "TurnOnSinkFaucet", "PickPlaceCounterToSink", "OpenCabinet", "CloseToasterOvenDoor"]
 )

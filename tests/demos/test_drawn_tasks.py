@@ -52,6 +52,7 @@ def test_recordings_have_the_stages_of_their_own_scene(fruits: tuple[Path, list[
                 assert set(demo["stage"][:].tolist()) == set(range(len(rows)))
 
 
+@pytest.mark.costly
 def test_replay_makes_the_same_scene_and_the_same_goal(fruits: tuple[Path, list[Any]]) -> None:
     path, recordings = fruits
     for number, recording in enumerate(recordings):

@@ -84,6 +84,7 @@ def test_a_file_of_robosuite_is_prepared(lift: tuple[list[ArmScene], list[Datage
         assert info.gripper[grasp] > 0
 
 
+@pytest.mark.costly
 def test_a_source_succeeds_in_its_own_scene(lift: tuple[list[ArmScene], list[DatagenInfo], Template]) -> None:
     scenes, infos, template = lift
     for scene, info in zip(scenes, infos, strict=True):

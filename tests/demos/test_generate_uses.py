@@ -48,6 +48,7 @@ def _tasks_with_every_verb() -> list[str]:
     return chosen
 
 
+@pytest.mark.costly
 def test_a_step_of_every_verb_can_be_noted() -> None:
     """Buttons are pressed and knobs turned, too: nothing is in the hand there that could be used."""
     for name in _tasks_with_every_verb():

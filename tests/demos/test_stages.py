@@ -57,6 +57,7 @@ def thaw(runs: bool) -> Task:
     )
 
 
+@pytest.mark.costly
 def test_two_stages_are_solved_one_after_the_other_and_recorded(tmp_path: Path) -> None:
     solved = 0
     for split, seed in itertools.product(("target", "pretrain"), range(3)):

@@ -54,6 +54,7 @@ def walk(env: KitchenEnv, seed: int) -> Iterator[None]:
                 return
 
 
+@pytest.mark.costly
 @pytest.mark.parametrize("task", task_selection.demonstrated(fast=FAST))
 def test_a_joined_picture_is_the_full_drawing(task: str, joined: list[bool]) -> None:
     env = KitchenEnv(task, cameras=(), terminate_on_success=False)

@@ -253,6 +253,7 @@ def test_depth_alone_and_no_cameras() -> None:
     env.close()
 
 
+@pytest.mark.costly
 def test_gymnasium_checker_and_vector_env_carry_depth_and_segmentation() -> None:
     make = partial(
         KitchenEnv,

@@ -343,6 +343,7 @@ def test_lists() -> None:
     assert number_word(12) == "12"
 
 
+@pytest.mark.costly
 def test_no_object_takes_the_last_category_of_one_that_is_drawn_later() -> None:
     """A tool in the drawer that was a bowl left SnackSorting none for the counter."""
     for name in task_names():

@@ -31,6 +31,7 @@ def make(task: str, **kwargs) -> KitchenEnv:
     return env.unwrapped
 
 
+@pytest.mark.costly
 @pytest.mark.parametrize("task", every_task())
 def test_gymnasium_checker_finds_no_fault(task):
     env = make(task)
@@ -42,6 +43,7 @@ def test_gymnasium_checker_finds_no_fault(task):
     env.close()
 
 
+@pytest.mark.costly
 @pytest.mark.parametrize("task", every_task())
 def test_task_checker_finds_no_fault(task):
     assert check_task(task, seeds=(0, 1)) == []
@@ -106,6 +108,7 @@ def test_different_seeds_give_different_scenes():
     env.close()
 
 
+@pytest.mark.costly
 def test_render_preset_changes_pictures_but_not_physics():
     states, pictures = [], []
     for preset in ("fast", "quality"):

@@ -33,6 +33,7 @@ def starts(**kwargs: object) -> list[tuple[np.ndarray, np.ndarray, str]]:
     return out
 
 
+@pytest.mark.costly
 def test_each_noise_moves_what_it_names() -> None:
     plain = starts()
     assert all(np.array_equal(a[1], b[1]) for a, b in zip(plain, starts(), strict=True))
@@ -60,6 +61,7 @@ def test_the_base_starts_anywhere_within_a_distance_and_at_any_heading() -> None
     assert np.cos(shifts[:, 2]).min() < 0.0
 
 
+@pytest.mark.costly
 @pytest.mark.parametrize("novel", [False, True])
 def test_the_side_that_an_instruction_names_is_that_of_where_the_base_starts(novel: bool) -> None:
     """As seen by somebody at its place who faces the counter, as the task has it start."""
@@ -81,6 +83,7 @@ def test_the_side_that_an_instruction_names_is_that_of_where_the_base_starts(nov
     assert 0 < sum(named) < len(named), "some starts are on the other side of the drawer"
 
 
+@pytest.mark.costly
 def test_the_base_starts_in_no_open_door_and_within_the_room() -> None:
     env = KitchenEnv("CloseFridge", cameras=(), initial_noise=InitialNoise(base_within_m=1.5))
     moved = 0
@@ -126,6 +129,7 @@ def env_start(env: KitchenEnv, seed: int) -> RobotPose:
     return plain.scene.robot_pose
 
 
+@pytest.mark.costly
 @pytest.mark.parametrize("task", every_task())
 def test_novel_language_is_one_of_the_tasks_other_wordings(task: str) -> None:
     plain, novel = KitchenEnv(task, cameras=()), KitchenEnv(task, cameras=(), novel_language=True)

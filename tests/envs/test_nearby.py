@@ -84,6 +84,7 @@ def assert_same_as_with_all(task: str, seed: int, steps: int = 60, meddle: Meddl
     assert not differing, f"{task}, seed {seed}: other bits from step {differing[0]} on"
 
 
+@pytest.mark.costly
 @pytest.mark.parametrize("task", every_task())
 def test_random_motion_is_the_same(task: str) -> None:
     assert_same_as_with_all(task, seed=2)
@@ -131,6 +132,7 @@ def teleport(env: KitchenEnv, number: int) -> None:
         env.robot.place_base(env.model, env.data, *env.model.stat.center[:2], 1.0)
 
 
+@pytest.mark.costly
 @pytest.mark.parametrize("meddle", [lift, throw, pull, teleport])
 @pytest.mark.parametrize("seed", [0, 3])
 def test_what_a_user_writes_is_the_same(meddle: Meddle, seed: int) -> None:

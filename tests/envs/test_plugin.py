@@ -42,6 +42,7 @@ def test_companion_is_named_as_lerobots_discovery_wants() -> None:
     assert COMPANION in names, "run `make setup`"
 
 
+@pytest.mark.costly
 def test_discovery_of_installed_plugins_finds_both_types() -> None:
     finding = doctor.check_plugins()  # asks LeRobot in a fresh process
     assert finding.status == "ok", finding

@@ -41,6 +41,7 @@ def digests(order: list[int]) -> dict[int, str]:
     return found
 
 
+@pytest.mark.costly
 @pytest.mark.render
 def test_a_scene_does_not_hang_on_those_before_it() -> None:
     forwards = digests([0, 1, 2, 3, 4])

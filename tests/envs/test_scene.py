@@ -140,6 +140,7 @@ def stage_counts(task: Task) -> set[int]:
     return {len(task.bound(build_scene(task, "target", seed)).stages) for seed in range(8)}
 
 
+@pytest.mark.costly
 @pytest.mark.parametrize("name", task_names())
 def test_declarations_agree_with_the_published_facts(name, shared):
     with (shared / "facts" / "tasks.csv").open() as file:

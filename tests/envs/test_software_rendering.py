@@ -32,6 +32,7 @@ def differences(one: Picture, other: Picture) -> NDArray[np.int64]:
     return np.asarray(np.abs(one.astype(int) - other.astype(int)).max(axis=-1))
 
 
+@pytest.mark.costly
 @pytest.mark.render
 @pytest.mark.parametrize("task", task_selection.every_task())
 def test_a_kitchen_is_drawn_as_opengl_draws_it(task: str) -> None:
@@ -280,6 +281,7 @@ def test_who_draws_follows_from_the_machine(
     assert gl.draws_on_cpu() is False
 
 
+@pytest.mark.costly
 @pytest.mark.parametrize("task", task_selection.demonstrated())
 def test_a_picture_does_not_depend_on_what_is_kept(task: str) -> None:
     """A demonstration, drawn in full and with what stands still kept; then its states in any order."""

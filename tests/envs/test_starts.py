@@ -232,6 +232,7 @@ def test_footprints_are_pushed_in_by_as_little_as_it_takes() -> None:
     assert area.pushed_in(Footprint(1.0, 2.0, 0.0, (0.11, 0.05))) is None
 
 
+@pytest.mark.costly
 @pytest.mark.parametrize(
     ("task", "layout", "style"),
     [("PortionHotDogs", 22, 31), ("LoadFridgeByType", 28, 15), ("SteamVeggiesWithWater", 42, 41)],

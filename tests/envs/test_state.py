@@ -64,6 +64,7 @@ def test_an_episode_continues_from_a_state_bit_for_bit(task: str, tmp_path: Path
     assert np.array_equal(other.get_state().physics, env.get_state().physics)
 
 
+@pytest.mark.costly
 @pytest.mark.parametrize("task", demonstrated())
 def test_a_demonstration_continues_from_anywhere(task: str) -> None:
     """In grasps, with doors in motion, while things fall asleep and wake: the rest replays to the same bits."""

@@ -36,6 +36,7 @@ def of_env(batch: Any, index: int) -> Any:
     return {key: of_env(value, index) for key, value in batch.items()} if isinstance(batch, dict) else batch[index]
 
 
+@pytest.mark.costly
 @pytest.mark.render
 @pytest.mark.parametrize("mode", [AutoresetMode.NEXT_STEP, AutoresetMode.SAME_STEP])
 def test_two_kitchens_go_the_way_of_two_single_envs(mode: AutoresetMode) -> None:

@@ -87,6 +87,7 @@ def test_a_shard_looks_for_its_devices(tmp_path: Path, ray: StandIn, capsys: pyt
     assert ray.asked[-1]["num_gpus"] == 1
 
 
+@pytest.mark.costly
 def test_the_same_command_runs_what_shards_lack_now(
     tmp_path: Path, ray: StandIn, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -20,6 +20,7 @@ def evaluate(out: Path, *changes: str) -> list[TrialRecord]:
     return engine.evaluate(engine.prepare(load_config(EvaluationConfig, [*arguments, *changes])))
 
 
+@pytest.mark.costly
 @pytest.mark.render
 def test_a_kitchen_trial_goes_the_same_way_whatever_ran_before_it_and_filmed_or_not(tmp_path: Path) -> None:
     ensure_gl()

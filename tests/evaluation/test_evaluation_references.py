@@ -37,6 +37,7 @@ def demos(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return record_task(settings, folder, show_progress=False).path
 
 
+@pytest.mark.costly
 def test_replayed_demonstrations_solve_their_scenes_and_zeros_do_not(demos: Path, tmp_path: Path) -> None:
     episodes = read_episodes(demos)
     records = evaluate(tmp_path / "out", f"--policy=replay:{demos},zero", "--env.tasks=CloseDrawer", "--trials=3")
@@ -108,6 +109,7 @@ def test_a_converted_dataset_is_replayed_as_its_source_is(demos: Path, tmp_path:
     assert all(r.success for r in records)
 
 
+@pytest.mark.costly
 def test_the_demonstrator_is_a_policy_of_the_engine(tmp_path: Path) -> None:
     records = evaluate(tmp_path / "out", "--policy=demonstrator", "--env.tasks=OpenDrawer,CloseDrawer", "--trials=3")
     assert [r.success for r in records] == [True] * 6

@@ -208,6 +208,7 @@ def test_slurm_runs_the_shards_and_joins_them(
     assert main(command) == 2, "the number of shards is needed"
 
 
+@pytest.mark.costly
 def test_faulty_trials_cost_only_themselves(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     own: dict[str, Any] = {"policy": "zero", "env.tasks": "Slide", "trials": 40, "workers": 2, "stall_seconds": 3}
     assert_faults_cost_only_their_trials(evaluate, own, REASONS, tmp_path, monkeypatch)

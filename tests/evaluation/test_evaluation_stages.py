@@ -77,6 +77,7 @@ def test_progress_is_the_share_of_what_was_left_to_do() -> None:
         mean_progress([1.5])
 
 
+@pytest.mark.costly
 @pytest.mark.render
 def test_the_command_records_how_far_any_policy_comes(tmp_path: Path) -> None:
     out = tmp_path / "out"

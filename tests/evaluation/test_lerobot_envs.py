@@ -52,6 +52,7 @@ def evaluate(out: Path, **changes: Any) -> list[TrialRecord]:
     return engine.evaluate(engine.prepare(load_config(EvaluationConfig, words)))
 
 
+@pytest.mark.costly
 def test_robocasa_gets_our_actions_in_its_parts_and_gives_our_state(notes: Path) -> None:
     env = ForeignEnv(robocasa(split="target"), "CloseDrawer", image_size=48)
     try:

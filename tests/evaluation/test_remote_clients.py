@@ -168,6 +168,7 @@ def ask_for_ever(client: Any) -> None:
 PROTOCOLS = ("openpi", "vla_eval", "gr00t")
 
 
+@pytest.mark.costly
 @pytest.mark.parametrize("protocol", PROTOCOLS)
 def test_refused_closed_and_timed_out_are_told_apart(protocol: str) -> None:
     slow = threading.Event()

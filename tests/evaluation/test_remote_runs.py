@@ -282,6 +282,7 @@ def test_shards_merge_when_the_server_has_gone(tmp_path: Path) -> None:
     assert comparable(read_results(tmp_path / "out")) == comparable(whole)
 
 
+@pytest.mark.costly
 @pytest.mark.render
 def test_a_kitchen_goes_on_after_a_kill_of_the_evaluation(tmp_path: Path) -> None:
     out = tmp_path / "out"

@@ -152,6 +152,7 @@ def _alive(pid: int) -> bool:
 REASONS = {**trial_faults.REASONS, "sigkill": ("crashed", "the simulator's process was ended by SIGKILL")}
 
 
+@pytest.mark.costly
 def test_faulty_trials_cost_only_themselves(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     own: dict[str, Any] = {"policy": "zero", "env.tasks": "Slide", "trials": 12, "workers": 2, "stall_seconds": 3}
     own["env.factory"] = SLIDE

@@ -91,6 +91,7 @@ def test_a_convnet_ends_at_the_resolution_that_it_names(stem: int, side: int) ->
     assert out.shape == (2, 16, expected, expected)
 
 
+@pytest.mark.costly
 def test_hashed_words() -> None:
     words = hashed_words("Open the LEFT drawer!", 32, 100)
     assert words == hashed_words("open the left drawer!", 32, 100)

@@ -69,6 +69,7 @@ def test_variant_trains_and_predicts(overrides: dict[str, Any]) -> None:
     assert config.action_delta_indices[config.n_obs_steps - 1] == 0
 
 
+@pytest.mark.costly
 @pytest.mark.parametrize("name", ["default", "encoder per camera", "resnet18", "grid", "multi-layer perceptron"])
 def test_compiled_it_has_the_same_loss_and_gradients(name: str) -> None:
     """Translated in parts, each without a break: one would be a wait for the GPU in every step."""

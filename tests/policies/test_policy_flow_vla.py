@@ -145,6 +145,7 @@ def two_episodes(config: FlowVlaConfig, length: int = 8) -> dict[str, Any]:
     return batch
 
 
+@pytest.mark.costly
 @pytest.mark.parametrize("time_conditioning", ["mlp", pytest.param("adaptive_norm", marks=pytest.mark.slow)])
 def test_overfits_two_episodes(time_conditioning: str) -> None:
     config = tiny_config(

@@ -185,6 +185,7 @@ def experiment_file(folder: Path, data: Path, kind: str, models: Path) -> Path:
     return path
 
 
+@pytest.mark.costly
 @pytest.mark.parametrize("kind", RESUMED)
 def test_two_steps_and_two_more_equal_four_and_a_trial(kind: str, data: Path, tmp_path: Path) -> None:
     at_once, in_two = tmp_path / "at_once", tmp_path / "in_two"

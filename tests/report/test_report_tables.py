@@ -258,6 +258,7 @@ def test_the_output_of_a_training_stands_for_its_evaluations(foundation: tuple[P
     assert len(found.single) == len(runs)
 
 
+@pytest.mark.costly
 def test_an_average_over_missing_tasks_is_not_given(foundation: tuple[Path, list[Path]], tmp_path: Path) -> None:
     folder, runs = foundation
     without = [run for run in runs if run.relative_to(folder).parts[:2] != ("foundation", "composite_unseen_10")]

@@ -76,6 +76,7 @@ def test_a_key_map_of_ones_own_takes_seed_and_number_to_gr00ts_wire(checkpoint: 
     assert len({record.trajectory for record in ours}) == TRIALS
 
 
+@pytest.mark.costly
 @pytest.mark.parametrize(
     ("protocol", "keys", "version"),
     [

@@ -231,7 +231,7 @@ def keep_whole_run(folder: Path, steps: dict[str, int]) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize(("number", "status"), [(signal.SIGTERM, 2), (signal.SIGKILL, -signal.SIGKILL)])
 def test_nothing_goes_on_alone_when_the_study_ends(tmp_path: Path, number: signal.Signals, status: int) -> None:
-    words = ("multitask", "--episodes=pretrain=100", *TINY)
+    words = ("multitask", "--episodes=more=100", *TINY, "--seeds=2", "--at_once=2")
     with subprocess.Popen([*COMMAND, *words], cwd=tmp_path, stderr=subprocess.PIPE, text=True) as process:
         deadline = time.monotonic() + 120
         while not list(tmp_path.glob("datasets/study/.making/**/log.txt")):  # recordings have begun
@@ -239,7 +239,7 @@ def test_nothing_goes_on_alone_when_the_study_ends(tmp_path: Path, number: signa
             assert time.monotonic() < deadline
             time.sleep(0.2)
         others = psutil.Process(process.pid).children(recursive=True)
-        assert others
+        assert sum("study" in other.cmdline() for other in others) == 1, "the other training's"
         process.send_signal(number)
         assert process.wait(60) == status
         _, alive = psutil.wait_procs(others, timeout=60)

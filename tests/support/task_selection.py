@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import hashlib
 import os
 from collections.abc import Callable, Sequence
 from typing import Any
 
 import pytest
-from task_sample import SAMPLE_VARIABLE
+from task_sample import SAMPLE_VARIABLE, number_of
 
 from robocasa_lerobot.benchmark.tasks import facts_of
 from robocasa_lerobot.demos.demonstrator import can_demonstrate
@@ -48,7 +47,7 @@ def drawn(seed: str | None = None) -> tuple[str, ...]:
     seed = os.environ.get(SAMPLE_VARIABLE, "") if seed is None else seed
     kinds = ("atomic", "composite")
     of_kind = [sorted(name for name in task_names() if facts_of(name).kind == kind) for kind in kinds]
-    return tuple(names[int(hashlib.sha256(seed.encode()).hexdigest(), 16) % len(names)] for names in of_kind)
+    return tuple(names[number_of(seed) % len(names)] for names in of_kind)
 
 
 def _marked(names: Sequence[str], fast: Sequence[str]) -> list[Any]:

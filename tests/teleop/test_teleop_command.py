@@ -75,6 +75,7 @@ def save_one(client: TeleopClient, seed: int) -> None:
     client.until_told("saved", WAIT_S)
 
 
+@pytest.mark.costly
 def test_ctrl_c_keeps_what_is_saved(tmp_path: Path) -> None:
     with command(tmp_path, "--episodes", "3") as running:
         assert re.fullmatch(r"http://127\.0\.0\.1:\d+/\?t=[\w-]{20,}", running.address)

@@ -105,6 +105,7 @@ def perform(desk: Desk, what: str, times: int) -> None:
         desk.say(what)
 
 
+@pytest.mark.costly
 @examples(max_examples=4)
 @given(operations=OPERATIONS)
 @example([("hold", 7), ("undo", 1), ("succeed", 0), ("tick", 8), ("follow", 20), ("disconnect", 0), ("succeed", 0)])

@@ -239,6 +239,7 @@ def test_checkpoint_of_another_experiment_can_be_the_start(tmp_path: Path, finis
     assert config["width"] == 16
 
 
+@pytest.mark.costly
 @pytest.mark.parametrize(
     ("kind", "plain"),
     [

@@ -133,6 +133,7 @@ def test_evaluations_mean_the_experiments_registry_where_they_name_none(tmp_path
     assert load_experiment(path).registry == str(registry)
 
 
+@pytest.mark.costly
 def test_nothing_of_a_killed_training_goes_on_evaluating(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The evaluation of a trainer that is killed ends, so that the next one may write to its folder."""
     monkeypatch.setenv("PYTHONPATH", f"{ROOT / 'tests' / 'support'}{os.pathsep}{ROOT}")
@@ -188,6 +189,7 @@ def test_a_signal_to_all_processes_is_no_failure_of_the_running_evaluation(
     assert not list(tmp_path.rglob("finished"))
 
 
+@pytest.mark.costly
 def test_a_failed_evaluation_does_not_hide_that_a_run_was_stopped(
     tmp_path: Path, data: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -198,6 +200,7 @@ def test_a_failed_evaluation_does_not_hide_that_a_run_was_stopped(
     assert train(path, *words) == 2
 
 
+@pytest.mark.costly
 def test_an_evaluation_whose_file_has_changed_runs_again(
     tmp_path: Path, data: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

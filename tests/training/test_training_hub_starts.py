@@ -184,6 +184,7 @@ def _without_num2words(monkeypatch: pytest.MonkeyPatch) -> None:
         monkeypatch.setattr(processing_smolvlm, "num2words", str)
 
 
+@pytest.mark.costly
 @pytest.mark.parametrize("kind", ["smolvla", "xvla"])
 def test_a_published_policy_trains_goes_on_and_acts_in_our_kitchen(kind: str, tmp_path: Path, data: Path) -> None:
     start = hub_checkpoint(tmp_path / "hub", kind, tmp_path / "models")

@@ -129,6 +129,7 @@ def test_signal_saves_and_asks_for_another_turn(tmp_path: Path, data: Path) -> N
     assert int(last.name) == metrics(tmp_path, "pretrain")[-1]["step"] < 100000
 
 
+@pytest.mark.costly
 def test_loader_processes_outlive_what_asks_the_run_to_end(tmp_path: Path, data: Path) -> None:
     """From their first moment on; and one that hangs is ended all the same when nobody needs it any more."""
     experiment = tiny(tmp_path, data)
@@ -271,6 +272,7 @@ def test_tracker_without_its_package_is_told(
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.costly
 @pytest.mark.parametrize("tracker", TRACKERS)
 def test_trackers_get_the_metrics(tmp_path: Path, data: Path, monkeypatch: pytest.MonkeyPatch, tracker: str) -> None:
     pytest.importorskip(tracker)

@@ -50,6 +50,7 @@ def test_optimizer_and_schedule_of_a_phase(tmp_path: Path, data: Path) -> None:
         made("--phases.pretrain.optimizer={type: sdg}")
 
 
+@pytest.mark.costly
 def test_matrices_are_trained_by_muon_where_a_policy_says_so(tmp_path: Path, data: Path) -> None:
     """In one go and stopped, by the same rates in both phases; LeRobot's settings of it lie beside the weights."""
     changes = ["--policy.optimizer_name=muon", "--phases.finetune.learning_rate=5e-4"]

@@ -127,6 +127,7 @@ def test_the_slurm_recipe_passes_the_signal_on_to_the_trainers(
     assert "the same command goes on" in log.read_text()
 
 
+@pytest.mark.costly
 def test_one_run_at_a_time_trains_a_phase_and_its_end_lets_the_next_one_in(tmp_path: Path, data: Path) -> None:
     path = experiment_file(tmp_path, data, defaults={"steps": 100000, "save_every": 2})
     words = [*command(path), "--end-with-input"]
@@ -186,6 +187,7 @@ finally:
 """
 
 
+@pytest.mark.costly
 @pytest.mark.parametrize("end", ["dies", pytest.param("fails", marks=pytest.mark.slow)])
 def test_no_process_gives_up_while_the_first_one_evaluates(tmp_path: Path, end: str) -> None:
     """Work of twice the time after which a barrier fails; and where it fails or is killed, no process hangs."""

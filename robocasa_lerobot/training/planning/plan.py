@@ -8,6 +8,8 @@ import io
 import json
 import statistics
 import tempfile
+import time
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -24,7 +26,7 @@ from robocasa_lerobot.data.mixture_config import LoaderConfig, MemberConfig, Mix
 from robocasa_lerobot.data.registry.registry import missing_datasets
 from robocasa_lerobot.errors import UserError
 from robocasa_lerobot.training.config.experiment import FROM_SCRATCH, ExperimentConfig, PhaseConfig
-from robocasa_lerobot.training.loop import train_phase
+from robocasa_lerobot.training.loop import PhaseRun, train_phase
 from robocasa_lerobot.training.metrics import METRICS, read_lines
 from robocasa_lerobot.training.planning.evaluations import phase_evaluations
 from robocasa_lerobot.training.planning.skipped import PHASE
@@ -37,6 +39,7 @@ from robocasa_lerobot.training.weights.checkpoint import checkpoint_step, last_c
 from robocasa_lerobot.training.weights.master_weights import half_parameters
 
 MEASURED_STEPS = 20
+_FEWEST_STEPS, _MEASURED_SECONDS = 6, 20.0  # a slow machine measures no more steps than it takes seconds for
 _LARGEST_ON_CPU = 2e8  # parameters; 20 steps of more take hours without an accelerator
 _IMAGE_SIZE = 256  # pixels of the published datasets and ours
 
@@ -102,7 +105,8 @@ def plan_experiment(
     Args:
         experiment: what to plan.
         only: the one phase to plan; None is all.
-        measured_steps: optimiser steps with made-up data that are timed for each kind of step that differs; 0: none.
+        measured_steps: optimiser steps with made-up data that are timed for each kind of step that differs, fewer where
+            they are slow; 0: none.
         measured: times of kinds of steps that are known already, and to which new ones are added.
 
     Raises:
@@ -236,6 +240,7 @@ def _measure(experiment: ExperimentConfig, phase: PhaseConfig, device: str, step
             with contextlib.redirect_stdout(io.StringIO()):  # what a training tells of itself is not about the plan
                 run = prepare_phase(trial, alone, device, accelerator)
                 run.save = False
+                run.stop = _measured_enough(run, time.perf_counter() + _MEASURED_SECONDS)
                 train_phase(run, accelerator)
         except (UserError, RuntimeError) as error:  # too little memory is a RuntimeError
             return f"could not be measured: {_first_line(error)}"
@@ -244,6 +249,11 @@ def _measure(experiment: ExperimentConfig, phase: PhaseConfig, device: str, step
         lines = read_lines(Path(folder) / phase.name / METRICS)
     times = [line["seconds_per_step"] - line["data_seconds_per_step"] for line in lines]
     return statistics.median(times[len(times) // 4 :])
+
+
+def _measured_enough(run: PhaseRun, deadline: float) -> Callable[[], bool]:
+    """Whether a training has been measured for long enough."""
+    return lambda: run.state.step >= _FEWEST_STEPS and time.perf_counter() > deadline
 
 
 def _made_up_meta(loader: LoaderConfig) -> MixtureMeta:
