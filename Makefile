@@ -46,7 +46,7 @@ $(STAMP): requirements.lock pyproject.toml $(COMPANION)/pyproject.toml scripts/f
 demo: $(STAMP)  ## demonstrations, dataset, two training phases, evaluation and report
 	PYTHON=$(BIN)/python sh scripts/demo.sh
 
-# About a day on two idle cores; goes on where it was stopped. PARTS="multitask lifelong" runs some,
+# About a day on two idle cores, two trainings at once; goes on where it was stopped. PARTS="multitask lifelong" runs some,
 # STUDY_ARGS=--plan tells hours and disk, STUDY_ARGS="--device cuda --results docs/results_cuda --page docs/results_cuda.md" is for one GPU.
 study: $(STAMP)  ## what small policies learn: trainings from data to trials, and docs/results.md
 	$(BIN)/robocasa-lerobot study $(PARTS) --results docs/results --page docs/results.md $(STUDY_ARGS)

@@ -6,6 +6,7 @@ import dataclasses
 import re
 import shutil
 import signal
+import tempfile
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
@@ -211,8 +212,21 @@ def configs_for(device: str, study: StudyConfig, root: Path) -> Path:
             f"the study's `registry` is {study.registry}, outside of {configs}. With --device {device} a changed copy "
             "of that folder is used: put the registry file there, and name it from there."
         )
+    root.mkdir(parents=True, exist_ok=True)
     copy = root / "configs"
-    shutil.copytree(configs, copy, dirs_exist_ok=True)
+    with tempfile.TemporaryDirectory(prefix=".configs_", dir=root) as folder:
+        aside = Path(folder)
+        shutil.copytree(configs, aside, dirs_exist_ok=True)
+        _change_for_a_gpu(aside, study)
+        for file in sorted(path for path in aside.rglob("*") if path.is_file()):
+            there = copy / file.relative_to(aside)
+            if not there.is_file() or there.read_bytes() != file.read_bytes():  # others may be reading it
+                there.parent.mkdir(parents=True, exist_ok=True)
+                file.replace(there)
+    return copy
+
+
+def _change_for_a_gpu(copy: Path, study: StudyConfig) -> None:
     parts = copy / "experiments" / "parts"
     shutil.copyfile(parts / _GPU_POLICY, parts / _POLICY)
     _enlarge_pictures(copy / study.registry)
@@ -229,7 +243,6 @@ def configs_for(device: str, study: StudyConfig, root: Path) -> Path:
             if "batch_size" in settings:
                 settings["batch_size"] *= _GPU_BATCH
         write_text(file, yaml.safe_dump(experiment, sort_keys=False))
-    return copy
 
 
 def _enlarge_pictures(file: Path) -> None:

@@ -134,6 +134,7 @@ def test_no_training_at_a_time_is_refused(capsys: pytest.CaptureFixture[str]) ->
 
 @pytest.mark.slow
 @pytest.mark.render
+@pytest.mark.timeout(900)
 def test_two_trainings_beside_each_other_end_as_one_study(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
