@@ -17,7 +17,9 @@ def configure(parser: argparse.ArgumentParser) -> None:
     from robocasa_lerobot.jobs.parent import add_end_with_input
     from robocasa_lerobot.study.runs import CPU, DEVICES
 
-    parser.add_argument("parts", nargs="*", metavar="PART", help="parts of the study (default: all, in their order)")
+    parser.add_argument(
+        "parts", nargs="*", metavar="PART", help="parts of the study (default: all that are not on request)"
+    )
     parser.add_argument("--config_path", type=Path, metavar="FILE", help="study file (default: configs/study.yaml)")
     parser.add_argument(
         "--plan", action="store_true", help="print demonstrations, hours and disk of each part, and end"

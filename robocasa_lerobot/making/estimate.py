@@ -24,7 +24,7 @@ PREPARING_SECONDS_PER_STEP = 0.003
 # Of one core, with three cameras, by the height and width of their pictures.
 STEPS_PER_SECOND: Mapping[int, float] = {64: 167.0, 256: 94.0}
 # Of one core, a small policy that drives before it is corrected (`benchmarks/results/scaling.json`: trials).
-DRIVEN_STEPS_PER_SECOND, DRIVEN_STEPS = 66.0, 175
+DRIVEN_STEPS_PER_SECOND, DRIVEN_STEPS = 47.0, 175
 BYTES_PER_STEP = 6_000
 BYTES_PER_EPISODE = 500_000  # scene, textures and states, kept so that it can be drawn again
 

@@ -22,7 +22,7 @@ from robocasa_lerobot.training.planning.plan import PhasePlan, plan_experiment
 
 # Of one core, a small policy on the CPU, without films (`benchmarks/results/scaling.json`); and the part of their
 # horizons that trials last on average, since those that succeed end before (the demo's: 0.6).
-TRIAL_STEPS_PER_SECOND = 66.0
+TRIAL_STEPS_PER_SECOND = 47.0
 PART_OF_HORIZON = 0.6
 
 

@@ -16,6 +16,7 @@ from robocasa_lerobot.study.stored import FILMED_SEED, StoredRun, StoredTrial, s
 from robocasa_lerobot.study.tables import (
     CellRate,
     Stored,
+    between_trainings,
     cell,
     difference,
     failure_terms,
@@ -52,7 +53,7 @@ def write_page(study: StudyConfig, stored: Stored, sets: Sets, results: Path, pa
     short = ["## In short", ""]
     lines: list[str] = []
     for name, part in study.parts.items():
-        own = {key: run for key, run in stored.items() if key[0] in part.experiments and key[1] < part.seeds}
+        own = {key: run for key, run in stored.items() if key[0] in part.experiments and key[1] < part.seeds_of(key[0])}
         lines += [f"## {part.asks}", ""]
         lines += [f"Published: {part.published}", ""] if part.published else []
         if not own:
@@ -98,7 +99,7 @@ def _part(
         answers = [_retained(name, rows, lifelong) for name, rows in variants(part).items()]
     else:
         answers = [_most(part, rates, against)]
-    lines = [*answers, "", *_markdown(head, table), ""]
+    lines = [*answers, "", *_markdown(head, table), "", *_between(rates)]
     if part.matrix:
         lines += _forgetting(len(part.sets), lifelong)
     if part.tasks:
@@ -133,11 +134,30 @@ def _most(part: PartConfig, rates: Mapping[str, CellRate], against: Mapping[str,
     best = max(rates, key=lambda row: rates[row].rate.value)
     most = f"Most: {best}, {_percent(rates[best].rate)}"
     if best in against:
-        return f"{most}; against {part.reference}: {_points(against[best])}."
+        assert part.reference is not None
+        return f"{most}; against {part.reference}: {_points(against[best])}{_once(rates, best, part.reference)}."
     if best != part.reference or not against:
-        return f"{most}."
+        return f"{most}{_once(rates, best)}."
     second = max(against, key=lambda row: against[row].value)
-    return f"{most}; beside it, {second}: {_points(against[second])}."
+    return f"{most}; beside it, {second}: {_points(against[second])}{_once(rates, best, second)}."
+
+
+def _once(rates: Mapping[str, CellRate], *rows: str) -> str:
+    """That rows rest on one training, where they do."""
+    alone = [row for row in rows if row in rates and len(rates[row].seeds) == 1]
+    return "" if not alone else ", one training of each" if len(alone) > 1 else f", one training of {alone[0]}"
+
+
+def _between(rates: Mapping[str, CellRate]) -> list[str]:
+    found = between_trainings(rates.values())
+    if found is None:
+        return []
+    deviation, rows = found
+    text = (
+        f"Trainings that differ in their seed alone, each with its own trials, differ by {100 * deviation:.0f} points "
+        f"(standard deviation, from {rows} row{'s' if rows > 1 else ''}). Intervals do not cover that."
+    )
+    return [text, ""]
 
 
 def _retained(name: str, rows: Mapping[int, str], lifelong: Mapping[str, Lifelong]) -> str:
@@ -181,6 +201,7 @@ def _strips(row: RowConfig, label: str, results: Path, folder: str) -> list[str]
 def _circumstances(part: PartConfig, stored: Iterable[StoredRun]) -> list[str]:
     runs = list(stored)
     wanted = {(row.experiment, row.phase) for row in part.rows.values()}
+    asked = sum(part.seeds_of(experiment) for experiment, _ in wanted)
     ended = sum((run.experiment, phase) in wanted for run in runs for phase in run.phases)
     training = sum(float(run.about["training_hours"]) for run in runs)
     trying = sum(float(run.about["trial_hours_of_one_process"]) for run in runs)
@@ -189,7 +210,7 @@ def _circumstances(part: PartConfig, stored: Iterable[StoredRun]) -> list[str]:
     versions = sorted({f"{name} {number}" for run in runs for name, number in run.about["versions"].items()})
     devices = ", ".join(sorted({str(run.about["device"]) for run in runs} - {CPU}))
     text = (
-        f"{ended} of {len(wanted) * part.seeds} trainings, {training:.1f} hours of training"
+        f"{ended} of {asked} trainings, {training:.1f} hours of training"
         f"{f' (on {devices})' if devices else ''} and {trying:.1f} process-hours of trials "
         f"on {'; '.join(machines)}; commits {', '.join(commits)}; {', '.join(versions)}."
     )

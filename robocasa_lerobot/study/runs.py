@@ -179,7 +179,7 @@ def runs_of(
     found: dict[tuple[str, int], Run] = {}
     for part in parts:
         for experiment in part.experiments:
-            for seed in range(part.seeds):
+            for seed in range(part.seeds_of(experiment)):
                 found.setdefault((experiment, seed), Run(experiment, seed, root, configs, scale, episodes))
     return list(found.values())
 

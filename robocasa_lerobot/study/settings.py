@@ -27,11 +27,13 @@ class RowConfig:
         experiment: file in `configs/experiments/study/`, without its ending.
         phase: of the experiment.
         evaluation: of the phase, by the name of its file.
+        seeds: trainings of the experiment, where that is more than its part has.
     """
 
     experiment: str
     phase: str
     evaluation: str
+    seeds: int | None = None
 
 
 @dataclass(frozen=True)
@@ -47,6 +49,7 @@ class PartConfig:
         reference: row that all others are compared with.
         published: what the benchmark's paper found.
         matrix: whether the rows are phases of lifelong learning, `NAME, after phase K`, and the sets those phases'.
+        on_request: whether the part is run only where it is named: it is not one of the study's questions.
     """
 
     asks: str
@@ -57,6 +60,7 @@ class PartConfig:
     reference: str | None = None
     published: str = ""
     matrix: bool = False
+    on_request: bool = False
 
     def __post_init__(self) -> None:
         if not self.rows or not self.sets or self.seeds < 1:
@@ -76,6 +80,16 @@ class PartConfig:
         """Names of its experiments, each once."""
         return tuple(dict.fromkeys(row.experiment for row in self.rows.values()))
 
+    def seeds_of(self, experiment: str) -> int:
+        """How many trainings of an experiment the part has."""
+        own = [row.seeds for row in self.rows.values() if row.experiment == experiment and row.seeds is not None]
+        return max([self.seeds, *own])
+
+    def with_seeds(self, seeds: int) -> PartConfig:
+        """The part with so many trainings of each experiment."""
+        rows = {label: dataclasses.replace(row, seeds=None) for label, row in self.rows.items()}
+        return dataclasses.replace(self, rows=rows, seeds=seeds)
+
 
 @dataclass(frozen=True)
 class StudyConfig:
@@ -92,7 +106,9 @@ class StudyConfig:
     parts: dict[str, PartConfig] = field(default_factory=dict)
 
     def chosen(self, names: Sequence[str], seeds: int | None = None) -> dict[str, PartConfig]:
-        """The parts of these names, in the study's order; all without names. With `seeds` each has so many.
+        """The parts of these names, in the study's order; without names all but those on request.
+
+        With `seeds` each has so many trainings.
 
         Raises:
             UnknownNameError: there is no such part.
@@ -100,8 +116,8 @@ class StudyConfig:
         for name in names:
             if name not in self.parts:
                 raise UnknownNameError("part of the study", name, self.parts)
-        own = {name: part for name, part in self.parts.items() if not names or name in names}
-        return own if seeds is None else {name: dataclasses.replace(part, seeds=seeds) for name, part in own.items()}
+        own = {name: part for name, part in self.parts.items() if (name in names if names else not part.on_request)}
+        return own if seeds is None else {name: part.with_seeds(seeds) for name, part in own.items()}
 
     def shown_with(self, parts: Mapping[str, PartConfig]) -> StudyConfig:
         """The study as its page shows it when `parts` are run: with its own seeds, and more where these have more.

@@ -38,7 +38,7 @@ def row_trials(part: PartConfig, row: str, stored: Stored) -> list[tuple[int, St
     return [
         (seed, trial)
         for (experiment, seed), run in sorted(stored.items())
-        if experiment == wanted.experiment and seed < part.seeds
+        if experiment == wanted.experiment and seed < part.seeds_of(experiment)
         for trial in run.trials
         if (trial.phase, trial.evaluation) == (wanted.phase, wanted.evaluation)
     ]
@@ -57,10 +57,27 @@ def cell(trials: Sequence[tuple[int, StoredTrial]], tasks: Iterable[str]) -> Cel
     return CellRate(average_over_tasks(counts), sum(n for _, n in counts), tuple(each))
 
 
+def between_trainings(rates: Iterable[CellRate]) -> tuple[float, int] | None:
+    """By how much trainings differ that differ in their seed alone, each with its own trials; and of how many rows.
+
+    A standard deviation, pooled over the rows with more than one training. None where there is no such row.
+    """
+    several = [found.seeds for found in rates if len(found.seeds) > 1]
+    if not several:
+        return None
+    squares = sum(float(np.var(seeds, ddof=1)) * (len(seeds) - 1) for seeds in several)
+    return float(np.sqrt(squares / sum(len(seeds) - 1 for seeds in several))), len(several)
+
+
 def difference(
     one: Sequence[tuple[int, StoredTrial]], other: Sequence[tuple[int, StoredTrial]], tasks: Iterable[str]
 ) -> Estimate | None:
-    """Rate of `one` minus rate of `other` over the trials that both have; None where they share none."""
+    """Rate of `one` minus rate of `other` over the trials that both have.
+
+    None where they share none, or where one has trainings that the other has not: its rate is not of these trials.
+    """
+    if {seed for seed, _ in one} != {seed for seed, _ in other}:
+        return None
     kept = tuple(tasks)
     pairs: dict[str, tuple[list[bool], list[bool]]] = {}
     theirs = {(seed, trial.task, trial.trial, trial.seed): trial.success for seed, trial in other}

@@ -52,7 +52,8 @@ def run(checkout: Path, *arguments: str, fails: str = "nothing", cores: str = "2
 def test_every_folder_of_tests_is_run_once(checkout: Path) -> None:
     (checkout / "tests" / "new").mkdir()
     status, _, calls = run(checkout)
-    asked = sorted(" ".join(calls).split())
+    assert all(call.startswith("--in-turns ") for call in calls), "of the costly tests a third"
+    asked = sorted(word for call in calls for word in call.split()[1:])
     folders = [f"tests/{path.name}" for path in (checkout / "tests").iterdir()]
     assert status == 0
     assert len(calls) == 2
@@ -69,4 +70,4 @@ def test_a_failure_of_either_part_is_one_of_the_whole(checkout: Path, fails: str
 
 def test_what_is_asked_for_is_run_by_itself(checkout: Path) -> None:
     assert run(checkout, "tests/envs", "-x")[2] == ["tests/envs -x"]
-    assert run(checkout, cores="1")[2] == [""]
+    assert run(checkout, cores="1")[2] == ["--in-turns"]

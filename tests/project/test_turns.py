@@ -26,11 +26,7 @@ def test_every_costly_test_has_its_turn() -> None:
     assert {len(turn) for turn in turns} == {6, 7}
 
 
-def test_a_file_that_is_named_runs_whole_and_make_test_takes_turns() -> None:
-    everything = collected()
+def test_a_file_that_is_named_runs_whole_unless_turns_are_asked_for() -> None:
     costly = collected("-m", "costly")
-    in_turns = collected("--in-turns", "--task-sample=any")
-    assert 5 < len(costly) < len(everything)
-    assert set(in_turns) == set(everything) - set(costly) | set(whose_turn(costly, "any"))
-    script = (REPOSITORY / "scripts/test.sh").read_text(encoding="utf-8")
-    assert script.count("pytest --in-turns") == 2
+    assert len(costly) > 5
+    assert collected("-m", "costly", "--in-turns", "--task-sample=any") == whose_turn(costly, "any")

@@ -24,7 +24,7 @@ from robocasa_lerobot.training.config.experiment import load_experiment
 
 TINY = ("--scale=tiny", "--seeds=1", "--measure=0")
 STUDIES = {
-    "study.yaml": "few=1,more=1,pretrain=1,target=1",
+    "study.yaml": "corrections=1,few=1,more=1,pretrain=1,target=1",
     "study_generation.yaml": "made=1,sources=1",
 }  # demonstrations of each kind
 PARTS = [(file, part) for file in STUDIES for part in load_study(configs_folder() / file).parts]

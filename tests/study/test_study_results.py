@@ -16,7 +16,7 @@ from robocasa_lerobot.study import stored as files
 from robocasa_lerobot.study.page import write_page
 from robocasa_lerobot.study.settings import PartConfig, RowConfig, StudyConfig
 from robocasa_lerobot.study.stored import StoredRun, StoredTrial, read_stored
-from robocasa_lerobot.study.tables import cell, difference, failure_terms, row_trials, summaries
+from robocasa_lerobot.study.tables import between_trainings, cell, difference, failure_terms, row_trials, summaries
 from robocasa_lerobot.training.setup import builders
 
 SETS = {"both": ["A", "B"], "first": ["A"], "second": ["B"]}
@@ -76,7 +76,22 @@ def test_rates_are_means_over_tasks_and_seeds() -> None:
     assert apart.value == pytest.approx((4 / 8 + 3 / 8) / 2)
     assert apart.low < apart.value < apart.high
     assert difference(many, [], SETS["both"]) is None
+    first = [pair for pair in few if pair[0] == 0]
+    assert difference(many, first, SETS["both"]) is None, "more trainings than the other"
     assert failure_terms(few)[0] == ("B", "open", 8)
+
+
+def test_a_row_has_more_trainings_than_its_part_where_it_says_so() -> None:
+    more = PartConfig("Which?", {**PART.rows, "many": dataclasses.replace(row("many"), seeds=3)}, ["both"], 1)
+    assert [more.seeds_of(name) for name in ("few", "many")] == [1, 3]
+    found = {name: cell(row_trials(more, name, STORED), SETS["both"]) for name in more.rows}
+    assert [len(one.seeds) for one in found.values() if one] == [1, 3]
+    assert more.with_seeds(2).seeds_of("many") == 2
+    # 0.75, 0.5 and 1, against their mean.
+    deviation, rows = between_trainings([one for one in found.values() if one]) or (0.0, 0)
+    assert rows == 1
+    assert deviation == pytest.approx(0.25)
+    assert between_trainings([one for one in found.values() if one][:1]) is None
 
 
 def test_forgetting_of_two_phases() -> None:

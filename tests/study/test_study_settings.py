@@ -58,6 +58,14 @@ def test_the_evaluations_of_a_part_try_the_tasks_of_its_columns(study: StudyConf
         assert {row for row, own in tried.items() if columns <= own} == set(config.rows)
 
 
+def test_what_is_on_request_is_run_by_its_name_only() -> None:
+    asked = STUDY.chosen([])
+    assert list(asked) == ["multitask", "data_efficiency", "lifelong", "diversity", "recipes", "quality"]
+    assert list(STUDY.chosen(["demonstrations"])) == ["demonstrations"]
+    assert "demonstrations" in STUDY.shown_with(asked).parts, "the page has it"
+    assert STUDY.chosen(["demonstrations"], seeds=1)["demonstrations"].seeds_of("recipe_disturbed") == 1
+
+
 def test_every_experiment_of_a_study_is_in_one() -> None:
     named = {experiment for study, part in PARTS for experiment in study.parts[part].experiments}
     start = f"{EXPERIMENTS}/"
