@@ -15,7 +15,8 @@ import pytest
 from robocasa_lerobot import cli
 from robocasa_lerobot.config_files import configs_folder
 from robocasa_lerobot.jobs.locks import locked
-from robocasa_lerobot.study.runs import Run, StoppedError
+from robocasa_lerobot.study.runs import Run, StoppedError, root_for
+from robocasa_lerobot.study.settings import load_study
 from robocasa_lerobot.study.sharing import alone, at_once_by_default, helped_by, shared_runs
 
 
@@ -141,7 +142,7 @@ def test_two_trainings_beside_each_other_end_as_one_study(
     monkeypatch.chdir(tmp_path)
     words = ["study", "multitask", "--scale=tiny", "--seeds=2", "--episodes=more=1", "--at_once=2"]
     assert cli.main(words) == 0
-    (root,) = (tmp_path / "outputs").iterdir()
+    root = tmp_path / root_for(load_study(), "cpu", "tiny", "more=1")
     kept = {path.parent.name for path in root.glob("results/multitask/seed_*/about.json")}
     assert kept == {"seed_0", "seed_1"}
     helper = (root / "helper_1.log").read_text(encoding="utf-8")
