@@ -83,7 +83,7 @@ def run(args: argparse.Namespace) -> int:
     from robocasa_lerobot.study.costs import cost_lines, costs
     from robocasa_lerobot.study.page import write_page
     from robocasa_lerobot.study.runs import CUDA, Run, configs_for, root_for, runs_of
-    from robocasa_lerobot.study.sharing import alone, at_once_by_default, helped_by, shared_runs
+    from robocasa_lerobot.study.sharing import alone, helped_by, shared_runs, threads_of_each, trainings_at_once
     from robocasa_lerobot.study.stored import check_results, is_stored, read_stored, stands_for, store
 
     numbers = parse_episodes(args.episodes) if args.episodes else {}
@@ -94,7 +94,10 @@ def run(args: argparse.Namespace) -> int:
     configs = configs_for(args.device, study, root)
     sets = open_registry(str(configs / study.registry)).task_sets
     check_study(study, configs, sets)
-    at_once = args.at_once or at_once_by_default(cores_here(), args.device == CUDA)
+
+    def at_once(runs: int) -> int:
+        return trainings_at_once(args.at_once, runs, cores_here(), args.device == CUDA)
+
     if args.plan:
         runs, planned = {}, set[str]()
         for name, part in parts.items():
@@ -102,8 +105,9 @@ def run(args: argparse.Namespace) -> int:
             planned |= {run.name for run in own}
             runs[name] = [run for run in own if not is_stored(run, results)]
         cores = args.workers or cores_here()
-        found = costs(study, runs, configs, cores, args.measure, at_once)
-        print("\n".join(cost_lines(parts, found, cores, args.device, at_once)))
+        beside = at_once(sum(map(len, runs.values())))
+        found = costs(study, runs, configs, cores, args.measure, beside)
+        print("\n".join(cost_lines(parts, found, cores, args.device, beside)))
         return 0
     shown = study.shown_with(parts)
     whole = runs_of(list(shown.parts.values()), root, configs, *asked)
@@ -120,10 +124,9 @@ def run(args: argparse.Namespace) -> int:
     def ended(run: Run) -> bool:
         return is_stored(run, results)
 
-    left = sum(not ended(run) for run in wanted)
-    helpers = max(0, min(at_once, left) - 1)
-    threads = max(1, cores_here() // at_once) if at_once > 1 else None
-    with helped_by(helpers, [*_words(args), "--at_once=1"], root, threads or 1):
+    beside = at_once(sum(not ended(run) for run in wanted))
+    threads = threads_of_each(beside, cores_here())
+    with helped_by(beside - 1, [*_words(args), "--at_once=1"], root, threads):
         for run in shared_runs(wanted, ended, root):
             print(f"== {wanted.index(run) + 1} of {len(wanted)}: {run.name}", flush=True)
             for _ in run.carry_out(args.workers, threads, lambda: alone(root, "data")):

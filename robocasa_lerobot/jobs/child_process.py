@@ -6,9 +6,11 @@ import os
 import signal
 import subprocess
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
-from typing import IO
+from types import FrameType
+from typing import IO, Any
 
 from robocasa_lerobot.jobs.parent import END_WITH_INPUT
 
@@ -59,16 +61,29 @@ def run_command(arguments: Sequence[str], environment: Mapping[str, str]) -> int
             child.send_signal(number)
             taken.append(signal.Signals(number))
 
-        before = {number: signal.signal(number, pass_on) for number in STOP_SIGNALS}
-        try:
+        with stop_signals_to(pass_on) as before:
             status = child.wait()
-        finally:
-            for number, handler in before.items():
-                signal.signal(number, handler)
     for number in taken:
         if callable(handler := before[number]):
             handler(number, None)
     return status
+
+
+@contextmanager
+def stop_signals_to(handler: Callable[[int, FrameType | None], None]) -> Iterator[dict[signal.Signals, Any]]:
+    """Inside, what asks this process to end goes to `handler` alone.
+
+    Yields who had each signal before, and gets it back.
+
+    Raises:
+        ValueError: this is not the main thread: signals are not ours to handle.
+    """
+    before = {number: signal.signal(number, handler) for number in STOP_SIGNALS}
+    try:
+        yield before
+    finally:
+        for number, earlier in before.items():
+            signal.signal(number, earlier)
 
 
 def environment_of_python() -> dict[str, str]:

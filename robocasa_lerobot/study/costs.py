@@ -16,6 +16,7 @@ from robocasa_lerobot.making.needs import Need, needs_of, parse_episodes
 from robocasa_lerobot.progress import Bar
 from robocasa_lerobot.study.runs import Run
 from robocasa_lerobot.study.settings import PartConfig, StudyConfig
+from robocasa_lerobot.study.sharing import threads_of_each
 from robocasa_lerobot.training.config.experiment import load_experiment
 from robocasa_lerobot.training.planning.evaluations import FINISHED, FOLDER, PlannedEvaluation, plan_evaluations
 from robocasa_lerobot.training.planning.plan import PhasePlan, plan_experiment
@@ -80,7 +81,7 @@ def costs(
     total = len(set(kinds.values()))
     with (
         Bar(total=total, desc="timing steps", unit="experiment", leave=False) as bar,
-        _torch_threads(max(1, cores // at_once) if at_once > 1 else None),
+        _torch_threads(threads_of_each(at_once, cores)),
     ):
         for run, kind in kinds.items():
             if kind not in plans:

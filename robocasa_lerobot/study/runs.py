@@ -152,7 +152,7 @@ class Run:
         for command in self.commands(workers):
             making = command[0] == "data"
             with data_alone() if making else nullcontext():
-                self._run(command, {} if threads is None or making else {"OMP_NUM_THREADS": str(threads)})
+                self._run(command, threads_variable(None if making else threads))
             if not making:
                 yield
 
@@ -166,6 +166,11 @@ class Run:
                 f"{self.name}: `robocasa-lerobot {' '.join(command)}` ended with status {status}; "
                 "the same study goes on there."
             )
+
+
+def threads_variable(threads: int | None) -> dict[str, str]:
+    """The environment of a process in which torch has so many threads; None leaves it as it is."""
+    return {} if threads is None else {"OMP_NUM_THREADS": str(threads)}
 
 
 def runs_of(

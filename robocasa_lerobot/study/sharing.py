@@ -7,20 +7,25 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
-from robocasa_lerobot.jobs.child_process import STOP_SIGNALS, start_command
+from robocasa_lerobot.jobs.child_process import start_command, stop_signals_to
 from robocasa_lerobot.jobs.locks import LockHeldError, locked
-from robocasa_lerobot.study.runs import Run, StoppedError
+from robocasa_lerobot.study.runs import Run, StoppedError, threads_variable
 
 _MOST_AT_ONCE = 4  # each holds a policy, its optimizer and a share of the frames: about 3 GB in the small experiments
 
 
-def at_once_by_default(cores: int, cuda: bool) -> int:
-    """How many trainings go on beside each other: one for each core, since small policies use a second one badly.
+def trainings_at_once(asked: int | None, runs: int, cores: int, cuda: bool) -> int:
+    """How many of `runs` trainings go on beside each other: as many as asked for, or by default one for each core.
 
-    Two with one thread each make 15 steps a second together where one with two threads makes 11.8 (the demo's policy on
-    two cores). On a GPU it is one.
+    Small policies use a second one badly: two with one thread each make 15 steps a second together where one with two
+    threads makes 11.8 (the demo's policy on two cores). On a GPU it is one.
     """
-    return 1 if cuda else max(1, min(cores, _MOST_AT_ONCE))
+    return max(1, min(asked or (1 if cuda else min(cores, _MOST_AT_ONCE)), runs))
+
+
+def threads_of_each(at_once: int, cores: int) -> int | None:
+    """Threads of a training beside the others; None leaves them to torch, where it is alone."""
+    return max(1, cores // at_once) if at_once > 1 else None
 
 
 def shared_runs(runs: Sequence[Run], ended: Callable[[Run], bool], root: Path) -> Iterator[Run]:
@@ -64,7 +69,7 @@ def alone(root: Path, work: str) -> Iterator[None]:
 
 
 @contextmanager
-def helped_by(number: int, arguments: Sequence[str], root: Path, threads: int) -> Iterator[None]:
+def helped_by(number: int, arguments: Sequence[str], root: Path, threads: int | None) -> Iterator[None]:
     """Have so many further processes carry out the same study, given by its arguments, until the end of the context.
 
     They write to `helper_N.log` in `root`. Where the context ends with an error or a signal, they save and end as well.
@@ -81,10 +86,10 @@ def helped_by(number: int, arguments: Sequence[str], root: Path, threads: int) -
         helpers = []
         for log in logs:
             file = stack.enter_context(log.open("a", encoding="utf-8"))
-            helper = start_command(["study", *arguments], {"OMP_NUM_THREADS": str(threads)}, file)
+            helper = start_command(["study", *arguments], threads_variable(threads), file)
             helpers.append(stack.enter_context(helper))
         print(f"{number} more beside this one: {', '.join(map(str, logs))}", flush=True)
-        stack.enter_context(_signals_as_errors())
+        stack.enter_context(stop_signals_to(_stop))
         try:
             yield
             statuses = [helper.wait() for helper in helpers]
@@ -99,19 +104,8 @@ def helped_by(number: int, arguments: Sequence[str], root: Path, threads: int) -
             raise StoppedError(f"a process beside this one ended with status {status}; its words are in {log}.")
 
 
-@contextmanager
-def _signals_as_errors() -> Iterator[None]:
-    """Inside, what asks this process to end raises StoppedError."""
-
-    def stop(number: int, _frame: object) -> None:
-        raise StoppedError(f"ended by {signal.Signals(number).name}; the same study goes on there.")
-
-    before = {number: signal.signal(number, stop) for number in STOP_SIGNALS}
-    try:
-        yield
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
+def _stop(number: int, _frame: object) -> None:
+    raise StoppedError(f"ended by {signal.Signals(number).name}; the same study goes on there.")
 
 
 def _lock(run: Run, root: Path) -> Path:

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import signal
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 
-from robocasa_lerobot.jobs.child_process import STOP_SIGNALS
+from robocasa_lerobot.jobs.child_process import stop_signals_to
 
 REQUEUE = 75  # exit status "try again later" (EX_TEMPFAIL of sysexits.h): saved on a signal
 STOPPED = 3  # exit status: saved after the number of steps that was asked for
@@ -35,13 +34,7 @@ class Interrupts:
         def on_signal(*_: object) -> None:
             self.signalled = True
 
-        try:
-            before = {number: signal.signal(number, on_signal) for number in STOP_SIGNALS}
-        except ValueError:  # not in the main thread: signals are not ours to handle
+        with ExitStack() as stack:
+            with suppress(ValueError):  # not in the main thread
+                stack.enter_context(stop_signals_to(on_signal))
             yield
-            return
-        try:
-            yield
-        finally:
-            for number, handler in before.items():
-                signal.signal(number, handler)

@@ -17,7 +17,7 @@ from robocasa_lerobot.config_files import configs_folder
 from robocasa_lerobot.jobs.locks import locked
 from robocasa_lerobot.study.runs import Run, StoppedError, root_for
 from robocasa_lerobot.study.settings import load_study
-from robocasa_lerobot.study.sharing import alone, at_once_by_default, helped_by, shared_runs
+from robocasa_lerobot.study.sharing import alone, helped_by, shared_runs, threads_of_each, trainings_at_once
 
 
 @pytest.fixture
@@ -80,8 +80,13 @@ def test_data_are_made_by_one_process_at_a_time(tmp_path: Path, capsys: pytest.C
 
 
 def test_small_policies_get_a_core_each() -> None:
-    assert [at_once_by_default(cores, cuda=False) for cores in (1, 2, 64)] == [1, 2, 4]
-    assert at_once_by_default(16, cuda=True) == 1
+    assert [trainings_at_once(None, 9, cores, cuda=False) for cores in (1, 2, 64)] == [1, 2, 4]
+    assert trainings_at_once(None, 9, 16, cuda=True) == 1
+    assert trainings_at_once(8, 9, 2, cuda=False) == 8, "as many as asked for"
+    assert trainings_at_once(8, 0, 2, cuda=False) == 1
+    alone = trainings_at_once(None, 1, 4, cuda=False)
+    assert (alone, threads_of_each(alone, 4)) == (1, None), "one that is alone has all cores"
+    assert [threads_of_each(at_once, 8) for at_once in (2, 3, 16)] == [4, 2, 1]
 
 
 def test_a_helper_that_fails_is_told(tmp_path: Path) -> None:
