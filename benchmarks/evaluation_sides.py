@@ -69,11 +69,9 @@ def make_checkpoint(folder: Path, settings: dict[str, Any], image_size: int) -> 
 def run_ours(job: Job) -> dict[str, Any]:
     """Our engine, on the seeds that LeRobot gives its episodes: seed, seed + 1, ... for each task."""
     from robocasa_lerobot.evaluation.config.evaluation import EnvSettings, EvaluationConfig, PolicySettings
-    from robocasa_lerobot.evaluation.run.engine import evaluate, prepare
-    from robocasa_lerobot.evaluation.run.outputs import write_outputs
+    from robocasa_lerobot.evaluation.run.processes import start_importing
     from robocasa_lerobot.gl import ensure_drawing
 
-    ensure_drawing()  # as the command does
     config = EvaluationConfig(
         policy=PolicySettings(path=[job.checkpoint], label=["policy"], device="cpu"),
         env=EnvSettings(tasks=job.tasks, image_size=job.image_size),
@@ -83,6 +81,11 @@ def run_ours(job: Job) -> dict[str, Any]:
         out=job.out,
         report=False,  # which LeRobot has none of; its `eval_info.json` both write
     )
+    ensure_drawing()  # this and the next before other imports, as the command does
+    start_importing(checkpoints=True, threads=config.policy.threads)
+    from robocasa_lerobot.evaluation.run.engine import evaluate, prepare
+    from robocasa_lerobot.evaluation.run.outputs import write_outputs
+
     evaluation = prepare(config)
     plan = [dataclasses.replace(spec, seed=job.seed + spec.trial) for spec in evaluation.plan]
     evaluation = dataclasses.replace(evaluation, plan=plan, todo_plan=plan)

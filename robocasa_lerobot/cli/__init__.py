@@ -9,11 +9,13 @@ import os
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from types import ModuleType
 
 from robocasa_lerobot import __version__
 from robocasa_lerobot.errors import UserError, suggest
 from robocasa_lerobot.jobs.workers import check_workers
+from robocasa_lerobot.provenance import other_checkout
 
 # Errors of a path that the user gave.
 _NAMED = (FileExistsError, FileNotFoundError, IsADirectoryError, NotADirectoryError, PermissionError)
@@ -111,6 +113,12 @@ def main(argv: Sequence[str] | None = None) -> int:
     args, unknown = parser.parse_known_args(arguments)
     if unknown and not getattr(args, "takes_settings", False):
         parser.error(f"unrecognized arguments: {' '.join(unknown)}")
+    if other_checkout(Path.cwd()):
+        print(
+            f"robocasa-lerobot {name}: this folder is another checkout than the one that runs; PYTHONPATH={Path.cwd()} "
+            "before the command has this one run.",
+            file=sys.stderr,
+        )
     try:
         if unknown:
             args.settings = unknown

@@ -9,6 +9,7 @@ import sys
 import textwrap
 import typing
 from collections.abc import Iterator
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from robocasa_lerobot.errors import UserError
@@ -57,11 +58,7 @@ def run(args: argparse.Namespace) -> int:
         end_with_input()
     from robocasa_lerobot.evaluation.config.evaluation import EvaluationConfig
     from robocasa_lerobot.evaluation.config.loader import load_config
-    from robocasa_lerobot.evaluation.planning.run_header import partial_sentence
-    from robocasa_lerobot.evaluation.run.engine import evaluate, prepare
-    from robocasa_lerobot.evaluation.run.merging import merge
-    from robocasa_lerobot.evaluation.run.outputs import write_outputs
-    from robocasa_lerobot.gl import announce_backend, ensure_drawing
+    from robocasa_lerobot.gl import announce_backend
 
     given = [f"--{key.removeprefix('set:')}={value}" for key, value in vars(args).items() if key.startswith("set:")]
     path = [f"--config_path={args.config_path}"] if args.config_path else []
@@ -75,6 +72,13 @@ def run(args: argparse.Namespace) -> int:
         return _run_elsewhere(config, args)
     if args.shards is not None:
         raise UserError("--shards is for --executor slurm or ray; here give --shard=I/N, and --merge at the end.")
+    if not args.merge:
+        _begin(config)
+    from robocasa_lerobot.evaluation.planning.run_header import partial_sentence
+    from robocasa_lerobot.evaluation.run.engine import evaluate, prepare
+    from robocasa_lerobot.evaluation.run.merging import merge
+    from robocasa_lerobot.evaluation.run.outputs import write_outputs
+
     evaluation = prepare(config, ask=not args.merge, here=not args.merge)
     header = evaluation.header
     partial = partial_sentence(header.task_sets, header.missing_tasks, header.missing_by_set)
@@ -87,7 +91,6 @@ def run(args: argparse.Namespace) -> int:
         write_outputs(evaluation)
         return 0
     if config.env.is_kitchen:
-        ensure_drawing()  # Inherited by the workers.
         announce_backend()
     evaluate(evaluation)
     if config.shard is None:
@@ -95,6 +98,16 @@ def run(args: argparse.Namespace) -> int:
     else:
         print(f"shard {config.shard} is complete. When all are: the same command with --merge instead of --shard.")
     return 0
+
+
+def _begin(config: EvaluationConfig) -> None:
+    """What workers need and takes seconds, while this process goes on reading: their imports."""
+    from robocasa_lerobot.evaluation.run.processes import start_importing
+    from robocasa_lerobot.gl import ensure_drawing
+
+    if config.env.is_kitchen:
+        ensure_drawing()  # inherited by the workers
+    start_importing(any(Path(path).is_dir() for path in config.policy.path), config.policy.threads)
 
 
 def _run_elsewhere(config: EvaluationConfig, args: argparse.Namespace) -> int:

@@ -46,6 +46,18 @@ def test_example_parses(name: str) -> None:
             assert (REPOSITORY / path).is_file(), f"{path} of the example does not exist"
 
 
+def test_a_command_in_another_checkout_says_which_one_runs(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "robocasa_lerobot" / "cli").mkdir(parents=True)
+    (tmp_path / "robocasa_lerobot" / "cli" / "__init__.py").touch()
+    for folder, told in ((tmp_path, True), (REPOSITORY, False), (tmp_path / "robocasa_lerobot", False)):
+        monkeypatch.chdir(folder)
+        assert cli.main(["tasks", "OpenDrawer"]) == 0
+        said = capsys.readouterr().err
+        assert (f"PYTHONPATH={tmp_path}" in said) == told, said
+
+
 def test_no_command_takes_a_number_of_workers_that_does_nothing(capsys: pytest.CaptureFixture[str]) -> None:
     asked = []
     for name in cli.SUBCOMMANDS:

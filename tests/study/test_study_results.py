@@ -9,9 +9,12 @@ from pathlib import Path
 
 import pytest
 from evaluation_records import write_results
+from source_tree import REPOSITORY
 
 from robocasa_lerobot.config_files import configs_folder
+from robocasa_lerobot.envs.tasks.registry import get_task
 from robocasa_lerobot.errors import UserError
+from robocasa_lerobot.study import costs
 from robocasa_lerobot.study import stored as files
 from robocasa_lerobot.study.page import write_page
 from robocasa_lerobot.study.settings import PartConfig, RowConfig, StudyConfig
@@ -247,3 +250,17 @@ def test_fewer_tasks_than_rows_are_the_columns(tmp_path: Path) -> None:
         write_page(StudyConfig("r", "x", {"some": part}), STORED, SETS, tmp_path / "results", tmp_path / "page.md")
         lines = (tmp_path / "page.md").read_text(encoding="utf-8").splitlines()
         assert lines[lines.index(head) + 2].startswith(line)
+
+
+def test_hours_of_trials_are_told_as_those_of_the_stored_runs_were() -> None:
+    results = REPOSITORY / "docs" / "results"
+    stored = [read_stored(results, file.parts[-3], int(file.parts[-2][5:])) for file in results.glob("*/*/about.json")]
+    assert len(stored) > 20, "results of the study lie in docs/results"
+    steps = horizons = seconds = 0.0
+    for found in stored:
+        assert found is not None
+        steps += sum(trial.steps for trial in found.trials)
+        horizons += sum(get_task(trial.task).horizon for trial in found.trials)
+        seconds += 3600 * found.about["trial_hours_of_one_process"]
+    assert costs.PART_OF_HORIZON == pytest.approx(steps / horizons, rel=0.1)
+    assert costs.TRIAL_STEPS_PER_SECOND == pytest.approx(steps / seconds, rel=0.3)

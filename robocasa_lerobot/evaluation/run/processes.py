@@ -12,6 +12,7 @@ import os
 import signal
 from collections.abc import Iterator
 from contextlib import contextmanager
+from multiprocessing import forkserver
 from multiprocessing.context import ForkServerContext, ForkServerProcess
 
 POLICY_MODULES = (
@@ -41,6 +42,20 @@ def process_context(checkpoints: bool) -> ForkServerContext:
     # An import that fails there is silently left to the worker, which reports it.
     context.set_forkserver_preload([*modules, *(POLICY_MODULES if checkpoints else ())])
     return context
+
+
+def start_importing(checkpoints: bool, threads: int) -> None:
+    """Start the server process, whose imports take seconds, while this one still reads what it is to do.
+
+    Before it, this process has what the workers are to have in their environment when libraries are loaded.
+
+    Args:
+        checkpoints: as of `process_context`.
+        threads: of the numeric libraries, which the workers have from it.
+    """
+    process_context(checkpoints)
+    with thread_limit(threads):
+        forkserver.ensure_running()
 
 
 def take_over(environment: dict[str, str]) -> None:
