@@ -109,6 +109,18 @@ def test_uint8_and_float_images_are_the_same() -> None:
     torch.testing.assert_close(policy.predict_action_chunk(a, generator=x), policy.predict_action_chunk(b, generator=y))
 
 
+def test_a_single_observation_is_the_same_with_its_time_axis_and_without() -> None:
+    config = tiny_config(n_obs_steps=1, horizon=9)
+    policy, preprocess, _ = build(config)
+    without = preprocess(batch_for(config))
+    assert without[contract.IMAGE_KEYS[0]].ndim == 4, "as LeRobot's datasets give it"
+    with_axis = {k: x.unsqueeze(1) if k in contract.IMAGE_KEYS else x for k, x in without.items()}
+    (a,), (b,), (c,), (d,) = (generators(1) for _ in range(4))
+    torch.testing.assert_close(policy(without, generator=a)[0], policy(with_axis, generator=b)[0], rtol=0, atol=0)
+    chunks = (policy.predict_action_chunk(batch, generator=g) for batch, g in ((without, c), (with_axis, d)))
+    torch.testing.assert_close(*chunks, rtol=0, atol=0)
+
+
 def test_masks() -> None:
     horizon, conditions = 10, 3
     causal, memory = causal_mask(horizon), memory_mask(horizon, conditions)
@@ -296,8 +308,8 @@ def test_select_action_steps_through_chunks_of_the_true_history(offsets: list[in
     config = tiny_config(**chosen_offsets, n_action_steps=n_action_steps, horizon=8)
     policy, preprocess, _ = build(config)
     episode = [
-        {k: v[:, -1] if isinstance(v, torch.Tensor) else v for k, v in batch_for(config, size=2, seed=t).items()}
-        for t in range(9)
+        {k: v[:, -1] if k == contract.STATE_KEY or getattr(v, "ndim", 0) == 5 else v for k, v in batch.items()}
+        for batch in (batch_for(config, size=2, seed=t) for t in range(9))
     ]
     steps = [preprocess({k: v for k, v in step.items() if not k.startswith("action")}) for step in episode]
     noise = torch.randn(2, 8, contract.ACTION_SIZE, generator=generators(0)[0])

@@ -53,13 +53,14 @@ def tiny_config(pixels: int = 32, **overrides: Any) -> DiffusionTransformerConfi
 def batch_for(
     config: PreTrainedConfig, size: int = 4, pixels: int = 32, seed: int = 0, uint8: bool = True
 ) -> dict[str, Any]:
-    """A batch as a LeRobot data loader gives it, before the preprocessor."""
+    """A batch as a LeRobot data loader gives it, before the preprocessor: a single picture has no time axis."""
     rng = np.random.default_rng(seed)
     steps, length = config.observation_delta_indices, len(config.action_delta_indices)
     observed = (size,) if steps is None else (size, len(steps))
+    seen = (size,) if steps is None or len(steps) == 1 else observed
     batch: dict[str, Any] = {}
     for key in contract.IMAGE_KEYS:
-        images = torch.from_numpy(rng.integers(0, 256, (*observed, 3, pixels, pixels), dtype=np.uint8))
+        images = torch.from_numpy(rng.integers(0, 256, (*seen, 3, pixels, pixels), dtype=np.uint8))
         batch[key] = images if uint8 else images.float() / 255
     batch[contract.STATE_KEY] = torch.from_numpy(rng.uniform(-1, 1, (*observed, contract.STATE_SIZE)))
     batch[contract.ACTION_KEY] = torch.from_numpy(rng.uniform(-1, 1, (size, length, contract.ACTION_SIZE)))

@@ -114,8 +114,9 @@ class DiffusionTransformerPolicy(PreTrainedPolicy):
         """Loss of a batch.
 
         Args:
-            batch: observations (B, n_obs_steps, ...), `action` (B, L, A) at the config's `action_delta_indices`, whose
-                first `horizon` are the chunk, and, for the mask, `action_is_pad`.
+            batch: observations (B, n_obs_steps, ...), of a single step also without that axis; `action` (B, L, A) at
+                the config's `action_delta_indices`, whose first `horizon` are the chunk, and, for the mask,
+                `action_is_pad`.
             reduction: `mean` gives a scalar, `none` the loss of each sample (B,).
             generator: for noise, diffusion times and crops; None uses the global one.
             noise: (B * noise_draws, horizon, A), drawn where None.
@@ -125,6 +126,8 @@ class DiffusionTransformerPolicy(PreTrainedPolicy):
             The loss, and scalars to log.
         """
         draws = self.config.noise_draws
+        if self.config.n_obs_steps == 1:  # LeRobot's datasets give a single picture without its time axis
+            batch = self._with_time_axis(batch)
         observed = self.observation_encoder(batch, generator).float()
         features = observed.repeat_interleave(draws, dim=0)
         loaded = target_actions(batch, len(self.config.action_delta_indices), self.action_dim, draws)
@@ -238,13 +241,10 @@ class DiffusionTransformerPolicy(PreTrainedPolicy):
         return self._planned.popleft()
 
     def _with_time_axis(self, batch: dict[str, Tensor]) -> dict[str, Tensor]:
-        if batch[OBS_STATE].ndim == 3:
-            return batch
+        """The batch with (B, n_obs_steps, ...) for what has no time axis, the same at all of them."""
         steps = self.config.n_obs_steps
-        return {
-            **batch,
-            **{k: batch[k].unsqueeze(1).expand(-1, steps, *batch[k].shape[1:]) for k in self._observed_keys},
-        }
+        lacking = {k: batch[k] for k in self._observed_keys if batch[k].ndim < (3 if k == OBS_STATE else 5)}
+        return {**batch, **{k: x.unsqueeze(1).expand(-1, steps, *x.shape[1:]) for k, x in lacking.items()}}
 
 
 def _noise_scheduler(config: DiffusionTransformerConfig) -> DDPMScheduler | DDIMScheduler:
