@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import time
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +12,7 @@ import torch
 from lerobot.configs.default import DatasetConfig
 from lerobot.datasets.lerobot_dataset import LeRobotDataset
 from lerobot.datasets.sampler import EpisodeAwareSampler
+from lerobot.utils.collate import lerobot_collate_fn
 
 from robocasa_lerobot import contract
 from robocasa_lerobot.data.mixture import MixtureDataset, StepBatches
@@ -48,6 +49,12 @@ def lerobot_sampler(dataset: LeRobotDataset, drop_last_frames: int = 0, seed: in
     )
 
 
+def lerobot_collate(dataset: LeRobotDataset) -> Callable[..., Any]:
+    """How `lerobot-train` puts samples together: by itself where a dataset tells stages, whose columns are lists."""
+    collate: Callable[..., Any] = torch.utils.data.default_collate
+    return lerobot_collate_fn if dataset.meta.has_language_columns else collate
+
+
 class LeRobotBatches(torch.utils.data.Dataset[dict[str, Any]]):
     """Batch i of LeRobot's samples in LeRobot's order, for a loop that asks for batches by number."""
 
@@ -58,7 +65,7 @@ class LeRobotBatches(torch.utils.data.Dataset[dict[str, Any]]):
     def __getitem__(self, index: int) -> dict[str, Any]:
         first = index * self.batch_size
         chosen = (self._order[i % len(self._order)] for i in range(first, first + self.batch_size))
-        batch: dict[str, Any] = torch.utils.data.default_collate([self.dataset[i] for i in chosen])
+        batch: dict[str, Any] = lerobot_collate(self.dataset)([self.dataset[i] for i in chosen])
         return batch
 
 
@@ -80,7 +87,12 @@ def open_loader(kind: str, root: Path, windows: Windows, batch_size: int, worker
     if kind == LEROBOT:
         dataset = lerobot_dataset(root, windows)
         loader = torch.utils.data.DataLoader(
-            dataset, batch_size=batch_size, sampler=lerobot_sampler(dataset), drop_last=True, **processes
+            dataset,
+            batch_size=batch_size,
+            sampler=lerobot_sampler(dataset),
+            drop_last=True,
+            collate_fn=lerobot_collate(dataset),
+            **processes,
         )
         return itertools.chain.from_iterable(itertools.repeat(loader))
     mixture = MixtureDataset(MixtureConfig([MemberConfig(str(root))]))
