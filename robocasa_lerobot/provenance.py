@@ -12,7 +12,6 @@ from pathlib import Path
 
 import robocasa_lerobot
 
-_PACKAGE = Path(robocasa_lerobot.__file__).parent
 # What `make study` writes as it goes, which changes nothing of what it runs next.
 _WRITTEN_BY_US = ("docs/results", "docs/results.md")
 
@@ -20,15 +19,6 @@ _WRITTEN_BY_US = ("docs/results", "docs/results.md")
 def utc_now() -> str:
     """This moment, ISO 8601 with seconds."""
     return datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds")
-
-
-def other_checkout(folder: Path) -> bool:
-    """Whether a folder is a checkout of this package, and not the one that this process runs.
-
-    A console command runs the package that is installed, wherever it is given.
-    """
-    there, here = (Path(place) / "cli" / "__init__.py" for place in (folder / "robocasa_lerobot", _PACKAGE))
-    return there.is_file() and not there.samefile(here)
 
 
 def versions(*packages: str) -> dict[str, str]:

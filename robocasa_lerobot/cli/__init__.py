@@ -15,7 +15,6 @@ from types import ModuleType
 from robocasa_lerobot import __version__
 from robocasa_lerobot.errors import UserError, suggest
 from robocasa_lerobot.jobs.workers import check_workers
-from robocasa_lerobot.provenance import other_checkout
 
 # Errors of a path that the user gave.
 _NAMED = (FileExistsError, FileNotFoundError, IsADirectoryError, NotADirectoryError, PermissionError)
@@ -76,6 +75,12 @@ def _nobody_reads() -> bool:
     return False
 
 
+def _is_other_checkout(folder: Path) -> bool:
+    """Whether a folder is a checkout of this package, but not of the one that runs: the one that is installed."""
+    there = folder / "robocasa_lerobot" / "cli" / "__init__.py"
+    return there.is_file() and not there.samefile(__file__)
+
+
 def build_parser(names: Sequence[str] = tuple(SUBCOMMANDS)) -> argparse.ArgumentParser:
     """The parser with the given subcommands configured (importing only their modules)."""
     parser = argparse.ArgumentParser(prog="robocasa-lerobot", description="Train and benchmark robots in kitchens.")
@@ -113,7 +118,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     args, unknown = parser.parse_known_args(arguments)
     if unknown and not getattr(args, "takes_settings", False):
         parser.error(f"unrecognized arguments: {' '.join(unknown)}")
-    if other_checkout(Path.cwd()):
+    if _is_other_checkout(Path.cwd()):
         print(
             f"robocasa-lerobot {name}: this folder is another checkout than the one that runs; PYTHONPATH={Path.cwd()} "
             "before the command has this one run.",
