@@ -32,6 +32,13 @@ def configure(parser: argparse.ArgumentParser) -> None:
         default=0,
         help="observations that are computed at once; 0 (default): as an evaluation would",
     )
+    policy.add_argument(
+        "--policy.runtime",
+        dest="runtime",
+        choices=("onnx", "torch"),
+        default="onnx",
+        help="what computes this project's own policies on a CPU; as in `eval` (default onnx)",
+    )
     policy.add_argument("--executed-steps", type=int, help="actions of an answer (default: the policy's own)")
     policy.add_argument("--seed", type=int, default=0, help="of the noise where clients give no seed (default 0)")
     policy.add_argument("--resize", action="store_true", help="scale pictures of another size than the policy's")
@@ -96,7 +103,9 @@ def run(args: argparse.Namespace) -> int:
         args.groot_version,
         args.allow_kill,
     )
-    policy = load_served(read_source(args.path, args.label), args.device, args.executed_steps, args.width, args.threads)
+    policy = load_served(
+        read_source(args.path, args.label), args.device, args.executed_steps, args.width, args.threads, args.runtime
+    )
     host = Host(policy, args.seed, args.resize, args.repeat_history)
 
     def ready(bound: int) -> None:

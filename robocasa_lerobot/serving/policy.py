@@ -202,7 +202,12 @@ def _batched(observation: dict[str, Any]) -> dict[str, Any]:
 
 
 def load_served(
-    source: PolicySource, device: str = "auto", executed_steps: int | None = None, width: int = 0, threads: int = 1
+    source: PolicySource,
+    device: str = "auto",
+    executed_steps: int | None = None,
+    width: int = 0,
+    threads: int = 1,
+    runtime: str = "onnx",
 ) -> ServedPolicy:
     """Load a policy to be served.
 
@@ -212,6 +217,7 @@ def load_served(
         executed_steps: executed steps of each chunk; the policy's own if None.
         width: observations that are computed at once; 0: as an evaluation chooses it.
         threads: CPU threads.
+        runtime: see `LoadedCheckpoint`.
 
     Raises:
         UserError: a reference policy that acts on what only the simulator knows; see also `LoadedCheckpoint`.
@@ -229,7 +235,7 @@ def load_served(
 
     torch.set_num_threads(threads)
     device = pick_device(device)
-    loaded = LoadedCheckpoint(source, device, executed_steps)
+    loaded = LoadedCheckpoint(source, device, executed_steps, runtime)
     config = json.loads((Path(source.path) / "config.json").read_text(encoding="utf-8"))
     cameras = tuple(filled_cameras(config, Path(source.path)))
     if not ChunkPolicy.serves(loaded):

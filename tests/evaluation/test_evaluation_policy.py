@@ -124,6 +124,18 @@ def test_a_chunk_does_not_depend_on_who_is_asked_for_with_it(checkpoint: Path) -
         assert not np.array_equal(policy.predict([other])[0].actions, together[0])
 
 
+def test_onnx_runtime_computes_a_loaded_policy_unless_torch_is_asked_for(checkpoint: Path) -> None:
+    source, chunks = read_source(str(checkpoint)), {}
+    for runtime in ("onnx", "torch"):
+        loaded = LoadedCheckpoint(source, "cpu", None, runtime)
+        policy = ChunkPolicy(loaded, 1)
+        chunks[runtime] = policy.predict(requests_of(checkpoint, 1, policy))[0].actions
+        (ask,) = loaded.policy._denoise._recorded.values()
+        assert ("onnx" in getattr(ask, "__module__", "")) == (runtime == "onnx")
+    assert chunks["onnx"].std() > 0
+    np.testing.assert_allclose(chunks["onnx"], chunks["torch"], atol=1e-5)
+
+
 @pytest.mark.parametrize("width", [2, 4])
 @pytest.mark.parametrize("leak", [0.0, 1e-7])
 def test_batches_are_full_and_a_leak_between_samples_is_found(

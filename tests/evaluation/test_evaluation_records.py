@@ -348,6 +348,20 @@ def test_noise_for_a_whole_batch_is_drawn_for_one_observation_at_a_time() -> Non
     assert (width("flow_vla", "groot"), width("flow_vla", device="cpu")) == (1, 1)
 
 
+def test_what_computes_a_policy_is_a_setting_where_it_makes_a_difference() -> None:
+    def runtime(*kinds: str, device: str = "cpu", asked: str = "onnx") -> object:
+        arguments = ["--policy.path=x", "--env.tasks=A", f"--policy.runtime={asked}"]
+        return outcome_settings(load_config(EvaluationConfig, arguments), 64, device, kinds).get("runtime")
+
+    assert [runtime("act", kind) for kind in ("diffusion_transformer", "flow_vla")] == ["onnx"] * 2
+    # Runs of before ONNX Runtime have none, and go on with torch.
+    assert [runtime("act"), runtime(), runtime("flow_vla", device="cuda"), runtime("flow_vla", asked="torch")] == [
+        None
+    ] * 4
+    with pytest.raises(UserError, match=r"policy.runtime 'onx'.*onnx"):
+        runtime("flow_vla", asked="onx")
+
+
 def test_the_saved_configuration_loads_again(tmp_path: Path) -> None:
     config = load_config(EvaluationConfig, ["--policy.path=zero", "--env.tasks=A,B", "--seed=3"])
     path = tmp_path / "evaluation.yaml"

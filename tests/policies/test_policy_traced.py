@@ -1,4 +1,4 @@
-"""Recorded networks give the module's own bits, follow its weights, and stay out of checkpoints and copies."""
+"""Recorded networks give the module's own bits and follow its weights; frozen ones its values; copies hold none."""
 
 from __future__ import annotations
 

@@ -39,6 +39,13 @@ def default_width(kinds: Iterable[str], device: str) -> int:
     return GPU_BATCH_WIDTH if device != "cpu" and each_alone else 1
 
 
+def can_be_frozen(kinds: Iterable[str], device: str) -> bool:
+    """Whether policies of any of these types are computed by ONNX Runtime, if that is wished."""
+    from robocasa_lerobot.policies.registry import POLICY_TYPES
+
+    return device == "cpu" and not set(POLICY_TYPES).isdisjoint(kinds)
+
+
 def observation_offsets(config: Any) -> tuple[int, ...]:
     """Control steps at which a policy with this configuration looks, ascending up to 0."""
     chosen = getattr(config, "observation_offsets", None)
@@ -167,14 +174,21 @@ def _stacked(observations: Sequence[Any]) -> Any:
 class LoadedCheckpoint:
     """Policy, processors and configuration of a checkpoint, on a device.
 
+    Args:
+        source: the checkpoint.
+        device: where it computes.
+        executed_steps: actions of each chunk that are carried out; the policy's own if None.
+        runtime: `onnx` has ONNX Runtime compute what it can (`can_be_frozen`): the weights are not to change; `torch`.
+
     Raises:
         UserError: the policy's type is not registered, or `executed_steps` does not fit it.
     """
 
-    def __init__(self, source: PolicySource, device: str, executed_steps: int | None) -> None:
+    def __init__(self, source: PolicySource, device: str, executed_steps: int | None, runtime: str = "onnx") -> None:
         from lerobot.configs.policies import PreTrainedConfig
         from lerobot.policies.factory import get_policy_class, make_pre_post_processors
 
+        from robocasa_lerobot.policies.common.traced import freeze
         from robocasa_lerobot.policies.registry import register_policy_type
         from robocasa_lerobot.settings import user_error_in
 
@@ -195,6 +209,8 @@ class LoadedCheckpoint:
         self.config: Any = config
         self.policy: Any = get_policy_class(config.type).from_pretrained(source.path, config=config)
         self.policy.to(device).eval()
+        if runtime == "onnx" and can_be_frozen([config.type], device):
+            freeze(self.policy)
         self.pre, self.post = make_pre_post_processors(
             policy_cfg=config,
             pretrained_path=source.path,

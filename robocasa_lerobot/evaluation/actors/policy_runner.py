@@ -68,6 +68,7 @@ def load_actor(
     device: str,
     executed_steps: int | None,
     width: int = 1,
+    runtime: str = "onnx",
     waiting: Callable[[], None] = lambda: None,
 ) -> Actor:
     """What acts for a policy source in this process; `waiting` is called while a policy behind a socket computes.
@@ -80,7 +81,7 @@ def load_actor(
         return RemoteActor(source.label, source.remote, waiting)
     if source.is_reference:
         return load_reference(source)
-    loaded = LoadedCheckpoint(source, device, executed_steps)
+    loaded = LoadedCheckpoint(source, device, executed_steps, runtime)
     if not ChunkPolicy.serves(loaded):
         return StepPolicy(loaded)
     policy = ChunkPolicy(loaded, width)

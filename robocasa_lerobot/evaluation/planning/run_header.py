@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from robocasa_lerobot.errors import UnknownNameError, UserError
-from robocasa_lerobot.evaluation.actors.chunk_policy import default_width
+from robocasa_lerobot.evaluation.actors.chunk_policy import can_be_frozen, default_width
 from robocasa_lerobot.evaluation.config.evaluation import (
     EnvSettings,
     EvaluationConfig,
@@ -22,7 +22,7 @@ from robocasa_lerobot.provenance import git_commit, machine, utc_now, versions
 HORIZON_VERSION = "1.0.1"
 _SHOWN = 60
 
-PACKAGES = ("lerobot", "mujoco", "torch", "gymnasium", "numpy")  # what simulates and infers
+PACKAGES = ("lerobot", "mujoco", "torch", "onnxruntime", "gymnasium", "numpy")  # what simulates and infers
 
 
 class NothingRegisteredError(UserError):
@@ -221,6 +221,7 @@ def outcome_settings(
         "success_rule": config.success.rule,
         "success_hold_steps": config.success.hold_steps,
         "perturbation": noise,
+        **({"runtime": "onnx"} if config.policy.runtime == "onnx" and can_be_frozen(kinds, device) else {}),
         **({} if config.scale is None else {"scale": config.scale}),
     }
 

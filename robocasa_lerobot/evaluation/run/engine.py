@@ -254,6 +254,7 @@ def worker_settings(evaluation: Evaluation) -> WorkerSettings:
         success_rule=config.success.rule,
         success_hold_steps=config.success.hold_steps,
         width=header.settings["batch_width"],
+        runtime=config.policy.runtime,
         served=served_labels(evaluation.sources, config.policy, header.device),
     )
 

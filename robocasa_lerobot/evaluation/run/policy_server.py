@@ -40,6 +40,7 @@ class ServerSettings:
     threads: int
     width: int
     executed_steps: int | None
+    runtime: str
     address: str
 
 
@@ -119,7 +120,9 @@ class _Server:
             settings = self._settings
             self._parent.send(Loading())
             try:
-                loaded = LoadedCheckpoint(settings.sources[label], settings.device, settings.executed_steps)
+                loaded = LoadedCheckpoint(
+                    settings.sources[label], settings.device, settings.executed_steps, settings.runtime
+                )
                 self._policy = (label, ChunkPolicy(loaded, settings.width))
             except Exception as error:
                 detail = "" if isinstance(error, UserError) else "\n" + traceback.format_exc()

@@ -17,6 +17,8 @@ from multiprocessing.context import ForkServerContext, ForkServerProcess
 
 POLICY_MODULES = (
     "torch",
+    "onnx",
+    "onnxruntime",
     "robocasa_lerobot.policies.diffusion_transformer.modeling_diffusion_transformer",
     "lerobot.policies.factory",
     "lerobot.envs.utils",

@@ -77,6 +77,7 @@ def open_servers(settings: WorkerSettings, config: EvaluationConfig) -> Iterator
         threads=settings.threads,
         width=settings.width,
         executed_steps=settings.executed_steps,
+        runtime=settings.runtime,
         address="",
     )
     pool = ServerPool(server, config.policy.devices or _devices(settings.device), config.stall_seconds)

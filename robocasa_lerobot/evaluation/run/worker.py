@@ -60,6 +60,7 @@ class WorkerSettings:
     success_rule: str = "any_step"
     success_hold_steps: int = 1
     width: int = 1
+    runtime: str = "onnx"
     served: frozenset[str] = frozenset()
 
 
@@ -171,7 +172,9 @@ class _Worker:
                     torch.set_num_threads(settings.threads)
                 waiting = partial(self._alive, -1)
                 self._alive(-1, loads=True)
-                actor = load_actor(source, settings.device, settings.executed_steps, settings.width, waiting)
+                actor = load_actor(
+                    source, settings.device, settings.executed_steps, settings.width, settings.runtime, waiting
+                )
                 self._alive(-1)
             except _OrphanedError:
                 raise

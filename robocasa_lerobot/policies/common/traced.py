@@ -12,6 +12,8 @@ from typing import Any
 import torch
 from torch import Tensor, nn
 
+from robocasa_lerobot.policies.common.onnx_session import onnx_session
+
 _MOST_SHAPES = 8  # recordings of one network; batches of evaluation have one shape, training none
 _CHECKED_RUNS = 3  # TorchScript looks at the first runs and may change a recording after them
 
@@ -27,6 +29,9 @@ class Traced:
     changes these in place. A recording that does not give what the module gives, to the bit, is not used: so do
     modules whose course depends on values, if those of the first call show it. Copies and pickles hold none.
 
+    Frozen, it is run by ONNX Runtime where that can be, from then on: sooner still, with other last bits, and with the
+    weights of the first call.
+
     Args:
         module: its forward takes tensors and gives one tensor.
     """
@@ -34,6 +39,12 @@ class Traced:
     def __init__(self, module: nn.Module) -> None:
         self._module = module
         self._recorded: dict[_Key, Callable[..., Tensor]] = {}
+        self._frozen = False
+
+    def freeze(self) -> None:
+        """Take the weights for final: whoever changes them later gets what they gave before."""
+        self._frozen = True
+        self._recorded.clear()
 
     def __call__(self, *inputs: Tensor) -> Tensor:
         """What the module gives for these inputs."""
@@ -54,6 +65,10 @@ class Traced:
     def _record(self, inputs: tuple[Tensor, ...]) -> Callable[..., Tensor]:
         if any(_has_hooks(module) for module in self._module.modules()):
             return self._module
+        if self._frozen:
+            session = onnx_session(self._module, inputs)
+            if session is not None:
+                return session
         expected = self._module(*inputs)
         try:
             with warnings.catch_warnings():
@@ -65,10 +80,19 @@ class Traced:
         return recorded if alike else self._module
 
     def __getstate__(self) -> dict[str, Any]:
-        return {"_module": self._module, "_recorded": {}}
+        return {"_module": self._module, "_recorded": {}, "_frozen": self._frozen}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         self.__dict__.update(state)
+
+
+def freeze(policy: nn.Module) -> None:
+    """Take the weights of all networks that a policy calls through `Traced` for final: for whoever only samples."""
+    for module in policy.modules():
+        for value in vars(module).values():
+            for one in value.values() if isinstance(value, dict) else (value,):
+                if isinstance(one, Traced):
+                    one.freeze()
 
 
 def _has_hooks(module: nn.Module) -> bool:

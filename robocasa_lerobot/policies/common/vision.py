@@ -43,8 +43,9 @@ class SpatialSoftmax(nn.Module):
         heat = self.to_keypoints(x)
         height, width = heat.shape[-2:]
         weight = functional.softmax(heat.flatten(2), dim=-1).unflatten(2, (height, width))
-        xs = torch.linspace(-1.0, 1.0, width, device=x.device, dtype=weight.dtype)
-        ys = torch.linspace(-1.0, 1.0, height, device=x.device, dtype=weight.dtype)
+        # Asked for twice, because PyTorch's ONNX exporter overlooks the first.
+        xs = torch.linspace(-1.0, 1.0, width, device=x.device, dtype=weight.dtype).type_as(weight)
+        ys = torch.linspace(-1.0, 1.0, height, device=x.device, dtype=weight.dtype).type_as(weight)
         expected_x = (weight.sum(dim=2) * xs).sum(dim=-1)
         expected_y = (weight.sum(dim=3) * ys).sum(dim=-1)
         return torch.stack([expected_x, expected_y], dim=-1).flatten(1)

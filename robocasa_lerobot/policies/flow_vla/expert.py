@@ -105,7 +105,10 @@ class Norm(nn.Module):
 
     def forward(self, x: Tensor, condition: Tensor | None) -> tuple[Tensor, Tensor | None]:
         """Maps x (B, S, width) and condition (B, D) or None to the normed x and the gate (B, 1, width) or None."""
-        y = functional.rms_norm(x, (self.width,), None, NORM_EPS)
+        if torch.onnx.is_in_onnx_export():  # which has no word for it
+            y = x * torch.rsqrt(x.square().mean(dim=-1, keepdim=True) + NORM_EPS)
+        else:
+            y = functional.rms_norm(x, (self.width,), None, NORM_EPS)
         if self.modulation is None:
             return y * self.weight, None
         scale, shift, *gate = self.modulation(condition).unsqueeze(1).split(self.width, dim=-1)
@@ -138,7 +141,10 @@ class ExpertLayer(nn.Module):
         q, k, v = (self._heads(proj(normed)) for proj in (self.q_proj, self.k_proj, self.v_proj))
         k = torch.cat([keys.to(k.dtype), rotate(k, rotary)], dim=2)
         v = torch.cat([values.to(v.dtype), v], dim=2)
-        seen = functional.scaled_dot_product_attention(rotate(q, rotary), k, v, attn_mask=mask, enable_gqa=True)
+        grouped = not torch.onnx.is_in_onnx_export()
+        if not grouped:  # ONNX has no word for heads that share keys and values
+            k, v = (one.repeat_interleave(q.shape[1] // one.shape[1], dim=1) for one in (k, v))
+        seen = functional.scaled_dot_product_attention(rotate(q, rotary), k, v, attn_mask=mask, enable_gqa=grouped)
         x = _add(x, self.o_proj(seen.transpose(1, 2).flatten(2)), gate)
         normed, gate = self.norm2(x, condition)
         y = self.down_proj(functional.gelu(self.gate_proj(normed), approximate="tanh") * self.up_proj(normed))
