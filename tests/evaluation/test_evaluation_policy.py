@@ -130,7 +130,7 @@ def test_onnx_runtime_computes_a_loaded_policy_unless_torch_is_asked_for(checkpo
         loaded = LoadedCheckpoint(source, "cpu", None, runtime)
         policy = ChunkPolicy(loaded, 1)
         chunks[runtime] = policy.predict(requests_of(checkpoint, 1, policy))[0].actions
-        (ask,) = loaded.policy._denoise._recorded.values()
+        (ask,) = loaded.policy._decode._recorded.values()
         assert ("onnx" in getattr(ask, "__module__", "")) == (runtime == "onnx")
     assert chunks["onnx"].std() > 0
     np.testing.assert_allclose(chunks["onnx"], chunks["torch"], atol=1e-5)

@@ -80,12 +80,36 @@ def test_a_policy_asks_for_these_levels(scheduler: str, monkeypatch: pytest.Monk
     assert isinstance(policy, DiffusionTransformerPolicy)
     asked: list[int] = []
 
-    def denoise(x: torch.Tensor, times: torch.Tensor, features: torch.Tensor) -> torch.Tensor:
+    def decode(x: torch.Tensor, times: torch.Tensor) -> torch.Tensor:
+        assert times.tolist() == [int(times[0])] * 2
         asked.append(int(times[0]))
         level = policy.scheduler.alphas_cumprod[asked[-1]]
         return (x - level**0.5 * CLEAN) / (1 - level) ** 0.5
 
-    monkeypatch.setattr(policy, "_denoise", denoise)
+    monkeypatch.setattr(policy, "_condition", lambda times, features: times)
+    monkeypatch.setattr(policy, "_decode", decode)
     chunk = policy.sample(preprocess(batch_for(config, 2)))
     assert asked == sampling_times(config)
     torch.testing.assert_close(chunk, torch.full_like(chunk, CLEAN), atol=0.02, rtol=0)
+
+
+def test_a_step_predicts_what_the_denoiser_does_for_its_sample_and_level(monkeypatch: pytest.MonkeyPatch) -> None:
+    config = tiny_config(num_inference_steps=3)
+    policy, preprocess, _ = build(config)
+    policy.eval()
+    batch = preprocess(batch_for(config, 2))
+    features, levels = policy.observation_encoder(batch), iter(sampling_times(config))
+    decode, seen = policy._decode, []
+
+    def compared(x: torch.Tensor, memory: torch.Tensor) -> torch.Tensor:
+        out: torch.Tensor = decode(x, memory)
+        whole = policy.denoiser(x, torch.full((2,), next(levels)), features)
+        torch.testing.assert_close(out, whole, atol=1e-6, rtol=1e-5)
+        seen.append(out)
+        return out
+
+    monkeypatch.setattr(policy, "_decode", compared)
+    policy.sample(batch)
+    assert len(seen) == 3
+    assert not torch.allclose(seen[0][0], seen[0][1])
+    assert not torch.allclose(seen[0], seen[1])

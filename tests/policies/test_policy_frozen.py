@@ -31,7 +31,7 @@ def networks(policy: Any) -> list[Traced]:
     """What `freeze` is to find."""
     if hasattr(policy, "expert"):
         return [policy._ask_expert]
-    return [policy._denoise, *policy.observation_encoder._encoders.values()]
+    return [policy._condition, policy._decode, *policy.observation_encoder._encoders.values()]
 
 
 def by_onnx(traced: Traced) -> list[bool]:

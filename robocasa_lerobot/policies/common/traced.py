@@ -33,11 +33,12 @@ class Traced:
     weights of the first call.
 
     Args:
-        module: its forward takes tensors and gives one tensor.
+        module: what it is of.
+        method: of the module; takes tensors and gives one tensor. Hooks of the module are of `forward` alone.
     """
 
-    def __init__(self, module: nn.Module) -> None:
-        self._module = module
+    def __init__(self, module: nn.Module, method: str = "forward") -> None:
+        self._module, self._method = module, method
         self._recorded: dict[_Key, Callable[..., Tensor]] = {}
         self._frozen = False
 
@@ -52,7 +53,7 @@ class Traced:
         changes = torch.is_grad_enabled() or self._module.training or _has_hooks(self._module)
         # A recording has the types of its first call, whether autocast chose them or not.
         if changes or torch.is_autocast_enabled("cpu") or any(x.device.type != "cpu" for x in inputs):
-            out = self._module(*inputs)
+            out = self._call(*inputs)
             return out
         key = tuple((x.shape, x.dtype) for x in inputs)
         if key not in self._recorded:
@@ -62,28 +63,44 @@ class Traced:
         out = self._recorded[key](*inputs)
         return out
 
+    def _call(self, *inputs: Tensor) -> Any:
+        return self._module(*inputs) if self._method == "forward" else getattr(self._module, self._method)(*inputs)
+
     def _record(self, inputs: tuple[Tensor, ...]) -> Callable[..., Tensor]:
         if any(_has_hooks(module) for module in self._module.modules()):
-            return self._module
+            return self._call
+        module = self._module if self._method == "forward" else _Method(self._module, self._method)
         if self._frozen:
-            session = onnx_session(self._module, inputs)
+            session = onnx_session(module, inputs)
             if session is not None:
                 return session
-        expected = self._module(*inputs)
+        expected = self._call(*inputs)
         try:
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore")  # shapes are constants here, and TorchScript has successors elsewhere
-                recorded: Callable[..., Tensor] = torch.jit.trace(self._module, inputs, check_trace=False)
+                recorded: Callable[..., Tensor] = torch.jit.trace(module, inputs, check_trace=False)
         except Exception:  # whatever TorchScript cannot record; and it may be gone one day
-            return self._module
+            return self._call
         alike = all(torch.equal(recorded(*inputs), expected) for _ in range(_CHECKED_RUNS))
-        return recorded if alike else self._module
+        return recorded if alike else self._call
 
     def __getstate__(self) -> dict[str, Any]:
-        return {"_module": self._module, "_recorded": {}, "_frozen": self._frozen}
+        return {"_module": self._module, "_method": self._method, "_recorded": {}, "_frozen": self._frozen}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         self.__dict__.update(state)
+
+
+class _Method(nn.Module):
+    """A method of a module as a module, for recording."""
+
+    def __init__(self, module: nn.Module, method: str) -> None:
+        super().__init__()
+        self.module, self._method = module, method
+        self.training = module.training
+
+    def forward(self, *inputs: Tensor) -> Any:
+        return getattr(self.module, self._method)(*inputs)
 
 
 def freeze(policy: nn.Module) -> None:

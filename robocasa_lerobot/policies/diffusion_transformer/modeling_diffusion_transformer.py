@@ -72,7 +72,7 @@ class DiffusionTransformerPolicy(PreTrainedPolicy):
             else None
         )
         self.scheduler = _noise_scheduler(config)
-        self._denoise = Traced(self.denoiser)
+        self._condition, self._decode = Traced(self.denoiser, "condition"), Traced(self.denoiser, "decode")
         self._ddim: DdimSteps | None = None  # of the levels that were last asked for
         self._observed_keys = (*self.observation_encoder.image_keys, OBS_STATE)
         self.reset()
@@ -190,9 +190,11 @@ class DiffusionTransformerPolicy(PreTrainedPolicy):
             self.scheduler.set_timesteps(timesteps=times)
         else:
             ddim = self._ddim_steps(times)
+        # The conditions of all steps at once: they do not depend on the actions.
+        asked = torch.tensor(times, device=x.device).repeat_interleave(shape[0])
+        memory = self._condition(asked, features.repeat(len(times), 1, 1)).unflatten(0, (len(times), shape[0]))
         for number, time in enumerate(times):
-            asked = torch.full(shape[:1], time, device=x.device, dtype=torch.long)
-            prediction = self._denoise(x, asked, features).float()
+            prediction = self._decode(x, memory[number]).float()
             if ddim is None:
                 x = self.scheduler.step(prediction, time, x, generator=random).prev_sample
             else:

@@ -112,13 +112,22 @@ class DenoisingTransformer(nn.Module):
         Returns:
             (B, horizon, action_dim).
         """
+        return self.decode(noisy_actions, self.condition(times, features))
+
+    def condition(self, times: Tensor, features: Tensor) -> Tensor:
+        """Tokens of times (B,) and observations, as in `forward`, for `decode`: (B, 1 + n_obs_steps, width)."""
         time = self.time_embedding(times).unsqueeze(1).to(features.dtype)
         condition = torch.cat([time, self.embed_observation(features)], dim=1)
-        memory = self.condition_encoder(self.dropout(condition + self.condition_position))
+        memory: Tensor = self.condition_encoder(self.dropout(condition + self.condition_position))
+        return memory
+
+    def decode(self, noisy_actions: Tensor, memory: Tensor) -> Tensor:
+        """What `forward` predicts, from noisy actions and what `condition` gives."""
         x = self.dropout(self.embed_action(noisy_actions) + self.action_position)
         # Told nothing about the masks, PyTorch compares them with a causal one of its own, each time.
         x = self.decoder(x, memory, self.causal_mask, self.memory_mask, tgt_is_causal=False, memory_is_causal=False)
-        return self.head(self.norm(x))
+        out: Tensor = self.head(self.norm(x))
+        return out
 
 
 def _initialise(module: nn.Module) -> None:
