@@ -223,10 +223,11 @@ def test_an_evaluation_whose_file_has_changed_runs_again(
 # Another value for each setting of an evaluation.
 OTHER_SETTINGS = {
     "policy.path": "random", "policy.label": "other", "policy.device": "cpu", "policy.devices": "cuda:1",
-    "policy.placement": "workers", "policy.batch_width": 2, "policy.threads": 2, "policy.lifelong_phase": 1,
-    "policy.demo_fraction": 0.5, "policy.training_data": "other", "remote.connect_seconds": 1,
-    "remote.answer_seconds": 1, "remote.first_answer_seconds": 1, "env.tasks": "CloseDrawer",
-    "env.task_sets": "atomic_seen", "env.registry": "configs/experiments/parts/kitchens.yaml", "env.tasks_per_set": 1,
+    "policy.placement": "workers", "policy.batch_width": 2, "policy.threads": 2, "policy.runtime": "torch",
+    "policy.lifelong_phase": 1, "policy.demo_fraction": 0.5, "policy.training_data": "other",
+    "remote.connect_seconds": 1, "remote.answer_seconds": 1, "remote.first_answer_seconds": 1,
+    "env.tasks": "CloseDrawer", "env.task_sets": "atomic_seen",
+    "env.registry": "configs/experiments/parts/kitchens.yaml", "env.tasks_per_set": 1,
     "env.allow_missing_tasks": False, "env.split": "pretrain", "env.render_preset": "quality", "env.image_size": 64,
     "env.horizon": 9, "env.horizon_multiplier": 2, "env.render_devices": 1, "success.rule": "at_end",
     "perturbation.names": "camera", "perturbation.camera_position_m": 1, "perturbation.camera_angle_deg": 1,

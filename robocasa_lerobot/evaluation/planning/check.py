@@ -19,7 +19,7 @@ from dataclasses import dataclass
 
 from robocasa_lerobot import contract
 from robocasa_lerobot.errors import UserError
-from robocasa_lerobot.evaluation.config.evaluation import EvaluationConfig, check_factory
+from robocasa_lerobot.evaluation.config.evaluation import EvaluationConfig, PolicySettings, check_factory
 from robocasa_lerobot.evaluation.config.loader import load_config
 from robocasa_lerobot.evaluation.planning.run_header import (
     NothingRegisteredError,
@@ -103,6 +103,8 @@ def _name(config: EvaluationConfig, tasks: PlannedTasks) -> str:
     for key in _NOT_OF_THE_RUN:
         group, _, name = key.rpartition(".")
         del (settings[group] if group else settings)[name]
+    if config.policy.runtime == PolicySettings.runtime:  # younger than the names of finished runs
+        del settings["policy"]["runtime"]
     return hashlib.sha256(json.dumps([tasks.horizons, settings], default=str).encode()).hexdigest()[:12]
 
 
