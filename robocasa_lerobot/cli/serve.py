@@ -15,6 +15,7 @@ _PORTS = {"openpi": 8000, "gr00t": 5555, "vla_eval": 8000}  # those of the proto
 
 def configure(parser: argparse.ArgumentParser) -> None:
     """Add the arguments."""
+    from robocasa_lerobot.evaluation.config.evaluation import RUNTIMES, PolicySettings
     from robocasa_lerobot.serving.limits import Limits
 
     limits = Limits()
@@ -35,9 +36,9 @@ def configure(parser: argparse.ArgumentParser) -> None:
     policy.add_argument(
         "--policy.runtime",
         dest="runtime",
-        choices=("onnx", "torch"),
-        default="onnx",
-        help="what computes this project's own policies on a CPU; as in `eval` (default onnx)",
+        choices=RUNTIMES,
+        default=PolicySettings.runtime,
+        help="what computes this project's own policies on a CPU; as in `eval` (default %(default)s)",
     )
     policy.add_argument("--executed-steps", type=int, help="actions of an answer (default: the policy's own)")
     policy.add_argument("--seed", type=int, default=0, help="of the noise where clients give no seed (default 0)")

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import io
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from unittest.mock import patch
 
 import torch
@@ -34,7 +34,8 @@ def onnx_session(module: nn.Module, inputs: tuple[Tensor, ...]) -> Callable[...,
         given = tuple(x.clone() for x in inputs)  # what inference mode has made cannot be recorded outside it
         expected = module(*given)
         try:
-            ask = _session(_exported(module, given))
+            names = [f"input_{number}" for number in range(len(given))]
+            ask = _session(_exported(module, given, names), names)
             answer = ask(*given)
         except Exception:  # whatever the exporter or the runtime cannot do, or one of them is not there
             return None
@@ -44,7 +45,7 @@ def onnx_session(module: nn.Module, inputs: tuple[Tensor, ...]) -> Callable[...,
     return ask if bool((answer - expected).abs().max() <= TOLERANCE * largest) else None
 
 
-def _exported(module: nn.Module, inputs: tuple[Tensor, ...]) -> bytes:
+def _exported(module: nn.Module, inputs: tuple[Tensor, ...], names: Sequence[str]) -> bytes:
     """The graph. PyTorch's newer exporter takes ten times as long, and another package, for the same one."""
     out = io.BytesIO()
     fast_path = torch.backends.mha.get_fastpath_enabled()
@@ -53,16 +54,15 @@ def _exported(module: nn.Module, inputs: tuple[Tensor, ...]) -> bytes:
         # Shapes are constants here, this exporter has a successor, and it prints a network that it cannot express.
         with warnings.catch_warnings(), patch.object(torch._C, "_jit_onnx_log", lambda *_: None, create=True):
             warnings.simplefilter("ignore")
-            names = [_input_name(number) for number in range(len(inputs))]
             torch.onnx.export(
-                module, inputs, out, input_names=names, output_names=["out"], opset_version=_OPSET, dynamo=False
+                module, inputs, out, input_names=list(names), output_names=["out"], opset_version=_OPSET, dynamo=False
             )
     finally:
         torch.backends.mha.set_fastpath_enabled(fast_path)
     return out.getvalue()
 
 
-def _session(graph: bytes) -> Callable[..., Tensor]:
+def _session(graph: bytes, names: Sequence[str]) -> Callable[..., Tensor]:
     import onnxruntime
 
     options = onnxruntime.SessionOptions()
@@ -72,13 +72,9 @@ def _session(graph: bytes) -> Callable[..., Tensor]:
     options.log_severity_level = 3  # errors; warnings are of its own optimizer
     session = onnxruntime.InferenceSession(graph, options, providers=["CPUExecutionProvider"])
     there = {found.name for found in session.get_inputs()}  # what the network does not use is left out
+    asked = [(number, name) for number, name in enumerate(names) if name in there]
 
     def ask(*inputs: Tensor) -> Tensor:
-        given = {_input_name(number): x.numpy() for number, x in enumerate(inputs) if _input_name(number) in there}
-        return torch.from_numpy(session.run(None, given)[0])
+        return torch.from_numpy(session.run(None, {name: inputs[number].numpy() for number, name in asked})[0])
 
     return ask
-
-
-def _input_name(number: int) -> str:
-    return f"input_{number}"

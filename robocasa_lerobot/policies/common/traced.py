@@ -34,10 +34,10 @@ class Traced:
 
     Args:
         module: what it is of.
-        method: of the module; takes tensors and gives one tensor. Hooks of the module are of `forward` alone.
+        method: of the module; takes tensors and gives one tensor. Only calls of the module itself have its hooks.
     """
 
-    def __init__(self, module: nn.Module, method: str = "forward") -> None:
+    def __init__(self, module: nn.Module, method: str = "__call__") -> None:
         self._module, self._method = module, method
         self._recorded: dict[_Key, Callable[..., Tensor]] = {}
         self._frozen = False
@@ -64,12 +64,12 @@ class Traced:
         return out
 
     def _call(self, *inputs: Tensor) -> Any:
-        return self._module(*inputs) if self._method == "forward" else getattr(self._module, self._method)(*inputs)
+        return getattr(self._module, self._method)(*inputs)
 
     def _record(self, inputs: tuple[Tensor, ...]) -> Callable[..., Tensor]:
         if any(_has_hooks(module) for module in self._module.modules()):
             return self._call
-        module = self._module if self._method == "forward" else _Method(self._module, self._method)
+        module = _Method(self._module, self._method)
         if self._frozen:
             session = onnx_session(module, inputs)
             if session is not None:
