@@ -16,9 +16,10 @@ from robocasa_lerobot.errors import UserError
 
 # Pictures smaller than this are enlarged by a whole factor, so that a film of a policy with small inputs can be seen.
 MIN_HEIGHT = 128
-# As good as "veryfast" at 23, measured on a film of a kitchen: a third larger, in two thirds of its time.
-CRF = "24"
-PRESET = "superfast"
+# As good as "superfast" at 24, by the signal-to-noise ratio of films of twenty scenes: a fifth larger, in two fifths of
+# its time.
+CRF = "25"
+PRESET = "ultrafast"
 
 
 def side_by_side(pixels: dict[str, NDArray[np.uint8]]) -> NDArray[np.uint8]:

@@ -298,6 +298,10 @@ class KitchenEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         """A picture (S, S, 3) uint8 of the present state from any camera of the model, or a free one."""
         return self._open_renderer().render(self.data, camera)
 
+    def renderer_of_size(self, height: int, width: int) -> SceneRenderer:
+        """A renderer of the episode's scene for pictures of another size, in pixels; close it when the episode ends."""
+        return self._open_renderer().resized(height, width)
+
     @property
     def segmentation_names(self) -> tuple[str, ...]:
         """What each id of the episode's segmentation is: a fixture, an object, or a body of the robot.

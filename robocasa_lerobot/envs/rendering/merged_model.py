@@ -9,6 +9,7 @@ it fits kitchens and recorded MJCF files alike.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import mujoco
 import numpy as np
@@ -20,6 +21,8 @@ from robocasa_lerobot.envs.rendering.hidden_faces import shown_faces
 from robocasa_lerobot.envs.rendering.merged_shapes import merged_shapes
 from robocasa_lerobot.envs.rendering.mesh_assets import add_surface, copy_mesh
 from robocasa_lerobot.envs.rendering.rest_poses import RestPoses, matrices
+from robocasa_lerobot.envs.rendering.software.arrays import Shapes
+from robocasa_lerobot.envs.rendering.software.triangles import shapes_of
 from robocasa_lerobot.envs.rendering.view_grid import on_grid
 
 Array = NDArray[np.float64]
@@ -74,6 +77,11 @@ class MergedModel:
         self._kinds = _kinds(self.source)
         self._colours_matter = np.ones(self.source.ngeom, dtype=bool)
         self._colours_matter[list(self.loose)] = False  # they are copied with every picture
+
+    @cached_property
+    def shapes(self) -> Shapes | None:
+        """Its triangles, made when they are first asked for; None where only OpenGL can draw it."""
+        return shapes_of(self.model)
 
     def follow(self, data: mujoco.MjData) -> None:
         """Take the poses of `data`, and the present colours of the source's materials."""

@@ -95,6 +95,21 @@ class SceneRenderer:
         alike.follow(data)
         return self._drawn(numbers)
 
+    def resized(self, height: int, width: int) -> SceneRenderer:
+        """Another renderer of the same model, for pictures of that size, in pixels.
+
+        It shares the look-alike, which is most of what a new one takes to make. Close it for itself.
+        """
+        return SceneRenderer(
+            self._model,
+            height,
+            width,
+            shadows=self._shadows,
+            alike=self._alike,
+            opengl=not self._on_cpu,
+            keeps_backgrounds=self._keeps,
+        )
+
     def geometry(
         self, data: mujoco.MjData, camera: str | mujoco.MjvCamera
     ) -> tuple[NDArray[np.float32], NDArray[np.int32]]:
@@ -157,7 +172,7 @@ class SceneRenderer:
         if self._merged is not None:
             self._merged.close()
         self._painter = self._merged = self._backgrounds = None
-        if self._alike is not None and self._on_cpu:
-            self._painter = Painter.of(self._alike.model, *self._size, keeps_views=self._keeps)
+        if self._alike is not None and self._on_cpu and (shapes := self._alike.shapes) is not None:
+            self._painter = Painter(self._alike.model, *self._size, shapes, keeps_views=self._keeps)
         if self._alike is not None and self._painter is None:
             self._merged = Canvas(self._alike.model, *self._size)

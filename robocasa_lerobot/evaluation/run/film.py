@@ -36,9 +36,9 @@ class FilmError(LackingMachineError):
 class Film:
     """A video of one trial, in real time: every second picture, at half the control rate (10 fps in our kitchens).
 
-    An env with a MuJoCo `model` and `data` is filmed by a renderer of its own, so that a policy with small inputs
-    still gets a film that shows something, and the env renders what the policy sees and no more. Of any other env
-    the observation's pictures are filmed.
+    An env with `renderer_of_size`, as a kitchen, is filmed by one of the film's own size, so that a policy with small
+    inputs still gets a film that shows something, and the env renders what the policy sees and no more. Of any other
+    env the observation's pictures are filmed.
     """
 
     def __init__(self, path: Path, control_hz: float | None = None) -> None:
@@ -59,7 +59,7 @@ class Film:
 
     def needs_observation(self, env: Any) -> bool:
         """Whether the env itself has to render at each step for the film."""
-        return not hasattr(type(env), "model")
+        return not hasattr(type(env), "renderer_of_size")
 
     def _pictures(self, env: Any, observation: dict[str, Any]) -> dict[str, NDArray[np.uint8]]:
         if self.needs_observation(env):
@@ -68,10 +68,7 @@ class Film:
                 raise NoPicturesError("the env shows no `pixels`: there is nothing to film. Give --videos=0.")
             return pixels if isinstance(pixels, dict) else {"picture": pixels}
         if self._renderer is None:
-            from robocasa_lerobot.envs.rendering import SceneRenderer
-
-            shadows = env.render_preset == "quality"
-            self._renderer = SceneRenderer(env.model, FILM_SIZE, FILM_SIZE, shadows=shadows)
+            self._renderer = env.renderer_of_size(FILM_SIZE, FILM_SIZE)
         pictures = self._renderer.pictures(env.data, contract.CAMERAS)  # together: the state is looked at once
         return dict(zip(contract.CAMERAS, pictures, strict=True))
 

@@ -17,10 +17,12 @@ from robocasa_lerobot.envs.rendering.software.arrays import (
     Single,
     View,
 )
+from robocasa_lerobot.envs.rendering.software.occlusion import is_hidden
 from robocasa_lerobot.envs.rendering.software.rasterization import NOTHING, to_camera, visible
 from robocasa_lerobot.envs.rendering.software.shading import shade
 
 KEEP_NOTHING, KEEP, USE_KEPT = 0, 1, 2
+_HIDDEN = -1  # instead of a geom's number
 _LAYS = 2  # MuJoCo lays what is transparent over the picture twice, as pictures show
 
 
@@ -77,10 +79,14 @@ def draw(
         for pixel in range(pixels):
             over[pixel] = seen[pixel] if seen[pixel] != kept.seen[rows.start + pixel] else NOTHING
         shade(everything, over, shapes, pose, scratch, view, picture)
-    if len(transparent) > 0:
-        to_camera(transparent, shapes, pose, scratch)
-        for _ in range(_LAYS):
-            for geom in transparent:
+    for lay in range(_LAYS):
+        for number, geom in enumerate(transparent):
+            if lay == 0:
+                if is_hidden(geom, shapes, pose, view, inverse):
+                    transparent[number] = _HIDDEN
+                    continue
+                to_camera(geom, shapes, pose, scratch)
+            if geom != _HIDDEN:
                 _lay_over(geom, shapes, pose, scratch, view, picture)
 
 
@@ -89,8 +95,8 @@ def _see(
     geoms: Numbers, shapes: Shapes, pose: Pose, scratch: Scratch, view: View, inverse: Single, seen: Numbers
 ) -> None:
     """Note where these geoms are seen."""
-    to_camera(geoms, shapes, pose, scratch)
     for geom in geoms:
+        to_camera(geom, shapes, pose, scratch)
         first, end = shapes.first_face[geom], shapes.first_face[geom + 1]
         visible(first, end, True, shapes.faces, scratch.corners, pose.lens, view, inverse, seen)
 
@@ -180,6 +186,6 @@ def _lay_over(geom: int, shapes: Shapes, pose: Pose, scratch: Scratch, view: Vie
         for y in range(first_row - view.first_row, end_row - view.first_row):
             for pixel in range(np.uint64(y * width + first_column), np.uint64(y * width + end_column)):
                 scratch.over_seen[pixel] = NOTHING
-        visible(face, face + 1, False, faces, corners, pose.lens, view, scratch.inverse, scratch.over_seen)
-        window = (first_row, end_row, first_column, end_column)
-        shade(window, scratch.over_seen, shapes, pose, scratch, view, picture)
+        if visible(face, face + 1, False, faces, corners, pose.lens, view, scratch.inverse, scratch.over_seen):
+            window = (first_row, end_row, first_column, end_column)
+            shade(window, scratch.over_seen, shapes, pose, scratch, view, picture)

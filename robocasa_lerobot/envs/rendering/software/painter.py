@@ -34,7 +34,6 @@ from robocasa_lerobot.envs.rendering.software.arrays import (
 )
 from robocasa_lerobot.envs.rendering.software.drawing import KEEP, KEEP_NOTHING, USE_KEPT, draw
 from robocasa_lerobot.envs.rendering.software.rasterization import nearest_m
-from robocasa_lerobot.envs.rendering.software.triangles import shapes_of
 from robocasa_lerobot.envs.rendering.standing_views import StandingViews
 from robocasa_lerobot.gl import note_own_renderer
 from robocasa_lerobot.jobs.workers import cores_here
@@ -59,7 +58,7 @@ class Painter:
     Args:
         model: to draw.
         height, width: of the pictures, pixels.
-        shapes: of the model, as of `shapes_of`.
+        shapes: of the model, as of `triangles.shapes_of`.
         keeps_views: draw only what moves in views that come again; the pictures are the same either way.
     """
 
@@ -80,12 +79,6 @@ class Painter:
             [_USUAL_LOOK],
             axis=0,
         )
-
-    @classmethod
-    def of(cls, model: mujoco.MjModel, height: int, width: int, *, keeps_views: bool = True) -> Painter | None:
-        """Of a model; None where it has what only OpenGL draws here (see `shapes_of`)."""
-        shapes = shapes_of(model)
-        return None if shapes is None else cls(model, height, width, shapes, keeps_views=keeps_views)
 
     def pictures(self, data: mujoco.MjData, cameras: Sequence[int]) -> list[Picture]:
         """What each camera sees, upright RGB of shape (height, width, 3)."""

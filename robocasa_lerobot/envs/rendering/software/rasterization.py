@@ -27,30 +27,29 @@ def nearest_m(near_m: float, focal_pixels: float) -> float:
 
 
 @compiled
-def to_camera(geoms: Numbers, shapes: Shapes, pose: Pose, scratch: Scratch) -> None:
-    """Take the vertices of some geoms into the camera's frame: into `scratch.corners`."""
+def to_camera(geom: int, shapes: Shapes, pose: Pose, scratch: Scratch) -> None:
+    """Take the vertices of a geom into the camera's frame: into `scratch.corners`."""
     vertices, first_vertex, found = shapes.vertices, shapes.first_vertex, scratch.corners
     positions, rotations, eye, axes = pose.positions, pose.rotations, pose.eye, pose.axes
-    for geom in geoms:
-        x, y, z = positions[geom, 0] - eye[0], positions[geom, 1] - eye[1], positions[geom, 2] - eye[2]
-        right = axes[0] * x + axes[3] * y + axes[6] * z
-        up = axes[1] * x + axes[4] * y + axes[7] * z
-        back = axes[2] * x + axes[5] * y + axes[8] * z
-        turn = rotations[geom]
-        r0 = axes[0] * turn[0] + axes[3] * turn[3] + axes[6] * turn[6]
-        r1 = axes[0] * turn[1] + axes[3] * turn[4] + axes[6] * turn[7]
-        r2 = axes[0] * turn[2] + axes[3] * turn[5] + axes[6] * turn[8]
-        u0 = axes[1] * turn[0] + axes[4] * turn[3] + axes[7] * turn[6]
-        u1 = axes[1] * turn[1] + axes[4] * turn[4] + axes[7] * turn[7]
-        u2 = axes[1] * turn[2] + axes[4] * turn[5] + axes[7] * turn[8]
-        b0 = axes[2] * turn[0] + axes[5] * turn[3] + axes[8] * turn[6]
-        b1 = axes[2] * turn[1] + axes[5] * turn[4] + axes[8] * turn[7]
-        b2 = axes[2] * turn[2] + axes[5] * turn[5] + axes[8] * turn[8]
-        for vertex in range(first_vertex[geom], first_vertex[geom + 1]):
-            x, y, z = vertices[vertex, 0], vertices[vertex, 1], vertices[vertex, 2]
-            found[vertex, 0] = r0 * x + r1 * y + r2 * z + right
-            found[vertex, 1] = u0 * x + u1 * y + u2 * z + up
-            found[vertex, 2] = -(b0 * x + b1 * y + b2 * z + back)
+    x, y, z = positions[geom, 0] - eye[0], positions[geom, 1] - eye[1], positions[geom, 2] - eye[2]
+    right = axes[0] * x + axes[3] * y + axes[6] * z
+    up = axes[1] * x + axes[4] * y + axes[7] * z
+    back = axes[2] * x + axes[5] * y + axes[8] * z
+    turn = rotations[geom]
+    r0 = axes[0] * turn[0] + axes[3] * turn[3] + axes[6] * turn[6]
+    r1 = axes[0] * turn[1] + axes[3] * turn[4] + axes[6] * turn[7]
+    r2 = axes[0] * turn[2] + axes[3] * turn[5] + axes[6] * turn[8]
+    u0 = axes[1] * turn[0] + axes[4] * turn[3] + axes[7] * turn[6]
+    u1 = axes[1] * turn[1] + axes[4] * turn[4] + axes[7] * turn[7]
+    u2 = axes[1] * turn[2] + axes[4] * turn[5] + axes[7] * turn[8]
+    b0 = axes[2] * turn[0] + axes[5] * turn[3] + axes[8] * turn[6]
+    b1 = axes[2] * turn[1] + axes[5] * turn[4] + axes[8] * turn[7]
+    b2 = axes[2] * turn[2] + axes[5] * turn[5] + axes[8] * turn[8]
+    for vertex in range(first_vertex[geom], first_vertex[geom + 1]):
+        x, y, z = vertices[vertex, 0], vertices[vertex, 1], vertices[vertex, 2]
+        found[vertex, 0] = r0 * x + r1 * y + r2 * z + right
+        found[vertex, 1] = u0 * x + u1 * y + u2 * z + up
+        found[vertex, 2] = -(b0 * x + b1 * y + b2 * z + back)
 
 
 @compiled
@@ -64,7 +63,7 @@ def visible(
     view: View,
     inverse: Single,
     seen: Numbers,
-) -> None:
+) -> bool:
     """Note for each pixel which of the triangles from `first` to `end` is seen there, and its inverse distance.
 
     Args:
@@ -77,11 +76,15 @@ def visible(
         view: rows that are drawn.
         inverse: of the distance from the camera's plane, 1/m, where something was drawn before, row after row.
         seen: number of the triangle, row after row; both are changed.
+
+    Returns:
+        Whether any of them is seen.
     """
     focal_x, focal_y, middle_x, middle_y, near = lens
     left, right = -middle_x / focal_x, (view.width - middle_x) / focal_x
     top, bottom = (middle_y - view.first_row) / focal_y, (middle_y - view.end_row) / focal_y
     cut, steps_x, steps_y = np.empty((4, 3)), np.empty(4, np.int64), np.empty(4, np.int64)
+    found = False
     for face in range(first, end):
         a, b, c = faces[face, 0], faces[face, 1], faces[face, 2]
         ax, ay, az = corners[a, 0], corners[a, 1], corners[a, 2]
@@ -112,8 +115,10 @@ def visible(
         # Inverse distance is linear over the picture: (n . ray) / away, with ray = ((x - mx) / fx, (my - y) / fy, 1).
         along, down = nx / away / focal_x, -ny / away / focal_y
         corner = nz / away - along * middle_x - down * middle_y
+        # Of a triangle that is seen from its edge the middle of a pixel may lie far before it: corners are moved.
+        most = np.float32(1.0 / max(near, min(az, bz, cz)))
         for k in range(2, count):
-            _fill(
+            found |= _fill(
                 steps_x[0],
                 steps_y[0],
                 steps_x[k],
@@ -123,12 +128,14 @@ def visible(
                 along,
                 down,
                 corner,
+                most,
                 face,
                 hides,
                 view,
                 inverse,
                 seen,
             )
+    return found
 
 
 @compiled
@@ -177,16 +184,17 @@ def _fill(
     along: float,
     down: float,
     corner: float,
+    most: np.float32,
     face: int,
     hides: bool,
     view: View,
     inverse: Single,
     seen: Numbers,
-) -> None:
-    """Note a triangle wherever it is the nearest so far.
+) -> bool:
+    """Note a triangle wherever it is the nearest so far, and return whether it is anywhere.
 
     Its corners are in 1/256 of a pixel from the picture's upper left corner, clockwise as they are seen; its inverse
-    distance is `corner` there, and grows by `along` and `down` with each pixel.
+    distance is `corner` there, and grows by `along` and `down` with each pixel, but to no more than `most`.
     """
     half = _STEPS // 2
     first_x = max(0, (min(x0, x1, x2) + half - 1) >> _FRACTION_BITS)
@@ -194,7 +202,7 @@ def _fill(
     first_y = max(view.first_row, (min(y0, y1, y2) + half - 1) >> _FRACTION_BITS)
     last_y = min(view.end_row - 1, (max(y0, y1, y2) - half) >> _FRACTION_BITS)
     if first_x > last_x or first_y > last_y:
-        return
+        return False
     # Of each edge a number that is at least 0 inside, at the first pixel's middle, and how it grows.
     px, py = (first_x << _FRACTION_BITS) + half, (first_y << _FRACTION_BITS) + half
     ax, ay, bx, by, cx, cy = y0 - y1, x1 - x0, y1 - y2, x2 - x1, y2 - y0, x0 - x2
@@ -210,6 +218,7 @@ def _fill(
     # By itself in each row, so that a picture is the same whatever rows are drawn together.
     corner += along * (first_x + 0.5)
     number = np.int32(face)
+    noted = np.int32(0)
     if last < _NARROW_PIXELS:
         for y in range(first_y, last_y + 1):
             here_a, here_b, here_c = a, b, c
@@ -217,12 +226,13 @@ def _fill(
             row = (y - view.first_row) * view.width
             for x in range(first_x, last_x + 1):
                 if (here_a | here_b | here_c) >= 0:
-                    single = np.float32(at_pixel)
+                    single = min(np.float32(at_pixel), most)
                     before = inverse[row + x]
                     if single > before or (single == before and number > seen[row + x]):
                         if hides:
                             inverse[row + x] = single
                         seen[row + x] = number
+                        noted = np.int32(1)
                 here_a += ax
                 here_b += bx
                 here_c += cx
@@ -230,7 +240,7 @@ def _fill(
             a += ay
             b += by
             c += cy
-        return
+        return bool(noted > 0)
     part_a, part_b, part_c = 1.0 / max(1, abs(ax)), 1.0 / max(1, abs(bx)), 1.0 / max(1, abs(cx))
     for y in range(first_y, last_y + 1):
         low, high = _inside(a, ax, part_a, 0, last)
@@ -243,14 +253,19 @@ def _fill(
             # Numbers without a sign, which need no look at whether they count from the end: this loop becomes vectors.
             for pixel in range(np.uint64(row + low), np.uint64(row + high + 1)):
                 near = begin + step * np.float32(count)
+                near = near if near < most else most
                 count = np.int32(count + 1)
                 before = inverse[pixel]
                 nearer = (near > before) | ((near == before) & (number > seen[pixel]))
                 inverse[pixel] = near if nearer and hides else before
                 seen[pixel] = number if nearer else seen[pixel]
+            if not hides:  # asked for what is transparent alone
+                for pixel in range(np.uint64(row + low), np.uint64(row + high + 1)):
+                    noted += np.int32(seen[pixel] == number)
         a += ay
         b += by
         c += cy
+    return bool(noted > 0)
 
 
 @compiled
