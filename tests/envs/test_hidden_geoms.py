@@ -21,7 +21,7 @@ FAR_M = 50.0
 
 
 def cluttered(rng: np.random.Generator, panes: int) -> mujoco.MjModel:
-    """A wall with a gap, pillars, and panes of all kinds before, in and behind them."""
+    """A wall with a gap, a pillar, and panes of all kinds before, in and behind them."""
     geoms = [
         "<geom type='box' pos='-1.1 3 0' size='1 .1 3' rgba='.6 .5 .4 1' group='1'/>",
         "<geom type='box' pos='1.4 3 0' size='1 .1 3' rgba='.4 .5 .6 1' group='1'/>",
@@ -29,13 +29,9 @@ def cluttered(rng: np.random.Generator, panes: int) -> mujoco.MjModel:
     ]
     for _ in range(panes):
         kind = rng.choice(("box", "ellipsoid"))
-        numbers = [
-            " ".join(f"{x:.3f}" for x in rng.uniform(*bounds, 3)) for bounds in ((-2, 2), (0.01, 0.4), (-90, 90))
-        ]
+        size, euler = (" ".join(f"{x:.3f}" for x in rng.uniform(*bounds, 3)) for bounds in ((0.01, 0.4), (-90, 90)))
         pos = " ".join(f"{x:.3f}" for x in (rng.uniform(-3, 3), rng.uniform(-1, 7), rng.uniform(-2, 2)))
-        geoms.append(
-            f"<geom type='{kind}' pos='{pos}' size='{numbers[1]}' euler='{numbers[2]}' rgba='.9 .3 .3 .5' group='1'/>"
-        )
+        geoms.append(f"<geom type='{kind}' pos='{pos}' size='{size}' euler='{euler}' rgba='.9 .3 .3 .5' group='1'/>")
     return mujoco.MjModel.from_xml_string(
         f"<mujoco><visual><quality offsamples='0'/></visual><worldbody><light pos='0 0 3' dir='0 1 -1'/>"
         f"<camera name='seen' pos='0 0 0' xyaxes='1 0 0 0 0 1' fovy='70'/>{''.join(geoms)}</worldbody></mujoco>"
@@ -56,9 +52,8 @@ def is_seen(geom: int, shapes: Shapes, pose: Pose, view: View, scratch: Scratch)
     to_camera(geom, shapes, pose, scratch)
     seen = np.full(PIXELS * PIXELS, NOTHING, dtype=np.int32)
     first, end = shapes.first_face[geom], shapes.first_face[geom + 1]
-    found = visible(first, end, False, shapes.faces, scratch.corners, pose.lens, view, scratch.inverse, seen)
-    assert found == (seen != NOTHING).any()
-    return bool(found)
+    visible(first, end, False, shapes.faces, scratch.corners, pose.lens, view, scratch.inverse, seen)
+    return bool((seen != NOTHING).any())
 
 
 @pytest.mark.parametrize("seed", range(5))

@@ -22,7 +22,6 @@ from robocasa_lerobot.envs.rendering.software.rasterization import NOTHING, to_c
 from robocasa_lerobot.envs.rendering.software.shading import shade
 
 KEEP_NOTHING, KEEP, USE_KEPT = 0, 1, 2
-_HIDDEN = -1  # instead of a geom's number
 _LAYS = 2  # MuJoCo lays what is transparent over the picture twice, as pictures show
 
 
@@ -79,15 +78,14 @@ def draw(
         for pixel in range(pixels):
             over[pixel] = seen[pixel] if seen[pixel] != kept.seen[rows.start + pixel] else NOTHING
         shade(everything, over, shapes, pose, scratch, view, picture)
-    for lay in range(_LAYS):
-        for number, geom in enumerate(transparent):
-            if lay == 0:
-                if is_hidden(geom, shapes, pose, view, inverse):
-                    transparent[number] = _HIDDEN
-                    continue
-                to_camera(geom, shapes, pose, scratch)
-            if geom != _HIDDEN:
-                _lay_over(geom, shapes, pose, scratch, view, picture)
+    shown = np.empty(len(transparent), dtype=np.bool_)
+    for number, geom in enumerate(transparent):
+        shown[number] = not is_hidden(geom, shapes, pose, view, inverse)
+        if shown[number]:
+            to_camera(geom, shapes, pose, scratch)
+    for _ in range(_LAYS):
+        for geom in transparent[shown]:
+            _lay_over(geom, shapes, pose, scratch, view, picture)
 
 
 @compiled
@@ -186,6 +184,11 @@ def _lay_over(geom: int, shapes: Shapes, pose: Pose, scratch: Scratch, view: Vie
         for y in range(first_row - view.first_row, end_row - view.first_row):
             for pixel in range(np.uint64(y * width + first_column), np.uint64(y * width + end_column)):
                 scratch.over_seen[pixel] = NOTHING
-        if visible(face, face + 1, False, faces, corners, pose.lens, view, scratch.inverse, scratch.over_seen):
+        visible(face, face + 1, False, faces, corners, pose.lens, view, scratch.inverse, scratch.over_seen)
+        covered = np.int32(0)
+        for y in range(first_row - view.first_row, end_row - view.first_row):
+            for pixel in range(np.uint64(y * width + first_column), np.uint64(y * width + end_column)):
+                covered += np.int32(scratch.over_seen[pixel] != NOTHING)
+        if covered > 0:  # else something is before all of it
             window = (first_row, end_row, first_column, end_column)
             shade(window, scratch.over_seen, shapes, pose, scratch, view, picture)

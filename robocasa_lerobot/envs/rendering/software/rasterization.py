@@ -63,7 +63,7 @@ def visible(
     view: View,
     inverse: Single,
     seen: Numbers,
-) -> bool:
+) -> None:
     """Note for each pixel which of the triangles from `first` to `end` is seen there, and its inverse distance.
 
     Args:
@@ -76,15 +76,11 @@ def visible(
         view: rows that are drawn.
         inverse: of the distance from the camera's plane, 1/m, where something was drawn before, row after row.
         seen: number of the triangle, row after row; both are changed.
-
-    Returns:
-        Whether any of them is seen.
     """
     focal_x, focal_y, middle_x, middle_y, near = lens
     left, right = -middle_x / focal_x, (view.width - middle_x) / focal_x
     top, bottom = (middle_y - view.first_row) / focal_y, (middle_y - view.end_row) / focal_y
     cut, steps_x, steps_y = np.empty((4, 3)), np.empty(4, np.int64), np.empty(4, np.int64)
-    found = False
     for face in range(first, end):
         a, b, c = faces[face, 0], faces[face, 1], faces[face, 2]
         ax, ay, az = corners[a, 0], corners[a, 1], corners[a, 2]
@@ -118,7 +114,7 @@ def visible(
         # Of a triangle that is seen from its edge the middle of a pixel may lie far before it: corners are moved.
         most = np.float32(1.0 / max(near, min(az, bz, cz)))
         for k in range(2, count):
-            found |= _fill(
+            _fill(
                 steps_x[0],
                 steps_y[0],
                 steps_x[k],
@@ -135,7 +131,6 @@ def visible(
                 inverse,
                 seen,
             )
-    return found
 
 
 @compiled
@@ -190,8 +185,8 @@ def _fill(
     view: View,
     inverse: Single,
     seen: Numbers,
-) -> bool:
-    """Note a triangle wherever it is the nearest so far, and return whether it is anywhere.
+) -> None:
+    """Note a triangle wherever it is the nearest so far.
 
     Its corners are in 1/256 of a pixel from the picture's upper left corner, clockwise as they are seen; its inverse
     distance is `corner` there, and grows by `along` and `down` with each pixel, but to no more than `most`.
@@ -202,7 +197,7 @@ def _fill(
     first_y = max(view.first_row, (min(y0, y1, y2) + half - 1) >> _FRACTION_BITS)
     last_y = min(view.end_row - 1, (max(y0, y1, y2) - half) >> _FRACTION_BITS)
     if first_x > last_x or first_y > last_y:
-        return False
+        return
     # Of each edge a number that is at least 0 inside, at the first pixel's middle, and how it grows.
     px, py = (first_x << _FRACTION_BITS) + half, (first_y << _FRACTION_BITS) + half
     ax, ay, bx, by, cx, cy = y0 - y1, x1 - x0, y1 - y2, x2 - x1, y2 - y0, x0 - x2
@@ -218,7 +213,6 @@ def _fill(
     # By itself in each row, so that a picture is the same whatever rows are drawn together.
     corner += along * (first_x + 0.5)
     number = np.int32(face)
-    noted = np.int32(0)
     if last < _NARROW_PIXELS:
         for y in range(first_y, last_y + 1):
             here_a, here_b, here_c = a, b, c
@@ -232,7 +226,6 @@ def _fill(
                         if hides:
                             inverse[row + x] = single
                         seen[row + x] = number
-                        noted = np.int32(1)
                 here_a += ax
                 here_b += bx
                 here_c += cx
@@ -240,7 +233,7 @@ def _fill(
             a += ay
             b += by
             c += cy
-        return bool(noted > 0)
+        return
     part_a, part_b, part_c = 1.0 / max(1, abs(ax)), 1.0 / max(1, abs(bx)), 1.0 / max(1, abs(cx))
     for y in range(first_y, last_y + 1):
         low, high = _inside(a, ax, part_a, 0, last)
@@ -259,13 +252,9 @@ def _fill(
                 nearer = (near > before) | ((near == before) & (number > seen[pixel]))
                 inverse[pixel] = near if nearer and hides else before
                 seen[pixel] = number if nearer else seen[pixel]
-            if not hides:  # asked for what is transparent alone
-                for pixel in range(np.uint64(row + low), np.uint64(row + high + 1)):
-                    noted += np.int32(seen[pixel] == number)
         a += ay
         b += by
         c += cy
-    return bool(noted > 0)
 
 
 @compiled
