@@ -16,9 +16,6 @@ from robocasa_lerobot.demos.recorder import Recording
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.files import write_text
 
-# Half the control rate and small pictures: on a CPU, filming takes longer than the attempt.
-FILM_EVERY, FILM_SIZE = 2, 192
-
 
 def film_of(folder: Path, seed: int) -> Path:
     """The description (JSON) of the failure with a seed; its film has the same name with `.mp4`."""
@@ -59,13 +56,12 @@ def remove_others(folder: Path, failures: list[Failure]) -> None:
 
 
 def _film(path: Path, env: KitchenEnv, recording: Recording) -> None:
-    from robocasa_lerobot.envs.rendering import SceneRenderer
     from robocasa_lerobot.gl import ensure_drawing
-    from robocasa_lerobot.video import VideoWriter, side_by_side
+    from robocasa_lerobot.video import FILM_EVERY, FILM_SIZE, VideoWriter, side_by_side
 
     ensure_drawing()
     model, data = env.model, mujoco.MjData(env.model)
-    renderer = SceneRenderer(model, FILM_SIZE, FILM_SIZE)
+    renderer = env.renderer_of_size(FILM_SIZE, FILM_SIZE)
     try:
         with VideoWriter(path, contract.CONTROL_HZ // FILM_EVERY) as film:
             for state in recording.states[::FILM_EVERY]:

@@ -18,6 +18,7 @@ import pytest
 from evaluation_env import SlideEnv
 from full_disk import full_after
 
+from robocasa_lerobot import contract
 from robocasa_lerobot.errors import UserError
 from robocasa_lerobot.evaluation.actors.reference_policies import RandomPolicy, ZeroPolicy
 from robocasa_lerobot.evaluation.config.evaluation import EvaluationConfig
@@ -27,10 +28,10 @@ from robocasa_lerobot.evaluation.records import results, trials_file
 from robocasa_lerobot.evaluation.records.eval_info import write_eval_info
 from robocasa_lerobot.evaluation.records.results import TrialRecord
 from robocasa_lerobot.evaluation.run import engine
-from robocasa_lerobot.evaluation.run.film import FILM_EVERY, FILM_FPS, Film, FilmError
+from robocasa_lerobot.evaluation.run.film import Film, FilmError
 from robocasa_lerobot.evaluation.run.rollout import RolloutError, run_trial
 from robocasa_lerobot.evaluation.run.worker_pool import WorkerPool
-from robocasa_lerobot.video import frames_and_rate
+from robocasa_lerobot.video import FILM_EVERY, frames_and_rate
 
 ROOT = Path(__file__).parents[2]
 FACTORY = "evaluation_env:SlideEnv"
@@ -71,7 +72,7 @@ def test_outcomes_do_not_depend_on_workers_order_or_films(tmp_path: Path) -> Non
         assert {r.trial for r in group if r.video is not None} >= {0, 1}
     for record in filmed:
         frames, rate = frames_and_rate(tmp_path / "two" / str(record.video))
-        assert (frames, rate) == (1 + record.steps // FILM_EVERY, FILM_FPS)
+        assert (frames, rate) == (1 + record.steps // FILM_EVERY, contract.CONTROL_HZ / FILM_EVERY)
     assert not list((tmp_path / "two").rglob("*.partial"))
 
 

@@ -10,9 +10,8 @@ from robocasa_lerobot.evaluation.config.evaluation import EvaluationConfig
 from robocasa_lerobot.evaluation.config.loader import load_config
 from robocasa_lerobot.evaluation.records.results import TrialRecord
 from robocasa_lerobot.evaluation.run import engine
-from robocasa_lerobot.evaluation.run.film import FILM_SIZE
 from robocasa_lerobot.gl import ensure_gl
-from robocasa_lerobot.video import read_frames
+from robocasa_lerobot.video import FILM_SIZE, read_frames
 
 
 def evaluate(out: Path, *changes: str) -> list[TrialRecord]:

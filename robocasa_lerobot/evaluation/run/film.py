@@ -11,12 +11,7 @@ from numpy.typing import NDArray
 
 from robocasa_lerobot import contract
 from robocasa_lerobot.errors import LackingMachineError, UserError
-from robocasa_lerobot.video import VideoWriter, side_by_side
-
-# Half the control rate and 192 pixels: on a CPU, rendering every step at full size would take longer than the trial.
-FILM_EVERY = 2
-FILM_FPS = contract.CONTROL_HZ // FILM_EVERY
-FILM_SIZE = 192
+from robocasa_lerobot.video import FILM_EVERY, FILM_SIZE, VideoWriter, side_by_side
 
 
 class NoPicturesError(UserError):
