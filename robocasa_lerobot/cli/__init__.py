@@ -14,6 +14,7 @@ from types import ModuleType
 
 from robocasa_lerobot import __version__
 from robocasa_lerobot.errors import UserError, suggest
+from robocasa_lerobot.jobs.importing import rare_collections
 from robocasa_lerobot.jobs.workers import check_workers
 
 # Errors of a path that the user gave.
@@ -128,7 +129,8 @@ def main(argv: Sequence[str] | None = None) -> int:
         if unknown:
             args.settings = unknown
         check_workers(getattr(args, "workers", None))
-        return int(args.run(args) or 0)
+        with rare_collections():
+            return int(args.run(args) or 0)
     except UserError as error:
         print(f"robocasa-lerobot {name}: {error}", file=sys.stderr)
         return 2

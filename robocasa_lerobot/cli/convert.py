@@ -7,6 +7,8 @@ from pathlib import Path
 
 from robocasa_lerobot.cli.options import add_source_options, source_settings
 from robocasa_lerobot.jobs.executors import add_options, execution_of
+from robocasa_lerobot.jobs.importing import start_importing
+from robocasa_lerobot.jobs.workers import cores_here
 
 EXAMPLE = "robocasa-lerobot convert demos/*.hdf5 --out data/demos"
 
@@ -60,8 +62,10 @@ def configure(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Convert, and say what was written, rejected and assumed."""
     execution = execution_of(args)
-    from robocasa_lerobot.convert.settings import ConversionSettings
+    from robocasa_lerobot.convert.settings import CORES_PER_WORKER, ConversionSettings
 
+    if execution.kind == "local" and not args.merge and (args.workers or cores_here() // CORES_PER_WORKER) > 1:
+        start_importing("robocasa_lerobot.convert.shard")
     settings = ConversionSettings(
         asset_roots=tuple(args.asset_root),
         **source_settings(args),

@@ -39,7 +39,15 @@ from robocasa_lerobot.convert.record_files import (
     kept_assets,
 )
 from robocasa_lerobot.convert.scenes.prefetch import scenes_ahead
-from robocasa_lerobot.convert.settings import ConversionSettings, Plan, Shard, SourceRecord, make_plan
+from robocasa_lerobot.convert.settings import (
+    CORES_PER_WORKER,
+    MIN_FRAMES_PER_WORKER,
+    ConversionSettings,
+    Plan,
+    Shard,
+    SourceRecord,
+    make_plan,
+)
 from robocasa_lerobot.convert.shard import convert_shard
 from robocasa_lerobot.convert.writing.card import write_dataset_card
 from robocasa_lerobot.convert.writing.encoder import CODECS, SAMPLED_FRAMES, SAMPLED_PIXELS, Histogram
@@ -66,12 +74,6 @@ from robocasa_lerobot.jsonl import json_text, read_jsonl, write_jsonl
 from robocasa_lerobot.quiet import quiet_libraries
 
 # Our part of a dataset's folder; LeRobot reads nothing in it.
-# Starting a worker imports LeRobot and MuJoCo (about 6 s of CPU time); below this much work that does not pay: 3,150
-# frames took as long with two workers as with one.
-_MIN_FRAMES_PER_WORKER = 2000
-# It renders in one process and encodes in others: on two cores a second one makes conversion from states 11 % slower,
-# and that of stored pictures 3 % faster (`benchmarks/results/convert_speed.json`).
-_CORES_PER_WORKER = 2
 _MERGED = "merged"  # in the working folder
 
 
@@ -134,7 +136,7 @@ def _convert(
         return _recorded_result(plan, out)
     with held_folder(partial), failures_explained(out, partial):
         go_on(partial / _MERGED)
-        processes = num_workers(workers, len(plan.shards), plan.num_frames, _MIN_FRAMES_PER_WORKER, _CORES_PER_WORKER)
+        processes = num_workers(workers, len(plan.shards), plan.num_frames, MIN_FRAMES_PER_WORKER, CORES_PER_WORKER)
         run_pieces(
             _ShardTask(plan, str(partial), in_order=processes == 1 and execution.kind == "local"),
             len(plan.shards),

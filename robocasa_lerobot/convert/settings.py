@@ -28,7 +28,7 @@ from robocasa_lerobot.convert.writing.stages import stage_features
 from robocasa_lerobot.errors import UnknownNameError, UserError
 
 # Raised when the written bytes change for the same input, so that shards of an older version are not taken up again.
-FORMAT_VERSION = 4
+FORMAT_VERSION = 5
 _STAGES_VERSION = 1  # the same for datasets with stages
 # A shard is what a kill can lose and what a worker takes at a time: some seconds of work, but never so many shards
 # that joining them costs more than making them.
@@ -36,6 +36,12 @@ SHARD_FRAMES = 1000
 _MIN_SHARD_FRAMES = 125
 _WANTED_SHARDS = 4  # of little work, so that several processes have something to do
 MAX_SHARDS = 64
+# Starting a worker imports LeRobot and MuJoCo (about 6 s of CPU time); below this much work that does not pay: 3,150
+# frames took as long with two workers as with one.
+MIN_FRAMES_PER_WORKER = 2000
+# A worker draws in one process and encodes in another: on two cores a second one made conversion from states 11 %
+# slower, and that of stored pictures 3 % faster (`benchmarks/results/convert_speed.json`).
+CORES_PER_WORKER = 2
 _MAX_FAILURES = 10  # demos without a known robot, camera or mesh, after which no other is tried
 
 

@@ -31,7 +31,7 @@ from robocasa_lerobot.convert.writing.encoder import CODECS
 from robocasa_lerobot.errors import UnknownNameError, UserError
 
 # Raised when the written bytes change for the same input.
-RENDER_VERSION = 1
+RENDER_VERSION = 2
 SOURCE_FORMAT = "LeRobotDataset v3.0, rendered again"
 _MAX_MODEL_BYTES = 256 * 2**20
 _RECORD = "meta/robocasa/conversion.json"
