@@ -23,6 +23,7 @@ import numpy as np
 import torch
 from lerobot.configs import RGBEncoderConfig
 from lerobot.datasets.video_utils import encode_video_frames
+from lerobot.utils.collate import lerobot_collate_fn
 from numpy.typing import NDArray
 from peers import sim_loop
 
@@ -242,7 +243,11 @@ def decode(root: str, batches: int, seed: int) -> dict[str, Any]:
     sampler = torch.utils.data.RandomSampler(
         dataset, replacement=True, num_samples=(batches + 1) * BATCH, generator=torch.Generator().manual_seed(seed)
     )
-    loader = iter(torch.utils.data.DataLoader(dataset, batch_size=BATCH, sampler=sampler, num_workers=0))
+    loader = iter(
+        torch.utils.data.DataLoader(
+            dataset, batch_size=BATCH, sampler=sampler, num_workers=0, collate_fn=lerobot_collate_fn
+        )
+    )
     first = next(loader)  # opens the files
     cameras = [key for key in first if key.startswith(contract.IMAGE_PREFIX)]
     clock = Clock()
