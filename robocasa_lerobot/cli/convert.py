@@ -62,8 +62,10 @@ def configure(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Convert, and say what was written, rejected and assumed."""
     execution = execution_of(args)
+    from robocasa_lerobot.convert.reading.inputs import check_demo_files
     from robocasa_lerobot.convert.settings import CORES_PER_WORKER, ConversionSettings
 
+    check_demo_files(args.files)
     if execution.kind == "local" and not args.merge and (args.workers or cores_here() // CORES_PER_WORKER) > 1:
         start_importing("robocasa_lerobot.convert.shard")
     settings = ConversionSettings(

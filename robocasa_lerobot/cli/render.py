@@ -49,9 +49,11 @@ def configure(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Render, and say what was written."""
     execution = execution_of(args)
+    from robocasa_lerobot.convert.reading.inputs import check_dataset
     from robocasa_lerobot.convert.rerender.camera_configs import camera_set, read_camera_configs
     from robocasa_lerobot.convert.rerender.plan import RenderSettings
 
+    check_dataset(args.dataset)
     configs = {}
     if args.camera_set is not None:
         configs = camera_set(args.camera_set)

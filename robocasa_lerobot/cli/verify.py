@@ -39,6 +39,9 @@ def configure(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Verify; exit status 1 where anything differs."""
+    from robocasa_lerobot.convert.reading.inputs import check_converted
+
+    check_converted(args.dataset)
     from robocasa_lerobot.convert.verify import verify
 
     pictures, least_db = args.pictures_per_episode, args.min_psnr

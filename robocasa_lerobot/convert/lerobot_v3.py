@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from robocasa_lerobot import contract
 from robocasa_lerobot.convert.mapping.robot_mapping import EXTRA_PREFIX
+from robocasa_lerobot.convert.reading.inputs import INFO_FILE, check_dataset
 from robocasa_lerobot.convert.record_files import EPISODES_FILE, EXTRAS, episode_folder, kept_assets
 from robocasa_lerobot.convert.writing.statistics import column_of
 from robocasa_lerobot.errors import UserError
@@ -51,9 +52,8 @@ class ExportedDataset:
 
     def __init__(self, root: Path) -> None:
         self.root = root
-        file = root / "meta" / "info.json"
-        if not file.is_file():
-            raise UserError(f"{root} is no LeRobot dataset: meta/info.json is not there.")
+        check_dataset(root)
+        file = root / INFO_FILE
         try:
             self.info: dict[str, Any] = json.loads(file.read_text(encoding="utf-8"))
             version = str(self.info["codebase_version"])

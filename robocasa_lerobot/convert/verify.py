@@ -13,6 +13,7 @@ from lerobot.datasets.lerobot_dataset import LeRobotDataset
 from robocasa_lerobot.convert.lerobot_v2.dataset import V2Dataset, is_dataset_folder
 from robocasa_lerobot.convert.lerobot_v2.plan import SOURCE_FORMAT, source_record
 from robocasa_lerobot.convert.lerobot_v2.verify import V2Verification
+from robocasa_lerobot.convert.reading.inputs import check_converted
 from robocasa_lerobot.convert.record_files import CONVERSION_FILE, EPISODES_FILE, META_FOLDER
 from robocasa_lerobot.convert.report import Report
 from robocasa_lerobot.convert.rerender.plan import SOURCE_FORMAT as RERENDERED
@@ -55,9 +56,7 @@ def verify(
             than one process was asked for.
     """
     check_workers(workers)
-    if not (root / META_FOLDER / CONVERSION_FILE).is_file():
-        what = "a dataset without our records" if (root / "meta" / "info.json").is_file() else "no dataset"
-        raise UserError(f"{root} is {what}: {META_FOLDER}/{CONVERSION_FILE}, which `convert` writes, is not there.")
+    check_converted(root)
     record = json.loads((root / META_FOLDER / CONVERSION_FILE).read_text(encoding="utf-8"))
     if record.get("source_format") == RERENDERED:
         dataset = _opened(root)

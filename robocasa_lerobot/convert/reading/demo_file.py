@@ -40,8 +40,8 @@ from robocasa_lerobot.convert.reading.hdf5 import (
     recorded_attributes,
     shape_and_type,
 )
+from robocasa_lerobot.convert.reading.inputs import check_demo_file
 from robocasa_lerobot.convert.reading.layout import DEFAULT_EPISODES, ROBOMIMIC, Layout
-from robocasa_lerobot.errors import suggest
 
 __all__ = ["IMAGE_SUFFIX", "MAX_COLUMN_VALUES", "Demo", "DemoFile", "RejectedEpisodeError", "SourceError"]
 
@@ -66,10 +66,7 @@ class DemoFile:
 
     def __init__(self, path: Path, layout: Layout = ROBOMIMIC) -> None:
         self.path, self.layout = path, layout
-        if not path.is_file():
-            siblings = [p.name for p in path.parent.glob("*")] if path.parent.is_dir() else []
-            kind = "is a folder" if path.is_dir() else "does not exist"
-            raise SourceError(f"{path} {kind}; an HDF5 file is needed. {suggest(path.name, siblings)}")
+        check_demo_file(path)
         try:
             self._file = h5py.File(path, "r")
         except OSError as error:

@@ -1,0 +1,55 @@
+"""Whether what a command was given is there: asked before LeRobot is imported, which takes seconds."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from robocasa_lerobot.convert.reading.hdf5 import SourceError
+from robocasa_lerobot.convert.record_files import CONVERSION_FILE, META_FOLDER
+from robocasa_lerobot.errors import UserError, suggest
+
+INFO_FILE = "meta/info.json"  # of LeRobot datasets of all versions
+
+
+def check_demo_file(path: Path) -> None:
+    """Check that there is a file.
+
+    Raises:
+        SourceError: there is none; it names the most alike.
+    """
+    if not path.is_file():
+        siblings = [p.name for p in path.parent.glob("*")] if path.parent.is_dir() else []
+        kind = "is a folder" if path.is_dir() else "does not exist"
+        raise SourceError(f"{path} {kind}; an HDF5 file is needed. {suggest(path.name, siblings)}")
+
+
+def check_demo_files(paths: list[Path]) -> None:
+    """Check that each is a file or the folder of a dataset.
+
+    Raises:
+        SourceError: as `check_demo_file`.
+    """
+    for path in paths:
+        if not (path / INFO_FILE).is_file():
+            check_demo_file(path)
+
+
+def check_dataset(root: Path) -> None:
+    """Check that a folder has what every LeRobot dataset has.
+
+    Raises:
+        UserError: it has not.
+    """
+    if not (root / INFO_FILE).is_file():
+        raise UserError(f"{root} is no LeRobot dataset: {INFO_FILE} is not there.")
+
+
+def check_converted(root: Path) -> None:
+    """Check that a folder is a dataset that `convert` has written.
+
+    Raises:
+        UserError: it is none.
+    """
+    if not (root / META_FOLDER / CONVERSION_FILE).is_file():
+        what = "a dataset without our records" if (root / INFO_FILE).is_file() else "no dataset"
+        raise UserError(f"{root} is {what}: {META_FOLDER}/{CONVERSION_FILE}, which `convert` writes, is not there.")
