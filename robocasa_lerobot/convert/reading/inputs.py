@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 from robocasa_lerobot.convert.reading.hdf5 import SourceError
@@ -23,7 +24,7 @@ def check_demo_file(path: Path) -> None:
         raise SourceError(f"{path} {kind}; an HDF5 file is needed. {suggest(path.name, siblings)}")
 
 
-def check_demo_files(paths: list[Path]) -> None:
+def check_demo_files(paths: Sequence[Path]) -> None:
     """Check that each is a file or the folder of a dataset.
 
     Raises:
