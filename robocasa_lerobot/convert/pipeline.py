@@ -73,7 +73,6 @@ from robocasa_lerobot.jobs.workers import check_workers, num_workers
 from robocasa_lerobot.jsonl import json_text, read_jsonl, write_jsonl
 from robocasa_lerobot.quiet import quiet_libraries
 
-# Our part of a dataset's folder; LeRobot reads nothing in it.
 _MERGED = "merged"  # in the working folder
 
 

@@ -10,10 +10,10 @@ from typing import Any
 
 from lerobot.datasets.lerobot_dataset import LeRobotDataset
 
-from robocasa_lerobot.convert.lerobot_v2.dataset import V2Dataset, is_dataset_folder
+from robocasa_lerobot.convert.lerobot_v2.dataset import V2Dataset
 from robocasa_lerobot.convert.lerobot_v2.plan import SOURCE_FORMAT, source_record
 from robocasa_lerobot.convert.lerobot_v2.verify import V2Verification
-from robocasa_lerobot.convert.reading.inputs import check_converted
+from robocasa_lerobot.convert.reading.inputs import check_converted, is_dataset
 from robocasa_lerobot.convert.record_files import CONVERSION_FILE, EPISODES_FILE, META_FOLDER
 from robocasa_lerobot.convert.report import Report
 from robocasa_lerobot.convert.rerender.plan import SOURCE_FORMAT as RERENDERED
@@ -139,7 +139,7 @@ def recorded_settings(record: dict[str, Any], asset_roots: Sequence[str]) -> Con
 
 
 def _sha256(path: Path) -> str:
-    return source_record(V2Dataset(path)).sha256 if is_dataset_folder(path) else file_sha256(path)
+    return source_record(V2Dataset(path)).sha256 if is_dataset(path) else file_sha256(path)
 
 
 def _find_sources(root: Path, recorded: list[dict[str, Any]], given: Sequence[Path]) -> Iterator[Source]:

@@ -9,17 +9,13 @@ from typing import Any
 
 import pyarrow.parquet as pq
 
+from robocasa_lerobot.convert.reading.inputs import INFO_FILE
 from robocasa_lerobot.errors import UserError
 from robocasa_lerobot.jsonl import read_jsonl
 
 # Where `convert` keeps its own records (its pipeline imports LeRobot, which takes seconds).
 _RECORDS = "meta/robocasa"
 _SHOWN = 10
-
-
-def is_dataset(path: Path) -> bool:
-    """Whether a path is a folder with a LeRobot dataset."""
-    return (path / "meta" / "info.json").is_file()
 
 
 def inspect_dataset(root: Path) -> dict[str, Any]:
@@ -29,7 +25,7 @@ def inspect_dataset(root: Path) -> dict[str, Any]:
         UserError: its metadata cannot be read.
     """
     try:
-        info = json.loads((root / "meta" / "info.json").read_text(encoding="utf-8"))
+        info = json.loads((root / INFO_FILE).read_text(encoding="utf-8"))
         features = dict(info["features"])
         report = {
             "dataset": str(root),

@@ -26,9 +26,10 @@ def configure(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Print what each file or dataset holds; write the draft where asked."""
-    from robocasa_lerobot.convert.inspect.dataset import describe_dataset, inspect_dataset, is_dataset
+    from robocasa_lerobot.convert.inspect.dataset import describe_dataset, inspect_dataset
     from robocasa_lerobot.convert.inspect.draft import draft_mapping
     from robocasa_lerobot.convert.inspect.hdf5 import describe, inspect_hdf5
+    from robocasa_lerobot.convert.reading.inputs import is_dataset
 
     if args.draft_mapping is not None:
         if len(args.paths) > 1 or is_dataset(args.paths[0]):

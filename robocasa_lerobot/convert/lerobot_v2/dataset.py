@@ -16,9 +16,9 @@ from typing import Any
 
 from robocasa_lerobot import contract
 from robocasa_lerobot.convert.reading.demo_file import SourceError
+from robocasa_lerobot.convert.reading.inputs import INFO_FILE
 from robocasa_lerobot.errors import suggest
 
-INFO = "meta/info.json"
 VERSIONS = ("v2.0", "v2.1")
 EXTRAS = "extras"
 # The only fields that a path template may hold, with at most two digits of width: a template is input like any other.
@@ -42,11 +42,6 @@ class EpisodeLine:
         return f"episode_{self.index:06d}"
 
 
-def is_dataset_folder(path: Path) -> bool:
-    """Whether this is the folder of a LeRobot dataset of any version."""
-    return (path / INFO).is_file()
-
-
 class V2Dataset:
     """The `meta` files of a dataset; nothing else is read.
 
@@ -56,7 +51,7 @@ class V2Dataset:
 
     def __init__(self, root: Path) -> None:
         self.root = root
-        self.info = _json_object(root / INFO)
+        self.info = _json_object(root / INFO_FILE)
         self.version = str(self.info.get("codebase_version"))
         if self.version not in VERSIONS:
             remedy = "it needs no conversion" if self.version.startswith("v3") else "bring it to v2.1 with LeRobot 0.3"
@@ -66,7 +61,7 @@ class V2Dataset:
             )
         features = self.info.get("features")
         if not isinstance(features, dict) or not all(_is_feature(feature) for feature in features.values()):
-            raise SourceError(f"{root / INFO} has no usable 'features' (name -> dtype and shape).")
+            raise SourceError(f"{root / INFO_FILE} has no usable 'features' (name -> dtype and shape).")
         self.features: dict[str, dict[str, Any]] = features
         self.tasks = self._tasks()
         self.episodes = self._episodes()
@@ -80,7 +75,7 @@ class V2Dataset:
         """
         fps = self.info.get("fps")
         if not isinstance(fps, int | float) or isinstance(fps, bool) or fps <= 0 or round(fps) != fps:
-            raise SourceError(f"{self.root / INFO} has fps {fps!r}; a positive whole number is needed.")
+            raise SourceError(f"{self.root / INFO_FILE} has fps {fps!r}; a positive whole number is needed.")
         return int(fps)
 
     @property
@@ -181,7 +176,7 @@ class V2Dataset:
         plain = _FIELD.sub("", template) if isinstance(template, str) else "{"
         if "{" in plain or "}" in plain or PurePosixPath(plain).is_absolute() or ".." in PurePosixPath(plain).parts:
             raise SourceError(
-                f"{self.root / INFO}: {template_key} {template!r} is no path inside the dataset made of "
+                f"{self.root / INFO_FILE}: {template_key} {template!r} is no path inside the dataset made of "
                 "{episode_chunk}, {episode_index} and {video_key}."
             )
         assert isinstance(template, str)
@@ -189,7 +184,7 @@ class V2Dataset:
         chunk = episode // size if isinstance(size, int) and size > 0 else 0
         relative = template.format(episode_chunk=chunk, episode_index=episode, video_key=video_key)
         if ".." in PurePosixPath(relative).parts:
-            raise SourceError(f"{self.root / INFO}: {template_key} leads out of the dataset with {video_key!r}.")
+            raise SourceError(f"{self.root / INFO_FILE}: {template_key} leads out of the dataset with {video_key!r}.")
         return self.root / relative
 
     def _tasks(self) -> dict[int, str]:

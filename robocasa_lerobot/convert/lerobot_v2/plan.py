@@ -20,11 +20,11 @@ from robocasa_lerobot.convert.lerobot_v2.dataset import (
     EpisodeLine,
     V2Dataset,
     camera_of,
-    is_dataset_folder,
 )
 from robocasa_lerobot.convert.lerobot_v2.episode import Column, V2Episode, given_instruction
 from robocasa_lerobot.convert.mapping.robot_mapping import RobotMapping
 from robocasa_lerobot.convert.reading.demo_file import RejectedEpisodeError, SourceError
+from robocasa_lerobot.convert.reading.inputs import is_dataset
 from robocasa_lerobot.convert.reading.selection import select
 from robocasa_lerobot.convert.settings import (
     MAX_SHARDS,
@@ -84,7 +84,7 @@ def takes(files: Sequence[Path]) -> bool:
     Raises:
         UserError: some are and some are not.
     """
-    folders = [file for file in files if file.is_dir() and is_dataset_folder(file)]
+    folders = [file for file in files if is_dataset(file)]
     if folders and len(folders) != len(files):
         other = next(file for file in files if file not in folders)
         raise UserError(

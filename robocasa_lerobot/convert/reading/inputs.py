@@ -12,6 +12,11 @@ from robocasa_lerobot.errors import UserError, suggest
 INFO_FILE = "meta/info.json"  # of LeRobot datasets of all versions
 
 
+def is_dataset(path: Path) -> bool:
+    """Whether this is the folder of a LeRobot dataset of any version."""
+    return (path / INFO_FILE).is_file()
+
+
 def check_demo_file(path: Path) -> None:
     """Check that there is a file.
 
@@ -31,7 +36,7 @@ def check_demo_files(paths: Sequence[Path]) -> None:
         SourceError: as `check_demo_file`.
     """
     for path in paths:
-        if not (path / INFO_FILE).is_file():
+        if not is_dataset(path):
             check_demo_file(path)
 
 
@@ -41,7 +46,7 @@ def check_dataset(root: Path) -> None:
     Raises:
         UserError: it has not.
     """
-    if not (root / INFO_FILE).is_file():
+    if not is_dataset(root):
         raise UserError(f"{root} is no LeRobot dataset: {INFO_FILE} is not there.")
 
 
@@ -52,5 +57,5 @@ def check_converted(root: Path) -> None:
         UserError: it is none.
     """
     if not (root / META_FOLDER / CONVERSION_FILE).is_file():
-        what = "a dataset without our records" if (root / INFO_FILE).is_file() else "no dataset"
+        what = "a dataset without our records" if is_dataset(root) else "no dataset"
         raise UserError(f"{root} is {what}: {META_FOLDER}/{CONVERSION_FILE}, which `convert` writes, is not there.")

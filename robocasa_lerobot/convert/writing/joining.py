@@ -22,13 +22,13 @@ from lerobot.datasets.io_utils import write_tasks
 from numpy.typing import NDArray
 
 from robocasa_lerobot import contract
+from robocasa_lerobot.convert.reading.inputs import INFO_FILE
 from robocasa_lerobot.convert.writing.files import VIDEO_FILE_MB
 from robocasa_lerobot.convert.writing.stages import SubtaskTable, read_subtasks
 from robocasa_lerobot.convert.writing.statistics import column_of, vector_statistics
 from robocasa_lerobot.convert.writing.video import VideoFiles, probe
 
 DATA_FILE_MB = 100  # LeRobot's default
-_INFO = "meta/info.json"
 _SHIFTED = ("min", "max", "mean", "q01", "q10", "q50", "q90", "q99")  # statistics that move with their values
 
 
@@ -37,7 +37,7 @@ def join_datasets(parts: Sequence[Path], target: Path) -> None:
 
     The parts have equal features, rates and robots. `meta/stats.json` is left to the caller.
     """
-    infos = [json.loads((part / _INFO).read_text(encoding="utf-8")) for part in parts]
+    infos = [json.loads((part / INFO_FILE).read_text(encoding="utf-8")) for part in parts]
     first = infos[0]
     for info in infos[1:]:
         for key in ("fps", "robot_type"):
@@ -103,7 +103,7 @@ def join_datasets(parts: Sequence[Path], target: Path) -> None:
         "data_files_size_in_mb": DATA_FILE_MB,
         "splits": {"train": f"0:{num_episodes}"},
     }
-    (target / _INFO).write_text(json.dumps(info, indent=4, ensure_ascii=False), encoding="utf-8")
+    (target / INFO_FILE).write_text(json.dumps(info, indent=4, ensure_ascii=False), encoding="utf-8")
 
 
 def copy_tree(source: Path, target: Path) -> None:
