@@ -28,6 +28,7 @@ class Subcommand:
 
     Its module has `EXAMPLE: str`, `configure(parser: argparse.ArgumentParser) -> None` and
     `run(args: argparse.Namespace) -> int`, and imports anything heavy (torch, mujoco, lerobot) inside `run`.
+    `args.own_process` tells it whether the process is the command's alone, and not a test's or a notebook's.
     With `parser.set_defaults(takes_settings=True, settings=[])` arguments that the parser does not know come in
     `args.settings`: a command with a typed configuration answers them better than argparse would.
     """
@@ -128,6 +129,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     try:
         if unknown:
             args.settings = unknown
+        args.own_process = argv is None
         check_workers(getattr(args, "workers", None))
         with rare_collections():
             return int(args.run(args) or 0)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from robocasa_lerobot.cli.options import add_source_options, source_settings
+from robocasa_lerobot.cli.options import add_source_options, import_lerobot_leanly, source_settings
 from robocasa_lerobot.jobs.executors import add_options, execution_of
 from robocasa_lerobot.jobs.importing import start_importing
 from robocasa_lerobot.jobs.workers import cores_here
@@ -64,10 +64,11 @@ def run(args: argparse.Namespace) -> int:
     execution = execution_of(args)
     from robocasa_lerobot.convert.reading.inputs import check_demo_files
     from robocasa_lerobot.convert.settings import CORES_PER_WORKER, ConversionSettings
+    from robocasa_lerobot.convert.worker_imports import SHARD_IMPORTS
 
     check_demo_files(args.files)
     if execution.kind == "local" and not args.merge and (args.workers or cores_here() // CORES_PER_WORKER) > 1:
-        start_importing("robocasa_lerobot.convert.shard")
+        start_importing(SHARD_IMPORTS)
     settings = ConversionSettings(
         asset_roots=tuple(args.asset_root),
         **source_settings(args),
@@ -76,6 +77,7 @@ def run(args: argparse.Namespace) -> int:
         reencode=args.reencode,
         max_gop=args.max_gop,
     )
+    import_lerobot_leanly(args)
     from robocasa_lerobot.convert.pipeline import convert, merge, submit
 
     if args.merge:

@@ -107,7 +107,8 @@ def _begin(config: EvaluationConfig) -> None:
 
     if config.env.is_kitchen:
         ensure_drawing()  # inherited by the workers
-    start_importing(any(Path(path).is_dir() for path in config.policy.path), config.policy.threads)
+    folders = [folder for path in config.policy.path if (folder := Path(path)).is_dir()]
+    start_importing(folders, config.policy.threads)
 
 
 def _run_elsewhere(config: EvaluationConfig, args: argparse.Namespace) -> int:

@@ -6,6 +6,7 @@ import argparse
 import json
 from pathlib import Path
 
+from robocasa_lerobot.cli.options import import_lerobot_leanly
 from robocasa_lerobot.jobs.executors import add_options, execution_of
 
 EXAMPLE = "robocasa-lerobot render data/demos --out data/demos_cotraining --camera-set cotraining"
@@ -67,6 +68,7 @@ def run(args: argparse.Namespace) -> int:
         cam_configs=json.dumps(configs, sort_keys=True),
         asset_roots=tuple(args.asset_root),
     )
+    import_lerobot_leanly(args)
     from robocasa_lerobot.convert.rerender.work import render_dataset
 
     result = render_dataset(args.dataset, args.out, settings, args.workers, args.overwrite, execution)

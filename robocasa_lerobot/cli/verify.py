@@ -8,6 +8,8 @@ import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from robocasa_lerobot.cli.options import import_lerobot_leanly
+
 if TYPE_CHECKING:
     from robocasa_lerobot.convert.verify import Report
 
@@ -42,6 +44,7 @@ def run(args: argparse.Namespace) -> int:
     from robocasa_lerobot.convert.reading.inputs import check_converted
 
     check_converted(args.dataset)
+    import_lerobot_leanly(args)
     from robocasa_lerobot.convert.verify import verify
 
     pictures, least_db = args.pictures_per_episode, args.min_psnr

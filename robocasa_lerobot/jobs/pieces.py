@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
 from robocasa_lerobot.errors import UserError
@@ -26,7 +26,7 @@ def run_pieces(
     num_frames: int,
     what: str,
     initializer: Callable[[], None],
-    preload: str,
+    preload: Sequence[str],
 ) -> None:
     """Run the pieces that are not complete, with a bar over frames, and wait for them.
 
@@ -39,7 +39,7 @@ def run_pieces(
         num_frames: in all pieces.
         what: title of the bar.
         initializer: called in each process.
-        preload: module with slow imports.
+        preload: modules with slow imports.
     """
     assert execution.kind != "slurm", "jobs are submitted, not waited for"
     initializer()
@@ -54,7 +54,7 @@ def run_pieces(
         workers=workers,
         logging_dir=str(folder),
         initializer=initializer,
-        preload=[preload],
+        preload=preload,
     )
     if executor.get_incomplete_ranks():
         with _progress_bar(pieces, partial, num_frames, what):

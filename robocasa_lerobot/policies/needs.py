@@ -1,12 +1,14 @@
-"""What LeRobot's own policies need beyond this package's installation, for errors that say so."""
+"""What policies need: LeRobot's beyond this installation, for errors that say so; ours of LeRobot's extras."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
+from typing import Any
 
 from robocasa_lerobot.errors import UserError
+from robocasa_lerobot.jobs.importing import POLICY_PACKAGES
 
 
 @dataclass(frozen=True)
@@ -54,6 +56,21 @@ NEEDS: dict[str, Need] = {
         "set base_model_path to a folder that holds them, or allow access to the hub",
     ),
 }
+# What LeRobot imports where it is installed; ours use diffusers' samplers, but LeRobot's imports of it are others'.
+OTHERS_PACKAGES = (*POLICY_PACKAGES, "datasets", "scipy")
+
+
+def needs_no_others(config: Mapping[str, Any]) -> bool:
+    """Whether a policy with this config.json computes its actions with a LeRobot that lacks `OTHERS_PACKAGES`.
+
+    Ours with a text encoder of its own does; CLIP and language models come with transformers, and adapters of LoRA with
+    peft.
+    """
+    return (
+        config.get("type") == "diffusion_transformer"
+        and config.get("text_encoder") == "token"
+        and not config.get("use_peft")
+    )
 
 
 @contextmanager

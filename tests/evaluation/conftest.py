@@ -10,7 +10,7 @@ from ray_support import ray
 from slurm_support import slurm
 from tiny_checkpoint import checkpoint
 
-from robocasa_lerobot.evaluation.run.processes import POLICY_MODULES
+from robocasa_lerobot.evaluation.imports.policy_imports import POLICY_MODULES
 
 __all__ = ["checkpoint", "ray", "slurm"]
 

@@ -31,6 +31,7 @@ from robocasa_lerobot.convert.rerender.plan import (
     make_render_plan,
 )
 from robocasa_lerobot.convert.scenes.prefetch import scenes_ahead
+from robocasa_lerobot.convert.worker_imports import RENDER_IMPORTS
 from robocasa_lerobot.convert.writing.card import renew_dataset_card
 from robocasa_lerobot.convert.writing.encoder import (
     CODECS,
@@ -121,7 +122,15 @@ def render_dataset(
     ):
         go_on(partial / _MERGED)
         run_pieces(
-            step, len(plan.pieces), partial, execution, workers, plan.num_frames, "rendering", quiet_libraries, __name__
+            step,
+            len(plan.pieces),
+            partial,
+            execution,
+            workers,
+            plan.num_frames,
+            "rendering",
+            quiet_libraries,
+            RENDER_IMPORTS,
         )
         return _complete(plan, partial, out, overwrite)
 

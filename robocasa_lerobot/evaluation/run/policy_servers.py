@@ -13,6 +13,7 @@ from multiprocessing.context import ForkServerProcess
 from pathlib import Path
 
 from robocasa_lerobot.errors import UserError
+from robocasa_lerobot.evaluation.actors.checkpoint import checkpoint_folders
 from robocasa_lerobot.evaluation.run.messages import Loading, Refused
 from robocasa_lerobot.evaluation.run.policy_server import ServerSettings, server_main
 from robocasa_lerobot.evaluation.run.processes import cause_of_death, process_context, thread_limit
@@ -42,7 +43,7 @@ class ServerPool:
 
     def __init__(self, settings: ServerSettings, devices: Sequence[str], stall_seconds: float) -> None:
         self._folder = Path(tempfile.mkdtemp(prefix="robocasa-lerobot-"))
-        self._context = process_context(checkpoints=True)
+        self._context = process_context(checkpoint_folders(settings.sources.values()))
         self._stall_seconds, self._restarts = stall_seconds, 0
         self._servers = [
             self._start(replace(settings, device=device, address=str(self._folder / f"policy-{i}")))

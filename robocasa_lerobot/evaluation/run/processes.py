@@ -10,20 +10,15 @@ from __future__ import annotations
 import multiprocessing
 import os
 import signal
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from contextlib import contextmanager
 from multiprocessing import forkserver
 from multiprocessing.context import ForkServerContext, ForkServerProcess
+from pathlib import Path
 
-POLICY_MODULES = (
-    "torch",
-    "onnx",
-    "onnxruntime",
-    "robocasa_lerobot.policies.diffusion_transformer.modeling_diffusion_transformer",
-    "lerobot.policies.factory",
-    "lerobot.envs.utils",
-    "robocasa_lerobot.envs.kitchen_env",
-)
+from robocasa_lerobot.evaluation.imports.policy_imports import policy_imports
+
+_WORKERS = ("robocasa_lerobot.evaluation.run.worker", "robocasa_lerobot.evaluation.run.policy_server")
 
 
 def cause_of_death(process: ForkServerProcess, what: str = "worker process") -> str:
@@ -37,16 +32,15 @@ def cause_of_death(process: ForkServerProcess, what: str = "worker process") -> 
     return f"the {what} ended with exit status {code}"
 
 
-def process_context(checkpoints: bool) -> ForkServerContext:
-    """The context that processes are started in; with `checkpoints`, what they need is imported beforehand."""
+def process_context(checkpoints: Collection[Path]) -> ForkServerContext:
+    """The context that processes are started in; what the policies in these folders need is imported beforehand."""
     context = multiprocessing.get_context("forkserver")
-    modules = ["robocasa_lerobot.evaluation.run.worker", "robocasa_lerobot.evaluation.run.policy_server"]
     # An import that fails there is silently left to the worker, which reports it.
-    context.set_forkserver_preload([*modules, *(POLICY_MODULES if checkpoints else ())])
+    context.set_forkserver_preload([*_WORKERS, *policy_imports(checkpoints)])
     return context
 
 
-def start_importing(checkpoints: bool, threads: int) -> None:
+def start_importing(checkpoints: Collection[Path], threads: int) -> None:
     """Start the server process, whose imports take seconds, while this one still reads what it is to do.
 
     Before it, this process has what the workers are to have in their environment when libraries are loaded.

@@ -1,0 +1,1 @@
+"""What the processes of an evaluation import before their work."""
