@@ -16,7 +16,7 @@ from vector_support import STILL, FaultyEnv, clean_workers  # noqa: F401 (a fixt
 from robocasa_lerobot import contract, gl
 from robocasa_lerobot.envs.kitchen_env import KitchenEnv
 from robocasa_lerobot.envs.vector.kitchens import make_vector_env
-from robocasa_lerobot.evaluation.run.worker import WorkerSettings
+from robocasa_lerobot.evaluation.run.messages import WorkerSettings
 from robocasa_lerobot.evaluation.run.worker_pool import WorkerPool
 
 

@@ -25,7 +25,7 @@ from robocasa_lerobot.evaluation.planning import run_header as resolve
 from robocasa_lerobot.evaluation.planning import trials as plan
 from robocasa_lerobot.evaluation.planning.trials import TrialSpec
 from robocasa_lerobot.evaluation.run import engine, rollout, success
-from robocasa_lerobot.evaluation.run.rollout import Outcome
+from robocasa_lerobot.evaluation.run.messages import Outcome
 
 TASKS_CSV = Path(__file__).parents[3] / "shared/facts/tasks.csv"
 

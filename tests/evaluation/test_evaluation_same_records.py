@@ -178,7 +178,7 @@ def test_a_gpu_that_is_of_no_use_any_more_costs_its_process_and_an_attempt(
     processes = tmp_path / "processes"
     processes.mkdir()
     monkeypatch.setenv(broken_gpu.FOLDER, str(processes))
-    monkeypatch.setattr(policy_servers, "server_main", broken_gpu.server_main)
+    monkeypatch.setattr(policy_servers, "POLICY_SERVER", (broken_gpu.__name__, "server_main"))
     servers = {"policy.placement": "servers", "policy.devices": "cuda:0"}
     records = evaluate(tmp_path / "out", policy=checkpoint, trials=3, **{"env.tasks": "Slide", **servers})
     assert [record.error for record in records] == [None] * 3

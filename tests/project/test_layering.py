@@ -300,6 +300,11 @@ def test_learning_side_loads_no_mujoco_and_has_no_import_side_effects() -> None:
     assert report["random"] is False
 
 
+def test_what_only_hands_out_trials_loads_no_simulator() -> None:
+    report = import_in_new_process([f"robocasa_lerobot.evaluation.run.{name}" for name in ("engine", "outputs")])
+    assert not {"mujoco", "gymnasium", "numba", *TORCH} & set(report["loaded"])  # type: ignore[call-overload]
+
+
 def test_command_modules_are_light() -> None:
     names = ["robocasa_lerobot.cli", *(subcommand.module for subcommand in SUBCOMMANDS.values())]
     report = import_in_new_process(names, preloaded=("gymnasium",))

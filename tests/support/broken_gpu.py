@@ -8,6 +8,7 @@ from typing import Any
 
 from robocasa_lerobot.evaluation.actors.chunk_policy import ChunkPolicy, LoadedCheckpoint
 from robocasa_lerobot.evaluation.run import policy_server
+from robocasa_lerobot.evaluation.run.messages import ServerSettings
 
 FOLDER = "BROKEN_GPU"  # variable of a folder in which each server's process leaves a file
 
@@ -19,7 +20,7 @@ class OnCpu(LoadedCheckpoint):
         super().__init__(source, "cpu", executed_steps)
 
 
-def server_main(parent: Connection, settings: policy_server.ServerSettings, environment: dict[str, str]) -> None:
+def server_main(parent: Connection, settings: ServerSettings, environment: dict[str, str]) -> None:
     """The engine's server in a process of its own, in which alone all of this is replaced."""
     import torch
 

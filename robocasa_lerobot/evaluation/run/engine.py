@@ -31,12 +31,11 @@ from robocasa_lerobot.evaluation.records.results import (
     read_results,
 )
 from robocasa_lerobot.evaluation.records.trials_file import append, check_same_run, drop_torn_line
+from robocasa_lerobot.evaluation.run.messages import WorkerSettings
 from robocasa_lerobot.evaluation.run.serving import check_devices, open_servers, served_labels
-from robocasa_lerobot.evaluation.run.worker import WorkerSettings
 from robocasa_lerobot.evaluation.run.worker_pool import Completed, WorkerPool
-from robocasa_lerobot.evaluation.simulators.foreign_env import FACTORY
 from robocasa_lerobot.evaluation.simulators.planning import plan_simulator
-from robocasa_lerobot.evaluation.simulators.simulator import env_arguments, simulator_of
+from robocasa_lerobot.evaluation.simulators.simulator import FOREIGN_FACTORY, env_arguments, simulator_of
 from robocasa_lerobot.files import write_text
 from robocasa_lerobot.gl import check_device
 from robocasa_lerobot.jobs.locks import LockHeldError, locked
@@ -240,7 +239,7 @@ def worker_settings(evaluation: Evaluation) -> WorkerSettings:
     factory, env_kwargs = config.env.factory, {"split": config.env.split, "render_preset": config.env.render_preset}
     simulator = simulator_of(config.env.python, config.env.type, factory, config.env.options)
     if simulator is not None:
-        factory, env_kwargs = FACTORY, env_arguments(simulator)
+        factory, env_kwargs = FOREIGN_FACTORY, env_arguments(simulator)
     return WorkerSettings(
         sources=evaluation.sources,
         factory=factory,

@@ -9,16 +9,14 @@ import time
 import traceback
 from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import dataclass
 from multiprocessing.connection import Client, Connection, Listener, wait
 from pathlib import Path
 from typing import Any
 
 from robocasa_lerobot.errors import UserError
 from robocasa_lerobot.evaluation.actors.actor import ChunkActor, ChunkReply, ChunkRequest, ChunkShape
-from robocasa_lerobot.evaluation.actors.checkpoint import PolicySource
 from robocasa_lerobot.evaluation.actors.chunk_policy import BatchingError, ChunkPolicy, LoadedCheckpoint
-from robocasa_lerobot.evaluation.run.messages import Alive, Describe, Failed, Loading, Ready, Refused
+from robocasa_lerobot.evaluation.run.messages import Alive, Describe, Failed, Loading, Ready, Refused, ServerSettings
 from robocasa_lerobot.evaluation.run.processes import take_over
 from robocasa_lerobot.evaluation.run.rollout import RolloutError
 
@@ -29,19 +27,6 @@ _LOST = (EOFError, ConnectionError, BrokenPipeError)
 
 class PolicyServerError(RolloutError):
     """The policy's process failed or ended while a trial waited for it."""
-
-
-@dataclass(frozen=True)
-class ServerSettings:
-    """What a policy server needs; picklable. `address` is the path of its socket."""
-
-    sources: dict[str, PolicySource]
-    device: str
-    threads: int
-    width: int
-    executed_steps: int | None
-    runtime: str
-    address: str
 
 
 def server_main(parent: Connection, settings: ServerSettings, environment: dict[str, str]) -> None:

@@ -14,9 +14,14 @@ from pathlib import Path
 
 from robocasa_lerobot.errors import UserError
 from robocasa_lerobot.evaluation.actors.checkpoint import checkpoint_folders
-from robocasa_lerobot.evaluation.run.messages import Loading, Refused
-from robocasa_lerobot.evaluation.run.policy_server import ServerSettings, server_main
-from robocasa_lerobot.evaluation.run.processes import cause_of_death, process_context, thread_limit
+from robocasa_lerobot.evaluation.run.messages import Loading, Refused, ServerSettings
+from robocasa_lerobot.evaluation.run.processes import (
+    POLICY_SERVER,
+    cause_of_death,
+    process_context,
+    run_in,
+    thread_limit,
+)
 
 MAX_RESTARTS = 10
 # No sign of life comes while a process starts, or loads weights from a slow disk.
@@ -102,7 +107,9 @@ class ServerPool:
         ours, theirs = self._context.Pipe()
         with thread_limit(settings.threads):
             environment = dict(os.environ)
-            process = self._context.Process(target=server_main, args=(theirs, settings, environment), daemon=True)
+            process = self._context.Process(
+                target=run_in, args=(POLICY_SERVER, theirs, settings, environment), daemon=True
+            )
             process.start()
         theirs.close()
         return _Server(settings, process, ours, time.monotonic())

@@ -7,6 +7,7 @@ present one is handed over.
 
 from __future__ import annotations
 
+import importlib
 import multiprocessing
 import os
 import signal
@@ -18,7 +19,9 @@ from pathlib import Path
 
 from robocasa_lerobot.evaluation.imports.policy_imports import policy_imports
 
-_WORKERS = ("robocasa_lerobot.evaluation.run.worker", "robocasa_lerobot.evaluation.run.policy_server")
+# What they run: a module, which this process does without, and a function in it.
+WORKER = ("robocasa_lerobot.evaluation.run.worker", "worker_main")
+POLICY_SERVER = ("robocasa_lerobot.evaluation.run.policy_server", "server_main")
 
 
 def cause_of_death(process: ForkServerProcess, what: str = "worker process") -> str:
@@ -36,7 +39,7 @@ def process_context(checkpoints: Collection[Path]) -> ForkServerContext:
     """The context that processes are started in; what the policies in these folders need is imported beforehand."""
     context = multiprocessing.get_context("forkserver")
     # An import that fails there is silently left to the worker, which reports it.
-    context.set_forkserver_preload([*_WORKERS, *policy_imports(checkpoints)])
+    context.set_forkserver_preload([*policy_imports(checkpoints), WORKER[0], POLICY_SERVER[0]])
     return context
 
 
@@ -52,6 +55,12 @@ def start_importing(checkpoints: Collection[Path], threads: int) -> None:
     process_context(checkpoints)
     with thread_limit(threads):
         forkserver.ensure_running()
+
+
+def run_in(what: tuple[str, str], *arguments: object) -> None:
+    """Call a function of a module with these arguments; the target of a new process, which imports the module."""
+    module, function = what
+    getattr(importlib.import_module(module), function)(*arguments)
 
 
 def take_over(environment: dict[str, str]) -> None:

@@ -6,7 +6,7 @@ import hashlib
 import math
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 import gymnasium
@@ -20,6 +20,7 @@ from robocasa_lerobot.evaluation.actors.actor import Actor
 from robocasa_lerobot.evaluation.planning.trials import TrialSpec
 from robocasa_lerobot.evaluation.records.results import Seconds, StageSummary, TermSummary
 from robocasa_lerobot.evaluation.run.film import Film
+from robocasa_lerobot.evaluation.run.messages import Outcome
 from robocasa_lerobot.evaluation.run.physics_warnings import PhysicsWarnings
 from robocasa_lerobot.evaluation.run.success import SuccessRule
 
@@ -52,29 +53,6 @@ class RolloutError(RuntimeError):
 
 class DivergedError(RolloutError, control_step.DivergedError):
     """Numbers that are not finite, from the policy or the physics, found by the rollout and not by the env itself."""
-
-
-@dataclass
-class Outcome:
-    """What a trial gave; `steps` are control steps, the first step is number 1.
-
-    `fps` is how many of them are a second, where the env has an attribute that says it: our kitchens' are 20.
-    `stages` is how far it came in the task's stages, None for an env that has none.
-    `trajectory` is a SHA-256 over all actions and proprioception: two trials with the same one took the same course.
-    """
-
-    success: bool = False
-    steps: int = 0
-    first_success_step: int | None = None
-    terms: dict[str, TermSummary] = field(default_factory=dict)
-    stages: StageSummary | None = None
-    instruction: str = ""
-    layout_id: int | None = None
-    style_id: int | None = None
-    trajectory: str | None = None
-    fps: float | None = None
-    warnings: dict[str, int] = field(default_factory=dict)
-    seconds: Seconds = field(default=Seconds(0.0), compare=False)
 
 
 def run_trial(

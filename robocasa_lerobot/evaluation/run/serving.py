@@ -9,9 +9,8 @@ from robocasa_lerobot.errors import UnknownNameError, UserError
 from robocasa_lerobot.evaluation.actors.checkpoint import PolicySource
 from robocasa_lerobot.evaluation.actors.chunk_policy import STATELESS_TYPES
 from robocasa_lerobot.evaluation.config.evaluation import EvaluationConfig, PolicySettings
-from robocasa_lerobot.evaluation.run.policy_server import ServerSettings
+from robocasa_lerobot.evaluation.run.messages import ServerSettings, WorkerSettings
 from robocasa_lerobot.evaluation.run.policy_servers import ServerPool
-from robocasa_lerobot.evaluation.run.worker import WorkerSettings
 
 
 def served_labels(sources: Mapping[str, PolicySource], settings: PolicySettings, device: str) -> frozenset[str]:

@@ -8,7 +8,6 @@ import time
 import traceback
 import warnings
 from collections.abc import Callable
-from dataclasses import dataclass, field
 from functools import partial
 from multiprocessing.connection import Connection
 from pathlib import Path
@@ -20,7 +19,6 @@ from robocasa_lerobot import gl
 from robocasa_lerobot.envs.robots.control_step import DivergedError
 from robocasa_lerobot.errors import UserError
 from robocasa_lerobot.evaluation.actors.actor import Actor
-from robocasa_lerobot.evaluation.actors.checkpoint import PolicySource
 from robocasa_lerobot.evaluation.actors.chunk_policy import BatchingError
 from robocasa_lerobot.evaluation.actors.policy_runner import load_actor
 from robocasa_lerobot.evaluation.actors.remote_actor import RemoteActor
@@ -29,39 +27,15 @@ from robocasa_lerobot.evaluation.records.results import CRASHED, DIVERGED, file_
 from robocasa_lerobot.evaluation.remote.failures import LostError
 from robocasa_lerobot.evaluation.remote.translation import UnfitEnvError
 from robocasa_lerobot.evaluation.run.film import Film, FilmError, NoPicturesError
-from robocasa_lerobot.evaluation.run.messages import Alive, Finished, Ready, Refused
+from robocasa_lerobot.evaluation.run.messages import Alive, Finished, Outcome, Ready, Refused, WorkerSettings
 from robocasa_lerobot.evaluation.run.policy_server import PolicyConnection
 from robocasa_lerobot.evaluation.run.processes import take_over
-from robocasa_lerobot.evaluation.run.rollout import Outcome, horizon_of, run_trial
+from robocasa_lerobot.evaluation.run.rollout import horizon_of, run_trial
 from robocasa_lerobot.evaluation.run.success import SuccessRule
 from robocasa_lerobot.evaluation.simulators.fit import UnfitPolicyError, needs_of
 from robocasa_lerobot.evaluation.simulators.foreign_env import ForeignEnv
 
 EnvFactory = Callable[..., gymnasium.Env[Any, Any]]
-
-
-@dataclass(frozen=True)
-class WorkerSettings:
-    """What a worker needs beside the trials themselves; picklable.
-
-    `perturbations` are the arguments that each of them adds to the env's, `served` the labels of policies that a
-    policy server computes.
-    """
-
-    sources: dict[str, PolicySource]
-    factory: str
-    env_kwargs: dict[str, Any]
-    device: str
-    threads: int
-    executed_steps: int | None
-    out: str
-    render_devices: tuple[int, ...] = ()
-    perturbations: dict[str, dict[str, Any]] = field(default_factory=dict)
-    success_rule: str = "any_step"
-    success_hold_steps: int = 1
-    width: int = 1
-    runtime: str = "onnx"
-    served: frozenset[str] = frozenset()
 
 
 def worker_main(

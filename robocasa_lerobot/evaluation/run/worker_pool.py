@@ -16,11 +16,9 @@ from robocasa_lerobot.errors import UserError
 from robocasa_lerobot.evaluation.actors.checkpoint import checkpoint_folders
 from robocasa_lerobot.evaluation.planning.trials import TrialSpec
 from robocasa_lerobot.evaluation.records.results import CRASHED, HUNG
-from robocasa_lerobot.evaluation.run.messages import Alive, Finished, Ready, Refused
+from robocasa_lerobot.evaluation.run.messages import Alive, Finished, Outcome, Ready, Refused, WorkerSettings
 from robocasa_lerobot.evaluation.run.policy_servers import LOADING_SECONDS, ServerPool
-from robocasa_lerobot.evaluation.run.processes import cause_of_death, process_context, thread_limit
-from robocasa_lerobot.evaluation.run.rollout import Outcome
-from robocasa_lerobot.evaluation.run.worker import WorkerSettings, worker_main
+from robocasa_lerobot.evaluation.run.processes import WORKER, cause_of_death, process_context, run_in, thread_limit
 
 # That end with an error; lost connections are counted apart.
 MAX_ATTEMPTS = 2
@@ -189,7 +187,7 @@ class WorkerPool:
         with thread_limit(self._settings.threads):
             environment = dict(os.environ)
             process = self._context.Process(
-                target=worker_main, args=(theirs, self._settings, device, server, environment), daemon=True
+                target=run_in, args=(WORKER, theirs, self._settings, device, server, environment), daemon=True
             )
             process.start()
         theirs.close()  # Else end-of-file would never come.

@@ -13,7 +13,6 @@ from robocasa_lerobot.evaluation.simulators.fit import Needs, UnfitPolicyError
 from robocasa_lerobot.evaluation.simulators.process import Arrays, EnvRaisedError, ForeignProcess, SimulatorError
 from robocasa_lerobot.evaluation.simulators.simulator import Simulator
 
-FACTORY = f"{__name__}:make_env"
 _PICTURES = "pixels"
 
 

@@ -13,6 +13,7 @@ from robocasa_lerobot.errors import UnknownNameError, UserError
 from robocasa_lerobot.evaluation.simulators.foreign_worker import PROTOCOL
 from robocasa_lerobot.evaluation.simulators.process import EnvRaisedError, ForeignProcess, SimulatorError
 
+FOREIGN_FACTORY = "robocasa_lerobot.evaluation.simulators.foreign_env:make_env"  # by which workers reach it
 LEROBOT = "lerobot"  # written --env.type=lerobot:NAME
 _LEROBOT_ENVS = Path(__file__).with_name("lerobot_envs.py")
 
