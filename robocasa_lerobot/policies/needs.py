@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
@@ -60,16 +60,21 @@ NEEDS: dict[str, Need] = {
 OTHERS_PACKAGES = (*POLICY_PACKAGES, "datasets", "scipy")
 
 
-def needs_no_others(config: Mapping[str, Any]) -> bool:
-    """Whether a policy with this config.json computes its actions with a LeRobot that lacks `OTHERS_PACKAGES`.
+def needs_no_others(config: Mapping[str, Any], steps: Collection[str]) -> bool:
+    """Whether a policy computes its actions with a LeRobot that lacks `OTHERS_PACKAGES`.
 
-    Ours with a text encoder of its own does; CLIP and language models come with transformers, and adapters of LoRA with
-    peft.
+    Ours with a text encoder of its own does; CLIP, language models and LeRobot's tokenizers come with transformers, and
+    adapters of LoRA with peft.
+
+    Args:
+        config: of its checkpoint (config.json).
+        steps: names of the steps of its saved processors.
     """
     return (
         config.get("type") == "diffusion_transformer"
         and config.get("text_encoder") == "token"
         and not config.get("use_peft")
+        and not any("tokenizer" in name for name in steps)
     )
 
 

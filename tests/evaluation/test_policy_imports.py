@@ -83,6 +83,15 @@ def test_what_is_left_out_depends_on_the_policy(
     assert policy_imports([]) == ()
 
 
+def test_lerobots_tokenizers_need_what_would_be_left_out(checkpoint: Path, tmp_path: Path) -> None:
+    changed = tmp_path / "pretrained_model"
+    shutil.copytree(checkpoint, changed)
+    file = changed / "policy_preprocessor.json"
+    saved = json.loads(file.read_text())
+    file.write_text(json.dumps({**saved, "steps": [*saved["steps"], {"registry_name": "tokenizer_processor"}]}))
+    assert policy_imports([changed]) == POLICY_MODULES
+
+
 @pytest.mark.parametrize("text", ["", "[]", "{}"])
 def test_a_folder_that_is_no_checkpoint_leaves_nothing_out(tmp_path: Path, text: str) -> None:
     assert policy_imports([tmp_path]) == POLICY_MODULES

@@ -16,6 +16,8 @@ POLICY_MODULES = (
     "robocasa_lerobot.policies.diffusion_transformer.modeling_diffusion_transformer",
     "robocasa_lerobot.envs.kitchen_env",
 )
+# A folder that is no checkpoint, or has other files than LeRobot writes: whoever loads it says so.
+_UNREADABLE = (CheckpointError, OSError, ValueError, LookupError, AttributeError, TypeError)
 _LEAN_POLICIES = "robocasa_lerobot.evaluation.imports.lean_policies"
 
 
@@ -28,6 +30,9 @@ def policy_imports(checkpoints: Collection[Path]) -> tuple[str, ...]:
 
 def _is_lean(checkpoint: Path) -> bool:
     try:
-        return needs_no_others(json.loads((find_pretrained(checkpoint) / "config.json").read_text(encoding="utf-8")))
-    except (CheckpointError, OSError, ValueError, AttributeError):  # whoever loads it says what is wrong with it
+        folder = find_pretrained(checkpoint)
+        saved = [json.loads(file.read_text(encoding="utf-8")) for file in folder.glob("policy_*processor.json")]
+        steps = [step.get("registry_name") or "" for processor in saved for step in processor["steps"]]
+        return needs_no_others(json.loads((folder / "config.json").read_text(encoding="utf-8")), steps)
+    except _UNREADABLE:
         return False
