@@ -14,4 +14,4 @@ from robocasa_lerobot.cli import main
 
 # The guard matters: worker processes import this file again.
 if __name__ == "__main__":
-    raise SystemExit(main(["eval", *sys.argv[1:]]))
+    raise SystemExit(main(["eval", *sys.argv[1:]], own_process=True))

@@ -9,4 +9,4 @@ import sys
 from robocasa_lerobot.cli import main
 
 if __name__ == "__main__":
-    raise SystemExit(main(["train", *sys.argv[1:]]))
+    raise SystemExit(main(["train", *sys.argv[1:]], own_process=True))

@@ -82,7 +82,7 @@ def run_ours(job: Job) -> dict[str, Any]:
         report=False,  # which LeRobot has none of; its `eval_info.json` both write
     )
     ensure_drawing()  # this and the next before other imports, as the command does
-    start_importing([Path(job.checkpoint)], threads=config.policy.threads)
+    start_importing([Path(job.checkpoint)], config.policy.threads, own_process=True)
     from robocasa_lerobot.evaluation.run.engine import evaluate, prepare
     from robocasa_lerobot.evaluation.run.outputs import write_outputs
 

@@ -105,8 +105,13 @@ def build_parser(names: Sequence[str] = tuple(SUBCOMMANDS)) -> argparse.Argument
     return parser
 
 
-def main(argv: Sequence[str] | None = None) -> int:
-    """Run a subcommand; returns its exit status. A user's mistake is printed in one paragraph, with status 2."""
+def main(argv: Sequence[str] | None = None, own_process: bool | None = None) -> int:
+    """Run a subcommand; returns its exit status. A user's mistake is printed in one paragraph, with status 2.
+
+    Args:
+        argv: what was given (default: to this program).
+        own_process: whether nothing else is done in this process (default: where `argv` is not given).
+    """
     arguments = list(sys.argv[1:] if argv is None else argv)
     name = next((a for a in arguments if not a.startswith("-")), None)
     if name is not None and name not in SUBCOMMANDS:
@@ -129,7 +134,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     try:
         if unknown:
             args.settings = unknown
-        args.own_process = argv is None
+        args.own_process = argv is None if own_process is None else own_process
         check_workers(getattr(args, "workers", None))
         with rare_collections():
             return int(args.run(args) or 0)

@@ -73,7 +73,7 @@ def run(args: argparse.Namespace) -> int:
     if args.shards is not None:
         raise UserError("--shards is for --executor slurm or ray; here give --shard=I/N, and --merge at the end.")
     if not args.merge:
-        _begin(config)
+        _begin(config, args.own_process)
     from robocasa_lerobot.evaluation.planning.run_header import partial_sentence
     from robocasa_lerobot.evaluation.run.engine import evaluate, prepare
     from robocasa_lerobot.evaluation.run.merging import merge
@@ -100,7 +100,7 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
-def _begin(config: EvaluationConfig) -> None:
+def _begin(config: EvaluationConfig, own_process: bool) -> None:
     """What workers need and takes seconds, while this process goes on reading: their imports."""
     from robocasa_lerobot.evaluation.run.processes import start_importing
     from robocasa_lerobot.gl import ensure_drawing
@@ -108,7 +108,7 @@ def _begin(config: EvaluationConfig) -> None:
     if config.env.is_kitchen:
         ensure_drawing()  # inherited by the workers
     folders = [folder for path in config.policy.path if (folder := Path(path)).is_dir()]
-    start_importing(folders, config.policy.threads)
+    start_importing(folders, config.policy.threads, own_process)
 
 
 def _run_elsewhere(config: EvaluationConfig, args: argparse.Namespace) -> int:

@@ -2,61 +2,58 @@
 
 from __future__ import annotations
 
-import importlib.util
 import json
+import os
 import shutil
 import subprocess
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
-from tiny_checkpoint import SIZE
 
-from robocasa_lerobot import contract
-from robocasa_lerobot.evaluation.actors.actor import ChunkRequest
-from robocasa_lerobot.evaluation.actors.checkpoint import read_source
-from robocasa_lerobot.evaluation.actors.chunk_policy import ChunkPolicy, LoadedCheckpoint
 from robocasa_lerobot.evaluation.imports.policy_imports import POLICY_MODULES, policy_imports
+from robocasa_lerobot.evaluation.records.results import TrialRecord, read_results
 
+ROOT = Path(__file__).parents[2]
 LEAN = ("robocasa_lerobot.evaluation.imports.lean_policies",)
-PROGRAM = """
-import json, sys
-from robocasa_lerobot.evaluation.imports import lean_policies
-sys.path += json.loads(sys.argv[2])
-import test_policy_imports as this
-actions = this.actions_of(this.Path(sys.argv[1]))
-print(json.dumps([actions.tolist(), sorted(sys.modules)]))
+EMBEDDED = (
+    "import sys\nfrom robocasa_lerobot.cli import main\nif __name__ == '__main__': sys.exit(main(sys.argv[1:]))\n"
+)
+ENV = """
+import json, os, pathlib, sys
+from evaluation_env import SlideEnv
+
+class Probe(SlideEnv):
+    def reset(self, **arguments):
+        pathlib.Path(os.environ["PROBE"]).write_text(json.dumps(sorted(sys.modules)))
+        return super().reset(**arguments)
 """
 
 
-def actions_of(checkpoint: Path) -> np.ndarray:
-    policy = ChunkPolicy(LoadedCheckpoint(read_source(str(checkpoint)), "cpu", None), width=1)
-    rng = np.random.default_rng(0)
-    observations = tuple(
-        {
-            "pixels": {c: rng.integers(0, 255, (SIZE, SIZE, 3), dtype=np.uint8) for c in contract.CAMERAS},
-            "agent_pos": rng.normal(size=contract.STATE_SIZE),
-        }
-        for _ in range(policy.shape.history)
-    )
-    (reply,) = policy.predict([ChunkRequest("label", observations, "open the drawer", seed=3, number=0)])
-    return np.asarray(reply.actions)
+def trial_of(program: Sequence[str], checkpoint: Path, folder: Path) -> tuple[set[str], TrialRecord]:
+    """What a worker of an evaluation has imported, and the record of its trial."""
+    folder.mkdir()
+    (folder / "probe_env.py").write_text(ENV)
+    paths = [str(ROOT), str(ROOT / "tests" / "support"), str(folder)]
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(paths), "PROBE": str(folder / "modules.json")}
+    options = ["--env.factory=probe_env:Probe", "--env.tasks=Slide", "--env.horizon=20", "--trials=1", "--workers=1"]
+    command = [*program, f"--policy.path={checkpoint}", *options, "--videos=0", "--report=false", "--out=out"]
+    subprocess.run([sys.executable, *command], cwd=folder, env=environment, capture_output=True, text=True, check=True)
+    (record,) = read_results(folder / "out" / "trials.jsonl").trials
+    return set(json.loads((folder / "modules.json").read_text())), record
 
 
-def test_a_policy_acts_the_same_without_what_only_others_need(checkpoint: Path) -> None:
-    assert all(map(importlib.util.find_spec, ("transformers", "datasets", "scipy")))  # else nothing is compared
-    done = subprocess.run(
-        [sys.executable, "-c", PROGRAM, str(checkpoint), json.dumps(sys.path)],
-        capture_output=True,
-        text=True,
-        check=True,
-    )
-    actions, modules = json.loads(done.stdout.splitlines()[-1])
-    assert not {"transformers", "peft", "datasets"} & set(modules)
-    assert "lerobot.policies.factory" in modules
-    np.testing.assert_array_equal(np.asarray(actions), actions_of(checkpoint))
+def test_a_policy_acts_the_same_without_what_only_others_need(checkpoint: Path, tmp_path: Path) -> None:
+    program = tmp_path / "program.py"
+    program.write_text(EMBEDDED)
+    lean, record = trial_of([str(ROOT / "eval.py")], checkpoint, tmp_path / "command")
+    whole, other = trial_of([str(program), "eval"], checkpoint, tmp_path / "embedded")
+    assert "lerobot.policies.factory" in lean & whole
+    assert whole - lean >= {"transformers", "datasets"}
+    assert record.error is None
+    assert record.trajectory == other.trajectory
 
 
 @pytest.mark.parametrize(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -75,11 +75,6 @@ class PolicySource:
             experiment=self.experiment,
             remote=None if self.remote is None else self.remote.describe(),
         )
-
-
-def checkpoint_folders(sources: Iterable[PolicySource]) -> list[Path]:
-    """The folders of those policies that are computed here."""
-    return [Path(source.path) for source in sources if source.is_checkpoint]
 
 
 def _as_given(path: Path, folder: Path) -> Path:

@@ -13,7 +13,6 @@ from multiprocessing.context import ForkServerProcess
 from pathlib import Path
 
 from robocasa_lerobot.errors import UserError
-from robocasa_lerobot.evaluation.actors.checkpoint import checkpoint_folders
 from robocasa_lerobot.evaluation.run.messages import Loading, Refused, ServerSettings
 from robocasa_lerobot.evaluation.run.processes import (
     POLICY_SERVER,
@@ -48,7 +47,7 @@ class ServerPool:
 
     def __init__(self, settings: ServerSettings, devices: Sequence[str], stall_seconds: float) -> None:
         self._folder = Path(tempfile.mkdtemp(prefix="robocasa-lerobot-"))
-        self._context = process_context(checkpoint_folders(settings.sources.values()))
+        self._context = process_context(checkpoints=True)
         self._stall_seconds, self._restarts = stall_seconds, 0
         self._servers = [
             self._start(replace(settings, device=device, address=str(self._folder / f"policy-{i}")))

@@ -11,13 +11,13 @@ import importlib
 import multiprocessing
 import os
 import signal
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterator, Sequence
 from contextlib import contextmanager
 from multiprocessing import forkserver
 from multiprocessing.context import ForkServerContext, ForkServerProcess
 from pathlib import Path
 
-from robocasa_lerobot.evaluation.imports.policy_imports import policy_imports
+from robocasa_lerobot.evaluation.imports.policy_imports import POLICY_MODULES, policy_imports
 
 # What they run: a module, which this process does without, and a function in it.
 WORKER = ("robocasa_lerobot.evaluation.run.worker", "worker_main")
@@ -35,26 +35,32 @@ def cause_of_death(process: ForkServerProcess, what: str = "worker process") -> 
     return f"the {what} ended with exit status {code}"
 
 
-def process_context(checkpoints: Collection[Path]) -> ForkServerContext:
-    """The context that processes are started in; what the policies in these folders need is imported beforehand."""
-    context = multiprocessing.get_context("forkserver")
-    # An import that fails there is silently left to the worker, which reports it.
-    context.set_forkserver_preload([*policy_imports(checkpoints), WORKER[0], POLICY_SERVER[0]])
-    return context
+def process_context(checkpoints: bool) -> ForkServerContext:
+    """The context that processes are started in; with `checkpoints`, what any policy needs is imported beforehand."""
+    return _forking(POLICY_MODULES if checkpoints else ())
 
 
-def start_importing(checkpoints: Collection[Path], threads: int) -> None:
+def start_importing(checkpoints: Collection[Path], threads: int, own_process: bool) -> None:
     """Start the server process, whose imports take seconds, while this one still reads what it is to do.
 
     Before it, this process has what the workers are to have in their environment when libraries are loaded.
 
     Args:
-        checkpoints: as of `process_context`.
+        checkpoints: folders of the policies that the workers will compute.
         threads: of the numeric libraries, which the workers have from it.
+        own_process: whether this process computes no other policies, so that what these do not need can be left out.
     """
-    process_context(checkpoints)
+    _forking(policy_imports(checkpoints) if own_process else POLICY_MODULES if checkpoints else ())
     with thread_limit(threads):
         forkserver.ensure_running()
+
+
+def _forking(imports: Sequence[str]) -> ForkServerContext:
+    """The context whose server process imports these; what it has imported stays, once it is started."""
+    context = multiprocessing.get_context("forkserver")
+    # An import that fails there is silently left to the worker, which reports it.
+    context.set_forkserver_preload([*imports, WORKER[0], POLICY_SERVER[0]])
+    return context
 
 
 def run_in(what: tuple[str, str], *arguments: object) -> None:

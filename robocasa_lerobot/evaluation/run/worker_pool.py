@@ -13,7 +13,6 @@ from multiprocessing.connection import Connection
 from multiprocessing.context import ForkServerProcess
 
 from robocasa_lerobot.errors import UserError
-from robocasa_lerobot.evaluation.actors.checkpoint import checkpoint_folders
 from robocasa_lerobot.evaluation.planning.trials import TrialSpec
 from robocasa_lerobot.evaluation.records.results import CRASHED, HUNG
 from robocasa_lerobot.evaluation.run.messages import Alive, Finished, Outcome, Ready, Refused, WorkerSettings
@@ -88,7 +87,7 @@ class WorkerPool:
     ) -> None:
         self._settings, self._size, self._stall_seconds = settings, size, stall_seconds
         self._servers = servers
-        self._context = process_context(checkpoint_folders(settings.sources.values()))
+        self._context = process_context(any(source.is_checkpoint for source in settings.sources.values()))
         self._slots: list[_Slot] = []
         self._failed_starts = 0
 
