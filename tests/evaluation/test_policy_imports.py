@@ -7,20 +7,17 @@ import os
 import shutil
 import subprocess
 import sys
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import pytest
 
+from robocasa_lerobot import cli
 from robocasa_lerobot.evaluation.imports.policy_imports import POLICY_MODULES, policy_imports
 from robocasa_lerobot.evaluation.records.results import TrialRecord, read_results
 
 ROOT = Path(__file__).parents[2]
 LEAN = ("robocasa_lerobot.evaluation.imports.lean_policies",)
-EMBEDDED = (
-    "import sys\nfrom robocasa_lerobot.cli import main\nif __name__ == '__main__': sys.exit(main(sys.argv[1:]))\n"
-)
 ENV = """
 import json, os, pathlib, sys
 from evaluation_env import SlideEnv
@@ -32,24 +29,32 @@ class Probe(SlideEnv):
 """
 
 
-def trial_of(program: Sequence[str], checkpoint: Path, folder: Path) -> tuple[set[str], TrialRecord]:
-    """What a worker of an evaluation has imported, and the record of its trial."""
-    folder.mkdir()
-    (folder / "probe_env.py").write_text(ENV)
-    paths = [str(ROOT), str(ROOT / "tests" / "support"), str(folder)]
-    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(paths), "PROBE": str(folder / "modules.json")}
-    options = ["--env.factory=probe_env:Probe", "--env.tasks=Slide", "--env.horizon=20", "--trials=1", "--workers=1"]
-    command = [*program, f"--policy.path={checkpoint}", *options, "--videos=0", "--report=false", "--out=out"]
-    subprocess.run([sys.executable, *command], cwd=folder, env=environment, capture_output=True, text=True, check=True)
+def trial_in(folder: Path) -> tuple[set[str], TrialRecord]:
+    """What the worker of an evaluation had imported, and the record of its trial."""
     (record,) = read_results(folder / "out" / "trials.jsonl").trials
     return set(json.loads((folder / "modules.json").read_text())), record
 
 
-def test_a_policy_acts_the_same_without_what_only_others_need(checkpoint: Path, tmp_path: Path) -> None:
-    program = tmp_path / "program.py"
-    program.write_text(EMBEDDED)
-    lean, record = trial_of([str(ROOT / "eval.py")], checkpoint, tmp_path / "command")
-    whole, other = trial_of([str(program), "eval"], checkpoint, tmp_path / "embedded")
+def test_a_policy_acts_the_same_without_what_only_others_need(
+    checkpoint: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "probe_env.py").write_text(ENV)
+    monkeypatch.syspath_prepend(tmp_path)
+    options = ["--env.factory=probe_env:Probe", "--env.tasks=Slide", "--env.horizon=20", "--trials=1", "--workers=1"]
+    options += [f"--policy.path={checkpoint}", "--videos=0", "--report=false"]
+    found = {}
+    for name in ("command", "embedded"):
+        folder = tmp_path / name
+        folder.mkdir()
+        monkeypatch.setenv("PROBE", str(folder / "modules.json"))
+        arguments = [*options, f"--out={folder / 'out'}"]
+        if name == "command":
+            environment = {**os.environ, "PYTHONPATH": os.pathsep.join([str(ROOT), *sys.path])}
+            subprocess.run([sys.executable, str(ROOT / "eval.py"), *arguments], env=environment, check=True)
+        else:
+            assert cli.main(["eval", *arguments]) == 0
+        found[name] = trial_in(folder)
+    (lean, record), (whole, other) = found["command"], found["embedded"]
     assert "lerobot.policies.factory" in lean & whole
     assert whole - lean >= {"transformers", "datasets"}
     assert record.error is None
