@@ -64,11 +64,11 @@ def run(args: argparse.Namespace) -> int:
     execution = execution_of(args)
     from robocasa_lerobot.convert.reading.inputs import check_demo_files
     from robocasa_lerobot.convert.settings import CORES_PER_WORKER, ConversionSettings
-    from robocasa_lerobot.convert.worker_imports import SHARD_IMPORTS
+    from robocasa_lerobot.convert.worker_imports import worker_imports
 
     check_demo_files(args.files)
     if execution.kind == "local" and not args.merge and (args.workers or cores_here() // CORES_PER_WORKER) > 1:
-        start_importing(SHARD_IMPORTS)
+        start_importing(worker_imports("robocasa_lerobot.convert.shard", lean=args.own_process))
     settings = ConversionSettings(
         asset_roots=tuple(args.asset_root),
         **source_settings(args),

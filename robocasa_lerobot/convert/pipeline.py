@@ -49,7 +49,7 @@ from robocasa_lerobot.convert.settings import (
     make_plan,
 )
 from robocasa_lerobot.convert.shard import convert_shard
-from robocasa_lerobot.convert.worker_imports import SHARD_IMPORTS
+from robocasa_lerobot.convert.worker_imports import worker_imports
 from robocasa_lerobot.convert.writing.card import write_dataset_card
 from robocasa_lerobot.convert.writing.encoder import CODECS, SAMPLED_FRAMES, SAMPLED_PIXELS, Histogram
 from robocasa_lerobot.convert.writing.encoding_process import shared_encoder
@@ -146,7 +146,7 @@ def _convert(
             plan.num_frames,
             "converting",
             quiet_libraries,
-            SHARD_IMPORTS,
+            worker_imports(convert_shard.__module__),
         )
         return _completed(plan, partial, out, overwrite)
 

@@ -9,12 +9,13 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from robocasa_lerobot.benchmark.tasks import published_tasks
-from robocasa_lerobot.convert.worker_imports import V2_SHARD_IMPORTS
 from robocasa_lerobot.data.registry.published import CONVERTED, dataset_version
 from robocasa_lerobot.errors import UserError
 from robocasa_lerobot.jobs.executors import Execution
 from robocasa_lerobot.making.needs import WORK, Need
 from robocasa_lerobot.making.pieces import Outcome, run_pieces
+
+_PRELOAD = ("robocasa_lerobot.convert.lerobot_v2.shard",)
 
 
 @dataclass(frozen=True)
@@ -87,7 +88,7 @@ def find_downloads(folder: Path, to: Path | None = None, needs: Sequence[Need] |
 
 def convert_downloads(downloads: Sequence[Download], execution: Execution, cores: int) -> Outcome:
     """Convert them; see `run_pieces`."""
-    outcome = run_pieces(downloads, downloads[0].folder, execution, cores, "converting", "dataset", V2_SHARD_IMPORTS)
+    outcome = run_pieces(downloads, downloads[0].folder, execution, cores, "converting", "dataset", _PRELOAD)
     if not outcome.submitted and not outcome.failed:
         with contextlib.suppress(OSError):
             downloads[0].folder.rmdir()

@@ -12,7 +12,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from robocasa_lerobot.convert.worker_imports import SHARD_IMPORTS
 from robocasa_lerobot.corrections.disturbances import with_disturbances
 from robocasa_lerobot.data.registry.published import dataset_version
 from robocasa_lerobot.data.registry.recipes import REPLAY, RecipeConfig
@@ -29,7 +28,7 @@ if TYPE_CHECKING:
     from robocasa_lerobot.corrections.settings import CorrectionSettings
     from robocasa_lerobot.demos.generate.settings import GenerationSettings
 
-_PRELOAD = ("robocasa_lerobot.envs.kitchen_env", *SHARD_IMPORTS)
+_PRELOAD = ("robocasa_lerobot.envs.kitchen_env", "robocasa_lerobot.convert.shard")
 SOURCES, SOURCE_SEEDS = "sources", 50_000_000  # folder of those that are multiplied, and how far off their seeds are
 _REASON = "reason.txt"
 _HALF = 0.5  # of the work on a dataset is recording, half drawing and encoding

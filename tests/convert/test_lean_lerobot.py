@@ -7,10 +7,11 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
 from convert_support import write_demos
 
 from robocasa_lerobot import cli
-from robocasa_lerobot.convert import worker_imports
+from robocasa_lerobot.convert.worker_imports import LEAN_LEROBOT, worker_imports
 
 PROGRAM = """
 import json, sys
@@ -18,6 +19,7 @@ from robocasa_lerobot.cli import main
 status = main()
 print(json.dumps([status, sorted(sys.modules)]))
 """
+MODULES = ("robocasa_lerobot.convert.shard", "robocasa_lerobot.convert.rerender.work")
 PACKAGES = {"transformers", "diffusers", "peft"}
 
 
@@ -38,15 +40,22 @@ def test_commands_do_without_the_packages_of_policies(tmp_path: Path) -> None:
 
 
 def test_workers_are_forked_from_a_process_without_them() -> None:
-    imports = [names for names in vars(worker_imports).values() if isinstance(names, tuple)]
-    assert {names[0] for names in imports} == {worker_imports.LEAN_LEROBOT}  # before any that imports LeRobot
+    imports = [worker_imports(module, lean=True) for module in MODULES]
+    assert {names[0] for names in imports} == {LEAN_LEROBOT}  # before any that imports LeRobot
     modules = [name for names in imports for name in names]
     program = f"import sys\nfor name in {modules!r}: __import__(name)\nprint(*{PACKAGES!r} & sys.modules.keys())"
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
     assert done.stdout.split() == []
 
 
+@pytest.mark.parametrize("module", MODULES)
+def test_workers_of_a_process_with_all_of_lerobot_have_it_too(module: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    assert worker_imports(module) == (module,)
+    monkeypatch.setitem(sys.modules, LEAN_LEROBOT, sys)
+    assert worker_imports(module) == (LEAN_LEROBOT, module)
+
+
 def test_in_this_process_lerobot_stays_whole(tmp_path: Path) -> None:
     demos = write_demos(tmp_path / "demos.hdf5", images=32)
     assert cli.main(["convert", str(demos), "--out", str(tmp_path / "data")]) == 0
-    assert worker_imports.LEAN_LEROBOT not in sys.modules
+    assert LEAN_LEROBOT not in sys.modules

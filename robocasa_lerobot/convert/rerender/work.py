@@ -31,7 +31,7 @@ from robocasa_lerobot.convert.rerender.plan import (
     make_render_plan,
 )
 from robocasa_lerobot.convert.scenes.prefetch import scenes_ahead
-from robocasa_lerobot.convert.worker_imports import RENDER_IMPORTS
+from robocasa_lerobot.convert.worker_imports import worker_imports
 from robocasa_lerobot.convert.writing.card import renew_dataset_card
 from robocasa_lerobot.convert.writing.encoder import (
     CODECS,
@@ -130,7 +130,7 @@ def render_dataset(
             plan.num_frames,
             "rendering",
             quiet_libraries,
-            RENDER_IMPORTS,
+            worker_imports(__name__),
         )
         return _complete(plan, partial, out, overwrite)
 
