@@ -8,11 +8,13 @@ from __future__ import annotations
 import functools
 import io
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
+from robocasa_lerobot.envs.kitchens.kept_textures import kept
 from robocasa_lerobot.errors import UnknownNameError
 
 TEXTURE_SIZE = 256  # pixels, height and width
@@ -350,13 +352,18 @@ GENERATORS = {
 
 @functools.lru_cache(maxsize=512)
 def texture_png(record: TextureRecord) -> bytes:
-    """PNG bytes of a texture, RGB, 256x256 pixels, tileable.
+    """PNG bytes of a texture, RGB, 256x256 pixels, tileable; drawn once on a machine (`kept_textures`).
 
     Raises:
         UnknownNameError: the record's kind has no generator.
     """
     if record.kind not in GENERATORS:
         raise UnknownNameError("texture kind", record.kind, GENERATORS)
+    return kept(Path(record.file).stem, record, Path(__file__), lambda: draw(record))
+
+
+def draw(record: TextureRecord) -> bytes:
+    """As `texture_png`, drawn anew."""
     pixels = GENERATORS[record.kind](record, np.random.default_rng(record.seed))
     buffer = io.BytesIO()
     Image.fromarray(np.round(np.clip(pixels, 0.0, 1.0) * 255).astype(np.uint8)).save(

@@ -186,5 +186,5 @@ def pack(paints: Sequence[Paint]) -> Atlas:
             ((x + inset) / width, 1 - (y + h - inset) / height, (x + w - inset) / width, 1 - (y + inset) / height)
         )
     buffer = io.BytesIO()
-    Image.fromarray(out).save(buffer, format="PNG")
+    Image.fromarray(out).save(buffer, format="PNG", compress_level=1)
     return Atlas(buffer.getvalue(), tuple(places))

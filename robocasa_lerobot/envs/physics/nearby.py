@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robocasa_lerobot.envs.physics.native import compiled
+from robocasa_lerobot.envs.physics.quaternions import matrices
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -190,20 +191,17 @@ def _shapes(model: mujoco.MjModel) -> Shapes:
     touches = (model.geom_contype | model.geom_conaffinity) != 0
     endless = model.geom_bodyid[model.geom_type == mujoco.mjtGeom.mjGEOM_PLANE]
     bodies = np.setdiff1d(model.geom_bodyid[touches], np.append(endless, 0))
-    center, half, radius = np.zeros((bodies.size, 3)), np.zeros((bodies.size, 3)), np.zeros(bodies.size)
+    geoms = np.flatnonzero(touches & np.isin(model.geom_bodyid, bodies))
+    geoms = geoms[np.argsort(model.geom_bodyid[geoms], kind="stable")]
     signs = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])
-    for i, body in enumerate(bodies):
-        corners = []
-        for geom in np.flatnonzero(touches & (model.geom_bodyid == body)):
-            rotation = np.empty(9)
-            mujoco.mju_quat2Mat(rotation, model.geom_quat[geom])
-            box = model.geom_aabb[geom, :3] + signs * model.geom_aabb[geom, 3:]
-            # A contact counts from this distance on.
-            reach = model.geom_margin[geom] + model.geom_gap[geom]
-            local = model.geom_pos[geom] + box @ rotation.reshape(3, 3).T
-            corners.append(np.concatenate([local - reach, local + reach]))
-        every = np.concatenate(corners)
-        low, high = every.min(axis=0), every.max(axis=0)
-        center[i], half[i] = (low + high) / 2, (high - low) / 2
-        radius[i] = float(np.linalg.norm(np.maximum(abs(low), abs(high))))
-    return Shapes(bodies.astype(np.int64), model.body_treeid[bodies].astype(np.int64), center, half, radius)
+    aabb = model.geom_aabb[geoms]
+    corners = aabb[:, None, :3] + signs * aabb[:, None, 3:]
+    local = model.geom_pos[geoms, None] + corners @ matrices(model.geom_quat[geoms]).transpose(0, 2, 1)
+    # A contact counts from this distance on.
+    reach = (model.geom_margin[geoms] + model.geom_gap[geoms])[:, None]
+    first = np.searchsorted(model.geom_bodyid[geoms], bodies)
+    low = np.minimum.reduceat(local.min(axis=1) - reach, first)
+    high = np.maximum.reduceat(local.max(axis=1) + reach, first)
+    radius = np.linalg.norm(np.maximum(abs(low), abs(high)), axis=1)
+    trees = model.body_treeid[bodies].astype(np.int64)
+    return Shapes(bodies.astype(np.int64), trees, (low + high) / 2, (high - low) / 2, radius)

@@ -15,12 +15,13 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from robocasa_lerobot.envs.physics.quaternions import matrices
 from robocasa_lerobot.envs.rendering.canvas import BACKDROP_GROUP
 from robocasa_lerobot.envs.rendering.frustum import opaque as opaque_geoms
 from robocasa_lerobot.envs.rendering.hidden_faces import shown_faces
 from robocasa_lerobot.envs.rendering.merged_shapes import merged_shapes
 from robocasa_lerobot.envs.rendering.mesh_assets import add_surface, copy_mesh
-from robocasa_lerobot.envs.rendering.rest_poses import RestPoses, matrices
+from robocasa_lerobot.envs.rendering.rest_poses import RestPoses
 from robocasa_lerobot.envs.rendering.software.arrays import Shapes
 from robocasa_lerobot.envs.rendering.software.triangles import shapes_of
 from robocasa_lerobot.envs.rendering.view_grid import on_grid

@@ -8,6 +8,8 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from robocasa_lerobot.envs.physics.quaternions import matrices
+
 Array = NDArray[np.float64]
 
 
@@ -40,14 +42,3 @@ class RestPoses:
         for geom in np.flatnonzero(at_rest).tolist():
             mujoco.mju_mat2Quat(quats[geom], matrix_of[geom])
         return cls(at_rest, positions, rotations, quats)
-
-
-def matrices(quaternions: Array) -> Array:
-    """Rotation matrices (n, 3, 3) of unit quaternions wxyz (n, 4)."""
-    w, x, y, z = quaternions.T
-    rows = (
-        (1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)),
-        (2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)),
-        (2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)),
-    )
-    return np.moveaxis(np.array(rows), -1, 0)
