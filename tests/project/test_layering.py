@@ -60,10 +60,11 @@ ROOMS: dict[str, dict[str, set[str]]] = {
     "envs": {
         "physics": set(),
         "seeds": set(),
+        "kept_files": set(),
         "rendering": {"physics"},
         "robots": {"physics", "rendering"},
-        "kitchens": {"physics", "rendering"},
-        "objects": {"kitchens", "rendering"},
+        "kitchens": {"physics", "rendering", "kept_files"},
+        "objects": {"kitchens", "rendering", "kept_files"},
         "scene": {"physics", "rendering", "robots", "kitchens", "objects", "seeds"},
         "predicates": {"robots", "kitchens", "objects", "scene"},
         "tasks": {"kitchens", "objects", "scene", "predicates"},

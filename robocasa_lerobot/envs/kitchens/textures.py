@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from robocasa_lerobot.envs.kitchens.kept_textures import kept
+from robocasa_lerobot.envs.kept_files import kept, stamp
 from robocasa_lerobot.errors import UnknownNameError
 
 TEXTURE_SIZE = 256  # pixels, height and width
@@ -352,14 +352,14 @@ GENERATORS = {
 
 @functools.lru_cache(maxsize=512)
 def texture_png(record: TextureRecord) -> bytes:
-    """PNG bytes of a texture, RGB, 256x256 pixels, tileable; drawn once on a machine (`kept_textures`).
+    """PNG bytes of a texture, RGB, 256x256 pixels, tileable; drawn once on a machine (`envs.kept_files`).
 
     Raises:
         UnknownNameError: the record's kind has no generator.
     """
     if record.kind not in GENERATORS:
         raise UnknownNameError("texture kind", record.kind, GENERATORS)
-    return kept(Path(record.file).stem, record, Path(__file__), lambda: draw(record))
+    return kept("textures", Path(record.file).stem, record, stamp(Path(__file__)), lambda: draw(record))
 
 
 def draw(record: TextureRecord) -> bytes:

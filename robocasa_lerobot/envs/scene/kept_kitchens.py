@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import mujoco
 
 from robocasa_lerobot.envs.kitchens.layout import Layout
-from robocasa_lerobot.envs.kitchens.materials import MaterialPalette, load_style
+from robocasa_lerobot.envs.kitchens.materials import MaterialPalette, load_style, split_of
 from robocasa_lerobot.envs.scene.assembly import bare_kitchen
 
 # Of kitchens, the ones that came last. One that came once costs nothing, one that came again about 2.7 MiB.
@@ -46,7 +46,10 @@ class _Built:
 
 @dataclass
 class _Place:
-    """Where a kitchen is kept from its second time on: most of the pretraining split's 2,500 do not come again soon."""
+    """Where a kitchen is kept: of the target split at once, else from its second time on.
+
+    Most of the pretraining split's 2,500 do not come again soon.
+    """
 
     came: int = 0
     built: _Built | None = None
@@ -62,7 +65,7 @@ def kitchen(layout: Layout, render_preset: str = "fast") -> tuple[mujoco.MjSpec,
     if place.built is not None:
         return place.built.again(layout)
     place.came += 1
-    if place.came == 1:
+    if place.came == 1 and {split_of(layout.layout_id), split_of(layout.style_id)} != {"target"}:
         return bare_kitchen(layout, render_preset)
     before = _attributes(layout)
     spec, palette = bare_kitchen(layout, render_preset)
