@@ -54,9 +54,14 @@ class Episode:
         # Everything that is written is read or looked at here, so that no mistake is found after half of the writing.
         self.simulator_states = self.demo.states
         names = [camera.name for camera in plan.cameras]
-        for camera in names:
-            if camera in self.demo.image_cameras:
-                self.demo.image_shape(camera)
+        for camera in plan.cameras:
+            if camera.name in self.demo.image_cameras:
+                size, wanted = self.demo.image_shape(camera.name), (camera.height, camera.width)
+                if settings.image_size is None and size != wanted:
+                    raise RejectedEpisodeError(
+                        f"its pictures of {camera.name} are {size[0]}x{size[1]}, those of other episodes "
+                        f"{wanted[0]}x{wanted[1]}. Convert it by itself (--demos), or all to one size (--image-size)."
+                    )
         recorded = plan.mapping.recorded_states(self.demo)
         if needs_scene(self.demo, plan.mapping, names):
             self._scene = self._stack.enter_context(self._load(file, plan, ahead))

@@ -6,7 +6,6 @@ file is written beside its place and renamed when complete.
 
 from __future__ import annotations
 
-import gzip
 import json
 import re
 from collections.abc import Iterator, Sequence
@@ -23,6 +22,8 @@ from robocasa_lerobot.contract import Part
 from robocasa_lerobot.convert.lerobot_v3 import EXTRA_PREFIX, ExportedDataset, ExportedEpisode
 from robocasa_lerobot.convert.mapping.robots import ABSOLUTE_ACTION_PARTS
 from robocasa_lerobot.convert.reading.demo_file import ASSETS_GROUP, IMAGE_SUFFIX, DemoFile
+from robocasa_lerobot.convert.reading.extras import read_scene, read_states
+from robocasa_lerobot.convert.reading.hdf5 import RejectedEpisodeError
 from robocasa_lerobot.convert.reading.layout import ABSOLUTE_ACTIONS, ACTIONS
 from robocasa_lerobot.convert.reading.stages import STAGE_DATASET
 from robocasa_lerobot.errors import UnknownNameError, UserError
@@ -126,7 +127,14 @@ def _write(
     with Bar(total=sum(episode.length for episode in episodes), unit="frame", desc="exporting") as bar:
         for index, episode in enumerate(episodes):
             group = data.create_group(f"demo_{index}")
-            for what in _write_vectors(group, dataset, episode, compression):
+            try:
+                lacks = _write_vectors(group, dataset, episode, compression)
+            except RejectedEpisodeError as error:
+                raise UserError(
+                    f"{dataset.root}, episode {episode.index}: {error} Copy this file again, or take it away to export "
+                    "the episode without what it holds."
+                ) from None
+            for what in lacks:
                 lacking[what] = lacking.get(what, 0) + 1
             for camera in cameras:
                 _write_pictures(group, dataset, episode, camera, compression)
@@ -176,8 +184,7 @@ def _write_vectors(
     folder = dataset.extras(episode)
     states = folder / "states.npz"
     if states.is_file():
-        with np.load(states) as arrays:
-            group.create_dataset("states", data=arrays["states"], **compression)
+        group.create_dataset("states", data=read_states(states, episode.length), **compression)
     else:
         lacking.append("simulator states")
     for key, values in further.items():
@@ -185,7 +192,7 @@ def _write_vectors(
             group.create_dataset(key, data=values, **compression)
     model = folder / "model.xml.gz"
     if model.is_file():
-        group.attrs["model_file"] = gzip.decompress(model.read_bytes()).decode("utf-8")
+        group.attrs["model_file"] = read_scene(model)
     else:
         lacking.append("scenes (model_file)")
     meta_file = folder / "ep_meta.json"

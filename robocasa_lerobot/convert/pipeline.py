@@ -246,7 +246,7 @@ def _result(
         rejected=rejected,
         cameras=tuple(camera.name for camera in plan.cameras),
         instruction_sources=dict(Counter(line["instruction_source"] for line in episodes)),
-        notes=plan.notes if isinstance(plan, V2Plan) else (),
+        notes=plan.notes,
         warnings=(warning,) if warning else (),
     )
 

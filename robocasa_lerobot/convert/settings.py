@@ -43,6 +43,7 @@ MIN_FRAMES_PER_WORKER = 2000
 # slower, and that of stored pictures 3 % faster (`benchmarks/results/convert_speed.json`).
 CORES_PER_WORKER = 2
 _MAX_FAILURES = 10  # demos without a known robot, camera or mesh, after which no other is tried
+_ASSUMED = "are assumed (another one: `inspect --draft-mapping`, `convert --mapping`)"
 
 
 @dataclass(frozen=True)
@@ -150,6 +151,7 @@ class Plan:
     shards: tuple[Shard, ...]
     num_frames: int  # an upper bound: rejected episodes are counted
     stages: bool = field(default=False, kw_only=True)  # whether any source says which stage its steps belong to
+    notes: tuple[str, ...] = field(default=(), kw_only=True)  # for the user: what was assumed, left out or changed
 
     @property
     def features(self) -> dict[str, dict[str, Any]]:
@@ -214,6 +216,7 @@ def make_plan(files: Sequence[Path], settings: ConversionSettings) -> Plan:
         tuple(shards),
         num_frames,
         stages=any(look.stages for look in looks),
+        notes=tuple(f"{look.file} tells no rate: {look.fps} Hz {_ASSUMED}" for look in looks if look.rate_is_assumed),
     )
 
 
@@ -263,6 +266,7 @@ class _Look:
     digests: dict[str, str]  # of whole demos
     stages: bool  # whether a demo says which stage its steps belong to
     decisions: tuple[str, ...]  # what all demos say about who decided
+    rate_is_assumed: bool
 
 
 def _look(path: Path, settings: ConversionSettings, roots: Sequence[Path]) -> _Look:
@@ -298,6 +302,7 @@ def _look(path: Path, settings: ConversionSettings, roots: Sequence[Path]) -> _L
         return _Look(
             *(path, mapping, cameras, file.control_hz, tuple(demos), strays, all_demos, traps, digests, stages),
             decisions,
+            file.rate_is_assumed,
         )
 
 

@@ -16,7 +16,7 @@ import numpy as np
 
 from robocasa_lerobot import __version__
 from robocasa_lerobot.demos.recorder import Recording
-from robocasa_lerobot.errors import differing
+from robocasa_lerobot.errors import UserError, differing
 from robocasa_lerobot.hdf5_files import new_hdf5
 
 ENV_TYPE_ROBOSUITE = 1  # robomimic's number for environments of this family
@@ -104,8 +104,11 @@ def versions() -> dict[str, str]:
     return {"robocasa_lerobot_version": __version__, "mujoco_version": mujoco.__version__}
 
 
-# What generated demonstrations are made by, of recorded ones, whose settings are all among those of generated ones.
-RECORDED: Mapping[str, Any] = MappingProxyType({"method": None})
+# What only demonstrations of other kinds have, of plainly recorded ones, whose settings are all among theirs: of those
+# generated, led astray, of corrected policies, driven by hand (with a policy).
+RECORDED: Mapping[str, Any] = MappingProxyType(
+    dict.fromkeys(("method", "disturbances", "fingerprint", "after_steps", "recorded_by", "with_policy"))
+)
 
 
 def recorded_otherwise(found: Mapping[str, Any], settings: Mapping[str, Any], software: Mapping[str, str]) -> str:
@@ -134,8 +137,20 @@ class Summary:
 
 
 def read_summary(path: Path) -> Summary:
-    """Read the attributes of a file that `merge_parts` wrote; files of others have few of them, or none."""
-    with h5py.File(path, "r") as file:
+    """Read the attributes of a file that `merge_parts` wrote; files of others have few of them, or none.
+
+    Raises:
+        UserError: it holds no demonstrations.
+    """
+    try:
+        opened = h5py.File(path, "r")
+    except OSError as error:
+        raise UserError(f"{path} is no HDF5 file ({error}). Remove it, or choose another place.") from error
+    with opened as file:
+        if not isinstance(file.get("data"), h5py.Group):
+            raise UserError(
+                f"{path} holds no demonstrations: it has no group `data`. Remove it, or choose another place."
+            )
         data = file["data"]
         attributes = data.attrs
         demos = [name for name in data if name.startswith("demo_")]

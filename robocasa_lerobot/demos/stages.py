@@ -284,7 +284,8 @@ def _fallen_out(env: KitchenEnv) -> Stage | None:
     wanted: dict[str, bool] = {}
     if len(task.stages) == 1 or task.goal.evaluate(env.scene, env.data, wanted):
         return None
-    failing = (term for name, terms in terms_by_name(task.goal).items() if wanted.get(name) is False for term in terms)
+    named = terms_by_name(task.goal, unwanted=False)
+    failing = (term for name, terms in named.items() if wanted.get(name) is False for term in terms)
     fallen = next((term for term in failing if isinstance(term, ObjectOn)), None)
     return (
         None if fallen is None else Stage("pick_place", "place", fallen.receptacle, object=fallen.object, until=fallen)

@@ -209,6 +209,11 @@ class KitchenEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         """The seed that the next reset without one will take; asking changes nothing."""
         return int(copy.deepcopy(self.np_random).integers(_SEED_LIMIT))
 
+    @property
+    def steps(self) -> int:
+        """Control steps of the running episode so far."""
+        return self._steps
+
     def get_state(self) -> KitchenState:
         """The state of the running episode.
 

@@ -34,8 +34,8 @@ Generated from the declarations by `make docs`; do not edit. `robocasa-lerobot t
 `robocasa-lerobot tasks NAME --pictures FILE.png` renders its first and its last state.
 
 Horizons are control steps at {hz} Hz. The human median is the length of the published demonstrations. Words in braces
-are drawn at reset. Terms of the goal have the names that they have in `info["success_terms"]`; distances are metres,
-angles radians, openness and turns shares of the part's range.
+are drawn at reset. Terms of the goal have the names that they have in `info["success_terms"]`, where `x`
+under "not" is `not_x`; distances are metres, angles radians, openness and turns shares of the part's range.
 """
 _INSIDE_NOTE = (
     "The published test of being inside grows more lenient the shorter an edge of the region is; here the corners of "

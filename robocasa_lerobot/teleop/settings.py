@@ -59,6 +59,8 @@ class TeleopSettings:
         return {"split": self.split, "image_size": self.image_size, "render_preset": self.render_preset, **chosen}
 
     def identity(self) -> dict[str, Any]:
-        """What the kitchens depend on: episodes that were recorded under other values are not mixed in."""
+        """What kitchens and kinds of episodes depend on: those recorded under other values are not mixed in."""
         ids = {key: None if (v := getattr(self, key)) is None else list(v) for key in ("layouts", "styles")}
-        return {"recorded_by": "teleop", "task": self.task, "split": self.split, "seed": self.seed, **ids}
+        # Without a policy nothing says who decided each step: among episodes that do, conversion would leave it out.
+        driven = {"with_policy": True} if self.policy else {}
+        return {"recorded_by": "teleop", "task": self.task, "split": self.split, "seed": self.seed, **ids, **driven}

@@ -54,6 +54,12 @@ ROBOTS: dict[str, tuple[tuple[str, ...], dict[str, Any], int, dict[str, int]]] =
                        {"end_effector_position": 3, "gripper_close": 1}),
     "joint velocities": (("robot0_",), {"robots": "Panda", "controller_configs": {"type": "JOINT_VELOCITY"}}, 8,
                          {"joint_velocity": 7, "gripper_close": 1}),
+    "joint positions": (("robot0_",), {"robots": "Panda", "controller_configs": {"type": "JOINT_POSITION"}}, 8,
+                        {"joint_position": 7, "gripper_close": 1}),
+    "absolute joint positions": (
+        ("robot0_",),
+        {"robots": "Panda", "controller_configs": {"type": "JOINT_POSITION", "input_type": "absolute"}}, 8,
+        {"joint_position_absolute": 7, "gripper_close": 1}),
     "absolute poses": (("robot0_",), {"robots": "Panda", "controller_configs": {**OSC_POSE, "control_delta": False}}, 7,
                        {"end_effector_position_absolute": 3, "end_effector_rotation_absolute": 3, "gripper_close": 1}),
     "absolute poses, 1.5": (

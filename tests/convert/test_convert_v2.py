@@ -14,6 +14,7 @@ import v2_support as v2
 from convert_support import leftovers, tree_hashes
 
 from robocasa_lerobot import cli, contract
+from robocasa_lerobot.errors import UserError
 from robocasa_lerobot.jsonl import read_jsonl
 
 pytest.importorskip("lerobot.datasets")
@@ -197,6 +198,41 @@ def test_other_orders_of_components_become_the_contracts(source: Path, tmp_path:
         n: (where.start, where.stop) for n, where in contract.ACTION_SLICES.items()
     }
     assert verify(result.root).passed
+
+
+def test_components_go_by_their_names_where_nothing_else_tells_their_order(source: Path, tmp_path: Path) -> None:
+    names = contract.component_names(contract.ACTION_PARTS)
+    true = np.concatenate([v2.read_columns(source, index)["action"].flatten().to_numpy() for index in range(3)])
+
+    def converted(name: str, words: list[str], robot: str = contract.ROBOT_TYPE) -> Path:
+        changed = v2.clone(source, tmp_path / name / "in")
+
+        def describe(info: dict[str, Any]) -> None:
+            info["robot_type"] = robot
+            info["features"]["action"]["names"] = words
+            info["features"]["observation.state"]["names"] = contract.component_names(contract.STATE_PARTS)
+
+        (changed / "meta" / "modality.json").unlink()
+        v2.edit_json(changed / "meta" / "info.json", describe)
+        return convert([changed], tmp_path / name / "out", SETTINGS, workers=1).root
+
+    turned = converted("turned", names[::-1])
+    rows = column(turned, "action").reshape(-1, len(names))
+    assert rows.tobytes() == np.ascontiguousarray(true.reshape(-1, len(names))[:, ::-1]).tobytes()
+    assert v2_features(turned)["action"]["names"] == names
+    # Ports of RoboCasa's HDF5 files: as many numbers, of another meaning.
+    other = [f"arm_{i}" for i in range(len(names))]
+    kept = converted("other", other)
+    assert column(kept, "action").tobytes() == true.tobytes()
+    assert v2_features(kept)["action"]["names"] == other
+    with pytest.raises(UserError, match=r"does not say what the 12 numbers of 'action' are.*modality\.json"):
+        converted("unnamed", ["action"])
+    assert not (tmp_path / "unnamed" / "out").exists()
+
+
+def v2_features(root: Path) -> dict[str, Any]:
+    features: dict[str, Any] = json.loads((root / "meta" / "info.json").read_text())["features"]
+    return features
 
 
 def test_episodes_are_selected_by_the_benchmarks_rule(source: Path, tmp_path: Path) -> None:

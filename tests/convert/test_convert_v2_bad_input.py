@@ -101,6 +101,13 @@ def scrambled_video(root: Path, index: int) -> None:
     path.write_bytes(content)
 
 
+def scrambled_model(root: Path, index: int) -> None:
+    path = root / f"extras/episode_{index:06d}/model.xml.gz"
+    content = bytearray(path.read_bytes())
+    content[20:28] = b"\xff" * 8  # in what is deflated
+    path.write_bytes(content)
+
+
 def video_of(length: int) -> EpisodeDamage:
     def damage(root: Path, index: int) -> None:
         v2.write_video(v2.video(root, index, CAMERA), v2.moving_pictures(length, v2.SIZE), v2.TARGET)
@@ -151,6 +158,11 @@ EPISODES: dict[str, tuple[EpisodeDamage, str]] = {
         lambda root, index: [(root / f"extras/episode_{index:06d}/model.xml.gz").write_bytes(b"<mujoco/>"), None][1],
         "extras/model.xml.gz cannot be used",
     ),
+    "half a file of states": (
+        lambda root, index: v2.truncate(root / f"extras/episode_{index:06d}/states.npz", 0.5),
+        "extras/states.npz cannot be used",
+    ),
+    "scrambled model": (scrambled_model, "extras/model.xml.gz cannot be used"),
     "ep_meta is no object": (
         lambda root, index: [(root / f"extras/episode_{index:06d}/ep_meta.json").write_text("[1]"), None][1],
         "its ep_meta.json is a JSON list",

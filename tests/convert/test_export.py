@@ -282,6 +282,18 @@ def test_damaged_datasets_leave_nothing(ours: tuple[Path, Path, Path], tmp_path:
     attempt("is no LeRobot dataset")
 
 
+@pytest.mark.parametrize("name", ["states.npz", "model.xml.gz"])
+def test_damaged_extras_are_named(name: str, ours: tuple[Path, Path, Path], tmp_path: Path) -> None:
+    copy = Path(shutil.copytree(ours[1], tmp_path / "copy"))
+    damaged = sorted((copy / "extras").glob(f"*/{name}"))[1]
+    v2.truncate(damaged, 0.5)
+    with pytest.raises(UserError, match=rf"episode 1: its extras/{name} cannot be used .* Copy this file again"):
+        export(copy, tmp_path / "out.hdf5")
+    assert not list(tmp_path.glob("out.hdf5*"))
+    damaged.unlink()
+    assert any("1 episodes are not in the dataset" in note for note in export(copy, tmp_path / "out.hdf5").notes)
+
+
 def test_cameras_that_were_placed_after_the_recording_are_told(ours: tuple[Path, Path, Path], tmp_path: Path) -> None:
     assert not any("placed" in note for note in export(ours[1], tmp_path / "plain.hdf5").notes)
     copy = Path(shutil.copytree(ours[1], tmp_path / "copy"))

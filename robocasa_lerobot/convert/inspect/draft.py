@@ -42,7 +42,7 @@ def draft_mapping(report: FileReport) -> str:
     if report.mapping is not None:
         lines.append("# The robot is recognised: without this mapping its state is read, or computed from the scene.")
     lines.append(f"robot_type: {_quoted(_robot_type(report))}")
-    known = report.fps is not None and report.env_name != "unknown"
+    known = report.fps is not None and not report.fps_is_assumed
     fps = report.fps or ASSUMED_FPS
     lines.append(f"fps: {fps}" + ("" if known else "  # assumed: steps per second of the recording"))
     if layout.episodes != DEFAULT_EPISODES:

@@ -23,6 +23,7 @@ from robocasa_lerobot.errors import UserError
 from robocasa_lerobot.progress import Bar
 
 _ACTION = re.compile(r"(^|/)actions?$")
+_OTHER_ACTIONS = re.compile(r"data/demo_[0-9]+/action")  # as `actions`, in the singular
 _MAX_DEPTH = 3  # groups below the file in which episodes are looked for
 _SHOWN_TEXT = 300  # characters of an attribute
 
@@ -56,6 +57,7 @@ class FileReport:
     instructions: dict[str, int] = field(default_factory=dict)
     instruction_sources: dict[str, int] = field(default_factory=dict)
     fps: int | None = None
+    fps_is_assumed: bool = False
     mapping: RobotMapping | None = None
     no_mapping: str = ""
     problems: dict[str, str] = field(default_factory=dict)
@@ -85,7 +87,7 @@ def inspect_hdf5(path: Path) -> FileReport:
         except UserError as error:
             report.problems["mask"] = str(error)
         try:
-            report.fps = file.control_hz
+            report.fps, report.fps_is_assumed = file.control_hz, file.rate_is_assumed
         except UserError as error:
             report.problems["rate"] = str(error)
         sample = _walk(file, found, report)
@@ -148,9 +150,10 @@ def _find_layout(path: Path) -> tuple[Layout | None, tuple[str, ...]]:
     """The episodes and their actions, where the structure shows them; and the names at the top of the file."""
     with DemoFile(path, Layout(episodes="/")) as whole:  # the checks of opening, and no assumption
         groups, children_of_data = whole.members("/"), whole.members("data")
-        if any(re.fullmatch(r"demo_[0-9]+", name) for name in children_of_data):
-            return Layout(), groups
+        usual = any(re.fullmatch(r"demo_[0-9]+", name) for name in children_of_data)
         shapes = whole.demo(WHOLE_FILE).shapes()
+        if usual and not any(_OTHER_ACTIONS.fullmatch(key) for key in shapes):
+            return Layout(), groups
     found: Counter[tuple[str, str]] = Counter()
     children: dict[tuple[str, str], set[str]] = {}
     for key in shapes:
@@ -197,7 +200,8 @@ def describe(report: FileReport) -> str:
     lines.append(f"episodes: {count} ({report.layout.episodes}: {report.episodes[0]} to {report.episodes[-1]})")
     if report.lengths:
         low, middle, high = (int(f(report.lengths)) for f in (np.min, np.median, np.max))
-        lines.append(f"steps: {sum(report.lengths):,} (episodes of {low} to {high}, median {middle}), {report.fps} Hz")
+        rate = f"{report.fps} Hz" + (" (assumed: the file does not say)" if report.fps_is_assumed else "")
+        lines.append(f"steps: {sum(report.lengths):,} (episodes of {low} to {high}, median {middle}), {rate}")
     lines.append(f"environment: {report.env_name}")
     lines += _section("attributes", (f"{key}: {value}" for key, value in report.attributes.items()))
     kinds = (f"{key}: {kind}" for key, kind in report.episode_attributes.items())

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import gzip
 import hashlib
 import json
 from collections.abc import Iterator, Mapping
@@ -20,6 +19,7 @@ from robocasa_lerobot import contract
 from robocasa_lerobot.convert.lerobot_v2.dataset import EpisodeLine, V2Dataset
 from robocasa_lerobot.convert.mapping.instruction import OPTION, template_fields
 from robocasa_lerobot.convert.reading.demo_file import RejectedEpisodeError
+from robocasa_lerobot.convert.reading.extras import read_scene, read_states
 from robocasa_lerobot.convert.settings import Camera, ConversionSettings
 from robocasa_lerobot.convert.writing.statistics import column_of
 from robocasa_lerobot.convert.writing.video import VideoForm, frames, probe, rgb
@@ -27,7 +27,6 @@ from robocasa_lerobot.errors import UserError
 
 # How far the recorded times may be from even steps, in steps, before they say that frames were lost.
 MAX_TIME_DEVIATION = 0.1
-MAX_MODEL_BYTES = 256 * 2**20
 EP_META, MODEL, STATES = "ep_meta.json", "model.xml.gz", "states.npz"  # RoboCasa's names under `extras`
 
 
@@ -261,15 +260,10 @@ class V2Episode:
                 if path.name == EP_META:
                     meta = json.loads(path.read_text(encoding="utf-8"))
                 elif path.name == MODEL:
-                    with gzip.open(path) as stream:
-                        if len(stream.read(MAX_MODEL_BYTES + 1)) > MAX_MODEL_BYTES:
-                            raise ValueError("larger than any scene")
+                    read_scene(path)
                 else:
-                    with np.load(path, allow_pickle=False) as arrays:
-                        states = arrays["states"]
-                    if states.ndim != 2 or len(states) != self.length or not np.isfinite(states).all():
-                        raise ValueError(f"states are {states.shape}, expected ({self.length}, n) finite numbers")
-            except (OSError, ValueError, KeyError, TypeError, EOFError, RecursionError) as error:
+                    read_states(path, self.length)
+            except (OSError, ValueError, RecursionError) as error:
                 raise RejectedEpisodeError(f"its extras/{path.name} cannot be used ({error}).") from None
         if not isinstance(meta, dict):
             raise RejectedEpisodeError(f"its {EP_META} is a JSON {type(meta).__name__}, expected an object.")

@@ -52,13 +52,12 @@ class V2Plan(Plan):
     """A plan whose sources are dataset folders.
 
     Attributes: `columns` that are taken over, `camera_keys` with the source's feature of each camera, `tasks` united
-    over all sources, `notes` for the user, and `stamp`, which changes when any source file is touched.
+    over all sources, and `stamp`, which changes when any source file is touched.
     """
 
     columns: tuple[Column, ...]
     camera_keys: tuple[tuple[str, str], ...]
     tasks: tuple[str, ...]
-    notes: tuple[str, ...]
     stamp: str
 
     @property
@@ -263,19 +262,31 @@ def _columns(dataset: V2Dataset, notes: list[str]) -> tuple[tuple[Column, ...], 
 def _vector(
     dataset: V2Dataset, column: Column, kind: str, contract_parts: tuple[Part, ...]
 ) -> tuple[Column, tuple[Part, ...]]:
-    """Names of a vector's components: the contract's for its own robot, else the dataset's, else by its parts."""
+    """Names of a vector's components: the contract's for its own robot, else the dataset's, else by its parts.
+
+    Raises:
+        SourceError: it is as long as the contract's, and nothing says in which order its components are.
+    """
     slices = _modality_slices(dataset, column, kind)
+    components = _flat_names(dataset.features[column.name].get("names"), column.size)
     contract_sizes = {part.name: part.size for part in contract_parts}
     if dataset.robot_type == contract.ROBOT_TYPE and column.size == sum(contract_sizes.values()):
         names = tuple(contract.component_names(contract_parts))
-        if not slices:
-            return Column(column.name, column.dtype, column.size, names), contract_parts
+        order: tuple[int, ...] | None = None
         if {name: stop - start for name, (start, stop) in slices.items()} == contract_sizes:
             order = tuple(i for part in contract_parts for i in range(*slices[part.name]))
+        elif components is not None and set(components) == set(names):
+            order = tuple(components.index(name) for name in names)
+        elif components is None and not slices:
+            # Ports of RoboCasa's HDF5 files have as many numbers in another order.
+            raise SourceError(
+                f"{dataset.root} does not say what the {column.size} numbers of {column.name!r} are: it has neither "
+                f"meta/modality.json nor {column.size} `names` in meta/info.json. Put one of them there: RoboCasa's "
+                f"own datasets have {', '.join(f'{part.name} {part.size}' for part in contract_parts)}, in this order."
+            )
+        if order is not None:
             changed = order if order != tuple(range(column.size)) else None
             return Column(column.name, column.dtype, column.size, names, changed), contract_parts
-    declared = dataset.features[column.name].get("names")
-    components = _flat_names(declared, column.size)
     if components is None and slices:
         components = [f"{name}_{i}" for name, (start, stop) in slices.items() for i in range(stop - start)]
     components = components or [f"{kind}_{i}" for i in range(column.size)]

@@ -126,6 +126,6 @@ def _arm_parts(arm: str, configuration: Mapping[str, Any], num_joints: int | Non
     if kind == "OSC_POSITION":
         return [position]
     if kind in _JOINT_KINDS and num_joints is not None:
-        name = _JOINT_KINDS[kind]
+        name = _JOINT_KINDS[kind] + (ending if kind == "JOINT_POSITION" else "")
         return [Part(f"{arm}{name}", tuple(f"{arm}joint_{i + 1}" for i in range(num_joints)))]
     return None

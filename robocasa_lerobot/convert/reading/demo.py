@@ -305,7 +305,9 @@ def text_of_attribute(value: Any) -> str | None:
 
 
 def plain(value: Any) -> Any:
-    """An attribute as plain Python values."""
+    """An attribute as plain Python values, bytes as text."""
     if isinstance(value, np.ndarray | np.generic):
-        return value.tolist()
+        value = value.tolist()
+    if isinstance(value, list):
+        return [plain(one) for one in value]
     return text_of_attribute(value) or value

@@ -249,12 +249,22 @@ class DemoFile:
         """
         if self.layout.robot is not None:
             return self.layout.robot.fps
-        rate = self.environment.get("control_freq")
+        rate = self._told_hz
         if rate is None:
-            rate = self._recorded_hz() or contract.CONTROL_HZ
+            rate = contract.CONTROL_HZ
         if not isinstance(rate, int | float) or not 0 < rate <= MAX_RATE_HZ or round(rate) != rate:
             raise SourceError(f"{self.path} has the control rate {rate!r} Hz; a positive whole number is needed.")
         return int(rate)
+
+    @property
+    def rate_is_assumed(self) -> bool:
+        """Whether nothing in the file, and no description of it, tells its control rate."""
+        return self.layout.robot is None and self._told_hz is None
+
+    @cached_property
+    def _told_hz(self) -> Any:
+        rate = self.environment.get("control_freq")
+        return self._recorded_hz() if rate is None else rate
 
     def _recorded_hz(self) -> float | None:
         for name in self.demo_names:

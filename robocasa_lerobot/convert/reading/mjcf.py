@@ -63,6 +63,7 @@ class AssetFinder:
                 raise UserError(f"--asset-root {root} is not a folder.")
         self._roots = [root.resolve() for root in roots]
         self._embedded = embedded
+        self.leading_out: list[Path] = []  # links that were met whose files lie outside of the roots
 
     def read(self, name: str) -> bytes | None:
         """Bytes of the file that the path `name` stands for, or None."""
@@ -75,7 +76,7 @@ class AssetFinder:
         parts = [part for part in path.split("/") if part not in ("", "..", ".")]
         for root in self._roots:
             for start in range(len(parts)):
-                file = _inside(root, parts[start:])
+                file = _inside(root, parts[start:], self.leading_out)
                 if file is not None:
                     return _content(file)
         for package in ASSET_PACKAGES:
@@ -178,6 +179,12 @@ def loadable(xml: str, finder: AssetFinder) -> tuple[str, dict[str, bytes]]:
             f"{len(set(missing))} mesh or texture files of the scene were not found, the first:{shown}\n"
             "Give the folder that holds them with --asset-root DIR (repeatable): a file counts as found when the end "
             "of its path exists under DIR, e.g. .../robosuite/models/assets."
+            + (
+                f" {finder.leading_out[0]} is there, but as a link that leads out of this folder, which is not "
+                "followed: give a folder with the files themselves (`cp -rL`)."
+                if finder.leading_out
+                else ""
+            )
         )
     return ET.tostring(root, encoding="unicode"), assets
 
@@ -210,13 +217,17 @@ def _files(root: ET.Element, folders: dict[str, str]) -> Iterator[tuple[ET.Eleme
         yield element, attribute, path if posixpath.isabs(path) else posixpath.join(folders[folder], path)
 
 
-def _inside(root: Path, parts: Sequence[str]) -> Path | None:
+def _inside(root: Path, parts: Sequence[str], leading_out: list[Path] | None = None) -> Path | None:
+    """The file below a root, or None; a link that points out of it is noted in `leading_out`, and not followed."""
     if not parts:
         return None
     file = root.joinpath(*parts)
     try:
-        # A link under the root may point out of it.
-        return file if file.is_file() and file.resolve().is_relative_to(root) else None
+        if file.is_file() and file.resolve().is_relative_to(root):
+            return file
+        if file.is_file() and leading_out is not None:
+            leading_out.append(file)
+        return None
     except OSError:  # a name that is too long, a folder that may not be entered
         return None
 

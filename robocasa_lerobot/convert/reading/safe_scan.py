@@ -23,12 +23,14 @@ import h5py
 import numpy as np
 
 from robocasa_lerobot.convert.reading.hdf5 import (
+    LEFT_OUT,
     MAX_TEXT_BYTES,
     RejectedEpisodeError,
     SourceError,
     member,
     names,
     reading,
+    recorded_attributes,
     shape_and_type,
     text_attribute,
 )
@@ -42,6 +44,7 @@ _MAX_TRAPS = 5  # more places than these that end the process, and the file is g
 _MAX_DEPTH = 12
 _READ_BYTES = 1 << 20  # larger arrays are read in part
 _FIRST_PART_BYTES = 64 << 20
+_LONG_TEXTS = ("model_file", "ep_meta")  # attributes that may be longer than what a record takes over
 _SKIPPED = ("next_obs",)  # never converted
 _MODULE = "robocasa_lerobot.convert.reading.safe_scan"
 
@@ -188,10 +191,12 @@ def _digest(group: h5py.Group, path: str, contents: dict[str, str | None]) -> st
     if None in mine.values():
         return None
     try:
-        texts = [text_attribute(group, key) for key in ("model_file", "ep_meta")]
-    except RejectedEpisodeError:
+        texts = [text_attribute(group, key) for key in _LONG_TEXTS]
+        short = [(key, value) for key, value in recorded_attributes(group).items() if key != LEFT_OUT]
+        content = json.dumps([texts, sorted(short), sorted(mine.items())])
+        return hashlib.blake2b(content.encode(), digest_size=16).hexdigest()
+    except (RejectedEpisodeError, ValueError, TypeError):
         return None
-    return hashlib.blake2b(json.dumps([texts, sorted(mine.items())]).encode(), digest_size=16).hexdigest()
 
 
 def _natural(name: str) -> tuple[int, str]:

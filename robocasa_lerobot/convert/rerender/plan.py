@@ -6,10 +6,8 @@ the episodes, `info.json`, `stats.json` and `modality.json` change in what they 
 
 from __future__ import annotations
 
-import gzip
 import hashlib
 import json
-import shutil
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import cached_property
@@ -22,6 +20,7 @@ from numpy.typing import NDArray
 from robocasa_lerobot import contract
 from robocasa_lerobot.convert.lerobot_v3 import ExportedDataset, ExportedEpisode
 from robocasa_lerobot.convert.reading.demo_file import RejectedEpisodeError
+from robocasa_lerobot.convert.reading.extras import read_scene, read_states
 from robocasa_lerobot.convert.reading.mjcf import AssetFinder, loadable, scene_names
 from robocasa_lerobot.convert.record_files import EXTRAS, kept_assets
 from robocasa_lerobot.convert.rerender.camera_configs import check_camera_configs, with_cameras
@@ -33,7 +32,6 @@ from robocasa_lerobot.errors import UnknownNameError, UserError
 # Raised when the written bytes change for the same input.
 RENDER_VERSION = 2
 SOURCE_FORMAT = "LeRobotDataset v3.0, rendered again"
-_MAX_MODEL_BYTES = 256 * 2**20
 _RECORD = "meta/robocasa/conversion.json"
 
 
@@ -147,15 +145,7 @@ class ExportedScene:
             RejectedEpisodeError: it cannot be read, or as `loadable`.
             MissingAssetsError: as `loadable`.
         """
-        try:
-            with gzip.open(self.file) as stream:
-                content = stream.read(_MAX_MODEL_BYTES + 1)
-            if len(content) > _MAX_MODEL_BYTES:
-                raise RejectedEpisodeError(f"its {self.file.name} unpacks to more than {_MAX_MODEL_BYTES} bytes.")
-            xml = content.decode("utf-8")
-        except (OSError, EOFError, UnicodeDecodeError) as error:
-            raise RejectedEpisodeError(f"its {self.file.name} cannot be read ({error}).") from None
-        xml = with_cameras(xml, json.loads(self.cam_configs))
+        xml = with_cameras(read_scene(self.file), json.loads(self.cam_configs))
         return loadable(xml, AssetFinder(self.asset_roots))
 
 
@@ -174,7 +164,7 @@ class EpisodePictures:
         from robocasa_lerobot.convert.scenes.compiled import CompiledScene
 
         self._cameras = plan.cameras
-        self.states = _states(plan.dataset.extras(episode) / "states.npz", episode.length)
+        self.states = read_states(plan.dataset.extras(episode) / "states.npz", episode.length)
         source = ExportedScene.of(plan, episode)
         compiled = ahead.take(source) if ahead is not None else None
         self._scene = Scene(compiled or CompiledScene.of(*source(), preset=plan.settings.render_preset))
@@ -220,17 +210,6 @@ def recorded(root: Path) -> dict[str, Any]:
 def _record(root: Path) -> dict[str, Any]:
     file = root / _RECORD
     return dict(json.loads(file.read_text(encoding="utf-8"))) if file.is_file() else {}
-
-
-def _states(file: Path, length: int) -> NDArray[np.float64]:
-    try:
-        with np.load(file, allow_pickle=False) as arrays:
-            states = np.asarray(arrays["states"], np.float64)
-    except (OSError, ValueError, KeyError, shutil.Error) as error:
-        raise RejectedEpisodeError(f"its {file.name} cannot be read ({error}).") from None
-    if states.ndim != 2 or len(states) != length or not np.isfinite(states).all():
-        raise RejectedEpisodeError(f"its {file.name} holds {states.shape} numbers, expected ({length}, n) finite ones.")
-    return states
 
 
 def _cameras(dataset: ExportedDataset, settings: RenderSettings) -> tuple[Camera, ...]:

@@ -15,6 +15,9 @@ if TYPE_CHECKING:
     from robocasa_lerobot.envs.scene.scene import Scene
 
 
+_NEGATED = "not_"  # before the names of what is not to hold
+
+
 class Goal(ABC):
     """Something that holds or does not hold in a state."""
 
@@ -139,7 +142,7 @@ class Exactly(Several):
 
 
 class Not(Joined):
-    """The part does not hold; its own terms are reported as they are."""
+    """The part does not hold; of its terms it is reported that they do not: true always is as the goal wants."""
 
     def __init__(self, part: Goal) -> None:
         self.part = part
@@ -147,7 +150,7 @@ class Not(Joined):
     @property
     def name(self) -> str:
         """E.g. `not_obj_on_plate`."""
-        return f"not_{self.part.name}"
+        return f"{_NEGATED}{self.part.name}"
 
     @property
     def inner(self) -> tuple[Goal, ...]:
@@ -155,8 +158,11 @@ class Not(Joined):
         return (self.part,)
 
     def evaluate(self, scene: Scene, data: mujoco.MjData, terms: dict[str, bool]) -> bool:
-        """Evaluate the part."""
-        return not self.part.evaluate(scene, data, terms)
+        """Evaluate the part; `x` is reported as `not_x`."""
+        own: dict[str, bool] = {}
+        held = self.part.evaluate(scene, data, own)
+        terms.update({f"{_NEGATED}{name}": not value for name, value in own.items()})
+        return not held
 
     def bound(self, scene: Drawn) -> Goal:
         """Bind the part."""
@@ -237,17 +243,23 @@ def every_goal_in(goal: Goal) -> Iterator[Goal]:
     yield goal
 
 
-def terms_by_name(goal: Goal) -> dict[str, tuple[Term, ...]]:
+def terms_by_name(goal: Goal, *, unwanted: bool = True) -> dict[str, tuple[Term, ...]]:
     """The terms that `evaluate` reports; several of one name only where `When` takes one of them.
+
+    A term under `Not` has the name under which it is reported, `not_x`; it is left out where none that are `unwanted`
+    are asked for.
 
     Raises:
         UserError: two different terms of one name: one of them would be lost.
     """
     if isinstance(goal, Term):
         return {goal.name: (goal,)}
+    if isinstance(goal, Not):
+        own = terms_by_name(goal.part) if unwanted else {}
+        return {f"{_NEGATED}{name}": terms for name, terms in own.items()}
     found: dict[str, tuple[Term, ...]] = {}
     for part in goal.inner:
-        for name, terms in terms_by_name(part).items():
+        for name, terms in terms_by_name(part, unwanted=unwanted).items():
             before = found.get(name, ())
             clash = next(((a, b) for a in before for b in terms if a != b), None)
             if clash is not None and not isinstance(goal, When):

@@ -34,6 +34,12 @@ class HoldAtEnd(gymnasium.Wrapper[Any, Any, Any, Any]):
         self._last = None
         return self.env.reset(seed=seed, options=options)
 
+    def set_state(self, state: Any) -> tuple[Any, dict[str, Any]]:
+        """Go on from a state, as the env does: what has ended runs again."""
+        begun: tuple[Any, dict[str, Any]] = self.env.get_wrapper_attr("set_state")(state)
+        self._last = None
+        return begun
+
     def step(self, action: Any) -> tuple[Any, Any, bool, bool, dict[str, Any]]:
         """One step, or, while the env holds, the last one's result with a reward of 0."""
         if self._last is not None:

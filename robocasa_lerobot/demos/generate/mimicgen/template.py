@@ -85,7 +85,7 @@ def read_json_template(path: Path) -> Any:
     """
     try:
         asked = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, json.JSONDecodeError) as error:
+    except (OSError, ValueError, RecursionError) as error:  # also what is no text
         raise UserError(f"{path} cannot be read as JSON ({error}).") from error
     template_from(asked, str(path))
     return asked
@@ -97,23 +97,32 @@ def template_from(asked: Any, where: str = "template") -> Template:
     Raises:
         UserError, UnknownNameError: see `read_json_template`.
     """
-    specs = asked.get("task", {}).get("task_spec") if isinstance(asked, dict) else None
+    specs = _inside(_inside(asked, "task"), "task_spec")
     if not isinstance(specs, dict) or not specs:
         raise UserError(f"{where} has no `task.task_spec` with subtasks; MimicGen's own templates have.")
     named = [(name, spec) for name, spec in specs.items() if spec]
+    for name, spec in named:
+        if not isinstance(spec, dict):
+            raise UserError(f"{where}, {name}: found {spec!r}, expected the settings of a subtask.")
     if not named:
         raise UserError(
             f"{where} leaves its subtasks to RoboCasa's own code: they are empty here. Leave --template out to have "
             "them derived from the sources."
         )
     subtasks = tuple(_subtask(f"{where}, {name}", spec, last=spec is named[-1][1]) for name, spec in named)
-    generation = asked.get("experiment", {}).get("generation", {})
+    generation = _inside(_inside(asked, "experiment"), "generation")
+    generation = generation if isinstance(generation, dict) else {}
     return Template(
         subtasks,
         per_subtask=bool(generation.get("select_src_per_subtask", False)),
         first_pose=bool(generation.get("transform_first_robot_pose", False)),
         from_last_target=bool(generation.get("interpolate_from_last_target_pose", True)),
     )
+
+
+def _inside(values: Any, key: str) -> Any:
+    """What an object of JSON has under a key; None where it has not, or is no object."""
+    return values.get(key) if isinstance(values, dict) else None
 
 
 def _subtask(where: str, spec: Mapping[str, Any], *, last: bool) -> Subtask:

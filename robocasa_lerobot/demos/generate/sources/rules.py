@@ -63,7 +63,7 @@ def read_rules(path: Path) -> dict[str, CutRules]:
     """
     try:
         asked = yaml.safe_load(path.read_text(encoding="utf-8")) or {}
-    except (OSError, yaml.YAMLError) as error:
+    except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
         raise UserError(f"{path} cannot be read as YAML ({error}).") from error
     if not isinstance(asked, dict):
         raise UserError(f"{path} should name skills and verbs with their rules, as `drawers open: {{near_m: 0.1}}`.")
